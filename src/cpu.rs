@@ -1,0 +1,182 @@
+//! The CPU engine: columns of a batch, stepped a truck at a time by all cores.
+//!
+//! A truck's step reads and writes its own [`Row`] and reads the shared [`World`], so the number of threads and the place in the batch
+//! cannot change a result.
+
+pub mod collide;
+pub mod drive;
+pub mod follow;
+pub mod judge;
+pub mod observe;
+pub mod reset;
+pub mod sense;
+pub mod steer;
+
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use crate::layout::{Clearance, Control, N_RAYS, N_VALUES, Progress, RewardTerms, Truck};
+use crate::stages::{STAGES, Stage};
+use crate::world::World;
+
+/// One truck's share of the columns while a stage works on it.
+#[derive(Debug)]
+pub struct Row<'a> {
+    /// The batch's seed.
+    pub seed: u32,
+    /// The truck's place in the batch.
+    pub env: u32,
+    /// Routes that episodes run on, as indices into the world's table.
+    pub choice: &'a RouteChoice,
+    /// Index into the action table.
+    pub action: u32,
+    /// What drives the truck.
+    pub control: &'a mut Control,
+    /// The truck.
+    pub truck: &'a mut Truck,
+    /// Its distance to the kerbs.
+    pub clearance: &'a mut Clearance,
+    /// Its place along the route.
+    pub progress: &'a mut Progress,
+    /// Its distance sensors [m].
+    pub ranges: &'a mut [f32; N_RAYS],
+    /// What the next action sees.
+    pub observation: &'a mut [f32; N_VALUES],
+    /// What the last action led to.
+    pub next_observation: &'a mut [f32; N_VALUES],
+    /// Code of [`crate::layout::Ended`] for the step just made.
+    pub ended: &'a mut u32,
+    /// What the reward weighs.
+    pub terms: &'a mut RewardTerms,
+    /// The reward of the step just made.
+    pub reward: &'a mut f32,
+}
+
+/// Which route an episode runs on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RouteChoice {
+    /// Drawn anew for every episode, each as likely as the next. A held truck does not exist here: episodes follow each other.
+    Drawn(Vec<u32>),
+    /// Truck `env` runs `routes[env]`, once: when its episode has ended it is held until the batch is reset.
+    Fixed(Vec<u32>),
+}
+
+/// The columns of a batch: `n_envs` rows each.
+#[derive(Debug, Clone)]
+pub struct Batch {
+    seed: u32,
+    choice: RouteChoice,
+    /// Index into the action table, `[n_envs]`.
+    pub action: Vec<u32>,
+    /// What drives each truck, `[n_envs]`.
+    pub control: Vec<Control>,
+    /// The trucks, `[n_envs]`.
+    pub truck: Vec<Truck>,
+    /// Distances to the kerbs, `[n_envs]`.
+    pub clearance: Vec<Clearance>,
+    /// Places along the routes, `[n_envs]`.
+    pub progress: Vec<Progress>,
+    /// Distance sensors [m], `[n_envs, 29]`.
+    pub ranges: Vec<[f32; N_RAYS]>,
+    /// What the next action sees, `[n_envs, 69]`.
+    pub observation: Vec<[f32; N_VALUES]>,
+    /// What the last action led to, `[n_envs, 69]`; differs from `observation` only where an episode ended.
+    pub next_observation: Vec<[f32; N_VALUES]>,
+    /// Codes of [`crate::layout::Ended`] for the step just made, `[n_envs]`.
+    pub ended: Vec<u32>,
+    /// What the reward weighs, `[n_envs]`.
+    pub terms: Vec<RewardTerms>,
+    /// Rewards of the step just made, `[n_envs]`.
+    pub reward: Vec<f32>,
+}
+
+impl Batch {
+    /// `n_envs` trucks that have yet to be reset.
+    pub(crate) fn new(n_envs: usize, seed: u32, choice: RouteChoice) -> Batch {
+        Batch {
+            seed,
+            choice,
+            action: vec![0; n_envs],
+            control: vec![Control::default(); n_envs],
+            truck: vec![Truck::default(); n_envs],
+            clearance: vec![Clearance::default(); n_envs],
+            progress: vec![Progress::default(); n_envs],
+            ranges: vec![[0.0; N_RAYS]; n_envs],
+            observation: vec![[0.0; N_VALUES]; n_envs],
+            next_observation: vec![[0.0; N_VALUES]; n_envs],
+            ended: vec![0; n_envs],
+            terms: vec![RewardTerms::default(); n_envs],
+            reward: vec![0.0; n_envs],
+        }
+    }
+
+    /// Trucks in the batch.
+    pub fn n_envs(&self) -> usize {
+        self.truck.len()
+    }
+
+    /// Does `work` to every row, all cores sharing the rows.
+    pub(crate) fn for_each_row(&mut self, work: impl Fn(&mut Row) + Sync) {
+        let (seed, choice) = (self.seed, &self.choice);
+        (
+            &self.action,
+            &mut self.control,
+            &mut self.truck,
+            &mut self.clearance,
+            &mut self.progress,
+            &mut self.ranges,
+            &mut self.observation,
+            &mut self.next_observation,
+            &mut self.ended,
+            &mut self.terms,
+            (&mut self.reward).into_par_iter().enumerate(),
+        )
+            .into_par_iter()
+            .with_min_len(16)
+            .for_each(
+                |(&action, control, truck, clearance, progress, ranges, observation, next_observation, ended, terms, (env, reward))| {
+                    work(&mut Row {
+                        seed,
+                        env: env as u32,
+                        choice,
+                        action,
+                        control,
+                        truck,
+                        clearance,
+                        progress,
+                        ranges,
+                        observation,
+                        next_observation,
+                        ended,
+                        terms,
+                        reward,
+                    });
+                },
+            );
+    }
+
+    /// One step of every truck: all stages over a row while it is in the cache, then the next row.
+    pub(crate) fn step(&mut self, world: &World) {
+        self.for_each_row(|row| {
+            if row.truck.held == 0 {
+                for stage in STAGES {
+                    (stage.cpu)(world, row);
+                }
+            }
+        });
+    }
+
+    /// The same step a stage at a time over all rows: the time of each, in the order of [`STAGES`].
+    pub(crate) fn step_by_stage(&mut self, world: &World) -> [Duration; STAGES.len()] {
+        STAGES.map(|Stage { cpu, .. }| {
+            let begun = Instant::now();
+            self.for_each_row(|row| {
+                if row.truck.held == 0 {
+                    cpu(world, row);
+                }
+            });
+            begun.elapsed()
+        })
+    }
+}

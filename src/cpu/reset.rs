@@ -1,0 +1,64 @@
+//! Begins the next episode of a truck whose last one ended, within the same step.
+//!
+//! Route and pose are functions of (seed, env, episode) alone. A truck on a fixed route drives it once and is then held.
+
+use glam::Vec2;
+
+use crate::angle::wrapped;
+use crate::cpu::follow::{followed, reference_point};
+use crate::cpu::{RouteChoice, Row, observe, sense};
+use crate::layout::{Control, Ended, Params, Truck, WaypointRow};
+use crate::random::{self, Draw};
+use crate::world::World;
+
+/// Hands the observation on, or begins a new episode where one ended.
+pub fn reset(world: &World, row: &mut Row) {
+    *row.observation = *row.next_observation;
+    if *row.ended == Ended::Running as u32 {
+        return;
+    }
+    match row.choice {
+        RouteChoice::Fixed(_) => row.truck.held = 1,
+        RouteChoice::Drawn(_) => {
+            // The new truck is sensed and observed with the stages' own code, which writes `next_observation`.
+            let led_to = *row.next_observation;
+            begin(world, row, row.truck.episode + 1);
+            *row.next_observation = led_to;
+        }
+    }
+}
+
+/// Puts the truck at the start of `episode` and writes what it sees there to both observations.
+pub fn begin(world: &World, row: &mut Row, episode: u32) {
+    let route = match row.choice {
+        RouteChoice::Fixed(routes) => routes[row.env as usize],
+        RouteChoice::Drawn(routes) => {
+            let [word, ..] = random::words(row.seed, row.env, episode, Draw::Route as u32);
+            routes[random::index_below(word, routes.len() as u32) as usize]
+        }
+    };
+    let [offset, heading, ..] = random::words(row.seed, row.env, episode, Draw::Pose as u32).map(random::signed_unit);
+    let waypoints = world.route_waypoints(route);
+    *row.control = Control::default();
+    *row.truck = Truck { route, episode, ..started(&world.params, &waypoints[0], offset, heading) };
+    let point = reference_point(world.params.rig.wheelbase, row.truck);
+    *row.progress = followed(waypoints, point, 1, world.params.stray_distance);
+    row.progress.passed = 0;
+    sense::sense(world, row);
+    observe::observe(world, row);
+    *row.observation = *row.next_observation;
+}
+
+/// A truck at `waypoint`, trailer straight, moved aside and turned by shares of the largest start errors.
+pub fn started(params: &Params, waypoint: &WaypointRow, offset: f32, heading: f32) -> Truck {
+    let heading = wrapped(waypoint.heading + heading * params.start_heading);
+    let (sin, cos) = heading.sin_cos();
+    let point = waypoint.position + offset * params.start_offset * waypoint.direction.perp();
+    Truck {
+        position: point - 0.5 * params.rig.wheelbase * Vec2::new(cos, sin),
+        heading,
+        trailer_heading: heading,
+        speed: params.start_speed,
+        ..Truck::default()
+    }
+}

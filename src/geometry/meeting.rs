@@ -1,0 +1,59 @@
+//! Where two pieces meet: the crossings of segments and arcs, exactly.
+
+use glam::DVec2;
+
+use super::Piece;
+
+impl Piece {
+    /// The points that two pieces share, touching included; stretches that coincide are not listed.
+    pub(crate) fn meetings(&self, other: &Piece) -> Vec<DVec2> {
+        match (*self, *other) {
+            (Piece::Segment { from, to }, _) => {
+                let along = to - from;
+                let on = |share: &f64| (0.0..=1.0).contains(share);
+                other.on_line(from, along).into_iter().flatten().filter(on).map(|share| from + share * along).collect()
+            }
+            (Piece::Arc { .. }, Piece::Segment { .. }) => other.meetings(self),
+            (Piece::Arc { centre, radius, .. }, Piece::Arc { centre: other_centre, radius: other_radius, .. }) => {
+                let between = other_centre - centre;
+                let distance = between.length();
+                if distance == 0.0 {
+                    return Vec::new();
+                }
+                let ahead = (distance * distance + radius * radius - other_radius * other_radius) / (2.0 * distance);
+                let square = radius * radius - ahead * ahead;
+                // Tangent circles meet in one point although rounding may part them.
+                if square < -1e-9 * radius * radius {
+                    return Vec::new();
+                }
+                let direction = between / distance;
+                let side = direction.perp() * square.max(0.0).sqrt();
+                let points = [centre + direction * ahead + side, centre + direction * ahead - side];
+                points.into_iter().filter(|&p| self.faces(p - centre) && other.faces(p - other_centre)).collect()
+            }
+        }
+    }
+
+    /// The multiples of `along` at which the line from `origin` crosses the piece.
+    pub(crate) fn on_line(&self, origin: DVec2, along: DVec2) -> [Option<f64>; 2] {
+        match *self {
+            Piece::Segment { from, to } => {
+                let across = to - from;
+                let turn = along.perp_dot(across);
+                let share = (from - origin).perp_dot(along) / turn;
+                let hit = turn != 0.0 && (0.0..=1.0).contains(&share);
+                [hit.then(|| (from - origin).perp_dot(across) / turn), None]
+            }
+            Piece::Arc { centre, radius, .. } => {
+                let out = origin - centre;
+                let (a, b, c) = (along.length_squared(), out.dot(along), out.length_squared() - radius * radius);
+                let square = b * b - a * c;
+                if square < 0.0 || a == 0.0 {
+                    return [None, None];
+                }
+                let on = |share: &f64| self.faces(out + *share * along);
+                [Some((-b - square.sqrt()) / a).filter(on), Some((-b + square.sqrt()) / a).filter(on)]
+            }
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! The edge of what can be driven on: closed curves, with exact distance, side, rays and overlap.
+//!
+//! A point is drivable when a ray from it crosses the loops an odd number of times: inside the outer boundary, outside island and
+//! splitters. Loops are kept with the drivable side on their left.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use glam::DVec2;
+
+use super::offset::grown;
+use super::{Curve, Piece};
+
+/// Closed loops that part the drivable surface from what is solid.
+#[derive(Debug, Clone)]
+pub struct Outline {
+    /// The loops, each with the drivable side on its left.
+    pub loops: Vec<Curve>,
+    pieces: Vec<Placed>,
+    rises: Vec<Rise>,
+}
+
+/// A piece with what its distance needs, computed once.
+#[derive(Debug, Clone, Copy)]
+struct Placed {
+    piece: Piece,
+    start: DVec2,
+    end: DVec2,
+    /// Direction from an arc's centre to its middle.
+    middle: DVec2,
+    /// Cosine of half an arc's sweep, at most -1 for a whole circle.
+    half: f64,
+}
+
+impl Placed {
+    fn new(piece: Piece) -> Placed {
+        let (middle, half) = match piece {
+            Piece::Segment { .. } => (DVec2::ZERO, 0.0),
+            Piece::Arc { from, sweep, .. } => {
+                let half = sweep.abs() / 2.0;
+                (DVec2::from_angle(from + sweep / 2.0), if PI <= half { -2.0 } else { half.cos() })
+            }
+        };
+        Placed { piece, start: piece.start(), end: piece.end(), middle, half }
+    }
+
+    fn distance(&self, p: DVec2) -> f64 {
+        match self.piece {
+            Piece::Segment { .. } => self.piece.distance(p),
+            Piece::Arc { centre, radius, .. } => {
+                let out = p - centre;
+                let length = out.length();
+                if length * self.half <= out.dot(self.middle) {
+                    (length - radius).abs()
+                } else {
+                    p.distance_squared(self.start).min(p.distance_squared(self.end)).sqrt()
+                }
+            }
+        }
+    }
+}
+
+/// A stretch of the outline along which y only rises or only falls; neighbours share their ends to the last bit, so that a horizontal
+/// ray through a vertex is counted once.
+#[derive(Debug, Clone, Copy)]
+struct Rise {
+    from: DVec2,
+    to: DVec2,
+    /// Centre, radius and side (+1 east, -1 west) of an arc.
+    arc: Option<(DVec2, f64, f64)>,
+}
+
+impl Rise {
+    /// Whether the ray from `p` to the east crosses this stretch.
+    fn crossed(&self, p: DVec2) -> bool {
+        if (self.from.y <= p.y) == (self.to.y <= p.y) {
+            return false;
+        }
+        let x = match self.arc {
+            Some((centre, radius, side)) => centre.x + side * (radius * radius - (p.y - centre.y).powi(2)).max(0.0).sqrt(),
+            None => self.from.x + (p.y - self.from.y) / (self.to.y - self.from.y) * (self.to.x - self.from.x),
+        };
+        p.x < x
+    }
+}
+
+impl Outline {
+    /// The outline that `loops` make, whichever way each is travelled; every loop must be closed.
+    pub fn new(loops: Vec<Curve>) -> Outline {
+        let rises: Vec<Vec<Rise>> = loops.iter().map(rises_of).collect();
+        let turned = |(index, curve): (usize, &Curve)| {
+            let inside = |other: &usize| *other != index && odd(&rises[*other], curve.point_at(0.0));
+            let hole = (0..loops.len()).filter(inside).count() % 2 == 1;
+            if (curve.signed_area() < 0.0) == hole { curve.clone() } else { curve.reversed() }
+        };
+        let loops: Vec<Curve> = loops.iter().enumerate().map(turned).collect();
+        let pieces = loops.iter().flat_map(|curve| &curve.pieces).map(|&piece| Placed::new(piece)).collect();
+        Outline { loops, pieces, rises: rises.concat() }
+    }
+
+    /// Distance from `p` to the nearest point of the outline, whichever side `p` is on [m].
+    pub fn distance(&self, p: DVec2) -> f64 {
+        nearest(&self.pieces, p)
+    }
+
+    /// Whether `p` lies on the drivable surface.
+    pub fn contains(&self, p: DVec2) -> bool {
+        odd(&self.rises, p)
+    }
+
+    /// Distance from `p` to the outline, positive on the drivable surface, negative in what is solid [m].
+    pub fn signed_distance(&self, p: DVec2) -> f64 {
+        if self.contains(p) { self.distance(p) } else { -self.distance(p) }
+    }
+
+    /// Distance along the ray from `origin` in `direction` (of length 1) to the outline; `range` where nothing is met before, 0 from
+    /// inside a solid [m].
+    pub fn ray(&self, origin: DVec2, direction: DVec2, range: f64) -> f64 {
+        if !self.contains(origin) {
+            return 0.0;
+        }
+        let hits = self.pieces.iter().flat_map(|placed| placed.piece.on_line(origin, direction)).flatten();
+        hits.filter(|&hit| 0.0 <= hit).fold(range, f64::min)
+    }
+
+    /// Whether the rectangle with these corners, in order around it, shares a point with anything solid.
+    pub fn intersects_rectangle(&self, corners: &[DVec2; 4]) -> bool {
+        let edges: [Piece; 4] = std::array::from_fn(|i| Piece::Segment { from: corners[i], to: corners[(i + 1) % 4] });
+        // A solid's boundary that meets no edge lies wholly inside the rectangle or wholly outside it.
+        let within = |p: DVec2| {
+            let sides = edges.map(|edge| (edge.end() - edge.start()).perp_dot(p - edge.start()));
+            sides.iter().all(|&side| 0.0 <= side) || sides.iter().all(|&side| side <= 0.0)
+        };
+        !self.contains(corners[0])
+            || self.pieces.iter().any(|placed| edges.iter().any(|edge| !edge.meetings(&placed.piece).is_empty()))
+            || self.loops.iter().any(|curve| within(curve.point_at(0.0)))
+    }
+
+    /// The corners (west south, east north) of the smallest upright rectangle around the outline [m].
+    pub fn bounds(&self) -> (DVec2, DVec2) {
+        let ends = self.rises.iter().flat_map(|rise| {
+            let bulge = rise.arc.and_then(|(centre, radius, side)| {
+                // The stretch passes its circle's easternmost or westernmost point when it passes the centre's height.
+                ((rise.from.y <= centre.y) != (rise.to.y <= centre.y)).then(|| centre + DVec2::new(side * radius, 0.0))
+            });
+            [Some(rise.from), Some(rise.to), bulge].into_iter().flatten()
+        });
+        ends.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
+    }
+
+    /// What suffices for signed distances of points within `radius` of `centre`: far fewer pieces than the whole.
+    pub fn near(&self, centre: DVec2, radius: f64) -> Nearby {
+        let distances: Vec<f64> = self.pieces.iter().map(|placed| placed.distance(centre)).collect();
+        let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
+        // A point within `radius` is at most `least + radius` from the outline and sees each piece at most `radius` nearer than the centre.
+        let reach = least + 2.0 * radius + 1e-9;
+        let pieces = self.pieces.iter().zip(&distances).filter(|&(_, &distance)| distance <= reach).map(|(placed, _)| *placed).collect();
+        let side = if radius < least {
+            Side::Same(self.contains(centre))
+        } else {
+            let level = |rise: &&Rise| rise.from.y.min(rise.to.y) <= centre.y + radius && centre.y - radius <= rise.from.y.max(rise.to.y);
+            Side::Mixed(self.rises.iter().filter(level).copied().collect())
+        };
+        Nearby { pieces, side }
+    }
+
+    /// The outline with everything solid grown by `distance`: at every point of the new outline the old one is `distance` away [m].
+    pub fn offset(&self, distance: f64) -> Outline {
+        Outline::new(grown(self, distance))
+    }
+}
+
+/// A part of an [`Outline`] that gives exact signed distances around one place.
+#[derive(Debug, Clone)]
+pub struct Nearby {
+    pieces: Vec<Placed>,
+    side: Side,
+}
+
+#[derive(Debug, Clone)]
+enum Side {
+    /// No outline comes this near: every point is on one side.
+    Same(bool),
+    /// The stretches that a ray to the east from any of the points may cross.
+    Mixed(Vec<Rise>),
+}
+
+impl Nearby {
+    /// Distance from `p` to the whole outline, positive on the drivable surface; exact for the points that [`Outline::near`] was asked
+    /// about [m].
+    pub fn signed_distance(&self, p: DVec2) -> f64 {
+        let drivable = match &self.side {
+            Side::Same(drivable) => *drivable,
+            Side::Mixed(rises) => odd(rises, p),
+        };
+        if drivable { nearest(&self.pieces, p) } else { -nearest(&self.pieces, p) }
+    }
+}
+
+fn nearest(pieces: &[Placed], p: DVec2) -> f64 {
+    pieces.iter().map(|placed| placed.distance(p)).fold(f64::INFINITY, f64::min)
+}
+
+fn odd(rises: &[Rise], p: DVec2) -> bool {
+    rises.iter().filter(|rise| rise.crossed(p)).count() % 2 == 1
+}
+
+fn rises_of(curve: &Curve) -> Vec<Rise> {
+    let mut rises: Vec<Rise> = Vec::new();
+    for piece in &curve.pieces {
+        match *piece {
+            Piece::Segment { from, to } => rises.push(Rise { from, to, arc: None }),
+            Piece::Arc { centre, radius, from, sweep } => {
+                // Arcs are cut at their northernmost and southernmost points.
+                let (low, high) = (from.min(from + sweep), from.max(from + sweep));
+                let first = ((low - FRAC_PI_2) / PI).floor() as i64 + 1;
+                let mut cuts: Vec<f64> =
+                    (first..first + 4).map(|turn| FRAC_PI_2 + turn as f64 * PI).filter(|&cut| low < cut && cut < high).collect();
+                cuts.insert(0, low);
+                cuts.push(high);
+                if sweep < 0.0 {
+                    cuts.reverse();
+                }
+                let point = |angle: f64| centre + radius * DVec2::from_angle(angle);
+                rises.extend(cuts.windows(2).map(|cut| Rise {
+                    from: point(cut[0]),
+                    to: point(cut[1]),
+                    arc: Some((centre, radius, ((cut[0] + cut[1]) / 2.0).cos().signum())),
+                }));
+            }
+        }
+    }
+    for index in 0..rises.len() {
+        rises[index].from = rises[(index + rises.len() - 1) % rises.len()].to;
+    }
+    rises
+}

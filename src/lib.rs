@@ -1,0 +1,20 @@
+//! Many trucks through many roundabouts at once.
+//!
+//! A [`scenario::Scenario`] is read from a file and baked into a [`world::World`]. A [`simulator::Simulator`] steps a batch of trucks
+//! through it, every step the same [`stages`] in the same order.
+
+pub mod angle; // angles in plain f32
+pub mod cpu; // the CPU engine
+pub mod field; // the signed distance to the kerbs, baked
+pub mod geometry; // arcs, segments, outlines; exact distances
+pub mod layout; // rows and constants that engines share
+pub mod random; // numbers from (seed, env, episode, draw)
+pub mod roundabout; // parameters -> kerbs and lanes
+pub mod route; // lane centre lines -> waypoints
+pub mod scenario; // what to drive
+pub mod simulator;
+pub mod stages; // one step, in order
+pub mod swept; // the path of a truck that never leaves its line
+pub mod trace; // one truck, open loop, for comparison with references
+pub mod vehicle; // tractor, trailer, load
+pub mod world; // what trucks share, baked // many trucks, many steps

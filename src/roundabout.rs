@@ -1,0 +1,127 @@
+//! A roundabout by its parameters: ring, arms, kerbs, lanes and splitter islands, as arcs and segments.
+//!
+//! Right-hand traffic around an island at the origin. Whatever parameters make no roundabout is refused when the file is read, so that
+//! kerbs and lanes of a [`Roundabout`] in hand never fail.
+
+mod alignment;
+mod check;
+pub mod deviation;
+mod kerb;
+mod lane;
+#[cfg(test)]
+mod tests;
+mod written;
+
+use std::path::Path;
+
+use glam::DVec2;
+
+use crate::geometry::{Curve, Outline};
+use crate::route::{Lane, LeavesWorld, Route, waypoints};
+use crate::scenario::{Error, Reader};
+use lane::Lanes;
+use written::{Arm, Ring, Written};
+
+/// Whether trucks may use the strip between the driving lanes and the kerb.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Gutter {
+    /// The kerb face is solid, the gutter is road.
+    #[default]
+    Drivable,
+    /// The lane's edge is solid: kerbs grown by the gutter.
+    Solid,
+}
+
+/// A roundabout, checked.
+#[derive(Debug, Clone)]
+pub struct Roundabout {
+    /// The file's stem, `20m`.
+    pub name: String,
+    ring: Ring,
+    arms: Vec<Arm>,
+    kerbs: Outline,
+    lanes: Lanes,
+}
+
+impl Roundabout {
+    /// Reads a roundabout. Everything that can be wrong with one is found here, with its key.
+    pub fn read(path: &Path) -> Result<Roundabout, Error> {
+        let (reader, written) = Reader::read::<Written>(path)?;
+        let (ring, arms) = written.checked(&reader)?;
+        let kerbs = kerb::kerbs(&reader, &ring, &arms)?;
+        let lanes = Lanes::new(&reader, &ring, &arms)?;
+        check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes)?;
+        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        Ok(Roundabout { name, ring, arms, kerbs, lanes })
+    }
+
+    /// The names of the arms, counter-clockwise, in the order of the file.
+    pub fn arms(&self) -> impl Iterator<Item = &str> {
+        self.arms.iter().map(|arm| arm.name.as_str())
+    }
+
+    /// Radius of the outer kerb's face; approaches and departures are counted from this circle [m].
+    pub fn outer_radius(&self) -> f64 {
+        self.ring.outer()
+    }
+
+    /// Radius of the ring lane's centre line [m].
+    pub fn lane_radius(&self, lane: Lane) -> f64 {
+        lane::radius(&self.ring, lane)
+    }
+
+    /// The edge of what can be driven on.
+    pub fn kerbs(&self, gutter: Gutter) -> Outline {
+        match gutter {
+            Gutter::Drivable => self.kerbs.clone(),
+            Gutter::Solid => self.kerbs.offset(self.ring.gutter),
+        }
+    }
+
+    /// The centre lines of all lanes: two around the ring, two in and two out on every arm.
+    pub fn lanes(&self) -> Vec<Curve> {
+        let rings = Lane::BOTH.map(|lane| Curve::circle(DVec2::ZERO, self.lane_radius(lane)));
+        rings.into_iter().chain(self.lanes.curves().cloned()).collect()
+    }
+
+    /// All routes, five an entry, by entry arm, then lane, then exit: from `approach` before the ring to `departure` after it, waypoints
+    /// every `spacing` [m]. Fails where an arm is too short.
+    pub fn routes(&self, approach: f64, departure: f64, spacing: f64) -> Result<Vec<Route>, LeavesWorld> {
+        let mut routes = Vec::new();
+        for (entry, arm) in self.arms.iter().enumerate() {
+            for (lane, exit) in lane::exits(self.arms.len()) {
+                let exit_arm = &self.arms[(entry + exit as usize) % self.arms.len()];
+                let line = self.lanes.route(entry, lane, exit);
+                let leaves = |part, asked, longest, arm: &Arm| {
+                    let (arm, roundabout) = (arm.name.clone(), self.name.clone());
+                    Err(LeavesWorld { part, asked, longest, arm, roundabout })
+                };
+                let (reaches, left) = lane::ring_stations(&line, self.ring.outer());
+                let after = line.length() - left;
+                if reaches < approach {
+                    return leaves("approach", approach, reaches, arm);
+                }
+                if after < departure {
+                    return leaves("departure", departure, after, exit_arm);
+                }
+                let centre_line = line.part(reaches - approach, left + departure);
+                let half = self.ring.lane_width / 2.0;
+                let crossing = match lane {
+                    Lane::Left => (half, half + self.ring.lane_width),
+                    Lane::Right => (half + self.ring.lane_width, half),
+                };
+                routes.push(Route {
+                    name: format!("{}/{}-{}-{exit}", self.name, arm.name, lane.name()),
+                    entry,
+                    lane,
+                    exit,
+                    waypoints: waypoints(&centre_line, spacing),
+                    centre_line,
+                    crossing,
+                });
+            }
+        }
+        Ok(routes)
+    }
+}

@@ -1,0 +1,183 @@
+//! What can be wrong between the parts of a roundabout: arcs that do not fit, kerbs that cross, lanes that run into a kerb.
+
+use glam::DVec2;
+
+use super::alignment::{Fault, Way};
+use super::lane::Lanes;
+use super::written::{Arm, Ring};
+use crate::geometry::{Curve, Outline};
+use crate::route::Lane;
+use crate::scenario::{Error, Reader};
+
+/// Half the width of a truck: a lane's centre line nearer to a kerb than this cannot be driven [m].
+const NEAREST: f64 = 1.3;
+
+/// A rounding arc that does not fit between its neighbours.
+pub(super) fn too_large(reader: &Reader, key: &str, radius: f64, largest: f64) -> Error {
+    // Down to whole centimetres, so that the number named does fit.
+    let largest = (largest * 100.0).floor() / 100.0;
+    reader.invalid(key, format_args!("{radius} m"), format!("does not fit between its neighbours: at most {largest} m"))
+}
+
+/// An alignment that is no curve. `corner` is the key of the arc between this arm and the next, where there is one.
+pub(super) fn fault(reader: &Reader, arms: &[Arm], arm: usize, corner: Option<&str>, part: &str, way: Way, fault: Fault) -> Error {
+    let next = (arm + 1) % arms.len();
+    let alignment = |arm: usize, way: Way| {
+        let carriageway = arms[arm].way(way);
+        match part {
+            "left" => &carriageway.lanes[0],
+            "right" => &carriageway.lanes[1],
+            _ => &carriageway.kerb,
+        }
+    };
+    let point = |arm: usize, way: Way, point: usize, largest: f64| {
+        let key = format!("arm[{arm}].{}.{part}.points[{point}].radius", way.name());
+        too_large(reader, &key, alignment(arm, way).bends[point + 1].radius, largest)
+    };
+    let corner_key = format!("arm[{arm}].{}", corner.unwrap_or("corner"));
+    let corner_radius = if part == "kerb" { arms[arm].kerb_corner } else { arms[arm].lane_corner }.unwrap_or_default();
+    match fault {
+        Fault::Point(index, largest) => point(arm, way, index, largest),
+        Fault::NextPoint(index, largest) => point(next, Way::Exit, index, largest),
+        Fault::Corner(largest) => too_large(reader, &corner_key, corner_radius, largest),
+        Fault::Apart => reader.invalid(
+            corner_key,
+            format_args!("{corner_radius} m"),
+            format!("the last straights of {} and {} do not meet ahead of both", arms[arm].name, arms[next].name),
+        ),
+        Fault::Ring => reader.invalid(
+            format!("arm[{arm}].{}.{part}.ring_radius", way.name()),
+            format_args!("{} m", alignment(arm, way).ring_radius),
+            "no such arc leads the last straight into the ring after the last point: aim nearer to the centre or change the radius",
+        ),
+    }
+}
+
+/// Two arms whose kerbs would need `length` metres of ring between them, a negative length.
+pub(super) fn no_room(reader: &Reader, arms: &[Arm], arm: usize, length: f64) -> Error {
+    let next = &arms[(arm + 1) % arms.len()];
+    reader.invalid(
+        format!("arm[{arm}].entry.kerb"),
+        format_args!("{:.2} m of ring left before {}", length, next.name),
+        format!("arms {} and {} overlap: move them apart, or join their kerbs with corner.kerb_radius", arms[arm].name, next.name),
+    )
+}
+
+/// A way through that would leave the ring before it arrives there.
+pub(super) fn backwards(reader: &Reader, arms: &[Arm], entry: usize, lane: Lane, exit: u32, length: f64) -> Error {
+    let to = &arms[(entry + exit as usize) % arms.len()].name;
+    reader.invalid(
+        format!("arm[{entry}].entry.{}", lane.name()),
+        format_args!("{length:.2} m of ring on the way to {to}"),
+        "must not be negative nor a whole turn: change ring_radius, or give corner.lane_radius where it is the right lane's first exit",
+    )
+}
+
+/// A kerb between two arms that turns too sharply for a lane beside it.
+pub(super) fn no_way_beside(reader: &Reader, arms: &[Arm], arm: usize) -> Error {
+    let next = &arms[(arm + 1) % arms.len()];
+    let expected =
+        format!("the kerb from {} to {} turns too sharply for a lane beside it: give the lane's radius", arms[arm].name, next.name);
+    reader.invalid(format!("arm[{arm}].corner.lane_radius"), "missing", expected)
+}
+
+/// No corner's kerb crosses itself or another corner's.
+pub(super) fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) -> Result<(), Error> {
+    let n = corners.len();
+    for first in 0..n {
+        for second in first..n {
+            if cross(&corners[first], (first != second).then_some(&corners[second])) {
+                // Corners follow their arms: neighbouring corners share the arm between them.
+                let (a, b) = if first == second { (first, (first + 1) % n) } else { (first, second) };
+                return Err(reader.invalid(
+                    format!("arm[{b}]"),
+                    format!("{:?}", arms[b].name),
+                    format!("arms {} and {} overlap: their kerbs cross", arms[a].name, arms[b].name),
+                ));
+            }
+        }
+    }
+    // The solid edges that end the arms must not cut into another arm.
+    for (index, arm) in arms.iter().enumerate() {
+        let (left, right) = (corners[index].point_at(0.0), corners[(index + n - 1) % n].point_at(f64::INFINITY));
+        let end = crate::geometry::Piece::Segment { from: right, to: left };
+        let along = DVec2::from_angle(arm.bearing).perp();
+        if (left - right).dot(along) <= 0.0 {
+            return Err(reader.invalid(
+                format!("arm[{index}].entry.kerb"),
+                format!("{:?}", arm.name),
+                "the entry's kerb must lie left of the exit's, seen from the ring",
+            ));
+        }
+        let meets = |corner: &Curve| corner.pieces.iter().filter(|piece| !piece.meetings(&end).is_empty()).count();
+        if let Some(other) = (0..n).find(|&corner| usize::from(corner == index || (corner + 1) % n == index) < meets(&corners[corner])) {
+            let message = format!("arms {} and {} overlap: shorten one or move them apart", arm.name, arms[other].name);
+            return Err(reader.invalid(format!("arm[{index}].length"), format_args!("{} m", arm.length), message));
+        }
+    }
+    Ok(())
+}
+
+/// Whether two curves cross, or, without a second, whether the first crosses itself away from its joints.
+fn cross(curve: &Curve, other: Option<&Curve>) -> bool {
+    let joint = |index: usize, p: DVec2| p.distance(curve.pieces[index].end()) < 1e-6;
+    (0..curve.pieces.len()).any(|index| {
+        let piece = &curve.pieces[index];
+        match other {
+            Some(other) => other.pieces.iter().any(|there| !piece.meetings(there).is_empty()),
+            None => {
+                let after = curve.pieces.iter().enumerate().skip(index + 1);
+                after.into_iter().any(|(next, there)| piece.meetings(there).into_iter().any(|p| index + 1 != next || !joint(index, p)))
+            }
+        }
+    })
+}
+
+/// A splitter island keeps out of the ring and of the loops placed before it.
+pub(super) fn splitter(reader: &Reader, ring: &Ring, arm: usize, island: &Curve, loops: &[Curve]) -> Result<(), Error> {
+    let key = format!("arm[{arm}].splitter");
+    let refused = |value: String, expected: &str| Err(reader.invalid(&key, value, expected));
+    if cross(island, None) {
+        return refused("crosses itself".into(), "corners must go around the island once");
+    }
+    let nearest = island.distance(DVec2::ZERO);
+    if nearest < ring.outer() - ring.gutter {
+        return refused(
+            format!("{nearest:.2} m from the ring's centre"),
+            &format!("must stay out of the ring: {:.2} m", ring.outer() - ring.gutter),
+        );
+    }
+    if loops.iter().any(|other| cross(island, Some(other))) || !Outline::new(loops.to_vec()).contains(island.point_at(0.0)) {
+        return refused("meets a kerb".into(), "must lie on the road, away from the kerbs and other islands");
+    }
+    Ok(())
+}
+
+/// Every lane keeps half a truck's width from every kerb, splitters included.
+pub(super) fn lanes_clear_of_kerbs(reader: &Reader, kerbs: &Outline, arms: &[Arm], lanes: &Lanes) -> Result<(), Error> {
+    for index in 0..arms.len() {
+        for (way, lane) in [(Way::Entry, Lane::Left), (Way::Entry, Lane::Right), (Way::Exit, Lane::Left), (Way::Exit, Lane::Right)] {
+            clear(reader, kerbs, lanes.curve(index, way, lane), &format!("arm[{index}].{}.{}", way.name(), lane.name()))?;
+        }
+        if let Some(curve) = lanes.first_exit(index) {
+            clear(reader, kerbs, curve, &format!("arm[{index}].corner.lane_radius"))?;
+        }
+    }
+    Ok(())
+}
+
+fn clear(reader: &Reader, kerbs: &Outline, curve: &Curve, key: &str) -> Result<(), Error> {
+    const STEP: f64 = 0.25;
+    let length = curve.length();
+    // An arm's end is a solid edge that every lane meets.
+    let free = 2.0 * NEAREST..length - 2.0 * NEAREST;
+    let stations = (0..=(length / STEP) as usize).map(|step| step as f64 * STEP).filter(|s| free.contains(s));
+    match stations.map(|s| curve.point_at(s)).find(|&p| kerbs.signed_distance(p) < NEAREST) {
+        None => Ok(()),
+        Some(place) => Err(reader.invalid(
+            key,
+            format_args!("{:.2} m from a kerb at ({:.1}, {:.1})", kerbs.signed_distance(place), place.x, place.y),
+            format!("a lane's centre line must keep {NEAREST} m from every kerb and splitter island"),
+        )),
+    }
+}

@@ -1,0 +1,248 @@
+//! What to drive: a benchmark file as written (unknown keys refused) and as understood (checked, SI units).
+//!
+//! Every error names file, key, value and what would do; it is found here or in the reader of the part it belongs to, never later.
+
+mod reader;
+mod written;
+
+use std::path::Path;
+
+pub use reader::{Error, Reader};
+
+use crate::layout::Action;
+use crate::roundabout::{Gutter, Roundabout};
+use crate::route::Route;
+use crate::vehicle::Vehicle;
+use written::{Written, WrittenChoice, WrittenRoundabout, WrittenRoutes};
+
+/// Which routes: those learned on, or those kept for the examination.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Split {
+    /// Learned on.
+    Train,
+    /// Never learned on.
+    Test,
+}
+
+impl Split {
+    /// The split's key in a benchmark file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Split::Train => "train",
+            Split::Test => "test",
+        }
+    }
+}
+
+/// One roundabout of a benchmark with the routes that it uses.
+#[derive(Debug)]
+pub struct Place {
+    /// The roundabout.
+    pub roundabout: Roundabout,
+    /// Routes of either split, each once, in the roundabout's order.
+    pub routes: Vec<Route>,
+}
+
+/// A benchmark: roundabouts, routes and their split, vehicle, actions, reward. SI units and radians.
+#[derive(Debug)]
+pub struct Scenario {
+    /// The file's stem.
+    pub name: String,
+    /// The vehicle.
+    pub vehicle: Vehicle,
+    /// The vehicle's load, one that it has.
+    pub load: String,
+    /// Lock of the front wheels where it is not the vehicle's own [rad].
+    pub steer_max: Option<f64>,
+    /// Whether a gutter may be driven on.
+    pub gutter: Gutter,
+    /// Time of a step [s].
+    pub step: f64,
+    /// Physics sub-steps in a step.
+    pub n_substeps: u32,
+    /// Spacing of the field's nodes [m].
+    pub cell: f64,
+    /// Steer levels as shares of the lock, left positive.
+    pub steer_levels: Vec<f64>,
+    /// Target speeds [m/s].
+    pub speeds: Vec<f64>,
+    /// Reach of the distance sensors [m].
+    pub sensor_range: f64,
+    /// Largest lateral offset at the start [m].
+    pub start_offset: f64,
+    /// Largest heading error at the start [rad].
+    pub start_heading: f64,
+    /// Distance to the next waypoint beyond which the truck has strayed [m].
+    pub stray_distance: f64,
+    /// Articulation beyond which the truck is jackknifed [rad].
+    pub jackknife_angle: f64,
+    /// Load transfer ratio from which the truck has rolled over.
+    pub rollover_ratio: f64,
+    /// An episode's time limit, in times that the route takes at the target speed.
+    pub time_limit: f64,
+    /// Reward for a waypoint.
+    pub waypoint_weight: f64,
+    /// Reward for the lane-distance term, each step.
+    pub lane_distance_weight: f64,
+    /// Distance to the lane centre at which that term is 1 [m].
+    pub lane_distance_limit: f64,
+    /// Reward for the clearance term, each step.
+    pub clearance_weight: f64,
+    /// Margin kept from kerbs, within which that term counts [m].
+    pub clearance_limit: f64,
+    /// Reward for failing.
+    pub failure_weight: f64,
+    /// The roundabouts.
+    pub places: Vec<Place>,
+    train: Vec<u32>,
+    test: Vec<u32>,
+}
+
+impl Scenario {
+    /// Reads a benchmark file and every file that it names (paths are relative to it).
+    pub fn read(path: &Path) -> Result<Scenario, Error> {
+        let (reader, written) = Reader::read::<Written>(path)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let vehicle = Vehicle::read(&folder.join(&written.vehicle))?;
+        if !vehicle.loads.contains_key(&written.load) {
+            let loads: Vec<&str> = vehicle.loads.keys().map(String::as_str).collect();
+            return Err(reader.invalid("load", format_args!("{:?}", written.load), format!("the vehicle has {}", loads.join(", "))));
+        }
+        let mut scenario = Scenario {
+            name: path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
+            steer_max: written
+                .steer_max_deg
+                .map(|lock| reader.within("steer_max_deg", lock, 1.0..=80.0, "deg").map(f64::to_radians))
+                .transpose()?,
+            vehicle,
+            load: written.load,
+            gutter: written.gutter,
+            step: reader.within("time.step", written.time.step, 0.01..=1.0, "s")?,
+            n_substeps: reader.count("time.substeps", written.time.substeps, 1..=100)? as u32,
+            cell: reader.within("field.cell", written.field.cell, 0.1..=1.0, "m")?,
+            steer_levels: numbers(&reader, "actions.steer_levels", &written.actions.steer_levels, 1.0, -1.0, "")?,
+            speeds: numbers(&reader, "actions.speeds_kmh", &written.actions.speeds_kmh, 90.0, 1.0, "km/h")?
+                .into_iter()
+                .map(|speed| speed / 3.6)
+                .collect(),
+            sensor_range: reader.within("sensors.range", written.sensors.range, 1.0..=50.0, "m")?,
+            start_offset: reader.within("start.offset", written.start.offset, 0.0..=1.0, "m")?,
+            start_heading: reader.within("start.heading_deg", written.start.heading_deg, 0.0..=20.0, "deg")?.to_radians(),
+            stray_distance: reader.within("ending.stray_distance", written.ending.stray_distance, 3.0..=50.0, "m")?,
+            jackknife_angle: reader.within("ending.jackknife_deg", written.ending.jackknife_deg, 30.0..=120.0, "deg")?.to_radians(),
+            rollover_ratio: reader.within("ending.rollover_ratio", written.ending.rollover_ratio, 0.1..=2.0, "")?,
+            time_limit: reader.within("ending.time_limit", written.ending.time_limit, 1.0..=20.0, "")?,
+            waypoint_weight: weight(&reader, "reward.waypoint", written.reward.waypoint)?,
+            lane_distance_weight: weight(&reader, "reward.lane_distance", written.reward.lane_distance)?,
+            lane_distance_limit: reader.within("reward.lane_distance_limit", written.reward.lane_distance_limit, 0.1..=50.0, "m")?,
+            clearance_weight: weight(&reader, "reward.clearance", written.reward.clearance)?,
+            clearance_limit: reader.within("reward.clearance_limit", written.reward.clearance_limit, 0.01..=10.0, "m")?,
+            failure_weight: weight(&reader, "reward.failure", written.reward.failure)?,
+            places: Vec::new(),
+            train: Vec::new(),
+            test: Vec::new(),
+        };
+        let lengths = WrittenRoutes {
+            approach: reader.within("routes.approach", written.routes.approach, 5.0..=500.0, "m")?,
+            departure: reader.within("routes.departure", written.routes.departure, 5.0..=500.0, "m")?,
+            spacing: reader.within("routes.spacing", written.routes.spacing, 0.5..=5.0, "m")?,
+        };
+        reader.count("roundabout", written.roundabout.len(), 1..=64)?;
+        for (index, place) in written.roundabout.iter().enumerate() {
+            scenario.add(&reader, &format!("roundabout[{index}]"), folder, place, &lengths)?;
+        }
+        if scenario.train.is_empty() && scenario.test.is_empty() {
+            return Err(reader.invalid("roundabout", "no routes", "at least one route must stand under `train` or `test`"));
+        }
+        Ok(scenario)
+    }
+
+    /// Indices of a split's routes in the world's table.
+    pub fn split(&self, split: Split) -> &[u32] {
+        match split {
+            Split::Train => &self.train,
+            Split::Test => &self.test,
+        }
+    }
+
+    /// Every route used, in the order of the world's table, with its roundabout's index.
+    pub fn routes(&self) -> impl Iterator<Item = (usize, &Route)> {
+        self.places.iter().enumerate().flat_map(|(index, place)| place.routes.iter().map(move |route| (index, route)))
+    }
+
+    /// (steer angle, target speed) pairs, the speed varying slowest.
+    pub fn actions(&self, lock: f32) -> Vec<Action> {
+        let pair = |speed: f64, level: f64| Action { steering: level as f32 * lock, speed: speed as f32 };
+        self.speeds.iter().flat_map(|&speed| self.steer_levels.iter().map(move |&level| pair(speed, level))).collect()
+    }
+
+    /// The speed that a truck starts with and that time limits are reckoned by: the highest target [m/s].
+    pub fn cruising_speed(&self) -> f64 {
+        self.speeds.iter().copied().fold(0.0, f64::max)
+    }
+
+    fn add(&mut self, reader: &Reader, key: &str, folder: &Path, place: &WrittenRoundabout, lengths: &WrittenRoutes) -> Result<(), Error> {
+        let roundabout = Roundabout::read(&folder.join(&place.file))?;
+        if self.places.iter().any(|other| other.roundabout.name == roundabout.name) {
+            return Err(reader.invalid(format!("{key}.file"), place.file.display(), "each roundabout may stand here once"));
+        }
+        let routes = roundabout
+            .routes(lengths.approach, lengths.departure, lengths.spacing)
+            .map_err(|leaves| reader.invalid(format!("routes.{}", leaves.part), format_args!("{} m", leaves.asked), leaves.to_string()))?;
+        let train = chosen(reader, &format!("{key}.train"), &place.train, &routes)?;
+        let test = chosen(reader, &format!("{key}.test"), &place.test, &routes)?;
+        let mut next = self.routes().count() as u32;
+        let mut kept = Vec::new();
+        for (index, route) in routes.into_iter().enumerate() {
+            if train.contains(&index) && test.contains(&index) {
+                return Err(reader.invalid(format!("{key}.test"), route.name, "is trained on too; a route is in one split"));
+            }
+            if train.contains(&index) {
+                self.train.push(next);
+            } else if test.contains(&index) {
+                self.test.push(next);
+            } else {
+                continue;
+            }
+            next += 1;
+            kept.push(route);
+        }
+        self.places.push(Place { roundabout, routes: kept });
+        Ok(())
+    }
+}
+
+/// A non-empty list of finite numbers within a range.
+fn numbers(reader: &Reader, key: &str, values: &[f64], most: f64, least: f64, unit: &str) -> Result<Vec<f64>, Error> {
+    reader.count(key, values.len(), 1..=64)?;
+    values.iter().enumerate().map(|(index, &value)| reader.within(&format!("{key}[{index}]"), value, least..=most, unit)).collect()
+}
+
+fn weight(reader: &Reader, key: &str, value: f64) -> Result<f64, Error> {
+    reader.within(key, value, -1e6..=1e6, "")
+}
+
+/// Indices of the routes that a split names.
+fn chosen(reader: &Reader, key: &str, choice: &WrittenChoice, routes: &[Route]) -> Result<Vec<usize>, Error> {
+    let names = match choice {
+        WrittenChoice::Word(word) if word == "all" => return Ok((0..routes.len()).collect()),
+        WrittenChoice::Word(word) => {
+            return Err(reader.invalid(key, format_args!("{word:?}"), "must be \"all\" or a list of route names"));
+        }
+        WrittenChoice::Names(names) => names,
+    };
+    let mut indices = Vec::new();
+    for (place, name) in names.iter().enumerate() {
+        let key = format!("{key}[{place}]");
+        let found = routes.iter().position(|route| route.name.rsplit('/').next() == Some(name));
+        let index = found.ok_or_else(|| {
+            let known: Vec<&str> = routes.iter().filter_map(|route| route.name.rsplit('/').next()).collect();
+            reader.invalid(&key, format_args!("{name:?}"), format!("the roundabout has {}", known.join(", ")))
+        })?;
+        if indices.contains(&index) {
+            return Err(reader.invalid(&key, format_args!("{name:?}"), "stands here twice"));
+        }
+        indices.push(index);
+    }
+    Ok(indices)
+}

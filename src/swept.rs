@@ -1,0 +1,92 @@
+//! The path that both units sweep when the front axle follows a lane's centre line exactly: what a driver who never leaves the line needs.
+//!
+//! This is a fact about vehicle, speed and line, worked out in f64 apart from any batch; pictures and reports use it.
+
+use glam::DVec2;
+
+use crate::geometry::{Curve, Outline};
+use crate::layout::{Body, Rig};
+
+/// Where both units stand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Middle of the drive axle [m].
+    pub position: DVec2,
+    /// Heading of the tractor [rad].
+    pub heading: f64,
+    /// Middle of the trailer's axle group [m].
+    pub trailer_position: DVec2,
+    /// Heading of the trailer [rad].
+    pub trailer_heading: f64,
+}
+
+impl Pose {
+    /// Corners of the tractor's outline, counter-clockwise from front left [m].
+    pub fn tractor_corners(&self, rig: &Rig) -> [DVec2; 4] {
+        corners(&rig.tractor_body, self.position, self.heading)
+    }
+
+    /// Corners of the trailer's outline, counter-clockwise from front left [m].
+    pub fn trailer_corners(&self, rig: &Rig) -> [DVec2; 4] {
+        corners(&rig.trailer_body, self.trailer_position, self.trailer_heading)
+    }
+}
+
+/// Corners of a body in a frame at `origin` with `heading`, counter-clockwise from front left [m].
+pub fn corners(body: &Body, origin: DVec2, heading: f64) -> [DVec2; 4] {
+    let ahead = DVec2::from_angle(heading);
+    let (front, rear, side) = (f64::from(body.front), f64::from(body.rear), f64::from(body.half_width) * ahead.perp());
+    [origin + front * ahead + side, origin + rear * ahead + side, origin + rear * ahead - side, origin + front * ahead - side]
+}
+
+/// Poses about every `spacing` metres of a truck whose front axle runs along `centre_line` at `speed`, beginning straight.
+///
+/// The front axle's velocity points along the line; slip moves the tractor's turning point ahead by `slip * speed^2`, which shortens the
+/// lever of the turn, as in the single-track equations of [`crate::cpu::drive`].
+pub fn swept_path(rig: &Rig, centre_line: &Curve, speed: f64, spacing: f64) -> Vec<Pose> {
+    let wheelbase = f64::from(rig.wheelbase);
+    let (fifth_wheel, trailer_wheelbase) = (f64::from(rig.fifth_wheel), f64::from(rig.trailer_wheelbase));
+    // The same bound as in the simulator's equations keeps both levers positive.
+    let slip = (f64::from(rig.slip) * speed * speed).min(crate::cpu::drive::SLIP_LEVER_MAX.into());
+    let rates = |line: f64, heading: f64, trailer_heading: f64| {
+        let steering = line - heading;
+        let along = speed * steering.cos();
+        let yaw = speed * steering.sin() / (wheelbase - slip);
+        let (sin, cos) = (heading - trailer_heading).sin_cos();
+        let hitch = (fifth_wheel - slip) * yaw;
+        (yaw, (along * sin + hitch * cos) / (trailer_wheelbase - slip))
+    };
+    let pose = |station: f64, heading: f64, trailer_heading: f64| {
+        let position = centre_line.point_at(station) - wheelbase * DVec2::from_angle(heading);
+        let hitch = position + fifth_wheel * DVec2::from_angle(heading);
+        let trailer_position = hitch - trailer_wheelbase * DVec2::from_angle(trailer_heading);
+        Pose { position, heading, trailer_position, trailer_heading }
+    };
+    // Steps of 2 cm keep the midpoint rule's error below a millimetre on the tightest curve.
+    let per_pose = (spacing / 0.02).ceil().max(1.0);
+    let step = spacing / per_pose;
+    let mut heading = centre_line.heading_at(0.0);
+    let mut trailer_heading = heading;
+    let mut poses = vec![pose(0.0, heading, trailer_heading)];
+    let n_poses = (centre_line.length() / spacing).floor() as usize;
+    for index in 0..n_poses {
+        for part in 0..per_pose as usize {
+            let station = index as f64 * spacing + part as f64 * step;
+            let duration = step / speed;
+            let (yaw, trailer_yaw) = rates(centre_line.heading_at(station), heading, trailer_heading);
+            let line = centre_line.heading_at(station + 0.5 * step);
+            let (yaw, trailer_yaw) = rates(line, heading + 0.5 * duration * yaw, trailer_heading + 0.5 * duration * trailer_yaw);
+            heading += duration * yaw;
+            trailer_heading += duration * trailer_yaw;
+        }
+        poses.push(pose((index + 1) as f64 * spacing, heading, trailer_heading));
+    }
+    poses
+}
+
+/// No pose of the path touches a solid: a truck on this route need not leave its lane.
+pub fn own_lane_suffices(rig: &Rig, kerbs: &Outline, path: &[Pose]) -> bool {
+    !path
+        .iter()
+        .any(|pose| kerbs.intersects_rectangle(&pose.tractor_corners(rig)) || kerbs.intersects_rectangle(&pose.trailer_corners(rig)))
+}

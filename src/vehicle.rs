@@ -1,0 +1,194 @@
+//! Tractor, trailer and load: their measures as a vehicle file gives them, and what the stages need of them.
+//!
+//! The trailer's suspension is the load's: an empty trailer and a full tank lean differently on the same axles.
+
+mod single_track;
+mod suspension;
+mod written;
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use glam::{DVec2, Vec2};
+
+pub use single_track::{SingleTrack, Steady};
+pub use suspension::Suspension;
+
+use crate::layout::{Body, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, Ray, Rig};
+
+/// Acceleration of free fall [m/s^2].
+pub const GRAVITY: f64 = 9.81;
+
+/// A tractor and its trailer with every load that they may carry. SI units and radians.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Vehicle {
+    /// The towing unit.
+    pub tractor: Tractor,
+    /// The towed unit.
+    pub trailer: Trailer,
+    /// What the trailer may carry, by name.
+    pub loads: BTreeMap<String, Load>,
+    /// How the target speed is held.
+    pub speed_control: SpeedControl,
+    /// Where the distance sensors sit.
+    pub sensors: Sensors,
+}
+
+/// The towing unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tractor {
+    /// Front axle ahead of the drive axle [m].
+    pub wheelbase: f64,
+    /// Fifth wheel ahead of the drive axle, negative when behind [m].
+    pub fifth_wheel: f64,
+    /// Front end ahead of the front axle [m].
+    pub front_overhang: f64,
+    /// Rear end behind the drive axle [m].
+    pub rear_overhang: f64,
+    /// Width of the outline [m].
+    pub width: f64,
+    /// Largest steer angle [rad].
+    pub steer_max: f64,
+    /// Fastest change of the steer angle [rad/s].
+    pub steer_rate: f64,
+    /// Lateral acceleration that the tyres can hold, in units of gravity.
+    pub friction: f64,
+    /// Mass [kg].
+    pub mass: f64,
+    /// How it leans.
+    pub suspension: Suspension,
+}
+
+/// The towed unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trailer {
+    /// Kingpin ahead of the axle group's centre [m].
+    pub wheelbase: f64,
+    /// Front end ahead of the kingpin [m].
+    pub kingpin_to_front: f64,
+    /// Rear end behind the kingpin [m].
+    pub kingpin_to_rear: f64,
+    /// Width of the outline [m].
+    pub width: f64,
+}
+
+/// What the trailer carries and how the whole then moves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Load {
+    /// Mass of the trailer with its load [kg].
+    pub mass: f64,
+    /// Slip angle of an axle per lateral acceleration [rad/(m/s^2)].
+    pub slip: f64,
+    /// Strongest braking, negative [m/s^2].
+    pub acceleration_min: f64,
+    /// Strongest drive [m/s^2].
+    pub acceleration_max: f64,
+    /// How the loaded trailer leans.
+    pub suspension: Suspension,
+}
+
+/// Proportional-integral control of the speed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpeedControl {
+    /// Acceleration per speed error [1/s].
+    pub gain: f64,
+    /// Acceleration per integral of the speed error [1/s^2].
+    pub integral_gain: f64,
+    /// Speed error beyond which nothing is integrated [m/s].
+    pub integral_band: f64,
+    /// Strongest braking that is asked for, negative [m/s^2].
+    pub braking: f64,
+}
+
+/// Where the distance sensors sit, each in its unit's frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensors {
+    /// The tractor's, from left 90 deg to right 90 deg: ahead of the drive axle, left [m].
+    pub tractor_mounts: [DVec2; N_TRACTOR_RAYS],
+    /// The trailer's foremost, behind the trailer's front end [m].
+    pub trailer_first: f64,
+    /// The trailer's rearmost, behind the trailer's front end [m].
+    pub trailer_last: f64,
+}
+
+impl Vehicle {
+    /// Lengths that decide where the trailer goes.
+    pub fn single_track(&self) -> SingleTrack {
+        SingleTrack { wheelbase: self.tractor.wheelbase, fifth_wheel: self.tractor.fifth_wheel, trailer_wheelbase: self.trailer.wheelbase }
+    }
+
+    /// The tractor's outline in the frame of its drive axle.
+    pub fn tractor_body(&self) -> Body {
+        let Tractor { wheelbase, front_overhang, rear_overhang, width, .. } = self.tractor;
+        Body { front: (wheelbase + front_overhang) as f32, rear: -rear_overhang as f32, half_width: (0.5 * width) as f32 }
+    }
+
+    /// The trailer's outline in the frame of its axle group.
+    pub fn trailer_body(&self) -> Body {
+        let Trailer { wheelbase, kingpin_to_front, kingpin_to_rear, width } = self.trailer;
+        Body { front: (wheelbase + kingpin_to_front) as f32, rear: (wheelbase - kingpin_to_rear) as f32, half_width: (0.5 * width) as f32 }
+    }
+
+    /// Mass of tractor, trailer and load [kg].
+    pub fn gross_mass(&self, load: &Load) -> f64 {
+        self.tractor.mass + load.mass
+    }
+
+    /// Radius of the circle that the inner side of the trailer's axle group keeps clear when the tractor's outer front corner runs on a
+    /// circle of radius `outer` [m]; `None` where the combination cannot. Directive 96/53/EC asks for 5.30 m at 12.50 m.
+    pub fn turning_circle_inner_radius(&self, outer: f64) -> Option<f64> {
+        let Tractor { wheelbase, front_overhang, width, .. } = self.tractor;
+        let corner = outer.powi(2) - (wheelbase + front_overhang).powi(2);
+        let steady = self.single_track().at_tractor_radius(corner.sqrt() - 0.5 * width)?;
+        Some(steady.trailer_radius - 0.5 * self.trailer.width)
+    }
+
+    /// The vehicle as the stages need it, with the load of that name and its roll discretised for sub-steps of `substep` [s].
+    ///
+    /// `steer_max` replaces the vehicle's own lock [rad].
+    ///
+    /// # Panics
+    ///
+    /// When the vehicle has no such load: whoever read the name has compared it with [`Vehicle::loads`].
+    pub fn rig(&self, load: &str, substep: f32, steer_max: Option<f64>) -> Rig {
+        let load = &self.loads[load];
+        Rig {
+            wheelbase: self.tractor.wheelbase as f32,
+            fifth_wheel: self.tractor.fifth_wheel as f32,
+            trailer_wheelbase: self.trailer.wheelbase as f32,
+            slip: load.slip as f32,
+            steer_max: steer_max.unwrap_or(self.tractor.steer_max) as f32,
+            steer_rate: self.tractor.steer_rate as f32,
+            acceleration_min: load.acceleration_min as f32,
+            acceleration_max: load.acceleration_max as f32,
+            lateral_acceleration_max: (self.tractor.friction * GRAVITY) as f32,
+            speed_gain: self.speed_control.gain as f32,
+            speed_integral_gain: self.speed_control.integral_gain as f32,
+            speed_integral_band: self.speed_control.integral_band as f32,
+            speed_braking: self.speed_control.braking as f32,
+            tractor_body: self.tractor_body(),
+            trailer_body: self.trailer_body(),
+            tractor_roll: self.tractor.suspension.roll(substep.into()),
+            trailer_roll: load.suspension.roll(substep.into()),
+        }
+    }
+
+    /// The distance sensors as an observation has them: the trailer's left and right in turn from front to rear, then the tractor's from
+    /// left to right.
+    pub fn rays(&self) -> [Ray; N_RAYS] {
+        let body = self.trailer_body();
+        let Sensors { trailer_first, trailer_last, .. } = self.sensors;
+        std::array::from_fn(|index| {
+            if index < N_TRAILER_RAYS {
+                let share = (index / 2) as f64 / (N_TRAILER_RAYS / 2 - 1) as f64;
+                let behind_front = trailer_first + share * (trailer_last - trailer_first);
+                let side = if index % 2 == 0 { 1.0 } else { -1.0 };
+                Ray { origin: Vec2::new(body.front - behind_front as f32, side * body.half_width), direction: Vec2::new(0.0, side) }
+            } else {
+                let place = index - N_TRAILER_RAYS;
+                let angle = PI * (0.5 - place as f64 / (N_TRACTOR_RAYS - 1) as f64);
+                Ray { origin: self.sensors.tractor_mounts[place].as_vec2(), direction: DVec2::from_angle(angle).as_vec2() }
+            }
+        })
+    }
+}

@@ -1,0 +1,163 @@
+//! What all trucks share: the roundabouts baked into fields, the routes as a table of waypoints, the vehicle and the weights.
+//!
+//! A `World` in hand can always be stepped: everything that can be wrong was found while its scenario was read.
+
+use std::f64::consts::PI;
+
+use glam::{DVec2, Vec2};
+
+use crate::field::Field;
+use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, Ray, RouteRow, WaypointRow};
+use crate::route::{Route, Waypoint};
+use crate::scenario::Scenario;
+
+/// Waypoints to the corner of each observed curvature.
+const CURVATURE_STEPS: [usize; 4] = [5, 7, 10, 12];
+/// Waypoints in each chord of the observed radii.
+const CHORD: usize = 5;
+/// Radius that is observed as 1 [m].
+const RADIUS_SCALE: f64 = 100.0;
+
+/// The shared, unchanging part of a batch.
+#[derive(Debug)]
+pub struct World {
+    /// Vehicle, time and weights.
+    pub params: Params,
+    /// The action table.
+    pub actions: Vec<Action>,
+    /// The distance sensors, trailer's first.
+    pub rays: [Ray; N_RAYS],
+    /// One field a roundabout.
+    pub fields: Vec<Field>,
+    /// Every route's waypoints, one route after the other.
+    pub waypoints: Vec<WaypointRow>,
+    /// Every route, in the order of `route_names`.
+    pub routes: Vec<RouteRow>,
+    /// `20m/N-left-3` and the like.
+    pub route_names: Vec<String>,
+}
+
+impl World {
+    /// Works out everything that does not change while trucks drive.
+    pub fn bake(scenario: &Scenario) -> World {
+        let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
+        let rig = scenario.vehicle.rig(&scenario.load, substep, scenario.steer_max);
+        let actions = scenario.actions(rig.steer_max);
+        let mut waypoints = Vec::new();
+        let mut routes = Vec::new();
+        let mut route_names = Vec::new();
+        for (roundabout, route) in scenario.routes() {
+            routes.push(RouteRow {
+                first: waypoints.len() as u32,
+                n_waypoints: route.waypoints.len() as u32,
+                roundabout: roundabout as u32,
+                step_limit: step_limit(scenario, route),
+                crossing_left: route.crossing.0 as f32,
+                crossing_right: route.crossing.1 as f32,
+            });
+            route_names.push(route.name.clone());
+            waypoints.extend((0..route.waypoints.len()).map(|index| waypoint_row(&route.waypoints, index)));
+        }
+        World {
+            params: Params {
+                rig,
+                substep,
+                n_substeps: scenario.n_substeps,
+                n_actions: actions.len() as u32,
+                sensor_range: scenario.sensor_range as f32,
+                start_offset: scenario.start_offset as f32,
+                start_heading: scenario.start_heading as f32,
+                start_speed: scenario.cruising_speed() as f32,
+                stray_distance: scenario.stray_distance as f32,
+                jackknife_angle: scenario.jackknife_angle as f32,
+                rollover_ratio: scenario.rollover_ratio as f32,
+                lane_distance_limit: scenario.lane_distance_limit as f32,
+                waypoint_weight: scenario.waypoint_weight as f32,
+                lane_distance_weight: scenario.lane_distance_weight as f32,
+                clearance_limit: scenario.clearance_limit as f32,
+                clearance_weight: scenario.clearance_weight as f32,
+                failure_weight: scenario.failure_weight as f32,
+            },
+            actions,
+            rays: scenario.vehicle.rays(),
+            fields: scenario.places.iter().map(|place| Field::bake(&place.roundabout.kerbs(scenario.gutter), scenario.cell)).collect(),
+            waypoints,
+            routes,
+            route_names,
+        }
+    }
+
+    /// The waypoints of a route of this world.
+    #[inline]
+    pub fn route_waypoints(&self, route: u32) -> &[WaypointRow] {
+        let route = &self.routes[route as usize];
+        &self.waypoints[route.first as usize..][..route.n_waypoints as usize]
+    }
+
+    /// The field that a route runs through.
+    #[inline]
+    pub fn route_field(&self, route: u32) -> &Field {
+        &self.fields[self.routes[route as usize].roundabout as usize]
+    }
+}
+
+/// Steps after which an episode on this route is timed out.
+fn step_limit(scenario: &Scenario, route: &Route) -> u32 {
+    (scenario.time_limit * route.centre_line.length() / (scenario.cruising_speed() * scenario.step)).ceil() as u32
+}
+
+/// A waypoint with what is observed of the route around it. Beyond either end of the route the end waypoint repeats.
+fn waypoint_row(waypoints: &[Waypoint], index: usize) -> WaypointRow {
+    let here = &waypoints[index];
+    let at = |ahead: usize| waypoints[(index + ahead).min(waypoints.len() - 1)].position;
+    let back = |behind: usize| waypoints[index.saturating_sub(behind)].position;
+    let mut preview = [0.0; N_PREVIEW];
+    for (n, steps) in CURVATURE_STEPS.into_iter().enumerate() {
+        preview[n] = (corner(at(0), at(steps), at(2 * steps)) / PI) as f32;
+        preview[4 + n] = (corner(back(steps), at(0), at(steps)) / PI) as f32;
+    }
+    for (n, value) in preview[8..].iter_mut().enumerate() {
+        let [from, middle, to] = [n, n + 1, n + 2].map(|chord| at(CHORD * chord));
+        *value = (turning_radius(from, middle, to) / RADIUS_SCALE).min(1.0) as f32;
+    }
+    WaypointRow {
+        position: here.position.as_vec2(),
+        direction: Vec2::from_angle(here.heading as f32),
+        heading: here.heading as f32,
+        preview,
+    }
+}
+
+/// Angle at `corner` between `from` and `to`: pi when the three lie in line, and when two of them are the same point [rad].
+fn corner(from: DVec2, corner: DVec2, to: DVec2) -> f64 {
+    let (back, ahead) = (from - corner, to - corner);
+    if back == DVec2::ZERO || ahead == DVec2::ZERO { PI } else { back.angle_to(ahead).abs() }
+}
+
+/// Distance from `middle` to the meeting point of the bisectors of the two chords that join there; infinite when they are parallel [m].
+fn turning_radius(from: DVec2, middle: DVec2, to: DVec2) -> f64 {
+    let (first, second) = (middle - from, to - middle);
+    // Radius of the circle through three points: the product of the sides over four times the area.
+    let area = 0.5 * first.perp_dot(second).abs();
+    let sides = first.length() * second.length() * (to - from).length();
+    if area < 1e-9 { f64::INFINITY } else { sides / (4.0 * area) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_points_of_a_circle_give_its_radius() {
+        let at = |angle: f64| 17.0 * DVec2::from_angle(angle);
+        assert!((turning_radius(at(0.1), at(0.5), at(1.0)) - 17.0).abs() < 1e-9);
+        assert_eq!(turning_radius(DVec2::ZERO, DVec2::X, 2.0 * DVec2::X), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_corner_of_a_square_is_a_right_angle_and_a_straight_line_is_pi() {
+        assert!((corner(DVec2::X, DVec2::ZERO, DVec2::Y) - PI / 2.0).abs() < 1e-12);
+        assert!((corner(-DVec2::X, DVec2::ZERO, DVec2::X) - PI).abs() < 1e-12);
+        assert_eq!(corner(DVec2::X, DVec2::X, DVec2::Y), PI);
+    }
+}

@@ -1,0 +1,191 @@
+//! Wrong files: every scenario file is broken in every place, and each time the reader must answer with the file's name, never panic.
+
+use std::path::{Path, PathBuf};
+
+use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::scenario::{Error, Scenario};
+use offtrack::simulator::{self, RouteChoice, Simulator};
+use offtrack::vehicle::Vehicle;
+use proptest::prelude::*;
+
+use crate::benchmark;
+
+fn scenarios() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
+}
+
+/// Every scenario file, relative to the folder of scenarios.
+fn files() -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for folder in ["", "roundabouts", "vehicles"] {
+        for entry in std::fs::read_dir(scenarios().join(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|extension| extension == "toml") {
+                files.push(path.strip_prefix(scenarios()).unwrap().to_owned());
+            }
+        }
+    }
+    files.sort();
+    assert_eq!(files.len(), 12, "five roundabouts, three vehicles, four benchmarks");
+    files
+}
+
+/// Reads a file as what its folder says it is.
+fn read(path: &Path) -> Result<(), Error> {
+    match path.parent().and_then(Path::file_name).and_then(|folder| folder.to_str()) {
+        Some("roundabouts") => {
+            let roundabout = Roundabout::read(path)?;
+            // What was accepted must be usable.
+            for gutter in [Gutter::Drivable, Gutter::Solid] {
+                assert!(roundabout.kerbs(gutter).signed_distance(glam::DVec2::new(3.0, -7.0)).is_finite());
+            }
+            let _ = roundabout.routes(40.0, 35.0, 2.0);
+            Ok(())
+        }
+        Some("vehicles") => Vehicle::read(path).map(|_| ()),
+        _ => Scenario::read(path).map(|_| ()),
+    }
+}
+
+/// A copy of all scenarios, so that one file at a time can be broken.
+fn copy() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for file in files() {
+        let to = folder.path().join(&file);
+        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+        std::fs::copy(scenarios().join(&file), to).unwrap();
+    }
+    folder
+}
+
+/// Reads the broken text in place of `file`; the error, if it is one, names that file or the one it led to.
+fn broken(folder: &Path, file: &Path, text: &[u8]) -> Result<(), String> {
+    let path = folder.join(file);
+    std::fs::write(&path, text).unwrap();
+    let outcome = read(&path).map_err(|error| error.to_string());
+    if let Err(message) = &outcome {
+        assert!(message.contains(folder.to_str().unwrap()), "{message}");
+    }
+    std::fs::copy(scenarios().join(file), &path).unwrap();
+    outcome
+}
+
+/// Byte ranges of the values in a TOML text: what follows `=`, `[` or `,` up to the next of `,]}#` or the line's end.
+fn values(text: &str) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        let code = line.split('#').next().unwrap_or("");
+        if let Some(equals) = code.find('=').or(code.trim_start().starts_with(['"', '[', '{', '-']).then_some(0)) {
+            let mut from = start + equals;
+            for (offset, character) in code.char_indices().skip(equals).chain([(code.len(), '\n')]) {
+                if ",]}[{=\n".contains(character) {
+                    let value = &text[from..start + offset];
+                    let trimmed = value.trim_matches(|c: char| c.is_whitespace() || ",[{=".contains(c));
+                    if !trimmed.is_empty() && (trimmed.starts_with('"') || trimmed.parse::<f64>().is_ok()) {
+                        let at = from + value.find(trimmed).unwrap();
+                        found.push((at, at + trimmed.len()));
+                    }
+                    from = start + offset;
+                }
+            }
+        }
+        start += line.len();
+    }
+    found
+}
+
+#[test]
+fn no_wrong_value_in_any_place_of_any_file_makes_a_reader_panic() {
+    let folder = copy();
+    let nasty = ["0", "-1.0", "nan", "inf", "-inf", "1e300", "1000000000", "0.001", "\"text\"", "true", "[]", "{}", "\"\""];
+    let (mut tried, mut refused) = (0, 0);
+    for file in files() {
+        let text = std::fs::read_to_string(scenarios().join(&file)).unwrap();
+        let places = values(&text);
+        assert!(10 < places.len(), "{}: {} values found", file.display(), places.len());
+        for (from, to) in places {
+            for value in nasty {
+                tried += 1;
+                refused +=
+                    usize::from(broken(folder.path(), &file, format!("{}{value}{}", &text[..from], &text[to..]).as_bytes()).is_err());
+            }
+        }
+    }
+    // Most of these values make no sense anywhere: a reader that accepts them checks nothing.
+    assert!(5000 < tried && 4 * tried < 5 * refused, "{refused} of {tried} refused");
+}
+
+#[test]
+fn no_missing_line_cut_or_unknown_key_makes_a_reader_panic() {
+    let folder = copy();
+    for file in files() {
+        let text = std::fs::read_to_string(scenarios().join(&file)).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        for without in 0..lines.len() {
+            let kept: Vec<&str> = lines.iter().enumerate().filter(|&(line, _)| line != without).map(|(_, line)| *line).collect();
+            let _ = broken(folder.path(), &file, kept.join("\n").as_bytes());
+        }
+        for end in (0..text.len()).step_by(7) {
+            let _ = broken(folder.path(), &file, &text.as_bytes()[..end]);
+        }
+        let message = broken(folder.path(), &file, format!("no_such_key = 1\n{text}").as_bytes()).unwrap_err();
+        assert!(message.contains("no_such_key"), "{message}");
+        broken(folder.path(), &file, &[0xff, 0xfe, 0]).unwrap_err();
+        broken(folder.path(), &file, b"").unwrap_err();
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn no_scrambled_bytes_make_a_reader_panic(which in 0usize..12, edits in prop::collection::vec((any::<prop::sample::Index>(), 0x20u8..0x7f), 1..6)) {
+        let folder = copy();
+        let file = &files()[which];
+        let mut text = std::fs::read(scenarios().join(file)).unwrap();
+        for (at, byte) in edits {
+            let at = at.index(text.len());
+            text[at] = byte;
+        }
+        let _ = broken(folder.path(), file, &text);
+    }
+}
+
+#[test]
+fn a_wrong_value_is_named_with_file_key_value_and_what_would_do() {
+    let folder = copy();
+    let file = Path::new("attard2023.toml");
+    let text = std::fs::read_to_string(scenarios().join(file)).unwrap();
+    let cases = [
+        ("range = 20.0", "range = -4.0", ["sensors.range", "-4 m", "must lie in 1..50 m"]),
+        ("speeds_kmh = [30.0]", "speeds_kmh = []", ["actions.speeds_kmh", "0", "must lie in 1..64"]),
+        ("load = \"empty\"", "load = \"water\"", ["load", "\"water\"", "laden"]),
+        ("\"E-left-2\"", "\"E-left-9\"", ["train[0]", "\"E-left-9\"", "E-left-3"]),
+        ("[sensors]", "[routes]\napproach = 400.0\n\n[sensors]", ["routes.approach", "400 m", "at most"]),
+    ];
+    for (from, to, parts) in cases {
+        assert!(text.contains(from), "{from}");
+        let message = broken(folder.path(), file, text.replacen(from, to, 1).as_bytes()).unwrap_err();
+        for part in parts {
+            assert!(message.contains(part), "{part} is not in: {message}");
+        }
+    }
+    let missing = Scenario::read(Path::new("no/such/file.toml")).unwrap_err().to_string();
+    assert!(missing.contains("no/such/file.toml"), "{missing}");
+}
+
+#[test]
+fn a_batch_that_cannot_be_is_refused_and_a_wrong_action_changes_nothing() {
+    let (_, world) = benchmark("attard2023");
+    let world = std::sync::Arc::new(world);
+    let new = |n_envs, choice| Simulator::new(world.clone(), n_envs, 0, choice).map(|_| ()).unwrap_err();
+    assert_eq!(new(0, RouteChoice::Drawn(vec![0])), simulator::Error::EmptyBatch);
+    assert_eq!(new(4, RouteChoice::Drawn(vec![])), simulator::Error::NoRoutes);
+    assert_eq!(new(4, RouteChoice::Drawn(vec![75])), simulator::Error::UnknownRoute { route: 75, n_routes: 75 });
+    assert_eq!(new(4, RouteChoice::Fixed(vec![0])), simulator::Error::RouteCount { n_routes: 1, n_envs: 4 });
+    let mut simulator = Simulator::new(world.clone(), 2, 0, RouteChoice::Drawn(vec![0])).unwrap();
+    let before = simulator.batch().truck.clone();
+    assert_eq!(simulator.step(&[0, 9]).unwrap_err().to_string(), "actions[1]: 9; must lie in 0..9");
+    assert_eq!(simulator.step(&[0]).unwrap_err().to_string(), "actions: 1 for 2 trucks; one each is needed");
+    assert_eq!(simulator.batch().truck, before);
+}

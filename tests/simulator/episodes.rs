@@ -1,0 +1,184 @@
+//! Whole episodes: determinism, ten million random steps, and what a step promises.
+
+use std::sync::Arc;
+
+use offtrack::layout::{Ended, N_RAYS};
+use offtrack::scenario::Split;
+use offtrack::simulator::{Batch, RouteChoice, Simulator};
+use offtrack::world::World;
+
+use crate::benchmark;
+
+fn all_routes(world: &World) -> RouteChoice {
+    RouteChoice::Drawn((0..world.routes.len() as u32).collect())
+}
+
+/// Every byte of the first `n` trucks' columns.
+fn bytes(batch: &Batch, n: usize) -> Vec<u8> {
+    let columns: [&[u8]; 10] = [
+        bytemuck::cast_slice(&batch.control[..n]),
+        bytemuck::cast_slice(&batch.truck[..n]),
+        bytemuck::cast_slice(&batch.clearance[..n]),
+        bytemuck::cast_slice(&batch.progress[..n]),
+        bytemuck::cast_slice(batch.ranges[..n].as_flattened()),
+        bytemuck::cast_slice(batch.observation[..n].as_flattened()),
+        bytemuck::cast_slice(batch.next_observation[..n].as_flattened()),
+        bytemuck::cast_slice(&batch.ended[..n]),
+        bytemuck::cast_slice(&batch.terms[..n]),
+        bytemuck::cast_slice(&batch.reward[..n]),
+    ];
+    columns.concat()
+}
+
+/// The first `n` trucks of a batch of `n_envs` after 300 random steps on `threads` threads.
+fn driven(world: &Arc<World>, n_envs: usize, n: usize, seed: u32, threads: usize) -> Vec<u8> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| {
+        let mut simulator = Simulator::new(world.clone(), n_envs, seed, all_routes(world)).unwrap();
+        for _ in 0..300 {
+            simulator.step_at_random();
+        }
+        bytes(simulator.batch(), n)
+    })
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_whatever_threads_batch_size_and_repetition() {
+    let (_, world) = benchmark("attard2023-full");
+    let world = Arc::new(world);
+    let one = driven(&world, 1, 1, 5, 1);
+    for n_envs in [7, 64, 4096] {
+        assert_eq!(driven(&world, n_envs, 1, 5, 2), one, "{n_envs} trucks");
+    }
+    let many = driven(&world, 4096, 4096, 5, 1);
+    assert!(many == driven(&world, 4096, 4096, 5, 2), "two threads");
+    assert!(many == driven(&world, 4096, 4096, 5, 1), "again");
+    assert_ne!(driven(&world, 1, 1, 6, 1), one, "another seed must differ");
+}
+
+#[test]
+fn stepping_a_stage_at_a_time_gives_the_same_bytes() {
+    let (_, world) = benchmark("attard2023");
+    let world = Arc::new(world);
+    let [mut fused, mut staged] = [0, 1].map(|_| Simulator::new(world.clone(), 256, 3, all_routes(&world)).unwrap());
+    for _ in 0..300 {
+        fused.step_at_random();
+        staged.step_at_random_by_stage();
+    }
+    assert!(bytes(fused.batch(), 256) == bytes(staged.batch(), 256));
+}
+
+#[test]
+fn ten_million_random_steps_stay_finite_in_range_and_inside_the_world() {
+    let (scenario, world) = benchmark("attard2023-full");
+    let world = Arc::new(world);
+    let n_envs = 8192;
+    let n_steps = 10_000_000usize.div_ceil(n_envs);
+    let bounds: Vec<_> = scenario
+        .places
+        .iter()
+        .map(|place| place.roundabout.kerbs(scenario.gutter).bounds())
+        .map(|(low, high)| (low.as_vec2(), high.as_vec2()))
+        .collect();
+    let mut simulator = Simulator::new(world.clone(), n_envs, 1, all_routes(&world)).unwrap();
+    let mut ends = [0usize; Ended::ALL.len()];
+    for _ in 0..n_steps {
+        simulator.step_at_random();
+        let batch = simulator.batch();
+        for env in 0..n_envs {
+            let truck = &batch.truck[env];
+            let (low, high) = bounds[world.routes[truck.route as usize].roundabout as usize];
+            assert!(low.cmple(truck.position).all() && truck.position.cmple(high).all(), "{truck:?}");
+            let pi = std::f32::consts::PI;
+            assert!(truck.heading.abs() <= pi && truck.trailer_heading.abs() <= pi, "{truck:?}");
+            assert!((0.0..30.0).contains(&truck.speed) && truck.steering.abs() <= world.params.rig.steer_max, "{truck:?}");
+            let finite = [truck.tractor_roll, truck.trailer_roll_rate, truck.trailer_load_transfer_ratio, batch.reward[env]];
+            assert!(finite.into_iter().all(f32::is_finite), "{truck:?}");
+            assert!(batch.clearance[env].tractor.is_finite() && batch.clearance[env].trailer.is_finite());
+            for values in [&batch.observation[env], &batch.next_observation[env]] {
+                for (index, value) in values.iter().enumerate() {
+                    let least = if (6..22).contains(&index) { -1.0 } else { 0.0 };
+                    assert!((least..=1.0).contains(value), "value {index}: {value}");
+                }
+            }
+            ends[batch.ended[env] as usize] += 1;
+        }
+    }
+    assert!(10_000_000 <= ends.iter().sum::<usize>());
+    // Random driving must meet the kerbs with both units, or the walls are not where the trucks are.
+    assert!(1000 < ends[Ended::TractorCollided as usize] && 1000 < ends[Ended::TrailerCollided as usize], "{ends:?}");
+}
+
+#[test]
+fn observation_and_next_observation_differ_only_where_an_episode_ended() {
+    let (_, world) = benchmark("attard2023");
+    let world = Arc::new(world);
+    let mut simulator = Simulator::new(world.clone(), 512, 9, all_routes(&world)).unwrap();
+    let mut ended = 0;
+    for _ in 0..400 {
+        simulator.step_at_random();
+        let batch = simulator.batch();
+        for env in 0..512 {
+            let over = batch.ended[env] != Ended::Running as u32;
+            assert_eq!(over, batch.observation[env] != batch.next_observation[env]);
+            assert_eq!(over, batch.truck[env].steps == 0);
+            ended += usize::from(over);
+        }
+    }
+    assert!(100 < ended, "{ended}");
+}
+
+#[test]
+fn a_truck_on_a_fixed_route_drives_it_once_and_is_held() {
+    let (scenario, world) = benchmark("attard2023");
+    let world = Arc::new(world);
+    let routes = scenario.split(Split::Test).to_vec();
+    let mut simulator = Simulator::new(world.clone(), routes.len(), 2, RouteChoice::Fixed(routes.clone())).unwrap();
+    let mut last = None;
+    for _ in 0..1500 {
+        simulator.step_at_random();
+        if simulator.batch().truck.iter().all(|truck| truck.held == 1) {
+            last.get_or_insert_with(|| bytes(simulator.batch(), routes.len()));
+        }
+    }
+    let batch = simulator.batch();
+    assert!(batch.truck.iter().zip(&routes).all(|(truck, &route)| truck.route == route && truck.episode == 0));
+    assert_eq!(last.as_deref(), Some(bytes(batch, routes.len()).as_slice()), "a held truck moved");
+    simulator.reset();
+    assert!(simulator.batch().truck.iter().all(|truck| truck.held == 0 && truck.steps == 0));
+}
+
+#[test]
+fn a_truck_that_only_drives_straight_leaves_its_route_and_the_reward_says_so() {
+    let (_, world) = benchmark("attard2023");
+    let world = Arc::new(world);
+    let route = world.route_names.iter().position(|name| name == "20m/N-left-4").unwrap() as u32;
+    let mut simulator = Simulator::new(world.clone(), 1, 0, RouteChoice::Fixed(vec![route])).unwrap();
+    let (mut passed, mut reward, mut terms) = (0, 0.0, 0.0);
+    while simulator.batch().truck[0].held == 0 {
+        simulator.step(&[4]).unwrap();
+        let batch = simulator.batch();
+        passed += batch.progress[0].passed;
+        reward += batch.reward[0];
+        let weighed = batch.terms[0];
+        terms += 100.0 * weighed.waypoints - 1.5 * weighed.lane_distance - 500.0 * weighed.failure;
+    }
+    assert_eq!(simulator.batch().ended[0], Ended::TractorCollided as u32);
+    assert_eq!(reward, terms);
+    // It passes the approach of 40 m, a waypoint every 2 m, meets the island and pays for it.
+    assert!((15..35).contains(&passed), "{passed}");
+    assert!((100.0 * passed as f32 - 550.0..100.0 * passed as f32 - 500.0).contains(&reward), "{reward}");
+}
+
+#[test]
+fn the_sensors_see_the_road_ahead_at_the_start_of_every_route() {
+    let (_, world) = benchmark("attard2023-full");
+    let world = Arc::new(world);
+    let n = world.routes.len();
+    let simulator = Simulator::new(world.clone(), n, 0, RouteChoice::Fixed((0..n as u32).collect())).unwrap();
+    for (env, ranges) in simulator.batch().ranges.iter().enumerate() {
+        // The tractor's middle ray looks down its own lane, which may bend; the first trailer rays meet the kerbs a few metres aside.
+        assert!(10.0 < ranges[N_RAYS - 7], "{}: {}", world.route_names[env], ranges[N_RAYS - 7]);
+        assert!(0.3 < ranges[0] && 0.3 < ranges[1], "{}", world.route_names[env]);
+    }
+}

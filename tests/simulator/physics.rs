@@ -1,0 +1,24 @@
+//! The truck's physics: reference vectors, properties that hold for any control, and what the vehicle files say.
+
+#![expect(clippy::unwrap_used, reason = "a test whose own means fail has failed")]
+
+mod circulation;
+mod properties;
+mod speed_control;
+mod vectors;
+mod vehicles;
+
+use std::path::PathBuf;
+
+use offtrack::vehicle::Vehicle;
+
+/// The vehicle files of the project.
+const VEHICLES: [&str; 3] = ["daf_xf", "eu_4x2_13m6", "us_wb62"];
+
+fn vehicle_file(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/vehicles/{name}.toml"))
+}
+
+fn vehicle(name: &str) -> Vehicle {
+    Vehicle::read(&vehicle_file(name)).unwrap()
+}

@@ -1,0 +1,355 @@
+//! The reference vectors, each kind computed with the simulator's own functions and held to the tolerances that stand beside it.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use glam::DVec2;
+use offtrack::cpu::drive::motion;
+use offtrack::geometry::{Curve, Piece};
+use offtrack::layout::Rig;
+use offtrack::swept::swept_path;
+use offtrack::trace::{Case, CaseVehicle, Command, Init, Traced, trace};
+use offtrack::vehicle::{SingleTrack, Suspension};
+use serde_json::Value;
+
+use super::{VEHICLES, vehicle};
+
+const FOOT: f64 = 0.3048;
+
+/// The largest error over its tolerance, and what it was of.
+#[derive(Debug, Clone, Default)]
+struct Worst {
+    ratio: f64,
+    what: String,
+}
+
+impl Worst {
+    fn see(&mut self, what: &str, error: f64, tolerance: f64) {
+        let ratio = error.abs() / tolerance;
+        // No number is the worst of all.
+        if ratio.is_nan() || self.ratio < ratio {
+            *self =
+                Worst { ratio: if ratio.is_nan() { f64::INFINITY } else { ratio }, what: format!("{what}: {error:e} of {tolerance:e}") };
+        }
+    }
+
+    fn see_option(&mut self, what: &str, value: Option<f64>, expected: &Value, tolerance: f64) {
+        match (value, expected.as_f64()) {
+            (Some(value), Some(expected)) => self.see(what, value - expected, tolerance),
+            (None, None) => {}
+            _ => self.see(what, f64::NAN, tolerance),
+        }
+    }
+}
+
+fn cases() -> Vec<Value> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/physics_vectors.json");
+    let file: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    file["cases"].as_array().unwrap().clone()
+}
+
+fn case(id: &str) -> Value {
+    cases().into_iter().find(|case| case["id"] == id).unwrap()
+}
+
+fn number(value: &Value, key: &str) -> f64 {
+    value[key].as_f64().unwrap_or_else(|| panic!("{key} in {value}"))
+}
+
+fn point(value: &Value) -> DVec2 {
+    DVec2::new(value[0].as_f64().unwrap(), value[1].as_f64().unwrap())
+}
+
+fn rows(case: &Value) -> &[Value] {
+    case["rows"].as_array().unwrap()
+}
+
+/// Any case's vehicle, for cases that only say where the axles are.
+fn kinematic(row: &Value) -> CaseVehicle {
+    let any: CaseVehicle = serde_json::from_value(case("straight_30")["vehicle"].clone()).unwrap();
+    CaseVehicle { L1: number(row, "L1"), a: number(row, "a"), L2: number(row, "L2"), K: 0.0, delta_max: 1.5, gamma_max: 10.0, ..any }
+}
+
+fn single_track(row: &Value) -> SingleTrack {
+    SingleTrack { wheelbase: number(row, "L1"), fifth_wheel: number(row, "a"), trailer_wheelbase: number(row, "L2") }
+}
+
+/// The state that a truck reaches `t` seconds after `init` under one command.
+fn driven(vehicle: CaseVehicle, init: Init, command: Command, t: f64) -> offtrack::trace::State {
+    let case =
+        Case { id: String::new(), vehicle, dt: 0.05, init, commands: vec![command], t_end: t, times: Some(vec![t]), expected: vec![] };
+    trace(&case).unwrap().states[0]
+}
+
+fn trajectory(written: &Value, changed: impl Fn(&mut Case)) -> Worst {
+    let mut case: Case = serde_json::from_value(written.clone()).unwrap();
+    assert_eq!(case.dt, 0.05);
+    changed(&mut case);
+    compare(&trace(&case).unwrap(), written)
+}
+
+fn compare(traced: &Traced, written: &Value) -> Worst {
+    let mut worst = Worst::default();
+    let tolerance = |key: &str| number(&written["tolerance"], key);
+    let expected = written["expected"].as_array().unwrap();
+    assert_eq!(traced.states.len(), expected.len());
+    for (state, expected) in traced.states.iter().zip(expected) {
+        assert_eq!(state.t, number(expected, "t"));
+        let place = DVec2::new(number(expected, "x"), number(expected, "y"));
+        worst.see("pos", DVec2::new(state.x, state.y).distance(place), tolerance("pos"));
+        worst.see("hitch", DVec2::from(state.hitch).distance(point(&expected["hitch"])), tolerance("pos"));
+        worst.see("trailer_pos", DVec2::from(state.trailer_axle).distance(point(&expected["trailer_axle"])), tolerance("trailer_pos"));
+        worst.see("psi1", state.psi1 - number(expected, "psi1"), tolerance("psi1"));
+        worst.see("psi2", state.psi2 - number(expected, "psi2"), tolerance("psi1") + tolerance("gamma"));
+        worst.see("gamma", state.gamma - number(expected, "gamma"), tolerance("gamma"));
+        worst.see("v", state.v - number(expected, "v"), tolerance("v"));
+        worst.see("delta", state.delta - number(expected, "delta"), tolerance("delta"));
+        worst.see("ay1", state.ay1 - number(expected, "ay1"), tolerance("ay"));
+        worst.see("ay2", state.ay2 - number(expected, "ay2"), tolerance("ay"));
+        worst.see("ltr1_qs", state.ltr1_qs - number(expected, "ltr1_qs"), tolerance("ltr"));
+        worst.see("ltr2_qs", state.ltr2_qs - number(expected, "ltr2_qs"), tolerance("ltr"));
+        worst.see("ltr2_dyn", state.ltr2_dyn - number(expected, "ltr2_dyn"), tolerance("ltr"));
+    }
+    if let Some(expected) = written["expected_peak"].as_object() {
+        let peak = serde_json::to_value(traced.peak.unwrap()).unwrap();
+        assert_eq!(expected.len(), 7);
+        for (key, expected) in expected {
+            let expected = expected.as_f64().unwrap();
+            // A peak of nothing at all may still be the rounding of an f32.
+            worst.see(&format!("peak {key}"), number(&peak, key) - expected, tolerance("peak_rel") * expected.abs() + 1e-6);
+        }
+    }
+    let jackknife_tolerance = written["tolerance"]["t_jackknife"].as_f64().unwrap_or(0.05);
+    worst.see_option("t_jackknife", traced.t_jackknife, &written["t_jackknife"], jackknife_tolerance);
+    worst
+}
+
+fn closed_form(written: &Value) -> Worst {
+    let mut worst = Worst::default();
+    let (pos, angle) = (number(&written["tolerance"], "pos"), number(&written["tolerance"], "angle"));
+    for row in rows(written) {
+        let (delta, v) = (number(row, "delta"), number(row, "v"));
+        let init = Init { x: 0.0, y: 0.0, psi1: 0.0, psi2: -number(row, "gamma0"), v, delta };
+        let state = driven(kinematic(row), init, Command { t: 0.0, delta_cmd: delta, a_cmd: 0.0 }, number(row, "t"));
+        worst.see("pos", DVec2::new(state.x, state.y).distance(DVec2::new(number(row, "x"), number(row, "y"))), pos);
+        worst.see("psi1", state.psi1 - number(row, "psi1"), angle);
+        worst.see("gamma", state.gamma - number(row, "gamma"), angle);
+        let steady = single_track(row).at_steering(delta).map(|steady| steady.articulation);
+        worst.see_option("gamma_steady", steady, &row["gamma_steady"], angle);
+    }
+    worst
+}
+
+fn steady_state(written: &Value) -> Worst {
+    let mut worst = Worst::default();
+    let (length, angle) = (number(&written["tolerance"], "length"), number(&written["tolerance"], "angle"));
+    for row in rows(written) {
+        let track = single_track(row);
+        let steady = track.at_front_radius(number(row, "Rf"));
+        worst.see_option("gamma", steady.map(|steady| steady.articulation), &row["gamma"], angle);
+        worst.see_option("R2", steady.map(|steady| steady.trailer_radius), &row["R2"], length);
+        worst.see_option("offtracking", steady.map(|steady| steady.off_tracking()), &row["offtracking"], length);
+        if let Some(steady) = steady {
+            worst.see("delta", steady.steering - number(row, "delta"), angle);
+            worst.see("R1", steady.tractor_radius - number(row, "R1"), length);
+            worst.see("RH", steady.fifth_wheel_radius - number(row, "RH"), length);
+            // In a steady turn of the simulator's own both units turn at one rate.
+            let turning = motion(&kinematic(row).rig(0.05), 5.0, steady.steering as f32, steady.articulation as f32);
+            worst.see("rates", f64::from(turning.yaw_rate - turning.trailer_yaw_rate), 1e-5);
+        }
+    }
+    worst
+}
+
+fn steady_state_limit(written: &Value) -> Worst {
+    let mut worst = Worst::default();
+    for row in rows(written) {
+        let critical = single_track(row).critical_steering();
+        worst.see("critical", critical - number(row, "delta_critical"), number(&written["tolerance"], "angle"));
+        assert!(single_track(row).at_steering(critical - 1e-3).is_some() && single_track(row).at_steering(critical + 1e-3).is_none());
+    }
+    worst
+}
+
+fn steady_envelope(written: &Value) -> Worst {
+    let mut worst = Worst::default();
+    let length = number(&written["tolerance"], "length_m");
+    for row in rows(written) {
+        // The directive's construction has the kingpin above the drive axle.
+        let track = SingleTrack { wheelbase: 3.6, fifth_wheel: 0.0, trailer_wheelbase: number(row, "L2") };
+        let steady = track.at_tractor_radius(number(row, "RH")).unwrap();
+        worst.see("R2", steady.trailer_radius - number(row, "R2"), length);
+        worst.see("inner", steady.trailer_radius - 0.5 * number(row, "width") - number(row, "r_inner"), length);
+    }
+    worst
+}
+
+fn rollover_static(written: &Value) -> Worst {
+    let mut worst = Worst::default();
+    let tolerance = |key: &str| number(&written["tolerance"], key);
+    for row in rows(written) {
+        for name in VEHICLES {
+            let load = &vehicle(name).loads[row["preset"].as_str().unwrap()];
+            assert_eq!(load.mass, number(row, "m2"));
+            let suspension = load.suspension;
+            let rigid = Suspension { roll_gain: 0.0, ..suspension };
+            worst.see("rigid", rigid.rollover_threshold() - number(row, "srt_rigid_g"), tolerance("g"));
+            worst.see("srt", suspension.rollover_threshold() - number(row, "srt_g"), tolerance("g"));
+            let ratio = suspension.quasi_static_load_transfer_ratio(0.3 * 9.81);
+            worst.see("ltr", ratio - number(row, "ltr_qs_at_0p3g"), tolerance("ltr"));
+            let keys = ["fn2", "zeta2", "hr2", "T2", "Rphi2"].map(|key| number(row, key));
+            let Suspension { roll_frequency, roll_damping, roll_centre, track, roll_gain, .. } = suspension;
+            assert_eq!([roll_frequency, roll_damping, roll_centre, track, roll_gain], keys);
+        }
+    }
+    worst
+}
+
+fn cross_check(written: &Value) -> Worst {
+    let mut worst = Worst::default();
+    let (pos, angle) = (number(&written["tolerance"], "pos"), number(&written["tolerance"], "angle"));
+    let row = |lengths: [f64; 3]| serde_json::json!({"L1": lengths[0], "a": lengths[1], "L2": lengths[2]});
+    for check in rows(written) {
+        let [x, y, delta, v, psi1, alpha] = serde_json::from_value(check["x0_kst"].clone()).unwrap();
+        let [steer_rate, a_cmd]: [f64; 2] = serde_json::from_value(check["u"].clone()).unwrap();
+        let vehicle = CaseVehicle { delta_rate: steer_rate.abs(), ..kinematic(&row([3.6, 0.0, 8.1])) };
+        let command = Command { t: 0.0, delta_cmd: 1.5_f64.copysign(steer_rate), a_cmd };
+        let state = driven(vehicle, Init { x, y, psi1, psi2: psi1 + alpha, v, delta }, command, number(check, "t"));
+        worst.see("pos", DVec2::new(state.x, state.y).distance(DVec2::new(number(check, "x"), number(check, "y"))), pos);
+        for (key, value) in [("psi1", state.psi1), ("gamma", state.gamma), ("delta", state.delta), ("v", state.v)] {
+            worst.see(key, value - number(check, key), angle);
+        }
+    }
+    worst
+}
+
+/// Least distances of a point on the drive axle and one on the trailer's axle group, both `aside` metres left of the middle, from the
+/// centre of a left turn, the front axle on a straight, an arc and a straight [m].
+fn least_radii(rig: &Rig, radius: f64, turn: f64, aside: f64) -> (f64, f64) {
+    let arc = Piece::Arc { centre: DVec2::ZERO, radius, from: -FRAC_PI_2, sweep: turn };
+    let approach = Piece::Segment { from: arc.start() - DVec2::X, to: arc.start() };
+    let departure = Piece::Segment { from: arc.end(), to: arc.end() + 30.0 * DVec2::from_angle(turn) };
+    let poses = swept_path(rig, &Curve { pieces: vec![approach, arc, departure] }, 1.0, 0.05);
+    let radius = |axle: DVec2, heading: f64| (axle + aside * DVec2::from_angle(heading).perp()).length();
+    let drive = poses.iter().map(|pose| radius(pose.position, pose.heading)).fold(f64::INFINITY, f64::min);
+    let trailer = poses.iter().map(|pose| radius(pose.trailer_position, pose.trailer_heading)).fold(f64::INFINITY, f64::min);
+    (drive, trailer)
+}
+
+fn path_follow(written: &Value) -> Worst {
+    let mut worst = Worst::default();
+    for row in rows(written) {
+        // A vehicle without a trailer pulls one that nobody looks at.
+        let length = |key: &str| row[key].as_f64().map(|feet| feet * FOOT);
+        let rig = Rig {
+            wheelbase: length("L1_ft").unwrap() as f32,
+            fifth_wheel: length("a_ft").unwrap_or(0.0) as f32,
+            trailer_wheelbase: length("L2_ft").unwrap_or(10.0) as f32,
+            ..Rig::default()
+        };
+        let radius = length("CTR_ft").or(length("R_ft")).unwrap();
+        let turn = number(row, "turn_deg") / 360.0 * TAU;
+        if let Some(width) = length("width_ft") {
+            let (drive, trailer) = least_radii(&rig, radius, turn, 0.5 * width);
+            let inside = if row["L2_ft"].is_null() { drive } else { trailer } / FOOT;
+            let tolerance = number(&written["tolerance"], "length_ft");
+            worst.see(&format!("{} published", row["vehicle"]), inside - number(row, "published_min_inside_radius_ft"), tolerance);
+            // The reference is the same equation, sampled every 5 cm here; without a trailer it looks no further than the turn's end, which
+            // leaves out the last 0.038 ft of a city bus.
+            let sampling = if row["L2_ft"].is_null() { 0.05 } else { 0.01 };
+            let error = inside - number(row, "reference_min_inside_radius_ft");
+            worst.see(&format!("{} reference", row["vehicle"]), error, sampling);
+        } else {
+            let (drive, trailer) = least_radii(&rig, radius, turn, 0.0);
+            let tolerance = number(&written["tolerance"], "length_in");
+            let inches = |least: f64| (radius - least) / FOOT * 12.0;
+            worst.see("drive axles", inches(drive) - number(row, "published_drive_in"), tolerance);
+            worst.see("trailer axles", inches(trailer) - number(row, "published_trailer_in"), tolerance);
+        }
+    }
+    worst
+}
+
+#[test]
+fn every_reference_vector_holds_within_its_own_tolerance() {
+    let mut checked = 0;
+    for case in cases() {
+        let worst = match case["kind"].as_str().unwrap() {
+            "trajectory" => trajectory(&case, |_| {}),
+            "closed_form" => closed_form(&case),
+            "steady_state" => steady_state(&case),
+            "steady_state_limit" => steady_state_limit(&case),
+            "steady_envelope" => steady_envelope(&case),
+            "rollover_static" => rollover_static(&case),
+            "cross_check" => cross_check(&case),
+            "path_follow" => path_follow(&case),
+            other => panic!("no check for {other}"),
+        };
+        println!("{}: {:.4} ({})", case["id"], worst.ratio, worst.what);
+        assert!(worst.ratio <= 1.0, "{}: {worst:?}", case["id"]);
+        checked += 1;
+    }
+    assert_eq!(checked, 30);
+}
+
+#[test]
+fn a_fifth_wheel_on_the_wrong_side_of_the_axle_fails_the_vectors() {
+    let worst = trajectory(&case("hitch_positive_same_cmd"), |case| case.vehicle.a = -case.vehicle.a);
+    assert!(1.0 < worst.ratio, "{worst:?}");
+}
+
+#[test]
+fn tyres_that_do_not_slip_fail_the_vectors() {
+    let worst = trajectory(&case("slip_roundabout_S_30"), |case| case.vehicle.K = 0.0);
+    assert!(1.0 < worst.ratio, "{worst:?}");
+}
+
+#[test]
+fn a_roll_with_the_wrong_damping_fails_the_vectors() {
+    let worst = trajectory(&case("circle_R20_30"), |case| case.vehicle.zeta2 *= 1.5);
+    assert!(1.0 < worst.ratio, "{worst:?}");
+}
+
+#[test]
+fn tyres_that_hold_seven_tenths_of_gravity_fail_the_one_vector_that_asks_for_more() {
+    let failing =
+        cases().into_iter().filter(|case| case["kind"] == "trajectory" && 1.0 < trajectory(case, |case| case.vehicle.mu = Some(0.7)).ratio);
+    let failing: Vec<String> = failing.map(|case| case["id"].as_str().unwrap().to_owned()).collect();
+    assert_eq!(failing, ["circle_paper_R9p57_30"]);
+}
+
+#[test]
+fn an_instant_between_two_sub_steps_lies_on_the_arc_and_disturbs_no_other() {
+    let mut case: Case = serde_json::from_value(case("circle_R10_20")).unwrap();
+    case.times = Some(vec![4.0]);
+    let alone = trace(&case).unwrap();
+    // A command between two sub-steps that says nothing new.
+    case.commands.push(Command { t: 1.23, ..case.commands[0].clone() });
+    case.times = Some(vec![0.07, 1.0 / 3.0, 4.0]);
+    let among = trace(&case).unwrap();
+    let radius = case.vehicle.L1 / case.init.delta.tan();
+    for state in &among.states {
+        let turned = case.init.v / radius * state.t;
+        let place = radius * DVec2::new(turned.sin(), 1.0 - turned.cos());
+        // The midpoint rule is off by 0.6 mm after 8 s.
+        assert!(DVec2::new(state.x, state.y).distance(place) < 1e-3 && (state.psi1 - turned).abs() < 1e-4, "{state:?}");
+    }
+    // One sub-step more, in two parts, rounds differently.
+    assert!((among.states[2].x - alone.states[0].x).abs() < 1e-4 && (among.states[2].psi2 - alone.states[0].psi2).abs() < 1e-5);
+}
+
+#[test]
+fn explicit_euler_at_the_same_step_fails_the_vectors() {
+    let written = case("circle_R20_30");
+    let case: Case = serde_json::from_value(written.clone()).unwrap();
+    let rig = case.vehicle.rig(case.dt);
+    let Init { mut x, mut y, mut psi1, mut psi2, v, delta } = case.init;
+    let expected = &written["expected"][1];
+    for _ in 0..(number(expected, "t") / case.dt).round() as usize {
+        let motion = motion(&rig, v as f32, delta as f32, (psi1 - psi2) as f32);
+        (x, y) = (x + case.dt * v * psi1.cos(), y + case.dt * v * psi1.sin());
+        psi1 += case.dt * f64::from(motion.yaw_rate);
+        psi2 += case.dt * f64::from(motion.trailer_yaw_rate);
+    }
+    let off = DVec2::new(x, y).distance(DVec2::new(number(expected, "x"), number(expected, "y")));
+    assert!(number(&written["tolerance"], "pos") < off, "{off}");
+}
