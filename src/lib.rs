@@ -18,3 +18,8 @@ pub mod swept; // the path of a truck that never leaves its line
 pub mod trace; // one truck, open loop, for comparison with references
 pub mod vehicle; // tractor, trailer, load
 pub mod world; // what trucks share, baked // many trucks, many steps
+
+/// The README's example, compiled and run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -182,3 +182,20 @@ fn the_sensors_see_the_road_ahead_at_the_start_of_every_route() {
         assert!(0.3 < ranges[0] && 0.3 < ranges[1], "{}", world.route_names[env]);
     }
 }
+
+#[test]
+fn a_step_allocates_nothing() {
+    let (_, world) = benchmark("attard2023");
+    let world = Arc::new(world);
+    // The counter watches one thread, so one thread does all the work.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let (steps, collecting) = pool.install(|| {
+        let mut simulator = Simulator::new(world.clone(), 64, 4, all_routes(&world)).unwrap();
+        let actions = vec![4; 64];
+        // Over 100 steps episodes end and begin, too.
+        let steps = allocation_counter::measure(|| (0..100).for_each(|_| simulator.step(&actions).unwrap()));
+        (steps, allocation_counter::measure(|| drop(simulator.batch().reward.clone())))
+    });
+    assert_eq!(steps.count_total, 0);
+    assert_eq!(collecting.count_total, 1, "the counter counts");
+}

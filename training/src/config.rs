@@ -1,0 +1,167 @@
+//! How to learn: a training file, checked. `training/configs/default.toml` says what each key means.
+
+use std::path::Path;
+
+use offtrack::scenario::Reader;
+use serde::{Deserialize, Serialize};
+
+use crate::error::Error;
+
+/// A training file. Unknown keys are refused; one in hand has been checked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// A benchmark's name, or the path of its file.
+    pub benchmark: String,
+    /// A benchmark to practise on in place of `benchmark`, on whose test routes the driver is examined all the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub practice: Option<String>,
+    /// What routes, poses, networks, actions and samples are drawn from.
+    pub seed: u32,
+    /// Trucks that drive at once.
+    pub n_envs: usize,
+    /// Time to learn for [min].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub minutes: Option<f64>,
+    /// Env steps to learn for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steps: Option<u64>,
+    /// What is kept of the past.
+    pub memory: Memory,
+    /// How it is learned from.
+    pub learning: Learning,
+}
+
+/// What is kept of the past.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Memory {
+    /// Transitions held.
+    pub capacity: usize,
+    /// Transitions before the first update.
+    pub warmup: usize,
+}
+
+/// How transitions are learned from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Learning {
+    /// Sizes of the hidden layers of actor and critics.
+    pub hidden: Vec<usize>,
+    /// Transitions in an update.
+    pub batch: usize,
+    /// Updates after each step of all trucks.
+    pub updates_per_step: usize,
+    /// Steps whose rewards are summed before the value takes over.
+    pub n_steps: usize,
+    /// Weight of the next step beside this one.
+    pub discount: f64,
+    /// What rewards are multiplied by.
+    pub reward_scale: f64,
+    /// Adam's learning rate of the actor.
+    pub actor_rate: f64,
+    /// Adam's learning rate of the critics.
+    pub critic_rate: f64,
+    /// How the two critics' values become one.
+    pub critics: Critics,
+    /// How far the target critics move toward the critics at a time; 1 copies them.
+    pub target_rate: f64,
+    /// Updates from one such move to the next.
+    pub target_every: usize,
+    /// How far the policy that is kept moves toward the actor in each update.
+    pub average_rate: f64,
+    /// The entropy beside the reward.
+    pub entropy: Entropy,
+}
+
+/// How the two critics' values become one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Critics {
+    /// Their average.
+    Average,
+    /// The lower of the two.
+    Lowest,
+}
+
+/// The entropy beside the reward.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entropy {
+    /// Entropy that the weight is led to, as a share of the most that there can be; without it the weight stays.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub share: Option<f64>,
+    /// Weight of the entropy, at the beginning or for good.
+    pub weight: f64,
+    /// Adam's learning rate of the weight's logarithm.
+    pub rate: f64,
+}
+
+impl Config {
+    /// Reads a training file. Everything that can be wrong with it is found here, with its key.
+    pub fn read(path: &Path) -> Result<Config, Error> {
+        let (reader, config) = Reader::read::<Config>(path)?;
+        config.check(&reader)?;
+        Ok(config)
+    }
+
+    /// What the command line says in place of the file.
+    pub fn override_with(&mut self, seed: Option<u32>, minutes: Option<f64>, steps: Option<u64>, envs: Option<usize>) -> Result<(), Error> {
+        self.seed = seed.unwrap_or(self.seed);
+        self.n_envs = envs.unwrap_or(self.n_envs);
+        if minutes.is_some() || steps.is_some() {
+            (self.minutes, self.steps) = (minutes, steps);
+        }
+        self.check(&Reader::of(Path::new("command line")))
+    }
+
+    /// The file that this config would be read from.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("numbers, words and lists of numbers can all be written as TOML")
+    }
+
+    fn check(&self, reader: &Reader) -> Result<(), Error> {
+        let Config { memory, learning, .. } = self;
+        reader.count("n_envs", self.n_envs, 1..=65_536)?;
+        if let Some(minutes) = self.minutes {
+            reader.within("minutes", minutes, 0.01..=100_000.0, "min")?;
+        }
+        if let Some(steps) = self.steps {
+            reader.within("steps", steps as f64, 1.0..=1e12, "")?;
+        }
+        if self.minutes.is_none() && self.steps.is_none() {
+            return Err(reader.invalid("minutes", "missing", "`minutes`, `steps` or both must say when to stop").into());
+        }
+        reader.count("memory.capacity", memory.capacity, 1_000..=100_000_000)?;
+        reader.count("memory.warmup", memory.warmup, 1..=memory.capacity)?;
+        reader.count("learning.hidden", learning.hidden.len(), 1..=8)?;
+        for (index, &size) in learning.hidden.iter().enumerate() {
+            reader.count(&format!("learning.hidden[{index}]"), size, 1..=8192)?;
+        }
+        reader.count("learning.batch", learning.batch, 2..=1 << 20)?;
+        reader.count("learning.updates_per_step", learning.updates_per_step, 1..=1000)?;
+        reader.count("learning.n_steps", learning.n_steps, 1..=100)?;
+        // A ring of fewer slots than that would hold no step that enough others follow.
+        let slots = memory.capacity / self.n_envs;
+        if slots <= learning.n_steps {
+            let expected = format!("must hold more than learning.n_steps = {} steps of n_envs = {} trucks", learning.n_steps, self.n_envs);
+            return Err(reader.invalid("memory.capacity", memory.capacity, expected).into());
+        }
+        reader.within("learning.discount", learning.discount, 0.0..=0.9999, "")?;
+        reader.within("learning.reward_scale", learning.reward_scale, 1e-6..=1e6, "")?;
+        reader.within("learning.actor_rate", learning.actor_rate, 1e-8..=1.0, "")?;
+        reader.within("learning.critic_rate", learning.critic_rate, 1e-8..=1.0, "")?;
+        reader.within("learning.target_rate", learning.target_rate, 1e-6..=1.0, "")?;
+        reader.count("learning.target_every", learning.target_every, 1..=1_000_000)?;
+        reader.within("learning.average_rate", learning.average_rate, 1e-6..=1.0, "")?;
+        if let Some(share) = learning.entropy.share {
+            reader.within("learning.entropy.share", share, 0.0..=1.0, "")?;
+        }
+        reader.within("learning.entropy.weight", learning.entropy.weight, 1e-9..=1e3, "")?;
+        reader.within("learning.entropy.rate", learning.entropy.rate, 1e-8..=1.0, "")?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

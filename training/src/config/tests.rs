@@ -1,0 +1,113 @@
+use super::*;
+use crate::files;
+
+fn default_file() -> String {
+    std::fs::read_to_string(files::repository().join("training/configs/default.toml")).unwrap()
+}
+
+/// What reading `text` as a training file gives.
+fn read(text: &str) -> Result<Config, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("fast.toml");
+    std::fs::write(&file, text).unwrap();
+    Config::read(&file).map_err(|error| {
+        let message = error.to_string();
+        assert!(message.starts_with(file.to_str().unwrap()), "{message}");
+        assert_eq!(error.exit_code(), 2);
+        message
+    })
+}
+
+/// The default file with the line of `key` changed; an empty line takes it out.
+fn with(key: &str, line: &str) -> Result<Config, String> {
+    let mut changed = 0;
+    let text = default_file();
+    let lines: Vec<&str> = text
+        .lines()
+        .map(|old| {
+            let found = old.strip_prefix(key).is_some_and(|rest| rest.starts_with(" ="));
+            changed += usize::from(found);
+            if found { line } else { old }
+        })
+        .collect();
+    assert_eq!(changed, 1, "{key}");
+    read(&lines.join("\n"))
+}
+
+#[test]
+fn the_default_file_reads_and_is_written_back_the_same() {
+    let config = read(&default_file()).unwrap();
+    assert_eq!(read(&config.to_toml()).unwrap(), config);
+}
+
+#[test]
+fn every_value_out_of_its_range_is_refused_with_its_key_and_what_would_do() {
+    let out_of_range = [
+        ("n_envs", "n_envs = 0", "n_envs: 0; must lie in 1..65536"),
+        ("minutes", "minutes = 0.0", "minutes: 0 min; must lie in 0.01..100000 min"),
+        ("minutes", "minutes = nan", "minutes: NaN min"),
+        ("minutes", "minutes = 1.0\nsteps = 0", "steps: 0; must lie in"),
+        ("capacity", "capacity = 10", "memory.capacity: 10; must lie in 1000.."),
+        ("warmup", "warmup = 0", "memory.warmup: 0; must lie in 1.."),
+        ("warmup", "warmup = 90000000", "memory.warmup: 90000000; must lie in 1.."),
+        ("hidden", "hidden = []", "learning.hidden: 0; must lie in 1..8"),
+        ("hidden", "hidden = [64, 0]", "learning.hidden[1]: 0; must lie in 1..8192"),
+        ("batch", "batch = 1", "learning.batch: 1; must lie in 2.."),
+        ("updates_per_step", "updates_per_step = 0", "learning.updates_per_step: 0; must lie in 1.."),
+        ("n_steps", "n_steps = 0", "learning.n_steps: 0; must lie in 1..100"),
+        ("discount", "discount = 1.0", "learning.discount: 1; must lie in 0..0.9999"),
+        ("discount", "discount = -0.1", "learning.discount: -0.1; must lie in 0..0.9999"),
+        ("reward_scale", "reward_scale = 0.0", "learning.reward_scale: 0; must lie in"),
+        ("actor_rate", "actor_rate = 0.0", "learning.actor_rate: 0; must lie in"),
+        ("critic_rate", "critic_rate = inf", "learning.critic_rate: inf; must lie in"),
+        ("target_rate", "target_rate = 1.5", "learning.target_rate: 1.5; must lie in"),
+        ("target_every", "target_every = 0", "learning.target_every: 0; must lie in"),
+        ("average_rate", "average_rate = 0.0", "learning.average_rate: 0; must lie in"),
+        ("share", "share = 1.1", "learning.entropy.share: 1.1; must lie in 0..1"),
+        ("weight", "weight = 0.0", "learning.entropy.weight: 0; must lie in"),
+        ("rate", "rate = -1.0", "learning.entropy.rate: -1; must lie in"),
+    ];
+    for (key, line, expected) in out_of_range {
+        let message = with(key, line).unwrap_err();
+        assert!(message.contains(expected), "{line}: {message}");
+    }
+}
+
+#[test]
+fn a_key_that_is_unknown_missing_or_of_another_type_is_refused_by_its_name() {
+    for (key, line, expected) in [
+        ("batch", "bacth = 512", "unknown field `bacth`"),
+        ("batch", "", "missing field `batch`"),
+        ("batch", "batch = -4", "invalid value"),
+        ("seed", "seed = 4294967296", "invalid value"),
+        ("critics", "critics = \"mean\"", "unknown variant `mean`"),
+        ("hidden", "hidden = 256", "invalid type"),
+    ] {
+        let message = with(key, line).unwrap_err();
+        assert!(message.contains(expected), "{line}: {message}");
+    }
+}
+
+#[test]
+fn a_run_that_nothing_would_end_is_refused() {
+    let message = with("minutes", "").unwrap_err();
+    assert!(message.contains("`minutes`, `steps` or both"), "{message}");
+    assert!(with("minutes", "steps = 1000").is_ok());
+}
+
+#[test]
+fn a_memory_too_short_for_its_trucks_is_refused() {
+    let text = default_file().replace("n_envs = 128", "n_envs = 65536").replace("capacity = 600000", "capacity = 196608");
+    let message = read(&text).unwrap_err();
+    // Three slots can hold no step that three others follow.
+    assert!(message.contains("memory.capacity: 196608; must hold more than learning.n_steps = 3"), "{message}");
+}
+
+#[test]
+fn what_the_command_line_says_wins_and_a_budget_there_replaces_both() {
+    let mut config = with("minutes", "minutes = 5.0\nsteps = 7").unwrap();
+    config.override_with(Some(3), None, Some(1000), Some(16)).unwrap();
+    assert_eq!((config.seed, config.n_envs, config.minutes, config.steps), (3, 16, None, Some(1000)));
+    let message = config.override_with(None, None, None, Some(0)).unwrap_err().to_string();
+    assert!(message.contains("n_envs: 0; must lie in 1..65536"), "{message}");
+}

@@ -1,0 +1,85 @@
+//! What can go wrong in a command, and the exit code that says so: 2 for wrong input, 1 for a failure.
+
+use std::path::{Path, PathBuf};
+
+/// Why a command stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A scenario, vehicle or roundabout file is wrong.
+    #[error(transparent)]
+    Scenario(#[from] offtrack::scenario::Error),
+    /// A batch was asked for that cannot be.
+    #[error(transparent)]
+    Simulator(#[from] offtrack::simulator::Error),
+    /// A command-line argument makes no sense.
+    #[error("{flag}: {value}; {expected}")]
+    Flag {
+        /// The argument's name.
+        flag: &'static str,
+        /// What was given.
+        value: String,
+        /// What would do.
+        expected: String,
+    },
+    /// A file that a command was pointed to has wrong contents.
+    #[error("{}: {message}", file.display())]
+    Contents {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it and what would do.
+        message: String,
+    },
+    /// A file that a command was pointed to cannot be read.
+    #[error("{}: cannot be read: {source}", file.display())]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A result cannot be written.
+    #[error("{}: cannot be written: {source}", file.display())]
+    Write {
+        /// The file or folder.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The learner's threads cannot be started.
+    #[error("threads to learn with cannot be started: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The learner has broken down.
+    #[error("{what} is {value} after {env_steps} env steps: the learner has broken down; {} keeps the last policy saved before", folder.display())]
+    Diverged {
+        /// Which figure.
+        what: &'static str,
+        /// Its value, no number.
+        value: f32,
+        /// Env steps taken.
+        env_steps: u64,
+        /// The run's folder.
+        folder: PathBuf,
+    },
+}
+
+impl Error {
+    /// What the process exits with.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Write { .. } | Error::Threads(_) | Error::Diverged { .. } => 1,
+            _ => 2,
+        }
+    }
+
+    /// For `map_err` on a file being written.
+    pub fn write(file: &Path) -> impl FnOnce(std::io::Error) -> Error {
+        let file = file.to_owned();
+        move |source| Error::Write { file, source }
+    }
+
+    /// For `map_err` on a file being read.
+    pub fn read(file: &Path) -> impl FnOnce(std::io::Error) -> Error {
+        let file = file.to_owned();
+        move |source| Error::Read { file, source }
+    }
+}

@@ -1,0 +1,247 @@
+//! Examines a driver: every route of a split, so many episodes each, every one counted.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::Vec2;
+use indicatif::{ProgressBar, ProgressStyle};
+use offtrack::angle::wrapped;
+use offtrack::layout::{Ended, Rig, Truck};
+use offtrack::scenario::{Scenario, Split};
+use offtrack::simulator::{Batch, RouteChoice, Simulator};
+use offtrack::swept::{own_lane_suffices, swept_path};
+use offtrack::world::World;
+
+use crate::drivers::{Chance, Driver, Learned, Pursuit};
+use crate::error::Error;
+use crate::files;
+use crate::policy::Policy;
+use crate::report::{Episode, Report, RouteReport, Summary};
+
+/// Examine a driver on a benchmark's routes.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A policy file, `pursuit` (pure pursuit of the centre line) or `random`.
+    #[arg(long)]
+    policy: String,
+    /// A benchmark's name, or the path of its file.
+    #[arg(long, default_value = "attard2023")]
+    benchmark: String,
+    /// Which routes: `test` (never learned on) or `train`.
+    #[arg(long, default_value = "test", value_parser = ["test", "train"])]
+    split: String,
+    /// Episodes on each route.
+    #[arg(long, default_value_t = 30)]
+    episodes: usize,
+    /// What the start poses are drawn from.
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
+    /// Write the report to this file as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// With `pursuit`: distance to the point pursued [m].
+    #[arg(long, default_value_t = PURSUIT_LOOK_AHEAD, allow_negative_numbers = true)]
+    look_ahead: f32,
+}
+
+/// The best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of attard2023 [m].
+pub const PURSUIT_LOOK_AHEAD: f32 = 7.0;
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Error> {
+    if !(1.0..=50.0).contains(&args.look_ahead) {
+        let value = format!("{} m", args.look_ahead);
+        return Err(Error::Flag { flag: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
+    }
+    if !(1..=100_000).contains(&args.episodes) {
+        return Err(Error::Flag { flag: "--episodes", value: args.episodes.to_string(), expected: "must lie in 1..100000".into() });
+    }
+    let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
+    let world = Arc::new(World::bake(&scenario));
+    let mut driver: Box<dyn Driver> = match args.policy.as_str() {
+        "pursuit" => Box::new(Pursuit { look_ahead: args.look_ahead }),
+        "random" => Box::new(Chance { seed: args.seed }),
+        file => {
+            let policy = Policy::load(Path::new(file))?;
+            policy.check(&world, Path::new(file))?;
+            Box::new(Learned { name: file.to_owned(), policy })
+        }
+    };
+    let split = if args.split == "train" { Split::Train } else { Split::Test };
+    let report = examine(&scenario, &world, split, args.episodes, args.seed, driver.as_mut())?;
+    if let Some(file) = &args.json {
+        files::write_json(file, &report)?;
+    }
+    files::print(&report.table())
+}
+
+/// Runs `episodes` episodes on every route of `split`, all at once, each truck once.
+pub fn examine(
+    scenario: &Scenario,
+    world: &Arc<World>,
+    split: Split,
+    episodes: usize,
+    seed: u32,
+    driver: &mut dyn Driver,
+) -> Result<Report, Error> {
+    let routes = scenario.split(split);
+    if routes.is_empty() {
+        let value = split.name().to_owned();
+        return Err(Error::Flag { flag: "--split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
+    }
+    let trucks: Vec<u32> = routes.iter().flat_map(|&route| std::iter::repeat_n(route, episodes)).collect();
+    let mut simulator = Simulator::new(world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?;
+    let mut running: Vec<Running> = simulator.batch().truck.iter().map(|truck| Running::new(&world.params.rig, truck)).collect();
+    let bar = ProgressBar::new(running.len() as u64).with_style(
+        ProgressStyle::with_template("evaluating {bar:30} {pos}/{len} episodes, {elapsed}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    let mut actions = Vec::new();
+    let mut finished: Vec<Option<Episode>> = vec![None; running.len()];
+    while finished.iter().any(Option::is_none) {
+        driver.act(world, simulator.batch(), &mut actions);
+        simulator.step(&actions)?;
+        let batch = simulator.batch();
+        for (env, (running, finished)) in running.iter_mut().zip(&mut finished).enumerate() {
+            if finished.is_none() && running.follow(&world.params.rig, batch, env) {
+                *finished = Some(running.finish(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running)));
+                bar.inc(1);
+            }
+        }
+    }
+    bar.finish_and_clear();
+    let finished: Vec<Episode> = finished.into_iter().flatten().collect();
+    Ok(summarised(scenario, world, split, seed, driver.name(), &finished, episodes))
+}
+
+fn summarised(scenario: &Scenario, world: &World, split: Split, seed: u32, policy: &str, finished: &[Episode], per_route: usize) -> Report {
+    let rig = &world.params.rig;
+    let own_lane: Vec<bool> = scenario
+        .routes()
+        .map(|(place, route)| {
+            let kerbs = scenario.places[place].roundabout.kerbs(scenario.gutter);
+            own_lane_suffices(rig, &kerbs, &swept_path(rig, &route.centre_line, scenario.cruising_speed(), 0.25))
+        })
+        .collect();
+    let routes = scenario.split(split);
+    let chunks = || routes.iter().map(|&route| route as usize).zip(finished.chunks(per_route));
+    let of_routes = |suffices: bool| {
+        let kept: Vec<&Episode> = chunks().filter(|&(route, _)| own_lane[route] == suffices).flat_map(|(_, chunk)| chunk).collect();
+        Summary::of(kept.into_iter(), scenario.step)
+    };
+    let route_reports = chunks().filter_map(|(route, chunk)| {
+        let summary = Summary::of(chunk.iter(), scenario.step)?;
+        Some(RouteReport { name: world.route_names[route].clone(), own_lane_suffices: own_lane[route], summary })
+    });
+    Report {
+        benchmark: scenario.name.clone(),
+        split: split.name(),
+        policy: policy.to_owned(),
+        seed,
+        engine: "cpu".to_owned(),
+        summary: Summary::of(finished.iter(), scenario.step).expect("a split has a route and a route an episode: both were checked"),
+        own_lane_suffices: of_routes(true),
+        needs_deviation: of_routes(false),
+        routes: route_reports.collect(),
+    }
+}
+
+/// One truck's episode while it runs.
+struct Running {
+    steps: u32,
+    reward: f64,
+    lane_distance_sum: f64,
+    episode: Episode,
+    /// Where the front axle was, first a point far behind the start: the trailer's axle is measured against it.
+    front_path: Vec<Vec2>,
+    trailer_path: Vec<Vec2>,
+}
+
+impl Running {
+    fn new(rig: &Rig, truck: &Truck) -> Running {
+        let front = front_axle(rig, truck);
+        let ahead = Vec2::from_angle(truck.heading);
+        Running {
+            steps: 0,
+            reward: 0.0,
+            lane_distance_sum: 0.0,
+            episode: Episode {
+                ended: Ended::Running,
+                steps: 0,
+                reward: 0.0,
+                lane_distance_mean: 0.0,
+                lane_distance_max: 0.0,
+                tractor_clearance_min: f64::INFINITY,
+                trailer_clearance_min: f64::INFINITY,
+                load_transfer_ratio_peak: 0.0,
+                articulation_peak: 0.0,
+                off_tracking_peak: 0.0,
+            },
+            front_path: vec![front - 2.0 * (rig.wheelbase + rig.trailer_wheelbase) * ahead, front],
+            trailer_path: Vec::new(),
+        }
+    }
+
+    /// Takes the step just made into account; true when it was the episode's last.
+    fn follow(&mut self, rig: &Rig, batch: &Batch, env: usize) -> bool {
+        let (truck, progress, clearance) = (&batch.truck[env], &batch.progress[env], &batch.clearance[env]);
+        let raise = |peak: &mut f64, value: f32| *peak = peak.max(f64::from(value));
+        let lower = |least: &mut f64, value: f32| *least = least.min(f64::from(value));
+        self.steps += 1;
+        self.reward += f64::from(batch.reward[env]);
+        self.lane_distance_sum += f64::from(progress.lane_distance);
+        raise(&mut self.episode.lane_distance_max, progress.lane_distance);
+        lower(&mut self.episode.tractor_clearance_min, clearance.tractor);
+        lower(&mut self.episode.trailer_clearance_min, clearance.trailer);
+        raise(&mut self.episode.load_transfer_ratio_peak, truck.tractor_load_transfer_ratio.abs());
+        raise(&mut self.episode.load_transfer_ratio_peak, truck.trailer_load_transfer_ratio.abs());
+        raise(&mut self.episode.articulation_peak, wrapped(truck.heading - truck.trailer_heading).abs());
+        self.front_path.push(front_axle(rig, truck));
+        self.trailer_path.push(truck.trailer_position(rig));
+        batch.ended[env] != Ended::Running as u32
+    }
+
+    fn finish(&self, ended: Ended) -> Episode {
+        Episode {
+            ended,
+            steps: self.steps,
+            reward: self.reward,
+            lane_distance_mean: self.lane_distance_sum / f64::from(self.steps.max(1)),
+            off_tracking_peak: off_tracking(&self.front_path, &self.trailer_path),
+            ..self.episode.clone()
+        }
+    }
+}
+
+/// Middle of the front axle [m].
+fn front_axle(rig: &Rig, truck: &Truck) -> Vec2 {
+    truck.position + rig.wheelbase * Vec2::from_angle(truck.heading)
+}
+
+/// Largest distance of a point of `trailer` from the path `front` [m]. The trailer passes along the path in order, so the search for the
+/// nearest stretch only ever moves on.
+fn off_tracking(front: &[Vec2], trailer: &[Vec2]) -> f64 {
+    let distance = |point: Vec2, index: usize| f64::from(offtrack::cpu::follow::distance_to_segment(point, front[index], front[index + 1]));
+    let mut index = 0;
+    let mut most = 0.0f64;
+    for &point in trailer {
+        while index + 2 < front.len() && distance(point, index + 1) <= distance(point, index) {
+            index += 1;
+        }
+        most = most.max(distance(point, index));
+    }
+    most
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trailer_on_a_smaller_circle_is_off_by_the_difference_of_the_radii() {
+        let circle = |radius: f32, lag: f32| (0..200).map(move |i| radius * Vec2::from_angle(0.02 * i as f32 - lag)).collect::<Vec<_>>();
+        let (front, trailer) = (circle(20.0, 0.0), circle(18.0, 0.5));
+        // The chords of the path lie up to 1 mm inside its circle. The first points lie behind the path's beginning.
+        assert!((off_tracking(&front, &trailer[30..]) - 2.0).abs() < 2e-3);
+    }
+}

@@ -1,0 +1,66 @@
+//! The command line: reads what is asked for, prints an error and chooses the exit code (2 for wrong input, 1 for a failure).
+
+mod bench;
+mod bridge;
+mod config;
+mod deviations;
+mod draw;
+mod drivers;
+mod error;
+mod evaluate;
+mod files;
+mod memory;
+mod network;
+mod policy;
+mod report;
+mod sac;
+mod scaling;
+mod trace;
+mod train;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// A large batch's tensors come and go thousands of times a second; the system's allocator takes a third of an update's time.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+/// Tractor-trailers learn to drive through roundabouts. Without a command: `train`.
+#[derive(Debug, Parser)]
+#[command(version, about)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Train(train::Args),
+    Evaluate(evaluate::Args),
+    Bench(bench::Args),
+    Draw(draw::Args),
+    Trace(trace::Args),
+    Deviations(deviations::Args),
+}
+
+fn main() -> ExitCode {
+    let command = Cli::parse().command.unwrap_or(Command::Train(train::Args::default()));
+    let done = match &command {
+        Command::Train(args) => train::run(args),
+        Command::Evaluate(args) => evaluate::run(args),
+        Command::Bench(args) => bench::run(args),
+        Command::Draw(args) => draw::run(args),
+        Command::Trace(args) => trace::run(args),
+        Command::Deviations(args) => deviations::run(args),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // Where nobody reads it, the exit code still tells.
+            let _ = writeln!(std::io::stderr(), "offtrack: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}

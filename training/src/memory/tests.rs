@@ -1,0 +1,112 @@
+use super::*;
+use rand::SeedableRng;
+use rand::rngs::SmallRng;
+
+const DISCOUNT: f32 = 0.9;
+
+/// The history of one truck: each step's reward and end. Step `t` is observed as `t`, and leads to `1000 + t`.
+type History = Vec<(f32, Ended)>;
+
+/// Two trucks whose episodes end at different steps in different ways.
+fn histories(n_steps: usize) -> [History; 2] {
+    let of = |period: usize, offset: usize| -> History {
+        let ends = [Ended::Arrived, Ended::TimedOut, Ended::TrailerCollided, Ended::TimedOut];
+        let end = |step: usize| if step % period == period - 1 { ends[step / period % 4] } else { Ended::Running };
+        (0..n_steps).map(|step| ((step * 7 + offset) as f32 % 5.0 - 2.0, end(step))).collect()
+    };
+    [of(5, 0), of(7, 3)]
+}
+
+fn filled(histories: &[History; 2], capacity: usize) -> Memory<2> {
+    let mut memory = Memory::new(2, capacity);
+    for (step, (first, second)) in histories[0].iter().zip(&histories[1]).enumerate() {
+        let of = |value: usize| [0, 1].map(|env| [value as f32, env as f32]);
+        memory.append(Rows {
+            observation: &of(step),
+            action: &[step as u32, step as u32 + 1],
+            reward: &[first.0, second.0],
+            ended: &[first.1 as u32, second.1 as u32],
+            next_observation: &of(1000 + step),
+        });
+    }
+    memory
+}
+
+/// The n-step return as its definition reads, from one truck's whole history: (reward, discount, observed next).
+fn reference(history: &History, start: usize, n_steps: usize) -> (f32, f32, Option<f32>) {
+    let mut reward = 0.0;
+    for n in 0..n_steps {
+        let (step_reward, ended) = history[start + n];
+        reward += DISCOUNT.powi(n as i32) * step_reward;
+        if ended.terminated() {
+            return (reward, 0.0, None);
+        }
+        if ended.truncated() {
+            return (reward, DISCOUNT.powi(n as i32 + 1), Some((1000 + start + n) as f32));
+        }
+    }
+    (reward, DISCOUNT.powi(n_steps as i32), Some((start + n_steps) as f32))
+}
+
+fn check(memory: &Memory<2>, histories: &[History; 2], n_steps: usize) -> Vec<usize> {
+    let sample = memory.sample(4000, n_steps, DISCOUNT, &mut SmallRng::seed_from_u64(1));
+    let mut starts = Vec::new();
+    for row in 0..4000 {
+        let [step, env] = sample.observation[row].map(|value| value as usize);
+        let (reward, discount, next) = reference(&histories[env], step, n_steps);
+        assert_eq!(sample.action[row] as usize, step + env);
+        // Two orders of multiplying up to five factors.
+        assert!((sample.reward[row] - reward).abs() < 1e-5, "step {step} of {env}");
+        assert!((sample.discount[row] - discount).abs() < 1e-6, "step {step} of {env}");
+        if let Some(next) = next {
+            assert_eq!(sample.next_observation[row], [next, env as f32], "step {step} of {env}");
+        }
+        starts.push(step);
+    }
+    starts.sort_unstable();
+    starts.dedup();
+    starts
+}
+
+#[test]
+fn returns_over_several_steps_equal_their_definition() {
+    let histories = histories(60);
+    for n_steps in [1, 2, 5] {
+        let starts = check(&filled(&histories, 200), &histories, n_steps);
+        assert_eq!(starts, (0..60 - n_steps).collect::<Vec<_>>(), "every step that enough others follow can be drawn");
+    }
+}
+
+#[test]
+fn a_full_ring_holds_the_latest_steps_alone() {
+    let histories = histories(103);
+    let memory = filled(&histories, 40);
+    assert_eq!(memory.len(), 40);
+    // 20 slots, the last three of which nothing follows far enough.
+    assert_eq!(check(&memory, &histories, 3), (83..100).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_forgotten_time_out_leaves_nothing_behind() {
+    let histories = histories(1000);
+    let memory = filled(&histories, 40);
+    let held = memory.after.iter().filter(|&&after| after == After::Cut).count();
+    assert!(0 < held);
+    assert_eq!(memory.cut.len(), held);
+}
+
+#[test]
+fn only_a_followed_step_can_be_drawn() {
+    let histories = histories(4);
+    let memory = filled(&histories, 40);
+    assert!(memory.can_sample(3));
+    assert!(!memory.can_sample(4));
+}
+
+#[test]
+fn the_same_seed_draws_the_same_sample() {
+    let memory = filled(&histories(60), 200);
+    let draw = |seed| memory.sample(50, 3, DISCOUNT, &mut SmallRng::seed_from_u64(seed));
+    assert_eq!(draw(4), draw(4));
+    assert_ne!(draw(4), draw(5));
+}

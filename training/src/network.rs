@@ -1,0 +1,102 @@
+//! The network of actor and critics alike: a stack of linear layers with rectifiers between them.
+
+use burn::module::{Module, Param};
+use burn::nn::Linear;
+use burn::tensor::activation::{log_softmax, relu};
+use burn::tensor::{Device, Tensor, TensorData};
+use rand::Rng;
+
+/// Linear layers, a rectifier after each but the last.
+#[derive(Module, Debug, Default)]
+pub struct Mlp {
+    /// The layers, from the observation on; weights are `[inputs, outputs]`.
+    pub layers: Vec<Linear>,
+}
+
+impl Mlp {
+    /// Layers between the given sizes. Weights are drawn from He's uniform distribution ("Delving Deep into Rectifiers", 2015), those of the
+    /// last layer times `last_gain`; biases are 0.
+    pub fn new(sizes: &[usize], last_gain: f32, rng: &mut impl Rng, device: &Device) -> Mlp {
+        let n_layers = sizes.len() - 1;
+        let layers = sizes.windows(2).enumerate().map(|(index, ends)| {
+            let [inputs, outputs] = [ends[0], ends[1]];
+            let gain = if index + 1 == n_layers { last_gain } else { 1.0 };
+            let limit = gain * (6.0 / inputs as f32).sqrt();
+            let weights: Vec<f32> = (0..inputs * outputs).map(|_| limit * rng.random_range(-1.0..1.0f32)).collect();
+            layer(weights, vec![0.0; outputs], device)
+        });
+        Mlp { layers: layers.collect() }
+    }
+
+    /// From an observation `[B, inputs]` to one value an action `[B, A]`.
+    pub fn forward(&self, observation: Tensor<2>) -> Tensor<2> {
+        let mut layers = self.layers.iter();
+        let first = layers.next().map(|layer| layer.forward(observation.clone()));
+        layers.fold(first.unwrap_or(observation), |hidden, layer| layer.forward(relu(hidden)))
+    }
+
+    /// Moved toward `other` by `rate`, 1 making it a copy. `other` may carry gradients, the result does not.
+    pub fn toward(&self, other: &Mlp, rate: f64) -> Mlp {
+        let layers = self.layers.iter().zip(&other.layers).map(|(own, other)| Linear {
+            weight: blend(&own.weight, &other.weight, rate),
+            bias: own.bias.as_ref().zip(other.bias.as_ref()).map(|(own, other)| blend(own, other, rate)),
+        });
+        Mlp { layers: layers.collect() }
+    }
+}
+
+/// A layer with the given weights `[inputs, outputs]` and biases `[outputs]`.
+pub fn layer(weights: Vec<f32>, biases: Vec<f32>, device: &Device) -> Linear {
+    let shape = [weights.len() / biases.len(), biases.len()];
+    Linear {
+        weight: Param::from_data(TensorData::new(weights, shape), device),
+        bias: Some(Param::from_data(TensorData::new(biases, [shape[1]]), device)),
+    }
+}
+
+/// Probabilities and their logarithms, `[B, A]` each, of an actor's output `[B, A]`.
+pub fn distribution(logits: Tensor<2>) -> (Tensor<2>, Tensor<2>) {
+    let log_probs = log_softmax(logits, 1);
+    (log_probs.clone().exp(), log_probs)
+}
+
+fn blend<const D: usize>(own: &Param<Tensor<D>>, other: &Param<Tensor<D>>, rate: f64) -> Param<Tensor<D>> {
+    Param::initialized(own.id, own.val().inner().mul_scalar(1.0 - rate) + other.val().inner().mul_scalar(rate))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand::rngs::SmallRng;
+
+    fn weights(network: &Mlp) -> Vec<f32> {
+        network.layers.iter().flat_map(|layer| layer.weight.val().into_data().try_to_vec::<f32>().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_rectifier_stands_between_the_layers_and_none_after_the_last() {
+        let device = Device::flex();
+        let network = Mlp { layers: vec![layer(vec![1.0, -1.0], vec![0.0, 0.5], &device), layer(vec![-2.0, 3.0], vec![1.0], &device)] };
+        let output = network.forward(Tensor::from_data([[2.0], [-1.0]], &device));
+        // relu(2), relu(-1.5) -> -4 + 0 + 1; relu(-1), relu(1.5) -> 0 + 4.5 + 1.
+        assert_eq!(output.into_data().try_to_vec::<f32>().unwrap(), [-3.0, 5.5]);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_network() {
+        let network = |seed| Mlp::new(&[4, 8, 2], 1.0, &mut SmallRng::seed_from_u64(seed), &Device::flex());
+        assert_eq!(weights(&network(1)), weights(&network(1)));
+        assert_ne!(weights(&network(1)), weights(&network(2)));
+    }
+
+    #[test]
+    fn moving_toward_a_network_goes_part_of_the_way_or_all_of_it() {
+        let device = Device::flex();
+        let of = |weight: f32| Mlp { layers: vec![layer(vec![weight], vec![-weight], &device)] };
+        let moved = of(1.0).toward(&of(3.0), 0.25);
+        assert_eq!(weights(&moved), [1.5]);
+        assert_eq!(moved.layers[0].bias.as_ref().unwrap().val().into_data().try_to_vec::<f32>().unwrap(), [-1.5]);
+        assert_eq!(weights(&of(1.0).toward(&of(3.0), 1.0)), [3.0]);
+    }
+}

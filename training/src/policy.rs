@@ -1,0 +1,129 @@
+//! What was learned: an actor with all that it takes to drive with it, in one file.
+//!
+//! The file is in the safetensors format, which other programs read too: the weights, and under the key `offtrack` of its metadata the
+//! action table, the benchmark and a checksum over all of it.
+
+mod file;
+
+use std::path::Path;
+
+use burn::tensor::Device;
+use offtrack::layout::{Action, N_VALUES};
+use offtrack::world::World;
+use rand::Rng;
+
+use crate::bridge;
+use crate::error::Error;
+use crate::files;
+use crate::network::{Mlp, layer};
+use crate::scaling::Scaling;
+use file::Contents;
+
+/// How far apart two entries of an action table may lie and still be the same, relative: f32 rounds at 6e-8.
+const SAME_ACTION: f32 = 1e-5;
+
+/// An actor that can drive.
+#[derive(Debug)]
+pub struct Policy {
+    /// The benchmark it learned on.
+    pub benchmark: String,
+    /// The action table that its output refers to.
+    pub actions: Vec<Action>,
+    /// How observations are scaled for it.
+    pub scaling: Scaling,
+    /// The network, without gradients.
+    pub actor: Mlp,
+}
+
+impl Policy {
+    /// The action that the actor holds for best for each observation, `[rows]`.
+    pub fn act(&self, observations: &[[f32; N_VALUES]]) -> Vec<u32> {
+        greedy(&bridge::logits(&self.actor, &self.scaling, observations), self.actions.len())
+    }
+
+    /// Reads a policy file. One that is cut, changed, or was never one is refused.
+    pub fn load(file: &Path) -> Result<Policy, Error> {
+        let bytes = std::fs::read(file).map_err(Error::read(file))?;
+        let contents = Contents::from_bytes(&bytes).map_err(|message| Error::Contents { file: file.to_owned(), message })?;
+        let device = Device::flex();
+        Ok(Policy {
+            benchmark: contents.benchmark,
+            actions: contents.actions.iter().map(|&[steering, speed]| Action { steering, speed }).collect(),
+            scaling: contents.scaling,
+            actor: Mlp { layers: contents.layers.into_iter().map(|(weights, biases)| layer(weights, biases, &device)).collect() },
+        })
+    }
+
+    /// Writes the policy in one move: the file is the old one or the new one, never half of either.
+    pub fn save(&self, file: &Path) -> Result<(), Error> {
+        files::write_whole(file, &self.to_bytes())
+    }
+
+    /// The file's bytes. Equal policies give equal bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let values = |data: burn::tensor::TensorData| data.try_to_vec().expect("the layers' weights are f32");
+        let layers = self.actor.layers.iter().map(|layer| {
+            let biases = layer.bias.as_ref().map(|bias| values(bias.val().into_data()));
+            (values(layer.weight.val().into_data()), biases.unwrap_or_default())
+        });
+        Contents {
+            benchmark: self.benchmark.clone(),
+            actions: self.actions.iter().map(|action| [action.steering, action.speed]).collect(),
+            scaling: self.scaling.clone(),
+            layers: layers.collect(),
+        }
+        .to_bytes()
+    }
+
+    /// Whether the policy can drive in `world`: its action table must be the world's. `file` is for the message.
+    pub fn check(&self, world: &World, file: &Path) -> Result<(), Error> {
+        let near = |a: f32, b: f32| (a - b).abs() <= SAME_ACTION * a.abs().max(1.0);
+        let same = |(a, b): (&Action, &Action)| near(a.steering, b.steering) && near(a.speed, b.speed);
+        if self.actions.len() == world.actions.len() && self.actions.iter().zip(&world.actions).all(same) {
+            return Ok(());
+        }
+        let message = format!(
+            "learned with another action table: {} here, {} in the benchmark; one learned on {} is needed",
+            described(&self.actions),
+            described(&world.actions),
+            "a benchmark with the same actions and vehicle lock"
+        );
+        Err(Error::Contents { file: file.to_owned(), message })
+    }
+}
+
+/// The best action of each row of `logits`, `[rows]`; the first of equals.
+pub fn greedy(logits: &[f32], n_actions: usize) -> Vec<u32> {
+    let best = |row: &[f32]| (1..n_actions).fold(0, |best, action| if row[best] < row[action] { action } else { best });
+    logits.chunks_exact(n_actions).map(|row| best(row) as u32).collect()
+}
+
+/// An action drawn from each row of `logits`, `[rows]`.
+pub fn drawn(logits: &[f32], n_actions: usize, rng: &mut impl Rng) -> Vec<u32> {
+    let mut one = |row: &[f32]| {
+        let most = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let sum: f32 = row.iter().map(|logit| (logit - most).exp()).sum();
+        let mut left = sum * rng.random::<f32>();
+        let reached = row.iter().position(|logit| {
+            left -= (logit - most).exp();
+            left < 0.0
+        });
+        // Rounding can leave a little of the sum after the last action.
+        reached.unwrap_or(n_actions - 1) as u32
+    };
+    logits.chunks_exact(n_actions).map(&mut one).collect()
+}
+
+/// An action table in a few words.
+fn described(actions: &[Action]) -> String {
+    let of = |value: fn(&Action) -> f32| {
+        let values = actions.iter().map(value);
+        (values.clone().fold(f32::INFINITY, f32::min), values.fold(f32::NEG_INFINITY, f32::max))
+    };
+    let (right, left) = of(|action| action.steering.to_degrees());
+    let (slow, fast) = of(|action| action.speed * 3.6);
+    format!("{} actions, {right:.1}..{left:.1} deg, {slow:.1}..{fast:.1} km/h", actions.len())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,183 @@
+//! How far a run is: the live line, the rows of `metrics.csv`, and when to stop.
+
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use offtrack::layout::Ended;
+use offtrack::simulator::Batch;
+
+use crate::config::Config;
+use crate::error::Error;
+use crate::sac::Update;
+use crate::train::folder::Folder;
+
+/// Time between two rows of figures.
+const ROW_EVERY: Duration = Duration::from_secs(5);
+/// Time between two lines where no terminal shows the live one.
+const LINE_EVERY: Duration = Duration::from_secs(30);
+/// Episodes that the success rate looks back on.
+const WINDOW: usize = 1000;
+
+/// Counters and clocks of a run.
+#[derive(Debug)]
+pub struct Progress {
+    begun: Instant,
+    minutes: Option<f64>,
+    steps: Option<u64>,
+    env_steps: u64,
+    episodes: u64,
+    updates: u64,
+    /// Whether each of the latest episodes arrived.
+    arrived: VecDeque<bool>,
+    /// Sums since the last row.
+    sums: Update,
+    since_row: Instant,
+    row_steps: u64,
+    row_updates: u64,
+    since_line: Instant,
+    bar: ProgressBar,
+    metrics: (PathBuf, File),
+}
+
+impl Progress {
+    /// Starts the clock and the file of figures.
+    pub fn new(config: &Config, folder: &Folder) -> Result<Progress, Error> {
+        let path = folder.metrics();
+        let mut file = File::create_new(&path).map_err(Error::write(&path))?;
+        let head = "seconds,env_steps,episodes,updates,success,critic_loss,actor_loss,entropy,value,entropy_weight,steps_per_second,updates_per_second";
+        writeln!(file, "{head}").map_err(Error::write(&path))?;
+        let style = ProgressStyle::with_template("{bar:24} {percent:>3} % {msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+        Ok(Progress {
+            begun: Instant::now(),
+            minutes: config.minutes,
+            steps: config.steps,
+            env_steps: 0,
+            episodes: 0,
+            updates: 0,
+            arrived: VecDeque::with_capacity(WINDOW),
+            sums: Update::default(),
+            since_row: Instant::now(),
+            row_steps: 0,
+            row_updates: 0,
+            since_line: Instant::now(),
+            bar: ProgressBar::new(1000).with_style(style),
+            metrics: (path, file),
+        })
+    }
+
+    /// Share of the run that is over: by time or by steps, whichever is further.
+    pub fn share(&self) -> f64 {
+        let by_time = self.minutes.map_or(0.0, |minutes| self.seconds() / (60.0 * minutes));
+        let by_steps = self.steps.map_or(0.0, |steps| self.env_steps as f64 / steps as f64);
+        by_time.max(by_steps).min(1.0)
+    }
+
+    /// Time since the start [s].
+    pub fn seconds(&self) -> f64 {
+        self.begun.elapsed().as_secs_f64()
+    }
+
+    /// Env steps taken.
+    pub fn env_steps(&self) -> u64 {
+        self.env_steps
+    }
+
+    /// Updates made.
+    pub fn updates(&self) -> u64 {
+        self.updates
+    }
+
+    /// Share of the latest episodes that arrived, none before the first ended.
+    pub fn success(&self) -> Option<f64> {
+        let arrived = self.arrived.iter().filter(|&&arrived| arrived).count();
+        (!self.arrived.is_empty()).then(|| arrived as f64 / self.arrived.len() as f64)
+    }
+
+    /// Counts a step of every truck.
+    pub fn stepped(&mut self, batch: &Batch) {
+        self.env_steps += batch.n_envs() as u64;
+        for &code in batch.ended.iter().filter(|&&code| code != Ended::Running as u32) {
+            self.episodes += 1;
+            if self.arrived.len() == WINDOW {
+                self.arrived.pop_front();
+            }
+            self.arrived.push_back(code == Ended::Arrived as u32);
+        }
+    }
+
+    /// Counts an update.
+    pub fn updated(&mut self, update: &Update) {
+        self.updates += 1;
+        self.sums.critic_loss += update.critic_loss;
+        self.sums.actor_loss += update.actor_loss;
+        self.sums.entropy += update.entropy;
+        self.sums.value += update.value;
+    }
+
+    /// Moves the live line on and writes a row when it is time for one.
+    pub fn report(&mut self, entropy_weight: f32) -> Result<(), Error> {
+        if ROW_EVERY <= self.since_row.elapsed() {
+            self.row(entropy_weight)?;
+        }
+        Ok(())
+    }
+
+    /// Writes the last row and ends the live line.
+    pub fn finish(&mut self, entropy_weight: f32) -> Result<(), Error> {
+        self.row(entropy_weight)?;
+        self.bar.finish();
+        Ok(())
+    }
+
+    fn row(&mut self, entropy_weight: f32) -> Result<(), Error> {
+        let seconds = self.since_row.elapsed().as_secs_f64();
+        let n = (self.updates - self.row_updates).max(1) as f32;
+        let [steps_rate, update_rate] =
+            [self.env_steps - self.row_steps, self.updates - self.row_updates].map(|count| count as f64 / seconds);
+        let success = self.success().map(|success| format!("{success:.4}")).unwrap_or_default();
+        let Update { critic_loss, actor_loss, entropy, value } = self.sums;
+        let row = format!(
+            "{:.1},{},{},{},{success},{:.5},{:.5},{:.4},{:.4},{entropy_weight:.6},{steps_rate:.0},{update_rate:.1}\n",
+            self.seconds(),
+            self.env_steps,
+            self.episodes,
+            self.updates,
+            critic_loss / n,
+            actor_loss / n,
+            entropy / n,
+            value / n,
+        );
+        let (path, file) = &mut self.metrics;
+        file.write_all(row.as_bytes()).and_then(|()| file.flush()).map_err(Error::write(path))?;
+        self.show(steps_rate, update_rate);
+        self.sums = Update::default();
+        (self.since_row, self.row_steps, self.row_updates) = (Instant::now(), self.env_steps, self.updates);
+        Ok(())
+    }
+
+    /// The live line on a terminal, a plain line now and then elsewhere.
+    fn show(&mut self, steps_rate: f64, update_rate: f64) {
+        let share = self.share();
+        let left = if 0.0 < share { self.seconds() * (1.0 - share) / share } else { 0.0 };
+        let success = self.success().map_or_else(|| "-".to_owned(), |success| format!("{:.1} %", 100.0 * success));
+        let line = format!(
+            "{:.2} M steps, {steps_rate:.0} steps/s, {update_rate:.0} updates/s, success {success} of the last {}, {}:{:02} left",
+            self.env_steps as f64 / 1e6,
+            self.arrived.len(),
+            left as u64 / 60,
+            left as u64 % 60,
+        );
+        if std::io::stderr().is_terminal() {
+            self.bar.set_position((1000.0 * share) as u64);
+            self.bar.set_message(line);
+        } else if LINE_EVERY <= self.since_line.elapsed() || share == 1.0 {
+            // A run goes on when nobody reads its lines any more.
+            let _ = writeln!(std::io::stderr(), "{:>3.0} % {line}", 100.0 * share);
+            self.since_line = Instant::now();
+        }
+    }
+}
