@@ -118,7 +118,8 @@ pub fn wilson(successes: usize, trials: usize) -> (f64, f64) {
     let (n, p) = (trials as f64, successes as f64 / trials as f64);
     let centre = (p + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
     let half = Z / (1.0 + Z * Z / n) * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
-    ((centre - half).max(0.0), (centre + half).min(1.0))
+    // The interval holds the share itself, to the last bit too.
+    ((centre - half).clamp(0.0, p), (centre + half).clamp(p, 1.0))
 }
 
 /// One route's episodes.

@@ -111,3 +111,41 @@ fn what_the_command_line_says_wins_and_a_budget_there_replaces_both() {
     let message = config.override_with(None, None, None, Some(0)).unwrap_err().to_string();
     assert!(message.contains("n_envs: 0; must lie in 1..65536"), "{message}");
 }
+
+#[test]
+fn whatever_stands_for_a_value_is_taken_or_refused_by_its_key() {
+    let text = default_file();
+    let keys: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).filter_map(|line| Some(line.split_once(" = ")?.0)).collect();
+    assert_eq!(keys.len(), 22, "{keys:?}");
+    let mut taken = 0;
+    for key in keys {
+        for value in [
+            "0",
+            "-1",
+            "0.0",
+            "-0.5",
+            "nan",
+            "inf",
+            "-inf",
+            "1e300",
+            "9223372036854775807",
+            "\"\"",
+            "\"text\"",
+            "[]",
+            "[[]]",
+            "{}",
+            "true",
+            "1979-05-27",
+        ] {
+            match with(key, &format!("{key} = {value}")) {
+                Ok(config) => {
+                    taken += 1;
+                    assert_eq!(read(&config.to_toml()).as_ref(), Ok(&config), "{key} = {value}");
+                }
+                Err(message) => assert!(message.contains(key), "{key} = {value}: {message}"),
+            }
+        }
+    }
+    // Zeros where they mean something, and any text for a benchmark's name.
+    assert!((4..20).contains(&taken), "{taken}");
+}

@@ -1,8 +1,8 @@
 use super::*;
 use offtrack::layout::N_VALUES;
 use proptest::prelude::*;
-use rand::{Rng, SeedableRng};
 use rand::rngs::SmallRng;
+use rand::{Rng, SeedableRng};
 
 fn policy(hidden: &[usize], n_actions: usize) -> Policy {
     let rng = &mut SmallRng::seed_from_u64(3);

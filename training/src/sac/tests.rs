@@ -211,10 +211,10 @@ fn parts_of_a_batch_make_the_update_of_the_whole() {
     // Of two rows and of four: a part counts for its rows.
     let uneven = |sample: &Sample<2>| {
         let whole = whole(sample);
-        let rows = |tensor: &Tensor<2>, from: usize, to: usize| tensor.clone().slice([from..to]);
+        let rows = |tensor: &Tensor<2>, from: usize, to: usize| tensor.clone().narrow(0, from, to - from);
         let part = |from: usize, to: usize| Transitions {
             observation: rows(&whole.observation, from, to),
-            action: whole.action.clone().slice([from..to]),
+            action: whole.action.clone().narrow(0, from, to - from),
             reward: rows(&whole.reward, from, to),
             discount: rows(&whole.discount, from, to),
             next_observation: rows(&whole.next_observation, from, to),

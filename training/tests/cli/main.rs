@@ -1,4 +1,10 @@
 //! The program from outside, as its users run it.
 
+#![expect(clippy::unwrap_used, reason = "what a helper of a test cannot do fails the test")]
+
 mod draw;
+mod evaluate;
+mod input;
+mod interruption;
+mod place;
 mod train;

@@ -1,0 +1,87 @@
+//! `offtrack evaluate`: every episode counted, the same again with the same seed, and files that are no policy refused.
+
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+
+use crate::place::{Place, offtrack, refusal, succeed};
+
+#[test]
+fn every_episode_is_counted_once_by_its_end_and_once_by_its_route() {
+    let place = Place::new();
+    for policy in ["random", "pursuit"] {
+        succeed(&place.evaluate(&["--policy", policy, "--episodes", "3", "--json", &place.text("report.json")]));
+        let report = place.json("report.json");
+        assert_eq!(
+            (&report["benchmark"], &report["split"], &report["policy"], &report["seed"]),
+            (&Value::from("short"), &Value::from("test"), &Value::from(policy), &Value::from(0))
+        );
+        let count = |value: &Value| value.as_u64().unwrap();
+        let ends = |value: &Value| value["ends"].as_object().unwrap().values().map(count).sum::<u64>();
+        let routes = report["routes"].as_array().unwrap();
+        assert_eq!((routes.len(), count(&report["episodes"]), ends(&report)), (2, 6, 6));
+        for route in routes {
+            assert_eq!((count(&route["episodes"]), ends(route), &route["ends"]["arrived"]), (3, 3, &route["arrived"]));
+            assert!(route["name"].is_string() && route["own_lane_suffices"].is_boolean() && route["lane_distance_mean"].is_f64());
+        }
+        let arrived: u64 = routes.iter().map(|route| count(&route["arrived"])).sum();
+        assert_eq!(arrived, count(&report["arrived"]));
+        let [low, share, high] = ["success_low", "success", "success_high"].map(|key| report[key].as_f64().unwrap());
+        assert!(low <= share && share <= high && (share - arrived as f64 / 6.0).abs() < 1e-9, "{low} {share} {high}");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_report_byte_for_byte_and_another_seed_another() {
+    let place = Place::new();
+    let report = |seed: &str| {
+        succeed(&place.evaluate(&["--policy", "random", "--episodes", "2", "--seed", seed, "--json", &place.text("report.json")]));
+        std::fs::read_to_string(place.file("report.json")).unwrap()
+    };
+    assert_eq!(report("4"), report("4"));
+    assert_ne!(report("4").replace("\"seed\": 4", ""), report("5").replace("\"seed\": 5", ""), "more than the seed's own line differs");
+}
+
+#[test]
+fn a_file_that_is_no_whole_policy_is_refused_by_its_name() {
+    let place = Place::new();
+    succeed(&place.train(&["--name", "run", "--steps", "600"]));
+    let policy = place.text("runs/run/policy.safetensors");
+    succeed(&place.evaluate(&["--policy", &policy, "--episodes", "1"]));
+    let bytes = std::fs::read(&policy).unwrap();
+    std::fs::write(place.file("cut"), &bytes[..bytes.len() / 2]).unwrap();
+    std::fs::write(place.file("changed"), bytes.iter().rev().copied().collect::<Vec<u8>>()).unwrap();
+    for (name, expected) in
+        [("cut", "is no policy file"), ("changed", "is no policy file"), ("tiny.toml", "is no policy file"), ("missing", "cannot be read")]
+    {
+        let said = refusal(&place.evaluate(&["--policy", &place.text(name), "--episodes", "1"]), 2);
+        assert!(said.contains(&place.text(name)) && said.contains(expected), "{said}");
+    }
+    // The benchmark of the repository has nine actions where this policy learned five.
+    let said = refusal(&offtrack(&["evaluate", "--policy", &policy, "--episodes", "1"]), 2);
+    assert!(said.contains(&policy) && said.contains("another action table: 5 actions"), "{said}");
+}
+
+#[test]
+fn a_report_that_cannot_be_written_is_a_failure() {
+    let place = Place::new();
+    let below_a_file = place.text("tiny.toml/report.json");
+    let said = refusal(&place.evaluate(&["--policy", "random", "--episodes", "1", "--json", &below_a_file]), 1);
+    assert!(said.contains(&below_a_file) && said.contains("cannot be written"), "{said}");
+}
+
+#[test]
+fn a_reader_that_has_gone_costs_the_table_and_not_the_report() {
+    let place = Place::new();
+    let mut evaluation = Command::new(env!("CARGO_BIN_EXE_offtrack"))
+        .args(["evaluate", "--benchmark", &place.text("short.toml"), "--policy", "random", "--episodes", "1"])
+        .args(["--json", &place.text("report.json")])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(evaluation.stdout.take());
+    let said = refusal(&evaluation.wait_with_output().unwrap(), 1);
+    assert!(said.contains("standard output: cannot be written"), "{said}");
+    assert_eq!(place.json("report.json")["episodes"], 2);
+}

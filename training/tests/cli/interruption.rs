@@ -1,0 +1,71 @@
+//! `offtrack train` ended from outside: what it has written by then is whole.
+#![cfg(unix)]
+
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+use crate::place::{Place, succeed};
+
+/// A run far too long to end by itself, once it writes figures.
+fn begun(place: &Place) -> Child {
+    let run = place.training(&["--name", "run", "--steps", "1000000000"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    while !place.file("runs/run/metrics.csv").is_file() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    run
+}
+
+fn ended(run: Child, signal: &str) -> Output {
+    assert!(Command::new("kill").args([signal, &run.id().to_string()]).status().unwrap().success());
+    run.wait_with_output().unwrap()
+}
+
+/// Every row that ends with a line break has as many columns as the first.
+fn assert_whole_rows(place: &Place) {
+    let metrics = std::fs::read_to_string(place.file("runs/run/metrics.csv")).unwrap();
+    let rows: Vec<usize> = metrics.split_inclusive('\n').filter(|row| row.ends_with('\n')).map(|row| row.split(',').count()).collect();
+    assert!(rows.iter().all(|&columns| columns == rows[0]), "{metrics}");
+}
+
+#[test]
+fn an_interrupted_run_leaves_a_driver_and_says_that_it_was_interrupted() {
+    let place = Place::new();
+    let patient = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
+    // Interrupted while it learns or soon before, and while it is certain to be still driving by chance.
+    let endless = patient.replace("capacity = 2000, warmup = 400", "capacity = 100000000, warmup = 100000000");
+    assert_ne!(endless, patient);
+    for training in [patient, endless] {
+        std::fs::write(place.file("tiny.toml"), training).unwrap();
+        let run = begun(&place);
+        std::thread::sleep(Duration::from_millis(500));
+        let output = ended(run, "-INT");
+        succeed(&output);
+        assert!(String::from_utf8_lossy(&output.stdout).contains("stopped: "));
+        let report = place.json("runs/run/report.json");
+        assert_eq!((report["interrupted"].as_bool(), report["evaluation"].is_null()), (Some(true), true));
+        assert!(0 < report["env_steps"].as_u64().unwrap());
+        assert_whole_rows(&place);
+        succeed(&place.evaluate(&["--policy", &place.text("runs/run/policy.safetensors"), "--episodes", "1"]));
+        std::fs::remove_dir_all(place.file("runs")).unwrap();
+    }
+}
+
+#[test]
+fn a_killed_run_leaves_a_whole_driver_or_none() {
+    let place = Place::new();
+    let run = begun(&place);
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(ended(run, "-KILL").status.code(), None);
+    assert_whole_rows(&place);
+    let policy = place.file("runs/run/policy.safetensors");
+    if policy.exists() {
+        succeed(&place.evaluate(&["--policy", policy.to_str().unwrap(), "--episodes", "1"]));
+    }
+    // What it was to do is known, and can be begun again.
+    let config = place.text("runs/run/config.toml");
+    let again = Command::new(env!("CARGO_BIN_EXE_offtrack"))
+        .args(["train", &config, "--steps", "600", "--name", "again", "--out", &place.text("runs")])
+        .output()
+        .unwrap();
+    succeed(&again);
+}

@@ -1,0 +1,118 @@
+//! A folder with a small benchmark and a small training file, and the program run on them.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// A benchmark of one route to learn on and two to be examined on.
+const BENCHMARK: &str = r#"
+vehicle = "vehicles/daf_xf.toml"
+load = "empty"
+gutter = "drivable"
+actions = { steer_levels = [-0.8, -0.4, 0.0, 0.4, 0.8], speeds_kmh = [30.0] }
+sensors = { range = 20.0 }
+reward = { waypoint = 100.0, lane_distance = -1.5, lane_distance_limit = 4.0, failure = -500.0 }
+
+[[roundabout]]
+file = "roundabouts/16m.toml"
+train = ["E-right-1"]
+
+[[roundabout]]
+file = "roundabouts/20m.toml"
+test = ["E-right-1", "W-left-3"]
+"#;
+
+/// A learner small enough that a run takes a second.
+const TRAINING: &str = r#"
+benchmark = "BENCHMARK"
+seed = 5
+n_envs = 8
+steps = 1600
+memory = { capacity = 2000, warmup = 400 }
+
+[learning]
+hidden = [16]
+batch = 32
+updates_per_step = 1
+n_steps = 3
+discount = 0.97
+reward_scale = 0.01
+actor_rate = 3e-4
+critic_rate = 3e-4
+critics = "average"
+target_rate = 0.005
+target_every = 1
+average_rate = 0.005
+entropy = { share = 0.25, weight = 0.05, rate = 3e-4 }
+"#;
+
+/// A folder with `short.toml`, a benchmark, `tiny.toml`, a training file for it, and room for `runs`.
+pub struct Place(tempfile::TempDir);
+
+impl Place {
+    pub fn new() -> Place {
+        let place = Place(tempfile::tempdir().unwrap());
+        let scenarios = repository().join("scenarios");
+        let written = ["vehicles/", "roundabouts/"].iter().fold(BENCHMARK.to_owned(), |text, folder| {
+            text.replace(&format!("\"{folder}"), &format!("\"{}/{folder}", scenarios.display()))
+        });
+        std::fs::write(place.file("short.toml"), written).unwrap();
+        std::fs::write(place.file("tiny.toml"), TRAINING.replace("BENCHMARK", &place.text("short.toml"))).unwrap();
+        place
+    }
+
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// A file's path as an argument.
+    pub fn text(&self, name: &str) -> String {
+        self.file(name).to_str().unwrap().to_owned()
+    }
+
+    pub fn train(&self, arguments: &[&str]) -> Output {
+        self.training(arguments).output().unwrap()
+    }
+
+    /// A run not yet begun.
+    pub fn training(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_offtrack"));
+        command.args(["train", &self.text("tiny.toml"), "--out", &self.text("runs")]).args(arguments);
+        command
+    }
+
+    /// `evaluate` on the short benchmark.
+    pub fn evaluate(&self, arguments: &[&str]) -> Output {
+        offtrack(&[&["evaluate", "--benchmark", &self.text("short.toml")], arguments].concat())
+    }
+
+    pub fn json(&self, name: &str) -> Value {
+        serde_json::from_slice(&std::fs::read(self.file(name)).unwrap()).unwrap()
+    }
+}
+
+pub fn repository() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
+}
+
+/// The program, run in the repository.
+pub fn offtrack(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_offtrack")).current_dir(repository()).args(arguments).output().unwrap()
+}
+
+pub fn succeed(output: &Output) {
+    assert!(output.status.success(), "{}", said(output));
+}
+
+/// What was said of a command that had to end with `code`.
+pub fn refusal(output: &Output, code: i32) -> String {
+    let said = said(output);
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    assert!(!said.contains("panicked"), "{said}");
+    said
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
