@@ -15,6 +15,15 @@ use crate::route::Route;
 use crate::vehicle::Vehicle;
 use written::{Written, WrittenChoice, WrittenRoundabout, WrittenRoutes};
 
+/// Length of a route before the ring where a benchmark says nothing else [m].
+pub const APPROACH: f64 = 40.0;
+/// Length of a route after the ring where a benchmark says nothing else [m].
+pub const DEPARTURE: f64 = 35.0;
+/// Distance between waypoints where a benchmark says nothing else [m].
+pub const WAYPOINT_SPACING: f64 = 2.0;
+/// Width of the distance field's cells where a benchmark says nothing else [m].
+pub const FIELD_CELL: f64 = 0.5;
+
 /// Which routes: those learned on, or those kept for the examination.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Split {

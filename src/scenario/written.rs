@@ -52,7 +52,7 @@ pub(super) struct WrittenField {
 
 impl Default for WrittenField {
     fn default() -> Self {
-        WrittenField { cell: 0.5 }
+        WrittenField { cell: super::FIELD_CELL }
     }
 }
 
@@ -124,7 +124,7 @@ pub(super) struct WrittenRoutes {
 
 impl Default for WrittenRoutes {
     fn default() -> Self {
-        WrittenRoutes { approach: 40.0, departure: 35.0, spacing: 2.0 }
+        WrittenRoutes { approach: super::APPROACH, departure: super::DEPARTURE, spacing: super::WAYPOINT_SPACING }
     }
 }
 

@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::Route;
+use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
 use offtrack::vehicle::Vehicle;
 use resvg::{tiny_skia, usvg};
 
@@ -53,18 +54,15 @@ pub(crate) struct Args {
     #[arg(long, default_value = "drivable", value_parser = PossibleValuesParser::new(["drivable", "solid"]).map(gutter))]
     gutter: Gutter,
     /// Length of the routes before the ring [m].
-    #[arg(long, default_value_t = 40.0)]
+    #[arg(long, default_value_t = APPROACH)]
     approach: f64,
     /// Length of the routes after the ring [m].
-    #[arg(long, default_value_t = 35.0)]
+    #[arg(long, default_value_t = DEPARTURE)]
     departure: f64,
     /// Width of a PNG [pixels].
     #[arg(long, default_value_t = 1000)]
     size: u32,
 }
-
-/// Distance between the waypoints of a route [m].
-const WAYPOINT_SPACING: f64 = 2.0;
 
 /// What can be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

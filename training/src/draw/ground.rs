@@ -7,6 +7,7 @@ use offtrack::field::Field;
 use offtrack::geometry::{Curve, Outline};
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::{Lane, Route};
+use offtrack::scenario::FIELD_CELL;
 use svg::node::element::{Group, Path};
 
 use super::isolines::isolines;
@@ -14,8 +15,6 @@ use super::legend::{Entry, Swatch, chevron};
 use super::lettering::{Align, Lettering};
 use super::page::{Straights, View, colour};
 
-/// Size of the field's cells [m].
-const CELL: f64 = 0.25;
 /// Least distance between arrows of one colour [m].
 const APART: f64 = 5.0;
 /// From the ring to the name of an arm [m].
@@ -70,7 +69,7 @@ impl<'a> Ground<'a> {
 
     /// Lines of equal distance to the kerbs.
     pub(super) fn distances(&self) -> Group {
-        let field = Field::bake(&self.kerbs, CELL);
+        let field = Field::bake(&self.kerbs, FIELD_CELL);
         let lines: String = isolines(&field, self.view).iter().map(|ring| self.view.line(ring)).collect();
         let lines = Path::new().set("d", lines).set("fill", "none").set("stroke", colour::CONTOUR).set("stroke-width", 0.8);
         Group::new().add(lines)
