@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::Vec2;
 use indicatif::{ProgressBar, ProgressStyle};
 use offtrack::angle::wrapped;
+use offtrack::geometry::Outline;
 use offtrack::layout::{Ended, Rig, Truck};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
@@ -116,22 +117,22 @@ pub fn examine(
 
 fn summarised(scenario: &Scenario, world: &World, split: Split, seed: u32, policy: &str, finished: &[Episode], per_route: usize) -> Report {
     let rig = &world.params.rig;
-    let own_lane: Vec<bool> = scenario
-        .routes()
-        .map(|(place, route)| {
-            let kerbs = scenario.places[place].roundabout.kerbs(scenario.gutter);
-            own_lane_suffices(rig, &kerbs, &swept_path(rig, &route.centre_line, scenario.cruising_speed(), 0.25))
-        })
-        .collect();
+    let kerbs: Vec<Outline> = scenario.places.iter().map(|place| place.roundabout.kerbs(scenario.gutter)).collect();
+    let all: Vec<_> = scenario.routes().collect();
+    let suffices = |&index: &u32| {
+        let (place, route) = all[index as usize];
+        own_lane_suffices(rig, &kerbs[place], &swept_path(rig, &route.centre_line, scenario.cruising_speed(), 0.25))
+    };
     let routes = scenario.split(split);
-    let chunks = || routes.iter().map(|&route| route as usize).zip(finished.chunks(per_route));
+    let own_lane: Vec<bool> = routes.iter().map(suffices).collect();
+    let chunks = || own_lane.iter().zip(finished.chunks(per_route));
     let of_routes = |suffices: bool| {
-        let kept: Vec<&Episode> = chunks().filter(|&(route, _)| own_lane[route] == suffices).flat_map(|(_, chunk)| chunk).collect();
+        let kept: Vec<&Episode> = chunks().filter(|&(&own, _)| own == suffices).flat_map(|(_, chunk)| chunk).collect();
         Summary::of(kept.into_iter(), scenario.step)
     };
-    let route_reports = chunks().filter_map(|(route, chunk)| {
+    let route_reports = routes.iter().zip(chunks()).filter_map(|(&route, (&own_lane_suffices, chunk))| {
         let summary = Summary::of(chunk.iter(), scenario.step)?;
-        Some(RouteReport { name: world.route_names[route].clone(), own_lane_suffices: own_lane[route], summary })
+        Some(RouteReport { name: world.route_names[route as usize].clone(), own_lane_suffices, summary })
     });
     Report {
         benchmark: scenario.name.clone(),
@@ -148,9 +149,8 @@ fn summarised(scenario: &Scenario, world: &World, split: Split, seed: u32, polic
 
 /// One truck's episode while it runs.
 struct Running {
-    steps: u32,
-    reward: f64,
     lane_distance_sum: f64,
+    /// What it has come to so far; the mean and the off-tracking are worked out at its end.
     episode: Episode,
     /// Where the front axle was, first a point far behind the start: the trailer's axle is measured against it.
     front_path: Vec<Vec2>,
@@ -162,8 +162,6 @@ impl Running {
         let front = front_axle(rig, truck);
         let ahead = Vec2::from_angle(truck.heading);
         Running {
-            steps: 0,
-            reward: 0.0,
             lane_distance_sum: 0.0,
             episode: Episode {
                 ended: Ended::Running,
@@ -187,8 +185,8 @@ impl Running {
         let (truck, progress, clearance) = (&batch.truck[env], &batch.progress[env], &batch.clearance[env]);
         let raise = |peak: &mut f64, value: f32| *peak = peak.max(f64::from(value));
         let lower = |least: &mut f64, value: f32| *least = least.min(f64::from(value));
-        self.steps += 1;
-        self.reward += f64::from(batch.reward[env]);
+        self.episode.steps += 1;
+        self.episode.reward += f64::from(batch.reward[env]);
         self.lane_distance_sum += f64::from(progress.lane_distance);
         raise(&mut self.episode.lane_distance_max, progress.lane_distance);
         lower(&mut self.episode.tractor_clearance_min, clearance.tractor);
@@ -204,9 +202,7 @@ impl Running {
     fn finish(&self, ended: Ended) -> Episode {
         Episode {
             ended,
-            steps: self.steps,
-            reward: self.reward,
-            lane_distance_mean: self.lane_distance_sum / f64::from(self.steps.max(1)),
+            lane_distance_mean: self.lane_distance_sum / f64::from(self.episode.steps.max(1)),
             off_tracking_peak: off_tracking(&self.front_path, &self.trailer_path),
             ..self.episode.clone()
         }
