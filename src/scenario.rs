@@ -174,6 +174,12 @@ impl Scenario {
         }
     }
 
+    /// Names of a split's routes.
+    pub fn split_names(&self, split: Split) -> Vec<&str> {
+        let names: Vec<&str> = self.routes().map(|(_, route)| route.name.as_str()).collect();
+        self.split(split).iter().map(|&route| names[route as usize]).collect()
+    }
+
     /// Every route used, in the order of the world's table, with its roundabout's index.
     pub fn routes(&self) -> impl Iterator<Item = (usize, &Route)> {
         self.places.iter().enumerate().flat_map(|(index, place)| place.routes.iter().map(move |route| (index, route)))

@@ -3,7 +3,6 @@
 //! Speeds are medians over windows of about a quarter of a second: other work on the machine disturbs some windows, not most.
 
 use std::path::PathBuf;
-use std::process::Command;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -16,6 +15,7 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::files;
+use crate::provenance;
 
 /// Measure env steps per second: random actions drawn inside.
 #[derive(Debug, clap::Args)]
@@ -86,9 +86,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let world = Arc::new(World::bake(&scenario));
     let routes = [scenario.split(Split::Train), scenario.split(Split::Test)].concat();
     let mut bench = Bench {
-        machine: machine(),
+        machine: provenance::machine(),
         threads: rayon::current_num_threads(),
-        commit: commit(),
+        commit: provenance::commit(),
         date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
         benchmark: scenario.name.clone(),
         step: Step { dt: scenario.step, substeps: scenario.n_substeps, rays: N_RAYS, values: N_VALUES, actions: "random, drawn inside" },
@@ -158,22 +158,4 @@ fn median(values: &mut [f64]) -> f64 {
 
 fn rounded(value: f64) -> f64 {
     (10.0 * value).round() / 10.0
-}
-
-/// The processor's name and number of cores.
-pub fn machine() -> String {
-    let name = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
-        text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|(_, name)| name.trim().to_owned()))
-    });
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    format!("{}, {cores} cores", name.unwrap_or_else(|| std::env::consts::ARCH.to_owned()))
-}
-
-/// The commit that the program's sources are at, with `-dirty` when they differ from it.
-pub fn commit() -> String {
-    let output = Command::new("git").arg("-C").arg(files::repository()).args(["describe", "--always", "--dirty", "--abbrev=12"]).output();
-    match output {
-        Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).trim().to_owned(),
-        _ => "unknown".to_owned(),
-    }
 }

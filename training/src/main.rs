@@ -12,6 +12,7 @@ mod files;
 mod memory;
 mod network;
 mod policy;
+mod provenance;
 mod report;
 mod sac;
 mod scaling;

@@ -28,6 +28,7 @@ use crate::evaluate::examine;
 use crate::files;
 use crate::memory::Memory;
 use crate::policy::{self, Policy};
+use crate::provenance;
 use crate::report::Report;
 use crate::sac::{Sac, Update};
 use crate::scaling::Scaling;
@@ -94,16 +95,18 @@ pub fn run(args: &Args) -> Result<(), Error> {
     config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
     let scenario = Scenario::read(&files::benchmark(&config.benchmark)?)?;
     let practice = practice(&config, &scenario)?;
+    let (world, practice_world) = (Arc::new(World::bake(&scenario)), Arc::new(World::bake(&practice)));
+    if practice_world.actions != world.actions {
+        let expected = format!("its actions and vehicle lock must be those of {}, on which the driver is examined", scenario.name);
+        return Err(Error::Flag { flag: "practice", value: practice.name, expected });
+    }
     let runs = args.out.clone().unwrap_or_else(|| PathBuf::from("runs"));
     let folder = Folder::create(&runs, args.name.as_deref(), &file, &config)?;
     let n_routes = practice.split(Split::Train).len();
     // A run goes on when nobody reads its lines.
     let _ = files::print(&format!("{}: learning on {n_routes} training routes of {}\n", folder.path().display(), practice.name));
     let stop = stop_flag();
-    let world = Arc::new(World::bake(&scenario));
-    let practice_world = Arc::new(World::bake(&practice));
     let (policy, mut finished) = learn(&config, &practice, &practice_world, &folder, stop)?;
-    policy.check(&world, &folder.policy())?;
     policy.save(&folder.policy())?;
     if finished.interrupted {
         files::write_json(&folder.report(), &finished)?;
@@ -123,14 +126,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
 /// What is practised on: the benchmark, or what the config names in its place. No route that the driver will be examined on may be in it.
 fn practice(config: &Config, benchmark: &Scenario) -> Result<Scenario, Error> {
     let practice = Scenario::read(&files::benchmark(config.practice.as_ref().unwrap_or(&config.benchmark))?)?;
-    let names = |scenario: &Scenario, split: Split| {
-        let kept = scenario.split(split).to_vec();
-        let all: Vec<String> = scenario.routes().map(|(_, route)| route.name.clone()).collect();
-        kept.into_iter().map(move |route| all[route as usize].clone()).collect::<Vec<_>>()
-    };
-    let examined = names(benchmark, Split::Test);
-    if let Some(route) = names(&practice, Split::Train).into_iter().find(|route| examined.contains(route)) {
-        let expected = format!("{} is a test route of {} and must not be practised on", route, benchmark.name);
+    let examined = benchmark.split_names(Split::Test);
+    if let Some(route) = practice.split_names(Split::Train).into_iter().find(|route| examined.contains(route)) {
+        let expected = format!("{route} is a test route of {} and must not be practised on", benchmark.name);
         return Err(Error::Flag { flag: "practice", value: practice.name, expected });
     }
     if practice.split(Split::Train).is_empty() {
@@ -216,8 +214,8 @@ fn learn(
         env_steps: progress.env_steps(),
         updates: progress.updates(),
         training_success: progress.success(),
-        machine: crate::bench::machine(),
-        commit: crate::bench::commit(),
+        machine: provenance::machine(),
+        commit: provenance::commit(),
         evaluation: None,
     };
     Ok((policy(&sac), finished))

@@ -66,3 +66,24 @@ fn a_run_that_cannot_be_is_refused_before_a_folder_is_made() {
     assert!(message.contains("missing.toml"), "{message}");
     assert!(!place.file("runs").exists());
 }
+
+#[test]
+fn practice_on_an_examined_route_or_with_other_actions_is_refused_before_a_folder_is_made() {
+    let place = Place::new();
+    let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
+    std::fs::write(place.file("tiny.toml"), format!("practice = \"{}\"\n{training}", place.text("practice.toml"))).unwrap();
+    let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
+    for (from, to, expected) in [
+        ("test = ", "train = ", "20m/E-right-1 is a test route of short"),
+        ("-0.8, -0.4,", "-0.8, -0.5,", "its actions and vehicle lock must be those of short"),
+        ("load =", "steer_max_deg = 30.0\nload =", "its actions and vehicle lock must be those of short"),
+    ] {
+        assert!(benchmark.contains(from), "{from}");
+        std::fs::write(place.file("practice.toml"), benchmark.replacen(from, to, 1)).unwrap();
+        let message = refusal(&place.train(&[]), 2);
+        assert!(message.contains("practice: practice") && message.contains(expected), "{message}");
+        assert!(!place.file("runs").exists());
+    }
+    std::fs::write(place.file("practice.toml"), &benchmark).unwrap();
+    succeed(&place.train(&["--steps", "800"]));
+}
