@@ -7,7 +7,7 @@ mod isolines;
 mod legend;
 mod lettering;
 mod page;
-mod polygons;
+pub(crate) mod polygons;
 mod sweep;
 
 use std::path::{Path, PathBuf};
