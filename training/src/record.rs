@@ -6,18 +6,20 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use offtrack::roundabout::Roundabout;
+use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::Route;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;
 
+use crate::draw::episode::Scene;
+use crate::draw::{Failure, film, rasterised};
 use crate::drivers::{self, Driver, PURSUIT_LOOK_AHEAD};
 use crate::error::Error;
 use crate::files;
 use crate::recording::{Map, Measures, Recorder, Recording, centre_line};
 
-/// Record one episode as data (.json).
+/// Record one episode: as a film, as a picture with the swept paths of both units, or as data.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A policy file, `pursuit` (pure pursuit of the centre line) or `random`.
@@ -26,8 +28,13 @@ pub struct Args {
     /// One of the benchmark's routes, to learn on or to be examined on: 20m/N-left-3.
     #[arg(long)]
     route: String,
-    /// The file to write.
-    #[arg(short, long)]
+    /// The file to write: .gif, .png, .svg, or .json for data.
+    ///
+    /// A film runs at twice the truck's speed and shows what it senses. JSON: {"benchmark", "route", "policy", "seed", "episode",
+    /// "episodes", "step" [s], "ended", "vehicle": measures and mounts, "actions": [[steer angle, speed], ...], "map": {"drivable", "lanes"},
+    /// "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state after step n, the step that ended the episode included.
+    /// Metres, seconds and radians, x east, y north, the ring's centre at the origin.
+    #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// A benchmark's name, or the path of its file.
     #[arg(long, default_value = "attard2023")]
@@ -41,14 +48,31 @@ pub struct Args {
     /// How many episodes a route that examination has.
     #[arg(long, default_value_t = 30)]
     episodes: usize,
+    /// Width of a film or a PNG [pixels]; 720 and 1000 where nothing is said.
+    #[arg(long)]
+    size: Option<u32>,
     /// With `pursuit`: distance to the point pursued [m].
     #[arg(long, default_value_t = PURSUIT_LOOK_AHEAD, allow_negative_numbers = true)]
     look_ahead: f32,
 }
 
+/// What can be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Gif,
+    Png,
+    Svg,
+    Json,
+}
+
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
-    format(&args.output)?;
+    let format = format(&args.output)?;
+    if let Some(size) = args.size
+        && !(200..=4000).contains(&size)
+    {
+        return Err(Error::Flag { flag: "--size", value: size.to_string(), expected: "must lie in 200..4000 pixels".into() });
+    }
     if !(1..=100_000).contains(&args.episodes) {
         return Err(Error::Flag { flag: "--episodes", value: args.episodes.to_string(), expected: "must lie in 1..100000".into() });
     }
@@ -61,19 +85,45 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let world = Arc::new(World::bake(&scenario));
     let mut driver = drivers::named(&args.policy, args.look_ahead, args.seed, &world)?;
     let recording = recorded(args, &scenario, &world, &chosen, driver.as_mut())?;
-    let mut text = serde_json::to_string(&recording).map_err(|error| Error::write(&args.output)(error.into()))?;
-    text.push('\n');
-    files::write_whole(&args.output, text.as_bytes())
+    let bytes = bytes(format, args.size, &recording, &chosen, scenario.gutter);
+    files::write_whole(&args.output, &bytes.map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?)
 }
 
-fn format(output: &Path) -> Result<(), Error> {
+/// The recording in the format asked for.
+fn bytes(format: Format, size: Option<u32>, recording: &Recording, chosen: &Chosen, gutter: Gutter) -> Result<Vec<u8>, Failure> {
+    if format == Format::Json {
+        let mut text = serde_json::to_string(recording)?;
+        text.push('\n');
+        return Ok(text.into_bytes());
+    }
+    let scene = Scene::new(recording, chosen.roundabout, gutter, chosen.route)?;
+    if format != Format::Gif {
+        let svg = scene.still();
+        return if format == Format::Png { rasterised(&svg, size.unwrap_or(1000)) } else { Ok(svg.into_bytes()) };
+    }
+    let pages = film::pages(recording.frames.len(), recording.step);
+    let bar = progress("drawing", "pages", pages.len() as u64);
+    let film = film::gif(&scene, &pages, size.unwrap_or(720), || bar.inc(1))?;
+    bar.finish_and_clear();
+    Ok(film)
+}
+
+fn format(output: &Path) -> Result<Format, Error> {
     match output.extension().and_then(|extension| extension.to_str()) {
-        Some("json") => Ok(()),
+        Some("gif") => Ok(Format::Gif),
+        Some("png") => Ok(Format::Png),
+        Some("svg") => Ok(Format::Svg),
+        Some("json") => Ok(Format::Json),
         _ => {
             let value = output.display().to_string();
-            Err(Error::Flag { flag: "--output", value, expected: "must end in .json".into() })
+            Err(Error::Flag { flag: "--output", value, expected: "must end in .gif, .png, .svg or .json".into() })
         }
     }
+}
+
+fn progress(what: &str, of: &str, length: u64) -> ProgressBar {
+    let template = format!("{what} {{bar:30}} {{pos}} {of}, {{elapsed}}");
+    ProgressBar::new(length).with_style(ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
 /// A route of a benchmark, where it runs and where it stands in its split.
@@ -114,9 +164,7 @@ fn recorded(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chose
     let limit = world.routes[trucks[env] as usize].step_limit;
     let mut simulator = Simulator::new(world.clone(), trucks.len(), args.seed, RouteChoice::Fixed(trucks))?;
     let mut recorder = Recorder::new(world, simulator.batch(), [env]);
-    let bar = ProgressBar::new(limit.into()).with_style(
-        ProgressStyle::with_template("driving {bar:30} {pos} steps, {elapsed}").unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
+    let bar = progress("driving", "steps", limit.into());
     let mut actions = Vec::new();
     while recorder.is_running() {
         driver.act(world, simulator.batch(), &mut actions);
