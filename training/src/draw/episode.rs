@@ -253,8 +253,8 @@ impl<'a> Scene<'a> {
             (0.0, format!("{:.1} s", index as f64 * self.recording.step)),
             (84.0, format!("{:.1} km/h", 3.6 * frame.speed)),
             (206.0, format!("articulation {}\u{b0}", signed(frame.articulation.to_degrees(), 0))),
-            (388.0, format!("LTR {ratio:.2}")),
-            (496.0, format!("clearance: tractor {tractor} m, trailer {trailer} m")),
+            (398.0, format!("LTR {ratio:.2}")),
+            (508.0, format!("clearance: tractor {tractor} m, trailer {trailer} m")),
         ];
         let place = |x: f64| FILMED.corner + DVec2::new(x, -18.0);
         let text =
