@@ -7,4 +7,5 @@ mod evaluate;
 mod input;
 mod interruption;
 mod place;
+mod record;
 mod train;
