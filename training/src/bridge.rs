@@ -3,7 +3,9 @@
 use burn::tensor::{Device, Tensor, TensorData};
 use offtrack::layout::N_VALUES;
 use offtrack::simulator::Batch;
+use rand::Rng;
 
+use crate::config::Learning;
 use crate::memory::{Memory, Rows, Sample};
 use crate::network::Mlp;
 use crate::sac::{N_PARTS, Transitions};
@@ -20,25 +22,37 @@ pub fn remember(memory: &mut Memory<N_VALUES>, seen: &[[f32; N_VALUES]], batch: 
     });
 }
 
-/// A sample as the learner takes it, in [`N_PARTS`] parts of nearly the same size.
-pub fn parts<const N: usize>(sample: &Sample<N>, scaling: &Scaling, reward_scale: f32) -> Vec<Transitions> {
+/// A sample as the learner takes it, in [`N_PARTS`] parts of nearly the same size. Both observations of a transition get the same noise, so
+/// that what changes between them stays what it is.
+pub fn parts<const N: usize>(sample: &Sample<N>, scaling: &Scaling, learning: &Learning, rng: &mut impl Rng) -> Vec<Transitions> {
     let device = Device::flex();
     let n_rows = sample.action.len();
-    let part = |index: usize| {
+    let (reward_scale, noise) = (learning.reward_scale as f32, learning.observation_noise as f32);
+    let mut part = |index: usize| {
         let rows = n_rows * index / N_PARTS..n_rows * (index + 1) / N_PARTS;
         let shape = [rows.len(), 1];
         let actions: Vec<i32> = sample.action[rows.clone()].iter().map(|&action| action as i32).collect();
         let rewards: Vec<f32> = sample.reward[rows.clone()].iter().map(|reward| reward * reward_scale).collect();
+        let mut seen = [&sample.observation, &sample.next_observation].map(|column| scaling.apply(&column[rows.clone()]));
+        if 0.0 < noise {
+            let [observation, next] = &mut seen;
+            for (value, next) in observation.iter_mut().zip(next) {
+                let added = rng.random_range(-noise..noise);
+                *value += added;
+                *next += added;
+            }
+        }
+        let [observation, next_observation] = seen.map(|values| Tensor::from_data(TensorData::new(values, [rows.len(), N]), &device));
         Transitions {
-            observation: observations(&sample.observation[rows.clone()], scaling),
+            observation,
             action: Tensor::from_data(TensorData::new(actions, shape), &device),
             reward: Tensor::from_data(TensorData::new(rewards, shape), &device),
             discount: Tensor::from_data(TensorData::new(sample.discount[rows.clone()].to_vec(), shape), &device),
-            next_observation: observations(&sample.next_observation[rows.clone()], scaling),
+            next_observation,
             weight: Tensor::from_data(TensorData::new(sample.weight[rows].to_vec(), shape), &device),
         }
     };
-    (0..N_PARTS).map(part).collect()
+    (0..N_PARTS).map(&mut part).collect()
 }
 
 /// An actor's output for each observation, `[rows * actions]`.

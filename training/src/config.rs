@@ -93,6 +93,9 @@ pub struct Learning {
     pub reward_scale: f64,
     /// Observed values are shifted and stretched to mean 0 and deviation 1.
     pub scale_observations: bool,
+    /// Noise that is added to the scaled observations that are learned from, evenly distributed up to this; 0 none.
+    #[serde(default)]
+    pub observation_noise: f64,
     /// Adam's learning rate of the actor.
     pub actor_rate: f64,
     /// Adam's learning rate of the critics.
@@ -235,6 +238,7 @@ impl Config {
         }
         reader.within("learning.discount", learning.discount, 0.0..=1.0, "")?;
         reader.within("learning.reward_scale", learning.reward_scale, 1e-6..=1e6, "")?;
+        reader.within("learning.observation_noise", learning.observation_noise, 0.0..=10.0, "")?;
         reader.within("learning.actor_rate", learning.actor_rate, 1e-8..=1.0, "")?;
         reader.within("learning.critic_rate", learning.critic_rate, 1e-8..=1.0, "")?;
         reader.within("learning.last_rate", learning.last_rate, 0.0..=1.0, "")?;

@@ -202,7 +202,7 @@ fn learn(
         let pace = 1.0 - (1.0 - learning.last_rate) * progress.share();
         for _ in 0..learning.updates_per_step {
             let sample = memory.sample(learning.batch, learning.discount as f32, &mut sampling);
-            let (update, errors) = sac.update(bridge::parts(&sample, &scaling, learning.reward_scale as f32), pace);
+            let (update, errors) = sac.update(bridge::parts(&sample, &scaling, learning, &mut sampling), pace);
             check(&update, progress.env_steps(), folder.path())?;
             memory.learned(&sample, &errors);
             progress.updated(&update);

@@ -22,6 +22,7 @@ fn learning() -> Learning {
         discount: 0.5,
         reward_scale: 1.0,
         scale_observations: false,
+        observation_noise: 0.0,
         actor_rate: 0.01,
         critic_rate: 0.01,
         last_rate: 1.0,
@@ -71,7 +72,7 @@ fn whole(sample: &Sample<2>) -> Transitions {
 }
 
 fn parts(sample: &Sample<2>) -> Vec<Transitions> {
-    bridge::parts(sample, &unscaled(), 1.0)
+    bridge::parts(sample, &unscaled(), &learning(), &mut SmallRng::seed_from_u64(0))
 }
 
 /// Updates at an even, then a falling pace.
