@@ -138,9 +138,10 @@ class Learner:
             torch.rand(self.batch, 1) * 2 - 1,
             torch.full((self.batch, 1), 0.97**3),
             torch.rand(self.batch, N_VALUES) * 2 - 1,
+            torch.ones(self.batch, 1),
         )
 
-    def update(self, observation, action, reward, discount, next_observation):
+    def update(self, observation, action, reward, discount, next_observation, weight):
         alpha = math.exp(self.log_weight)
         # Soft value of what follows: expectation over actions.
         with torch.no_grad():
@@ -152,7 +153,7 @@ class Learner:
         # Each critic learns the value of the action that was taken.
         values = [self.first(observation), self.second(observation)]
         taken = [q.gather(1, action) for q in values]
-        critic_loss = nn.functional.mse_loss(taken[0], target) + nn.functional.mse_loss(taken[1], target)
+        critic_loss = (((taken[0] - target).square() + (taken[1] - target).square()) * weight).mean()
 
         # The actor learns from the same values, as constants.
         q = ((values[0] + values[1]) * 0.5).detach()
@@ -161,7 +162,9 @@ class Learner:
         actor_loss = (probs * (alpha * log_probs - q)).sum(1).mean()
         with torch.no_grad():
             entropy = -(probs * log_probs).sum(1).mean().item()
-            value = 0.5 * (taken[0].mean() + taken[1].mean()).item()
+            value = (taken[0] + taken[1]) * 0.5
+            errors = (value - target).abs().squeeze(1).numpy()
+            value = value.mean().item()
 
         for optimizer, loss in ((self.critic_optimizer, critic_loss), (self.actor_optimizer, actor_loss)):
             optimizer.zero_grad(set_to_none=True)
@@ -171,7 +174,7 @@ class Learner:
         with torch.no_grad():
             torch._foreach_lerp_(self.target_parameters, self.critic_parameters, 0.005)
             torch._foreach_lerp_(self.average_parameters, self.actor_parameters, 0.005)
-        return critic_loss.item(), actor_loss.item(), entropy, value
+        return critic_loss.item(), actor_loss.item(), entropy, value, errors
 
     def lead(self, entropy):
         """One of Adam's steps for the entropy's weight, a number on the host as in offtrack."""

@@ -34,7 +34,8 @@ pub fn parts<const N: usize>(sample: &Sample<N>, scaling: &Scaling, reward_scale
             action: Tensor::from_data(TensorData::new(actions, shape), &device),
             reward: Tensor::from_data(TensorData::new(rewards, shape), &device),
             discount: Tensor::from_data(TensorData::new(sample.discount[rows.clone()].to_vec(), shape), &device),
-            next_observation: observations(&sample.next_observation[rows], scaling),
+            next_observation: observations(&sample.next_observation[rows.clone()], scaling),
+            weight: Tensor::from_data(TensorData::new(sample.weight[rows].to_vec(), shape), &device),
         }
     };
     (0..N_PARTS).map(part).collect()

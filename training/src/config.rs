@@ -26,10 +26,28 @@ pub struct Config {
     /// Env steps to learn for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<u64>,
+    /// How far from the policy the trucks act.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exploration: Option<Exploration>,
     /// What is kept of the past.
     pub memory: Memory,
     /// How it is learned from.
     pub learning: Learning,
+}
+
+/// Actions by chance in place of the policy's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Exploration {
+    /// Share of the actions that are drawn by chance, at the beginning.
+    pub first: f64,
+    /// The same from `steps` on.
+    pub last: f64,
+    /// Env steps over which the share goes from `first` to `last`.
+    pub steps: u64,
+    /// How differently the trucks explore: the share of truck i of n is raised to the power 1 + spread i / (n - 1).
+    #[serde(default)]
+    pub spread: f64,
 }
 
 /// What is kept of the past.
@@ -40,6 +58,19 @@ pub struct Memory {
     pub capacity: usize,
     /// Transitions before the first update.
     pub warmup: usize,
+    /// Which transitions are drawn more often; without it all are equal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub priority: Option<Priority>,
+}
+
+/// Transitions are drawn in proportion to the error that the critics made on them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Priority {
+    /// The power of the error that a transition is drawn in proportion to.
+    pub exponent: f64,
+    /// How much of the bias is taken back by weights: 0 nothing, 1 all of it.
+    pub correction: f64,
 }
 
 /// How transitions are learned from.
@@ -58,12 +89,24 @@ pub struct Learning {
     pub discount: f64,
     /// What rewards are multiplied by.
     pub reward_scale: f64,
+    /// Observed values are shifted and stretched to mean 0 and deviation 1.
+    pub scale_observations: bool,
     /// Adam's learning rate of the actor.
     pub actor_rate: f64,
     /// Adam's learning rate of the critics.
     pub critic_rate: f64,
+    /// Share of the learning rates that is left at the end of the run.
+    pub last_rate: f64,
+    /// Layers of the critics are normalised over their units.
+    pub layer_norm: bool,
     /// How the two critics' values become one.
     pub critics: Critics,
+    /// How far a critic may move from its target before its loss stops following; without it freely.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value_clip: Option<f64>,
+    /// Critics give a distribution of values in place of one; without it one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub categories: Option<Categories>,
     /// How far the target critics move toward the critics at a time; 1 copies them.
     pub target_rate: f64,
     /// Updates from one such move to the next.
@@ -84,10 +127,24 @@ pub enum Critics {
     Lowest,
 }
 
+/// Values as a histogram of evenly spaced categories.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Categories {
+    /// Their number.
+    pub count: usize,
+    /// Value of the first, in scaled rewards.
+    pub low: f64,
+    /// Value of the last.
+    pub high: f64,
+}
+
 /// The entropy beside the reward.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entropy {
+    /// The critics' target counts the entropy of what follows; otherwise the actor alone does.
+    pub in_target: bool,
     /// Entropy that the weight is led to, as a share of the most that there can be; without it the weight stays.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub share: Option<f64>,
@@ -134,6 +191,16 @@ impl Config {
         }
         reader.count("memory.capacity", memory.capacity, 1_000..=100_000_000)?;
         reader.count("memory.warmup", memory.warmup, 1..=memory.capacity)?;
+        if let Some(priority) = memory.priority {
+            reader.within("memory.priority.exponent", priority.exponent, 0.0..=1.0, "")?;
+            reader.within("memory.priority.correction", priority.correction, 0.0..=1.0, "")?;
+        }
+        if let Some(exploration) = &self.exploration {
+            reader.within("exploration.first", exploration.first, 0.0..=1.0, "")?;
+            reader.within("exploration.last", exploration.last, 0.0..=1.0, "")?;
+            reader.within("exploration.steps", exploration.steps as f64, 1.0..=1e12, "")?;
+            reader.within("exploration.spread", exploration.spread, 0.0..=100.0, "")?;
+        }
         reader.count("learning.hidden", learning.hidden.len(), 1..=8)?;
         for (index, &size) in learning.hidden.iter().enumerate() {
             reader.count(&format!("learning.hidden[{index}]"), size, 1..=8192)?;
@@ -147,10 +214,28 @@ impl Config {
             let expected = format!("must hold more than learning.n_steps = {} steps of n_envs = {} trucks", learning.n_steps, self.n_envs);
             return Err(reader.invalid("memory.capacity", memory.capacity, expected).into());
         }
-        reader.within("learning.discount", learning.discount, 0.0..=0.9999, "")?;
+        reader.within("learning.discount", learning.discount, 0.0..=1.0, "")?;
         reader.within("learning.reward_scale", learning.reward_scale, 1e-6..=1e6, "")?;
         reader.within("learning.actor_rate", learning.actor_rate, 1e-8..=1.0, "")?;
         reader.within("learning.critic_rate", learning.critic_rate, 1e-8..=1.0, "")?;
+        reader.within("learning.last_rate", learning.last_rate, 0.0..=1.0, "")?;
+        if let Some(clip) = learning.value_clip {
+            reader.within("learning.value_clip", clip, 1e-6..=1e6, "")?;
+        }
+        if let Some(Categories { count, low, high }) = learning.categories {
+            reader.count("learning.categories.count", count, 2..=1001)?;
+            reader.within("learning.categories.low", low, -1e6..=1e6, "")?;
+            reader.within("learning.categories.high", high, -1e6..=1e6, "")?;
+            if high <= low {
+                return Err(reader
+                    .invalid("learning.categories.high", high, format!("must be above learning.categories.low = {low}"))
+                    .into());
+            }
+            if learning.value_clip.is_some() {
+                let expected = "has no meaning beside learning.categories: leave one of them out";
+                return Err(reader.invalid("learning.value_clip", "given", expected).into());
+            }
+        }
         reader.within("learning.target_rate", learning.target_rate, 1e-6..=1.0, "")?;
         reader.count("learning.target_every", learning.target_every, 1..=1_000_000)?;
         reader.within("learning.average_rate", learning.average_rate, 1e-6..=1.0, "")?;

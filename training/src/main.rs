@@ -8,6 +8,7 @@ mod draw;
 mod drivers;
 mod error;
 mod evaluate;
+mod exploration;
 mod files;
 mod memory;
 mod network;

@@ -3,10 +3,15 @@
 //! Rows lie in the order of time, `n_envs` to a slot, so what follows a row stands in the next slot. Only where the clock ended an episode
 //! does it not: those few observations are kept beside the ring.
 
+mod priority;
+
 use std::collections::HashMap;
 
 use offtrack::layout::Ended;
 use rand::Rng;
+
+use crate::config;
+use priority::Priorities;
 
 /// One step of every truck, as the simulator's columns have it. All are `[n_envs]`.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +41,10 @@ pub struct Sample<const N: usize> {
     pub discount: Vec<f32>,
     /// What the last step on the way led to.
     pub next_observation: Vec<[f32; N]>,
+    /// Weight in the critics' loss: 1, or less where priorities made the transition likely.
+    pub weight: Vec<f32>,
+    /// Where the transitions lie, for [`Memory::learned`].
+    pub row: Vec<usize>,
 }
 
 /// What a row's step left behind.
@@ -61,14 +70,21 @@ pub struct Memory<const N: usize> {
     reward: Vec<f32>,
     after: Vec<After>,
     cut: HashMap<usize, [f32; N]>,
+    /// Steps that must follow a transition before it can be drawn.
+    n_steps: usize,
+    priorities: Option<Priorities>,
 }
 
 impl<const N: usize> Memory<N> {
-    /// Room for at least `capacity` transitions of `n_envs` trucks. The room is taken as it is filled.
-    pub fn new(n_envs: usize, capacity: usize) -> Memory<N> {
+    /// Room for at least `settings.capacity` transitions of `n_envs` trucks, to be drawn over `n_steps` steps each. The room is taken as
+    /// it is filled.
+    pub fn new(n_envs: usize, n_steps: usize, settings: &config::Memory) -> Memory<N> {
+        let n_slots = settings.capacity.div_ceil(n_envs);
         Memory {
             n_envs,
-            n_slots: capacity.div_ceil(n_envs),
+            n_slots,
+            n_steps,
+            priorities: settings.priority.map(|priority| Priorities::new(priority, n_slots * n_envs)),
             count: 0,
             observation: Vec::new(),
             action: Vec::new(),
@@ -117,43 +133,71 @@ impl<const N: usize> Memory<N> {
                 After::Next
             };
         }
+        if let Some(priorities) = &mut self.priorities {
+            // What was here is gone; the slot that now has enough followers can be drawn.
+            (first..first + self.n_envs).for_each(|row| priorities.dismiss(row));
+            if self.n_steps <= self.count {
+                let ready = (self.count - self.n_steps) % self.n_slots * self.n_envs;
+                (ready..ready + self.n_envs).for_each(|row| priorities.admit(row));
+            }
+        }
         self.count += 1;
     }
 
-    /// Whether there is a step that `n_steps` others follow, so that one can be drawn.
-    pub fn can_sample(&self, n_steps: usize) -> bool {
-        n_steps < self.slots_held()
+    /// Whether there is a step that enough others follow, so that one can be drawn.
+    pub fn can_sample(&self) -> bool {
+        self.n_steps < self.slots_held()
     }
 
-    /// Draws `batch` transitions, each held one as likely as the next, and follows each for `n_steps` steps or to its episode's end.
+    /// Takes note of the error of each row of a sample, `[batch]`; what has no priorities has no use for it.
+    pub fn learned(&mut self, sample: &Sample<N>, errors: &[f32]) {
+        if let Some(priorities) = &mut self.priorities {
+            sample.row.iter().zip(errors).for_each(|(&row, &error)| priorities.learned(row, error));
+        }
+    }
+
+    /// Draws `batch` transitions, each held one as likely as the next or by its priority, and follows each for `n_steps` steps or to its
+    /// episode's end.
     ///
     /// The sum of rewards is R. Sutton's n-step return ("Learning to Predict by the Methods of Temporal Differences", 1988), without a
     /// correction for actions that today's policy would not choose. [`Memory::can_sample`] must hold.
-    pub fn sample(&self, batch: usize, n_steps: usize, discount: f32, rng: &mut impl Rng) -> Sample<N> {
-        let oldest = self.count - self.slots_held();
+    pub fn sample(&self, batch: usize, discount: f32, rng: &mut impl Rng) -> Sample<N> {
+        let held = self.slots_held();
+        let oldest = self.count - held;
         let mut sample = Sample {
             observation: Vec::with_capacity(batch),
             action: Vec::with_capacity(batch),
             reward: Vec::with_capacity(batch),
             discount: Vec::with_capacity(batch),
             next_observation: Vec::with_capacity(batch),
+            weight: vec![1.0; batch],
+            row: Vec::with_capacity(batch),
         };
-        for _ in 0..batch {
-            // The last `n_steps` slots are not yet followed by enough others.
-            let slot = rng.random_range(oldest..self.count - n_steps);
-            let env = rng.random_range(0..self.n_envs);
-            self.follow(slot, env, n_steps, discount, &mut sample);
+        for index in 0..batch {
+            let (slot, env) = match &self.priorities {
+                // The last `n_steps` slots are not yet followed by enough others.
+                None => (rng.random_range(oldest..self.count - self.n_steps), rng.random_range(0..self.n_envs)),
+                Some(priorities) => {
+                    let row = priorities.draw(index, batch, rng);
+                    let place = row / self.n_envs;
+                    (oldest + (place + self.n_slots - oldest % self.n_slots) % self.n_slots, row % self.n_envs)
+                }
+            };
+            self.follow(slot, env, discount, &mut sample);
+        }
+        if let Some(priorities) = &self.priorities {
+            sample.weight = priorities.weights(&sample.row, (held - self.n_steps) * self.n_envs);
         }
         sample
     }
 
-    fn follow(&self, slot: usize, env: usize, n_steps: usize, discount: f32, sample: &mut Sample<N>) {
+    fn follow(&self, slot: usize, env: usize, discount: f32, sample: &mut Sample<N>) {
         let row_of = |slot: usize| slot % self.n_slots * self.n_envs + env;
         let first = row_of(slot);
         let mut reward = 0.0;
         let mut weight = 1.0;
         let mut next = None;
-        for row in (slot..slot + n_steps).map(row_of) {
+        for row in (slot..slot + self.n_steps).map(row_of) {
             reward += weight * self.reward[row];
             weight *= discount;
             match self.after[row] {
@@ -163,12 +207,13 @@ impl<const N: usize> Memory<N> {
             }
             break;
         }
+        sample.row.push(first);
         sample.observation.push(self.observation[first]);
         sample.action.push(self.action[first]);
         sample.reward.push(reward);
         sample.discount.push(weight);
         // After an episode's end this is another episode's observation: its weight is then 0.
-        sample.next_observation.push(*next.unwrap_or(&self.observation[row_of(slot + n_steps)]));
+        sample.next_observation.push(*next.unwrap_or(&self.observation[row_of(slot + self.n_steps)]));
     }
 
     fn slots_held(&self) -> usize {

@@ -1,7 +1,7 @@
 //! The network of actor and critics alike: a stack of linear layers with rectifiers between them.
 
 use burn::module::{Module, Param};
-use burn::nn::Linear;
+use burn::nn::{LayerNorm, LayerNormConfig, Linear};
 use burn::tensor::activation::{log_softmax, relu};
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;
@@ -11,6 +11,8 @@ use rand::Rng;
 pub struct Mlp {
     /// The layers, from the observation on; weights are `[inputs, outputs]`.
     pub layers: Vec<Linear>,
+    /// Normalisations before the rectifiers, one each or none at all (J. Ba and others, "Layer Normalization", 2016).
+    pub norms: Vec<LayerNorm>,
 }
 
 impl Mlp {
@@ -25,14 +27,29 @@ impl Mlp {
             let weights: Vec<f32> = (0..inputs * outputs).map(|_| limit * rng.random_range(-1.0..1.0f32)).collect();
             layer(weights, vec![0.0; outputs], device)
         });
-        Mlp { layers: layers.collect() }
+        Mlp { layers: layers.collect(), norms: Vec::new() }
+    }
+
+    /// The same layers with every hidden one's output normalised over its units.
+    pub fn normalised(self) -> Mlp {
+        let hidden = self.layers.len() - 1;
+        let norm = |layer: &Linear| LayerNormConfig::new(layer.weight.dims()[1]).init(&layer.weight.device());
+        Mlp { norms: self.layers[..hidden].iter().map(norm).collect(), layers: self.layers }
     }
 
     /// From an observation `[B, inputs]` to one value an action `[B, A]`.
     pub fn forward(&self, observation: Tensor<2>) -> Tensor<2> {
-        let mut layers = self.layers.iter();
-        let first = layers.next().map(|layer| layer.forward(observation.clone()));
-        layers.fold(first.unwrap_or(observation), |hidden, layer| layer.forward(relu(hidden)))
+        let mut output = observation;
+        for (index, layer) in self.layers.iter().enumerate() {
+            output = layer.forward(output);
+            if let Some(norm) = self.norms.get(index) {
+                output = norm.forward(output);
+            }
+            if index + 1 < self.layers.len() {
+                output = relu(output);
+            }
+        }
+        output
     }
 }
 
@@ -64,7 +81,10 @@ mod tests {
     #[test]
     fn a_rectifier_stands_between_the_layers_and_none_after_the_last() {
         let device = Device::flex();
-        let network = Mlp { layers: vec![layer(vec![1.0, -1.0], vec![0.0, 0.5], &device), layer(vec![-2.0, 3.0], vec![1.0], &device)] };
+        let network = Mlp {
+            layers: vec![layer(vec![1.0, -1.0], vec![0.0, 0.5], &device), layer(vec![-2.0, 3.0], vec![1.0], &device)],
+            norms: Vec::new(),
+        };
         let output = network.forward(Tensor::from_data([[2.0], [-1.0]], &device));
         // relu(2), relu(-1.5) -> -4 + 0 + 1; relu(-1), relu(1.5) -> 0 + 4.5 + 1.
         assert_eq!(output.into_data().try_to_vec::<f32>().unwrap(), [-3.0, 5.5]);

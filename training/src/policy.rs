@@ -50,7 +50,10 @@ impl Policy {
             benchmark: contents.benchmark,
             actions: contents.actions.iter().map(|&[steering, speed]| Action { steering, speed }).collect(),
             scaling: contents.scaling,
-            actor: Mlp { layers: contents.layers.into_iter().map(|(weights, biases)| layer(weights, biases, &device)).collect() },
+            actor: Mlp {
+                layers: contents.layers.into_iter().map(|(weights, biases)| layer(weights, biases, &device)).collect(),
+                norms: Vec::new(),
+            },
         })
     }
 

@@ -4,6 +4,7 @@
 //! never depends on the machine, so neither does the result.
 
 mod adam;
+mod critics;
 mod entropy;
 
 use std::mem::take;
@@ -15,12 +16,13 @@ use rand::SeedableRng;
 use rand::rngs::SmallRng;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
-use crate::config::{Critics, Learning};
+use crate::config::Learning;
 use crate::network::{Mlp, distribution};
 use adam::Adam;
+use critics::{Following, Reading, Twins};
 use entropy::EntropyWeight;
 
-/// Parts that a batch is learned in. Two: their gradients' sum is the same in either order, and the optimizer promises none.
+/// Parts that a batch is learned in: two, for the cores that the smallest machines have. Another number would round sums otherwise.
 pub const N_PARTS: usize = 2;
 
 /// Some rows of a batch, as tensors without gradients. B is the number of rows.
@@ -36,12 +38,14 @@ pub struct Transitions {
     pub discount: Tensor<2>,
     /// What it led to, `[B, values]`.
     pub next_observation: Tensor<2>,
+    /// Weight of the row in the critics' loss, `[B, 1]`.
+    pub weight: Tensor<2>,
 }
 
 /// What an update came to, averaged over its batch.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Update {
-    /// Squared error of the two critics, summed.
+    /// Squared error of the two critics, summed; with categories the cross entropy.
     pub critic_loss: f32,
     /// Weighted negative entropy minus value: what the actor minimises.
     pub actor_loss: f32,
@@ -51,23 +55,10 @@ pub struct Update {
     pub value: f32,
 }
 
-/// Two critics that read alike, begin apart and err apart.
-#[derive(Module, Debug, Default)]
-struct Twins {
-    first: Mlp,
-    second: Mlp,
-}
-
-impl Twins {
-    /// Value of every action by each critic, `[B, A]` twice.
-    fn values(&self, observation: Tensor<2>) -> [Tensor<2>; 2] {
-        [self.first.forward(observation.clone()), self.second.forward(observation)]
-    }
-}
-
 /// The learner: actor, critics, and all that an update moves.
 pub struct Sac {
     learning: Learning,
+    reading: Reading,
     actor: Mlp,
     critics: Twins,
     target: Twins,
@@ -84,9 +75,15 @@ impl Sac {
     pub fn new(learning: &Learning, n_values: usize, n_actions: usize, seed: u64) -> Result<Sac, ThreadPoolBuildError> {
         let device = Device::flex().autodiff();
         let rng = &mut SmallRng::seed_from_u64(seed);
-        let sizes: Vec<usize> = [n_values].into_iter().chain(learning.hidden.iter().copied()).chain([n_actions]).collect();
-        let actor = Mlp::new(&sizes, 0.01, rng, &device);
-        let critics = Twins { first: Mlp::new(&sizes, 0.1, rng, &device), second: Mlp::new(&sizes, 0.1, rng, &device) };
+        let reading = Reading::new(learning, n_actions);
+        let sizes =
+            |n_outputs: usize| -> Vec<usize> { [n_values].into_iter().chain(learning.hidden.iter().copied()).chain([n_outputs]).collect() };
+        let actor = Mlp::new(&sizes(n_actions), 0.01, rng, &device);
+        let mut critic = || {
+            let plain = Mlp::new(&sizes(reading.n_outputs()), 0.1, rng, &device);
+            if learning.layer_norm { plain.normalised() } else { plain }
+        };
+        let critics = Twins { first: critic(), second: critic() };
         let pools: Result<_, _> = (0..N_PARTS).map(|_| ThreadPoolBuilder::new().num_threads(1).build()).collect();
         Ok(Sac {
             target: critics.valid(),
@@ -97,6 +94,7 @@ impl Sac {
             updates: 0,
             pools: pools?,
             learning: learning.clone(),
+            reading,
             actor,
             critics,
         })
@@ -117,20 +115,23 @@ impl Sac {
         self.entropy_weight.value()
     }
 
-    /// One gradient step of critics, actor and entropy weight on the batch that the parts make up, with learning rates times `pace`.
-    pub fn update(&mut self, parts: Vec<Transitions>, pace: f64) -> Update {
+    /// One gradient step of critics, actor and entropy weight on the batch that the parts make up, with learning rates times `pace`. Gives
+    /// also the error of each row, `[batch]`: how far the critics' average was from what they are to give.
+    pub fn update(&mut self, parts: Vec<Transitions>, pace: f64) -> (Update, Vec<f32>) {
         let n_rows: usize = parts.iter().map(|part| part.observation.dims()[0]).sum();
         let shares = on_pools(&self.pools, parts, |part| {
             let share = part.observation.dims()[0] as f32 / n_rows as f32;
             self.gradients(part, share)
         });
         let mut update = Update::default();
+        let mut errors = Vec::with_capacity(n_rows);
         let [mut critic_gradients, mut actor_gradients] = [Vec::new(), Vec::new()];
         for share in shares {
             update.critic_loss += share.update.critic_loss;
             update.actor_loss += share.update.actor_loss;
             update.entropy += share.update.entropy;
             update.value += share.update.value;
+            errors.extend(share.errors);
             critic_gradients.push(share.critics);
             actor_gradients.push(share.actor);
         }
@@ -142,7 +143,7 @@ impl Sac {
         let [actor, average] = [&mut self.actor, &mut self.average].map(take);
         (self.actor, self.average) = self.actor_optimizer.step(actor, average, actor_gradients, actor_rate, self.learning.average_rate);
         self.entropy_weight.update(update.entropy);
-        update
+        (update, errors)
     }
 
     /// One part's gradients; its losses count for `share` of the batch's.
@@ -153,22 +154,32 @@ impl Sac {
         let actor = self.actor.clone().fork(&device);
         let critics = self.critics.clone().fork(&device);
 
-        // Soft value of what follows: expectation over actions.
+        // Value of what follows: expectation over actions, with the entropy's worth where it counts.
         let (probs, log_probs) = distribution(self.actor.valid().forward(part.next_observation.clone())); // [B, A] each
-        let q = self.one_value(self.target.values(part.next_observation)); // [B, A]
-        let value = (probs * (q - log_probs.mul_scalar(alpha))).sum_dim(1); // [B, 1]
-        let target = part.reward + part.discount * value; // [B, 1]
+        let bonus = self.learning.entropy.in_target.then(|| (probs.clone() * log_probs).sum_dim(1).mul_scalar(-alpha)); // [B, 1]
+        let goal = self.reading.goal(Following {
+            probs,
+            outputs: self.target.forward(part.next_observation),
+            bonus,
+            reward: &part.reward,
+            discount: &part.discount,
+        });
 
         // Each critic learns the value of the action that was taken.
-        let [first, second] = critics.values(part.observation.clone().autodiff()); // [B, A] each
-        let taken = |q: &Tensor<2>| q.clone().gather(1, part.action.clone().autodiff()); // [B, 1]
-        let error = |q: &Tensor<2>| (taken(q) - target.clone().autodiff()).square().mean();
-        let critic_loss = (error(&first) + error(&second)).mul_scalar(share); // [1]
+        let outputs = critics.forward(part.observation.clone().autodiff());
+        let bounds = self.reading.clips().then(|| {
+            let taken = |q: Tensor<2>| q.gather(1, part.action.clone()); // [B, 1]
+            self.target.forward(part.observation.clone()).map(taken)
+        });
+        let [first_bound, second_bound] = bounds.map_or([None, None], |bounds| bounds.map(Some));
+        let (first_loss, first_value) = self.reading.loss(&outputs[0], &part.action, &goal, first_bound); // [B, 1] each
+        let (second_loss, second_value) = self.reading.loss(&outputs[1], &part.action, &goal, second_bound); // [B, 1] each
+        let critic_loss = ((first_loss + second_loss) * part.weight.autodiff()).mean().mul_scalar(share); // [1]
+        let value = (first_value + second_value).mul_scalar(0.5); // [B, 1]
+        let errors = (value.clone() - goal.value().clone()).abs().into_data();
 
         // The actor learns what the critics hold for best, and to keep some entropy. Their values are constants here.
-        let values = [first, second].map(Tensor::inner); // [B, A] each
-        let taken_value = values.iter().map(|q| q.clone().gather(1, part.action.clone()).mean().into_scalar::<f32>()).sum::<f32>();
-        let q = self.one_value(values).autodiff(); // [B, A]
+        let q = self.reading.one_value(outputs.map(|output| self.reading.values(output.inner()))).autodiff(); // [B, A]
         let (probs, log_probs) = distribution(actor.forward(part.observation.autodiff())); // [B, A] each
         let entropy = (probs.clone() * log_probs.clone()).inner().sum_dim(1).mean().into_scalar::<f32>();
         let actor_loss = (probs * (log_probs.mul_scalar(alpha) - q)).sum_dim(1).mean().mul_scalar(share); // [1]
@@ -178,18 +189,11 @@ impl Sac {
                 critic_loss: critic_loss.clone().inner().into_scalar(),
                 actor_loss: actor_loss.clone().inner().into_scalar(),
                 entropy: -entropy * share,
-                value: 0.5 * taken_value * share,
+                value: value.mean().into_scalar::<f32>() * share,
             },
+            errors: errors.try_to_vec().expect("the critics' weights are f32, and so are their errors"),
             critics: GradientsParams::from_grads(critic_loss.backward(), &critics),
             actor: GradientsParams::from_grads(actor_loss.backward(), &actor),
-        }
-    }
-
-    /// The two critics' values `[B, A]` as one, `[B, A]`.
-    fn one_value(&self, [first, second]: [Tensor<2>; 2]) -> Tensor<2> {
-        match self.learning.critics {
-            Critics::Average => (first + second).mul_scalar(0.5),
-            Critics::Lowest => first.min_pair(second),
         }
     }
 }
@@ -197,6 +201,7 @@ impl Sac {
 /// What one part adds to an update.
 struct Share {
     update: Update,
+    errors: Vec<f32>,
     critics: GradientsParams,
     actor: GradientsParams,
 }

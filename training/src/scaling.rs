@@ -17,6 +17,11 @@ pub struct Scaling {
 }
 
 impl Scaling {
+    /// Leaves observations of `n_values` values as they are.
+    pub fn none(n_values: usize) -> Scaling {
+        Scaling { mean: vec![0.0; n_values], factor: vec![1.0; n_values] }
+    }
+
     /// What brings these observations to mean 0 and deviation 1.
     pub fn of<const N: usize>(observations: &[[f32; N]]) -> Scaling {
         let n = observations.len().max(1) as f64;

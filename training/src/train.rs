@@ -37,8 +37,6 @@ use progress::Progress;
 
 /// Time between two saved policies.
 const SAVE_EVERY: Duration = Duration::from_secs(60);
-/// Share of the learning rates that is left at the end of a run.
-const LAST_PACE: f64 = 0.1;
 /// Episodes on each route in the closing examination.
 const EPISODES: usize = 30;
 
@@ -163,7 +161,7 @@ fn learn(
     let n_actions = world.actions.len();
     let routes = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
     let mut simulator = Simulator::new(world.clone(), config.n_envs, config.seed, routes)?;
-    let mut memory: Memory<N_VALUES> = Memory::new(config.n_envs, config.memory.capacity);
+    let mut memory: Memory<N_VALUES> = Memory::new(config.n_envs, learning.n_steps, &config.memory);
     let stream = |purpose: u32| SmallRng::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
     let (mut acting, mut sampling) = (stream(1), stream(2));
     let mut sac = Sac::new(learning, N_VALUES, n_actions, u64::from(config.seed))?;
@@ -172,14 +170,14 @@ fn learn(
 
     // Chance drives until there is enough to tell how the observed values lie; their scaling then stays.
     let stopped = || 0 < stop.load(Ordering::Relaxed);
-    let ready = |memory: &Memory<N_VALUES>| config.memory.warmup <= memory.len() && memory.can_sample(learning.n_steps);
+    let ready = |memory: &Memory<N_VALUES>| config.memory.warmup <= memory.len() && memory.can_sample();
     while !ready(&memory) && progress.share() < 1.0 && !stopped() {
         seen.clone_from(&simulator.batch().observation);
         simulator.step_at_random();
         bridge::remember(&mut memory, &seen, simulator.batch());
         progress.stepped(simulator.batch());
     }
-    let scaling = Scaling::of(memory.observations());
+    let scaling = if learning.scale_observations { Scaling::of(memory.observations()) } else { Scaling::none(N_VALUES) };
     let policy = |sac: &Sac| Policy {
         benchmark: config.benchmark.clone(),
         actions: world.actions.clone(),
@@ -190,15 +188,19 @@ fn learn(
     let mut saved = Instant::now();
     while progress.share() < 1.0 && !stopped() {
         seen.clone_from(&simulator.batch().observation);
-        let actions = policy::drawn(&bridge::logits(&sac.actor(), &scaling, &seen), n_actions, &mut acting);
+        let mut actions = policy::drawn(&bridge::logits(&sac.actor(), &scaling, &seen), n_actions, &mut acting);
+        if let Some(exploration) = &config.exploration {
+            exploration.explore(progress.env_steps(), n_actions, &mut actions, &mut acting);
+        }
         simulator.step(&actions)?;
         bridge::remember(&mut memory, &seen, simulator.batch());
         progress.stepped(simulator.batch());
-        let pace = 1.0 - (1.0 - LAST_PACE) * progress.share();
+        let pace = 1.0 - (1.0 - learning.last_rate) * progress.share();
         for _ in 0..learning.updates_per_step {
-            let sample = memory.sample(learning.batch, learning.n_steps, learning.discount as f32, &mut sampling);
-            let update = sac.update(bridge::parts(&sample, &scaling, learning.reward_scale as f32), pace);
+            let sample = memory.sample(learning.batch, learning.discount as f32, &mut sampling);
+            let (update, errors) = sac.update(bridge::parts(&sample, &scaling, learning.reward_scale as f32), pace);
             check(&update, progress.env_steps(), folder.path())?;
+            memory.learned(&sample, &errors);
             progress.updated(&update);
         }
         progress.report(sac.entropy_weight())?;

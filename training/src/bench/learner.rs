@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::{Args, median};
 use crate::bridge;
-use crate::config::{Critics, Entropy, Learning};
+use crate::config::{self, Critics, Entropy, Learning};
 use crate::error::Error;
 use crate::files;
 use crate::memory::{Memory, Rows, Sample};
@@ -118,7 +118,8 @@ impl Learner {
         let learning = learning(hidden, batch);
         let sac = Sac::new(&learning, N_VALUES, N_ACTIONS, 0)?;
         let mut rng = SmallRng::seed_from_u64(0);
-        let mut memory = Memory::new(N_ENVS, N_ENVS * N_SLOTS);
+        let capacity = N_ENVS * N_SLOTS;
+        let mut memory = Memory::new(N_ENVS, learning.n_steps, &config::Memory { capacity, warmup: capacity, priority: None });
         for _ in 0..N_SLOTS {
             memory.append(Rows {
                 observation: &rows(&mut rng),
@@ -133,7 +134,7 @@ impl Learner {
     }
 
     fn sample(&mut self) -> Sample<N_VALUES> {
-        self.memory.sample(self.learning.batch, self.learning.n_steps, self.learning.discount as f32, &mut self.rng)
+        self.memory.sample(self.learning.batch, self.learning.discount as f32, &mut self.rng)
     }
 
     /// Updates for so many seconds, once at least.
@@ -186,7 +187,7 @@ impl Learner {
     }
 }
 
-/// What is learned with, in the default training file's manner.
+/// Plain twin critics, as in the default training file.
 fn learning(hidden: &[usize], batch: usize) -> Learning {
     Learning {
         hidden: hidden.to_vec(),
@@ -195,13 +196,18 @@ fn learning(hidden: &[usize], batch: usize) -> Learning {
         n_steps: 3,
         discount: 0.97,
         reward_scale: 1.0,
+        scale_observations: true,
         actor_rate: 3e-4,
         critic_rate: 3e-4,
+        last_rate: 1.0,
+        layer_norm: false,
+        value_clip: None,
+        categories: None,
         critics: Critics::Average,
         target_rate: 0.005,
         target_every: 1,
         average_rate: 0.005,
-        entropy: Entropy { share: Some(0.1), weight: 0.05, rate: 3e-4 },
+        entropy: Entropy { in_target: true, share: Some(0.1), weight: 0.05, rate: 3e-4 },
     }
 }
 

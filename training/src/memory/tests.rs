@@ -17,8 +17,11 @@ fn histories(n_steps: usize) -> [History; 2] {
     [of(5, 0), of(7, 3)]
 }
 
-fn filled(histories: &[History; 2], capacity: usize) -> Memory<2> {
-    let mut memory = Memory::new(2, capacity);
+/// With and without priorities.
+const SETTINGS: [Option<config::Priority>; 2] = [None, Some(config::Priority { exponent: 0.6, correction: 0.4 })];
+
+fn filled(histories: &[History; 2], n_steps: usize, capacity: usize, priority: Option<config::Priority>) -> Memory<2> {
+    let mut memory = Memory::new(2, n_steps, &config::Memory { capacity, warmup: 1, priority });
     for (step, (first, second)) in histories[0].iter().zip(&histories[1]).enumerate() {
         let of = |value: usize| [0, 1].map(|env| [value as f32, env as f32]);
         memory.append(Rows {
@@ -49,7 +52,7 @@ fn reference(history: &History, start: usize, n_steps: usize) -> (f32, f32, Opti
 }
 
 fn check(memory: &Memory<2>, histories: &[History; 2], n_steps: usize) -> Vec<usize> {
-    let sample = memory.sample(4000, n_steps, DISCOUNT, &mut SmallRng::seed_from_u64(1));
+    let sample = memory.sample(4000, DISCOUNT, &mut SmallRng::seed_from_u64(1));
     let mut starts = Vec::new();
     for row in 0..4000 {
         let [step, env] = sample.observation[row].map(|value| value as usize);
@@ -72,24 +75,28 @@ fn check(memory: &Memory<2>, histories: &[History; 2], n_steps: usize) -> Vec<us
 fn returns_over_several_steps_equal_their_definition() {
     let histories = histories(60);
     for n_steps in [1, 2, 5] {
-        let starts = check(&filled(&histories, 200), &histories, n_steps);
-        assert_eq!(starts, (0..60 - n_steps).collect::<Vec<_>>(), "every step that enough others follow can be drawn");
+        for priority in SETTINGS {
+            let starts = check(&filled(&histories, n_steps, 200, priority), &histories, n_steps);
+            assert_eq!(starts, (0..60 - n_steps).collect::<Vec<_>>(), "every step that enough others follow can be drawn");
+        }
     }
 }
 
 #[test]
 fn a_full_ring_holds_the_latest_steps_alone() {
     let histories = histories(103);
-    let memory = filled(&histories, 40);
-    assert_eq!(memory.len(), 40);
-    // 20 slots, the last three of which nothing follows far enough.
-    assert_eq!(check(&memory, &histories, 3), (83..100).collect::<Vec<_>>());
+    for priority in SETTINGS {
+        let memory = filled(&histories, 3, 40, priority);
+        assert_eq!(memory.len(), 40);
+        // 20 slots, the last three of which nothing follows far enough.
+        assert_eq!(check(&memory, &histories, 3), (83..100).collect::<Vec<_>>());
+    }
 }
 
 #[test]
 fn a_forgotten_time_out_leaves_nothing_behind() {
     let histories = histories(1000);
-    let memory = filled(&histories, 40);
+    let memory = filled(&histories, 3, 40, None);
     let held = memory.after.iter().filter(|&&after| after == After::Cut).count();
     assert!(0 < held);
     assert_eq!(memory.cut.len(), held);
@@ -98,15 +105,30 @@ fn a_forgotten_time_out_leaves_nothing_behind() {
 #[test]
 fn only_a_followed_step_can_be_drawn() {
     let histories = histories(4);
-    let memory = filled(&histories, 40);
-    assert!(memory.can_sample(3));
-    assert!(!memory.can_sample(4));
+    assert!(filled(&histories, 3, 40, None).can_sample());
+    assert!(!filled(&histories, 4, 40, None).can_sample());
 }
 
 #[test]
 fn the_same_seed_draws_the_same_sample() {
-    let memory = filled(&histories(60), 200);
-    let draw = |seed| memory.sample(50, 3, DISCOUNT, &mut SmallRng::seed_from_u64(seed));
+    let memory = filled(&histories(60), 3, 200, None);
+    let draw = |seed| memory.sample(50, DISCOUNT, &mut SmallRng::seed_from_u64(seed));
     assert_eq!(draw(4), draw(4));
     assert_ne!(draw(4), draw(5));
+}
+
+#[test]
+fn what_was_learned_with_a_large_error_is_drawn_more_often_and_weighs_less() {
+    let mut memory = filled(&histories(60), 3, 200, SETTINGS[1]);
+    let all = memory.sample(4000, DISCOUNT, &mut SmallRng::seed_from_u64(1));
+    assert!(all.weight.iter().all(|weight| (weight - 1.0).abs() < 1e-6), "new transitions are equal");
+    let errors: Vec<f32> = all.row.iter().map(|&row| if row == 10 { 8.0 } else { 0.5 }).collect();
+    memory.learned(&all, &errors);
+    let again = memory.sample(4000, DISCOUNT, &mut SmallRng::seed_from_u64(2));
+    let of = |wanted: bool| again.row.iter().zip(&again.weight).filter(move |&(&row, _)| (row == 10) == wanted);
+    // 114 transitions: 16^0.6 = 5.28 of 118.28 shares; the draws are stratified.
+    assert!((of(true).count() as f64 - 4000.0 * 5.28 / 118.28).abs() < 20.0, "{}", of(true).count());
+    // 5.28^-0.4 of the weight of the others, whose weight is the largest.
+    assert!(of(false).all(|(_, weight)| (weight - 1.0).abs() < 1e-5));
+    assert!(of(true).all(|(_, weight)| (weight - 0.514).abs() < 1e-3));
 }

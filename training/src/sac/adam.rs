@@ -192,7 +192,7 @@ mod tests {
     use rayon::ThreadPoolBuilder;
 
     fn random(seed: u64, device: &Device) -> Mlp {
-        Mlp::new(&[3, 7, 2], 1.0, &mut SmallRng::seed_from_u64(seed), device)
+        Mlp::new(&[3, 7, 2], 1.0, &mut SmallRng::seed_from_u64(seed), device).normalised()
     }
 
     /// Two parts' gradients of the squared output.

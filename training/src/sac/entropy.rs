@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn the_weight_rises_while_the_entropy_is_too_low_and_falls_while_it_is_too_high() {
-        let mut weight = EntropyWeight::new(&Entropy { share: Some(0.5), weight: 0.1, rate: 0.01 }, 9);
+        let mut weight = EntropyWeight::new(&Entropy { in_target: true, share: Some(0.5), weight: 0.1, rate: 0.01 }, 9);
         let goal = 0.5 * 9f32.ln();
         weight.update(goal - 0.3);
         // Adam's first step is the rate itself whatever the gradient: the logarithm moves by 0.01.
@@ -65,7 +65,7 @@ mod tests {
 
     #[test]
     fn a_fixed_weight_stays() {
-        let mut weight = EntropyWeight::new(&Entropy { share: None, weight: 0.1, rate: 0.01 }, 9);
+        let mut weight = EntropyWeight::new(&Entropy { in_target: true, share: None, weight: 0.1, rate: 0.01 }, 9);
         weight.update(0.0);
         assert!((weight.value() - 0.1).abs() < 1e-7);
     }
