@@ -185,7 +185,7 @@ fn elements_mut(values: &mut TensorData) -> &mut [f32] {
 mod tests {
     use super::*;
     use crate::network::Mlp;
-    use burn::optim::AdamConfig;
+    use burn::optim::{AdamConfig, MultiGradientsParams};
     use burn::tensor::Device;
     use rand::rngs::SmallRng;
     use rand::{Rng, SeedableRng};
@@ -228,9 +228,8 @@ mod tests {
         let mut library = AdamConfig::new().with_epsilon(EPSILON as f32).init();
         let begun = weights(&expected);
         for step in 0..50 {
-            let mut parts = burn::optim::MultiGradientsParams::default();
-            parts.grads = gradients(&expected, step).into_iter().map(|part| (part, Device::flex())).collect();
-            expected = library.step_multi(0.01, expected, parts);
+            let grads = gradients(&expected, step).into_iter().map(|part| (part, Device::flex())).collect();
+            expected = library.step_multi(0.01, expected, MultiGradientsParams { grads });
             let parts = gradients(&found, step);
             (found, follower) = adam.step(found, follower, parts, 0.01, 0.0);
         }
