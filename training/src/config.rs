@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 
+mod set;
+
 /// A training file. Unknown keys are refused; one in hand has been checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -158,6 +160,23 @@ impl Config {
     /// Reads a training file. Everything that can be wrong with it is found here, with its key.
     pub fn read(path: &Path) -> Result<Config, Error> {
         let (reader, config) = Reader::read::<Config>(path)?;
+        config.check(&reader)?;
+        Ok(config)
+    }
+
+    /// Reads a training file with some of its keys set to other values, each `KEY=VALUE`.
+    pub fn read_with(path: &Path, settings: &[String]) -> Result<Config, Error> {
+        if settings.is_empty() {
+            return Config::read(path);
+        }
+        let (_, mut table) = Reader::read::<toml::Table>(path)?;
+        set::set(&mut table, settings)?;
+        let origin = format!("{} with --set {}", path.display(), settings.join(" --set "));
+        let reader = Reader::of(Path::new(&origin));
+        let config: Config = table.try_into().map_err(|error: toml::de::Error| Error::Contents {
+            file: origin.clone().into(),
+            message: error.to_string().trim().to_owned(),
+        })?;
         config.check(&reader)?;
         Ok(config)
     }

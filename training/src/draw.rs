@@ -2,12 +2,14 @@
 //!
 //! A PNG is the SVG rasterised: both show the same, on every machine, because letters are drawn as outlines too.
 
+pub(crate) mod episode;
+pub(crate) mod film;
 mod ground;
 mod isolines;
 mod legend;
 mod lettering;
 mod page;
-mod polygons;
+pub(crate) mod polygons;
 mod sweep;
 
 use std::path::{Path, PathBuf};
@@ -172,22 +174,40 @@ fn chosen<'a>(routes: &'a [Route], name: &str) -> Result<&'a Route, Error> {
     })
 }
 
+/// What drawing can fail with.
+pub(crate) type Failure = Box<dyn std::error::Error + Send + Sync>;
+
 /// The picture as a PNG, `width` pixels wide.
-fn rasterised(svg: &str, width: u32) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
+pub(crate) fn rasterised(svg: &str, width: u32) -> Result<Vec<u8>, Failure> {
     let tree = usvg::Tree::from_str(svg, &usvg::Options::default())?;
-    let scale = width as f32 / tree.size().width();
-    let height = (tree.size().height() * scale).round().max(1.0) as u32;
-    let mut pixels = tiny_skia::Pixmap::new(width, height).ok_or("the picture is too large")?;
-    resvg::render(&tree, tiny_skia::Transform::from_scale(scale, scale), &mut pixels.as_mut());
-    // The paper is opaque, and steps of 15 in a line's colour are too small to see: together they halve the file.
-    let step = |channel: u8| (channel.saturating_add(7) / 15) * 15;
-    let colours: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|pixel| [step(pixel[0]), step(pixel[1]), step(pixel[2])]).collect();
+    let pixels = painted(&tree, width, None)?;
+    let colours: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|pixel| [0, 1, 2].map(|channel| stepped(pixel[channel]))).collect();
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    let mut encoder = png::Encoder::new(&mut bytes, pixels.width(), pixels.height());
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_compression(png::Compression::High);
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&colours)?;
     writer.finish()?;
     Ok(bytes)
+}
+
+/// The picture in pixels, `width` wide, over another of the same size or over nothing.
+fn painted(tree: &usvg::Tree, width: u32, ground: Option<&tiny_skia::Pixmap>) -> Result<tiny_skia::Pixmap, Failure> {
+    let scale = width as f32 / tree.size().width();
+    let height = (tree.size().height() * scale).round().max(1.0) as u32;
+    let mut pixels = match ground {
+        Some(ground) => ground.clone(),
+        None => tiny_skia::Pixmap::new(width, height).ok_or("the picture is too large")?,
+    };
+    resvg::render(tree, tiny_skia::Transform::from_scale(scale, scale), &mut pixels.as_mut());
+    Ok(pixels)
+}
+
+/// Width of the steps between the values of a colour's channel: too small to see, and they halve a PNG.
+const COLOUR_STEP: u8 = 15;
+
+/// A channel's nearest step. The paper is opaque, so that a pixel's channels are its colour.
+fn stepped(channel: u8) -> u8 {
+    (channel.saturating_add(COLOUR_STEP / 2) / COLOUR_STEP) * COLOUR_STEP
 }

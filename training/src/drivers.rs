@@ -1,11 +1,17 @@
 //! Who drives: a learned policy, pure pursuit of the centre line, or chance. The last two are what a learner must beat.
 
+use std::path::Path;
+
 use offtrack::layout::{Action, Truck, WaypointRow};
 use offtrack::random::{self, Draw};
 use offtrack::simulator::Batch;
 use offtrack::world::World;
 
+use crate::error::Error;
 use crate::policy::Policy;
+
+/// The best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of attard2023 [m].
+pub const PURSUIT_LOOK_AHEAD: f32 = 7.0;
 
 /// Chooses an action for every truck of a batch.
 pub trait Driver {
@@ -14,6 +20,24 @@ pub trait Driver {
 
     /// Writes one index into the action table a truck, `[n_envs]`.
     fn act(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>);
+}
+
+/// The driver that a command's `--policy` names: `pursuit`, `random` or a policy's file, which must suit the world. `look_ahead` is
+/// pure pursuit's [m], `seed` that of chance.
+pub fn named(policy: &str, look_ahead: f32, seed: u32, world: &World) -> Result<Box<dyn Driver>, Error> {
+    if !(1.0..=50.0).contains(&look_ahead) {
+        let value = format!("{look_ahead} m");
+        return Err(Error::Flag { flag: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
+    }
+    match policy {
+        "pursuit" => Ok(Box::new(Pursuit { look_ahead })),
+        "random" => Ok(Box::new(Chance { seed })),
+        file => {
+            let policy = Policy::load(Path::new(file))?;
+            policy.check(world, Path::new(file))?;
+            Ok(Box::new(Learned { name: file.to_owned(), policy }))
+        }
+    }
 }
 
 /// The action that a policy holds for best.

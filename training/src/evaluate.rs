@@ -1,6 +1,6 @@
 //! Examines a driver: every route of a split, so many episodes each, every one counted.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::Vec2;
@@ -13,10 +13,9 @@ use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::swept::{own_lane_suffices, swept_path};
 use offtrack::world::World;
 
-use crate::drivers::{Chance, Driver, Learned, Pursuit};
+use crate::drivers::{self, Driver, PURSUIT_LOOK_AHEAD};
 use crate::error::Error;
 use crate::files;
-use crate::policy::Policy;
 use crate::report::{Episode, Report, RouteReport, Summary};
 
 /// Examine a driver on a benchmark's routes.
@@ -45,29 +44,14 @@ pub struct Args {
     look_ahead: f32,
 }
 
-/// The best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of attard2023 [m].
-pub const PURSUIT_LOOK_AHEAD: f32 = 7.0;
-
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
-    if !(1.0..=50.0).contains(&args.look_ahead) {
-        let value = format!("{} m", args.look_ahead);
-        return Err(Error::Flag { flag: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
-    }
     if !(1..=100_000).contains(&args.episodes) {
         return Err(Error::Flag { flag: "--episodes", value: args.episodes.to_string(), expected: "must lie in 1..100000".into() });
     }
     let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
     let world = Arc::new(World::bake(&scenario));
-    let mut driver: Box<dyn Driver> = match args.policy.as_str() {
-        "pursuit" => Box::new(Pursuit { look_ahead: args.look_ahead }),
-        "random" => Box::new(Chance { seed: args.seed }),
-        file => {
-            let policy = Policy::load(Path::new(file))?;
-            policy.check(&world, Path::new(file))?;
-            Box::new(Learned { name: file.to_owned(), policy })
-        }
-    };
+    let mut driver = drivers::named(&args.policy, args.look_ahead, args.seed, &world)?;
     let split = if args.split == "train" { Split::Train } else { Split::Test };
     let report = examine(&scenario, &world, split, args.episodes, args.seed, driver.as_mut())?;
     if let Some(file) = &args.json {

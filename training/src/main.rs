@@ -14,6 +14,8 @@ mod memory;
 mod network;
 mod policy;
 mod provenance;
+mod record;
+mod recording;
 mod report;
 mod sac;
 mod scaling;
@@ -43,6 +45,7 @@ enum Command {
     Evaluate(evaluate::Args),
     Bench(bench::Args),
     Draw(draw::Args),
+    Record(record::Args),
     Trace(trace::Args),
     Deviations(deviations::Args),
 }
@@ -54,6 +57,7 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Draw(args) => draw::run(args),
+        Command::Record(args) => record::run(args),
         Command::Trace(args) => trace::run(args),
         Command::Deviations(args) => deviations::run(args),
     };

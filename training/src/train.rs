@@ -63,6 +63,10 @@ pub struct Args {
     /// Another number of trucks.
     #[arg(long)]
     envs: Option<usize>,
+    /// Another value of one of the training file's keys, as in `learning.n_steps=5`; nothing after the `=` leaves the key out. May be
+    /// given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
 }
 
 /// What a run came to, as written to `report.json`.
@@ -89,7 +93,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         if here.is_file() { here } else { files::repository().join(here) }
     };
     let file = args.config.clone().unwrap_or_else(default);
-    let mut config = Config::read(&file)?;
+    let mut config = Config::read_with(&file, &args.settings)?;
     config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
     let scenario = Scenario::read(&files::benchmark(&config.benchmark)?)?;
     let practice = practice(&config, &scenario)?;

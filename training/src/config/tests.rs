@@ -149,3 +149,50 @@ fn whatever_stands_for_a_value_is_taken_or_refused_by_its_key() {
     // Zeros where they mean something, and any text for a benchmark's name.
     assert!((4..20).contains(&taken), "{taken}");
 }
+
+/// What reading the default file with some keys set gives.
+fn with_set(settings: &[&str]) -> Result<Config, String> {
+    let file = files::repository().join("training/configs/default.toml");
+    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+    Config::read_with(&file, &settings).map_err(|error| error.to_string())
+}
+
+#[test]
+fn single_keys_can_be_set_added_and_taken_out() {
+    let config =
+        with_set(&["learning.n_steps=7", "memory.priority.exponent=0.6", "memory.priority.correction = 0.4", "practice="]).unwrap();
+    assert_eq!(config.learning.n_steps, 7);
+    assert_eq!(config.memory.priority, Some(Priority { exponent: 0.6, correction: 0.4 }));
+    assert_eq!(config.practice, None);
+    let words = with_set(&["learning.critics=lowest", "practice=elsewhere", "learning.hidden=[8, 8]"]).unwrap();
+    assert_eq!(
+        (words.learning.critics, words.practice.as_deref(), words.learning.hidden),
+        (Critics::Lowest, Some("elsewhere"), vec![8, 8])
+    );
+}
+
+#[test]
+fn a_key_set_wrongly_is_refused_with_what_would_do() {
+    for (setting, expected) in [
+        ("learning.n_steps", "--set: learning.n_steps; KEY=VALUE is needed"),
+        ("=5", "--set: =5; a key is needed before"),
+        ("learning..n_steps=5", "joined by single points"),
+        ("seed.low=5", "seed is a value and has no keys below it"),
+        ("learning.n_steps=0", "--set learning.n_steps=0: learning.n_steps: 0; must lie in 1..100"),
+        ("learning.n_step=1", "unknown field `n_step`"),
+        ("learning.hidden=wide", "--set learning.hidden=wide: invalid type: string"),
+    ] {
+        let message = with_set(&[setting]).unwrap_err();
+        assert!(message.contains(expected), "{setting}: {message}");
+    }
+}
+
+#[test]
+fn every_training_file_reads() {
+    let folder = files::repository().join("training/configs");
+    let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert!(2 <= files.len());
+    for file in files {
+        Config::read(&file).unwrap_or_else(|error| panic!("{error}"));
+    }
+}

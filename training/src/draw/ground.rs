@@ -140,17 +140,22 @@ impl<'a> Ground<'a> {
         group
     }
 
-    /// The legend's lines for what every map shows.
+    /// The legend's lines for a map with distances.
     pub(super) fn legend(&self) -> Vec<Entry> {
+        let [solid, gutter, edge, lane] = self.surface_legend();
+        vec![solid, gutter, edge, Entry::new(Swatch::Line(colour::CONTOUR, 1.2, ""), "distance to it, each metre"), lane]
+    }
+
+    /// The legend's lines for surface, kerbs and lanes.
+    pub(super) fn surface_legend(&self) -> [Entry; 4] {
         let gutter = match self.gutter {
             Gutter::Drivable => "gutter, drivable",
             Gutter::Solid => "gutter, solid",
         };
-        vec![
+        [
             Entry::new(Swatch::Area(colour::SOLID), "solid"),
             Entry::new(Swatch::Area(colour::GUTTER), gutter),
             Entry::new(Swatch::Line(colour::KERB, 1.6, ""), "edge of what is drivable"),
-            Entry::new(Swatch::Line(colour::CONTOUR, 1.2, ""), "distance to it, each metre"),
             Entry::new(Swatch::Line(colour::LANE, 0.9, LANE_DASHES), "lane centre"),
         ]
     }

@@ -35,10 +35,12 @@ pub(super) mod colour {
     pub(in super::super) const DRIVE_AXLE: &str = "#004a80";
     pub(in super::super) const TRAILER_AXLES: &str = "#a84300";
     pub(in super::super) const OVERLAP: &str = "#c2003a";
+    pub(in super::super) const ROUTE: &str = "#228833";
+    pub(in super::super) const RAY: &str = "#aa3377";
 }
 
 /// Width of the page [px].
-const WIDTH: f64 = 1000.0;
+pub(super) const WIDTH: f64 = 1000.0;
 /// From the page's left, right and upper edge to the map [px].
 const LEFT: f64 = 48.0;
 const RIGHT: f64 = 16.0;
@@ -64,23 +66,45 @@ pub(super) struct View {
     pub(super) high: DVec2,
     /// Pixels in a metre [px/m].
     pub(super) scale: f64,
+    /// Upper left corner of the map on the page [px].
+    corner: DVec2,
 }
+
+/// How a map lies on its page.
+pub(super) struct Layout {
+    /// Upper left corner of the map [px].
+    pub(super) corner: DVec2,
+    /// Width of the map [px].
+    pub(super) width: f64,
+    /// Room around what must be shown [m].
+    pub(super) margin: f64,
+    /// Least width of the map as a share of its height.
+    pub(super) ratio: f64,
+}
+
+/// The layout of a picture for print. A map much higher than wide leaves no room for the page below it.
+const PRINTED: Layout = Layout { corner: DVec2::new(LEFT, TOP), width: WIDTH - LEFT - RIGHT, margin: MARGIN, ratio: 0.85 };
 
 impl View {
     /// All of the given points with a margin.
-    fn around(points: impl Iterator<Item = DVec2>) -> View {
+    pub(super) fn around(points: impl Iterator<Item = DVec2>) -> View {
+        View::laid_out(points, &PRINTED)
+    }
+
+    /// All of the given points in a map of another layout.
+    pub(super) fn laid_out(points: impl Iterator<Item = DVec2>, layout: &Layout) -> View {
         let (low, high) = points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
-        let (low, high) = (low - MARGIN, high + MARGIN);
-        // A map much wider or much higher than this leaves no room for the legend or for the page below it.
+        let (low, high) = (low - layout.margin, high + layout.margin);
+        // A map much wider than high leaves no room for the legend.
         let centre = (low + high) / 2.0;
         let extent = high - low;
-        let extent = extent.max(DVec2::new(extent.y * 0.85, extent.x * 0.5));
-        View { low: centre - extent / 2.0, high: centre + extent / 2.0, scale: (WIDTH - LEFT - RIGHT) / extent.x }
+        let extent = extent.max(DVec2::new(extent.y * layout.ratio, extent.x * 0.5));
+        View { low: centre - extent / 2.0, high: centre + extent / 2.0, scale: layout.width / extent.x, corner: layout.corner }
     }
 
     /// Where `p` lies on the page [px].
     pub(super) fn point(&self, p: DVec2) -> DVec2 {
-        DVec2::new(LEFT + (p.x - self.low.x) * self.scale, TOP + (self.high.y - p.y) * self.scale)
+        self.corner + DVec2::new(p.x - self.low.x, self.high.y - p.y) * self.scale
     }
 
     /// Whether the map shows `p`, at least `margin` metres from its edge.
@@ -129,7 +153,7 @@ impl View {
     }
 
     /// Path data of the map's edge.
-    fn frame(&self) -> String {
+    pub(super) fn frame(&self) -> String {
         self.polygon(&[self.low, DVec2::new(self.high.x, self.low.y), self.high, DVec2::new(self.low.x, self.high.y)])
     }
 
@@ -189,7 +213,8 @@ pub(super) fn of_sweep(
     Ok(composed(&view, &lettering, &title, &subtitle, definitions, map, &legend))
 }
 
-fn composed(
+/// A whole page as SVG text.
+pub(super) fn composed(
     view: &View,
     lettering: &Lettering,
     title: &str,
@@ -242,7 +267,7 @@ fn axes(view: &View, lettering: &Lettering) -> Group {
 }
 
 /// Ten metres, in the map's lower right corner.
-fn scale_bar(view: &View, lettering: &Lettering) -> Group {
+pub(super) fn scale_bar(view: &View, lettering: &Lettering) -> Group {
     let right = view.point(DVec2::new(view.high.x, view.low.y)) - DVec2::new(16.0, 14.0);
     let length = 10.0 * view.scale;
     let box_corner = right - DVec2::new(length + 14.0, 32.0);

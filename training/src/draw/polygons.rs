@@ -1,7 +1,7 @@
 //! A roundabout's kerbs as polygons and its routes as waypoints, for other programs. The shape is documented at the command's `--output`.
 
 use glam::DVec2;
-use offtrack::geometry::Outline;
+use offtrack::geometry::{Curve, Outline};
 use offtrack::route::Route;
 use serde::Serialize;
 
@@ -10,7 +10,8 @@ const TOLERANCE: f64 = 0.005;
 /// How far the ground reaches past the outermost kerb [m].
 const MARGIN: f64 = 5.0;
 
-type Polygon = Vec<[f64; 2]>;
+/// The points of a line, open or closed [m]. A closed one does not repeat its first point.
+pub(crate) type Polygon = Vec<[f64; 2]>;
 
 #[derive(Serialize)]
 struct Written<'a> {
@@ -27,19 +28,10 @@ struct WrittenRoute<'a> {
 
 /// The JSON text, a line.
 pub(super) fn json(kerbs: &Outline, routes: &[Route]) -> serde_json::Result<String> {
-    // Loops keep the drivable side on their left: the boundary turns counter-clockwise, islands clockwise.
-    let (mut boundary, islands): (Vec<_>, Vec<_>) = kerbs.loops.iter().partition(|curve| 0.0 < curve.signed_area());
-    boundary.sort_by(|a, b| b.signed_area().total_cmp(&a.signed_area()));
-    let closed = |curve: &offtrack::geometry::Curve| {
-        let mut points = curve.polyline(TOLERANCE);
-        points.pop();
-        points
-    };
-    let islands: Vec<Vec<DVec2>> = islands.into_iter().map(closed).collect();
-    let boundary: Vec<Vec<DVec2>> = boundary.into_iter().map(closed).collect();
+    let (boundary, islands) = corners(kerbs);
     let ground = boundary.first().map(|points| ground(points)).into_iter().flatten();
     let solids = islands.iter().cloned().chain(ground).map(|points| rounded(&points)).collect();
-    let drivable = boundary.iter().chain(&islands).map(|points| rounded(points)).collect();
+    let drivable = drivable(kerbs);
     let routes = routes.iter().map(|route| WrittenRoute {
         name: &route.name,
         waypoints: route.waypoints.iter().map(|w| [to(1e4, w.position.x), to(1e4, w.position.y), to(1e6, w.heading)]).collect(),
@@ -47,6 +39,30 @@ pub(super) fn json(kerbs: &Outline, routes: &[Route]) -> serde_json::Result<Stri
     let mut text = serde_json::to_string(&Written { solids, drivable, routes: routes.collect() })?;
     text.push('\n');
     Ok(text)
+}
+
+/// The edges of what can be driven on: the outer boundary counter-clockwise, then the islands clockwise.
+pub(crate) fn drivable(kerbs: &Outline) -> Vec<Polygon> {
+    let (boundary, islands) = corners(kerbs);
+    boundary.iter().chain(&islands).map(|points| rounded(points)).collect()
+}
+
+/// A curve from its beginning to its end.
+pub(crate) fn line(curve: &Curve) -> Polygon {
+    rounded(&curve.polyline(TOLERANCE))
+}
+
+/// The kerbs' corners: of the boundaries, the largest first, and of the islands.
+fn corners(kerbs: &Outline) -> (Vec<Vec<DVec2>>, Vec<Vec<DVec2>>) {
+    // Loops keep the drivable side on their left: the boundary turns counter-clockwise, islands clockwise.
+    let (mut boundary, islands): (Vec<_>, Vec<_>) = kerbs.loops.iter().partition(|curve| 0.0 < curve.signed_area());
+    boundary.sort_by(|a, b| b.signed_area().total_cmp(&a.signed_area()));
+    let closed = |curve: &Curve| {
+        let mut points = curve.polyline(TOLERANCE);
+        points.pop();
+        points
+    };
+    (boundary.into_iter().map(closed).collect(), islands.into_iter().map(closed).collect())
 }
 
 /// All around a counter-clockwise boundary, cut at its westernmost and its easternmost point: north of it and south of it.

@@ -78,11 +78,9 @@ impl<'a> Sweep<'a> {
 
     /// The areas swept, to be drawn once and used twice.
     pub(super) fn shapes(&self, view: &View) -> Definitions {
-        let area = |unit: &Unit| {
-            let drawn: Vec<&[DVec2; 4]> = unit.corners.iter().step_by(2).chain(unit.corners.last()).collect();
-            // A hull of two neighbours has no teeth where a corner swings out. All hulls turn the same way: a non-zero fill is their union.
-            drawn.windows(2).map(|pair| view.polygon(&hull([*pair[0], *pair[1]].concat()))).collect::<String>()
-        };
+        // Half of the poses are dense enough.
+        let drawn = |unit: &Unit| unit.corners.iter().step_by(2).chain(unit.corners.last()).copied().collect::<Vec<_>>();
+        let area = |unit: &Unit| swept_area(view, &drawn(unit));
         self.units.iter().fold(Definitions::new(), |all, unit| all.add(Path::new().set("id", unit.name).set("d", area(unit))))
     }
 
@@ -174,8 +172,14 @@ impl Unit {
     }
 }
 
+/// Path data of what a rectangle sweeps on its way through `corners`; to be filled by the non-zero rule.
+pub(super) fn swept_area(view: &View, corners: &[[DVec2; 4]]) -> String {
+    // A hull of two neighbours has no teeth where a corner swings out. All hulls turn the same way: a non-zero fill is their union.
+    corners.windows(2).map(|pair| view.polygon(&hull(pair.concat()))).collect()
+}
+
 /// The point of a rectangle's outline with the least signed distance from the kerbs, and that distance [m].
-fn nearest(corners: &[DVec2; 4], kerbs: &Outline) -> (DVec2, f64) {
+pub(super) fn nearest(corners: &[DVec2; 4], kerbs: &Outline) -> (DVec2, f64) {
     let centre = (corners[0] + corners[2]) / 2.0;
     let nearby = kerbs.near(centre, corners[0].distance(centre));
     let points = (0..4).flat_map(|side| {

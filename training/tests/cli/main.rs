@@ -8,4 +8,5 @@ mod evaluate;
 mod input;
 mod interruption;
 mod place;
+mod record;
 mod train;

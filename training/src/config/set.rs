@@ -1,0 +1,36 @@
+//! Single keys of a training file set from the command line: `--set learning.n_steps=5`.
+
+use toml::{Table, Value};
+
+use crate::error::Error;
+
+/// Sets what each of `settings` says, `KEY=VALUE`, in the file's `table`; nothing after the `=` takes the key out.
+pub(super) fn set(table: &mut Table, settings: &[String]) -> Result<(), Error> {
+    settings.iter().try_for_each(|setting| one(table, setting))
+}
+
+fn one(table: &mut Table, setting: &str) -> Result<(), Error> {
+    let wrong = |expected: String| Error::Flag { flag: "--set", value: setting.to_owned(), expected };
+    let (key, value) = setting.split_once('=').ok_or_else(|| wrong("KEY=VALUE is needed, as in learning.n_steps=5".into()))?;
+    let path: Vec<&str> = key.trim().split('.').collect();
+    let [tables @ .., last] = path.as_slice() else { return Err(wrong("a key is needed before the `=`".into())) };
+    if path.iter().any(|part| part.is_empty()) {
+        return Err(wrong("a key is needed before the `=`, its parts joined by single points".into()));
+    }
+    let mut table = table;
+    for part in tables {
+        let inner = table.entry(*part).or_insert_with(|| Value::Table(Table::new()));
+        table = inner.as_table_mut().ok_or_else(|| wrong(format!("{part} is a value and has no keys below it")))?;
+    }
+    match value.trim() {
+        "" => table.remove(*last),
+        value => table.insert((*last).to_owned(), parsed(value)),
+    };
+    Ok(())
+}
+
+/// A TOML value; what is none is a word.
+fn parsed(value: &str) -> Value {
+    let read = toml::from_str::<Table>(&format!("value = {value}")).ok();
+    read.and_then(|mut table| table.remove("value")).unwrap_or_else(|| Value::String(value.to_owned()))
+}

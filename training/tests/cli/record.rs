@@ -1,0 +1,146 @@
+//! `offtrack record`: the episode that an examination counts, as data, film and picture.
+
+use std::io::Cursor;
+
+use serde_json::Value;
+
+use crate::place::{Place, offtrack, refusal, succeed};
+
+const ROUTE: &str = "20m/E-right-1";
+
+fn record(place: &Place, output: &str, arguments: &[&str]) {
+    succeed(&offtrack(&recording(place, output, arguments).iter().map(String::as_str).collect::<Vec<_>>()));
+}
+
+/// The arguments for an episode of the short benchmark.
+fn recording(place: &Place, output: &str, arguments: &[&str]) -> Vec<String> {
+    let mut all =
+        ["record", "--benchmark", &place.text("short.toml"), "--route", ROUTE, "-o", &place.text(output)].map(str::to_owned).to_vec();
+    if !arguments.contains(&"--policy") {
+        all.extend(["--policy", "pursuit"].map(str::to_owned));
+    }
+    all.extend(arguments.iter().map(|&argument| argument.to_owned()));
+    all
+}
+
+#[test]
+fn the_episodes_recorded_are_those_that_the_examination_counts() {
+    let place = Place::new();
+    succeed(&place.evaluate(&["--policy", "random", "--episodes", "3", "--seed", "7", "--json", &place.text("report.json")]));
+    let report = place.json("report.json");
+    let counted = report["routes"].as_array().unwrap().iter().find(|route| route["name"] == ROUTE).unwrap();
+    let mut reward = 0.0;
+    let mut steps = 0;
+    for episode in ["0", "1", "2"] {
+        let flags = ["--policy", "random", "--seed", "7", "--episodes", "3", "--episode", episode];
+        record(&place, "episode.json", &flags);
+        let recording = place.json("episode.json");
+        let frames = recording["frames"].as_array().unwrap();
+        assert_eq!((&recording["route"], &recording["episode"]), (&Value::from(ROUTE), &Value::from(episode.parse::<u32>().unwrap())));
+        assert!(0 < counted["ends"][recording["ended"].as_str().unwrap()].as_u64().unwrap());
+        assert!(frames[0]["action"].is_null() && frames[1..].iter().all(|frame| frame["action"].is_u64()));
+        assert!(frames.iter().all(|frame| frame["ranges"].as_array().unwrap().len() == 29));
+        steps += frames.len() - 1;
+        reward += frames.iter().map(|frame| frame["reward"].as_f64().unwrap()).sum::<f64>();
+    }
+    assert!((0.1 * steps as f64 / 3.0 - counted["time_mean"].as_f64().unwrap()).abs() < 1e-9, "a frame a step, and the start");
+    // Rewards are written to a thousandth; an episode has fewer than a thousand steps.
+    assert!((reward / 3.0 - counted["reward_mean"].as_f64().unwrap()).abs() < 1.0);
+}
+
+#[test]
+fn the_same_flags_give_the_same_bytes_in_every_format_and_another_start_gives_others() {
+    let place = Place::new();
+    for name in ["a.json", "a.svg", "a.png", "a.gif"] {
+        let bytes = |episode: &str| {
+            record(&place, name, &["--episode", episode, "--episodes", "2", "--policy", "random"]);
+            std::fs::read(place.file(name)).unwrap()
+        };
+        let first = bytes("0");
+        assert_eq!(first, bytes("0"), "{name}");
+        assert_ne!(first, bytes("1"), "{name}");
+    }
+}
+
+#[test]
+fn a_film_has_every_second_frame_and_the_last_in_the_size_asked_for() {
+    let place = Place::new();
+    record(&place, "a.json", &[]);
+    record(&place, "a.gif", &["--size", "240"]);
+    let frames = place.json("a.json")["frames"].as_array().unwrap().len();
+    let mut options = gif::DecodeOptions::new();
+    options.set_color_output(gif::ColorOutput::Indexed);
+    let mut decoder = options.read_info(Cursor::new(std::fs::read(place.file("a.gif")).unwrap())).unwrap();
+    assert_eq!(decoder.width(), 240);
+    let height = decoder.height();
+    assert!((240..360).contains(&height), "{height}");
+    let mut pages = Vec::new();
+    while let Some(page) = decoder.read_next_frame().unwrap() {
+        pages.push((page.width, page.height, page.delay));
+    }
+    assert_eq!(pages.len(), (frames - 1).div_ceil(2) + 1);
+    assert_eq!((pages[0], pages[pages.len() - 1].2), ((240, height, 10), 250));
+    assert!(pages[1..].iter().all(|&(width, high, _)| width < 240 || high < height), "later pages hold what changed");
+}
+
+#[test]
+fn a_still_has_the_size_asked_for_and_says_how_the_episode_ended() {
+    let place = Place::new();
+    record(&place, "a.png", &["--size", "300"]);
+    let bytes = std::fs::read(place.file("a.png")).unwrap();
+    let mut decoder = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+    assert_eq!(decoder.info().width, 300);
+    let mut pixels = vec![0; decoder.output_buffer_size().unwrap()];
+    decoder.next_frame(&mut pixels).unwrap();
+    record(&place, "a.json", &[]);
+    record(&place, "a.svg", &[]);
+    let ended = place.json("a.json")["ended"].as_str().unwrap().replace('_', " ");
+    let still = std::fs::read_to_string(place.file("a.svg")).unwrap();
+    assert!(still.contains(&format!("{ROUTE}, pure pursuit: {ended} after ")), "{ended}");
+    assert!(!still.contains("<text"), "letters are outlines: no font is needed to look at a picture");
+}
+
+#[test]
+fn wrong_input_is_refused_with_exit_code_2_and_leaves_nothing_behind() {
+    let place = Place::new();
+    succeed(&place.train(&["--name", "run", "--steps", "600"]));
+    let (policy, short) = (place.text("runs/run/policy.safetensors"), place.text("short.toml"));
+    let refused = |output: &str, arguments: &[&str]| {
+        let all = recording(&place, output, arguments);
+        let said = refusal(&offtrack(&all.iter().map(String::as_str).collect::<Vec<_>>()), 2);
+        assert!(!place.file(output).exists());
+        said
+    };
+    for (output, flags, expected) in [
+        ("a.mp4", &[][..], "--output: "),
+        ("a", &[], "must end in .gif, .png, .svg or .json"),
+        ("a.png", &["--size", "199"], "--size: 199; must lie in 200..4000 pixels"),
+        ("a.json", &["--episode", "30"], "--episode: 30; must lie in 0..29: --episodes says how many there are"),
+        ("a.json", &["--episodes", "0"], "--episodes: 0; must lie in 1..100000"),
+        ("a.json", &["--policy", "missing"], "missing: cannot be read"),
+    ] {
+        let said = refused(output, flags);
+        assert!(said.contains(expected), "{said}");
+    }
+    let said = |route: &str, benchmark: &str| {
+        let output = place.text("a.json");
+        refusal(&offtrack(&["record", "--policy", &policy, "--benchmark", benchmark, "--route", route, "-o", &output]), 2)
+    };
+    let near = said("20m/E-right-9", &short);
+    assert!(near.contains("--route: 20m/E-right-9; of 20m the benchmark short has 20m/E-right-1, 20m/W-left-3"), "{near}");
+    let far = said("E-right-1", &short);
+    assert!(far.contains("a route of the benchmark short is needed, such as 16m/E-right-1, 20m/E-right-1"), "{far}");
+    // The benchmark of the repository has nine actions where this policy learned five.
+    let other = said(ROUTE, "attard2023");
+    assert!(other.contains(&policy) && other.contains("another action table: 5 actions"), "{other}");
+}
+
+#[test]
+fn a_recording_that_cannot_be_written_is_a_failure() {
+    let place = Place::new();
+    for name in ["missing/a.json", "missing/a.gif"] {
+        let all = recording(&place, name, &["--size", "200"]);
+        let said = refusal(&offtrack(&all.iter().map(String::as_str).collect::<Vec<_>>()), 1);
+        assert!(said.contains(&place.text(name)) && said.contains("cannot be written"), "{said}");
+    }
+}
