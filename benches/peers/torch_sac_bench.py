@@ -54,6 +54,7 @@ def main():
         "machine": machine(),
         "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
         "commit": commit(),
+        "load": round(os.getloadavg()[0], 1),
         "versions": {"python": platform.python_version(), "torch": version("torch")},
         "threads": args.threads,
         "seconds_a_round": args.seconds,
