@@ -1,6 +1,8 @@
-//! Measures env steps per second against the number of trucks, and what each stage takes.
+//! Measures env steps per second against the number of trucks, and what each stage takes; with `--learner` the time of an update.
 //!
 //! Speeds are medians over windows of about a quarter of a second: other work on the machine disturbs some windows, not most.
+
+mod learner;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -17,13 +19,13 @@ use crate::error::Error;
 use crate::files;
 use crate::provenance;
 
-/// Measure env steps per second: random actions drawn inside.
+/// Measure env steps per second, random actions drawn inside, or what an update of the learner takes.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Numbers of trucks, separated by commas.
     #[arg(long, value_delimiter = ',', default_value = "64,256,1024,4096,16384")]
     envs: Vec<usize>,
-    /// Time for each number of trucks [s].
+    /// Time for each number of trucks, or of transitions [s].
     #[arg(long, default_value_t = 5.0, allow_negative_numbers = true)]
     seconds: f64,
     /// A benchmark's name, or the path of its file.
@@ -32,6 +34,18 @@ pub struct Args {
     /// Write the result to this file as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// Measure the learner instead: the time of an update, alone and with drawing its batch.
+    #[arg(long, conflicts_with_all = ["envs", "benchmark"])]
+    learner: bool,
+    /// Sizes of the learner's hidden layers, separated by commas.
+    #[arg(long, requires = "learner", value_delimiter = ',', default_value = "256,256")]
+    hidden: Vec<usize>,
+    /// Transitions in an update; several numbers, separated by commas, are measured one after the other.
+    #[arg(long, requires = "learner", value_delimiter = ',', default_value = "256,1024")]
+    batch: Vec<usize>,
+    /// Measure a round of `--seconds` for each line read and print it as a line of JSON.
+    #[arg(long, requires = "learner", conflicts_with = "json")]
+    lines: bool,
 }
 
 /// The result, as written.
@@ -81,6 +95,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     if !(0.1..=3600.0).contains(&args.seconds) {
         return Err(Error::Flag { flag: "--seconds", value: format!("{} s", args.seconds), expected: "must lie in 0.1..3600 s".into() });
+    }
+    if args.learner {
+        return learner::run(args);
     }
     let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
     let world = Arc::new(World::bake(&scenario));

@@ -51,21 +51,6 @@ impl Mlp {
         }
         output
     }
-
-    /// Moved toward `other` by `rate`, 1 making it a copy. `other` may carry gradients, the result does not.
-    pub fn toward(&self, other: &Mlp, rate: f64) -> Mlp {
-        let layers = self.layers.iter().zip(&other.layers).map(|(own, other)| Linear {
-            weight: blend(&own.weight, &other.weight, rate),
-            bias: own.bias.as_ref().zip(other.bias.as_ref()).map(|(own, other)| blend(own, other, rate)),
-        });
-        let norms = self.norms.iter().zip(&other.norms).map(|(own, other)| {
-            let mut norm = own.clone();
-            norm.gamma = blend(&own.gamma, &other.gamma, rate);
-            norm.beta = own.beta.as_ref().zip(other.beta.as_ref()).map(|(own, other)| blend(own, other, rate));
-            norm
-        });
-        Mlp { layers: layers.collect(), norms: norms.collect() }
-    }
 }
 
 /// A layer with the given weights `[inputs, outputs]` and biases `[outputs]`.
@@ -81,10 +66,6 @@ pub fn layer(weights: Vec<f32>, biases: Vec<f32>, device: &Device) -> Linear {
 pub fn distribution(logits: Tensor<2>) -> (Tensor<2>, Tensor<2>) {
     let log_probs = log_softmax(logits, 1);
     (log_probs.clone().exp(), log_probs)
-}
-
-fn blend<const D: usize>(own: &Param<Tensor<D>>, other: &Param<Tensor<D>>, rate: f64) -> Param<Tensor<D>> {
-    Param::initialized(own.id, own.val().inner().mul_scalar(1.0 - rate) + other.val().inner().mul_scalar(rate))
 }
 
 #[cfg(test)]
@@ -114,15 +95,5 @@ mod tests {
         let network = |seed| Mlp::new(&[4, 8, 2], 1.0, &mut SmallRng::seed_from_u64(seed), &Device::flex());
         assert_eq!(weights(&network(1)), weights(&network(1)));
         assert_ne!(weights(&network(1)), weights(&network(2)));
-    }
-
-    #[test]
-    fn moving_toward_a_network_goes_part_of_the_way_or_all_of_it() {
-        let device = Device::flex();
-        let of = |weight: f32| Mlp { layers: vec![layer(vec![weight], vec![-weight], &device)], norms: Vec::new() };
-        let moved = of(1.0).toward(&of(3.0), 0.25);
-        assert_eq!(weights(&moved), [1.5]);
-        assert_eq!(moved.layers[0].bias.as_ref().unwrap().val().into_data().try_to_vec::<f32>().unwrap(), [-1.5]);
-        assert_eq!(weights(&of(1.0).toward(&of(3.0), 1.0)), [3.0]);
     }
 }

@@ -3,13 +3,14 @@
 //! A batch arrives in parts, one a thread: each part works out its gradients alone, and their sum makes one step. The number of parts
 //! never depends on the machine, so neither does the result.
 
+mod adam;
 mod critics;
 mod entropy;
 
 use std::mem::take;
 
 use burn::module::Module;
-use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer, MultiGradientsParams};
+use burn::optim::GradientsParams;
 use burn::tensor::{Device, Int, Tensor};
 use rand::SeedableRng;
 use rand::rngs::SmallRng;
@@ -17,10 +18,11 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::config::Learning;
 use crate::network::{Mlp, distribution};
+use adam::Adam;
 use critics::{Following, Reading, Twins};
 use entropy::EntropyWeight;
 
-/// Parts that a batch is learned in. Two: their gradients' sum is the same in either order, and the optimizer promises none.
+/// Parts that a batch is learned in: two, for the cores that the smallest machines have. Another number would round sums otherwise.
 pub const N_PARTS: usize = 2;
 
 /// Some rows of a batch, as tensors without gradients. B is the number of rows.
@@ -61,8 +63,8 @@ pub struct Sac {
     critics: Twins,
     target: Twins,
     average: Mlp,
-    actor_optimizer: ModuleOptimizer,
-    critic_optimizer: ModuleOptimizer,
+    actor_optimizer: Adam,
+    critic_optimizer: Adam,
     entropy_weight: EntropyWeight,
     updates: u64,
     pools: Vec<ThreadPool>,
@@ -82,13 +84,12 @@ impl Sac {
             if learning.layer_norm { plain.normalised() } else { plain }
         };
         let critics = Twins { first: critic(), second: critic() };
-        let optimizer = || AdamConfig::new().with_epsilon(1e-5).init();
         let pools: Result<_, _> = (0..N_PARTS).map(|_| ThreadPoolBuilder::new().num_threads(1).build()).collect();
         Ok(Sac {
             target: critics.valid(),
             average: actor.valid(),
-            actor_optimizer: optimizer(),
-            critic_optimizer: optimizer(),
+            actor_optimizer: Adam::default(),
+            critic_optimizer: Adam::default(),
             entropy_weight: EntropyWeight::new(&learning.entropy, n_actions),
             updates: 0,
             pools: pools?,
@@ -124,28 +125,24 @@ impl Sac {
         });
         let mut update = Update::default();
         let mut errors = Vec::with_capacity(n_rows);
-        let [mut critic_gradients, mut actor_gradients] = [MultiGradientsParams::default(), MultiGradientsParams::default()];
+        let [mut critic_gradients, mut actor_gradients] = [Vec::new(), Vec::new()];
         for share in shares {
             update.critic_loss += share.update.critic_loss;
             update.actor_loss += share.update.actor_loss;
             update.entropy += share.update.entropy;
             update.value += share.update.value;
             errors.extend(share.errors);
-            critic_gradients.grads.push((share.critics, Device::flex()));
-            actor_gradients.grads.push((share.actor, Device::flex()));
+            critic_gradients.push(share.critics);
+            actor_gradients.push(share.actor);
         }
-        let rates = [self.learning.critic_rate * pace, self.learning.actor_rate * pace];
-        self.critics = self.critic_optimizer.step_multi(rates[0], take(&mut self.critics), critic_gradients);
-        self.actor = self.actor_optimizer.step_multi(rates[1], take(&mut self.actor), actor_gradients);
-        self.entropy_weight.update(update.entropy);
         self.updates += 1;
-        if self.updates.is_multiple_of(self.learning.target_every as u64) {
-            let rate = self.learning.target_rate;
-            let [first, second] = [(&self.target.first, &self.critics.first), (&self.target.second, &self.critics.second)]
-                .map(|(target, critic)| target.toward(critic, rate));
-            self.target = Twins { first, second };
-        }
-        self.average = self.average.toward(&self.actor, self.learning.average_rate);
+        let [critic_rate, actor_rate] = [self.learning.critic_rate, self.learning.actor_rate].map(|rate| rate * pace);
+        let target_rate = if self.updates.is_multiple_of(self.learning.target_every as u64) { self.learning.target_rate } else { 0.0 };
+        let [critics, target] = [&mut self.critics, &mut self.target].map(take);
+        (self.critics, self.target) = self.critic_optimizer.step(critics, target, critic_gradients, critic_rate, target_rate);
+        let [actor, average] = [&mut self.actor, &mut self.average].map(take);
+        (self.actor, self.average) = self.actor_optimizer.step(actor, average, actor_gradients, actor_rate, self.learning.average_rate);
+        self.entropy_weight.update(update.entropy);
         (update, errors)
     }
 
@@ -212,11 +209,22 @@ struct Share {
 /// Does `work` to each part, each on a pool of one thread: the tensor library would otherwise share out single small products, which costs
 /// more than it gains.
 fn on_pools<I: Send, O: Send>(pools: &[ThreadPool], parts: Vec<I>, work: impl Fn(I) -> O + Sync) -> Vec<O> {
-    let work = &work;
-    std::thread::scope(|scope| {
-        let threads: Vec<_> = pools.iter().zip(parts).map(|(pool, part)| scope.spawn(move || pool.install(|| work(part)))).collect();
-        threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
-    })
+    let mut done: Vec<Option<O>> = parts.iter().map(|_| None).collect();
+    let mut jobs: Vec<_> = pools.iter().zip(parts).zip(&mut done).map(|((pool, part), done)| (pool, part, done)).collect();
+    in_turn(&mut jobs.drain(..), &work);
+    done.into_iter().flatten().collect()
+}
+
+/// Starts the first job, then all others, then waits.
+fn in_turn<'a, I: Send + 'a, O: Send + 'a>(
+    jobs: &mut impl Iterator<Item = (&'a ThreadPool, I, &'a mut Option<O>)>,
+    work: &(impl Fn(I) -> O + Sync),
+) {
+    let Some((pool, part, done)) = jobs.next() else { return };
+    pool.in_place_scope(|scope| {
+        scope.spawn(|_| *done = Some(work(part)));
+        in_turn(jobs, work);
+    });
 }
 
 #[cfg(test)]

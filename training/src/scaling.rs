@@ -39,7 +39,11 @@ impl Scaling {
     /// The scaled rows, one after the other, `[rows * values]`.
     pub fn apply<const N: usize>(&self, observations: &[[f32; N]]) -> Vec<f32> {
         let scaled = |((value, mean), factor): ((&f32, &f32), &f32)| ((value - mean) * factor).clamp(-LIMIT, LIMIT);
-        observations.iter().flat_map(|row| row.iter().zip(&self.mean).zip(&self.factor).map(scaled)).collect()
+        let mut values = Vec::with_capacity(observations.len() * N);
+        for row in observations {
+            values.extend(row.iter().zip(&self.mean).zip(&self.factor).map(scaled));
+        }
+        values
     }
 }
 

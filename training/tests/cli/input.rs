@@ -4,7 +4,7 @@ use crate::place::{Place, offtrack, refusal};
 
 #[test]
 fn a_wrong_argument_is_named_with_its_value_and_what_would_do() {
-    let cases: [(&[&str], &[&str]); 17] = [
+    let cases: [(&[&str], &[&str]); 20] = [
         (&["evaluate", "--policy", "random", "--episodes", "0"], &["--episodes: 0; must lie in 1..100000"]),
         (&["evaluate", "--policy", "random", "--episodes", "many"], &["'many'", "--episodes"]),
         (&["evaluate", "--policy", "random", "--benchmark", "nowhere"], &["benchmark: nowhere", "scenarios/"]),
@@ -16,6 +16,9 @@ fn a_wrong_argument_is_named_with_its_value_and_what_would_do() {
         (&["evaluate"], &["--policy"]),
         (&["bench", "--envs", "0"], &["--envs: 0; must lie in 1..4194304"]),
         (&["bench", "--seconds", "-1"], &["--seconds: -1 s; must lie in 0.1..3600 s"]),
+        (&["bench", "--learner", "--hidden", "256,0"], &["--hidden: 0; sizes must lie in 1..8192"]),
+        (&["bench", "--learner", "--batch", "1"], &["--batch: 1; must lie in 2..1048576"]),
+        (&["bench", "--hidden", "256"], &["--learner"]),
         (&["train", "no.toml"], &["no.toml: cannot be read"]),
         (&["train", "--minutes", "nan"], &["minutes: NaN min; must lie in 0.01..100000 min"]),
         (&["train", "--wings", "2"], &["'--wings'"]),

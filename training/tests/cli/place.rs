@@ -38,13 +38,16 @@ updates_per_step = 1
 n_steps = 3
 discount = 0.97
 reward_scale = 0.01
+scale_observations = true
 actor_rate = 3e-4
 critic_rate = 3e-4
+last_rate = 0.1
+layer_norm = false
 critics = "average"
 target_rate = 0.005
 target_every = 1
 average_rate = 0.005
-entropy = { share = 0.25, weight = 0.05, rate = 3e-4 }
+entropy = { in_target = true, share = 0.25, weight = 0.05, rate = 3e-4 }
 "#;
 
 /// A folder with `short.toml`, a benchmark, `tiny.toml`, a training file for it, and room for `runs`.
