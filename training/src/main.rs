@@ -11,6 +11,7 @@ mod evaluate;
 mod files;
 mod memory;
 mod network;
+mod page;
 mod policy;
 mod provenance;
 mod record;

@@ -160,22 +160,24 @@ impl Progress {
 
     fn row(&mut self, entropy_weight: f32) -> Result<(), Error> {
         let seconds = self.since_row.elapsed().as_secs_f64();
-        let n = (self.updates - self.row_updates).max(1) as f32;
+        let n = self.updates - self.row_updates;
+        // A mean over no updates is left empty.
+        let mean = |sum: f32, decimals: usize| if n == 0 { String::new() } else { format!("{:.decimals$}", sum / n as f32) };
         let [steps_rate, update_rate] =
             [self.env_steps - self.row_steps, self.updates - self.row_updates].map(|count| count as f64 / seconds);
         let success = self.success().map(|success| format!("{success:.4}")).unwrap_or_default();
         let reward = self.reward().map(|reward| format!("{reward:.2}")).unwrap_or_default();
         let Update { critic_loss, actor_loss, entropy, value } = self.sums;
         let row = format!(
-            "{:.1},{},{},{},{success},{reward},{:.5},{:.5},{:.4},{:.4},{entropy_weight:.6},{steps_rate:.0},{update_rate:.1}\n",
+            "{:.1},{},{},{},{success},{reward},{},{},{},{},{entropy_weight:.6},{steps_rate:.0},{update_rate:.1}\n",
             self.seconds(),
             self.env_steps,
             self.episodes,
             self.updates,
-            critic_loss / n,
-            actor_loss / n,
-            entropy / n,
-            value / n,
+            mean(critic_loss, 5),
+            mean(actor_loss, 5),
+            mean(entropy, 4),
+            mean(value, 4),
         );
         let (path, file) = &mut self.metrics;
         file.write_all(row.as_bytes()).and_then(|()| file.flush()).map_err(Error::write(path))?;
