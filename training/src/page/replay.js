@@ -86,9 +86,8 @@ class Replay {
     const moments = Array.from({ length: episode.n_frames }, (_, frame) => instant(this.page, episode, frame));
     byId("readings").replaceChildren(...READINGS.map(([name, value]) =>
       html("div", {}, html("dt", {}, name), html("dd", {}), sparkline(moments.map(value)))));
-    byId("scrub").max = decimal(episode.seconds, 3);
-    byId("scrub").step = this.page.ground.step;
-    this.seek(seconds / this.page.ground.step);
+    byId("scrub").max = episode.n_frames - 1;
+    this.seek(Number((seconds / this.page.ground.step).toFixed(6)));
   }
 
   /** Opens what the address asks for; false when it asks for no episode. */
@@ -110,7 +109,7 @@ class Replay {
   show() {
     const { page, episode, frame } = this, now = instant(page, episode, frame);
     drawScene(this.canvas, page, this.scene, now, frame, { rays: byId("rays").checked, follow: byId("follow").checked });
-    byId("scrub").value = now.time;
+    byId("scrub").value = frame;
     byId("scrub").setAttribute("aria-valuetext", `${decimal(now.time, 1)} s`);
     byId("clock").textContent = `${decimal(now.time, 1)} / ${decimal(episode.seconds, 1)}${GAP}s`;
     const along = (100 * frame) / Math.max(episode.n_frames - 1, 1);
@@ -173,7 +172,7 @@ class Replay {
   listen() {
     byId("route").addEventListener("change", (event) => this.openRoute(event.target.value));
     byId("play").addEventListener("click", () => this.play(!this.playing));
-    byId("scrub").addEventListener("input", (event) => { this.play(false); this.seek(event.target.value / this.page.ground.step); });
+    byId("scrub").addEventListener("input", (event) => { this.play(false); this.seek(Number(event.target.value)); });
     for (const id of ["rays", "follow"]) byId(id).addEventListener("change", () => this.show());
     document.addEventListener("keydown", (event) => this.onKey(event));
     window.addEventListener("hashchange", () => this.openLink());
