@@ -17,7 +17,7 @@ use crate::provenance;
 use crate::recording::{self, Map, Measures, Track};
 use crate::report::Report;
 
-/// Most episodes that a page holds: it would be 25 MB then.
+/// Most episodes that a page holds: about 15 MB.
 pub const MOST_EPISODES: usize = 4000;
 
 const TEMPLATE: &str = include_str!("page/report.html");

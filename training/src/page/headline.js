@@ -30,8 +30,8 @@ function showHeadline(page) {
     html("p", {}, `of all episodes on ${evaluation.routes.length} ${routes} arrived`),
     html("p", { class: "muted" }, `${whole(evaluation.arrived)} of ${whole(evaluation.episodes)}; 95${GAP}% Wilson interval ${interval(evaluation.success_low, evaluation.success_high)}`));
   const bars = [["This driver", evaluation.success, evaluation.success_low, evaluation.success_high, "var(--good)"]];
-  const certified = certifiedOf(evaluation);
-  if (certified) bars.push(["certified routes", certified.success, certified.success_low, certified.success_high, "var(--good)"]);
+  const { certified } = evaluation;
+  if (certified) bars.push(["This driver, certified routes", certified.success, certified.success_low, certified.success_high, "var(--good)"]);
   const study = comparable(evaluation) && STUDY[evaluation.split];
   if (study) bars.push(["Study, 2023 (SAC)", study.arrived / study.episodes, ...wilson(study.arrived, study.episodes), "var(--study)"]);
   byId("comparison").replaceChildren(html("div", { class: "bars" }, ...bars.flatMap(([name, value, low, high, colour]) =>
@@ -39,14 +39,11 @@ function showHeadline(page) {
   showFigures(page, routes, study, certified);
 }
 
-/** Routes of which it is proved that some driver can pass them, where the report tells. */
-const certifiedOf = (evaluation) => evaluation.certified ?? evaluation.certified_routes ?? null;
-
 function showFigures({ report, evaluation, ground }, routes, study, certified) {
   const own = evaluation.own_lane_suffices, deviating = evaluation.needs_deviation, compared = comparable(evaluation);
   const rows = [
     [`Success, ${routes}`, share(evaluation), study && share(study)],
-    certified && ["Success, certified routes", share(certified)],
+    certified && ["Success, routes certified to be possible", share(certified)],
     own && ["Success where the own lane suffices", share(own)],
     own && deviating && ["Success where it does not", share(deviating)],
     compared && evaluation.split === "test" && ["Success, training routes", null, share(STUDY.train)],

@@ -92,7 +92,7 @@ class Replay {
 
   /** Opens what the address asks for; false when it asks for no episode. */
   openLink() {
-    const asked = decodeURIComponent(location.hash).match(/^#([^/]+\/[^/]+)\/(\d+)(?:\/(\d+(?:\.\d+)?))?$/);
+    const asked = location.hash.match(/^#([^/]+\/[^/]+)\/(\d+)(?:\/(\d+(?:\.\d+)?))?$/);
     const route = asked && this.page.ground.routes.findIndex(({ name }) => name === asked[1]);
     const episode = asked && this.page.episodes.find((episode) => episode.route === route && episode.number === Number(asked[2]));
     if (!episode) return false;
