@@ -1,6 +1,6 @@
 //! Examines a driver: every route of a split, so many episodes each, every one counted.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::Vec2;
@@ -12,10 +12,13 @@ use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::swept::{own_lane_suffices, swept_path};
 use offtrack::world::World;
+use serde_json::Value;
 
 use crate::drivers::{self, Driver, PURSUIT_LOOK_AHEAD};
 use crate::error::Error;
 use crate::files;
+use crate::page::{MOST_EPISODES, Page};
+use crate::recording::{Recorder, Track};
 use crate::report::{Episode, Report, RouteReport, Summary};
 
 /// Examine a driver on a benchmark's routes.
@@ -39,6 +42,12 @@ pub struct Args {
     /// Write the report to this file as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// Write a page to this file that shows the report and every episode, for a browser.
+    #[arg(long)]
+    html: Option<PathBuf>,
+    /// With --html: the folder of the training run that the driver comes from, to show its curves too.
+    #[arg(long, requires = "html")]
+    run: Option<PathBuf>,
     /// With `pursuit`: distance to the point pursued [m].
     #[arg(long, default_value_t = PURSUIT_LOOK_AHEAD, allow_negative_numbers = true)]
     look_ahead: f32,
@@ -53,14 +62,39 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let world = Arc::new(World::bake(&scenario));
     let mut driver = drivers::named(&args.policy, args.look_ahead, args.seed, &world)?;
     let split = if args.split == "train" { Split::Train } else { Split::Test };
-    let report = examine(&scenario, &world, split, args.episodes, args.seed, driver.as_mut())?;
+    let n_episodes = args.episodes * scenario.split(split).len();
+    if args.html.is_some() && MOST_EPISODES < n_episodes {
+        let expected = format!("{n_episodes} in all; a page holds {MOST_EPISODES} at most: ask for fewer, or leave --html out");
+        return Err(Error::Flag { flag: "--episodes", value: args.episodes.to_string(), expected });
+    }
+    let (run, metrics) = match &args.run {
+        Some(folder) => read_run(folder)?,
+        None => (Value::Null, None),
+    };
+    let (report, tracks) = examine(&scenario, &world, split, args.episodes, args.seed, driver.as_mut(), args.html.is_some())?;
     if let Some(file) = &args.json {
         files::write_json(file, &report)?;
+    }
+    if let Some(file) = &args.html {
+        Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run, metrics }.write(file)?;
     }
     files::print(&report.table())
 }
 
-/// Runs `episodes` episodes on every route of `split`, all at once, each truck once.
+/// What a run's folder says of it: its report, and the rows of its figures.
+fn read_run(folder: &Path) -> Result<(Value, Option<String>), Error> {
+    let [report, metrics] = ["report.json", "metrics.csv"].map(|name| folder.join(name));
+    let read = |file: &Path| std::fs::read_to_string(file).map_err(Error::read(file));
+    let wrong = |message: String| Error::Contents { file: report.clone(), message };
+    let run: Value = serde_json::from_str(&read(&report)?).map_err(|error| wrong(format!("{error}; a run's report is needed")))?;
+    if run.get("env_steps").is_none() {
+        return Err(wrong("has no env_steps; a run's report is needed, as `train` writes it".to_owned()));
+    }
+    Ok((run, Some(read(&metrics)?)))
+}
+
+/// Runs `episodes` episodes on every route of `split`, all at once, each truck once. With `record` every episode is kept, in the order of the
+/// report's routes.
 pub fn examine(
     scenario: &Scenario,
     world: &Arc<World>,
@@ -68,7 +102,8 @@ pub fn examine(
     episodes: usize,
     seed: u32,
     driver: &mut dyn Driver,
-) -> Result<Report, Error> {
+    record: bool,
+) -> Result<(Report, Vec<Track>), Error> {
     let routes = scenario.split(split);
     if routes.is_empty() {
         let value = split.name().to_owned();
@@ -77,6 +112,8 @@ pub fn examine(
     let trucks: Vec<u32> = routes.iter().flat_map(|&route| std::iter::repeat_n(route, episodes)).collect();
     let mut simulator = Simulator::new(world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?;
     let mut running: Vec<Running> = simulator.batch().truck.iter().map(|truck| Running::new(&world.params.rig, truck)).collect();
+    let recorded = if record { 0..running.len() } else { 0..0 };
+    let mut recorder = Recorder::new(world, simulator.batch(), recorded);
     let bar = ProgressBar::new(running.len() as u64).with_style(
         ProgressStyle::with_template("evaluating {bar:30} {pos}/{len} episodes, {elapsed}")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
@@ -87,6 +124,7 @@ pub fn examine(
         driver.act(world, simulator.batch(), &mut actions);
         simulator.step(&actions)?;
         let batch = simulator.batch();
+        recorder.follow(world, batch);
         for (env, (running, finished)) in running.iter_mut().zip(&mut finished).enumerate() {
             if finished.is_none() && running.follow(&world.params.rig, batch, env) {
                 *finished = Some(running.finish(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running)));
@@ -96,7 +134,7 @@ pub fn examine(
     }
     bar.finish_and_clear();
     let finished: Vec<Episode> = finished.into_iter().flatten().collect();
-    Ok(summarised(scenario, world, split, seed, driver.name(), &finished, episodes))
+    Ok((summarised(scenario, world, split, seed, driver.name(), &finished, episodes), recorder.finish()))
 }
 
 fn summarised(scenario: &Scenario, world: &World, split: Split, seed: u32, policy: &str, finished: &[Episode], per_route: usize) -> Report {

@@ -12,6 +12,7 @@ mod exploration;
 mod files;
 mod memory;
 mod network;
+mod page;
 mod policy;
 mod provenance;
 mod record;

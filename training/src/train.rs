@@ -19,6 +19,7 @@ use offtrack::world::World;
 use rand::SeedableRng;
 use rand::rngs::SmallRng;
 use serde::Serialize;
+use serde_json::json;
 
 use crate::bridge;
 use crate::config::Config;
@@ -27,6 +28,7 @@ use crate::error::Error;
 use crate::evaluate::examine;
 use crate::files;
 use crate::memory::Memory;
+use crate::page::Page;
 use crate::policy::{self, Policy};
 use crate::provenance;
 use crate::report::Report;
@@ -74,12 +76,16 @@ pub struct Args {
 struct Finished {
     /// The run was stopped before its time.
     interrupted: bool,
+    seed: u32,
     /// Time spent learning [s].
     seconds: f64,
     env_steps: u64,
+    episodes: u64,
     updates: u64,
     /// Share of the last training episodes that arrived.
     training_success: Option<f64>,
+    /// How many episodes that is a share of, and each row of the metrics a mean over.
+    training_window: usize,
     machine: String,
     commit: String,
     /// The closing examination; none after an interruption.
@@ -114,14 +120,18 @@ pub fn run(args: &Args) -> Result<(), Error> {
         files::write_json(&folder.report(), &finished)?;
         return files::print(&format!("stopped: policy and figures are in {}; not examined\n", folder.path().display()));
     }
-    let mut table = String::new();
-    if !scenario.split(Split::Test).is_empty() {
-        let mut driver = Learned { name: folder.policy().display().to_string(), policy };
-        let report = examine(&scenario, &world, Split::Test, EPISODES, 0, &mut driver)?;
-        table = report.table();
-        finished.evaluation = Some(report);
+    if scenario.split(Split::Test).is_empty() {
+        files::write_json(&folder.report(), &finished)?;
+        return files::print(&format!("written: {}\n", folder.path().display()));
     }
+    let mut driver = Learned { name: folder.policy().display().to_string(), policy };
+    let (report, tracks) = examine(&scenario, &world, Split::Test, EPISODES, 0, &mut driver, true)?;
+    let table = report.table();
+    finished.evaluation = Some(report.clone());
     files::write_json(&folder.report(), &finished)?;
+    let metrics = std::fs::read_to_string(folder.metrics()).map_err(Error::read(&folder.metrics()))?;
+    Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run: json!(finished), metrics: Some(metrics) }
+        .write(&folder.page())?;
     files::print(&format!("{table}written: {}\n", folder.path().display()))
 }
 
@@ -216,10 +226,13 @@ fn learn(
     progress.finish(sac.entropy_weight())?;
     let finished = Finished {
         interrupted: stopped(),
+        seed: config.seed,
         seconds: progress.seconds(),
         env_steps: progress.env_steps(),
+        episodes: progress.episodes(),
         updates: progress.updates(),
         training_success: progress.success(),
+        training_window: progress::WINDOW,
         machine: provenance::machine(),
         commit: provenance::commit(),
         evaluation: None,

@@ -72,4 +72,9 @@ impl Folder {
     pub fn report(&self) -> PathBuf {
         self.0.join("report.json")
     }
+
+    /// The same as a page to look at.
+    pub fn page(&self) -> PathBuf {
+        self.0.join("report.html")
+    }
 }

@@ -19,8 +19,16 @@ use crate::train::folder::Folder;
 const ROW_EVERY: Duration = Duration::from_secs(5);
 /// Time between two lines where no terminal shows the live one.
 const LINE_EVERY: Duration = Duration::from_secs(30);
-/// Episodes that the success rate looks back on.
-const WINDOW: usize = 1000;
+/// Episodes that the success rate and the mean reward look back on, as many as in the study.
+pub const WINDOW: usize = 250;
+
+/// What is remembered of an episode.
+#[derive(Debug)]
+struct Episode {
+    arrived: bool,
+    /// Sum of its rewards.
+    reward: f32,
+}
 
 /// Counters and clocks of a run.
 #[derive(Debug)]
@@ -31,8 +39,10 @@ pub struct Progress {
     env_steps: u64,
     episodes: u64,
     updates: u64,
-    /// Whether each of the latest episodes arrived.
-    arrived: VecDeque<bool>,
+    /// The latest episodes.
+    latest: VecDeque<Episode>,
+    /// Each truck's sum of rewards in the episode that it is in, `[n_envs]`.
+    rewards: Vec<f32>,
     /// Sums since the last row.
     sums: Update,
     since_row: Instant,
@@ -48,7 +58,7 @@ impl Progress {
     pub fn new(config: &Config, folder: &Folder) -> Result<Progress, Error> {
         let path = folder.metrics();
         let mut file = File::create_new(&path).map_err(Error::write(&path))?;
-        let head = "seconds,env_steps,episodes,updates,success,critic_loss,actor_loss,entropy,value,entropy_weight,steps_per_second,updates_per_second";
+        let head = "seconds,env_steps,episodes,updates,success,reward,critic_loss,actor_loss,entropy,value,entropy_weight,steps_per_second,updates_per_second";
         writeln!(file, "{head}").map_err(Error::write(&path))?;
         let style = ProgressStyle::with_template("{bar:24} {percent:>3} % {msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
         Ok(Progress {
@@ -58,7 +68,8 @@ impl Progress {
             env_steps: 0,
             episodes: 0,
             updates: 0,
-            arrived: VecDeque::with_capacity(WINDOW),
+            latest: VecDeque::with_capacity(WINDOW),
+            rewards: vec![0.0; config.n_envs],
             sums: Update::default(),
             since_row: Instant::now(),
             row_steps: 0,
@@ -86,6 +97,11 @@ impl Progress {
         self.env_steps
     }
 
+    /// Episodes ended.
+    pub fn episodes(&self) -> u64 {
+        self.episodes
+    }
+
     /// Updates made.
     pub fn updates(&self) -> u64 {
         self.updates
@@ -93,19 +109,28 @@ impl Progress {
 
     /// Share of the latest episodes that arrived, none before the first ended.
     pub fn success(&self) -> Option<f64> {
-        let arrived = self.arrived.iter().filter(|&&arrived| arrived).count();
-        (!self.arrived.is_empty()).then(|| arrived as f64 / self.arrived.len() as f64)
+        let arrived = self.latest.iter().filter(|episode| episode.arrived).count();
+        (!self.latest.is_empty()).then(|| arrived as f64 / self.latest.len() as f64)
+    }
+
+    /// Mean sum of rewards of the latest episodes, none before the first ended.
+    fn reward(&self) -> Option<f64> {
+        let sum: f64 = self.latest.iter().map(|episode| f64::from(episode.reward)).sum();
+        (!self.latest.is_empty()).then(|| sum / self.latest.len() as f64)
     }
 
     /// Counts a step of every truck.
     pub fn stepped(&mut self, batch: &Batch) {
         self.env_steps += batch.n_envs() as u64;
-        for &code in batch.ended.iter().filter(|&&code| code != Ended::Running as u32) {
-            self.episodes += 1;
-            if self.arrived.len() == WINDOW {
-                self.arrived.pop_front();
+        for ((sum, &reward), &code) in self.rewards.iter_mut().zip(&batch.reward).zip(&batch.ended) {
+            *sum += reward;
+            if code != Ended::Running as u32 {
+                self.episodes += 1;
+                if self.latest.len() == WINDOW {
+                    self.latest.pop_front();
+                }
+                self.latest.push_back(Episode { arrived: code == Ended::Arrived as u32, reward: std::mem::take(sum) });
             }
-            self.arrived.push_back(code == Ended::Arrived as u32);
         }
     }
 
@@ -135,21 +160,24 @@ impl Progress {
 
     fn row(&mut self, entropy_weight: f32) -> Result<(), Error> {
         let seconds = self.since_row.elapsed().as_secs_f64();
-        let n = (self.updates - self.row_updates).max(1) as f32;
+        let n = self.updates - self.row_updates;
+        // A mean over no updates is left empty.
+        let mean = |sum: f32, decimals: usize| if n == 0 { String::new() } else { format!("{:.decimals$}", sum / n as f32) };
         let [steps_rate, update_rate] =
             [self.env_steps - self.row_steps, self.updates - self.row_updates].map(|count| count as f64 / seconds);
         let success = self.success().map(|success| format!("{success:.4}")).unwrap_or_default();
+        let reward = self.reward().map(|reward| format!("{reward:.2}")).unwrap_or_default();
         let Update { critic_loss, actor_loss, entropy, value } = self.sums;
         let row = format!(
-            "{:.1},{},{},{},{success},{:.5},{:.5},{:.4},{:.4},{entropy_weight:.6},{steps_rate:.0},{update_rate:.1}\n",
+            "{:.1},{},{},{},{success},{reward},{},{},{},{},{entropy_weight:.6},{steps_rate:.0},{update_rate:.1}\n",
             self.seconds(),
             self.env_steps,
             self.episodes,
             self.updates,
-            critic_loss / n,
-            actor_loss / n,
-            entropy / n,
-            value / n,
+            mean(critic_loss, 5),
+            mean(actor_loss, 5),
+            mean(entropy, 4),
+            mean(value, 4),
         );
         let (path, file) = &mut self.metrics;
         file.write_all(row.as_bytes()).and_then(|()| file.flush()).map_err(Error::write(path))?;
@@ -167,7 +195,7 @@ impl Progress {
         let line = format!(
             "{:.2} M steps, {steps_rate:.0} steps/s, {update_rate:.0} updates/s, success {success} of the last {}, {}:{:02} left",
             self.env_steps as f64 / 1e6,
-            self.arrived.len(),
+            self.latest.len(),
             left as u64 / 60,
             left as u64 % 60,
         );

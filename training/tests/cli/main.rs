@@ -7,6 +7,7 @@ mod draw;
 mod evaluate;
 mod input;
 mod interruption;
+mod page;
 mod place;
 mod record;
 mod train;

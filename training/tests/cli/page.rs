@@ -1,0 +1,120 @@
+//! `report.html`, opened in a browser: with `#selftest` the page checks itself and writes what came of it into its document.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::place::{Place, offtrack, refusal, succeed};
+
+/// A Chromium, whatever its name.
+fn browser() -> PathBuf {
+    let folders: Vec<PathBuf> = std::env::var_os("PATH").iter().flat_map(std::env::split_paths).collect();
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    let found = names.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name))).find(|file| file.is_file());
+    found.expect("a browser opens the page in this test: install the package `chromium`")
+}
+
+/// What the page says of itself.
+fn selftest(page: &Path) -> String {
+    let profile = tempfile::tempdir().unwrap();
+    let output = Command::new(browser())
+        // The sandbox cannot start for root, as in most containers; the page is our own.
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"])
+        .arg(format!("--user-data-dir={}", profile.path().display()))
+        // Time of the page's clock: waiting costs none of ours.
+        .args(["--virtual-time-budget=60000", "--dump-dom"])
+        .arg(format!("file://{}#selftest", page.display()))
+        .output()
+        .unwrap();
+    let document = String::from_utf8_lossy(&output.stdout).into_owned();
+    let said = || String::from_utf8_lossy(&output.stderr).into_owned();
+    let (_, outcome) = document.rsplit_once("<pre id=\"selftest\">").unwrap_or_else(|| panic!("no outcome; {}", said()));
+    outcome.to_owned()
+}
+
+/// A data block of the page.
+fn block<'a>(page: &'a str, id: &str) -> &'a str {
+    let (_, text) = page.split_once(&format!("id=\"{id}\">")).unwrap();
+    text.split_once("</script>").unwrap().0
+}
+
+fn read(file: &Path) -> String {
+    std::fs::read_to_string(file).unwrap()
+}
+
+#[test]
+fn a_training_run_leaves_a_page_that_holds_its_report_and_passes_its_own_checks() {
+    let place = Place::new();
+    succeed(&place.train(&["--name", "run"]));
+    let page = place.file("runs/run/report.html");
+    let text = read(&page);
+    assert_eq!(serde_json::from_str::<Value>(block(&text, "report")).unwrap(), place.json("runs/run/report.json"));
+    assert_eq!(serde_json::from_str::<Value>(block(&text, "metrics")).unwrap(), read(&place.file("runs/run/metrics.csv")));
+    let outcome = selftest(&page);
+    assert!(outcome.starts_with("selftest passed\n"), "{outcome}");
+    // The only address in it is the name of SVG: a page that loads nothing opens anywhere.
+    assert_eq!(text.matches("http://").count() + text.matches("https://").count(), text.matches("\"http://www.w3.org/2000/svg\"").count());
+}
+
+#[test]
+fn a_page_of_an_examination_alone_passes_its_own_checks_and_one_with_a_wrong_figure_does_not() {
+    let place = Place::new();
+    let page = place.file("page.html");
+    let arguments = ["--policy", "pursuit", "--episodes", "2", "--html", &place.text("page.html"), "--json", &place.text("report.json")];
+    succeed(&place.evaluate(&arguments));
+    let text = read(&page);
+    assert_eq!(serde_json::from_str::<Value>(block(&text, "report")).unwrap()["evaluation"], place.json("report.json"));
+    let outcome = selftest(&page);
+    assert!(outcome.starts_with("selftest passed\n"), "{outcome}");
+
+    // A character of the recorded episodes exchanged, and a figure of the report two centimetres off.
+    let tracks = block(&text, "tracks");
+    let middle = tracks.len() / 2;
+    let other = if tracks.as_bytes()[middle] == b'A' { "B" } else { "A" };
+    let changed = format!("{}{other}{}", &tracks[..middle], &tracks[middle + 1..]);
+    let mean = place.json("report.json")["lane_distance_mean"].as_f64().unwrap();
+    let key = |mean: f64| format!("\"lane_distance_mean\":{mean}");
+    for (from, to, expected) in [
+        (tracks, changed.as_str(), "fails: the page is read"),
+        (&key(mean), &key(mean + 0.02), "fails: the recorded frames give the report's figures: distance"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&page, text.replacen(from, to, 1)).unwrap();
+        let outcome = selftest(&page);
+        assert!(outcome.starts_with("selftest failed\n") && outcome.contains(expected), "{outcome}");
+    }
+}
+
+#[test]
+fn a_page_takes_its_curves_from_the_folder_of_a_run() {
+    let place = Place::new();
+    succeed(&place.train(&["--name", "run", "--steps", "800"]));
+    let page = place.text("page.html");
+    let arguments = ["--policy", "random", "--episodes", "1", "--html", &page, "--run"];
+    let with_run = |run: &str| place.evaluate(&[&arguments[..], &[&place.text(run)]].concat());
+    succeed(&with_run("runs/run"));
+    let text = read(Path::new(&page));
+    let report: Value = serde_json::from_str(block(&text, "report")).unwrap();
+    assert_eq!((&report["env_steps"], &report["evaluation"]["policy"]), (&Value::from(800), &Value::from("random")));
+    assert_eq!(serde_json::from_str::<Value>(block(&text, "metrics")).unwrap(), read(&place.file("runs/run/metrics.csv")));
+
+    let said = refusal(&with_run("runs/none"), 2);
+    assert!(said.contains("runs/none/report.json") && said.contains("cannot be read"), "{said}");
+    std::fs::write(place.file("runs/run/report.json"), "{}").unwrap();
+    let said = refusal(&with_run("runs/run"), 2);
+    assert!(said.contains("report.json: has no env_steps"), "{said}");
+}
+
+#[test]
+fn a_page_that_would_be_too_large_or_cannot_be_written_is_refused() {
+    let place = Place::new();
+    let page = place.text("page.html");
+    let said = refusal(&place.evaluate(&["--policy", "random", "--episodes", "2001", "--html", &page]), 2);
+    assert!(said.contains("--episodes: 2001; 4002 in all; a page holds 4000 at most"), "{said}");
+    let said = refusal(&offtrack(&["evaluate", "--policy", "random", "--run", "runs/run"]), 2);
+    assert!(said.contains("--html"), "{said}");
+    let below_a_file = place.text("tiny.toml/page.html");
+    let said = refusal(&place.evaluate(&["--policy", "random", "--episodes", "1", "--html", &below_a_file]), 1);
+    assert!(said.contains(&below_a_file) && said.contains("cannot be written"), "{said}");
+}
