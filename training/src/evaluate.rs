@@ -13,6 +13,7 @@ use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::swept::{own_lane_suffices, swept_path};
 use offtrack::world::World;
 
+use crate::certify::certified;
 use crate::drivers::{Chance, Driver, Learned, Pursuit};
 use crate::error::Error;
 use crate::files;
@@ -40,6 +41,9 @@ pub struct Args {
     /// Write the report to this file as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// A certificate of `offtrack certify`: success over the routes that it shows to be possible is reported too.
+    #[arg(long)]
+    certified: Option<PathBuf>,
     /// With `pursuit`: distance to the point pursued [m].
     #[arg(long, default_value_t = PURSUIT_LOOK_AHEAD, allow_negative_numbers = true)]
     look_ahead: f32,
@@ -69,7 +73,14 @@ pub fn run(args: &Args) -> Result<(), Error> {
         }
     };
     let split = if args.split == "train" { Split::Train } else { Split::Test };
-    let report = examine(&scenario, &world, split, args.episodes, args.seed, driver.as_mut())?;
+    let possible = args.certified.as_ref().map(|file| certified(file, &scenario, &world, scenario.split(split))).transpose()?;
+    let finished = drive(&scenario, &world, split, args.episodes, args.seed, driver.as_mut())?;
+    let mut report = summarised(&scenario, &world, split, args.seed, driver.name(), &finished, args.episodes);
+    report.certified = possible.and_then(|possible| {
+        let chunks = scenario.split(split).iter().zip(finished.chunks(args.episodes));
+        let kept: Vec<&Episode> = chunks.filter(|(route, _)| possible.contains(route)).flat_map(|(_, chunk)| chunk).collect();
+        Summary::of(kept.into_iter(), scenario.step)
+    });
     if let Some(file) = &args.json {
         files::write_json(file, &report)?;
     }
@@ -85,6 +96,19 @@ pub fn examine(
     seed: u32,
     driver: &mut dyn Driver,
 ) -> Result<Report, Error> {
+    let finished = drive(scenario, world, split, episodes, seed, driver)?;
+    Ok(summarised(scenario, world, split, seed, driver.name(), &finished, episodes))
+}
+
+/// The episodes of every route of `split`, `episodes` each, in the order of its routes.
+fn drive(
+    scenario: &Scenario,
+    world: &Arc<World>,
+    split: Split,
+    episodes: usize,
+    seed: u32,
+    driver: &mut dyn Driver,
+) -> Result<Vec<Episode>, Error> {
     let routes = scenario.split(split);
     if routes.is_empty() {
         let value = split.name().to_owned();
@@ -111,8 +135,7 @@ pub fn examine(
         }
     }
     bar.finish_and_clear();
-    let finished: Vec<Episode> = finished.into_iter().flatten().collect();
-    Ok(summarised(scenario, world, split, seed, driver.name(), &finished, episodes))
+    Ok(finished.into_iter().flatten().collect())
 }
 
 fn summarised(scenario: &Scenario, world: &World, split: Split, seed: u32, policy: &str, finished: &[Episode], per_route: usize) -> Report {
@@ -143,6 +166,7 @@ fn summarised(scenario: &Scenario, world: &World, split: Split, seed: u32, polic
         summary: Summary::of(finished.iter(), scenario.step).expect("a split has a route and a route an episode: both were checked"),
         own_lane_suffices: of_routes(true),
         needs_deviation: of_routes(false),
+        certified: None,
         routes: route_reports.collect(),
     }
 }

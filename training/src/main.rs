@@ -2,6 +2,7 @@
 
 mod bench;
 mod bridge;
+mod certify;
 mod config;
 mod deviations;
 mod draw;
@@ -41,6 +42,7 @@ enum Command {
     Train(train::Args),
     Evaluate(evaluate::Args),
     Bench(bench::Args),
+    Certify(certify::Args),
     Draw(draw::Args),
     Trace(trace::Args),
     Deviations(deviations::Args),
@@ -52,6 +54,7 @@ fn main() -> ExitCode {
         Command::Train(args) => train::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Bench(args) => bench::run(args),
+        Command::Certify(args) => certify::run(args),
         Command::Draw(args) => draw::run(args),
         Command::Trace(args) => trace::run(args),
         Command::Deviations(args) => deviations::run(args),

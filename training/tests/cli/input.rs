@@ -4,7 +4,7 @@ use crate::place::{Place, offtrack, refusal};
 
 #[test]
 fn a_wrong_argument_is_named_with_its_value_and_what_would_do() {
-    let cases: [(&[&str], &[&str]); 17] = [
+    let cases: [(&[&str], &[&str]); 20] = [
         (&["evaluate", "--policy", "random", "--episodes", "0"], &["--episodes: 0; must lie in 1..100000"]),
         (&["evaluate", "--policy", "random", "--episodes", "many"], &["'many'", "--episodes"]),
         (&["evaluate", "--policy", "random", "--benchmark", "nowhere"], &["benchmark: nowhere", "scenarios/"]),
@@ -14,6 +14,9 @@ fn a_wrong_argument_is_named_with_its_value_and_what_would_do() {
         (&["evaluate", "--policy", "pursuit", "--look-ahead", "nan"], &["--look-ahead: NaN m; must lie in 1..50 m"]),
         (&["evaluate", "--policy", "pursuit", "--look-ahead", "-3"], &["--look-ahead: -3 m; must lie in 1..50 m"]),
         (&["evaluate"], &["--policy"]),
+        (&["certify", "--widths", "64,0"], &["--widths: 0; must lie in 1..262144"]),
+        (&["certify", "--hold", "0"], &["--hold: 0; must lie in 1..50"]),
+        (&["certify", "--verify", "no.json"], &["no.json: cannot be read"]),
         (&["bench", "--envs", "0"], &["--envs: 0; must lie in 1..4194304"]),
         (&["bench", "--seconds", "-1"], &["--seconds: -1 s; must lie in 0.1..3600 s"]),
         (&["train", "no.toml"], &["no.toml: cannot be read"]),
