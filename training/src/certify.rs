@@ -19,7 +19,7 @@ use offtrack::world::World;
 use crate::error::Error;
 use crate::files;
 use crate::policy::Policy;
-use beam::Pass;
+use beam::{Outcome, Pass};
 use file::{Certificate, CertifiedRoute, Found};
 
 /// On the lane centre, and the four corners of the largest start errors.
@@ -163,28 +163,29 @@ fn passes(widths: &[usize], hold: usize) -> Vec<Pass> {
 /// Searches from one start until a pass arrives or all have been made. Of those that did not, the one that got furthest is told.
 fn attempt(world: &Arc<World>, route: u32, start: &Start, passes: &[Pass], policy: Option<&Policy>) -> Result<Found, Error> {
     let mut env_steps = 0;
-    let mut best: Option<Found> = None;
+    let mut best: Option<(Pass, Outcome)> = None;
     for &pass in passes {
         let outcome = beam::search(world, route, start, pass, policy)?;
         env_steps += outcome.env_steps;
         let arrived = outcome.ended == Ended::Arrived;
-        if arrived || best.as_ref().is_none_or(|best| best.progress < outcome.progress) {
-            best = Some(Found {
-                ended: outcome.ended.name().to_owned(),
-                progress: (outcome.progress * 1e3).round() / 1e3,
-                steps: outcome.steps,
-                width: pass.width,
-                hold: pass.hold,
-                env_steps,
-                actions: file::runs(&outcome.actions),
-            });
+        let further = |best: &Outcome| (best.progress, best.steps) < (outcome.progress, outcome.steps);
+        if arrived || best.as_ref().is_none_or(|(_, best)| further(best)) {
+            best = Some((pass, outcome));
         }
         if arrived {
             break;
         }
     }
-    let best = best.expect("there is a width, so there was a pass");
-    Ok(Found { env_steps, ..best })
+    let (pass, outcome) = best.expect("there is a width, so there was a pass");
+    Ok(Found {
+        ended: outcome.ended.name().to_owned(),
+        progress: (outcome.progress * 1e3).round() / 1e3,
+        steps: outcome.steps,
+        width: pass.width,
+        hold: pass.hold,
+        env_steps,
+        actions: file::runs(&outcome.actions),
+    })
 }
 
 /// What a person reads: the budget, the sums, and every route that was not completed from a start.

@@ -204,7 +204,7 @@ fn traced(stretches: &[Stretch], candidate: &Candidate) -> Vec<u32> {
 fn note_furthest(world: &World, batch: &Batch, outcome: &mut Outcome) {
     for ((truck, progress), &ended) in batch.truck.iter().zip(&batch.progress).zip(&batch.ended) {
         let share = f64::from(progress.waypoint) / f64::from(world.routes[truck.route as usize].n_waypoints);
-        if outcome.progress <= share {
+        if (outcome.progress, outcome.steps) <= (share, truck.steps) {
             (outcome.progress, outcome.steps) = (share, truck.steps);
             outcome.ended = Ended::from_code(ended).unwrap_or(Ended::Running);
         }
