@@ -116,6 +116,31 @@ impl Batch {
         self.truck.len()
     }
 
+    /// The rows `indices` of this batch, in that order and as often as they are named: row `i` carries on as row `indices[i]` was.
+    pub(crate) fn gathered(&self, indices: &[u32]) -> Batch {
+        fn picked<T: Copy>(column: &[T], indices: &[u32]) -> Vec<T> {
+            indices.iter().map(|&index| column[index as usize]).collect()
+        }
+        Batch {
+            seed: self.seed,
+            choice: match &self.choice {
+                RouteChoice::Fixed(routes) => RouteChoice::Fixed(picked(routes, indices)),
+                RouteChoice::Drawn(routes) => RouteChoice::Drawn(routes.clone()),
+            },
+            action: picked(&self.action, indices),
+            control: picked(&self.control, indices),
+            truck: picked(&self.truck, indices),
+            clearance: picked(&self.clearance, indices),
+            progress: picked(&self.progress, indices),
+            ranges: picked(&self.ranges, indices),
+            observation: picked(&self.observation, indices),
+            next_observation: picked(&self.next_observation, indices),
+            ended: picked(&self.ended, indices),
+            terms: picked(&self.terms, indices),
+            reward: picked(&self.reward, indices),
+        }
+    }
+
     /// Does `work` to every row, all cores sharing the rows.
     pub(crate) fn for_each_row(&mut self, work: impl Fn(&mut Row) + Sync) {
         let (seed, choice) = (self.seed, &self.choice);

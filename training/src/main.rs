@@ -2,6 +2,7 @@
 
 mod bench;
 mod bridge;
+mod certify;
 mod config;
 mod deviations;
 mod draw;
@@ -45,6 +46,7 @@ enum Command {
     Train(train::Args),
     Evaluate(evaluate::Args),
     Bench(bench::Args),
+    Certify(certify::Args),
     Draw(draw::Args),
     Record(record::Args),
     Trace(trace::Args),
@@ -57,6 +59,7 @@ fn main() -> ExitCode {
         Command::Train(args) => train::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Bench(args) => bench::run(args),
+        Command::Certify(args) => certify::run(args),
         Command::Draw(args) => draw::run(args),
         Command::Record(args) => record::run(args),
         Command::Trace(args) => trace::run(args),
