@@ -2,6 +2,7 @@
 
 mod bench;
 mod bridge;
+mod checkpoint;
 mod config;
 mod deviations;
 mod draw;
@@ -10,6 +11,7 @@ mod error;
 mod evaluate;
 mod exploration;
 mod files;
+mod generator;
 mod memory;
 mod network;
 mod page;
