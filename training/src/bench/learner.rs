@@ -16,9 +16,9 @@ use crate::bridge;
 use crate::config::{self, Critics, Entropy, Learning};
 use crate::error::Error;
 use crate::files;
-use crate::memory::{Memory, Rows, Sample};
+use crate::memory::{Memory, Rows};
 use crate::provenance;
-use crate::sac::Sac;
+use crate::sac::{Sac, Transitions};
 use crate::scaling::Scaling;
 
 /// Actions of the benchmark's table.
@@ -133,8 +133,10 @@ impl Learner {
         Ok(Learner { learning, sac, memory, scaling, rng })
     }
 
-    fn sample(&mut self) -> Sample<N_VALUES> {
-        self.memory.sample(self.learning.batch, self.learning.discount as f32, &mut self.rng)
+    /// A batch drawn from the memory.
+    fn parts(&mut self) -> Vec<Transitions> {
+        let sample = self.memory.sample(self.learning.batch, self.learning.discount as f32, &mut self.rng);
+        bridge::parts(&sample, &self.scaling, &self.learning, &mut self.rng)
     }
 
     /// Updates for so many seconds, once at least.
@@ -168,7 +170,7 @@ impl Learner {
 
     /// Time of an update whose batch is at hand [s].
     fn alone(&mut self, n: usize) -> f64 {
-        let batches: Vec<_> = (0..n).map(|_| bridge::parts(&self.sample(), &self.scaling, 1.0)).collect();
+        let batches: Vec<_> = (0..n).map(|_| self.parts()).collect();
         let begun = Instant::now();
         for batch in batches {
             self.sac.update(batch, 1.0);
@@ -180,8 +182,8 @@ impl Learner {
     fn sampled(&mut self, n: usize) -> f64 {
         let begun = Instant::now();
         for _ in 0..n {
-            let sample = self.sample();
-            self.sac.update(bridge::parts(&sample, &self.scaling, 1.0), 1.0);
+            let batch = self.parts();
+            self.sac.update(batch, 1.0);
         }
         begun.elapsed().as_secs_f64() / n as f64
     }
@@ -197,6 +199,7 @@ fn learning(hidden: &[usize], batch: usize) -> Learning {
         discount: 0.97,
         reward_scale: 1.0,
         scale_observations: true,
+        observation_noise: 0.0,
         actor_rate: 3e-4,
         critic_rate: 3e-4,
         last_rate: 1.0,
