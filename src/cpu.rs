@@ -14,11 +14,15 @@ pub mod steer;
 
 use std::time::{Duration, Instant};
 
+use bytemuck::{cast_slice, cast_slice_mut};
 use rayon::prelude::*;
 
 use crate::layout::{Clearance, Control, N_RAYS, N_VALUES, Progress, RewardTerms, Truck};
 use crate::stages::{STAGES, Stage};
 use crate::world::World;
+
+/// Columns of a batch.
+pub const N_COLUMNS: usize = 11;
 
 /// One truck's share of the columns while a stage works on it.
 #[derive(Debug)]
@@ -139,6 +143,40 @@ impl Batch {
             terms: picked(&self.terms, indices),
             reward: picked(&self.reward, indices),
         }
+    }
+
+    /// Every column by its name, as the bytes it lies in: with them a batch goes on where it was, see [`crate::simulator::Simulator::restore`].
+    pub fn columns(&self) -> [(&'static str, &[u8]); N_COLUMNS] {
+        [
+            ("action", cast_slice(&self.action)),
+            ("control", cast_slice(&self.control)),
+            ("truck", cast_slice(&self.truck)),
+            ("clearance", cast_slice(&self.clearance)),
+            ("progress", cast_slice(&self.progress)),
+            ("ranges", cast_slice(self.ranges.as_flattened())),
+            ("observation", cast_slice(self.observation.as_flattened())),
+            ("next_observation", cast_slice(self.next_observation.as_flattened())),
+            ("ended", cast_slice(&self.ended)),
+            ("terms", cast_slice(&self.terms)),
+            ("reward", cast_slice(&self.reward)),
+        ]
+    }
+
+    /// The same to be written to.
+    pub(crate) fn columns_mut(&mut self) -> [(&'static str, &mut [u8]); N_COLUMNS] {
+        [
+            ("action", cast_slice_mut(&mut self.action)),
+            ("control", cast_slice_mut(&mut self.control)),
+            ("truck", cast_slice_mut(&mut self.truck)),
+            ("clearance", cast_slice_mut(&mut self.clearance)),
+            ("progress", cast_slice_mut(&mut self.progress)),
+            ("ranges", cast_slice_mut(self.ranges.as_flattened_mut())),
+            ("observation", cast_slice_mut(self.observation.as_flattened_mut())),
+            ("next_observation", cast_slice_mut(self.next_observation.as_flattened_mut())),
+            ("ended", cast_slice_mut(&mut self.ended)),
+            ("terms", cast_slice_mut(&mut self.terms)),
+            ("reward", cast_slice_mut(&mut self.reward)),
+        ]
     }
 
     /// Does `work` to every row, all cores sharing the rows.

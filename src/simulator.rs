@@ -79,6 +79,30 @@ pub enum Error {
         /// Entries of the action table.
         limit: u32,
     },
+    /// A column to go on from that is not of this batch.
+    #[error("{column}: {}; a batch of {n_envs} trucks needs {n_bytes} bytes", .found.map_or("missing".to_owned(), |found| format!("{found} bytes")))]
+    ColumnSize {
+        /// The column's name.
+        column: &'static str,
+        /// Bytes given, none where the column is missing.
+        found: Option<usize>,
+        /// Trucks in the batch.
+        n_envs: usize,
+        /// Bytes needed.
+        n_bytes: usize,
+    },
+    /// A truck to go on with that cannot be in this world.
+    #[error("{column}[{env}]: {found}; the world has {limit}")]
+    OutsideWorld {
+        /// The column's name.
+        column: &'static str,
+        /// The truck's place in the batch.
+        env: usize,
+        /// The index found there.
+        found: u32,
+        /// What it may be at most.
+        limit: String,
+    },
 }
 
 /// A batch of trucks in a world.
@@ -153,6 +177,32 @@ impl Simulator {
             return Err(Error::UnknownTruck { place, index, n_envs });
         }
         self.batch = self.batch.gathered(indices);
+        Ok(())
+    }
+
+    /// Goes on from columns that [`Batch::columns`] gave, found by their names: with the same world, seed and routes every later step is the
+    /// same bit for bit. An error leaves the batch as it was.
+    pub fn restore<'a>(&mut self, column: impl Fn(&str) -> Option<&'a [u8]>) -> Result<(), Error> {
+        let mut batch = self.batch.clone();
+        let n_envs = batch.n_envs();
+        for (name, bytes) in batch.columns_mut() {
+            let found = column(name);
+            let kept = found.filter(|found| found.len() == bytes.len());
+            let error = || Error::ColumnSize { column: name, found: found.map(<[u8]>::len), n_envs, n_bytes: bytes.len() };
+            bytes.copy_from_slice(kept.ok_or_else(error)?);
+        }
+        // Stages look routes and waypoints up without asking.
+        for (env, (truck, progress)) in batch.truck.iter().zip(&batch.progress).enumerate() {
+            let Some(route) = self.world.routes.get(truck.route as usize) else {
+                let limit = format!("routes 0..{}", self.world.routes.len());
+                return Err(Error::OutsideWorld { column: "truck", env, found: truck.route, limit });
+            };
+            if route.n_waypoints < progress.waypoint {
+                let limit = format!("{} waypoints on its route", route.n_waypoints);
+                return Err(Error::OutsideWorld { column: "progress", env, found: progress.waypoint, limit });
+            }
+        }
+        self.batch = batch;
         Ok(())
     }
 

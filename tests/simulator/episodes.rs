@@ -270,3 +270,35 @@ fn a_step_allocates_nothing() {
     assert_eq!(steps.count_total, 0);
     assert_eq!(collecting.count_total, 1, "the counter counts");
 }
+
+#[test]
+fn a_batch_put_back_goes_on_bit_for_bit_and_one_of_another_kind_is_refused() {
+    let world = Arc::new(benchmark("attard2023").1);
+    let begun = |n_envs| Simulator::new(world.clone(), n_envs, 3, all_routes(&world)).unwrap();
+    let mut driven = begun(64);
+    (0..150).for_each(|_| driven.step_at_random());
+    let kept: Vec<(&str, Vec<u8>)> = driven.batch().columns().map(|(name, bytes)| (name, bytes.to_vec())).into();
+    let find = |name: &str| kept.iter().find(|(kept, _)| *kept == name).map(|(_, bytes)| &bytes[..]);
+    let mut put_back = begun(64);
+    put_back.restore(find).unwrap();
+    for simulator in [&mut driven, &mut put_back] {
+        (0..150).for_each(|_| simulator.step_at_random());
+    }
+    assert!(bytes(driven.batch(), 64) == bytes(put_back.batch(), 64));
+    assert!(bytes(driven.batch(), 64) != bytes(begun(64).batch(), 64));
+
+    let wrong = |n_envs: usize, column: &str, changed: Option<Vec<u8>>| {
+        let mut simulator = begun(n_envs);
+        let before = bytes(simulator.batch(), n_envs);
+        let error = simulator.restore(|name| if name == column { changed.as_deref() } else { find(name) }).unwrap_err();
+        assert!(bytes(simulator.batch(), n_envs) == before);
+        error.to_string()
+    };
+    assert_eq!(wrong(64, "truck", None), "truck: missing; a batch of 64 trucks needs 4096 bytes");
+    assert_eq!(wrong(32, "nothing", None), "action: 256 bytes; a batch of 32 trucks needs 128 bytes");
+    // Indices beyond every table.
+    let truck = wrong(64, "truck", Some(vec![255; 64 * size_of::<offtrack::layout::Truck>()]));
+    assert!(truck.starts_with("truck[0]: 4294967295; the world has routes 0.."), "{truck}");
+    let progress = wrong(64, "progress", Some(vec![255; 64 * size_of::<offtrack::layout::Progress>()]));
+    assert!(progress.starts_with("progress[0]: 4294967295; the world has "), "{progress}");
+}

@@ -28,6 +28,9 @@ pub struct Config {
     /// Env steps to learn for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<u64>,
+    /// Time from one checkpoint to the next [min].
+    #[serde(default = "checkpoint_minutes")]
+    pub checkpoint_minutes: f64,
     /// How far from the policy the trucks act.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exploration: Option<Exploration>,
@@ -35,6 +38,10 @@ pub struct Config {
     pub memory: Memory,
     /// How it is learned from.
     pub learning: Learning,
+}
+
+fn checkpoint_minutes() -> f64 {
+    2.0
 }
 
 /// Actions by chance in place of the policy's.
@@ -194,6 +201,12 @@ impl Config {
         self.check(&Reader::of(Path::new("command line")))
     }
 
+    /// Whether a run with this config can go on where one with the other left off: they differ in their budget and checkpoints at most.
+    pub fn is_same_run(&self, other: &Config) -> bool {
+        let Config { minutes, steps, checkpoint_minutes, .. } = *self;
+        *self == Config { minutes, steps, checkpoint_minutes, ..other.clone() }
+    }
+
     /// The file that this config would be read from.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("numbers, words and lists of numbers can all be written as TOML")
@@ -211,6 +224,7 @@ impl Config {
         if self.minutes.is_none() && self.steps.is_none() {
             return Err(reader.invalid("minutes", "missing", "`minutes`, `steps` or both must say when to stop").into());
         }
+        reader.within("checkpoint_minutes", self.checkpoint_minutes, 1e-4..=100_000.0, "min")?;
         reader.count("memory.capacity", memory.capacity, 1_000..=100_000_000)?;
         reader.count("memory.warmup", memory.warmup, 1..=memory.capacity)?;
         if let Some(priority) = memory.priority {

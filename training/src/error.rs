@@ -61,16 +61,20 @@ pub enum Error {
     #[error("threads to learn with cannot be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// The learner has broken down.
-    #[error("{what} is {value} after {env_steps} env steps: the learner has broken down; {} keeps the last policy saved before", folder.display())]
+    #[error(
+        "{what} is {value} after {env_steps} env steps{also}: the learner has broken down; {kept}; lower learning rates or a smaller reward_scale would do"
+    )]
     Diverged {
-        /// Which figure.
-        what: &'static str,
+        /// Which figure or parameter.
+        what: String,
         /// Its value, no number.
         value: f32,
         /// Env steps taken.
         env_steps: u64,
-        /// The run's folder.
-        folder: PathBuf,
+        /// Where else it shows.
+        also: String,
+        /// What there is to go back to.
+        kept: String,
     },
 }
 

@@ -3,6 +3,7 @@
 mod bench;
 mod bridge;
 mod certify;
+mod checkpoint;
 mod config;
 mod deviations;
 mod draw;
@@ -11,6 +12,7 @@ mod error;
 mod evaluate;
 mod exploration;
 mod files;
+mod generator;
 mod memory;
 mod network;
 mod page;

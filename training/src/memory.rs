@@ -4,6 +4,7 @@
 //! does it not: those few observations are kept beside the ring.
 
 mod priority;
+mod state;
 
 use std::collections::HashMap;
 

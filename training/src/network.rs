@@ -51,15 +51,48 @@ impl Mlp {
         }
         output
     }
+
+    /// Every parameter with its name, in the order in which a module shows them.
+    pub fn parameters(&self) -> Vec<(String, Vec<f32>)> {
+        let layers = self.layers.iter().zip(1..).flat_map(|(layer, number)| {
+            let biases = layer.bias.as_ref().map(|bias| (format!("layer {number}, bias"), values(bias)));
+            [Some((format!("layer {number}, weight"), values(&layer.weight))), biases].into_iter().flatten()
+        });
+        let norms = self.norms.iter().zip(1..).flat_map(|(norm, number)| {
+            let shift = norm.beta.as_ref().map(|beta| (format!("normalisation {number}, shift"), values(beta)));
+            [Some((format!("normalisation {number}, scale"), values(&norm.gamma))), shift].into_iter().flatten()
+        });
+        layers.chain(norms).collect()
+    }
+
+    /// A network of the same sizes with other parameters, as many and as long as [`Mlp::parameters`] gives.
+    pub fn with_parameters(&self, parameters: Vec<Vec<f32>>, device: &Device) -> Mlp {
+        let mut parameters = parameters.into_iter();
+        let mut next = || parameters.next().unwrap_or_default();
+        let layers = self.layers.iter().map(|_| layer(next(), next(), device)).collect();
+        let norm = |norm: &LayerNorm| {
+            let mut norm = norm.clone();
+            norm.gamma = vector(next(), device);
+            norm.beta = norm.beta.map(|_| vector(next(), device));
+            norm
+        };
+        Mlp { layers, norms: self.norms.iter().map(norm).collect() }
+    }
+}
+
+fn values<const D: usize>(parameter: &Param<Tensor<D>>) -> Vec<f32> {
+    parameter.val().into_data().try_to_vec().expect("parameters are made of f32 values")
+}
+
+fn vector(values: Vec<f32>, device: &Device) -> Param<Tensor<1>> {
+    let shape = [values.len()];
+    Param::from_data(TensorData::new(values, shape), device)
 }
 
 /// A layer with the given weights `[inputs, outputs]` and biases `[outputs]`.
 pub fn layer(weights: Vec<f32>, biases: Vec<f32>, device: &Device) -> Linear {
     let shape = [weights.len() / biases.len(), biases.len()];
-    Linear {
-        weight: Param::from_data(TensorData::new(weights, shape), device),
-        bias: Some(Param::from_data(TensorData::new(biases, [shape[1]]), device)),
-    }
+    Linear { weight: Param::from_data(TensorData::new(weights, shape), device), bias: Some(vector(biases, device)) }
 }
 
 /// Probabilities and their logarithms, `[B, A]` each, of an actor's output `[B, A]`.

@@ -6,6 +6,7 @@
 mod adam;
 mod critics;
 mod entropy;
+mod state;
 
 use std::mem::take;
 

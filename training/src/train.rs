@@ -1,44 +1,39 @@
 //! The main job: trucks drive, the learner learns, and at the end the driver is examined on routes it never saw.
 //!
-//! Everything is written as it comes: the config at once, a row of figures every few seconds, the policy every minute. A run that is
-//! stopped leaves a driver that can be examined.
+//! Everything is written as it comes: the config at once, a row of figures every few seconds, the policy and a checkpoint every few
+//! minutes. A run that is stopped leaves a driver that can be examined and all that it takes to go on.
 
+mod figures;
 mod folder;
+mod keeper;
 mod progress;
+mod resume;
+mod run;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
-use std::time::{Duration, Instant};
 
-use offtrack::layout::N_VALUES;
-use offtrack::random;
 use offtrack::scenario::{Scenario, Split};
-use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;
-use rand::SeedableRng;
-use rand::rngs::SmallRng;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::bridge;
+use crate::checkpoint::Stored;
 use crate::config::Config;
 use crate::drivers::Learned;
 use crate::error::Error;
 use crate::evaluate::examine;
 use crate::files;
-use crate::memory::Memory;
 use crate::page::Page;
-use crate::policy::{self, Policy};
 use crate::provenance;
 use crate::report::Report;
-use crate::sac::{Sac, Update};
-use crate::scaling::Scaling;
+use figures::Figures;
 use folder::Folder;
 use progress::Progress;
+use resume::Resumed;
+use run::Run;
 
-/// Time between two saved policies.
-const SAVE_EVERY: Duration = Duration::from_secs(60);
 /// Episodes on each route in the closing examination.
 const EPISODES: usize = 30;
 
@@ -69,6 +64,12 @@ pub struct Args {
     /// given several times.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
+    /// Goes on with a run that was stopped, from the last checkpoint in its folder, as its own config.toml says. With --minutes or --steps
+    /// it learns for so long in all; learning rates fall until that end, so with a later one they are higher from here on than they
+    /// would have been, and a finished run goes on too. With `steps` alone the result is that of a run never stopped, bit for bit on the
+    /// same machine and program.
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "name", "out", "seed", "envs", "settings"])]
+    resume: Option<PathBuf>,
 }
 
 /// What a run came to, as written to `report.json`.
@@ -92,6 +93,14 @@ struct Finished {
     evaluation: Option<Report>,
 }
 
+/// Where a run writes, and where it begins.
+struct Begun {
+    folder: Folder,
+    figures: Figures,
+    /// What it goes on from.
+    stored: Option<Stored>,
+}
+
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     let default = || {
@@ -99,8 +108,15 @@ pub fn run(args: &Args) -> Result<(), Error> {
         if here.is_file() { here } else { files::repository().join(here) }
     };
     let file = args.config.clone().unwrap_or_else(default);
-    let mut config = Config::read_with(&file, &args.settings)?;
-    config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
+    let resumed = args.resume.as_ref().map(|folder| Resumed::open(folder, args.minutes, args.steps)).transpose()?;
+    let config = match &resumed {
+        Some(resumed) => resumed.config.clone(),
+        None => {
+            let mut config = Config::read_with(&file, &args.settings)?;
+            config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
+            config
+        }
+    };
     let scenario = Scenario::read(&files::benchmark(&config.benchmark)?)?;
     let practice = practice(&config, &scenario)?;
     let (world, practice_world) = (Arc::new(World::bake(&scenario)), Arc::new(World::bake(&practice)));
@@ -108,20 +124,42 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = format!("its actions and vehicle lock must be those of {}, on which the driver is examined", scenario.name);
         return Err(Error::Flag { flag: "practice", value: practice.name, expected });
     }
-    let runs = args.out.clone().unwrap_or_else(|| PathBuf::from("runs"));
-    let folder = Folder::create(&runs, args.name.as_deref(), &file, &config)?;
-    let n_routes = practice.split(Split::Train).len();
+    let Begun { folder, figures, stored } = match resumed {
+        Some(Resumed { folder, figures, stored, .. }) => Begun { folder, figures, stored: Some(stored) },
+        None => {
+            let runs = args.out.clone().unwrap_or_else(|| PathBuf::from("runs"));
+            let folder = Folder::create(&runs, args.name.as_deref(), &file, &config)?;
+            Begun { figures: Figures::create(folder.metrics())?, stored: None, folder }
+        }
+    };
+    let routes = practice.split(Split::Train).to_vec();
+    let n_routes = routes.len();
+    let mut run = Run::new(&config, routes, practice_world, &folder, Progress::new(&config, figures))?;
+    let mut doing = "learning".to_owned();
+    if let Some(stored) = stored {
+        run.restore(&stored)?;
+        if args.minutes.is_some() || args.steps.is_some() {
+            folder.write_config(&config)?;
+        }
+        doing = format!("going on after {} env steps and {:.2} min,", run.progress.env_steps(), run.progress.seconds() / 60.0);
+    }
     // A run goes on when nobody reads its lines.
-    let _ = files::print(&format!("{}: learning on {n_routes} training routes of {}\n", folder.path().display(), practice.name));
+    let _ = files::print(&format!("{}: {doing} on {n_routes} training routes of {}\n", folder.path().display(), practice.name));
     let stop = stop_flag();
-    let (policy, mut finished) = learn(&config, &practice, &practice_world, &folder, stop)?;
-    policy.save(&folder.policy())?;
+    run.learn(|| 0 < stop.load(Ordering::Relaxed))?;
+    let mut finished = finished(&config, &run.progress);
+    let written = run.close();
+    let policy = run.policy();
+    drop(run);
     if finished.interrupted {
         files::write_json(&folder.report(), &finished)?;
-        return files::print(&format!("stopped: policy and figures are in {}; not examined\n", folder.path().display()));
+        written?;
+        let path = folder.path().display();
+        return files::print(&format!("stopped: policy and figures are in {path}; not examined; train --resume {path} goes on\n"));
     }
     if scenario.split(Split::Test).is_empty() {
         files::write_json(&folder.report(), &finished)?;
+        written?;
         return files::print(&format!("written: {}\n", folder.path().display()));
     }
     let mut driver = Learned { name: folder.policy().display().to_string(), policy };
@@ -132,7 +170,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let metrics = std::fs::read_to_string(folder.metrics()).map_err(Error::read(&folder.metrics()))?;
     Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run: json!(finished), metrics: Some(metrics) }
         .write(&folder.page())?;
-    files::print(&format!("{table}written: {}\n", folder.path().display()))
+    files::print(&format!("{table}written: {}\n", folder.path().display()))?;
+    // The examination is not lost where something else could not be written.
+    written
 }
 
 /// What is practised on: the benchmark, or what the config names in its place. No route that the driver will be examined on may be in it.
@@ -154,7 +194,7 @@ fn practice(config: &Config, benchmark: &Scenario) -> Result<Scenario, Error> {
 fn stop_flag() -> Arc<AtomicU8> {
     let stop = Arc::new(AtomicU8::new(0));
     let flag = stop.clone();
-    // Without a handler Ctrl-C ends the process at once; the last saved policy is whole all the same.
+    // Without a handler Ctrl-C ends the process at once; the last policy and checkpoint are whole all the same.
     let _ = ctrlc::set_handler(move || {
         if 0 < flag.fetch_add(1, Ordering::Relaxed) {
             std::process::exit(130);
@@ -163,69 +203,10 @@ fn stop_flag() -> Arc<AtomicU8> {
     stop
 }
 
-/// The loop: act, step, remember, learn. Ends with the time, the steps, or Ctrl-C.
-fn learn(
-    config: &Config,
-    scenario: &Scenario,
-    world: &Arc<World>,
-    folder: &Folder,
-    stop: Arc<AtomicU8>,
-) -> Result<(Policy, Finished), Error> {
-    let learning = &config.learning;
-    let n_actions = world.actions.len();
-    let routes = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
-    let mut simulator = Simulator::new(world.clone(), config.n_envs, config.seed, routes)?;
-    let mut memory: Memory<N_VALUES> = Memory::new(config.n_envs, learning.n_steps, &config.memory);
-    let stream = |purpose: u32| SmallRng::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
-    let (mut acting, mut sampling) = (stream(1), stream(2));
-    let mut sac = Sac::new(learning, N_VALUES, n_actions, u64::from(config.seed))?;
-    let mut progress = Progress::new(config, folder)?;
-    let mut seen = Vec::new();
-
-    // Chance drives until there is enough to tell how the observed values lie; their scaling then stays.
-    let stopped = || 0 < stop.load(Ordering::Relaxed);
-    let ready = |memory: &Memory<N_VALUES>| config.memory.warmup <= memory.len() && memory.can_sample();
-    while !ready(&memory) && progress.share() < 1.0 && !stopped() {
-        seen.clone_from(&simulator.batch().observation);
-        simulator.step_at_random();
-        bridge::remember(&mut memory, &seen, simulator.batch());
-        progress.stepped(simulator.batch());
-    }
-    let scaling = if learning.scale_observations { Scaling::of(memory.observations()) } else { Scaling::none(N_VALUES) };
-    let policy = |sac: &Sac| Policy {
-        benchmark: config.benchmark.clone(),
-        actions: world.actions.clone(),
-        scaling: scaling.clone(),
-        actor: sac.average_actor().clone(),
-    };
-
-    let mut saved = Instant::now();
-    while progress.share() < 1.0 && !stopped() {
-        seen.clone_from(&simulator.batch().observation);
-        let mut actions = policy::drawn(&bridge::logits(&sac.actor(), &scaling, &seen), n_actions, &mut acting);
-        if let Some(exploration) = &config.exploration {
-            exploration.explore(progress.env_steps(), n_actions, &mut actions, &mut acting);
-        }
-        simulator.step(&actions)?;
-        bridge::remember(&mut memory, &seen, simulator.batch());
-        progress.stepped(simulator.batch());
-        let pace = 1.0 - (1.0 - learning.last_rate) * progress.share();
-        for _ in 0..learning.updates_per_step {
-            let sample = memory.sample(learning.batch, learning.discount as f32, &mut sampling);
-            let (update, errors) = sac.update(bridge::parts(&sample, &scaling, learning, &mut sampling), pace);
-            check(&update, progress.env_steps(), folder.path())?;
-            memory.learned(&sample, &errors);
-            progress.updated(&update);
-        }
-        progress.report(sac.entropy_weight())?;
-        if SAVE_EVERY <= saved.elapsed() {
-            policy(&sac).save(&folder.policy())?;
-            saved = Instant::now();
-        }
-    }
-    progress.finish(sac.entropy_weight())?;
-    let finished = Finished {
-        interrupted: stopped(),
+/// What a run has come to before its examination.
+fn finished(config: &Config, progress: &Progress) -> Finished {
+    Finished {
+        interrupted: progress.share() < 1.0,
         seed: config.seed,
         seconds: progress.seconds(),
         env_steps: progress.env_steps(),
@@ -236,16 +217,5 @@ fn learn(
         machine: provenance::machine(),
         commit: provenance::commit(),
         evaluation: None,
-    };
-    Ok((policy(&sac), finished))
-}
-
-/// A loss that is no number says that the learner has broken down; what it knew before is in the folder.
-fn check(update: &Update, env_steps: u64, folder: &Path) -> Result<(), Error> {
-    for (what, value) in [("critic loss", update.critic_loss), ("actor loss", update.actor_loss), ("entropy", update.entropy)] {
-        if !value.is_finite() {
-            return Err(Error::Diverged { what, value, env_steps, folder: folder.to_owned() });
-        }
     }
-    Ok(())
 }

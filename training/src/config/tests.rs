@@ -47,6 +47,7 @@ fn every_value_out_of_its_range_is_refused_with_its_key_and_what_would_do() {
         ("minutes", "minutes = 0.0", "minutes: 0 min; must lie in 0.01..100000 min"),
         ("minutes", "minutes = nan", "minutes: NaN min"),
         ("minutes", "minutes = 1.0\nsteps = 0", "steps: 0; must lie in"),
+        ("checkpoint_minutes", "checkpoint_minutes = 0.0", "checkpoint_minutes: 0 min; must lie in 0.0001..100000 min"),
         ("capacity", "capacity = 10", "memory.capacity: 10; must lie in 1000.."),
         ("warmup", "warmup = 0", "memory.warmup: 0; must lie in 1.."),
         ("warmup", "warmup = 90000000", "memory.warmup: 90000000; must lie in 1.."),
@@ -116,7 +117,7 @@ fn what_the_command_line_says_wins_and_a_budget_there_replaces_both() {
 fn whatever_stands_for_a_value_is_taken_or_refused_by_its_key() {
     let text = default_file();
     let keys: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).filter_map(|line| Some(line.split_once(" = ")?.0)).collect();
-    assert_eq!(keys.len(), 26, "{keys:?}");
+    assert_eq!(keys.len(), 27, "{keys:?}");
     let mut taken = 0;
     for key in keys {
         for value in [

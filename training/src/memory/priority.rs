@@ -15,6 +15,7 @@ pub(super) struct Priorities {
     settings: Priority,
     /// Leaves, a power of 2.
     n_leaves: usize,
+    n_rows: usize,
     /// Node 1 is the sum of all; node i that of nodes 2 i and 2 i + 1; the leaves come last.
     sums: Vec<f64>,
     /// The largest priority that a row was ever given: what a new row gets.
@@ -25,7 +26,34 @@ impl Priorities {
     /// Room for `n_rows` rows, none of which can be drawn yet.
     pub(super) fn new(settings: Priority, n_rows: usize) -> Priorities {
         let n_leaves = n_rows.next_power_of_two();
-        Priorities { settings, n_leaves, sums: vec![0.0; 2 * n_leaves], largest: 1.0 }
+        Priorities { settings, n_leaves, n_rows, sums: vec![0.0; 2 * n_leaves], largest: 1.0 }
+    }
+
+    /// With the priorities of all rows as [`Priorities::rows`] gave them.
+    pub(super) fn restored(settings: Priority, rows: &[f64], largest: f64) -> Priorities {
+        let mut priorities = Priorities { largest, ..Priorities::new(settings, rows.len()) };
+        let n_leaves = priorities.n_leaves;
+        priorities.sums[n_leaves..n_leaves + rows.len()].copy_from_slice(rows);
+        // Every sum is that of its two halves, whatever the order in which they came about.
+        for node in (1..n_leaves).rev() {
+            priorities.sums[node] = priorities.sums[2 * node] + priorities.sums[2 * node + 1];
+        }
+        priorities
+    }
+
+    /// How they are used.
+    pub(super) fn settings(&self) -> Priority {
+        self.settings
+    }
+
+    /// The priority of each row, `[rows]`.
+    pub(super) fn rows(&self) -> &[f64] {
+        &self.sums[self.n_leaves..self.n_leaves + self.n_rows]
+    }
+
+    /// What a new row gets.
+    pub(super) fn largest(&self) -> f64 {
+        self.largest
     }
 
     /// Makes a row as likely to be drawn as the likeliest.

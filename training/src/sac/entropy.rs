@@ -9,12 +9,12 @@ const EPSILON: f32 = 1e-8;
 /// The weight, kept as its logarithm so that it stays positive, and the state of D. Kingma and J. Ba's Adam (2015) for that one number.
 #[derive(Debug)]
 pub(super) struct EntropyWeight {
-    log_weight: f32,
+    pub(super) log_weight: f32,
     /// Entropy to be led to [nat]; none keeps the weight.
     goal: Option<f32>,
     rate: f32,
-    moments: [f32; 2],
-    updates: i32,
+    pub(super) moments: [f32; 2],
+    pub(super) updates: i32,
 }
 
 impl EntropyWeight {

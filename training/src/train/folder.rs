@@ -1,4 +1,4 @@
-//! The folder of a run: made anew, never written into twice.
+//! The folder of a run: made anew, and never written into by another.
 
 use std::path::{Path, PathBuf};
 
@@ -19,8 +19,23 @@ impl Folder {
             None => Folder::numbered(runs, config_file)?,
         };
         let folder = Folder(path);
-        files::write_whole(&folder.0.join("config.toml"), config.to_toml().as_bytes())?;
+        folder.write_config(config)?;
         Ok(folder)
+    }
+
+    /// The folder of a run that is to go on.
+    pub fn of(path: &Path) -> Result<Folder, Error> {
+        let folder = Folder(path.to_owned());
+        if folder.config().is_file() {
+            return Ok(folder);
+        }
+        let expected = "the folder of a run is needed, with the config.toml and the checkpoint.safetensors that it left".to_owned();
+        Err(Error::Flag { flag: "--resume", value: path.display().to_string(), expected })
+    }
+
+    /// Writes what the run is to do.
+    pub fn write_config(&self, config: &Config) -> Result<(), Error> {
+        files::write_whole(&self.config(), config.to_toml().as_bytes())
     }
 
     fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
@@ -56,6 +71,21 @@ impl Folder {
     /// The folder itself.
     pub fn path(&self) -> &Path {
         &self.0
+    }
+
+    /// What the run is to do.
+    pub fn config(&self) -> PathBuf {
+        self.0.join("config.toml")
+    }
+
+    /// All that it takes to go on, replaced in one move each time it is written.
+    pub fn checkpoint(&self) -> PathBuf {
+        self.0.join("checkpoint.safetensors")
+    }
+
+    /// The next checkpoint while it is being written.
+    pub fn checkpoint_part(&self) -> PathBuf {
+        self.0.join("checkpoint.part")
     }
 
     /// The driver, replaced in one move each time it is saved.

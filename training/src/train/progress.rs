@@ -1,22 +1,24 @@
 //! How far a run is: the live line, the rows of `metrics.csv`, and when to stop.
 
 use std::collections::VecDeque;
-use std::fs::File;
 use std::io::{IsTerminal, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use offtrack::layout::Ended;
 use offtrack::simulator::Batch;
 
+use super::figures::Figures;
+use crate::checkpoint::{Columns, Stored};
 use crate::config::Config;
 use crate::error::Error;
 use crate::sac::Update;
-use crate::train::folder::Folder;
 
-/// Time between two rows of figures.
+/// Time between two rows of figures, and two states of the live line.
 const ROW_EVERY: Duration = Duration::from_secs(5);
+/// Rows of a run that steps alone end: equal runs then leave equal figures.
+const N_ROWS: u64 = 500;
 /// Time between two lines where no terminal shows the live one.
 const LINE_EVERY: Duration = Duration::from_secs(30);
 /// Episodes that the success rate and the mean reward look back on, as many as in the study.
@@ -34,6 +36,8 @@ struct Episode {
 #[derive(Debug)]
 pub struct Progress {
     begun: Instant,
+    /// Time spent learning before that.
+    before: Duration,
     minutes: Option<f64>,
     steps: Option<u64>,
     env_steps: u64,
@@ -45,24 +49,28 @@ pub struct Progress {
     rewards: Vec<f32>,
     /// Sums since the last row.
     sums: Update,
-    since_row: Instant,
+    /// Time [s], steps and updates at the last row.
+    row_seconds: f64,
     row_steps: u64,
     row_updates: u64,
+    /// Time [s] and steps when one was last tried to be written.
+    tried: (f64, u64),
+    /// When the live line was last moved on, and the steps and updates by then.
+    shown: (Instant, u64, u64),
     since_line: Instant,
     bar: ProgressBar,
-    metrics: (PathBuf, File),
+    metrics: Figures,
+    /// Files that could not be written when that was last tried.
+    unwritten: Vec<PathBuf>,
 }
 
 impl Progress {
-    /// Starts the clock and the file of figures.
-    pub fn new(config: &Config, folder: &Folder) -> Result<Progress, Error> {
-        let path = folder.metrics();
-        let mut file = File::create_new(&path).map_err(Error::write(&path))?;
-        let head = "seconds,env_steps,episodes,updates,success,reward,critic_loss,actor_loss,entropy,value,entropy_weight,steps_per_second,updates_per_second";
-        writeln!(file, "{head}").map_err(Error::write(&path))?;
+    /// Starts the clock.
+    pub fn new(config: &Config, metrics: Figures) -> Progress {
         let style = ProgressStyle::with_template("{bar:24} {percent:>3} % {msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
-        Ok(Progress {
+        Progress {
             begun: Instant::now(),
+            before: Duration::ZERO,
             minutes: config.minutes,
             steps: config.steps,
             env_steps: 0,
@@ -71,13 +79,16 @@ impl Progress {
             latest: VecDeque::with_capacity(WINDOW),
             rewards: vec![0.0; config.n_envs],
             sums: Update::default(),
-            since_row: Instant::now(),
+            row_seconds: 0.0,
             row_steps: 0,
             row_updates: 0,
+            tried: (0.0, 0),
+            shown: (Instant::now(), 0, 0),
             since_line: Instant::now(),
             bar: ProgressBar::new(1000).with_style(style),
-            metrics: (path, file),
-        })
+            metrics,
+            unwritten: Vec::new(),
+        }
     }
 
     /// Share of the run that is over: by time or by steps, whichever is further.
@@ -87,9 +98,9 @@ impl Progress {
         by_time.max(by_steps).min(1.0)
     }
 
-    /// Time since the start [s].
+    /// Time spent learning [s].
     pub fn seconds(&self) -> f64 {
-        self.begun.elapsed().as_secs_f64()
+        (self.before + self.begun.elapsed()).as_secs_f64()
     }
 
     /// Env steps taken.
@@ -143,28 +154,59 @@ impl Progress {
         self.sums.value += update.value;
     }
 
-    /// Moves the live line on and writes a row when it is time for one.
-    pub fn report(&mut self, entropy_weight: f32) -> Result<(), Error> {
-        if ROW_EVERY <= self.since_row.elapsed() {
-            self.row(entropy_weight)?;
+    /// Whether it is time for a row: by the clock, or by steps where they alone end the run.
+    pub fn is_row_due(&self) -> bool {
+        let (seconds, tried_steps) = self.tried;
+        match (self.minutes, self.steps) {
+            (None, Some(steps)) => {
+                let row = |env_steps: u64| u128::from(env_steps) * u128::from(N_ROWS) / u128::from(steps.max(1));
+                row(tried_steps) < row(self.env_steps)
+            }
+            _ => ROW_EVERY.as_secs_f64() <= self.seconds() - seconds,
         }
-        Ok(())
     }
 
-    /// Writes the last row and ends the live line.
+    /// Writes a row. Where that fails its figures wait for the next one.
+    pub fn row(&mut self, entropy_weight: f32) {
+        let written = self.append_row(entropy_weight);
+        let file = self.metrics.path().to_owned();
+        self.note(&file, written);
+    }
+
+    /// Moves the live line on when it is time to.
+    pub fn show_now_and_then(&mut self) {
+        if ROW_EVERY <= self.shown.0.elapsed() {
+            self.show();
+        }
+    }
+
+    /// Writes the last row, of what no row has told of yet, and ends the live line.
     pub fn finish(&mut self, entropy_weight: f32) -> Result<(), Error> {
-        self.row(entropy_weight)?;
+        self.show();
         self.bar.finish();
-        Ok(())
+        if self.row_steps < self.env_steps { self.append_row(entropy_weight) } else { Ok(()) }
     }
 
-    fn row(&mut self, entropy_weight: f32) -> Result<(), Error> {
-        let seconds = self.since_row.elapsed().as_secs_f64();
+    /// Takes note of whether a file could be written: a failure is reported once, and the live line tells of it until it is made good.
+    pub fn note(&mut self, file: &Path, written: Result<(), Error>) {
+        let known = self.unwritten.iter().any(|unwritten| unwritten == file);
+        match written {
+            Ok(()) => self.unwritten.retain(|unwritten| unwritten != file),
+            Err(error) if !known => {
+                self.unwritten.push(file.to_owned());
+                // A run goes on when nobody reads its lines.
+                let _ = self.bar.suspend(|| writeln!(std::io::stderr(), "offtrack: {error}; the run goes on and will try again"));
+            }
+            Err(_) => {}
+        }
+    }
+
+    fn append_row(&mut self, entropy_weight: f32) -> Result<(), Error> {
+        self.tried = (self.seconds(), self.env_steps);
         let n = self.updates - self.row_updates;
+        let [steps_rate, update_rate] = per_second(self.seconds() - self.row_seconds, [self.env_steps - self.row_steps, n]);
         // A mean over no updates is left empty.
         let mean = |sum: f32, decimals: usize| if n == 0 { String::new() } else { format!("{:.decimals$}", sum / n as f32) };
-        let [steps_rate, update_rate] =
-            [self.env_steps - self.row_steps, self.updates - self.row_updates].map(|count| count as f64 / seconds);
         let success = self.success().map(|success| format!("{success:.4}")).unwrap_or_default();
         let reward = self.reward().map(|reward| format!("{reward:.2}")).unwrap_or_default();
         let Update { critic_loss, actor_loss, entropy, value } = self.sums;
@@ -179,16 +221,16 @@ impl Progress {
             mean(entropy, 4),
             mean(value, 4),
         );
-        let (path, file) = &mut self.metrics;
-        file.write_all(row.as_bytes()).and_then(|()| file.flush()).map_err(Error::write(path))?;
-        self.show(steps_rate, update_rate);
+        self.metrics.append(&row)?;
         self.sums = Update::default();
-        (self.since_row, self.row_steps, self.row_updates) = (Instant::now(), self.env_steps, self.updates);
+        (self.row_seconds, self.row_steps, self.row_updates) = (self.seconds(), self.env_steps, self.updates);
         Ok(())
     }
 
     /// The live line on a terminal, a plain line now and then elsewhere.
-    fn show(&mut self, steps_rate: f64, update_rate: f64) {
+    fn show(&mut self) {
+        let (since, steps, updates) = std::mem::replace(&mut self.shown, (Instant::now(), self.env_steps, self.updates));
+        let [steps_rate, update_rate] = per_second(since.elapsed().as_secs_f64(), [self.env_steps - steps, self.updates - updates]);
         let share = self.share();
         let left = if 0.0 < share { self.seconds() * (1.0 - share) / share } else { 0.0 };
         let success = self.success().map_or_else(|| "-".to_owned(), |success| format!("{:.1} %", 100.0 * success));
@@ -199,6 +241,8 @@ impl Progress {
             left as u64 / 60,
             left as u64 % 60,
         );
+        let names = self.unwritten.iter().filter_map(|file| Some(file.file_name()?.to_string_lossy()));
+        let line = names.fold(line, |line, name| format!("{line}, {name} cannot be written"));
         if std::io::stderr().is_terminal() {
             self.bar.set_position((1000.0 * share) as u64);
             self.bar.set_message(line);
@@ -208,4 +252,49 @@ impl Progress {
             self.since_line = Instant::now();
         }
     }
+
+    /// Adds the counters' columns.
+    pub fn save(&self, columns: &mut Columns) {
+        let Update { critic_loss, actor_loss, entropy, value } = self.sums;
+        let counts = [self.env_steps, self.episodes, self.updates, self.row_steps, self.row_updates, self.metrics.length()];
+        columns.put(COUNTS, counts.to_vec());
+        columns.put(SECONDS, vec![self.seconds(), self.row_seconds]);
+        columns.put("progress, sums", vec![critic_loss, actor_loss, entropy, value]);
+        columns.put("progress, arrived", self.latest.iter().map(|episode| u8::from(episode.arrived)).collect::<Vec<_>>());
+        columns.put("progress, episode rewards", self.latest.iter().map(|episode| episode.reward).collect::<Vec<_>>());
+        columns.put("progress, rewards", self.rewards.clone());
+    }
+
+    /// Goes on counting where a checkpoint of this run left off, and takes back the rows after it.
+    pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
+        let length;
+        [self.env_steps, self.episodes, self.updates, self.row_steps, self.row_updates, length] = stored.array(COUNTS)?;
+        let [seconds, row_seconds] = stored.array(SECONDS)?;
+        let [critic_loss, actor_loss, entropy, value] = stored.array("progress, sums")?;
+        let arrived: Vec<u8> = stored.column("progress, arrived")?;
+        let rewards: Vec<f32> = stored.exactly("progress, episode rewards", arrived.len())?;
+        self.sums = Update { critic_loss, actor_loss, entropy, value };
+        self.latest = arrived.iter().zip(rewards).map(|(&arrived, reward)| Episode { arrived: arrived != 0, reward }).collect();
+        self.rewards = stored.exactly("progress, rewards", self.rewards.len())?;
+        let before = Duration::try_from_secs_f64(seconds).map_err(|error| stored.error(format!("its column `{SECONDS}`: {error}")))?;
+        (self.before, self.begun, self.row_seconds) = (before, Instant::now(), row_seconds);
+        self.tried = (seconds, self.row_steps);
+        self.shown = (Instant::now(), self.env_steps, self.updates);
+        self.metrics.cut(length)
+    }
+}
+
+fn per_second(seconds: f64, counts: [u64; 2]) -> [f64; 2] {
+    counts.map(|count| count as f64 / seconds.max(f64::MIN_POSITIVE))
+}
+
+/// Columns of a checkpoint that say how far the run is.
+const COUNTS: &str = "progress, counts";
+const SECONDS: &str = "progress, seconds";
+
+/// Time spent learning [s] and env steps made when a checkpoint was written.
+pub fn reached(stored: &Stored) -> Result<(f64, u64), Error> {
+    let [seconds, _] = stored.array(SECONDS)?;
+    let [env_steps, ..] = stored.array::<u64, 6>(COUNTS)?;
+    Ok((seconds, env_steps))
 }

@@ -11,4 +11,5 @@ mod interruption;
 mod page;
 mod place;
 mod record;
+mod resume;
 mod train;

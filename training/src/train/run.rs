@@ -1,0 +1,244 @@
+//! The loop: act, step, remember, learn; and all of its state into a checkpoint and back.
+//!
+//! With a budget of steps alone what a run does depends on its state and on nothing else, so that one which goes on from a checkpoint
+//! equals one that was never stopped, bit for bit. With minutes the learning rates follow the clock.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use bytemuck::{bytes_of, cast_slice};
+use offtrack::layout::N_VALUES;
+use offtrack::random;
+use offtrack::simulator::{RouteChoice, Simulator};
+use offtrack::world::World;
+use rand::SeedableRng;
+
+use super::folder::Folder;
+use super::keeper::Keeper;
+use super::progress::Progress;
+use crate::bridge;
+use crate::checkpoint::{Columns, Stored};
+use crate::config::Config;
+use crate::error::Error;
+use crate::generator::Generator;
+use crate::memory::Memory;
+use crate::policy::{self, Policy};
+use crate::sac::{Sac, Update};
+use crate::scaling::Scaling;
+
+/// A run under way.
+pub struct Run {
+    config: Config,
+    world: Arc<World>,
+    /// CRC-32 of the world.
+    fingerprint: u32,
+    simulator: Simulator,
+    memory: Memory<N_VALUES>,
+    acting: Generator,
+    sampling: Generator,
+    sac: Sac,
+    /// None while chance drives.
+    scaling: Option<Scaling>,
+    /// How far it is.
+    pub progress: Progress,
+    keeper: Keeper,
+    policy_file: PathBuf,
+    /// What the trucks saw before the step in hand.
+    seen: Vec<[f32; N_VALUES]>,
+}
+
+impl Run {
+    /// A run at its beginning.
+    pub fn new(config: &Config, routes: Vec<u32>, world: Arc<World>, folder: &Folder, progress: Progress) -> Result<Run, Error> {
+        let stream = |purpose: u32| Generator::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
+        Ok(Run {
+            fingerprint: fingerprint(&world),
+            simulator: Simulator::new(world.clone(), config.n_envs, config.seed, RouteChoice::Drawn(routes))?,
+            memory: Memory::new(config.n_envs, config.learning.n_steps, &config.memory),
+            acting: stream(1),
+            sampling: stream(2),
+            sac: Sac::new(&config.learning, N_VALUES, world.actions.len(), u64::from(config.seed))?,
+            scaling: None,
+            progress,
+            keeper: Keeper::new(folder, config.checkpoint_minutes),
+            policy_file: folder.policy(),
+            seen: Vec::new(),
+            config: config.clone(),
+            world,
+        })
+    }
+
+    /// Goes on until the time or the steps are over, or it is to stop. Only a learner that has broken down is an error: what cannot be
+    /// written is reported and tried again.
+    pub fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {
+        while self.progress.share() < 1.0 && !stopped() {
+            self.seen.clone_from(&self.simulator.batch().observation);
+            // Chance drives until there is enough to tell how the observed values lie; their scaling then stays.
+            if self.scaling.is_none() && self.config.memory.warmup <= self.memory.len() && self.memory.can_sample() {
+                self.scaling = Some(self.found_scaling());
+            }
+            if let Some(scaling) = self.scaling.take() {
+                let learned = self.act_and_learn(&scaling);
+                self.scaling = Some(scaling);
+                learned?;
+                if self.progress.is_row_due() {
+                    self.check()?;
+                    self.progress.row(self.sac.entropy_weight());
+                }
+                self.progress.show_now_and_then();
+            } else {
+                self.simulator.step_at_random();
+                bridge::remember(&mut self.memory, &self.seen, self.simulator.batch());
+                self.progress.stepped(self.simulator.batch());
+            }
+            self.keep_now_and_then()?;
+        }
+        Ok(())
+    }
+
+    fn act_and_learn(&mut self, scaling: &Scaling) -> Result<(), Error> {
+        let learning = &self.config.learning;
+        let n_actions = self.world.actions.len();
+        let mut actions = policy::drawn(&bridge::logits(&self.sac.actor(), scaling, &self.seen), n_actions, &mut self.acting);
+        if let Some(exploration) = &self.config.exploration {
+            exploration.explore(self.progress.env_steps(), n_actions, &mut actions, &mut self.acting);
+        }
+        self.simulator.step(&actions)?;
+        bridge::remember(&mut self.memory, &self.seen, self.simulator.batch());
+        self.progress.stepped(self.simulator.batch());
+        let pace = 1.0 - (1.0 - learning.last_rate) * self.progress.share();
+        for _ in 0..learning.updates_per_step {
+            let sample = self.memory.sample(learning.batch, learning.discount as f32, &mut self.sampling);
+            let (update, errors) = self.sac.update(bridge::parts(&sample, scaling, learning, &mut self.sampling), pace);
+            if let Some((what, value)) = broken(&update) {
+                return Err(self.diverged(what, value));
+            }
+            self.memory.learned(&sample, &errors);
+            self.progress.updated(&update);
+        }
+        Ok(())
+    }
+
+    fn found_scaling(&self) -> Scaling {
+        if self.config.learning.scale_observations { Scaling::of(self.memory.observations()) } else { Scaling::none(N_VALUES) }
+    }
+
+    /// The driver as it is.
+    pub fn policy(&self) -> Policy {
+        Policy {
+            benchmark: self.config.benchmark.clone(),
+            actions: self.world.actions.clone(),
+            scaling: self.scaling.clone().unwrap_or_else(|| self.found_scaling()),
+            actor: self.sac.average_actor().clone(),
+        }
+    }
+
+    /// Writes what a run leaves behind. Everything is tried before the first failure is given.
+    pub fn close(&mut self) -> Result<(), Error> {
+        self.check()?;
+        // The last row belongs to this end alone: a run that goes on takes it back.
+        let kept = self.keep().and_then(|()| self.keeper.wait());
+        let saved = self.policy().save(&self.policy_file);
+        let row = self.progress.finish(self.sac.entropy_weight());
+        kept.and(saved).and(row)
+    }
+
+    fn keep_now_and_then(&mut self) -> Result<(), Error> {
+        if let Some(kept) = self.keeper.done() {
+            self.progress.note(self.keeper.file(), kept);
+        }
+        if self.keeper.is_due() {
+            self.check()?;
+            let begun = self.keep();
+            if begun.is_err() {
+                self.progress.note(self.keeper.file(), begun);
+            }
+            let saved = self.policy().save(&self.policy_file);
+            self.progress.note(&self.policy_file, saved);
+        }
+        Ok(())
+    }
+
+    /// Begins to write a checkpoint.
+    fn keep(&mut self) -> Result<(), Error> {
+        let mut columns = Columns::default();
+        for (name, bytes) in self.simulator.batch().columns() {
+            columns.put(batch_name(name), bytes);
+        }
+        columns.put("acting", &self.acting.state[..]);
+        columns.put("sampling", &self.sampling.state[..]);
+        if let Some(Scaling { mean, factor }) = &self.scaling {
+            columns.put("observation, mean", &mean[..]);
+            columns.put("observation, factor", &factor[..]);
+        }
+        self.progress.save(&mut columns);
+        self.sac.save(&mut columns);
+        self.memory.save(&mut columns);
+        self.keeper.begin(&columns, self.config.to_toml(), self.fingerprint)
+    }
+
+    /// Goes on from a checkpoint of this run.
+    pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
+        if stored.world() != self.fingerprint {
+            let what = self.config.practice.as_ref().unwrap_or(&self.config.benchmark);
+            return Err(stored.error(format!("was written when {what} was another: put its scenario, vehicle and roundabout files back")));
+        }
+        self.simulator.restore(|name| stored.bytes(&batch_name(name))).map_err(|error| stored.error(error.to_string()))?;
+        self.acting = Generator { state: stored.array("acting")? };
+        self.sampling = Generator { state: stored.array("sampling")? };
+        let values = |name: &str| stored.exactly(name, N_VALUES);
+        if stored.bytes("observation, mean").is_some() {
+            self.scaling = Some(Scaling { mean: values("observation, mean")?, factor: values("observation, factor")? });
+        }
+        self.memory.restore(stored)?;
+        self.sac.restore(stored)?;
+        self.progress.restore(stored)
+    }
+
+    /// Every number of the learner is one; a checkpoint never holds another.
+    fn check(&mut self) -> Result<(), Error> {
+        match self.sac.broken() {
+            Some((what, value)) => Err(self.diverged(&what, value)),
+            None => Ok(()),
+        }
+    }
+
+    /// The learner has broken down: says where, and what there is to go back to.
+    fn diverged(&mut self, what: &str, value: f32) -> Error {
+        let also = self.sac.broken().filter(|(name, _)| name != what).map(|(name, _)| format!(", so is {name}")).unwrap_or_default();
+        // One on its way was sound when it was begun; that it could not be written is told by what stands in the folder.
+        let _ = self.keeper.wait();
+        let file = self.keeper.file();
+        let kept = if file.is_file() {
+            format!("{} is the last good checkpoint", file.display())
+        } else {
+            "there is no checkpoint yet".to_owned()
+        };
+        Error::Diverged { what: what.to_owned(), value, also, env_steps: self.progress.env_steps(), kept }
+    }
+}
+
+/// A loss that is no number.
+fn broken(update: &Update) -> Option<(&'static str, f32)> {
+    let losses = [("critic loss", update.critic_loss), ("actor loss", update.actor_loss), ("entropy", update.entropy)];
+    losses.into_iter().find(|(_, value)| !value.is_finite())
+}
+
+fn batch_name(column: &str) -> String {
+    format!("batch, {column}")
+}
+
+/// CRC-32 of all that trucks drive by.
+fn fingerprint(world: &World) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(bytes_of(&world.params));
+    hasher.update(cast_slice(&world.actions));
+    hasher.update(cast_slice(&world.rays));
+    hasher.update(cast_slice(&world.waypoints));
+    hasher.update(cast_slice(&world.routes));
+    for field in &world.fields {
+        hasher.update(cast_slice(&field.cells));
+        hasher.update(cast_slice(&field.values));
+    }
+    hasher.finalize()
+}

@@ -1,0 +1,263 @@
+//! `offtrack train --resume`: a run that was stopped, killed or hindered goes on as if nothing had been.
+#![cfg(unix)]
+
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+use crate::place::{Place, offtrack, refusal, succeed};
+
+const ENDLESS: [&str; 2] = ["--steps", "1000000000"];
+/// Columns of the metrics that the clock has a part in.
+const TIMES: [&str; 3] = ["seconds", "steps_per_second", "updates_per_second"];
+
+/// A place whose runs write a checkpoint every few milliseconds, and use what needs most state.
+fn place() -> Place {
+    let place = Place::new();
+    let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
+    let state = "exploration = { first = 0.5, last = 0.1, steps = 1200, spread = 1.0 }\n";
+    let memory = "warmup = 400, priority = { exponent = 0.6, correction = 0.4 }";
+    let changed = training.replace("warmup = 400", memory).replace("layer_norm = false", "layer_norm = true");
+    std::fs::write(place.file("tiny.toml"), format!("checkpoint_minutes = 0.0001\n{state}{changed}")).unwrap();
+    place
+}
+
+fn resumed(place: &Place, run: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_offtrack"));
+    command.args(["train", "--resume", &place.text(&format!("runs/{run}"))]).args(arguments);
+    command
+}
+
+fn resume(place: &Place, run: &str, arguments: &[&str]) -> Output {
+    resumed(place, run, arguments).output().unwrap()
+}
+
+fn begun(mut command: Command) -> Child {
+    command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+fn interrupted(run: Child) -> Output {
+    assert!(Command::new("kill").args(["-INT", &run.id().to_string()]).status().unwrap().success());
+    run.wait_with_output().unwrap()
+}
+
+fn bytes(place: &Place, file: &str) -> Vec<u8> {
+    std::fs::read(place.file(file)).unwrap()
+}
+
+/// The rows of a run's metrics without the columns that the clock has a part in.
+fn figures(place: &Place, run: &str) -> Vec<Vec<String>> {
+    let text = std::fs::read_to_string(place.file(&format!("runs/{run}/metrics.csv"))).unwrap();
+    let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    assert!(TIMES.iter().all(|time| names.contains(time)), "{names:?}");
+    let timeless =
+        |row: &str| row.split(',').zip(&names).filter(|(_, name)| !TIMES.contains(name)).map(|(value, _)| value.to_owned()).collect();
+    text.lines().map(timeless).collect()
+}
+
+/// The env steps that a run said it goes on after.
+fn went_on_after(output: &Output) -> u64 {
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let steps = said.split_once("going on after ").and_then(|(_, rest)| rest.split_once(" env steps")).map(|(steps, _)| steps.parse());
+    steps.unwrap_or_else(|| panic!("{said}{}", String::from_utf8_lossy(&output.stderr))).unwrap()
+}
+
+fn wait_until(what: &str, reached: impl Fn() -> bool) {
+    // A minute is far more than a tiny run needs on a busy machine.
+    for _ in 0..12_000 {
+        if reached() {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    panic!("{what} was not reached within a minute");
+}
+
+#[test]
+fn a_run_killed_and_stopped_on_the_way_equals_one_never_stopped_bit_for_bit() {
+    let place = place();
+    let steps = ["--steps", "40000"];
+    succeed(&place.train(&[&["--name", "whole"], &steps[..]].concat()));
+    // Stopped while chance drives, if it gets there in time, killed, stopped while it learns, then left to its end.
+    let mut run = begun(place.training(&[&["--name", "parts"], &steps[..]].concat()));
+    wait_until("a checkpoint", || place.file("runs/parts/checkpoint.safetensors").is_file());
+    run.kill().unwrap();
+    run.wait().unwrap();
+    let mut stops = Vec::new();
+    for _ in 0..2 {
+        let before = bytes(&place, "runs/parts/checkpoint.safetensors");
+        let run = begun(resumed(&place, "parts", &[]));
+        wait_until("another checkpoint", || bytes(&place, "runs/parts/checkpoint.safetensors") != before);
+        let output = interrupted(run);
+        succeed(&output);
+        stops.push(went_on_after(&output));
+        assert_eq!(place.json("runs/parts/report.json")["interrupted"], true, "40000 steps are over too soon for this test");
+    }
+    let output = resume(&place, "parts", &[]);
+    succeed(&output);
+    stops.push(went_on_after(&output));
+    assert!(stops.is_sorted() && stops[0] < stops[2], "{stops:?}");
+    assert!(bytes(&place, "runs/parts/policy.safetensors") == bytes(&place, "runs/whole/policy.safetensors"), "{stops:?}");
+    let (parts, whole) = (figures(&place, "parts"), figures(&place, "whole"));
+    assert!(100 < whole.len(), "{}", whole.len());
+    assert_eq!(parts, whole);
+    let evaluation = |run: &str| place.json(&format!("runs/{run}/report.json"))["evaluation"]["groups"].clone();
+    assert_eq!(evaluation("parts"), evaluation("whole"));
+}
+
+#[test]
+fn twenty_kills_while_checkpoints_are_written_each_leave_a_good_one() {
+    let place = place();
+    let part = place.file("runs/run/checkpoint.part");
+    let mut run = begun(place.training(&[&["--name", "run"], &ENDLESS[..]].concat()));
+    wait_until("a checkpoint", || place.file("runs/run/checkpoint.safetensors").is_file());
+    let mut caught = 0;
+    for kill in 0..20 {
+        wait_until("a checkpoint being written", || part.is_file());
+        // At another point of the writing each time.
+        std::thread::sleep(Duration::from_micros(200 * kill));
+        run.kill().unwrap();
+        run.wait().unwrap();
+        caught += u32::from(part.is_file());
+        // Left over from the kill; the next run's own is waited for.
+        let _ = std::fs::remove_file(&part);
+        let before = bytes(&place, "runs/run/checkpoint.safetensors");
+        run = begun(resumed(&place, "run", &[]));
+        wait_until("another checkpoint", || bytes(&place, "runs/run/checkpoint.safetensors") != before);
+    }
+    let output = interrupted(run);
+    succeed(&output);
+    assert!(0 < went_on_after(&output));
+    assert!(0 < caught, "no kill met a checkpoint being written");
+    let before = place.json("runs/run/report.json")["env_steps"].as_u64().unwrap();
+    succeed(&resume(&place, "run", &["--steps", &(before + 80).to_string()]));
+    assert_eq!(place.json("runs/run/report.json")["env_steps"], before + 80);
+}
+
+#[test]
+fn a_finished_run_goes_on_only_with_a_larger_budget() {
+    let place = place();
+    succeed(&place.train(&["--name", "run", "--steps", "800"]));
+    let message = refusal(&resume(&place, "run", &[]), 2);
+    assert!(message.contains("it has finished") && message.contains("--steps"), "{message}");
+    let message = refusal(&resume(&place, "run", &["--steps", "800"]), 2);
+    assert!(message.contains("800 env steps: more are needed"), "{message}");
+    // The budget that was asked for stays with the run.
+    let run = begun(resumed(&place, "run", &ENDLESS));
+    wait_until("the new budget", || String::from_utf8(bytes(&place, "runs/run/config.toml")).unwrap().contains("steps = 1000000000"));
+    succeed(&interrupted(run));
+    succeed(&resume(&place, "run", &["--minutes", "0.02"]));
+    assert_eq!(place.json("runs/run/report.json")["interrupted"], false);
+    // An examination that was lost is made good.
+    std::fs::remove_file(place.file("runs/run/report.json")).unwrap();
+    succeed(&resume(&place, "run", &[]));
+    assert_eq!(place.json("runs/run/report.json")["evaluation"]["split"], "test");
+}
+
+#[test]
+fn a_run_that_cannot_go_on_is_refused_with_the_file_and_what_would_do() {
+    let place = place();
+    succeed(&place.train(&["--name", "run", "--steps", "800"]));
+    let whole = bytes(&place, "runs/run/checkpoint.safetensors");
+    let refused = |file: &str, changed: &[u8], expected: &[&str]| {
+        let kept = bytes(&place, file);
+        std::fs::write(place.file(file), changed).unwrap();
+        let message = refusal(&resume(&place, "run", &ENDLESS), 2);
+        assert!(expected.iter().all(|expected| message.contains(expected)), "{message}");
+        std::fs::write(place.file(file), kept).unwrap();
+    };
+    let checkpoint = "runs/run/checkpoint.safetensors";
+    refused(checkpoint, &whole[..whole.len() / 2], &[checkpoint, "damaged", "put a copy of it back"]);
+    let mut changed = whole.clone();
+    changed[whole.len() - 9] ^= 4;
+    refused(checkpoint, &changed, &[checkpoint, "checksum"]);
+    refused(checkpoint, &bytes(&place, "runs/run/policy.safetensors"), &[checkpoint, "no checkpoint"]);
+    let config = String::from_utf8(bytes(&place, "runs/run/config.toml")).unwrap();
+    let other = config.replace("discount = 0.97", "discount = 0.9");
+    assert_ne!(other, config);
+    refused("runs/run/config.toml", other.as_bytes(), &["runs/run/config.toml", "is not the training file that the checkpoint"]);
+    refused("runs/run/metrics.csv", b"seconds,env_steps\n", &["runs/run/metrics.csv", "columns"]);
+    let benchmark = String::from_utf8(bytes(&place, "short.toml")).unwrap();
+    refused("short.toml", benchmark.replace("waypoint = 100.0", "waypoint = 99.0").as_bytes(), &[checkpoint, "short.toml was another"]);
+    std::fs::remove_file(place.file(checkpoint)).unwrap();
+    let message = refusal(&resume(&place, "run", &[]), 2);
+    assert!(message.contains("it has no checkpoint.safetensors"), "{message}");
+    let message = refusal(&resume(&place, "elsewhere", &[]), 2);
+    assert!(message.contains("--resume") && message.contains("the folder of a run is needed"), "{message}");
+    let message = refusal(&offtrack(&["train", "--resume", &place.text("runs/run"), "--seed", "3"]), 2);
+    assert!(message.contains("cannot be used with '--seed"), "{message}");
+}
+
+#[test]
+fn two_runs_never_share_a_folder() {
+    let place = place();
+    let run = begun(place.training(&[&["--name", "run"], &ENDLESS[..]].concat()));
+    wait_until("a checkpoint", || place.file("runs/run/checkpoint.safetensors").is_file());
+    let message = refusal(&resume(&place, "run", &[]), 2);
+    assert!(message.contains("metrics.csv: another run is writing it"), "{message}");
+    succeed(&interrupted(run));
+}
+
+#[test]
+fn a_learner_that_breaks_down_stops_with_the_step_the_parameter_and_the_last_good_checkpoint() {
+    let place = place();
+    let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
+    let wild = [
+        ("reward_scale = 0.01", "reward_scale = 1e6"),
+        ("actor_rate = 3e-4", "actor_rate = 1.0"),
+        ("critic_rate = 3e-4", "critic_rate = 1.0"),
+    ];
+    let wild = wild.iter().fold(training, |text, (from, to)| text.replace(from, to)).replace("rate = 3e-4 }", "rate = 1.0 }");
+    std::fs::write(place.file("tiny.toml"), wild).unwrap();
+    let message = refusal(&place.train(&[&["--name", "run"], &ENDLESS[..]].concat()), 1);
+    for expected in
+        ["env steps", "the learner has broken down", "checkpoint.safetensors is the last good checkpoint", "lower learning rates"]
+    {
+        assert!(message.contains(expected), "{message}");
+    }
+    assert!(
+        ["critic 1, layer", "critic 2, layer", "actor, layer", "entropy weight"].iter().any(|name| message.contains(name)),
+        "{message}"
+    );
+    // It is good as far as it goes: it can be read, and breaks down again.
+    assert!(refusal(&resume(&place, "run", &[]), 1).contains("broken down"));
+}
+
+#[test]
+fn what_cannot_be_written_is_reported_once_and_written_once_it_can_be() {
+    let place = place();
+    succeed(&place.train(&["--name", "run", "--steps", "800"]));
+    // A folder where the next checkpoint is to be written.
+    let (part, checkpoint) = (place.file("runs/run/checkpoint.part"), "runs/run/checkpoint.safetensors");
+    std::fs::create_dir(&part).unwrap();
+    let before = bytes(&place, checkpoint);
+    let run = begun(resumed(&place, "run", &ENDLESS));
+    let policy = bytes(&place, "runs/run/policy.safetensors");
+    wait_until("another policy", || bytes(&place, "runs/run/policy.safetensors") != policy);
+    assert!(bytes(&place, checkpoint) == before);
+    std::fs::remove_dir(&part).unwrap();
+    wait_until("another checkpoint", || bytes(&place, checkpoint) != before);
+    let output = interrupted(run);
+    succeed(&output);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(said.matches("checkpoint.safetensors: cannot be written").count(), 1, "{said}");
+}
+
+#[test]
+fn a_full_disk_fails_a_run_only_at_its_end_after_the_examination() {
+    let place = place();
+    // Files of at most 500 blocks of 512 bytes: all fit but the checkpoint.
+    let program = env!("CARGO_BIN_EXE_offtrack");
+    let (training, runs) = (place.text("tiny.toml"), place.text("runs"));
+    let line = format!("trap '' XFSZ; ulimit -f 500; exec {program} train {training} --out {runs} --name run");
+    let output = Command::new("sh").args(["-c", &line]).output().unwrap();
+    let message = refusal(&output, 1);
+    assert_eq!(message.matches("the run goes on").count(), 1, "{message}");
+    assert!(message.lines().last().unwrap().contains("checkpoint.safetensors: cannot be written: File too large"), "{message}");
+    assert!(!place.file("runs/run/checkpoint.part").exists());
+    // One from the beginning, when the memory was short, may have fitted: it is whole, and with room the run goes on from it.
+    if place.file("runs/run/checkpoint.safetensors").exists() {
+        succeed(&resume(&place, "run", &[]));
+    }
+    succeed(&place.evaluate(&["--policy", &place.text("runs/run/policy.safetensors"), "--episodes", "1"]));
+    assert_eq!(place.json("runs/run/report.json")["evaluation"]["split"], "test");
+}
