@@ -44,9 +44,9 @@ fn the_default_file_reads_and_is_written_back_the_same() {
 fn every_value_out_of_its_range_is_refused_with_its_key_and_what_would_do() {
     let out_of_range = [
         ("n_envs", "n_envs = 0", "n_envs: 0; must lie in 1..65536"),
-        ("minutes", "minutes = 0.0", "minutes: 0 min; must lie in 0.01..100000 min"),
-        ("minutes", "minutes = nan", "minutes: NaN min"),
-        ("minutes", "minutes = 1.0\nsteps = 0", "steps: 0; must lie in"),
+        ("steps", "minutes = 0.0", "minutes: 0 min; must lie in 0.01..100000 min"),
+        ("steps", "minutes = nan", "minutes: NaN min"),
+        ("steps", "minutes = 1.0\nsteps = 0", "steps: 0; must lie in"),
         ("checkpoint_minutes", "checkpoint_minutes = 0.0", "checkpoint_minutes: 0 min; must lie in 0.0001..100000 min"),
         ("capacity", "capacity = 10", "memory.capacity: 10; must lie in 1000.."),
         ("warmup", "warmup = 0", "memory.warmup: 0; must lie in 1.."),
@@ -91,22 +91,22 @@ fn a_key_that_is_unknown_missing_or_of_another_type_is_refused_by_its_name() {
 
 #[test]
 fn a_run_that_nothing_would_end_is_refused() {
-    let message = with("minutes", "").unwrap_err();
+    let message = with("steps", "").unwrap_err();
     assert!(message.contains("`minutes`, `steps` or both"), "{message}");
-    assert!(with("minutes", "steps = 1000").is_ok());
+    assert!(with("steps", "minutes = 1000.0").is_ok());
 }
 
 #[test]
 fn a_memory_too_short_for_its_trucks_is_refused() {
-    let text = default_file().replace("n_envs = 128", "n_envs = 65536").replace("capacity = 600000", "capacity = 196608");
+    let text = default_file().replace("n_envs = 128", "n_envs = 65536").replace("capacity = 600000", "capacity = 655360");
     let message = read(&text).unwrap_err();
-    // Three slots can hold no step that three others follow.
-    assert!(message.contains("memory.capacity: 196608; must hold more than learning.n_steps = 3"), "{message}");
+    // Ten slots can hold no step that ten others follow.
+    assert!(message.contains("memory.capacity: 655360; must hold more than learning.n_steps = 10"), "{message}");
 }
 
 #[test]
 fn what_the_command_line_says_wins_and_a_budget_there_replaces_both() {
-    let mut config = with("minutes", "minutes = 5.0\nsteps = 7").unwrap();
+    let mut config = with("steps", "minutes = 5.0\nsteps = 7").unwrap();
     config.override_with(Some(3), None, Some(1000), Some(16)).unwrap();
     assert_eq!((config.seed, config.n_envs, config.minutes, config.steps), (3, 16, None, Some(1000)));
     let message = config.override_with(None, None, None, Some(0)).unwrap_err().to_string();
@@ -117,7 +117,7 @@ fn what_the_command_line_says_wins_and_a_budget_there_replaces_both() {
 fn whatever_stands_for_a_value_is_taken_or_refused_by_its_key() {
     let text = default_file();
     let keys: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).filter_map(|line| Some(line.split_once(" = ")?.0)).collect();
-    assert_eq!(keys.len(), 27, "{keys:?}");
+    assert_eq!(keys.len(), 28, "{keys:?}");
     let mut taken = 0;
     for key in keys {
         for value in [
