@@ -145,7 +145,8 @@ fn a_finished_run_goes_on_only_with_a_larger_budget() {
     let run = begun(resumed(&place, "run", &ENDLESS));
     wait_until("the new budget", || String::from_utf8(bytes(&place, "runs/run/config.toml")).unwrap().contains("steps = 1000000000"));
     succeed(&interrupted(run));
-    succeed(&resume(&place, "run", &["--minutes", "0.02"]));
+    let reached = place.json("runs/run/report.json")["env_steps"].as_u64().unwrap();
+    succeed(&resume(&place, "run", &["--steps", &(reached + 80).to_string()]));
     assert_eq!(place.json("runs/run/report.json")["interrupted"], false);
     // An examination that was lost is made good.
     std::fs::remove_file(place.file("runs/run/report.json")).unwrap();
