@@ -120,6 +120,31 @@ impl Batch {
         self.truck.len()
     }
 
+    /// The rows `indices` of this batch, in that order and as often as they are named: row `i` carries on as row `indices[i]` was.
+    pub(crate) fn gathered(&self, indices: &[u32]) -> Batch {
+        fn picked<T: Copy>(column: &[T], indices: &[u32]) -> Vec<T> {
+            indices.iter().map(|&index| column[index as usize]).collect()
+        }
+        Batch {
+            seed: self.seed,
+            choice: match &self.choice {
+                RouteChoice::Fixed(routes) => RouteChoice::Fixed(picked(routes, indices)),
+                RouteChoice::Drawn(routes) => RouteChoice::Drawn(routes.clone()),
+            },
+            action: picked(&self.action, indices),
+            control: picked(&self.control, indices),
+            truck: picked(&self.truck, indices),
+            clearance: picked(&self.clearance, indices),
+            progress: picked(&self.progress, indices),
+            ranges: picked(&self.ranges, indices),
+            observation: picked(&self.observation, indices),
+            next_observation: picked(&self.next_observation, indices),
+            ended: picked(&self.ended, indices),
+            terms: picked(&self.terms, indices),
+            reward: picked(&self.reward, indices),
+        }
+    }
+
     /// Every column by its name, as the bytes it lies in: with them a batch goes on where it was, see [`crate::simulator::Simulator::restore`].
     pub fn columns(&self) -> [(&'static str, &[u8]); N_COLUMNS] {
         [

@@ -73,6 +73,16 @@ impl Truck {
     }
 }
 
+/// Where a truck begins its route: shares of the largest start errors, each in -1..=1; zeros are the lane centre.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct Start {
+    /// Share of the largest lateral offset, left positive.
+    pub offset: f32,
+    /// Share of the largest heading error, counter-clockwise positive.
+    pub heading: f32,
+}
+
 /// Distance from a unit's outline to the nearest solid edge, negative where they touch [m]. Touching is exact to 2 cm; the distance is
 /// never less than the true one by more than the field's error, and at most twice it plus 2 cm: far from a kerb fewer points are sampled.
 #[repr(C)]

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use crate::cpu;
 pub use crate::cpu::{Batch, RouteChoice};
+use crate::layout::Start;
 use crate::random::{self, Draw};
 use crate::stages::STAGES;
 use crate::world::World;
@@ -31,6 +32,32 @@ pub enum Error {
     RouteCount {
         /// Routes given.
         n_routes: usize,
+        /// Trucks in the batch.
+        n_envs: usize,
+    },
+    /// One start a truck.
+    #[error("starts: {n_starts} for {n_envs} trucks; one each is needed")]
+    StartCount {
+        /// Starts given.
+        n_starts: usize,
+        /// Trucks in the batch.
+        n_envs: usize,
+    },
+    /// A start beyond the benchmark's largest errors.
+    #[error("starts[{env}]: {share} of the largest start error; must lie in -1..1")]
+    UnknownStart {
+        /// The truck it was meant for.
+        env: usize,
+        /// The share.
+        share: String,
+    },
+    /// A row that the batch does not have.
+    #[error("indices[{place}]: {index}; the batch has trucks 0..{n_envs}")]
+    UnknownTruck {
+        /// Its place among the indices.
+        place: usize,
+        /// The index asked for.
+        index: u32,
         /// Trucks in the batch.
         n_envs: usize,
     },
@@ -120,6 +147,37 @@ impl Simulator {
     /// Begins episode 0 of every truck.
     pub fn reset(&mut self) {
         self.batch.for_each_row(|row| cpu::reset::begin(&self.world, row, 0));
+    }
+
+    /// Begins episode 0 of every truck at a stated pose, `[n_envs]`, rather than a drawn one. An error leaves the batch as it was.
+    pub fn reset_from(&mut self, starts: &[Start]) -> Result<(), Error> {
+        let n_envs = self.batch.n_envs();
+        if starts.len() != n_envs {
+            return Err(Error::StartCount { n_starts: starts.len(), n_envs });
+        }
+        for (env, start) in starts.iter().enumerate() {
+            if let Some(share) = [start.offset, start.heading].into_iter().find(|share| !(-1.0..=1.0).contains(share)) {
+                return Err(Error::UnknownStart { env, share: share.to_string() });
+            }
+        }
+        self.batch.for_each_row(|row| cpu::reset::begin_from(&self.world, row, 0, &starts[row.env as usize]));
+        Ok(())
+    }
+
+    /// Makes row `i` what row `indices[i]` was, so that one truck can go on in several ways: the batch then has `indices.len()` trucks.
+    ///
+    /// A truck that was ended and held stays so. A fixed route moves with its truck; what is drawn later depends on the new row. An error
+    /// leaves the batch as it was.
+    pub fn gather(&mut self, indices: &[u32]) -> Result<(), Error> {
+        let n_envs = self.batch.n_envs();
+        if indices.is_empty() {
+            return Err(Error::EmptyBatch);
+        }
+        if let Some((place, &index)) = indices.iter().enumerate().find(|&(_, &index)| n_envs <= index as usize) {
+            return Err(Error::UnknownTruck { place, index, n_envs });
+        }
+        self.batch = self.batch.gathered(indices);
+        Ok(())
     }
 
     /// Goes on from columns that [`Batch::columns`] gave, found by their names: with the same world, seed and routes every later step is the

@@ -7,7 +7,7 @@ use glam::Vec2;
 use crate::angle::wrapped;
 use crate::cpu::follow::{followed, reference_point};
 use crate::cpu::{RouteChoice, Row, observe, sense};
-use crate::layout::{Control, Ended, Params, Truck, WaypointRow};
+use crate::layout::{Control, Ended, Params, Start, Truck, WaypointRow};
 use crate::random::{self, Draw};
 use crate::world::World;
 
@@ -28,8 +28,14 @@ pub fn reset(world: &World, row: &mut Row) {
     }
 }
 
-/// Puts the truck at the start of `episode` and writes what it sees there to both observations.
+/// Puts the truck at the start of `episode`, at a pose drawn for it, and writes what it sees there to both observations.
 pub fn begin(world: &World, row: &mut Row, episode: u32) {
+    let [offset, heading, ..] = random::words(row.seed, row.env, episode, Draw::Pose as u32).map(random::signed_unit);
+    begin_from(world, row, episode, &Start { offset, heading });
+}
+
+/// The same at a stated pose.
+pub fn begin_from(world: &World, row: &mut Row, episode: u32, start: &Start) {
     let route = match row.choice {
         RouteChoice::Fixed(routes) => routes[row.env as usize],
         RouteChoice::Drawn(routes) => {
@@ -37,10 +43,9 @@ pub fn begin(world: &World, row: &mut Row, episode: u32) {
             routes[random::index_below(word, routes.len() as u32) as usize]
         }
     };
-    let [offset, heading, ..] = random::words(row.seed, row.env, episode, Draw::Pose as u32).map(random::signed_unit);
     let waypoints = world.route_waypoints(route);
     *row.control = Control::default();
-    *row.truck = Truck { route, episode, ..started(&world.params, &waypoints[0], offset, heading) };
+    *row.truck = Truck { route, episode, ..started(&world.params, &waypoints[0], start) };
     let point = reference_point(world.params.rig.wheelbase, row.truck);
     *row.progress = followed(waypoints, point, 1, world.params.stray_distance);
     row.progress.passed = 0;
@@ -49,11 +54,11 @@ pub fn begin(world: &World, row: &mut Row, episode: u32) {
     *row.observation = *row.next_observation;
 }
 
-/// A truck at `waypoint`, trailer straight, moved aside and turned by shares of the largest start errors.
-pub fn started(params: &Params, waypoint: &WaypointRow, offset: f32, heading: f32) -> Truck {
-    let heading = wrapped(waypoint.heading + heading * params.start_heading);
+/// A truck at `waypoint`, trailer straight, moved aside and turned as `start` says.
+pub fn started(params: &Params, waypoint: &WaypointRow, start: &Start) -> Truck {
+    let heading = wrapped(waypoint.heading + start.heading * params.start_heading);
     let (sin, cos) = heading.sin_cos();
-    let point = waypoint.position + offset * params.start_offset * waypoint.direction.perp();
+    let point = waypoint.position + start.offset * params.start_offset * waypoint.direction.perp();
     Truck {
         position: point - 0.5 * params.rig.wheelbase * Vec2::new(cos, sin),
         heading,

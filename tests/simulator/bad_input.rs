@@ -187,5 +187,12 @@ fn a_batch_that_cannot_be_is_refused_and_a_wrong_action_changes_nothing() {
     let before = simulator.batch().truck.clone();
     assert_eq!(simulator.step(&[0, 9]).unwrap_err().to_string(), "actions[1]: 9; must lie in 0..9");
     assert_eq!(simulator.step(&[0]).unwrap_err().to_string(), "actions: 1 for 2 trucks; one each is needed");
+    let start = |offset| offtrack::layout::Start { offset, heading: 0.0 };
+    let refused = |starts: &[_]| Simulator::new(world.clone(), 2, 0, RouteChoice::Drawn(vec![0])).unwrap().reset_from(starts).unwrap_err();
+    assert_eq!(refused(&[start(0.0)]).to_string(), "starts: 1 for 2 trucks; one each is needed");
+    assert_eq!(refused(&[start(0.0), start(1.5)]).to_string(), "starts[1]: 1.5 of the largest start error; must lie in -1..1");
+    assert_eq!(refused(&[start(f32::NAN), start(0.0)]).to_string(), "starts[0]: NaN of the largest start error; must lie in -1..1");
+    assert_eq!(simulator.gather(&[1, 2]).unwrap_err().to_string(), "indices[1]: 2; the batch has trucks 0..2");
+    assert_eq!(simulator.gather(&[]).unwrap_err(), simulator::Error::EmptyBatch);
     assert_eq!(simulator.batch().truck, before);
 }

@@ -45,6 +45,18 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A certificate's sequence does not do what the file says.
+    #[error("{}: {route} from ({:+}, {:+}) of the largest start errors: the sequence does not arrive: {ended}", file.display(), start[0], start[1])]
+    NotVerified {
+        /// The certificate.
+        file: PathBuf,
+        /// The route.
+        route: String,
+        /// The start, as shares of the largest errors.
+        start: [f32; 2],
+        /// How the episode stood at the sequence's end.
+        ended: &'static str,
+    },
     /// The learner's threads cannot be started.
     #[error("threads to learn with cannot be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -70,7 +82,7 @@ impl Error {
     /// What the process exits with.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::Write { .. } | Error::Threads(_) | Error::Diverged { .. } => 1,
+            Error::Write { .. } | Error::Threads(_) | Error::Diverged { .. } | Error::NotVerified { .. } => 1,
             _ => 2,
         }
     }

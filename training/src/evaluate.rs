@@ -14,6 +14,7 @@ use offtrack::swept::{own_lane_suffices, swept_path};
 use offtrack::world::World;
 use serde_json::Value;
 
+use crate::certify::certified;
 use crate::drivers::{self, Driver, PURSUIT_LOOK_AHEAD};
 use crate::error::Error;
 use crate::files;
@@ -48,6 +49,9 @@ pub struct Args {
     /// With --html: the folder of the training run that the driver comes from, to show its curves too.
     #[arg(long, requires = "html")]
     run: Option<PathBuf>,
+    /// A certificate of `offtrack certify`: success over the routes that it shows to be possible is reported too.
+    #[arg(long)]
+    certified: Option<PathBuf>,
     /// With `pursuit`: distance to the point pursued [m].
     #[arg(long, default_value_t = PURSUIT_LOOK_AHEAD, allow_negative_numbers = true)]
     look_ahead: f32,
@@ -71,7 +75,14 @@ pub fn run(args: &Args) -> Result<(), Error> {
         Some(folder) => read_run(folder)?,
         None => (Value::Null, None),
     };
-    let (report, tracks) = examine(&scenario, &world, split, args.episodes, args.seed, driver.as_mut(), args.html.is_some())?;
+    let possible = args.certified.as_ref().map(|file| certified(file, &scenario, &world, scenario.split(split))).transpose()?;
+    let (finished, tracks) = drive(&scenario, &world, split, args.episodes, args.seed, driver.as_mut(), args.html.is_some())?;
+    let mut report = summarised(&scenario, &world, split, args.seed, driver.name(), &finished, args.episodes);
+    report.certified = possible.and_then(|possible| {
+        let chunks = scenario.split(split).iter().zip(finished.chunks(args.episodes));
+        let kept: Vec<&Episode> = chunks.filter(|(route, _)| possible.contains(route)).flat_map(|(_, chunk)| chunk).collect();
+        Summary::of(kept.into_iter(), scenario.step)
+    });
     if let Some(file) = &args.json {
         files::write_json(file, &report)?;
     }
@@ -104,6 +115,20 @@ pub fn examine(
     driver: &mut dyn Driver,
     record: bool,
 ) -> Result<(Report, Vec<Track>), Error> {
+    let (finished, tracks) = drive(scenario, world, split, episodes, seed, driver, record)?;
+    Ok((summarised(scenario, world, split, seed, driver.name(), &finished, episodes), tracks))
+}
+
+/// The episodes of every route of `split`, `episodes` each, in the order of its routes; with `record` also every state of each.
+fn drive(
+    scenario: &Scenario,
+    world: &Arc<World>,
+    split: Split,
+    episodes: usize,
+    seed: u32,
+    driver: &mut dyn Driver,
+    record: bool,
+) -> Result<(Vec<Episode>, Vec<Track>), Error> {
     let routes = scenario.split(split);
     if routes.is_empty() {
         let value = split.name().to_owned();
@@ -133,8 +158,7 @@ pub fn examine(
         }
     }
     bar.finish_and_clear();
-    let finished: Vec<Episode> = finished.into_iter().flatten().collect();
-    Ok((summarised(scenario, world, split, seed, driver.name(), &finished, episodes), recorder.finish()))
+    Ok((finished.into_iter().flatten().collect(), recorder.finish()))
 }
 
 fn summarised(scenario: &Scenario, world: &World, split: Split, seed: u32, policy: &str, finished: &[Episode], per_route: usize) -> Report {
@@ -165,6 +189,7 @@ fn summarised(scenario: &Scenario, world: &World, split: Split, seed: u32, polic
         summary: Summary::of(finished.iter(), scenario.step).expect("a split has a route and a route an episode: both were checked"),
         own_lane_suffices: of_routes(true),
         needs_deviation: of_routes(false),
+        certified: None,
         routes: route_reports.collect(),
     }
 }

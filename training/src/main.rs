@@ -2,6 +2,7 @@
 
 mod bench;
 mod bridge;
+mod certify;
 mod checkpoint;
 mod config;
 mod deviations;
@@ -47,6 +48,7 @@ enum Command {
     Train(train::Args),
     Evaluate(evaluate::Args),
     Bench(bench::Args),
+    Certify(certify::Args),
     Draw(draw::Args),
     Record(record::Args),
     Trace(trace::Args),
@@ -59,6 +61,7 @@ fn main() -> ExitCode {
         Command::Train(args) => train::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Bench(args) => bench::run(args),
+        Command::Certify(args) => certify::run(args),
         Command::Draw(args) => draw::run(args),
         Command::Record(args) => record::run(args),
         Command::Trace(args) => trace::run(args),

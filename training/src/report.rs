@@ -154,6 +154,9 @@ pub struct Report {
     pub own_lane_suffices: Option<Summary>,
     /// Episodes on the routes that need deviation.
     pub needs_deviation: Option<Summary>,
+    /// Episodes on the routes shown to be possible; none where no certificate was given or it certifies none of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certified: Option<Summary>,
     /// Each route.
     pub routes: Vec<RouteReport>,
 }
@@ -189,6 +192,9 @@ impl Report {
         }
         if let Some(summary) = &self.needs_deviation {
             line(&mut text, "needs deviation", "wide", summary);
+        }
+        if let Some(summary) = &self.certified {
+            line(&mut text, "certified", "", summary);
         }
         line(&mut text, "all", "", &self.summary);
         text

@@ -177,7 +177,7 @@ impl Sac {
         let (second_loss, second_value) = self.reading.loss(&outputs[1], &part.action, &goal, second_bound); // [B, 1] each
         let critic_loss = ((first_loss + second_loss) * part.weight.autodiff()).mean().mul_scalar(share); // [1]
         let value = (first_value + second_value).mul_scalar(0.5); // [B, 1]
-        let errors = (value.clone() - goal.value().clone()).abs().into_data();
+        let errors = (value.clone() - goal.value.clone()).abs().into_data();
 
         // The actor learns what the critics hold for best, and to keep some entropy. Their values are constants here.
         let q = self.reading.one_value(outputs.map(|output| self.reading.values(output.inner()))).autodiff(); // [B, A]

@@ -182,8 +182,8 @@ impl Learner {
     fn sampled(&mut self, n: usize) -> f64 {
         let begun = Instant::now();
         for _ in 0..n {
-            let batch = self.parts();
-            self.sac.update(batch, 1.0);
+            let parts = self.parts();
+            self.sac.update(parts, 1.0);
         }
         begun.elapsed().as_secs_f64() / n as f64
     }

@@ -25,11 +25,11 @@ impl Twins {
 }
 
 /// What the critics are to give for the actions taken.
-pub(super) enum Goal {
-    /// A value, `[B, 1]`.
-    Value(Tensor<2>),
-    /// Shares of the categories `[B, categories]` and the value that they mean `[B, 1]`.
-    Histogram(Tensor<2>, Tensor<2>),
+pub(super) struct Goal {
+    /// The value, `[B, 1]`.
+    pub(super) value: Tensor<2>,
+    /// With categories: their shares, `[B, categories]`.
+    histogram: Option<Tensor<2>>,
 }
 
 /// What the next state is worth to the policy. Shapes are `[B, 1]` where none is named.
@@ -87,7 +87,7 @@ impl Reading {
             let q = self.one_value(outputs); // [B, A]
             let value = (probs * q).sum_dim(1); // [B, 1]
             let value = bonus.map_or(value.clone(), |bonus| value + bonus);
-            return Goal::Value(reward.clone() + discount.clone() * value);
+            return Goal { value: reward.clone() + discount.clone() * value, histogram: None };
         };
         let [rows, n_actions] = probs.dims();
         let weights = probs.reshape([rows, n_actions, 1]);
@@ -105,7 +105,7 @@ impl Reading {
         }
         let device = Device::flex();
         let histogram = Tensor::from_data(TensorData::new(projected, [rows, categories.count]), &device);
-        Goal::Histogram(histogram, Tensor::from_data(TensorData::new(means, [rows, 1]), &device))
+        Goal { value: Tensor::from_data(TensorData::new(means, [rows, 1]), &device), histogram: Some(histogram) }
     }
 
     /// One critic's loss of each row, `[B, 1]`, and its value of the action taken, `[B, 1]` without gradients. `bound` is the target
@@ -117,25 +117,21 @@ impl Reading {
         goal: &Goal,
         bound: Option<Tensor<2>>,
     ) -> (Tensor<2>, Tensor<2>) {
-        match (goal, self.categories) {
-            (Goal::Histogram(histogram, _), Some(categories)) => {
-                let rows = output.dims()[0];
-                let index = action.clone().reshape([rows, 1, 1]).expand([rows, 1, categories.count]);
-                let taken: Tensor<2> = self.histograms(output.clone(), categories).gather(1, index.autodiff()).squeeze_dim(1); // [B, C]
-                let loss = -(log_softmax(taken.clone(), 1) * histogram.clone().autodiff()).sum_dim(1);
-                let centres = Tensor::<1>::from_data(TensorData::new(centres(categories), [categories.count]), &Device::flex());
-                (loss, (softmax(taken.inner(), 1) * centres.unsqueeze()).sum_dim(1))
-            }
-            (Goal::Value(goal) | Goal::Histogram(_, goal), _) => {
-                let taken = output.clone().gather(1, action.clone().autodiff()); // [B, 1]
-                let error = (taken.clone() - goal.clone().autodiff()).square();
-                let value = taken.clone().inner();
-                let Some((bound, clip)) = bound.zip(self.value_clip) else { return (error, value) };
-                // H. Zhou and others, "Revisiting Discrete Soft Actor-Critic" (2022): no gain from moving further than the clip.
-                let near = (taken - bound.clone().autodiff()).clamp(-clip, clip) + bound.autodiff();
-                (error.max_pair((near - goal.clone().autodiff()).square()), value)
-            }
+        if let Some((histogram, categories)) = goal.histogram.as_ref().zip(self.categories) {
+            let rows = output.dims()[0];
+            let index = action.clone().reshape([rows, 1, 1]).expand([rows, 1, categories.count]);
+            let taken: Tensor<2> = self.histograms(output.clone(), categories).gather(1, index.autodiff()).squeeze_dim(1); // [B, C]
+            let loss = -(log_softmax(taken.clone(), 1) * histogram.clone().autodiff()).sum_dim(1);
+            let centres = Tensor::<1>::from_data(TensorData::new(centres(categories), [categories.count]), &Device::flex());
+            return (loss, (softmax(taken.inner(), 1) * centres.unsqueeze()).sum_dim(1));
         }
+        let taken = output.clone().gather(1, action.clone().autodiff()); // [B, 1]
+        let error = (taken.clone() - goal.value.clone().autodiff()).square();
+        let value = taken.clone().inner();
+        let Some((bound, clip)) = bound.zip(self.value_clip) else { return (error, value) };
+        // H. Zhou and others, "Revisiting Discrete Soft Actor-Critic" (2022): no gain from moving further than the clip.
+        let near = (taken - bound.clone().autodiff()).clamp(-clip, clip) + bound.autodiff();
+        (error.max_pair((near - goal.value.clone().autodiff()).square()), value)
     }
 
     /// Whether the loss needs the target critics' values of the action taken.
@@ -147,15 +143,6 @@ impl Reading {
     fn histograms(&self, output: Tensor<2>, categories: Categories) -> Tensor<3> {
         let rows = output.dims()[0];
         output.reshape([rows, self.n_actions, categories.count])
-    }
-}
-
-impl Goal {
-    /// The value meant, `[B, 1]`.
-    pub(super) fn value(&self) -> &Tensor<2> {
-        match self {
-            Goal::Value(value) | Goal::Histogram(_, value) => value,
-        }
     }
 }
 

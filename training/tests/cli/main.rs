@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "what a helper of a test cannot do fails the test")]
 
 mod bench;
+mod certify;
 mod draw;
 mod evaluate;
 mod input;

@@ -1,0 +1,246 @@
+//! A certificate: which routes of a benchmark were completed from which starts, and the actions that did it.
+//!
+//! Actions stand there as runs, `4x12 5x3`: action 4 twelve times, then action 5 three times. What the truck, the clock and the action
+//! table were stands beside them in words, so that a file made under other conditions is refused by the one that differs.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::Path;
+
+use offtrack::layout::Start;
+use offtrack::roundabout::Gutter;
+use offtrack::scenario::Scenario;
+use offtrack::world::World;
+use serde::{Deserialize, Serialize};
+
+use super::beam::Pass;
+use crate::error::Error;
+use crate::files;
+
+/// Version of the file's meaning.
+const VERSION: u32 = 1;
+/// More steps than any sequence needs.
+const MOST_STEPS: usize = 1_000_000;
+
+/// A whole certificate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Certificate {
+    /// Version of the file's meaning.
+    pub version: u32,
+    /// The benchmark's name.
+    pub benchmark: String,
+    /// `test`, `train` or `all`.
+    pub split: String,
+    /// The policy whose actions were among the candidates.
+    pub policy: Option<String>,
+    /// What must be the same where the file is used.
+    pub conditions: BTreeMap<String, String>,
+    /// Searches made in turn from each start until one arrived.
+    pub passes: Vec<Pass>,
+    /// Where every route was begun: shares of the largest offset and heading error.
+    pub starts: Vec<[f32; 2]>,
+    /// The machine that searched.
+    pub machine: String,
+    /// The program's commit.
+    pub commit: String,
+    /// Time spent so far [s].
+    pub seconds: f64,
+    /// Env steps spent so far.
+    pub env_steps: u64,
+    /// Every route searched so far.
+    pub routes: Vec<CertifiedRoute>,
+}
+
+/// One route.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CertifiedRoute {
+    /// `20m/N-left-3` and the like.
+    pub name: String,
+    /// What the search from each start came to, in the order of the starts.
+    pub found: Vec<Found>,
+}
+
+/// What the search from one start came to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Found {
+    /// `arrived`, or how the candidate that got furthest ended.
+    pub ended: String,
+    /// Share of the waypoints that it passed.
+    pub progress: f64,
+    /// Steps that it took.
+    pub steps: u32,
+    /// Width of the search that found it.
+    pub width: usize,
+    /// Steps that it held each action for.
+    pub hold: usize,
+    /// Env steps of all searches made.
+    pub env_steps: u64,
+    /// Runs of actions to the arrival, empty where none was found.
+    pub actions: String,
+}
+
+impl Found {
+    /// A sequence was found.
+    pub fn arrived(&self) -> bool {
+        self.ended == offtrack::layout::Ended::Arrived.name()
+    }
+}
+
+impl CertifiedRoute {
+    /// A sequence was found from every start.
+    pub fn certified(&self) -> bool {
+        self.found.iter().all(Found::arrived)
+    }
+}
+
+impl Certificate {
+    /// A certificate without routes.
+    pub fn new(
+        scenario: &Scenario,
+        world: &World,
+        split: &str,
+        policy: Option<String>,
+        passes: Vec<Pass>,
+        starts: &[Start],
+    ) -> Certificate {
+        Certificate {
+            version: VERSION,
+            benchmark: scenario.name.clone(),
+            split: split.to_owned(),
+            policy,
+            conditions: conditions(scenario, world),
+            passes,
+            starts: starts.iter().map(|start| [start.offset, start.heading]).collect(),
+            machine: crate::provenance::machine(),
+            commit: crate::provenance::commit(),
+            seconds: 0.0,
+            env_steps: 0,
+            routes: Vec::new(),
+        }
+    }
+
+    /// Reads a certificate. A file that is cut, was never one, or contradicts itself is refused.
+    pub fn read(file: &Path) -> Result<Certificate, Error> {
+        let bytes = std::fs::read(file).map_err(Error::read(file))?;
+        let wrong = |message: String| Error::Contents { file: file.to_owned(), message };
+        let certificate: Certificate = serde_json::from_slice(&bytes)
+            .map_err(|error| wrong(format!("is no certificate, or a damaged one: {error}; `offtrack certify --json` writes one")))?;
+        if certificate.version != VERSION {
+            return Err(wrong(format!("is a certificate of version {}; this program reads version {VERSION}", certificate.version)));
+        }
+        if certificate.starts.is_empty() {
+            return Err(wrong("is a damaged certificate: starts: empty; at least 1 is needed".into()));
+        }
+        for route in &certificate.routes {
+            let (found, starts) = (route.found.len(), certificate.starts.len());
+            if found != starts {
+                return Err(wrong(format!(
+                    "is a damaged certificate: {}: found: {found} entries; {starts} are needed, one a start",
+                    route.name
+                )));
+            }
+        }
+        Ok(certificate)
+    }
+
+    /// Writes the certificate, a route a line, in one move.
+    pub fn write(&self, file: &Path) -> Result<(), Error> {
+        let head = serde_json::to_string(&Certificate { routes: Vec::new(), ..self.clone() });
+        let rows: Result<Vec<String>, _> = self.routes.iter().map(serde_json::to_string).collect();
+        let (head, rows) = head.and_then(|head| Ok((head, rows?))).map_err(|error| Error::write(file)(error.into()))?;
+        // The routes stand last, so their empty list is the head's end.
+        let text = format!("{}\n{}\n]}}\n", head.trim_end_matches("]}"), rows.join(",\n"));
+        files::write_whole(file, text.as_bytes())
+    }
+
+    /// Whether sequences of this certificate say anything about `scenario`: all that moves and ends a truck must be the same. `file` is
+    /// for the message.
+    pub fn check(&self, scenario: &Scenario, world: &World, file: &Path) -> Result<(), Error> {
+        let here = conditions(scenario, world);
+        let keys = self.conditions.keys().chain(here.keys());
+        let value = |conditions: &BTreeMap<String, String>, key: &String| conditions.get(key).cloned().unwrap_or_else(|| "nothing".into());
+        for key in keys {
+            let (there, here) = (value(&self.conditions, key), value(&here, key));
+            if there != here {
+                let (benchmark, made_for) = (&scenario.name, &self.benchmark);
+                let message = format!(
+                    "was made for {made_for} with another {key}: {there} there, {here} in {benchmark}; make one with `offtrack certify --benchmark {benchmark} --json FILE`"
+                );
+                return Err(Error::Contents { file: file.to_owned(), message });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// All that moves a truck and ends its episode, roads aside, in words. Numbers are rounded to what no machine's library differs in.
+fn conditions(scenario: &Scenario, world: &World) -> BTreeMap<String, String> {
+    let list = |values: &mut dyn Iterator<Item = f32>| values.map(|value| format!("{value:.4}")).collect::<Vec<_>>().join(" ");
+    let params = &world.params;
+    let rig: Vec<String> = bytemuck::cast_slice(&[params.rig]).iter().map(|value: &f32| format!("{value:.4e}")).collect();
+    let gutter = match scenario.gutter {
+        Gutter::Drivable => "drivable",
+        Gutter::Solid => "solid",
+    };
+    let entries = [
+        ("vehicle", format!("{:08x}", crc32fast::hash(rig.join(" ").as_bytes()))),
+        ("gutter", gutter.to_owned()),
+        ("action table", list(&mut world.actions.iter().flat_map(|action| [action.steering, action.speed]))),
+        ("step", format!("{:.4} s in {}", scenario.step, scenario.n_substeps)),
+        ("largest start errors", list(&mut [params.start_offset, params.start_heading].into_iter())),
+        (
+            "ending",
+            list(&mut [params.stray_distance, params.jackknife_angle, params.rollover_ratio, scenario.time_limit as f32].into_iter()),
+        ),
+    ];
+    entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+}
+
+/// Actions as runs.
+pub fn runs(actions: &[u32]) -> String {
+    let mut text = String::new();
+    for run in actions.chunk_by(|a, b| a == b) {
+        let gap = if text.is_empty() { "" } else { " " };
+        let _ = write!(text, "{gap}{}x{}", run[0], run.len());
+    }
+    text
+}
+
+/// The actions that `text` names, each below `n_actions`; what is wrong with it otherwise.
+pub fn actions(text: &str, n_actions: u32) -> Result<Vec<u32>, String> {
+    let mut actions = Vec::new();
+    for run in text.split_whitespace() {
+        let numbers = run.split_once('x').and_then(|(action, count)| Some((action.parse::<u32>().ok()?, count.parse::<usize>().ok()?)));
+        match numbers {
+            Some((action, count)) if action < n_actions && count <= MOST_STEPS - actions.len() => {
+                actions.extend(std::iter::repeat_n(action, count));
+            }
+            _ => return Err(format!("actions: {run:?}; runs like 4x12 are needed, of actions 0..{n_actions}, {MOST_STEPS} steps at most")),
+        }
+    }
+    Ok(actions)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn actions_come_back_from_their_runs() {
+        for sequence in [vec![], vec![4], vec![4, 4, 4, 0, 8, 8, 4]] {
+            assert_eq!(actions(&runs(&sequence), 9), Ok(sequence));
+        }
+        assert_eq!(runs(&[4, 4, 4, 0]), "4x3 0x1");
+    }
+
+    #[test]
+    fn what_is_no_run_of_a_known_action_is_named() {
+        for wrong in ["9x1", "4", "4x", "x4", "-1x2", "4x1000001", "4x1000000 4x1", "4x99999999999999999999"] {
+            let said = actions(wrong, 9).unwrap_err();
+            assert!(said.contains(wrong.split(' ').next_back().unwrap()) && said.contains("0..9"), "{said}");
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! `offtrack certify`: what was found arrives again, what was changed does not, and files for something else are refused.
+
+use serde_json::Value;
+
+use crate::place::{Place, offtrack, refusal, succeed};
+
+/// A certificate of the short benchmark, searched as quickly as it can be.
+fn certified() -> Place {
+    let place = Place::new();
+    let benchmark = place.text("short.toml");
+    succeed(&offtrack(&["certify", "--benchmark", &benchmark, "--widths", "16", "--json", &place.text("certificate.json")]));
+    place
+}
+
+fn verify(place: &Place, benchmark: &str) -> std::process::Output {
+    offtrack(&["certify", "--benchmark", benchmark, "--verify", &place.text("certificate.json")])
+}
+
+/// Writes the certificate again with something changed in it.
+fn change(place: &Place, change: impl Fn(&mut Value)) {
+    let mut certificate = place.json("certificate.json");
+    let before = certificate.clone();
+    change(&mut certificate);
+    assert_ne!(before, certificate);
+    std::fs::write(place.file("certificate.json"), certificate.to_string()).unwrap();
+}
+
+#[test]
+fn every_route_of_the_short_benchmark_is_completed_and_arrives_again() {
+    let place = certified();
+    let certificate = place.json("certificate.json");
+    let routes = certificate["routes"].as_array().unwrap();
+    let names: Vec<&str> = routes.iter().map(|route| route["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["16m/E-right-1", "20m/E-right-1", "20m/W-left-3"]);
+    let found: Vec<&Value> = routes.iter().flat_map(|route| route["found"].as_array().unwrap()).collect();
+    let count = |value: &Value| value["env_steps"].as_u64().unwrap();
+    assert_eq!(found.len(), 15);
+    assert!(found.iter().all(|found| found["ended"] == "arrived"), "{certificate}");
+    assert_eq!(count(&certificate), found.iter().map(|found| count(found)).sum::<u64>());
+    let output = verify(&place, &place.text("short.toml"));
+    succeed(&output);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("15 sequences driven again: all arrived"));
+}
+
+#[test]
+fn the_same_search_finds_the_same_sequences() {
+    let (one, two) = (certified(), certified());
+    assert_eq!(one.json("certificate.json")["routes"], two.json("certificate.json")["routes"]);
+}
+
+#[test]
+fn a_changed_or_shortened_sequence_is_a_failure_that_names_its_route_and_start() {
+    let place = certified();
+    let whole = std::fs::read(place.file("certificate.json")).unwrap();
+    for (actions, ended) in [("2x400", "collided"), ("2x5", "running"), ("", "running")] {
+        std::fs::write(place.file("certificate.json"), &whole).unwrap();
+        change(&place, |certificate| certificate["routes"][2]["found"][1]["actions"] = actions.into());
+        let said = refusal(&verify(&place, &place.text("short.toml")), 1);
+        assert!(said.contains("20m/W-left-3 from (+1, +1)") && said.contains(ended), "{said}");
+    }
+}
+
+#[test]
+fn a_file_that_is_no_whole_certificate_is_refused_by_its_name() {
+    let place = certified();
+    let whole = std::fs::read(place.file("certificate.json")).unwrap();
+    let refused = |expected: &str| {
+        let said = refusal(&verify(&place, &place.text("short.toml")), 2);
+        assert!(said.contains(&place.text("certificate.json")) && said.contains(expected), "{expected}: {said}");
+        std::fs::write(place.file("certificate.json"), &whole).unwrap();
+    };
+    std::fs::write(place.file("certificate.json"), &whole[..whole.len() / 2]).unwrap();
+    refused("is no certificate, or a damaged one");
+    std::fs::write(place.file("certificate.json"), "{}").unwrap();
+    refused("is no certificate, or a damaged one");
+    change(&place, |certificate| certificate["version"] = 2.into());
+    refused("version 2");
+    change(&place, |certificate| certificate["routes"][0]["found"][0]["actions"] = "5x20".into());
+    refused("actions: \"5x20\"");
+    change(&place, |certificate| certificate["starts"][0][0] = 2.into());
+    refused("must lie in -1..1");
+    change(&place, |certificate| certificate["starts"] = Value::Array(Vec::new()));
+    refused("starts: empty");
+    change(&place, |certificate| drop(certificate["routes"][0]["found"].as_array_mut().unwrap().pop()));
+    refused("4 entries");
+    change(&place, |certificate| certificate["routes"][0]["name"] = "20m/N-left-9".into());
+    refused("has a route 20m/N-left-9 that the benchmark does not have");
+    std::fs::remove_file(place.file("certificate.json")).unwrap();
+    refused("cannot be read");
+}
+
+#[test]
+fn a_certificate_made_under_other_conditions_is_refused_by_what_differs() {
+    let place = certified();
+    let short = std::fs::read_to_string(place.file("short.toml")).unwrap();
+    for (from, to, expected) in [
+        ("-0.4, 0.0", "-0.5, 0.0", "another action table"),
+        ("[30.0]", "[20.0]", "another action table"),
+        ("drivable", "solid", "another gutter: drivable there, solid"),
+        ("empty", "laden", "another vehicle"),
+    ] {
+        std::fs::write(place.file("other.toml"), short.replacen(from, to, 1)).unwrap();
+        assert_ne!(std::fs::read_to_string(place.file("other.toml")).unwrap(), short);
+        let said = refusal(&verify(&place, &place.text("other.toml")), 2);
+        assert!(said.contains(&place.text("certificate.json")) && said.contains(expected), "{said}");
+    }
+}
+
+#[test]
+fn an_evaluation_tells_success_over_the_certified_routes_apart() {
+    let place = certified();
+    let (certificate, report) = (place.text("certificate.json"), place.text("report.json"));
+    let evaluate = || place.evaluate(&["--policy", "pursuit", "--episodes", "2", "--certified", &certificate, "--json", &report]);
+    succeed(&evaluate());
+    assert_eq!(place.json("report.json")["certified"]["episodes"], 4);
+    // A route that was not completed from one of the starts is left out.
+    change(&place, |certificate| certificate["routes"][2]["found"][4]["ended"] = "strayed".into());
+    let output = evaluate();
+    succeed(&output);
+    let report = place.json("report.json");
+    assert_eq!(report["certified"]["episodes"], 2);
+    assert_eq!(report["certified"]["arrived"], report["routes"][0]["arrived"]);
+    assert!(String::from_utf8_lossy(&output.stdout).lines().any(|line| line.starts_with("certified ")));
+    // What the file claims is driven again first.
+    change(&place, |certificate| certificate["routes"][1]["found"][0]["actions"] = "2x5".into());
+    assert!(refusal(&evaluate(), 1).contains("20m/E-right-1"));
+    change(&place, |certificate| drop(certificate["routes"].as_array_mut().unwrap().remove(1)));
+    assert!(refusal(&evaluate(), 2).contains("has no route 20m/E-right-1"));
+}
+
+#[test]
+fn a_policy_may_be_among_the_candidates_and_must_fit_the_benchmark() {
+    let place = Place::new();
+    succeed(&place.train(&["--name", "run", "--steps", "600"]));
+    let (policy, benchmark) = (place.text("runs/run/policy.safetensors"), place.text("short.toml"));
+    let certify = |benchmark: &str| {
+        offtrack(&[
+            "certify",
+            "--benchmark",
+            benchmark,
+            "--split",
+            "train",
+            "--widths",
+            "16",
+            "--policy",
+            &policy,
+            "--json",
+            &place.text("c.json"),
+        ])
+    };
+    succeed(&certify(&benchmark));
+    let certificate = place.json("c.json");
+    assert_eq!((&certificate["policy"], &certificate["split"]), (&Value::from(policy.as_str()), &Value::from("train")));
+    assert_eq!(certificate["routes"].as_array().map(Vec::len), Some(1));
+    assert!(refusal(&certify("attard2023"), 2).contains("another action table"));
+}
