@@ -14,7 +14,6 @@ use rand::Rng;
 
 use crate::bridge;
 use crate::error::Error;
-use crate::files;
 use crate::network::{Mlp, layer};
 use crate::scaling::Scaling;
 use file::Contents;
@@ -55,11 +54,6 @@ impl Policy {
                 norms: Vec::new(),
             },
         })
-    }
-
-    /// Writes the policy in one move: the file is the old one or the new one, never half of either.
-    pub fn save(&self, file: &Path) -> Result<(), Error> {
-        files::write_whole(file, &self.to_bytes())
     }
 
     /// The file's bytes. Equal policies give equal bytes.

@@ -1,5 +1,5 @@
-//! Writes checkpoints while the run goes on: the columns go to the system at once, and a thread waits for the disk and moves the file into
-//! its place. Until then the checkpoint before it stands, so there is a whole one at any time.
+//! Writes checkpoints and drivers while the run goes on: the columns go to the system at once, and a thread waits for the disk and moves
+//! the files into their places. Until then the checkpoint before stands, so there is a whole one at any time.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -8,19 +8,28 @@ use std::time::{Duration, Instant};
 
 use crate::checkpoint::Columns;
 use crate::error::Error;
+use crate::files;
 use crate::train::folder::Folder;
 
-/// The checkpoint of a run.
+/// What came of writing a checkpoint and a driver.
+#[derive(Debug)]
+pub struct Kept {
+    pub checkpoint: Result<(), Error>,
+    pub policy: Result<(), Error>,
+}
+
+/// The checkpoint and the driver of a run.
 #[derive(Debug)]
 pub struct Keeper {
     /// The latest whole one.
     file: PathBuf,
     /// The one being written.
     part: PathBuf,
+    policy: PathBuf,
     metrics: PathBuf,
     every: Duration,
     since: Instant,
-    pending: Option<JoinHandle<Result<(), Error>>>,
+    pending: Option<JoinHandle<Kept>>,
 }
 
 impl Keeper {
@@ -29,6 +38,7 @@ impl Keeper {
         Keeper {
             file: folder.checkpoint(),
             part: folder.checkpoint_part(),
+            policy: folder.policy(),
             metrics: folder.metrics(),
             every: Duration::from_secs_f64(60.0 * minutes),
             since: Instant::now(),
@@ -46,43 +56,40 @@ impl Keeper {
         self.pending.is_none() && self.every <= self.since.elapsed()
     }
 
-    /// Begins to write a checkpoint of these columns. One still on its way is waited for.
-    pub fn begin(&mut self, columns: &Columns, config: String, world: u32) -> Result<(), Error> {
-        // Whatever came of it, this one is newer.
-        let _ = self.wait();
+    /// The driver.
+    pub fn policy(&self) -> &Path {
+        &self.policy
+    }
+
+    /// Begins to write a checkpoint of these columns and a driver. Those still on their way are waited for.
+    pub fn begin(&mut self, columns: &Columns, config: String, world: u32, policy: Vec<u8>) {
+        // Whatever came of them, these are newer.
+        self.wait();
         self.since = Instant::now();
-        let file = columns.write(&self.part, config, world).map_err(|error| self.failed(error))?;
-        let (part, whole, metrics) = (self.part.clone(), self.file.clone(), self.metrics.clone());
+        let written = columns.write(&self.part, config, world);
+        let (part, whole, policy_file, metrics) = (self.part.clone(), self.file.clone(), self.policy.clone(), self.metrics.clone());
         let finish = move || {
-            // Its rows are on the disk before the checkpoint that counts on them.
-            let moved = file.sync_all().and_then(|()| File::open(metrics)?.sync_all()).and_then(|()| std::fs::rename(&part, &whole));
-            moved.map_err(|error| failed(&part, &whole, error))
+            // The rows of figures are on the disk before the checkpoint that counts on them.
+            let moved = written
+                .and_then(|file| file.sync_all())
+                .and_then(|()| File::open(metrics)?.sync_all())
+                .and_then(|()| std::fs::rename(&part, &whole));
+            if moved.is_err() {
+                // What is left of a checkpoint that could not be written would fill the disk for nothing.
+                let _ = std::fs::remove_file(&part);
+            }
+            Kept { checkpoint: moved.map_err(Error::write(&whole)), policy: files::write_whole(&policy_file, &policy) }
         };
-        let thread = std::thread::Builder::new().name("checkpoint".to_owned()).spawn(finish);
-        self.pending = Some(thread.map_err(|error| self.failed(error))?);
-        Ok(())
+        self.pending = Some(std::thread::spawn(finish));
     }
 
-    /// What came of the checkpoint begun last, once that is known.
-    pub fn done(&mut self) -> Option<Result<(), Error>> {
-        self.pending.as_ref().is_some_and(JoinHandle::is_finished).then(|| self.wait())
+    /// What came of those begun last, once that is known.
+    pub fn done(&mut self) -> Option<Kept> {
+        if self.pending.as_ref().is_some_and(JoinHandle::is_finished) { self.wait() } else { None }
     }
 
-    /// Waits for the checkpoint begun last.
-    pub fn wait(&mut self) -> Result<(), Error> {
-        match self.pending.take() {
-            Some(pending) => pending.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
-            None => Ok(()),
-        }
+    /// Waits for those begun last.
+    pub fn wait(&mut self) -> Option<Kept> {
+        self.pending.take().map(|pending| pending.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     }
-
-    fn failed(&self, error: std::io::Error) -> Error {
-        failed(&self.part, &self.file, error)
-    }
-}
-
-/// What is left of a checkpoint that could not be written would fill the disk for nothing.
-fn failed(part: &Path, whole: &Path, error: std::io::Error) -> Error {
-    let _ = std::fs::remove_file(part);
-    Error::write(whole)(error)
 }

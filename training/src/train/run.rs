@@ -3,7 +3,6 @@
 //! With a budget of steps alone what a run does depends on its state and on nothing else, so that one which goes on from a checkpoint
 //! equals one that was never stopped, bit for bit. With minutes the learning rates follow the clock.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use bytemuck::{bytes_of, cast_slice};
@@ -14,7 +13,7 @@ use offtrack::world::World;
 use rand::SeedableRng;
 
 use super::folder::Folder;
-use super::keeper::Keeper;
+use super::keeper::{Keeper, Kept};
 use super::progress::Progress;
 use crate::bridge;
 use crate::checkpoint::{Columns, Stored};
@@ -42,7 +41,6 @@ pub struct Run {
     /// How far it is.
     pub progress: Progress,
     keeper: Keeper,
-    policy_file: PathBuf,
     /// What the trucks saw before the step in hand.
     seen: Vec<[f32; N_VALUES]>,
 }
@@ -61,7 +59,6 @@ impl Run {
             scaling: None,
             progress,
             keeper: Keeper::new(folder, config.checkpoint_minutes),
-            policy_file: folder.policy(),
             seen: Vec::new(),
             config: config.clone(),
             world,
@@ -137,30 +134,26 @@ impl Run {
     pub fn close(&mut self) -> Result<(), Error> {
         self.check()?;
         // The last row belongs to this end alone: a run that goes on takes it back.
-        let kept = self.keep().and_then(|()| self.keeper.wait());
-        let saved = self.policy().save(&self.policy_file);
+        self.keep();
+        let kept = self.keeper.wait();
         let row = self.progress.finish(self.sac.entropy_weight());
-        kept.and(saved).and(row)
+        kept.map_or(Ok(()), |Kept { checkpoint, policy }| checkpoint.and(policy)).and(row)
     }
 
     fn keep_now_and_then(&mut self) -> Result<(), Error> {
-        if let Some(kept) = self.keeper.done() {
-            self.progress.note(self.keeper.file(), kept);
+        if let Some(Kept { checkpoint, policy }) = self.keeper.done() {
+            self.progress.note(self.keeper.file(), checkpoint);
+            self.progress.note(self.keeper.policy(), policy);
         }
         if self.keeper.is_due() {
             self.check()?;
-            let begun = self.keep();
-            if begun.is_err() {
-                self.progress.note(self.keeper.file(), begun);
-            }
-            let saved = self.policy().save(&self.policy_file);
-            self.progress.note(&self.policy_file, saved);
+            self.keep();
         }
         Ok(())
     }
 
-    /// Begins to write a checkpoint.
-    fn keep(&mut self) -> Result<(), Error> {
+    /// Begins to write a checkpoint and the driver.
+    fn keep(&mut self) {
         let mut columns = Columns::default();
         for (name, bytes) in self.simulator.batch().columns() {
             columns.put(batch_name(name), bytes);
@@ -174,7 +167,7 @@ impl Run {
         self.progress.save(&mut columns);
         self.sac.save(&mut columns);
         self.memory.save(&mut columns);
-        self.keeper.begin(&columns, self.config.to_toml(), self.fingerprint)
+        self.keeper.begin(&columns, self.config.to_toml(), self.fingerprint, self.policy().to_bytes());
     }
 
     /// Goes on from a checkpoint of this run.
