@@ -1,6 +1,6 @@
 //! Who drives: a learned policy, pure pursuit of the centre line, or chance. The last two are what a learner must beat.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use offtrack::layout::{Action, Truck, WaypointRow};
 use offtrack::random::{self, Draw};
@@ -8,6 +8,7 @@ use offtrack::simulator::Batch;
 use offtrack::world::World;
 
 use crate::error::Error;
+use crate::files;
 use crate::policy::Policy;
 
 /// The best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of attard2023 [m].
@@ -22,20 +23,21 @@ pub trait Driver {
     fn act(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>);
 }
 
-/// The driver that a command's `--policy` names: `pursuit`, `random` or a policy's file, which must suit the world. `look_ahead` is
-/// pure pursuit's [m], `seed` that of chance.
-pub fn named(policy: &str, look_ahead: f32, seed: u32, world: &World) -> Result<Box<dyn Driver>, Error> {
+/// The driver that a command's `--policy` names: `pursuit`, `random` or a policy's file, which must suit the world; none is the policy that
+/// comes with the program for `benchmark`. `look_ahead` is pure pursuit's [m], `seed` that of chance.
+pub fn named(policy: Option<&str>, benchmark: &str, look_ahead: f32, seed: u32, world: &World) -> Result<Box<dyn Driver>, Error> {
     if !(1.0..=50.0).contains(&look_ahead) {
         let value = format!("{look_ahead} m");
         return Err(Error::Flag { flag: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
     }
     match policy {
-        "pursuit" => Ok(Box::new(Pursuit { look_ahead })),
-        "random" => Ok(Box::new(Chance { seed })),
+        Some("pursuit") => Ok(Box::new(Pursuit { look_ahead })),
+        Some("random") => Ok(Box::new(Chance { seed })),
         file => {
-            let policy = Policy::load(Path::new(file))?;
-            policy.check(world, Path::new(file))?;
-            Ok(Box::new(Learned { name: file.to_owned(), policy }))
+            let file = file.map_or_else(|| files::shipped_policy(benchmark), PathBuf::from);
+            let policy = Policy::load(&file)?;
+            policy.check(world, &file)?;
+            Ok(Box::new(Learned { name: file.display().to_string(), policy }))
         }
     }
 }

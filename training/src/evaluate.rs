@@ -25,9 +25,9 @@ use crate::report::{Episode, Report, RouteReport, Summary};
 /// Examine a driver on a benchmark's routes.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A policy file, `pursuit` (pure pursuit of the centre line) or `random`.
+    /// A policy file, `pursuit` (pure pursuit of the centre line) or `random`. Without it the policy that comes with the program.
     #[arg(long)]
-    policy: String,
+    policy: Option<String>,
     /// A benchmark's name, or the path of its file.
     #[arg(long, default_value = "attard2023")]
     benchmark: String,
@@ -64,7 +64,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
     let world = Arc::new(World::bake(&scenario));
-    let mut driver = drivers::named(&args.policy, args.look_ahead, args.seed, &world)?;
+    let mut driver = drivers::named(args.policy.as_deref(), &scenario.name, args.look_ahead, args.seed, &world)?;
     let split = if args.split == "train" { Split::Train } else { Split::Test };
     let n_episodes = args.episodes * scenario.split(split).len();
     if args.html.is_some() && MOST_EPISODES < n_episodes {

@@ -26,6 +26,17 @@ pub fn benchmark(name: &str) -> Result<PathBuf, Error> {
     }
 }
 
+/// The policy that comes with the program for a benchmark of this name: its own or, failing that, the one for `attard2023`, whose vehicle
+/// and actions other benchmarks may share.
+pub fn shipped_policy(benchmark: &str) -> PathBuf {
+    let of = |name: &str| Path::new("training/policies").join(name).join("policy.safetensors");
+    let places = |file: PathBuf| [file.clone(), repository().join(file)];
+    let candidates = [of(benchmark), of("attard2023")].map(places);
+    let found = candidates.iter().flatten().find(|candidate| candidate.is_file());
+    // Where none is, the error of reading it names the file that should be there.
+    found.unwrap_or(&candidates[1][0]).clone()
+}
+
 /// The repository that the program was built from.
 pub fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new(".")).to_owned()

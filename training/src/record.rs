@@ -22,9 +22,9 @@ use crate::recording::{Map, Measures, Recorder, Recording, centre_line};
 /// Record one episode: as a film, as a picture with the swept paths of both units, or as data.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A policy file, `pursuit` (pure pursuit of the centre line) or `random`.
+    /// A policy file, `pursuit` (pure pursuit of the centre line) or `random`. Without it the policy that comes with the program.
     #[arg(long)]
-    policy: String,
+    policy: Option<String>,
     /// One of the benchmark's routes, to learn on or to be examined on: 20m/N-left-3.
     #[arg(long)]
     route: String,
@@ -83,7 +83,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
     let chosen = Chosen::new(&scenario, &args.route)?;
     let world = Arc::new(World::bake(&scenario));
-    let mut driver = drivers::named(&args.policy, args.look_ahead, args.seed, &world)?;
+    let mut driver = drivers::named(args.policy.as_deref(), &scenario.name, args.look_ahead, args.seed, &world)?;
     let recording = recorded(args, &scenario, &world, &chosen, driver.as_mut())?;
     let bytes = bytes(format, args.size, &recording, &chosen, scenario.gutter);
     files::write_whole(&args.output, &bytes.map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?)
