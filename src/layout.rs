@@ -230,8 +230,6 @@ pub struct Params {
     pub start_heading: f32,
     /// Speed at the start [m/s].
     pub start_speed: f32,
-    /// Distance to a kerb at which a unit counts as having collided [m].
-    pub margin: f32,
     /// A waypoint further off than this is neither passed nor within reach: the truck has strayed [m].
     pub stray_distance: f32,
     /// Articulation beyond which the truck is jackknifed [rad].

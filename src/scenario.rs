@@ -81,8 +81,6 @@ pub struct Scenario {
     pub start_offset: f64,
     /// Largest heading error at the start [rad].
     pub start_heading: f64,
-    /// Distance to a kerb at which a unit counts as having collided: 0 but for practice [m].
-    pub margin: f64,
     /// Distance to the next waypoint beyond which the truck has strayed [m].
     pub stray_distance: f64,
     /// Articulation beyond which the truck is jackknifed [rad].
@@ -139,7 +137,6 @@ impl Scenario {
             sensor_range: reader.within("sensors.range", written.sensors.range, 1.0..=50.0, "m")?,
             start_offset: reader.within("start.offset", written.start.offset, 0.0..=1.0, "m")?,
             start_heading: reader.within("start.heading_deg", written.start.heading_deg, 0.0..=20.0, "deg")?.to_radians(),
-            margin: reader.within("ending.margin", written.ending.margin, 0.0..=2.0, "m")?,
             stray_distance: reader.within("ending.stray_distance", written.ending.stray_distance, 3.0..=50.0, "m")?,
             jackknife_angle: reader.within("ending.jackknife_deg", written.ending.jackknife_deg, 30.0..=120.0, "deg")?.to_radians(),
             rollover_ratio: reader.within("ending.rollover_ratio", written.ending.rollover_ratio, 0.1..=2.0, "")?,

@@ -68,7 +68,6 @@ impl World {
                 start_offset: scenario.start_offset as f32,
                 start_heading: scenario.start_heading as f32,
                 start_speed: scenario.cruising_speed() as f32,
-                margin: scenario.margin as f32,
                 stray_distance: scenario.stray_distance as f32,
                 jackknife_angle: scenario.jackknife_angle as f32,
                 rollover_ratio: scenario.rollover_ratio as f32,

@@ -22,9 +22,9 @@ pub fn ending(params: &Params, route: &RouteRow, truck: &Truck, clearance: &Clea
     let articulation = wrapped(truck.heading - truck.trailer_heading);
     let load_transfer_ratio = truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs());
     let arrived = route.n_waypoints <= progress.waypoint;
-    if clearance.tractor <= params.margin {
+    if clearance.tractor <= 0.0 {
         Ended::TractorCollided
-    } else if clearance.trailer <= params.margin {
+    } else if clearance.trailer <= 0.0 {
         Ended::TrailerCollided
     } else if params.rollover_ratio <= load_transfer_ratio {
         Ended::RolledOver

@@ -85,7 +85,6 @@ impl Default for WrittenStart {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct WrittenEnding {
-    pub(super) margin: f64,
     pub(super) stray_distance: f64,
     pub(super) jackknife_deg: f64,
     pub(super) rollover_ratio: f64,
@@ -94,7 +93,7 @@ pub(super) struct WrittenEnding {
 
 impl Default for WrittenEnding {
     fn default() -> Self {
-        WrittenEnding { margin: 0.0, stray_distance: 10.0, jackknife_deg: 90.0, rollover_ratio: 1.0, time_limit: 3.0 }
+        WrittenEnding { stray_distance: 10.0, jackknife_deg: 90.0, rollover_ratio: 1.0, time_limit: 3.0 }
     }
 }
 

@@ -98,7 +98,7 @@ fn a_run_that_nothing_would_end_is_refused() {
 
 #[test]
 fn a_memory_too_short_for_its_trucks_is_refused() {
-    let text = default_file().replace("n_envs = 128", "n_envs = 65536").replace("capacity = 600000", "capacity = 655360");
+    let text = default_file().replace("n_envs = 512", "n_envs = 65536").replace("capacity = 600000", "capacity = 655360");
     let message = read(&text).unwrap_err();
     // Ten slots can hold no step that ten others follow.
     assert!(message.contains("memory.capacity: 655360; must hold more than learning.n_steps = 10"), "{message}");
