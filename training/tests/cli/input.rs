@@ -4,7 +4,7 @@ use crate::place::{Place, offtrack, refusal};
 
 #[test]
 fn a_wrong_argument_is_named_with_its_value_and_what_would_do() {
-    let cases: [(&[&str], &[&str]); 20] = [
+    let cases: [(&[&str], &[&str]); 23] = [
         (&["evaluate", "--policy", "random", "--episodes", "0"], &["--episodes: 0; must lie in 1..100000"]),
         (&["evaluate", "--policy", "random", "--episodes", "many"], &["'many'", "--episodes"]),
         (&["evaluate", "--policy", "random", "--benchmark", "nowhere"], &["benchmark: nowhere", "scenarios/"]),
