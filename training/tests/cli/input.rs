@@ -13,7 +13,7 @@ fn a_wrong_argument_is_named_with_its_value_and_what_would_do() {
         (&["evaluate", "--policy", "random", "--seed", "-1"], &["-1"]),
         (&["evaluate", "--policy", "pursuit", "--look-ahead", "nan"], &["--look-ahead: NaN m; must lie in 1..50 m"]),
         (&["evaluate", "--policy", "pursuit", "--look-ahead", "-3"], &["--look-ahead: -3 m; must lie in 1..50 m"]),
-        (&["evaluate"], &["--policy"]),
+        (&["evaluate", "--policy", "no.safetensors"], &["no.safetensors: cannot be read"]),
         (&["certify", "--widths", "64,0"], &["--widths: 0; must lie in 1..262144"]),
         (&["certify", "--hold", "0"], &["--hold: 0; must lie in 1..50"]),
         (&["certify", "--verify", "no.json"], &["no.json: cannot be read"]),
