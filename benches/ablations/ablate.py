@@ -71,6 +71,8 @@ def train(core, args, name, settings, seed):
         )
         if done.returncode != 0:
             return {"seed": seed, "failed": done.stderr.strip().splitlines()[-1]}
+    # No run goes on from here, and its memory fills the disk.
+    (folder / "checkpoint.safetensors").unlink(missing_ok=True)
     finished = json.loads(report.read_text())
     evaluation = finished["evaluation"]
     return {
@@ -91,7 +93,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--offtrack", type=Path, default=Path("target/release/offtrack"))
     parser.add_argument("--minutes", type=float, default=0.6, help="time that each run learns for")
-    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--seeds", default="0,1,2", help="seeds of each choice")
     parser.add_argument("--cores", default=None, help="cores to run on, as in 0,1; all without it")
     parser.add_argument("--runs", type=Path, default=Path("runs/ablations"))
     parser.add_argument("--json", type=Path, required=True)
@@ -111,7 +113,7 @@ def main():
 
     with ThreadPoolExecutor(len(available)) as pool:
         # A seed of every choice before the next seed: a series cut short is even.
-        jobs = {(name, seed): pool.submit(job, name, seed) for seed in range(args.seeds) for name in CHOICES}
+        jobs = {(name, seed): pool.submit(job, name, seed) for seed in map(int, args.seeds.split(",")) for name in CHOICES}
         rows = {name: {"choice": name, "settings": CHOICES[name], "runs": []} for name in CHOICES}
         for (name, seed), running in jobs.items():
             result = running.result()

@@ -46,6 +46,8 @@ pub struct Summary {
     pub success_high: f64,
     /// Episodes by end code.
     pub ends: BTreeMap<&'static str, usize>,
+    /// Episodes that failed in their first step: the start pose stands on or against a kerb, and no action helps.
+    pub lost_at_start: usize,
     /// Mean distance to the lane centre, all episodes [m].
     pub lane_distance_mean: f64,
     /// The same of those that arrived; none when none did [m].
@@ -95,6 +97,7 @@ impl Summary {
             success_low,
             success_high,
             ends,
+            lost_at_start: episodes.clone().filter(|episode| episode.ended.failed() && episode.steps == 1).count(),
             lane_distance_mean: mean(|episode| episode.lane_distance_mean),
             lane_distance_mean_arrived: (0 < n_arrived)
                 .then(|| arrived.clone().map(|episode| episode.lane_distance_mean).sum::<f64>() / n_arrived as f64),

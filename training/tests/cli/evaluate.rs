@@ -4,7 +4,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::place::{Place, offtrack, refusal, succeed};
+use crate::place::{Place, offtrack, refusal, repository, succeed};
 
 #[test]
 fn every_episode_is_counted_once_by_its_end_and_once_by_its_route() {
@@ -84,4 +84,20 @@ fn a_reader_that_has_gone_costs_the_table_and_not_the_report() {
     let said = refusal(&evaluation.wait_with_output().unwrap(), 1);
     assert!(said.contains("standard output: cannot be written"), "{said}");
     assert_eq!(place.json("report.json")["episodes"], 2);
+}
+
+#[test]
+fn without_a_policy_the_one_that_comes_with_the_program_drives_as_its_report_says() {
+    let place = Place::new();
+    for benchmark in ["attard2023", "attard2023-as-run"] {
+        let shipped = repository().join("training/policies").join(benchmark);
+        let reported: Value = serde_json::from_slice(&std::fs::read(shipped.join("report.json")).unwrap()).unwrap();
+        let reported = &reported["evaluation"];
+        succeed(&offtrack(&["evaluate", "--benchmark", benchmark, "--episodes", "10", "--seed", "1", "--json", &place.text("report.json")]));
+        let report = place.json("report.json");
+        assert!(report["policy"].as_str().unwrap().ends_with(&format!("training/policies/{benchmark}/policy.safetensors")));
+        let [found, expected] = [&report, reported].map(|report| report["success"].as_f64().unwrap());
+        // 230 episodes from other starts than the report's 690: two standard errors of a share of 0.9 are 0.04.
+        assert!((found - expected).abs() < 0.05, "{benchmark}: {found} {expected}");
+    }
 }
