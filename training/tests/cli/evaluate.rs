@@ -93,7 +93,17 @@ fn without_a_policy_the_one_that_comes_with_the_program_drives_as_its_report_say
         let shipped = repository().join("training/policies").join(benchmark);
         let reported: Value = serde_json::from_slice(&std::fs::read(shipped.join("report.json")).unwrap()).unwrap();
         let reported = &reported["evaluation"];
-        succeed(&offtrack(&["evaluate", "--benchmark", benchmark, "--episodes", "10", "--seed", "1", "--json", &place.text("report.json")]));
+        succeed(&offtrack(&[
+            "evaluate",
+            "--benchmark",
+            benchmark,
+            "--episodes",
+            "10",
+            "--seed",
+            "1",
+            "--json",
+            &place.text("report.json"),
+        ]));
         let report = place.json("report.json");
         assert!(report["policy"].as_str().unwrap().ends_with(&format!("training/policies/{benchmark}/policy.safetensors")));
         let [found, expected] = [&report, reported].map(|report| report["success"].as_f64().unwrap());
