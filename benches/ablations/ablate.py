@@ -60,7 +60,6 @@ def train(core, args, name, settings, seed):
             subprocess.run(["rm", "-r", str(folder)], check=True)
         command = [str(args.offtrack), "train", "training/configs/default.toml", "--name", folder.name]
         command += ["--out", str(args.runs), "--seed", str(seed), "--minutes", str(args.minutes)]
-        command += ["--set", "steps="]
         for setting in settings:
             command += ["--set", setting]
         done = subprocess.run(
