@@ -96,11 +96,12 @@ impl Reading {
         let shares = host((first + second).mul_scalar(0.5));
         let moved = bonus.map_or(reward.clone(), |bonus| reward.clone() + discount.clone() * bonus);
         let (moved, discount) = (host(moved), host(discount.clone()));
+        let centres = centres(categories);
         let mut projected = Vec::with_capacity(shares.len());
         let mut means: Vec<f32> = Vec::with_capacity(rows);
         for ((shares, &moved), &discount) in shares.chunks_exact(categories.count).zip(&moved).zip(&discount) {
-            let histogram = projection(categories, shares, moved, discount);
-            means.push(histogram.iter().zip(centres(categories)).map(|(share, centre)| share * centre).sum());
+            let histogram = projection(categories, &centres, shares, moved, discount);
+            means.push(histogram.iter().zip(&centres).map(|(share, centre)| share * centre).sum());
             projected.extend(histogram);
         }
         let device = Device::flex();
@@ -153,11 +154,11 @@ fn centres(Categories { count, low, high }: Categories) -> Vec<f32> {
 
 /// A histogram over the categories after every value in it has become `moved + discount * value`: each share is divided between the two
 /// categories that it comes to lie between.
-fn projection(categories: Categories, shares: &[f32], moved: f32, discount: f32) -> Vec<f32> {
+fn projection(categories: Categories, centres: &[f32], shares: &[f32], moved: f32, discount: f32) -> Vec<f32> {
     let mut projected = vec![0.0; shares.len()];
     let last = shares.len() - 1;
     let width = ((categories.high - categories.low) / last as f64) as f32;
-    for (share, centre) in shares.iter().zip(centres(categories)) {
+    for (share, centre) in shares.iter().zip(centres) {
         let place = ((moved + discount * centre - categories.low as f32) / width).clamp(0.0, last as f32);
         let below = (place as usize).min(last - 1);
         let above = place - below as f32;
@@ -180,12 +181,12 @@ mod tests {
         let categories = Categories { count: 5, low: -2.0, high: 2.0 };
         let mean = |shares: &[f32]| shares.iter().zip(centres(categories)).map(|(share, centre)| share * centre).sum::<f32>();
         let shares = [0.1, 0.2, 0.4, 0.2, 0.1];
-        let moved = projection(categories, &shares, 0.3, 0.5);
+        let moved = projection(categories, &centres(categories), &shares, 0.3, 0.5);
         assert!((moved.iter().sum::<f32>() - 1.0).abs() < 1e-6);
         assert!((mean(&moved) - (0.3 + 0.5 * mean(&shares))).abs() < 1e-6);
         // Nothing follows: all of it lies at the reward, a quarter of the way from 0 to 1; beyond the ends it stays at the end.
         for (moved, discount, expected) in [(0.25, 0.0, [0.0, 0.0, 0.75, 0.25, 0.0]), (9.0, 1.0, [0.0, 0.0, 0.0, 0.0, 1.0])] {
-            let found = projection(categories, &shares, moved, discount);
+            let found = projection(categories, &centres(categories), &shares, moved, discount);
             assert!(found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-6), "{found:?}");
         }
     }
