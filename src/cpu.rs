@@ -4,6 +4,8 @@
 //! cannot change a result.
 
 pub mod collide;
+pub mod count;
+pub mod draw;
 pub mod drive;
 pub mod follow;
 pub mod judge;
@@ -17,9 +19,15 @@ use std::time::{Duration, Instant};
 use bytemuck::{cast_slice, cast_slice_mut};
 use rayon::prelude::*;
 
-use crate::layout::{Clearance, Control, N_RAYS, N_VALUES, Progress, RewardTerms, Truck};
-use crate::stages::{STAGES, Stage};
+use crate::cpu::count::Tally;
+use crate::layout::{Clearance, Control, N_RAYS, N_VALUES, Progress, RewardTerms, Truck, constants};
+use crate::stages::STAGES;
 use crate::world::World;
+
+constants! {
+    /// Threads of a workgroup.
+    pub const WORKGROUP: u32 = 64;
+}
 
 /// Columns of a batch.
 pub const N_COLUMNS: usize = 11;
@@ -34,7 +42,7 @@ pub struct Row<'a> {
     /// Routes that episodes run on, as indices into the world's table.
     pub choice: &'a RouteChoice,
     /// Index into the action table.
-    pub action: u32,
+    pub action: &'a mut u32,
     /// What drives the truck.
     pub control: &'a mut Control,
     /// The truck.
@@ -71,6 +79,8 @@ pub enum RouteChoice {
 pub struct Batch {
     seed: u32,
     choice: RouteChoice,
+    /// What happened since the batch was made.
+    pub(crate) tally: Tally,
     /// Index into the action table, `[n_envs]`.
     pub action: Vec<u32>,
     /// What drives each truck, `[n_envs]`.
@@ -101,6 +111,7 @@ impl Batch {
         Batch {
             seed,
             choice,
+            tally: Tally::default(),
             action: vec![0; n_envs],
             control: vec![Control::default(); n_envs],
             truck: vec![Truck::default(); n_envs],
@@ -120,6 +131,16 @@ impl Batch {
         self.truck.len()
     }
 
+    /// Which routes its episodes run on.
+    pub fn choice(&self) -> &RouteChoice {
+        &self.choice
+    }
+
+    /// What happened since the batch was made.
+    pub fn tally(&self) -> Tally {
+        self.tally
+    }
+
     /// The rows `indices` of this batch, in that order and as often as they are named: row `i` carries on as row `indices[i]` was.
     pub(crate) fn gathered(&self, indices: &[u32]) -> Batch {
         fn picked<T: Copy>(column: &[T], indices: &[u32]) -> Vec<T> {
@@ -127,6 +148,7 @@ impl Batch {
         }
         Batch {
             seed: self.seed,
+            tally: self.tally,
             choice: match &self.choice {
                 RouteChoice::Fixed(routes) => RouteChoice::Fixed(picked(routes, indices)),
                 RouteChoice::Drawn(routes) => RouteChoice::Drawn(routes.clone()),
@@ -179,11 +201,11 @@ impl Batch {
         ]
     }
 
-    /// Does `work` to every row, all cores sharing the rows.
-    pub(crate) fn for_each_row(&mut self, work: impl Fn(&mut Row) + Sync) {
+    /// Every row, all cores sharing them.
+    fn rows(&mut self) -> impl ParallelIterator<Item = Row<'_>> {
         let (seed, choice) = (self.seed, &self.choice);
         (
-            &self.action,
+            &mut self.action,
             &mut self.control,
             &mut self.truck,
             &mut self.clearance,
@@ -197,9 +219,9 @@ impl Batch {
         )
             .into_par_iter()
             .with_min_len(16)
-            .for_each(
-                |(&action, control, truck, clearance, progress, ranges, observation, next_observation, ended, terms, (env, reward))| {
-                    work(&mut Row {
+            .map(
+                move |(action, control, truck, clearance, progress, ranges, observation, next_observation, ended, terms, (env, reward))| {
+                    Row {
                         seed,
                         env: env as u32,
                         choice,
@@ -214,31 +236,45 @@ impl Batch {
                         ended,
                         terms,
                         reward,
-                    });
+                    }
                 },
-            );
+            )
+    }
+
+    /// Does `work` to every row.
+    pub(crate) fn for_each_row(&mut self, work: impl Fn(&mut Row) + Sync) {
+        self.rows().for_each(|mut row| work(&mut row));
+    }
+
+    /// Works on every row whose truck is not held; between `before` and `after` the step is counted.
+    fn drive_on(&mut self, before: &(impl Fn(&mut Row) + Sync), after: &(impl Fn(&mut Row) + Sync)) {
+        let driving = self.rows().filter(|row| row.truck.held == 0);
+        let tally = driving.fold(Tally::default, |tally, mut row| {
+            before(&mut row);
+            let tally = tally.with(&row);
+            after(&mut row);
+            tally
+        });
+        let tally = tally.reduce(Tally::default, Tally::plus);
+        self.tally = self.tally.plus(tally);
     }
 
     /// One step of every truck: all stages over a row while it is in the cache, then the next row.
     pub(crate) fn step(&mut self, world: &World) {
-        self.for_each_row(|row| {
-            if row.truck.held == 0 {
-                for stage in STAGES {
-                    (stage.cpu)(world, row);
-                }
-            }
-        });
+        let [stages @ .., last] = &STAGES;
+        self.drive_on(&|row| stages.iter().for_each(|stage| (stage.cpu)(world, row)), &|row| (last.cpu)(world, row));
     }
 
     /// The same step a stage at a time over all rows: the time of each, in the order of [`STAGES`].
     pub(crate) fn step_by_stage(&mut self, world: &World) -> [Duration; STAGES.len()] {
-        STAGES.map(|Stage { cpu, .. }| {
+        std::array::from_fn(|index| {
             let begun = Instant::now();
-            self.for_each_row(|row| {
-                if row.truck.held == 0 {
-                    cpu(world, row);
-                }
-            });
+            let cpu = STAGES[index].cpu;
+            if index + 1 == STAGES.len() {
+                self.drive_on(&|_| (), &|row| cpu(world, row));
+            } else {
+                self.rows().filter(|row| row.truck.held == 0).for_each(|mut row| cpu(world, &mut row));
+            }
             begun.elapsed()
         })
     }

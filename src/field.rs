@@ -7,8 +7,12 @@ mod bake;
 
 use glam::Vec2;
 
-/// Bits of a cell's word that hold the logarithm of its sub-cells a side; the rest is where its block begins.
-const LEVEL_BITS: u32 = 3;
+use crate::layout::constants;
+
+constants! {
+    /// Bits of a cell's word that hold the logarithm of its sub-cells a side; the rest is where its block begins.
+    const LEVEL_BITS: u32 = 3;
+}
 /// From here on f32 has no fractions: adding it to a smaller number leaves the whole part in the lower bits.
 const WHOLE: f32 = 8_388_608.0;
 const WHOLE_BITS: u32 = 0x7f_ffff;

@@ -3,283 +3,299 @@
 //! Each struct is plain data without padding (vectors first, then scalars), so that a column of them can be copied to a device as it is.
 //! SI units and radians throughout; headings lie in (-pi, pi].
 
-use bytemuck::{Pod, Zeroable};
+pub mod buffers;
+pub(crate) mod shared;
+
 use glam::Vec2;
 
-/// Values in an observation.
-pub const N_VALUES: usize = 69;
-/// Distance sensors on the trailer, left and right alternating, front to rear.
-pub const N_TRAILER_RAYS: usize = 16;
-/// Distance sensors on the tractor, from left 90 deg to right 90 deg.
-pub const N_TRACTOR_RAYS: usize = 13;
-/// Distance sensors in all: the trailer's first, then the tractor's, as the observation has them.
-pub const N_RAYS: usize = N_TRAILER_RAYS + N_TRACTOR_RAYS;
-/// Values of an observation that depend on the waypoint alone: future and current curvature, radius ahead.
-pub const N_PREVIEW: usize = 18;
+use crate::angle::direction;
+use crate::{angle, cpu, field, random};
+pub(crate) use shared::{constants, shared};
 
-/// What drives one truck through a step.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Control {
-    /// Steer angle asked for [rad].
-    pub steering: f32,
-    /// Acceleration asked for [m/s^2].
-    pub acceleration: f32,
-    /// Integral of the speed error [m].
-    pub speed_error_integral: f32,
+constants! {
+    /// Values in an observation.
+    pub const N_VALUES: usize = 69;
+    /// Distance sensors on the trailer, left and right alternating, front to rear.
+    pub const N_TRAILER_RAYS: usize = 16;
+    /// Distance sensors on the tractor, from left 90 deg to right 90 deg.
+    pub const N_TRACTOR_RAYS: usize = 13;
+    /// Distance sensors in all: the trailer's first, then the tractor's, as the observation has them.
+    pub const N_RAYS: usize = N_TRAILER_RAYS + N_TRACTOR_RAYS;
+    /// Values of an observation that depend on the waypoint alone: future and current curvature, radius ahead.
+    pub const N_PREVIEW: usize = 18;
 }
 
-/// One tractor and its trailer.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Truck {
-    /// Middle of the drive axle [m].
-    pub position: Vec2,
-    /// Heading of the tractor, counter-clockwise from +x [rad].
-    pub heading: f32,
-    /// Heading of the trailer, counter-clockwise from +x [rad].
-    pub trailer_heading: f32,
-    /// Speed of the drive axle along the tractor's heading [m/s].
-    pub speed: f32,
-    /// Steer angle of the front axle, left positive [rad].
-    pub steering: f32,
-    /// Roll angle of the tractor [rad].
-    pub tractor_roll: f32,
-    /// Roll rate of the tractor [rad/s].
-    pub tractor_roll_rate: f32,
-    /// Roll angle of the trailer [rad].
-    pub trailer_roll: f32,
-    /// Roll rate of the trailer [rad/s].
-    pub trailer_roll_rate: f32,
-    /// Load transfer ratio of the tractor, the largest of the step in magnitude, signed [1].
-    pub tractor_load_transfer_ratio: f32,
-    /// Load transfer ratio of the trailer, the largest of the step in magnitude, signed [1].
-    pub trailer_load_transfer_ratio: f32,
-    /// Index of the route in the world.
-    pub route: u32,
-    /// Episodes this truck has begun before this one.
-    pub episode: u32,
-    /// Steps taken in this episode.
-    pub steps: u32,
-    /// The truck stands still because its episode has ended and nobody began another (0 or 1).
-    pub held: u32,
+shared! {
+    /// What drives one truck through a step.
+    pub struct Control {
+        /// Steer angle asked for [rad].
+        pub steering: f32,
+        /// Acceleration asked for [m/s^2].
+        pub acceleration: f32,
+        /// Integral of the speed error [m].
+        pub speed_error_integral: f32,
+    }
+
+    /// One tractor and its trailer.
+    pub struct Truck {
+        /// Middle of the drive axle [m].
+        pub position: Vec2,
+        /// Heading of the tractor, counter-clockwise from +x [rad].
+        pub heading: f32,
+        /// Heading of the trailer, counter-clockwise from +x [rad].
+        pub trailer_heading: f32,
+        /// Speed of the drive axle along the tractor's heading [m/s].
+        pub speed: f32,
+        /// Steer angle of the front axle, left positive [rad].
+        pub steering: f32,
+        /// Roll angle of the tractor [rad].
+        pub tractor_roll: f32,
+        /// Roll rate of the tractor [rad/s].
+        pub tractor_roll_rate: f32,
+        /// Roll angle of the trailer [rad].
+        pub trailer_roll: f32,
+        /// Roll rate of the trailer [rad/s].
+        pub trailer_roll_rate: f32,
+        /// Load transfer ratio of the tractor, the largest of the step in magnitude, signed [1].
+        pub tractor_load_transfer_ratio: f32,
+        /// Load transfer ratio of the trailer, the largest of the step in magnitude, signed [1].
+        pub trailer_load_transfer_ratio: f32,
+        /// Index of the route in the world.
+        pub route: u32,
+        /// Episodes this truck has begun before this one.
+        pub episode: u32,
+        /// Steps taken in this episode.
+        pub steps: u32,
+        /// The truck stands still because its episode has ended and nobody began another (0 or 1).
+        pub held: u32,
+    }
+
+    /// Where a truck begins its route: shares of the largest start errors, each in -1..=1; zeros are the lane centre.
+    pub struct Start {
+        /// Share of the largest lateral offset, left positive.
+        pub offset: f32,
+        /// Share of the largest heading error, counter-clockwise positive.
+        pub heading: f32,
+    }
+
+    /// Distance from a unit's outline to the nearest solid edge, negative where they touch [m]. Touching is exact to 2 cm; the distance is
+    /// never less than the true one by more than the field's error, and at most twice it plus 2 cm: far from a kerb fewer points are sampled.
+    pub struct Clearance {
+        /// Of the tractor [m].
+        pub tractor: f32,
+        /// Of the trailer [m].
+        pub trailer: f32,
+    }
+
+    /// How far along its route a truck is.
+    pub struct Progress {
+        /// Distance from the reference point to the lane centre [m].
+        pub lane_distance: f32,
+        /// Distance from the reference point to the next waypoint [m].
+        pub waypoint_distance: f32,
+        /// Next waypoint to pass, counted from the route's first; the route's number of waypoints once all are passed.
+        pub waypoint: u32,
+        /// Waypoints passed in this step.
+        pub passed: u32,
+    }
+
+    /// The physical amounts that the reward weighs.
+    pub struct RewardTerms {
+        /// Waypoints passed in this step.
+        pub waypoints: f32,
+        /// Distance to the lane centre, limited and scaled to 0..1.
+        pub lane_distance: f32,
+        /// How far the nearer unit is within the margin kept from kerbs, 0 outside it to 1 at a kerb.
+        pub clearance: f32,
+        /// 1 when the episode failed in this step.
+        pub failure: f32,
+    }
+
+    /// One distance sensor, fixed to a unit. A tractor's frame starts at the drive axle, a trailer's at its axle group.
+    pub struct Ray {
+        /// Mount in the unit's frame, x forward, y left [m].
+        pub origin: Vec2,
+        /// Unit vector in the unit's frame.
+        pub direction: Vec2,
+    }
+
+    /// A rectangle fixed to a unit's frame.
+    pub struct Body {
+        /// Front end, ahead of the frame's origin [m].
+        pub front: f32,
+        /// Rear end, ahead of the frame's origin (negative when behind) [m].
+        pub rear: f32,
+        /// Half of the width [m].
+        pub half_width: f32,
+    }
+
+    /// One unit's roll model, discretised for a sub-step: `next = transition * state + input * lateral acceleration`.
+    pub struct Roll {
+        /// Row-major transition of (roll, roll rate) over one sub-step.
+        pub transition: [f32; 4],
+        /// What a lateral acceleration of 1 m/s^2 held through the sub-step adds to (roll, roll rate).
+        pub input: [f32; 2],
+        /// Load transfer ratio per m/s^2 of lateral acceleration.
+        pub per_acceleration: f32,
+        /// Load transfer ratio per rad of roll.
+        pub per_roll: f32,
+        /// Load transfer ratio per rad/s of roll rate.
+        pub per_roll_rate: f32,
+    }
+
+    /// The vehicle as the stages need it.
+    pub struct Rig {
+        /// Front axle ahead of the drive axle [m].
+        pub wheelbase: f32,
+        /// Fifth wheel ahead of the drive axle [m].
+        pub fifth_wheel: f32,
+        /// Kingpin ahead of the trailer's axle group [m].
+        pub trailer_wheelbase: f32,
+        /// Slip factor [rad/(m/s^2)].
+        pub slip: f32,
+        /// Largest steer angle [rad].
+        pub steer_max: f32,
+        /// Fastest change of the steer angle [rad/s].
+        pub steer_rate: f32,
+        /// Strongest braking, negative [m/s^2].
+        pub acceleration_min: f32,
+        /// Strongest drive [m/s^2].
+        pub acceleration_max: f32,
+        /// Lateral acceleration that the tyres can hold [m/s^2].
+        pub lateral_acceleration_max: f32,
+        /// Speed control: acceleration per speed error [1/s].
+        pub speed_gain: f32,
+        /// Speed control: acceleration per integral of the speed error [1/s^2].
+        pub speed_integral_gain: f32,
+        /// Speed control: speed error beyond which nothing is integrated [m/s].
+        pub speed_integral_band: f32,
+        /// Speed control: strongest braking it asks for, negative [m/s^2].
+        pub speed_braking: f32,
+        /// The tractor's outline.
+        pub tractor_body: Body,
+        /// The trailer's outline.
+        pub trailer_body: Body,
+        /// The tractor's roll.
+        pub tractor_roll: Roll,
+        /// The trailer's roll.
+        pub trailer_roll: Roll,
+    }
+
+    /// One entry of the action table.
+    pub struct Action {
+        /// Steer angle asked for [rad].
+        pub steering: f32,
+        /// Speed asked for [m/s].
+        pub speed: f32,
+    }
+
+    /// What every truck of a batch shares beside the world: vehicle, time, weights.
+    pub struct Params {
+        /// The vehicle.
+        pub rig: Rig,
+        /// Time of one sub-step [s].
+        pub substep: f32,
+        /// Sub-steps in a step.
+        pub n_substeps: u32,
+        /// Entries of the action table.
+        pub n_actions: u32,
+        /// Reach of a distance sensor [m].
+        pub sensor_range: f32,
+        /// Largest lateral offset at the start [m].
+        pub start_offset: f32,
+        /// Largest heading error at the start [rad].
+        pub start_heading: f32,
+        /// Speed at the start [m/s].
+        pub start_speed: f32,
+        /// A waypoint further off than this is neither passed nor within reach: the truck has strayed [m].
+        pub stray_distance: f32,
+        /// Articulation beyond which the truck is jackknifed [rad].
+        pub jackknife_angle: f32,
+        /// Load transfer ratio from which the truck has rolled over.
+        pub rollover_ratio: f32,
+        /// Distance to the lane centre at which its reward term is 1 [m].
+        pub lane_distance_limit: f32,
+        /// Reward for each waypoint passed.
+        pub waypoint_weight: f32,
+        /// Reward for the lane-distance term, each step.
+        pub lane_distance_weight: f32,
+        /// Margin kept from kerbs, within which the clearance term counts [m].
+        pub clearance_limit: f32,
+        /// Reward for the clearance term, each step.
+        pub clearance_weight: f32,
+        /// Reward when the episode fails.
+        pub failure_weight: f32,
+    }
+
+    /// One waypoint of one route.
+    pub struct WaypointRow {
+        /// Place on the lane centre [m].
+        pub position: Vec2,
+        /// Unit vector along the lane.
+        pub direction: Vec2,
+    }
+
+    /// What an observation needs of the route around one waypoint.
+    pub struct PreviewRow {
+        /// Heading of the lane [rad].
+        pub heading: f32,
+        /// Scaled as observed: 4 future curvatures, 4 current ones, 10 radii ahead.
+        pub values: [f32; N_PREVIEW],
+    }
+
+    /// One route in the world's table of waypoints.
+    pub struct RouteRow {
+        /// Its first waypoint in the table.
+        pub first: u32,
+        /// Its number of waypoints.
+        pub n_waypoints: u32,
+        /// Its roundabout.
+        pub roundabout: u32,
+        /// Steps after which an episode is timed out.
+        pub step_limit: u32,
+        /// Reach of a waypoint's crossing line to the left [m].
+        pub crossing_left: f32,
+        /// Reach of a waypoint's crossing line to the right [m].
+        pub crossing_right: f32,
+    }
+
+    /// One roundabout's field among the tables of all fields.
+    pub struct FieldRow {
+        /// South-west corner of the grid [m].
+        pub origin: Vec2,
+        /// Cells in a metre [1/m].
+        pub cells_per_metre: f32,
+        /// Cells from west to east.
+        pub columns: u32,
+        /// Cells from south to north.
+        pub rows: u32,
+        /// Where its cells begin.
+        pub first_cell: u32,
+        /// Where those for marching begin.
+        pub first_march_cell: u32,
+        /// Where its blocks' pairs begin.
+        pub first_pair: u32,
+    }
+
+    /// What the trucks of a batch share.
+    pub struct BatchFacts {
+        /// Trucks.
+        pub n_envs: u32,
+        /// What routes, poses and random actions are drawn from.
+        pub seed: u32,
+        /// Routes to draw from.
+        pub n_routes: u32,
+        /// Each truck runs the route of its own place once and is then held (0 or 1).
+        pub fixed: u32,
+    }
 }
 
 impl Truck {
     /// Middle of the trailer's axle group [m].
     #[inline]
     pub fn trailer_position(&self, rig: &Rig) -> Vec2 {
-        self.position + rig.fifth_wheel * Vec2::from_angle(self.heading) - rig.trailer_wheelbase * Vec2::from_angle(self.trailer_heading)
+        self.position + rig.fifth_wheel * direction(self.heading) - rig.trailer_wheelbase * direction(self.trailer_heading)
     }
-}
-
-/// Where a truck begins its route: shares of the largest start errors, each in -1..=1; zeros are the lane centre.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Start {
-    /// Share of the largest lateral offset, left positive.
-    pub offset: f32,
-    /// Share of the largest heading error, counter-clockwise positive.
-    pub heading: f32,
-}
-
-/// Distance from a unit's outline to the nearest solid edge, negative where they touch [m]. Touching is exact to 2 cm; the distance is
-/// never less than the true one by more than the field's error, and at most twice it plus 2 cm: far from a kerb fewer points are sampled.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Clearance {
-    /// Of the tractor [m].
-    pub tractor: f32,
-    /// Of the trailer [m].
-    pub trailer: f32,
-}
-
-/// How far along its route a truck is.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Progress {
-    /// Distance from the reference point to the lane centre [m].
-    pub lane_distance: f32,
-    /// Distance from the reference point to the next waypoint [m].
-    pub waypoint_distance: f32,
-    /// Next waypoint to pass, counted from the route's first; the route's number of waypoints once all are passed.
-    pub waypoint: u32,
-    /// Waypoints passed in this step.
-    pub passed: u32,
-}
-
-/// The physical amounts that the reward weighs.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct RewardTerms {
-    /// Waypoints passed in this step.
-    pub waypoints: f32,
-    /// Distance to the lane centre, limited and scaled to 0..1.
-    pub lane_distance: f32,
-    /// How far the nearer unit is within the margin kept from kerbs, 0 outside it to 1 at a kerb.
-    pub clearance: f32,
-    /// 1 when the episode failed in this step.
-    pub failure: f32,
-}
-
-/// One distance sensor, fixed to a unit. A tractor's frame starts at the drive axle, a trailer's at its axle group.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Ray {
-    /// Mount in the unit's frame, x forward, y left [m].
-    pub origin: Vec2,
-    /// Unit vector in the unit's frame.
-    pub direction: Vec2,
-}
-
-/// A rectangle fixed to a unit's frame.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Body {
-    /// Front end, ahead of the frame's origin [m].
-    pub front: f32,
-    /// Rear end, ahead of the frame's origin (negative when behind) [m].
-    pub rear: f32,
-    /// Half of the width [m].
-    pub half_width: f32,
-}
-
-/// One unit's roll model, discretised for a sub-step: `next = transition * state + input * lateral acceleration`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Roll {
-    /// Row-major transition of (roll, roll rate) over one sub-step.
-    pub transition: [f32; 4],
-    /// What a lateral acceleration of 1 m/s^2 held through the sub-step adds to (roll, roll rate).
-    pub input: [f32; 2],
-    /// Load transfer ratio per m/s^2 of lateral acceleration.
-    pub per_acceleration: f32,
-    /// Load transfer ratio per rad of roll.
-    pub per_roll: f32,
-    /// Load transfer ratio per rad/s of roll rate.
-    pub per_roll_rate: f32,
-}
-
-/// The vehicle as the stages need it.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Rig {
-    /// Front axle ahead of the drive axle [m].
-    pub wheelbase: f32,
-    /// Fifth wheel ahead of the drive axle [m].
-    pub fifth_wheel: f32,
-    /// Kingpin ahead of the trailer's axle group [m].
-    pub trailer_wheelbase: f32,
-    /// Slip factor [rad/(m/s^2)].
-    pub slip: f32,
-    /// Largest steer angle [rad].
-    pub steer_max: f32,
-    /// Fastest change of the steer angle [rad/s].
-    pub steer_rate: f32,
-    /// Strongest braking, negative [m/s^2].
-    pub acceleration_min: f32,
-    /// Strongest drive [m/s^2].
-    pub acceleration_max: f32,
-    /// Lateral acceleration that the tyres can hold [m/s^2].
-    pub lateral_acceleration_max: f32,
-    /// Speed control: acceleration per speed error [1/s].
-    pub speed_gain: f32,
-    /// Speed control: acceleration per integral of the speed error [1/s^2].
-    pub speed_integral_gain: f32,
-    /// Speed control: speed error beyond which nothing is integrated [m/s].
-    pub speed_integral_band: f32,
-    /// Speed control: strongest braking it asks for, negative [m/s^2].
-    pub speed_braking: f32,
-    /// The tractor's outline.
-    pub tractor_body: Body,
-    /// The trailer's outline.
-    pub trailer_body: Body,
-    /// The tractor's roll.
-    pub tractor_roll: Roll,
-    /// The trailer's roll.
-    pub trailer_roll: Roll,
-}
-
-/// One entry of the action table.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Action {
-    /// Steer angle asked for [rad].
-    pub steering: f32,
-    /// Speed asked for [m/s].
-    pub speed: f32,
-}
-
-/// What every truck of a batch shares beside the world: vehicle, time, weights.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct Params {
-    /// The vehicle.
-    pub rig: Rig,
-    /// Time of one sub-step [s].
-    pub substep: f32,
-    /// Sub-steps in a step.
-    pub n_substeps: u32,
-    /// Entries of the action table.
-    pub n_actions: u32,
-    /// Reach of a distance sensor [m].
-    pub sensor_range: f32,
-    /// Largest lateral offset at the start [m].
-    pub start_offset: f32,
-    /// Largest heading error at the start [rad].
-    pub start_heading: f32,
-    /// Speed at the start [m/s].
-    pub start_speed: f32,
-    /// A waypoint further off than this is neither passed nor within reach: the truck has strayed [m].
-    pub stray_distance: f32,
-    /// Articulation beyond which the truck is jackknifed [rad].
-    pub jackknife_angle: f32,
-    /// Load transfer ratio from which the truck has rolled over.
-    pub rollover_ratio: f32,
-    /// Distance to the lane centre at which its reward term is 1 [m].
-    pub lane_distance_limit: f32,
-    /// Reward for each waypoint passed.
-    pub waypoint_weight: f32,
-    /// Reward for the lane-distance term, each step.
-    pub lane_distance_weight: f32,
-    /// Margin kept from kerbs, within which the clearance term counts [m].
-    pub clearance_limit: f32,
-    /// Reward for the clearance term, each step.
-    pub clearance_weight: f32,
-    /// Reward when the episode fails.
-    pub failure_weight: f32,
-}
-
-/// One waypoint of one route, with all that an observation needs of the route around it.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct WaypointRow {
-    /// Place on the lane centre [m].
-    pub position: Vec2,
-    /// Unit vector along the lane.
-    pub direction: Vec2,
-    /// Heading of the lane [rad].
-    pub heading: f32,
-    /// Scaled as observed: 4 future curvatures, 4 current ones, 10 radii ahead.
-    pub preview: [f32; N_PREVIEW],
-}
-
-/// One route in the world's table of waypoints.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-pub struct RouteRow {
-    /// Its first waypoint in the table.
-    pub first: u32,
-    /// Its number of waypoints.
-    pub n_waypoints: u32,
-    /// Its roundabout.
-    pub roundabout: u32,
-    /// Steps after which an episode is timed out.
-    pub step_limit: u32,
-    /// Reach of a waypoint's crossing line to the left [m].
-    pub crossing_left: f32,
-    /// Reach of a waypoint's crossing line to the right [m].
-    pub crossing_right: f32,
 }
 
 /// Why an episode ended. Failure wins over arrival, everything wins over the clock.
@@ -350,4 +366,28 @@ impl Ended {
     pub fn failed(self) -> bool {
         self.terminated() && self != Ended::Arrived
     }
+}
+
+/// `shaders/layout.wgsl`: all that shaders share with Rust.
+pub fn wgsl() -> String {
+    let ends = Ended::ALL.map(|ended| format!("const {}: u32 = {}u;\n", ended.name().to_uppercase(), ended as u32));
+    [
+        "// What shaders share with Rust. Printed from src/layout.rs and the constants beside each stage: change those.\n\n".to_owned(),
+        printed_constants(),
+        angle::printed_constants(),
+        field::printed_constants(),
+        random::printed_constants(),
+        cpu::printed_constants(),
+        cpu::drive::printed_constants(),
+        cpu::collide::printed_constants(),
+        cpu::sense::printed_constants(),
+        cpu::observe::printed_constants(),
+        cpu::count::printed_constants(),
+        "\n// Why an episode ended.\n".to_owned(),
+        ends.concat(),
+        "\n".to_owned(),
+        printed_structs(),
+        buffers::printed(),
+    ]
+    .concat()
 }

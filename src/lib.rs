@@ -7,6 +7,8 @@ pub mod angle; // angles in plain f32
 pub mod cpu; // the CPU engine
 pub mod field; // the signed distance to the kerbs, baked
 pub mod geometry; // arcs, segments, outlines; exact distances
+#[cfg(feature = "gpu")]
+pub mod gpu; // the engine of compute shaders
 pub mod layout; // rows and constants that engines share
 pub mod random; // numbers from (seed, env, episode, draw)
 pub mod roundabout; // parameters -> kerbs and lanes

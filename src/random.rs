@@ -2,6 +2,25 @@
 //!
 //! The mixer is pcg4d of M. Jarzynski and M. Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020): u32 arithmetic alone.
 
+use crate::layout::constants;
+
+constants! {
+    /// Factor that tells neighbouring counters apart, of D. Lehmer's kind of generator.
+    const FACTOR: u32 = 1_664_525;
+    /// What is added then.
+    const ADDEND: u32 = 1_013_904_223;
+    /// A word has this many bits below those that an f32 holds.
+    const SPARE_BITS: u32 = 8;
+    /// What the others count in.
+    const UNIT: f32 = 1.0 / 8_388_608.0;
+    /// [`Draw::Route`] as shaders name it.
+    const DRAW_ROUTE: u32 = Draw::Route as u32;
+    /// [`Draw::Pose`].
+    const DRAW_POSE: u32 = Draw::Pose as u32;
+    /// [`Draw::Action`].
+    const DRAW_ACTION: u32 = Draw::Action as u32;
+}
+
 /// What a number is drawn for: each purpose has its own stream.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,7 +35,7 @@ pub enum Draw {
 
 /// Four random words.
 pub fn words(seed: u32, env: u32, episode: u32, draw: u32) -> [u32; 4] {
-    let [mut x, mut y, mut z, mut w] = [seed, env, episode, draw].map(|word| word.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
+    let [mut x, mut y, mut z, mut w] = [seed, env, episode, draw].map(|word| word.wrapping_mul(FACTOR).wrapping_add(ADDEND));
     x = x.wrapping_add(y.wrapping_mul(w));
     y = y.wrapping_add(z.wrapping_mul(x));
     z = z.wrapping_add(x.wrapping_mul(y));
@@ -31,7 +50,7 @@ pub fn words(seed: u32, env: u32, episode: u32, draw: u32) -> [u32; 4] {
 
 /// A word as a number in [-1, 1): its upper 24 bits, exact in f32.
 pub fn signed_unit(word: u32) -> f32 {
-    (word >> 8) as f32 * (1.0 / 8_388_608.0) - 1.0
+    (word >> SPARE_BITS) as f32 * UNIT - 1.0
 }
 
 /// A word as an index below `n`, as even as 32 bits allow.

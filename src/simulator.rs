@@ -4,9 +4,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::cpu;
+pub use crate::cpu::count::Tally;
 pub use crate::cpu::{Batch, RouteChoice};
+#[cfg(feature = "gpu")]
+use crate::gpu;
 use crate::layout::Start;
-use crate::random::{self, Draw};
 use crate::stages::STAGES;
 use crate::world::World;
 
@@ -91,6 +93,10 @@ pub enum Error {
         /// Bytes needed.
         n_bytes: usize,
     },
+    /// The device.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] gpu::Error),
     /// A truck to go on with that cannot be in this world.
     #[error("{column}[{env}]: {found}; the world has {limit}")]
     OutsideWorld {
@@ -105,17 +111,45 @@ pub enum Error {
     },
 }
 
+/// What steps a batch.
+#[derive(Debug, Clone, Default)]
+pub enum Engine {
+    /// The processor: all of its cores.
+    #[default]
+    Cpu,
+    /// Compute shaders on a device.
+    #[cfg(feature = "gpu")]
+    Gpu {
+        /// The device.
+        device: gpu::Device,
+        /// Columns that lie in memory of the caller.
+        columns: gpu::Columns,
+    },
+}
+
 /// A batch of trucks in a world.
 #[derive(Debug)]
 pub struct Simulator {
     world: Arc<World>,
-    batch: Batch,
-    seed: u32,
+    batch: Columns,
+}
+
+/// The columns, where their engine has them.
+#[derive(Debug)]
+enum Columns {
+    Cpu(Batch),
+    #[cfg(feature = "gpu")]
+    Gpu(Box<gpu::Batch>),
 }
 
 impl Simulator {
-    /// `n_envs` trucks, reset and ready for their first action.
+    /// `n_envs` trucks on the processor, reset and ready for their first action.
     pub fn new(world: Arc<World>, n_envs: usize, seed: u32, choice: RouteChoice) -> Result<Simulator, Error> {
+        Simulator::on(Engine::Cpu, world, n_envs, seed, choice)
+    }
+
+    /// `n_envs` trucks on an engine, reset and ready for their first action.
+    pub fn on(engine: Engine, world: Arc<World>, n_envs: usize, seed: u32, choice: RouteChoice) -> Result<Simulator, Error> {
         let (RouteChoice::Drawn(routes) | RouteChoice::Fixed(routes)) = &choice;
         if n_envs == 0 {
             return Err(Error::EmptyBatch);
@@ -129,7 +163,12 @@ impl Simulator {
         if matches!(choice, RouteChoice::Fixed(_)) && routes.len() != n_envs {
             return Err(Error::RouteCount { n_routes: routes.len(), n_envs });
         }
-        let mut simulator = Simulator { batch: Batch::new(n_envs, seed, choice), world, seed };
+        let batch = match engine {
+            Engine::Cpu => Columns::Cpu(Batch::new(n_envs, seed, choice)),
+            #[cfg(feature = "gpu")]
+            Engine::Gpu { device, columns } => Columns::Gpu(Box::new(gpu::Batch::new(&device, &world, n_envs, seed, choice, columns)?)),
+        };
+        let mut simulator = Simulator { batch, world };
         simulator.reset();
         Ok(simulator)
     }
@@ -139,19 +178,55 @@ impl Simulator {
         &self.world
     }
 
-    /// The columns, as the last step or reset left them.
+    /// Trucks in the batch.
+    pub fn n_envs(&self) -> usize {
+        match &self.batch {
+            Columns::Cpu(batch) => batch.n_envs(),
+            #[cfg(feature = "gpu")]
+            Columns::Gpu(batch) => batch.n_envs(),
+        }
+    }
+
+    /// The columns, as the last step or reset left them. From a device they are read when they are first asked for after a step; of one
+    /// that was lost meanwhile nothing can be read, and the next step says so.
     pub fn batch(&self) -> &Batch {
-        &self.batch
+        match &self.batch {
+            Columns::Cpu(batch) => batch,
+            #[cfg(feature = "gpu")]
+            Columns::Gpu(batch) => batch.columns(),
+        }
+    }
+
+    /// The batch on its device, none on the processor: for who computes beside it there.
+    #[cfg(feature = "gpu")]
+    pub fn on_device(&mut self) -> Option<&mut gpu::Batch> {
+        match &mut self.batch {
+            Columns::Cpu(_) => None,
+            Columns::Gpu(batch) => Some(batch),
+        }
+    }
+
+    /// What happened since the batch was made.
+    pub fn tally(&self) -> Result<Tally, Error> {
+        match &self.batch {
+            Columns::Cpu(batch) => Ok(batch.tally()),
+            #[cfg(feature = "gpu")]
+            Columns::Gpu(batch) => Ok(batch.tally()?),
+        }
     }
 
     /// Begins episode 0 of every truck.
     pub fn reset(&mut self) {
-        self.batch.for_each_row(|row| cpu::reset::begin(&self.world, row, 0));
+        match &mut self.batch {
+            Columns::Cpu(batch) => batch.for_each_row(|row| cpu::reset::begin(&self.world, row, 0)),
+            #[cfg(feature = "gpu")]
+            Columns::Gpu(batch) => batch.reset(),
+        }
     }
 
     /// Begins episode 0 of every truck at a stated pose, `[n_envs]`, rather than a drawn one. An error leaves the batch as it was.
     pub fn reset_from(&mut self, starts: &[Start]) -> Result<(), Error> {
-        let n_envs = self.batch.n_envs();
+        let n_envs = self.n_envs();
         if starts.len() != n_envs {
             return Err(Error::StartCount { n_starts: starts.len(), n_envs });
         }
@@ -160,8 +235,7 @@ impl Simulator {
                 return Err(Error::UnknownStart { env, share: share.to_string() });
             }
         }
-        self.batch.for_each_row(|row| cpu::reset::begin_from(&self.world, row, 0, &starts[row.env as usize]));
-        Ok(())
+        self.change(true, |world, batch| batch.for_each_row(|row| cpu::reset::begin_from(world, row, 0, &starts[row.env as usize])))
     }
 
     /// Makes row `i` what row `indices[i]` was, so that one truck can go on in several ways: the batch then has `indices.len()` trucks.
@@ -169,21 +243,25 @@ impl Simulator {
     /// A truck that was ended and held stays so. A fixed route moves with its truck; what is drawn later depends on the new row. An error
     /// leaves the batch as it was.
     pub fn gather(&mut self, indices: &[u32]) -> Result<(), Error> {
-        let n_envs = self.batch.n_envs();
+        let n_envs = self.n_envs();
         if indices.is_empty() {
             return Err(Error::EmptyBatch);
         }
         if let Some((place, &index)) = indices.iter().enumerate().find(|&(_, &index)| n_envs <= index as usize) {
             return Err(Error::UnknownTruck { place, index, n_envs });
         }
-        self.batch = self.batch.gathered(indices);
+        match &mut self.batch {
+            Columns::Cpu(batch) => *batch = batch.gathered(indices),
+            #[cfg(feature = "gpu")]
+            Columns::Gpu(batch) => **batch = batch.gathered(&self.world, indices)?,
+        }
         Ok(())
     }
 
-    /// Goes on from columns that [`Batch::columns`] gave, found by their names: with the same world, seed and routes every later step is the
-    /// same bit for bit. An error leaves the batch as it was.
+    /// Goes on from columns that [`Batch::columns`] gave, found by their names: with the same world, engine, seed and routes every later step
+    /// is the same bit for bit. An error leaves the batch as it was.
     pub fn restore<'a>(&mut self, column: impl Fn(&str) -> Option<&'a [u8]>) -> Result<(), Error> {
-        let mut batch = self.batch.clone();
+        let mut batch = self.batch().clone();
         let n_envs = batch.n_envs();
         for (name, bytes) in batch.columns_mut() {
             let found = column(name);
@@ -202,13 +280,29 @@ impl Simulator {
                 return Err(Error::OutsideWorld { column: "progress", env, found: progress.waypoint, limit });
             }
         }
-        self.batch = batch;
+        self.change(false, |_, columns| *columns = batch)
+    }
+
+    /// Changes the columns on the host, wherever they are; then every truck looks around on its own engine if `look` says so.
+    fn change(&mut self, look: bool, change: impl FnOnce(&World, &mut Batch)) -> Result<(), Error> {
+        match &mut self.batch {
+            Columns::Cpu(batch) => change(&self.world, batch),
+            #[cfg(feature = "gpu")]
+            Columns::Gpu(batch) => {
+                let mut host = batch.columns().clone();
+                change(&self.world, &mut host);
+                batch.upload(&host, look);
+                batch.device().check()?;
+            }
+        }
+        // The processor has looked while it changed them.
+        let _ = look;
         Ok(())
     }
 
     /// One step of every truck. An error leaves the batch as it was.
     pub fn step(&mut self, actions: &[u32]) -> Result<(), Error> {
-        let n_envs = self.batch.n_envs();
+        let n_envs = self.n_envs();
         if actions.len() != n_envs {
             return Err(Error::ActionCount { n_actions: actions.len(), n_envs });
         }
@@ -216,28 +310,51 @@ impl Simulator {
         if let Some((env, &action)) = actions.iter().enumerate().find(|&(_, &action)| limit <= action) {
             return Err(Error::UnknownAction { env, action, limit });
         }
-        self.batch.action.copy_from_slice(actions);
-        self.batch.step(&self.world);
+        match &mut self.batch {
+            Columns::Cpu(batch) => {
+                batch.action.copy_from_slice(actions);
+                batch.step(&self.world);
+            }
+            #[cfg(feature = "gpu")]
+            Columns::Gpu(batch) => {
+                batch.device().check()?;
+                batch.set_actions(actions);
+                batch.step();
+            }
+        }
         Ok(())
     }
 
     /// One step of every truck with an action drawn from (seed, env, episode, step), each as likely as the next.
     pub fn step_at_random(&mut self) {
-        self.draw_actions();
-        self.batch.step(&self.world);
+        match &mut self.batch {
+            Columns::Cpu(batch) => {
+                batch.for_each_row(|row| cpu::draw::draw(&self.world, row));
+                batch.step(&self.world);
+            }
+            #[cfg(feature = "gpu")]
+            Columns::Gpu(batch) => batch.step_at_random(),
+        }
     }
 
     /// [`Simulator::step_at_random`] a stage at a time over the whole batch, for timing: same result, one duration a stage.
-    pub fn step_at_random_by_stage(&mut self) -> [Duration; STAGES.len()] {
-        self.draw_actions();
-        self.batch.step_by_stage(&self.world)
+    pub fn step_at_random_by_stage(&mut self) -> Result<[Duration; STAGES.len()], Error> {
+        match &mut self.batch {
+            Columns::Cpu(batch) => {
+                batch.for_each_row(|row| cpu::draw::draw(&self.world, row));
+                Ok(batch.step_by_stage(&self.world))
+            }
+            #[cfg(feature = "gpu")]
+            Columns::Gpu(batch) => Ok(batch.step_at_random_by_stage()?),
+        }
     }
 
-    fn draw_actions(&mut self) {
-        let n_actions = self.world.params.n_actions;
-        for (env, (action, truck)) in self.batch.action.iter_mut().zip(&self.batch.truck).enumerate() {
-            let [word, ..] = random::words(self.seed, env as u32, truck.episode, (Draw::Action as u32).wrapping_add(truck.steps));
-            *action = random::index_below(word, n_actions);
+    /// Waits until every step asked for is done: a device works while its caller goes on.
+    pub fn wait(&self) -> Result<(), Error> {
+        match &self.batch {
+            Columns::Cpu(_) => Ok(()),
+            #[cfg(feature = "gpu")]
+            Columns::Gpu(batch) => Ok(batch.wait()?),
         }
     }
 }

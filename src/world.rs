@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use glam::{DVec2, Vec2};
 
 use crate::field::Field;
-use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, Ray, RouteRow, WaypointRow};
+use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, RouteRow, WaypointRow};
 use crate::route::{Route, Waypoint};
 use crate::scenario::Scenario;
 
@@ -31,6 +31,8 @@ pub struct World {
     pub fields: Vec<Field>,
     /// Every route's waypoints, one route after the other.
     pub waypoints: Vec<WaypointRow>,
+    /// What is observed at each of them, in the same order.
+    pub previews: Vec<PreviewRow>,
     /// Every route, in the order of `route_names`.
     pub routes: Vec<RouteRow>,
     /// `20m/N-left-3` and the like.
@@ -44,6 +46,7 @@ impl World {
         let rig = scenario.vehicle.rig(&scenario.load, substep, scenario.steer_max);
         let actions = scenario.actions(rig.steer_max);
         let mut waypoints = Vec::new();
+        let mut previews = Vec::new();
         let mut routes = Vec::new();
         let mut route_names = Vec::new();
         for (roundabout, route) in scenario.routes() {
@@ -56,7 +59,8 @@ impl World {
                 crossing_right: route.crossing.1 as f32,
             });
             route_names.push(route.name.clone());
-            waypoints.extend((0..route.waypoints.len()).map(|index| waypoint_row(&route.waypoints, index)));
+            waypoints.extend(route.waypoints.iter().map(waypoint_row));
+            previews.extend((0..route.waypoints.len()).map(|index| preview_row(&route.waypoints, index)));
         }
         World {
             params: Params {
@@ -82,6 +86,7 @@ impl World {
             rays: scenario.vehicle.rays(),
             fields: scenario.places.iter().map(|place| Field::bake(&place.roundabout.kerbs(scenario.gutter), scenario.cell)).collect(),
             waypoints,
+            previews,
             routes,
             route_names,
         }
@@ -92,6 +97,13 @@ impl World {
     pub fn route_waypoints(&self, route: u32) -> &[WaypointRow] {
         let route = &self.routes[route as usize];
         &self.waypoints[route.first as usize..][..route.n_waypoints as usize]
+    }
+
+    /// What is observed at each of them.
+    #[inline]
+    pub fn route_previews(&self, route: u32) -> &[PreviewRow] {
+        let route = &self.routes[route as usize];
+        &self.previews[route.first as usize..][..route.n_waypoints as usize]
     }
 
     /// The field that a route runs through.
@@ -106,26 +118,24 @@ fn step_limit(scenario: &Scenario, route: &Route) -> u32 {
     (scenario.time_limit * route.centre_line.length() / (scenario.cruising_speed() * scenario.step)).ceil() as u32
 }
 
-/// A waypoint with what is observed of the route around it. Beyond either end of the route the end waypoint repeats.
-fn waypoint_row(waypoints: &[Waypoint], index: usize) -> WaypointRow {
-    let here = &waypoints[index];
+fn waypoint_row(waypoint: &Waypoint) -> WaypointRow {
+    WaypointRow { position: waypoint.position.as_vec2(), direction: Vec2::from_angle(waypoint.heading as f32) }
+}
+
+/// What is observed of the route around a waypoint. Beyond either end of the route the end waypoint repeats.
+fn preview_row(waypoints: &[Waypoint], index: usize) -> PreviewRow {
     let at = |ahead: usize| waypoints[(index + ahead).min(waypoints.len() - 1)].position;
     let back = |behind: usize| waypoints[index.saturating_sub(behind)].position;
-    let mut preview = [0.0; N_PREVIEW];
+    let mut values = [0.0; N_PREVIEW];
     for (n, steps) in CURVATURE_STEPS.into_iter().enumerate() {
-        preview[n] = (corner(at(0), at(steps), at(2 * steps)) / PI) as f32;
-        preview[4 + n] = (corner(back(steps), at(0), at(steps)) / PI) as f32;
+        values[n] = (corner(at(0), at(steps), at(2 * steps)) / PI) as f32;
+        values[4 + n] = (corner(back(steps), at(0), at(steps)) / PI) as f32;
     }
-    for (n, value) in preview[8..].iter_mut().enumerate() {
+    for (n, value) in values[8..].iter_mut().enumerate() {
         let [from, middle, to] = [n, n + 1, n + 2].map(|chord| at(CHORD * chord));
         *value = (turning_radius(from, middle, to) / RADIUS_SCALE).min(1.0) as f32;
     }
-    WaypointRow {
-        position: here.position.as_vec2(),
-        direction: Vec2::from_angle(here.heading as f32),
-        heading: here.heading as f32,
-        preview,
-    }
+    PreviewRow { heading: waypoints[index].heading as f32, values }
 }
 
 /// Angle at `corner` between `from` and `to`: pi when the three lie in line, and when two of them are the same point [rad].

@@ -7,23 +7,30 @@
 use glam::Vec2;
 use multiversion::multiversion;
 
+use crate::angle::direction;
 use crate::cpu::Row;
 use crate::field::Field;
-use crate::layout::{Body, Clearance, Rig, Truck};
+use crate::layout::{Body, Clearance, Rig, Truck, constants};
 use crate::world::World;
 
-/// Samples taken at once.
-const LANES: usize = 8;
-/// Points of a tractor's centre line sampled first; with its corners they fill one bundle.
-const N_TRACTOR: usize = LANES - 4;
-/// Points of a trailer's centre line sampled first; with its corners they fill two.
-const N_TRAILER: usize = 2 * LANES - 4;
-/// Doubt that is left [m].
-const DOUBT: f32 = 0.01;
-/// Part of a clearance that may be left in doubt: what is far off need not be known to the centimetre.
-const SHARE: f32 = 0.5;
-/// Room for spans in doubt: at first 11 and 8 of a trailer, then at most 8 more for each of the 8 halvings from 2.5 m to 1 cm.
-const N_SPANS: usize = 96;
+constants! {
+    /// Samples taken at once.
+    const LANES: usize = 8;
+    /// Points of a unit sampled first, at most.
+    const N_FIRST: usize = 2 * LANES;
+    /// Further than any clearance [m].
+    const FAR: f32 = f32::MAX;
+    /// Points of a tractor's centre line sampled first; with its corners they fill one bundle.
+    const N_TRACTOR: usize = LANES - 4;
+    /// Points of a trailer's centre line sampled first; with its corners they fill two.
+    const N_TRAILER: usize = N_FIRST - 4;
+    /// Doubt that is left [m].
+    const DOUBT: f32 = 0.01;
+    /// Part of a clearance that may be left in doubt: what is far off need not be known to the centimetre.
+    const SHARE: f32 = 0.5;
+    /// Room for spans in doubt: at first 11 and 8 of a trailer, then at most 8 more for each of the 8 halvings from 2.5 m to 1 cm.
+    const N_SPANS: usize = 96;
+}
 
 /// Fills the row's clearance from where its truck is.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
@@ -34,76 +41,113 @@ pub fn collide(world: &World, row: &mut Row) {
 /// Clearance of both units: at least the field's least distance on their rectangles, and at most twice that plus 1 cm.
 #[inline(always)]
 pub fn clearance(field: &Field, rig: &Rig, truck: &Truck) -> Clearance {
-    let (tractor, trailer) = (Vec2::from_angle(truck.heading), Vec2::from_angle(truck.trailer_heading));
+    let (tractor, trailer) = (direction(truck.heading), direction(truck.trailer_heading));
     Clearance {
         tractor: body_clearance::<N_TRACTOR, LANES>(field, &rig.tractor_body, truck.position, tractor),
-        trailer: body_clearance::<N_TRAILER, { 2 * LANES }>(field, &rig.trailer_body, truck.trailer_position(rig), trailer),
+        trailer: body_clearance::<N_TRAILER, N_FIRST>(field, &rig.trailer_body, truck.trailer_position(rig), trailer),
     }
 }
 
-/// A stretch of a unit, in its frame, that may hide a solid between its ends.
-#[derive(Debug, Clone, Copy, Default)]
-struct Span {
-    from: Vec2,
-    to: Vec2,
-    /// Distance to the kerb at both ends, or what it is at least [m].
-    at_from: f32,
-    at_to: f32,
+/// A stretch of a unit, in its frame.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    begin: Vec2,
+    end: Vec2,
     /// What is subtracted from distances: the radius of the capsule, or nothing on the outline itself [m].
     radius: f32,
 }
 
-impl Span {
-    /// The clearance on the span is no less than this [m].
-    #[inline(always)]
-    fn bound(&self) -> f32 {
-        0.5 * (self.at_from + self.at_to - self.from.distance(self.to)) - self.radius
+/// A part of a line that may hide a solid between its ends.
+#[derive(Debug, Clone, Copy, Default)]
+struct Span {
+    line: u32,
+    /// Which part: 1 is all of the line, 2 and 3 are its halves, 4 to 7 its quarters.
+    part: u32,
+    /// Distance to the kerb at both ends, or what it is at least [m].
+    at_begin: f32,
+    at_end: f32,
+}
+
+/// The capsule's ends on the centre line, rear and front; a unit wider than long has a point between them.
+#[inline(always)]
+fn stretch(body: &Body) -> Vec2 {
+    let middle = 0.5 * (body.front + body.rear);
+    Vec2::new((body.rear + body.half_width).min(middle), (body.front - body.half_width).max(middle))
+}
+
+/// One of a body's points sampled first: `n_points` on the centre line from the rear on, then the corners.
+#[inline(always)]
+fn point(body: &Body, n_points: usize, index: usize) -> Vec2 {
+    if index < n_points {
+        let ends = stretch(body);
+        return Vec2::new(ends.x + index as f32 * ((ends.y - ends.x) / (n_points - 1) as f32), 0.0);
     }
+    let corner = index - n_points;
+    Vec2::new(if corner < 2 { body.rear } else { body.front }, if corner % 2 == 0 { body.half_width } else { -body.half_width })
+}
+
+/// One of a body's lines: the pieces of its centre line, then two from each corner. These run along the unit's end to its middle, and along
+/// its side to where the capsule takes over: both touch the capsule's end.
+#[inline(always)]
+fn line(body: &Body, n_points: usize, index: usize) -> Line {
+    if index < n_points - 1 {
+        return Line { begin: point(body, n_points, index), end: point(body, n_points, index + 1), radius: body.half_width };
+    }
+    let place = index - (n_points - 1);
+    let begin = point(body, n_points, n_points + place / 2);
+    let capsule = point(body, n_points, capsule_end(n_points, place / 2));
+    let end = if place % 2 == 0 { Vec2::new(begin.x, 0.0) } else { Vec2::new(capsule.x, begin.y) };
+    Line { begin, end, radius: 0.0 }
+}
+
+/// The point of the centre line that is the capsule's end near a corner.
+#[inline(always)]
+fn capsule_end(n_points: usize, corner: usize) -> usize {
+    if corner < 2 { 0 } else { n_points - 1 }
+}
+
+/// Length of a part, as a share of its line.
+#[inline(always)]
+fn width(part: u32) -> f32 {
+    1.0 / (1 << part.ilog2()) as f32
+}
+
+/// Middle of a part of a line, in the unit's frame.
+#[inline(always)]
+fn middle(line: &Line, part: u32) -> Vec2 {
+    let share = (part as f32 + 0.5) * width(part) - 1.0;
+    line.begin + share * (line.end - line.begin)
+}
+
+/// The clearance on a span is no less than this [m].
+#[inline(always)]
+fn bound(line: &Line, span: &Span) -> f32 {
+    0.5 * (span.at_begin + span.at_end - width(span.part) * line.begin.distance(line.end)) - line.radius
 }
 
 /// Clearance of one rectangle whose frame stands at `place`, turned by `heading`; `N` points of its centre line and its corners are the
 /// `ALL` samples taken first.
 #[inline(always)]
 fn body_clearance<const N: usize, const ALL: usize>(field: &Field, body: &Body, place: Vec2, heading: Vec2) -> f32 {
-    let radius = body.half_width;
-    // The capsule's ends; a unit wider than long has a point for a stretch.
-    let middle = 0.5 * (body.front + body.rear);
-    let (first, last) = ((body.rear + radius).min(middle), (body.front - radius).max(middle));
-    let spacing = (last - first) / (N - 1) as f32;
-    let mut points = [Vec2::ZERO; ALL];
-    for (n, point) in points.iter_mut().enumerate().take(N) {
-        *point = Vec2::new(first + n as f32 * spacing, 0.0);
-    }
-    for (n, corner) in points[N..].iter_mut().enumerate() {
-        *corner = Vec2::new(if n < 2 { body.rear } else { body.front }, if n % 2 == 0 { radius } else { -radius });
-    }
+    let points: [Vec2; ALL] = std::array::from_fn(|index| point(body, N, index));
     let distances = sampled(field, place, heading, &points);
-
-    let mut least = f32::INFINITY;
+    let mut least = FAR;
     for (n, distance) in distances.into_iter().enumerate() {
-        least = least.min(if n < N { distance - radius } else { distance });
+        least = least.min(if n < N { distance - body.half_width } else { distance });
     }
     let mut spans = Spans { spans: [Span::default(); N_SPANS], n: 0 };
-    let allowed = allowed(least);
     for n in 1..N {
-        let (from, to) = (points[n - 1], points[n]);
-        spans.push_below(allowed, Span { from, to, at_from: distances[n - 1], at_to: distances[n], radius });
+        let span = Span { line: n as u32 - 1, part: 1, at_begin: distances[n - 1], at_end: distances[n] };
+        spans.push(least, &line(body, N, n - 1), span);
     }
-    for n in N..ALL {
-        // From a corner along the unit's end to its middle, and along its side to where the capsule takes over: both touch the capsule's end.
-        let end = if points[n].x < middle { 0 } else { N - 1 };
-        let at_capsule = distances[end] - radius;
-        for to in [Vec2::new(points[n].x, 0.0), Vec2::new(points[end].x, points[n].y)] {
-            spans.push_below(allowed, Span { from: points[n], to, at_from: distances[n], at_to: at_capsule, radius: 0.0 });
+    for corner in 0..ALL - N {
+        let at_end = distances[capsule_end(N, corner)] - body.half_width;
+        for index in [N - 1 + 2 * corner, N + 2 * corner] {
+            let span = Span { line: index as u32, part: 1, at_begin: distances[N + corner], at_end };
+            spans.push(least, &line(body, N, index), span);
         }
     }
-    spans.settled(field, place, heading, least)
-}
-
-/// Spans below this bound need a closer look when the least clearance found is `least` [m].
-#[inline(always)]
-fn allowed(least: f32) -> f32 {
-    least - (SHARE * least).max(DOUBT)
+    spans.settled::<N>(field, body, place, heading, least)
 }
 
 /// Signed distance at points of a unit's frame [m].
@@ -124,31 +168,33 @@ struct Spans {
 }
 
 impl Spans {
-    /// Keeps `span` if it may hold less than `allowed`.
+    /// Keeps `span` if it may hold much less than the least clearance found.
     #[inline(always)]
-    fn push_below(&mut self, allowed: f32, span: Span) {
-        if span.bound() < allowed && self.n < N_SPANS {
+    fn push(&mut self, least: f32, line: &Line, span: Span) {
+        if bound(line, &span) < least - (SHARE * least).max(DOUBT) && self.n < N_SPANS {
             self.spans[self.n] = span;
             self.n += 1;
         }
     }
 
     /// Halves spans until none can hold much less than the least clearance found; a touch needs no closer look.
-    fn settled(mut self, field: &Field, place: Vec2, heading: Vec2, mut least: f32) -> f32 {
+    #[inline(always)]
+    fn settled<const N: usize>(mut self, field: &Field, body: &Body, place: Vec2, heading: Vec2, mut least: f32) -> f32 {
         while 0 < self.n && 0.0 < least {
             let taken = self.n.min(LANES);
             self.n -= taken;
-            let mut doubtful = [Span::default(); LANES];
+            let mut doubtful = [Span { part: 1, ..Span::default() }; LANES];
             doubtful[..taken].copy_from_slice(&self.spans[self.n..][..taken]);
-            let middles = doubtful.map(|span| 0.5 * (span.from + span.to));
-            let distances = sampled(field, place, heading, &middles);
+            let lines = doubtful.map(|span| line(body, N, span.line as usize));
+            let middles = std::array::from_fn(|n| middle(&lines[n], doubtful[n].part));
+            let distances: [f32; LANES] = sampled(field, place, heading, &middles);
             for n in 0..taken {
-                least = least.min(distances[n] - doubtful[n].radius);
+                least = least.min(distances[n] - lines[n].radius);
             }
             for n in 0..taken {
-                let span = doubtful[n];
-                self.push_below(allowed(least), Span { to: middles[n], at_to: distances[n], ..span });
-                self.push_below(allowed(least), Span { from: middles[n], at_from: distances[n], ..span });
+                let Span { line, part, at_begin, at_end } = doubtful[n];
+                self.push(least, &lines[n], Span { line, part: 2 * part, at_begin, at_end: distances[n] });
+                self.push(least, &lines[n], Span { line, part: 2 * part + 1, at_begin: distances[n], at_end });
             }
         }
         least

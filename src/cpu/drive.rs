@@ -3,17 +3,19 @@
 //! Tyre slip shifts each unit's no-slip point forward by `slip * speed²`; zero slip is pure kinematics. Integrated with the midpoint rule,
 //! steer angle and speed changing linearly inside a sub-step: holding them through one would cost decimetres in a turn.
 
-use std::f32::consts::FRAC_2_PI;
-
 use glam::Vec2;
 
-use crate::angle::wrapped;
+use crate::angle::{sin_cos, wrapped};
 use crate::cpu::Row;
-use crate::layout::{Control, Rig, Roll, Truck};
+use crate::layout::{Control, Rig, Roll, Truck, constants};
 use crate::world::World;
 
-/// The furthest that slip shifts a no-slip point [m]: the linear tyre behind it is not to be believed beyond.
-pub const SLIP_LEVER_MAX: f32 = 1.5;
+constants! {
+    /// The furthest that slip shifts a no-slip point [m]: the linear tyre behind it is not to be believed beyond.
+    pub const SLIP_LEVER_MAX: f32 = 1.5;
+    /// Keeps a quotient finite at a standstill [m^2/s^2].
+    const SPEED_SQUARED_MIN: f32 = 0.01;
+}
 
 /// One step of the truck: its sub-steps, and the largest load transfer ratio of each unit among them.
 pub fn drive(world: &World, row: &mut Row) {
@@ -28,8 +30,8 @@ pub fn driven(rig: &Rig, substep: f32, n_substeps: u32, control: &Control, truck
     let (mut tractor_ratio, mut trailer_ratio) = (0.0, 0.0);
     for _ in 0..n_substeps {
         moving = moved(rig, substep, control, &moving);
-        tractor_ratio = larger(tractor_ratio, moving.truck.tractor_load_transfer_ratio);
-        trailer_ratio = larger(trailer_ratio, moving.truck.trailer_load_transfer_ratio);
+        tractor_ratio = larger_in_magnitude(tractor_ratio, moving.truck.tractor_load_transfer_ratio);
+        trailer_ratio = larger_in_magnitude(trailer_ratio, moving.truck.trailer_load_transfer_ratio);
     }
     Truck { tractor_load_transfer_ratio: tractor_ratio, trailer_load_transfer_ratio: trailer_ratio, ..moving.truck }
 }
@@ -61,8 +63,8 @@ pub struct Motion {
 /// How a truck with this speed [m/s], steer angle and articulation [rad] moves.
 #[inline]
 pub fn motion(rig: &Rig, speed: f32, steering: f32, articulation: f32) -> Motion {
-    // What the tyres hold bounds the curvature; the floor only keeps the quotient finite at a standstill.
-    let curvature_max = rig.lateral_acceleration_max / (speed * speed).max(0.01);
+    // What the tyres hold bounds the curvature.
+    let curvature_max = rig.lateral_acceleration_max / (speed * speed).max(SPEED_SQUARED_MIN);
     let (sin, cos) = sin_cos(steering);
     let curvature = limited(sin / (cos * rig.wheelbase), curvature_max);
     let yaw_rate = speed * curvature;
@@ -150,44 +152,6 @@ fn limited(value: f32, limit: f32) -> f32 {
 
 /// Whichever is larger in magnitude.
 #[inline]
-fn larger(a: f32, b: f32) -> f32 {
+fn larger_in_magnitude(a: f32, b: f32) -> f32 {
     if a.abs() < b.abs() { b } else { a }
-}
-
-/// 1.5 * 2^23: the sum with a small number has no bits left for a fraction.
-const ROUNDER: f32 = 12_582_912.0;
-
-/// Sine and cosine in plain arithmetic, within 1.2e-7 of the true ones for an angle within a few turns of 0.
-///
-/// S. Moshier's Cephes polynomials for an eighth of a turn. As fast as the library's, whose last bits differ from engine to engine.
-#[inline]
-pub fn sin_cos(angle: f32) -> (f32, f32) {
-    // Added to a number this large, a fraction is rounded away and the whole stands in the lowest bits.
-    let shifted = angle * FRAC_2_PI + ROUNDER;
-    let quarter = shifted.to_bits();
-    let count = shifted - ROUNDER;
-    // pi/2 in three parts, the first two short enough for exact products.
-    let rest = ((angle - count * 1.570_312_5) - count * 4.837_513e-4) - count * 7.549_79e-8;
-    let square = rest * rest;
-    let sin = ((-1.951_529_6e-4 * square + 8.332_161e-3) * square - 0.166_666_55) * square * rest + rest;
-    let cos = ((2.443_315_7e-5 * square - 1.388_731_6e-3) * square + 4.166_664_6e-2) * square * square - 0.5 * square + 1.0;
-    let (sin, cos) = if quarter & 1 == 0 { (sin, cos) } else { (cos, -sin) };
-    if quarter & 2 == 0 { (sin, cos) } else { (-sin, -cos) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sine_and_cosine_agree_with_the_library_over_several_turns() {
-        for i in -200_000..=200_000 {
-            let angle = i as f32 * 1e-4;
-            let (sin, cos) = sin_cos(angle);
-            let (true_sin, true_cos) = f64::from(angle).sin_cos();
-            // Two units in the last place of a number near 1.
-            assert!((f64::from(sin) - true_sin).abs() < 1.2e-7 && (f64::from(cos) - true_cos).abs() < 1.2e-7, "{angle}");
-        }
-        assert_eq!(sin_cos(0.0), (0.0, 1.0));
-    }
 }

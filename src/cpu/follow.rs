@@ -4,6 +4,7 @@
 
 use glam::Vec2;
 
+use crate::angle::{TINY, direction};
 use crate::cpu::Row;
 use crate::layout::{Progress, Truck, WaypointRow};
 use crate::world::World;
@@ -18,8 +19,7 @@ pub fn follow(world: &World, row: &mut Row) {
 /// Middle of the wheelbase [m].
 #[inline]
 pub fn reference_point(wheelbase: f32, truck: &Truck) -> Vec2 {
-    let (sin, cos) = truck.heading.sin_cos();
-    truck.position + 0.5 * wheelbase * Vec2::new(cos, sin)
+    truck.position + 0.5 * wheelbase * direction(truck.heading)
 }
 
 /// Progress of a truck at `point` that had `next` as its next waypoint.
@@ -47,17 +47,16 @@ fn is_passed(waypoint: &WaypointRow, point: Vec2, reach: f32) -> bool {
 #[inline]
 pub fn distance_to_segment(point: Vec2, from: Vec2, to: Vec2) -> f32 {
     let along = to - from;
-    let share = (point - from).dot(along) / along.length_squared().max(f32::MIN_POSITIVE);
+    let share = (point - from).dot(along) / along.length_squared().max(TINY);
     point.distance(from + share.clamp(0.0, 1.0) * along)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::N_PREVIEW;
 
     fn straight(n: usize) -> Vec<WaypointRow> {
-        let row = |i| WaypointRow { position: Vec2::new(2.0 * i as f32, 0.0), direction: Vec2::X, heading: 0.0, preview: [0.0; N_PREVIEW] };
+        let row = |i| WaypointRow { position: Vec2::new(2.0 * i as f32, 0.0), direction: Vec2::X };
         (0..n).map(row).collect()
     }
 

@@ -14,7 +14,7 @@ pub fn judge(world: &World, row: &mut Row) {
     let ended = ending(&world.params, route, row.truck, row.clearance, row.progress);
     *row.ended = ended as u32;
     *row.terms = weighed(&world.params, row.clearance, row.progress, ended);
-    *row.reward = reward(&world.params, row.terms);
+    *row.reward = rewarded(&world.params, row.terms);
 }
 
 /// Why the episode ended, [`Ended::Running`] when it did not.
@@ -52,7 +52,7 @@ pub fn weighed(params: &Params, clearance: &Clearance, progress: &Progress, ende
 }
 
 /// The weighted sum.
-pub fn reward(params: &Params, terms: &RewardTerms) -> f32 {
+pub fn rewarded(params: &Params, terms: &RewardTerms) -> f32 {
     params.waypoint_weight * terms.waypoints
         + params.lane_distance_weight * terms.lane_distance
         + params.clearance_weight * terms.clearance

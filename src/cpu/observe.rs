@@ -2,30 +2,54 @@
 //!
 //! What depends on the waypoint alone was worked out when the world was baked (see [`crate::world`]).
 
-use std::f32::consts::PI;
-
 use glam::Vec2;
 
-use crate::angle::{atan2, wrapped};
+use crate::angle::{PI, arc_tangent, wrapped};
 use crate::cpu::Row;
 use crate::cpu::follow::{distance_to_segment, reference_point};
-use crate::layout::{N_RAYS, N_VALUES, Params, Progress, RouteRow, Truck, WaypointRow};
+use crate::layout::{N_RAYS, N_VALUES, Params, PreviewRow, Progress, RouteRow, Truck, WaypointRow, constants};
 use crate::world::World;
 
-/// Speed that is observed as 1 [m/s].
-pub const SPEED_SCALE: f32 = 27.8;
-/// Distance to a waypoint or its crossing line that is observed as 1 [m].
-pub const WAYPOINT_SCALE: f32 = 20.0;
-/// Distance to the lane centre that is observed as 1 [m].
-pub const LANE_SCALE: f32 = 10.0;
-/// Waypoints beyond the next one that angles are taken to.
-pub const LOOK_AHEAD: [usize; 5] = [0, 2, 5, 7, 10];
+constants! {
+    /// Speed that is observed as 1 [m/s].
+    pub const SPEED_SCALE: f32 = 27.8;
+    /// Distance to a waypoint or its crossing line that is observed as 1 [m].
+    pub const WAYPOINT_SCALE: f32 = 20.0;
+    /// Distance to the lane centre that is observed as 1 [m].
+    pub const LANE_SCALE: f32 = 10.0;
+    /// How many waypoints angles are taken to.
+    pub const N_LOOK_AHEAD: usize = 5;
+    /// Waypoints beyond the next one that angles are taken to.
+    pub const LOOK_AHEAD: [usize; N_LOOK_AHEAD] = [0, 2, 5, 7, 10];
+    /// Where values begin in an observation: distances to the next two waypoints.
+    const DISTANCES_AT: usize = 1;
+    /// Distances to their crossing lines.
+    const CROSSINGS_AT: usize = 3;
+    /// Distance to the lane centre.
+    const LANE_AT: usize = 5;
+    /// Angles at the waypoint behind, from those ahead to the truck.
+    const BEARINGS_AT: usize = 6;
+    /// Headings of the tractor against the lane's ahead.
+    const HEADINGS_AT: usize = 11;
+    /// Headings of the trailer against them.
+    const TRAILER_HEADINGS_AT: usize = 16;
+    /// Articulation.
+    const ARTICULATION_AT: usize = 21;
+    /// Curvatures of the route.
+    const CURVATURES_AT: usize = 22;
+    /// How many they are.
+    const N_CURVATURES: usize = 8;
+    /// Distance sensors.
+    const RANGES_AT: usize = 30;
+    /// Radii ahead.
+    const RADII_AT: usize = 59;
+}
 
 /// Writes what the step led to.
 pub fn observe(world: &World, row: &mut Row) {
     let route = &world.routes[row.truck.route as usize];
-    let waypoints = world.route_waypoints(row.truck.route);
-    *row.next_observation = observed(&world.params, route, waypoints, row.truck, row.progress, row.ranges);
+    let (waypoints, previews) = (world.route_waypoints(row.truck.route), world.route_previews(row.truck.route));
+    *row.next_observation = observed(&world.params, route, waypoints, previews, row.truck, row.progress, row.ranges);
 }
 
 /// The 69 values.
@@ -33,6 +57,7 @@ pub fn observed(
     params: &Params,
     route: &RouteRow,
     waypoints: &[WaypointRow],
+    previews: &[PreviewRow],
     truck: &Truck,
     progress: &Progress,
     ranges: &[f32; N_RAYS],
@@ -46,29 +71,30 @@ pub fn observed(
         let waypoint = &waypoints[(next + n).min(last)];
         let normal = waypoint.direction.perp();
         let (left, right) = (waypoint.position + route.crossing_left * normal, waypoint.position - route.crossing_right * normal);
-        values[1 + n] = (point.distance(waypoint.position) / WAYPOINT_SCALE).min(1.0);
-        values[3 + n] = (distance_to_segment(point, left, right) / WAYPOINT_SCALE).min(1.0);
+        values[DISTANCES_AT + n] = (point.distance(waypoint.position) / WAYPOINT_SCALE).min(1.0);
+        values[CROSSINGS_AT + n] = (distance_to_segment(point, left, right) / WAYPOINT_SCALE).min(1.0);
     }
-    values[5] = (progress.lane_distance / LANE_SCALE).min(1.0);
+    values[LANE_AT] = (progress.lane_distance / LANE_SCALE).min(1.0);
     let behind = waypoints[next.max(1) - 1].position;
     for (n, ahead) in LOOK_AHEAD.into_iter().enumerate() {
-        let waypoint = &waypoints[(next + ahead).min(last)];
-        values[6 + n] = angle_between(waypoint.position - behind, point - behind) / PI;
-        values[11 + n] = wrapped(truck.heading - waypoint.heading) / PI;
-        values[16 + n] = wrapped(truck.trailer_heading - waypoint.heading) / PI;
+        let index = (next + ahead).min(last);
+        let heading = previews[index].heading;
+        values[BEARINGS_AT + n] = angle_between(waypoints[index].position - behind, point - behind) / PI;
+        values[HEADINGS_AT + n] = wrapped(truck.heading - heading) / PI;
+        values[TRAILER_HEADINGS_AT + n] = wrapped(truck.trailer_heading - heading) / PI;
     }
-    values[21] = wrapped(truck.heading - truck.trailer_heading) / PI;
-    let preview = &waypoints[next].preview;
-    values[22..30].copy_from_slice(&preview[..8]);
-    for (value, range) in values[30..59].iter_mut().zip(ranges) {
+    values[ARTICULATION_AT] = wrapped(truck.heading - truck.trailer_heading) / PI;
+    let preview = &previews[next].values;
+    values[CURVATURES_AT..RANGES_AT].copy_from_slice(&preview[..N_CURVATURES]);
+    for (value, range) in values[RANGES_AT..RADII_AT].iter_mut().zip(ranges) {
         *value = range / params.sensor_range;
     }
-    values[59..].copy_from_slice(&preview[8..]);
+    values[RADII_AT..].copy_from_slice(&preview[N_CURVATURES..]);
     values
 }
 
 /// Signed angle from `from` to `to`, left positive [rad].
 #[inline]
 fn angle_between(from: Vec2, to: Vec2) -> f32 {
-    atan2(from.perp_dot(to), from.dot(to))
+    arc_tangent(from.perp_dot(to), from.dot(to))
 }

@@ -2,9 +2,7 @@
 //!
 //! Route and pose are functions of (seed, env, episode) alone. A truck on a fixed route drives it once and is then held.
 
-use glam::Vec2;
-
-use crate::angle::wrapped;
+use crate::angle::{direction, wrapped};
 use crate::cpu::follow::{followed, reference_point};
 use crate::cpu::{RouteChoice, Row, observe, sense};
 use crate::layout::{Control, Ended, Params, Start, Truck, WaypointRow};
@@ -45,7 +43,7 @@ pub fn begin_from(world: &World, row: &mut Row, episode: u32, start: &Start) {
     };
     let waypoints = world.route_waypoints(route);
     *row.control = Control::default();
-    *row.truck = Truck { route, episode, ..started(&world.params, &waypoints[0], start) };
+    *row.truck = Truck { route, episode, ..started(&world.params, &waypoints[0], world.route_previews(route)[0].heading, start) };
     let point = reference_point(world.params.rig.wheelbase, row.truck);
     *row.progress = followed(waypoints, point, 1, world.params.stray_distance);
     row.progress.passed = 0;
@@ -54,13 +52,12 @@ pub fn begin_from(world: &World, row: &mut Row, episode: u32, start: &Start) {
     *row.observation = *row.next_observation;
 }
 
-/// A truck at `waypoint`, trailer straight, moved aside and turned as `start` says.
-pub fn started(params: &Params, waypoint: &WaypointRow, start: &Start) -> Truck {
-    let heading = wrapped(waypoint.heading + start.heading * params.start_heading);
-    let (sin, cos) = heading.sin_cos();
+/// A truck at `waypoint`, where the lane has this heading [rad]: trailer straight, moved aside and turned as `start` says.
+pub fn started(params: &Params, waypoint: &WaypointRow, heading: f32, start: &Start) -> Truck {
+    let heading = wrapped(heading + start.heading * params.start_heading);
     let point = waypoint.position + start.offset * params.start_offset * waypoint.direction.perp();
     Truck {
-        position: point - 0.5 * params.rig.wheelbase * Vec2::new(cos, sin),
+        position: point - 0.5 * params.rig.wheelbase * direction(heading),
         heading,
         trailer_heading: heading,
         speed: params.start_speed,

@@ -3,12 +3,12 @@
 //! Sphere tracing over the field, all rays of a truck side by side; those that have arrived make room for a narrower bundle. A step goes
 //! as far as the slope along the ray lets hope, and is taken back unless the free circles at both of its ends meet.
 
-use glam::Vec2;
 use multiversion::multiversion;
 
+use crate::angle::direction;
 use crate::cpu::Row;
 use crate::field::{Field, Samples};
-use crate::layout::{N_RAYS, N_TRAILER_RAYS, Ray, Rig, Truck};
+use crate::layout::{N_RAYS, N_TRAILER_RAYS, Ray, Rig, Truck, constants};
 use crate::world::World;
 
 /// Rays in the widest bundle: all of a truck's.
@@ -16,22 +16,24 @@ const WIDE: usize = N_RAYS.next_power_of_two();
 /// Place of what no sensor asked for, among the ranges.
 const NOBODY: u32 = WIDE as u32 - 1;
 const _: () = assert!(N_RAYS < WIDE);
-/// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide between them.
-const GAP: f32 = 0.05;
-/// A step this short is never taken back [m].
-const SHORT: f32 = 0.25;
-/// Closer to a kerb than this, it is taken for straight [m].
-const CLOSE: f32 = 0.15;
-/// This close to a kerb the ray has met it [m].
-const MET: f32 = 0.004;
-/// Head-on, a ray has met the kerb from this much further off: a straight kerb's place is known to a few millimetres then [m].
-const MET_HEAD_ON: f32 = 0.02;
-/// Slope of a ray 5 deg from grazing; flatter ones are not followed to the last centimetre.
-const GRAZING: f32 = 0.087;
-/// Part of the farthest hope that is tried, so that the circles do meet where the field is off by a little.
-const CAUTION: f32 = 0.98;
-/// Samples after which a ray that creeps along a kerb ends where it is: the longest range in the shortest creeping steps takes fewer.
-const SAMPLES_MAX: u32 = 128;
+constants! {
+    /// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide between them.
+    const GAP: f32 = 0.05;
+    /// A step this short is never taken back [m].
+    const SHORT: f32 = 0.25;
+    /// Closer to a kerb than this, it is taken for straight [m].
+    const CLOSE: f32 = 0.15;
+    /// This close to a kerb the ray has met it [m].
+    const MET: f32 = 0.004;
+    /// Head-on, a ray has met the kerb from this much further off: a straight kerb's place is known to a few millimetres then [m].
+    const MET_HEAD_ON: f32 = 0.02;
+    /// Slope of a ray 5 deg from grazing; flatter ones are not followed to the last centimetre.
+    const GRAZING: f32 = 0.087;
+    /// Part of the farthest hope that is tried, so that the circles do meet where the field is off by a little.
+    const CAUTION: f32 = 0.98;
+    /// Samples after which a ray that creeps along a kerb ends where it is: the longest range in the shortest creeping steps takes fewer.
+    const SAMPLES_MAX: u32 = 128;
+}
 
 /// Fills the row's ranges from where its truck is.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
@@ -46,13 +48,14 @@ pub fn sense(world: &World, row: &mut Row) {
 pub fn ranges(field: &Field, rig: &Rig, rays: &[Ray; N_RAYS], truck: &Truck, reach: f32) -> [f32; N_RAYS] {
     let mut bundle = Bundle::<WIDE>::new(rig, rays, truck);
     let mut found = [0.0; WIDE];
-    bundle.trace(field, reach, WIDE / 2);
+    let mut samples = 0;
+    bundle.trace(field, reach, WIDE / 2, &mut samples);
     bundle.note(&mut found);
     let mut bundle: Bundle<{ WIDE / 2 }> = bundle.survivors();
-    bundle.trace(field, reach, WIDE / 4);
+    bundle.trace(field, reach, WIDE / 4, &mut samples);
     bundle.note(&mut found);
     let mut bundle: Bundle<{ WIDE / 4 }> = bundle.survivors();
-    bundle.trace(field, reach, 0);
+    bundle.trace(field, reach, 0, &mut samples);
     bundle.note(&mut found);
     std::array::from_fn(|ray| found[ray])
 }
@@ -95,10 +98,11 @@ impl<const N: usize> Bundle<N> {
         }
     }
 
-    /// Follows the rays until at most `enough` of them are left.
+    /// Follows the rays until at most `enough` of them are left; `samples` were taken on each before.
     #[inline(always)]
-    fn trace(&mut self, field: &Field, reach: f32, enough: usize) {
-        for _ in 0..SAMPLES_MAX {
+    fn trace(&mut self, field: &Field, reach: f32, enough: usize, samples: &mut u32) {
+        while *samples < SAMPLES_MAX {
+            *samples += 1;
             if self.advance(field, reach) as usize <= enough {
                 break;
             }
@@ -189,8 +193,8 @@ impl Bundle<WIDE> {
     /// The truck's rays where they begin.
     #[inline(always)]
     fn new(rig: &Rig, rays: &[Ray; N_RAYS], truck: &Truck) -> Bundle<WIDE> {
-        let tractor = (truck.position, Vec2::from_angle(truck.heading));
-        let trailer = (truck.trailer_position(rig), Vec2::from_angle(truck.trailer_heading));
+        let tractor = (truck.position, direction(truck.heading));
+        let trailer = (truck.trailer_position(rig), direction(truck.trailer_heading));
         let mut bundle = Bundle::empty();
         for (n, ray) in rays.iter().enumerate() {
             let (place, heading) = if n < N_TRAILER_RAYS { trailer } else { tractor };

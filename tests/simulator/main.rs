@@ -9,12 +9,15 @@ use offtrack::world::World;
 
 mod bad_input;
 mod collide;
+#[cfg(feature = "gpu")]
+mod device;
 mod episodes;
 mod field;
 mod fit;
 mod observe;
 mod physics;
 mod sense;
+mod shaders;
 
 /// A benchmark of the repository, read and baked.
 fn benchmark(name: &str) -> (Scenario, World) {

@@ -97,7 +97,7 @@ fn worst_differences(shift: usize) -> [f64; 69] {
     let mut worst = [0.0f64; 69];
     let mut states = 0;
     for (index, (_, route)) in scenario.routes().enumerate() {
-        let waypoints = world.route_waypoints(index as u32);
+        let (waypoints, previews) = (world.route_waypoints(index as u32), world.route_previews(index as u32));
         for state in 0..200 {
             let draws: Vec<f32> = (0..3).flat_map(|draw| random::words(11, index as u32, state, draw)).map(random::signed_unit).collect();
             let next = 1 + ((draws[0] + 1.0) * 0.5 * (waypoints.len() - 1) as f32) as usize;
@@ -106,7 +106,7 @@ fn worst_differences(shift: usize) -> [f64; 69] {
             for (ray, range) in ranges.iter_mut().enumerate() {
                 *range = 10.0 + 10.0 * random::signed_unit(random::words(12, index as u32, state, ray as u32)[0]);
             }
-            let heading = offtrack::angle::wrapped(near.heading + 1.5 * draws[1]);
+            let heading = offtrack::angle::wrapped(previews[next.min(waypoints.len() - 1)].heading + 1.5 * draws[1]);
             let truck = Truck {
                 position: near.position + 4.0 * glam::Vec2::new(draws[2], draws[3]),
                 heading,
@@ -119,7 +119,7 @@ fn worst_differences(shift: usize) -> [f64; 69] {
             let point = truck.position.as_dvec2() + 0.5 * wheelbase * DVec2::from_angle(f64::from(truck.heading));
             let lane_distance = distance_to_segment(point, view.w(view.next as i64 - 1), view.w(view.next as i64)) as f32;
             let progress = Progress { waypoint: next as u32, lane_distance, ..Progress::default() };
-            let values = observed(&world.params, &world.routes[index], waypoints, &truck, &progress, &ranges);
+            let values = observed(&world.params, &world.routes[index], waypoints, previews, &truck, &progress, &ranges);
             for (value, worst) in worst.iter_mut().enumerate() {
                 let difference = (f64::from(values[(value + shift) % 69]) - view.value(value)).abs();
                 // An angle of -180 deg is one of 180 deg: its scaled value may be -1 here and 1 there.

@@ -119,7 +119,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     files::print(&format!("{:>8} {:>14}   ns a truck, a stage at a time:{}\n", "trucks", "env steps/s", names.join("")))?;
     for &envs in &args.envs {
         let mut simulator = Simulator::new(world.clone(), envs, 0, RouteChoice::Drawn(routes.clone()))?;
-        let run = measured(&mut simulator, args.seconds);
+        let run = measured(&mut simulator, args.seconds)?;
         let stages: Vec<String> = run.stages.iter().map(|(_, time)| format!("{time:>8.0}")).collect();
         files::print(&format!("{:>8} {:>14.0}                                 {}\n", envs, run.env_steps_per_second, stages.join("")))?;
         bench.runs.push(run);
@@ -131,7 +131,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 }
 
 /// Three quarters of the time for whole steps, the rest a stage at a time.
-fn measured(simulator: &mut Simulator, seconds: f64) -> Run {
+fn measured(simulator: &mut Simulator, seconds: f64) -> Result<Run, Error> {
     let envs = simulator.batch().n_envs();
     // Trucks all begin at once: let their episodes spread out first.
     let warm = Instant::now();
@@ -151,12 +151,12 @@ fn measured(simulator: &mut Simulator, seconds: f64) -> Run {
     let mut times: [Vec<f64>; STAGES.len()] = Default::default();
     let begun = Instant::now();
     while begun.elapsed().as_secs_f64() < 0.2 * seconds || times[0].is_empty() {
-        for (times, time) in times.iter_mut().zip(simulator.step_at_random_by_stage()) {
+        for (times, time) in times.iter_mut().zip(simulator.step_at_random_by_stage()?) {
             times.push(time.as_secs_f64() * 1e9 / envs as f64);
         }
     }
     let stages = STAGES.iter().zip(&mut times).map(|(stage, times)| (stage.name, rounded(median(times))));
-    Run {
+    Ok(Run {
         engine: "cpu",
         envs,
         env_steps_per_second: median(&mut windows).round(),
@@ -164,7 +164,7 @@ fn measured(simulator: &mut Simulator, seconds: f64) -> Run {
         slowest_window: windows.first().copied().unwrap_or(0.0).round(),
         fastest_window: windows.last().copied().unwrap_or(0.0).round(),
         stages: stages.collect(),
-    }
+    })
 }
 
 /// The middle value; sorts on the way.

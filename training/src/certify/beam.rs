@@ -173,8 +173,8 @@ fn chosen(policy: Option<&Policy>, batch: &Batch, children: &[Candidate], straig
 /// What the step just made of one candidate costs.
 fn cost(world: &World, batch: &Batch, env: usize) -> f32 {
     let (truck, clearance, progress) = (&batch.truck[env], &batch.clearance[env], &batch.progress[env]);
-    let waypoints = world.route_waypoints(truck.route);
-    let lane_heading = waypoints[(progress.waypoint as usize + AHEAD).min(waypoints.len() - 1)].heading;
+    let previews = world.route_previews(truck.route);
+    let lane_heading = previews[(progress.waypoint as usize + AHEAD).min(previews.len() - 1)].heading;
     let lack = (1.0 - clearance.tractor.min(clearance.trailer) / MARGIN).max(0.0);
     let load = truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs()) / world.params.rollover_ratio;
     lack.powi(2)

@@ -228,6 +228,7 @@ fn fingerprint(world: &World) -> u32 {
     hasher.update(cast_slice(&world.actions));
     hasher.update(cast_slice(&world.rays));
     hasher.update(cast_slice(&world.waypoints));
+    hasher.update(cast_slice(&world.previews));
     hasher.update(cast_slice(&world.routes));
     for field in &world.fields {
         hasher.update(cast_slice(&field.cells));

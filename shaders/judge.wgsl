@@ -1,0 +1,57 @@
+// Judges the step: whether and why the episode ended, and what the step was worth.
+//
+// Failure wins over arrival, everything wins over the clock.
+
+@compute @workgroup_size(WORKGROUP)
+fn judge(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
+    let env = thread_of(group, groups, local);
+    if !is_driving(env) { return; }
+    truck[env].steps += 1u;
+    let code = ending(params, routes[truck[env].route], truck[env], clearance[env], progress[env]);
+    let weighed_terms = weighed(params, clearance[env], progress[env], code);
+    ended[env] = code;
+    terms[env] = weighed_terms;
+    reward[env] = rewarded(params, weighed_terms);
+}
+
+// Why the episode ended, RUNNING when it did not.
+fn ending(params: Params, route: RouteRow, truck: Truck, clearance: Clearance, progress: Progress) -> u32 {
+    let articulation = wrapped(truck.heading - truck.trailer_heading);
+    let load_transfer_ratio = max(abs(truck.tractor_load_transfer_ratio), abs(truck.trailer_load_transfer_ratio));
+    let arrived = route.n_waypoints <= progress.waypoint;
+    if clearance.tractor <= 0.0 {
+        return TRACTOR_COLLIDED;
+    } else if clearance.trailer <= 0.0 {
+        return TRAILER_COLLIDED;
+    } else if params.rollover_ratio <= load_transfer_ratio {
+        return ROLLED_OVER;
+    } else if params.jackknife_angle < abs(articulation) {
+        return JACKKNIFED;
+    } else if !arrived && params.stray_distance < progress.waypoint_distance {
+        return STRAYED;
+    } else if arrived {
+        return ARRIVED;
+    } else if route.step_limit < truck.steps {
+        return TIMED_OUT;
+    }
+    return RUNNING;
+}
+
+// The physical amounts that the reward weighs.
+fn weighed(params: Params, clearance: Clearance, progress: Progress, code: u32) -> RewardTerms {
+    let failed = code != RUNNING && code != ARRIVED && code != TIMED_OUT;
+    return RewardTerms(
+        f32(progress.passed),
+        min(progress.lane_distance / params.lane_distance_limit, 1.0),
+        clamp(1.0 - min(clearance.tractor, clearance.trailer) / params.clearance_limit, 0.0, 1.0),
+        select(0.0, 1.0, failed),
+    );
+}
+
+// The weighted sum.
+fn rewarded(params: Params, terms: RewardTerms) -> f32 {
+    return params.waypoint_weight * terms.waypoints
+        + params.lane_distance_weight * terms.lane_distance
+        + params.clearance_weight * terms.clearance
+        + params.failure_weight * terms.failure;
+}

@@ -1,0 +1,446 @@
+// What shaders share with Rust. Printed from src/layout.rs and the constants beside each stage: change those.
+
+// Values in an observation.
+const N_VALUES: u32 = 69u;
+// Distance sensors on the trailer, left and right alternating, front to rear.
+const N_TRAILER_RAYS: u32 = 16u;
+// Distance sensors on the tractor, from left 90 deg to right 90 deg.
+const N_TRACTOR_RAYS: u32 = 13u;
+// Distance sensors in all: the trailer's first, then the tractor's, as the observation has them.
+const N_RAYS: u32 = 29u;
+// Values of an observation that depend on the waypoint alone: future and current curvature, radius ahead.
+const N_PREVIEW: u32 = 18u;
+// Half a turn.
+const PI: f32 = 3.1415927f;
+// A turn.
+const TAU: f32 = 6.2831855f;
+// A quarter of a turn.
+const FRAC_PI_2: f32 = 1.5707964f;
+// An eighth of a turn.
+const FRAC_PI_4: f32 = 0.7853982f;
+// Quarters of a turn in a radian.
+const FRAC_2_PI: f32 = 0.63661975f;
+// tan(pi/8): beyond it the arc tangent's polynomial works on the angle's difference from 45 deg.
+const STEEP: f32 = 0.41421357f;
+// Polynomial of the arc tangent up to pi/8, in the square, highest power first.
+const ARC_TANGENT: array<f32, 4> = array<f32, 4>(0.080537446f, -0.13877685f, 0.19977711f, -0.3333295f);
+// pi/2 in three parts, the first two short enough for exact products.
+const QUARTER: array<f32, 3> = array<f32, 3>(1.5703125f, 0.0004837513f, 7.54979e-8f);
+// Polynomial of the sine up to pi/4, in the square, highest power first.
+const SINE: array<f32, 3> = array<f32, 3>(-0.00019515296f, 0.008332161f, -0.16666655f);
+// That of the cosine.
+const COSINE: array<f32, 3> = array<f32, 3>(2.4433157e-5f, -0.0013887316f, 0.041666646f);
+// The smallest number that is divided by.
+const TINY: f32 = 1.1754944e-38f;
+// Bits of a cell's word that hold the logarithm of its sub-cells a side; the rest is where its block begins.
+const LEVEL_BITS: u32 = 3u;
+// Factor that tells neighbouring counters apart, of D. Lehmer's kind of generator.
+const FACTOR: u32 = 1664525u;
+// What is added then.
+const ADDEND: u32 = 1013904223u;
+// A word has this many bits below those that an f32 holds.
+const SPARE_BITS: u32 = 8u;
+// What the others count in.
+const UNIT: f32 = 1.1920929e-7f;
+// [`Draw::Route`] as shaders name it.
+const DRAW_ROUTE: u32 = 0u;
+// [`Draw::Pose`].
+const DRAW_POSE: u32 = 1u;
+// [`Draw::Action`].
+const DRAW_ACTION: u32 = 2u;
+// Threads of a workgroup.
+const WORKGROUP: u32 = 64u;
+// The furthest that slip shifts a no-slip point [m]: the linear tyre behind it is not to be believed beyond.
+const SLIP_LEVER_MAX: f32 = 1.5f;
+// Keeps a quotient finite at a standstill [m^2/s^2].
+const SPEED_SQUARED_MIN: f32 = 0.01f;
+// Samples taken at once.
+const LANES: u32 = 8u;
+// Points of a unit sampled first, at most.
+const N_FIRST: u32 = 16u;
+// Further than any clearance [m].
+const FAR: f32 = 3.4028235e38f;
+// Points of a tractor's centre line sampled first; with its corners they fill one bundle.
+const N_TRACTOR: u32 = 4u;
+// Points of a trailer's centre line sampled first; with its corners they fill two.
+const N_TRAILER: u32 = 12u;
+// Doubt that is left [m].
+const DOUBT: f32 = 0.01f;
+// Part of a clearance that may be left in doubt: what is far off need not be known to the centimetre.
+const SHARE: f32 = 0.5f;
+// Room for spans in doubt: at first 11 and 8 of a trailer, then at most 8 more for each of the 8 halvings from 2.5 m to 1 cm.
+const N_SPANS: u32 = 96u;
+// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide between them.
+const GAP: f32 = 0.05f;
+// A step this short is never taken back [m].
+const SHORT: f32 = 0.25f;
+// Closer to a kerb than this, it is taken for straight [m].
+const CLOSE: f32 = 0.15f;
+// This close to a kerb the ray has met it [m].
+const MET: f32 = 0.004f;
+// Head-on, a ray has met the kerb from this much further off: a straight kerb's place is known to a few millimetres then [m].
+const MET_HEAD_ON: f32 = 0.02f;
+// Slope of a ray 5 deg from grazing; flatter ones are not followed to the last centimetre.
+const GRAZING: f32 = 0.087f;
+// Part of the farthest hope that is tried, so that the circles do meet where the field is off by a little.
+const CAUTION: f32 = 0.98f;
+// Samples after which a ray that creeps along a kerb ends where it is: the longest range in the shortest creeping steps takes fewer.
+const SAMPLES_MAX: u32 = 128u;
+// Speed that is observed as 1 [m/s].
+const SPEED_SCALE: f32 = 27.8f;
+// Distance to a waypoint or its crossing line that is observed as 1 [m].
+const WAYPOINT_SCALE: f32 = 20.0f;
+// Distance to the lane centre that is observed as 1 [m].
+const LANE_SCALE: f32 = 10.0f;
+// How many waypoints angles are taken to.
+const N_LOOK_AHEAD: u32 = 5u;
+// Waypoints beyond the next one that angles are taken to.
+const LOOK_AHEAD: array<u32, 5> = array<u32, 5>(0u, 2u, 5u, 7u, 10u);
+// Where values begin in an observation: distances to the next two waypoints.
+const DISTANCES_AT: u32 = 1u;
+// Distances to their crossing lines.
+const CROSSINGS_AT: u32 = 3u;
+// Distance to the lane centre.
+const LANE_AT: u32 = 5u;
+// Angles at the waypoint behind, from those ahead to the truck.
+const BEARINGS_AT: u32 = 6u;
+// Headings of the tractor against the lane's ahead.
+const HEADINGS_AT: u32 = 11u;
+// Headings of the trailer against them.
+const TRAILER_HEADINGS_AT: u32 = 16u;
+// Articulation.
+const ARTICULATION_AT: u32 = 21u;
+// Curvatures of the route.
+const CURVATURES_AT: u32 = 22u;
+// How many they are.
+const N_CURVATURES: u32 = 8u;
+// Distance sensors.
+const RANGES_AT: u32 = 30u;
+// Radii ahead.
+const RADII_AT: u32 = 59u;
+// Sums in a tally: steps by their end code, then the rewards.
+const N_SUMS: u32 = 9u;
+// The sum of the rewards.
+const REWARD_SUM: u32 = 8u;
+// Parts that a reward of 1 is counted in.
+const REWARD_PARTS: f32 = 256.0f;
+
+// Why an episode ended.
+const RUNNING: u32 = 0u;
+const ARRIVED: u32 = 1u;
+const TRACTOR_COLLIDED: u32 = 2u;
+const TRAILER_COLLIDED: u32 = 3u;
+const ROLLED_OVER: u32 = 4u;
+const JACKKNIFED: u32 = 5u;
+const STRAYED: u32 = 6u;
+const TIMED_OUT: u32 = 7u;
+
+// What drives one truck through a step.
+struct Control {
+    // Steer angle asked for [rad].
+    steering: f32,
+    // Acceleration asked for [m/s^2].
+    acceleration: f32,
+    // Integral of the speed error [m].
+    speed_error_integral: f32,
+}
+
+// One tractor and its trailer.
+struct Truck {
+    // Middle of the drive axle [m].
+    position: vec2<f32>,
+    // Heading of the tractor, counter-clockwise from +x [rad].
+    heading: f32,
+    // Heading of the trailer, counter-clockwise from +x [rad].
+    trailer_heading: f32,
+    // Speed of the drive axle along the tractor's heading [m/s].
+    speed: f32,
+    // Steer angle of the front axle, left positive [rad].
+    steering: f32,
+    // Roll angle of the tractor [rad].
+    tractor_roll: f32,
+    // Roll rate of the tractor [rad/s].
+    tractor_roll_rate: f32,
+    // Roll angle of the trailer [rad].
+    trailer_roll: f32,
+    // Roll rate of the trailer [rad/s].
+    trailer_roll_rate: f32,
+    // Load transfer ratio of the tractor, the largest of the step in magnitude, signed [1].
+    tractor_load_transfer_ratio: f32,
+    // Load transfer ratio of the trailer, the largest of the step in magnitude, signed [1].
+    trailer_load_transfer_ratio: f32,
+    // Index of the route in the world.
+    route: u32,
+    // Episodes this truck has begun before this one.
+    episode: u32,
+    // Steps taken in this episode.
+    steps: u32,
+    // The truck stands still because its episode has ended and nobody began another (0 or 1).
+    held: u32,
+}
+
+// Where a truck begins its route: shares of the largest start errors, each in -1..=1; zeros are the lane centre.
+struct Start {
+    // Share of the largest lateral offset, left positive.
+    offset: f32,
+    // Share of the largest heading error, counter-clockwise positive.
+    heading: f32,
+}
+
+// Distance from a unit's outline to the nearest solid edge, negative where they touch [m]. Touching is exact to 2 cm; the distance is
+// never less than the true one by more than the field's error, and at most twice it plus 2 cm: far from a kerb fewer points are sampled.
+struct Clearance {
+    // Of the tractor [m].
+    tractor: f32,
+    // Of the trailer [m].
+    trailer: f32,
+}
+
+// How far along its route a truck is.
+struct Progress {
+    // Distance from the reference point to the lane centre [m].
+    lane_distance: f32,
+    // Distance from the reference point to the next waypoint [m].
+    waypoint_distance: f32,
+    // Next waypoint to pass, counted from the route's first; the route's number of waypoints once all are passed.
+    waypoint: u32,
+    // Waypoints passed in this step.
+    passed: u32,
+}
+
+// The physical amounts that the reward weighs.
+struct RewardTerms {
+    // Waypoints passed in this step.
+    waypoints: f32,
+    // Distance to the lane centre, limited and scaled to 0..1.
+    lane_distance: f32,
+    // How far the nearer unit is within the margin kept from kerbs, 0 outside it to 1 at a kerb.
+    clearance: f32,
+    // 1 when the episode failed in this step.
+    failure: f32,
+}
+
+// One distance sensor, fixed to a unit. A tractor's frame starts at the drive axle, a trailer's at its axle group.
+struct Ray {
+    // Mount in the unit's frame, x forward, y left [m].
+    origin: vec2<f32>,
+    // Unit vector in the unit's frame.
+    direction: vec2<f32>,
+}
+
+// A rectangle fixed to a unit's frame.
+struct Body {
+    // Front end, ahead of the frame's origin [m].
+    front: f32,
+    // Rear end, ahead of the frame's origin (negative when behind) [m].
+    rear: f32,
+    // Half of the width [m].
+    half_width: f32,
+}
+
+// One unit's roll model, discretised for a sub-step: `next = transition * state + input * lateral acceleration`.
+struct Roll {
+    // Row-major transition of (roll, roll rate) over one sub-step.
+    transition: array<f32, 4>,
+    // What a lateral acceleration of 1 m/s^2 held through the sub-step adds to (roll, roll rate).
+    input: array<f32, 2>,
+    // Load transfer ratio per m/s^2 of lateral acceleration.
+    per_acceleration: f32,
+    // Load transfer ratio per rad of roll.
+    per_roll: f32,
+    // Load transfer ratio per rad/s of roll rate.
+    per_roll_rate: f32,
+}
+
+// The vehicle as the stages need it.
+struct Rig {
+    // Front axle ahead of the drive axle [m].
+    wheelbase: f32,
+    // Fifth wheel ahead of the drive axle [m].
+    fifth_wheel: f32,
+    // Kingpin ahead of the trailer's axle group [m].
+    trailer_wheelbase: f32,
+    // Slip factor [rad/(m/s^2)].
+    slip: f32,
+    // Largest steer angle [rad].
+    steer_max: f32,
+    // Fastest change of the steer angle [rad/s].
+    steer_rate: f32,
+    // Strongest braking, negative [m/s^2].
+    acceleration_min: f32,
+    // Strongest drive [m/s^2].
+    acceleration_max: f32,
+    // Lateral acceleration that the tyres can hold [m/s^2].
+    lateral_acceleration_max: f32,
+    // Speed control: acceleration per speed error [1/s].
+    speed_gain: f32,
+    // Speed control: acceleration per integral of the speed error [1/s^2].
+    speed_integral_gain: f32,
+    // Speed control: speed error beyond which nothing is integrated [m/s].
+    speed_integral_band: f32,
+    // Speed control: strongest braking it asks for, negative [m/s^2].
+    speed_braking: f32,
+    // The tractor's outline.
+    tractor_body: Body,
+    // The trailer's outline.
+    trailer_body: Body,
+    // The tractor's roll.
+    tractor_roll: Roll,
+    // The trailer's roll.
+    trailer_roll: Roll,
+}
+
+// One entry of the action table.
+struct Action {
+    // Steer angle asked for [rad].
+    steering: f32,
+    // Speed asked for [m/s].
+    speed: f32,
+}
+
+// What every truck of a batch shares beside the world: vehicle, time, weights.
+struct Params {
+    // The vehicle.
+    rig: Rig,
+    // Time of one sub-step [s].
+    substep: f32,
+    // Sub-steps in a step.
+    n_substeps: u32,
+    // Entries of the action table.
+    n_actions: u32,
+    // Reach of a distance sensor [m].
+    sensor_range: f32,
+    // Largest lateral offset at the start [m].
+    start_offset: f32,
+    // Largest heading error at the start [rad].
+    start_heading: f32,
+    // Speed at the start [m/s].
+    start_speed: f32,
+    // A waypoint further off than this is neither passed nor within reach: the truck has strayed [m].
+    stray_distance: f32,
+    // Articulation beyond which the truck is jackknifed [rad].
+    jackknife_angle: f32,
+    // Load transfer ratio from which the truck has rolled over.
+    rollover_ratio: f32,
+    // Distance to the lane centre at which its reward term is 1 [m].
+    lane_distance_limit: f32,
+    // Reward for each waypoint passed.
+    waypoint_weight: f32,
+    // Reward for the lane-distance term, each step.
+    lane_distance_weight: f32,
+    // Margin kept from kerbs, within which the clearance term counts [m].
+    clearance_limit: f32,
+    // Reward for the clearance term, each step.
+    clearance_weight: f32,
+    // Reward when the episode fails.
+    failure_weight: f32,
+}
+
+// One waypoint of one route.
+struct WaypointRow {
+    // Place on the lane centre [m].
+    position: vec2<f32>,
+    // Unit vector along the lane.
+    direction: vec2<f32>,
+}
+
+// What an observation needs of the route around one waypoint.
+struct PreviewRow {
+    // Heading of the lane [rad].
+    heading: f32,
+    // Scaled as observed: 4 future curvatures, 4 current ones, 10 radii ahead.
+    values: array<f32, 18>,
+}
+
+// One route in the world's table of waypoints.
+struct RouteRow {
+    // Its first waypoint in the table.
+    first: u32,
+    // Its number of waypoints.
+    n_waypoints: u32,
+    // Its roundabout.
+    roundabout: u32,
+    // Steps after which an episode is timed out.
+    step_limit: u32,
+    // Reach of a waypoint's crossing line to the left [m].
+    crossing_left: f32,
+    // Reach of a waypoint's crossing line to the right [m].
+    crossing_right: f32,
+}
+
+// One roundabout's field among the tables of all fields.
+struct FieldRow {
+    // South-west corner of the grid [m].
+    origin: vec2<f32>,
+    // Cells in a metre [1/m].
+    cells_per_metre: f32,
+    // Cells from west to east.
+    columns: u32,
+    // Cells from south to north.
+    rows: u32,
+    // Where its cells begin.
+    first_cell: u32,
+    // Where those for marching begin.
+    first_march_cell: u32,
+    // Where its blocks' pairs begin.
+    first_pair: u32,
+}
+
+// What the trucks of a batch share.
+struct BatchFacts {
+    // Trucks.
+    n_envs: u32,
+    // What routes, poses and random actions are drawn from.
+    seed: u32,
+    // Routes to draw from.
+    n_routes: u32,
+    // Each truck runs the route of its own place once and is then held (0 or 1).
+    fixed: u32,
+}
+
+// Vehicle, time and weights.
+@group(0) @binding(0) var<storage, read> params: Params;
+// The action table.
+@group(0) @binding(1) var<storage, read> actions: array<Action>;
+// The distance sensors, trailer's first.
+@group(0) @binding(2) var<storage, read> rays: array<Ray>;
+// A field for each roundabout.
+@group(0) @binding(3) var<storage, read> fields: array<FieldRow>;
+// Cells of all fields: of each first its own, then those for marching.
+@group(0) @binding(4) var<storage, read> cells: array<u32>;
+// Blocks of distances of all fields; a pair is the southern and the northern one [m].
+@group(0) @binding(5) var<storage, read> corners: array<vec2<f32>>;
+// Every route's waypoints, one route after the other.
+@group(0) @binding(6) var<storage, read> waypoints: array<WaypointRow>;
+// What is observed at each of them.
+@group(0) @binding(7) var<storage, read> previews: array<PreviewRow>;
+// Every route.
+@group(0) @binding(8) var<storage, read> routes: array<RouteRow>;
+// What the trucks of a batch share.
+@group(0) @binding(9) var<storage, read> batch: BatchFacts;
+// Routes that episodes run on: to be drawn from, or one a truck.
+@group(0) @binding(10) var<storage, read> choice: array<u32>;
+// Index into the action table, [n_envs].
+@group(0) @binding(11) var<storage, read_write> action: array<u32>;
+// What drives each truck, [n_envs].
+@group(0) @binding(12) var<storage, read_write> control: array<Control>;
+// The trucks, [n_envs].
+@group(0) @binding(13) var<storage, read_write> truck: array<Truck>;
+// Distances to the kerbs, [n_envs].
+@group(0) @binding(14) var<storage, read_write> clearance: array<Clearance>;
+// Places along the routes, [n_envs].
+@group(0) @binding(15) var<storage, read_write> progress: array<Progress>;
+// Distance sensors [m], [n_envs, N_RAYS].
+@group(0) @binding(16) var<storage, read_write> ranges: array<f32>;
+// What the next action sees, [n_envs, N_VALUES].
+@group(0) @binding(17) var<storage, read_write> observation: array<f32>;
+// What the last action led to, [n_envs, N_VALUES].
+@group(0) @binding(18) var<storage, read_write> next_observation: array<f32>;
+// Why each episode ended in the step just made, [n_envs].
+@group(0) @binding(19) var<storage, read_write> ended: array<u32>;
+// What the reward weighs, [n_envs].
+@group(0) @binding(20) var<storage, read_write> terms: array<RewardTerms>;
+// Rewards of the step just made, [n_envs].
+@group(0) @binding(21) var<storage, read_write> reward: array<f32>;
+// Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
+@group(0) @binding(22) var<storage, read_write> tally: array<atomic<u32>>;

@@ -1,0 +1,147 @@
+//! Structs and constants that are written once and read twice: by Rust, and by WGSL in the words printed here.
+
+use glam::Vec2;
+
+/// A type that WGSL has too.
+pub trait Shared {
+    /// Its name there.
+    fn wgsl() -> String;
+}
+
+impl Shared for f32 {
+    fn wgsl() -> String {
+        "f32".to_owned()
+    }
+}
+
+impl Shared for u32 {
+    fn wgsl() -> String {
+        "u32".to_owned()
+    }
+}
+
+impl Shared for Vec2 {
+    fn wgsl() -> String {
+        "vec2<f32>".to_owned()
+    }
+}
+
+impl<T: Shared, const N: usize> Shared for [T; N] {
+    fn wgsl() -> String {
+        format!("array<{}, {N}>", T::wgsl())
+    }
+}
+
+/// A value that WGSL can be told.
+pub trait Literal {
+    /// Its type there.
+    fn type_name() -> String;
+    /// The value as WGSL reads it, to the last bit.
+    fn literal(&self) -> String;
+}
+
+impl Literal for f32 {
+    fn type_name() -> String {
+        f32::wgsl()
+    }
+    fn literal(&self) -> String {
+        format!("{self:?}f")
+    }
+}
+
+impl Literal for u32 {
+    fn type_name() -> String {
+        u32::wgsl()
+    }
+    fn literal(&self) -> String {
+        format!("{self}u")
+    }
+}
+
+impl Literal for usize {
+    fn type_name() -> String {
+        u32::wgsl()
+    }
+    fn literal(&self) -> String {
+        format!("{self}u")
+    }
+}
+
+impl<T: Literal, const N: usize> Literal for [T; N] {
+    fn type_name() -> String {
+        format!("array<{}, {N}>", T::type_name())
+    }
+    fn literal(&self) -> String {
+        let values: Vec<String> = self.iter().map(Literal::literal).collect();
+        format!("{}({})", Self::type_name(), values.join(", "))
+    }
+}
+
+/// Prints a comment's lines, as `///` hands them over, at a depth.
+pub(crate) fn comment(depth: &str, lines: &[&str]) -> String {
+    lines.iter().map(|line| format!("{depth}//{line}\n")).collect()
+}
+
+/// Structs of plain data, each with its twin in WGSL.
+macro_rules! shared {
+    ($($(#[doc = $doc:literal])* pub struct $name:ident { $($(#[doc = $field_doc:literal])* pub $field:ident: $type:ty,)* })*) => {
+        $(
+            $(#[doc = $doc])*
+            #[repr(C)]
+            #[derive(Debug, Clone, Copy, PartialEq, Default, bytemuck::Pod, bytemuck::Zeroable)]
+            pub struct $name {
+                $($(#[doc = $field_doc])* pub $field: $type,)*
+            }
+
+            impl $crate::layout::shared::Shared for $name {
+                fn wgsl() -> String {
+                    stringify!($name).to_owned()
+                }
+            }
+        )*
+
+        /// Every shared struct: its name, its size [bytes], and the name and the offset [bytes] of each field.
+        pub fn structs() -> Vec<(&'static str, usize, Vec<(&'static str, usize)>)> {
+            vec![$((
+                stringify!($name),
+                size_of::<$name>(),
+                vec![$((stringify!($field), std::mem::offset_of!($name, $field)),)*],
+            ),)*]
+        }
+
+        /// The structs in WGSL.
+        fn printed_structs() -> String {
+            let mut printed = String::new();
+            $(
+                printed += &$crate::layout::shared::comment("", &[$($doc),*]);
+                printed += &format!("struct {} {{\n", stringify!($name));
+                $(
+                    printed += &$crate::layout::shared::comment("    ", &[$($field_doc),*]);
+                    printed += &format!("    {}: {},\n", stringify!($field), <$type as $crate::layout::shared::Shared>::wgsl());
+                )*
+                printed += "}\n\n";
+            )*
+            printed
+        }
+    };
+}
+
+/// Constants, each with its twin in WGSL.
+macro_rules! constants {
+    ($($(#[doc = $doc:literal])* $visibility:vis const $name:ident: $type:ty = $value:expr;)*) => {
+        $($(#[doc = $doc])* $visibility const $name: $type = $value;)*
+
+        /// The constants above in WGSL.
+        pub(crate) fn printed_constants() -> String {
+            use $crate::layout::shared::{Literal, comment};
+            let mut printed = String::new();
+            $(
+                printed += &comment("", &[$($doc),*]);
+                printed += &format!("const {}: {} = {};\n", stringify!($name), <$type>::type_name(), $name.literal());
+            )*
+            printed
+        }
+    };
+}
+
+pub(crate) use {constants, shared};
