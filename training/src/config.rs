@@ -103,6 +103,9 @@ pub struct Learning {
     /// Noise that is added to the scaled observations that are learned from, evenly distributed up to this; 0 none.
     #[serde(default)]
     pub observation_noise: f64,
+    /// Half of the transitions are learned from as in a mirror.
+    #[serde(default)]
+    pub mirror: bool,
     /// Adam's learning rate of the actor.
     pub actor_rate: f64,
     /// Adam's learning rate of the critics.
