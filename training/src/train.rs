@@ -23,7 +23,7 @@ use crate::checkpoint::Stored;
 use crate::config::Config;
 use crate::drivers::Learned;
 use crate::error::Error;
-use crate::evaluate::examine;
+use crate::evaluate::Examination;
 use crate::files;
 use crate::page::Page;
 use crate::provenance;
@@ -163,7 +163,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return files::print(&format!("written: {}\n", folder.path().display()));
     }
     let mut driver = Learned { name: folder.policy().display().to_string(), policy };
-    let (report, tracks) = examine(&scenario, &world, Split::Test, EPISODES, 0, &mut driver, true)?;
+    let examination = Examination { scenario: &scenario, world: &world, split: Split::Test, episodes: EPISODES, seed: 0, record: true };
+    let (report, tracks) = examination.report(&mut driver)?;
     let table = report.table();
     finished.evaluation = Some(report.clone());
     files::write_json(&folder.report(), &finished)?;
