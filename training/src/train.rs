@@ -141,6 +141,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
         if args.minutes.is_some() || args.steps.is_some() {
             folder.write_config(&config)?;
         }
+        // What an examination said of the driver before is not said of the one to come.
+        files::write_json(&folder.report(), &Finished { interrupted: true, ..finished(&config, &run.progress) })?;
+        let _ = std::fs::remove_file(folder.page());
         doing = format!("going on after {} env steps and {:.2} min,", run.progress.env_steps(), run.progress.seconds() / 60.0);
     }
     // A run goes on when nobody reads its lines.
