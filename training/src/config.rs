@@ -201,7 +201,13 @@ impl Config {
         if minutes.is_some() || steps.is_some() {
             (self.minutes, self.steps) = (minutes, steps);
         }
-        self.check(&Reader::of(Path::new("command line")))
+        // What the file says has been checked: where something is wrong, it is these.
+        let flags = [
+            minutes.map(|minutes| format!("--minutes {minutes}")),
+            steps.map(|steps| format!("--steps {steps}")),
+            envs.map(|envs| format!("--envs {envs}")),
+        ];
+        self.check(&Reader::of(Path::new(&flags.into_iter().flatten().collect::<Vec<_>>().join(" "))))
     }
 
     /// Whether a run with this config can go on where one with the other left off: they differ in their budget and checkpoints at most.
