@@ -282,6 +282,10 @@ impl Config {
                 return Err(reader.invalid("learning.value_clip", "given", expected).into());
             }
         }
+        if learning.categories.is_some() && learning.critics == Critics::Lowest {
+            let expected = "is for single values: beside learning.categories \"average\" is needed, for histograms are averaged";
+            return Err(reader.invalid("learning.critics", "\"lowest\"", expected).into());
+        }
         reader.within("learning.target_rate", learning.target_rate, 1e-6..=1.0, "")?;
         reader.count("learning.target_every", learning.target_every, 1..=1_000_000)?;
         reader.within("learning.average_rate", learning.average_rate, 1e-6..=1.0, "")?;
