@@ -103,6 +103,9 @@ pub struct Learning {
     /// Noise that is added to the scaled observations that are learned from, evenly distributed up to this; 0 none.
     #[serde(default)]
     pub observation_noise: f64,
+    /// Half of the transitions are learned from as in a mirror.
+    #[serde(default)]
+    pub mirror: bool,
     /// Adam's learning rate of the actor.
     pub actor_rate: f64,
     /// Adam's learning rate of the critics.
@@ -198,7 +201,13 @@ impl Config {
         if minutes.is_some() || steps.is_some() {
             (self.minutes, self.steps) = (minutes, steps);
         }
-        self.check(&Reader::of(Path::new("command line")))
+        // What the file says has been checked: where something is wrong, it is these.
+        let flags = [
+            minutes.map(|minutes| format!("--minutes {minutes}")),
+            steps.map(|steps| format!("--steps {steps}")),
+            envs.map(|envs| format!("--envs {envs}")),
+        ];
+        self.check(&Reader::of(Path::new(&flags.into_iter().flatten().collect::<Vec<_>>().join(" "))))
     }
 
     /// Whether a run with this config can go on where one with the other left off: they differ in their budget and checkpoints at most.
@@ -272,6 +281,10 @@ impl Config {
                 let expected = "has no meaning beside learning.categories: leave one of them out";
                 return Err(reader.invalid("learning.value_clip", "given", expected).into());
             }
+        }
+        if learning.categories.is_some() && learning.critics == Critics::Lowest {
+            let expected = "is for single values: beside learning.categories \"average\" is needed, for histograms are averaged";
+            return Err(reader.invalid("learning.critics", "\"lowest\"", expected).into());
         }
         reader.within("learning.target_rate", learning.target_rate, 1e-6..=1.0, "")?;
         reader.count("learning.target_every", learning.target_every, 1..=1_000_000)?;

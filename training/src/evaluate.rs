@@ -76,8 +76,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
         None => (Value::Null, None),
     };
     let possible = args.certified.as_ref().map(|file| certified(file, &scenario, &world, scenario.split(split))).transpose()?;
-    let (finished, tracks) = drive(&scenario, &world, split, args.episodes, args.seed, driver.as_mut(), args.html.is_some())?;
-    let mut report = summarised(&scenario, &world, split, args.seed, driver.name(), &finished, args.episodes);
+    let (episodes, seed, record) = (args.episodes, args.seed, args.html.is_some());
+    let examination = Examination { scenario: &scenario, world: &world, split, episodes, seed, record };
+    let (finished, tracks) = examination.drive(driver.as_mut())?;
+    let mut report = examination.summarised(driver.name(), &finished);
     report.certified = possible.and_then(|possible| {
         let chunks = scenario.split(split).iter().zip(finished.chunks(args.episodes));
         let kept: Vec<&Episode> = chunks.filter(|(route, _)| possible.contains(route)).flat_map(|(_, chunk)| chunk).collect();
@@ -104,93 +106,97 @@ fn read_run(folder: &Path) -> Result<(Value, Option<String>), Error> {
     Ok((run, Some(read(&metrics)?)))
 }
 
-/// Runs `episodes` episodes on every route of `split`, all at once, each truck once. With `record` every episode is kept, in the order of the
-/// report's routes.
-pub fn examine(
-    scenario: &Scenario,
-    world: &Arc<World>,
-    split: Split,
-    episodes: usize,
-    seed: u32,
-    driver: &mut dyn Driver,
-    record: bool,
-) -> Result<(Report, Vec<Track>), Error> {
-    let (finished, tracks) = drive(scenario, world, split, episodes, seed, driver, record)?;
-    Ok((summarised(scenario, world, split, seed, driver.name(), &finished, episodes), tracks))
+/// What a driver is examined on: every route of a split, so many episodes each, all at once, each truck once.
+#[derive(Debug, Clone, Copy)]
+pub struct Examination<'a> {
+    /// The benchmark.
+    pub scenario: &'a Scenario,
+    /// The same, baked.
+    pub world: &'a Arc<World>,
+    /// Which of its routes.
+    pub split: Split,
+    /// Episodes on each route.
+    pub episodes: usize,
+    /// What the start poses are drawn from.
+    pub seed: u32,
+    /// Every state of every episode is kept.
+    pub record: bool,
 }
 
-/// The episodes of every route of `split`, `episodes` each, in the order of its routes; with `record` also every state of each.
-fn drive(
-    scenario: &Scenario,
-    world: &Arc<World>,
-    split: Split,
-    episodes: usize,
-    seed: u32,
-    driver: &mut dyn Driver,
-    record: bool,
-) -> Result<(Vec<Episode>, Vec<Track>), Error> {
-    let routes = scenario.split(split);
-    if routes.is_empty() {
-        let value = split.name().to_owned();
-        return Err(Error::Flag { flag: "--split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
+impl Examination<'_> {
+    /// The driver's report and, where they are kept, the episodes in the order of its routes.
+    pub fn report(&self, driver: &mut dyn Driver) -> Result<(Report, Vec<Track>), Error> {
+        let (finished, tracks) = self.drive(driver)?;
+        Ok((self.summarised(driver.name(), &finished), tracks))
     }
-    let trucks: Vec<u32> = routes.iter().flat_map(|&route| std::iter::repeat_n(route, episodes)).collect();
-    let mut simulator = Simulator::new(world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?;
-    let mut running: Vec<Running> = simulator.batch().truck.iter().map(|truck| Running::new(&world.params.rig, truck)).collect();
-    let recorded = if record { 0..running.len() } else { 0..0 };
-    let mut recorder = Recorder::new(world, simulator.batch(), recorded);
-    let bar = ProgressBar::new(running.len() as u64).with_style(
-        ProgressStyle::with_template("evaluating {bar:30} {pos}/{len} episodes, {elapsed}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
-    let mut actions = Vec::new();
-    let mut finished: Vec<Option<Episode>> = vec![None; running.len()];
-    while finished.iter().any(Option::is_none) {
-        driver.act(world, simulator.batch(), &mut actions);
-        simulator.step(&actions)?;
-        let batch = simulator.batch();
-        recorder.follow(world, batch);
-        for (env, (running, finished)) in running.iter_mut().zip(&mut finished).enumerate() {
-            if finished.is_none() && running.follow(&world.params.rig, batch, env) {
-                *finished = Some(running.finish(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running)));
-                bar.inc(1);
+
+    /// The episodes, route by route in the order of the split; where they are kept also every state of each.
+    fn drive(&self, driver: &mut dyn Driver) -> Result<(Vec<Episode>, Vec<Track>), Error> {
+        let Examination { scenario, world, split, episodes, seed, record } = *self;
+        let routes = scenario.split(split);
+        if routes.is_empty() {
+            let value = split.name().to_owned();
+            return Err(Error::Flag { flag: "--split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
+        }
+        let trucks: Vec<u32> = routes.iter().flat_map(|&route| std::iter::repeat_n(route, episodes)).collect();
+        let mut simulator = Simulator::new(world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?;
+        let mut running: Vec<Running> = simulator.batch().truck.iter().map(|truck| Running::new(&world.params.rig, truck)).collect();
+        let recorded = if record { 0..running.len() } else { 0..0 };
+        let mut recorder = Recorder::new(world, simulator.batch(), recorded);
+        let bar = ProgressBar::new(running.len() as u64).with_style(
+            ProgressStyle::with_template("evaluating {bar:30} {pos}/{len} episodes, {elapsed}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar()),
+        );
+        let mut actions = Vec::new();
+        let mut finished: Vec<Option<Episode>> = vec![None; running.len()];
+        while finished.iter().any(Option::is_none) {
+            driver.act(world, simulator.batch(), &mut actions);
+            simulator.step(&actions)?;
+            let batch = simulator.batch();
+            recorder.follow(world, batch);
+            for (env, (running, finished)) in running.iter_mut().zip(&mut finished).enumerate() {
+                if finished.is_none() && running.follow(&world.params.rig, batch, env) {
+                    *finished = Some(running.finish(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running)));
+                    bar.inc(1);
+                }
             }
         }
+        bar.finish_and_clear();
+        Ok((finished.into_iter().flatten().collect(), recorder.finish()))
     }
-    bar.finish_and_clear();
-    Ok((finished.into_iter().flatten().collect(), recorder.finish()))
-}
 
-fn summarised(scenario: &Scenario, world: &World, split: Split, seed: u32, policy: &str, finished: &[Episode], per_route: usize) -> Report {
-    let rig = &world.params.rig;
-    let kerbs: Vec<Outline> = scenario.places.iter().map(|place| place.roundabout.kerbs(scenario.gutter)).collect();
-    let all: Vec<_> = scenario.routes().collect();
-    let suffices = |&index: &u32| {
-        let (place, route) = all[index as usize];
-        own_lane_suffices(rig, &kerbs[place], &swept_path(rig, &route.centre_line, scenario.cruising_speed(), 0.25))
-    };
-    let routes = scenario.split(split);
-    let own_lane: Vec<bool> = routes.iter().map(suffices).collect();
-    let chunks = || own_lane.iter().zip(finished.chunks(per_route));
-    let of_routes = |suffices: bool| {
-        let kept: Vec<&Episode> = chunks().filter(|&(&own, _)| own == suffices).flat_map(|(_, chunk)| chunk).collect();
-        Summary::of(kept.into_iter(), scenario.step)
-    };
-    let route_reports = routes.iter().zip(chunks()).filter_map(|(&route, (&own_lane_suffices, chunk))| {
-        let summary = Summary::of(chunk.iter(), scenario.step)?;
-        Some(RouteReport { name: world.route_names[route as usize].clone(), own_lane_suffices, summary })
-    });
-    Report {
-        benchmark: scenario.name.clone(),
-        split: split.name(),
-        policy: policy.to_owned(),
-        seed,
-        engine: "cpu".to_owned(),
-        summary: Summary::of(finished.iter(), scenario.step).expect("a split has a route and a route an episode: both were checked"),
-        own_lane_suffices: of_routes(true),
-        needs_deviation: of_routes(false),
-        certified: None,
-        routes: route_reports.collect(),
+    fn summarised(&self, policy: &str, finished: &[Episode]) -> Report {
+        let Examination { scenario, world, split, episodes, seed, .. } = *self;
+        let rig = &world.params.rig;
+        let kerbs: Vec<Outline> = scenario.places.iter().map(|place| place.roundabout.kerbs(scenario.gutter)).collect();
+        let all: Vec<_> = scenario.routes().collect();
+        let suffices = |&index: &u32| {
+            let (place, route) = all[index as usize];
+            own_lane_suffices(rig, &kerbs[place], &swept_path(rig, &route.centre_line, scenario.cruising_speed(), 0.25))
+        };
+        let routes = scenario.split(split);
+        let own_lane: Vec<bool> = routes.iter().map(suffices).collect();
+        let chunks = || own_lane.iter().zip(finished.chunks(episodes));
+        let of_routes = |suffices: bool| {
+            let kept: Vec<&Episode> = chunks().filter(|&(&own, _)| own == suffices).flat_map(|(_, chunk)| chunk).collect();
+            Summary::of(kept.into_iter(), scenario.step)
+        };
+        let route_reports = routes.iter().zip(chunks()).filter_map(|(&route, (&own_lane_suffices, chunk))| {
+            let summary = Summary::of(chunk.iter(), scenario.step)?;
+            Some(RouteReport { name: world.route_names[route as usize].clone(), own_lane_suffices, summary })
+        });
+        Report {
+            benchmark: scenario.name.clone(),
+            split: split.name(),
+            policy: policy.to_owned(),
+            seed,
+            engine: "cpu".to_owned(),
+            summary: Summary::of(finished.iter(), scenario.step).expect("a split has a route and a route an episode: both were checked"),
+            own_lane_suffices: of_routes(true),
+            needs_deviation: of_routes(false),
+            certified: None,
+            routes: route_reports.collect(),
+        }
     }
 }
 

@@ -14,6 +14,7 @@ mod exploration;
 mod files;
 mod generator;
 mod memory;
+mod mirror;
 mod network;
 mod page;
 mod policy;

@@ -23,7 +23,7 @@ use crate::checkpoint::Stored;
 use crate::config::Config;
 use crate::drivers::Learned;
 use crate::error::Error;
-use crate::evaluate::examine;
+use crate::evaluate::Examination;
 use crate::files;
 use crate::page::Page;
 use crate::provenance;
@@ -141,6 +141,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
         if args.minutes.is_some() || args.steps.is_some() {
             folder.write_config(&config)?;
         }
+        // What an examination said of the driver before is not said of the one to come.
+        files::write_json(&folder.report(), &Finished { interrupted: true, ..finished(&config, &run.progress) })?;
+        let _ = std::fs::remove_file(folder.page());
         doing = format!("going on after {} env steps and {:.2} min,", run.progress.env_steps(), run.progress.seconds() / 60.0);
     }
     // A run goes on when nobody reads its lines.
@@ -163,7 +166,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return files::print(&format!("written: {}\n", folder.path().display()));
     }
     let mut driver = Learned { name: folder.policy().display().to_string(), policy };
-    let (report, tracks) = examine(&scenario, &world, Split::Test, EPISODES, 0, &mut driver, true)?;
+    let examination = Examination { scenario: &scenario, world: &world, split: Split::Test, episodes: EPISODES, seed: 0, record: true };
+    let (report, tracks) = examination.report(&mut driver)?;
     let table = report.table();
     finished.evaluation = Some(report.clone());
     files::write_json(&folder.report(), &finished)?;

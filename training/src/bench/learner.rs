@@ -200,6 +200,7 @@ fn learning(hidden: &[usize], batch: usize) -> Learning {
         reward_scale: 1.0,
         scale_observations: true,
         observation_noise: 0.0,
+        mirror: false,
         actor_rate: 3e-4,
         critic_rate: 3e-4,
         last_rate: 1.0,

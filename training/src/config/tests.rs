@@ -110,14 +110,22 @@ fn what_the_command_line_says_wins_and_a_budget_there_replaces_both() {
     config.override_with(Some(3), None, Some(1000), Some(16)).unwrap();
     assert_eq!((config.seed, config.n_envs, config.minutes, config.steps), (3, 16, None, Some(1000)));
     let message = config.override_with(None, None, None, Some(0)).unwrap_err().to_string();
-    assert!(message.contains("n_envs: 0; must lie in 1..65536"), "{message}");
+    assert_eq!(message, "--envs 0: n_envs: 0; must lie in 1..65536");
+}
+
+#[test]
+fn the_lower_of_two_histograms_is_refused() {
+    let categories = ["learning.categories.count=31", "learning.categories.low=-3.0", "learning.categories.high=3.0"];
+    assert!(with_set(&categories).is_ok());
+    let message = with_set(&[&categories[..], &["learning.critics=lowest"]].concat()).unwrap_err();
+    assert!(message.contains("learning.critics: \"lowest\"; is for single values"), "{message}");
 }
 
 #[test]
 fn whatever_stands_for_a_value_is_taken_or_refused_by_its_key() {
     let text = default_file();
     let keys: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).filter_map(|line| Some(line.split_once(" = ")?.0)).collect();
-    assert_eq!(keys.len(), 28, "{keys:?}");
+    assert_eq!(keys.len(), 29, "{keys:?}");
     let mut taken = 0;
     for key in keys {
         for value in [

@@ -68,8 +68,9 @@ impl Reading {
     /// Value of every action by one critic, `[B, A]`, from its output.
     pub(super) fn values(&self, output: Tensor<2>) -> Tensor<2> {
         let Some(categories) = self.categories else { return output };
-        let centres = Tensor::<1>::from_data(TensorData::new(centres(categories), [categories.count]), &output.device());
-        (softmax(self.histograms(output, categories), 2) * centres.reshape([1, 1, categories.count])).sum_dim(2).squeeze_dim(2)
+        let rows = output.dims()[0];
+        let shares = softmax(self.histograms(output, categories), 2);
+        means(categories, shares.reshape([rows * self.n_actions, categories.count])).reshape([rows, self.n_actions])
     }
 
     /// The two critics' values `[B, A]` as one, `[B, A]`.
@@ -123,8 +124,7 @@ impl Reading {
             let index = action.clone().reshape([rows, 1, 1]).expand([rows, 1, categories.count]);
             let taken: Tensor<2> = self.histograms(output.clone(), categories).gather(1, index.autodiff()).squeeze_dim(1); // [B, C]
             let loss = -(log_softmax(taken.clone(), 1) * histogram.clone().autodiff()).sum_dim(1);
-            let centres = Tensor::<1>::from_data(TensorData::new(centres(categories), [categories.count]), &Device::flex());
-            return (loss, (softmax(taken.inner(), 1) * centres.unsqueeze()).sum_dim(1));
+            return (loss, means(categories, softmax(taken.inner(), 1)));
         }
         let taken = output.clone().gather(1, action.clone().autodiff()); // [B, 1]
         let error = (taken.clone() - goal.value.clone().autodiff()).square();
@@ -145,6 +145,12 @@ impl Reading {
         let rows = output.dims()[0];
         output.reshape([rows, self.n_actions, categories.count])
     }
+}
+
+/// Mean value of each histogram, `[rows, 1]`, from its shares `[rows, categories]`.
+fn means(categories: Categories, shares: Tensor<2>) -> Tensor<2> {
+    let centres = Tensor::<2>::from_data(TensorData::new(centres(categories), [1, categories.count]), &shares.device());
+    (shares * centres).sum_dim(1)
 }
 
 /// Values that the categories stand for, `[categories]`.

@@ -23,6 +23,7 @@ fn learning() -> Learning {
         reward_scale: 1.0,
         scale_observations: false,
         observation_noise: 0.0,
+        mirror: false,
         actor_rate: 0.01,
         critic_rate: 0.01,
         last_rate: 1.0,

@@ -21,6 +21,7 @@ use crate::config::Config;
 use crate::error::Error;
 use crate::generator::Generator;
 use crate::memory::Memory;
+use crate::mirror::Mirror;
 use crate::policy::{self, Policy};
 use crate::sac::{Sac, Update};
 use crate::scaling::Scaling;
@@ -35,6 +36,8 @@ pub struct Run {
     memory: Memory<N_VALUES>,
     acting: Generator,
     sampling: Generator,
+    /// None where only what happened is learned from.
+    mirror: Option<Mirror>,
     sac: Sac,
     /// None while chance drives.
     scaling: Option<Scaling>,
@@ -55,6 +58,7 @@ impl Run {
             memory: Memory::new(config.n_envs, config.learning.n_steps, &config.memory),
             acting: stream(1),
             sampling: stream(2),
+            mirror: config.learning.mirror.then(|| Mirror::of(&world)).transpose()?,
             sac: Sac::new(&config.learning, N_VALUES, world.actions.len(), u64::from(config.seed))?,
             scaling: None,
             progress,
@@ -105,7 +109,10 @@ impl Run {
         self.progress.stepped(self.simulator.batch());
         let pace = 1.0 - (1.0 - learning.last_rate) * self.progress.share();
         for _ in 0..learning.updates_per_step {
-            let sample = self.memory.sample(learning.batch, learning.discount as f32, &mut self.sampling);
+            let mut sample = self.memory.sample(learning.batch, learning.discount as f32, &mut self.sampling);
+            if let Some(mirror) = &self.mirror {
+                mirror.turn_half(&mut sample, &mut self.sampling);
+            }
             let (update, errors) = self.sac.update(bridge::parts(&sample, scaling, learning, &mut self.sampling), pace);
             if let Some((what, value)) = broken(&update) {
                 return Err(self.diverged(what, value));
@@ -117,7 +124,13 @@ impl Run {
     }
 
     fn found_scaling(&self) -> Scaling {
-        if self.config.learning.scale_observations { Scaling::of(self.memory.observations()) } else { Scaling::none(N_VALUES) }
+        if !self.config.learning.scale_observations {
+            return Scaling::none(N_VALUES);
+        }
+        let seen = self.memory.observations();
+        // What is learned from lies the same to both sides.
+        let images = self.mirror.iter().flat_map(|mirror| seen.iter().map(|seen| mirror.observation(seen)));
+        if self.mirror.is_none() { Scaling::of(seen) } else { Scaling::of(&seen.iter().copied().chain(images).collect::<Vec<_>>()) }
     }
 
     /// The driver as it is.

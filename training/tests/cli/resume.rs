@@ -100,7 +100,8 @@ fn a_run_killed_and_stopped_on_the_way_equals_one_never_stopped_bit_for_bit() {
     let (parts, whole) = (figures(&place, "parts"), figures(&place, "whole"));
     assert!(100 < whole.len(), "{}", whole.len());
     assert_eq!(parts, whole);
-    let evaluation = |run: &str| place.json(&format!("runs/{run}/report.json"))["evaluation"]["groups"].clone();
+    let evaluation = |run: &str| place.json(&format!("runs/{run}/report.json"))["evaluation"]["routes"].clone();
+    assert!(evaluation("whole").is_array());
     assert_eq!(evaluation("parts"), evaluation("whole"));
 }
 
@@ -141,10 +142,13 @@ fn a_finished_run_goes_on_only_with_a_larger_budget() {
     assert!(message.contains("it has finished") && message.contains("--steps"), "{message}");
     let message = refusal(&resume(&place, "run", &["--steps", "800"]), 2);
     assert!(message.contains("800 env steps: more are needed"), "{message}");
-    // The budget that was asked for stays with the run.
+    // The budget that was asked for stays with the run; what the examination said of the driver before is gone.
+    assert_eq!(place.json("runs/run/report.json")["interrupted"], false);
     let before = bytes(&place, "runs/run/checkpoint.safetensors");
     let run = begun(resumed(&place, "run", &ENDLESS));
     wait_until("another checkpoint", || bytes(&place, "runs/run/checkpoint.safetensors") != before);
+    assert_eq!(place.json("runs/run/report.json")["interrupted"], true);
+    assert!(!place.file("runs/run/report.html").exists());
     succeed(&interrupted(run));
     assert!(String::from_utf8(bytes(&place, "runs/run/config.toml")).unwrap().contains("steps = 1000000000"));
     let reached = place.json("runs/run/report.json")["env_steps"].as_u64().unwrap();
