@@ -8,7 +8,7 @@ mod tables;
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use wgpu::{Backends, DeviceType, Features, Instance, InstanceDescriptor, Limits};
+use wgpu::{Backends, BufferDescriptor, BufferUsages, DeviceType, Features, Instance, InstanceDescriptor, Limits, MapMode, PollType};
 
 use crate::layout::buffers::N_BUFFERS;
 pub use batch::{Batch, Columns, Slice};
@@ -208,6 +208,45 @@ impl Device {
             Some(message) => Err(self.broken(message.clone())),
             None => Ok(()),
         }
+    }
+
+    /// The bytes of some slices, once all work before is done.
+    pub fn read(&self, slices: &[Slice]) -> Result<Vec<Vec<u8>>, Error> {
+        self.check()?;
+        let size = slices.iter().map(|slice| slice.size).sum();
+        let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
+        let staging = self.device.create_buffer(&BufferDescriptor { label: Some("staging"), size, usage, mapped_at_creation: false });
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        let mut at = 0;
+        for slice in slices {
+            encoder.copy_buffer_to_buffer(&slice.buffer, slice.offset, &staging, at, slice.size);
+            at += slice.size;
+        }
+        self.queue.submit([encoder.finish()]);
+        let (sender, receiver) = std::sync::mpsc::channel();
+        staging.map_async(MapMode::Read, .., move |mapped| {
+            let _ = sender.send(mapped);
+        });
+        self.wait()?;
+        match receiver.try_recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => return Err(self.broken(error.to_string())),
+            Err(_) => return Err(self.broken("the driver never answered".to_owned())),
+        }
+        let mapped = staging.get_mapped_range(..).map_err(|error| self.broken(error.to_string()))?;
+        let mut rest = &mapped[..];
+        let parts = slices.iter().map(|slice| {
+            let (part, others) = rest.split_at(slice.size as usize);
+            rest = others;
+            part.to_vec()
+        });
+        Ok(parts.collect())
+    }
+
+    /// Waits until all that was asked of the device is done.
+    pub fn wait(&self) -> Result<(), Error> {
+        self.device.poll(PollType::wait_indefinitely()).map_err(|error| self.broken(error.to_string()))?;
+        self.check()
     }
 
     /// The shaders, compiled when they are first asked for.

@@ -370,6 +370,11 @@ impl Ended {
 
 /// `shaders/layout.wgsl`: all that shaders share with Rust.
 pub fn wgsl() -> String {
+    [shared_wgsl(), buffers::printed()].concat()
+}
+
+/// The constants and structs alone, for shaders with buffers of their own.
+pub fn shared_wgsl() -> String {
     let ends = Ended::ALL.map(|ended| format!("const {}: u32 = {}u;\n", ended.name().to_uppercase(), ended as u32));
     [
         "// What shaders share with Rust. Printed from src/layout.rs and the constants beside each stage: change those.\n\n".to_owned(),
@@ -387,7 +392,6 @@ pub fn wgsl() -> String {
         ends.concat(),
         "\n".to_owned(),
         printed_structs(),
-        buffers::printed(),
     ]
     .concat()
 }

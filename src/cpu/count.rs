@@ -42,6 +42,12 @@ impl Tally {
         self.sums[REWARD_SUM] as f64 / f64::from(REWARD_PARTS)
     }
 
+    /// What happened since the tally was `earlier`.
+    pub fn since(mut self, earlier: &Tally) -> Tally {
+        self.sums.iter_mut().zip(earlier.sums).for_each(|(sum, earlier)| *sum -= earlier);
+        self
+    }
+
     /// Counts the step just made of one truck.
     #[inline]
     pub(crate) fn with(mut self, row: &Row) -> Tally {

@@ -7,7 +7,7 @@ use bytemuck::{bytes_of, cast_slice};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buffer, BufferBinding, BufferDescriptor, BufferUsages, CommandEncoder,
-    ComputePassDescriptor, ComputePassTimestampWrites, Features, MapMode, PollType, QuerySetDescriptor, QueryType,
+    ComputePassDescriptor, ComputePassTimestampWrites, Features, QuerySetDescriptor, QueryType,
 };
 
 use super::tables::tables;
@@ -168,6 +168,11 @@ impl Batch {
         self.pass(encoder, last.kernels);
     }
 
+    /// The same for actions drawn by chance.
+    pub fn add_draw(&self, encoder: &mut CommandEncoder) {
+        self.pass(encoder, &[DRAW]);
+    }
+
     /// Forgets what the host saw of the columns: for who submits a step of their own.
     pub fn stepped(&mut self) {
         self.seen.take();
@@ -176,7 +181,7 @@ impl Batch {
     /// The same with actions drawn by chance.
     pub fn step_at_random(&mut self) {
         self.run(|batch, encoder| {
-            batch.pass(encoder, &[DRAW]);
+            batch.add_draw(encoder);
             batch.add_step(encoder);
         });
     }
@@ -212,7 +217,7 @@ impl Batch {
             }
             encoder.resolve_query_set(&set, 0..count, &resolved, 0);
         });
-        let bytes = self.fetched(&[Slice { buffer: resolved, offset: 0, size }])?;
+        let bytes = self.device.read(&[Slice { buffer: resolved, offset: 0, size }])?;
         let ticks: &[u64] = cast_slice(&bytes[0]);
         let period = f64::from(self.device.queue.get_timestamp_period());
         let lasted = |index: usize| ticks[2 * index + 1].saturating_sub(ticks[2 * index]) as f64 * period;
@@ -238,8 +243,7 @@ impl Batch {
 
     /// Waits until all that was asked of the device is done.
     pub fn wait(&self) -> Result<(), Error> {
-        self.device.device.poll(PollType::wait_indefinitely()).map_err(|error| self.device.broken(error.to_string()))?;
-        self.device.check()
+        self.device.wait()
     }
 
     /// Puts an action for every truck into its column.
@@ -252,7 +256,7 @@ impl Batch {
         self.seen.get_or_init(|| {
             let mut batch = cpu::Batch::new(self.n_envs, self.seed, self.choice.clone());
             // A device that fails here fails at the next step, which says so.
-            if let Ok(bytes) = self.fetched(&self.buffers[FIRST_COLUMN..FIRST_COLUMN + WIDTHS.len()]) {
+            if let Ok(bytes) = self.device.read(&self.buffers[FIRST_COLUMN..FIRST_COLUMN + WIDTHS.len()]) {
                 for ((_, column), bytes) in batch.columns_mut().into_iter().zip(bytes) {
                     column.copy_from_slice(&bytes);
                 }
@@ -264,7 +268,7 @@ impl Batch {
 
     /// What happened since the batch was made.
     pub fn tally(&self) -> Result<Tally, Error> {
-        let bytes = self.fetched(&self.buffers[N_BUFFERS - 1..])?;
+        let bytes = self.device.read(&self.buffers[N_BUFFERS - 1..])?;
         let words: &[u32] = cast_slice(&bytes[0]);
         let sum = |index: usize| (u64::from(words[2 * index]) | u64::from(words[2 * index + 1]) << 32) as i64;
         Ok(Tally { sums: std::array::from_fn(sum) })
@@ -340,39 +344,5 @@ impl Batch {
         if let Some(slice) = self.column(name) {
             self.device.queue.write_buffer(&slice.buffer, slice.offset, bytes);
         }
-    }
-
-    /// The bytes of some slices, once all work before is done.
-    fn fetched(&self, slices: &[Slice]) -> Result<Vec<Vec<u8>>, Error> {
-        self.device.check()?;
-        let size = slices.iter().map(|slice| slice.size).sum();
-        let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
-        let staging =
-            self.device.device.create_buffer(&BufferDescriptor { label: Some("staging"), size, usage, mapped_at_creation: false });
-        let mut encoder = self.device.device.create_command_encoder(&Default::default());
-        let mut at = 0;
-        for slice in slices {
-            encoder.copy_buffer_to_buffer(&slice.buffer, slice.offset, &staging, at, slice.size);
-            at += slice.size;
-        }
-        self.device.queue.submit([encoder.finish()]);
-        let (sender, receiver) = std::sync::mpsc::channel();
-        staging.map_async(MapMode::Read, .., move |mapped| {
-            let _ = sender.send(mapped);
-        });
-        self.wait()?;
-        match receiver.try_recv() {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => return Err(self.device.broken(error.to_string())),
-            Err(_) => return Err(self.device.broken("the driver never answered".to_owned())),
-        }
-        let mapped = staging.get_mapped_range(..).map_err(|error| self.device.broken(error.to_string()))?;
-        let mut rest = &mapped[..];
-        let parts = slices.iter().map(|slice| {
-            let (part, others) = rest.split_at(slice.size as usize);
-            rest = others;
-            part.to_vec()
-        });
-        Ok(parts.collect())
     }
 }

@@ -1,5 +1,8 @@
 //! From columns to tensors: the only file that names both.
 
+#[cfg(feature = "gpu")]
+pub mod device;
+
 use burn::tensor::{Device, Tensor, TensorData};
 use offtrack::layout::N_VALUES;
 use offtrack::simulator::Batch;

@@ -18,6 +18,12 @@ pub struct Config {
     /// A benchmark to practise on in place of `benchmark`, on whose test routes the driver is examined all the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub practice: Option<String>,
+    /// Where trucks and learner are.
+    #[serde(default)]
+    pub device: Device,
+    /// Part of the name of the graphics adapter; without it the first that is found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adapter: Option<String>,
     /// What routes, poses, networks, actions and samples are drawn from.
     pub seed: u32,
     /// Trucks that drive at once.
@@ -42,6 +48,17 @@ pub struct Config {
 
 fn checkpoint_minutes() -> f64 {
     2.0
+}
+
+/// Where trucks and learner are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Device {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// A graphics device, both on the same.
+    Gpu,
 }
 
 /// Actions by chance in place of the policy's.
@@ -223,7 +240,7 @@ impl Config {
 
     fn check(&self, reader: &Reader) -> Result<(), Error> {
         let Config { memory, learning, .. } = self;
-        reader.count("n_envs", self.n_envs, 1..=65_536)?;
+        reader.count("n_envs", self.n_envs, 1..=1 << 20)?;
         if let Some(minutes) = self.minutes {
             reader.within("minutes", minutes, 0.01..=100_000.0, "min")?;
         }
@@ -285,6 +302,16 @@ impl Config {
         if learning.categories.is_some() && learning.critics == Critics::Lowest {
             let expected = "is for single values: beside learning.categories \"average\" is needed, for histograms are averaged";
             return Err(reader.invalid("learning.critics", "\"lowest\"", expected).into());
+        }
+        if self.device == Device::Gpu {
+            let without = [
+                ("exploration", self.exploration.is_some()),
+                ("memory.priority", memory.priority.is_some()),
+                ("learning.categories", learning.categories.is_some()),
+            ];
+            if let Some((key, _)) = without.into_iter().find(|(_, given)| *given) {
+                return Err(reader.invalid(key, "given", "is not there with device = \"gpu\": leave one of them out").into());
+            }
         }
         reader.within("learning.target_rate", learning.target_rate, 1e-6..=1.0, "")?;
         reader.count("learning.target_every", learning.target_every, 1..=1_000_000)?;

@@ -57,6 +57,10 @@ pub enum Error {
         /// How the episode stood at the sequence's end.
         ended: &'static str,
     },
+    /// The graphics device failed, or cannot do what the learner needs of it.
+    #[cfg(feature = "gpu")]
+    #[error("the graphics device: {0}")]
+    Device(String),
     /// The learner's threads cannot be started.
     #[error("threads to learn with cannot be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),

@@ -50,6 +50,12 @@ impl Mirror {
         Ok(Mirror { values, actions: world.actions.iter().map(image).collect::<Result<_, _>>()? })
     }
 
+    /// Place of the value that comes to stand in each place, and its factor, `[values]`; and the action in place of each, `[actions]`.
+    #[cfg(feature = "gpu")]
+    pub fn images(&self) -> ([(usize, f32); N_VALUES], Vec<u32>) {
+        (self.values, self.actions.clone())
+    }
+
     /// What the driver would see in the mirror.
     pub fn observation(&self, seen: &[f32; N_VALUES]) -> [f32; N_VALUES] {
         self.values.map(|(place, factor)| factor * seen[place])

@@ -5,7 +5,10 @@
 
 mod adam;
 mod critics;
+#[cfg(feature = "gpu")]
+pub mod device;
 mod entropy;
+mod losses;
 mod state;
 
 use std::mem::take;
@@ -18,10 +21,11 @@ use rand::rngs::SmallRng;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::config::Learning;
-use crate::network::{Mlp, distribution};
+use crate::network::Mlp;
 use adam::Adam;
-use critics::{Following, Reading, Twins};
+use critics::{Reading, Twins};
 use entropy::EntropyWeight;
+use losses::{Losses, Networks, Weight, losses};
 
 /// Parts that a batch is learned in: two, for the cores that the smallest machines have. Another number would round sums otherwise.
 pub const N_PARTS: usize = 2;
@@ -155,44 +159,19 @@ impl Sac {
         let actor = self.actor.clone().fork(&device);
         let critics = self.critics.clone().fork(&device);
 
-        // Value of what follows: expectation over actions, with the entropy's worth where it counts.
-        let (probs, log_probs) = distribution(self.actor.valid().forward(part.next_observation.clone())); // [B, A] each
-        let bonus = self.learning.entropy.in_target.then(|| (probs.clone() * log_probs).sum_dim(1).mul_scalar(-alpha)); // [B, 1]
-        let goal = self.reading.goal(Following {
-            probs,
-            outputs: self.target.forward(part.next_observation),
-            bonus,
-            reward: &part.reward,
-            discount: &part.discount,
-        });
-
-        // Each critic learns the value of the action that was taken.
-        let outputs = critics.forward(part.observation.clone().autodiff());
-        let bounds = self.reading.clips().then(|| {
-            let taken = |q: Tensor<2>| q.gather(1, part.action.clone()); // [B, 1]
-            self.target.forward(part.observation.clone()).map(taken)
-        });
-        let [first_bound, second_bound] = bounds.map_or([None, None], |bounds| bounds.map(Some));
-        let (first_loss, first_value) = self.reading.loss(&outputs[0], &part.action, &goal, first_bound); // [B, 1] each
-        let (second_loss, second_value) = self.reading.loss(&outputs[1], &part.action, &goal, second_bound); // [B, 1] each
-        let critic_loss = ((first_loss + second_loss) * part.weight.autodiff()).mean().mul_scalar(share); // [1]
-        let value = (first_value + second_value).mul_scalar(0.5); // [B, 1]
-        let errors = (value.clone() - goal.value.clone()).abs().into_data();
-
-        // The actor learns what the critics hold for best, and to keep some entropy. Their values are constants here.
-        let q = self.reading.one_value(outputs.map(|output| self.reading.values(output.inner()))).autodiff(); // [B, A]
-        let (probs, log_probs) = distribution(actor.forward(part.observation.autodiff())); // [B, A] each
-        let entropy = (probs.clone() * log_probs.clone()).inner().sum_dim(1).mean().into_scalar::<f32>();
-        let actor_loss = (probs * (log_probs.mul_scalar(alpha) - q)).sum_dim(1).mean().mul_scalar(share); // [1]
+        let networks = Networks { actor: &actor, critics: &critics, target: &self.target };
+        let Losses { critic, actor: actor_loss, entropy, value, errors } =
+            losses(&self.reading, self.learning.entropy.in_target, &networks, &Weight::Number(alpha), part);
+        let (critic_loss, actor_loss) = (critic.mul_scalar(share), actor_loss.mul_scalar(share));
 
         Share {
             update: Update {
                 critic_loss: critic_loss.clone().inner().into_scalar(),
                 actor_loss: actor_loss.clone().inner().into_scalar(),
-                entropy: -entropy * share,
-                value: value.mean().into_scalar::<f32>() * share,
+                entropy: entropy.into_scalar::<f32>() * share,
+                value: value.into_scalar::<f32>() * share,
             },
-            errors: errors.try_to_vec().expect("the critics' weights are f32, and so are their errors"),
+            errors: errors.into_data().try_to_vec().expect("the critics' weights are f32, and so are their errors"),
             critics: GradientsParams::from_grads(critic_loss.backward(), &critics),
             actor: GradientsParams::from_grads(actor_loss.backward(), &actor),
         }

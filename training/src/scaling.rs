@@ -5,7 +5,7 @@
 /// Deviation below which a value counts as constant: stretching it further would amplify noise.
 const LEAST_DEVIATION: f64 = 0.01;
 /// Where a scaled value is cut off, in deviations.
-const LIMIT: f32 = 10.0;
+pub const LIMIT: f32 = 10.0;
 
 /// A shift and a factor for each value of an observation.
 #[derive(Debug, Clone, PartialEq)]

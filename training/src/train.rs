@@ -3,6 +3,8 @@
 //! Everything is written as it comes: the config at once, a row of figures every few seconds, the policy and a checkpoint every few
 //! minutes. A run that is stopped leaves a driver that can be examined and all that it takes to go on.
 
+#[cfg(feature = "gpu")]
+mod device;
 mod figures;
 mod folder;
 mod keeper;
@@ -19,13 +21,16 @@ use offtrack::world::World;
 use serde::Serialize;
 use serde_json::json;
 
+#[cfg(feature = "gpu")]
+use crate::bridge::device::Shared;
 use crate::checkpoint::Stored;
-use crate::config::Config;
+use crate::config::{self, Config};
 use crate::drivers::Learned;
 use crate::error::Error;
 use crate::evaluate::Examination;
 use crate::files;
 use crate::page::Page;
+use crate::policy::Policy;
 use crate::provenance;
 use crate::report::Report;
 use figures::Figures;
@@ -88,6 +93,8 @@ struct Finished {
     /// How many episodes that is a share of, and each row of the metrics a mean over.
     training_window: usize,
     machine: String,
+    /// Where trucks and learner were.
+    device: String,
     commit: String,
     /// The closing examination; none after an interruption.
     evaluation: Option<Report>,
@@ -104,7 +111,7 @@ struct Begun {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     let default = || {
-        let here = PathBuf::from("training/configs/default.toml");
+        let here = PathBuf::from(if cfg!(feature = "gpu") { "training/configs/gpu.toml" } else { "training/configs/default.toml" });
         if here.is_file() { here } else { files::repository().join(here) }
     };
     let file = args.config.clone().unwrap_or_else(default);
@@ -124,6 +131,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = format!("its actions and vehicle lock must be those of {}, on which the driver is examined", scenario.name);
         return Err(Error::Flag { flag: "practice", value: practice.name, expected });
     }
+    // What cannot learn leaves no folder behind.
+    let place = Place::open(&config)?;
     let Begun { folder, figures, stored } = match resumed {
         Some(Resumed { folder, figures, stored, .. }) => Begun { folder, figures, stored: Some(stored) },
         None => {
@@ -134,25 +143,30 @@ pub fn run(args: &Args) -> Result<(), Error> {
     };
     let routes = practice.split(Split::Train).to_vec();
     let n_routes = routes.len();
-    let mut run = Run::new(&config, routes, practice_world, &folder, Progress::new(&config, figures))?;
+    let mut run = Job::new(place, &config, routes.clone(), practice_world, &folder, Progress::new(&config, figures))?;
     let mut doing = "learning".to_owned();
     if let Some(stored) = stored {
-        run.restore(&stored)?;
+        run.restore(&stored, routes)?;
         if args.minutes.is_some() || args.steps.is_some() {
             folder.write_config(&config)?;
         }
         // What an examination said of the driver before is not said of the one to come.
-        files::write_json(&folder.report(), &Finished { interrupted: true, ..finished(&config, &run.progress) })?;
+        files::write_json(&folder.report(), &Finished { interrupted: true, ..finished(&config, &run) })?;
         let _ = std::fs::remove_file(folder.page());
-        doing = format!("going on after {} env steps and {:.2} min,", run.progress.env_steps(), run.progress.seconds() / 60.0);
+        doing = format!("going on after {} env steps and {:.2} min,", run.progress().env_steps(), run.progress().seconds() / 60.0);
     }
     // A run goes on when nobody reads its lines.
-    let _ = files::print(&format!("{}: {doing} on {n_routes} training routes of {}\n", folder.path().display(), practice.name));
+    let _ = files::print(&format!(
+        "{}: {doing} on {n_routes} training routes of {}, {}\n",
+        folder.path().display(),
+        practice.name,
+        run.device()
+    ));
     let stop = stop_flag();
     run.learn(|| 0 < stop.load(Ordering::Relaxed))?;
-    let mut finished = finished(&config, &run.progress);
+    let mut finished = finished(&config, &run);
     let written = run.close();
-    let policy = run.policy();
+    let policy = run.policy()?;
     drop(run);
     if finished.interrupted {
         files::write_json(&folder.report(), &finished)?;
@@ -177,6 +191,97 @@ pub fn run(args: &Args) -> Result<(), Error> {
     files::print(&format!("{table}written: {}\n", folder.path().display()))?;
     // The examination is not lost where something else could not be written.
     written
+}
+
+/// Where a run can be.
+enum Place {
+    Host,
+    #[cfg(feature = "gpu")]
+    Device(Box<Shared>),
+}
+
+impl Place {
+    /// The place that the config names, ready to work.
+    fn open(config: &Config) -> Result<Place, Error> {
+        match config.device {
+            config::Device::Cpu => Ok(Place::Host),
+            #[cfg(feature = "gpu")]
+            config::Device::Gpu => Ok(Place::Device(Box::new(Shared::open(config.adapter.as_deref())?))),
+            #[cfg(not(feature = "gpu"))]
+            config::Device::Gpu => {
+                let expected = "this program was built without the feature `gpu`: build it with `--features gpu`, or set device = \"cpu\"";
+                Err(Error::Flag { flag: "device", value: "\"gpu\"".to_owned(), expected: expected.to_owned() })
+            }
+        }
+    }
+}
+
+/// A run, where its config wants it.
+enum Job {
+    Host(Box<Run>),
+    #[cfg(feature = "gpu")]
+    Device(Box<device::DeviceRun>),
+}
+
+impl Job {
+    fn new(place: Place, config: &Config, routes: Vec<u32>, world: Arc<World>, folder: &Folder, progress: Progress) -> Result<Job, Error> {
+        match place {
+            Place::Host => Ok(Job::Host(Box::new(Run::new(config, routes, world, folder, progress)?))),
+            #[cfg(feature = "gpu")]
+            Place::Device(shared) => Ok(Job::Device(Box::new(device::DeviceRun::new(*shared, config, routes, world, folder, progress)?))),
+        }
+    }
+
+    /// What it runs on.
+    fn device(&self) -> String {
+        match self {
+            Job::Host(_) => "cpu".to_owned(),
+            #[cfg(feature = "gpu")]
+            Job::Device(run) => run.device(),
+        }
+    }
+
+    fn progress(&self) -> &Progress {
+        match self {
+            Job::Host(run) => &run.progress,
+            #[cfg(feature = "gpu")]
+            Job::Device(run) => &run.progress,
+        }
+    }
+
+    fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {
+        match self {
+            Job::Host(run) => run.learn(stopped),
+            #[cfg(feature = "gpu")]
+            Job::Device(run) => run.learn(stopped),
+        }
+    }
+
+    /// Goes on from a checkpoint, on the same routes as before.
+    #[cfg_attr(not(feature = "gpu"), expect(unused_variables, reason = "trucks on the processor are in the checkpoint"))]
+    fn restore(&mut self, stored: &Stored, routes: Vec<u32>) -> Result<(), Error> {
+        match self {
+            Job::Host(run) => run.restore(stored),
+            #[cfg(feature = "gpu")]
+            Job::Device(run) => run.restore(stored, routes),
+        }
+    }
+
+    fn policy(&self) -> Result<Policy, Error> {
+        match self {
+            Job::Host(run) => Ok(run.policy()),
+            #[cfg(feature = "gpu")]
+            Job::Device(run) => run.policy(),
+        }
+    }
+
+    fn close(&mut self) -> Result<(), Error> {
+        match self {
+            Job::Host(run) => run.close(),
+            #[cfg(feature = "gpu")]
+            Job::Device(run) => run.close(),
+        }
+    }
 }
 
 /// What is practised on: the benchmark, or what the config names in its place. No route that the driver will be examined on may be in it.
@@ -208,7 +313,8 @@ fn stop_flag() -> Arc<AtomicU8> {
 }
 
 /// What a run has come to before its examination.
-fn finished(config: &Config, progress: &Progress) -> Finished {
+fn finished(config: &Config, run: &Job) -> Finished {
+    let progress = run.progress();
     Finished {
         interrupted: progress.share() < 1.0,
         seed: config.seed,
@@ -217,8 +323,9 @@ fn finished(config: &Config, progress: &Progress) -> Finished {
         episodes: progress.episodes(),
         updates: progress.updates(),
         training_success: progress.success(),
-        training_window: progress::WINDOW,
+        training_window: progress.window(),
         machine: provenance::machine(),
+        device: run.device(),
         commit: provenance::commit(),
         evaluation: None,
     }

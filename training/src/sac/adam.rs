@@ -10,7 +10,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// Decay of the first and the second moment.
-const DECAY: [f32; 2] = [0.9, 0.999];
+pub(super) const DECAY: [f32; 2] = [0.9, 0.999];
 /// What keeps a step from dividing by 0.
 const EPSILON: f64 = 1e-5;
 /// Elements of a parameter that one thread moves at a time.
@@ -66,15 +66,15 @@ impl Adam {
 }
 
 /// What is the same for all elements of a step.
-struct Step {
-    rate: f32,
-    epsilon: f32,
-    follow: f32,
+pub(super) struct Step {
+    pub(super) rate: f32,
+    pub(super) epsilon: f32,
+    pub(super) follow: f32,
 }
 
 impl Step {
     /// The moments begin at 0 and are too small at first by 1 - decay ^ steps: the rate and epsilon make up for it.
-    fn new(n_steps: i32, rate: f64, follow: f64) -> Step {
+    pub(super) fn new(n_steps: i32, rate: f64, follow: f64) -> Step {
         let [first, second] = DECAY.map(|decay| 1.0 - f64::from(decay).powi(n_steps));
         Step { rate: (rate * second.sqrt() / first) as f32, epsilon: (EPSILON * second.sqrt()) as f32, follow: follow as f32 }
     }

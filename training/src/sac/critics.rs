@@ -60,6 +60,12 @@ impl Reading {
         Reading { n_actions, critics: learning.critics, categories: learning.categories, value_clip: learning.value_clip }
     }
 
+    /// Entries of the action table.
+    #[cfg(feature = "gpu")]
+    pub(super) fn n_actions(&self) -> usize {
+        self.n_actions
+    }
+
     /// Size of a critic's output.
     pub(super) fn n_outputs(&self) -> usize {
         self.n_actions * self.categories.map_or(1, |categories| categories.count)

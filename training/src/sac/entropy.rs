@@ -3,16 +3,16 @@
 use crate::config::Entropy;
 
 /// Adam's decay of the first and the second moment, and what keeps it from dividing by 0.
-const DECAY: [f32; 2] = [0.9, 0.999];
-const EPSILON: f32 = 1e-8;
+pub(super) const DECAY: [f32; 2] = [0.9, 0.999];
+pub(super) const EPSILON: f32 = 1e-8;
 
 /// The weight, kept as its logarithm so that it stays positive, and the state of D. Kingma and J. Ba's Adam (2015) for that one number.
 #[derive(Debug)]
 pub(super) struct EntropyWeight {
     pub(super) log_weight: f32,
     /// Entropy to be led to [nat]; none keeps the weight.
-    goal: Option<f32>,
-    rate: f32,
+    pub(super) goal: Option<f32>,
+    pub(super) rate: f32,
     pub(super) moments: [f32; 2],
     pub(super) updates: i32,
 }

@@ -51,6 +51,15 @@ impl Keeper {
         &self.file
     }
 
+    /// What there is to go back to, in words.
+    pub fn last_good(&self) -> String {
+        if self.file.is_file() {
+            format!("{} is the last good checkpoint", self.file.display())
+        } else {
+            "there is no checkpoint yet".to_owned()
+        }
+    }
+
     /// Whether it is time for another one.
     pub fn is_due(&self) -> bool {
         self.pending.is_none() && self.every <= self.since.elapsed()

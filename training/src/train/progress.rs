@@ -32,6 +32,15 @@ struct Episode {
     reward: f32,
 }
 
+/// The episodes that ended between two tellings.
+#[derive(Debug)]
+struct Recent {
+    episodes: u64,
+    arrived: u64,
+    /// Sum of all rewards in between.
+    reward: f64,
+}
+
 /// Counters and clocks of a run.
 #[derive(Debug)]
 pub struct Progress {
@@ -45,6 +54,8 @@ pub struct Progress {
     updates: u64,
     /// The latest episodes.
     latest: VecDeque<Episode>,
+    /// Episodes, arrivals and mean reward where they are counted for many trucks at once, as they were last told.
+    recent: Option<Recent>,
     /// Each truck's sum of rewards in the episode that it is in, `[n_envs]`.
     rewards: Vec<f32>,
     /// Sums since the last row.
@@ -77,6 +88,7 @@ impl Progress {
             episodes: 0,
             updates: 0,
             latest: VecDeque::with_capacity(WINDOW),
+            recent: None,
             rewards: vec![0.0; config.n_envs],
             sums: Update::default(),
             row_seconds: 0.0,
@@ -120,12 +132,18 @@ impl Progress {
 
     /// Share of the latest episodes that arrived, none before the first ended.
     pub fn success(&self) -> Option<f64> {
+        if let Some(Recent { episodes, arrived, .. }) = self.recent {
+            return Some(arrived as f64 / episodes as f64);
+        }
         let arrived = self.latest.iter().filter(|episode| episode.arrived).count();
         (!self.latest.is_empty()).then(|| arrived as f64 / self.latest.len() as f64)
     }
 
     /// Mean sum of rewards of the latest episodes, none before the first ended.
     fn reward(&self) -> Option<f64> {
+        if let Some(Recent { episodes, reward, .. }) = self.recent {
+            return Some(reward / episodes as f64);
+        }
         let sum: f64 = self.latest.iter().map(|episode| f64::from(episode.reward)).sum();
         (!self.latest.is_empty()).then(|| sum / self.latest.len() as f64)
     }
@@ -143,6 +161,37 @@ impl Progress {
                 self.latest.push_back(Episode { arrived: code == Ended::Arrived as u32, reward: std::mem::take(sum) });
             }
         }
+    }
+
+    /// Episodes that the success rate and the mean reward look back on.
+    pub fn window(&self) -> usize {
+        self.recent.as_ref().map_or(WINDOW, |recent| recent.episodes as usize)
+    }
+
+    /// Counts so many env steps, whose episodes are told of later.
+    #[cfg(feature = "gpu")]
+    pub fn driven(&mut self, n_steps: u64) {
+        self.env_steps += n_steps;
+    }
+
+    /// Counts what happened since this was last called.
+    #[cfg(feature = "gpu")]
+    pub fn tallied(&mut self, since: &offtrack::simulator::Tally) {
+        let (episodes, arrived) = (since.episodes(), since.ended(Ended::Arrived));
+        self.episodes += episodes;
+        if 0 < episodes {
+            self.recent = Some(Recent { episodes, arrived, reward: since.reward() });
+        }
+    }
+
+    /// Counts so many updates and what they came to in sum.
+    #[cfg(feature = "gpu")]
+    pub fn updated_by(&mut self, sums: &Update, n_updates: u64) {
+        self.updates += n_updates;
+        self.sums.critic_loss += sums.critic_loss;
+        self.sums.actor_loss += sums.actor_loss;
+        self.sums.entropy += sums.entropy;
+        self.sums.value += sums.value;
     }
 
     /// Counts an update.
@@ -237,7 +286,7 @@ impl Progress {
         let line = format!(
             "{:.2} M steps, {steps_rate:.0} steps/s, {update_rate:.0} updates/s, success {success} of the last {}, {}:{:02} left",
             self.env_steps as f64 / 1e6,
-            self.latest.len(),
+            self.recent.as_ref().map_or(self.latest.len(), |recent| recent.episodes as usize),
             left as u64 / 60,
             left as u64 % 60,
         );

@@ -124,13 +124,7 @@ impl Run {
     }
 
     fn found_scaling(&self) -> Scaling {
-        if !self.config.learning.scale_observations {
-            return Scaling::none(N_VALUES);
-        }
-        let seen = self.memory.observations();
-        // What is learned from lies the same to both sides.
-        let images = self.mirror.iter().flat_map(|mirror| seen.iter().map(|seen| mirror.observation(seen)));
-        if self.mirror.is_none() { Scaling::of(seen) } else { Scaling::of(&seen.iter().copied().chain(images).collect::<Vec<_>>()) }
+        found_scaling(&self.config, self.mirror.as_ref(), self.memory.observations())
     }
 
     /// The driver as it is.
@@ -185,10 +179,7 @@ impl Run {
 
     /// Goes on from a checkpoint of this run.
     pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
-        if stored.world() != self.fingerprint {
-            let what = self.config.practice.as_ref().unwrap_or(&self.config.benchmark);
-            return Err(stored.error(format!("was written when {what} was another: put its scenario, vehicle and roundabout files back")));
-        }
+        check_world(stored, self.fingerprint, &self.config)?;
         self.simulator.restore(|name| stored.bytes(&batch_name(name))).map_err(|error| stored.error(error.to_string()))?;
         self.acting = Generator { state: stored.array("acting")? };
         self.sampling = Generator { state: stored.array("sampling")? };
@@ -214,18 +205,32 @@ impl Run {
         let also = self.sac.broken().filter(|(name, _)| name != what).map(|(name, _)| format!(", so is {name}")).unwrap_or_default();
         // One on its way was sound when it was begun; that it could not be written is told by what stands in the folder.
         let _ = self.keeper.wait();
-        let file = self.keeper.file();
-        let kept = if file.is_file() {
-            format!("{} is the last good checkpoint", file.display())
-        } else {
-            "there is no checkpoint yet".to_owned()
-        };
+        let kept = self.keeper.last_good();
         Error::Diverged { what: what.to_owned(), value, also, env_steps: self.progress.env_steps(), kept }
     }
 }
 
+/// How observations are scaled that lie as these do.
+pub(super) fn found_scaling(config: &Config, mirror: Option<&Mirror>, seen: &[[f32; N_VALUES]]) -> Scaling {
+    if !config.learning.scale_observations {
+        return Scaling::none(N_VALUES);
+    }
+    // What is learned from lies the same to both sides.
+    let images = mirror.iter().flat_map(|mirror| seen.iter().map(|seen| mirror.observation(seen)));
+    if mirror.is_none() { Scaling::of(seen) } else { Scaling::of(&seen.iter().copied().chain(images).collect::<Vec<_>>()) }
+}
+
+/// A checkpoint goes on in the world it was written in alone.
+pub(super) fn check_world(stored: &Stored, fingerprint: u32, config: &Config) -> Result<(), Error> {
+    if stored.world() == fingerprint {
+        return Ok(());
+    }
+    let what = config.practice.as_ref().unwrap_or(&config.benchmark);
+    Err(stored.error(format!("was written when {what} was another: put its scenario, vehicle and roundabout files back")))
+}
+
 /// A loss that is no number.
-fn broken(update: &Update) -> Option<(&'static str, f32)> {
+pub(super) fn broken(update: &Update) -> Option<(&'static str, f32)> {
     let losses = [("critic loss", update.critic_loss), ("actor loss", update.actor_loss), ("entropy", update.entropy)];
     losses.into_iter().find(|(_, value)| !value.is_finite())
 }
@@ -235,7 +240,7 @@ fn batch_name(column: &str) -> String {
 }
 
 /// CRC-32 of all that trucks drive by.
-fn fingerprint(world: &World) -> u32 {
+pub(super) fn fingerprint(world: &World) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(bytes_of(&world.params));
     hasher.update(cast_slice(&world.actions));

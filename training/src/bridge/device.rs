@@ -1,0 +1,444 @@
+//! Simulator and learner on one device: columns are tensors, and the memory between them never leaves it.
+//!
+//! The simulator writes its observations into a buffer that a tensor owns; the memory's kernels read the simulator's columns where they are
+//! and write samples into buffers of other tensors. Both sides submit to one queue. The tensor library gathers its work before it
+//! submits it, so whatever it was asked for is handed over before a submission of ours, and nothing ever waits.
+
+use std::sync::Arc;
+
+use burn::backend::Wgpu;
+use burn::cubecl::server::Handle;
+use burn::cubecl::wgpu::{AutoCompiler, WgpuServer, WgpuSetup};
+use burn::tensor::{DType, Device, Int, Tensor, TensorData};
+use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
+use offtrack::cpu::WORKGROUP;
+use offtrack::gpu::{self, Slice};
+use offtrack::layout::{N_VALUES, shared_wgsl};
+use offtrack::simulator::{Engine, RouteChoice, Simulator};
+use offtrack::stages::SHADERS;
+use offtrack::world::World;
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingResource,
+    BindingType, Buffer, BufferBinding, BufferBindingType, BufferDescriptor, BufferUsages, CommandEncoder, ComputePassDescriptor,
+    ComputePipeline, ComputePipelineDescriptor, PipelineLayoutDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+};
+
+use crate::config::Config;
+use crate::error::Error;
+use crate::mirror::Mirror;
+use crate::network::Mlp;
+use crate::sac::Transitions;
+use crate::scaling::{LIMIT, Scaling};
+
+/// Workgroups in a row of a dispatch.
+const ROW: u32 = 65_535;
+/// Buffers that the memory's kernels see.
+const N_BUFFERS: u32 = 21;
+/// The binding of the actor's output.
+const LOGITS: usize = 15;
+
+/// A graphics device with both on it.
+#[derive(Clone)]
+pub struct Shared {
+    /// As the simulator knows it.
+    pub gpu: gpu::Device,
+    /// As the tensor library knows it.
+    pub tensors: Device,
+}
+
+impl Shared {
+    /// Opens a device and hands it to the tensor library too.
+    pub fn open(adapter: Option<&str>) -> Result<Shared, Error> {
+        let gpu = gpu::Device::open(adapter).map_err(offtrack::simulator::Error::from)?;
+        let setup = WgpuSetup {
+            instance: gpu.instance.clone(),
+            adapter: gpu.adapter.clone(),
+            device: gpu.device.clone(),
+            queue: gpu.queue.clone(),
+            backend: gpu.adapter.get_info().backend,
+        };
+        let tensors = Device::wgpu_options().setup(setup).init().map_err(|error| Error::Device(error.to_string()))?;
+        Ok(Shared { gpu, tensors })
+    }
+
+    /// Hands over what the tensor library has gathered, so that what is submitted next comes after it.
+    fn hand_over(&self) -> Result<(), Error> {
+        self.tensors.flush().map_err(|error| Error::Device(error.to_string()))
+    }
+
+    /// An error if the device has failed.
+    pub fn check(&self) -> Result<(), Error> {
+        Ok(self.gpu.check().map_err(offtrack::simulator::Error::from)?)
+    }
+}
+
+/// A buffer that a tensor owns. It stays where it is as long as this is held.
+struct Owned {
+    slice: Slice,
+    _held: Arc<dyn Send + Sync>,
+}
+
+/// Where a tensor's values lie: 32-bit ones, one after the other.
+fn owned(tensor: Handleful) -> Result<Owned, Error> {
+    let Handleful { client, handle, contiguous } = tensor;
+    if !contiguous {
+        return Err(Error::Device("a tensor's values do not lie one after the other".to_owned()));
+    }
+    let held = client.get_resource::<WgpuServer<AutoCompiler>>(handle).map_err(|error| Error::Device(error.to_string()))?;
+    let resource = held.resource();
+    let slice = Slice { buffer: resource.buffer.clone(), offset: resource.offset, size: resource.size };
+    Ok(Owned { slice, _held: Arc::new(std::sync::Mutex::new(held)) })
+}
+
+/// What is taken of a tensor to find its buffer.
+struct Handleful {
+    client: burn::cubecl::client::Client,
+    handle: Handle,
+    contiguous: bool,
+}
+
+fn floats<const D: usize>(tensor: &Tensor<D>) -> Result<Owned, Error> {
+    let primitive = tensor.clone().try_into_primitive::<Wgpu>().map_err(|error| Error::Device(format!("{error:?}")))?;
+    let contiguous = primitive.is_contiguous() && primitive.dtype == DType::F32;
+    owned(Handleful { contiguous, client: primitive.client, handle: primitive.handle })
+}
+
+fn integers<const D: usize>(tensor: &Tensor<D, Int>) -> Result<Owned, Error> {
+    let primitive = tensor.clone().try_into_primitive::<Wgpu>().map_err(|error| Error::Device(format!("{error:?}")))?;
+    let contiguous = primitive.is_contiguous() && primitive.dtype == DType::I32;
+    owned(Handleful { contiguous, client: primitive.client, handle: primitive.handle })
+}
+
+/// What does not change in a run, as `memory.wgsl` has it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Facts {
+    n_envs: u32,
+    n_slots: u32,
+    n_actions: u32,
+    n_rows: u32,
+    n_steps: u32,
+    acting_seed: u32,
+    sampling_seed: u32,
+    mirrored: u32,
+    discount: f32,
+    reward_scale: f32,
+    noise: f32,
+    scaled_limit: f32,
+}
+
+/// What changes from one dispatch to the next.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Now {
+    slot: u32,
+    oldest: u32,
+    n_drawable: u32,
+    step: u32,
+    sample: u32,
+}
+
+/// The trucks, the learner's memory of them, and the tensors between both and the networks.
+pub struct DeviceMemory {
+    shared: Shared,
+    simulator: Simulator,
+    facts: Facts,
+    /// Steps of all trucks kept since the beginning, and samples drawn.
+    n_kept: u64,
+    n_samples: u32,
+    pipelines: Pipelines,
+    buffers: Vec<Slice>,
+    now: Buffer,
+    scaling: Buffer,
+    /// What the trucks see, `[n_envs, values]`: the simulator's own column.
+    observation: Tensor<2>,
+    /// Shift and factor of each value, `[1, values]`.
+    scale: [Tensor<2>; 2],
+    sample: Transitions,
+    _owned: Vec<Owned>,
+}
+
+impl DeviceMemory {
+    /// Trucks on the routes drawn from, and room for `config.memory.capacity` of their transitions.
+    pub fn new(shared: &Shared, config: &Config, world: &Arc<World>, routes: Vec<u32>, seeds: [u32; 2]) -> Result<DeviceMemory, Error> {
+        let (n_envs, n_rows) = (config.n_envs, config.learning.batch);
+        let n_slots = config.memory.capacity.div_ceil(n_envs);
+        let row_bytes = (N_VALUES * size_of::<f32>()) as u64;
+        let limit = shared.gpu.device.limits().max_storage_buffer_binding_size.min(u64::from(u32::MAX) * 4);
+        let needed = (n_slots * n_envs) as u64 * row_bytes;
+        if limit < needed {
+            let name = shared.gpu.name();
+            let expected =
+                format!("its observations take {needed} bytes where {name} allows {limit} in a buffer: at most {}", limit / row_bytes);
+            return Err(Error::Flag { flag: "memory.capacity", value: config.memory.capacity.to_string(), expected });
+        }
+        let mirror = config.learning.mirror.then(|| Mirror::of(world)).transpose()?;
+        let device = &shared.tensors;
+        let zeros = |width: usize| Tensor::<2>::zeros([n_rows, width], device);
+        let observation = Tensor::<2>::zeros([n_envs, N_VALUES], device);
+        let sample = Transitions {
+            observation: zeros(N_VALUES),
+            action: Tensor::from_data(TensorData::new(vec![0i32; n_rows], [n_rows, 1]), device),
+            reward: zeros(1),
+            discount: zeros(1),
+            next_observation: zeros(N_VALUES),
+            weight: Tensor::ones([n_rows, 1], device),
+        };
+        shared.hand_over()?;
+        let seen = floats(&observation)?;
+        let drawn = [
+            floats(&sample.observation)?,
+            integers(&sample.action)?,
+            floats(&sample.reward)?,
+            floats(&sample.discount)?,
+            floats(&sample.next_observation)?,
+        ];
+        let engine = Engine::Gpu { device: shared.gpu.clone(), columns: vec![("observation", seen.slice.clone())] };
+        let mut simulator = Simulator::on(engine, world.clone(), n_envs, config.seed, RouteChoice::Drawn(routes))?;
+
+        let facts = Facts {
+            n_envs: n_envs as u32,
+            n_slots: n_slots as u32,
+            n_actions: world.params.n_actions,
+            n_rows: n_rows as u32,
+            n_steps: config.learning.n_steps as u32,
+            acting_seed: seeds[0],
+            sampling_seed: seeds[1],
+            mirrored: mirror.is_some().into(),
+            discount: config.learning.discount as f32,
+            reward_scale: config.learning.reward_scale as f32,
+            noise: config.learning.observation_noise as f32,
+            scaled_limit: LIMIT,
+        };
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+        let filled = |contents: &[u8]| {
+            let buffer = shared.gpu.device.create_buffer_init(&BufferInitDescriptor { label: Some("memory"), contents, usage });
+            Slice { size: contents.len() as u64, buffer, offset: 0 }
+        };
+        let empty = |size: u64| {
+            let buffer =
+                shared.gpu.device.create_buffer(&BufferDescriptor { label: Some("memory"), size, usage, mapped_at_creation: false });
+            Slice { buffer, offset: 0, size }
+        };
+        let now = empty(size_of::<Now>() as u64);
+        let scaling = filled(cast_slice(&[[0.0f32, 1.0]; N_VALUES]));
+        let (values, actions) = match &mirror {
+            Some(mirror) => mirror.images(),
+            None => (std::array::from_fn(|index| (index, 1.0)), (0..world.params.n_actions).collect()),
+        };
+        let images: Vec<[u32; 2]> = values.iter().map(|&(place, factor)| [place as u32, f32::to_bits(factor)]).collect();
+        let columns = ["action", "observation", "next_observation", "ended", "reward"];
+        let batch = simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
+        let columns: Vec<Slice> = columns.iter().filter_map(|name| batch.column(name).cloned()).collect();
+        let held = (n_slots * n_envs) as u64;
+        let mut buffers =
+            vec![filled(bytes_of(&facts)), now.clone(), scaling.clone(), filled(cast_slice(&images)), filled(cast_slice(&actions))];
+        buffers.extend(columns);
+        buffers.extend([held * row_bytes, held * row_bytes, held * 4, held * 4, held * 4].map(empty));
+        // The actor's output is another buffer every step; until the first one something must stand there.
+        buffers.push(empty(4));
+        buffers.extend(drawn.iter().map(|owned| owned.slice.clone()));
+        shared.check()?;
+        let scale = [0.0, 1.0].map(|value| Tensor::full([1, N_VALUES], value, device));
+        Ok(DeviceMemory {
+            pipelines: Pipelines::compile(&shared.gpu.device),
+            shared: shared.clone(),
+            simulator,
+            facts,
+            n_kept: 0,
+            n_samples: 0,
+            buffers,
+            now: now.buffer,
+            scaling: scaling.buffer,
+            observation,
+            scale,
+            sample,
+            _owned: drawn.into_iter().chain([seen]).collect(),
+        })
+    }
+
+    /// The trucks.
+    pub fn simulator(&self) -> &Simulator {
+        &self.simulator
+    }
+
+    /// Transitions held.
+    pub fn len(&self) -> usize {
+        self.slots_held() as usize * self.facts.n_envs as usize
+    }
+
+    /// Whether there is a step that enough others follow, so that one can be drawn.
+    pub fn can_sample(&self) -> bool {
+        self.facts.n_steps < self.slots_held()
+    }
+
+    /// One step of every truck by chance, kept.
+    pub fn step_at_random(&mut self) -> Result<(), Error> {
+        self.step(None)
+    }
+
+    /// One step of every truck by the actor, kept.
+    pub fn step_by(&mut self, actor: &Mlp) -> Result<(), Error> {
+        let logits = actor.forward(self.scaled());
+        self.step(Some(&logits))
+    }
+
+    /// What the trucks see, scaled, `[n_envs, values]`.
+    fn scaled(&self) -> Tensor<2> {
+        let [mean, factor] = self.scale.clone();
+        ((self.observation.clone() - mean) * factor).clamp(-LIMIT, LIMIT)
+    }
+
+    fn step(&mut self, logits: Option<&Tensor<2>>) -> Result<(), Error> {
+        self.shared.hand_over()?;
+        let output = logits.map(floats).transpose()?;
+        let group = self.group(output.as_ref().map(|output| &output.slice));
+        self.tell_now();
+        let mut encoder = self.shared.gpu.device.create_command_encoder(&Default::default());
+        let values = self.facts.n_envs * N_VALUES as u32;
+        let batch = self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
+        if logits.is_some() {
+            self.pipelines.add(&mut encoder, &group, Kernel::Choose, self.facts.n_envs);
+        } else {
+            batch.add_draw(&mut encoder);
+        }
+        self.pipelines.add(&mut encoder, &group, Kernel::Keep, values);
+        batch.add_step(&mut encoder);
+        self.pipelines.add(&mut encoder, &group, Kernel::Remember, values);
+        batch.stepped();
+        self.shared.gpu.queue.submit([encoder.finish()]);
+        self.n_kept += 1;
+        Ok(())
+    }
+
+    /// Draws transitions: the same tensors every time, with other values in them.
+    pub fn sample(&mut self) -> Result<Transitions, Error> {
+        self.shared.hand_over()?;
+        let group = self.group(None);
+        self.tell_now();
+        let mut encoder = self.shared.gpu.device.create_command_encoder(&Default::default());
+        self.pipelines.add(&mut encoder, &group, Kernel::Sample, self.facts.n_rows * N_VALUES as u32);
+        self.shared.gpu.queue.submit([encoder.finish()]);
+        self.n_samples = self.n_samples.wrapping_add(1);
+        Ok(Transitions {
+            observation: self.sample.observation.clone(),
+            action: self.sample.action.clone(),
+            reward: self.sample.reward.clone(),
+            discount: self.sample.discount.clone(),
+            next_observation: self.sample.next_observation.clone(),
+            weight: self.sample.weight.clone(),
+        })
+    }
+
+    /// What the trucks saw in the steps held, read to the host.
+    pub fn observations(&self) -> Result<Vec<[f32; N_VALUES]>, Error> {
+        let Slice { buffer, .. } = &self.buffers[10];
+        let size = (self.len() * N_VALUES * size_of::<f32>()) as u64;
+        let slice = Slice { buffer: buffer.clone(), offset: 0, size };
+        let bytes = self.shared.gpu.read(&[slice]).map_err(offtrack::simulator::Error::from)?;
+        // A byte vector need not lie where a float may.
+        Ok(bytes[0].chunks_exact(N_VALUES * 4).map(bytemuck::pod_read_unaligned).collect())
+    }
+
+    /// From here on observations are scaled so, for acting and learning alike.
+    pub fn set_scaling(&mut self, scaling: &Scaling) {
+        let pairs: Vec<[f32; 2]> = scaling.mean.iter().zip(&scaling.factor).map(|(&mean, &factor)| [mean, factor]).collect();
+        self.shared.gpu.queue.write_buffer(&self.scaling, 0, cast_slice(&pairs));
+        let row = |values: &[f32]| Tensor::from_data(TensorData::new(values.to_vec(), [1, values.len()]), &self.shared.tensors);
+        self.scale = [row(&scaling.mean), row(&scaling.factor)];
+    }
+
+    fn slots_held(&self) -> u32 {
+        self.n_kept.min(self.facts.n_slots.into()) as u32
+    }
+
+    fn tell_now(&self) {
+        let (held, n_slots) = (self.slots_held(), u64::from(self.facts.n_slots));
+        let now = Now {
+            slot: (self.n_kept % n_slots) as u32,
+            oldest: ((self.n_kept - u64::from(held)) % n_slots) as u32,
+            n_drawable: held.saturating_sub(self.facts.n_steps),
+            step: self.n_kept as u32,
+            sample: self.n_samples,
+        };
+        self.shared.gpu.queue.write_buffer(&self.now, 0, bytes_of(&now));
+    }
+
+    fn group(&self, logits: Option<&Slice>) -> BindGroup {
+        let slice = |index: usize| if index == LOGITS { logits.unwrap_or(&self.buffers[LOGITS]) } else { &self.buffers[index] };
+        let entries: Vec<BindGroupEntry> = (0..self.buffers.len())
+            .map(|index| {
+                let Slice { buffer, offset, size } = slice(index);
+                let size = std::num::NonZero::new(*size);
+                let resource = BindingResource::Buffer(BufferBinding { buffer, offset: *offset, size });
+                BindGroupEntry { binding: index as u32, resource }
+            })
+            .collect();
+        let layout = &self.pipelines.layout;
+        self.shared.gpu.device.create_bind_group(&BindGroupDescriptor { label: Some("memory"), layout, entries: &entries })
+    }
+}
+
+/// The memory's kernels.
+#[derive(Debug, Clone, Copy)]
+enum Kernel {
+    Choose,
+    Keep,
+    Remember,
+    Sample,
+}
+
+struct Pipelines {
+    layout: BindGroupLayout,
+    pipelines: [ComputePipeline; 4],
+}
+
+impl Pipelines {
+    fn compile(device: &wgpu::Device) -> Pipelines {
+        let random = SHADERS.iter().filter(|(name, _)| *name == "common/random").map(|(_, text)| *text);
+        let source: String =
+            [shared_wgsl()].iter().map(String::as_str).chain(random).chain([include_str!("../../shaders/memory.wgsl")]).collect();
+        let module =
+            device.create_shader_module(ShaderModuleDescriptor { label: Some("memory"), source: ShaderSource::Wgsl(source.into()) });
+        // A tensor's buffer is a slice of a page that other tensors lie in too, and a page is either read from or written to.
+        let entry = |binding| BindGroupLayoutEntry {
+            binding,
+            visibility: ShaderStages::COMPUTE,
+            ty: BindingType::Buffer {
+                ty: BufferBindingType::Storage { read_only: false },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        };
+        let entries: Vec<BindGroupLayoutEntry> = (0..N_BUFFERS).map(entry).collect();
+        let layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some("memory"), entries: &entries });
+        let pipeline_layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
+            label: Some("memory"),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let pipeline = |entry: &str| {
+            device.create_compute_pipeline(&ComputePipelineDescriptor {
+                label: Some(entry),
+                layout: Some(&pipeline_layout),
+                module: &module,
+                entry_point: Some(entry),
+                compilation_options: Default::default(),
+                cache: None,
+            })
+        };
+        let pipelines = ["choose", "keep", "remember", "sample"].map(pipeline);
+        Pipelines { layout, pipelines }
+    }
+
+    fn add(&self, encoder: &mut CommandEncoder, group: &BindGroup, kernel: Kernel, threads: u32) {
+        let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
+        pass.set_bind_group(0, group, &[]);
+        pass.set_pipeline(&self.pipelines[kernel as usize]);
+        let groups = threads.div_ceil(WORKGROUP);
+        let columns = groups.min(ROW);
+        pass.dispatch_workgroups(columns, groups.div_ceil(columns), 1);
+    }
+}
