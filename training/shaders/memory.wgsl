@@ -19,8 +19,6 @@ struct Facts {
     mirrored: u32,
     discount: f32,
     reward_scale: f32,
-    // Noise added to scaled observations, evenly distributed up to this.
-    noise: f32,
     // Where scaled values are cut off.
     scaled_limit: f32,
 }
@@ -38,10 +36,11 @@ struct Now {
     sample: u32,
 }
 
-// Shift and factor of a value.
+// How a value is scaled: what is subtracted and multiplied by, and the noise added then, evenly distributed up to this.
 struct Scale {
     mean: f32,
     factor: f32,
+    noise: f32,
 }
 
 // What stands in a value's place in the mirror.
@@ -171,7 +170,7 @@ fn sample(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) grou
     var image = Image(value, 1.0);
     if in_mirror { image = images[value]; }
     // The same noise on both, so that what changes between them stays what it is.
-    let noise = facts.noise * signed_unit(words(facts.sampling_seed, index, now.sample, 1u + value).x);
+    let noise = scaling[value].noise * signed_unit(words(facts.sampling_seed, index, now.sample, 1u + value).x);
     drawn_observation[thread] = scaled(image.factor * held_observation[first * N_VALUES + image.place], value) + noise;
     drawn_next[thread] = scaled(image.factor * held_next[last * N_VALUES + image.place], value) + noise;
 }

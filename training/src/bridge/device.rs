@@ -4,6 +4,7 @@
 //! and write samples into buffers of other tensors. Both sides submit to one queue. The tensor library gathers its work before it
 //! submits it, so whatever it was asked for is handed over before a submission of ours, and nothing ever waits.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use burn::backend::Wgpu;
@@ -21,7 +22,8 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingResource,
     BindingType, Buffer, BufferBinding, BufferBindingType, BufferDescriptor, BufferUsages, CommandEncoder, ComputePassDescriptor,
-    ComputePipeline, ComputePipelineDescriptor, PipelineLayoutDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    ComputePipeline, ComputePipelineDescriptor, PipelineLayoutDescriptor, PollType, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    SubmissionIndex,
 };
 
 use crate::config::Config;
@@ -31,6 +33,8 @@ use crate::network::Mlp;
 use crate::sac::Transitions;
 use crate::scaling::{LIMIT, Scaling};
 
+/// Steps that the host may be ahead of the device: work that waits takes memory, and must not pile up without end.
+const AHEAD: usize = 16;
 /// Workgroups in a row of a dispatch.
 const ROW: u32 = 65_535;
 /// Buffers that the memory's kernels see.
@@ -45,6 +49,9 @@ pub struct Shared {
     pub gpu: gpu::Device,
     /// As the tensor library knows it.
     pub tensors: Device,
+    /// Hands nothing over, to see what comes of it.
+    #[cfg(test)]
+    is_careless: bool,
 }
 
 impl Shared {
@@ -59,11 +66,20 @@ impl Shared {
             backend: gpu.adapter.get_info().backend,
         };
         let tensors = Device::wgpu_options().setup(setup).init().map_err(|error| Error::Device(error.to_string()))?;
-        Ok(Shared { gpu, tensors })
+        Ok(Shared {
+            gpu,
+            tensors,
+            #[cfg(test)]
+            is_careless: false,
+        })
     }
 
     /// Hands over what the tensor library has gathered, so that what is submitted next comes after it.
     fn hand_over(&self) -> Result<(), Error> {
+        #[cfg(test)]
+        if self.is_careless {
+            return Ok(());
+        }
         self.tensors.flush().map_err(|error| Error::Device(error.to_string()))
     }
 
@@ -124,7 +140,6 @@ struct Facts {
     mirrored: u32,
     discount: f32,
     reward_scale: f32,
-    noise: f32,
     scaled_limit: f32,
 }
 
@@ -147,16 +162,22 @@ pub struct DeviceMemory {
     /// Steps of all trucks kept since the beginning, and samples drawn.
     n_kept: u64,
     n_samples: u32,
+    /// Steps made, kept or not.
+    n_steps: u32,
     pipelines: Pipelines,
     buffers: Vec<Slice>,
     now: Buffer,
     scaling: Buffer,
     /// What the trucks see, `[n_envs, values]`: the simulator's own column.
     observation: Tensor<2>,
+    /// Noise on each value that is learned from.
+    noise: [f32; N_VALUES],
     /// Shift and factor of each value, `[1, values]`.
     scale: [Tensor<2>; 2],
     sample: Transitions,
     _owned: Vec<Owned>,
+    /// Steps that the device may not have made yet.
+    submitted: VecDeque<SubmissionIndex>,
 }
 
 impl DeviceMemory {
@@ -208,7 +229,6 @@ impl DeviceMemory {
             mirrored: mirror.is_some().into(),
             discount: config.learning.discount as f32,
             reward_scale: config.learning.reward_scale as f32,
-            noise: config.learning.observation_noise as f32,
             scaled_limit: LIMIT,
         };
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
@@ -222,7 +242,7 @@ impl DeviceMemory {
             Slice { buffer, offset: 0, size }
         };
         let now = empty(size_of::<Now>() as u64);
-        let scaling = filled(cast_slice(&[[0.0f32, 1.0]; N_VALUES]));
+        let scaling = filled(cast_slice(&[[0.0f32, 1.0, 0.0]; N_VALUES]));
         let (values, actions) = match &mirror {
             Some(mirror) => mirror.images(),
             None => (std::array::from_fn(|index| (index, 1.0)), (0..world.params.n_actions).collect()),
@@ -248,13 +268,16 @@ impl DeviceMemory {
             facts,
             n_kept: 0,
             n_samples: 0,
+            n_steps: 0,
             buffers,
             now: now.buffer,
             scaling: scaling.buffer,
+            noise: [config.learning.observation_noise as f32; N_VALUES],
             observation,
             scale,
             sample,
             _owned: drawn.into_iter().chain([seen]).collect(),
+            submitted: VecDeque::with_capacity(AHEAD),
         })
     }
 
@@ -275,13 +298,19 @@ impl DeviceMemory {
 
     /// One step of every truck by chance, kept.
     pub fn step_at_random(&mut self) -> Result<(), Error> {
-        self.step(None)
+        self.step(None, true)
     }
 
     /// One step of every truck by the actor, kept.
     pub fn step_by(&mut self, actor: &Mlp) -> Result<(), Error> {
         let logits = actor.forward(self.scaled());
-        self.step(Some(&logits))
+        self.step(Some(&logits), true)
+    }
+
+    /// One step of every truck by the actor, which nobody will learn from.
+    pub fn drive_by(&mut self, actor: &Mlp) -> Result<(), Error> {
+        let logits = actor.forward(self.scaled());
+        self.step(Some(&logits), false)
     }
 
     /// What the trucks see, scaled, `[n_envs, values]`.
@@ -290,7 +319,7 @@ impl DeviceMemory {
         ((self.observation.clone() - mean) * factor).clamp(-LIMIT, LIMIT)
     }
 
-    fn step(&mut self, logits: Option<&Tensor<2>>) -> Result<(), Error> {
+    fn step(&mut self, logits: Option<&Tensor<2>>, is_kept: bool) -> Result<(), Error> {
         self.shared.hand_over()?;
         let output = logits.map(floats).transpose()?;
         let group = self.group(output.as_ref().map(|output| &output.slice));
@@ -303,12 +332,21 @@ impl DeviceMemory {
         } else {
             batch.add_draw(&mut encoder);
         }
-        self.pipelines.add(&mut encoder, &group, Kernel::Keep, values);
+        if is_kept {
+            self.pipelines.add(&mut encoder, &group, Kernel::Keep, values);
+        }
         batch.add_step(&mut encoder);
-        self.pipelines.add(&mut encoder, &group, Kernel::Remember, values);
+        if is_kept {
+            self.pipelines.add(&mut encoder, &group, Kernel::Remember, values);
+            self.n_kept += 1;
+        }
         batch.stepped();
-        self.shared.gpu.queue.submit([encoder.finish()]);
-        self.n_kept += 1;
+        self.n_steps = self.n_steps.wrapping_add(1);
+        if self.submitted.len() == AHEAD {
+            let waited = self.shared.gpu.device.poll(PollType::Wait { submission_index: self.submitted.pop_front(), timeout: None });
+            waited.map_err(|error| Error::Device(error.to_string()))?;
+        }
+        self.submitted.push_back(self.shared.gpu.queue.submit([encoder.finish()]));
         Ok(())
     }
 
@@ -343,8 +381,9 @@ impl DeviceMemory {
 
     /// From here on observations are scaled so, for acting and learning alike.
     pub fn set_scaling(&mut self, scaling: &Scaling) {
-        let pairs: Vec<[f32; 2]> = scaling.mean.iter().zip(&scaling.factor).map(|(&mean, &factor)| [mean, factor]).collect();
-        self.shared.gpu.queue.write_buffer(&self.scaling, 0, cast_slice(&pairs));
+        let rows = scaling.mean.iter().zip(&scaling.factor).zip(&self.noise);
+        let rows: Vec<[f32; 3]> = rows.map(|((&mean, &factor), &noise)| [mean, factor, noise]).collect();
+        self.shared.gpu.queue.write_buffer(&self.scaling, 0, cast_slice(&rows));
         let row = |values: &[f32]| Tensor::from_data(TensorData::new(values.to_vec(), [1, values.len()]), &self.shared.tensors);
         self.scale = [row(&scaling.mean), row(&scaling.factor)];
     }
@@ -359,7 +398,7 @@ impl DeviceMemory {
             slot: (self.n_kept % n_slots) as u32,
             oldest: ((self.n_kept - u64::from(held)) % n_slots) as u32,
             n_drawable: held.saturating_sub(self.facts.n_steps),
-            step: self.n_kept as u32,
+            step: self.n_steps,
             sample: self.n_samples,
         };
         self.shared.gpu.queue.write_buffer(&self.now, 0, bytes_of(&now));
@@ -442,3 +481,6 @@ impl Pipelines {
         pass.dispatch_workgroups(columns, groups.div_ceil(columns), 1);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -261,3 +261,6 @@ impl Entropy {
 fn host(tensor: Tensor<1>) -> Vec<f32> {
     tensor.into_data().try_to_vec().expect("parameters and losses are f32")
 }
+
+#[cfg(test)]
+mod tests;

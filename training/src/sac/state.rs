@@ -62,7 +62,7 @@ impl Sac {
         self.numbers().into_iter().find_map(|(name, values)| Some((name, values.into_iter().find(|value| !value.is_finite())?)))
     }
 
-    fn numbers(&self) -> Vec<(String, Vec<f32>)> {
+    pub(super) fn numbers(&self) -> Vec<(String, Vec<f32>)> {
         let moving = [named("actor", &self.actor), critics_named(&self.critics)];
         let moments = [&self.actor_optimizer, &self.critic_optimizer].into_iter().zip(&moving).flat_map(|(optimizer, parameters)| {
             parameters.iter().zip(&optimizer.moments).flat_map(|((name, _), moments)| moment_names(name).into_iter().zip(moments.clone()))

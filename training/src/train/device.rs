@@ -232,3 +232,6 @@ impl DeviceRun {
 fn seeds(seed: u32, updates: u32) -> [u32; 2] {
     [1, 2].map(|purpose| random::words(seed, purpose, updates, u32::MAX)[0])
 }
+
+#[cfg(test)]
+mod tests;
