@@ -111,12 +111,14 @@ impl Chart {
             lowest = lowest.max(bottom);
         }
         let height = (lowest + MARGIN).ceil();
+        // As pixels the page may end in a part of one: the paper goes on for that.
+        let paper = Rectangle::new().set("width", width + 2.0).set("height", height + 2.0).set("fill", "white");
         let mut document = Document::new()
             .set("viewBox", (0.0, 0.0, width, height))
             .set("width", width)
             .set("height", height)
             .add(Title::new(self.title.as_str()))
-            .add(Rectangle::new().set("width", width).set("height", height).set("fill", "white"))
+            .add(paper)
             .add(lettering.text(&self.title, DVec2::new(24.0, 32.0), 23.0, Align::Left, colour::INK));
         for (index, words) in self.subtitles.iter().enumerate() {
             let at = DVec2::new(24.0, 56.0 + 19.0 * index as f64);
