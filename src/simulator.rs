@@ -187,6 +187,15 @@ impl Simulator {
         }
     }
 
+    /// Memory that the columns take, beside the shared world [bytes].
+    pub fn bytes(&self) -> usize {
+        match &self.batch {
+            Columns::Cpu(batch) => batch.columns().iter().map(|(_, column)| column.len()).sum(),
+            #[cfg(feature = "gpu")]
+            Columns::Gpu(batch) => batch.bytes(),
+        }
+    }
+
     /// The columns, as the last step or reset left them. From a device they are read when they are first asked for after a step; of one
     /// that was lost meanwhile nothing can be read, and the next step says so.
     pub fn batch(&self) -> &Batch {

@@ -92,6 +92,13 @@ impl World {
         }
     }
 
+    /// Memory that its tables take, whatever the number of trucks [bytes].
+    pub fn bytes(&self) -> usize {
+        let routes = size_of_val(self.waypoints.as_slice()) + size_of_val(self.previews.as_slice()) + size_of_val(self.routes.as_slice());
+        let vehicle = size_of_val(&self.params) + size_of_val(self.actions.as_slice()) + size_of_val(&self.rays);
+        self.fields.iter().map(Field::bytes).sum::<usize>() + routes + vehicle
+    }
+
     /// The waypoints of a route of this world.
     #[inline]
     pub fn route_waypoints(&self, route: u32) -> &[WaypointRow] {

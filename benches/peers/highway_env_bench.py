@@ -1,4 +1,4 @@
-"""Env steps per second of highway-env's `roundabout-v0` and of `offtrack bench`, one after the other on the same machine.
+"""Env steps per second of highway-env's `roundabout-v0` and of `offtrack scale`, one after the other on the same machine.
 
 A step is not the same thing on both sides: the result says what it is on either, see README.md beside this file.
 """
@@ -73,24 +73,24 @@ def main():
 
 
 def offtrack(args):
-    """One run of `offtrack bench`, and what its step is."""
+    """One run of `offtrack scale`, and what its step is."""
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "bench.json"
-        command = [args.offtrack, "bench", "--envs", str(args.envs), "--seconds", str(args.offtrack_seconds), "--json", file]
+        file = Path(folder) / "scale.json"
+        command = [args.offtrack, "scale", "--envs", str(args.envs), "--seconds", str(args.offtrack_seconds), "--json", file]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=REPOSITORY)
-        bench = json.loads(file.read_text())
-    run, step = bench["runs"][0], bench["step"]
+        scale = json.loads(file.read_text())
+    run, step = scale["runs"][0], scale["step"]
     speed = run["env_steps_per_second"]
     return {
-        "commit": bench["commit"],
-        "benchmark": bench["benchmark"],
-        "engine": run["engine"],
-        "threads": bench["threads"],
+        "commit": scale["commit"],
+        "benchmark": scale["benchmark"],
+        "engine": scale["engine"],
+        "threads": scale["threads"],
         "envs": run["envs"],
         "env_steps_per_second": speed,
         "simulated_seconds_per_second": round(speed * step["dt"]),
         "step": f"{step['dt']} s in {step['substeps']} sub-steps: one tractor and its trailer, {step['rays']} distance sensors, "
-        f"{step['values']} observed values; actions {step['actions']}; a new episode where one ended",
+        f"{step['values']} observed values; random actions drawn inside; a new episode where one ended",
     }
 
 

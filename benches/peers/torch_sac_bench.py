@@ -1,4 +1,4 @@
-"""Time of one update of a discrete twin-Q soft actor-critic, by PyTorch and by `offtrack bench --learner`, in turns on the same machine.
+"""Time of one update of a discrete twin-Q soft actor-critic, by PyTorch and by `offtrack bench`, in turns on the same machine.
 
 Both do the same work, see README.md beside this file.
 """
@@ -72,7 +72,7 @@ def main():
 def compared(hidden, batch, args):
     """One size: rounds of the program and of PyTorch in turns, the ratio of each pair."""
     sizes = ["--hidden", ",".join(map(str, hidden)), "--batch", str(batch), "--seconds", str(args.seconds)]
-    command = [args.offtrack, "bench", "--learner", "--lines", *sizes]
+    command = [args.offtrack, "bench", "--lines", *sizes]
     learner = Learner(hidden, batch)
     ours, theirs = [], []
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=REPOSITORY) as program:

@@ -48,16 +48,6 @@ const WIDTHS: [(&str, usize); cpu::N_COLUMNS] = [
     ("reward", size_of::<f32>()),
 ];
 
-/// Bytes that a truck takes on a device, beside the shared world.
-pub const BYTES_PER_TRUCK: usize = {
-    let (mut sum, mut column) = (0, 0);
-    while column < WIDTHS.len() {
-        sum += WIDTHS[column].1;
-        column += 1;
-    }
-    sum
-};
-
 /// A batch of trucks on a device.
 #[derive(Debug)]
 pub struct Batch {
@@ -134,6 +124,11 @@ impl Batch {
     /// Trucks in the batch.
     pub fn n_envs(&self) -> usize {
         self.n_envs
+    }
+
+    /// Memory that its columns take, wherever they lie, beside the shared world [bytes].
+    pub fn bytes(&self) -> usize {
+        self.buffers[FIRST_COLUMN..FIRST_COLUMN + WIDTHS.len()].iter().map(|slice| slice.size as usize).sum()
     }
 
     /// Where it lives.

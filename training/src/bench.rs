@@ -1,50 +1,52 @@
-//! Measures env steps per second against the number of trucks, and what each stage takes; with `--learner` the time of an update.
+//! Measures how long an update of the learner takes, alone and with drawing its batch from the memory.
 //!
-//! Speeds are medians over windows of about a quarter of a second: other work on the machine disturbs some windows, not most.
+//! With `--lines` each line read asks for a round: another program can take turns with this one, so that a busy machine slows both alike.
 
-mod learner;
+use std::io::BufRead;
+use std::path::{Path, PathBuf};
+use std::time::{Instant, SystemTime};
 
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime};
-
-use offtrack::layout::{N_RAYS, N_VALUES};
-use offtrack::scenario::{Scenario, Split};
-use offtrack::simulator::{RouteChoice, Simulator};
-use offtrack::stages::STAGES;
-use offtrack::world::World;
+use offtrack::layout::{Ended, N_VALUES};
+use rand::rngs::SmallRng;
+use rand::{Rng, SeedableRng};
 use serde::Serialize;
 
+use crate::bridge;
+use crate::config::{self, Critics, Entropy, Learning};
 use crate::error::Error;
 use crate::files;
+use crate::memory::{Memory, Rows};
 use crate::provenance;
+use crate::sac::{Sac, Transitions};
+use crate::scale::median;
+use crate::scaling::Scaling;
 
-/// Measure env steps per second, random actions drawn inside, or what an update of the learner takes.
+/// Actions of the benchmark's table.
+const N_ACTIONS: usize = 9;
+/// Trucks whose transitions are in the memory.
+const N_ENVS: usize = 128;
+/// Steps of each of them.
+const N_SLOTS: usize = 512;
+/// Updates timed in one go at most: their batches are made before.
+const WINDOW: usize = 8;
+
+/// Measure what an update of the learner takes, alone and with drawing its batch.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Numbers of trucks, separated by commas.
-    #[arg(long, value_delimiter = ',', default_value = "64,256,1024,4096,16384")]
-    envs: Vec<usize>,
-    /// Time for each number of trucks, or of transitions [s].
+    /// Sizes of the learner's hidden layers, separated by commas.
+    #[arg(long, value_delimiter = ',', default_value = "256,256")]
+    hidden: Vec<usize>,
+    /// Transitions in an update; several numbers, separated by commas, are measured one after the other.
+    #[arg(long, value_delimiter = ',', default_value = "256,1024")]
+    batch: Vec<usize>,
+    /// Time for each number of transitions [s].
     #[arg(long, default_value_t = 5.0, allow_negative_numbers = true)]
     seconds: f64,
-    /// A benchmark's name, or the path of its file.
-    #[arg(long, default_value = "attard2023")]
-    benchmark: String,
     /// Write the result to this file as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Measure the learner instead: the time of an update, alone and with drawing its batch.
-    #[arg(long, conflicts_with_all = ["envs", "benchmark"])]
-    learner: bool,
-    /// Sizes of the learner's hidden layers, separated by commas.
-    #[arg(long, requires = "learner", value_delimiter = ',', default_value = "256,256")]
-    hidden: Vec<usize>,
-    /// Transitions in an update; several numbers, separated by commas, are measured one after the other.
-    #[arg(long, requires = "learner", value_delimiter = ',', default_value = "256,1024")]
-    batch: Vec<usize>,
     /// Measure a round of `--seconds` for each line read and print it as a line of JSON.
-    #[arg(long, requires = "learner", conflicts_with = "json")]
+    #[arg(long, conflicts_with = "json")]
     lines: bool,
 }
 
@@ -52,76 +54,54 @@ pub struct Args {
 #[derive(Debug, Serialize)]
 struct Bench {
     machine: String,
-    threads: usize,
     commit: String,
     date: String,
-    benchmark: String,
-    step: Step,
+    values: usize,
+    actions: usize,
     runs: Vec<Run>,
 }
 
-/// What an env step is here.
-#[derive(Debug, Serialize)]
-struct Step {
-    dt: f64,
-    substeps: u32,
-    rays: usize,
-    values: usize,
-    actions: &'static str,
-}
-
+/// What a round came to: medians over windows.
 #[derive(Debug, Serialize)]
 struct Run {
-    engine: &'static str,
-    envs: usize,
-    env_steps_per_second: f64,
+    hidden: Vec<usize>,
+    batch: usize,
+    /// Time of an update whose batch is at hand [ms].
+    update: f64,
+    /// The same, the shortest of all windows [ms].
+    fastest: f64,
+    /// Time of an update and of drawing its batch [ms].
+    with_sampling: f64,
     windows: usize,
-    slowest_window: f64,
-    fastest_window: f64,
-    /// Time of each stage when the batch is stepped a stage at a time [ns a truck].
-    #[serde(serialize_with = "as_map")]
-    stages: Vec<(&'static str, f64)>,
-}
-
-/// Pairs as a map in their own order.
-fn as_map<S: serde::Serializer>(pairs: &[(&'static str, f64)], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_map(pairs.iter().copied())
 }
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
-    if let Some(envs) = args.envs.iter().find(|envs| !(1..=1 << 22).contains(*envs)) {
-        return Err(Error::Flag { flag: "--envs", value: envs.to_string(), expected: "must lie in 1..4194304".into() });
-    }
     if !(0.1..=3600.0).contains(&args.seconds) {
         return Err(Error::Flag { flag: "--seconds", value: format!("{} s", args.seconds), expected: "must lie in 0.1..3600 s".into() });
     }
-    if args.learner {
-        return learner::run(args);
+    if let Some(size) = args.hidden.iter().find(|size| !(1..=8192).contains(*size)) {
+        return Err(Error::Flag { flag: "--hidden", value: size.to_string(), expected: "sizes must lie in 1..8192".into() });
     }
-    let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
-    let world = Arc::new(World::bake(&scenario));
-    let routes = [scenario.split(Split::Train), scenario.split(Split::Test)].concat();
+    if let Some(batch) = args.batch.iter().find(|batch| !(2..=1 << 20).contains(*batch)) {
+        return Err(Error::Flag { flag: "--batch", value: batch.to_string(), expected: "must lie in 2..1048576".into() });
+    }
+    if args.lines {
+        return in_turns(args);
+    }
     let mut bench = Bench {
         machine: provenance::machine(),
-        threads: rayon::current_num_threads(),
         commit: provenance::commit(),
         date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
-        benchmark: scenario.name.clone(),
-        step: Step { dt: scenario.step, substeps: scenario.n_substeps, rays: N_RAYS, values: N_VALUES, actions: "random, drawn inside" },
+        values: N_VALUES,
+        actions: N_ACTIONS,
         runs: Vec::new(),
     };
-    files::print(&format!(
-        "{}, {} threads; a step is {} s in {} sub-steps, {N_RAYS} rays, {N_VALUES} values, random actions drawn inside\n",
-        bench.machine, bench.threads, scenario.step, scenario.n_substeps
-    ))?;
-    let names: Vec<String> = STAGES.iter().map(|stage| format!("{:>8}", stage.name)).collect();
-    files::print(&format!("{:>8} {:>14}   ns a truck, a stage at a time:{}\n", "trucks", "env steps/s", names.join("")))?;
-    for &envs in &args.envs {
-        let mut simulator = Simulator::new(world.clone(), envs, 0, RouteChoice::Drawn(routes.clone()))?;
-        let run = measured(&mut simulator, args.seconds)?;
-        let stages: Vec<String> = run.stages.iter().map(|(_, time)| format!("{time:>8.0}")).collect();
-        files::print(&format!("{:>8} {:>14.0}                                 {}\n", envs, run.env_steps_per_second, stages.join("")))?;
+    files::print(&format!("{}; {N_VALUES} values, {N_ACTIONS} actions, hidden layers {:?}\n", bench.machine, args.hidden))?;
+    files::print(&format!("{:>8} {:>14} {:>22}\n", "batch", "update [ms]", "with sampling [ms]"))?;
+    for &batch in &args.batch {
+        let run = Learner::new(&args.hidden, batch)?.warm(0.1 * args.seconds).round(0.9 * args.seconds);
+        files::print(&format!("{:>8} {:>14.2} {:>22.2}\n", run.batch, run.update, run.with_sampling))?;
         bench.runs.push(run);
         if let Some(file) = &args.json {
             files::write_json(file, &bench)?;
@@ -130,49 +110,139 @@ pub fn run(args: &Args) -> Result<(), Error> {
     Ok(())
 }
 
-/// Three quarters of the time for whole steps, the rest a stage at a time.
-fn measured(simulator: &mut Simulator, seconds: f64) -> Result<Run, Error> {
-    let envs = simulator.batch().n_envs();
-    // Trucks all begin at once: let their episodes spread out first.
-    let warm = Instant::now();
-    while warm.elapsed().as_secs_f64() < 0.1 * seconds {
-        simulator.step_at_random();
+/// Answers each line with the run of a round, a line of JSON, until there are no more lines.
+fn in_turns(args: &Args) -> Result<(), Error> {
+    let mut learners = Vec::new();
+    for &batch in &args.batch {
+        learners.push(Learner::new(&args.hidden, batch)?);
     }
-    let mut windows = Vec::new();
-    let begun = Instant::now();
-    while begun.elapsed().as_secs_f64() < 0.7 * seconds {
-        let (window, mut steps) = (Instant::now(), 0);
-        while window.elapsed() < Duration::from_millis(250).min(Duration::from_secs_f64(0.2 * seconds)) {
-            simulator.step_at_random();
-            steps += 1;
-        }
-        windows.push((steps * envs) as f64 / window.elapsed().as_secs_f64());
-    }
-    let mut times: [Vec<f64>; STAGES.len()] = Default::default();
-    let begun = Instant::now();
-    while begun.elapsed().as_secs_f64() < 0.2 * seconds || times[0].is_empty() {
-        for (times, time) in times.iter_mut().zip(simulator.step_at_random_by_stage()?) {
-            times.push(time.as_secs_f64() * 1e9 / envs as f64);
+    for line in std::io::stdin().lock().lines() {
+        line.map_err(Error::read(Path::new("standard input")))?;
+        for learner in &mut learners {
+            let run = learner.warm(0.1 * args.seconds).round(0.9 * args.seconds);
+            let text = serde_json::to_string(&run).map_err(|error| Error::write(Path::new("standard output"))(error.into()))?;
+            files::print(&format!("{text}\n"))?;
         }
     }
-    let stages = STAGES.iter().zip(&mut times).map(|(stage, times)| (stage.name, rounded(median(times))));
-    Ok(Run {
-        engine: "cpu",
-        envs,
-        env_steps_per_second: median(&mut windows).round(),
-        windows: windows.len(),
-        slowest_window: windows.first().copied().unwrap_or(0.0).round(),
-        fastest_window: windows.last().copied().unwrap_or(0.0).round(),
-        stages: stages.collect(),
-    })
+    Ok(())
 }
 
-/// The middle value; sorts on the way.
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+/// A learner and a memory of random transitions.
+struct Learner {
+    learning: Learning,
+    sac: Sac,
+    memory: Memory<N_VALUES>,
+    scaling: Scaling,
+    rng: SmallRng,
+}
+
+impl Learner {
+    fn new(hidden: &[usize], batch: usize) -> Result<Learner, Error> {
+        let learning = learning(hidden, batch);
+        let sac = Sac::new(&learning, N_VALUES, N_ACTIONS, 0)?;
+        let mut rng = SmallRng::seed_from_u64(0);
+        let capacity = N_ENVS * N_SLOTS;
+        let mut memory = Memory::new(N_ENVS, learning.n_steps, &config::Memory { capacity, warmup: capacity, priority: None });
+        for _ in 0..N_SLOTS {
+            memory.append(Rows {
+                observation: &rows(&mut rng),
+                action: &(0..N_ENVS).map(|_| rng.random_range(0..N_ACTIONS as u32)).collect::<Vec<_>>(),
+                reward: &(0..N_ENVS).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<_>>(),
+                ended: &[Ended::Running as u32; N_ENVS],
+                next_observation: &rows(&mut rng),
+            });
+        }
+        let scaling = Scaling::of(memory.observations());
+        Ok(Learner { learning, sac, memory, scaling, rng })
+    }
+
+    /// A batch drawn from the memory.
+    fn parts(&mut self) -> Vec<Transitions> {
+        let sample = self.memory.sample(self.learning.batch, self.learning.discount as f32, &mut self.rng);
+        bridge::parts(&sample, &self.scaling, &self.learning, &mut self.rng)
+    }
+
+    /// Updates for so many seconds, once at least.
+    fn warm(&mut self, seconds: f64) -> &mut Learner {
+        let begun = Instant::now();
+        let mut time = 0.0;
+        while begun.elapsed().as_secs_f64() < seconds || time == 0.0 {
+            time = self.sampled(1);
+        }
+        self
+    }
+
+    /// Windows of updates alone and of updates with sampling in turn, for so many seconds.
+    fn round(&mut self, seconds: f64) -> Run {
+        let [mut alone, mut sampled] = [Vec::new(), Vec::new()];
+        let begun = Instant::now();
+        while begun.elapsed().as_secs_f64() < seconds || alone.is_empty() {
+            alone.push(1e3 * self.alone(WINDOW));
+            sampled.push(1e3 * self.sampled(WINDOW));
+        }
+        Run {
+            hidden: self.learning.hidden.clone(),
+            batch: self.learning.batch,
+            // The median sorts.
+            update: rounded(median(&mut alone)),
+            fastest: rounded(alone[0]),
+            with_sampling: rounded(median(&mut sampled)),
+            windows: alone.len(),
+        }
+    }
+
+    /// Time of an update whose batch is at hand [s].
+    fn alone(&mut self, n: usize) -> f64 {
+        let batches: Vec<_> = (0..n).map(|_| self.parts()).collect();
+        let begun = Instant::now();
+        for batch in batches {
+            self.sac.update(batch, 1.0);
+        }
+        begun.elapsed().as_secs_f64() / n as f64
+    }
+
+    /// Time of an update and of drawing its batch [s].
+    fn sampled(&mut self, n: usize) -> f64 {
+        let begun = Instant::now();
+        for _ in 0..n {
+            let parts = self.parts();
+            self.sac.update(parts, 1.0);
+        }
+        begun.elapsed().as_secs_f64() / n as f64
+    }
+}
+
+/// Plain twin critics, as in the default training file.
+fn learning(hidden: &[usize], batch: usize) -> Learning {
+    Learning {
+        hidden: hidden.to_vec(),
+        batch,
+        updates_per_step: 1,
+        n_steps: 3,
+        discount: 0.97,
+        reward_scale: 1.0,
+        scale_observations: true,
+        observation_noise: 0.0,
+        mirror: false,
+        actor_rate: 3e-4,
+        critic_rate: 3e-4,
+        last_rate: 1.0,
+        layer_norm: false,
+        value_clip: None,
+        categories: None,
+        critics: Critics::Average,
+        target_rate: 0.005,
+        target_every: 1,
+        average_rate: 0.005,
+        entropy: Entropy { in_target: true, share: Some(0.1), weight: 0.05, rate: 3e-4 },
+    }
+}
+
+/// Random observations of every truck.
+fn rows(rng: &mut SmallRng) -> Vec<[f32; N_VALUES]> {
+    (0..N_ENVS).map(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0))).collect()
 }
 
 fn rounded(value: f64) -> f64 {
-    (10.0 * value).round() / 10.0
+    (1000.0 * value).round() / 1000.0
 }

@@ -2,6 +2,7 @@
 //!
 //! A PNG is the SVG rasterised: both show the same, on every machine, because letters are drawn as outlines too.
 
+pub(crate) mod chart;
 pub(crate) mod episode;
 pub(crate) mod film;
 mod ground;

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::device;
+
 /// Why a command stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -86,6 +88,7 @@ impl Error {
     /// What the process exits with.
     pub fn exit_code(&self) -> u8 {
         match self {
+            Error::Simulator(error) if device::has_failed(error) => 1,
             Error::Write { .. } | Error::Threads(_) | Error::Diverged { .. } | Error::NotVerified { .. } => 1,
             _ => 2,
         }

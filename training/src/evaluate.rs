@@ -15,6 +15,7 @@ use offtrack::world::World;
 use serde_json::Value;
 
 use crate::certify::certified;
+use crate::device::{self, Device};
 use crate::drivers::{self, Driver, PURSUIT_LOOK_AHEAD};
 use crate::error::Error;
 use crate::files;
@@ -55,6 +56,8 @@ pub struct Args {
     /// With `pursuit`: distance to the point pursued [m].
     #[arg(long, default_value_t = PURSUIT_LOOK_AHEAD, allow_negative_numbers = true)]
     look_ahead: f32,
+    #[command(flatten)]
+    device: device::Choice,
 }
 
 /// Runs the command.
@@ -62,6 +65,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if !(1..=100_000).contains(&args.episodes) {
         return Err(Error::Flag { flag: "--episodes", value: args.episodes.to_string(), expected: "must lie in 1..100000".into() });
     }
+    let device = args.device.open()?;
     let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
     let world = Arc::new(World::bake(&scenario));
     let mut driver = drivers::named(args.policy.as_deref(), &scenario.name, args.look_ahead, args.seed, &world)?;
@@ -77,7 +81,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     };
     let possible = args.certified.as_ref().map(|file| certified(file, &scenario, &world, scenario.split(split))).transpose()?;
     let (episodes, seed, record) = (args.episodes, args.seed, args.html.is_some());
-    let examination = Examination { scenario: &scenario, world: &world, split, episodes, seed, record };
+    let examination = Examination { scenario: &scenario, world: &world, split, episodes, seed, record, device: &device };
     let (finished, tracks) = examination.drive(driver.as_mut())?;
     let mut report = examination.summarised(driver.name(), &finished);
     report.certified = possible.and_then(|possible| {
@@ -121,6 +125,8 @@ pub struct Examination<'a> {
     pub seed: u32,
     /// Every state of every episode is kept.
     pub record: bool,
+    /// What steps the trucks; their driver is where it always is.
+    pub device: &'a Device,
 }
 
 impl Examination<'_> {
@@ -132,14 +138,14 @@ impl Examination<'_> {
 
     /// The episodes, route by route in the order of the split; where they are kept also every state of each.
     fn drive(&self, driver: &mut dyn Driver) -> Result<(Vec<Episode>, Vec<Track>), Error> {
-        let Examination { scenario, world, split, episodes, seed, record } = *self;
+        let Examination { scenario, world, split, episodes, seed, record, device } = *self;
         let routes = scenario.split(split);
         if routes.is_empty() {
             let value = split.name().to_owned();
             return Err(Error::Flag { flag: "--split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
         }
         let trucks: Vec<u32> = routes.iter().flat_map(|&route| std::iter::repeat_n(route, episodes)).collect();
-        let mut simulator = Simulator::new(world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?;
+        let mut simulator = Simulator::on(device.engine.clone(), world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?;
         let mut running: Vec<Running> = simulator.batch().truck.iter().map(|truck| Running::new(&world.params.rig, truck)).collect();
         let recorded = if record { 0..running.len() } else { 0..0 };
         let mut recorder = Recorder::new(world, simulator.batch(), recorded);
@@ -162,11 +168,13 @@ impl Examination<'_> {
             }
         }
         bar.finish_and_clear();
+        // A device that broke down in the last step says so here.
+        simulator.wait()?;
         Ok((finished.into_iter().flatten().collect(), recorder.finish()))
     }
 
     fn summarised(&self, policy: &str, finished: &[Episode]) -> Report {
-        let Examination { scenario, world, split, episodes, seed, .. } = *self;
+        let Examination { scenario, world, split, episodes, seed, device, .. } = *self;
         let rig = &world.params.rig;
         let kerbs: Vec<Outline> = scenario.places.iter().map(|place| place.roundabout.kerbs(scenario.gutter)).collect();
         let all: Vec<_> = scenario.routes().collect();
@@ -190,7 +198,7 @@ impl Examination<'_> {
             split: split.name(),
             policy: policy.to_owned(),
             seed,
-            engine: "cpu".to_owned(),
+            engine: device.name.clone(),
             summary: Summary::of(finished.iter(), scenario.step).expect("a split has a route and a route an episode: both were checked"),
             own_lane_suffices: of_routes(true),
             needs_deviation: of_routes(false),

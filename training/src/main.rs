@@ -6,6 +6,7 @@ mod certify;
 mod checkpoint;
 mod config;
 mod deviations;
+mod device;
 mod draw;
 mod drivers;
 mod error;
@@ -23,6 +24,7 @@ mod record;
 mod recording;
 mod report;
 mod sac;
+mod scale;
 mod scaling;
 mod trace;
 mod train;
@@ -48,7 +50,9 @@ struct Cli {
 enum Command {
     Train(train::Args),
     Evaluate(evaluate::Args),
+    Scale(scale::Args),
     Bench(bench::Args),
+    Devices(device::Args),
     Certify(certify::Args),
     Draw(draw::Args),
     Record(record::Args),
@@ -61,7 +65,9 @@ fn main() -> ExitCode {
     let done = match &command {
         Command::Train(args) => train::run(args),
         Command::Evaluate(args) => evaluate::run(args),
+        Command::Scale(args) => scale::run(args),
         Command::Bench(args) => bench::run(args),
+        Command::Devices(args) => device::run(args),
         Command::Certify(args) => certify::run(args),
         Command::Draw(args) => draw::run(args),
         Command::Record(args) => record::run(args),

@@ -13,11 +13,12 @@ pub fn machine() -> String {
     format!("{}, {cores} cores", name.unwrap_or_else(|| std::env::consts::ARCH.to_owned()))
 }
 
-/// The commit that the program's sources are at, with `-dirty` when they differ from it.
+/// The commit that the program's sources are at, with `-dirty` when they differ from it. On a machine without them the variable
+/// `OFFTRACK_COMMIT` of the environment says it.
 pub fn commit() -> String {
     let output = Command::new("git").arg("-C").arg(files::repository()).args(["describe", "--always", "--dirty", "--abbrev=12"]).output();
     match output {
         Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).trim().to_owned(),
-        _ => "unknown".to_owned(),
+        _ => std::env::var("OFFTRACK_COMMIT").unwrap_or_else(|_| "unknown".to_owned()),
     }
 }

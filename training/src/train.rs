@@ -25,6 +25,7 @@ use serde_json::json;
 use crate::bridge::device::Shared;
 use crate::checkpoint::Stored;
 use crate::config::{self, Config};
+use crate::device::Device;
 use crate::drivers::Learned;
 use crate::error::Error;
 use crate::evaluate::Examination;
@@ -180,7 +181,15 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return files::print(&format!("written: {}\n", folder.path().display()));
     }
     let mut driver = Learned { name: folder.policy().display().to_string(), policy };
-    let examination = Examination { scenario: &scenario, world: &world, split: Split::Test, episodes: EPISODES, seed: 0, record: true };
+    let examination = Examination {
+        scenario: &scenario,
+        world: &world,
+        split: Split::Test,
+        episodes: EPISODES,
+        seed: 0,
+        record: true,
+        device: &Device::processor(),
+    };
     let (report, tracks) = examination.report(&mut driver)?;
     let table = report.table();
     finished.evaluation = Some(report.clone());

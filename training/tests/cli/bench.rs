@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::place::{Place, offtrack, succeed};
 
 /// Small enough to be over in a moment.
-const SMALL: [&str; 8] = ["bench", "--learner", "--hidden", "4,3", "--batch", "2,6", "--seconds", "0.1"];
+const SMALL: [&str; 7] = ["bench", "--hidden", "4,3", "--batch", "2,6", "--seconds", "0.1"];
 
 fn assert_measured(run: &Value, batch: usize) {
     assert_eq!((&run["hidden"], &run["batch"]), (&Value::from(vec![4, 3]), &Value::from(batch)));

@@ -4,7 +4,7 @@ use crate::place::{Place, offtrack, refusal};
 
 #[test]
 fn a_wrong_argument_is_named_with_its_value_and_what_would_do() {
-    let cases: [(&[&str], &[&str]); 23] = [
+    let cases: [(&[&str], &[&str]); 29] = [
         (&["evaluate", "--policy", "random", "--episodes", "0"], &["--episodes: 0; must lie in 1..100000"]),
         (&["evaluate", "--policy", "random", "--episodes", "many"], &["'many'", "--episodes"]),
         (&["evaluate", "--policy", "random", "--benchmark", "nowhere"], &["benchmark: nowhere", "scenarios/"]),
@@ -17,11 +17,17 @@ fn a_wrong_argument_is_named_with_its_value_and_what_would_do() {
         (&["certify", "--widths", "64,0"], &["--widths: 0; must lie in 1..262144"]),
         (&["certify", "--hold", "0"], &["--hold: 0; must lie in 1..50"]),
         (&["certify", "--verify", "no.json"], &["no.json: cannot be read"]),
-        (&["bench", "--envs", "0"], &["--envs: 0; must lie in 1..4194304"]),
+        (&["scale", "--envs", "0"], &["--envs: 0; must lie in 1..4194304"]),
+        (&["scale", "--envs", "64..16"], &["--envs: 64..16; must lie in 1..4194304"]),
+        (&["scale", "--seconds", "-1"], &["--seconds: -1 s; must lie in 0.1..3600 s"]),
+        (&["scale", "--plot", "speed.pdf"], &["--plot: speed.pdf; must end in .svg or .png"]),
+        (&["scale", "--mode", "blind"], &["'blind'", "random"]),
+        (&["scale", "--device", "tpu"], &["'tpu'", "cpu, gpu"]),
+        (&["scale", "--adapter", "H200"], &["--adapter: H200; the processor is none: add --device gpu"]),
+        (&["evaluate", "--adapter", "H200"], &["--adapter: H200; the processor is none: add --device gpu"]),
         (&["bench", "--seconds", "-1"], &["--seconds: -1 s; must lie in 0.1..3600 s"]),
-        (&["bench", "--learner", "--hidden", "256,0"], &["--hidden: 0; sizes must lie in 1..8192"]),
-        (&["bench", "--learner", "--batch", "1"], &["--batch: 1; must lie in 2..1048576"]),
-        (&["bench", "--hidden", "256"], &["--learner"]),
+        (&["bench", "--hidden", "256,0"], &["--hidden: 0; sizes must lie in 1..8192"]),
+        (&["bench", "--batch", "1"], &["--batch: 1; must lie in 2..1048576"]),
         (&["train", "no.toml"], &["no.toml: cannot be read"]),
         (&["train", "--minutes", "nan"], &["minutes: NaN min; must lie in 0.01..100000 min"]),
         (&["train", "--wings", "2"], &["'--wings'"]),

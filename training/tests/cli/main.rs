@@ -4,6 +4,7 @@
 
 mod bench;
 mod certify;
+mod device;
 mod draw;
 mod evaluate;
 mod input;

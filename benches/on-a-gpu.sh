@@ -1,0 +1,96 @@
+#!/usr/bin/env bash
+# Everything there is to find out on a machine with a graphics device, from programs that were built elsewhere, in under eight minutes:
+# the devices, the simulator's device tests, speed against the number of trucks, and a training run. A part that fails or takes too long
+# is named at the end, and the others go on.
+#
+#     benches/on-a-gpu.sh OFFTRACK TESTS OUT
+#
+# OFFTRACK  the program, from `cargo build --release --features gpu`
+# TESTS     the simulator's test binary: the last line of `cargo test --release --features gpu -p offtrack --test simulator --no-run` names it
+# OUT       a folder for everything that comes of it
+#
+# From the environment, all optional:
+# VULKAN_DEBS      a folder of Debian packages with the Vulkan loader (libvulkan1 and what a driver asks for: libegl1 libgl1 libglvnd0
+#                  libglx0), used where the system has no loader; they are unpacked into a temporary folder
+# BUILT_AT         where this repository stood when the programs were built: the tests read its files there, so a link is put there where
+#                  nothing is
+# OFFTRACK_COMMIT  the commit that the programs were built from, for results, where git cannot tell
+# ADAPTER          part of an adapter's name, see `offtrack devices`
+# ENVS, MODES, SECONDS_EACH, TRAINING, MINUTES   what is measured, as below
+set -uo pipefail
+if [ $# -ne 3 ]; then
+    sed -n '2,/^set /p' "$0" | sed -n 's/^# \{0,1\}//p' >&2
+    exit 2
+fi
+offtrack=$(realpath -- "$1") || exit 2
+tests=$(realpath -- "$2") || exit 2
+mkdir -p -- "$3" && out=$(realpath -- "$3") || exit 2
+cd "$(dirname "$0")/.." || exit 2
+repository=$PWD
+envs=${ENVS:-256..1048576}
+modes=${MODES:-random}
+seconds=${SECONDS_EACH:-3}
+training=${TRAINING:-training/configs/gpu.toml}
+minutes=${MINUTES:-1}
+adapter=(${ADAPTER:+--adapter "$ADAPTER"})
+failed=()
+
+# part NAME SECONDS COMMAND...: runs a part of it, for so long at most, with what it says in OUT/NAME.txt.
+part() {
+    local name=$1 limit=$2 begun=$SECONDS code
+    shift 2
+    echo "== $name: $*"
+    timeout --kill-after=10 "$limit" "$@" 2>&1 | tee "$out/$name.txt"
+    code=${PIPESTATUS[0]}
+    [ "$code" -eq 124 ] && echo "stopped after $limit s" | tee -a "$out/$name.txt"
+    echo "== $name: exit code $code after $((SECONDS - begun)) s"
+    [ "$code" -eq 0 ] || failed+=("$name (exit code $code)")
+}
+
+# The loader: the system's, or one from packages.
+if ! ldconfig -p | grep -q 'libvulkan\.so\.1'; then
+    if [ -d "${VULKAN_DEBS:-}" ]; then
+        loader=$(mktemp -d)
+        trap 'rm -rf -- "$loader"' EXIT
+        for package in "$VULKAN_DEBS"/*.deb; do dpkg -x "$package" "$loader"; done
+        for folder in "$loader"/usr/lib/*-linux-gnu "$loader"/lib/*-linux-gnu; do
+            [ -d "$folder" ] && export LD_LIBRARY_PATH="$folder${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
+        done
+    else
+        echo "no Vulkan loader: install libvulkan1, or set VULKAN_DEBS to a folder of its package" >&2
+    fi
+fi
+# The driver: what the loader finds by itself, else where NVIDIA's driver puts its description.
+is_hardware() { "$offtrack" devices 2>/dev/null | grep -qE '  (discrete|integrated|virtual)  '; }
+if [ -z "${VK_DRIVER_FILES:-}" ] && ! is_hardware; then
+    for description in {/usr/share,/etc,/usr/local/share,/usr/local/nvidia/share}/vulkan/icd.d/nvidia_icd*.json; do
+        [ -f "$description" ] || continue
+        export VK_DRIVER_FILES=$description
+        is_hardware && echo "driver: $description" && break
+        unset VK_DRIVER_FILES
+    done
+fi
+# The files that the tests read.
+if [ -n "${BUILT_AT:-}" ] && [ ! -e "$BUILT_AT" ]; then
+    mkdir -p -- "$(dirname "$BUILT_AT")" && ln -s -- "$repository" "$BUILT_AT"
+fi
+
+part devices 30 "$offtrack" devices
+part tests 120 "$tests" device --nocapture
+grep -q '^running 0 tests' "$out/tests.txt" && failed+=("tests (none has device in its name)")
+smi=
+if command -v nvidia-smi >/dev/null; then
+    nvidia-smi --query-gpu=timestamp,name,driver_version,memory.used,utilization.gpu,power.draw --format=csv -l 1 >"$out/nvidia-smi.csv" 2>&1 &
+    smi=$!
+fi
+part scale 180 "$offtrack" scale --device gpu "${adapter[@]}" --mode "$modes" --envs "$envs" --seconds "$seconds" \
+    --json "$out/scale.json" --plot "$out/scale.svg"
+part training 130 "$offtrack" train "$training" --minutes "$minutes" --out "$out" --name training
+[ -n "$smi" ] && kill "$smi"
+
+echo
+echo "$SECONDS s; everything is in $out"
+if [ ${#failed[@]} -ne 0 ]; then
+    printf 'failed: %s\n' "${failed[@]}" | tee "$out/failed.txt"
+    exit 1
+fi

@@ -1,0 +1,172 @@
+//! Devices from outside: which there are, what is said where one cannot be had, and the speed measured on either engine.
+
+use offtrack::stages::STAGES;
+use serde_json::Value;
+
+use crate::place::{Place, offtrack, refusal, succeed};
+
+/// Over in a moment.
+const MOMENT: [&str; 2] = ["--seconds", "0.1"];
+
+/// `scale` for a moment on a list of sizes, as JSON.
+fn scaled(place: &Place, arguments: &[&str]) -> Value {
+    succeed(&offtrack(&[&["scale", "--json", &place.text("scale.json")], &MOMENT[..], arguments].concat()));
+    place.json("scale.json")
+}
+
+/// A run that was measured: its counts agree with each other, and its speed lies between its windows.
+fn assert_measured(run: &Value, envs: u64, rays: f64) {
+    assert_eq!((&run["envs"], &run["mode"]), (&Value::from(envs), &Value::from("random")), "{run}");
+    let count = |key: &str| run[key].as_u64().unwrap_or_else(|| panic!("{key}: {run}"));
+    let speed = |key: &str| run[key].as_f64().unwrap_or_else(|| panic!("{key}: {run}"));
+    // Every truck was counted in every step where it was stepped.
+    assert!(0 < count("steps") && count("env_steps") == envs * count("steps"), "{run}");
+    let [slowest, median, fastest] = ["slowest_window", "env_steps_per_second", "fastest_window"].map(speed);
+    assert!(0.0 < slowest && slowest <= median && median <= fastest, "{run}");
+    let rays_a_step = rays * (1.0 + count("episodes") as f64 / count("env_steps") as f64);
+    // Both speeds are whole numbers.
+    assert!((speed("rays_per_second") / median - rays_a_step).abs() < 0.01, "{run}");
+    assert_eq!(speed("bytes_per_truck"), 796.0);
+    let stages = run["stages"].as_object().unwrap();
+    assert!(stages.len() == STAGES.len() && STAGES.iter().all(|stage| stages.contains_key(stage.name)), "{run}");
+    assert!(stages.values().all(|time| 0.0 <= time.as_f64().unwrap()) && 0.0 < stages["sense"].as_f64().unwrap(), "{run}");
+}
+
+#[test]
+fn a_scale_on_the_processor_holds_every_size_and_draws_them_whole() {
+    let place = Place::new();
+    let scale = scaled(&place, &["--envs", "3,16..70", "--plot", &place.text("scale.svg")]);
+    assert_eq!((&scale["engine"], &scale["device"]), (&Value::from("cpu"), &Value::from("cpu")));
+    assert!(["machine", "commit", "date"].iter().all(|key| scale[key].as_str().is_some_and(|text| !text.is_empty())), "{scale}");
+    let step = &scale["step"];
+    assert_eq!((&step["dt"], &step["substeps"], &step["rays"], &step["values"]), (&0.1.into(), &2.into(), &29.into(), &69.into()));
+    // The fields of five roundabouts take some megabytes each.
+    assert!((1 << 20..1 << 27).contains(&scale["world_bytes"].as_u64().unwrap()), "{scale}");
+    let runs = scale["runs"].as_array().unwrap();
+    assert_eq!(runs.len(), 4);
+    for (run, envs) in runs.iter().zip([3, 16, 64, 70]) {
+        assert_measured(run, envs, 29.0);
+    }
+    let svg = std::fs::read_to_string(place.file("scale.svg")).unwrap();
+    assert!(svg.trim_end().ends_with("</svg>"));
+    for words in ["trucks", "env steps / s", "time a truck and step [ns]", "random actions", "time in proportion to the trucks", "sense"] {
+        assert!(svg.contains(&format!("aria-label=\"{words}\"")), "{words}");
+    }
+    assert!(svg.contains(scale["machine"].as_str().unwrap()) && svg.contains(scale["commit"].as_str().unwrap()));
+}
+
+#[test]
+fn a_scale_is_drawn_as_a_png_too() {
+    let place = Place::new();
+    scaled(&place, &["--envs", "8", "--plot", &place.text("scale.png")]);
+    let file = std::io::BufReader::new(std::fs::File::open(place.file("scale.png")).unwrap());
+    let mut picture = png::Decoder::new(file).read_info().unwrap();
+    let mut pixels = vec![0; picture.output_buffer_size().unwrap()];
+    let info = picture.next_frame(&mut pixels).unwrap();
+    assert_eq!(info.width, 1600);
+    // Paper at all four corners, ink between.
+    let row = 3 * info.width as usize;
+    assert!([0, row - 3, pixels.len() - row, pixels.len() - 3].iter().all(|&at| pixels[at..at + 3] == [255; 3]));
+    assert!(pixels.chunks_exact(3).any(|pixel| pixel.iter().all(|&channel| channel < 60)));
+}
+
+#[cfg(not(feature = "gpu"))]
+#[test]
+fn a_program_without_the_feature_says_so_and_how_to_build_one_that_has_it() {
+    let cases: [(&[&str], &str); 3] = [
+        (&["devices"], "devices"),
+        (&["scale", "--device", "gpu"], "--device: gpu"),
+        (&["evaluate", "--device", "gpu", "--adapter", "llvmpipe"], "--device: gpu"),
+    ];
+    for (arguments, named) in cases {
+        let said = refusal(&offtrack(arguments), 2);
+        let expected = [named, "built without the feature gpu", "cargo build --release --features gpu"];
+        assert!(expected.iter().all(|words| said.contains(words)), "{arguments:?}: {said}");
+    }
+}
+
+#[cfg(feature = "gpu")]
+mod on_a_device {
+    use std::process::Command;
+
+    use super::*;
+
+    #[test]
+    fn the_first_device_of_the_list_is_marked_and_is_the_one_a_result_names() {
+        let output = offtrack(&["devices"]);
+        succeed(&output);
+        let listed = String::from_utf8(output.stdout).unwrap();
+        let lines: Vec<&str> = listed.lines().collect();
+        assert!(["adapter", "interface", "driver", "kind", "largest buffer"].iter().all(|head| lines[0].contains(head)), "{listed}");
+        assert!(lines[1].starts_with("*  ") && lines[1].contains("MiB"), "{listed}");
+        assert!(lines[2..lines.len() - 1].iter().all(|line| line.starts_with("   ")), "{listed}");
+        let place = Place::new();
+        let scale = scaled(&place, &["--device", "gpu", "--envs", "16,50"]);
+        let device = scale["device"].as_str().unwrap();
+        let name = lines[1][3..].split("  ").next().unwrap();
+        assert!(device.starts_with(name) && scale["engine"] == "gpu", "{device:?}, {name:?}");
+        let runs = scale["runs"].as_array().unwrap();
+        assert_eq!(runs.len(), 2);
+        assert_measured(&runs[0], 16, 29.0);
+        assert_measured(&runs[1], 50, 29.0);
+        // Part of the name chooses it, whatever the case.
+        let part: String = name.chars().take(4).collect::<String>().to_uppercase();
+        assert_eq!(scaled(&place, &["--device", "gpu", "--adapter", &part, "--envs", "1"])["device"], scale["device"]);
+    }
+
+    #[test]
+    fn an_unknown_adapter_is_refused_with_those_there_are() {
+        let listed = String::from_utf8(offtrack(&["devices"]).stdout).unwrap();
+        let name = listed.lines().nth(1).unwrap()[3..].split("  ").next().unwrap().to_owned();
+        for command in ["scale", "evaluate"] {
+            let said = refusal(&offtrack(&[command, "--device", "gpu", "--adapter", "abacus"]), 2);
+            assert!(said.contains("--adapter: abacus; ") && said.contains(&name), "{said}");
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn without_a_driver_a_failure_says_what_was_looked_for_and_how_to_get_one() {
+        for arguments in [&["devices"][..], &["scale", "--device", "gpu"], &["evaluate", "--device", "gpu"]] {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_offtrack"));
+            // The second name is that of older loaders.
+            let output = command.args(arguments).env("VK_DRIVER_FILES", "/no.json").env("VK_ICD_FILENAMES", "/no.json").output().unwrap();
+            let said = refusal(&output, 1);
+            assert!(["no adapter", "VULKAN", "driver", "mesa-vulkan-drivers", "CPU"].iter().all(|words| said.contains(words)), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_size_beyond_the_adapter_is_a_result_and_the_others_go_on() {
+        let place = Place::new();
+        let scale = scaled(&place, &["--device", "gpu", "--envs", "4194304,16"]);
+        let runs = scale["runs"].as_array().unwrap();
+        assert_eq!((runs.len(), &runs[0]["envs"]), (2, &Value::from(4_194_304)));
+        // A large graphics card holds them; a software adapter allows 128 MiB in a buffer.
+        match runs[0]["error"].as_str() {
+            Some(error) => assert!(error.contains("n_envs: 4194304") && error.contains("trucks fit"), "{error}"),
+            None => assert_measured(&runs[0], 4_194_304, 29.0),
+        }
+        assert_measured(&runs[1], 16, 29.0);
+    }
+
+    #[test]
+    fn the_shipped_policy_arrives_as_often_on_every_route_as_on_the_processor() {
+        let place = Place::new();
+        let arrived = |arguments: &[&str]| {
+            let fixed = ["evaluate", "--episodes", "3", "--json", &place.text("report.json")];
+            succeed(&offtrack(&[&fixed, arguments].concat()));
+            let report = place.json("report.json");
+            let routes = report["routes"].as_array().unwrap().iter();
+            let arrived: Vec<(String, u64)> =
+                routes.map(|route| (route["name"].as_str().unwrap().to_owned(), route["arrived"].as_u64().unwrap())).collect();
+            (report["engine"].as_str().unwrap().to_owned(), arrived)
+        };
+        let (processor, device) = (arrived(&[]), arrived(&["--device", "gpu"]));
+        assert_eq!(processor.0, "cpu");
+        assert!(device.0.contains('(') && !device.0.contains("cpu"), "{}", device.0);
+        assert_eq!((processor.1.len(), &processor.1), (23, &device.1));
+        // Other starts are another result: equal counts are no accident of a driver that always arrives.
+        assert_ne!(arrived(&["--device", "gpu", "--seed", "1"]).1, device.1);
+    }
+}
