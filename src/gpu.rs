@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use wgpu::{Backends, DeviceType, Features, Instance, InstanceDescriptor, Limits};
 
 use crate::layout::buffers::N_BUFFERS;
-pub use batch::{Batch, Columns, Slice};
+pub use batch::{BYTES_PER_TRUCK, Batch, Columns, Slice};
 use kernels::Kernels;
 
 /// What can be wrong with a device.
@@ -204,6 +204,8 @@ impl Device {
 
     /// An error if the driver reported one since the device was opened: what was computed since is not to be trusted.
     pub fn check(&self) -> Result<(), Error> {
+        // Some losses are told to who polls alone; an error of the poll itself is told to who waits.
+        let _ = self.device.poll(wgpu::PollType::Poll);
         match &*self.broken.lock().unwrap_or_else(PoisonError::into_inner) {
             Some(message) => Err(self.broken(message.clone())),
             None => Ok(()),
