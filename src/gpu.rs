@@ -7,6 +7,7 @@ mod kernels;
 mod tables;
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::time::Duration;
 
 use wgpu::{Backends, BufferDescriptor, BufferUsages, DeviceType, Features, Instance, InstanceDescriptor, Limits, MapMode, PollType};
 
@@ -108,6 +109,9 @@ pub struct Adapter {
 /// up with it and compute wrongly or not at all.
 const BACKENDS: Backends = Backends::VULKAN.union(Backends::METAL).union(Backends::DX12);
 
+/// Longer than it takes to answer that a buffer is mapped, once all work is done.
+const ANSWER_TIME: Duration = Duration::from_secs(10);
+
 /// An opened device.
 #[derive(Debug, Clone)]
 pub struct Device {
@@ -204,6 +208,8 @@ impl Device {
 
     /// An error if the driver reported one since the device was opened: what was computed since is not to be trusted.
     pub fn check(&self) -> Result<(), Error> {
+        // Some losses are told to who polls alone; an error of the poll itself is told to who waits.
+        let _ = self.device.poll(wgpu::PollType::Poll);
         match &*self.broken.lock().unwrap_or_else(PoisonError::into_inner) {
             Some(message) => Err(self.broken(message.clone())),
             None => Ok(()),
@@ -228,7 +234,8 @@ impl Device {
             let _ = sender.send(mapped);
         });
         self.wait()?;
-        match receiver.try_recv() {
+        // Another thread that polls the device may be the one that is about to answer.
+        match receiver.recv_timeout(ANSWER_TIME) {
             Ok(Ok(())) => {}
             Ok(Err(error)) => return Err(self.broken(error.to_string())),
             Err(_) => return Err(self.broken("the driver never answered".to_owned())),

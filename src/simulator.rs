@@ -9,7 +9,7 @@ pub use crate::cpu::{Batch, RouteChoice};
 #[cfg(feature = "gpu")]
 use crate::gpu;
 use crate::layout::Start;
-use crate::stages::STAGES;
+use crate::stages::{STAGES, Stage};
 use crate::world::World;
 
 /// What a caller can get wrong about a batch.
@@ -355,6 +355,15 @@ impl Simulator {
             }
             #[cfg(feature = "gpu")]
             Columns::Gpu(batch) => Ok(batch.step_at_random_by_stage()?),
+        }
+    }
+
+    /// One stage of a step over every truck: for comparing engines a stage at a time.
+    pub fn run_stage(&mut self, stage: &Stage) {
+        match &mut self.batch {
+            Columns::Cpu(batch) => batch.run_stage(&self.world, stage),
+            #[cfg(feature = "gpu")]
+            Columns::Gpu(batch) => batch.run_stage(stage),
         }
     }
 

@@ -12,7 +12,7 @@ pub use case::{Case, CaseVehicle, Command, Error, Init, Instant};
 
 use crate::angle::wrapped;
 use crate::cpu::drive::{Moving, load_transfer_ratio, motion, moved};
-use crate::layout::{Control, Truck};
+use crate::layout::{Control, Rig, Truck};
 
 /// Instants closer together than this are the same [s].
 const SAME_INSTANT: f64 = 1e-7;
@@ -86,6 +86,11 @@ pub struct Peak {
 
 /// Drives a case.
 pub fn trace(case: &Case) -> Result<Traced, Error> {
+    trace_by(case, moved)
+}
+
+/// Drives a case with a [`moved`] of the caller's: the rig, the length of the sub-step [s], what drives the truck, and the truck.
+pub fn trace_by(case: &Case, mut moved: impl FnMut(&Rig, f32, &Control, &Moving) -> Moving) -> Result<Traced, Error> {
     let times = case.checked_times()?;
     let mut pending = times.iter().copied().peekable();
     let mut run = Run::new(case);
@@ -98,10 +103,10 @@ pub fn trace(case: &Case) -> Result<Traced, Error> {
         // Past the end there is nothing to drive through: what is left is asked of the last instant itself.
         let until = next.unwrap_or(f64::INFINITY);
         while let Some(t) = pending.next_if(|&t| t < until - SAME_INSTANT) {
-            traced.states.push(if t - run.t <= SAME_INSTANT { State { t, ..here } } else { run.after(t).state() });
+            traced.states.push(if t - run.t <= SAME_INSTANT { State { t, ..here } } else { run.after(t, &mut moved).state() });
         }
         let Some(next) = next else { break };
-        run = run.after(next);
+        run = run.after(next, &mut moved);
         let (before, after) = (here.gamma.abs(), run.state().gamma.abs());
         if traced.t_jackknife.is_none() && case.vehicle.gamma_max < after {
             traced.t_jackknife = Some(here.t + (run.t - here.t) * ((case.vehicle.gamma_max - before) / (after - before)).max(0.0));
@@ -149,7 +154,7 @@ impl Run<'_> {
     }
 
     /// The run at `t`, at most a sub-step from now.
-    fn after(&self, t: f64) -> Self {
+    fn after(&self, t: f64, moved: &mut impl FnMut(&Rig, f32, &Control, &Moving) -> Moving) -> Self {
         let control = self.case.commands.iter().rfind(|command| command.t <= self.t + SAME_INSTANT);
         // Before the first command the truck goes on as it is.
         let control = control.map_or(Control { steering: self.moving.truck.steering, ..Control::default() }, |command| Control {

@@ -19,7 +19,7 @@ const CHORD: usize = 5;
 const RADIUS_SCALE: f64 = 100.0;
 
 /// The shared, unchanging part of a batch.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct World {
     /// Vehicle, time and weights.
     pub params: Params,

@@ -4,7 +4,6 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use bytemuck::{bytes_of, cast_slice};
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buffer, BufferBinding, BufferDescriptor, BufferUsages, CommandEncoder,
     ComputePassDescriptor, ComputePassTimestampWrites, Features, QuerySetDescriptor, QueryType,
@@ -16,7 +15,7 @@ use crate::cpu::count::{N_SUMS, Tally};
 use crate::cpu::{self, RouteChoice};
 use crate::layout::buffers::{BUFFERS, FIRST_COLUMN, N_BUFFERS};
 use crate::layout::{BatchFacts, Clearance, Control, N_RAYS, N_VALUES, Progress, RewardTerms, Truck};
-use crate::stages::{DRAW, Kernel, RESTART, STAGES};
+use crate::stages::{DRAW, Kernel, RESTART, STAGES, Stage};
 use crate::world::World;
 
 /// Part of a buffer.
@@ -67,7 +66,7 @@ impl Batch {
     pub fn new(device: &Device, world: &World, n_envs: usize, seed: u32, choice: RouteChoice, columns: Columns) -> Result<Batch, Error> {
         let limit = device.device.limits().max_storage_buffer_binding_size.min(device.device.limits().max_buffer_size);
         for (buffer, width) in WIDTHS {
-            let n_bytes = n_envs as u64 * width as u64;
+            let n_bytes = (n_envs as u64).saturating_mul(width as u64);
             if limit < n_bytes {
                 let (adapter, fitting) = (device.adapter.get_info().name, limit / width as u64);
                 return Err(Error::TooManyTrucks { n_envs, buffer, n_bytes, adapter, limit, fitting });
@@ -81,15 +80,16 @@ impl Batch {
             fixed: matches!(choice, RouteChoice::Fixed(_)).into(),
         };
         let foreign = !columns.is_empty();
-        let filled = |label, contents: &[u8]| {
-            let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-            let buffer = device.device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents, usage });
-            Slice { size: contents.len() as u64, buffer, offset: 0 }
-        };
         let empty = |label, size| {
             let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
             let buffer = device.device.create_buffer(&BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
             Slice { buffer, offset: 0, size }
+        };
+        // Not created with their contents: on a lost device that would panic.
+        let filled = |label, contents: &[u8]| {
+            let slice = empty(label, contents.len() as u64);
+            device.queue.write_buffer(&slice.buffer, 0, contents);
+            slice
         };
         let names = || BUFFERS.iter().map(|buffer| buffer.name);
         let mut buffers: Vec<Slice> = names().zip(tables(world)).map(|(name, table)| filled(name, &table)).collect();
@@ -224,12 +224,7 @@ impl Batch {
         let mut times = [Duration::ZERO; STAGES.len()];
         for (index, stage) in STAGES.iter().enumerate() {
             let begun = Instant::now();
-            self.run(|batch, encoder| {
-                if index + 1 == STAGES.len() {
-                    batch.hand_on(encoder);
-                }
-                batch.pass(encoder, stage.kernels);
-            });
+            self.run_stage(stage);
             self.wait()?;
             times[index] = begun.elapsed();
         }
@@ -292,14 +287,13 @@ impl Batch {
         Ok(batch)
     }
 
-    /// Runs single stages, by the names in [`STAGES`] with what belongs to each: for comparing engines a stage at a time.
-    pub fn run_stage(&mut self, stage: &str) {
-        let Some(index) = STAGES.iter().position(|known| known.name == stage) else { return };
+    /// One stage over all trucks with what belongs to it.
+    pub(crate) fn run_stage(&mut self, stage: &Stage) {
         self.run(|batch, encoder| {
-            if index + 1 == STAGES.len() {
+            if stage.name == "reset" {
                 batch.hand_on(encoder);
             }
-            batch.pass(encoder, STAGES[index].kernels);
+            batch.pass(encoder, stage.kernels);
         });
     }
 

@@ -3,8 +3,10 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails as the test itself does")]
 
 use std::path::Path;
+use std::sync::Arc;
 
 use offtrack::scenario::Scenario;
+use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 
 mod bad_input;
@@ -15,6 +17,8 @@ mod episodes;
 mod field;
 mod fit;
 mod observe;
+#[cfg(feature = "gpu")]
+mod parity;
 mod physics;
 mod sense;
 mod shaders;
@@ -25,4 +29,18 @@ fn benchmark(name: &str) -> (Scenario, World) {
     let scenario = Scenario::read(&path).unwrap();
     let world = World::bake(&scenario);
     (scenario, world)
+}
+
+/// Every engine that the build has, by its name: what a batch promises holds on each of them.
+fn engines() -> Vec<(&'static str, Engine)> {
+    Vec::from([
+        ("processor", Engine::Cpu),
+        #[cfg(feature = "gpu")]
+        ("device", device::engine()),
+    ])
+}
+
+/// A batch on an engine.
+fn simulator(engine: &Engine, world: &Arc<World>, n_envs: usize, seed: u32, choice: RouteChoice) -> Simulator {
+    Simulator::on(engine.clone(), world.clone(), n_envs, seed, choice).unwrap()
 }

@@ -1,0 +1,165 @@
+//! Stage by stage and step by step, the device beside the processor: from the same states, value by value.
+
+mod compare;
+mod states;
+
+use std::sync::Arc;
+
+use offtrack::angle::wrapped;
+use offtrack::cpu::follow::reference_point;
+use offtrack::layout::Ended;
+use offtrack::roundabout::Gutter;
+use offtrack::simulator::{Batch, RouteChoice, Simulator};
+use offtrack::stages::STAGES;
+use offtrack::world::World;
+
+use crate::device::engine;
+use crate::simulator;
+use compare::{Agreement, agreements, column};
+use states::{ENOUGH, N_ENVS, on_each_roundabout, put, varied, world};
+
+/// What each stage writes, and one number of the world that it would notice to be off by a thousandth.
+const TOUCHED: [(&str, &[&str], fn(&mut World)); 8] = [
+    ("steer", &["control"], |world| world.params.rig.speed_gain *= 1.001),
+    ("drive", &["truck"], |world| world.params.rig.trailer_wheelbase *= 1.001),
+    ("collide", &["clearance"], |world| world.params.rig.trailer_body.half_width *= 1.001),
+    ("follow", &["progress"], |world| world.params.rig.wheelbase *= 1.001),
+    ("sense", &["ranges"], |world| world.rays.iter_mut().for_each(|ray| ray.origin *= 1.001)),
+    ("observe", &["next_observation"], |world| world.params.sensor_range *= 1.001),
+    ("judge", &["truck", "ended", "terms", "reward"], |world| world.params.lane_distance_limit *= 1.001),
+    ("reset", &["truck", "control", "progress", "ranges", "observation"], |world| world.params.start_offset *= 1.001),
+];
+
+/// A quantity this near to where a decision falls may be decided otherwise by an engine that is off by as much as it may be.
+const MARGIN: f32 = 1e-4;
+
+fn simulators(world: &Arc<World>, choice: &RouteChoice) -> [Simulator; 2] {
+    [Simulator::new(world.clone(), N_ENVS, 3, choice.clone()).unwrap(), simulator(&engine(), world, N_ENVS, 3, choice.clone())]
+}
+
+/// A device that computes with a world that is wrong in one number.
+fn wrong_device(world: &World, choice: &RouteChoice, change: fn(&mut World)) -> Simulator {
+    let mut world = world.clone();
+    change(&mut world);
+    simulator(&engine(), &Arc::new(world), N_ENVS, 3, choice.clone())
+}
+
+/// Whether something about a truck was decided by less than the margin, in the step or the stage that led from `before` to `after`.
+fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bool {
+    let (params, truck, clearance) = (&world.params, &after.truck[env], &after.clearance[env]);
+    let near = |value: f32, limit: f32| (value - limit).abs() < MARGIN;
+    let point = reference_point(params.rig.wheelbase, truck);
+    let waypoints = world.route_waypoints(truck.route);
+    // Those that were passed and the next one.
+    let tried = before.progress[env].waypoint as usize..waypoints.len().min(after.progress[env].waypoint as usize + 1);
+    let at_a_line = waypoints.get(tried).unwrap_or_default().iter().any(|waypoint| {
+        let offset = point - waypoint.position;
+        near(offset.dot(waypoint.direction), 0.0) || near(offset.length(), params.stray_distance)
+    });
+    let error = world.actions[before.action[env] as usize].speed - before.truck[env].speed;
+    let asked = params.rig.speed_gain * error;
+    at_a_line
+        || near(error.abs(), params.rig.speed_integral_band)
+        || near(asked, params.rig.speed_braking)
+        || near(asked, params.rig.acceleration_max)
+        || near(clearance.tractor, 0.0)
+        || near(clearance.trailer, 0.0)
+        || near(truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs()), params.rollover_ratio)
+        || near(wrapped(truck.heading - truck.trailer_heading).abs(), params.jackknife_angle)
+        || near(after.progress[env].waypoint_distance, params.stray_distance)
+}
+
+/// Which trucks are to agree: all but the few whose fate is a close call.
+fn judged(world: &World, before: &Batch, after: &Batch) -> Vec<bool> {
+    let judged: Vec<bool> = (0..N_ENVS).map(|env| !is_close_call(world, before, after, env)).collect();
+    let left_out = judged.iter().filter(|judged| !**judged).count();
+    assert!(200 * left_out < N_ENVS, "{left_out} of {N_ENVS} are left out");
+    judged
+}
+
+/// The agreement of two batches in some columns.
+fn compared(here: &Batch, there: &Batch, columns: &[&str], counted: &[bool]) -> Vec<Agreement> {
+    columns.iter().flat_map(|name| agreements(name, column(here, name), column(there, name), counted)).collect()
+}
+
+fn assert_agreement(what: &str, compared: &[Agreement]) {
+    for agreement in compared {
+        println!("{what} | {agreement}");
+        assert!(agreement.holds(), "{what}: {agreement:?}");
+    }
+}
+
+/// The rows of held trucks and the columns other than `written` are as they were.
+fn assert_untouched(before: &Batch, after: &Batch, written: &[&str]) {
+    for (name, bytes) in before.columns() {
+        let now = column(after, name);
+        assert!(written.contains(&name) || bytes == now, "{name}");
+        let width = bytes.len() / N_ENVS;
+        let held = (0..N_ENVS).filter(|&env| before.truck[env].held == 1);
+        assert!(held.map(|env| env * width..(env + 1) * width).all(|row| bytes[row.clone()] == now[row]), "{name} of held trucks");
+    }
+}
+
+#[test]
+fn every_stage_does_the_same_to_every_value_and_touches_no_other() {
+    for (gutter, fixed) in [(Gutter::Drivable, false), (Gutter::Solid, true)] {
+        let world = world(gutter);
+        let (choice, mut before) = varied(&world, fixed);
+        let counts = on_each_roundabout(&world, &before);
+        assert!(counts.len() == 5 && counts.iter().all(|&count| ENOUGH <= count), "{counts:?}");
+        assert_eq!(before.truck.iter().filter(|truck| truck.held == 1).count(), if fixed { N_ENVS / 16 } else { 0 });
+        let [mut processor, mut device] = simulators(&world, &choice);
+        for (stage, (name, written, change)) in STAGES.iter().zip(TOUCHED) {
+            assert_eq!(stage.name, name);
+            for simulator in [&mut processor, &mut device] {
+                put(simulator, &before);
+                simulator.run_stage(stage);
+            }
+            let here = processor.batch();
+            let counted = judged(&world, &before, here);
+            let fails = |there: &Batch| compared(here, there, written, &counted).iter().any(|agreement| !agreement.holds());
+            assert!(fails(&before), "{name}: nothing at all would pass");
+            // On fixed routes no truck begins anew.
+            if !fixed {
+                let mut wrong = wrong_device(&world, &choice, change);
+                put(&mut wrong, &before);
+                wrong.run_stage(stage);
+                assert!(fails(wrong.batch()), "{name}: a number off by a thousandth would pass");
+            }
+            assert_agreement(name, &compared(here, device.batch(), written, &counted));
+            assert_untouched(&before, here, written);
+            assert_untouched(&before, device.batch(), written);
+            before = here.clone();
+        }
+        let [here, there] = [&processor, &device].map(|simulator| simulator.tally().unwrap());
+        assert_eq!(here, there);
+        assert_eq!(here.env_steps() as usize, before.truck.len() - if fixed { N_ENVS / 16 } else { 0 });
+    }
+}
+
+#[test]
+fn a_whole_step_from_any_state_ends_alike_for_every_reason_there_is() {
+    let world = world(Gutter::Drivable);
+    let (choice, before) = varied(&world, false);
+    let [mut processor, mut device] = simulators(&world, &choice);
+    let mut wrong = wrong_device(&world, &choice, |world| world.params.rig.wheelbase *= 1.001);
+    // What the end was decided by is overwritten where another episode begins.
+    put(&mut processor, &before);
+    STAGES[..STAGES.len() - 1].iter().for_each(|stage| processor.run_stage(stage));
+    let counted = judged(&world, &before, processor.batch());
+    let mut codes = [0; Ended::ALL.len()];
+    processor.batch().ended.iter().zip(&counted).filter(|(_, counted)| **counted).for_each(|(&code, _)| codes[code as usize] += 1);
+    println!("{codes:?}");
+    assert!(codes.iter().all(|&count| 100 <= count), "{codes:?}");
+    for simulator in [&mut processor, &mut device, &mut wrong] {
+        put(simulator, &before);
+        simulator.step(&before.action).unwrap();
+    }
+    let here = processor.batch();
+    let names: Vec<&str> = here.columns().map(|(name, _)| name).into();
+    for there in [&before, wrong.batch()] {
+        assert!(compared(here, there, &names, &counted).iter().any(|agreement| !agreement.holds()));
+        assert!(compared(here, there, &["ended"], &counted).iter().any(|agreement| !agreement.holds()));
+    }
+    assert_agreement("step", &compared(here, device.batch(), &names, &counted));
+}

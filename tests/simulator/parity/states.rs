@@ -1,0 +1,115 @@
+//! Trucks in all kinds of states on every route of every roundabout, for comparing engines from there.
+
+use std::sync::{Arc, OnceLock};
+
+use offtrack::angle::wrapped;
+use offtrack::field::Field;
+use offtrack::layout::Truck;
+use offtrack::random::{index_below, signed_unit, words};
+use offtrack::roundabout::Gutter;
+use offtrack::simulator::{Batch, RouteChoice, Simulator};
+use offtrack::world::World;
+
+use crate::benchmark;
+
+/// Trucks: with all routes as likely as each other every roundabout has more than [`ENOUGH`].
+pub const N_ENVS: usize = 28_672;
+/// States that each roundabout must have.
+pub const ENOUGH: usize = 4096;
+
+/// Every route of every roundabout, with their gutters drivable or solid.
+pub fn world(gutter: Gutter) -> Arc<World> {
+    static WORLDS: OnceLock<[Arc<World>; 2]> = OnceLock::new();
+    let worlds = WORLDS.get_or_init(|| {
+        let (scenario, drivable) = benchmark("attard2023-full");
+        let solid = scenario.places.iter().map(|place| Field::bake(&place.roundabout.kerbs(Gutter::Solid), scenario.cell)).collect();
+        let solid = World { fields: solid, ..drivable.clone() };
+        [drivable, solid].map(Arc::new)
+    });
+    worlds[usize::from(gutter == Gutter::Solid)].clone()
+}
+
+/// Makes a simulator's columns those of `batch`.
+pub fn put(simulator: &mut Simulator, batch: &Batch) {
+    let columns = batch.columns();
+    simulator.restore(|name| columns.iter().find(|(column, _)| *column == name).map(|(_, bytes)| *bytes)).unwrap();
+}
+
+/// What the states are drawn from, beside the truck's place in the batch.
+const SEED: u32 = 23;
+
+/// Numbers in [-1, 1) for a truck.
+fn drawn(env: usize, draw: u32) -> [f32; 4] {
+    words(SEED, env as u32, 0, draw).map(signed_unit)
+}
+
+/// An index below `n` for a truck.
+fn picked(env: usize, draw: u32, n: usize) -> usize {
+    index_below(words(SEED, env as u32, 1, draw)[0], n as u32) as usize
+}
+
+/// Before a step: a quarter of the trucks where 40 random steps have brought them, the others anywhere near their routes, slow and fast,
+/// bent and leaning. On fixed routes one in sixteen is held.
+pub fn varied(world: &Arc<World>, fixed: bool) -> (RouteChoice, Batch) {
+    let all: Vec<u32> = (0..world.routes.len() as u32).collect();
+    let mut simulator = Simulator::new(world.clone(), N_ENVS, SEED, RouteChoice::Drawn(all.clone())).unwrap();
+    (0..40).for_each(|_| simulator.step_at_random());
+    let mut batch = simulator.batch().clone();
+    for env in 0..N_ENVS {
+        batch.action[env] = picked(env, 0, world.params.n_actions as usize) as u32;
+        if env % 4 != 0 {
+            put_anywhere(world, &mut batch, env);
+        }
+        if fixed && env % 16 == 5 {
+            batch.truck[env].held = 1;
+            batch.observation[env] = batch.next_observation[env];
+        }
+    }
+    let routes = batch.truck.iter().map(|truck| truck.route).collect();
+    (if fixed { RouteChoice::Fixed(routes) } else { RouteChoice::Drawn(all) }, batch)
+}
+
+/// Puts a truck somewhere near its route.
+fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
+    let route = batch.truck[env].route;
+    let (waypoints, previews) = (world.route_waypoints(route), world.route_previews(route));
+    let last = waypoints.len() - 1;
+    let kind = picked(env, 1, 16);
+    let near = if kind < 2 { last } else { picked(env, 2, waypoints.len()) };
+    let [aside, along, turned, bent] = drawn(env, 0);
+    let [speed, steering, lean, ratio] = drawn(env, 1);
+    let [roll, roll_rate, trailer_roll, trailer_roll_rate] = drawn(env, 2);
+    let waypoint = &waypoints[near];
+    let heading = wrapped(previews[near].heading + 0.3 * turned);
+    let behind = previews[near.saturating_sub(4)].heading;
+    let lean = if lean < -0.8 { 0.3 } else { 0.05 };
+    batch.truck[env] = Truck {
+        position: waypoint.position + 1.5 * aside * waypoint.direction.perp() + (along - 1.5) * waypoint.direction,
+        heading,
+        trailer_heading: wrapped(behind + if kind == 2 || kind == 5 { 2.5 * bent } else { 0.3 * bent }),
+        speed: 8.0 + 8.0 * speed,
+        steering: steering * world.params.rig.steer_max,
+        tractor_roll: lean * roll,
+        tractor_roll_rate: lean * roll_rate,
+        trailer_roll: lean * trailer_roll,
+        trailer_roll_rate: lean * trailer_roll_rate,
+        tractor_load_transfer_ratio: ratio,
+        trailer_load_transfer_ratio: -ratio,
+        route,
+        episode: words(SEED, env as u32, 2, 0)[0],
+        steps: if kind == 3 { world.routes[route as usize].step_limit } else { picked(env, 3, 200) as u32 },
+        held: 0,
+    };
+    // Up to the end, where a truck that has passed the last waypoint stands; one in sixteen is told a waypoint too far away.
+    let far = if kind == 4 { 10 } else { 0 };
+    batch.progress[env].waypoint = (near + far).clamp(1, last) as u32;
+    let [integral, ..] = drawn(env, 3);
+    batch.control[env].speed_error_integral = integral;
+}
+
+/// Trucks on each roundabout.
+pub fn on_each_roundabout(world: &World, batch: &Batch) -> Vec<usize> {
+    let mut counts = vec![0; world.fields.len()];
+    batch.truck.iter().for_each(|truck| counts[world.routes[truck.route as usize].roundabout as usize] += 1);
+    counts
+}
