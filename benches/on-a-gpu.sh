@@ -28,7 +28,7 @@ mkdir -p -- "$3" && out=$(realpath -- "$3") || exit 2
 cd "$(dirname "$0")/.." || exit 2
 repository=$PWD
 envs=${ENVS:-256..1048576}
-modes=${MODES:-random}
+modes=${MODES:-random,policy,study,training}
 seconds=${SECONDS_EACH:-3}
 training=${TRAINING:-training/configs/gpu.toml}
 minutes=${MINUTES:-1}

@@ -4,6 +4,8 @@
 
 use offtrack::simulator::{self, Engine};
 
+#[cfg(feature = "gpu")]
+use crate::bridge::device::Shared;
 use crate::error::Error;
 use crate::provenance;
 
@@ -35,12 +37,34 @@ pub struct Device {
     pub kind: &'static str,
     /// Name for results: `cpu` for the processor, which results name elsewhere; else the adapter's with its interface and driver.
     pub name: String,
+    /// The device as the tensor library knows it too, once someone has asked.
+    #[cfg(feature = "gpu")]
+    shared: std::sync::Arc<std::sync::OnceLock<Shared>>,
 }
 
 impl Device {
     /// The processor.
     pub fn processor() -> Device {
-        Device { engine: Engine::Cpu, kind: "cpu", name: "cpu".to_owned() }
+        Device {
+            engine: Engine::Cpu,
+            kind: "cpu",
+            name: "cpu".to_owned(),
+            #[cfg(feature = "gpu")]
+            shared: Default::default(),
+        }
+    }
+
+    /// The device, shared with the tensor library.
+    #[cfg(feature = "gpu")]
+    pub fn shared(&self) -> Result<Shared, Error> {
+        if let Some(shared) = self.shared.get() {
+            return Ok(shared.clone());
+        }
+        let Engine::Gpu { device, .. } = &self.engine else {
+            return Err(Error::Device("the processor is none".to_owned()));
+        };
+        let shared = Shared::on(device.clone())?;
+        Ok(self.shared.get_or_init(|| shared).clone())
     }
 
     /// Name for people: that of the processor or the adapter.
@@ -70,7 +94,7 @@ fn open(adapter: Option<&str>) -> Result<Device, Error> {
     match gpu::Device::open(adapter) {
         Ok(device) => {
             let name = device.name();
-            Ok(Device { engine: Engine::Gpu { device, columns: gpu::Columns::new() }, kind: "gpu", name })
+            Ok(Device { engine: Engine::Gpu { device, columns: gpu::Columns::new() }, kind: "gpu", name, shared: Default::default() })
         }
         Err(gpu::Error::UnknownAdapter { name, found }) => {
             let expected = format!("no adapter's name has this in it: there is {}", found.join(", "));

@@ -38,7 +38,7 @@ pub struct Args {
     /// Numbers of trucks, separated by commas; `256..1048576` is a range in steps of four times as many.
     #[arg(long, default_value = "64,256,1024,4096,16384")]
     envs: String,
-    /// What drives, separated by commas: `random`, actions drawn where the trucks are stepped.
+    /// What drives, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "random")]
     mode: Vec<Mode>,
     /// Time for each number of trucks and each mode [s].
@@ -166,11 +166,11 @@ pub fn run(args: &Args) -> Result<(), Error> {
             bar.set_message(format!("{envs} trucks, {}", mode.name()));
             bar.tick();
             let routes = [scenario.split(Split::Train), scenario.split(Split::Test)].concat();
-            let setting = Setting { engine: device.engine.clone(), world: world.clone(), routes, envs };
+            let setting = Setting { device: device.clone(), benchmark: scenario.name.clone(), world: world.clone(), routes, envs };
             let outcome = mode.drive(setting).and_then(|mut drive| measured(drive.as_mut(), args.seconds));
             let outcome = match outcome {
                 Ok(measured) => Outcome::Measured(Box::new(measured)),
-                Err(Error::Simulator(error)) => {
+                Err(error) if is_refusal(&error) => {
                     // What broke a device must not spoil the next size.
                     device = args.device.open()?;
                     let outcome = Outcome::Refused { error: error.to_string() };
@@ -189,8 +189,18 @@ pub fn run(args: &Args) -> Result<(), Error> {
     bar.finish_and_clear();
     match refusal {
         // Nothing at all came of it.
-        Some(error) if scale.runs.iter().all(|run| run.measured().is_none()) => Err(error.into()),
+        Some(error) if scale.runs.iter().all(|run| run.measured().is_none()) => Err(error),
         _ => Ok(()),
+    }
+}
+
+/// Whether a size was too much for the machine.
+fn is_refusal(error: &Error) -> bool {
+    match error {
+        Error::Simulator(_) | Error::Flag { flag: "memory.capacity", .. } => true,
+        #[cfg(feature = "gpu")]
+        Error::Device(_) => true,
+        _ => false,
     }
 }
 

@@ -122,9 +122,7 @@ fn spread_out(drive: &mut dyn Drive, seconds: f64) -> Result<(u64, u64), Error> 
 
 /// A run of steps, done when it returns.
 fn asked(drive: &mut dyn Drive, steps: u64) -> Result<(), Error> {
-    for _ in 0..steps {
-        drive.step()?;
-    }
+    drive.steps(steps)?;
     drive.wait()
 }
 

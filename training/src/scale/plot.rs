@@ -68,6 +68,9 @@ pub(super) fn drawn(scale: &Scale, device: &str) -> Result<String, Failure> {
 fn words(mode: Mode) -> &'static str {
     match mode {
         Mode::Random => "random actions",
+        Mode::Policy => "the shipped policy",
+        Mode::Study => "a policy of 512, 512, 1024",
+        Mode::Training => "training",
     }
 }
 
