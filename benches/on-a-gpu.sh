@@ -28,8 +28,8 @@ mkdir -p -- "$3" && out=$(realpath -- "$3") || exit 2
 cd "$(dirname "$0")/.." || exit 2
 repository=$PWD
 envs=${ENVS:-256..1048576}
-modes=${MODES:-random}
-seconds=${SECONDS_EACH:-3}
+modes=${MODES:-random,policy,large-policy,training}
+seconds=${SECONDS_EACH:-2}
 training=${TRAINING:-training/configs/gpu.toml}
 minutes=${MINUTES:-1}
 adapter=(${ADAPTER:+--adapter "$ADAPTER"})
@@ -83,9 +83,9 @@ if command -v nvidia-smi >/dev/null; then
     nvidia-smi --query-gpu=timestamp,name,driver_version,memory.used,utilization.gpu,power.draw --format=csv -l 1 >"$out/nvidia-smi.csv" 2>&1 &
     smi=$!
 fi
-part scale 180 "$offtrack" scale --device gpu "${adapter[@]}" --mode "$modes" --envs "$envs" --seconds "$seconds" \
+part scale 200 "$offtrack" scale --device gpu "${adapter[@]}" --mode "$modes" --envs "$envs" --seconds "$seconds" \
     --json "$out/scale.json" --plot "$out/scale.svg"
-part training 130 "$offtrack" train "$training" --minutes "$minutes" --out "$out" --name training
+part training 110 "$offtrack" train "$training" --minutes "$minutes" --out "$out" --name training
 [ -n "$smi" ] && kill "$smi"
 
 echo

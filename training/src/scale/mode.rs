@@ -1,34 +1,107 @@
 //! What drives the trucks while they are measured.
 
+#[cfg(feature = "gpu")]
+mod device;
+mod host;
+
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use offtrack::layout::N_VALUES;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::stages::STAGES;
 use offtrack::world::World;
+use rand::SeedableRng;
+use rand::rngs::SmallRng;
 use serde::Serialize;
 
+use super::Updates;
+use crate::config::Config;
 use crate::error::Error;
+use crate::files;
+use crate::network::Mlp;
+use crate::policy::Policy;
+
+/// Hidden layers of the study's own learner.
+const LARGE: [usize; 3] = [512, 512, 1024];
+
+/// A device with the learner's tensors on it; a program without the feature has none.
+#[cfg(feature = "gpu")]
+pub(super) type Shared = crate::bridge::device::Shared;
+#[cfg(not(feature = "gpu"))]
+pub(super) type Shared = std::convert::Infallible;
 
 /// A way to drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub(super) enum Mode {
-    /// Actions drawn where the trucks are stepped, each as likely as the next.
+    /// Actions drawn where the trucks are stepped, each as likely as the next
     Random,
+    /// Actions drawn from what the policy that comes with the program gives for each observation
+    Policy,
+    /// The same by an untrained network with hidden layers of 512, 512 and 1024
+    LargePolicy,
+    /// A training run under way: every step kept, and the updates of the training file after it
+    Training,
+}
+
+/// What those modes need that more than chance drives.
+#[derive(Debug)]
+pub(super) struct Learner {
+    policy: Policy,
+    config: Config,
+}
+
+impl Learner {
+    /// The policy that comes with the program for `benchmark`, and a training file.
+    pub(super) fn read(benchmark: &str, config: &Path, world: &World) -> Result<Learner, Error> {
+        let file = files::shipped_policy(benchmark);
+        let policy = Policy::load(&file)?;
+        policy.check(world, &file)?;
+        Ok(Learner { policy, config: Config::read(config)? })
+    }
+
+    /// What a step of a training run holds beside the trucks' own.
+    pub(super) fn updates(&self) -> Updates {
+        Updates { updates_per_step: self.config.learning.updates_per_step, batch: self.config.learning.batch }
+    }
+
+    /// The network that drives where nothing is learned.
+    fn actor(&self, mode: Mode) -> Mlp {
+        match mode {
+            Mode::LargePolicy => {
+                let sizes = [&[N_VALUES], &LARGE[..], &[self.policy.actions.len()]].concat();
+                Mlp::new(&sizes, 1.0, &mut SmallRng::seed_from_u64(0), &burn::tensor::Device::flex())
+            }
+            _ => self.policy.actor.clone(),
+        }
+    }
+
+    /// The training file for so many trucks, with room for the steps that an update needs of each.
+    fn config(&self, envs: usize) -> Config {
+        let mut config = Config { n_envs: envs, ..self.config.clone() };
+        config.memory.capacity = config.memory.capacity.max(envs * (config.learning.n_steps + 2));
+        config
+    }
 }
 
 /// Where and how many.
-#[derive(Debug, Clone)]
-pub(super) struct Setting {
+pub(super) struct Setting<'a> {
     /// What steps the trucks.
-    pub engine: Engine,
+    pub engine: &'a Engine,
+    /// Name of its adapter.
+    pub adapter: &'a str,
+    /// The same with tensors on it, once someone has needed that.
+    pub shared: &'a mut Option<Shared>,
     /// Where they drive.
-    pub world: Arc<World>,
+    pub world: &'a Arc<World>,
     /// Routes that their episodes run on.
-    pub routes: Vec<u32>,
+    pub routes: &'a [u32],
     /// How many there are.
     pub envs: usize,
+    /// For modes in which more than chance drives.
+    pub learner: Option<&'a Learner>,
 }
 
 /// Trucks that are driven one step after the other.
@@ -55,22 +128,37 @@ impl Mode {
     pub(super) fn name(self) -> &'static str {
         match self {
             Mode::Random => "random",
+            Mode::Policy => "policy",
+            Mode::LargePolicy => "large-policy",
+            Mode::Training => "training",
         }
     }
 
     /// Trucks that are driven this way.
     pub(super) fn drive(self, setting: Setting) -> Result<Box<dyn Drive>, Error> {
-        match self {
-            Mode::Random => Ok(Box::new(Random(setting.simulator()?))),
+        let Some(learner) = setting.learner.filter(|_| self != Mode::Random) else {
+            return Ok(Box::new(Random(setting.simulator()?)));
+        };
+        #[cfg(feature = "gpu")]
+        if matches!(setting.engine, Engine::Gpu { .. }) {
+            return device::drive(self, setting, learner);
         }
+        host::drive(self, &setting, learner)
     }
 }
 
-impl Setting {
+impl Setting<'_> {
     /// The trucks, about to begin.
-    fn simulator(self) -> Result<Simulator, Error> {
-        Ok(Simulator::on(self.engine, self.world, self.envs, 0, RouteChoice::Drawn(self.routes))?)
+    fn simulator(&self) -> Result<Simulator, Error> {
+        let choice = RouteChoice::Drawn(self.routes.to_vec());
+        Ok(Simulator::on(self.engine.clone(), self.world.clone(), self.envs, 0, choice)?)
     }
+}
+
+/// The training file that is measured where none is named.
+pub(super) fn default_config() -> PathBuf {
+    let here = PathBuf::from("training/configs/gpu.toml");
+    if here.is_file() { here } else { files::repository().join(here) }
 }
 
 /// See [`Mode::Random`].
