@@ -41,7 +41,8 @@ pub struct Args {
     /// What drives, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "random")]
     mode: Vec<Mode>,
-    /// With `--mode training`: the training file. Its number of trucks is left aside, and its memory is as large as that of `--envs` must be.
+    /// With `--mode training`: the training file, `training/configs/gpu.toml` unasked. `--envs` takes the place of its number of trucks, and
+    /// its memory is as small as an update allows.
     #[arg(long)]
     config: Option<PathBuf>,
     /// Time for each number of trucks and each mode [s].

@@ -78,10 +78,11 @@ impl Learner {
         }
     }
 
-    /// The training file for so many trucks, with room for the steps that an update needs of each.
+    /// The training file for so many trucks. The memory has room for what comes before the first update and for the steps that an update
+    /// needs of each truck: a larger one is no slower, and would keep small adapters from being measured.
     fn config(&self, envs: usize) -> Config {
         let mut config = Config { n_envs: envs, ..self.config.clone() };
-        config.memory.capacity = config.memory.capacity.max(envs * (config.learning.n_steps + 2));
+        config.memory.capacity = config.memory.warmup.max(envs * (config.learning.n_steps + 2));
         config
     }
 }
@@ -91,8 +92,10 @@ pub(super) struct Setting<'a> {
     /// What steps the trucks.
     pub engine: &'a Engine,
     /// Name of its adapter.
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "the processor needs none"))]
     pub adapter: &'a str,
     /// The same with tensors on it, once someone has needed that.
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "the processor needs none"))]
     pub shared: &'a mut Option<Shared>,
     /// Where they drive.
     pub world: &'a Arc<World>,
