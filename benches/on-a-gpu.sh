@@ -16,6 +16,7 @@
 #                  nothing is
 # OFFTRACK_COMMIT  the commit that the programs were built from, for results, where git cannot tell
 # ADAPTER          part of an adapter's name, see `offtrack devices`
+# TRAINING_OPTIONS more options for the training run, such as `--set memory.capacity=100000` where an adapter has little memory
 # ENVS, MODES, SECONDS_EACH, TRAINING, MINUTES   what is measured, as below
 set -uo pipefail
 if [ $# -ne 3 ]; then
@@ -28,10 +29,11 @@ mkdir -p -- "$3" && out=$(realpath -- "$3") || exit 2
 cd "$(dirname "$0")/.." || exit 2
 repository=$PWD
 envs=${ENVS:-256..1048576}
-modes=${MODES:-random,policy,study,training}
-seconds=${SECONDS_EACH:-3}
+modes=${MODES:-random,policy,large-policy,training}
+seconds=${SECONDS_EACH:-2}
 training=${TRAINING:-training/configs/gpu.toml}
 minutes=${MINUTES:-1}
+read -ra options <<<"${TRAINING_OPTIONS:-}"
 adapter=(${ADAPTER:+--adapter "$ADAPTER"})
 failed=()
 
@@ -83,9 +85,9 @@ if command -v nvidia-smi >/dev/null; then
     nvidia-smi --query-gpu=timestamp,name,driver_version,memory.used,utilization.gpu,power.draw --format=csv -l 1 >"$out/nvidia-smi.csv" 2>&1 &
     smi=$!
 fi
-part scale 180 "$offtrack" scale --device gpu "${adapter[@]}" --mode "$modes" --envs "$envs" --seconds "$seconds" \
+part scale 200 "$offtrack" scale --device gpu "${adapter[@]}" --mode "$modes" --config "$training" --envs "$envs" --seconds "$seconds" \
     --json "$out/scale.json" --plot "$out/scale.svg"
-part training 130 "$offtrack" train "$training" --minutes "$minutes" --out "$out" --name training
+part training 110 "$offtrack" train "$training" --minutes "$minutes" --out "$out" --name training "${options[@]}"
 [ -n "$smi" ] && kill "$smi"
 
 echo

@@ -2,10 +2,10 @@
 //!
 //! The only file here that asks whether the program was built with the feature `gpu`.
 
-use offtrack::simulator::{self, Engine};
-
 #[cfg(feature = "gpu")]
-use crate::bridge::device::Shared;
+use offtrack::simulator;
+use offtrack::simulator::Engine;
+
 use crate::error::Error;
 use crate::provenance;
 
@@ -37,34 +37,18 @@ pub struct Device {
     pub kind: &'static str,
     /// Name for results: `cpu` for the processor, which results name elsewhere; else the adapter's with its interface and driver.
     pub name: String,
-    /// The device as the tensor library knows it too, once someone has asked.
-    #[cfg(feature = "gpu")]
-    shared: std::sync::Arc<std::sync::OnceLock<Shared>>,
+    adapter: String,
 }
 
 impl Device {
     /// The processor.
     pub fn processor() -> Device {
-        Device {
-            engine: Engine::Cpu,
-            kind: "cpu",
-            name: "cpu".to_owned(),
-            #[cfg(feature = "gpu")]
-            shared: Default::default(),
-        }
+        Device { engine: Engine::Cpu, kind: "cpu", name: "cpu".to_owned(), adapter: String::new() }
     }
 
-    /// The device, shared with the tensor library.
-    #[cfg(feature = "gpu")]
-    pub fn shared(&self) -> Result<Shared, Error> {
-        if let Some(shared) = self.shared.get() {
-            return Ok(shared.clone());
-        }
-        let Engine::Gpu { device, .. } = &self.engine else {
-            return Err(Error::Device("the processor is none".to_owned()));
-        };
-        let shared = Shared::on(device.clone())?;
-        Ok(self.shared.get_or_init(|| shared).clone())
+    /// The adapter's own name, by which it can be opened again.
+    pub fn adapter(&self) -> &str {
+        &self.adapter
     }
 
     /// Name for people: that of the processor or the adapter.
@@ -93,8 +77,8 @@ fn open(adapter: Option<&str>) -> Result<Device, Error> {
 
     match gpu::Device::open(adapter) {
         Ok(device) => {
-            let name = device.name();
-            Ok(Device { engine: Engine::Gpu { device, columns: gpu::Columns::new() }, kind: "gpu", name, shared: Default::default() })
+            let (name, adapter) = (device.name(), device.adapter.get_info().name);
+            Ok(Device { engine: Engine::Gpu { device, columns: gpu::Columns::new() }, kind: "gpu", name, adapter })
         }
         Err(gpu::Error::UnknownAdapter { name, found }) => {
             let expected = format!("no adapter's name has this in it: there is {}", found.join(", "));
@@ -109,17 +93,40 @@ fn open(_: Option<&str>) -> Result<Device, Error> {
     Err(Error::Flag { flag: "--device", value: "gpu".to_owned(), expected: format!("{NOT_BUILT_IN}, or leave --device out") })
 }
 
-/// Whether a batch was refused by the machine rather than asked for wrongly.
+/// The outcome of `work`, an error where it panicked: the tensor library knows no other answer to a device that fails.
 #[cfg(feature = "gpu")]
-pub fn has_failed(error: &simulator::Error) -> bool {
-    use offtrack::gpu;
+pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+    use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 
-    matches!(error, simulator::Error::Gpu(gpu::Error::NoAdapter { .. } | gpu::Error::Broken { .. }))
+    let hook = take_hook();
+    set_hook(Box::new(|_| ()));
+    let outcome = catch_unwind(AssertUnwindSafe(work));
+    set_hook(hook);
+    outcome.unwrap_or_else(|panic| {
+        let said = panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|&said| said.to_owned()));
+        Err(Error::Device(said.unwrap_or_else(|| "it failed".to_owned())))
+    })
 }
 
-/// Whether a batch was refused by the machine rather than asked for wrongly.
+/// The outcome of `work`.
 #[cfg(not(feature = "gpu"))]
-pub fn has_failed(_: &simulator::Error) -> bool {
+pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+    work()
+}
+
+/// Whether the device failed, rather than that something was asked wrongly.
+#[cfg(feature = "gpu")]
+pub fn has_failed(error: &Error) -> bool {
+    use offtrack::gpu;
+
+    let broken =
+        |error: &simulator::Error| matches!(error, simulator::Error::Gpu(gpu::Error::NoAdapter { .. } | gpu::Error::Broken { .. }));
+    matches!(error, Error::Device(_)) || matches!(error, Error::Simulator(error) if broken(error))
+}
+
+/// Whether the device failed, rather than that something was asked wrongly.
+#[cfg(not(feature = "gpu"))]
+pub fn has_failed(_: &Error) -> bool {
     false
 }
 

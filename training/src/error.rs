@@ -88,7 +88,7 @@ impl Error {
     /// What the process exits with.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::Simulator(error) if device::has_failed(error) => 1,
+            error if device::has_failed(error) => 1,
             Error::Write { .. } | Error::Threads(_) | Error::Diverged { .. } | Error::NotVerified { .. } => 1,
             _ => 2,
         }

@@ -23,7 +23,7 @@ use crate::files;
 use crate::provenance;
 pub(crate) use measure::median;
 use measure::{Measured, measured};
-use mode::{Mode, Setting};
+use mode::{Learner, Mode, Setting};
 
 /// The largest batch that may be asked for.
 const MOST_ENVS: usize = 1 << 22;
@@ -41,6 +41,10 @@ pub struct Args {
     /// What drives, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "random")]
     mode: Vec<Mode>,
+    /// With `--mode training`: the training file, `training/configs/gpu.toml` unasked. `--envs` takes the place of its number of trucks, and
+    /// its memory is as small as an update allows.
+    #[arg(long)]
+    config: Option<PathBuf>,
     /// Time for each number of trucks and each mode [s].
     #[arg(long, default_value_t = 5.0, allow_negative_numbers = true)]
     seconds: f64,
@@ -87,6 +91,15 @@ struct Step {
     rays_counted: &'static str,
     /// What the speeds are.
     speeds: &'static str,
+    /// Updates after each step of all trucks in training, and their transitions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    learning: Option<Updates>,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(crate) struct Updates {
+    updates_per_step: usize,
+    batch: usize,
 }
 
 /// One number of trucks, driven one way.
@@ -136,6 +149,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let mut device = args.device.open()?;
     let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
     let world = Arc::new(World::bake(&scenario));
+    let learner = match args.mode.iter().any(|mode| *mode != Mode::Random) {
+        true => Some(Learner::read(&scenario.name, &args.config.clone().unwrap_or_else(mode::default_config), &world)?),
+        false => None,
+    };
     let mut scale = Scale {
         engine: device.kind,
         device: device.name.clone(),
@@ -152,6 +169,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
             holds: "physics, collision, progress, rays, observation, reward, and a new episode where one ended",
             rays_counted: "those of every step, and once more those of each episode begun anew",
             speeds: "medians over windows, nothing read back within one; stages are timed apart, each over the whole batch",
+            learning: learner.as_ref().filter(|_| args.mode.contains(&Mode::Training)).map(Learner::updates),
         },
         world_bytes: world.bytes(),
         runs: Vec::new(),
@@ -160,24 +178,24 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let bar = ProgressBar::new((envs.len() * args.mode.len()) as u64).with_style(
         ProgressStyle::with_template("measuring {bar:30} {pos}/{len} {msg}, {elapsed}").unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
-    let mut refusal = None;
+    let routes = [scenario.split(Split::Train), scenario.split(Split::Test)].concat();
+    let (mut refusal, mut shared) = (None, None);
     for &envs in &envs {
         for &mode in &args.mode {
             bar.set_message(format!("{envs} trucks, {}", mode.name()));
             bar.tick();
-            let routes = [scenario.split(Split::Train), scenario.split(Split::Test)].concat();
-            let setting = Setting { device: device.clone(), benchmark: scenario.name.clone(), world: world.clone(), routes, envs };
-            let outcome = mode.drive(setting).and_then(|mut drive| measured(drive.as_mut(), args.seconds));
+            let (engine, adapter) = (&device.engine, device.adapter());
+            let setting = Setting { engine, adapter, shared: &mut shared, world: &world, routes: &routes, envs, learner: learner.as_ref() };
+            let outcome = device::caught(|| measured(mode.drive(setting)?.as_mut(), args.seconds));
             let outcome = match outcome {
                 Ok(measured) => Outcome::Measured(Box::new(measured)),
-                Err(error) if is_refusal(&error) => {
+                Err(error) => {
                     // What broke a device must not spoil the next size.
-                    device = args.device.open()?;
+                    (device, shared) = (args.device.open()?, None);
                     let outcome = Outcome::Refused { error: error.to_string() };
                     refusal.get_or_insert(error);
                     outcome
                 }
-                Err(error) => return Err(error),
             };
             let run = Run { mode, envs, outcome };
             bar.suspend(|| files::print(&row(&run)))?;
@@ -191,16 +209,6 @@ pub fn run(args: &Args) -> Result<(), Error> {
         // Nothing at all came of it.
         Some(error) if scale.runs.iter().all(|run| run.measured().is_none()) => Err(error),
         _ => Ok(()),
-    }
-}
-
-/// Whether a size was too much for the machine.
-fn is_refusal(error: &Error) -> bool {
-    match error {
-        Error::Simulator(_) | Error::Flag { flag: "memory.capacity", .. } => true,
-        #[cfg(feature = "gpu")]
-        Error::Device(_) => true,
-        _ => false,
     }
 }
 

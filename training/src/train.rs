@@ -6,7 +6,7 @@
 #[cfg(feature = "gpu")]
 mod device;
 mod figures;
-pub mod folder;
+mod folder;
 mod keeper;
 mod progress;
 mod resume;
@@ -17,7 +17,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use offtrack::scenario::{Scenario, Split};
-use offtrack::simulator::Simulator;
 use offtrack::world::World;
 use serde::Serialize;
 use serde_json::json;
@@ -203,13 +202,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     written
 }
 
-/// Counters and figures of a run in a new folder, of which nobody is told.
-pub fn progress_of(config: &Config, folder: &Folder) -> Result<Progress, Error> {
-    Ok(Progress::new(config, Figures::create(folder.metrics())?).silent())
-}
-
 /// Where a run can be.
-pub enum Place {
+enum Place {
     Host,
     #[cfg(feature = "gpu")]
     Device(Box<Shared>),
@@ -217,7 +211,7 @@ pub enum Place {
 
 impl Place {
     /// The place that the config names, ready to work.
-    pub fn open(config: &Config) -> Result<Place, Error> {
+    fn open(config: &Config) -> Result<Place, Error> {
         match config.device {
             config::Device::Cpu => Ok(Place::Host),
             #[cfg(feature = "gpu")]
@@ -231,35 +225,15 @@ impl Place {
     }
 }
 
-impl Place {
-    /// The place that a command has opened.
-    pub fn on(device: &crate::device::Device) -> Result<Place, Error> {
-        #[cfg(feature = "gpu")]
-        if device.kind == "gpu" {
-            return Ok(Place::Device(Box::new(device.shared()?)));
-        }
-        let _ = device;
-        Ok(Place::Host)
-    }
-}
-
 /// A run, where its config wants it.
-pub enum Job {
+enum Job {
     Host(Box<Run>),
     #[cfg(feature = "gpu")]
     Device(Box<device::DeviceRun>),
 }
 
 impl Job {
-    /// A run at its beginning.
-    pub fn new(
-        place: Place,
-        config: &Config,
-        routes: Vec<u32>,
-        world: Arc<World>,
-        folder: &Folder,
-        progress: Progress,
-    ) -> Result<Job, Error> {
+    fn new(place: Place, config: &Config, routes: Vec<u32>, world: Arc<World>, folder: &Folder, progress: Progress) -> Result<Job, Error> {
         match place {
             Place::Host => Ok(Job::Host(Box::new(Run::new(config, routes, world, folder, progress)?))),
             #[cfg(feature = "gpu")]
@@ -284,17 +258,7 @@ impl Job {
         }
     }
 
-    /// The trucks.
-    pub fn simulator(&self) -> &Simulator {
-        match self {
-            Job::Host(run) => run.simulator(),
-            #[cfg(feature = "gpu")]
-            Job::Device(run) => run.simulator(),
-        }
-    }
-
-    /// Goes on until the budget is used up, or it is to stop.
-    pub fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {
+    fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {
         match self {
             Job::Host(run) => run.learn(stopped),
             #[cfg(feature = "gpu")]

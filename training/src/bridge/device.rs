@@ -43,7 +43,7 @@ const N_BUFFERS: u32 = 21;
 const LOGITS: usize = 15;
 
 /// A graphics device with both on it.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Shared {
     /// As the simulator knows it.
     pub gpu: gpu::Device,
@@ -57,11 +57,7 @@ pub struct Shared {
 impl Shared {
     /// Opens a device and hands it to the tensor library too.
     pub fn open(adapter: Option<&str>) -> Result<Shared, Error> {
-        Shared::on(gpu::Device::open(adapter).map_err(offtrack::simulator::Error::from)?)
-    }
-
-    /// Hands an open device to the tensor library too. It keeps what it takes of it as long as the program runs.
-    pub fn on(gpu: gpu::Device) -> Result<Shared, Error> {
+        let gpu = gpu::Device::open(adapter).map_err(offtrack::simulator::Error::from)?;
         let setup = WgpuSetup {
             instance: gpu.instance.clone(),
             adapter: gpu.adapter.clone(),

@@ -122,7 +122,9 @@ fn spread_out(drive: &mut dyn Drive, seconds: f64) -> Result<(u64, u64), Error> 
 
 /// A run of steps, done when it returns.
 fn asked(drive: &mut dyn Drive, steps: u64) -> Result<(), Error> {
-    drive.steps(steps)?;
+    for _ in 0..steps {
+        drive.step()?;
+    }
     drive.wait()
 }
 

@@ -68,8 +68,8 @@ pub(super) fn drawn(scale: &Scale, device: &str) -> Result<String, Failure> {
 fn words(mode: Mode) -> &'static str {
     match mode {
         Mode::Random => "random actions",
-        Mode::Policy => "the shipped policy",
-        Mode::Study => "a policy of 512, 512, 1024",
+        Mode::Policy => "policy in the loop, 256, 256",
+        Mode::LargePolicy => "policy in the loop, 512, 512, 1024",
         Mode::Training => "training",
     }
 }

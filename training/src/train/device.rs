@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use offtrack::layout::N_VALUES;
 use offtrack::random;
-use offtrack::simulator::{self, Simulator, Tally};
+use offtrack::simulator::{self, Tally};
 use offtrack::world::World;
 
 use super::folder::Folder;
@@ -66,11 +66,6 @@ impl DeviceRun {
         })
     }
 
-    /// The trucks.
-    pub fn simulator(&self) -> &Simulator {
-        self.memory.simulator()
-    }
-
     /// The adapter, as results name it.
     pub fn device(&self) -> String {
         self.shared.gpu.name()
@@ -102,8 +97,7 @@ impl DeviceRun {
             let is_warm = self.config.memory.warmup <= self.memory.len() && self.memory.can_sample();
             if self.scaling.is_none() && is_warm {
                 let mirror = self.config.learning.mirror.then(|| Mirror::of(&self.world)).transpose()?;
-                let seen = if self.config.learning.scale_observations { self.memory.observations()? } else { Vec::new() };
-                self.set_scaling(found_scaling(&self.config, mirror.as_ref(), &seen));
+                self.set_scaling(found_scaling(&self.config, mirror.as_ref(), &self.memory.observations()?));
             }
             if self.scaling.is_some() {
                 self.memory.step_by(&self.sac.actor())?;

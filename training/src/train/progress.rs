@@ -70,8 +70,6 @@ pub struct Progress {
     shown: (Instant, u64, u64),
     since_line: Instant,
     bar: ProgressBar,
-    /// Nobody is told how far it is.
-    is_silent: bool,
     metrics: Figures,
     /// Files that could not be written when that was last tried.
     unwritten: Vec<PathBuf>,
@@ -100,15 +98,9 @@ impl Progress {
             shown: (Instant::now(), 0, 0),
             since_line: Instant::now(),
             bar: ProgressBar::new(1000).with_style(style),
-            is_silent: false,
             metrics,
             unwritten: Vec::new(),
         }
-    }
-
-    /// Tells nobody how far it is: for who has other things to show.
-    pub fn silent(self) -> Progress {
-        Progress { is_silent: true, ..self }
     }
 
     /// Share of the run that is over: by time or by steps, whichever is further.
@@ -232,7 +224,7 @@ impl Progress {
 
     /// Moves the live line on when it is time to.
     pub fn show_now_and_then(&mut self) {
-        if !self.is_silent && ROW_EVERY <= self.shown.0.elapsed() {
+        if ROW_EVERY <= self.shown.0.elapsed() {
             self.show();
         }
     }

@@ -69,11 +69,6 @@ impl Run {
         })
     }
 
-    /// The trucks.
-    pub fn simulator(&self) -> &Simulator {
-        &self.simulator
-    }
-
     /// Goes on until the time or the steps are over, or it is to stop. Only a learner that has broken down is an error: what cannot be
     /// written is reported and tried again.
     pub fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {

@@ -8,10 +8,27 @@ use crate::place::{Place, offtrack, refusal, succeed};
 /// Over in a moment.
 const MOMENT: [&str; 2] = ["--seconds", "0.1"];
 
+/// Modes that take a network.
+const NETWORKS: [&str; 3] = ["policy", "large-policy", "training"];
+
 /// `scale` for a moment on a list of sizes, as JSON.
 fn scaled(place: &Place, arguments: &[&str]) -> Value {
     succeed(&offtrack(&[&["scale", "--json", &place.text("scale.json")], &MOMENT[..], arguments].concat()));
     place.json("scale.json")
+}
+
+/// The modes in which networks drive, in the order asked for: each counted where it was stepped, without times of stages.
+fn assert_networks_drove(scale: &Value, envs: u64) {
+    let runs = scale["runs"].as_array().unwrap();
+    let modes: Vec<&str> = runs.iter().map(|run| run["mode"].as_str().unwrap()).collect();
+    assert_eq!(modes, NETWORKS);
+    for run in runs {
+        let count = |key: &str| run[key].as_u64().unwrap_or_else(|| panic!("{key}: {run}"));
+        assert!(0 < count("steps") && count("env_steps") == envs * count("steps") && count("envs") == envs, "{run}");
+        assert!(0.0 < run["env_steps_per_second"].as_f64().unwrap() && run["stages"].as_object().unwrap().is_empty(), "{run}");
+    }
+    // As the training file says.
+    assert_eq!((&scale["step"]["learning"]["updates_per_step"], &scale["step"]["learning"]["batch"]), (&1.into(), &32.into()));
 }
 
 /// A run that was measured: its counts agree with each other, and its speed lies between its windows.
@@ -68,6 +85,16 @@ fn a_scale_is_drawn_as_a_png_too() {
     let row = 3 * info.width as usize;
     assert!([0, row - 3, pixels.len() - row, pixels.len() - 3].iter().all(|&at| pixels[at..at + 3] == [255; 3]));
     assert!(pixels.chunks_exact(3).any(|pixel| pixel.iter().all(|&channel| channel < 60)));
+}
+
+#[test]
+fn networks_drive_and_learn_on_the_processor() {
+    let place = Place::new();
+    let scale = scaled(&place, &["--envs", "16", "--mode", &NETWORKS.join(","), "--config", &place.text("tiny.toml")]);
+    assert_networks_drove(&scale, 16);
+    assert!(scale["step"]["learning"].is_object() && scaled(&place, &["--envs", "1"])["step"]["learning"].is_null());
+    let said = refusal(&offtrack(&["scale", "--mode", "training", "--config", "no.toml"]), 2);
+    assert!(said.contains("no.toml: cannot be read"), "{said}");
 }
 
 #[cfg(not(feature = "gpu"))]
@@ -148,6 +175,13 @@ mod on_a_device {
             None => assert_measured(&runs[0], 4_194_304, 29.0),
         }
         assert_measured(&runs[1], 16, 29.0);
+    }
+
+    #[test]
+    fn networks_drive_and_learn_on_the_device() {
+        let place = Place::new();
+        let arguments = ["--device", "gpu", "--envs", "16", "--mode", &NETWORKS.join(","), "--config", &place.text("tiny.toml")];
+        assert_networks_drove(&scaled(&place, &arguments), 16);
     }
 
     #[test]
