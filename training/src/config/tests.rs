@@ -43,7 +43,7 @@ fn the_default_file_reads_and_is_written_back_the_same() {
 #[test]
 fn every_value_out_of_its_range_is_refused_with_its_key_and_what_would_do() {
     let out_of_range = [
-        ("n_envs", "n_envs = 0", "n_envs: 0; must lie in 1..65536"),
+        ("n_envs", "n_envs = 0", "n_envs: 0; must lie in 1..1048576"),
         ("steps", "minutes = 0.0", "minutes: 0 min; must lie in 0.01..100000 min"),
         ("steps", "minutes = nan", "minutes: NaN min"),
         ("steps", "minutes = 1.0\nsteps = 0", "steps: 0; must lie in"),
@@ -110,7 +110,21 @@ fn what_the_command_line_says_wins_and_a_budget_there_replaces_both() {
     config.override_with(Some(3), None, Some(1000), Some(16)).unwrap();
     assert_eq!((config.seed, config.n_envs, config.minutes, config.steps), (3, 16, None, Some(1000)));
     let message = config.override_with(None, None, None, Some(0)).unwrap_err().to_string();
-    assert_eq!(message, "--envs 0: n_envs: 0; must lie in 1..65536");
+    assert_eq!(message, "--envs 0: n_envs: 0; must lie in 1..1048576");
+}
+
+#[test]
+fn what_a_device_does_not_have_is_refused_with_its_key() {
+    let on_device = format!("device = \"gpu\"\n{}", default_file());
+    assert_eq!(read(&on_device).unwrap().device, Device::Gpu);
+    let exploration = "[exploration]\nfirst = 1.0\nlast = 0.1\nsteps = 1000\n";
+    let priority = "[memory.priority]\nexponent = 0.6\ncorrection = 0.4\n";
+    let categories = "[learning.categories]\ncount = 51\nlow = -15.0\nhigh = 15.0\n";
+    for (key, table) in [("exploration", exploration), ("memory.priority", priority), ("learning.categories", categories)] {
+        assert!(read(&format!("{}\n{table}", default_file())).is_ok(), "{key}");
+        let message = read(&format!("{on_device}\n{table}")).unwrap_err().to_string();
+        assert!(message.contains(&format!("{key}: given; is not there with device = \"gpu\"")), "{message}");
+    }
 }
 
 #[test]

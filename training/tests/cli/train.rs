@@ -53,7 +53,7 @@ fn a_run_is_never_written_over() {
 fn a_run_that_cannot_be_is_refused_before_a_folder_is_made() {
     let place = Place::new();
     for (arguments, expected) in [
-        (&["--envs", "0"][..], "n_envs: 0; must lie in 1..65536"),
+        (&["--envs", "0"][..], "n_envs: 0; must lie in 1..1048576"),
         (&["--minutes", "-1"][..], "minutes"),
         (&["--steps", "0"][..], "steps: 0; must lie in"),
     ] {
