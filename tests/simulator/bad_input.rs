@@ -8,7 +8,7 @@ use offtrack::simulator::{self, RouteChoice, Simulator};
 use offtrack::vehicle::Vehicle;
 use proptest::prelude::*;
 
-use crate::benchmark;
+use crate::{batch_on, benchmark, engines};
 
 fn scenarios() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
@@ -176,23 +176,24 @@ fn a_wrong_value_is_named_with_file_key_value_and_what_would_do() {
 
 #[test]
 fn a_batch_that_cannot_be_is_refused_and_a_wrong_action_changes_nothing() {
-    let (_, world) = benchmark("attard2023");
-    let world = std::sync::Arc::new(world);
-    let new = |n_envs, choice| Simulator::new(world.clone(), n_envs, 0, choice).map(|_| ()).unwrap_err();
-    assert_eq!(new(0, RouteChoice::Drawn(vec![0])), simulator::Error::EmptyBatch);
-    assert_eq!(new(4, RouteChoice::Drawn(vec![])), simulator::Error::NoRoutes);
-    assert_eq!(new(4, RouteChoice::Drawn(vec![75])), simulator::Error::UnknownRoute { route: 75, n_routes: 75 });
-    assert_eq!(new(4, RouteChoice::Fixed(vec![0])), simulator::Error::RouteCount { n_routes: 1, n_envs: 4 });
-    let mut simulator = Simulator::new(world.clone(), 2, 0, RouteChoice::Drawn(vec![0])).unwrap();
-    let before = simulator.batch().truck.clone();
-    assert_eq!(simulator.step(&[0, 9]).unwrap_err().to_string(), "actions[1]: 9; must lie in 0..9");
-    assert_eq!(simulator.step(&[0]).unwrap_err().to_string(), "actions: 1 for 2 trucks; one each is needed");
-    let start = |offset| offtrack::layout::Start { offset, heading: 0.0 };
-    let refused = |starts: &[_]| Simulator::new(world.clone(), 2, 0, RouteChoice::Drawn(vec![0])).unwrap().reset_from(starts).unwrap_err();
-    assert_eq!(refused(&[start(0.0)]).to_string(), "starts: 1 for 2 trucks; one each is needed");
-    assert_eq!(refused(&[start(0.0), start(1.5)]).to_string(), "starts[1]: 1.5 of the largest start error; must lie in -1..1");
-    assert_eq!(refused(&[start(f32::NAN), start(0.0)]).to_string(), "starts[0]: NaN of the largest start error; must lie in -1..1");
-    assert_eq!(simulator.gather(&[1, 2]).unwrap_err().to_string(), "indices[1]: 2; the batch has trucks 0..2");
-    assert_eq!(simulator.gather(&[]).unwrap_err(), simulator::Error::EmptyBatch);
-    assert_eq!(simulator.batch().truck, before);
+    let world = std::sync::Arc::new(benchmark("attard2023").1);
+    for (_, engine) in engines() {
+        let new = |n_envs, choice| Simulator::on(engine.clone(), world.clone(), n_envs, 0, choice).map(|_| ()).unwrap_err();
+        assert_eq!(new(0, RouteChoice::Drawn(vec![0])), simulator::Error::EmptyBatch);
+        assert_eq!(new(4, RouteChoice::Drawn(vec![])), simulator::Error::NoRoutes);
+        assert_eq!(new(4, RouteChoice::Drawn(vec![75])), simulator::Error::UnknownRoute { route: 75, n_routes: 75 });
+        assert_eq!(new(4, RouteChoice::Fixed(vec![0])), simulator::Error::RouteCount { n_routes: 1, n_envs: 4 });
+        let mut simulator = batch_on(&engine, &world, 2, 0, RouteChoice::Drawn(vec![0]));
+        let before = simulator.batch().truck.clone();
+        assert_eq!(simulator.step(&[0, 9]).unwrap_err().to_string(), "actions[1]: 9; must lie in 0..9");
+        assert_eq!(simulator.step(&[0]).unwrap_err().to_string(), "actions: 1 for 2 trucks; one each is needed");
+        let start = |offset| offtrack::layout::Start { offset, heading: 0.0 };
+        let refused = |starts: &[_]| batch_on(&engine, &world, 2, 0, RouteChoice::Drawn(vec![0])).reset_from(starts).unwrap_err();
+        assert_eq!(refused(&[start(0.0)]).to_string(), "starts: 1 for 2 trucks; one each is needed");
+        assert_eq!(refused(&[start(0.0), start(1.5)]).to_string(), "starts[1]: 1.5 of the largest start error; must lie in -1..1");
+        assert_eq!(refused(&[start(f32::NAN), start(0.0)]).to_string(), "starts[0]: NaN of the largest start error; must lie in -1..1");
+        assert_eq!(simulator.gather(&[1, 2]).unwrap_err().to_string(), "indices[1]: 2; the batch has trucks 0..2");
+        assert_eq!(simulator.gather(&[]).unwrap_err(), simulator::Error::EmptyBatch);
+        assert_eq!(simulator.batch().truck, before);
+    }
 }

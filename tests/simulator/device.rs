@@ -8,7 +8,7 @@ use offtrack::layout::Truck;
 use offtrack::simulator::{self, Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 
-use crate::{benchmark, simulator};
+use crate::{batch_on, benchmark};
 
 /// The one device of all tests but the one that loses it.
 fn device() -> &'static Device {
@@ -31,8 +31,8 @@ fn full() -> (Arc<World>, RouteChoice) {
 fn after_400_steps_every_truck_is_in_the_same_step_of_the_same_episode_as_on_the_processor() {
     let (world, choice) = full();
     let n_envs = 4096;
-    let mut device = simulator(&engine(), &world, n_envs, 5, choice.clone());
-    let mut processor = simulator(&Engine::Cpu, &world, n_envs, 5, choice);
+    let mut device = batch_on(&engine(), &world, n_envs, 5, choice.clone());
+    let mut processor = batch_on(&Engine::Cpu, &world, n_envs, 5, choice);
     for _ in 0..400 {
         device.step_at_random();
         processor.step_at_random();
@@ -106,7 +106,7 @@ fn columns_of_the_callers_are_stepped_in_place_and_refused_when_too_small_or_gat
     assert_eq!(error.to_string(), "reward: 396 bytes; 100 trucks need 400");
 
     let mut foreign = with(vec![("observation", slice(100 * 276)), ("action", slice(1024))]).unwrap();
-    let mut own = simulator(&engine(), &world, 100, 4, choice.clone());
+    let mut own = batch_on(&engine(), &world, 100, 4, choice.clone());
     for simulator in [&mut foreign, &mut own] {
         (0..60).for_each(|_| simulator.step_at_random());
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::scenario::Scenario;
-use offtrack::simulator::{Engine, RouteChoice, Simulator};
+use offtrack::simulator::{Batch, Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 
 mod bad_input;
@@ -41,6 +41,11 @@ fn engines() -> Vec<(&'static str, Engine)> {
 }
 
 /// A batch on an engine.
-fn simulator(engine: &Engine, world: &Arc<World>, n_envs: usize, seed: u32, choice: RouteChoice) -> Simulator {
+fn batch_on(engine: &Engine, world: &Arc<World>, n_envs: usize, seed: u32, choice: RouteChoice) -> Simulator {
     Simulator::on(engine.clone(), world.clone(), n_envs, seed, choice).unwrap()
+}
+
+/// The bytes of a batch's column.
+fn column<'a>(batch: &'a Batch, name: &str) -> &'a [u8] {
+    batch.columns().into_iter().find(|(column, _)| *column == name).unwrap().1
 }

@@ -5,17 +5,19 @@ mod states;
 
 use std::sync::Arc;
 
+use glam::Vec2;
 use offtrack::angle::wrapped;
 use offtrack::cpu::follow::reference_point;
-use offtrack::layout::Ended;
+use offtrack::layout::{Ended, Truck, WaypointRow};
+use offtrack::random::{Draw, index_below, signed_unit, words};
 use offtrack::roundabout::Gutter;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::stages::STAGES;
 use offtrack::world::World;
 
 use crate::device::engine;
-use crate::simulator;
-use compare::{Agreement, agreements, column};
+use crate::{batch_on, column, engines};
+use compare::{Agreement, agreements};
 use states::{ENOUGH, N_ENVS, on_each_roundabout, put, varied, world};
 
 /// What each stage writes, and one number of the world that it would notice to be off by a thousandth.
@@ -34,14 +36,14 @@ const TOUCHED: [(&str, &[&str], fn(&mut World)); 8] = [
 const MARGIN: f32 = 1e-4;
 
 fn simulators(world: &Arc<World>, choice: &RouteChoice) -> [Simulator; 2] {
-    [Simulator::new(world.clone(), N_ENVS, 3, choice.clone()).unwrap(), simulator(&engine(), world, N_ENVS, 3, choice.clone())]
+    [Simulator::new(world.clone(), N_ENVS, 3, choice.clone()).unwrap(), batch_on(&engine(), world, N_ENVS, 3, choice.clone())]
 }
 
 /// A device that computes with a world that is wrong in one number.
 fn wrong_device(world: &World, choice: &RouteChoice, change: fn(&mut World)) -> Simulator {
     let mut world = world.clone();
     change(&mut world);
-    simulator(&engine(), &Arc::new(world), N_ENVS, 3, choice.clone())
+    batch_on(&engine(), &Arc::new(world), N_ENVS, 3, choice.clone())
 }
 
 /// Whether something about a truck was decided by less than the margin, in the step or the stage that led from `before` to `after`.
@@ -162,4 +164,54 @@ fn a_whole_step_from_any_state_ends_alike_for_every_reason_there_is() {
         assert!(compared(here, there, &["ended"], &counted).iter().any(|agreement| !agreement.holds()));
     }
     assert_agreement("step", &compared(here, device.batch(), &names, &counted));
+}
+
+#[test]
+fn routes_poses_and_actions_are_drawn_alike_to_the_last_bit() {
+    // Where a pose is nothing but what was drawn for it.
+    let mut world = World::clone(&world(Gutter::Drivable));
+    (world.params.start_offset, world.params.start_heading, world.params.rig.wheelbase) = (1.0, 1.0, 0.0);
+    world.waypoints.iter_mut().for_each(|waypoint| *waypoint = WaypointRow { position: Vec2::ZERO, direction: Vec2::X });
+    world.previews.iter_mut().for_each(|preview| preview.heading = 0.0);
+    let world = Arc::new(world);
+    let (n_envs, seed, n_actions) = (16_384, 0xdead_beef, world.params.n_actions);
+    // More entries than half a word counts.
+    let routes: Vec<u32> = (0..70_001).map(|place| place % world.routes.len() as u32).collect();
+    for (name, engine) in engines() {
+        let mut simulator = batch_on(&engine, &world, n_envs, seed, RouteChoice::Drawn(routes.clone()));
+        for round in 0..4 {
+            let mut before = simulator.batch().clone();
+            before.ended.fill(Ended::Arrived as u32);
+            for (env, truck) in (0..).zip(&mut before.truck) {
+                [truck.episode, truck.steps, ..] = words(7, env, round, 0);
+            }
+            put(&mut simulator, &before);
+            simulator.step_at_random();
+            let action = |seed: u32, env: u32, truck: &Truck| {
+                index_below(words(seed, env, truck.episode, (Draw::Action as u32).wrapping_add(truck.steps))[0], n_actions)
+            };
+            let drawn = simulator.batch().action.clone();
+            let agreeing =
+                |seed| (0..).zip(&before.truck).zip(&drawn).filter(|((env, truck), drawn)| action(seed, *env, truck) == **drawn).count();
+            assert_eq!(agreeing(seed), n_envs, "actions on the {name}");
+            assert!(agreeing(seed + 1) < n_envs / 5, "another seed would pass");
+
+            put(&mut simulator, &before);
+            simulator.run_stage(&STAGES[STAGES.len() - 1]);
+            let begun = |seed: u32, env: u32, episode: u32| {
+                let [offset, heading, ..] = words(seed, env, episode, Draw::Pose as u32).map(signed_unit);
+                (routes[index_below(words(seed, env, episode, Draw::Route as u32)[0], routes.len() as u32) as usize], offset, heading)
+            };
+            let trucks = (0..).zip(before.truck.iter().zip(&simulator.batch().truck));
+            let agreeing = |seed| {
+                let agrees = |(env, (before, after)): &(u32, (&Truck, &Truck))| {
+                    after.episode == before.episode + 1
+                        && begun(seed, *env, after.episode) == (after.route, after.position.y, after.heading)
+                };
+                trucks.clone().filter(agrees).count()
+            };
+            assert_eq!(agreeing(seed), n_envs, "routes and poses on the {name}");
+            assert_eq!(agreeing(seed + 1), 0, "another seed would pass");
+        }
+    }
 }

@@ -4,7 +4,6 @@ use std::fmt;
 
 use bytemuck::cast_slice;
 use offtrack::layout::N_RAYS;
-use offtrack::simulator::Batch;
 
 /// How far apart two engines may be in a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -156,10 +155,4 @@ pub fn agreements(column: &str, here: &[u8], there: &[u8], counted: &[bool]) -> 
         agreement
     });
     compared.collect()
-}
-
-/// The bytes of a batch's column.
-pub fn column<'a>(batch: &'a Batch, name: &str) -> &'a [u8] {
-    let found = batch.columns().into_iter().find(|(column, _)| *column == name);
-    found.unwrap_or_else(|| panic!("{name} is no column")).1
 }

@@ -10,7 +10,7 @@ use offtrack::roundabout::Gutter;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 
-use crate::benchmark;
+use crate::{benchmark, column};
 
 /// Trucks: with all routes as likely as each other every roundabout has more than [`ENOUGH`].
 pub const N_ENVS: usize = 28_672;
@@ -31,8 +31,7 @@ pub fn world(gutter: Gutter) -> Arc<World> {
 
 /// Makes a simulator's columns those of `batch`.
 pub fn put(simulator: &mut Simulator, batch: &Batch) {
-    let columns = batch.columns();
-    simulator.restore(|name| columns.iter().find(|(column, _)| *column == name).map(|(_, bytes)| *bytes)).unwrap();
+    simulator.restore(|name| Some(column(batch, name))).unwrap();
 }
 
 /// What the states are drawn from, beside the truck's place in the batch.
