@@ -137,7 +137,7 @@ pub struct Simulator {
 /// The columns, where their engine has them.
 #[derive(Debug)]
 enum Columns {
-    Cpu(Batch),
+    Cpu(Box<Batch>),
     #[cfg(feature = "gpu")]
     Gpu(Box<gpu::Batch>),
 }
@@ -164,7 +164,7 @@ impl Simulator {
             return Err(Error::RouteCount { n_routes: routes.len(), n_envs });
         }
         let batch = match engine {
-            Engine::Cpu => Columns::Cpu(Batch::new(n_envs, seed, choice)),
+            Engine::Cpu => Columns::Cpu(Box::new(Batch::new(n_envs, seed, choice))),
             #[cfg(feature = "gpu")]
             Engine::Gpu { device, columns } => Columns::Gpu(Box::new(gpu::Batch::new(&device, &world, n_envs, seed, choice, columns)?)),
         };
@@ -260,7 +260,7 @@ impl Simulator {
             return Err(Error::UnknownTruck { place, index, n_envs });
         }
         match &mut self.batch {
-            Columns::Cpu(batch) => *batch = batch.gathered(indices),
+            Columns::Cpu(batch) => **batch = batch.gathered(indices),
             #[cfg(feature = "gpu")]
             Columns::Gpu(batch) => **batch = batch.gathered(&self.world, indices)?,
         }

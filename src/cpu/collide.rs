@@ -83,7 +83,7 @@ fn point(body: &Body, n_points: usize, index: usize) -> Vec2 {
         return Vec2::new(ends.x + index as f32 * ((ends.y - ends.x) / (n_points - 1) as f32), 0.0);
     }
     let corner = index - n_points;
-    Vec2::new(if corner < 2 { body.rear } else { body.front }, if corner % 2 == 0 { body.half_width } else { -body.half_width })
+    Vec2::new(if corner < 2 { body.rear } else { body.front }, if corner.is_multiple_of(2) { body.half_width } else { -body.half_width })
 }
 
 /// One of a body's lines: the pieces of its centre line, then two from each corner. These run along the unit's end to its middle, and along
@@ -96,7 +96,7 @@ fn line(body: &Body, n_points: usize, index: usize) -> Line {
     let place = index - (n_points - 1);
     let begin = point(body, n_points, n_points + place / 2);
     let capsule = point(body, n_points, capsule_end(n_points, place / 2));
-    let end = if place % 2 == 0 { Vec2::new(begin.x, 0.0) } else { Vec2::new(capsule.x, begin.y) };
+    let end = if place.is_multiple_of(2) { Vec2::new(begin.x, 0.0) } else { Vec2::new(capsule.x, begin.y) };
     Line { begin, end, radius: 0.0 }
 }
 

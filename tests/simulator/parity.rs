@@ -20,8 +20,10 @@ use crate::{batch_on, column, engines};
 use compare::{Agreement, agreements};
 use states::{ENOUGH, N_ENVS, on_each_roundabout, put, varied, world};
 
-/// What each stage writes, and one number of the world that it would notice to be off by a thousandth.
-const TOUCHED: [(&str, &[&str], fn(&mut World)); 8] = [
+/// A stage's name, what it writes, and one number of the world that it would notice to be off by a thousandth.
+type Touched = (&'static str, &'static [&'static str], fn(&mut World));
+
+const TOUCHED: [Touched; 8] = [
     ("steer", &["control"], |world| world.params.rig.speed_gain *= 1.001),
     ("drive", &["truck"], |world| world.params.rig.trailer_wheelbase *= 1.001),
     ("collide", &["clearance"], |world| world.params.rig.trailer_body.half_width *= 1.001),
