@@ -169,6 +169,23 @@ fn a_whole_step_from_any_state_ends_alike_for_every_reason_there_is() {
 }
 
 #[test]
+fn the_largest_rewards_that_a_benchmark_may_give_are_summed_alike() {
+    let mut world = World::clone(&world(Gutter::Drivable));
+    let (choice, before) = varied(&world.clone().into(), false);
+    // Whole numbers, which every engine adds up to the same reward.
+    let params = &mut world.params;
+    (params.waypoint_weight, params.failure_weight) = (1e6, -1e6);
+    (params.lane_distance_weight, params.clearance_weight) = (0.0, 0.0);
+    let [here, there] = simulators(&Arc::new(world), &choice).map(|mut simulator| {
+        put(&mut simulator, &before);
+        simulator.step(&before.action).unwrap();
+        (simulator.batch().reward.iter().map(|&reward| f64::from(reward)).sum::<f64>(), simulator.tally().unwrap().reward())
+    });
+    assert_eq!(here.0, here.1);
+    assert_eq!(there, here);
+}
+
+#[test]
 fn routes_poses_and_actions_are_drawn_alike_to_the_last_bit() {
     // Where a pose is nothing but what was drawn for it.
     let mut world = World::clone(&world(Gutter::Drivable));
