@@ -1,6 +1,6 @@
 //! Networks on the device that steps the trucks: a policy in the loop, and a training run. Nothing comes back to the host.
 //!
-//! A policy that only drives keeps no steps; the memory is there for the way from trucks to network, with room for one step of each truck.
+//! Of a policy that only drives nothing is kept, though there is room for one step, 560 bytes a truck beside its columns.
 
 use offtrack::layout::N_VALUES;
 use offtrack::simulator::Simulator;
