@@ -75,7 +75,7 @@ impl DeviceSac {
     /// One gradient step on a batch, with learning rates times `pace`.
     pub fn update(&mut self, batch: Transitions, pace: f64) {
         let networks = Networks { actor: &self.actor, critics: &self.critics, target: &self.target };
-        let alpha = Weight::Tensor(self.entropy_weight.value());
+        let alpha = Weight::Tensor(Box::new(self.entropy_weight.value()));
         let Losses { critic, actor, entropy, value, .. } = losses(&self.reading, self.learning.entropy.in_target, &networks, &alpha, batch);
         let told = vec![critic.clone().inner(), actor.clone().inner(), entropy.clone(), value];
         self.sums = self.sums.clone() + Tensor::cat(told, 0);

@@ -23,7 +23,7 @@ pub(super) enum Weight {
     Number(f32),
     #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "the processor has the number at hand"))]
     /// `[1, 1]`, without gradients.
-    Tensor(Tensor<2>),
+    Tensor(Box<Tensor<2>>),
 }
 
 impl Weight {
@@ -31,7 +31,7 @@ impl Weight {
     fn times(&self, tensor: Tensor<2>) -> Tensor<2> {
         match self {
             Weight::Number(weight) => tensor.mul_scalar(*weight),
-            Weight::Tensor(weight) => tensor * weight.clone(),
+            Weight::Tensor(weight) => tensor * Tensor::clone(weight),
         }
     }
 
@@ -39,7 +39,7 @@ impl Weight {
     fn times_learning(&self, tensor: Tensor<2>) -> Tensor<2> {
         match self {
             Weight::Number(weight) => tensor.mul_scalar(*weight),
-            Weight::Tensor(weight) => tensor * weight.clone().autodiff(),
+            Weight::Tensor(weight) => tensor * Tensor::clone(weight).autodiff(),
         }
     }
 }

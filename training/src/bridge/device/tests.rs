@@ -72,11 +72,11 @@ fn samples_are_the_transitions_that_were_driven_scaled_noisy_and_mirrored_as_ask
             let first = 100 - n_slots + index_below(drawn[0], (n_slots - n_steps) as u32) as usize;
             let env = index_below(drawn[1], n_envs as u32) as usize;
             let (mut sum, mut weight, mut last) = (0.0f32, 1.0f32, first);
-            for step in first..first + n_steps {
+            for (step, trucks) in history.iter().enumerate().skip(first).take(n_steps) {
                 last = step;
-                sum += weight * history[step][env].reward;
+                sum += weight * trucks[env].reward;
                 weight *= config.learning.discount as f32;
-                let ended = Ended::from_code(history[step][env].ended).unwrap();
+                let ended = Ended::from_code(trucks[env].ended).unwrap();
                 if ended.terminated() {
                     weight = 0.0;
                 }
