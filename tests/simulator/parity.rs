@@ -148,9 +148,13 @@ fn a_whole_step_from_any_state_ends_alike_for_every_reason_there_is() {
     let [mut processor, mut device] = simulators(&world, &choice);
     let mut wrong = wrong_device(&world, &choice, |world| world.params.rig.wheelbase *= 1.001);
     // What the end was decided by is overwritten where another episode begins.
-    put(&mut processor, &before);
-    STAGES[..STAGES.len() - 1].iter().for_each(|stage| processor.run_stage(stage));
+    for simulator in [&mut processor, &mut device] {
+        put(simulator, &before);
+        STAGES[..STAGES.len() - 1].iter().for_each(|stage| simulator.run_stage(stage));
+    }
     let counted = judged(&world, &before, processor.batch());
+    let decisive = compared(processor.batch(), device.batch(), &["truck", "clearance", "progress"], &counted);
+    assert!(decisive.iter().all(|agreement| agreement.worst < MARGIN), "the margin is too small: {decisive:?}");
     let mut codes = [0; Ended::ALL.len()];
     processor.batch().ended.iter().zip(&counted).filter(|(_, counted)| **counted).for_each(|(&code, _)| codes[code as usize] += 1);
     println!("{codes:?}");
