@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Everything there is to find out on a machine with a graphics device, from programs that were built elsewhere, in under eight minutes:
-# the devices, the simulator's device tests, speed against the number of trucks, and a training run. A part that fails or takes too long
-# is named at the end, and the others go on.
+# the devices, the simulator's tests, which run on a device too, speed against the number of trucks, and a training run. A part that fails
+# or takes too long is named at the end, and the others go on.
 #
 #     benches/on-a-gpu.sh OFFTRACK TESTS OUT
 #
@@ -16,6 +16,7 @@
 #                  nothing is
 # OFFTRACK_COMMIT  the commit that the programs were built from, for results, where git cannot tell
 # ADAPTER          part of an adapter's name, see `offtrack devices`
+# FILTER           words of which a test's name has one, such as `device parity`; without it all tests run
 # TRAINING_OPTIONS more options for the training run, such as `--set memory.capacity=100000` where an adapter has little memory
 # ENVS, MODES, SECONDS_EACH, TRAINING, MINUTES   what is measured, as below
 set -uo pipefail
@@ -29,6 +30,7 @@ mkdir -p -- "$3" && out=$(realpath -- "$3") || exit 2
 cd "$(dirname "$0")/.." || exit 2
 repository=$PWD
 envs=${ENVS:-256..1048576}
+filter=${FILTER:-}
 modes=${MODES:-random,policy,large-policy,training}
 seconds=${SECONDS_EACH:-2}
 training=${TRAINING:-training/configs/gpu.toml}
@@ -78,16 +80,17 @@ if [ -n "${BUILT_AT:-}" ] && [ ! -e "$BUILT_AT" ]; then
 fi
 
 part devices 30 "$offtrack" devices
-part tests 120 "$tests" device --nocapture
-grep -q '^running 0 tests' "$out/tests.txt" && failed+=("tests (none has device in its name)")
+# shellcheck disable=SC2086 # several words are several filters
+part tests 150 "$tests" $filter --nocapture
+grep -q '^running 0 tests' "$out/tests.txt" && failed+=("tests (none was run)")
 smi=
 if command -v nvidia-smi >/dev/null; then
     nvidia-smi --query-gpu=timestamp,name,driver_version,memory.used,utilization.gpu,power.draw --format=csv -l 1 >"$out/nvidia-smi.csv" 2>&1 &
     smi=$!
 fi
-part scale 200 "$offtrack" scale --device gpu "${adapter[@]}" --mode "$modes" --config "$training" --envs "$envs" --seconds "$seconds" \
+part scale 190 "$offtrack" scale --device gpu "${adapter[@]}" --mode "$modes" --config "$training" --envs "$envs" --seconds "$seconds" \
     --json "$out/scale.json" --plot "$out/scale.svg"
-part training 110 "$offtrack" train "$training" --minutes "$minutes" --out "$out" --name training "${options[@]}"
+part training 100 "$offtrack" train "$training" --minutes "$minutes" --out "$out" --name training "${options[@]}"
 [ -n "$smi" ] && kill "$smi"
 
 echo
