@@ -2,7 +2,6 @@
 //!
 //! A checkpoint holds the learner and not the memory: a run that goes on fills it again, its own driver at the wheel, before it learns on.
 
-use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::sync::Arc;
 
 use offtrack::layout::N_VALUES;
@@ -17,6 +16,7 @@ use super::run::{broken, fingerprint, found_scaling};
 use crate::bridge::device::{DeviceMemory, Shared};
 use crate::checkpoint::{Columns, Stored};
 use crate::config::Config;
+use crate::device::caught;
 use crate::error::Error;
 use crate::mirror::Mirror;
 use crate::policy::Policy;
@@ -73,21 +73,12 @@ impl DeviceRun {
 
     /// See [`super::run::Run::learn`]. A device that fails on the way is an error that names the last good checkpoint.
     pub fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {
-        // The tensor library knows no other answer to a lost device than a panic.
-        let hook = take_hook();
-        set_hook(Box::new(|_| ()));
-        let learned = catch_unwind(AssertUnwindSafe(|| self.learn_on(stopped)));
-        set_hook(hook);
-        let failed = match learned {
-            Ok(Ok(())) => return Ok(()),
-            Ok(Err(Error::Device(message))) => message,
-            Ok(Err(error @ Error::Simulator(simulator::Error::Gpu(_)))) => error.to_string(),
-            Ok(Err(error)) => return Err(error),
-            Err(panic) => {
-                let said = panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|&said| said.to_owned()));
-                let known = self.shared.check().err().map(|error| error.to_string());
-                known.or(said).unwrap_or_else(|| "it failed".to_owned())
-            }
+        let failed = match caught(|| self.learn_on(stopped)) {
+            Ok(()) => return Ok(()),
+            // What the driver said, rather than what came of it.
+            Err(Error::Device(message)) => self.shared.check().err().map_or(message, |error| error.to_string()),
+            Err(error @ Error::Simulator(simulator::Error::Gpu(_))) => error.to_string(),
+            Err(error) => return Err(error),
         };
         Err(Error::Device(format!("{failed}; {}", self.kept())))
     }
