@@ -23,7 +23,9 @@ fn mirrored(scenario: &Scenario) -> World {
     for waypoint in &mut world.waypoints {
         waypoint.position *= flip;
         waypoint.direction *= flip;
-        waypoint.heading = -waypoint.heading;
+    }
+    for preview in &mut world.previews {
+        preview.heading = -preview.heading;
     }
     for route in &mut world.routes {
         std::mem::swap(&mut route.crossing_left, &mut route.crossing_right);
