@@ -48,7 +48,6 @@ CHOICES = {
     "updates of 2,048 transitions": ["learning.batch=2048"],
     "layers of 512, 512, 1,024": ["learning.hidden=[512, 512, 1024]"],
     "the last actor, no running average": ["learning.average_rate=1.0"],
-    "practice with the examined truck": ["practice={examined_truck}"],
     "practice on the benchmark itself": ["practice="],
 }
 
@@ -64,17 +63,6 @@ FEWER_STEPS = {
 }
 
 
-def examined_truck(args):
-    """A practice file that differs from the default's in its vehicle alone."""
-    scenarios = Path("scenarios").resolve()
-    text = (scenarios / "attard2023-practice.toml").read_text()
-    text = text.replace("vehicles/daf_xf_longer.toml", "vehicles/daf_xf.toml")
-    text = text.replace('"vehicles/', f'"{scenarios}/vehicles/').replace('"roundabouts/', f'"{scenarios}/roundabouts/')
-    file = args.runs / "examined-truck.toml"
-    file.write_text(text)
-    return file
-
-
 def train(core, args, name, settings, seed):
     """One run pinned to a core; its report."""
     folder = args.runs / f"{name.replace(' ', '-').replace(',', '')}-{seed}"
@@ -86,7 +74,7 @@ def train(core, args, name, settings, seed):
         command = [str(args.offtrack), "train", "training/configs/default.toml", "--name", folder.name]
         command += ["--out", str(args.runs), "--seed", str(seed), "--steps", str(FEWER_STEPS.get(name, STEPS))]
         for setting in settings:
-            command += ["--set", setting.format(examined_truck=examined_truck(args))]
+            command += ["--set", setting]
         done = subprocess.run(
             command,
             capture_output=True,

@@ -26,7 +26,7 @@ fn files() -> Vec<PathBuf> {
         }
     }
     files.sort();
-    assert_eq!(files.len(), 14, "five roundabouts, four vehicles, five benchmarks");
+    assert_eq!(files.len(), 13, "five roundabouts, three vehicles, five benchmarks");
     files
 }
 

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use offtrack::vehicle::Vehicle;
 
 /// The vehicle files of the project.
-const VEHICLES: [&str; 4] = ["daf_xf", "daf_xf_longer", "eu_4x2_13m6", "us_wb62"];
+const VEHICLES: [&str; 3] = ["daf_xf", "eu_4x2_13m6", "us_wb62"];
 
 fn vehicle_file(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/vehicles/{name}.toml"))

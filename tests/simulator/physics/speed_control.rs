@@ -40,7 +40,7 @@ fn a_truck_reaches_its_target_speed_without_driving_past_it() {
             }
         }
     }
-    assert_eq!(checked, 4 * 4 * 7);
+    assert_eq!(checked, 3 * 4 * 7);
 }
 
 #[test]
