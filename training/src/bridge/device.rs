@@ -4,25 +4,21 @@
 //! and write samples into buffers of other tensors. Both sides submit to one queue. The tensor library gathers its work before it
 //! submits it, so whatever it was asked for is handed over before a submission of ours, and nothing ever waits.
 
+mod kernels;
+mod shared;
+
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use burn::backend::Wgpu;
-use burn::cubecl::server::Handle;
-use burn::cubecl::wgpu::{AutoCompiler, WgpuServer, WgpuSetup};
-use burn::tensor::{DType, Device, Int, Tensor, TensorData};
+use burn::tensor::{Tensor, TensorData};
 use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
-use offtrack::cpu::WORKGROUP;
-use offtrack::gpu::{self, Slice};
-use offtrack::layout::{N_VALUES, shared_wgsl};
+use offtrack::gpu::Slice;
+use offtrack::layout::N_VALUES;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
-use offtrack::stages::SHADERS;
 use offtrack::world::World;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{
-    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingResource,
-    BindingType, Buffer, BufferBinding, BufferBindingType, BufferDescriptor, BufferUsages, CommandEncoder, ComputePassDescriptor,
-    ComputePipeline, ComputePipelineDescriptor, PipelineLayoutDescriptor, PollType, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buffer, BufferBinding, BufferDescriptor, BufferUsages, PollType,
     SubmissionIndex,
 };
 
@@ -32,99 +28,14 @@ use crate::mirror::Mirror;
 use crate::network::Mlp;
 use crate::sac::Transitions;
 use crate::scaling::{LIMIT, Scaling};
+use kernels::{Kernel, Pipelines};
+pub use shared::Shared;
+use shared::{Owned, floats, integers};
 
 /// Steps that the host may be ahead of the device: work that waits takes memory, and must not pile up without end.
 const AHEAD: usize = 16;
-/// Workgroups in a row of a dispatch.
-const ROW: u32 = 65_535;
-/// Buffers that the memory's kernels see.
-const N_BUFFERS: u32 = 21;
 /// The binding of the actor's output.
 const LOGITS: usize = 15;
-
-/// A graphics device with both on it.
-#[derive(Clone)]
-pub struct Shared {
-    /// As the simulator knows it.
-    pub gpu: gpu::Device,
-    /// As the tensor library knows it.
-    pub tensors: Device,
-    /// Hands nothing over, to see what comes of it.
-    #[cfg(test)]
-    is_careless: bool,
-}
-
-impl Shared {
-    /// Opens a device and hands it to the tensor library too.
-    pub fn open(adapter: Option<&str>) -> Result<Shared, Error> {
-        let gpu = gpu::Device::open(adapter).map_err(offtrack::simulator::Error::from)?;
-        let setup = WgpuSetup {
-            instance: gpu.instance.clone(),
-            adapter: gpu.adapter.clone(),
-            device: gpu.device.clone(),
-            queue: gpu.queue.clone(),
-            backend: gpu.adapter.get_info().backend,
-        };
-        let tensors = Device::wgpu_options().setup(setup).init().map_err(|error| Error::Device(error.to_string()))?;
-        Ok(Shared {
-            gpu,
-            tensors,
-            #[cfg(test)]
-            is_careless: false,
-        })
-    }
-
-    /// Hands over what the tensor library has gathered, so that what is submitted next comes after it.
-    fn hand_over(&self) -> Result<(), Error> {
-        #[cfg(test)]
-        if self.is_careless {
-            return Ok(());
-        }
-        self.tensors.flush().map_err(|error| Error::Device(error.to_string()))
-    }
-
-    /// An error if the device has failed.
-    pub fn check(&self) -> Result<(), Error> {
-        Ok(self.gpu.check().map_err(offtrack::simulator::Error::from)?)
-    }
-}
-
-/// A buffer that a tensor owns. It stays where it is as long as this is held.
-struct Owned {
-    slice: Slice,
-    _held: Arc<dyn Send + Sync>,
-}
-
-/// Where a tensor's values lie: 32-bit ones, one after the other.
-fn owned(tensor: Handleful) -> Result<Owned, Error> {
-    let Handleful { client, handle, contiguous } = tensor;
-    if !contiguous {
-        return Err(Error::Device("a tensor's values do not lie one after the other".to_owned()));
-    }
-    let held = client.get_resource::<WgpuServer<AutoCompiler>>(handle).map_err(|error| Error::Device(error.to_string()))?;
-    let resource = held.resource();
-    let slice = Slice { buffer: resource.buffer.clone(), offset: resource.offset, size: resource.size };
-    Ok(Owned { slice, _held: Arc::new(std::sync::Mutex::new(held)) })
-}
-
-/// What is taken of a tensor to find its buffer.
-struct Handleful {
-    client: burn::cubecl::client::Client,
-    handle: Handle,
-    contiguous: bool,
-}
-
-fn floats<const D: usize>(tensor: &Tensor<D>) -> Result<Owned, Error> {
-    let primitive = tensor.clone().try_into_primitive::<Wgpu>().map_err(|error| Error::Device(format!("{error:?}")))?;
-    let contiguous = primitive.is_contiguous() && primitive.dtype == DType::F32;
-    owned(Handleful { contiguous, client: primitive.client, handle: primitive.handle })
-}
-
-fn integers<const D: usize>(tensor: &Tensor<D, Int>) -> Result<Owned, Error> {
-    let primitive = tensor.clone().try_into_primitive::<Wgpu>().map_err(|error| Error::Device(format!("{error:?}")))?;
-    let contiguous = primitive.is_contiguous() && primitive.dtype == DType::I32;
-    owned(Handleful { contiguous, client: primitive.client, handle: primitive.handle })
-}
 
 /// What does not change in a run, as `memory.wgsl` has it.
 #[repr(C)]
@@ -416,69 +327,6 @@ impl DeviceMemory {
             .collect();
         let layout = &self.pipelines.layout;
         self.shared.gpu.device.create_bind_group(&BindGroupDescriptor { label: Some("memory"), layout, entries: &entries })
-    }
-}
-
-/// The memory's kernels.
-#[derive(Debug, Clone, Copy)]
-enum Kernel {
-    Choose,
-    Keep,
-    Remember,
-    Sample,
-}
-
-struct Pipelines {
-    layout: BindGroupLayout,
-    pipelines: [ComputePipeline; 4],
-}
-
-impl Pipelines {
-    fn compile(device: &wgpu::Device) -> Pipelines {
-        let random = SHADERS.iter().filter(|(name, _)| *name == "common/random").map(|(_, text)| *text);
-        let source: String =
-            [shared_wgsl()].iter().map(String::as_str).chain(random).chain([include_str!("../../shaders/memory.wgsl")]).collect();
-        let module =
-            device.create_shader_module(ShaderModuleDescriptor { label: Some("memory"), source: ShaderSource::Wgsl(source.into()) });
-        // A tensor's buffer is a slice of a page that other tensors lie in too, and a page is either read from or written to.
-        let entry = |binding| BindGroupLayoutEntry {
-            binding,
-            visibility: ShaderStages::COMPUTE,
-            ty: BindingType::Buffer {
-                ty: BufferBindingType::Storage { read_only: false },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        };
-        let entries: Vec<BindGroupLayoutEntry> = (0..N_BUFFERS).map(entry).collect();
-        let layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some("memory"), entries: &entries });
-        let pipeline_layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
-            label: Some("memory"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = |entry: &str| {
-            device.create_compute_pipeline(&ComputePipelineDescriptor {
-                label: Some(entry),
-                layout: Some(&pipeline_layout),
-                module: &module,
-                entry_point: Some(entry),
-                compilation_options: Default::default(),
-                cache: None,
-            })
-        };
-        let pipelines = ["choose", "keep", "remember", "sample"].map(pipeline);
-        Pipelines { layout, pipelines }
-    }
-
-    fn add(&self, encoder: &mut CommandEncoder, group: &BindGroup, kernel: Kernel, threads: u32) {
-        let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
-        pass.set_bind_group(0, group, &[]);
-        pass.set_pipeline(&self.pipelines[kernel as usize]);
-        let groups = threads.div_ceil(WORKGROUP);
-        let columns = groups.min(ROW);
-        pass.dispatch_workgroups(columns, groups.div_ceil(columns), 1);
     }
 }
 
