@@ -66,6 +66,9 @@ pub struct Args {
     /// Another number of trucks.
     #[arg(long)]
     envs: Option<usize>,
+    /// Part of the name of another graphics adapter, see `offtrack devices`.
+    #[arg(long)]
+    adapter: Option<String>,
     /// Another value of one of the training file's keys, as in `learning.n_steps=5`; nothing after the `=` leaves the key out. May be
     /// given several times.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -74,7 +77,7 @@ pub struct Args {
     /// it learns for so long in all; learning rates fall until that end, so with a later one they are higher from here on than they
     /// would have been, and a finished run goes on too. With `steps` alone the result is that of a run never stopped, bit for bit on the
     /// same machine and program.
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "name", "out", "seed", "envs", "settings"])]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "name", "out", "seed", "envs", "adapter", "settings"])]
     resume: Option<PathBuf>,
 }
 
@@ -122,6 +125,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
         None => {
             let mut config = Config::read_with(&file, &args.settings)?;
             config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
+            if let Some(adapter) = &args.adapter {
+                if config.device == config::Device::Cpu {
+                    let expected = "the training file learns on the processor: leave it out, or add --set device=gpu".to_owned();
+                    return Err(Error::Flag { flag: "--adapter", value: adapter.clone(), expected });
+                }
+                config.adapter = Some(adapter.clone());
+            }
             config
         }
     };

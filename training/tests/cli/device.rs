@@ -97,6 +97,22 @@ fn networks_drive_and_learn_on_the_processor() {
     assert!(said.contains("no.toml: cannot be read"), "{said}");
 }
 
+#[test]
+fn an_adapter_for_a_training_run_on_the_processor_is_refused() {
+    let place = Place::new();
+    let said = refusal(&offtrack(&["train", &place.text("tiny.toml"), "--out", &place.text("runs"), "--adapter", "abacus"]), 2);
+    assert!(said.contains("--adapter: abacus; the training file learns on the processor"), "{said}");
+}
+
+#[cfg(not(feature = "gpu"))]
+#[test]
+fn a_training_file_for_a_device_is_refused_by_a_program_without_the_feature() {
+    let place = Place::new();
+    let said = refusal(&offtrack(&["train", &place.text("tiny.toml"), "--out", &place.text("runs"), "--set", "device=gpu"]), 2);
+    assert!(said.contains("device: \"gpu\"; this program was built without the feature `gpu`"), "{said}");
+    assert!(!std::path::Path::new(&place.text("runs")).exists());
+}
+
 #[cfg(not(feature = "gpu"))]
 #[test]
 fn a_program_without_the_feature_says_so_and_how_to_build_one_that_has_it() {
@@ -178,6 +194,15 @@ mod on_a_device {
     }
 
     #[test]
+    fn a_training_run_on_an_adapter_that_is_not_there_leaves_no_folder_behind() {
+        let place = Place::new();
+        let arguments = ["train", &place.text("tiny.toml"), "--out", &place.text("runs"), "--set", "device=gpu"];
+        let said = refusal(&offtrack(&[&arguments[..], &["--adapter", "abacus"]].concat()), 2);
+        assert!(said.contains("adapter \"abacus\": not there; this machine has "), "{said}");
+        assert!(!std::path::Path::new(&place.text("runs")).exists());
+    }
+
+    #[test]
     fn networks_drive_and_learn_on_the_device() {
         let place = Place::new();
         let arguments = ["--device", "gpu", "--envs", "16", "--mode", &NETWORKS.join(","), "--config", &place.text("tiny.toml")];
@@ -185,7 +210,7 @@ mod on_a_device {
     }
 
     #[test]
-    fn the_shipped_policy_arrives_as_often_on_every_route_as_on_the_processor() {
+    fn drivers_arrive_as_often_on_every_route_as_on_the_processor() {
         let place = Place::new();
         let arrived = |arguments: &[&str]| {
             let fixed = ["evaluate", "--episodes", "3", "--json", &place.text("report.json")];
@@ -200,7 +225,10 @@ mod on_a_device {
         assert_eq!(processor.0, "cpu");
         assert!(device.0.contains('(') && !device.0.contains("cpu"), "{}", device.0);
         assert_eq!((processor.1.len(), &processor.1), (23, &device.1));
-        // Other starts are another result: equal counts are no accident of a driver that always arrives.
-        assert_ne!(arrived(&["--device", "gpu", "--seed", "1"]).1, device.1);
+        // A driver that fails on two routes of three, and other starts: equal counts are no accident of one that always arrives.
+        let pursuit = ["--policy", "pursuit", "--device", "gpu"];
+        let device = arrived(&pursuit).1;
+        assert_eq!(arrived(&pursuit[..2]).1, device);
+        assert_ne!(arrived(&[&pursuit[..], &["--seed", "1"]].concat()).1, device);
     }
 }
