@@ -250,6 +250,21 @@ impl Device {
         Ok(parts.collect())
     }
 
+    /// A buffer of so many bytes, all 0, for shaders to read and write, and to be copied from and to.
+    pub fn empty(&self, label: &str, size: u64) -> Slice {
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+        let buffer = self.device.create_buffer(&BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
+        Slice { buffer, offset: 0, size }
+    }
+
+    /// The same with something in it.
+    pub fn filled(&self, label: &str, contents: &[u8]) -> Slice {
+        // Not created with its contents: on a lost device that would panic.
+        let slice = self.empty(label, contents.len() as u64);
+        self.queue.write_buffer(&slice.buffer, 0, contents);
+        slice
+    }
+
     /// Waits until all that was asked of the device is done.
     pub fn wait(&self) -> Result<(), Error> {
         self.device.poll(PollType::wait_indefinitely()).map_err(|error| self.broken(error.to_string()))?;

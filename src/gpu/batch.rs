@@ -80,30 +80,19 @@ impl Batch {
             fixed: matches!(choice, RouteChoice::Fixed(_)).into(),
         };
         let foreign = !columns.is_empty();
-        let empty = |label, size| {
-            let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-            let buffer = device.device.create_buffer(&BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
-            Slice { buffer, offset: 0, size }
-        };
-        // Not created with their contents: on a lost device that would panic.
-        let filled = |label, contents: &[u8]| {
-            let slice = empty(label, contents.len() as u64);
-            device.queue.write_buffer(&slice.buffer, 0, contents);
-            slice
-        };
         let names = || BUFFERS.iter().map(|buffer| buffer.name);
-        let mut buffers: Vec<Slice> = names().zip(tables(world)).map(|(name, table)| filled(name, &table)).collect();
-        buffers.push(filled("batch", bytes_of(&facts)));
-        buffers.push(filled("choice", cast_slice(routes)));
+        let mut buffers: Vec<Slice> = names().zip(tables(world)).map(|(name, table)| device.filled(name, &table)).collect();
+        buffers.push(device.filled("batch", bytes_of(&facts)));
+        buffers.push(device.filled("choice", cast_slice(routes)));
         for (column, width) in WIDTHS {
             let needed = (n_envs * width) as u64;
             let given = columns.iter().find(|(name, _)| *name == column);
             if let Some((_, slice)) = given.filter(|(_, slice)| slice.size < needed) {
                 return Err(Error::ColumnSize { column, found: slice.size, n_envs, needed });
             }
-            buffers.push(given.map_or_else(|| empty(column, needed), |(_, slice)| Slice { size: needed, ..slice.clone() }));
+            buffers.push(given.map_or_else(|| device.empty(column, needed), |(_, slice)| Slice { size: needed, ..slice.clone() }));
         }
-        buffers.push(empty("tally", (2 * N_SUMS * size_of::<u32>()) as u64));
+        buffers.push(device.empty("tally", (2 * N_SUMS * size_of::<u32>()) as u64));
         debug_assert!(buffers.len() == N_BUFFERS && names().skip(FIRST_COLUMN).zip(WIDTHS).all(|(name, (column, _))| name == column));
 
         let entries = (0..).zip(&buffers).map(|(binding, slice)| BindGroupEntry {
@@ -157,8 +146,7 @@ impl Batch {
     /// Adds a step with the actions that lie in the column to someone else's commands, who submits them.
     pub fn add_step(&self, encoder: &mut CommandEncoder) {
         let [stages @ .., last] = &STAGES;
-        let kernels: Vec<Kernel> = stages.iter().flat_map(|stage| stage.kernels).copied().collect();
-        self.pass(encoder, &kernels);
+        self.pass(encoder, stages.iter().flat_map(|stage| stage.kernels));
         self.hand_on(encoder);
         self.pass(encoder, last.kernels);
     }
@@ -196,19 +184,12 @@ impl Batch {
             self.device.device.create_buffer(&BufferDescriptor { label: Some("stages"), size, usage, mapped_at_creation: false });
         self.run(|batch, encoder| {
             for (index, stage) in (0..).zip(&STAGES) {
-                if index + 1 == STAGES.len() as u32 {
-                    batch.hand_on(encoder);
-                }
-                let timestamp_writes = Some(ComputePassTimestampWrites {
+                let timestamp_writes = ComputePassTimestampWrites {
                     query_set: &set,
                     beginning_of_pass_write_index: Some(2 * index),
                     end_of_pass_write_index: Some(2 * index + 1),
-                });
-                let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor { label: Some(stage.name), timestamp_writes });
-                pass.set_bind_group(0, &batch.group, &[]);
-                for kernel in stage.kernels {
-                    batch.device.kernels().dispatch(&mut pass, kernel, batch.n_envs as u32);
-                }
+                };
+                batch.add_stage(encoder, stage, Some(timestamp_writes));
             }
             encoder.resolve_query_set(&set, 0..count, &resolved, 0);
         });
@@ -289,19 +270,21 @@ impl Batch {
 
     /// One stage over all trucks with what belongs to it.
     pub(crate) fn run_stage(&mut self, stage: &Stage) {
-        self.run(|batch, encoder| {
-            if stage.name == "reset" {
-                batch.hand_on(encoder);
-            }
-            batch.pass(encoder, stage.kernels);
-        });
+        self.run(|batch, encoder| batch.add_stage(encoder, stage, None));
+    }
+
+    /// Adds a stage with what belongs to it.
+    fn add_stage(&self, encoder: &mut CommandEncoder, stage: &Stage, timestamp_writes: Option<ComputePassTimestampWrites>) {
+        if stage.name == "reset" {
+            self.hand_on(encoder);
+        }
+        self.add_pass(encoder, stage.kernels, timestamp_writes);
     }
 
     /// Senses and observes where the trucks stand.
     fn look(&self, encoder: &mut CommandEncoder) {
-        let kernels: Vec<Kernel> =
-            STAGES.iter().filter(|stage| ["sense", "observe"].contains(&stage.name)).flat_map(|stage| stage.kernels).copied().collect();
-        self.pass(encoder, &kernels);
+        let looking = STAGES.iter().filter(|stage| ["sense", "observe"].contains(&stage.name));
+        self.pass(encoder, looking.flat_map(|stage| stage.kernels));
         self.hand_on(encoder);
     }
 
@@ -312,8 +295,17 @@ impl Batch {
         }
     }
 
-    fn pass(&self, encoder: &mut CommandEncoder, kernels: &[Kernel]) {
-        let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
+    fn pass<'a>(&self, encoder: &mut CommandEncoder, kernels: impl IntoIterator<Item = &'a Kernel>) {
+        self.add_pass(encoder, kernels, None);
+    }
+
+    fn add_pass<'a>(
+        &self,
+        encoder: &mut CommandEncoder,
+        kernels: impl IntoIterator<Item = &'a Kernel>,
+        timestamp_writes: Option<ComputePassTimestampWrites>,
+    ) {
+        let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor { label: None, timestamp_writes });
         pass.set_bind_group(0, &self.group, &[]);
         for kernel in kernels {
             self.device.kernels().dispatch(&mut pass, kernel, self.n_envs as u32);

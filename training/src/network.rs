@@ -65,6 +65,12 @@ impl Mlp {
         layers.chain(norms).collect()
     }
 
+    /// The same network on a device; waits for the one that it is on.
+    #[cfg(feature = "gpu")]
+    pub fn on(&self, device: &Device) -> Mlp {
+        self.with_parameters(self.parameters().into_iter().map(|(_, values)| values).collect(), device)
+    }
+
     /// A network of the same sizes with other parameters, as many and as long as [`Mlp::parameters`] gives.
     pub fn with_parameters(&self, parameters: Vec<Vec<f32>>, device: &Device) -> Mlp {
         let mut parameters = parameters.into_iter();

@@ -16,11 +16,7 @@ use offtrack::gpu::Slice;
 use offtrack::layout::N_VALUES;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
-use wgpu::{
-    BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buffer, BufferBinding, BufferDescriptor, BufferUsages, PollType,
-    SubmissionIndex,
-};
+use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buffer, BufferBinding, PollType, SubmissionIndex};
 
 use crate::config::Config;
 use crate::error::Error;
@@ -142,16 +138,8 @@ impl DeviceMemory {
             reward_scale: config.learning.reward_scale as f32,
             scaled_limit: LIMIT,
         };
-        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        let filled = |contents: &[u8]| {
-            let buffer = shared.gpu.device.create_buffer_init(&BufferInitDescriptor { label: Some("memory"), contents, usage });
-            Slice { size: contents.len() as u64, buffer, offset: 0 }
-        };
-        let empty = |size: u64| {
-            let buffer =
-                shared.gpu.device.create_buffer(&BufferDescriptor { label: Some("memory"), size, usage, mapped_at_creation: false });
-            Slice { buffer, offset: 0, size }
-        };
+        let filled = |contents: &[u8]| shared.gpu.filled("memory", contents);
+        let empty = |size: u64| shared.gpu.empty("memory", size);
         let now = empty(size_of::<Now>() as u64);
         let scaling = filled(cast_slice(&[[0.0f32, 1.0, 0.0]; N_VALUES]));
         let (values, actions) = match &mirror {

@@ -18,6 +18,12 @@ pub(super) struct Twins {
 }
 
 impl Twins {
+    /// The same critics on a device.
+    #[cfg(feature = "gpu")]
+    pub(super) fn on(&self, device: &Device) -> Twins {
+        Twins { first: self.first.on(device), second: self.second.on(device) }
+    }
+
     /// Output of each critic, `[B, A]` or `[B, A * categories]` twice.
     pub(super) fn forward(&self, observation: Tensor<2>) -> [Tensor<2>; 2] {
         [self.first.forward(observation.clone()), self.second.forward(observation)]

@@ -40,18 +40,13 @@ impl DeviceSac {
     /// The learner `host` on a device.
     pub fn new(host: &Sac, device: &Device) -> DeviceSac {
         let learning_device = device.clone().autodiff();
-        let moved = |network: &Mlp, device: &Device| {
-            let parameters = network.parameters().into_iter().map(|(_, values)| values).collect();
-            network.with_parameters(parameters, device)
-        };
-        let twins = |twins: &Twins, device: &Device| Twins { first: moved(&twins.first, device), second: moved(&twins.second, device) };
         DeviceSac {
             n_actions: host.reading.n_actions(),
             reading: host.reading.clone(),
-            actor: moved(&host.actor, &learning_device),
-            critics: twins(&host.critics, &learning_device),
-            target: twins(&host.target, device),
-            average: moved(&host.average, device),
+            actor: host.actor.on(&learning_device),
+            critics: host.critics.on(&learning_device),
+            target: host.target.on(device),
+            average: host.average.on(device),
             actor_optimizer: Moments::new(&host.actor_optimizer, device),
             critic_optimizer: Moments::new(&host.critic_optimizer, device),
             entropy_weight: Entropy::new(&host.entropy_weight, device),
@@ -102,16 +97,11 @@ impl DeviceSac {
     /// The learner as it is, on the processor; waits for the device.
     pub fn to_host(&self, into: Sac) -> Sac {
         let (plain, learning) = (Device::flex(), Device::flex().autodiff());
-        let moved = |network: &Mlp, device: &Device| {
-            let parameters = network.parameters().into_iter().map(|(_, values)| values).collect();
-            network.with_parameters(parameters, device)
-        };
-        let twins = |twins: &Twins, device: &Device| Twins { first: moved(&twins.first, device), second: moved(&twins.second, device) };
         Sac {
-            actor: moved(&self.actor, &learning),
-            critics: twins(&self.critics, &learning),
-            target: twins(&self.target, &plain),
-            average: moved(&self.average, &plain),
+            actor: self.actor.on(&learning),
+            critics: self.critics.on(&learning),
+            target: self.target.on(&plain),
+            average: self.average.on(&plain),
             actor_optimizer: self.actor_optimizer.to_host(),
             critic_optimizer: self.critic_optimizer.to_host(),
             entropy_weight: self.entropy_weight.to_host(&self.learning.entropy, self.n_actions),

@@ -125,7 +125,7 @@ impl DeviceRun {
         self.progress.tallied(&tally.since(&self.told));
         self.told = tally;
         let (sums, n_updates) = self.sac.summed();
-        self.progress.updated_by(&sums, n_updates.into());
+        self.progress.updated(&sums, n_updates.into());
         match broken(&sums).filter(|_| 0 < n_updates) {
             Some((what, value)) => Err(self.diverged(what, value)),
             None => Ok(()),

@@ -185,22 +185,12 @@ impl Progress {
     }
 
     /// Counts so many updates and what they came to in sum.
-    #[cfg(feature = "gpu")]
-    pub fn updated_by(&mut self, sums: &Update, n_updates: u64) {
+    pub fn updated(&mut self, sums: &Update, n_updates: u64) {
         self.updates += n_updates;
         self.sums.critic_loss += sums.critic_loss;
         self.sums.actor_loss += sums.actor_loss;
         self.sums.entropy += sums.entropy;
         self.sums.value += sums.value;
-    }
-
-    /// Counts an update.
-    pub fn updated(&mut self, update: &Update) {
-        self.updates += 1;
-        self.sums.critic_loss += update.critic_loss;
-        self.sums.actor_loss += update.actor_loss;
-        self.sums.entropy += update.entropy;
-        self.sums.value += update.value;
     }
 
     /// Whether it is time for a row: by the clock, or by steps where they alone end the run.

@@ -118,7 +118,7 @@ impl Run {
                 return Err(self.diverged(what, value));
             }
             self.memory.learned(&sample, &errors);
-            self.progress.updated(&update);
+            self.progress.updated(&update, 1);
         }
         Ok(())
     }

@@ -28,8 +28,7 @@ pub(super) fn drive(mode: Mode, setting: Setting, learner: &Learner) -> Result<B
     memory.set_scaling(&learner.policy.scaling);
     if mode != Mode::Training {
         let actor = learner.actor(mode);
-        let parameters = actor.parameters().into_iter().map(|(_, values)| values).collect();
-        return Ok(Box::new(Acting { actor: actor.with_parameters(parameters, &shared.tensors), memory, shared }));
+        return Ok(Box::new(Acting { actor: actor.on(&shared.tensors), memory, shared }));
     }
     while memory.len() < config.memory.warmup || !memory.can_sample() {
         memory.step_at_random()?;
