@@ -13,7 +13,7 @@ use wgpu::{Backends, BufferDescriptor, BufferUsages, DeviceType, Features, Insta
 
 use crate::layout::buffers::N_BUFFERS;
 pub use batch::{Batch, Columns, Slice};
-use kernels::Kernels;
+pub use kernels::Kernels;
 
 /// What can be wrong with a device.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -273,7 +273,7 @@ impl Device {
 
     /// The shaders, compiled when they are first asked for.
     fn kernels(&self) -> &Kernels {
-        self.kernels.get_or_init(|| Kernels::compile(&self.device))
+        self.kernels.get_or_init(|| Kernels::of_stages(&self.device))
     }
 
     fn broken(&self, message: String) -> Error {

@@ -4,13 +4,13 @@
 //! SI units and radians throughout; headings lie in (-pi, pi].
 
 pub mod buffers;
-pub(crate) mod shared;
+pub mod shared;
 
 use glam::Vec2;
 
 use crate::angle::direction;
 use crate::{angle, cpu, field, random};
-pub(crate) use shared::{constants, shared};
+pub(crate) use shared::constants;
 
 constants! {
     /// Values in an observation.
@@ -25,7 +25,7 @@ constants! {
     pub const N_PREVIEW: usize = 18;
 }
 
-shared! {
+crate::shared! {
     /// What drives one truck through a step.
     pub struct Control {
         /// Steer angle asked for [rad].

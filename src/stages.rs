@@ -61,8 +61,9 @@ pub const DRAW: Kernel = per_truck("draw");
 pub const RESTART: Kernel = per_truck("restart");
 
 /// The shader files in the order in which they make one module.
-pub const SHADERS: [(&str, &str); 15] = [
+pub const SHADERS: [(&str, &str); 16] = [
     ("layout", include_str!("../shaders/layout.wgsl")),
+    ("common/thread", include_str!("../shaders/common/thread.wgsl")),
     ("common/angle", include_str!("../shaders/common/angle.wgsl")),
     ("common/random", include_str!("../shaders/common/random.wgsl")),
     ("common/field", include_str!("../shaders/common/field.wgsl")),

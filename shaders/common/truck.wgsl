@@ -1,13 +1,8 @@
-// Where things are on a truck, and which thread works on which.
+// Where things are on a truck, and which trucks there is work on.
 
 // Middle of the trailer's axle group [m].
 fn trailer_position(rig: Rig, truck: Truck) -> vec2<f32> {
     return truck.position + rig.fifth_wheel * direction(truck.heading) - rig.trailer_wheelbase * direction(truck.trailer_heading);
-}
-
-// This thread's place among all of a dispatch, whose workgroups lie in rows because one row would not hold them all.
-fn thread_of(group: vec3<u32>, groups: vec3<u32>, local: u32) -> u32 {
-    return (group.y * groups.x + group.x) * WORKGROUP + local;
 }
 
 // Whether there is such a truck, and its episode goes on.

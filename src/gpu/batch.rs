@@ -308,7 +308,7 @@ impl Batch {
         let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor { label: None, timestamp_writes });
         pass.set_bind_group(0, &self.group, &[]);
         for kernel in kernels {
-            self.device.kernels().dispatch(&mut pass, kernel, self.n_envs as u32);
+            self.device.kernels().dispatch_over(&mut pass, kernel, self.n_envs as u32);
         }
     }
 

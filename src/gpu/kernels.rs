@@ -1,4 +1,4 @@
-//! The shaders, compiled: one module of all files, a pipeline for each entry point, one bind group layout for all.
+//! Shaders, compiled: a pipeline for each entry point of a module, one bind group layout for all.
 
 use wgpu::{
     BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType, ComputePass, ComputePipeline,
@@ -13,48 +13,64 @@ use crate::stages::{BESIDE, Kernel, SHADERS, STAGES, Threads};
 /// Workgroups in a row of a dispatch: what every device takes.
 const ROW: u32 = 65_535;
 
-/// All kernels.
+/// A module's kernels.
 #[derive(Debug)]
-pub(super) struct Kernels {
-    /// What they see.
+pub struct Kernels {
+    /// What they see: storage buffers in one bind group.
     pub layout: BindGroupLayout,
     pipelines: Vec<(&'static str, ComputePipeline)>,
 }
 
 impl Kernels {
-    /// Compiles them.
-    pub fn compile(device: &wgpu::Device) -> Kernels {
-        let source: String = SHADERS.iter().flat_map(|(_, text)| [text, "\n"]).collect();
-        let module =
-            device.create_shader_module(ShaderModuleDescriptor { label: Some("offtrack"), source: ShaderSource::Wgsl(source.into()) });
-        let entries: Vec<BindGroupLayoutEntry> = (0..).zip(&BUFFERS).map(|(binding, buffer)| entry(binding, buffer.access)).collect();
-        let layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some("offtrack"), entries: &entries });
+    /// Compiles the entry points of `source`, whose bindings are buffers with these accesses, in their order.
+    pub fn compile(
+        device: &wgpu::Device,
+        label: &str,
+        source: String,
+        accesses: impl IntoIterator<Item = Access>,
+        entries: impl IntoIterator<Item = &'static str>,
+    ) -> Kernels {
+        let module = device.create_shader_module(ShaderModuleDescriptor { label: Some(label), source: ShaderSource::Wgsl(source.into()) });
+        let bindings: Vec<BindGroupLayoutEntry> = (0..).zip(accesses).map(|(binding, access)| bound(binding, access)).collect();
+        let layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some(label), entries: &bindings });
         let pipeline_layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
-            label: Some("offtrack"),
+            label: Some(label),
             bind_group_layouts: &[Some(&layout)],
             immediate_size: 0,
         });
-        let pipelines = STAGES.iter().flat_map(|stage| stage.kernels).chain(&BESIDE).map(|kernel| {
+        let pipelines = entries.into_iter().map(|entry| {
             let pipeline = device.create_compute_pipeline(&ComputePipelineDescriptor {
-                label: Some(kernel.entry),
+                label: Some(entry),
                 layout: Some(&pipeline_layout),
                 module: &module,
-                entry_point: Some(kernel.entry),
+                entry_point: Some(entry),
                 compilation_options: Default::default(),
                 cache: None,
             });
-            (kernel.entry, pipeline)
+            (entry, pipeline)
         });
         Kernels { pipelines: pipelines.collect(), layout }
     }
 
-    /// Adds a kernel to a pass, over all trucks.
-    pub fn dispatch(&self, pass: &mut ComputePass, kernel: &Kernel, n_envs: u32) {
-        let Some((_, pipeline)) = self.pipelines.iter().find(|(entry, _)| *entry == kernel.entry) else { return };
+    /// The kernels of a step and those beside it.
+    pub(super) fn of_stages(device: &wgpu::Device) -> Kernels {
+        let source = SHADERS.iter().flat_map(|(_, text)| [text, "\n"]).collect();
+        let entries = STAGES.iter().flat_map(|stage| stage.kernels).chain(&BESIDE).map(|kernel| kernel.entry);
+        Kernels::compile(device, "offtrack", source, BUFFERS.iter().map(|buffer| buffer.access), entries)
+    }
+
+    /// Adds a kernel of a step to a pass, over all trucks.
+    pub(super) fn dispatch_over(&self, pass: &mut ComputePass, kernel: &Kernel, n_envs: u32) {
         let threads = match kernel.threads {
             Threads::Truck => u64::from(n_envs),
             Threads::Ray => u64::from(n_envs) * N_RAYS as u64,
         };
+        self.dispatch(pass, kernel.entry, threads);
+    }
+
+    /// Adds a kernel to a pass, over so many threads, whose workgroups lie in rows: see `common/thread.wgsl`.
+    pub fn dispatch(&self, pass: &mut ComputePass, entry: &str, threads: u64) {
+        let Some((_, pipeline)) = self.pipelines.iter().find(|(known, _)| *known == entry) else { return };
         let groups = threads.div_ceil(WORKGROUP.into()) as u32;
         let columns = groups.min(ROW);
         pass.set_pipeline(pipeline);
@@ -62,7 +78,7 @@ impl Kernels {
     }
 }
 
-fn entry(binding: u32, access: Access) -> BindGroupLayoutEntry {
+fn bound(binding: u32, access: Access) -> BindGroupLayoutEntry {
     BindGroupLayoutEntry {
         binding,
         visibility: ShaderStages::COMPUTE,

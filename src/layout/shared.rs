@@ -78,11 +78,12 @@ impl<T: Literal, const N: usize> Literal for [T; N] {
 }
 
 /// Prints a comment's lines, as `///` hands them over, at a depth.
-pub(crate) fn comment(depth: &str, lines: &[&str]) -> String {
+pub fn comment(depth: &str, lines: &[&str]) -> String {
     lines.iter().map(|line| format!("{depth}//{line}\n")).collect()
 }
 
-/// Structs of plain data, each with its twin in WGSL.
+/// Structs of plain data, each with its twin in WGSL: beside them `structs` says where their fields lie, and `printed_structs` gives the twins.
+#[macro_export]
 macro_rules! shared {
     ($($(#[doc = $doc:literal])* pub struct $name:ident { $($(#[doc = $field_doc:literal])* pub $field:ident: $type:ty,)* })*) => {
         $(
@@ -101,6 +102,7 @@ macro_rules! shared {
         )*
 
         /// Every shared struct: its name, its size [bytes], and the name and the offset [bytes] of each field.
+        #[allow(dead_code, reason = "asked by tests alone where no one else looks at a layout")]
         pub fn structs() -> Vec<(&'static str, usize, Vec<(&'static str, usize)>)> {
             vec![$((
                 stringify!($name),
@@ -144,4 +146,4 @@ macro_rules! constants {
     };
 }
 
-pub(crate) use {constants, shared};
+pub(crate) use constants;

@@ -1,54 +1,6 @@
 // The learner's memory on the device: a ring of the latest steps of every truck, filled from the simulator's columns and drawn from into
 // the learner's tensors. See src/memory.rs, whose twin it is, and src/bridge/device.rs, which declares the same buffers.
 
-// What does not change in a run.
-struct Facts {
-    n_envs: u32,
-    // Steps of all trucks that are held.
-    n_slots: u32,
-    n_actions: u32,
-    // Transitions drawn at a time.
-    n_rows: u32,
-    // Steps whose rewards are summed.
-    n_steps: u32,
-    // What actions are drawn from.
-    acting_seed: u32,
-    // What transitions, noise and mirrors are drawn from.
-    sampling_seed: u32,
-    // Half of the transitions are seen in a mirror (0 or 1).
-    mirrored: u32,
-    discount: f32,
-    reward_scale: f32,
-    // Where scaled values are cut off.
-    scaled_limit: f32,
-}
-
-// What changes from one dispatch to the next.
-struct Now {
-    // The slot to be written.
-    slot: u32,
-    // The oldest slot.
-    oldest: u32,
-    // Slots that enough others follow, from the oldest on.
-    n_drawable: u32,
-    // Steps and samples so far: what makes one draw differ from the next.
-    step: u32,
-    sample: u32,
-}
-
-// How a value is scaled: what is subtracted and multiplied by, and the noise added then, evenly distributed up to this.
-struct Scale {
-    mean: f32,
-    factor: f32,
-    noise: f32,
-}
-
-// What stands in a value's place in the mirror.
-struct Image {
-    place: u32,
-    factor: f32,
-}
-
 @group(0) @binding(0) var<storage, read_write> facts: Facts;
 @group(0) @binding(1) var<storage, read_write> now: Now;
 @group(0) @binding(2) var<storage, read_write> scaling: array<Scale>;
@@ -74,10 +26,6 @@ struct Image {
 @group(0) @binding(18) var<storage, read_write> drawn_reward: array<f32>;
 @group(0) @binding(19) var<storage, read_write> drawn_discount: array<f32>;
 @group(0) @binding(20) var<storage, read_write> drawn_next: array<f32>;
-
-fn thread_of(group: vec3<u32>, groups: vec3<u32>, local: u32) -> u32 {
-    return (group.y * groups.x + group.x) * WORKGROUP + local;
-}
 
 // Draws an action for every truck from the actor's output.
 @compute @workgroup_size(WORKGROUP)

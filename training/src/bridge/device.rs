@@ -11,8 +11,8 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use burn::tensor::{Tensor, TensorData};
-use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
-use offtrack::gpu::Slice;
+use bytemuck::{bytes_of, cast_slice};
+use offtrack::gpu::{Kernels, Slice};
 use offtrack::layout::N_VALUES;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
@@ -24,7 +24,7 @@ use crate::mirror::Mirror;
 use crate::network::Mlp;
 use crate::sac::Transitions;
 use crate::scaling::{LIMIT, Scaling};
-use kernels::{Kernel, Pipelines};
+use kernels::{Facts, Image, Now, Scale};
 pub use shared::Shared;
 use shared::{Owned, floats, integers};
 
@@ -32,34 +32,6 @@ use shared::{Owned, floats, integers};
 const AHEAD: usize = 16;
 /// The binding of the actor's output.
 const LOGITS: usize = 15;
-
-/// What does not change in a run, as `memory.wgsl` has it.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Facts {
-    n_envs: u32,
-    n_slots: u32,
-    n_actions: u32,
-    n_rows: u32,
-    n_steps: u32,
-    acting_seed: u32,
-    sampling_seed: u32,
-    mirrored: u32,
-    discount: f32,
-    reward_scale: f32,
-    scaled_limit: f32,
-}
-
-/// What changes from one dispatch to the next.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Now {
-    slot: u32,
-    oldest: u32,
-    n_drawable: u32,
-    step: u32,
-    sample: u32,
-}
 
 /// The trucks, the learner's memory of them, and the tensors between both and the networks.
 pub struct DeviceMemory {
@@ -71,7 +43,7 @@ pub struct DeviceMemory {
     n_samples: u32,
     /// Steps made, kept or not.
     n_steps: u32,
-    pipelines: Pipelines,
+    kernels: Kernels,
     buffers: Vec<Slice>,
     now: Buffer,
     scaling: Buffer,
@@ -141,12 +113,12 @@ impl DeviceMemory {
         let filled = |contents: &[u8]| shared.gpu.filled("memory", contents);
         let empty = |size: u64| shared.gpu.empty("memory", size);
         let now = empty(size_of::<Now>() as u64);
-        let scaling = filled(cast_slice(&[[0.0f32, 1.0, 0.0]; N_VALUES]));
+        let scaling = filled(cast_slice(&[Scale { mean: 0.0, factor: 1.0, noise: 0.0 }; N_VALUES]));
         let (values, actions) = match &mirror {
             Some(mirror) => mirror.images(),
             None => (std::array::from_fn(|index| (index, 1.0)), (0..world.params.n_actions).collect()),
         };
-        let images: Vec<[u32; 2]> = values.iter().map(|&(place, factor)| [place as u32, f32::to_bits(factor)]).collect();
+        let images = values.map(|(place, factor)| Image { place: place as u32, factor });
         let columns = ["action", "observation", "next_observation", "ended", "reward"];
         let batch = simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
         let columns: Vec<Slice> = columns.iter().filter_map(|name| batch.column(name).cloned()).collect();
@@ -161,7 +133,7 @@ impl DeviceMemory {
         shared.check()?;
         let scale = [0.0, 1.0].map(|value| Tensor::full([1, N_VALUES], value, device));
         Ok(DeviceMemory {
-            pipelines: Pipelines::compile(&shared.gpu.device),
+            kernels: kernels::compile(&shared.gpu.device),
             shared: shared.clone(),
             simulator,
             facts,
@@ -227,16 +199,16 @@ impl DeviceMemory {
         let values = self.facts.n_envs * N_VALUES as u32;
         let batch = self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
         if logits.is_some() {
-            self.pipelines.add(&mut encoder, &group, Kernel::Choose, self.facts.n_envs);
+            kernels::add(&self.kernels, &mut encoder, &group, "choose", self.facts.n_envs);
         } else {
             batch.add_draw(&mut encoder);
         }
         if is_kept {
-            self.pipelines.add(&mut encoder, &group, Kernel::Keep, values);
+            kernels::add(&self.kernels, &mut encoder, &group, "keep", values);
         }
         batch.add_step(&mut encoder);
         if is_kept {
-            self.pipelines.add(&mut encoder, &group, Kernel::Remember, values);
+            kernels::add(&self.kernels, &mut encoder, &group, "remember", values);
             self.n_kept += 1;
         }
         batch.stepped();
@@ -255,7 +227,7 @@ impl DeviceMemory {
         let group = self.group(None);
         self.tell_now();
         let mut encoder = self.shared.gpu.device.create_command_encoder(&Default::default());
-        self.pipelines.add(&mut encoder, &group, Kernel::Sample, self.facts.n_rows * N_VALUES as u32);
+        kernels::add(&self.kernels, &mut encoder, &group, "sample", self.facts.n_rows * N_VALUES as u32);
         self.shared.gpu.queue.submit([encoder.finish()]);
         self.n_samples = self.n_samples.wrapping_add(1);
         Ok(Transitions {
@@ -281,7 +253,7 @@ impl DeviceMemory {
     /// From here on observations are scaled so, for acting and learning alike.
     pub fn set_scaling(&mut self, scaling: &Scaling) {
         let rows = scaling.mean.iter().zip(&scaling.factor).zip(&self.noise);
-        let rows: Vec<[f32; 3]> = rows.map(|((&mean, &factor), &noise)| [mean, factor, noise]).collect();
+        let rows: Vec<Scale> = rows.map(|((&mean, &factor), &noise)| Scale { mean, factor, noise }).collect();
         self.shared.gpu.queue.write_buffer(&self.scaling, 0, cast_slice(&rows));
         let row = |values: &[f32]| Tensor::from_data(TensorData::new(values.to_vec(), [1, values.len()]), &self.shared.tensors);
         self.scale = [row(&scaling.mean), row(&scaling.factor)];
@@ -313,7 +285,7 @@ impl DeviceMemory {
                 BindGroupEntry { binding: index as u32, resource }
             })
             .collect();
-        let layout = &self.pipelines.layout;
+        let layout = &self.kernels.layout;
         self.shared.gpu.device.create_bind_group(&BindGroupDescriptor { label: Some("memory"), layout, entries: &entries })
     }
 }
