@@ -1,4 +1,4 @@
-//! What steps trucks: the processor, or a device and its name in results; and the command that lists devices.
+//! What steps trucks: the processor, or a device and its name in results.
 //!
 //! The only file here that asks whether the program was built with the feature `gpu`.
 
@@ -11,22 +11,8 @@ use crate::provenance;
 
 /// What would do where a program without the feature is asked for a device.
 #[cfg(not(feature = "gpu"))]
-const NOT_BUILT_IN: &str = "this program was built without the feature gpu; `cargo build --release --features gpu` builds one that has it";
-
-/// List the devices that `--device gpu` can run on, best first; the one chosen unasked is marked.
-#[derive(Debug, clap::Args)]
-pub struct Args {}
-
-/// Where a command steps its trucks.
-#[derive(Debug, clap::Args)]
-pub struct Choice {
-    /// What steps the trucks: `cpu`, all cores of the processor, or `gpu`, compute shaders on a device.
-    #[arg(long, default_value = "cpu", value_parser = ["cpu", "gpu"])]
-    device: String,
-    /// With --device gpu: part of an adapter's name, see `offtrack devices`. Without it the first of that list.
-    #[arg(long)]
-    adapter: Option<String>,
-}
+pub const NOT_BUILT_IN: &str =
+    "this program was built without the feature gpu; `cargo build --release --features gpu` builds one that has it";
 
 /// An engine and its name.
 #[derive(Debug, Clone)]
@@ -57,22 +43,9 @@ impl Device {
     }
 }
 
-impl Choice {
-    /// Opens what was chosen.
-    pub fn open(&self) -> Result<Device, Error> {
-        match (self.device.as_str(), &self.adapter) {
-            ("gpu", adapter) => open(adapter.as_deref()),
-            (_, None) => Ok(Device::processor()),
-            (_, Some(name)) => {
-                let expected = "the processor is none: add --device gpu, or leave --adapter out".to_owned();
-                Err(Error::Flag { flag: "--adapter", value: name.clone(), expected })
-            }
-        }
-    }
-}
-
+/// Opens the first adapter whose name contains `adapter`.
 #[cfg(feature = "gpu")]
-fn open(adapter: Option<&str>) -> Result<Device, Error> {
+pub fn open(adapter: Option<&str>) -> Result<Device, Error> {
     use offtrack::gpu;
 
     match gpu::Device::open(adapter) {
@@ -88,8 +61,9 @@ fn open(adapter: Option<&str>) -> Result<Device, Error> {
     }
 }
 
+/// Opens the first adapter whose name contains `adapter`.
 #[cfg(not(feature = "gpu"))]
-fn open(_: Option<&str>) -> Result<Device, Error> {
+pub fn open(_: Option<&str>) -> Result<Device, Error> {
     Err(Error::Flag { flag: "--device", value: "gpu".to_owned(), expected: format!("{NOT_BUILT_IN}, or leave --device out") })
 }
 
@@ -128,34 +102,4 @@ pub fn has_failed(error: &Error) -> bool {
 #[cfg(not(feature = "gpu"))]
 pub fn has_failed(_: &Error) -> bool {
     false
-}
-
-/// Runs the command.
-#[cfg(feature = "gpu")]
-pub fn run(_: &Args) -> Result<(), Error> {
-    use offtrack::gpu;
-
-    let adapters = gpu::adapters();
-    if adapters.is_empty() {
-        // The error says what was looked for and how to get one.
-        open(None)?;
-    }
-    let mut rows = vec![["", "adapter", "interface", "driver", "kind", "largest buffer"].map(str::to_owned)];
-    rows.extend(adapters.into_iter().enumerate().map(|(index, adapter)| {
-        let mark = if index == 0 { "*" } else { "" };
-        let largest = format!("{} MiB", adapter.binding_max >> 20);
-        [mark.to_owned(), adapter.name, adapter.interface, adapter.driver, adapter.kind.to_owned(), largest]
-    }));
-    let widths: [usize; 6] = std::array::from_fn(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0));
-    for row in rows {
-        let cells: Vec<String> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:width$}")).collect();
-        crate::files::print(&format!("{}\n", cells.join("  ").trim_end()))?;
-    }
-    crate::files::print("* chosen where --adapter names none\n")
-}
-
-/// Runs the command.
-#[cfg(not(feature = "gpu"))]
-pub fn run(_: &Args) -> Result<(), Error> {
-    Err(Error::Flag { flag: "devices", value: "none can be listed".to_owned(), expected: NOT_BUILT_IN.to_owned() })
 }

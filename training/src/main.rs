@@ -1,38 +1,13 @@
 //! The command line: reads what is asked for, prints an error and chooses the exit code (2 for wrong input, 1 for a failure).
 
-mod bench;
-mod bridge;
-mod certify;
-mod checkpoint;
-mod config;
-mod deviations;
-mod device;
-mod draw;
-mod drivers;
-mod error;
-mod evaluate;
-mod exploration;
-mod files;
-mod generator;
-mod memory;
-mod mirror;
-mod network;
-mod page;
-mod policy;
-mod provenance;
-mod record;
-mod recording;
-mod report;
-mod sac;
-mod scale;
-mod scaling;
-mod trace;
-mod train;
+mod commands;
 
 use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use commands::{bench, certify, deviations, devices, draw, evaluate, record, scale, trace, train};
 
 /// A large batch's tensors come and go thousands of times a second; the system's allocator takes a third of an update's time.
 #[global_allocator]
@@ -52,7 +27,7 @@ enum Command {
     Evaluate(evaluate::Args),
     Scale(scale::Args),
     Bench(bench::Args),
-    Devices(device::Args),
+    Devices(devices::Args),
     Certify(certify::Args),
     Draw(draw::Args),
     Record(record::Args),
@@ -67,7 +42,7 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::run(args),
         Command::Scale(args) => scale::run(args),
         Command::Bench(args) => bench::run(args),
-        Command::Devices(args) => device::run(args),
+        Command::Devices(args) => devices::run(args),
         Command::Certify(args) => certify::run(args),
         Command::Draw(args) => draw::run(args),
         Command::Record(args) => record::run(args),

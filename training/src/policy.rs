@@ -12,10 +12,10 @@ use offtrack::layout::{Action, N_VALUES};
 use offtrack::world::World;
 use rand::Rng;
 
-use crate::bridge;
 use crate::error::Error;
-use crate::network::{Mlp, layer};
-use crate::scaling::Scaling;
+use crate::learner::bridge;
+use crate::learner::network::{Mlp, layer};
+use crate::learner::normalisation::Scaling;
 use file::Contents;
 
 /// How far apart two entries of an action table may lie and still be the same, relative: f32 rounds at 6e-8.

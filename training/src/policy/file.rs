@@ -7,7 +7,7 @@ use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
-use crate::scaling::Scaling;
+use crate::learner::normalisation::Scaling;
 
 /// Key of the metadata's one entry.
 const KEY: &str = "offtrack";

@@ -1,0 +1,122 @@
+//! `offtrack trace`: drives the trajectory cases of a file with the simulator's own equations and prints the states it was asked for.
+
+use std::path::{Path, PathBuf};
+
+use offtrack::trace::{Case, Traced, trace};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use offtrack_training::error::Error;
+use offtrack_training::files::{print, write_json};
+
+/// Drive the trajectory cases of a file of reference vectors and print where the truck is at the instants they ask for.
+///
+/// A case says its vehicle, `dt`, `init`, `commands` and `t_end`; its instants are `times` or those of `expected`. One sub-step is `dt`
+/// long; an instant between two of them is reached by a part of one. Cases of other kinds are named and left out.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// JSON file with `cases`, in the format of tests/data/physics_vectors.json
+    cases: PathBuf,
+    /// Where to write the states instead of to standard output
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Report {
+    cases: Vec<Traced>,
+    not_taken: Vec<NotTaken>,
+}
+
+/// A case of a kind that is not a truck's trajectory.
+#[derive(Serialize)]
+struct NotTaken {
+    id: String,
+    kind: String,
+}
+
+/// Reads the cases, drives those that can be driven, prints or writes the report.
+pub fn run(args: &Args) -> Result<(), Error> {
+    let report = report(&args.cases)?;
+    for NotTaken { id, kind } in &report.not_taken {
+        eprintln!("offtrack: {}: case {id:?} is not taken: its kind is {kind:?}, not \"trajectory\"", args.cases.display());
+    }
+    match &args.output {
+        Some(file) => write_json(file, &report),
+        None => {
+            let standard_output = Path::new("standard output");
+            let text = serde_json::to_string_pretty(&report).map_err(|error| Error::write(standard_output)(error.into()))?;
+            print(&format!("{text}\n"))
+        }
+    }
+}
+
+fn report(file: &Path) -> Result<Report, Error> {
+    let wrong = |message: String| Error::Contents { file: file.to_owned(), message };
+    let text = std::fs::read_to_string(file).map_err(Error::read(file))?;
+    let written: Value = serde_json::from_str(&text).map_err(|error| wrong(format!("no JSON: {error}")))?;
+    let cases = written["cases"].as_array().ok_or_else(|| wrong("cases: missing or no list; a list of cases is needed".to_owned()))?;
+    let mut report = Report { cases: Vec::new(), not_taken: Vec::new() };
+    for (index, case) in cases.iter().enumerate() {
+        let text = |key: &str| {
+            let text = case[key].as_str().map(str::to_owned);
+            text.ok_or_else(|| wrong(format!("cases[{index}].{key}: {}; must be text", case[key])))
+        };
+        let (id, kind) = (text("id")?, text("kind")?);
+        if kind == "trajectory" {
+            let case = Case::deserialize(case).map_err(|error| wrong(format!("case {id:?}: {error}")))?;
+            report.cases.push(trace(&case).map_err(|error| wrong(error.to_string()))?);
+        } else {
+            report.not_taken.push(NotTaken { id, kind });
+        }
+    }
+    Ok(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn vectors() -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/physics_vectors.json")
+    }
+
+    #[test]
+    fn a_file_of_vectors_is_driven_and_what_is_not_is_named() {
+        let report = report(&vectors()).unwrap();
+        assert_eq!((report.cases.len(), report.not_taken.len()), (22, 8));
+        assert_eq!(report.not_taken[0].kind, "closed_form");
+        let printed = serde_json::to_value(&report).unwrap();
+        let state = printed["cases"][0]["states"][1].as_object().unwrap();
+        let keys = "t x y psi1 psi2 gamma v delta hitch trailer_axle ay1 ay2 ltr1_qs ltr2_qs ltr2_dyn";
+        assert!(keys.split(' ').all(|key| state.contains_key(key)));
+    }
+
+    /// What is said of the vectors once `from` stands as `to` in their file.
+    fn refusal(from: &str, to: &str) -> String {
+        let text = std::fs::read_to_string(vectors()).unwrap();
+        let changed = text.replacen(from, to, 1);
+        assert_ne!(changed, text);
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("cases.json");
+        std::fs::write(&file, changed).unwrap();
+        let Err(error) = report(&file) else { panic!("{from} -> {to} was accepted") };
+        assert_eq!(error.exit_code(), 2);
+        error.to_string()
+    }
+
+    #[test]
+    fn a_wrong_file_is_told_its_case_key_and_value() {
+        for (from, to, expected) in [
+            ("\"cases\"", "\"cassettes\"", "cases: missing or no list"),
+            ("{", "[", "no JSON"),
+            ("\"L1\"", "\"l1\"", "case \"straight_30\": missing field `L1`"),
+            ("\"dt\": 0.05", "\"dt\": -1", "case \"straight_30\": dt: -1 s; must lie in 0.0001..0.2 s"),
+            ("\"t_end\": 10", "\"t_end\": 4", "case \"straight_30\": expected[1].t: 5 s; must lie in 0..4 s"),
+            ("\"kind\": \"trajectory\"", "\"kind\": 3", "cases[0].kind: 3; must be text"),
+        ] {
+            let message = refusal(from, to);
+            assert!(message.contains("cases.json") && message.contains(expected), "{message}");
+        }
+    }
+}
