@@ -11,6 +11,7 @@ pub mod geometry; // arcs, segments, outlines; exact distances
 pub mod gpu; // the engine of compute shaders
 pub mod layout; // rows and constants that engines share
 pub mod random; // numbers from (seed, env, episode, draw)
+pub mod reader; // files: errors with file, key, value and what would do
 pub mod roundabout; // parameters -> kerbs and lanes
 pub mod route; // lane centre lines -> waypoints
 pub mod scenario; // what to drive

@@ -17,8 +17,8 @@ use std::path::Path;
 use glam::DVec2;
 
 use crate::geometry::{Curve, Outline};
+use crate::reader::{Error, Reader};
 use crate::route::{Lane, LeavesWorld, Route, waypoints};
-use crate::scenario::{Error, Reader};
 use lane::Lanes;
 use written::{Arm, Ring, Written};
 

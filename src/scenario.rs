@@ -2,12 +2,11 @@
 //!
 //! Every error names file, key, value and what would do; it is found here or in the reader of the part it belongs to, never later.
 
-mod reader;
 mod written;
 
 use std::path::Path;
 
-pub use reader::{Error, Reader};
+use crate::reader::{Error, Reader};
 
 use crate::layout::Action;
 use crate::roundabout::{Gutter, Roundabout};

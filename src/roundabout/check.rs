@@ -6,8 +6,8 @@ use super::alignment::{Fault, Way};
 use super::lane::Lanes;
 use super::written::{Arm, Ring};
 use crate::geometry::{Curve, Outline};
+use crate::reader::{Error, Reader};
 use crate::route::Lane;
-use crate::scenario::{Error, Reader};
 
 /// Half the width of a truck: a lane's centre line nearer to a kerb than this cannot be driven [m].
 const NEAREST: f64 = 1.3;

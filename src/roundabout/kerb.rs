@@ -8,7 +8,7 @@ use super::alignment::{Way, around, ring_arc};
 use super::check;
 use super::written::{Arm, Ring};
 use crate::geometry::{Curve, Outline, Piece, rounded, wrapped};
-use crate::scenario::{Error, Reader};
+use crate::reader::{Error, Reader};
 
 /// The kerb faces as an outline; fails where they cross each other.
 pub(super) fn kerbs(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<Outline, Error> {

@@ -9,8 +9,8 @@ use super::check;
 use super::kerb::corner;
 use super::written::{Arm, Ring};
 use crate::geometry::{Curve, Piece, wrapped};
+use crate::reader::{Error, Reader};
 use crate::route::Lane;
-use crate::scenario::{Error, Reader};
 
 /// One end of a route: from an arm's end to the ring, in the world.
 #[derive(Debug, Clone)]

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::alignment::{Alignment, Way};
 use crate::geometry::Bend;
-use crate::scenario::{Error, Reader};
+use crate::reader::{Error, Reader};
 
 /// The smallest radius of a bend in a lane: below it nothing on wheels follows [m].
 const SHARPEST_LANE: f64 = 1.0;

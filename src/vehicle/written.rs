@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::{Load, Sensors, SpeedControl, Suspension, Tractor, Trailer, Vehicle};
 use crate::layout::N_TRACTOR_RAYS;
-use crate::scenario::{Error, Reader};
+use crate::reader::{Error, Reader};
 
 /// The file. Nothing here is trusted yet.
 #[derive(Deserialize)]

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use offtrack::reader::Error;
 use offtrack::roundabout::{Gutter, Roundabout};
-use offtrack::scenario::{Error, Scenario};
+use offtrack::scenario::Scenario;
 use offtrack::simulator::{self, RouteChoice, Simulator};
 use offtrack::vehicle::Vehicle;
 use proptest::prelude::*;

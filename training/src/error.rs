@@ -7,9 +7,9 @@ use crate::device;
 /// Why a command stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A scenario, vehicle or roundabout file is wrong.
+    /// A file that was read is wrong: scenario, vehicle, roundabout, or one that cannot be read at all.
     #[error(transparent)]
-    Scenario(#[from] offtrack::scenario::Error),
+    Input(#[from] offtrack::reader::Error),
     /// A batch was asked for that cannot be.
     #[error(transparent)]
     Simulator(#[from] offtrack::simulator::Error),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use offtrack::scenario::Reader;
+use offtrack::reader::Reader;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;

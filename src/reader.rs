@@ -1,6 +1,8 @@
 //! Reading a file: its path goes into every error, and values are checked one key at a time.
 
 use std::fmt::Display;
+use std::fs::File;
+use std::io::Read;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -16,6 +18,20 @@ pub enum Error {
         file: PathBuf,
         /// What the system said.
         source: std::io::Error,
+    },
+    /// A folder, a device or a pipe: reading one may never end.
+    #[error("{}: is not a regular file; a file is needed", file.display())]
+    NotAFile {
+        /// What was asked for.
+        file: PathBuf,
+    },
+    /// The file is larger than any of its kind.
+    #[error("{}: is larger than {} MiB, the most that is read of such a file", file.display(), limit >> 20)]
+    TooLarge {
+        /// The file that was asked for.
+        file: PathBuf,
+        /// Most bytes read.
+        limit: u64,
     },
     /// The file is not valid TOML, has an unknown key, lacks one, or has one of a wrong type.
     #[error("{}: {message}", file.display())]
@@ -39,6 +55,32 @@ pub enum Error {
     },
 }
 
+/// Most bytes of a scenario, vehicle or roundabout file: a hundred times the largest that comes with the project.
+pub const TEXT_LIMIT: u64 = 1 << 20;
+
+/// The bytes of a regular file of at most `limit` bytes. Anything else is refused before it is read, or as soon as it proves too long.
+pub fn read_bytes(file: &Path, limit: u64) -> Result<Vec<u8>, Error> {
+    let unreadable = |source| Error::Unreadable { file: file.to_owned(), source };
+    // Opening a pipe waits for its writer, so ask what it is first.
+    if !std::fs::metadata(file).map_err(unreadable)?.is_file() {
+        return Err(Error::NotAFile { file: file.to_owned() });
+    }
+    let mut bytes = Vec::new();
+    File::open(file).map_err(unreadable)?.take(limit + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if limit < bytes.len() as u64 {
+        return Err(Error::TooLarge { file: file.to_owned(), limit });
+    }
+    Ok(bytes)
+}
+
+/// The same as text.
+pub fn read_text(file: &Path, limit: u64) -> Result<String, Error> {
+    String::from_utf8(read_bytes(file, limit)?).map_err(|error| Error::Unreadable {
+        file: file.to_owned(),
+        source: std::io::Error::new(std::io::ErrorKind::InvalidData, error.utf8_error()),
+    })
+}
+
 /// A file being read: keeps its path for the errors and checks values one key at a time.
 #[derive(Debug, Clone, Copy)]
 pub struct Reader<'a> {
@@ -48,7 +90,7 @@ pub struct Reader<'a> {
 impl<'a> Reader<'a> {
     /// Reads `file` as TOML into the type that mirrors it.
     pub fn read<T: DeserializeOwned>(file: &'a Path) -> Result<(Reader<'a>, T), Error> {
-        let text = std::fs::read_to_string(file).map_err(|source| Error::Unreadable { file: file.to_owned(), source })?;
+        let text = read_text(file, TEXT_LIMIT)?;
         let written = toml::from_str(&text).map_err(|error| Error::Malformed { file: file.to_owned(), message: error.to_string() })?;
         Ok((Reader { file }, written))
     }
