@@ -1,4 +1,4 @@
-//! Draws a roundabout as a picture, with what a truck sweeps on one of its routes, or writes its polygons and waypoints as JSON.
+//! Draws a roundabout, or a truck's swept path on one of its routes, or writes polygons and waypoints as JSON.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use offtrack_drawing::sheet::{self, Straights};
 use offtrack_drawing::sweep::Sweep;
 use offtrack_drawing::{polygons, rasterised};
 
-use offtrack_training::error::Error;
+use offtrack_training::error::{Error, number};
 use offtrack_training::files;
 
 /// Draw a roundabout, or a truck's swept path on one of its routes.
@@ -40,7 +40,7 @@ pub struct Args {
     /// With --route: speed at which the front axle follows the lane's centre [km/h].
     #[arg(long, default_value_t = 30.0, requires = "route")]
     speed_kmh: f64,
-    /// Whether a gutter is road.
+    /// Whether gutters may be driven on.
     #[arg(long, default_value = "drivable", value_parser = PossibleValuesParser::new(["drivable", "solid"]).map(gutter))]
     gutter: Gutter,
     /// Length of the routes before the ring [m].
@@ -54,7 +54,7 @@ pub struct Args {
     size: u32,
 }
 
-/// What can be written.
+/// The format of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Svg,
@@ -71,7 +71,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if !(1.0..=90.0).contains(&args.speed_kmh) {
         return Err(Error::Flag {
             flag: "--speed-kmh",
-            value: format!("{} km/h", args.speed_kmh),
+            value: format!("{} km/h", number(args.speed_kmh)),
             expected: "must lie in 1..90 km/h".into(),
         });
     }
@@ -138,7 +138,7 @@ fn length(flag: &'static str, value: f64) -> Result<(), Error> {
     if (5.0..=500.0).contains(&value) {
         return Ok(());
     }
-    Err(Error::Flag { flag, value: format!("{value} m"), expected: "must lie in 5..500 m".into() })
+    Err(Error::Flag { flag, value: format!("{} m", number(value)), expected: "must lie in 5..500 m".into() })
 }
 
 /// A file by its path, or by its name in a folder of the scenarios.

@@ -14,9 +14,8 @@ use serde_json::json;
 
 use offtrack_training::device::Device;
 use offtrack_training::error::Error;
-use offtrack_training::evaluation::Examination;
+use offtrack_training::evaluation::Evaluation;
 use offtrack_training::evaluation::page::Page;
-use offtrack_training::evaluation::policies::Learned;
 use offtrack_training::evaluation::report::Report;
 use offtrack_training::files;
 #[cfg(feature = "gpu")]
@@ -28,7 +27,7 @@ use offtrack_training::learner::run::metrics::Figures;
 use offtrack_training::learner::run::progress::Progress;
 use offtrack_training::learner::run::resume::Resumed;
 use offtrack_training::learner::run::{self, Run};
-use offtrack_training::policy::Policy;
+use offtrack_training::policy::LearnedPolicy;
 use offtrack_training::provenance;
 
 /// Episodes on each route in the closing examination.
@@ -181,8 +180,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         written?;
         return files::print(&format!("written: {}\n", folder.path().display()));
     }
-    let mut driver = Learned { name: folder.policy().display().to_string(), policy };
-    let examination = Examination {
+    let mut policy = LearnedPolicy { name: folder.policy().display().to_string(), ..policy };
+    let evaluation = Evaluation {
         scenario: &scenario,
         world: &world,
         split: Split::Test,
@@ -191,7 +190,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         record: true,
         device: &Device::processor(),
     };
-    let (report, tracks) = examination.report(&mut driver)?;
+    let (report, tracks) = evaluation.report(&mut policy, &mut |_, _| ())?;
     let table = report.table();
     finished.evaluation = Some(report.clone());
     files::write_json(&folder.report(), &finished)?;
@@ -279,7 +278,7 @@ impl Job {
         }
     }
 
-    fn policy(&self) -> Result<Policy, Error> {
+    fn policy(&self) -> Result<LearnedPolicy, Error> {
         match self {
             Job::Host(run) => Ok(run.policy()),
             #[cfg(feature = "gpu")]

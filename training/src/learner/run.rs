@@ -29,7 +29,7 @@ use crate::learner::mirror::Mirror;
 use crate::learner::normalisation::Scaling;
 use crate::learner::replay_buffer::Memory;
 use crate::learner::sac::{Sac, Update};
-use crate::policy::{self, Policy};
+use crate::policy::{self, LearnedPolicy};
 use checkpointer::{Keeper, Kept};
 use folder::Folder;
 use progress::Progress;
@@ -136,8 +136,9 @@ impl Run {
     }
 
     /// The driver as it is.
-    pub fn policy(&self) -> Policy {
-        Policy {
+    pub fn policy(&self) -> LearnedPolicy {
+        LearnedPolicy {
+            name: self.config.benchmark.clone(),
             benchmark: self.config.benchmark.clone(),
             actions: self.world.actions.clone(),
             scaling: self.scaling.clone().unwrap_or_else(|| self.found_scaling()),

@@ -18,10 +18,9 @@ use serde::Serialize;
 
 use super::Updates;
 use offtrack_training::error::Error;
-use offtrack_training::files;
 use offtrack_training::learner::config::Config;
 use offtrack_training::learner::network::Mlp;
-use offtrack_training::policy::Policy;
+use offtrack_training::policy::LearnedPolicy;
 
 /// Hidden layers of the study's own learner.
 const LARGE: [usize; 3] = [512, 512, 1024];
@@ -49,16 +48,15 @@ pub(super) enum Mode {
 /// What those modes need that more than chance drives.
 #[derive(Debug)]
 pub(super) struct Learner {
-    policy: Policy,
+    policy: LearnedPolicy,
     config: Config,
 }
 
 impl Learner {
     /// The policy that comes with the program for `benchmark`, and a training file.
     pub(super) fn read(benchmark: &str, config: &Path, world: &World) -> Result<Learner, Error> {
-        let file = files::shipped_policy(benchmark);
-        let policy = Policy::load(&file)?;
-        policy.check(world, &file)?;
+        let policy = LearnedPolicy::shipped_or_default(benchmark)?;
+        policy.check(world)?;
         Ok(Learner { policy, config: Config::read(config)? })
     }
 

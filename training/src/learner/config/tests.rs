@@ -13,7 +13,7 @@ fn read(text: &str) -> Result<Config, String> {
     Config::read(&file).map_err(|error| {
         let message = error.to_string();
         assert!(message.starts_with(file.to_str().unwrap()), "{message}");
-        assert_eq!(error.exit_code(), 2);
+        assert!(error.is_wrong_input());
         message
     })
 }

@@ -22,7 +22,7 @@ use crate::learner::mirror::Mirror;
 use crate::learner::normalisation::Scaling;
 use crate::learner::sac::Sac;
 use crate::learner::sac::device::DeviceSac;
-use crate::policy::Policy;
+use crate::policy::LearnedPolicy;
 
 /// A run under way on a device.
 pub struct DeviceRun {
@@ -139,12 +139,13 @@ impl DeviceRun {
     }
 
     /// The driver as it is; waits for the device.
-    pub fn policy(&self) -> Result<Policy, Error> {
+    pub fn policy(&self) -> Result<LearnedPolicy, Error> {
         Ok(self.policy_of(&self.host()?))
     }
 
-    fn policy_of(&self, host: &Sac) -> Policy {
-        Policy {
+    fn policy_of(&self, host: &Sac) -> LearnedPolicy {
+        LearnedPolicy {
+            name: self.config.benchmark.clone(),
             benchmark: self.config.benchmark.clone(),
             actions: self.world.actions.clone(),
             scaling: self.scaling.clone().unwrap_or_else(|| Scaling::none(N_VALUES)),
