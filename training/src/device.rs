@@ -77,8 +77,7 @@ pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     let outcome = catch_unwind(AssertUnwindSafe(work));
     set_hook(hook);
     outcome.unwrap_or_else(|panic| {
-        let message =
-            panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|&message| message.to_owned()));
+        let message = panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|&message| message.to_owned()));
         Err(Error::Device(message.unwrap_or_else(|| "it failed".to_owned())))
     })
 }

@@ -53,11 +53,7 @@ impl Evaluation<'_> {
 
     /// The episodes, route by route in the order of the split; if recorded, also every state of each. `progress` is called with the number
     /// of finished episodes and the number of all, after each step that finished one.
-    pub fn drive(
-        &self,
-        policy: &mut dyn Policy,
-        progress: &mut dyn FnMut(usize, usize),
-    ) -> Result<(Vec<Episode>, Vec<Track>), Error> {
+    pub fn drive(&self, policy: &mut dyn Policy, progress: &mut dyn FnMut(usize, usize)) -> Result<(Vec<Episode>, Vec<Track>), Error> {
         let Evaluation { scenario, world, split, episodes, seed, record, device } = *self;
         let routes = scenario.split(split);
         if routes.is_empty() {

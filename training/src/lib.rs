@@ -12,10 +12,7 @@
 //! use offtrack_training::policy::LearnedPolicy;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let scenario = Scenario::read(std::path::Path::new("../scenarios/attard2023.toml"))?;
-//! # let _ = stringify! {
 //! let scenario = Scenario::named("attard2023")?;
-//! # };
 //! let world = Arc::new(World::bake(&scenario));
 //! let policy = LearnedPolicy::shipped("attard2023")?;
 //! let routes = scenario.split(Split::Test).to_vec();

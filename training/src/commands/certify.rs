@@ -73,7 +73,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 /// Drives a certificate's sequences again.
 fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
     let certificate = Certificate::read(path)?;
-    let scenario = Scenario::read(&files::benchmark(benchmark.unwrap_or(&certificate.benchmark))?)?;
+    let scenario = Scenario::find(benchmark.unwrap_or(&certificate.benchmark))?;
     let world = Arc::new(World::bake(&scenario));
     certificate.check(&scenario, &world, path)?;
     let arrived = verify::verify(&certificate, &world, path, |_| true)?;
@@ -82,7 +82,7 @@ fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
 
 /// Searches every route from every start.
 fn certify(args: &Args) -> Result<(), Error> {
-    let scenario = Scenario::read(&files::benchmark(args.benchmark.as_deref().unwrap_or("attard2023"))?)?;
+    let scenario = Scenario::find(args.benchmark.as_deref().unwrap_or("attard2023"))?;
     let world = Arc::new(World::bake(&scenario));
     let policy = args.policy.as_deref().map(policies::learned).transpose()?;
     if let Some(policy) = &policy {

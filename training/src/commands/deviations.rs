@@ -23,7 +23,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
-    let roundabout = Roundabout::read(&args.roundabout)?;
+    let roundabout = Roundabout::find(&args.roundabout)?;
     let text = reader::read_text(&args.measured, LIMIT)?;
     let wrong = |message: String| Error::Contents { file: args.measured.clone(), message };
     let measured: Measured = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;

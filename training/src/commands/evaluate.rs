@@ -59,7 +59,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return Err(Error::Flag { flag: "--episodes", value: args.episodes.to_string(), expected: "must lie in 1..100000".into() });
     }
     let device = args.device.open()?;
-    let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
+    let scenario = Scenario::find(&args.benchmark)?;
     let world = Arc::new(World::bake(&scenario));
     let mut policy = args.policy.open(&scenario, &world, args.seed)?;
     let split = if args.split == "train" { Split::Train } else { Split::Test };

@@ -77,7 +77,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = format!("must lie in 0..{}: --episodes says how many there are", args.episodes - 1);
         return Err(Error::Flag { flag: "--episode", value: args.episode.to_string(), expected });
     }
-    let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
+    let scenario = Scenario::find(&args.benchmark)?;
     let chosen = Chosen::new(&scenario, &args.route)?;
     let world = Arc::new(World::bake(&scenario));
     let mut policy = args.policy.open(&scenario, &world, args.seed)?;

@@ -190,8 +190,11 @@ pub fn run(args: &Args) -> Result<(), Error> {
         record: true,
         device: &Device::processor(),
     };
-    let (report, tracks) = evaluation.report(&mut policy, &mut |_, _| ())?;
-    let table = report.table();
+    let (report, tracks) = {
+        let bar = super::progress::Bar::new("evaluating", "episodes", 0);
+        evaluation.report(&mut policy, &mut |done, all| bar.set(done, all))?
+    };
+    let table = report.table(super::terminal::width());
     finished.evaluation = Some(report.clone());
     files::write_json(&folder.report(), &finished)?;
     let metrics = std::fs::read_to_string(folder.metrics()).map_err(Error::read(&folder.metrics()))?;

@@ -5,10 +5,11 @@ use std::path::Path;
 
 use offtrack::layout::{Action, Truck, WaypointRow};
 use offtrack::random::{self, Draw};
+use offtrack::reader::shown;
 use offtrack::simulator::Batch;
 use offtrack::world::World;
 
-use crate::error::{Error, number};
+use crate::error::Error;
 use crate::policy::LearnedPolicy;
 
 /// Pure pursuit's default look-ahead distance: the best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of attard2023 [m].
@@ -28,7 +29,7 @@ pub trait Policy {
 /// `look_ahead` is pure pursuit's [m], `seed` that of random actions.
 pub fn find(policy: Option<&str>, benchmark: &str, look_ahead: f32, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
     if !(1.0..=50.0).contains(&look_ahead) {
-        let value = format!("{} m", number(look_ahead.into()));
+        let value = format!("{} m", shown(look_ahead.into()));
         return Err(Error::Flag { flag: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
     }
     let learned = match policy {

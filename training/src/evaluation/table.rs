@@ -73,8 +73,7 @@ impl Report {
             ("certified", "", self.certified.as_ref()),
             ("all", "", Some(&self.summary)),
         ];
-        let sums: Vec<Line> =
-            sums.into_iter().filter_map(|(name, lane, summary)| Some(Line { name, lane, summary: summary? })).collect();
+        let sums: Vec<Line> = sums.into_iter().filter_map(|(name, lane, summary)| Some(Line { name, lane, summary: summary? })).collect();
         let (columns, left_out) = fitting(width, &routes, &sums);
         let mut text = String::new();
         for row in 0..2 {
@@ -90,7 +89,11 @@ impl Report {
         }
         if !left_out.is_empty() {
             let names: Vec<String> = left_out.iter().map(|column| column.head.join(" ").trim().to_owned()).collect();
-            push_wrapped(&mut text, &format!("Left out for want of width: {}. A wider terminal and --json have them.", names.join(", ")), width);
+            push_wrapped(
+                &mut text,
+                &format!("Left out for want of width: {}. A wider terminal and --json have them.", names.join(", ")),
+                width,
+            );
         }
         text + "\n" + &legend(width)
     }

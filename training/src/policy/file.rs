@@ -83,7 +83,9 @@ impl Contents {
         let found = std::mem::take(&mut description.checksum);
         let expected = checksum(&description, read.iter().map(|(_, tensor)| tensor.data()));
         if found != expected {
-            return Err(format!("is damaged: its checksum is {found:08x} and its contents give {expected:08x}; download it or train it again"));
+            return Err(format!(
+                "is damaged: its checksum is {found:08x} and its contents give {expected:08x}; download it or train it again"
+            ));
         }
         Contents::from_tensors(description, &read)
     }
@@ -93,7 +95,9 @@ impl Contents {
     fn from_tensors(description: Description, tensors: &[(String, TensorView)]) -> Result<Contents, String> {
         for (name, tensor) in tensors {
             if let Some((index, value)) = floats(tensor.data()).into_iter().enumerate().find(|(_, value)| !value.is_finite()) {
-                return Err(format!("is a policy that cannot drive: {name}[{index}] is {value}; every number must be finite; train it again"));
+                return Err(format!(
+                    "is a policy that cannot drive: {name}[{index}] is {value}; every number must be finite; train it again"
+                ));
             }
         }
         if let Some((index, _)) = description.actions.iter().enumerate().find(|(_, action)| !action.iter().all(|value| value.is_finite())) {

@@ -18,6 +18,7 @@ use serde::Serialize;
 
 use super::Updates;
 use offtrack_training::error::Error;
+use offtrack_training::files;
 use offtrack_training::learner::config::Config;
 use offtrack_training::learner::network::Mlp;
 use offtrack_training::policy::LearnedPolicy;
