@@ -15,12 +15,13 @@ pub mod reader; // files: errors with file, key, value and what would do
 pub mod roundabout; // parameters -> kerbs and lanes
 pub mod route; // lane centre lines -> waypoints
 pub mod scenario; // what to drive
-pub mod simulator;
+pub mod shipped; // the scenario files that come with the library
+pub mod simulator; // many trucks, many steps
 pub mod stages; // one step, in order
 pub mod swept; // the path of a truck that never leaves its line
 pub mod trace; // one truck, open loop, for comparison with references
 pub mod vehicle; // tractor, trailer, load
-pub mod world; // what trucks share, baked // many trucks, many steps
+pub mod world; // what trucks share, baked
 
 /// The README's example, compiled and run as a test.
 #[cfg(doctest)]

@@ -19,6 +19,7 @@ use glam::DVec2;
 use crate::geometry::{Curve, Outline};
 use crate::reader::{Error, Reader};
 use crate::route::{Lane, LeavesWorld, Route, waypoints};
+use crate::shipped::{Kind, Source};
 use lane::Lanes;
 use written::{Arm, Ring, Written};
 
@@ -45,14 +46,52 @@ pub struct Roundabout {
 }
 
 impl Roundabout {
-    /// Reads a roundabout. Everything that can be wrong with one is found here, with its key.
+    /// Reads a roundabout file. Every fault that a roundabout can have is found here.
+    ///
+    /// # Errors
+    ///
+    /// The file and, for a value that makes no sense, its key, the value and what would do.
     pub fn read(path: &Path) -> Result<Roundabout, Error> {
-        let (reader, written) = Reader::read::<Written>(path)?;
+        Roundabout::from_source(&Source::Disk(path.to_owned()))
+    }
+
+    /// A roundabout that comes with the library: `16m`, `20m`, `32m`, `40m` or `50m`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::UnknownName`], which lists the known names.
+    pub fn named(name: &str) -> Result<Roundabout, Error> {
+        Roundabout::from_source(&Source::named(Kind::Roundabout, name)?)
+    }
+
+    /// Reads a file where `name_or_path` ends in `.toml` or is the path of a file; else the same as [`Roundabout::named`].
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Roundabout::read`] and [`Roundabout::named`].
+    pub fn find(name_or_path: &str) -> Result<Roundabout, Error> {
+        Roundabout::from_source(&Source::find(Kind::Roundabout, name_or_path)?)
+    }
+
+    /// A roundabout from the text of a roundabout file. `name` is its name, and stands for the file in errors.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Roundabout::read`].
+    pub fn from_toml(name: &str, text: &str) -> Result<Roundabout, Error> {
+        Roundabout::parsed(name.to_owned(), Path::new(name), text)
+    }
+
+    pub(crate) fn from_source(source: &Source) -> Result<Roundabout, Error> {
+        Roundabout::parsed(source.stem(), &source.shown(), &source.text()?)
+    }
+
+    fn parsed(name: String, file: &Path, text: &str) -> Result<Roundabout, Error> {
+        let (reader, written) = Reader::parse::<Written>(file, text)?;
         let (ring, arms) = written.checked(&reader)?;
         let kerbs = kerb::kerbs(&reader, &ring, &arms)?;
         let lanes = Lanes::new(&reader, &ring, &arms)?;
         check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes)?;
-        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         Ok(Roundabout { name, ring, arms, kerbs, lanes })
     }
 

@@ -6,11 +6,11 @@ mod written;
 
 use std::path::Path;
 
-use crate::reader::{Error, Reader};
-
 use crate::layout::Action;
+use crate::reader::{Error, Reader};
 use crate::roundabout::{Gutter, Roundabout};
 use crate::route::Route;
+use crate::shipped::{Kind, Source};
 use crate::vehicle::Vehicle;
 use written::{Written, WrittenChoice, WrittenRoundabout, WrittenRoutes};
 
@@ -107,17 +107,52 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    /// Reads a benchmark file and every file that it names (paths are relative to it).
+    /// Reads a benchmark file and every file that it refers to. Their paths are relative to it.
+    ///
+    /// # Errors
+    ///
+    /// The file and, for a value that makes no sense, its key, the value and what would do.
     pub fn read(path: &Path) -> Result<Scenario, Error> {
-        let (reader, written) = Reader::read::<Written>(path)?;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let vehicle = Vehicle::read(&folder.join(&written.vehicle))?;
+        Scenario::from_source(&Source::Disk(path.to_owned()))
+    }
+
+    /// A benchmark that comes with the library.
+    ///
+    /// ```
+    /// use offtrack::scenario::{Scenario, Split};
+    ///
+    /// let scenario = Scenario::named("attard2023")?;
+    /// assert_eq!(scenario.split(Split::Train).len(), 52);
+    /// assert_eq!(scenario.split(Split::Test).len(), 23);
+    /// # Ok::<(), offtrack::reader::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`Error::UnknownName`], which lists the known names.
+    pub fn named(name: &str) -> Result<Scenario, Error> {
+        Scenario::from_source(&Source::named(Kind::Benchmark, name)?)
+    }
+
+    /// Reads a file where `name_or_path` ends in `.toml` or is the path of a file; else the same as [`Scenario::named`].
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Scenario::read`] and [`Scenario::named`].
+    pub fn find(name_or_path: &str) -> Result<Scenario, Error> {
+        Scenario::from_source(&Source::find(Kind::Benchmark, name_or_path)?)
+    }
+
+    fn from_source(source: &Source) -> Result<Scenario, Error> {
+        let file = source.shown();
+        let (reader, written) = Reader::parse::<Written>(&file, &source.text()?)?;
+        let vehicle = referred(&reader, "vehicle", source, &written.vehicle, Vehicle::from_source)?;
         if !vehicle.loads.contains_key(&written.load) {
             let loads: Vec<&str> = vehicle.loads.keys().map(String::as_str).collect();
             return Err(reader.invalid("load", format_args!("{:?}", written.load), format!("the vehicle has {}", loads.join(", "))));
         }
         let mut scenario = Scenario {
-            name: path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
+            name: source.stem(),
             steer_max: written
                 .steer_max_deg
                 .map(|lock| reader.within("steer_max_deg", lock, 1.0..=80.0, "deg").map(f64::to_radians))
@@ -157,7 +192,7 @@ impl Scenario {
         };
         reader.count("roundabout", written.roundabout.len(), 1..=64)?;
         for (index, place) in written.roundabout.iter().enumerate() {
-            scenario.add(&reader, &format!("roundabout[{index}]"), folder, place, &lengths)?;
+            scenario.add(&reader, &format!("roundabout[{index}]"), source, place, &lengths)?;
         }
         if scenario.train.is_empty() && scenario.test.is_empty() {
             return Err(reader.invalid("roundabout", "no routes", "at least one route must stand under `train` or `test`"));
@@ -195,8 +230,15 @@ impl Scenario {
         self.speeds.iter().copied().fold(0.0, f64::max)
     }
 
-    fn add(&mut self, reader: &Reader, key: &str, folder: &Path, place: &WrittenRoundabout, lengths: &WrittenRoutes) -> Result<(), Error> {
-        let roundabout = Roundabout::read(&folder.join(&place.file))?;
+    fn add(
+        &mut self,
+        reader: &Reader,
+        key: &str,
+        source: &Source,
+        place: &WrittenRoundabout,
+        lengths: &WrittenRoutes,
+    ) -> Result<(), Error> {
+        let roundabout = referred(reader, &format!("{key}.file"), source, &place.file, Roundabout::from_source)?;
         if self.places.iter().any(|other| other.roundabout.name == roundabout.name) {
             return Err(reader.invalid(format!("{key}.file"), place.file.display(), "each roundabout may stand here once"));
         }
@@ -224,6 +266,16 @@ impl Scenario {
         self.places.push(Place { roundabout, routes: kept });
         Ok(())
     }
+}
+
+/// Reads the file at `path` that `source` refers to under `key`. Where there is no such file, the error names the key too.
+fn referred<T>(reader: &Reader, key: &str, source: &Source, path: &Path, read: impl Fn(&Source) -> Result<T, Error>) -> Result<T, Error> {
+    read(&source.relative(path)).map_err(|error| match error {
+        Error::Unreadable { .. } | Error::NotAFile { .. } | Error::TooLarge { .. } => {
+            reader.invalid(key, format_args!("{:?}", path.display().to_string()), error.to_string())
+        }
+        error => error,
+    })
 }
 
 /// A non-empty list of finite numbers within a range.

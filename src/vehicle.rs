@@ -8,6 +8,7 @@ mod written;
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use std::path::Path;
 
 use glam::{DVec2, Vec2};
 
@@ -15,6 +16,8 @@ pub use single_track::{SingleTrack, Steady};
 pub use suspension::Suspension;
 
 use crate::layout::{Body, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, Ray, Rig};
+use crate::reader::Error;
+use crate::shipped::{Kind, Source};
 
 /// Acceleration of free fall [m/s^2].
 pub const GRAVITY: f64 = 9.81;
@@ -112,6 +115,33 @@ pub struct Sensors {
 }
 
 impl Vehicle {
+    /// Reads a vehicle file. Every fault that a vehicle can have is found here.
+    ///
+    /// # Errors
+    ///
+    /// The file and, for a value that makes no sense, its key, the value and what would do.
+    pub fn read(path: &Path) -> Result<Vehicle, Error> {
+        Vehicle::from_source(&Source::Disk(path.to_owned()))
+    }
+
+    /// A vehicle that comes with the library: `daf_xf`, `eu_4x2_13m6` or `us_wb62`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::UnknownName`], which lists the known names.
+    pub fn named(name: &str) -> Result<Vehicle, Error> {
+        Vehicle::from_source(&Source::named(Kind::Vehicle, name)?)
+    }
+
+    /// Reads a file where `name_or_path` ends in `.toml` or is the path of a file; else the same as [`Vehicle::named`].
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Vehicle::read`] and [`Vehicle::named`].
+    pub fn find(name_or_path: &str) -> Result<Vehicle, Error> {
+        Vehicle::from_source(&Source::find(Kind::Vehicle, name_or_path)?)
+    }
+
     /// Lengths that decide where the trailer goes.
     pub fn single_track(&self) -> SingleTrack {
         SingleTrack { wheelbase: self.tractor.wheelbase, fifth_wheel: self.tractor.fifth_wheel, trailer_wheelbase: self.trailer.wheelbase }

@@ -1,7 +1,6 @@
 //! A vehicle file as written, and the checks that make a [`Vehicle`] of it.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use glam::DVec2;
 use serde::Deserialize;
@@ -9,6 +8,7 @@ use serde::Deserialize;
 use super::{Load, Sensors, SpeedControl, Suspension, Tractor, Trailer, Vehicle};
 use crate::layout::N_TRACTOR_RAYS;
 use crate::reader::{Error, Reader};
+use crate::shipped::Source;
 
 /// The file. Nothing here is trusted yet.
 #[derive(Deserialize)]
@@ -98,9 +98,10 @@ fn dry_asphalt() -> f64 {
 }
 
 impl Vehicle {
-    /// Everything that can be wrong with a vehicle is found here, with its key.
-    pub fn read(path: &Path) -> Result<Vehicle, Error> {
-        let (reader, written) = Reader::read::<Written>(path)?;
+    /// Reads and checks a vehicle file.
+    pub(crate) fn from_source(source: &Source) -> Result<Vehicle, Error> {
+        let file = source.shown();
+        let (reader, written) = Reader::parse::<Written>(&file, &source.text()?)?;
         let tractor = tractor(&reader, &written.tractor)?;
         let trailer = trailer(&reader, &written.trailer)?;
         if tractor.fifth_wheel.abs() >= trailer.wheelbase {

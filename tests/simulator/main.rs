@@ -22,6 +22,7 @@ mod parity;
 mod physics;
 mod sense;
 mod shaders;
+mod shipped;
 
 /// A benchmark of the repository, read and baked.
 fn benchmark(name: &str) -> (Scenario, World) {

@@ -1,26 +1,30 @@
-//! Compares a roundabout file with a measured one and prints how far apart their kerbs and lanes are.
+//! Compares a roundabout with a measured one and prints the distances between their kerbs and lanes.
 
 use std::path::PathBuf;
 
+use offtrack::reader;
 use offtrack::roundabout::Roundabout;
 use offtrack::roundabout::deviation::{Measured, deviations};
 
 use offtrack_training::error::Error;
 use offtrack_training::files;
 
+/// Most bytes of a measured roundabout.
+const LIMIT: u64 = 16 << 20;
+
 /// Compare a roundabout with a measured one: road edges with solid gutters, and lane centre lines, within 45 m of the centre.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A roundabout file, scenarios/roundabouts/16m.toml.
-    roundabout: PathBuf,
-    /// Its measured counterpart, tests/data/measured/16m.json.
+    /// A roundabout's name, or the path of its file.
+    roundabout: String,
+    /// Its measured counterpart as JSON: tests/data/measured/16m.json.
     measured: PathBuf,
 }
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
-    let roundabout = Roundabout::read(&args.roundabout)?;
-    let text = std::fs::read_to_string(&args.measured).map_err(Error::read(&args.measured))?;
+    let roundabout = Roundabout::find(&args.roundabout)?;
+    let text = reader::read_text(&args.measured, LIMIT)?;
     let wrong = |message: String| Error::Contents { file: args.measured.clone(), message };
     let measured: Measured = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     let rows = deviations(&roundabout, &measured).map_err(|error| wrong(error.to_string()))?;

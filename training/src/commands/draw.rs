@@ -1,11 +1,13 @@
-//! Draws a roundabout as a picture, with what a truck sweeps on one of its routes, or writes its polygons and waypoints as JSON.
+//! Draws a roundabout, or a truck's swept path on one of its routes, or writes polygons and waypoints as JSON.
 
 use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use offtrack::reader::shown;
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::Route;
 use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
+use offtrack::shipped::{Kind, Source};
 use offtrack::vehicle::Vehicle;
 use offtrack_drawing::sheet::{self, Straights};
 use offtrack_drawing::sweep::Sweep;
@@ -40,7 +42,7 @@ pub struct Args {
     /// With --route: speed at which the front axle follows the lane's centre [km/h].
     #[arg(long, default_value_t = 30.0, requires = "route")]
     speed_kmh: f64,
-    /// Whether a gutter is road.
+    /// Whether gutters may be driven on.
     #[arg(long, default_value = "drivable", value_parser = PossibleValuesParser::new(["drivable", "solid"]).map(gutter))]
     gutter: Gutter,
     /// Length of the routes before the ring [m].
@@ -54,7 +56,7 @@ pub struct Args {
     size: u32,
 }
 
-/// What can be written.
+/// The format of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Svg,
@@ -71,13 +73,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if !(1.0..=90.0).contains(&args.speed_kmh) {
         return Err(Error::Flag {
             flag: "--speed-kmh",
-            value: format!("{} km/h", args.speed_kmh),
+            value: format!("{} km/h", shown(args.speed_kmh)),
             expected: "must lie in 1..90 km/h".into(),
         });
     }
     length("--approach", args.approach)?;
     length("--departure", args.departure)?;
-    let roundabout = Roundabout::read(&scenario_file("roundabout", "roundabouts", &args.roundabout)?)?;
+    let roundabout = Roundabout::find(&args.roundabout)?;
     let routes = roundabout.routes(args.approach, args.departure, WAYPOINT_SPACING).map_err(|leaves| {
         let (flag, value) = if leaves.part == "approach" { ("--approach", args.approach) } else { ("--departure", args.departure) };
         Error::Flag { flag, value: format!("{value} m"), expected: leaves.to_string() }
@@ -106,14 +108,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
 }
 
 fn sweep<'a>(args: &Args, roundabout: &Roundabout, route: &'a Route) -> Result<Sweep<'a>, Error> {
-    let file = scenario_file("--vehicle", "vehicles", &args.vehicle)?;
-    let vehicle = Vehicle::read(&file)?;
+    let vehicle = Vehicle::find(&args.vehicle)?;
     if !vehicle.loads.contains_key(&args.load) {
         let loads: Vec<&str> = vehicle.loads.keys().map(String::as_str).collect();
         let expected = format!("the vehicle has {}", loads.join(", "));
         return Err(Error::Flag { flag: "--load", value: args.load.clone(), expected });
     }
-    let name = file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = Source::find(Kind::Vehicle, &args.vehicle)?.stem();
     let driven = format!("{name}, {}, {} km/h", args.load, args.speed_kmh);
     Ok(Sweep::new(&vehicle, &args.load, args.speed_kmh / 3.6, &roundabout.kerbs(args.gutter), route, driven))
 }
@@ -138,19 +139,7 @@ fn length(flag: &'static str, value: f64) -> Result<(), Error> {
     if (5.0..=500.0).contains(&value) {
         return Ok(());
     }
-    Err(Error::Flag { flag, value: format!("{value} m"), expected: "must lie in 5..500 m".into() })
-}
-
-/// A file by its path, or by its name in a folder of the scenarios.
-fn scenario_file(flag: &'static str, folder: &str, name: &str) -> Result<PathBuf, Error> {
-    let path = Path::new(name);
-    if path.extension().is_some_and(|extension| extension == "toml") || path.is_file() {
-        return Ok(path.to_owned());
-    }
-    files::benchmark(&format!("{folder}/{name}")).map_err(|_| {
-        let expected = format!("give the name of a file under scenarios/{folder}/ or a path ending in .toml");
-        Error::Flag { flag, value: name.to_owned(), expected }
-    })
+    Err(Error::Flag { flag, value: format!("{} m", shown(value)), expected: "must lie in 5..500 m".into() })
 }
 
 /// The route with this name; the roundabout's own name before it may be left out.

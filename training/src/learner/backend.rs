@@ -64,7 +64,13 @@ impl Backend {
     }
 
     /// Trucks and a replay buffer there.
-    pub fn rollout(&self, config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<Box<dyn Rollout>, Error> {
+    pub fn rollout(
+        &self,
+        config: &Config,
+        world: &Arc<World>,
+        routes: Vec<u32>,
+        mirror: Option<Mirror>,
+    ) -> Result<Box<dyn Rollout>, Error> {
         match self {
             Backend::Host => Ok(Box::new(HostRollout::new(config, world, routes, mirror)?)),
             #[cfg(feature = "gpu")]

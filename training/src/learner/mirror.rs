@@ -44,7 +44,9 @@ impl Mirror {
             let same = |other: &Action| (action.steering + other.steering).abs() <= SAME && (action.speed - other.speed).abs() <= SAME;
             world.actions.iter().position(same).map(|index| index as u32).ok_or_else(|| {
                 let degrees = action.steering.to_degrees();
-                refused(format!("steering {degrees:.1} deg is in the action table and its opposite is not: leave learning.mirror_augmentation out"))
+                refused(format!(
+                    "steering {degrees:.1} deg is in the action table and its opposite is not: leave learning.mirror_augmentation out"
+                ))
             })
         };
         Ok(Mirror { values, actions: world.actions.iter().map(image).collect::<Result<_, _>>()? })

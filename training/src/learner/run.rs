@@ -22,7 +22,7 @@ use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::config::Config;
 use crate::learner::sac::not_finite;
 use crate::learner::training::Training;
-use crate::policy::Policy;
+use crate::policy::LearnedPolicy;
 use checkpointer::{Checkpointer, Written};
 use folder::Folder;
 use progress::Progress;
@@ -129,7 +129,7 @@ impl Run {
     }
 
     /// The policy as it is; waits for a device.
-    pub fn policy(&self) -> Result<Policy, Error> {
+    pub fn policy(&self) -> Result<LearnedPolicy, Error> {
         self.training.policy()
     }
 

@@ -119,7 +119,13 @@ pub struct Sac {
 
 impl Sac {
     /// A learner with random weights; its policy is close to uniform.
-    pub fn new(learning: &Learning, n_values: usize, n_actions: usize, seed: u64, placement: Placement) -> Result<Sac, ThreadPoolBuildError> {
+    pub fn new(
+        learning: &Learning,
+        n_values: usize,
+        n_actions: usize,
+        seed: u64,
+        placement: Placement,
+    ) -> Result<Sac, ThreadPoolBuildError> {
         let device = placement.learning();
         let rng = &mut SmallRng::seed_from_u64(seed);
         let sizes: Vec<usize> = [n_values].into_iter().chain(learning.hidden.iter().copied()).chain([n_actions]).collect();

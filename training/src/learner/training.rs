@@ -13,7 +13,7 @@ use super::normalisation::Normalisation;
 use super::rollout::Rollout;
 use super::sac::{Sac, Transitions};
 use crate::error::Error;
-use crate::policy::Policy;
+use crate::policy::LearnedPolicy;
 
 /// Trucks, replay buffer and learner.
 pub struct Training {
@@ -124,8 +124,9 @@ impl Training {
     }
 
     /// The policy: the EMA of the actor. Waits for a device.
-    pub fn policy(&self) -> Result<Policy, Error> {
-        Ok(Policy {
+    pub fn policy(&self) -> Result<LearnedPolicy, Error> {
+        Ok(LearnedPolicy {
+            name: "the policy in training".to_owned(),
             benchmark: self.config.benchmark.clone(),
             actions: self.world.actions.clone(),
             normalisation: self.normalisation.clone().map_or_else(|| self.found_normalisation(), Ok)?,

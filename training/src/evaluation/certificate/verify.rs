@@ -1,4 +1,4 @@
-//! Drives the sequences of a certificate again, all at once, through the simulator's own step: nothing in the file is taken on trust.
+//! Drives the sequences of a certificate again, in one batch of the simulator: no claim of the file is believed unchecked.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,8 +17,8 @@ struct Sequence<'a> {
     actions: Vec<u32>,
 }
 
-/// Fails with the first route whose sequence does not arrive; says how many arrived. Routes of the certificate must be the world's; only
-/// those that `wanted` picks are driven.
+/// Drives the sequences of the routes that `wanted` accepts and gives their number, or the first that does not arrive. Every such route
+/// must be one of the world's.
 pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted: impl Fn(&str) -> bool) -> Result<usize, Error> {
     let wrong = |message: String| Error::Contents { file: path.to_owned(), message };
     let (mut sequences, mut routes) = (Vec::new(), Vec::new());
@@ -38,7 +38,7 @@ pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted
     let starts: Vec<Start> = sequences.iter().map(|sequence| sequence.start).collect();
     let mut simulator = Simulator::new(world.clone(), routes.len(), 0, RouteChoice::Fixed(routes))?;
     simulator.reset_from(&starts).map_err(|error| wrong(format!("is a damaged certificate: {error}")))?;
-    // What a truck does after its sequence is nobody's concern, so how it stood at the sequence's end is noted there.
+    // A truck drives on after its sequence, so its end code is taken at the sequence's last step.
     let mut ended = vec![Ended::Running as u32; sequences.len()];
     for step in 0..sequences.iter().map(|sequence| sequence.actions.len()).max().unwrap_or(0) {
         let actions: Vec<u32> = sequences.iter().map(|sequence| sequence.actions.get(step).copied().unwrap_or(0)).collect();

@@ -51,10 +51,7 @@ impl Config {
             return Err(reader.invalid("steps", steps, expected).into());
         }
         if self.device == Device::Gpu {
-            let without = [
-                ("exploration", self.exploration.is_some()),
-                ("replay_buffer.priority", replay_buffer.priority.is_some()),
-            ];
+            let without = [("exploration", self.exploration.is_some()), ("replay_buffer.priority", replay_buffer.priority.is_some())];
             if let Some((key, _)) = without.into_iter().find(|(_, given)| *given) {
                 return Err(reader.invalid(key, "given", "works with device = \"cpu\" alone: leave one of them out").into());
             }

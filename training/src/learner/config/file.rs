@@ -24,7 +24,8 @@ pub(super) fn resolved(file: &Path) -> Result<Table, Error> {
 
 fn with_bases(file: &Path, depth: usize) -> Result<Table, Error> {
     let mut table = table(file)?;
-    let invalid = |value: String, expected: String| reader::Error::Invalid { file: file.to_owned(), key: "base".to_owned(), value, expected };
+    let invalid =
+        |value: String, expected: String| reader::Error::Invalid { file: file.to_owned(), key: "base".to_owned(), value, expected };
     let base = match table.remove("base") {
         None => return Ok(table),
         Some(Value::String(base)) if depth < DEPTH => base,

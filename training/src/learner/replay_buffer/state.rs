@@ -39,6 +39,12 @@ impl<const N: usize> ReplayBuffer<N> {
         let codes: Option<_> = codes.into_iter().map(after).collect();
         self.after = codes.ok_or_else(|| stored.error("its column `replay buffer, after` has an unknown code".to_owned()))?;
         self.restore_truncated(stored)?;
+        let (count, n_envs, n_slots, n_steps) = (self.count, self.n_envs, self.n_slots, self.n_steps);
+        // At least `n_steps` others follow the step of this row.
+        let is_ready = |row: usize| {
+            let last = count - 1;
+            n_steps <= (last + n_slots - row / n_envs) % n_slots
+        };
         if let Some(priorities) = &mut self.priorities {
             let [largest] = stored.array("replay buffer, largest priority")?;
             let rows: Vec<f64> = stored.exactly("replay buffer, priorities", self.n_slots * self.n_envs)?;
@@ -46,8 +52,7 @@ impl<const N: usize> ReplayBuffer<N> {
                 return Err(stored.error("its column `replay buffer, priorities` has one that is negative or above the largest".to_owned()));
             }
             // A row that can be sampled has a priority, any other has none.
-            let sampled = |row: usize| self.n_steps < self.count - self.newest(row / self.n_envs);
-            let ready = |(row, &priority): (usize, &f64)| (0.0 < priority) == (row < n_rows && sampled(row));
+            let ready = |(row, &priority): (usize, &f64)| (0.0 < priority) == (row < n_rows && is_ready(row));
             if !rows.iter().enumerate().all(ready) {
                 let message = "its column `replay buffer, priorities` has one where none may be, or lacks one".to_owned();
                 return Err(stored.error(message));
@@ -68,11 +73,5 @@ impl<const N: usize> ReplayBuffer<N> {
         let observations: Vec<f32> = stored.exactly("replay buffer, truncated observations", rows.len() * N)?;
         self.truncated = rows.iter().map(|&row| row as usize).zip(observations.as_chunks().0.iter().copied()).collect();
         Ok(())
-    }
-
-    /// Steps appended before the one that slot `slot` holds.
-    fn newest(&self, slot: usize) -> usize {
-        let last = self.count - 1;
-        last - (last + self.n_slots - slot) % self.n_slots
     }
 }

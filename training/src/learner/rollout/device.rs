@@ -62,7 +62,13 @@ pub struct DeviceRollout {
 
 impl DeviceRollout {
     /// Trucks at the start of their first episodes, and an empty replay buffer of `config.replay_buffer.capacity` transitions.
-    pub fn new(shared: &Shared, config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<DeviceRollout, Error> {
+    pub fn new(
+        shared: &Shared,
+        config: &Config,
+        world: &Arc<World>,
+        routes: Vec<u32>,
+        mirror: Option<Mirror>,
+    ) -> Result<DeviceRollout, Error> {
         DeviceRollout::with_seeds(shared, config, world, routes, mirror, seeds(config.seed, 0))
     }
 

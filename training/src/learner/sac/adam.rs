@@ -84,10 +84,6 @@ impl Step {
     /// Bias correction: the moments begin at 0 and are too small at first by 1 - decay ^ steps; rate and epsilon make up for it.
     fn new(n_steps: i32, learning_rate: f64, tau: f64) -> Step {
         let [first, second] = DECAY.map(|decay| 1.0 - f64::from(decay).powi(n_steps));
-        Step {
-            learning_rate: (learning_rate * second.sqrt() / first) as f32,
-            epsilon: (EPSILON * second.sqrt()) as f32,
-            tau: tau as f32,
-        }
+        Step { learning_rate: (learning_rate * second.sqrt() / first) as f32, epsilon: (EPSILON * second.sqrt()) as f32, tau: tau as f32 }
     }
 }

@@ -2,6 +2,7 @@
 
 use offtrack::gpu::{Kernels, Slice};
 use offtrack::layout::buffers::Access;
+use offtrack::layout::shared::Shared as _;
 use offtrack::layout::{N_VALUES, shared_wgsl};
 use offtrack::stages::SHADERS;
 use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, BufferBinding, CommandEncoder, ComputePassDescriptor, Device};

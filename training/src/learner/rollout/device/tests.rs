@@ -41,8 +41,10 @@ fn samples_are_the_transitions_that_were_driven_normalised_noisy_and_mirrored_as
     let (world, routes) = training();
     let shared = Shared::open(None).unwrap();
     let mirror = Mirror::of(&world).unwrap();
-    for settings in [["learning.mirror_augmentation=true", "learning.observation_noise=0.2"], ["learning.mirror_augmentation=false", "learning.observation_noise=0"]]
-    {
+    for settings in [
+        ["learning.mirror_augmentation=true", "learning.observation_noise=0.2"],
+        ["learning.mirror_augmentation=false", "learning.observation_noise=0"],
+    ] {
         let config = config(&settings);
         let (n_envs, n_steps, seeds) = (config.n_envs, config.learning.n_steps, [7, 8]);
         let mut rollout = DeviceRollout::with_seeds(&shared, &config, &world, routes.clone(), mirror_of(&config, &mirror), seeds).unwrap();
@@ -141,7 +143,8 @@ fn rewards(skips_flush: bool) -> Vec<Vec<f32>> {
     let (world, routes) = training();
     let mut shared = Shared::open(None).unwrap();
     shared.skips_flush = skips_flush;
-    let mut rollout = DeviceRollout::with_seeds(&shared, &config(&["learning.mirror_augmentation=false"]), &world, routes, None, [7, 8]).unwrap();
+    let mut rollout =
+        DeviceRollout::with_seeds(&shared, &config(&["learning.mirror_augmentation=false"]), &world, routes, None, [7, 8]).unwrap();
     for _ in 0..40 {
         rollout.step_at_random().unwrap();
     }
@@ -168,7 +171,8 @@ fn a_sample_is_read_before_the_next_one_overwrites_it_and_only_because_of_the_fl
 fn trucks_take_the_actions_of_the_latest_output() {
     let (world, routes) = training();
     let shared = Shared::open(None).unwrap();
-    let mut rollout = DeviceRollout::with_seeds(&shared, &config(&["learning.mirror_augmentation=false"]), &world, routes, None, [7, 8]).unwrap();
+    let mut rollout =
+        DeviceRollout::with_seeds(&shared, &config(&["learning.mirror_augmentation=false"]), &world, routes, None, [7, 8]).unwrap();
     let output = |step: usize| {
         let row = (0..9).map(|action| if action == step % 9 { 50.0 } else { 0.0 });
         Tensor::<2>::from_data(TensorData::new(row.collect::<Vec<f32>>(), [1, 9]), &shared.tensors).repeat_dim(0, 64)

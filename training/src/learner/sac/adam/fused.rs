@@ -159,6 +159,7 @@ fn elements_mut(values: &mut TensorData) -> &mut [f32] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::EPSILON;
     use super::*;
     use crate::learner::network::Mlp;
     use burn::optim::{AdamConfig, MultiGradientsParams};
