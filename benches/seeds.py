@@ -5,7 +5,7 @@ The last three rows are the mean over the seeds, the worst seed, and the 95 % in
 
 A run with seed S has two files in the folder of results:
 
-    STEM-S.json         report.json of the run, with the evaluation on the unseen routes
+    STEM-S.json         report.json of the run, with the evaluation on the test routes
     STEM-S-train.json   offtrack evaluate --policy runs/NAME/policy.safetensors --split train --json FILE; optional
 
 The interval is Student's t interval over the seeds' success rates: it says how well so few seeds determine the mean.
@@ -29,7 +29,7 @@ STUDENT_T = {
 }  # fmt: skip
 
 # The table's cells, in order.
-CELLS = ["seed", "unseen", "training", "lane", "own", "time", "updates"]
+CELLS = ["seed", "test", "training", "lane", "own", "time", "updates"]
 
 
 def main():
@@ -40,11 +40,11 @@ def main():
     parser.add_argument("--links", default="seeds/", help="prefix of the links, relative to the page that shows the table")
     args = parser.parse_args()
     rows = [row(args, seed) for seed in seeds(args.seeds)]
-    print("| seed | unseen routes | training routes | lane distance, unseen | where the own lane suffices | time | updates |")
+    print("| seed | test routes | training routes | lane distance, test routes | where the own lane suffices | time | updates |")
     print("|---|---|---|---|---|---|---|")
     for each in rows:
         print("| " + " | ".join(str(each[key]) for key in CELLS) + " |")
-    columns = [[each["unseen_success"] for each in rows], [each["training_success"] for each in rows]]
+    columns = [[each["test_success"] for each in rows], [each["training_success"] for each in rows]]
     for name, value in (("mean", mean), ("worst", worst), ("95 % interval of the mean", interval)):
         cells = [value(column) if None not in column else "" for column in columns]
         print(f"| **{name}** | {cells[0]} | {cells[1]} | | | | |")
@@ -69,20 +69,20 @@ def row(args, seed):
     """What one seed came to; its training routes are left empty where they were not evaluated."""
     name = f"{args.stem}-{seed}.json"
     run = read(args.folder / name)
-    unseen = evaluation(args.folder / name, run)
+    test = evaluation(args.folder / name, run)
     train_name = f"{args.stem}-{seed}-train.json"
     train_file = args.folder / train_name
     training = evaluation(train_file, read(train_file)) if train_file.is_file() else None
     if run.get("seed") != seed:
         sys.exit(f"{args.folder / name}: seed: {run.get('seed')}; must be {seed}, as the file's name says")
-    own = unseen.get("own_lane_suffices")
+    own = test.get("own_lane_suffices")
     return {
         "seed": seed,
-        "unseen": link(args, unseen, name),
-        "unseen_success": success(unseen),
+        "test": link(args, test, name),
+        "test_success": success(test),
         "training": link(args, training, train_name) if training else "",
         "training_success": success(training) if training else None,
-        "lane": f"{unseen['lane_distance_mean']:.2f} m",
+        "lane": f"{test['lane_distance_mean']:.2f} m",
         "own": f"{own['lane_distance_mean']:.2f} m" if own else "",
         "time": f"{run['seconds']:.0f} s",
         "updates": f"{run['updates']:,}",
