@@ -26,7 +26,7 @@ CHOICES = {
     "1-step returns": ["learning.n_steps=1"],
     "3-step returns": ["learning.n_steps=3"],
     "gamma 0.99": ["learning.discount=0.99"],
-    "entropy in the actor's loss alone": ["learning.entropy.in_target=false"],
+    "entropy in the actor loss alone": ["learning.entropy.in_target=false"],
     "layer normalisation in the critics": ["learning.layer_norm=true"],
     "lower of the two critics": ["learning.critics=lowest"],
     "prioritised replay": ["memory.priority.exponent=0.6", "memory.priority.correction=0.4"],
