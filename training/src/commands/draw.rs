@@ -9,7 +9,7 @@ use offtrack::route::Route;
 use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
 use offtrack::shipped::{Kind, Source};
 use offtrack::vehicle::Vehicle;
-use offtrack_drawing::sheet::{self, Straights};
+use offtrack_drawing::figure::{self, Straights};
 use offtrack_drawing::sweep::Sweep;
 use offtrack_drawing::{polygons, rasterised};
 
@@ -92,10 +92,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let straights = Straights { approach: args.approach, departure: args.departure };
     let page = match route {
-        None => sheet::of_all(&roundabout, &routes, straights, args.gutter),
+        None => figure::roundabout(&roundabout, &routes, straights, args.gutter),
         Some(route) => {
             let sweep = sweep(args, &roundabout, route)?;
-            sheet::of_sweep(&roundabout, &routes, straights, args.gutter, &sweep)
+            figure::swept_path(&roundabout, &routes, straights, args.gutter, &sweep)
         }
     };
     let svg = page.map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?;

@@ -13,7 +13,7 @@ use offtrack::world::World;
 
 use offtrack_drawing::episode::Scene;
 use offtrack_drawing::recording::{Map, Measures, Recorder, Recording, centre_line};
-use offtrack_drawing::{Failure, film, rasterised};
+use offtrack_drawing::{film, rasterised};
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::policies::Policy;
 use offtrack_training::files;
@@ -87,7 +87,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
 }
 
 /// The recording in the format asked for.
-fn bytes(format: Format, size: Option<u32>, recording: &Recording, chosen: &Chosen, gutter: Gutter) -> Result<Vec<u8>, Failure> {
+fn bytes(
+    format: Format,
+    size: Option<u32>,
+    recording: &Recording,
+    chosen: &Chosen,
+    gutter: Gutter,
+) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
     if format == Format::Json {
         let mut text = serde_json::to_string(recording)?;
         text.push('\n');
@@ -96,11 +102,11 @@ fn bytes(format: Format, size: Option<u32>, recording: &Recording, chosen: &Chos
     let scene = Scene::new(recording, chosen.roundabout, gutter, chosen.route)?;
     if format != Format::Gif {
         let svg = scene.still();
-        return if format == Format::Png { rasterised(&svg, size.unwrap_or(1000)) } else { Ok(svg.into_bytes()) };
+        return if format == Format::Png { Ok(rasterised(&svg, size.unwrap_or(1000))?) } else { Ok(svg.into_bytes()) };
     }
-    let pages = film::pages(recording.frames.len(), recording.step);
-    let bar = progress::Bar::new("drawing", "frames", pages.len());
-    film::gif(&scene, &pages, size.unwrap_or(720), || bar.advance())
+    let frames = film::frames(recording.frames.len(), recording.step);
+    let bar = progress::Bar::new("drawing", "frames", frames.len());
+    Ok(film::gif(&scene, &frames, size.unwrap_or(720), || bar.advance())?)
 }
 
 fn format(output: &Path) -> Result<Format, Error> {
