@@ -66,7 +66,8 @@ pub struct Line {
 /// How a line looks.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Kind {
-    /// Measured: a mark at each point, with its least and greatest value where they are known, in the order of the points.
+    /// Measured: a mark at each point, with its least and greatest value where they are known, in the order of the
+    /// points.
     Measured(Vec<(f64, f64)>),
     /// For comparison: dashed.
     Reference,

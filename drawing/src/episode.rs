@@ -1,4 +1,5 @@
-//! A recorded episode on the map, as a still with the swept paths of both units. `episode/moving.rs` draws the pictures of a film.
+//! A recorded episode on the map, as a still with the swept paths of both units. `episode/moving.rs` draws the pictures
+//! of a film.
 
 mod moving;
 
@@ -41,7 +42,8 @@ pub struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// The scene of a recording that was made on this route of the roundabout; `gutter` says whether gutters are drivable.
+    /// The scene of a recording that was made on this route of the roundabout; `gutter` says whether gutters are
+    /// drivable.
     ///
     /// # Errors
     ///

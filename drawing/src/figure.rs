@@ -15,8 +15,8 @@ use crate::lettering::{Align, Lettering};
 use crate::road::Road;
 use crate::sweep::Sweep;
 
-/// Colours that differ for colour-blind readers and in grey: the hues of P. Tol's "vibrant" scheme. Channels of areas are multiples of 15,
-/// which the quantisation of a PNG leaves as they are.
+/// Colours that differ for colour-blind readers and in grey: the hues of P. Tol's "vibrant" scheme. Channels of areas
+/// are multiples of 15, which the quantisation of a PNG leaves as they are.
 pub(crate) mod colour {
     pub const INK: &str = "#1a1a1a";
     pub const FAINT: &str = "#6e6e6e";

@@ -1,4 +1,5 @@
-//! A film of an episode as an animated GIF. All pictures share one palette, and each holds only the pixels that changed.
+//! A film of an episode as an animated GIF. All pictures share one palette, and each holds only the pixels that
+//! changed.
 
 use std::collections::BTreeMap;
 
@@ -19,8 +20,8 @@ const N_LEVELS: usize = 255 / COLOUR_STEP as usize + 1;
 /// Index of the transparent colour, after all others.
 const UNCHANGED: u8 = 255;
 
-/// Indices of the frames of a recording that a film shows: the first, the last, and those between at even distances. `step` is the time
-/// between two frames [s].
+/// Indices of the frames of a recording that a film shows: the first, the last, and those between at even distances.
+/// `step` is the time between two frames [s].
 pub fn frames(n_frames: usize, step: f64) -> Vec<usize> {
     let stride = (DRIVEN / step).round().max(1.0) as usize;
     let last = n_frames - 1;
@@ -40,7 +41,8 @@ pub fn gif(scene: &Scene, frames: &[usize], width: u32, mut drawn: impl FnMut())
     let options = usvg::Options::default();
     let background = painted(&usvg::Tree::from_str(&scene.film_background(), &options)?, width, None)?;
     let picture = |index: usize| painted(&usvg::Tree::from_str(&scene.film_picture(index), &options)?, width, Some(&background));
-    // The colours of the film: the last picture has the longest paths and the end in words, one half way has the truck in the ring.
+    // The colours of the film: the last picture has the longest paths and the end in words, one half way has the truck
+    // in the ring.
     let samples = [picture(frames[frames.len() / 2])?, picture(frames[frames.len() - 1])?];
     let palette = Palette::of(&samples);
     let (width, height) = (background.width(), background.height());
@@ -59,7 +61,8 @@ pub fn gif(scene: &Scene, frames: &[usize], width: u32, mut drawn: impl FnMut())
     Ok(encoder.into_inner().map_err(gif::EncodingError::from)?)
 }
 
-/// The least rectangle with all pixels that differ, in a picture `width` pixels wide; the whole picture if `before` is empty.
+/// The least rectangle with all pixels that differ, in a picture `width` pixels wide; the whole picture if `before` is
+/// empty.
 fn changed(before: &[u8], now: &[u8], width: usize) -> gif::Frame<'static> {
     let differs = |at: usize| before.get(at) != Some(&now[at]);
     let (mut left, mut right, mut top, mut bottom) = (width, 0, usize::MAX, 0);

@@ -1,9 +1,12 @@
 //! Pictures of roundabouts, swept paths, episodes and measurements, as SVG, PNG and GIF.
 //!
-//! - [`figure::roundabout`] draws a roundabout with its routes, [`figure::swept_path`] a [`sweep::Sweep`] on one of them.
-//! - [`recording::Recorder`] records episodes of a batch, [`episode::Scene`] draws one as a still, [`film::gif`] as a film.
+//! - [`figure::roundabout`] draws a roundabout with its routes, [`figure::swept_path`] a [`sweep::Sweep`] on one of
+//!   them.
+//! - [`recording::Recorder`] records episodes of a batch, [`episode::Scene`] draws one as a still, [`film::gif`] as a
+//!   film.
 //! - [`chart::Chart`] draws measurements over logarithmic axes.
-//! - [`rasterised`] makes a PNG of any of these SVGs. Text is drawn as outlines, so that pictures are equal on every machine.
+//! - [`rasterised`] makes a PNG of any of these SVGs. Text is drawn as outlines, so that pictures are equal on every
+//!   machine.
 //!
 //! ```
 //! use offtrack::roundabout::{Gutter, Roundabout};

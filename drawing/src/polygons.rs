@@ -26,11 +26,11 @@ struct WrittenRoute<'a> {
     waypoints: Vec<[f64; 3]>,
 }
 
-/// Polygons and waypoints as one line of JSON, in metres and radians:
-/// `{"solids": [[[x, y], ...], ...], "drivable": [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x, y, heading], ...]}]}`.
+/// Polygons and waypoints as one line of JSON, in metres and radians: `{"solids": [[[x, y], ...], ...], "drivable":
+/// [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x, y, heading], ...]}]}`.
 ///
-/// `drivable` is the outer boundary, then one hole for each island; `solids` are the islands, then the ground beyond the boundary as two
-/// polygons. Curves are within 1 cm.
+/// `drivable` is the outer boundary, then one hole for each island; `solids` are the islands, then the ground beyond
+/// the boundary as two polygons. Curves are within 1 cm.
 ///
 /// # Errors
 ///
@@ -73,7 +73,8 @@ fn corners(kerbs: &Outline) -> (Vec<Vec<DVec2>>, Vec<Vec<DVec2>>) {
     (boundary.into_iter().map(closed).collect(), islands.into_iter().map(closed).collect())
 }
 
-/// The ground around a counter-clockwise boundary, cut at its westernmost and easternmost points into a northern and a southern polygon.
+/// The ground around a counter-clockwise boundary, cut at its westernmost and easternmost points into a northern and a
+/// southern polygon.
 fn ground(boundary: &[DVec2]) -> [Vec<DVec2>; 2] {
     let n = boundary.len();
     let furthest = |sign: f64| (0..n).max_by(|&a, &b| (sign * boundary[a].x).total_cmp(&(sign * boundary[b].x))).unwrap_or(0);

@@ -1,7 +1,8 @@
 //! A recording: the states of one truck through an episode, step by step, independent of any picture of it.
 //!
-//! Frame 0 is the start, before any action; frame n is the state after step n, up to and including the step that ended the episode.
-//! Numbers are rounded when they are recorded (lengths to 1 mm, angles to 0.1 mrad), so that a file holds the recording exactly.
+//! Frame 0 is the start, before any action; frame n is the state after step n, up to and including the step that ended
+//! the episode. Numbers are rounded when they are recorded (lengths to 1 mm, angles to 0.1 mrad), so that a file holds
+//! the recording exactly.
 
 use offtrack::angle::wrapped;
 use offtrack::cpu::collide;
@@ -50,8 +51,8 @@ pub struct Frame {
     pub trailer_load_transfer_ratio: f32,
     /// Of the step; 0 at the start.
     pub reward: f32,
-    /// Distance along each ray to the kerb, the trailer's 16 first, left and right alternating, front to rear, then the tractor's 13 from
-    /// left to right [m].
+    /// Distance along each ray to the kerb, the trailer's 16 first, left and right alternating, front to rear, then the
+    /// tractor's 13 from left to right [m].
     pub ranges: [f32; N_RAYS],
 }
 
@@ -104,8 +105,8 @@ pub struct Track {
     pub frames: Vec<Frame>,
 }
 
-/// Records some trucks of a batch while it is stepped. Made for [`offtrack::simulator::RouteChoice::Fixed`], where a truck is held after its
-/// episode: the first episode of each truck is kept.
+/// Records some trucks of a batch while it is stepped. Made for [`offtrack::simulator::RouteChoice::Fixed`], where a
+/// truck is held after its episode: the first episode of each truck is kept.
 #[derive(Debug)]
 pub struct Recorder {
     tracks: Vec<Track>,
@@ -154,8 +155,8 @@ impl From<Rectangle> for Body {
     }
 }
 
-/// Dimensions of the truck for drawing it. The origin of the tractor is the frame's `position`, that of the trailer `trailer_position`; x
-/// forward, y left.
+/// Dimensions of the truck for drawing it. The origin of the tractor is the frame's `position`, that of the trailer
+/// `trailer_position`; x forward, y left.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measures {
     /// Front axle ahead of the drive axle [m].
@@ -200,8 +201,8 @@ impl Measures {
 /// A roundabout as lines of points [m].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Map {
-    /// Polygons around the drivable area: the outer boundary counter-clockwise, then each island clockwise, without a repeated first
-    /// point. A point is drivable if an odd number of them contain it.
+    /// Polygons around the drivable area: the outer boundary counter-clockwise, then each island clockwise, without a
+    /// repeated first point. A point is drivable if an odd number of them contain it.
     pub drivable: Vec<Polygon>,
     /// The lanes' centre lines.
     pub lanes: Vec<Polygon>,

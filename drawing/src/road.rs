@@ -111,7 +111,8 @@ impl<'a> Road<'a> {
         })
     }
 
-    /// Stations of the arrows of a route: two on its approach, one at every eighth of the ring, two on its departure [m].
+    /// Stations of the arrows of a route: two on its approach, one at every eighth of the ring, two on its departure
+    /// [m].
     fn arrow_stations(&self, line: &Curve) -> Vec<f64> {
         let eighth = |s: f64| (line.point_at(s).to_angle() / FRAC_PI_4).floor();
         let (enters, leaves) = (self.straights.approach, line.length() - self.straights.departure);

@@ -45,7 +45,8 @@ struct Unit {
 }
 
 impl<'a> Sweep<'a> {
-    /// The path of `vehicle` with this load at `speed` [m/s]. `kerbs` are the roundabout's, `driven` is vehicle, load and speed in words.
+    /// The path of `vehicle` with this load at `speed` [m/s]. `kerbs` are the roundabout's, `driven` is vehicle, load
+    /// and speed in words.
     ///
     /// # Panics
     ///
@@ -89,7 +90,8 @@ impl<'a> Sweep<'a> {
         self.units.iter().fold(Definitions::new(), |all, unit| all.add(Path::new().set("id", unit.name).set("d", area(unit))))
     }
 
-    /// The swept areas, to be drawn below the kerbs. The tractor's hides the trailer's: what remains of it is the off-tracking.
+    /// The swept areas, to be drawn below the kerbs. The tractor's hides the trailer's: what remains of it is the
+    /// off-tracking.
     pub(crate) fn areas(&self) -> Group {
         self.units.iter().rev().fold(Group::new(), |group, unit| group.add(unit.area(unit.light)))
     }
@@ -179,7 +181,8 @@ impl Unit {
 
 /// Path data of the area that a rectangle sweeps through the poses `corners`, for the non-zero fill rule.
 pub(crate) fn swept_area(view: &View, corners: &[[DVec2; 4]]) -> String {
-    // Hulls of neighbouring poses leave no teeth where a corner swings out. All have one orientation: the non-zero fill is their union.
+    // Hulls of neighbouring poses leave no teeth where a corner swings out. All have one orientation: the non-zero fill
+    // is their union.
     corners.windows(2).map(|pair| view.polygon(&hull(pair.concat()))).collect()
 }
 
@@ -195,7 +198,8 @@ pub(crate) fn nearest(corners: &[DVec2; 4], kerbs: &Outline) -> (DVec2, f64) {
     points.map(|p| (p, nearby.signed_distance(p))).fold((centre, f64::INFINITY), |least, here| if here.1 < least.1 { here } else { least })
 }
 
-/// The corners of the convex hull, counter-clockwise (A. M. Andrew, "Another efficient algorithm for convex hulls in two dimensions", 1979).
+/// The corners of the convex hull, counter-clockwise (A. M. Andrew, "Another efficient algorithm for convex hulls in
+/// two dimensions", 1979).
 fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let chain = |points: &mut dyn Iterator<Item = DVec2>| {
@@ -236,7 +240,8 @@ mod tests {
         let kerb = Outline::new(vec![Curve::circle(DVec2::ZERO, 50.0), Curve::circle(DVec2::new(0.0, -3.0), 2.0)]);
         let body = [(6.0, 1.2), (-6.0, 1.2), (-6.0, -1.2), (6.0, -1.2)].map(|(x, y)| DVec2::new(x, y));
         let (at, depth) = nearest(&body, &kerb);
-        // The circle reaches up to y = -1, 0.2 m into the body; its nearest point to the side's middle lies straight below.
+        // The circle reaches up to y = -1, 0.2 m into the body; its nearest point to the side's middle lies straight
+        // below.
         assert!((depth + 0.2).abs() < 1e-9 && at.distance(DVec2::new(0.0, -1.2)) < 1e-9, "{at} {depth}");
     }
 }

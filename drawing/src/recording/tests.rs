@@ -9,7 +9,8 @@ fn scenario() -> Scenario {
     Scenario::named("attard2023").unwrap()
 }
 
-/// Two trucks on the first two test routes that steer hard left until each collides: their tracks, and the batch after every step.
+/// Two trucks on the first two test routes that steer hard left until each collides: their tracks, and the batch after
+/// every step.
 fn driven(scenario: &Scenario) -> (Arc<World>, Vec<Track>, Vec<Batch>) {
     let world = Arc::new(World::bake(scenario));
     let routes = scenario.split(Split::Test)[..2].to_vec();

@@ -23,11 +23,12 @@ pub struct Args {
     roundabout: String,
     /// The file to write: .svg, .png, or .json for polygons and waypoints.
     ///
-    /// JSON: {"solids": [[[x, y], ...], ...], "drivable": [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x, y, heading], ...]}]} in
-    /// metres and radians, x east, y north, the ring's centre at the origin. No polygon repeats its first point at its end; curves are
-    /// within 1 cm. `drivable` is the surface's outer boundary, then one hole for each island. `solids` are the islands, then the ground beyond
-    /// the outer boundary as two polygons, north and south, up to 5 m past the kerbs. So a point is drivable when an odd number of
-    /// `drivable` contain it, and solid when any of `solids` does.
+    /// JSON: {"solids": [[[x, y], ...], ...], "drivable": [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x,
+    /// y, heading], ...]}]} in metres and radians, x east, y north, the ring's centre at the origin. No polygon repeats
+    /// its first point at its end; curves are within 1 cm. `drivable` is the surface's outer boundary, then one hole
+    /// for each island. `solids` are the islands, then the ground beyond the outer boundary as two polygons, north and
+    /// south, up to 5 m past the kerbs. So a point is drivable when an odd number of `drivable` contain it, and solid
+    /// when any of `solids` does.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// Draw the swept path on this route: N-left-3, or 16m/N-left-3. JSON then lists this route alone.

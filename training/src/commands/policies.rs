@@ -11,8 +11,8 @@ use offtrack_training::policy::LearnedPolicy;
 /// Which policy drives.
 #[derive(Debug, clap::Args)]
 pub struct Choice {
-    /// A policy file, `pursuit` (pure pursuit of the lane's centre), `random`, or the name of a shipped policy. Without it the policy shipped
-    /// for the benchmark or, where there is none, the one for attard2023.
+    /// A policy file, `pursuit` (pure pursuit of the lane's centre), `random`, or the name of a shipped policy. Without
+    /// it the policy shipped for the benchmark or, where there is none, the one for attard2023.
     #[arg(long)]
     policy: Option<String>,
     /// With `pursuit`: look-ahead distance [m].

@@ -1,6 +1,7 @@
 //! Records one episode: as data, as a film, or as a still with the swept paths of both units.
 //!
-//! The truck drives in the batch of an evaluation with the same seed, so that its episode is the one that `evaluate` counts.
+//! The truck drives in the batch of an evaluation with the same seed, so that its episode is the one that `evaluate`
+//! counts.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -30,10 +31,11 @@ pub struct Args {
     route: String,
     /// The file to write: .gif, .png, .svg, or .json for data.
     ///
-    /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed", "episode",
-    /// "episodes", "step" [s], "ended", "vehicle": dimensions and sensors, "actions": [[steer angle, speed], ...], "map": {"drivable", "lanes"},
-    /// "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state after step n, the step that ended the episode included.
-    /// Metres, seconds and radians, x east, y north, the ring's centre at the origin.
+    /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed",
+    /// "episode", "episodes", "step" [s], "ended", "vehicle": dimensions and sensors, "actions": [[steer angle, speed],
+    /// ...], "map": {"drivable", "lanes"}, "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state
+    /// after step n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's
+    /// centre at the origin.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// A benchmark's name, or the path of its file.
