@@ -60,7 +60,7 @@ impl Evaluation<'_> {
         let routes = scenario.split(split);
         if routes.is_empty() {
             let value = split.name().to_owned();
-            return Err(Error::Flag { flag: "--split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
+            return Err(Error::Flag { flag: "split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
         }
         let trucks: Vec<u32> = routes.iter().flat_map(|&route| std::iter::repeat_n(route, episodes)).collect();
         let mut simulator = Simulator::on(device.engine.clone(), world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?;
@@ -98,8 +98,8 @@ impl Evaluation<'_> {
         let kerbs: Vec<Outline> = scenario.places.iter().map(|place| place.roundabout.kerbs(scenario.gutter)).collect();
         let all: Vec<_> = scenario.routes().collect();
         let suffices = |&index: &u32| {
-            let (place, route) = all[index as usize];
-            own_lane_suffices(rig, &kerbs[place], &swept_path(rig, &route.centre_line, scenario.cruising_speed(), 0.25))
+            let (roundabout, route) = all[index as usize];
+            own_lane_suffices(rig, &kerbs[roundabout], &swept_path(rig, &route.centre_line, scenario.cruising_speed(), 0.25))
         };
         let routes = scenario.split(split);
         let own_lane: Vec<bool> = routes.iter().map(suffices).collect();

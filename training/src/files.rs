@@ -64,7 +64,7 @@ pub fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), Error> {
 
 /// Begin and end of a temporary file's name. The process that writes it stands between: `.offtrack-123-Xy9z2w.tmp`.
 const TEMPORARY: (&str, &str) = (".offtrack-", ".tmp");
-/// A temporary file that was not written to for this long belongs to nobody if its process does not exist here: a
+/// A temporary file that was not written to for this long is stale if its process does not exist here: a
 /// folder may be shared with other machines and containers, whose processes cannot be seen.
 const STALE: Duration = Duration::from_secs(60);
 
@@ -78,7 +78,7 @@ fn temporary_in(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
-/// Removes temporary files of processes that no longer run from `folder`. One that cannot be removed harms nobody.
+/// Removes temporary files of processes that no longer run from `folder`. One that cannot be removed stays.
 pub fn remove_stale(folder: &Path) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for entry in entries.flatten() {

@@ -134,12 +134,12 @@ struct Chosen<'a> {
 
 impl<'a> Chosen<'a> {
     fn new(scenario: &'a Scenario, name: &str) -> Result<Chosen<'a>, Error> {
-        let Some((index, (place, route))) = scenario.routes().enumerate().find(|(_, (_, route))| route.name == name) else {
+        let Some((index, (roundabout, route))) = scenario.routes().enumerate().find(|(_, (_, route))| route.name == name) else {
             return Err(Error::Flag { flag: "--route", value: name.to_owned(), expected: known(scenario, name) });
         };
         let within = |split: Split| Some((split, scenario.split(split).iter().position(|&other| other as usize == index)?));
         let (split, in_split) = within(Split::Test).or_else(|| within(Split::Train)).expect("a benchmark's route is in one of its splits");
-        Ok(Chosen { route, roundabout: &scenario.places[place].roundabout, split, in_split })
+        Ok(Chosen { route, roundabout: &scenario.places[roundabout].roundabout, split, in_split })
     }
 }
 

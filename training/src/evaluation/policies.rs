@@ -5,7 +5,6 @@ use std::path::Path;
 
 use offtrack::layout::{Action, Truck, WaypointRow};
 use offtrack::random::{self, Draw};
-use offtrack::reader::shown;
 use offtrack::simulator::Batch;
 use offtrack::world::World;
 
@@ -29,10 +28,6 @@ pub trait Policy {
 /// benchmark. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where
 /// there is none, the one for attard2023. `look_ahead` is pure pursuit's [m], `seed` that of random actions.
 pub fn find(policy: Option<&str>, benchmark: &str, look_ahead: f32, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
-    if !(1.0..=50.0).contains(&look_ahead) {
-        let value = format!("{} m", shown(look_ahead.into()));
-        return Err(Error::Flag { flag: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
-    }
     let learned = match policy {
         Some("pursuit") => return Ok(Box::new(PurePursuit { look_ahead })),
         Some("random") => return Ok(Box::new(UniformRandom { seed })),

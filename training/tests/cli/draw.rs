@@ -156,8 +156,8 @@ fn sides(polygon: &Polygon) -> impl Iterator<Item = (DVec2, DVec2)> {
 }
 
 fn to_segment(p: DVec2, a: DVec2, b: DVec2) -> f64 {
-    let share = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
-    p.distance(a.lerp(b, share))
+    let fraction = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+    p.distance(a.lerp(b, fraction))
 }
 
 fn contains(polygon: &Polygon, p: DVec2) -> bool {
