@@ -1,5 +1,5 @@
-//! What can go wrong while training, evaluating or drawing: one error type for this crate, above those of the simulator's edges
-//! ([`offtrack::reader::Error`] for files, [`offtrack::simulator::Error`] for batches and devices).
+//! What can go wrong while training, evaluating or drawing: one error type for this crate, above those of the
+//! simulator's edges ([`offtrack::reader::Error`] for files, [`offtrack::simulator::Error`] for batches and devices).
 
 use std::path::{Path, PathBuf};
 
@@ -86,8 +86,8 @@ pub enum Error {
 }
 
 impl Error {
-    /// Whether the input was wrong: a file, a setting or a batch asked for. Otherwise something failed on valid input: a device, a disk, the
-    /// learner, or a certificate.
+    /// Whether the input was wrong: a file, a setting or a batch asked for. Otherwise something failed on valid input:
+    /// a device, a disk, the learner, or a certificate.
     pub fn is_wrong_input(&self) -> bool {
         let failed = matches!(self, Error::Write { .. } | Error::Threads(_) | Error::Diverged { .. } | Error::NotVerified { .. });
         !failed && !device::has_failed(self)

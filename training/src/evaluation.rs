@@ -25,7 +25,8 @@ use report::{Episode, Report, RouteReport, Summary};
 
 pub use table::legend;
 
-/// What a policy is evaluated on: a number of episodes on every route of a split, all in one batch, one episode a truck.
+/// What a policy is evaluated on: a number of episodes on every route of a split, all in one batch, one episode a
+/// truck.
 #[derive(Debug, Clone, Copy)]
 pub struct Evaluation<'a> {
     /// The benchmark.
@@ -45,20 +46,21 @@ pub struct Evaluation<'a> {
 }
 
 impl Evaluation<'_> {
-    /// The policy's report and, if recorded, the episodes in the order of its routes. `progress` is as in [`Evaluation::drive`].
+    /// The policy's report and, if recorded, the episodes in the order of its routes. `progress` is as in
+    /// [`Evaluation::drive`].
     pub fn report(&self, policy: &mut dyn Policy, progress: &mut dyn FnMut(usize, usize)) -> Result<(Report, Vec<Track>), Error> {
         let (finished, tracks) = self.drive(policy, progress)?;
         Ok((self.summarised(policy.name(), &finished), tracks))
     }
 
-    /// The episodes, route by route in the order of the split; if recorded, also every state of each. `progress` is called with the number
-    /// of finished episodes and the number of all, after each step that finished one.
+    /// The episodes, route by route in the order of the split; if recorded, also every state of each. `progress` is
+    /// called with the number of finished episodes and the number of all, after each step that finished one.
     pub fn drive(&self, policy: &mut dyn Policy, progress: &mut dyn FnMut(usize, usize)) -> Result<(Vec<Episode>, Vec<Track>), Error> {
         let Evaluation { scenario, world, split, episodes, seed, record, device } = *self;
         let routes = scenario.split(split);
         if routes.is_empty() {
             let value = split.name().to_owned();
-            return Err(Error::Flag { flag: "--split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
+            return Err(Error::Flag { flag: "split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
         }
         let trucks: Vec<u32> = routes.iter().flat_map(|&route| std::iter::repeat_n(route, episodes)).collect();
         let mut simulator = Simulator::on(device.engine.clone(), world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?;
@@ -96,8 +98,8 @@ impl Evaluation<'_> {
         let kerbs: Vec<Outline> = scenario.places.iter().map(|place| place.roundabout.kerbs(scenario.gutter)).collect();
         let all: Vec<_> = scenario.routes().collect();
         let suffices = |&index: &u32| {
-            let (place, route) = all[index as usize];
-            own_lane_suffices(rig, &kerbs[place], &swept_path(rig, &route.centre_line, scenario.cruising_speed(), 0.25))
+            let (roundabout, route) = all[index as usize];
+            own_lane_suffices(rig, &kerbs[roundabout], &swept_path(rig, &route.centre_line, scenario.cruising_speed(), 0.25))
         };
         let routes = scenario.split(split);
         let own_lane: Vec<bool> = routes.iter().map(suffices).collect();
@@ -130,7 +132,8 @@ struct Running {
     lane_distance_sum: f64,
     /// Its figures so far; the mean and the off-tracking follow at its end.
     episode: Episode,
-    /// Path of the front axle. Its first point lies far behind the start, so that the trailer's axle is beside it from the first step on.
+    /// Path of the front axle. Its first point lies far behind the start, so that the trailer's axle is beside it from
+    /// the first step on.
     front_path: Vec<Vec2>,
     trailer_path: Vec<Vec2>,
 }
@@ -192,8 +195,8 @@ fn front_axle(rig: &Rig, truck: &Truck) -> Vec2 {
     truck.position + rig.wheelbase * Vec2::from_angle(truck.heading)
 }
 
-/// Largest distance of a point of `trailer` from the path `front` [m]. The trailer follows the path in order, so the search for the
-/// nearest segment only moves forwards.
+/// Largest distance of a point of `trailer` from the path `front` [m]. The trailer follows the path in order, so the
+/// search for the nearest segment only moves forwards.
 fn off_tracking(front: &[Vec2], trailer: &[Vec2]) -> f64 {
     let distance = |point: Vec2, index: usize| f64::from(offtrack::cpu::follow::distance_to_segment(point, front[index], front[index + 1]));
     let mut index = 0;

@@ -9,7 +9,8 @@ use serde::Serialize;
 
 use crate::error::Error;
 
-/// The file of a benchmark: a path as it is, or a name in `scenarios/` here or, failing that, where the program was built.
+/// The file of a benchmark: a path as it is, or a name in `scenarios/` here or, failing that, where the program was
+/// built.
 pub fn benchmark(name: &str) -> Result<PathBuf, Error> {
     let path = PathBuf::from(name);
     if path.extension().is_some_and(|extension| extension == "toml") || path.is_file() {
@@ -45,8 +46,8 @@ pub fn write_json(file: &Path, value: &impl Serialize) -> Result<(), Error> {
     write_whole(file, text.as_bytes())
 }
 
-/// Writes `bytes` to a temporary file beside `file` and renames it, so that `file` is never half written: not after a crash, and not on a
-/// full disk. Temporary files that killed programs left in the folder are removed.
+/// Writes `bytes` to a temporary file beside `file` and renames it, so that `file` is never half written: not after a
+/// crash, and not on a full disk. Temporary files that killed programs left in the folder are removed.
 pub fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), Error> {
     let folder = match file.parent() {
         Some(folder) if folder != Path::new("") => folder,
@@ -63,8 +64,8 @@ pub fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), Error> {
 
 /// Begin and end of a temporary file's name. The process that writes it stands between: `.offtrack-123-Xy9z2w.tmp`.
 const TEMPORARY: (&str, &str) = (".offtrack-", ".tmp");
-/// A temporary file that was not written to for this long belongs to nobody if its process does not exist here: a folder may be shared with
-/// other machines and containers, whose processes cannot be seen.
+/// A temporary file that was not written to for this long is stale if its process does not exist here: a
+/// folder may be shared with other machines and containers, whose processes cannot be seen.
 const STALE: Duration = Duration::from_secs(60);
 
 /// A temporary file that, once renamed, has the permissions of any new file.
@@ -77,7 +78,7 @@ fn temporary_in(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
-/// Removes temporary files of processes that no longer run from `folder`. One that cannot be removed harms nobody.
+/// Removes temporary files of processes that no longer run from `folder`. One that cannot be removed stays.
 pub fn remove_stale(folder: &Path) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
@@ -118,7 +119,8 @@ impl Drop for Listed {
     }
 }
 
-/// Removes the temporary files that this process is writing. For a process about to end at once: whatever is being written is given up.
+/// Removes the temporary files that this process is writing. For a process about to end at once: whatever is being
+/// written is given up.
 pub fn remove_temporaries() {
     for file in WRITING.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
         let _ = std::fs::remove_file(file);

@@ -1,6 +1,7 @@
 //! Policies for tractor-trailers in roundabouts: learned, loaded, evaluated.
 //!
-//! A policy that comes with the project, one truck on each route that it never saw in training, until every episode has ended:
+//! A policy that comes with the project, one truck on each route that it never saw in training, until every episode has
+//! ended:
 //!
 //! ```
 //! use std::sync::Arc;
@@ -27,8 +28,8 @@
 //! # }
 //! ```
 //!
-//! The command line `offtrack` is the binary of this package; the feature `cli`, on by default, builds it. Without the feature `gpu` no
-//! graphics crate is built.
+//! The command line `offtrack` is the binary of this package; the feature `cli`, on by default, builds it. Without the
+//! feature `gpu` no graphics crate is built.
 
 pub mod device; // what steps the trucks
 pub mod error;

@@ -11,7 +11,8 @@ use offtrack_training::{files, provenance};
 
 use commands::{bench, certify, deviations, devices, draw, evaluate, record, scale, trace, train};
 
-/// Batches of tensors are allocated thousands of times a second; the system's allocator takes a third of an update's time.
+/// Batches of tensors are allocated thousands of times a second; the system's allocator takes a third of an update's
+/// time.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

@@ -1,7 +1,8 @@
 //! A learned policy: the actor with all that is needed to drive with it, in one file.
 //!
-//! The file is in the safetensors format, which other programs read too: the weights, and under the key `offtrack` of its metadata the
-//! action table, the benchmark and a checksum over all of it. The policies that come with the project are part of the library.
+//! The file is in the safetensors format, which other programs read too: the weights, and under the key `offtrack` of
+//! its metadata the action table, the benchmark and a checksum over all of it. The policies that come with the project
+//! are part of the library.
 
 mod file;
 
@@ -51,7 +52,8 @@ impl LearnedPolicy {
         greedy(&logits(&self.actor, &self.normalisation, observations), self.actions.len())
     }
 
-    /// Reads a policy file. One that is cut, changed, or of another format, and one with a number that is not finite, is refused.
+    /// Reads a policy file. One that is cut, changed, or of another format, and one with a number that is not finite,
+    /// is refused.
     pub fn load(file: &Path) -> Result<LearnedPolicy, Error> {
         let bytes = reader::read_bytes(file, FILE_LIMIT)?;
         let contents = Contents::from_bytes(&bytes).map_err(|message| Error::Contents { file: file.to_owned(), message })?;
@@ -71,8 +73,8 @@ impl LearnedPolicy {
         }
     }
 
-    /// The policy that comes with the project for this benchmark or, where there is none, the one for `attard2023`: other benchmarks may
-    /// share its vehicle and actions.
+    /// The policy that comes with the project for this benchmark or, where there is none, the one for `attard2023`:
+    /// other benchmarks may share its vehicle and actions.
     pub fn shipped_or_default(benchmark: &str) -> Result<LearnedPolicy, Error> {
         let known = LearnedPolicy::shipped_names().contains(&benchmark);
         LearnedPolicy::shipped(if known { benchmark } else { "attard2023" })

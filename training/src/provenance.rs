@@ -20,15 +20,15 @@ fn described(name: &str, cores: usize) -> String {
     format!("{name}, {cores} {}", if cores == 1 { "core" } else { "cores" })
 }
 
-/// States the commit that the program was built from, once and before anything is written. The binary does, so that a new commit recompiles
-/// the binary and not this library.
+/// States the commit that the program was built from, once and before anything is written. The binary does, so that a
+/// new commit recompiles the binary and not this library.
 pub fn set_commit(commit: &'static str) {
     // A second call changes nothing: results of one process have one commit.
     let _ = COMMIT.set(commit);
 }
 
-/// The commit that the program was built from, with `-dirty` if its sources differed from it. Where the build did not know, it is the
-/// variable `OFFTRACK_COMMIT` of the environment, else `unknown`.
+/// The commit that the program was built from, with `-dirty` if its sources differed from it. Where the build did not
+/// know, it is the variable `OFFTRACK_COMMIT` of the environment, else `unknown`.
 pub fn commit() -> String {
     let stated = COMMIT.get().copied().filter(|&commit| commit != UNKNOWN).map(str::to_owned);
     stated.or_else(|| std::env::var("OFFTRACK_COMMIT").ok()).unwrap_or_else(|| UNKNOWN.to_owned())

@@ -1,15 +1,15 @@
 //! The commit that a program is built from, for its results.
 //!
-//! A macro and not a build script: a new commit recompiles the crate that uses the macro, where a build script would recompile the whole
-//! package, the learner with it.
+//! A macro and not a build script: a new commit recompiles the crate that uses the macro, where a build script would
+//! recompile the whole package, the learner with it.
 
 use std::path::Path;
 use std::process::Command;
 
 use proc_macro::TokenStream;
 
-/// The commit that the sources of the calling crate are at, as a string, with `-dirty` if they differ from it. Without git it is the variable
-/// `OFFTRACK_COMMIT` of the build's environment, else `unknown`.
+/// The commit that the sources of the calling crate are at, as a string, with `-dirty` if they differ from it. Without
+/// git it is the variable `OFFTRACK_COMMIT` of the build's environment, else `unknown`.
 #[proc_macro]
 pub fn commit(_: TokenStream) -> TokenStream {
     let stated = || std::env::var("OFFTRACK_COMMIT").ok().filter(|commit| !commit.is_empty());

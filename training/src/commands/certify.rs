@@ -1,6 +1,8 @@
-//! Shows which routes can be completed at all: searches for action sequences that complete each from several starts, and drives them again.
+//! Shows which routes can be completed at all: searches for action sequences that complete each from several starts,
+//! and drives them again.
 //!
-//! A route that no search completed may still be possible: the report names the searches made and the progress of the best candidate.
+//! A route that no search completed may still be possible: the report names the searches made and the progress of the
+//! best candidate.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -138,7 +140,8 @@ fn passes(widths: &[usize], hold: usize) -> Vec<Pass> {
     passes
 }
 
-/// Searches from one start until a pass arrives or all have been made. Without an arrival the result is the pass with the most progress.
+/// Searches from one start until a pass arrives or all have been made. Without an arrival the result is the pass with
+/// the most progress.
 fn attempt(world: &Arc<World>, route: u32, start: &Start, passes: &[Pass], policy: Option<&LearnedPolicy>) -> Result<Found, Error> {
     let mut env_steps = 0;
     let mut best: Option<(Pass, Outcome)> = None;

@@ -12,7 +12,8 @@ use offtrack_training::files;
 /// Most bytes of a measured roundabout.
 const LIMIT: u64 = 16 << 20;
 
-/// Compare a roundabout with a measured one: road edges with solid gutters, and lane centre lines, within 45 m of the centre.
+/// Compare a roundabout with a measured one: road edges with solid gutters, and lane centre lines, within 45 m of the
+/// centre.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A roundabout's name, or the path of its file.

@@ -9,7 +9,7 @@ use offtrack::route::Route;
 use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
 use offtrack::shipped::{Kind, Source};
 use offtrack::vehicle::Vehicle;
-use offtrack_drawing::sheet::{self, Straights};
+use offtrack_drawing::figure::{self, Straights};
 use offtrack_drawing::sweep::Sweep;
 use offtrack_drawing::{polygons, rasterised};
 
@@ -23,11 +23,12 @@ pub struct Args {
     roundabout: String,
     /// The file to write: .svg, .png, or .json for polygons and waypoints.
     ///
-    /// JSON: {"solids": [[[x, y], ...], ...], "drivable": [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x, y, heading], ...]}]} in
-    /// metres and radians, x east, y north, the ring's centre at the origin. No polygon repeats its first point at its end; curves are
-    /// within 1 cm. `drivable` is the surface's outer boundary, then one hole for each island. `solids` are the islands, then the ground beyond
-    /// the outer boundary as two polygons, north and south, up to 5 m past the kerbs. So a point is drivable when an odd number of
-    /// `drivable` contain it, and solid when any of `solids` does.
+    /// JSON: {"solids": [[[x, y], ...], ...], "drivable": [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x,
+    /// y, heading], ...]}]} in metres and radians, x east, y north, the ring's centre at the origin. No polygon repeats
+    /// its first point at its end; curves are within 1 cm. `drivable` is the surface's outer boundary, then one hole
+    /// for each island. `solids` are the islands, then the ground beyond the outer boundary as two polygons, north and
+    /// south, up to 5 m past the kerbs. So a point is drivable when an odd number of `drivable` contain it, and solid
+    /// when any of `solids` does.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// Draw the swept path on this route: N-left-3, or 16m/N-left-3. JSON then lists this route alone.
@@ -92,10 +93,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let straights = Straights { approach: args.approach, departure: args.departure };
     let page = match route {
-        None => sheet::of_all(&roundabout, &routes, straights, args.gutter),
+        None => figure::roundabout(&roundabout, &routes, straights, args.gutter),
         Some(route) => {
             let sweep = sweep(args, &roundabout, route)?;
-            sheet::of_sweep(&roundabout, &routes, straights, args.gutter, &sweep)
+            figure::swept_path(&roundabout, &routes, straights, args.gutter, &sweep)
         }
     };
     let svg = page.map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?;

@@ -1,6 +1,7 @@
 //! Records one episode: as data, as a film, or as a still with the swept paths of both units.
 //!
-//! The truck drives in the batch of an evaluation with the same seed, so that its episode is the one that `evaluate` counts.
+//! The truck drives in the batch of an evaluation with the same seed, so that its episode is the one that `evaluate`
+//! counts.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,7 +14,7 @@ use offtrack::world::World;
 
 use offtrack_drawing::episode::Scene;
 use offtrack_drawing::recording::{Map, Measures, Recorder, Recording, centre_line};
-use offtrack_drawing::{Failure, film, rasterised};
+use offtrack_drawing::{film, rasterised};
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::policies::Policy;
 use offtrack_training::files;
@@ -30,10 +31,11 @@ pub struct Args {
     route: String,
     /// The file to write: .gif, .png, .svg, or .json for data.
     ///
-    /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed", "episode",
-    /// "episodes", "step" [s], "ended", "vehicle": dimensions and sensors, "actions": [[steer angle, speed], ...], "map": {"drivable", "lanes"},
-    /// "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state after step n, the step that ended the episode included.
-    /// Metres, seconds and radians, x east, y north, the ring's centre at the origin.
+    /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed",
+    /// "episode", "episodes", "step" [s], "ended", "vehicle": dimensions and sensors, "actions": [[steer angle, speed],
+    /// ...], "map": {"drivable", "lanes"}, "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state
+    /// after step n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's
+    /// centre at the origin.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// A benchmark's name, or the path of its file.
@@ -87,7 +89,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
 }
 
 /// The recording in the format asked for.
-fn bytes(format: Format, size: Option<u32>, recording: &Recording, chosen: &Chosen, gutter: Gutter) -> Result<Vec<u8>, Failure> {
+fn bytes(
+    format: Format,
+    size: Option<u32>,
+    recording: &Recording,
+    chosen: &Chosen,
+    gutter: Gutter,
+) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
     if format == Format::Json {
         let mut text = serde_json::to_string(recording)?;
         text.push('\n');
@@ -96,11 +104,11 @@ fn bytes(format: Format, size: Option<u32>, recording: &Recording, chosen: &Chos
     let scene = Scene::new(recording, chosen.roundabout, gutter, chosen.route)?;
     if format != Format::Gif {
         let svg = scene.still();
-        return if format == Format::Png { rasterised(&svg, size.unwrap_or(1000)) } else { Ok(svg.into_bytes()) };
+        return if format == Format::Png { Ok(rasterised(&svg, size.unwrap_or(1000))?) } else { Ok(svg.into_bytes()) };
     }
-    let pages = film::pages(recording.frames.len(), recording.step);
-    let bar = progress::Bar::new("drawing", "frames", pages.len());
-    film::gif(&scene, &pages, size.unwrap_or(720), || bar.advance())
+    let frames = film::frames(recording.frames.len(), recording.step);
+    let bar = progress::Bar::new("drawing", "frames", frames.len());
+    Ok(film::gif(&scene, &frames, size.unwrap_or(720), || bar.advance())?)
 }
 
 fn format(output: &Path) -> Result<Format, Error> {
@@ -126,12 +134,12 @@ struct Chosen<'a> {
 
 impl<'a> Chosen<'a> {
     fn new(scenario: &'a Scenario, name: &str) -> Result<Chosen<'a>, Error> {
-        let Some((index, (place, route))) = scenario.routes().enumerate().find(|(_, (_, route))| route.name == name) else {
+        let Some((index, (roundabout, route))) = scenario.routes().enumerate().find(|(_, (_, route))| route.name == name) else {
             return Err(Error::Flag { flag: "--route", value: name.to_owned(), expected: known(scenario, name) });
         };
         let within = |split: Split| Some((split, scenario.split(split).iter().position(|&other| other as usize == index)?));
         let (split, in_split) = within(Split::Test).or_else(|| within(Split::Train)).expect("a benchmark's route is in one of its splits");
-        Ok(Chosen { route, roundabout: &scenario.places[place].roundabout, split, in_split })
+        Ok(Chosen { route, roundabout: &scenario.places[roundabout].roundabout, split, in_split })
     }
 }
 

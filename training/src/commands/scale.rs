@@ -253,7 +253,7 @@ fn write(args: &Args, scale: &Scale, title: &str) -> Result<(), Error> {
 }
 
 /// For `map_err` on a picture being drawn.
-fn failed(file: &Path) -> impl FnOnce(offtrack_drawing::Failure) -> Error {
+fn failed(file: &Path) -> impl FnOnce(offtrack_drawing::Error) -> Error {
     let file = file.to_owned();
     move |source| Error::Write { file, source: std::io::Error::other(source) }
 }

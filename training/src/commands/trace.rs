@@ -1,4 +1,5 @@
-//! `offtrack trace`: drives the trajectory cases of a file with the simulator's equations of motion and prints the states asked for.
+//! `offtrack trace`: drives the trajectory cases of a file with the simulator's equations of motion and prints the
+//! states asked for.
 
 use std::path::{Path, PathBuf};
 
@@ -15,8 +16,9 @@ const LIMIT: u64 = 16 << 20;
 
 /// Drive the trajectory cases of a file of reference vectors and print the truck's state at the times they ask for.
 ///
-/// A case has a vehicle, `dt`, `init`, `commands` and `t_end`; its times are `times` or those of `expected`. A sub-step is `dt` long; a
-/// time between two sub-steps is reached with a shorter one. Cases of another kind are named on standard error and skipped.
+/// A case has a vehicle, `dt`, `init`, `commands` and `t_end`; its times are `times` or those of `expected`. A sub-step
+/// is `dt` long; a time between two sub-steps is reached with a shorter one. Cases of another kind are named on
+/// standard error and skipped.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// JSON file with `cases`, in the format of tests/data/physics_vectors.json

@@ -1,4 +1,5 @@
-//! The result of an evaluation: every episode counted, for each route and in all. It is serialised as JSON; `table` prints it.
+//! The result of an evaluation: every episode counted, for each route and in all. It is serialised as JSON; `table`
+//! prints it.
 
 use std::collections::BTreeMap;
 
@@ -113,8 +114,8 @@ impl Summary {
     }
 }
 
-/// The 95 % Wilson interval of the fraction `successes / trials` (E. Wilson, "Probable Inference, the Law of Succession, and Statistical
-/// Inference", 1927).
+/// The 95 % Wilson interval of the fraction `successes / trials` (E. Wilson, "Probable Inference, the Law of
+/// Succession, and Statistical Inference", 1927).
 pub fn wilson(successes: usize, trials: usize) -> (f64, f64) {
     const Z: f64 = 1.959_964;
     let (n, p) = (trials as f64, successes as f64 / trials as f64);

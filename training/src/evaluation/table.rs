@@ -59,8 +59,8 @@ const ALL: [Column; 13] = [
 ];
 
 impl Report {
-    /// The table that a person reads, at most `width` characters wide where that leaves room for the route and its success: a line a route,
-    /// then the sums, then what the columns mean.
+    /// The table that a person reads, at most `width` characters wide where that leaves room for the route and its
+    /// success: a line a route, then the sums, then what the columns mean.
     pub fn table(&self, width: usize) -> String {
         let routes: Vec<Line> = self
             .routes

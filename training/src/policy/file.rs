@@ -90,8 +90,8 @@ impl Contents {
         Contents::from_tensors(description, &read)
     }
 
-    /// The numbers of a file whose checksum is right. Shapes may still be those of another observation or action table, and values may
-    /// not be finite.
+    /// The numbers of a file whose checksum is right. Shapes may still be those of another observation or action table,
+    /// and values may not be finite.
     fn from_tensors(description: Description, tensors: &[(String, TensorView)]) -> Result<Contents, String> {
         for (name, tensor) in tensors {
             if let Some((index, value)) = floats(tensor.data()).into_iter().enumerate().find(|(_, value)| !value.is_finite()) {

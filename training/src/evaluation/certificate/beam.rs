@@ -1,7 +1,8 @@
 //! A beam search over action sequences: can this route be completed from this start at all?
 //!
-//! At one speed all candidates of a depth have made the same progress, so they are ranked by a discounted cost of how safely they drove.
-//! Candidates in nearly the same state would fill the beam with copies of one plan: only the best of those is kept.
+//! At one speed all candidates of a depth have made the same progress, so they are ranked by a discounted cost of how
+//! safely they drove. Candidates in nearly the same state would fill the beam with copies of one plan: only the best of
+//! those is kept.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -20,13 +21,15 @@ const DISCOUNT: f32 = 0.95;
 const MARGIN: f32 = 0.6;
 /// Cost of the squared distance to the lane centre [1/m^2]; the cost of touching a kerb is 1.
 const LANE_WEIGHT: f32 = 0.1;
-/// Cost of the squared heading difference between the tractor and the lane a little ahead [1/rad^2]. Without it a beam misses the entry.
+/// Cost of the squared heading difference between the tractor and the lane a little ahead [1/rad^2]. Without it a beam
+/// misses the entry.
 const HEADING_WEIGHT: f32 = 1.0;
 /// Waypoints beyond the next one at which that lane heading is taken.
 const AHEAD: usize = 1;
 /// Cost of a load transfer ratio at its limit, to the fourth power: half of the limit costs little.
 const LOAD_TRANSFER_WEIGHT: f32 = 0.3;
-/// Two candidates are in nearly the same state if these agree after rounding: position [m], headings [rad], steer angle [rad].
+/// Two candidates are in nearly the same state if these agree after rounding: position [m], headings [rad], steer angle
+/// [rad].
 const POSITION_BIN: f32 = 0.2;
 const HEADING_BIN: f32 = 0.035;
 const STEER_BIN: f32 = 0.07;
@@ -79,7 +82,8 @@ struct Candidate {
     cost: f32,
 }
 
-/// Searches for a sequence of actions that completes `route` from `start`. With a `policy`, its own sequence is a candidate until it fails.
+/// Searches for a sequence of actions that completes `route` from `start`. With a `policy`, its own sequence is a
+/// candidate until it fails.
 pub fn search(world: &Arc<World>, route: u32, start: &Start, pass: Pass, policy: Option<&LearnedPolicy>) -> Result<Outcome, Error> {
     let mut simulator = Simulator::new(world.clone(), 1, 0, RouteChoice::Fixed(vec![route]))?;
     simulator.reset_from(&[*start])?;
@@ -143,8 +147,8 @@ fn branched(world: &World, batch: &Batch, beam: &[Candidate], straight: u32, hol
     (rows, children)
 }
 
-/// The actions that differ within `hold` steps: the steer angle changes at a limited rate, so all levels beyond reach are equal. The `last`
-/// action represents those equal to it, so that a sequence changes seldom.
+/// The actions that differ within `hold` steps: the steer angle changes at a limited rate, so all levels beyond reach
+/// are equal. The `last` action represents those equal to it, so that a sequence changes seldom.
 fn distinct(world: &World, steering: f32, last: u32, hold: usize) -> Vec<u32> {
     let params = &world.params;
     let reach = params.rig.steer_rate * (hold as u32 * params.n_substeps) as f32 * params.substep;

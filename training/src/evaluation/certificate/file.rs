@@ -1,7 +1,9 @@
-//! A certificate: which routes of a benchmark were completed from which starts, and the action sequences that completed them.
+//! A certificate: which routes of a benchmark were completed from which starts, and the action sequences that completed
+//! them.
 //!
-//! A sequence is run-length encoded, `4x12 5x3`: action 4 twelve times, then action 5 three times. Vehicle, clock and action table are
-//! stated beside them, so that a file made under other conditions is refused by the condition that differs.
+//! A sequence is run-length encoded, `4x12 5x3`: action 4 twelve times, then action 5 three times. Vehicle, clock and
+//! action table are stated beside them, so that a file made under other conditions is refused by the condition that
+//! differs.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -159,8 +161,8 @@ impl Certificate {
         files::write_whole(file, text.as_bytes())
     }
 
-    /// Whether the sequences of this certificate are valid in `scenario`: whatever moves a truck or ends its episode must be equal. `file` is
-    /// for the error.
+    /// Whether the sequences of this certificate are valid in `scenario`: whatever moves a truck or ends its episode
+    /// must be equal. `file` is for the error.
     pub fn check(&self, scenario: &Scenario, world: &World, file: &Path) -> Result<(), Error> {
         let here = conditions(scenario, world);
         let keys = self.conditions.keys().chain(here.keys());
@@ -179,7 +181,8 @@ impl Certificate {
     }
 }
 
-/// Whatever moves a truck or ends its episode, apart from the roads. Numbers are rounded, so that they are equal on all machines.
+/// Whatever moves a truck or ends its episode, apart from the roads. Numbers are rounded, so that they are equal on all
+/// machines.
 fn conditions(scenario: &Scenario, world: &World) -> BTreeMap<String, String> {
     let list = |values: &mut dyn Iterator<Item = f32>| values.map(|value| format!("{value:.4}")).collect::<Vec<_>>().join(" ");
     let params = &world.params;

@@ -1,4 +1,5 @@
-//! Drives the sequences of a certificate again, in one batch of the simulator: no claim of the file is believed unchecked.
+//! Drives the sequences of a certificate again, in one batch of the simulator: no claim of the file is believed
+//! unchecked.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,8 +18,8 @@ struct Sequence<'a> {
     actions: Vec<u32>,
 }
 
-/// Drives the sequences of the routes that `wanted` accepts and gives their number, or the first that does not arrive. Every such route
-/// must be one of the world's.
+/// Drives the sequences of the routes that `wanted` accepts and gives their number, or the first that does not arrive.
+/// Every such route must be one of the world's.
 pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted: impl Fn(&str) -> bool) -> Result<usize, Error> {
     let wrong = |message: String| Error::Contents { file: path.to_owned(), message };
     let (mut sequences, mut routes) = (Vec::new(), Vec::new());

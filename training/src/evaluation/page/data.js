@@ -1,6 +1,7 @@
 // The data blocks of the page: the report, the roundabouts, the training figures and every recorded episode.
 //
-// Episodes lie column by column: for each column and episode the difference to the frame before, as zigzag varint, all of it gzipped.
+// Episodes lie column by column: for each column and episode the difference to the frame before, as zigzag varint, all
+// of it gzipped.
 
 /** The text of a data block. */
 const block = (id) => byId(id).textContent.trim();

@@ -1,5 +1,5 @@
-// The replay of one episode, with the figures of the current frame. A link ending in #20m/W-left-3/4/7.5 opens the fifth episode of that
-// route at 7.5 s.
+// The replay of one episode, with the figures of the current frame. A link ending in #20m/W-left-3/4/7.5 opens the
+// fifth episode of that route at 7.5 s.
 
 const toDegrees = (angle) => (180 * angle) / Math.PI;
 

@@ -1,5 +1,5 @@
-// A row a route, grouped by roundabout: success with its interval, ends by code, distance to the lane centre, peak load transfer ratio and
-// articulation. A table, so that each bar stands beside its number.
+// A row a route, grouped by roundabout: success with its interval, ends by code, distance to the lane centre, peak load
+// transfer ratio and articulation. A table, so that each bar stands beside its number.
 
 const METRICS = [["success", "Success"], ["ends", "Ends"], ["lane", "Lane"], ["transfer", "LTR"], ["articulation", "Articulation"]];
 

@@ -1,4 +1,5 @@
-// Opened with #selftest the page checks itself and writes the result into the document, for a test that reads the document.
+// Opened with #selftest the page checks itself and writes the result into the document, for a test that reads the
+// document.
 
 /** Each check throws when it does not hold. */
 const CHECKS = {

@@ -1,5 +1,6 @@
-//! Recorded episodes in few bytes: whole numbers of a unit, column by column, the difference to the previous frame as a zigzag varint
-//! (seven bits a byte, lowest first, the eighth bit set if more follow; 0, -1, 1, -2 are 0, 1, 2, 3), gzipped, in base64.
+//! Recorded episodes in few bytes: whole numbers of a unit, column by column, the difference to the previous frame as a
+//! zigzag varint (seven bits a byte, lowest first, the eighth bit set if more follow; 0, -1, 1, -2 are 0, 1, 2, 3),
+//! gzipped, in base64.
 //!
 //! The first difference of each episode is to 0. `data.js` decodes them.
 
