@@ -18,7 +18,7 @@
 # OFFTRACK_COMMIT  the commit that the programs were built from, for the results, where git cannot tell
 # ADAPTER          part of an adapter's name, see `offtrack devices`
 # FILTER           test name filters separated by spaces, such as `device parity`; without it all tests run
-# TRAINING_OPTIONS more options for the training run, such as `--set memory.capacity=100000` for an adapter with little
+# TRAINING_OPTIONS more options for the training run, such as `--set replay_buffer.capacity=100000` for an adapter with little
 #                  memory
 # ENVS, MODES, SECONDS_EACH, TRAINING, MINUTES   what is measured, as below
 set -uo pipefail

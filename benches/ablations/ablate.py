@@ -21,28 +21,28 @@ from queue import Queue
 # What differs from training/configs/default.toml: name -> settings. Each is a row of the table.
 CHOICES = {
     "default": [],
-    "no mirror augmentation": ["learning.mirror=false"],
+    "no mirror augmentation": ["learning.mirror_augmentation=false"],
     "no observation noise": ["learning.observation_noise=0.0"],
     "1-step returns": ["learning.n_steps=1"],
     "3-step returns": ["learning.n_steps=3"],
-    "gamma 0.99": ["learning.discount=0.99"],
+    "gamma 0.99": ["learning.gamma=0.99"],
     "entropy in the actor loss alone": ["learning.entropy.in_target=false"],
     "layer normalisation in the critics": ["learning.layer_norm=true"],
-    "lower of the two critics": ["learning.critics=lowest"],
-    "prioritised replay": ["memory.priority.exponent=0.6", "memory.priority.correction=0.4"],
+    "lower of the two critics": ["learning.critics=minimum"],
+    "prioritised replay": ["replay_buffer.priority.exponent=0.6", "replay_buffer.priority.correction=0.4"],
     "random actions with a rate per truck": [
-        "exploration.first=0.4",
-        "exploration.last=0.4",
+        "exploration.initial_fraction=0.4",
+        "exploration.final_fraction=0.4",
         "exploration.steps=1",
         "exploration.spread=7.0",
     ],
-    "no observation normalisation": ["learning.scale_observations=false"],
+    "no observation normalisation": ["learning.normalise_observations=false"],
     "no reward scale": ["learning.reward_scale=1.0"],
     "128 trucks": ["n_envs=128"],
     "batch of 2,048": ["learning.batch=2048"],
     "layers of 512, 512, 1,024": ["learning.hidden=[512, 512, 1024]"],
-    "no EMA of the actor": ["learning.average_rate=1.0"],
-    "training on the benchmark itself": ["practice="],
+    "no EMA of the actor": ["learning.actor_ema_rate=1.0"],
+    "training on the benchmark itself": ["training_benchmark="],
 }
 
 # Env steps of a run, and of the choices that need more time for each.

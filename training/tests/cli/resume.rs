@@ -17,8 +17,8 @@ fn place() -> Place {
     let place = Place::new();
     let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
     let state = "exploration = { initial_fraction = 0.5, final_fraction = 0.1, steps = 1200, spread = 1.0 }\n";
-    let memory = "warmup = 400, priority = { exponent = 0.6, correction = 0.4 }";
-    let changed = training.replace("warmup = 400", memory).replace("layer_norm = false", "layer_norm = true");
+    let buffer = "warmup = 400, priority = { exponent = 0.6, correction = 0.4 }";
+    let changed = training.replace("warmup = 400", buffer).replace("layer_norm = false", "layer_norm = true");
     std::fs::write(place.file("tiny.toml"), format!("checkpoint_minutes = 0.0001\n{state}{changed}")).unwrap();
     place
 }
@@ -326,7 +326,7 @@ fn what_cannot_be_written_is_reported_once_and_written_once_it_can_be() {
 }
 
 #[test]
-fn a_full_disk_fails_a_run_only_at_its_end_after_the_examination() {
+fn a_full_disk_fails_a_run_only_at_its_end_after_the_evaluation() {
     let place = place();
     // Files of at most 500 blocks of 512 bytes: all fit but the checkpoint.
     let program = env!("CARGO_BIN_EXE_offtrack");
@@ -334,11 +334,11 @@ fn a_full_disk_fails_a_run_only_at_its_end_after_the_examination() {
     let line = format!("trap '' XFSZ; ulimit -f 500; exec {program} train {training} --out {runs} --name run");
     let output = Command::new("sh").args(["-c", &line]).output().unwrap();
     let message = refusal(&output, 1);
-    // A run so short may meet the full disk at its end alone.
-    assert!(message.matches("the run goes on").count() <= 1, "{message}");
+    // So short a run may meet the full disk at its end alone.
+    assert!(message.matches("training goes on").count() <= 1, "{message}");
     assert!(message.lines().last().unwrap().contains("checkpoint.safetensors: cannot be written: File too large"), "{message}");
     assert!(!place.file("runs/run/checkpoint.part").exists());
-    // One from the beginning, when the memory was short, may have fitted: it is whole, and with room the run goes on from it.
+    // One from the beginning, when the replay buffer was small, may have fitted: it is whole, and with room the run continues from it.
     if place.file("runs/run/checkpoint.safetensors").exists() {
         succeed(&resume(&place, "run", &[]));
     }
