@@ -107,9 +107,8 @@ impl Run {
         Ok(())
     }
 
-    /// Writes a row of metrics, once all numbers have been checked.
+    /// Writes a row of metrics, once its figures have been checked.
     fn write_row(&mut self) -> Result<(), Error> {
-        self.check()?;
         self.add_sums()?;
         let entropy_coefficient = self.training.sac().entropy_coefficient();
         self.progress.write_row(entropy_coefficient);
