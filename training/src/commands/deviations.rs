@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
+use offtrack::reader::{read_text, shortened};
 use offtrack::roundabout::Roundabout;
-use offtrack::roundabout::deviation::{Measured, deviations};
+use offtrack_comparison::FILE_LIMIT;
+use offtrack_comparison::deviation::{Measured, deviations};
 
 use offtrack_training::error::Error;
 use offtrack_training::files;
@@ -11,18 +13,18 @@ use offtrack_training::files;
 /// Compare a roundabout with a measured one: road edges with solid gutters, and lane centre lines, within 45 m of the centre.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A roundabout file, scenarios/roundabouts/16m.toml.
-    roundabout: PathBuf,
-    /// Its measured counterpart, tests/data/measured/16m.json.
+    /// A roundabout's name, or the path of its file.
+    roundabout: String,
+    /// Its measured counterpart, a JSON file as tests/data/measured/16m.json.
     measured: PathBuf,
 }
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
-    let roundabout = Roundabout::read(&args.roundabout)?;
-    let text = std::fs::read_to_string(&args.measured).map_err(Error::read(&args.measured))?;
+    let roundabout = Roundabout::find(&args.roundabout)?;
+    let text = read_text(&args.measured, FILE_LIMIT)?;
     let wrong = |message: String| Error::Contents { file: args.measured.clone(), message };
-    let measured: Measured = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+    let measured: Measured = serde_json::from_str(&text).map_err(|error| wrong(shortened(&error.to_string(), 600)))?;
     let rows = deviations(&roundabout, &measured).map_err(|error| wrong(error.to_string()))?;
     let mut table = format!("{:<14} {:>21} {:>30}\n", roundabout.name, "measured to model", "model to measured");
     table += &format!("{:<14} {:>8} {:>8} {:>8} {:>12} {:>8} {:>8}\n", "", "worst m", "mean m", "points", "worst m", "mean m", "points");

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::trace::{Case, Traced, trace};
+use offtrack::reader::{read_text, shortened};
+use offtrack_comparison::FILE_LIMIT;
+use offtrack_comparison::trace::{Case, Traced, trace};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -53,18 +55,18 @@ pub fn run(args: &Args) -> Result<(), Error> {
 
 fn report(file: &Path) -> Result<Report, Error> {
     let wrong = |message: String| Error::Contents { file: file.to_owned(), message };
-    let text = std::fs::read_to_string(file).map_err(Error::read(file))?;
+    let text = read_text(file, FILE_LIMIT)?;
     let written: Value = serde_json::from_str(&text).map_err(|error| wrong(format!("no JSON: {error}")))?;
     let cases = written["cases"].as_array().ok_or_else(|| wrong("cases: missing or no list; a list of cases is needed".to_owned()))?;
     let mut report = Report { cases: Vec::new(), not_taken: Vec::new() };
     for (index, case) in cases.iter().enumerate() {
         let text = |key: &str| {
             let text = case[key].as_str().map(str::to_owned);
-            text.ok_or_else(|| wrong(format!("cases[{index}].{key}: {}; must be text", case[key])))
+            text.ok_or_else(|| wrong(format!("cases[{index}].{key}: {}; must be text", shortened(&case[key].to_string(), 100))))
         };
         let (id, kind) = (text("id")?, text("kind")?);
         if kind == "trajectory" {
-            let case = Case::deserialize(case).map_err(|error| wrong(format!("case {id:?}: {error}")))?;
+            let case = Case::deserialize(case).map_err(|error| wrong(shortened(&format!("case {id:?}: {error}"), 600)))?;
             report.cases.push(trace(&case).map_err(|error| wrong(error.to_string()))?);
         } else {
             report.not_taken.push(NotTaken { id, kind });
