@@ -26,7 +26,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Error> {
     let roundabout = Roundabout::find(&args.roundabout)?;
     let text = reader::read_text(&args.measured, LIMIT)?;
-    let wrong = |message: String| Error::Contents { file: args.measured.clone(), message };
+    let wrong = |message: String| Error::contents(&args.measured, message);
     let measured: Measured = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     let rows = deviations(&roundabout, &measured).map_err(|error| wrong(error.to_string()))?;
     let mut table = format!("{:<14} {:>21} {:>30}\n", roundabout.name, "measured to model", "model to measured");

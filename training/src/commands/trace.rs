@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::reader;
+use offtrack::reader::{self, shortened};
 use offtrack::trace::{Case, Traced, trace};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 }
 
 fn report(file: &Path) -> Result<Report, Error> {
-    let wrong = |message: String| Error::Contents { file: file.to_owned(), message };
+    let wrong = |message: String| Error::contents(file, message);
     let text = reader::read_text(file, LIMIT)?;
     let written: Value = serde_json::from_str(&text).map_err(|error| wrong(format!("is not JSON: {error}")))?;
     let cases = written["cases"].as_array().ok_or_else(|| wrong("cases: missing or not a list; a list of cases is needed".to_owned()))?;
@@ -66,7 +66,7 @@ fn report(file: &Path) -> Result<Report, Error> {
     for (index, case) in cases.iter().enumerate() {
         let text = |key: &str| {
             let text = case[key].as_str().map(str::to_owned);
-            text.ok_or_else(|| wrong(format!("cases[{index}].{key}: {}; must be text", case[key])))
+            text.ok_or_else(|| wrong(format!("cases[{index}].{key}: {}; must be text", shortened(&case[key].to_string(), 100))))
         };
         let (id, kind) = (text("id")?, text("kind")?);
         if kind == "trajectory" {
