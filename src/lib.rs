@@ -19,7 +19,6 @@ pub mod shipped; // the scenario files that come with the library
 pub mod simulator; // many trucks, many steps
 pub mod stages; // one step, in order
 pub mod swept; // the path of a truck that never leaves its line
-pub mod trace; // one truck, open loop, for comparison with references
 pub mod vehicle; // tractor, trailer, load
 pub mod world; // what trucks share, baked
 

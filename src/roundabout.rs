@@ -5,12 +5,11 @@
 
 mod alignment;
 mod check;
-pub mod deviation;
 mod kerb;
 mod lane;
+mod roundabout_keys;
 #[cfg(test)]
 mod tests;
-mod written;
 
 use std::path::Path;
 
@@ -21,7 +20,7 @@ use crate::reader::{Error, Reader};
 use crate::route::{Lane, LeavesWorld, Route, waypoints};
 use crate::shipped::{Kind, Source};
 use lane::Lanes;
-use written::{Arm, Ring, Written};
+use roundabout_keys::{Arm, Ring, Written};
 
 /// Whether trucks may use the strip between the driving lanes and the kerb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Deserialize, serde::Serialize)]
@@ -92,12 +91,23 @@ impl Roundabout {
         let kerbs = kerb::kerbs(&reader, &ring, &arms)?;
         let lanes = Lanes::new(&reader, &ring, &arms)?;
         check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes)?;
+        check::lanes_beside_each_other(&reader, &arms, &lanes)?;
         Ok(Roundabout { name, ring, arms, kerbs, lanes })
     }
 
     /// The names of the arms, counter-clockwise, in the order of the file.
     pub fn arms(&self) -> impl Iterator<Item = &str> {
         self.arms.iter().map(|arm| arm.name.as_str())
+    }
+
+    /// Radius of the central island's kerb face [m].
+    pub fn island_radius(&self) -> f64 {
+        self.ring.island_radius
+    }
+
+    /// Width of the strip between a kerb's face and the lane beside it [m].
+    pub fn gutter(&self) -> f64 {
+        self.ring.gutter
     }
 
     /// Radius of the outer kerb's face; approaches and departures are counted from this circle [m].
@@ -122,6 +132,12 @@ impl Roundabout {
     pub fn lanes(&self) -> Vec<Curve> {
         let rings = Lane::BOTH.map(|lane| Curve::circle(DVec2::ZERO, self.lane_radius(lane)));
         rings.into_iter().chain(self.lanes.curves().cloned()).collect()
+    }
+
+    /// The centre line of a route from the end of its entry arm to the end of its exit arm, or `None` if there is no such route.
+    pub fn line(&self, entry: &str, lane: Lane, exit: u32) -> Option<Curve> {
+        let entry = self.arms().position(|arm| arm == entry)?;
+        lane::exits(self.arms.len()).any(|way| way == (lane, exit)).then(|| self.lanes.route(entry, lane, exit))
     }
 
     /// All routes, five an entry, by entry arm, then lane, then exit: from `approach` before the ring to `departure` after it, waypoints
@@ -158,6 +174,8 @@ impl Roundabout {
                     waypoints: waypoints(&centre_line, spacing),
                     centre_line,
                     crossing,
+                    before: reaches - approach,
+                    after: after - departure,
                 });
             }
         }

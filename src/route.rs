@@ -5,6 +5,7 @@
 use glam::DVec2;
 
 use crate::geometry::Curve;
+use crate::reader::shown;
 
 /// Which of the two lanes of a carriageway, seen in the direction of travel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Deserialize, serde::Serialize)]
@@ -56,11 +57,15 @@ pub struct Route {
     pub waypoints: Vec<Waypoint>,
     /// How far the crossing line of a waypoint reaches to the left and to the right of it, covering both lanes of the carriageway [m].
     pub crossing: (f64, f64),
+    /// Length of lane between the entry arm's end and the route's beginning [m].
+    pub before: f64,
+    /// Length of lane between the route's end and the exit arm's end [m].
+    pub after: f64,
 }
 
 /// A route that would begin or end beyond the end of its arm.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{part} of {asked} m leaves arm {arm} of {roundabout}; at most {longest:.1} m fit")]
+#[error("{part} of {} m leaves arm {arm} of {roundabout}; at most {} m fit", shown(*asked), (longest * 100.0).floor() / 100.0)]
 pub struct LeavesWorld {
     /// `approach` or `departure`.
     pub part: &'static str,

@@ -2,17 +2,17 @@
 //!
 //! Every error names file, key, value and what would do; it is found here or in the reader of the part it belongs to, never later.
 
-mod written;
+mod benchmark_keys;
 
 use std::path::Path;
 
 use crate::layout::Action;
-use crate::reader::{Error, Reader};
+use crate::reader::{Error, Reader, shown};
 use crate::roundabout::{Gutter, Roundabout};
 use crate::route::Route;
 use crate::shipped::{Kind, Source};
 use crate::vehicle::Vehicle;
-use written::{Written, WrittenChoice, WrittenRoundabout, WrittenRoutes};
+use benchmark_keys::{Written, WrittenChoice, WrittenRoundabout, WrittenRoutes};
 
 /// Length of a route before the ring where a benchmark says nothing else [m].
 pub const APPROACH: f64 = 40.0;
@@ -242,9 +242,9 @@ impl Scenario {
         if self.places.iter().any(|other| other.roundabout.name == roundabout.name) {
             return Err(reader.invalid(format!("{key}.file"), place.file.display(), "each roundabout may stand here once"));
         }
-        let routes = roundabout
-            .routes(lengths.approach, lengths.departure, lengths.spacing)
-            .map_err(|leaves| reader.invalid(format!("routes.{}", leaves.part), format_args!("{} m", leaves.asked), leaves.to_string()))?;
+        let routes = roundabout.routes(lengths.approach, lengths.departure, lengths.spacing).map_err(|leaves| {
+            reader.invalid(format!("routes.{}", leaves.part), format_args!("{} m", shown(leaves.asked)), leaves.to_string())
+        })?;
         let train = chosen(reader, &format!("{key}.train"), &place.train, &routes)?;
         let test = chosen(reader, &format!("{key}.test"), &place.test, &routes)?;
         let mut next = self.routes().count() as u32;
@@ -263,7 +263,28 @@ impl Scenario {
             next += 1;
             kept.push(route);
         }
+        self.whole_truck_on_arms(reader, &kept, lengths)?;
         self.places.push(Place { roundabout, routes: kept });
+        Ok(())
+    }
+
+    /// Every route leaves room on its arms for the whole truck, at the start pose behind the route's beginning and, on arrival, ahead of its
+    /// end.
+    fn whole_truck_on_arms(&self, reader: &Reader, routes: &[Route], lengths: &WrittenRoutes) -> Result<(), Error> {
+        let (behind, ahead) = self.vehicle.reach(self.start_heading);
+        let starts = routes.iter().map(|route| (route.before - behind, route));
+        let ends = routes.iter().map(|route| (route.after - ahead, route));
+        let nearest = |(a, first), (b, second)| if b < a { (b, second) } else { (a, first) };
+        for (part, asked, reach, side, room) in [
+            ("approach", lengths.approach, behind, "behind its start", starts.reduce(nearest)),
+            ("departure", lengths.departure, ahead, "ahead of its end", ends.reduce(nearest)),
+        ] {
+            let Some((room, route)) = room.filter(|(room, _)| *room < 0.0) else { continue };
+            // Rounded down, so that the length named does fit.
+            let longest = ((asked + room) * 100.0).floor() / 100.0;
+            let expected = format!("the truck needs {reach:.2} m of the arm {side}: at most {longest} m fit {}", route.name);
+            return Err(reader.invalid(format!("routes.{part}"), format_args!("{} m", shown(asked)), expected));
+        }
         Ok(())
     }
 }

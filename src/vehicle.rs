@@ -4,7 +4,7 @@
 
 mod single_track;
 mod suspension;
-mod written;
+mod vehicle_keys;
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -157,6 +157,21 @@ impl Vehicle {
     pub fn trailer_body(&self) -> Body {
         let Trailer { wheelbase, kingpin_to_front, kingpin_to_rear, width } = self.trailer;
         Body { front: (wheelbase + kingpin_to_front) as f32, rear: (wheelbase - kingpin_to_rear) as f32, half_width: (0.5 * width) as f32 }
+    }
+
+    /// How far the truck reaches behind and ahead of the middle of its wheelbase, the point that follows a route, with the trailer straight
+    /// and the tractor turned by up to `heading` [rad] either way [m].
+    pub fn reach(&self, heading: f64) -> (f64, f64) {
+        let Tractor { wheelbase, fifth_wheel, front_overhang, rear_overhang, width, .. } = self.tractor;
+        let behind_axle = (self.trailer.kingpin_to_rear - fifth_wheel).max(rear_overhang);
+        let ahead_of_axle = (wheelbase + front_overhang).max(fifth_wheel + self.trailer.kingpin_to_front);
+        let half_width = 0.5 * width.max(self.trailer.width);
+        // A corner reaches furthest once it is turned into the direction of travel.
+        let turned = |length: f64| {
+            let turn = heading.min((half_width / length).atan());
+            length * turn.cos() + half_width * turn.sin()
+        };
+        (turned(0.5 * wheelbase + behind_axle), turned(ahead_of_axle - 0.5 * wheelbase))
     }
 
     /// Mass of tractor, trailer and load [kg].

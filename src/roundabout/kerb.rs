@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use super::alignment::{Way, around, ring_arc};
 use super::check;
-use super::written::{Arm, Ring};
+use super::roundabout_keys::{Arm, Ring};
 use crate::geometry::{Curve, Outline, Piece, rounded, wrapped};
 use crate::reader::{Error, Reader};
 

@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::alignment::{Way, around, ring_arc};
 use super::check;
 use super::kerb::corner;
-use super::written::{Arm, Ring};
+use super::roundabout_keys::{Arm, Ring};
 use crate::geometry::{Curve, Piece, wrapped};
 use crate::reader::{Error, Reader};
 use crate::route::Lane;

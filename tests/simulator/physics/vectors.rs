@@ -11,9 +11,9 @@ use offtrack::layout::Rig;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::stages::STAGES;
 use offtrack::swept::swept_path;
-use offtrack::trace::{Case, CaseVehicle, Command, Init, Traced, trace, trace_by};
 use offtrack::vehicle::{SingleTrack, Suspension};
 use offtrack::world::World;
+use offtrack_comparison::trace::{Case, CaseVehicle, Command, Init, Traced, trace, trace_by};
 use serde_json::Value;
 
 use super::{VEHICLES, vehicle};
@@ -112,7 +112,7 @@ fn alone(engine: &Engine, rig: &Rig, substep: f32) -> Simulator {
 }
 
 /// The state that a truck reaches `t` seconds after `init` under one command.
-fn driven(engine: &Engine, vehicle: CaseVehicle, init: Init, command: Command, t: f64) -> offtrack::trace::State {
+fn driven(engine: &Engine, vehicle: CaseVehicle, init: Init, command: Command, t: f64) -> offtrack_comparison::trace::State {
     let case =
         Case { id: String::new(), vehicle, dt: 0.05, init, commands: vec![command], t_end: t, times: Some(vec![t]), expected: vec![] };
     traced(engine, &case).states[0]

@@ -2,15 +2,13 @@
 
 use std::path::PathBuf;
 
-use offtrack::reader;
+use offtrack::reader::read_text;
 use offtrack::roundabout::Roundabout;
-use offtrack::roundabout::deviation::{Measured, deviations};
+use offtrack_comparison::FILE_LIMIT;
+use offtrack_comparison::deviation::{Measured, deviations};
 
 use offtrack_training::error::Error;
 use offtrack_training::files;
-
-/// Most bytes of a measured roundabout.
-const LIMIT: u64 = 16 << 20;
 
 /// Compare a roundabout with a measured one: road edges with solid gutters, and lane centre lines, within 45 m of the
 /// centre.
@@ -25,7 +23,7 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     let roundabout = Roundabout::find(&args.roundabout)?;
-    let text = reader::read_text(&args.measured, LIMIT)?;
+    let text = read_text(&args.measured, FILE_LIMIT)?;
     let wrong = |message: String| Error::contents(&args.measured, message);
     let measured: Measured = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     let rows = deviations(&roundabout, &measured).map_err(|error| wrong(error.to_string()))?;

@@ -3,16 +3,14 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::reader::{self, shortened};
-use offtrack::trace::{Case, Traced, trace};
+use offtrack::reader::{read_text, shortened};
+use offtrack_comparison::FILE_LIMIT;
+use offtrack_comparison::trace::{Case, Traced, trace};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use offtrack_training::error::Error;
 use offtrack_training::files::{print, write_json};
-
-/// Most bytes of a file of cases.
-const LIMIT: u64 = 16 << 20;
 
 /// Drive the trajectory cases of a file of reference vectors and print the truck's state at the times they ask for.
 ///
@@ -59,7 +57,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 
 fn report(file: &Path) -> Result<Report, Error> {
     let wrong = |message: String| Error::contents(file, message);
-    let text = reader::read_text(file, LIMIT)?;
+    let text = read_text(file, FILE_LIMIT)?;
     let written: Value = serde_json::from_str(&text).map_err(|error| wrong(format!("is not JSON: {error}")))?;
     let cases = written["cases"].as_array().ok_or_else(|| wrong("cases: missing or not a list; a list of cases is needed".to_owned()))?;
     let mut report = Report { cases: Vec::new(), skipped: Vec::new() };

@@ -1,39 +1,38 @@
-//! A truck driven open loop by the simulator's own [`drive`](crate::cpu::drive), for comparison with reference trajectories.
+//! One truck, open loop, moved by the simulator's own [`drive`](offtrack::cpu::drive) stage, for comparison with reference trajectories.
 //!
-//! A case is what `tests/data/physics_vectors.json` holds. Between the instants of the case's grid the truck is moved by a part of a
-//! sub-step from the grid instant before, on a copy, so that asking for a state never changes those after it.
+//! `tests/data/physics_vectors.json` holds such cases. A state between two instants of the sub-step grid is computed on a copy, from the
+//! grid instant before it, so that a request for a state never changes later ones.
 
 mod case;
 
 use glam::Vec2;
+use offtrack::angle::wrapped;
+use offtrack::cpu::drive::{Moving, load_transfer_ratio, motion, moved};
+use offtrack::layout::{Control, Rig, Truck};
 use serde::Serialize;
 
 pub use case::{Case, CaseVehicle, Command, Error, Init, Instant};
 
-use crate::angle::wrapped;
-use crate::cpu::drive::{Moving, load_transfer_ratio, motion, moved};
-use crate::layout::{Control, Rig, Truck};
-
 /// Instants closer together than this are the same [s].
 const SAME_INSTANT: f64 = 1e-7;
 
-/// What came of a case.
+/// The result of a case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Traced {
     /// The case's name.
     pub id: String,
-    /// The truck at the instants asked for.
+    /// The truck at the requested instants.
     pub states: Vec<State>,
-    /// Largest magnitudes over all sub-steps; none when the truck jackknifed, after which they mean nothing.
+    /// Largest magnitudes over all sub-steps; `None` if the truck jackknifed, because they mean nothing after that.
     pub peak: Option<Peak>,
-    /// When the articulation passed its limit, interpolated within its sub-step [s].
+    /// Time at which the articulation passed its limit, interpolated within the sub-step [s].
     pub t_jackknife: Option<f64>,
 }
 
-/// The truck at an instant. Headings are unwrapped: they go on from the case's own.
+/// The truck at an instant. Headings are unwrapped: they continue from the case's initial headings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct State {
-    /// When [s].
+    /// Time [s].
     pub t: f64,
     /// Middle of the drive axle [m].
     pub x: f64,
@@ -84,12 +83,21 @@ pub struct Peak {
     pub gamma: f64,
 }
 
-/// Drives a case.
+/// Drives a case with the simulator's own equations.
+///
+/// # Errors
+///
+/// The first value of the case that makes no sense.
 pub fn trace(case: &Case) -> Result<Traced, Error> {
     trace_by(case, moved)
 }
 
-/// Drives a case with a [`moved`] of the caller's: the rig, the length of the sub-step [s], what drives the truck, and the truck.
+/// Drives a case with the caller's replacement for [`moved`]. Its arguments are the rig, the length of the sub-step [s], the control and
+/// the truck.
+///
+/// # Errors
+///
+/// The first value of the case that makes no sense.
 pub fn trace_by(case: &Case, mut moved: impl FnMut(&Rig, f32, &Control, &Moving) -> Moving) -> Result<Traced, Error> {
     let times = case.checked_times()?;
     let mut pending = times.iter().copied().peekable();
@@ -100,7 +108,7 @@ pub fn trace_by(case: &Case, mut moved: impl FnMut(&Rig, f32, &Control, &Moving)
         let here = run.state();
         peak = peak.grown(&here, run.tractor_ratio());
         let next = run.next_instant();
-        // Past the end there is nothing to drive through: what is left is asked of the last instant itself.
+        // At the end every remaining request is answered by the last instant.
         let until = next.unwrap_or(f64::INFINITY);
         while let Some(t) = pending.next_if(|&t| t < until - SAME_INSTANT) {
             traced.states.push(if t - run.t <= SAME_INSTANT { State { t, ..here } } else { run.after(t, &mut moved).state() });
@@ -116,16 +124,16 @@ pub fn trace_by(case: &Case, mut moved: impl FnMut(&Rig, f32, &Control, &Moving)
     Ok(traced)
 }
 
-/// A case being driven.
+/// A case in progress.
 #[derive(Clone)]
 struct Run<'a> {
     case: &'a Case,
-    /// Now [s].
+    /// Current time [s].
     t: f64,
-    /// Sub-steps of the grid begun or passed.
+    /// Index of the last sub-step of the grid that has begun.
     grid: u32,
     moving: Moving,
-    /// Headings that go on growing, kept beside the truck's wrapped ones [rad].
+    /// Unwrapped headings, in addition to the truck's wrapped ones [rad].
     psi1: f64,
     psi2: f64,
 }
@@ -145,7 +153,7 @@ impl Run<'_> {
         Run { case, t: 0.0, grid: 0, moving: Moving { truck, motion }, psi1: init.psi1, psi2: init.psi2 }
     }
 
-    /// The end of the sub-step now beginning: the grid's next instant, or a command or the case's end before it. `None` at the end.
+    /// The end of the next sub-step: the grid's next instant, or a command or the case's end before it. `None` at the end.
     fn next_instant(&self) -> Option<f64> {
         let later = |&t: &f64| self.t + SAME_INSTANT < t;
         let grid = f64::from(self.grid + 1) * self.case.dt;
@@ -156,14 +164,14 @@ impl Run<'_> {
     /// The run at `t`, at most a sub-step from now.
     fn after(&self, t: f64, moved: &mut impl FnMut(&Rig, f32, &Control, &Moving) -> Moving) -> Self {
         let control = self.case.commands.iter().rfind(|command| command.t <= self.t + SAME_INSTANT);
-        // Before the first command the truck goes on as it is.
+        // Before the first command the steer angle and the speed stay as they are.
         let control = control.map_or(Control { steering: self.moving.truck.steering, ..Control::default() }, |command| Control {
             steering: command.delta_cmd as f32,
             acceleration: command.a_cmd as f32,
             speed_error_integral: 0.0,
         });
         let duration = t - self.t;
-        // A whole sub-step takes the very number that a simulator is given, not a difference of instants.
+        // A whole sub-step uses the simulator's own `dt`, not a difference of instants, which would round differently.
         let duration = if (duration - self.case.dt).abs() < SAME_INSTANT { self.case.dt } else { duration };
         let moving = moved(&self.case.vehicle.rig(duration), duration as f32, &control, &self.moving);
         let turned = |after: f32, before: f32| f64::from(wrapped(after - before));

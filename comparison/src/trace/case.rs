@@ -1,30 +1,30 @@
-//! A case as its file gives it, and the checks that make it safe to drive.
+//! A case as written in its file, and the checks before it is driven.
 
 use std::ops::RangeInclusive;
 
+use offtrack::layout::Rig;
+use offtrack::reader::{shortened, shown};
+use offtrack::vehicle::{GRAVITY, Suspension};
 use serde::Deserialize;
 
-use crate::layout::Rig;
-use crate::vehicle::{GRAVITY, Suspension};
-
-/// No tyre: a lateral acceleration far beyond any truck's, for cases that name no friction [m/s^2].
+/// Lateral acceleration far beyond any truck's, for cases without friction [m/s^2].
 const UNLIMITED: f32 = 1e6;
 
 /// A case whose values make no sense.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("case {id:?}: {key}: {value}; {expected}")]
+#[error("case {:?}: {key}: {value}; {expected}", shortened(id, 100))]
 pub struct Error {
     /// The case.
     pub id: String,
     /// The key in the case, `vehicle.L1`.
     pub key: String,
-    /// What stands there.
+    /// The value as written.
     pub value: String,
     /// What would do.
     pub expected: String,
 }
 
-/// A truck, where it starts and what it is told, in the symbols of the reference equations. Keys that say nothing of this are passed over.
+/// A truck, its initial state and its commands, in the symbols of the reference equations. Other keys are ignored.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Case {
     /// Its name.
@@ -33,15 +33,15 @@ pub struct Case {
     pub vehicle: CaseVehicle,
     /// Length of a sub-step [s].
     pub dt: f64,
-    /// Where it starts.
+    /// Initial state.
     pub init: Init,
-    /// What it is told, in order of time.
+    /// Commands in order of time.
     pub commands: Vec<Command>,
-    /// Where it ends [s].
+    /// End of the case [s].
     pub t_end: f64,
-    /// Instants to report [s]; those of `expected` where absent.
+    /// Instants to report, ascending; those of `expected` where absent [s].
     pub times: Option<Vec<f64>>,
-    /// Reference states, of which only the instants are read here.
+    /// Reference states. Only their instants are used here.
     #[serde(default)]
     pub expected: Vec<Instant>,
 }
@@ -58,7 +58,7 @@ pub struct CaseVehicle {
     pub L2: f64,
     /// Slip factor [rad/(m/s^2)].
     pub K: f64,
-    /// Lateral acceleration that the tyres hold, in units of gravity; without it nothing limits them.
+    /// Lateral acceleration that the tyres can hold, in units of gravity; unlimited where absent.
     pub mu: Option<f64>,
     /// Lock [rad].
     pub delta_max: f64,
@@ -97,7 +97,7 @@ pub struct CaseVehicle {
     pub zeta2: f64,
 }
 
-/// Where a case starts.
+/// Initial state of a case.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Init {
     /// Middle of the drive axle [m].
@@ -114,21 +114,21 @@ pub struct Init {
     pub delta: f64,
 }
 
-/// What holds from an instant on.
+/// A command, in force until the next one.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Command {
-    /// The instant [s].
+    /// Time from which it is in force [s].
     pub t: f64,
-    /// Steer angle asked for [rad].
+    /// Target steer angle [rad].
     pub delta_cmd: f64,
-    /// Acceleration asked for [m/s^2].
+    /// Target acceleration [m/s^2].
     pub a_cmd: f64,
 }
 
 /// An instant to report.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Instant {
-    /// When [s].
+    /// Time [s].
     pub t: f64,
 }
 
@@ -161,7 +161,7 @@ impl CaseVehicle {
         }
     }
 
-    /// The vehicle as the drive stage needs it, for sub-steps of `substep` seconds. It has no outline and no speed control.
+    /// The rig for the drive stage with sub-steps of `substep` seconds, without outline and speed control.
     pub fn rig(&self, substep: f64) -> Rig {
         Rig {
             wheelbase: self.L1 as f32,
@@ -181,7 +181,7 @@ impl CaseVehicle {
 }
 
 impl Case {
-    /// The instants to report, ascending, once every value has been found to make sense.
+    /// Checks every value and gives the instants to report, ascending [s].
     pub(super) fn checked_times(&self) -> Result<Vec<f64>, Error> {
         let vehicle = &self.vehicle;
         let (any, positive, speed) = (-1e5..=1e5, 1e-3..=1e3, -60.0..=60.0);
@@ -236,10 +236,10 @@ impl Case {
         }
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         let limits = if *range.end() == f64::MAX {
-            format!("must be at least {}{unit}", range.start())
+            format!("must be at least {}{unit}", shown(*range.start()))
         } else {
-            format!("must lie in {}..{}{unit}", range.start(), range.end())
+            format!("must lie in {}..{}{unit}", shown(*range.start()), shown(*range.end()))
         };
-        Err(Error { id: self.id.clone(), key: key.to_owned(), value: format!("{value}{unit}"), expected: limits })
+        Err(Error { id: self.id.clone(), key: key.to_owned(), value: format!("{}{unit}", shown(value)), expected: limits })
     }
 }
