@@ -15,9 +15,9 @@ use offtrack::world::World;
 use rand::Rng;
 
 use crate::error::Error;
-use crate::learner::bridge;
 use crate::learner::network::{Mlp, layer};
-use crate::learner::normalisation::Scaling;
+use crate::learner::normalisation::Normalisation;
+use crate::learner::rollout::host::logits;
 use file::Contents;
 
 /// Largest relative difference of two entries of an action table that count as equal: f32 rounds at 6e-8.
@@ -41,7 +41,7 @@ pub struct LearnedPolicy {
     /// The action table that its output refers to.
     pub actions: Vec<Action>,
     /// How observations are normalised for it.
-    pub scaling: Scaling,
+    pub normalisation: Normalisation,
     /// The network, without gradients.
     pub actor: Mlp,
 }
@@ -49,7 +49,7 @@ pub struct LearnedPolicy {
 impl LearnedPolicy {
     /// The index of the most probable action for each observation, `[n_envs]`.
     pub fn act(&self, observations: &[[f32; N_VALUES]]) -> Vec<u32> {
-        greedy(&bridge::logits(&self.actor, &self.scaling, observations), self.actions.len())
+        greedy(&logits(&self.actor, &self.normalisation, observations), self.actions.len())
     }
 
     /// Reads a policy file. One that is cut, changed, or of another format, and one with a number that is not finite,
@@ -91,7 +91,7 @@ impl LearnedPolicy {
             name,
             benchmark: contents.benchmark,
             actions: contents.actions.iter().map(|&[steering, speed]| Action { steering, speed }).collect(),
-            scaling: contents.scaling,
+            normalisation: contents.normalisation,
             actor: Mlp {
                 layers: contents.layers.into_iter().map(|(weights, biases)| layer(weights, biases, &device)).collect(),
                 norms: Vec::new(),
@@ -109,7 +109,7 @@ impl LearnedPolicy {
         Contents {
             benchmark: self.benchmark.clone(),
             actions: self.actions.iter().map(|action| [action.steering, action.speed]).collect(),
-            scaling: self.scaling.clone(),
+            normalisation: self.normalisation.clone(),
             layers: layers.collect(),
         }
         .to_bytes()
@@ -139,7 +139,7 @@ pub fn greedy(logits: &[f32], n_actions: usize) -> Vec<u32> {
 }
 
 /// An action sampled from the softmax of each row of `logits`, `[rows]`.
-pub fn drawn(logits: &[f32], n_actions: usize, rng: &mut impl Rng) -> Vec<u32> {
+pub fn sampled(logits: &[f32], n_actions: usize, rng: &mut impl Rng) -> Vec<u32> {
     let mut one = |row: &[f32]| {
         let most = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
         let sum: f32 = row.iter().map(|logit| (logit - most).exp()).sum();

@@ -30,8 +30,8 @@ impl Mlp {
         Mlp { layers: layers.collect(), norms: Vec::new() }
     }
 
-    /// The same layers with every hidden one's output normalised over its units.
-    pub fn normalised(self) -> Mlp {
+    /// The same layers with layer normalisation before each rectifier.
+    pub fn with_layer_norm(self) -> Mlp {
         let hidden = self.layers.len() - 1;
         let norm = |layer: &Linear| LayerNormConfig::new(layer.weight.dims()[1]).init(&layer.weight.device());
         Mlp { norms: self.layers[..hidden].iter().map(norm).collect(), layers: self.layers }

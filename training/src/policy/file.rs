@@ -7,7 +7,7 @@ use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
-use crate::learner::normalisation::Scaling;
+use crate::learner::normalisation::Normalisation;
 
 /// Key of the metadata's one entry.
 const KEY: &str = "offtrack";
@@ -22,7 +22,7 @@ pub(super) struct Contents {
     pub(super) benchmark: String,
     /// Steer angle \[rad] and speed [m/s] of each action.
     pub(super) actions: Vec<[f32; 2]>,
-    pub(super) scaling: Scaling,
+    pub(super) normalisation: Normalisation,
     /// Weights `[inputs * outputs]`, inputs varying slowest, and biases `[outputs]`, from the observation on.
     pub(super) layers: Vec<(Vec<f32>, Vec<f32>)>,
 }
@@ -106,26 +106,29 @@ impl Contents {
         let mut sizes = vec![N_VALUES];
         let mut numbers = tensors.iter().map(|(_, tensor)| floats(tensor.data()));
         let mut next = || numbers.next().unwrap_or_default();
-        let scaling = Scaling { mean: next(), factor: next() };
+        let normalisation = Normalisation { mean: next(), factor: next() };
         let layers: Vec<_> = (0..description.layers).map(|_| (next(), next())).collect();
         sizes.extend(layers.iter().map(|(_, biases)| biases.len()));
         let fits = |((weights, _), ends): (&(Vec<f32>, Vec<f32>), &[usize])| 0 < ends[1] && weights.len() == ends[0] * ends[1];
         let chain = layers.iter().zip(sizes.windows(2)).all(fits);
-        if scaling.mean.len() != N_VALUES || scaling.factor.len() != N_VALUES || !chain || sizes.last() != Some(&description.actions.len())
+        if normalisation.mean.len() != N_VALUES
+            || normalisation.factor.len() != N_VALUES
+            || !chain
+            || sizes.last() != Some(&description.actions.len())
         {
             return Err(format!(
                 "is a policy of another shape: {} observation values and layers of {:?}; {N_VALUES} values and {} actions are needed",
-                scaling.mean.len(),
+                normalisation.mean.len(),
                 &sizes[1..],
                 description.actions.len()
             ));
         }
-        Ok(Contents { benchmark: description.benchmark, actions: description.actions, scaling, layers })
+        Ok(Contents { benchmark: description.benchmark, actions: description.actions, normalisation, layers })
     }
 
     /// Every tensor in the order of [`names`].
     fn tensors(&self) -> Vec<Named> {
-        let vectors = [&self.scaling.mean, &self.scaling.factor].map(|values| (vec![values.len()], values));
+        let vectors = [&self.normalisation.mean, &self.normalisation.factor].map(|values| (vec![values.len()], values));
         let layers = self.layers.iter().flat_map(|(weights, biases)| {
             let outputs = biases.len();
             [(vec![weights.len() / outputs.max(1), outputs], weights), (vec![outputs], biases)]
@@ -149,9 +152,9 @@ struct Named {
 
 /// Names of a policy's tensors in the order of reading.
 fn names(n_layers: usize) -> impl Iterator<Item = String> {
-    let scaling = ["observation.mean", "observation.factor"].map(str::to_owned);
+    let normalisation = ["observation.mean", "observation.factor"].map(str::to_owned);
     let layers = (0..n_layers).flat_map(|index| ["weight", "bias"].map(|part| format!("actor.{index}.{part}")));
-    scaling.into_iter().chain(layers)
+    normalisation.into_iter().chain(layers)
 }
 
 fn floats(bytes: &[u8]) -> Vec<f32> {

@@ -12,7 +12,7 @@ fn policy(hidden: &[usize], n_actions: usize) -> LearnedPolicy {
         name: "test".into(),
         benchmark: "attard2023".into(),
         actions: (0..n_actions).map(|index| Action { steering: 0.1 * index as f32 - 0.4, speed: 25.0 / 3.0 }).collect(),
-        scaling: Scaling::of(&observations),
+        normalisation: Normalisation::of(&observations),
         actor: Mlp::new(&sizes, 1.0, rng, &Device::flex()),
     }
 }
@@ -67,7 +67,7 @@ fn serialize_without_description() -> Vec<u8> {
 #[test]
 fn a_policy_of_another_shape_is_refused() {
     let mut other = policy(&[8], 9);
-    other.scaling.mean.truncate(40);
+    other.normalisation.mean.truncate(40);
     assert!(refusal(&other.to_bytes()).contains("another shape: 40 observation values"));
     let mut other = policy(&[8], 9);
     other.actions.pop();
@@ -140,7 +140,7 @@ fn the_best_action_is_the_first_of_the_highest() {
 fn actions_are_sampled_with_their_probabilities() {
     let probs = [0.1f32, 0.6, 0.05, 0.25];
     let logits: Vec<f32> = probs.map(|prob| prob.ln() + 30.0).repeat(40_000);
-    let actions = drawn(&logits, 4, &mut SmallRng::seed_from_u64(9));
+    let actions = sampled(&logits, 4, &mut SmallRng::seed_from_u64(9));
     for (action, prob) in probs.into_iter().enumerate() {
         let frequency = actions.iter().filter(|&&drawn| drawn as usize == action).count() as f32 / 40_000.0;
         // Four standard deviations of a frequency over 40,000 samples.
@@ -152,7 +152,7 @@ fn actions_are_sampled_with_their_probabilities() {
 fn a_policy_with_a_number_that_is_not_finite_is_refused_by_its_tensor() {
     for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut broken = policy(&[8], 9);
-        broken.scaling.mean[3] = value;
+        broken.normalisation.mean[3] = value;
         assert!(refusal(&broken.to_bytes()).contains(&format!("observation.mean[3] is {value}")));
         let mut contents = Contents::from_bytes(&policy(&[8], 9).to_bytes()).unwrap();
         contents.layers[1].0[5] = value;

@@ -142,7 +142,7 @@ fn a_benchmark_without_a_policy_of_its_own_is_driven_by_the_one_for_attard2023_a
 fn a_policy_that_is_not_finite_is_refused_by_file_and_tensor() {
     let place = Place::new();
     let mut policy = LearnedPolicy::shipped("attard2023").unwrap();
-    policy.scaling.mean[7] = f32::NAN;
+    policy.normalisation.mean[7] = f32::NAN;
     std::fs::write(place.file("nan.safetensors"), policy.to_bytes()).unwrap();
     let said = refusal(&offtrack(&["evaluate", "--episodes", "1", "--policy", &place.text("nan.safetensors")]), 2);
     assert!(said.contains("nan.safetensors: is a policy that cannot drive: observation.mean[7] is NaN"), "{said}");

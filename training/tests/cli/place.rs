@@ -29,25 +29,25 @@ benchmark = "BENCHMARK"
 seed = 5
 n_envs = 8
 steps = 1600
-memory = { capacity = 2000, warmup = 400 }
+replay_buffer = { capacity = 2000, warmup = 400 }
 
 [learning]
 hidden = [16]
 batch = 32
 updates_per_step = 1
 n_steps = 3
-discount = 0.97
+gamma = 0.97
 reward_scale = 0.01
-scale_observations = true
-actor_rate = 3e-4
-critic_rate = 3e-4
-last_rate = 0.1
+normalise_observations = true
+actor_learning_rate = 3e-4
+critic_learning_rate = 3e-4
+final_learning_rate_fraction = 0.1
 layer_norm = false
-critics = "average"
-target_rate = 0.005
-target_every = 1
-average_rate = 0.005
-entropy = { in_target = true, share = 0.25, weight = 0.05, rate = 3e-4 }
+critics = "mean"
+tau = 0.005
+target_interval = 1
+actor_ema_rate = 0.005
+entropy = { in_target = true, target_fraction = 0.25, coefficient = 0.05, learning_rate = 3e-4 }
 "#;
 
 /// A temporary folder with the benchmark `short.toml` and the training file `tiny.toml`; runs go to `runs`.
