@@ -11,15 +11,15 @@ use crate::figure::{colour, number};
 use crate::legend::{self, Entry, Swatch};
 use crate::lettering::{Align, Lettering};
 
-/// Upper left corner of the first panel's plot [px].
+/// Upper left corner of the first panel's plot \[px].
 const CORNER: DVec2 = DVec2::new(92.0, 118.0);
-/// Size of a plot [px].
+/// Size of a plot \[px].
 const PLOT: DVec2 = DVec2::new(440.0, 380.0);
-/// From one plot's right edge to the next one's left [px].
+/// From one plot's right edge to the next one's left \[px].
 const GAP: f64 = 104.0;
-/// From a plot's lower edge to its legend: numbers and axis title [px].
+/// From a plot's lower edge to its legend: numbers and axis title \[px].
 const AXIS: f64 = 62.0;
-/// Margin to the right of the last plot and below the longest legend [px].
+/// Margin to the right of the last plot and below the longest legend \[px].
 const MARGIN: f64 = 24.0;
 /// Margin beside the outermost points, as a factor.
 const ROOM: f64 = 1.35;
@@ -77,7 +77,7 @@ pub enum Kind {
 struct Axis {
     low: f64,
     high: f64,
-    /// Positions of the ends [px].
+    /// Positions of the ends \[px].
     from: f64,
     to: f64,
 }
@@ -142,7 +142,7 @@ impl Chart {
 }
 
 impl Panel {
-    /// The panel with its plot's upper left corner at `corner`, and how far down it reaches [px].
+    /// The panel with its plot's upper left corner at `corner`, and how far down it reaches \[px].
     fn drawn(&self, lettering: &Lettering, corner: DVec2) -> (Group, f64) {
         let end = corner + PLOT;
         let points = || self.lines.iter().flat_map(|line| &line.points);

@@ -26,13 +26,13 @@ impl Lettering {
         Ok(Lettering { face: Face::parse(epaint_default_fonts::UBUNTU_LIGHT, 0)? })
     }
 
-    /// Width of `words` in text of `size` [px].
+    /// Width of `words` in text of `size` \[px].
     pub fn width(&self, words: &str, size: f64) -> f64 {
         let advance = |letter| self.face.glyph_index(letter).and_then(|glyph| self.face.glyph_hor_advance(glyph)).unwrap_or(0);
         words.chars().map(|letter| f64::from(advance(letter))).sum::<f64>() * self.scale(size)
     }
 
-    /// One line of text with its base line at `at` [px].
+    /// One line of text with its base line at `at` \[px].
     pub fn text(&self, words: &str, at: DVec2, size: f64, align: Align, colour: &str) -> Path {
         // The typeface is light: a thin stroke keeps it readable in small pictures.
         let weight = number(0.035 * size);

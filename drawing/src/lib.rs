@@ -54,9 +54,9 @@ pub enum Error {
     /// The picture has no pixels, or more than its format can hold.
     #[error("a picture of {width} x {height} pixels cannot be drawn")]
     Size {
-        /// Width asked for [pixels].
+        /// Width asked for \[pixels].
         width: u32,
-        /// Height that follows from it [pixels].
+        /// Height that follows from it \[pixels].
         height: u32,
     },
 }

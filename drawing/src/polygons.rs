@@ -5,12 +5,12 @@ use offtrack::geometry::{Curve, Outline};
 use offtrack::route::Route;
 use serde::Serialize;
 
-/// Largest distance of a chord to its arc, half of the documented 1 cm [m].
+/// Largest distance of a chord to its arc, half of the documented 1 cm \[m].
 const TOLERANCE: f64 = 0.005;
-/// Extent of solid ground beyond the outermost kerb [m].
+/// Extent of solid ground beyond the outermost kerb \[m].
 const MARGIN: f64 = 5.0;
 
-/// The points of a line, open or closed [m]. A closed one does not repeat its first point.
+/// The points of a line, open or closed \[m]. A closed one does not repeat its first point.
 pub type Polygon = Vec<[f64; 2]>;
 
 #[derive(Serialize)]

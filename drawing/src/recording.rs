@@ -23,27 +23,27 @@ const ANGLE: f64 = 1e4;
 /// One truck after one step, less than 250 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
-    /// Middle of the drive axle, x east, y north [m].
+    /// Middle of the drive axle, x east, y north \[m].
     pub position: [f32; 2],
-    /// Of the tractor, counter-clockwise from east, in (-pi, pi] [rad].
+    /// Of the tractor, counter-clockwise from east, in (-pi, pi] \[rad].
     pub heading: f32,
-    /// Middle of the trailer's axle group [m].
+    /// Middle of the trailer's axle group \[m].
     pub trailer_position: [f32; 2],
-    /// Of the trailer [rad].
+    /// Of the trailer \[rad].
     pub trailer_heading: f32,
-    /// Tractor's heading minus the trailer's, in (-pi, pi] [rad].
+    /// Tractor's heading minus the trailer's, in (-pi, pi] \[rad].
     pub articulation: f32,
-    /// Of the front axle, left positive [rad].
+    /// Of the front axle, left positive \[rad].
     pub steering: f32,
     /// Of the drive axle [m/s].
     pub speed: f32,
     /// Index of the last action in the action table; `None` at the start.
     pub action: Option<u32>,
-    /// From the reference point to the lane centre [m].
+    /// From the reference point to the lane centre \[m].
     pub lane_distance: f32,
-    /// From the tractor's outline to the nearest kerb, negative where they overlap [m].
+    /// From the tractor's outline to the nearest kerb, negative where they overlap \[m].
     pub tractor_clearance: f32,
-    /// From the trailer's outline to the nearest kerb [m].
+    /// From the trailer's outline to the nearest kerb \[m].
     pub trailer_clearance: f32,
     /// Of the tractor, the largest of the step in magnitude, signed.
     pub tractor_load_transfer_ratio: f32,
@@ -52,7 +52,7 @@ pub struct Frame {
     /// Of the step; 0 at the start.
     pub reward: f32,
     /// Distance along each ray to the kerb, the trailer's 16 first, left and right alternating, front to rear, then the
-    /// tractor's 13 from left to right [m].
+    /// tractor's 13 from left to right \[m].
     pub ranges: [f32; N_RAYS],
 }
 
@@ -141,11 +141,11 @@ impl Recorder {
 /// A rectangle in its unit's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Rectangle {
-    /// Front end, ahead of the frame's origin [m].
+    /// Front end, ahead of the frame's origin \[m].
     pub front: f32,
-    /// Rear end, ahead of the frame's origin (negative when behind) [m].
+    /// Rear end, ahead of the frame's origin (negative when behind) \[m].
     pub rear: f32,
-    /// Half of the width [m].
+    /// Half of the width \[m].
     pub half_width: f32,
 }
 
@@ -159,11 +159,11 @@ impl From<Rectangle> for Body {
 /// `trailer_position`; x forward, y left.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measures {
-    /// Front axle ahead of the drive axle [m].
+    /// Front axle ahead of the drive axle \[m].
     pub wheelbase: f32,
-    /// Fifth wheel ahead of the drive axle [m].
+    /// Fifth wheel ahead of the drive axle \[m].
     pub fifth_wheel: f32,
-    /// Kingpin ahead of the trailer's axle group [m].
+    /// Kingpin ahead of the trailer's axle group \[m].
     pub trailer_wheelbase: f32,
     /// The tractor's outline.
     pub tractor_body: Rectangle,
@@ -173,7 +173,7 @@ pub struct Measures {
     pub trailer_rays: Vec<[f32; 4]>,
     /// The tractor's sensors.
     pub tractor_rays: Vec<[f32; 4]>,
-    /// Reach of a sensor [m].
+    /// Reach of a sensor \[m].
     pub sensor_range: f32,
 }
 
@@ -198,7 +198,7 @@ impl Measures {
     }
 }
 
-/// A roundabout as lines of points [m].
+/// A roundabout as lines of points \[m].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Map {
     /// Polygons around the drivable area: the outer boundary counter-clockwise, then each island clockwise, without a
@@ -215,7 +215,7 @@ impl Map {
     }
 }
 
-/// A route's centre line as points within 1 cm of it [m].
+/// A route's centre line as points within 1 cm of it \[m].
 pub fn centre_line(route: &Route) -> Polygon {
     polygons::line(&route.centre_line)
 }
@@ -235,17 +235,17 @@ pub struct Recording {
     pub episode: usize,
     /// Episodes on each route in that evaluation: the start pose depends on it.
     pub episodes: usize,
-    /// Time between two frames [s].
+    /// Time between two frames \[s].
     pub step: f64,
     /// Why the episode ended, by its name in reports.
     pub ended: String,
     /// The truck.
     pub vehicle: Measures,
-    /// The action table: steer angle [rad] and speed asked for [m/s].
+    /// The action table: steer angle \[rad] and speed asked for [m/s].
     pub actions: Vec<[f32; 2]>,
     /// The roundabout.
     pub map: Map,
-    /// The route's centre line [m].
+    /// The route's centre line \[m].
     pub centre_line: Polygon,
     /// The start, then one frame a step.
     pub frames: Vec<Frame>,

@@ -3,7 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
+use offtrack::reader::shortened;
+
 use crate::device;
+
+/// Most characters of a message about the contents of a file.
+const LONGEST_MESSAGE: usize = 600;
 
 /// Why training, an evaluation or a command stopped. [`Error::is_wrong_input`] tells wrong input from a failure.
 #[derive(Debug, thiserror::Error)]
@@ -91,6 +96,11 @@ impl Error {
     pub fn is_wrong_input(&self) -> bool {
         let failed = matches!(self, Error::Write { .. } | Error::Threads(_) | Error::Diverged { .. } | Error::NotVerified { .. });
         !failed && !device::has_failed(self)
+    }
+
+    /// A file has wrong contents. A long message, which may repeat a part of the file, is shortened.
+    pub fn contents(file: &Path, message: impl AsRef<str>) -> Error {
+        Error::Contents { file: file.to_owned(), message: shortened(message.as_ref(), LONGEST_MESSAGE) }
     }
 
     /// For `map_err` on a file being written.

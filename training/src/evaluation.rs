@@ -190,12 +190,12 @@ impl Running {
     }
 }
 
-/// Middle of the front axle [m].
+/// Middle of the front axle \[m].
 fn front_axle(rig: &Rig, truck: &Truck) -> Vec2 {
     truck.position + rig.wheelbase * Vec2::from_angle(truck.heading)
 }
 
-/// Largest distance of a point of `trailer` from the path `front` [m]. The trailer follows the path in order, so the
+/// Largest distance of a point of `trailer` from the path `front` \[m]. The trailer follows the path in order, so the
 /// search for the nearest segment only moves forwards.
 fn off_tracking(front: &[Vec2], trailer: &[Vec2]) -> f64 {
     let distance = |point: Vec2, index: usize| f64::from(offtrack::cpu::follow::distance_to_segment(point, front[index], front[index + 1]));

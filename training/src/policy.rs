@@ -56,7 +56,7 @@ impl LearnedPolicy {
     /// is refused.
     pub fn load(file: &Path) -> Result<LearnedPolicy, Error> {
         let bytes = reader::read_bytes(file, FILE_LIMIT)?;
-        let contents = Contents::from_bytes(&bytes).map_err(|message| Error::Contents { file: file.to_owned(), message })?;
+        let contents = Contents::from_bytes(&bytes).map_err(|message| Error::contents(file, message))?;
         Ok(LearnedPolicy::new(file.display().to_string(), contents))
     }
 

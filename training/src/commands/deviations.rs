@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use offtrack::reader::{read_text, shortened};
+use offtrack::reader::read_text;
 use offtrack::roundabout::Roundabout;
 use offtrack_comparison::FILE_LIMIT;
 use offtrack_comparison::deviation::{Measured, deviations};
@@ -24,8 +24,8 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Error> {
     let roundabout = Roundabout::find(&args.roundabout)?;
     let text = read_text(&args.measured, FILE_LIMIT)?;
-    let wrong = |message: String| Error::Contents { file: args.measured.clone(), message };
-    let measured: Measured = serde_json::from_str(&text).map_err(|error| wrong(shortened(&error.to_string(), 600)))?;
+    let wrong = |message: String| Error::contents(&args.measured, message);
+    let measured: Measured = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     let rows = deviations(&roundabout, &measured).map_err(|error| wrong(error.to_string()))?;
     let mut table = format!("{:<14} {:>21} {:>30}\n", roundabout.name, "measured to model", "model to measured");
     table += &format!("{:<14} {:>8} {:>8} {:>8} {:>12} {:>8} {:>8}\n", "", "worst m", "mean m", "points", "worst m", "mean m", "points");

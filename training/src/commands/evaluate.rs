@@ -104,7 +104,7 @@ fn printed(report: &Report, episodes: usize) -> String {
 /// A run's report, and the text of its metrics.csv.
 fn read_run(folder: &Path) -> Result<(Value, Option<String>), Error> {
     let [report, metrics] = ["report.json", "metrics.csv"].map(|name| folder.join(name));
-    let wrong = |message: String| Error::Contents { file: report.clone(), message };
+    let wrong = |message: String| Error::contents(&report, message);
     let text = reader::read_text(&report, RUN_LIMIT)?;
     let run: Value = serde_json::from_str(&text).map_err(|error| wrong(format!("{error}; a run's report is needed")))?;
     if run.get("env_steps").is_none() {

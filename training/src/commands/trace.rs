@@ -56,7 +56,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 }
 
 fn report(file: &Path) -> Result<Report, Error> {
-    let wrong = |message: String| Error::Contents { file: file.to_owned(), message };
+    let wrong = |message: String| Error::contents(file, message);
     let text = read_text(file, FILE_LIMIT)?;
     let written: Value = serde_json::from_str(&text).map_err(|error| wrong(format!("is not JSON: {error}")))?;
     let cases = written["cases"].as_array().ok_or_else(|| wrong("cases: missing or not a list; a list of cases is needed".to_owned()))?;
@@ -68,7 +68,7 @@ fn report(file: &Path) -> Result<Report, Error> {
         };
         let (id, kind) = (text("id")?, text("kind")?);
         if kind == "trajectory" {
-            let case = Case::deserialize(case).map_err(|error| wrong(shortened(&format!("case {id:?}: {error}"), 600)))?;
+            let case = Case::deserialize(case).map_err(|error| wrong(format!("case {id:?}: {error}")))?;
             report.cases.push(trace(&case).map_err(|error| wrong(error.to_string()))?);
         } else {
             report.skipped.push(Skipped { id, kind });

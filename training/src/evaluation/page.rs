@@ -55,7 +55,7 @@ pub struct Page<'a> {
 /// Roundabouts, routes, truck and episodes, as the page's scripts read them.
 #[derive(Serialize)]
 struct Ground<'a> {
-    /// Time between two frames [s].
+    /// Time between two frames \[s].
     step: f64,
     vehicle: Measures,
     n_rays: usize,

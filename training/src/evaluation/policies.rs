@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::policy::LearnedPolicy;
 
 /// Pure pursuit's default look-ahead distance: the best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of
-/// attard2023 [m].
+/// attard2023 \[m].
 pub const LOOK_AHEAD: f32 = 7.0;
 
 /// Chooses an action for every truck of a batch.
@@ -26,7 +26,7 @@ pub trait Policy {
 
 /// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its
 /// benchmark. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where
-/// there is none, the one for attard2023. `look_ahead` is pure pursuit's [m], `seed` that of random actions.
+/// there is none, the one for attard2023. `look_ahead` is pure pursuit's \[m], `seed` that of random actions.
 pub fn find(policy: Option<&str>, benchmark: &str, look_ahead: f32, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
     let learned = match policy {
         Some("pursuit") => return Ok(Box::new(PurePursuit { look_ahead })),
@@ -83,7 +83,7 @@ impl Policy for UniformRandom {
 /// R. Coulter, "Implementation of the Pure Pursuit Path Tracking Algorithm" (Carnegie Mellon, 1992).
 #[derive(Debug)]
 pub struct PurePursuit {
-    /// Look-ahead distance: from the drive axle to the target point [m].
+    /// Look-ahead distance: from the drive axle to the target point \[m].
     pub look_ahead: f32,
 }
 
@@ -103,7 +103,7 @@ impl Policy for PurePursuit {
 }
 
 impl PurePursuit {
-    /// Steer angle of the arc to the target point [rad].
+    /// Steer angle of the arc to the target point \[rad].
     fn steering(&self, wheelbase: f32, truck: &Truck, waypoints: &[WaypointRow], next: usize) -> f32 {
         let pair = |index: usize| (waypoints[index - 1].position, waypoints[index].position);
         // The first segment that ends beyond the look-ahead distance; it starts within it.

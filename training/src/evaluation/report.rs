@@ -15,19 +15,19 @@ pub struct Episode {
     pub steps: u32,
     /// Sum of the rewards.
     pub reward: f64,
-    /// Mean distance to the lane centre [m].
+    /// Mean distance to the lane centre \[m].
     pub lane_distance_mean: f64,
-    /// Largest distance to the lane centre [m].
+    /// Largest distance to the lane centre \[m].
     pub lane_distance_max: f64,
-    /// Smallest distance of the tractor to a kerb [m].
+    /// Smallest distance of the tractor to a kerb \[m].
     pub tractor_clearance_min: f64,
-    /// Smallest distance of the trailer to a kerb [m].
+    /// Smallest distance of the trailer to a kerb \[m].
     pub trailer_clearance_min: f64,
     /// Largest load transfer ratio of either unit.
     pub load_transfer_ratio_peak: f64,
-    /// Largest articulation [rad].
+    /// Largest articulation \[rad].
     pub articulation_peak: f64,
-    /// Largest distance of the trailer axle from the path of the front axle [m].
+    /// Largest distance of the trailer axle from the path of the front axle \[m].
     pub off_tracking_peak: f64,
 }
 
@@ -48,25 +48,25 @@ pub struct Summary {
     pub ends: BTreeMap<&'static str, usize>,
     /// Episodes that failed in their first step: the truck starts on or against a kerb, and no action helps.
     pub lost_at_start: usize,
-    /// Mean distance to the lane centre, all episodes [m].
+    /// Mean distance to the lane centre, all episodes \[m].
     pub lane_distance_mean: f64,
-    /// The same of those that arrived, `None` if none did [m].
+    /// The same of those that arrived, `None` if none did \[m].
     pub lane_distance_mean_arrived: Option<f64>,
-    /// Largest distance to the lane centre [m].
+    /// Largest distance to the lane centre \[m].
     pub lane_distance_max: f64,
-    /// The same of those that arrived [m].
+    /// The same of those that arrived \[m].
     pub lane_distance_max_arrived: Option<f64>,
-    /// Smallest distance of the tractor to a kerb [m].
+    /// Smallest distance of the tractor to a kerb \[m].
     pub tractor_clearance_min: f64,
-    /// Smallest distance of the trailer to a kerb [m].
+    /// Smallest distance of the trailer to a kerb \[m].
     pub trailer_clearance_min: f64,
     /// Largest load transfer ratio.
     pub load_transfer_ratio_peak: f64,
-    /// Largest articulation [deg].
+    /// Largest articulation \[deg].
     pub articulation_peak_deg: f64,
-    /// Largest off-tracking [m].
+    /// Largest off-tracking \[m].
     pub off_tracking_peak: f64,
-    /// Mean time of an episode [s].
+    /// Mean time of an episode \[s].
     pub time_mean: f64,
     /// Mean sum of rewards.
     pub reward_mean: f64,

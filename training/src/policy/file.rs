@@ -20,7 +20,7 @@ const MOST_LAYERS: usize = 64;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Contents {
     pub(super) benchmark: String,
-    /// Steer angle [rad] and speed [m/s] of each action.
+    /// Steer angle \[rad] and speed [m/s] of each action.
     pub(super) actions: Vec<[f32; 2]>,
     pub(super) normalisation: Normalisation,
     /// Weights `[inputs * outputs]`, inputs varying slowest, and biases `[outputs]`, from the observation on.

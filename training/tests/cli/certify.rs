@@ -83,6 +83,8 @@ fn a_damaged_certificate_is_refused_by_its_name() {
     refused("must lie in -1..1");
     change(&place, |certificate| certificate["starts"] = Value::Array(Vec::new()));
     refused("starts: empty");
+    change(&place, |certificate| certificate["routes"][1] = certificate["routes"][0].clone());
+    refused("16m/E-right-1: is there twice");
     change(&place, |certificate| drop(certificate["routes"][0]["found"].as_array_mut().unwrap().pop()));
     refused("4 entries");
     change(&place, |certificate| certificate["routes"][0]["name"] = "20m/N-left-9".into());

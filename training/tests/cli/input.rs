@@ -133,6 +133,18 @@ fn deeply_nested_json_is_an_error_and_no_abort() {
 }
 
 #[test]
+fn a_long_value_is_not_repeated_whole() {
+    let place = Place::new();
+    let long = "x".repeat(1_000_000);
+    std::fs::write(place.file("cases.json"), format!(r#"{{"cases": [{{"id": ["{long}"]}}]}}"#)).unwrap();
+    let said = refusal(&offtrack(&["trace", &place.text("cases.json")]), 2);
+    assert!(said.contains("cases[0].id") && said.contains("must be text") && said.len() < 1000, "{}", said.len());
+    std::fs::write(place.file("measured.json"), format!(r#"{{"{long}": 1}}"#)).unwrap();
+    let said = refusal(&offtrack(&["deviations", "16m", &place.text("measured.json")]), 2);
+    assert!(said.contains("unknown field") && said.len() < 1000, "{}", said.len());
+}
+
+#[test]
 fn a_roundabout_is_found_by_its_name_or_its_path() {
     for roundabout in ["16m", "scenarios/roundabouts/16m.toml"] {
         let output = offtrack(&["deviations", roundabout, "tests/data/measured/16m.json"]);

@@ -5,7 +5,7 @@
 //! action table are stated beside them, so that a file made under other conditions is refused by the condition that
 //! differs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -24,6 +24,8 @@ use crate::files;
 const VERSION: u32 = 1;
 /// Most bytes of a certificate: a hundred times that of all routes of attard2023.
 const FILE_LIMIT: u64 = 64 << 20;
+/// Most starts of every route.
+const MOST_STARTS: usize = 1000;
 /// Most steps of a sequence.
 const MOST_STEPS: usize = 1_000_000;
 
@@ -49,7 +51,7 @@ pub struct Certificate {
     pub machine: String,
     /// The commit that the program was built from.
     pub commit: String,
-    /// Time of the search so far [s].
+    /// Time of the search so far \[s].
     pub seconds: f64,
     /// Env steps of the search so far.
     pub env_steps: u64,
@@ -130,7 +132,7 @@ impl Certificate {
     /// Reads a certificate. A file that is truncated, of another format, or contradicts itself is refused.
     pub fn read(file: &Path) -> Result<Certificate, Error> {
         let bytes = reader::read_bytes(file, FILE_LIMIT)?;
-        let wrong = |message: String| Error::Contents { file: file.to_owned(), message };
+        let wrong = |message: String| Error::contents(file, message);
         let certificate: Certificate = serde_json::from_slice(&bytes)
             .map_err(|error| wrong(format!("is not a certificate, or is damaged: {error}; `offtrack certify --json` writes one")))?;
         if certificate.version != VERSION {
@@ -138,6 +140,14 @@ impl Certificate {
         }
         if certificate.starts.is_empty() {
             return Err(wrong("is a damaged certificate: starts: empty; at least 1 is needed".into()));
+        }
+        if MOST_STARTS < certificate.starts.len() {
+            let n = certificate.starts.len();
+            return Err(wrong(format!("is a damaged certificate: starts: {n} entries; at most {MOST_STARTS} are read")));
+        }
+        let mut names = HashSet::new();
+        if let Some(twice) = certificate.routes.iter().find(|route| !names.insert(&route.name)) {
+            return Err(wrong(format!("is a damaged certificate: {}: is there twice; a route has one entry", twice.name)));
         }
         for route in &certificate.routes {
             let (found, starts) = (route.found.len(), certificate.starts.len());
@@ -174,7 +184,7 @@ impl Certificate {
                 let message = format!(
                     "was made for {made_for} with another {key}: {there} there, {here} in {benchmark}; make one with `offtrack certify --benchmark {benchmark} --json FILE`"
                 );
-                return Err(Error::Contents { file: file.to_owned(), message });
+                return Err(Error::contents(file, message));
             }
         }
         Ok(())
@@ -215,14 +225,16 @@ pub fn runs(actions: &[u32]) -> String {
     text
 }
 
-/// Decodes [`runs`]. Each action must be below `n_actions`; the error says what is wrong.
-pub fn actions(text: &str, n_actions: u32) -> Result<Vec<u32>, String> {
+/// Decodes the first `limit` actions of [`runs`]. Each action must be below `n_actions`; the error says what is wrong.
+pub fn actions(text: &str, n_actions: u32, limit: usize) -> Result<Vec<u32>, String> {
     let mut actions = Vec::new();
+    let mut total = 0;
     for run in text.split_whitespace() {
         let numbers = run.split_once('x').and_then(|(action, count)| Some((action.parse::<u32>().ok()?, count.parse::<usize>().ok()?)));
         match numbers {
-            Some((action, count)) if action < n_actions && count <= MOST_STEPS - actions.len() => {
-                actions.extend(std::iter::repeat_n(action, count));
+            Some((action, count)) if action < n_actions && count <= MOST_STEPS - total => {
+                total += count;
+                actions.extend(std::iter::repeat_n(action, count.min(limit - actions.len())));
             }
             _ => {
                 return Err(format!(
@@ -242,15 +254,16 @@ mod tests {
     #[test]
     fn run_length_encoded_actions_are_decoded() {
         for sequence in [vec![], vec![4], vec![4, 4, 4, 0, 8, 8, 4]] {
-            assert_eq!(actions(&runs(&sequence), 9), Ok(sequence));
+            assert_eq!(actions(&runs(&sequence), 9, 100), Ok(sequence));
         }
         assert_eq!(runs(&[4, 4, 4, 0]), "4x3 0x1");
+        assert_eq!(actions("4x3 0x1", 9, 2), Ok(vec![4, 4]));
     }
 
     #[test]
     fn a_wrong_run_of_actions_is_named() {
         for wrong in ["9x1", "4", "4x", "x4", "-1x2", "4x1000001", "4x1000000 4x1", "4x99999999999999999999"] {
-            let said = actions(wrong, 9).unwrap_err();
+            let said = actions(wrong, 9, 10).unwrap_err();
             assert!(said.contains(wrong.split(' ').next_back().unwrap()) && said.contains("0..9"), "{said}");
         }
     }

@@ -21,14 +21,16 @@ struct Sequence<'a> {
 /// Drives the sequences of the routes that `wanted` accepts and gives their number, or the first that does not arrive.
 /// Every such route must be one of the world's.
 pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted: impl Fn(&str) -> bool) -> Result<usize, Error> {
-    let wrong = |message: String| Error::Contents { file: path.to_owned(), message };
+    let wrong = |message: String| Error::contents(path, message);
     let (mut sequences, mut routes) = (Vec::new(), Vec::new());
     for route in certificate.routes.iter().filter(|route| wanted(&route.name)) {
         let index = world.route_names.iter().position(|name| *name == route.name);
         let index = index.ok_or_else(|| wrong(format!("has a route {} that the benchmark does not have", route.name)))?;
         for (found, &[offset, heading]) in route.found.iter().zip(&certificate.starts).filter(|(found, _)| found.arrived()) {
             let damaged = |message| wrong(format!("is a damaged certificate: {}: {message}", route.name));
-            let actions = file::actions(&found.actions, world.params.n_actions).map_err(damaged)?;
+            // Beyond the time limit of its route no action changes the outcome.
+            let limit = world.routes[index].step_limit as usize;
+            let actions = file::actions(&found.actions, world.params.n_actions, limit).map_err(damaged)?;
             routes.push(index as u32);
             sequences.push(Sequence { route: &route.name, start: Start { offset, heading }, actions });
         }

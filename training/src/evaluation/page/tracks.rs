@@ -14,9 +14,9 @@ use offtrack::layout::N_RAYS;
 
 use offtrack_drawing::recording::{Frame, Track};
 
-/// Resolution of lengths [m].
+/// Resolution of lengths \[m].
 const LENGTH: f64 = 0.01;
-/// Resolution of angles [rad].
+/// Resolution of angles \[rad].
 const ANGLE: f64 = 1e-4;
 /// Resolution of speeds [m/s] and of load transfer ratios.
 const HUNDREDTH: f64 = 0.01;
