@@ -1,6 +1,8 @@
-//! The learner: discrete soft actor-critic, its replay buffer, and the training loop, on the processor or on a graphics device.
+//! The learner: discrete soft actor-critic, its replay buffer, and the training loop, on the processor or on a graphics
+//! device.
 //!
-//! Start with [`training`], the loop, then [`sac`], the algorithm. [`rollout`] is what differs between processor and device.
+//! Start with [`training`], the loop, then [`sac`], the algorithm. [`rollout`] is what differs between processor and
+//! device.
 
 pub mod backend; // the choice of processor or device
 pub mod checkpoint; // all state in a file

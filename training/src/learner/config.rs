@@ -173,7 +173,8 @@ pub struct Entropy {
 }
 
 impl Config {
-    /// Reads a training file by its path or its name, `default`. Everything that can be wrong with it is found here, with its key.
+    /// Reads a training file by its path or its name, `default`. Everything that can be wrong with it is found here,
+    /// with its key.
     pub fn read(file: &Path) -> Result<Config, Error> {
         Config::read_with(file, &[])
     }
