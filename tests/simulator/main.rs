@@ -20,6 +20,7 @@ mod observe;
 #[cfg(feature = "gpu")]
 mod parity;
 mod physics;
+mod pinned;
 mod sense;
 mod shaders;
 
