@@ -1,4 +1,4 @@
-//! A truck driven open loop by the simulator's own [`drive`](crate::cpu::drive), for comparison with reference trajectories.
+//! A truck driven open loop by the simulator's own [`drive`](crate::engine::cpu::drive), for comparison with reference trajectories.
 //!
 //! A case is what `tests/data/physics_vectors.json` holds. Between the instants of the case's grid the truck is moved by a part of a
 //! sub-step from the grid instant before, on a copy, so that asking for a state never changes those after it.
@@ -11,7 +11,7 @@ use serde::Serialize;
 pub use case::{Case, CaseVehicle, Command, Error, Init, Instant};
 
 use crate::angle::wrapped;
-use crate::cpu::drive::{Moving, load_transfer_ratio, motion, moved};
+use crate::engine::cpu::drive::{Moving, load_transfer_ratio, motion, moved};
 use crate::layout::{Control, Rig, Truck};
 
 /// Instants closer together than this are the same [s].

@@ -27,7 +27,8 @@ const ROOM: f64 = 1.35;
 const REACH: f64 = 12.0;
 
 /// Colours for lines, apart for colour-blind readers: P. Tol's "muted" scheme.
-pub const LINES: [&str; 9] = ["#332288", "#cc6677", "#117733", "#88ccee", "#882255", "#ddaa33", "#44aa99", "#999933", "#aa4499"];
+pub const LINES: [&str; 10] =
+    ["#332288", "#cc6677", "#117733", "#88ccee", "#882255", "#ddaa33", "#44aa99", "#999933", "#aa4499", "#661100"];
 
 /// A picture of panels.
 pub struct Chart {

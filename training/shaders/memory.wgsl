@@ -29,8 +29,8 @@
 
 // Draws an action for every truck from the actor's output.
 @compute @workgroup_size(WORKGROUP)
-fn choose(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let env = thread_of(group, groups, local);
+fn choose(thread: Thread) {
+    let env = index_of(thread);
     if facts.n_envs <= env { return; }
     let first = env * facts.n_actions;
     var most = logits[first];
@@ -56,26 +56,26 @@ fn choose(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) grou
 
 // Keeps what the trucks see and do, before the step; a thread a value.
 @compute @workgroup_size(WORKGROUP)
-fn keep(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let thread = thread_of(group, groups, local);
-    let env = thread / N_VALUES;
+fn keep(thread: Thread) {
+    let element = index_of(thread);
+    let env = element / N_VALUES;
     if facts.n_envs <= env { return; }
     let row = now.slot * facts.n_envs + env;
-    held_observation[row * N_VALUES + thread % N_VALUES] = observation[thread];
-    if thread % N_VALUES == 0u {
+    held_observation[row * N_VALUES + element % N_VALUES] = observation[element];
+    if element % N_VALUES == 0u {
         held_action[row] = action[env];
     }
 }
 
 // Keeps what the step led to, after it; a thread a value.
 @compute @workgroup_size(WORKGROUP)
-fn remember(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let thread = thread_of(group, groups, local);
-    let env = thread / N_VALUES;
+fn remember(thread: Thread) {
+    let element = index_of(thread);
+    let env = element / N_VALUES;
     if facts.n_envs <= env { return; }
     let row = now.slot * facts.n_envs + env;
-    held_next[row * N_VALUES + thread % N_VALUES] = next_observation[thread];
-    if thread % N_VALUES == 0u {
+    held_next[row * N_VALUES + element % N_VALUES] = next_observation[element];
+    if element % N_VALUES == 0u {
         held_reward[row] = reward[env];
         held_ended[row] = ended[env];
     }
@@ -85,10 +85,10 @@ fn remember(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
 //
 // The sum of rewards is R. Sutton's n-step return ("Learning to Predict by the Methods of Temporal Differences", 1988).
 @compute @workgroup_size(WORKGROUP)
-fn sample(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let thread = thread_of(group, groups, local);
-    let index = thread / N_VALUES;
-    let value = thread % N_VALUES;
+fn sample(thread: Thread) {
+    let element = index_of(thread);
+    let index = element / N_VALUES;
+    let value = element % N_VALUES;
     if facts.n_rows <= index { return; }
     let drawn = words(facts.sampling_seed, index, now.sample, 0u);
     let slot = now.oldest + index_below(drawn.x, now.n_drawable);
@@ -119,8 +119,8 @@ fn sample(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) grou
     if in_mirror { image = images[value]; }
     // The same noise on both, so that what changes between them stays what it is.
     let noise = scaling[value].noise * signed_unit(words(facts.sampling_seed, index, now.sample, 1u + value).x);
-    drawn_observation[thread] = scaled(image.factor * held_observation[first * N_VALUES + image.place], value) + noise;
-    drawn_next[thread] = scaled(image.factor * held_next[last * N_VALUES + image.place], value) + noise;
+    drawn_observation[element] = scaled(image.factor * held_observation[first * N_VALUES + image.place], value) + noise;
+    drawn_next[element] = scaled(image.factor * held_next[last * N_VALUES + image.place], value) + noise;
 }
 
 // An observed value as networks like it.

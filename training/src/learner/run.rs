@@ -170,8 +170,8 @@ impl Run {
     /// Begins to write a checkpoint and the driver.
     fn keep(&mut self) {
         let mut columns = Columns::default();
-        for (name, bytes) in self.simulator.batch().columns() {
-            columns.put(batch_name(name), bytes);
+        for (column, bytes) in self.simulator.batch().columns() {
+            columns.put(batch_name(column.name()), bytes);
         }
         columns.put("acting", &self.acting.state[..]);
         columns.put("sampling", &self.sampling.state[..]);
@@ -188,7 +188,7 @@ impl Run {
     /// Goes on from a checkpoint of this run.
     pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
         check_world(stored, self.fingerprint, &self.config)?;
-        self.simulator.restore(|name| stored.bytes(&batch_name(name))).map_err(|error| stored.error(error.to_string()))?;
+        self.simulator.restore(|column| stored.bytes(&batch_name(column.name()))).map_err(|error| stored.error(error.to_string()))?;
         self.acting = Generator { state: stored.array("acting")? };
         self.sampling = Generator { state: stored.array("sampling")? };
         let values = |name: &str| stored.exactly(name, N_VALUES);

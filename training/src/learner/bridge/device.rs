@@ -13,7 +13,7 @@ use std::sync::Arc;
 use burn::tensor::{Tensor, TensorData};
 use bytemuck::{bytes_of, cast_slice};
 use offtrack::gpu::{Kernels, Slice};
-use offtrack::layout::N_VALUES;
+use offtrack::layout::{Column, N_VALUES};
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buffer, BufferBinding, PollType, SubmissionIndex};
@@ -24,7 +24,7 @@ use crate::learner::mirror::Mirror;
 use crate::learner::network::Mlp;
 use crate::learner::normalisation::{LIMIT, Scaling};
 use crate::learner::sac::Transitions;
-use kernels::{Facts, Image, Now, Scale};
+use kernels::{Facts, Image, Kernel, Now, Scale};
 pub use shared::Shared;
 use shared::{Owned, floats, integers};
 
@@ -43,7 +43,7 @@ pub struct DeviceMemory {
     n_samples: u32,
     /// Steps made, kept or not.
     n_steps: u32,
-    kernels: Kernels,
+    kernels: Kernels<Kernel>,
     buffers: Vec<Slice>,
     now: Buffer,
     scaling: Buffer,
@@ -94,7 +94,7 @@ impl DeviceMemory {
             floats(&sample.discount)?,
             floats(&sample.next_observation)?,
         ];
-        let engine = Engine::Gpu { device: shared.gpu.clone(), columns: vec![("observation", seen.slice.clone())] };
+        let engine = Engine::Gpu { device: shared.gpu.clone(), columns: vec![(Column::Observation, seen.slice.clone())] };
         let mut simulator = Simulator::on(engine, world.clone(), n_envs, config.seed, RouteChoice::Drawn(routes))?;
 
         let facts = Facts {
@@ -119,9 +119,9 @@ impl DeviceMemory {
             None => (std::array::from_fn(|index| (index, 1.0)), (0..world.params.n_actions).collect()),
         };
         let images = values.map(|(place, factor)| Image { place: place as u32, factor });
-        let columns = ["action", "observation", "next_observation", "ended", "reward"];
+        let columns = [Column::Action, Column::Observation, Column::NextObservation, Column::Ended, Column::Reward];
         let batch = simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
-        let columns: Vec<Slice> = columns.iter().filter_map(|name| batch.column(name).cloned()).collect();
+        let columns: Vec<Slice> = columns.map(|column| batch.column(column).clone()).into();
         let held = (n_slots * n_envs) as u64;
         let mut buffers =
             vec![filled(bytes_of(&facts)), now.clone(), scaling.clone(), filled(cast_slice(&images)), filled(cast_slice(&actions))];
@@ -199,16 +199,16 @@ impl DeviceMemory {
         let values = self.facts.n_envs * N_VALUES as u32;
         let batch = self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
         if logits.is_some() {
-            kernels::add(&self.kernels, &mut encoder, &group, "choose", self.facts.n_envs);
+            kernels::add(&self.kernels, &mut encoder, &group, Kernel::Choose, self.facts.n_envs);
         } else {
             batch.add_draw(&mut encoder);
         }
         if is_kept {
-            kernels::add(&self.kernels, &mut encoder, &group, "keep", values);
+            kernels::add(&self.kernels, &mut encoder, &group, Kernel::Keep, values);
         }
         batch.add_step(&mut encoder);
         if is_kept {
-            kernels::add(&self.kernels, &mut encoder, &group, "remember", values);
+            kernels::add(&self.kernels, &mut encoder, &group, Kernel::Remember, values);
             self.n_kept += 1;
         }
         batch.stepped();
@@ -227,7 +227,7 @@ impl DeviceMemory {
         let group = self.group(None);
         self.tell_now();
         let mut encoder = self.shared.gpu.device.create_command_encoder(&Default::default());
-        kernels::add(&self.kernels, &mut encoder, &group, "sample", self.facts.n_rows * N_VALUES as u32);
+        kernels::add(&self.kernels, &mut encoder, &group, Kernel::Sample, self.facts.n_rows * N_VALUES as u32);
         self.shared.gpu.queue.submit([encoder.finish()]);
         self.n_samples = self.n_samples.wrapping_add(1);
         Ok(Transitions {

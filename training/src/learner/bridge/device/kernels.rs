@@ -2,8 +2,8 @@
 
 use offtrack::gpu::Kernels;
 use offtrack::layout::buffers::Access;
-use offtrack::layout::shared_wgsl;
 use offtrack::stages::SHADERS;
+use offtrack::wgsl;
 use wgpu::{BindGroup, CommandEncoder, ComputePassDescriptor};
 
 /// Buffers that the kernels see.
@@ -69,22 +69,36 @@ offtrack::shared! {
     }
 }
 
+offtrack::named! {
+    /// The memory's kernels.
+    pub enum Kernel {
+        /// Draws actions from the actor's output.
+        Choose = "choose",
+        /// Keeps the observations and actions of a step.
+        Keep = "keep",
+        /// Keeps the results of a step.
+        Remember = "remember",
+        /// Draws transitions.
+        Sample = "sample",
+    }
+}
+
 /// The module's text.
 fn source() -> String {
     let common = SHADERS.iter().filter(|(name, _)| ["common/thread", "common/random"].contains(name)).map(|(_, text)| *text);
-    let own = [shared_wgsl(), printed_structs()];
+    let own = [wgsl::shared(), printed_structs()];
     own.iter().map(String::as_str).chain(common).chain([include_str!("../../../../shaders/memory.wgsl")]).collect()
 }
 
 /// Compiles them. A tensor's buffer is a slice of a page that other tensors lie in too, and a page is either read from or written to, so all
 /// may be written to.
-pub(super) fn compile(device: &wgpu::Device) -> Kernels {
-    Kernels::compile(device, "memory", source(), [Access::ReadWrite; N_BUFFERS], ["choose", "keep", "remember", "sample"])
+pub(super) fn compile(device: &wgpu::Device) -> Kernels<Kernel> {
+    Kernels::compile(device, "memory", source(), [Access::ReadWrite; N_BUFFERS])
 }
 
 /// Adds a kernel to the commands, over so many threads.
-pub(super) fn add(kernels: &Kernels, encoder: &mut CommandEncoder, group: &BindGroup, entry: &str, threads: u32) {
+pub(super) fn add(kernels: &Kernels<Kernel>, encoder: &mut CommandEncoder, group: &BindGroup, kernel: Kernel, threads: u32) {
     let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
     pass.set_bind_group(0, group, &[]);
-    kernels.dispatch(&mut pass, entry, threads.into());
+    kernels.dispatch(&mut pass, kernel, threads.into());
 }
