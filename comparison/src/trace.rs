@@ -1,4 +1,5 @@
-//! One truck, open loop, moved by the simulator's own [`drive`](offtrack::cpu::drive) stage, for comparison with reference trajectories.
+//! A truck driven open loop by the simulator's own [`drive`](offtrack::cpu::drive), for comparison with reference
+//! trajectories.
 //!
 //! `tests/data/physics_vectors.json` holds such cases. A state between two instants of the sub-step grid is computed on a copy, from the
 //! grid instant before it, so that a request for a state never changes later ones.
