@@ -1,6 +1,6 @@
-// The replay buffer on a device: a ring of the latest steps of every truck, filled from the simulator's columns and sampled into the
-// learner's tensors. Its twin on the host is src/learner/replay_buffer.rs. Structs and bindings are printed from
-// src/learner/rollout/device/memory_kernels.rs.
+// The replay buffer on a device: a ring of the latest steps of every truck, filled from the simulator's columns and
+// sampled into the learner's tensors. Its twin on the host is src/learner/replay_buffer.rs. Structs and bindings are
+// printed from src/learner/rollout/device/memory_kernels.rs.
 
 // Samples an action for every truck from the actor's output.
 @compute @workgroup_size(WORKGROUP)

@@ -1,6 +1,7 @@
 //! `offtrack bench`: the time of an update of the learner, alone and with sampling its batch.
 //!
-//! With `--lines` each line read asks for a round: another program can take turns with this one, so that a busy machine slows both alike.
+//! With `--lines` each line read asks for a round: another program can take turns with this one, so that a busy machine
+//! slows both alike.
 
 use std::io::BufRead;
 use std::path::{Path, PathBuf};

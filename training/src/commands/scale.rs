@@ -1,4 +1,5 @@
-//! `offtrack scale`: env steps per second against the number of trucks, on the processor or on a device, by mode and by stage.
+//! `offtrack scale`: env steps per second against the number of trucks, on the processor or on a device, by mode and by
+//! stage.
 //!
 //! A size that an adapter cannot hold is a result too: it is in the file with the reason, and the others go on.
 
@@ -40,8 +41,8 @@ pub struct Args {
     /// Where the actions come from, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "random")]
     mode: Vec<Mode>,
-    /// With `--mode training`: the training file, its path or name; without it `gpu`. `--envs` replaces its number of trucks, and its replay
-    /// buffer is as small as an update allows.
+    /// With `--mode training`: the training file, its path or name; without it `gpu`. `--envs` replaces its number of
+    /// trucks, and its replay buffer is as small as an update allows.
     #[arg(long)]
     config: Option<PathBuf>,
     /// Time for each number of trucks and each mode [s].

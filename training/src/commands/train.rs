@@ -1,7 +1,8 @@
 //! `offtrack train`: trains a policy, then evaluates it on the test routes.
 //!
-//! Everything is written as it comes: the training file at once, a row of metrics every few seconds, policy and checkpoint every few minutes. A
-//! stopped run leaves a policy that can be evaluated, and all that it takes to continue.
+//! Everything is written as it comes: the training file at once, a row of metrics every few seconds, policy and
+//! checkpoint every few minutes. A stopped run leaves a policy that can be evaluated, and all that it takes to
+//! continue.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -40,8 +41,8 @@ const METRICS_LIMIT: u64 = 64 << 20;
 /// Train a policy, then evaluate it on the test routes.
 #[derive(Debug, Default, clap::Args)]
 pub struct Args {
-    /// A training file: its path, or one of `default`, `gpu`, `as-run` and `paper`, which come with the program. Without it `default`, in a
-    /// program built for graphics devices `gpu`.
+    /// A training file: its path, or one of `default`, `gpu`, `as-run` and `paper`, which come with the program.
+    /// Without it `default`, in a program built for graphics devices `gpu`.
     config: Option<PathBuf>,
     /// Name of the run's folder; must be new. Without it the training file's name, numbered.
     #[arg(long)]
@@ -64,14 +65,14 @@ pub struct Args {
     /// Part of another graphics adapter's name, see `offtrack devices`.
     #[arg(long)]
     adapter: Option<String>,
-    /// Another value of one of the training file's keys, as in `learning.n_steps=5`; nothing after the `=` removes the key. May be given
-    /// several times.
+    /// Another value of one of the training file's keys, as in `learning.n_steps=5`; nothing after the `=` removes the
+    /// key. May be given several times.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
-    /// Continue a run that was stopped or killed, from the last checkpoint in its folder, by its own config.toml. --minutes or --steps give
-    /// another budget, counted from the run's beginning; a finished run continues too. The learning-rate schedule ends with the budget, so
-    /// with a larger one the rates are higher from here on. With a budget of steps alone the result is that of a run never stopped, bit for
-    /// bit on the same machine and program.
+    /// Continue a run that was stopped or killed, from the last checkpoint in its folder, by its own config.toml.
+    /// --minutes or --steps give another budget, counted from the run's beginning; a finished run continues too. The
+    /// learning-rate schedule ends with the budget, so with a larger one the rates are higher from here on. With a
+    /// budget of steps alone the result is that of a run never stopped, bit for bit on the same machine and program.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "name", "out", "seed", "envs", "adapter", "settings"])]
     resume: Option<PathBuf>,
 }
@@ -175,7 +176,8 @@ fn config(args: &Args, file: &Path) -> Result<Config, Error> {
 }
 
 impl Worlds {
-    /// Both benchmarks of a training file. None of the routes that the policy is evaluated on may be among those it is trained on.
+    /// Both benchmarks of a training file. None of the routes that the policy is evaluated on may be among those it is
+    /// trained on.
     fn read(config: &Config) -> Result<Worlds, Error> {
         let benchmark = Scenario::find(&config.benchmark)?;
         let training = Scenario::find(config.training_benchmark.as_ref().unwrap_or(&config.benchmark))?;
@@ -196,8 +198,8 @@ impl Worlds {
     }
 }
 
-/// Evaluates the policy of a run that was not interrupted, and writes what the run leaves behind. `written` says whether its last
-/// checkpoint could be written.
+/// Evaluates the policy of a run that was not interrupted, and writes what the run leaves behind. `written` says
+/// whether its last checkpoint could be written.
 fn conclude(
     folder: &Folder,
     worlds: &Worlds,
@@ -239,7 +241,8 @@ fn conclude(
     written
 }
 
-/// Counts Ctrl-C, SIGTERM and SIGHUP: the first lets the step in hand finish and everything be written, the second ends the process.
+/// Counts Ctrl-C, SIGTERM and SIGHUP: the first lets the step in hand finish and everything be written, the second ends
+/// the process.
 fn stop_flag() -> Arc<AtomicU8> {
     let stop = Arc::new(AtomicU8::new(0));
     let flag = stop.clone();

@@ -1,7 +1,7 @@
 //! A checkpoint's file: named columns of numbers.
 //!
-//! The format is safetensors, as a policy's is. The metadata's entry has the format's version, the training file, and a checksum over all
-//! columns: a file that is cut or changed is refused. Floats in it are finite.
+//! The format is safetensors, as a policy's is. The metadata's entry has the format's version, the training file, and a
+//! checksum over all columns: a file that is cut or changed is refused. Floats in it are finite.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -94,7 +94,8 @@ impl<'a> Columns<'a> {
         self.0.push(Column { name: name.into(), dtype: T::DTYPE, bytes });
     }
 
-    /// Writes the file of a run with this training file in this world. What was at `path` is lost at once: write beside the last good file.
+    /// Writes the file of a run with this training file in this world. What was at `path` is lost at once: write beside
+    /// the last good file.
     pub fn write(&self, path: &Path, config: String, world: u32) -> std::io::Result<File> {
         let mut description = Description { version: VERSION, config, world, checksum: 0 };
         let named = self.0.iter().map(|column| (column.name.as_str(), column.bytes.as_ref()));

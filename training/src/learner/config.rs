@@ -173,7 +173,8 @@ pub struct Entropy {
 }
 
 impl Config {
-    /// Reads a training file by its path or its name, `default`. Everything that can be wrong with it is found here, with its key.
+    /// Reads a training file by its path or its name, `default`. Everything that can be wrong with it is found here,
+    /// with its key.
     pub fn read(file: &Path) -> Result<Config, Error> {
         Config::read_with(file, &[])
     }
@@ -186,10 +187,8 @@ impl Config {
             [] => file.display().to_string(),
             _ => format!("{} with --set {}", file.display(), settings.join(" --set ")),
         };
-        let config: Config = table.try_into().map_err(|error: toml::de::Error| Error::Contents {
-            file: origin.clone().into(),
-            message: error.to_string().trim().to_owned(),
-        })?;
+        let wrong = |error: toml::de::Error| Error::contents(Path::new(&origin), error.to_string().trim().to_owned());
+        let config: Config = table.try_into().map_err(wrong)?;
         config.check(&Reader::of(Path::new(&origin)))?;
         Ok(config)
     }

@@ -1,4 +1,5 @@
-//! Epsilon-greedy exploration: random actions replace some of the policy's. Their fraction falls over time and differs between trucks.
+//! Epsilon-greedy exploration: random actions replace some of the policy's. Their fraction falls over time and differs
+//! between trucks.
 
 use rand::Rng;
 

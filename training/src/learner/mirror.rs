@@ -1,7 +1,7 @@
 //! Mirror augmentation: transitions mirrored left to right.
 //!
-//! A truck and its sensors are symmetric, so the mirror image of a transition is a valid transition of left-hand traffic. A learner that
-//! samples both has seen every bend in both directions.
+//! A truck and its sensors are symmetric, so the mirror image of a transition is a valid transition of left-hand
+//! traffic. A learner that samples both has seen every bend in both directions.
 
 use offtrack::layout::{Action, N_TRACTOR_RAYS, N_TRAILER_RAYS, N_VALUES, Ray};
 use offtrack::world::World;
@@ -14,7 +14,8 @@ use crate::learner::replay_buffer::Sample;
 const SIGNED: std::ops::Range<usize> = 6..22;
 /// Index of the first distance sensor in an observation.
 const RANGES: usize = 30;
-/// Tolerance of two sensors' mounts or two steer angles that are mirror images [m, rad]: f32 rounds at 1e-6 of a few metres.
+/// Tolerance of two sensors' mounts or two steer angles that are mirror images [m, rad]: f32 rounds at 1e-6 of a few
+/// metres.
 const SAME: f32 = 1e-4;
 
 /// The mirror image of observations and actions.
@@ -52,7 +53,8 @@ impl Mirror {
         Ok(Mirror { values, actions: world.actions.iter().map(image).collect::<Result<_, _>>()? })
     }
 
-    /// Index of the value that each value is mirrored from, and its factor, `[values]`; and each action's mirror image, `[actions]`.
+    /// Index of the value that each value is mirrored from, and its factor, `[values]`; and each action's mirror image,
+    /// `[actions]`.
     pub fn images(&self) -> ([(usize, f32); N_VALUES], Vec<u32>) {
         (self.values, self.actions.clone())
     }

@@ -16,8 +16,8 @@ pub struct Mlp {
 }
 
 impl Mlp {
-    /// Layers between the given sizes. Weights are drawn from He's uniform distribution ("Delving Deep into Rectifiers", 2015), those of the
-    /// last layer times `last_gain`; biases are 0.
+    /// Layers between the given sizes. Weights are drawn from He's uniform distribution ("Delving Deep into
+    /// Rectifiers", 2015), those of the last layer times `last_gain`; biases are 0.
     pub fn new(sizes: &[usize], last_gain: f32, rng: &mut impl Rng, device: &Device) -> Mlp {
         let n_layers = sizes.len() - 1;
         let layers = sizes.windows(2).enumerate().map(|(index, ends)| {

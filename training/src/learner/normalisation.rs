@@ -1,7 +1,7 @@
 //! Observation normalisation: every value to mean 0 and standard deviation 1.
 //!
-//! An observed angle of a degree is 0.006 and matters as much as a sensor that reads 1. Without normalisation a network learns it far more
-//! slowly.
+//! An observed angle of a degree is 0.006 and matters as much as a sensor that reads 1. Without normalisation a network
+//! learns it far more slowly.
 
 /// Standard deviation below which a value counts as constant: dividing by less would amplify noise.
 const LEAST_DEVIATION: f64 = 0.01;

@@ -1,7 +1,7 @@
 //! The replay buffer on the host: the latest transitions of every truck, in a ring.
 //!
-//! Rows are in the order of time, `n_envs` to a slot, so the next observation of a row is in the next slot. Only where an episode was
-//! truncated it is not: those few observations are kept beside the ring.
+//! Rows are in the order of time, `n_envs` to a slot, so the next observation of a row is in the next slot. Only where
+//! an episode was truncated it is not: those few observations are kept beside the ring.
 
 mod priorities;
 mod state;
@@ -77,8 +77,8 @@ pub struct ReplayBuffer<const N: usize> {
 }
 
 impl<const N: usize> ReplayBuffer<N> {
-    /// A buffer for at least `settings.capacity` transitions of `n_envs` trucks, sampled over `n_steps` steps each. Memory is allocated
-    /// as it is filled.
+    /// A buffer for at least `settings.capacity` transitions of `n_envs` trucks, sampled over `n_steps` steps each.
+    /// Memory is allocated as it is filled.
     pub fn new(n_envs: usize, n_steps: usize, settings: &config::ReplayBuffer) -> ReplayBuffer<N> {
         let n_slots = settings.capacity.div_ceil(n_envs);
         ReplayBuffer {
@@ -155,17 +155,19 @@ impl<const N: usize> ReplayBuffer<N> {
         self.priorities.is_some()
     }
 
-    /// Sets priorities from the absolute TD error of each sampled row, both `[batch]`. Without priorities it does nothing.
+    /// Sets priorities from the absolute TD error of each sampled row, both `[batch]`. Without priorities it does
+    /// nothing.
     pub fn set_td_errors(&mut self, rows: &[usize], errors: &[f32]) {
         if let Some(priorities) = &mut self.priorities {
             rows.iter().zip(errors).for_each(|(&row, &error)| priorities.set_td_error(row, error));
         }
     }
 
-    /// Samples `batch` transitions, uniformly at random or by priority, each over `n_steps` steps or to the end of its episode.
+    /// Samples `batch` transitions, uniformly at random or by priority, each over `n_steps` steps or to the end of its
+    /// episode.
     ///
-    /// The sum of rewards is R. Sutton's n-step return ("Learning to Predict by the Methods of Temporal Differences", 1988), without an
-    /// off-policy correction. [`ReplayBuffer::can_sample`] must hold.
+    /// The sum of rewards is R. Sutton's n-step return ("Learning to Predict by the Methods of Temporal Differences",
+    /// 1988), without an off-policy correction. [`ReplayBuffer::can_sample`] must hold.
     pub fn sample(&self, batch: usize, gamma: f32, rng: &mut impl Rng) -> Sample<N> {
         let held = self.slots_held();
         let oldest = self.count - held;

@@ -1,6 +1,7 @@
 //! Acting, stepping, remembering and sampling: what the training loop asks of the trucks and their replay buffer.
 //!
-//! On the host or on a graphics device. These are the only modules that name both a column of the simulator and a tensor.
+//! On the host or on a graphics device. These are the only modules that name both a column of the simulator and a
+//! tensor.
 
 #[cfg(feature = "gpu")]
 pub mod device;
@@ -47,7 +48,8 @@ pub trait Rollout {
     /// One step of every truck with random actions, remembered.
     fn step_at_random(&mut self) -> Result<(), Error>;
 
-    /// One step of every truck with actions sampled from the actor's distribution, remembered. `env_steps` were made before.
+    /// One step of every truck with actions sampled from the actor's distribution, remembered. `env_steps` were made
+    /// before.
     fn step(&mut self, actor: &Mlp, env_steps: u64) -> Result<(), Error>;
 
     /// The same, not remembered.
@@ -59,7 +61,8 @@ pub trait Rollout {
     /// Sets priorities from the absolute TD errors of the latest sample, `[B, 1]` a shard.
     fn set_td_errors(&mut self, errors: Vec<Tensor<2>>);
 
-    /// The episodes that ended since this was last called. Where counting them means waiting for a device, none unless `wait`.
+    /// The episodes that ended since this was last called. Where counting them means waiting for a device, none unless
+    /// `wait`.
     fn take_episodes(&mut self, wait: bool) -> Result<Vec<Episodes>, Error>;
 
     /// Waits until all that was asked for is done.
@@ -71,6 +74,7 @@ pub trait Rollout {
     /// Adds what continues bit for bit; on a device, nothing.
     fn save<'a>(&'a self, columns: &mut Columns<'a>);
 
-    /// Continues after `n_updates` from what [`Rollout::save`] added; on a device with an empty replay buffer and new episodes.
+    /// Continues after `n_updates` from what [`Rollout::save`] added; on a device with an empty replay buffer and new
+    /// episodes.
     fn restore(&mut self, stored: &Stored, n_updates: u64) -> Result<(), Error>;
 }

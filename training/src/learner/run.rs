@@ -1,7 +1,7 @@
 //! A training run in its folder: the loop, its rows of metrics, its checkpoints, and its end.
 //!
-//! With a budget of steps alone, a run depends on its state and on nothing else: one that continues from a checkpoint equals one that was never
-//! stopped, bit for bit. With minutes the learning rates follow the clock.
+//! With a budget of steps alone, a run depends on its state and on nothing else: one that continues from a checkpoint
+//! equals one that was never stopped, bit for bit. With minutes the learning rates follow the clock.
 
 pub mod checkpointer;
 pub mod folder;
@@ -57,8 +57,8 @@ impl Run {
         self.backend.name()
     }
 
-    /// Trains until the budget is spent or `stopped` says so. A diverged learner and a failed device are errors; a file that cannot be
-    /// written is reported and tried again.
+    /// Trains until the budget is spent or `stopped` says so. A diverged learner and a failed device are errors; a file
+    /// that cannot be written is reported and tried again.
     pub fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {
         let backend = self.backend.clone();
         match backend.guarded(|| self.learn_until(&stopped)) {

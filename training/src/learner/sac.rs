@@ -1,8 +1,10 @@
-//! Soft actor-critic over a discrete action table, in the order of P. Christodoulou, "Soft Actor-Critic for Discrete Action Settings" (2019).
+//! Soft actor-critic over a discrete action table, in the order of P. Christodoulou, "Soft Actor-Critic for Discrete
+//! Action Settings" (2019).
 //!
-//! One learner for the processor and for a graphics device. Only three parts differ: on the processor a batch is learned in shards, one
-//! thread each, Adam is one fused pass, and single numbers are plain; on a device Adam is tensor operations and an update waits for nothing.
-//! The number of shards does not depend on the machine, so neither does the result.
+//! One learner for the processor and for a graphics device. Only three parts differ: on the processor a batch is
+//! learned in shards, one thread each, Adam is one fused pass, and single numbers are plain; on a device Adam is tensor
+//! operations and an update waits for nothing. The number of shards does not depend on the machine, so neither does the
+//! result.
 
 mod adam;
 mod critics;
@@ -28,7 +30,8 @@ use entropy::EntropyCoefficient;
 use scalar::Scalar;
 use shards::Shards;
 
-/// Shards of a batch on the processor: two, for the cores of the smallest machines. Another number would round sums differently.
+/// Shards of a batch on the processor: two, for the cores of the smallest machines. Another number would round sums
+/// differently.
 pub const N_SHARDS: usize = 2;
 
 /// Where a learner's tensors are.
@@ -170,8 +173,8 @@ impl Sac {
         self.entropy_coefficient.value().read()
     }
 
-    /// One gradient step of critics, actor and entropy coefficient on the batch that the shards make up. Learning rates are multiplied by
-    /// `rate_factor`. Returns the absolute TD error of each transition, `[B, 1]` a shard.
+    /// One gradient step of critics, actor and entropy coefficient on the batch that the shards make up. Learning rates
+    /// are multiplied by `rate_factor`. Returns the absolute TD error of each transition, `[B, 1]` a shard.
     pub fn update(&mut self, shards: Vec<Transitions>, rate_factor: f64) -> Vec<Tensor<2>> {
         let n_rows: usize = shards.iter().map(|shard| shard.observation.dims()[0]).sum();
         let gradients = self.shards.map(shards, |shard| {

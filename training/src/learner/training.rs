@@ -28,8 +28,8 @@ pub struct Training {
 }
 
 impl Training {
-    /// Trucks at the start of their first episodes on `routes`, an empty replay buffer, and a learner with random weights. All that can
-    /// be wrong with a config in this world is an error here.
+    /// Trucks at the start of their first episodes on `routes`, an empty replay buffer, and a learner with random
+    /// weights. All that can be wrong with a config in this world is an error here.
     pub fn new(backend: &Backend, config: &Config, world: Arc<World>, routes: Vec<u32>) -> Result<Training, Error> {
         let mirror = config.learning.mirror_augmentation.then(|| Mirror::of(&world)).transpose()?;
         Ok(Training {
@@ -73,7 +73,8 @@ impl Training {
         self.normalisation = Some(normalisation);
     }
 
-    /// Whether the replay buffer is full enough for updates. The first time it is, the normalisation is computed from it.
+    /// Whether the replay buffer is full enough for updates. The first time it is, the normalisation is computed from
+    /// it.
     pub fn is_warm(&mut self) -> Result<bool, Error> {
         let is_warm = self.config.replay_buffer.warmup <= self.rollout.n_transitions() && self.rollout.can_sample();
         if is_warm && self.normalisation.is_none() {

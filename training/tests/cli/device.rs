@@ -1,4 +1,5 @@
-//! Devices from outside: which there are, what is said where one cannot be had, and the speed measured on either engine.
+//! Devices from outside: which there are, what is said where one cannot be had, and the speed measured on either
+//! engine.
 
 use offtrack::stages::STAGES;
 use serde_json::Value;
@@ -225,7 +226,8 @@ mod on_a_device {
         assert_eq!(processor.0, "cpu");
         assert!(device.0.contains('(') && !device.0.contains("cpu"), "{}", device.0);
         assert_eq!((processor.1.len(), &processor.1), (23, &device.1));
-        // A policy that fails on two routes of three, and other starts: equal counts are no accident of one that always arrives.
+        // A policy that fails on two routes of three, and other starts: equal counts are no accident of one that always
+        // arrives.
         let pursuit = ["--policy", "pursuit", "--device", "gpu"];
         let device = arrived(&pursuit).1;
         assert_eq!(arrived(&pursuit[..2]).1, device);

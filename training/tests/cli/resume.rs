@@ -191,7 +191,8 @@ fn a_run_that_cannot_go_on_is_refused_with_the_file_and_what_would_do() {
     assert!(message.contains("cannot be used with '--seed"), "{message}");
 }
 
-/// A checkpoint with its column `name` changed, and the checksum that goes with it: as a program with a fault would have written it.
+/// A checkpoint with its column `name` changed, and the checksum that goes with it: as a program with a fault would
+/// have written it.
 fn with_column(whole: &[u8], name: &str, change: impl FnOnce(&mut [u8])) -> Vec<u8> {
     let n = u64::from_le_bytes(whole[..8].try_into().unwrap()) as usize;
     let mut header: Value = serde_json::from_slice(&whole[8..8 + n]).unwrap();
@@ -338,7 +339,8 @@ fn a_full_disk_fails_a_run_only_at_its_end_after_the_evaluation() {
     assert!(message.matches("training goes on").count() <= 1, "{message}");
     assert!(message.lines().last().unwrap().contains("checkpoint.safetensors: cannot be written: File too large"), "{message}");
     assert!(!place.file("runs/run/checkpoint.part").exists());
-    // One from the beginning, when the replay buffer was small, may have fitted: it is whole, and with room the run continues from it.
+    // One from the beginning, when the replay buffer was small, may have fitted: it is whole, and with room the run
+    // continues from it.
     if place.file("runs/run/checkpoint.safetensors").exists() {
         succeed(&resume(&place, "run", &[]));
     }

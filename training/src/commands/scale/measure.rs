@@ -1,7 +1,7 @@
 //! Measures env steps per second: medians over windows, since other work on a machine disturbs some windows, not most.
 //!
-//! Steps are queued on a device in runs and waited for once a run: waiting for each would measure the wait, and never waiting would queue
-//! without bound.
+//! Steps are queued on a device in runs and waited for once a run: waiting for each would measure the wait, and never
+//! waiting would queue without bound.
 
 use std::time::{Duration, Instant};
 
@@ -55,7 +55,8 @@ pub(super) struct Measured {
     pub steps_a_wait: u64,
     /// Memory of the columns.
     pub bytes_per_truck: f64,
-    /// Median time of each stage when the batch is stepped a stage at a time [ns a truck]; empty where a step is more than the stages.
+    /// Median time of each stage when the batch is stepped a stage at a time [ns a truck]; empty where a step is more
+    /// than the stages.
     #[serde(serialize_with = "as_map")]
     pub stages: Vec<(&'static str, f64)>,
 }
@@ -65,7 +66,8 @@ fn as_map<S: serde::Serializer>(pairs: &[(&'static str, f64)], serializer: S) ->
     serializer.collect_map(pairs.iter().copied())
 }
 
-/// Steps the trucks for about so many seconds: a fifth for the trucks to spread out, three fifths for whole steps, the rest a stage at a time.
+/// Steps the trucks for about so many seconds: a fifth for the trucks to spread out, three fifths for whole steps, the
+/// rest a stage at a time.
 pub(super) fn measured(driven: &mut Driven, seconds: f64) -> Result<Measured, Error> {
     let envs = driven.simulator().n_envs();
     let (steps_before, steps_a_wait) = spread_out(driven, 0.2 * seconds)?;

@@ -69,8 +69,8 @@ impl Learner {
         }
     }
 
-    /// The training file for so many trucks, with the smallest replay buffer that the mode can do with: a larger one is no slower, and
-    /// would keep small adapters from being measured.
+    /// The training file for so many trucks, with the smallest replay buffer that the mode can do with: a larger one is
+    /// no slower, and would keep small adapters from being measured.
     fn config(&self, mode: Mode, envs: usize) -> Config {
         let mut config = Config { n_envs: envs, ..self.config.clone() };
         config.replay_buffer.capacity = match mode {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::reader::{self, TEXT_LIMIT, read_text};
+use offtrack::reader::{self, TEXT_LIMIT, read_text, shortened};
 use toml::{Table, Value};
 
 use crate::error::Error;
@@ -64,7 +64,8 @@ fn table(file: &Path) -> Result<Table, Error> {
         }
         None => read_text(file, TEXT_LIMIT)?,
     };
-    let malformed = |error: toml::de::Error| reader::Error::Malformed { file: file.to_owned(), message: error.to_string() };
+    let malformed =
+        |error: toml::de::Error| reader::Error::Malformed { file: file.to_owned(), message: shortened(&error.to_string(), 400) };
     Ok(toml::from_str(&text).map_err(malformed)?)
 }
 

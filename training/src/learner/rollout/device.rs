@@ -1,8 +1,8 @@
 //! Trucks and replay buffer on a graphics device: nothing leaves it.
 //!
-//! The simulator writes observations into a buffer that a tensor owns. Kernels read the simulator's columns in place and write samples into
-//! buffers of other tensors. Both sides submit to one queue. The tensor library queues its work before it submits it, so it is flushed before
-//! every submission of ours, and nothing waits.
+//! The simulator writes observations into a buffer that a tensor owns. Kernels read the simulator's columns in place
+//! and write samples into buffers of other tensors. Both sides submit to one queue. The tensor library queues its work
+//! before it submits it, so it is flushed before every submission of ours, and nothing waits.
 
 mod memory_kernels;
 mod shared;
@@ -61,7 +61,8 @@ pub struct DeviceRollout {
 }
 
 impl DeviceRollout {
-    /// Trucks at the start of their first episodes, and an empty replay buffer of `config.replay_buffer.capacity` transitions.
+    /// Trucks at the start of their first episodes, and an empty replay buffer of `config.replay_buffer.capacity`
+    /// transitions.
     pub fn new(
         shared: &Shared,
         config: &Config,

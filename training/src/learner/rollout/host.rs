@@ -41,7 +41,8 @@ pub struct HostRollout {
 }
 
 impl HostRollout {
-    /// Trucks at the start of their first episodes, and an empty replay buffer. A mirror that the world does not have is an error.
+    /// Trucks at the start of their first episodes, and an empty replay buffer. A mirror that the world does not have
+    /// is an error.
     pub fn new(config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<HostRollout, Error> {
         let stream = |purpose: u32| Generator::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
         Ok(HostRollout {
@@ -189,8 +190,8 @@ fn column_name(column: &str) -> String {
     format!("batch, {column}")
 }
 
-/// A sample as tensors, in [`N_SHARDS`] shards of nearly the same size. Both observations of a transition get the same noise, so that their
-/// difference stays what it is.
+/// A sample as tensors, in [`N_SHARDS`] shards of nearly the same size. Both observations of a transition get the same
+/// noise, so that their difference stays what it is.
 pub fn shards<const N: usize>(
     sample: &Sample<N>,
     normalisation: &Normalisation,

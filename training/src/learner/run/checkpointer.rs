@@ -1,5 +1,6 @@
-//! Writes checkpoints and policies while training goes on. The columns are handed to the system at once; a thread waits for the disk and moves
-//! the files into place. Until then the previous checkpoint stands, so there is a whole one at any time.
+//! Writes checkpoints and policies while training goes on. The columns are handed to the system at once; a thread waits
+//! for the disk and moves the files into place. Until then the previous checkpoint stands, so there is a whole one at
+//! any time.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};

@@ -61,6 +61,7 @@ fn the_critics_loss_goes_down() {
     assert!(40 < losses.len(), "{metrics}");
     let mean = |rows: &[f32]| rows.iter().sum::<f32>() / rows.len() as f32;
     let (first, last) = (mean(&losses[..10]), mean(&losses[losses.len() - 10..]));
-    // A critic that begins at 0 is off by the rewards; one that has learned their mean is off by their standard deviation.
+    // A critic that begins at 0 is off by the rewards; one that has learned their mean is off by their standard
+    // deviation.
     assert!(last < 0.9 * first, "{first} {last}");
 }

@@ -170,7 +170,8 @@ impl Progress {
         if self.row_steps < self.env_steps { self.append_row(entropy_coefficient) } else { Ok(()) }
     }
 
-    /// Notes whether a file could be written. A failure is reported once, and the progress bar names the file until it can be written again.
+    /// Notes whether a file could be written. A failure is reported once, and the progress bar names the file until it
+    /// can be written again.
     pub fn note(&mut self, file: &Path, written: Result<(), Error>) {
         let known = self.unwritten.iter().any(|unwritten| unwritten == file);
         match written {

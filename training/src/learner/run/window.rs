@@ -6,8 +6,8 @@ use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::rollout::Episodes;
 
-/// Episodes that success and mean reward are means over, as many as in the study: the latest, or where a device counts them in groups,
-/// the fewest latest groups that hold so many.
+/// Episodes that success and mean reward are means over, as many as in the study: the latest, or where a device counts
+/// them in groups, the fewest latest groups that hold so many.
 pub const WINDOW: u64 = 250;
 
 /// The latest episodes, in groups: one each on the host, those of a row of metrics on a device.

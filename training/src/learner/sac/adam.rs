@@ -1,6 +1,8 @@
-//! Adam of D. Kingma and J. Ba (2015), and the network that follows the one it moves: a target network by tau, or an EMA of the actor.
+//! Adam of D. Kingma and J. Ba (2015), and the network that follows the one it moves: a target network by tau, or an
+//! EMA of the actor.
 //!
-//! On the processor it is one fused pass over the parameters, on a device tensor operations. Both do the same arithmetic.
+//! On the processor it is one fused pass over the parameters, on a device tensor operations. Both do the same
+//! arithmetic.
 
 mod fused;
 mod tensors;
@@ -24,13 +26,14 @@ pub(super) enum Adam {
     Tensors(Tensors),
 }
 
-/// An optimizer's state in the processor's memory. It is all there is: with these fields restored, steps continue bit for bit.
+/// An optimizer's state in the processor's memory. It is all there is: with these fields restored, steps continue bit
+/// for bit.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct State {
     /// Steps made.
     pub(super) n_steps: i32,
-    /// First and second moment of each parameter, `[elements]` each, in the order in which the network lists its parameters; none before
-    /// the first step.
+    /// First and second moment of each parameter, `[elements]` each, in the order in which the network lists its
+    /// parameters; none before the first step.
     pub(super) moments: Vec<[Vec<f32>; 2]>,
 }
 
@@ -39,9 +42,11 @@ impl Adam {
         if on_host { Adam::Fused(Fused::default()) } else { Adam::Tensors(Tensors::default()) }
     }
 
-    /// Moves `network` against the sum of the shards' gradients, then `follower` toward it by `tau`: 0 leaves it, 1 makes it a copy.
+    /// Moves `network` against the sum of the shards' gradients, then `follower` toward it by `tau`: 0 leaves it, 1
+    /// makes it a copy.
     ///
-    /// Both are given up and returned so that no copy has to be made; a parameter that is also held elsewhere is copied.
+    /// Both are given up and returned so that no copy has to be made; a parameter that is also held elsewhere is
+    /// copied.
     pub(super) fn step<M: Module>(
         &mut self,
         network: M,
@@ -81,7 +86,8 @@ struct Step {
 }
 
 impl Step {
-    /// Bias correction: the moments begin at 0 and are too small at first by 1 - decay ^ steps; rate and epsilon make up for it.
+    /// Bias correction: the moments begin at 0 and are too small at first by 1 - decay ^ steps; rate and epsilon make
+    /// up for it.
     fn new(n_steps: i32, learning_rate: f64, tau: f64) -> Step {
         let [first, second] = DECAY.map(|decay| 1.0 - f64::from(decay).powi(n_steps));
         Step { learning_rate: (learning_rate * second.sqrt() / first) as f32, epsilon: (EPSILON * second.sqrt()) as f32, tau: tau as f32 }

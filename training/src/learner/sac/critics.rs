@@ -6,7 +6,8 @@ use burn::tensor::Tensor;
 use crate::learner::config::Critics;
 use crate::learner::network::Mlp;
 
-/// Two critics with weights of their own: their errors differ, so that their mean or minimum is less biased than either.
+/// Two critics with weights of their own: their errors differ, so that their mean or minimum is less biased than
+/// either.
 #[derive(Module, Debug, Default)]
 pub(super) struct Twins {
     pub(super) first: Mlp,

@@ -8,7 +8,8 @@ const DECAY: [f32; 2] = [0.9, 0.999];
 /// Keeps Adam from dividing by 0.
 const EPSILON: f32 = 1e-8;
 
-/// The coefficient, kept as its logarithm so that it stays positive, and the state of D. Kingma and J. Ba's Adam (2015) for that one number.
+/// The coefficient, kept as its logarithm so that it stays positive, and the state of D. Kingma and J. Ba's Adam (2015)
+/// for that one number.
 #[derive(Debug)]
 pub(super) struct EntropyCoefficient {
     pub(super) log: Scalar,

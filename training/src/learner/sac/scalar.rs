@@ -1,4 +1,5 @@
-//! A single number that lies where the learner is: on the host, or in the memory of a device, where nobody waits for it.
+//! A single number that lies where the learner is: on the host, or in the memory of a device, where nobody waits for
+//! it.
 
 use burn::tensor::Tensor;
 

@@ -12,7 +12,8 @@ const ALPHA: f32 = 0.5;
 /// Observations of two states.
 const PLAIN: [f32; 2] = [1.0, 0.0];
 const OTHER: [f32; 2] = [0.0, 1.0];
-/// The networks can represent every value of these tasks; after some hundred of Adam's steps the error is below a hundredth.
+/// The networks can represent every value of these tasks; after some hundred of Adam's steps the error is below a
+/// hundredth.
 const CONVERGED: f32 = 0.01;
 
 fn learning() -> Learning {
@@ -53,7 +54,8 @@ fn figures(sac: &mut Sac) -> Update {
     figures
 }
 
-/// Six transitions of a chain: from the first state actions 0 and 2 lead to the second and action 1 ends it; every action ends the second.
+/// Six transitions of a chain: from the first state actions 0 and 2 lead to the second and action 1 ends it; every
+/// action ends the second.
 fn chain() -> Sample<2> {
     Sample {
         observation: vec![PLAIN, PLAIN, PLAIN, OTHER, OTHER, OTHER],
@@ -134,7 +136,8 @@ fn gradients_of(gradients: &GradientsParams, network: &Mlp) -> Vec<f32> {
 fn a_chains_values_and_policy_are_the_soft_optimal_ones() {
     let mut sac = learner(&learning(), 3, 1);
     let last = learn(&mut sac, chain, 1500);
-    // Each end is worth its reward. The second state is worth alpha ln sum exp(Q / alpha), the soft maximum of its values.
+    // Each end is worth its reward. The second state is worth alpha ln sum exp(Q / alpha), the soft maximum of its
+    // values.
     let end: [f32; 3] = [1.0, 0.5, -1.0];
     let soft_maximum = ALPHA * end.iter().map(|q| (q / ALPHA).exp()).sum::<f32>().ln();
     let begin = [0.8 * soft_maximum, 1.0, -0.5 + 0.8 * soft_maximum];
@@ -180,7 +183,8 @@ fn critics_with_layer_normalisation_find_the_same_values() {
     assert_near(&values(&sac, PLAIN)[0], &[0.8 * earned, 1.0, -0.5 + 0.8 * earned], 5.0 * CONVERGED);
 }
 
-/// The value of an action after each step of which an episode ends in `ended`, leaving the truck where it was, with reward 1.
+/// The value of an action after each step of which an episode ends in `ended`, leaving the truck where it was, with
+/// reward 1.
 fn learned_value(ended: Ended) -> f32 {
     let learning = learning();
     let mut buffer = ReplayBuffer::<2>::new(1, learning.n_steps, &config::ReplayBuffer { capacity: 1000, warmup: 1, priority: None });
@@ -355,7 +359,8 @@ fn an_update_on_a_device_is_that_on_the_host() {
                 host.update(vec![random_batch(step, &Device::flex())], 0.5);
                 on_device.update(vec![random_batch(step, &device)], 0.5);
             }
-            // Sums in another order: a few units in the last place of gradients, divided by their own size plus 1e-5 in Adam's first steps.
+            // Sums in another order: a few units in the last place of gradients, divided by their own size plus 1e-5 in
+            // Adam's first steps.
             let (difference, name) = furthest(&host, &on_device);
             assert!(difference < 3e-4, "{name}: {difference}");
             assert!(0.003 < furthest(&host, &new(3, Placement::Host)).0, "three steps of 0.0015 are seen");

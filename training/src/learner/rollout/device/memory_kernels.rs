@@ -1,4 +1,5 @@
-//! The kernels of the replay buffer on a device: structs and bindings declared once, printed for `memory.wgsl`, and compiled.
+//! The kernels of the replay buffer on a device: structs and bindings declared once, printed for `memory.wgsl`, and
+//! compiled.
 
 use offtrack::gpu::{Kernels, Slice};
 use offtrack::layout::buffers::Access;
@@ -196,8 +197,8 @@ fn source() -> String {
     own.iter().map(String::as_str).chain(common).chain([include_str!("../../../../shaders/memory.wgsl")]).collect()
 }
 
-/// Compiles the kernels. A tensor's buffer is a slice of a page that other tensors use too, and a page is bound either to be read or to be
-/// written, so all bindings may be written.
+/// Compiles the kernels. A tensor's buffer is a slice of a page that other tensors use too, and a page is bound either
+/// to be read or to be written, so all bindings may be written.
 pub(super) fn compile(device: &Device) -> Kernels {
     let access = [Access::ReadWrite; Binding::ALL.len()];
     Kernels::compile(device, "replay buffer", source(), access, Kernel::ALL.map(Kernel::entry))

@@ -1,7 +1,8 @@
 //! Adam in a single pass over the parameters, for a learner on the processor.
 //!
-//! A step is bound by memory bandwidth, not by arithmetic: parameters, gradients, moments and followers are each read and written once, in
-//! place. The pass is split into independent blocks, so the result is the same for any number of threads.
+//! A step is bound by memory bandwidth, not by arithmetic: parameters, gradients, moments and followers are each read
+//! and written once, in place. The pass is split into independent blocks, so the result is the same for any number of
+//! threads.
 
 use burn::module::{Module, ModuleMapper, Param};
 use burn::optim::GradientsParams;
