@@ -137,7 +137,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
             Opened { metrics: MetricsFile::create(folder.metrics())?, stored: None, folder }
         }
     };
-    let mut run = Run::new(backend, &config, &worlds.training_world, training, &folder, Progress::new(&config, metrics));
+    let progress = Progress::new(&config, metrics, Box::new(progress::TrainingDisplay::new()));
+    let mut run = Run::new(backend, &config, &worlds.training_world, training, &folder, progress);
     let mut doing = "training".to_owned();
     if let Some(stored) = stored {
         run.restore(&stored)?;

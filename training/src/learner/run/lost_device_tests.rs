@@ -18,7 +18,7 @@ fn run(folder: &Path, settings: &[&str]) -> (Run, Folder, Shared) {
     let folder = Folder::create(folder, Some("run"), Path::new("gpu"), &config).unwrap();
     let scenario = Scenario::named("attard2023").unwrap();
     let (world, routes) = (Arc::new(World::bake(&scenario)), scenario.split(Split::Train).to_vec());
-    let progress = Progress::new(&config, MetricsFile::create(folder.metrics()).unwrap());
+    let progress = Progress::new(&config, MetricsFile::create(folder.metrics()).unwrap(), Box::new(()));
     let shared = Shared::open(None).unwrap();
     let backend = Backend::Device(Box::new(shared.clone()));
     let training = Training::new(&backend, &config, world.clone(), routes).unwrap();

@@ -1,10 +1,7 @@
-//! Counters and clocks of a run: the progress bar, the rows of `metrics.csv`, and when to stop.
+//! Counters and clocks of a run: what it shows, the rows of `metrics.csv`, and when to stop.
 
-use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-
-use indicatif::{ProgressBar, ProgressStyle};
 
 use super::metrics_file::MetricsFile;
 use super::window::Window;
@@ -14,14 +11,30 @@ use crate::learner::config::Config;
 use crate::learner::rollout::Episodes;
 use crate::learner::sac::Update;
 
-/// Time between two rows of metrics, and two updates of the progress bar.
+/// Time between two rows of metrics, and two updates of the display.
 const ROW_EVERY: Duration = Duration::from_secs(5);
 /// Rows of a run with a budget of steps alone: equal runs then leave equal rows.
 const N_ROWS: u64 = 500;
-/// Time between two lines where there is no terminal for a progress bar.
-const LINE_EVERY: Duration = Duration::from_secs(30);
+/// Where a run shows how far it is.
+pub trait Display {
+    /// The fraction of the budget that is spent, and a line about it.
+    fn show(&mut self, fraction: f64, line: String);
+
+    /// A line that is to stay, about something that went wrong.
+    fn warn(&mut self, line: String);
+
+    /// Leaves the last state where it is.
+    fn close(&mut self);
+}
+
+/// Shows nothing.
+impl Display for () {
+    fn show(&mut self, _: f64, _: String) {}
+    fn warn(&mut self, _: String) {}
+    fn close(&mut self) {}
+}
+
 /// Counters and clocks of a run.
-#[derive(Debug)]
 pub struct Progress {
     begun: Instant,
     /// Training time before that.
@@ -41,10 +54,9 @@ pub struct Progress {
     row_updates: u64,
     /// Time [s] and steps when one was last tried to be written.
     tried: (f64, u64),
-    /// When the progress bar was last updated, and the steps and updates by then.
+    /// When the display was last updated, and the steps and updates by then.
     shown: (Instant, u64, u64),
-    since_line: Instant,
-    bar: ProgressBar,
+    display: Box<dyn Display>,
     metrics: MetricsFile,
     /// Files that could not be written when that was last tried.
     unwritten: Vec<PathBuf>,
@@ -52,8 +64,7 @@ pub struct Progress {
 
 impl Progress {
     /// Starts the clock.
-    pub fn new(config: &Config, metrics: MetricsFile) -> Progress {
-        let style = ProgressStyle::with_template("{bar:24} {percent:>3} % {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+    pub fn new(config: &Config, metrics: MetricsFile, display: Box<dyn Display>) -> Progress {
         Progress {
             begun: Instant::now(),
             before: Duration::ZERO,
@@ -69,8 +80,7 @@ impl Progress {
             row_updates: 0,
             tried: (0.0, 0),
             shown: (Instant::now(), 0, 0),
-            since_line: Instant::now(),
-            bar: ProgressBar::new(1000).with_style(style),
+            display,
             metrics,
             unwritten: Vec::new(),
         }
@@ -156,21 +166,21 @@ impl Progress {
         self.note(&file, written);
     }
 
-    /// Updates the progress bar when it is time to.
+    /// Updates the display when it is time to.
     pub fn show_if_due(&mut self) {
         if ROW_EVERY <= self.shown.0.elapsed() {
             self.show();
         }
     }
 
-    /// Writes the last row, of what is in no row yet, and leaves the progress bar where it is.
+    /// Writes the last row, of what is in no row yet, and closes the display.
     pub fn finish(&mut self, entropy_coefficient: f32) -> Result<(), Error> {
         self.show();
-        self.bar.abandon();
+        self.display.close();
         if self.row_steps < self.env_steps { self.append_row(entropy_coefficient) } else { Ok(()) }
     }
 
-    /// Notes whether a file could be written. A failure is reported once, and the progress bar names the file until it
+    /// Notes whether a file could be written. A failure is reported once, and the display names the file until it
     /// can be written again.
     pub fn note(&mut self, file: &Path, written: Result<(), Error>) {
         let known = self.unwritten.iter().any(|unwritten| unwritten == file);
@@ -178,8 +188,7 @@ impl Progress {
             Ok(()) => self.unwritten.retain(|unwritten| unwritten != file),
             Err(error) if !known => {
                 self.unwritten.push(file.to_owned());
-                // Training goes on when nobody reads its lines.
-                let _ = self.bar.suspend(|| writeln!(std::io::stderr(), "offtrack: {error}; training goes on and will try again"));
+                self.display.warn(format!("{error}; training goes on and will try again"));
             }
             Err(_) => {}
         }
@@ -211,7 +220,7 @@ impl Progress {
         Ok(())
     }
 
-    /// The progress bar on a terminal, a plain line now and then elsewhere.
+    /// Shows how far the run is.
     fn show(&mut self) {
         let (since, steps, updates) = std::mem::replace(&mut self.shown, (Instant::now(), self.env_steps, self.updates));
         let [steps_rate, update_rate] = per_second(since.elapsed().as_secs_f64(), [self.env_steps - steps, self.updates - updates]);
@@ -227,14 +236,7 @@ impl Progress {
         );
         let names = self.unwritten.iter().filter_map(|file| Some(file.file_name()?.to_string_lossy()));
         let line = names.fold(line, |line, name| format!("{line}, {name} cannot be written"));
-        if std::io::stderr().is_terminal() {
-            self.bar.set_position((1000.0 * fraction) as u64);
-            self.bar.set_message(line);
-        } else if LINE_EVERY <= self.since_line.elapsed() || fraction == 1.0 {
-            // Training goes on when nobody reads its lines any more.
-            let _ = writeln!(std::io::stderr(), "{:>3.0} % {line}", 100.0 * fraction);
-            self.since_line = Instant::now();
-        }
+        self.display.show(fraction, line);
     }
 
     /// Adds the counters' columns.
