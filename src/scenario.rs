@@ -2,6 +2,7 @@
 //!
 //! Every error names file, key, value and what would do; it is found here or in the reader of the part it belongs to, never later.
 
+mod check;
 mod written;
 
 use std::path::Path;
@@ -12,6 +13,7 @@ use crate::layout::Action;
 use crate::roundabout::{Gutter, Roundabout};
 use crate::route::Route;
 use crate::vehicle::Vehicle;
+pub use check::Invalid;
 use written::{Written, WrittenChoice, WrittenRoundabout, WrittenRoutes};
 
 /// Length of a route before the ring where a benchmark says nothing else [m].

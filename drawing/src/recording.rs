@@ -272,7 +272,7 @@ mod tests {
     /// Trucks on the first two routes of the examination that steer hard left until each has met a kerb: recorded, and their states
     /// copied from the batch after every step.
     fn driven(scenario: &Scenario) -> (Arc<World>, Vec<Track>, Vec<Batch>) {
-        let world = Arc::new(World::bake(scenario));
+        let world = Arc::new(World::bake(scenario).unwrap());
         let routes = scenario.split(Split::Test)[..2].to_vec();
         let mut simulator = Simulator::new(world.clone(), 2, 3, RouteChoice::Fixed(routes)).unwrap();
         let mut recorder = Recorder::new(&world, simulator.batch(), [1, 0]);

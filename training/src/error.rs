@@ -10,6 +10,9 @@ pub enum Error {
     /// A file that was read is wrong: scenario, vehicle, roundabout, or one that cannot be read at all.
     #[error(transparent)]
     Input(#[from] offtrack::reader::Error),
+    /// A scenario that no truck could be stepped in.
+    #[error(transparent)]
+    Scenario(#[from] offtrack::scenario::Invalid),
     /// A batch was asked for that cannot be.
     #[error(transparent)]
     Simulator(#[from] offtrack::simulator::Error),

@@ -72,7 +72,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
     let certificate = Certificate::read(path)?;
     let scenario = Scenario::read(&files::benchmark(benchmark.unwrap_or(&certificate.benchmark))?)?;
-    let world = Arc::new(World::bake(&scenario));
+    let world = Arc::new(World::bake(&scenario)?);
     certificate.check(&scenario, &world, path)?;
     let arrived = verify::verify(&certificate, &world, path, |_| true)?;
     files::print(&format!("{}{arrived} sequences driven again: all arrived\n", table(&certificate)))
@@ -81,7 +81,7 @@ fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
 /// Searches every route from every start.
 fn certify(args: &Args) -> Result<(), Error> {
     let scenario = Scenario::read(&files::benchmark(args.benchmark.as_deref().unwrap_or("attard2023"))?)?;
-    let world = Arc::new(World::bake(&scenario));
+    let world = Arc::new(World::bake(&scenario)?);
     let policy = args.policy.as_ref().map(|path| {
         let policy = Policy::load(path)?;
         policy.check(&world, path)?;

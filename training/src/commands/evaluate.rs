@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let device = args.device.open()?;
     let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
-    let world = Arc::new(World::bake(&scenario));
+    let world = Arc::new(World::bake(&scenario)?);
     let mut driver = drivers::named(args.policy.as_deref(), &scenario.name, args.look_ahead, args.seed, &world)?;
     let split = if args.split == "train" { Split::Train } else { Split::Test };
     let n_episodes = args.episodes * scenario.split(split).len();

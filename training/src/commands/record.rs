@@ -82,7 +82,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
     let chosen = Chosen::new(&scenario, &args.route)?;
-    let world = Arc::new(World::bake(&scenario));
+    let world = Arc::new(World::bake(&scenario)?);
     let mut driver = drivers::named(args.policy.as_deref(), &scenario.name, args.look_ahead, args.seed, &world)?;
     let recording = recorded(args, &scenario, &world, &chosen, driver.as_mut())?;
     let bytes = bytes(format, args.size, &recording, &chosen, scenario.gutter);

@@ -128,7 +128,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     };
     let scenario = Scenario::read(&files::benchmark(&config.benchmark)?)?;
     let practice = practice(&config, &scenario)?;
-    let (world, practice_world) = (Arc::new(World::bake(&scenario)), Arc::new(World::bake(&practice)));
+    let (world, practice_world) = (Arc::new(World::bake(&scenario)?), Arc::new(World::bake(&practice)?));
     if practice_world.actions != world.actions {
         let expected = format!("its actions and vehicle lock must be those of {}, on which the driver is examined", scenario.name);
         return Err(Error::Flag { flag: "practice", value: practice.name, expected });

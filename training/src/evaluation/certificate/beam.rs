@@ -241,7 +241,7 @@ mod tests {
 
     fn world() -> Arc<World> {
         let path = files::repository().join("scenarios/attard2023.toml");
-        Arc::new(World::bake(&offtrack::scenario::Scenario::read(&path).unwrap()))
+        Arc::new(World::bake(&offtrack::scenario::Scenario::read(&path).unwrap()).unwrap())
     }
 
     #[test]

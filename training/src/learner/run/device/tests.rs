@@ -14,7 +14,7 @@ fn run(folder: &Path, settings: &[&str]) -> (DeviceRun, Folder) {
     let config = Config::read_with(&file, &settings).unwrap();
     let folder = Folder::create(folder, Some("run"), &file, &config).unwrap();
     let scenario = Scenario::read(&files::benchmark("attard2023").unwrap()).unwrap();
-    let (world, routes) = (Arc::new(World::bake(&scenario)), scenario.split(Split::Train).to_vec());
+    let (world, routes) = (Arc::new(World::bake(&scenario).unwrap()), scenario.split(Split::Train).to_vec());
     let progress = Progress::new(&config, Figures::create(folder.metrics()).unwrap());
     let run = DeviceRun::new(Shared::open(None).unwrap(), &config, routes, world, &folder, progress).unwrap();
     (run, folder)
