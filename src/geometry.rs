@@ -1,7 +1,7 @@
 //! Exact plane geometry: segments, arcs, the curves they form, and the outlines that curves enclose.
 //!
-//! Right-handed frame, x east, y north, metres and radians. Nothing here is a polygon pretending to be round: distances, crossings and
-//! rays are computed on the arcs themselves.
+//! Right-handed frame, x east, y north, metres and radians. Arcs are not approximated by polygons: distances, crossings
+//! and rays are computed on the arcs themselves.
 
 mod alignment;
 mod meeting;
@@ -86,8 +86,8 @@ impl Piece {
         match *self {
             Piece::Segment { from, to } => {
                 let along = to - from;
-                let share = ((p - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-                p.distance(from + share * along)
+                let fraction = ((p - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                p.distance(from + fraction * along)
             }
             Piece::Arc { centre, radius, .. } => {
                 let out = p - centre;
@@ -96,7 +96,7 @@ impl Piece {
         }
     }
 
-    /// The same piece travelled the other way.
+    /// The same piece in the opposite direction.
     pub fn reversed(&self) -> Piece {
         match *self {
             Piece::Segment { from, to } => Piece::Segment { from: to, to: from },
@@ -113,7 +113,7 @@ impl Piece {
         }
     }
 
-    /// The same piece on the other side of the x axis.
+    /// The mirror image of the piece in the x axis.
     pub fn mirrored(&self) -> Piece {
         let mirror = DVec2::new(1.0, -1.0);
         match *self {
@@ -132,7 +132,8 @@ impl Piece {
         }
     }
 
-    /// The piece `distance` to the left of this one, or to the right of it where negative; `None` for an arc that would shrink to nothing [m].
+    /// The piece `distance` to the left of this one, or to the right of it if negative; `None` if an arc would shrink
+    /// to nothing [m].
     pub fn beside(&self, distance: f64) -> Option<Piece> {
         match *self {
             Piece::Segment { from, to } => {
@@ -157,13 +158,13 @@ impl Piece {
         }
     }
 
-    /// How far along the piece its point nearest to `p` lies, for `p` on the piece [m].
+    /// Station of `p`, a point of the piece: its distance from the beginning along the piece [m].
     pub(crate) fn station(&self, p: DVec2) -> f64 {
         match *self {
             Piece::Segment { from, to } => (p - from).dot((to - from).normalize_or_zero()).clamp(0.0, self.length()),
             Piece::Arc { centre, radius, from, sweep } => {
                 let turned = ((p - centre).to_angle() - from) * sweep.signum();
-                // Rounding may put a point at the beginning just before it: that is the beginning, not nearly a full turn.
+                // Rounding may put a point just before the beginning, which must not count as nearly a full turn.
                 let slack = (TAU - sweep.abs()) / 2.0;
                 let turned = (turned + slack).rem_euclid(TAU) - slack;
                 turned.clamp(0.0, sweep.abs()) * radius
@@ -221,7 +222,7 @@ impl Curve {
         points
     }
 
-    /// The same curve travelled the other way.
+    /// The same curve in the opposite direction.
     pub fn reversed(&self) -> Curve {
         Curve { pieces: self.pieces.iter().rev().map(Piece::reversed).collect() }
     }
@@ -231,7 +232,7 @@ impl Curve {
         Curve { pieces: self.pieces.iter().map(|piece| piece.turned(angle)).collect() }
     }
 
-    /// The same curve on the other side of the x axis, in the same order of travel.
+    /// The mirror image of the curve in the x axis, in the same order of travel.
     pub fn mirrored(&self) -> Curve {
         Curve { pieces: self.pieces.iter().map(Piece::mirrored).collect() }
     }
@@ -251,7 +252,7 @@ impl Curve {
         Curve { pieces }
     }
 
-    /// How far along the curve its point nearest to `p` lies [m].
+    /// Station of the curve's point nearest to `p`: its distance from the beginning along the curve [m].
     pub fn station(&self, p: DVec2) -> f64 {
         let mut begin = 0.0;
         let mut best = (f64::INFINITY, 0.0);
@@ -265,7 +266,7 @@ impl Curve {
         best.1
     }
 
-    /// The area a closed curve goes around, positive counter-clockwise [m²].
+    /// The area enclosed by a closed curve, positive counter-clockwise [m²].
     pub fn signed_area(&self) -> f64 {
         let area = |piece: &Piece| match *piece {
             Piece::Segment { from, to } => from.perp_dot(to) / 2.0,

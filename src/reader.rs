@@ -1,6 +1,8 @@
-//! Reads files of a limited size and checks their values one key at a time. Every error names the file and, where there is one, the key.
+//! Reads files of a limited size and checks their values one key at a time. Every error names the file and, where there
+//! is one, the key.
 //!
-//! Messages stay short whatever the file holds: long lines and values are cut, large numbers are printed with an exponent.
+//! Messages stay short whatever the file holds: long lines and values are cut, large numbers are printed with an
+//! exponent.
 
 mod message;
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! Distances between a roundabout's curves and measured lines: road edges and lane centre lines, in both directions.
 //!
-//! Measured road edges are the lanes' edges, so they are compared with the outline of [`Gutter::Solid`]. Two kinds of points are left out:
-//! those farther than [`WITHIN`] from the centre, and those whose nearest counterpart is the loose end of a measured line, beyond which
-//! nothing was measured.
+//! Measured road edges are the lanes' edges, so they are compared with the outline of [`Gutter::Solid`]. Two kinds of
+//! points are left out: those farther than [`WITHIN`] from the centre, and those whose nearest counterpart is the loose
+//! end of a measured line, beyond which nothing was measured.
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Piece};

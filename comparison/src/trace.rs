@@ -1,7 +1,8 @@
-//! One truck, open loop, moved by the simulator's own [`drive`](offtrack::cpu::drive) stage, for comparison with reference trajectories.
+//! One truck, open loop, moved by the simulator's own [`drive`](offtrack::cpu::drive) stage, for comparison with
+//! reference trajectories.
 //!
-//! `tests/data/physics_vectors.json` holds such cases. A state between two instants of the sub-step grid is computed on a copy, from the
-//! grid instant before it, so that a request for a state never changes later ones.
+//! `tests/data/physics_vectors.json` holds such cases. A state between two instants of the sub-step grid is computed on
+//! a copy, from the grid instant before it, so that a request for a state never changes later ones.
 
 mod case;
 
@@ -92,8 +93,8 @@ pub fn trace(case: &Case) -> Result<Traced, Error> {
     trace_by(case, moved)
 }
 
-/// Drives a case with the caller's replacement for [`moved`]. Its arguments are the rig, the length of the sub-step [s], the control and
-/// the truck.
+/// Drives a case with the caller's replacement for [`moved`]. Its arguments are the rig, the length of the sub-step
+/// [s], the control and the truck.
 ///
 /// # Errors
 ///
@@ -153,7 +154,8 @@ impl Run<'_> {
         Run { case, t: 0.0, grid: 0, moving: Moving { truck, motion }, psi1: init.psi1, psi2: init.psi2 }
     }
 
-    /// The end of the next sub-step: the grid's next instant, or a command or the case's end before it. `None` at the end.
+    /// The end of the next sub-step: the grid's next instant, or a command or the case's end before it. `None` at the
+    /// end.
     fn next_instant(&self) -> Option<f64> {
         let later = |&t: &f64| self.t + SAME_INSTANT < t;
         let grid = f64::from(self.grid + 1) * self.case.dt;

@@ -1,4 +1,5 @@
-//! Growing what is solid: every piece moves to the side, corners are rounded, and what comes too near to another piece is cut away.
+//! Growth of the solid area: every piece moves to the side, corners are rounded, and parts too near to the original
+//! outline are removed.
 
 use glam::DVec2;
 

@@ -1,4 +1,5 @@
-//! The reference vectors, each kind computed with the simulator's own functions and held to the tolerances that stand beside it.
+//! The reference vectors: each kind is computed with the simulator's own functions and compared within the tolerances
+//! of its file.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::{Arc, OnceLock};
@@ -21,7 +22,7 @@ use crate::{batch_on, benchmark, column, engines};
 
 const FOOT: f64 = 0.3048;
 
-/// The largest error over its tolerance, and what it was of.
+/// The largest ratio of an error to its tolerance, and its quantity.
 #[derive(Debug, Clone, Default)]
 struct Worst {
     ratio: f64,
@@ -31,7 +32,7 @@ struct Worst {
 impl Worst {
     fn see(&mut self, what: &str, error: f64, tolerance: f64) {
         let ratio = error.abs() / tolerance;
-        // No number is the worst of all.
+        // NaN counts as the largest error.
         if ratio.is_nan() || self.ratio < ratio {
             *self =
                 Worst { ratio: if ratio.is_nan() { f64::INFINITY } else { ratio }, what: format!("{what}: {error:e} of {tolerance:e}") };
@@ -69,7 +70,7 @@ fn rows(case: &Value) -> &[Value] {
     case["rows"].as_array().unwrap()
 }
 
-/// Any case's vehicle, for cases that only say where the axles are.
+/// A vehicle for cases that only give the positions of the axles.
 fn kinematic(row: &Value) -> CaseVehicle {
     let any: CaseVehicle = serde_json::from_value(case("straight_30")["vehicle"].clone()).unwrap();
     CaseVehicle { L1: number(row, "L1"), a: number(row, "a"), L2: number(row, "L2"), K: 0.0, delta_max: 1.5, gamma_max: 10.0, ..any }
@@ -79,7 +80,7 @@ fn single_track(row: &Value) -> SingleTrack {
     SingleTrack { wheelbase: number(row, "L1"), fifth_wheel: number(row, "a"), trailer_wheelbase: number(row, "L2") }
 }
 
-/// Drives a case on an engine, a sub-step at a time: each is one drive stage of a world that has this rig.
+/// Drives a case on an engine, a sub-step at a time. Each is one drive stage of a world that has this rig.
 fn traced(engine: &Engine, case: &Case) -> Traced {
     let mut simulators: Vec<(Rig, f32, Simulator)> = Vec::new();
     trace_by(case, |rig, substep, control, moving| {
@@ -123,7 +124,7 @@ fn trajectory(engine: &Engine, written: &Value, changed: impl Fn(&mut Case)) -> 
     assert_eq!(case.dt, 0.05);
     changed(&mut case);
     let traced = traced(engine, &case);
-    assert!(!matches!(engine, Engine::Cpu) || traced == trace(&case).unwrap(), "{}: a trace is no drive", case.id);
+    assert!(!matches!(engine, Engine::Cpu) || traced == trace(&case).unwrap(), "{}: a trace differs from the drive stage", case.id);
     compare(&traced, written)
 }
 
@@ -262,8 +263,8 @@ fn cross_check(engine: &Engine, written: &Value) -> Worst {
     worst
 }
 
-/// Least distances of a point on the drive axle and one on the trailer's axle group, both `aside` metres left of the middle, from the
-/// centre of a left turn, the front axle on a straight, an arc and a straight [m].
+/// Least distances of a point on the drive axle and one on the trailer's axle group, both `aside` metres left of the
+/// middle, from the centre of a left turn, the front axle on a straight, an arc and a straight [m].
 fn least_radii(rig: &Rig, radius: f64, turn: f64, aside: f64) -> (f64, f64) {
     let arc = Piece::Arc { centre: DVec2::ZERO, radius, from: -FRAC_PI_2, sweep: turn };
     let approach = Piece::Segment { from: arc.start() - DVec2::X, to: arc.start() };
@@ -278,7 +279,7 @@ fn least_radii(rig: &Rig, radius: f64, turn: f64, aside: f64) -> (f64, f64) {
 fn path_follow(written: &Value) -> Worst {
     let mut worst = Worst::default();
     for row in rows(written) {
-        // A vehicle without a trailer pulls one that nobody looks at.
+        // A vehicle without a trailer is given one whose path is not compared.
         let length = |key: &str| row[key].as_f64().map(|feet| feet * FOOT);
         let rig = Rig {
             wheelbase: length("L1_ft").unwrap() as f32,
@@ -293,8 +294,8 @@ fn path_follow(written: &Value) -> Worst {
             let inside = if row["L2_ft"].is_null() { drive } else { trailer } / FOOT;
             let tolerance = number(&written["tolerance"], "length_ft");
             worst.see(&format!("{} published", row["vehicle"]), inside - number(row, "published_min_inside_radius_ft"), tolerance);
-            // The reference is the same equation, sampled every 5 cm here; without a trailer it looks no further than the turn's end, which
-            // leaves out the last 0.038 ft of a city bus.
+            // The reference is the same equation, sampled every 5 cm here; without a trailer it looks no further than
+            // the turn's end, which leaves out the last 0.038 ft of a city bus.
             let sampling = if row["L2_ft"].is_null() { 0.05 } else { 0.01 };
             let error = inside - number(row, "reference_min_inside_radius_ft");
             worst.see(&format!("{} reference", row["vehicle"]), error, sampling);
@@ -333,7 +334,7 @@ fn every_reference_vector_holds_within_its_own_tolerance() {
     }
 }
 
-/// How far the case is missed, on whichever engine comes nearest, once something about it is changed.
+/// The smallest error ratio over all engines once something about the case is changed.
 fn missed(id: &str, changed: impl Fn(&mut Case)) -> f64 {
     engines().iter().map(|(_, engine)| trajectory(engine, &case(id), &changed).ratio).fold(f64::INFINITY, f64::min)
 }
@@ -363,11 +364,11 @@ fn tyres_that_hold_seven_tenths_of_gravity_fail_the_one_vector_that_asks_for_mor
 }
 
 #[test]
-fn an_instant_between_two_sub_steps_lies_on_the_arc_and_disturbs_no_other() {
+fn an_instant_between_two_sub_steps_lies_on_the_arc_and_changes_no_other() {
     let mut case: Case = serde_json::from_value(case("circle_R10_20")).unwrap();
     case.times = Some(vec![4.0]);
     let alone = trace(&case).unwrap();
-    // A command between two sub-steps that says nothing new.
+    // A command between two sub-steps that repeats the one before it.
     case.commands.push(Command { t: 1.23, ..case.commands[0].clone() });
     case.times = Some(vec![0.07, 1.0 / 3.0, 4.0]);
     let among = trace(&case).unwrap();
