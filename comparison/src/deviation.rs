@@ -263,6 +263,18 @@ mod tests {
     }
 
     #[test]
+    fn nested_arrays_up_to_the_size_limit_are_refused_without_overflowing_the_stack() {
+        let depth = crate::FILE_LIMIT as usize / 2 - 8;
+        let arrays = format!("{{\"island\":{}{}}}", "[".repeat(depth), "]".repeat(depth));
+        for text in [arrays.as_str(), &arrays[..depth], &"{\"cases\":".repeat(depth / 9)] {
+            assert!(text.len() as u64 <= crate::FILE_LIMIT);
+            assert!(serde_json::from_str::<Measured>(text).is_err());
+            assert!(serde_json::from_str::<crate::trace::Case>(text).is_err());
+            assert!(serde_json::from_str::<serde_json::Value>(text).is_err());
+        }
+    }
+
+    #[test]
     fn empty_lines_and_lines_of_one_point_are_compared_as_nothing() {
         let mut measured = measured();
         measured.ring = vec![vec![], vec![[1.0, 2.0]]];
