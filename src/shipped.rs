@@ -18,9 +18,9 @@ macro_rules! embedded {
 pub const FILES: &[(&str, &str)] = embedded![
     "attard2023.toml",
     "attard2023-as-run.toml",
-    "attard2023-as-run-practice.toml",
+    "attard2023-as-run-training.toml",
     "attard2023-full.toml",
-    "attard2023-practice.toml",
+    "attard2023-training.toml",
     "roundabouts/16m.toml",
     "roundabouts/20m.toml",
     "roundabouts/32m.toml",

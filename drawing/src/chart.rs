@@ -5,62 +5,71 @@ use std::fmt::Write;
 use glam::DVec2;
 use svg::Document;
 use svg::node::element::{Circle, Group, Path, Rectangle, Title};
-use ttf_parser::FaceParsingError;
 
+use crate::Error;
+use crate::figure::{colour, number};
 use crate::legend::{self, Entry, Swatch};
 use crate::lettering::{Align, Lettering};
-use crate::sheet::{colour, number};
 
-/// Upper left corner of the first panel's plot [px].
+/// Upper left corner of the first panel's plot \[px].
 const CORNER: DVec2 = DVec2::new(92.0, 118.0);
-/// Size of a plot [px].
+/// Size of a plot \[px].
 const PLOT: DVec2 = DVec2::new(440.0, 380.0);
-/// From one plot's right edge to the next one's left [px].
+/// From one plot's right edge to the next one's left \[px].
 const GAP: f64 = 104.0;
-/// From a plot's lower edge to its legend: numbers and what they are [px].
+/// From a plot's lower edge to its legend: numbers and axis title \[px].
 const AXIS: f64 = 62.0;
-/// Right of the last plot and below the longest legend [px].
+/// Margin to the right of the last plot and below the longest legend \[px].
 const MARGIN: f64 = 24.0;
-/// Room beside the outermost points, as a factor.
+/// Margin beside the outermost points, as a factor.
 const ROOM: f64 = 1.35;
-/// An axis reaches over this factor at least.
+/// Least ratio of the ends of an axis.
 const REACH: f64 = 12.0;
 
-/// Colours for lines, apart for colour-blind readers: P. Tol's "muted" scheme.
+/// Colours for lines that colour-blind readers can distinguish: P. Tol's "muted" scheme.
 pub const LINES: [&str; 9] = ["#332288", "#cc6677", "#117733", "#88ccee", "#882255", "#ddaa33", "#44aa99", "#999933", "#aa4499"];
 
 /// A picture of panels.
 pub struct Chart {
+    /// The first line.
     pub title: String,
+    /// Further lines below it.
     pub subtitles: Vec<String>,
+    /// Side by side, from left to right.
     pub panels: Vec<Panel>,
 }
 
 /// Lines over the same axes.
 pub struct Panel {
+    /// Above the plot.
     pub title: &'static str,
-    /// What the axes show, with units.
+    /// Title of the horizontal axis, with its unit.
     pub x: &'static str,
+    /// Title of the vertical axis, with its unit.
     pub y: &'static str,
+    /// In the order of the legend.
     pub lines: Vec<Line>,
 }
 
-/// What a panel shows.
+/// A line of a panel.
 pub struct Line {
-    /// In the legend; none leaves it out there.
+    /// Words in the legend; without them the line is not in it.
     pub name: Option<&'static str>,
+    /// As SVG writes it, such as one of [`LINES`].
     pub colour: &'static str,
+    /// Measured, or for comparison.
     pub kind: Kind,
-    /// Places, from left to right. Both coordinates are positive.
+    /// Points from left to right, in the units of the axes. Both coordinates are positive.
     pub points: Vec<DVec2>,
 }
 
 /// How a line looks.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Kind {
-    /// A measured one: a mark at each point, with the least and the greatest value where they are known.
+    /// Measured: a mark at each point, with its least and greatest value where they are known, in the order of the
+    /// points.
     Measured(Vec<(f64, f64)>),
-    /// One to compare with: dashes.
+    /// For comparison: dashed.
     Reference,
 }
 
@@ -68,7 +77,7 @@ pub enum Kind {
 struct Axis {
     low: f64,
     high: f64,
-    /// Where the ends lie [px].
+    /// Positions of the ends \[px].
     from: f64,
     to: f64,
 }
@@ -86,7 +95,7 @@ impl Axis {
         self.from + (value / self.low).ln() / (self.high / self.low).ln() * (self.to - self.from)
     }
 
-    /// 1, 2, ... 9 times each power of ten, and whether that is numbered.
+    /// Ticks at 1, 2, ... 9 times each power of ten, and whether each has a number.
     fn ticks(&self) -> Vec<(f64, bool)> {
         let decades = (self.high / self.low).log10();
         let first = self.low.log10().floor() as i32;
@@ -98,7 +107,11 @@ impl Axis {
 
 impl Chart {
     /// The chart as SVG text.
-    pub fn drawn(&self) -> Result<String, FaceParsingError> {
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Typeface`].
+    pub fn drawn(&self) -> Result<String, Error> {
         let lettering = Lettering::new()?;
         let n_panels = self.panels.len().max(1) as f64;
         let width = CORNER.x + n_panels * PLOT.x + (n_panels - 1.0) * GAP + MARGIN;
@@ -111,7 +124,7 @@ impl Chart {
             lowest = lowest.max(bottom);
         }
         let height = (lowest + MARGIN).ceil();
-        // As pixels the page may end in a part of one: the paper goes on for that.
+        // The last row and column of pixels may be partly outside the page: the paper covers them.
         let paper = Rectangle::new().set("width", width + 2.0).set("height", height + 2.0).set("fill", "white");
         let mut document = Document::new()
             .set("viewBox", (0.0, 0.0, width, height))
@@ -129,7 +142,7 @@ impl Chart {
 }
 
 impl Panel {
-    /// The panel with its plot's upper left corner at `corner`, and how far down it reaches [px].
+    /// The panel with its plot's upper left corner at `corner`, and how far down it reaches \[px].
     fn drawn(&self, lettering: &Lettering, corner: DVec2) -> (Group, f64) {
         let end = corner + PLOT;
         let points = || self.lines.iter().flat_map(|line| &line.points);
@@ -146,7 +159,7 @@ impl Panel {
         let words = lettering.text(self.y, DVec2::new(corner.x - 62.0, corner.y + 0.5 * PLOT.y), 15.0, Align::Middle, colour::INK);
         group = group.add(words.set("transform", upright));
         group = group.add(lettering.text(self.title, DVec2::new(corner.x, corner.y - 10.0), 16.0, Align::Left, colour::INK));
-        // What is compared with lies under what was measured.
+        // Lines for comparison lie below measured ones.
         let (references, measured): (Vec<&Line>, Vec<&Line>) = self.lines.iter().partition(|line| line.kind == Kind::Reference);
         for line in references.into_iter().chain(measured) {
             group = group.add(line.drawn(&x, &y));
@@ -164,10 +177,10 @@ impl Panel {
 
 impl Line {
     fn drawn(&self, x: &Axis, y: &Axis) -> Group {
-        let place = |p: &DVec2| (number(x.at(p.x)), number(y.at(p.y)));
+        let position = |p: &DVec2| (number(x.at(p.x)), number(y.at(p.y)));
         let mut data = String::new();
         for (index, p) in self.points.iter().enumerate() {
-            let (across, down) = place(p);
+            let (across, down) = position(p);
             // Writing to a string cannot fail.
             let _ = write!(data, "{}{across} {down}", if index == 0 { 'M' } else { 'L' });
         }
@@ -185,7 +198,7 @@ impl Line {
         let bars = Path::new().set("d", bars).set("fill", "none").set("stroke", self.colour).set("stroke-width", 1.2);
         let mut group = Group::new().add(path.set("stroke-width", 2.4)).add(bars);
         for p in &self.points {
-            let (across, down) = place(p);
+            let (across, down) = position(p);
             let mark = Circle::new().set("cx", across).set("cy", down).set("r", 3.6).set("fill", self.colour);
             group = group.add(mark.set("stroke", "white").set("stroke-width", 1.0));
         }
@@ -248,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn a_factor_is_the_same_length_everywhere_and_numbers_have_prefixes() {
+    fn a_factor_has_the_same_length_everywhere_and_numbers_have_prefixes() {
         let axis = Axis::over([1.0, 1e6].into_iter(), 500.0, 0.0);
         let length = |from: f64| axis.at(10.0 * from) - axis.at(from);
         assert!((length(1.0) - length(3e4)).abs() < 1e-9 && length(1.0) < 0.0);

@@ -1,17 +1,17 @@
-//! Lines of equal distance to the kerbs, from the baked field.
+//! Contour lines of the distance to the kerbs, from the baked field.
 
 use contour::ContourBuilder;
 use glam::DVec2;
 use offtrack::field::Field;
 
-use crate::sheet::View;
+use crate::figure::View;
 
-/// Distance between the points at which the field is looked at: ridges between two lines half a metre apart stay whole [m].
+/// Sampling distance of the field: fine enough for ridges between two lines half a metre apart \[m].
 const STEP: f64 = 0.2;
-/// A point this near to the straight between its neighbours is left out [m].
+/// A point nearer than this to the line between its neighbours is left out \[m].
 const STRAIGHT: f64 = 0.02;
 
-/// The field's lines at every whole metre of distance within the view.
+/// The contour lines at every whole metre within the view.
 pub fn isolines(field: &Field, view: &View) -> Vec<Vec<DVec2>> {
     let low = view.low - STEP;
     let count = |extent: f64| (extent / STEP).ceil() as usize + 3;
@@ -20,7 +20,7 @@ pub fn isolines(field: &Field, view: &View) -> Vec<Vec<DVec2>> {
     let values: Vec<f64> = (0..columns * rows).map(|index| f64::from(field.distance(node(index).as_vec2()))).collect();
     let highest = values.iter().copied().fold(0.0, f64::max);
     let levels: Vec<f64> = (1..).map(f64::from).take_while(|&level| level < highest).collect();
-    // The builder takes a value to stand in the middle of its cell.
+    // The builder takes values at the middles of cells.
     let corner = low - STEP / 2.0;
     let builder = ContourBuilder::new(columns, rows, true).x_origin(corner.x).y_origin(corner.y).x_step(STEP).y_step(STEP);
     // It fails only when the number of values is not columns * rows.
@@ -29,10 +29,10 @@ pub fn isolines(field: &Field, view: &View) -> Vec<Vec<DVec2>> {
     rings.map(|ring| thinned(ring.coords().map(|p| DVec2::new(p.x, p.y)))).collect()
 }
 
-/// The points without those that lie on a straight.
+/// The points without those on a straight line.
 fn thinned(points: impl Iterator<Item = DVec2>) -> Vec<DVec2> {
     let mut kept: Vec<DVec2> = Vec::new();
-    // What was left out since the last point kept, the newest at its end.
+    // Points left out since the last kept one, the newest last.
     let mut pending: Vec<DVec2> = Vec::new();
     for p in points {
         if let (Some(&from), Some(&newest)) = (kept.last(), pending.last()) {

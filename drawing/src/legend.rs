@@ -1,21 +1,21 @@
-//! The legend: a sample and a few words for everything on the map, in columns.
+//! The legend: a sample and a few words for each element of a map, in columns.
 
 use glam::DVec2;
 use svg::node::element::{Circle, Group, Path, Rectangle};
 
+use crate::figure::{colour, number};
 use crate::lettering::{Align, Lettering};
-use crate::sheet::{colour, number};
 
-/// Letters of the legend [px].
+/// Size of the text \[px].
 const SIZE: f64 = 15.0;
-/// From one line to the next [px].
+/// Line spacing \[px].
 const LINE: f64 = 25.0;
-/// Width of a sample with the gap after it [px].
+/// Width of a sample and the gap after it \[px].
 const SAMPLE: f64 = 46.0;
-/// Width of a sample alone [px].
+/// Width of a sample alone \[px].
 const SWATCH: f64 = 36.0;
 
-/// How something looks on the map.
+/// How an element of the map looks.
 pub enum Swatch {
     /// Fill.
     Area(&'static str),
@@ -23,11 +23,11 @@ pub enum Swatch {
     Line(&'static str, f64, &'static str),
     /// A line with a direction.
     Arrow(&'static str),
-    /// A ring around a place.
+    /// A ring around a point.
     Ring(&'static str),
 }
 
-/// One thing on the map.
+/// One element of the map.
 pub struct Entry {
     swatch: Swatch,
     words: &'static str,
@@ -39,14 +39,14 @@ impl Entry {
     }
 }
 
-/// The legend with its upper left corner at `corner`, at most `width` wide, and its height [px].
+/// The legend with its upper left corner at `corner`, at most `width` wide, and its height \[px].
 pub fn drawn(lettering: &Lettering, entries: &[Entry], corner: DVec2, width: f64) -> (Group, f64) {
     let widest = entries.iter().map(|entry| lettering.width(entry.words, SIZE)).fold(0.0, f64::max);
     let columns = ((width / (SAMPLE + widest + 12.0)).floor() as usize).clamp(1, 4);
     let rows = entries.len().div_ceil(columns);
     let mut group = Group::new();
     for (index, entry) in entries.iter().enumerate() {
-        // Down the columns: neighbours in the list stand below each other.
+        // Filled column by column.
         let (column, row) = (index / rows, index % rows);
         let at = corner + DVec2::new(column as f64 * width / columns as f64, (row as f64 + 0.5) * LINE);
         group = group.add(sample(&entry.swatch, at));
@@ -55,7 +55,7 @@ pub fn drawn(lettering: &Lettering, entries: &[Entry], corner: DVec2, width: f64
     (group, rows as f64 * LINE)
 }
 
-/// A chevron with its tip at `at`, pointing along `direction` [px].
+/// A chevron with its tip at `at`, pointing along `direction` \[px].
 pub fn chevron(at: DVec2, direction: DVec2, colour: &str) -> Path {
     let (back, side) = (direction * -9.0, direction.perp() * 4.6);
     let [left, notch, right] = [back + side, back * 0.68, back - side].map(|corner| at + corner);
@@ -64,7 +64,7 @@ pub fn chevron(at: DVec2, direction: DVec2, colour: &str) -> Path {
     Path::new().set("d", data).set("fill", colour).set("stroke", "white").set("stroke-width", 0.6)
 }
 
-/// The sample of an entry, its left end at `at`, half way up [px].
+/// The sample of an entry; `at` is the middle of its left edge \[px].
 fn sample(swatch: &Swatch, at: DVec2) -> Group {
     let line = |colour: &str, width: f64| {
         let path = Path::new().set("d", format!("M{} {}h{SWATCH}", number(at.x), number(at.y))).set("fill", "none");

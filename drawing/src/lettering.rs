@@ -1,4 +1,4 @@
-//! Letters as outlines of an embedded typeface, so that a picture needs no fonts where it is looked at.
+//! Text as outlines of an embedded typeface, so that a picture needs no fonts.
 
 use std::fmt::Write;
 
@@ -6,9 +6,9 @@ use glam::DVec2;
 use svg::node::element::{Group, Path};
 use ttf_parser::{Face, FaceParsingError, OutlineBuilder};
 
-use crate::sheet::number;
+use crate::figure::number;
 
-/// Which part of a line of text stands at its place.
+/// Which part of a line of text is at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Align {
     Left,
@@ -26,20 +26,20 @@ impl Lettering {
         Ok(Lettering { face: Face::parse(epaint_default_fonts::UBUNTU_LIGHT, 0)? })
     }
 
-    /// How long `words` are in letters of `size` [px].
+    /// Width of `words` in text of `size` \[px].
     pub fn width(&self, words: &str, size: f64) -> f64 {
         let advance = |letter| self.face.glyph_index(letter).and_then(|glyph| self.face.glyph_hor_advance(glyph)).unwrap_or(0);
         words.chars().map(|letter| f64::from(advance(letter))).sum::<f64>() * self.scale(size)
     }
 
-    /// One line of text with its base line at `at` [px].
+    /// One line of text with its base line at `at` \[px].
     pub fn text(&self, words: &str, at: DVec2, size: f64, align: Align, colour: &str) -> Path {
-        // The typeface is a light one: a hair of stroke makes it readable when the picture is printed small.
+        // The typeface is light: a thin stroke keeps it readable in small pictures.
         let weight = number(0.035 * size);
         self.outlines(words, at, size, align).set("fill", colour).set("stroke", colour).set("stroke-width", weight).set("aria-label", words)
     }
 
-    /// The same over a busy ground, with a light rim.
+    /// The same with a light rim, to be read over a map.
     pub fn text_on_map(&self, words: &str, at: DVec2, size: f64, align: Align, colour: &str) -> Group {
         let rim = self.outlines(words, at, size, align).set("fill", "white").set("stroke", "white");
         let rim = rim.set("stroke-width", number(0.3 * size)).set("stroke-linejoin", "round").set("stroke-opacity", 0.85);
@@ -54,7 +54,7 @@ impl Lettering {
         };
         let mut pen = Pen { data: String::new(), at: at - DVec2::new(shift * self.width(words, size), 0.0), scale: self.scale(size) };
         for glyph in words.chars().filter_map(|letter| self.face.glyph_index(letter)) {
-            // A letter without an outline, a space, only moves the pen.
+            // A glyph without an outline, such as a space, only moves the pen.
             self.face.outline_glyph(glyph, &mut pen);
             pen.at.x += f64::from(self.face.glyph_hor_advance(glyph).unwrap_or(0)) * pen.scale;
         }

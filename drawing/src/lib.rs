@@ -1,26 +1,72 @@
-//! Pictures: roundabouts, swept paths, episodes and measurements, as SVG, PNG and GIF.
+//! Pictures of roundabouts, swept paths, episodes and measurements, as SVG, PNG and GIF.
 //!
-//! A PNG is the SVG rasterised: both show the same on every machine, because letters are drawn as outlines too.
+//! - [`figure::roundabout`] draws a roundabout with its routes, [`figure::swept_path`] a [`sweep::Sweep`] on one of
+//!   them.
+//! - [`recording::Recorder`] records episodes of a batch, [`episode::Scene`] draws one as a still, [`film::gif`] as a
+//!   film.
+//! - [`chart::Chart`] draws measurements over logarithmic axes.
+//! - [`rasterised`] makes a PNG of any of these SVGs. Text is drawn as outlines, so that pictures are equal on every
+//!   machine.
+//!
+//! ```
+//! use offtrack::roundabout::{Gutter, Roundabout};
+//! use offtrack_drawing::figure::{self, Straights};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let roundabout = Roundabout::named("16m")?;
+//! let straights = Straights { approach: 40.0, departure: 35.0 };
+//! let routes = roundabout.routes(straights.approach, straights.departure, 2.0)?;
+//! let svg = figure::roundabout(&roundabout, &routes, straights, Gutter::Drivable)?;
+//! # assert!(svg.starts_with("<svg "));
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod chart; // measurements as lines
 pub mod episode; // a recorded episode, still or moving
+pub mod figure; // a map with axes, title and legend
 pub mod film; // a recorded episode as GIF
 mod isolines; // lines of equal distance
-mod legend;
+mod legend; // samples and words below a map
 mod lettering; // text as outlines
 pub mod polygons; // curves as points
-pub mod recording; // an episode, step by step
-mod road; // a roundabout from above
-pub mod sheet; // a map with axes, title and legend
-pub mod sweep; // what a truck covers on its route
+pub mod recording; // the states of an episode
+mod road; // the layers of a map
+pub mod sweep; // a truck's swept path on a route
 
 use resvg::{tiny_skia, usvg};
 
-/// What drawing can fail with.
-pub type Failure = Box<dyn std::error::Error + Send + Sync>;
+/// Why a picture cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The embedded typeface cannot be read.
+    #[error("the typeface cannot be read: {0}")]
+    Typeface(#[from] ttf_parser::FaceParsingError),
+    /// A text is not an SVG.
+    #[error("the SVG cannot be read: {0}")]
+    Svg(#[from] usvg::Error),
+    /// A PNG cannot be encoded.
+    #[error("the PNG cannot be encoded: {0}")]
+    Png(#[from] png::EncodingError),
+    /// A film cannot be encoded.
+    #[error("the GIF cannot be encoded: {0}")]
+    Gif(#[from] gif::EncodingError),
+    /// The picture has no pixels, or more than its format can hold.
+    #[error("a picture of {width} x {height} pixels cannot be drawn")]
+    Size {
+        /// Width asked for \[pixels].
+        width: u32,
+        /// Height that follows from it \[pixels].
+        height: u32,
+    },
+}
 
-/// The picture as a PNG, `width` pixels wide.
-pub fn rasterised(svg: &str, width: u32) -> Result<Vec<u8>, Failure> {
+/// The PNG of an SVG text, `width` pixels wide.
+///
+/// # Errors
+///
+/// [`Error::Svg`] for a text that is not an SVG, [`Error::Size`] for a width of 0 or one too large.
+pub fn rasterised(svg: &str, width: u32) -> Result<Vec<u8>, Error> {
     let tree = usvg::Tree::from_str(svg, &usvg::Options::default())?;
     let pixels = painted(&tree, width, None)?;
     let colours: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|pixel| [0, 1, 2].map(|channel| stepped(pixel[channel]))).collect();
@@ -34,22 +80,22 @@ pub fn rasterised(svg: &str, width: u32) -> Result<Vec<u8>, Failure> {
     Ok(bytes)
 }
 
-/// The picture in pixels, `width` wide, over another of the same size or over nothing.
-fn painted(tree: &usvg::Tree, width: u32, ground: Option<&tiny_skia::Pixmap>) -> Result<tiny_skia::Pixmap, Failure> {
+/// The picture in pixels, `width` wide, over a background of the same size.
+fn painted(tree: &usvg::Tree, width: u32, background: Option<&tiny_skia::Pixmap>) -> Result<tiny_skia::Pixmap, Error> {
     let scale = width as f32 / tree.size().width();
     let height = (tree.size().height() * scale).round().max(1.0) as u32;
-    let mut pixels = match ground {
-        Some(ground) => ground.clone(),
-        None => tiny_skia::Pixmap::new(width, height).ok_or("the picture is too large")?,
+    let mut pixels = match background {
+        Some(background) => background.clone(),
+        None => tiny_skia::Pixmap::new(width, height).ok_or(Error::Size { width, height })?,
     };
     resvg::render(tree, tiny_skia::Transform::from_scale(scale, scale), &mut pixels.as_mut());
     Ok(pixels)
 }
 
-/// Width of the steps between the values of a colour's channel: too small to see, and they halve a PNG.
+/// Quantisation step of a colour channel: too small to see, and it halves a PNG.
 const COLOUR_STEP: u8 = 15;
 
-/// A channel's nearest step. The paper is opaque, so that a pixel's channels are its colour.
+/// The nearest quantised value of a channel. The paper is opaque, so a pixel's channels are its colour.
 fn stepped(channel: u8) -> u8 {
     (channel.saturating_add(COLOUR_STEP / 2) / COLOUR_STEP) * COLOUR_STEP
 }

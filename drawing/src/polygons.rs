@@ -1,16 +1,16 @@
-//! A roundabout's kerbs as polygons and its routes as waypoints, for other programs. The shape is documented at the command's `--output`.
+//! A roundabout's kerbs as polygons and its routes as waypoints, for other programs.
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Outline};
 use offtrack::route::Route;
 use serde::Serialize;
 
-/// Chords leave their arcs by at most this; the promise is 1 cm [m].
+/// Largest distance of a chord to its arc, half of the documented 1 cm \[m].
 const TOLERANCE: f64 = 0.005;
-/// How far the ground reaches past the outermost kerb [m].
+/// Extent of solid ground beyond the outermost kerb \[m].
 const MARGIN: f64 = 5.0;
 
-/// The points of a line, open or closed [m]. A closed one does not repeat its first point.
+/// The points of a line, open or closed \[m]. A closed one does not repeat its first point.
 pub type Polygon = Vec<[f64; 2]>;
 
 #[derive(Serialize)]
@@ -26,7 +26,15 @@ struct WrittenRoute<'a> {
     waypoints: Vec<[f64; 3]>,
 }
 
-/// The JSON text, a line.
+/// Polygons and waypoints as one line of JSON, in metres and radians: `{"solids": [[[x, y], ...], ...], "drivable":
+/// [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x, y, heading], ...]}]}`.
+///
+/// `drivable` is the outer boundary, then one hole for each island; `solids` are the islands, then the ground beyond
+/// the boundary as two polygons. Curves are within 1 cm.
+///
+/// # Errors
+///
+/// A coordinate that is not finite.
 pub fn json(kerbs: &Outline, routes: &[Route]) -> serde_json::Result<String> {
     let (boundary, islands) = corners(kerbs);
     let ground = boundary.first().map(|points| ground(points)).into_iter().flatten();
@@ -41,7 +49,7 @@ pub fn json(kerbs: &Outline, routes: &[Route]) -> serde_json::Result<String> {
     Ok(text)
 }
 
-/// The edges of what can be driven on: the outer boundary counter-clockwise, then the islands clockwise.
+/// The edges of the drivable area: the outer boundary counter-clockwise, then the islands clockwise.
 pub fn drivable(kerbs: &Outline) -> Vec<Polygon> {
     let (boundary, islands) = corners(kerbs);
     boundary.iter().chain(&islands).map(|points| rounded(points)).collect()
@@ -65,7 +73,8 @@ fn corners(kerbs: &Outline) -> (Vec<Vec<DVec2>>, Vec<Vec<DVec2>>) {
     (boundary.into_iter().map(closed).collect(), islands.into_iter().map(closed).collect())
 }
 
-/// All around a counter-clockwise boundary, cut at its westernmost and its easternmost point: north of it and south of it.
+/// The ground around a counter-clockwise boundary, cut at its westernmost and easternmost points into a northern and a
+/// southern polygon.
 fn ground(boundary: &[DVec2]) -> [Vec<DVec2>; 2] {
     let n = boundary.len();
     let furthest = |sign: f64| (0..n).max_by(|&a, &b| (sign * boundary[a].x).total_cmp(&(sign * boundary[b].x))).unwrap_or(0);

@@ -1,4 +1,4 @@
-//! The roundabout itself on the map: solids, gutters, distances, lanes, routes and the names of its arms.
+//! The layers of a map: solids, gutters, distances, lanes, routes and the names of the arms.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -10,20 +10,20 @@ use offtrack::route::{Lane, Route};
 use offtrack::scenario::FIELD_CELL;
 use svg::node::element::{Group, Path};
 
+use crate::figure::{Straights, View, colour};
 use crate::isolines::isolines;
 use crate::legend::{Entry, Swatch, chevron};
 use crate::lettering::{Align, Lettering};
-use crate::sheet::{Straights, View, colour};
 
-/// Least distance between arrows of one colour [m].
+/// Least distance between arrows of one colour \[m].
 const APART: f64 = 5.0;
-/// From the ring to the name of an arm [m].
+/// From the ring to the name of an arm \[m].
 const TO_NAME: f64 = 23.0;
 
 const LANE_DASHES: &str = "6 5";
 
-/// What is drawn on whichever map.
-pub struct Ground<'a> {
+/// A roundabout in a view; each method draws one layer.
+pub(crate) struct Road<'a> {
     view: &'a View,
     lettering: &'a Lettering,
     roundabout: &'a Roundabout,
@@ -33,25 +33,25 @@ pub struct Ground<'a> {
     kerbs: Outline,
 }
 
-impl<'a> Ground<'a> {
-    pub fn new(
+impl<'a> Road<'a> {
+    pub(crate) fn new(
         view: &'a View,
         lettering: &'a Lettering,
         roundabout: &'a Roundabout,
         routes: &'a [Route],
         straights: Straights,
         gutter: Gutter,
-    ) -> Ground<'a> {
-        Ground { view, lettering, roundabout, routes, straights, gutter, kerbs: roundabout.kerbs(gutter) }
+    ) -> Road<'a> {
+        Road { view, lettering, roundabout, routes, straights, gutter, kerbs: roundabout.kerbs(gutter) }
     }
 
-    /// Path data of the edges of what can be driven on.
-    pub fn kerb_data(&self) -> String {
+    /// Path data of the edges of the drivable area.
+    pub(crate) fn kerb_data(&self) -> String {
         self.view.loops(&self.kerbs.loops)
     }
 
-    /// Solids, gutters and road.
-    pub fn surface(&self) -> Group {
+    /// Solid ground, gutters and road.
+    pub(crate) fn surface(&self) -> Group {
         let fill = |outline: &Outline, colour: &str| {
             Path::new().set("d", self.view.loops(&outline.loops)).set("fill", colour).set("fill-rule", "evenodd")
         };
@@ -68,7 +68,7 @@ impl<'a> Ground<'a> {
     }
 
     /// Lines of equal distance to the kerbs.
-    pub fn distances(&self) -> Group {
+    pub(crate) fn distances(&self) -> Group {
         let field = Field::bake(&self.kerbs, FIELD_CELL);
         let lines: String = isolines(&field, self.view).iter().map(|ring| self.view.line(ring)).collect();
         let lines = Path::new().set("d", lines).set("fill", "none").set("stroke", colour::CONTOUR).set("stroke-width", 0.8);
@@ -76,19 +76,19 @@ impl<'a> Ground<'a> {
     }
 
     /// The centre lines of the lanes.
-    pub fn lanes(&self) -> Group {
+    pub(crate) fn lanes(&self) -> Group {
         let lanes: String = self.roundabout.lanes().iter().map(|lane| self.view.curve(lane)).collect();
         let lanes = Path::new().set("d", lanes).set("fill", "none").set("stroke", colour::LANE).set("stroke-width", 0.9);
         Group::new().add(lanes.set("stroke-dasharray", LANE_DASHES))
     }
 
-    /// The edges of what can be driven on.
-    pub fn kerbs(&self) -> Group {
+    /// The edges of the drivable area.
+    pub(crate) fn kerbs(&self) -> Group {
         Group::new().add(Path::new().set("d", self.kerb_data()).set("fill", "none").set("stroke", colour::KERB).set("stroke-width", 1.6))
     }
 
-    /// All routes, with arrows where they come in, go around and leave.
-    pub fn routes(&self) -> Group {
+    /// All routes, with arrows on their approach, around the ring and on their departure.
+    pub(crate) fn routes(&self) -> Group {
         let mut lines = Group::new();
         let mut arrows: Vec<(DVec2, f64, Lane)> = Vec::new();
         for route in self.routes {
@@ -97,7 +97,7 @@ impl<'a> Ground<'a> {
             for s in self.arrow_stations(&route.centre_line) {
                 let at = route.centre_line.point_at(s);
                 let heading = route.centre_line.heading_at(s);
-                // Routes share lanes: one arrow does for all of them.
+                // Routes share lanes: one arrow serves all of them.
                 let shares = |&(other, towards, lane): &(DVec2, f64, Lane)| {
                     lane == route.lane && other.distance(at) < APART && 0.0 < (towards - heading).cos()
                 };
@@ -111,23 +111,24 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Where a route gets arrows: twice on its way in, at every eighth of a turn around the ring, twice on its way out [m].
+    /// Stations of the arrows of a route: two on its approach, one at every eighth of the ring, two on its departure
+    /// \[m].
     fn arrow_stations(&self, line: &Curve) -> Vec<f64> {
         let eighth = |s: f64| (line.point_at(s).to_angle() / FRAC_PI_4).floor();
         let (enters, leaves) = (self.straights.approach, line.length() - self.straights.departure);
         let around = (0..).map(|step| enters + 0.2 * f64::from(step)).take_while(|&s| s < leaves);
         let mut stations: Vec<f64> = around.filter(|&s| eighth(s) != eighth(s + 0.2)).collect();
-        stations.extend([0.3, 0.75].into_iter().flat_map(|share| [share * enters, leaves + share * self.straights.departure]));
+        stations.extend([0.3, 0.75].into_iter().flat_map(|part| [part * enters, leaves + part * self.straights.departure]));
         stations
     }
 
     /// The arms' names, between their carriageways.
-    pub fn arm_names(&self) -> Group {
+    pub(crate) fn arm_names(&self) -> Group {
         let mut group = Group::new();
         let Straights { approach, departure } = self.straights;
         let away = TO_NAME.min(approach).min(departure);
         for (arm, name) in self.roundabout.arms().enumerate() {
-            // The U-turn comes in and goes out on the left lanes of its arm.
+            // The U-turn enters and leaves on the left lanes of its arm.
             let last = self.roundabout.arms().count() as u32;
             let Some(u_turn) = self.routes.iter().find(|route| route.entry == arm && route.exit == last) else { continue };
             let line = &u_turn.centre_line;
@@ -141,13 +142,13 @@ impl<'a> Ground<'a> {
     }
 
     /// The legend's lines for a map with distances.
-    pub fn legend(&self) -> Vec<Entry> {
+    pub(crate) fn legend(&self) -> Vec<Entry> {
         let [solid, gutter, edge, lane] = self.surface_legend();
         vec![solid, gutter, edge, Entry::new(Swatch::Line(colour::CONTOUR, 1.2, ""), "distance to it, each metre"), lane]
     }
 
     /// The legend's lines for surface, kerbs and lanes.
-    pub fn surface_legend(&self) -> [Entry; 4] {
+    pub(crate) fn surface_legend(&self) -> [Entry; 4] {
         let gutter = match self.gutter {
             Gutter::Drivable => "gutter, drivable",
             Gutter::Solid => "gutter, solid",
@@ -161,7 +162,7 @@ impl<'a> Ground<'a> {
     }
 
     /// The legend's lines for the routes.
-    pub fn route_legend(&self) -> [Entry; 2] {
+    pub(crate) fn route_legend(&self) -> [Entry; 2] {
         [
             Entry::new(Swatch::Arrow(lane_colour(Lane::Left)), "route from a left lane"),
             Entry::new(Swatch::Arrow(lane_colour(Lane::Right)), "route from a right lane"),

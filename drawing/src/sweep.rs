@@ -1,4 +1,4 @@
-//! What both units of a truck sweep while its front axle follows a route's centre line, and where that is not road.
+//! The swept path of a truck whose front axle follows a route's centre line, and where it leaves the road.
 
 use glam::DVec2;
 use offtrack::geometry::Outline;
@@ -8,43 +8,49 @@ use offtrack::swept::{Pose, own_lane_suffices, swept_path};
 use offtrack::vehicle::Vehicle;
 use svg::node::element::{Circle, Definitions, Group, Path, Use};
 
+use crate::figure::{View, colour, number};
 use crate::legend::{Entry, Swatch};
 use crate::lettering::{Align, Lettering};
-use crate::sheet::{View, colour, number};
 
-/// Distance between poses [m].
+/// Distance between poses \[m].
 const SPACING: f64 = 0.25;
-/// Distance between the trucks that are drawn [m].
+/// Distance between the trucks that are drawn \[m].
 const BETWEEN_TRUCKS: f64 = 22.0;
-/// Distance between the points of an outline at which clearance is looked at [m].
+/// Distance between the points of an outline at which clearance is computed \[m].
 const BETWEEN_POINTS: f64 = 0.05;
 
-/// A truck's path along a route.
+/// A truck's swept path along a route.
 pub struct Sweep<'a> {
     /// The route.
     pub route: &'a Route,
-    /// Vehicle, load and speed in words.
+    /// Vehicle, load and speed, for the title.
     pub driven: String,
-    /// No pose touches a solid.
+    /// Whether no pose touches solid ground.
     pub suffices: bool,
     poses: Vec<Pose>,
     rig: Rig,
     units: [Unit; 2],
 }
 
-/// One unit's share of it.
+/// The swept path of one unit.
 struct Unit {
     name: &'static str,
     colour: &'static str,
     light: &'static str,
     corners: Vec<[DVec2; 4]>,
-    /// Least signed distance of the outline from the kerbs [m].
+    /// Least signed distance of the outline from the kerbs \[m].
     clearance: f64,
-    /// For each stretch on which the unit overlaps a solid: where it reaches deepest, and how deep [m].
+    /// For each section on which the unit overlaps solid ground: its deepest point, and the depth \[m].
     overlaps: Vec<(DVec2, f64)>,
 }
 
 impl<'a> Sweep<'a> {
+    /// The path of `vehicle` with this load at `speed` [m/s]. `kerbs` are the roundabout's, `driven` is vehicle, load
+    /// and speed in words.
+    ///
+    /// # Panics
+    ///
+    /// If the vehicle does not have the load.
     pub fn new(vehicle: &Vehicle, load: &str, speed: f64, kerbs: &Outline, route: &'a Route, driven: String) -> Sweep<'a> {
         // Path and outlines depend on neither the sub-step nor the lock.
         let rig = vehicle.rig(load, 0.05, None);
@@ -64,7 +70,7 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// Clearance of both units, or how far each is beyond a kerb.
+    /// The least clearance of both units, or how far each overlaps a kerb, in words.
     pub fn summary(&self) -> String {
         let [tractor, trailer] = self.units.each_ref().map(|unit| {
             if unit.overlaps.is_empty() {
@@ -76,26 +82,27 @@ impl<'a> Sweep<'a> {
         format!("{tractor}, {trailer}")
     }
 
-    /// The areas swept, to be drawn once and used twice.
-    pub fn shapes(&self, view: &View) -> Definitions {
+    /// Definitions of the swept areas, which are used twice.
+    pub(crate) fn shapes(&self, view: &View) -> Definitions {
         // Half of the poses are dense enough.
         let drawn = |unit: &Unit| unit.corners.iter().step_by(2).chain(unit.corners.last()).copied().collect::<Vec<_>>();
         let area = |unit: &Unit| swept_area(view, &drawn(unit));
         self.units.iter().fold(Definitions::new(), |all, unit| all.add(Path::new().set("id", unit.name).set("d", area(unit))))
     }
 
-    /// The areas swept; to be drawn under the kerbs. The tractor's hides the trailer's, so that off-tracking is what remains of that.
-    pub fn areas(&self) -> Group {
+    /// The swept areas, to be drawn below the kerbs. The tractor's hides the trailer's: what remains of it is the
+    /// off-tracking.
+    pub(crate) fn areas(&self) -> Group {
         self.units.iter().rev().fold(Group::new(), |group, unit| group.add(unit.area(unit.light)))
     }
 
-    /// The areas once more, to be clipped to the solids.
-    pub fn overlaps(&self) -> Group {
+    /// The areas again, to be clipped to solid ground.
+    pub(crate) fn overlaps(&self) -> Group {
         self.units.iter().fold(Group::new(), |group, unit| group.add(unit.area(colour::OVERLAP)))
     }
 
     /// Trucks, paths of the axles, and a ring with its depth around each overlap.
-    pub fn marks(&self, view: &View, lettering: &Lettering) -> Group {
+    pub(crate) fn marks(&self, view: &View, lettering: &Lettering) -> Group {
         let mut group = Group::new();
         let every = (BETWEEN_TRUCKS / SPACING) as usize;
         for unit in self.units.iter().rev() {
@@ -120,15 +127,15 @@ impl<'a> Sweep<'a> {
                 let ring = Circle::new().set("cx", number(at.x)).set("cy", number(at.y)).set("r", 11).set("fill", "none");
                 group = group.add(ring.set("stroke", colour::OVERLAP).set("stroke-width", 2.2));
                 let words = format!("{} {depth:.2} m", unit.name);
-                let place = at + DVec2::new(16.0, if below { 18.0 } else { -8.0 });
-                group = group.add(lettering.text_on_map(&words, place, 15.0, Align::Left, colour::OVERLAP));
+                let corner = at + DVec2::new(16.0, if below { 18.0 } else { -8.0 });
+                group = group.add(lettering.text_on_map(&words, corner, 15.0, Align::Left, colour::OVERLAP));
             }
         }
         group
     }
 
     /// The lines of the legend.
-    pub fn legend(&self) -> Vec<Entry> {
+    pub(crate) fn legend(&self) -> Vec<Entry> {
         let mut entries = vec![
             Entry::new(Swatch::Area(colour::SWEPT_BY_TRACTOR), "swept by the tractor"),
             Entry::new(Swatch::Area(colour::SWEPT_BY_TRAILER), "swept by the trailer alone"),
@@ -152,13 +159,13 @@ impl Unit {
         for corners in &unit.corners {
             let (deepest, distance) = nearest(corners, kerbs);
             unit.clearance = unit.clearance.min(distance);
-            // A nose may slip in between two points of the outline: whether they meet is decided exactly.
+            // A narrow nose may lie between two points of the outline: the overlap is decided exactly.
             let overlaps = kerbs.intersects_rectangle(corners);
             if overlaps {
                 let depth = -distance.min(0.0);
                 match unit.overlaps.last_mut().filter(|_| overlapping) {
-                    Some(stretch) if depth <= stretch.1 => {}
-                    Some(stretch) => *stretch = (deepest, depth),
+                    Some(section) if depth <= section.1 => {}
+                    Some(section) => *section = (deepest, depth),
                     None => unit.overlaps.push((deepest, depth)),
                 }
             }
@@ -172,14 +179,15 @@ impl Unit {
     }
 }
 
-/// Path data of what a rectangle sweeps on its way through `corners`; to be filled by the non-zero rule.
-pub fn swept_area(view: &View, corners: &[[DVec2; 4]]) -> String {
-    // A hull of two neighbours has no teeth where a corner swings out. All hulls turn the same way: a non-zero fill is their union.
+/// Path data of the area that a rectangle sweeps through the poses `corners`, for the non-zero fill rule.
+pub(crate) fn swept_area(view: &View, corners: &[[DVec2; 4]]) -> String {
+    // Hulls of neighbouring poses leave no teeth where a corner swings out. All have one orientation: the non-zero fill
+    // is their union.
     corners.windows(2).map(|pair| view.polygon(&hull(pair.concat()))).collect()
 }
 
-/// The point of a rectangle's outline with the least signed distance from the kerbs, and that distance [m].
-pub fn nearest(corners: &[DVec2; 4], kerbs: &Outline) -> (DVec2, f64) {
+/// The point of a rectangle's outline with the least signed distance from the kerbs, and that distance \[m].
+pub(crate) fn nearest(corners: &[DVec2; 4], kerbs: &Outline) -> (DVec2, f64) {
     let centre = (corners[0] + corners[2]) / 2.0;
     let nearby = kerbs.near(centre, corners[0].distance(centre));
     let points = (0..4).flat_map(|side| {
@@ -190,7 +198,8 @@ pub fn nearest(corners: &[DVec2; 4], kerbs: &Outline) -> (DVec2, f64) {
     points.map(|p| (p, nearby.signed_distance(p))).fold((centre, f64::INFINITY), |least, here| if here.1 < least.1 { here } else { least })
 }
 
-/// The corners of the convex hull, counter-clockwise (A. M. Andrew, "Another efficient algorithm for convex hulls in two dimensions", 1979).
+/// The corners of the convex hull, counter-clockwise (A. M. Andrew, "Another efficient algorithm for convex hulls in
+/// two dimensions", 1979).
 fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let chain = |points: &mut dyn Iterator<Item = DVec2>| {
@@ -219,7 +228,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_hull_keeps_the_corners_of_two_squares_that_stick_out_and_goes_around_them_counter_clockwise() {
+    fn a_hull_of_two_squares_has_their_outer_corners_counter_clockwise() {
         let square = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
         let shifted = square.map(|p| p + DVec2::new(1.0, 0.5));
         let expected = [(0.0, 0.0), (2.0, 0.0), (3.0, 0.5), (3.0, 2.5), (1.0, 2.5), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
@@ -227,11 +236,12 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_point_of_a_body_to_a_kerb_is_found_on_its_sides_too() {
+    fn the_point_of_a_body_nearest_to_a_kerb_may_lie_on_a_side() {
         let kerb = Outline::new(vec![Curve::circle(DVec2::ZERO, 50.0), Curve::circle(DVec2::new(0.0, -3.0), 2.0)]);
         let body = [(6.0, 1.2), (-6.0, 1.2), (-6.0, -1.2), (6.0, -1.2)].map(|(x, y)| DVec2::new(x, y));
         let (at, depth) = nearest(&body, &kerb);
-        // The circle reaches up to y = -1, 0.2 m into the body; its nearest point to the side's middle lies straight below.
+        // The circle reaches up to y = -1, 0.2 m into the body; its nearest point to the side's middle lies straight
+        // below.
         assert!((depth + 0.2).abs() < 1e-9 && at.distance(DVec2::new(0.0, -1.2)) < 1e-9, "{at} {depth}");
     }
 }

@@ -9,7 +9,7 @@ use offtrack::simulator::Engine;
 use crate::error::Error;
 use crate::provenance;
 
-/// What would do where a program without the feature is asked for a device.
+/// The error text where a program without the feature is asked for a device.
 #[cfg(not(feature = "gpu"))]
 pub const NOT_BUILT_IN: &str =
     "this program was built without the feature gpu; `cargo build --release --features gpu` builds one that has it";
@@ -21,7 +21,7 @@ pub struct Device {
     pub engine: Engine,
     /// `cpu` or `gpu`.
     pub kind: &'static str,
-    /// Name for results: `cpu` for the processor, which results name elsewhere; else the adapter's with its interface and driver.
+    /// Name for results: `cpu`, whose processor results name elsewhere, or the adapter with its interface and driver.
     pub name: String,
     adapter: String,
 }
@@ -32,12 +32,12 @@ impl Device {
         Device { engine: Engine::Cpu, kind: "cpu", name: "cpu".to_owned(), adapter: String::new() }
     }
 
-    /// The adapter's own name, by which it can be opened again.
+    /// The adapter's own name, with which it can be opened again.
     pub fn adapter(&self) -> &str {
         &self.adapter
     }
 
-    /// Name for people: that of the processor or the adapter.
+    /// Name for people: of the processor or of the adapter.
     pub fn title(&self) -> String {
         if self.kind == "cpu" { provenance::machine() } else { self.name.clone() }
     }
@@ -54,7 +54,7 @@ pub fn open(adapter: Option<&str>) -> Result<Device, Error> {
             Ok(Device { engine: Engine::Gpu { device, columns: gpu::Columns::new() }, kind: "gpu", name, adapter })
         }
         Err(gpu::Error::UnknownAdapter { name, found }) => {
-            let expected = format!("no adapter's name has this in it: there is {}", found.join(", "));
+            let expected = format!("no adapter's name contains this; there is {}", found.join(", "));
             Err(Error::Flag { flag: "--adapter", value: name, expected })
         }
         Err(error) => Err(simulator::Error::from(error).into()),
@@ -67,7 +67,7 @@ pub fn open(_: Option<&str>) -> Result<Device, Error> {
     Err(Error::Flag { flag: "--device", value: "gpu".to_owned(), expected: format!("{NOT_BUILT_IN}, or leave --device out") })
 }
 
-/// The outcome of `work`, an error where it panicked: the tensor library knows no other answer to a device that fails.
+/// The outcome of `work`, or an error if it panicked: the tensor library panics when its device fails.
 #[cfg(feature = "gpu")]
 pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
@@ -77,8 +77,8 @@ pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     let outcome = catch_unwind(AssertUnwindSafe(work));
     set_hook(hook);
     outcome.unwrap_or_else(|panic| {
-        let said = panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|&said| said.to_owned()));
-        Err(Error::Device(said.unwrap_or_else(|| "it failed".to_owned())))
+        let message = panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|&message| message.to_owned()));
+        Err(Error::Device(message.unwrap_or_else(|| "it failed".to_owned())))
     })
 }
 
@@ -88,7 +88,7 @@ pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     work()
 }
 
-/// Whether the device failed, rather than that something was asked wrongly.
+/// Whether the error is a failure of the device rather than wrong input.
 #[cfg(feature = "gpu")]
 pub fn has_failed(error: &Error) -> bool {
     use offtrack::gpu;
@@ -98,7 +98,7 @@ pub fn has_failed(error: &Error) -> bool {
     matches!(error, Error::Device(_)) || matches!(error, Error::Simulator(error) if broken(error))
 }
 
-/// Whether the device failed, rather than that something was asked wrongly.
+/// Whether the error is a failure of the device rather than wrong input.
 #[cfg(not(feature = "gpu"))]
 pub fn has_failed(_: &Error) -> bool {
     false

@@ -1,14 +1,14 @@
-//! Examines a driver: every route of a split, so many episodes each, every one counted.
+//! Evaluates a policy: a number of episodes on every route of a split, every one counted.
 
 pub mod certificate; // routes shown to be possible
 pub mod page; // a report as an HTML page
-pub mod policies; // what drives: learned, pure pursuit, random
+pub mod policies; // what chooses the actions: learned, pure pursuit, random
 pub mod report; // figures of an evaluation
+mod table; // a report as text
 
 use std::sync::Arc;
 
 use glam::Vec2;
-use indicatif::{ProgressBar, ProgressStyle};
 use offtrack::angle::wrapped;
 use offtrack::geometry::Outline;
 use offtrack::layout::{Ended, Rig, Truck};
@@ -20,12 +20,15 @@ use offtrack_drawing::recording::{Recorder, Track};
 
 use crate::device::Device;
 use crate::error::Error;
-use policies::Driver;
+use policies::Policy;
 use report::{Episode, Report, RouteReport, Summary};
 
-/// What a driver is examined on: every route of a split, so many episodes each, all at once, each truck once.
+pub use table::legend;
+
+/// What a policy is evaluated on: a number of episodes on every route of a split, all in one batch, one episode a
+/// truck.
 #[derive(Debug, Clone, Copy)]
-pub struct Examination<'a> {
+pub struct Evaluation<'a> {
     /// The benchmark.
     pub scenario: &'a Scenario,
     /// The same, baked.
@@ -34,66 +37,69 @@ pub struct Examination<'a> {
     pub split: Split,
     /// Episodes on each route.
     pub episodes: usize,
-    /// What the start poses are drawn from.
+    /// Seed of the start poses.
     pub seed: u32,
-    /// Every state of every episode is kept.
+    /// Whether every state of every episode is kept.
     pub record: bool,
-    /// What steps the trucks; their driver is where it always is.
+    /// What steps the trucks. A learned policy runs on the processor on either.
     pub device: &'a Device,
 }
 
-impl Examination<'_> {
-    /// The driver's report and, where they are kept, the episodes in the order of its routes.
-    pub fn report(&self, driver: &mut dyn Driver) -> Result<(Report, Vec<Track>), Error> {
-        let (finished, tracks) = self.drive(driver)?;
-        Ok((self.summarised(driver.name(), &finished), tracks))
+impl Evaluation<'_> {
+    /// The policy's report and, if recorded, the episodes in the order of its routes. `progress` is as in
+    /// [`Evaluation::drive`].
+    pub fn report(&self, policy: &mut dyn Policy, progress: &mut dyn FnMut(usize, usize)) -> Result<(Report, Vec<Track>), Error> {
+        let (finished, tracks) = self.drive(policy, progress)?;
+        Ok((self.summarised(policy.name(), &finished), tracks))
     }
 
-    /// The episodes, route by route in the order of the split; where they are kept also every state of each.
-    pub fn drive(&self, driver: &mut dyn Driver) -> Result<(Vec<Episode>, Vec<Track>), Error> {
-        let Examination { scenario, world, split, episodes, seed, record, device } = *self;
+    /// The episodes, route by route in the order of the split; if recorded, also every state of each. `progress` is
+    /// called with the number of finished episodes and the number of all, after each step that finished one.
+    pub fn drive(&self, policy: &mut dyn Policy, progress: &mut dyn FnMut(usize, usize)) -> Result<(Vec<Episode>, Vec<Track>), Error> {
+        let Evaluation { scenario, world, split, episodes, seed, record, device } = *self;
         let routes = scenario.split(split);
         if routes.is_empty() {
             let value = split.name().to_owned();
-            return Err(Error::Flag { flag: "--split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
+            return Err(Error::Flag { flag: "split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
         }
         let trucks: Vec<u32> = routes.iter().flat_map(|&route| std::iter::repeat_n(route, episodes)).collect();
         let mut simulator = Simulator::on(device.engine.clone(), world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?;
         let mut running: Vec<Running> = simulator.batch().truck.iter().map(|truck| Running::new(&world.params.rig, truck)).collect();
         let recorded = if record { 0..running.len() } else { 0..0 };
         let mut recorder = Recorder::new(world, simulator.batch(), recorded);
-        let bar = ProgressBar::new(running.len() as u64).with_style(
-            ProgressStyle::with_template("evaluating {bar:30} {pos}/{len} episodes, {elapsed}")
-                .unwrap_or_else(|_| ProgressStyle::default_bar()),
-        );
         let mut actions = Vec::new();
         let mut finished: Vec<Option<Episode>> = vec![None; running.len()];
-        while finished.iter().any(Option::is_none) {
-            driver.act(world, simulator.batch(), &mut actions);
+        let mut n_finished = 0;
+        while n_finished < finished.len() {
+            let n_before = n_finished;
+            policy.choose(world, simulator.batch(), &mut actions);
             simulator.step(&actions)?;
             let batch = simulator.batch();
             recorder.follow(world, batch);
             for (env, (running, finished)) in running.iter_mut().zip(&mut finished).enumerate() {
                 if finished.is_none() && running.follow(&world.params.rig, batch, env) {
                     *finished = Some(running.finish(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running)));
-                    bar.inc(1);
+                    n_finished += 1;
                 }
             }
+            if n_before < n_finished {
+                progress(n_finished, finished.len());
+            }
         }
-        bar.finish_and_clear();
-        // A device that broke down in the last step says so here.
+        // A device that failed in the last step reports it here.
         simulator.wait()?;
         Ok((finished.into_iter().flatten().collect(), recorder.finish()))
     }
 
+    /// The report of these episodes, which stand as [`Evaluation::drive`] gives them; `policy` is its name.
     pub fn summarised(&self, policy: &str, finished: &[Episode]) -> Report {
-        let Examination { scenario, world, split, episodes, seed, device, .. } = *self;
+        let Evaluation { scenario, world, split, episodes, seed, device, .. } = *self;
         let rig = &world.params.rig;
         let kerbs: Vec<Outline> = scenario.places.iter().map(|place| place.roundabout.kerbs(scenario.gutter)).collect();
         let all: Vec<_> = scenario.routes().collect();
         let suffices = |&index: &u32| {
-            let (place, route) = all[index as usize];
-            own_lane_suffices(rig, &kerbs[place], &swept_path(rig, &route.centre_line, scenario.cruising_speed(), 0.25))
+            let (roundabout, route) = all[index as usize];
+            own_lane_suffices(rig, &kerbs[roundabout], &swept_path(rig, &route.centre_line, scenario.cruising_speed(), 0.25))
         };
         let routes = scenario.split(split);
         let own_lane: Vec<bool> = routes.iter().map(suffices).collect();
@@ -124,9 +130,10 @@ impl Examination<'_> {
 /// One truck's episode while it runs.
 struct Running {
     lane_distance_sum: f64,
-    /// What it has come to so far; the mean and the off-tracking are worked out at its end.
+    /// Its figures so far; the mean and the off-tracking follow at its end.
     episode: Episode,
-    /// Where the front axle was, first a point far behind the start: the trailer's axle is measured against it.
+    /// Path of the front axle. Its first point lies far behind the start, so that the trailer's axle is beside it from
+    /// the first step on.
     front_path: Vec<Vec2>,
     trailer_path: Vec<Vec2>,
 }
@@ -154,7 +161,7 @@ impl Running {
         }
     }
 
-    /// Takes the step just made into account; true when it was the episode's last.
+    /// Adds the last step; true if it ended the episode.
     fn follow(&mut self, rig: &Rig, batch: &Batch, env: usize) -> bool {
         let (truck, progress, clearance) = (&batch.truck[env], &batch.progress[env], &batch.clearance[env]);
         let raise = |peak: &mut f64, value: f32| *peak = peak.max(f64::from(value));
@@ -183,13 +190,13 @@ impl Running {
     }
 }
 
-/// Middle of the front axle [m].
+/// Middle of the front axle \[m].
 fn front_axle(rig: &Rig, truck: &Truck) -> Vec2 {
     truck.position + rig.wheelbase * Vec2::from_angle(truck.heading)
 }
 
-/// Largest distance of a point of `trailer` from the path `front` [m]. The trailer passes along the path in order, so the search for the
-/// nearest stretch only ever moves on.
+/// Largest distance of a point of `trailer` from the path `front` \[m]. The trailer follows the path in order, so the
+/// search for the nearest segment only moves forwards.
 fn off_tracking(front: &[Vec2], trailer: &[Vec2]) -> f64 {
     let distance = |point: Vec2, index: usize| f64::from(offtrack::cpu::follow::distance_to_segment(point, front[index], front[index + 1]));
     let mut index = 0;

@@ -1,4 +1,4 @@
-//! The command line: reads what is asked for, prints an error and chooses the exit code (2 for wrong input, 1 for a failure).
+//! The command line: reads the arguments, runs one command, prints its error and chooses the exit code.
 
 mod commands;
 
@@ -6,16 +6,35 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use offtrack_training::error::Error;
+use offtrack_training::{files, provenance};
 
 use commands::{bench, certify, deviations, devices, draw, evaluate, record, scale, trace, train};
 
-/// A large batch's tensors come and go thousands of times a second; the system's allocator takes a third of an update's time.
+/// Batches of tensors are allocated thousands of times a second; the system's allocator takes a third of an update's
+/// time.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// Tractor-trailers learn to drive through roundabouts. Without a command: `train`.
+/// Exit code of a failure on valid input.
+const FAILED: u8 = 1;
+/// Exit code of wrong input; clap exits with it too.
+const WRONG_INPUT: u8 = 2;
+/// Exit code after Ctrl-C, as shells give it: 128 and the number of the signal.
+const INTERRUPTED: i32 = 130;
+
+const AFTER_HELP: &str = "\
+Without a command `offtrack` trains, as `offtrack train` does.
+
+Exit codes:
+  0    done; training that Ctrl-C stopped once, with everything written
+  1    failed on valid input: device, disk, learner, or a certificate that does not hold
+  2    wrong input: arguments or files
+  130  interrupted: by Ctrl-C, in training by a second one";
+
+/// Tractor-trailers learn to drive through roundabouts.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(name = "offtrack", version, about, after_help = AFTER_HELP)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -36,7 +55,15 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    provenance::set_commit(offtrack_commit::commit!());
     let command = Cli::parse().command.unwrap_or(Command::Train(train::Args::default()));
+    if !matches!(command, Command::Train(_)) {
+        // Training has a handler of its own, which stops the run and writes it.
+        let _ = ctrlc::set_handler(|| {
+            files::remove_temporaries();
+            std::process::exit(INTERRUPTED);
+        });
+    }
     let done = match &command {
         Command::Train(args) => train::run(args),
         Command::Evaluate(args) => evaluate::run(args),
@@ -52,9 +79,13 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // Where nobody reads it, the exit code still tells.
+            // With standard error closed, the exit code is all that is left.
             let _ = writeln!(std::io::stderr(), "offtrack: {error}");
-            ExitCode::from(error.exit_code())
+            ExitCode::from(exit_code(&error))
         }
     }
+}
+
+fn exit_code(error: &Error) -> u8 {
+    if error.is_wrong_input() { WRONG_INPUT } else { FAILED }
 }

@@ -1,36 +1,36 @@
-//! Measures how long an update of the learner takes, alone and with drawing its batch from the memory.
+//! `offtrack bench`: the time of an update of the learner, alone and with sampling its batch.
 //!
-//! With `--lines` each line read asks for a round: another program can take turns with this one, so that a busy machine slows both alike.
+//! With `--lines` each line read asks for a round: another program can take turns with this one, so that a busy machine
+//! slows both alike.
 
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
-use offtrack::layout::{Ended, N_VALUES};
-use rand::rngs::SmallRng;
-use rand::{Rng, SeedableRng};
-use serde::Serialize;
-
-use crate::commands::scale::median;
+use offtrack::layout::N_VALUES;
+use offtrack::scenario::{Scenario, Split};
+use offtrack::world::World;
 use offtrack_training::error::Error;
 use offtrack_training::files;
-use offtrack_training::learner::bridge;
-use offtrack_training::learner::config::{self, Critics, Entropy, Learning};
-use offtrack_training::learner::normalisation::Scaling;
-use offtrack_training::learner::replay_buffer::{Memory, Rows};
-use offtrack_training::learner::sac::{Sac, Transitions};
+use offtrack_training::learner::backend::Backend;
+use offtrack_training::learner::config::{self, Config, Learning};
+use offtrack_training::learner::training::Training;
 use offtrack_training::provenance;
+use serde::Serialize;
 
-/// Actions of the benchmark's table.
-const N_ACTIONS: usize = 9;
-/// Trucks whose transitions are in the memory.
+use super::scale::median;
+
+/// The benchmark whose transitions are learned from.
+const BENCHMARK: &str = "attard2023-training";
+/// Trucks whose transitions are in the replay buffer.
 const N_ENVS: usize = 128;
 /// Steps of each of them.
 const N_SLOTS: usize = 512;
 /// Updates timed in one go at most: their batches are made before.
 const WINDOW: usize = 8;
 
-/// Measure what an update of the learner takes, alone and with drawing its batch.
+/// Measure the time of an update of the learner, alone and with sampling its batch.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Sizes of the learner's hidden layers, separated by commas.
@@ -61,16 +61,16 @@ struct Bench {
     runs: Vec<Run>,
 }
 
-/// What a round came to: medians over windows.
+/// The result of a round: medians over windows.
 #[derive(Debug, Serialize)]
 struct Run {
     hidden: Vec<usize>,
     batch: usize,
     /// Time of an update whose batch is at hand [ms].
     update: f64,
-    /// The same, the shortest of all windows [ms].
+    /// The shortest of all windows [ms].
     fastest: f64,
-    /// Time of an update and of drawing its batch [ms].
+    /// Time of an update and of sampling its batch [ms].
     with_sampling: f64,
     windows: usize,
 }
@@ -94,13 +94,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
         commit: provenance::commit(),
         date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
         values: N_VALUES,
-        actions: N_ACTIONS,
+        actions: Scenario::named(BENCHMARK)?.actions(1.0).len(),
         runs: Vec::new(),
     };
-    files::print(&format!("{}; {N_VALUES} values, {N_ACTIONS} actions, hidden layers {:?}\n", bench.machine, args.hidden))?;
+    files::print(&format!("{}; {N_VALUES} values, {} actions, hidden layers {:?}\n", bench.machine, bench.actions, args.hidden))?;
     files::print(&format!("{:>8} {:>14} {:>22}\n", "batch", "update [ms]", "with sampling [ms]"))?;
     for &batch in &args.batch {
-        let run = Learner::new(&args.hidden, batch)?.warm(0.1 * args.seconds).round(0.9 * args.seconds);
+        let run = Learner::new(&args.hidden, batch)?.warm(0.1 * args.seconds)?.round(0.9 * args.seconds)?;
         files::print(&format!("{:>8} {:>14.2} {:>22.2}\n", run.batch, run.update, run.with_sampling))?;
         bench.runs.push(run);
         if let Some(file) = &args.json {
@@ -119,7 +119,7 @@ fn in_turns(args: &Args) -> Result<(), Error> {
     for line in std::io::stdin().lock().lines() {
         line.map_err(Error::read(Path::new("standard input")))?;
         for learner in &mut learners {
-            let run = learner.warm(0.1 * args.seconds).round(0.9 * args.seconds);
+            let run = learner.warm(0.1 * args.seconds)?.round(0.9 * args.seconds)?;
             let text = serde_json::to_string(&run).map_err(|error| Error::write(Path::new("standard output"))(error.into()))?;
             files::print(&format!("{text}\n"))?;
         }
@@ -127,60 +127,46 @@ fn in_turns(args: &Args) -> Result<(), Error> {
     Ok(())
 }
 
-/// A learner and a memory of random transitions.
+/// The default learner with other sizes, and a full replay buffer of transitions with random actions.
 struct Learner {
     learning: Learning,
-    sac: Sac,
-    memory: Memory<N_VALUES>,
-    scaling: Scaling,
-    rng: SmallRng,
+    training: Training,
 }
 
 impl Learner {
     fn new(hidden: &[usize], batch: usize) -> Result<Learner, Error> {
-        let learning = learning(hidden, batch);
-        let sac = Sac::new(&learning, N_VALUES, N_ACTIONS, 0)?;
-        let mut rng = SmallRng::seed_from_u64(0);
-        let capacity = N_ENVS * N_SLOTS;
-        let mut memory = Memory::new(N_ENVS, learning.n_steps, &config::Memory { capacity, warmup: capacity, priority: None });
-        for _ in 0..N_SLOTS {
-            memory.append(Rows {
-                observation: &rows(&mut rng),
-                action: &(0..N_ENVS).map(|_| rng.random_range(0..N_ACTIONS as u32)).collect::<Vec<_>>(),
-                reward: &(0..N_ENVS).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<_>>(),
-                ended: &[Ended::Running as u32; N_ENVS],
-                next_observation: &rows(&mut rng),
-            });
+        let mut config = Config::read(Path::new("default"))?;
+        config.n_envs = N_ENVS;
+        config.replay_buffer = config::ReplayBuffer { capacity: N_ENVS * N_SLOTS, warmup: N_ENVS * N_SLOTS, priority: None };
+        config.learning = Learning { hidden: hidden.to_vec(), batch, ..config.learning };
+        let scenario = Scenario::named(BENCHMARK)?;
+        let routes = scenario.split(Split::Train).to_vec();
+        let mut training = Training::new(&Backend::Host, &config, Arc::new(World::bake(&scenario)), routes)?;
+        while !training.is_warm()? {
+            training.act(0)?;
         }
-        let scaling = Scaling::of(memory.observations());
-        Ok(Learner { learning, sac, memory, scaling, rng })
-    }
-
-    /// A batch drawn from the memory.
-    fn parts(&mut self) -> Vec<Transitions> {
-        let sample = self.memory.sample(self.learning.batch, self.learning.discount as f32, &mut self.rng);
-        bridge::parts(&sample, &self.scaling, &self.learning, &mut self.rng)
+        Ok(Learner { learning: config.learning, training })
     }
 
     /// Updates for so many seconds, once at least.
-    fn warm(&mut self, seconds: f64) -> &mut Learner {
+    fn warm(&mut self, seconds: f64) -> Result<&mut Learner, Error> {
         let begun = Instant::now();
         let mut time = 0.0;
         while begun.elapsed().as_secs_f64() < seconds || time == 0.0 {
-            time = self.sampled(1);
+            time = self.sampled(1)?;
         }
-        self
+        Ok(self)
     }
 
     /// Windows of updates alone and of updates with sampling in turn, for so many seconds.
-    fn round(&mut self, seconds: f64) -> Run {
+    fn round(&mut self, seconds: f64) -> Result<Run, Error> {
         let [mut alone, mut sampled] = [Vec::new(), Vec::new()];
         let begun = Instant::now();
         while begun.elapsed().as_secs_f64() < seconds || alone.is_empty() {
-            alone.push(1e3 * self.alone(WINDOW));
-            sampled.push(1e3 * self.sampled(WINDOW));
+            alone.push(1e3 * self.alone(WINDOW)?);
+            sampled.push(1e3 * self.sampled(WINDOW)?);
         }
-        Run {
+        Ok(Run {
             hidden: self.learning.hidden.clone(),
             batch: self.learning.batch,
             // The median sorts.
@@ -188,59 +174,28 @@ impl Learner {
             fastest: rounded(alone[0]),
             with_sampling: rounded(median(&mut sampled)),
             windows: alone.len(),
-        }
+        })
     }
 
     /// Time of an update whose batch is at hand [s].
-    fn alone(&mut self, n: usize) -> f64 {
-        let batches: Vec<_> = (0..n).map(|_| self.parts()).collect();
+    fn alone(&mut self, n: usize) -> Result<f64, Error> {
+        let batches: Result<Vec<_>, Error> = (0..n).map(|_| self.training.rollout_mut().sample()).collect();
+        let batches = batches?;
         let begun = Instant::now();
         for batch in batches {
-            self.sac.update(batch, 1.0);
+            self.training.update_on(batch, 1.0);
         }
-        begun.elapsed().as_secs_f64() / n as f64
+        Ok(begun.elapsed().as_secs_f64() / n as f64)
     }
 
     /// Time of an update and of drawing its batch [s].
-    fn sampled(&mut self, n: usize) -> f64 {
+    fn sampled(&mut self, n: usize) -> Result<f64, Error> {
         let begun = Instant::now();
         for _ in 0..n {
-            let parts = self.parts();
-            self.sac.update(parts, 1.0);
+            self.training.update(1.0)?;
         }
-        begun.elapsed().as_secs_f64() / n as f64
+        Ok(begun.elapsed().as_secs_f64() / n as f64)
     }
-}
-
-/// Plain twin critics, as in the default training file.
-fn learning(hidden: &[usize], batch: usize) -> Learning {
-    Learning {
-        hidden: hidden.to_vec(),
-        batch,
-        updates_per_step: 1,
-        n_steps: 3,
-        discount: 0.97,
-        reward_scale: 1.0,
-        scale_observations: true,
-        observation_noise: 0.0,
-        mirror: false,
-        actor_rate: 3e-4,
-        critic_rate: 3e-4,
-        last_rate: 1.0,
-        layer_norm: false,
-        value_clip: None,
-        categories: None,
-        critics: Critics::Average,
-        target_rate: 0.005,
-        target_every: 1,
-        average_rate: 0.005,
-        entropy: Entropy { in_target: true, share: Some(0.1), weight: 0.05, rate: 3e-4 },
-    }
-}
-
-/// Random observations of every truck.
-fn rows(rng: &mut SmallRng) -> Vec<[f32; N_VALUES]> {
-    (0..N_ENVS).map(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0))).collect()
 }
 
 fn rounded(value: f64) -> f64 {

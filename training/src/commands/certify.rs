@@ -1,13 +1,14 @@
-//! Shows which routes can be completed at all: searches for actions that complete each from several starts, and drives them again.
+//! Shows which routes can be completed at all: searches for action sequences that complete each from several starts,
+//! and drives them again.
 //!
-//! A route that no search completed may still be possible: the report names the searches made and how far the best candidate got.
+//! A route that no search completed may still be possible: the report names the searches made and the progress of the
+//! best candidate.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressStyle};
 use offtrack::layout::{Ended, Start};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
@@ -16,8 +17,11 @@ use offtrack_training::error::Error;
 use offtrack_training::evaluation::certificate::beam::{self, Outcome, Pass};
 use offtrack_training::evaluation::certificate::file::{self, Certificate, CertifiedRoute, Found};
 use offtrack_training::evaluation::certificate::verify;
+use offtrack_training::evaluation::policies;
 use offtrack_training::files;
-use offtrack_training::policy::Policy;
+use offtrack_training::policy::LearnedPolicy;
+
+use super::progress;
 
 /// On the lane centre, and the four corners of the largest start errors.
 const STARTS: [Start; 5] = [
@@ -37,16 +41,16 @@ pub struct Args {
     /// Which routes: `test`, `train` or `all`.
     #[arg(long, default_value = "all", value_parser = ["test", "train", "all"])]
     split: String,
-    /// A policy file: its own actions are then always among the candidates.
+    /// A policy file, or the name of a shipped policy: its own action sequence is then among the candidates.
     #[arg(long)]
-    policy: Option<PathBuf>,
-    /// Candidates kept at each depth: widths tried in turn until one arrives, separated by commas.
+    policy: Option<String>,
+    /// Beam widths (candidates kept at each depth), tried in turn until one arrives, separated by commas.
     #[arg(long, value_delimiter = ',', default_value = "64,512,4096")]
     widths: Vec<usize>,
-    /// Steps that each chosen action is held for. The widest search is made once more with 1.
+    /// Steps that each chosen action is held for. The widest search is repeated with 1.
     #[arg(long, default_value_t = 3)]
     hold: usize,
-    /// Write what was found to this file as JSON, after every route.
+    /// Write the certificate to this file as JSON, after every route.
     #[arg(long)]
     json: Option<PathBuf>,
     /// Drive the sequences of this file again and search for nothing.
@@ -71,7 +75,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 /// Drives a certificate's sequences again.
 fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
     let certificate = Certificate::read(path)?;
-    let scenario = Scenario::read(&files::benchmark(benchmark.unwrap_or(&certificate.benchmark))?)?;
+    let scenario = Scenario::find(benchmark.unwrap_or(&certificate.benchmark))?;
     let world = Arc::new(World::bake(&scenario));
     certificate.check(&scenario, &world, path)?;
     let arrived = verify::verify(&certificate, &world, path, |_| true)?;
@@ -80,14 +84,12 @@ fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
 
 /// Searches every route from every start.
 fn certify(args: &Args) -> Result<(), Error> {
-    let scenario = Scenario::read(&files::benchmark(args.benchmark.as_deref().unwrap_or("attard2023"))?)?;
+    let scenario = Scenario::find(args.benchmark.as_deref().unwrap_or("attard2023"))?;
     let world = Arc::new(World::bake(&scenario));
-    let policy = args.policy.as_ref().map(|path| {
-        let policy = Policy::load(path)?;
-        policy.check(&world, path)?;
-        Ok::<Policy, Error>(policy)
-    });
-    let policy = policy.transpose()?;
+    let policy = args.policy.as_deref().map(policies::learned).transpose()?;
+    if let Some(policy) = &policy {
+        policy.check(&world)?;
+    }
     let mut routes: Vec<u32> = [Split::Train, Split::Test]
         .into_iter()
         .filter(|split| args.split == "all" || args.split == split.name())
@@ -99,37 +101,35 @@ fn certify(args: &Args) -> Result<(), Error> {
         return Err(Error::Flag { flag: "--split", value: args.split.clone(), expected });
     }
     let passes = passes(&args.widths, args.hold);
-    let name = args.policy.as_ref().map(|path| path.display().to_string());
+    let name = policy.as_ref().map(|policy| policy.name.clone());
     let mut certificate = Certificate::new(&scenario, &world, &args.split, name, passes.clone(), &STARTS);
-    let begun = Instant::now();
-    let style = "certifying {bar:24} {pos}/{len} starts, {elapsed}, {msg}";
-    let bar = ProgressBar::new((routes.len() * STARTS.len()) as u64)
-        .with_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let started = Instant::now();
+    let bar = progress::Bar::new("certifying", "starts", routes.len() * STARTS.len());
     let mut failures = 0;
     for route in routes {
         let name = world.route_names[route as usize].clone();
         let mut found = Vec::new();
         for start in &STARTS {
-            bar.set_message(format!("{failures} not completed, {name}"));
+            bar.say(format!("{failures} not completed, {name}"));
             let one = attempt(&world, route, start, &passes, policy.as_ref())?;
             failures += usize::from(!one.arrived());
             certificate.env_steps += one.env_steps;
             found.push(one);
-            bar.inc(1);
+            bar.advance();
         }
         certificate.routes.push(CertifiedRoute { name, found });
-        certificate.seconds = begun.elapsed().as_secs_f64();
+        certificate.seconds = started.elapsed().as_secs_f64();
         if let Some(path) = &args.json {
             certificate.write(path)?;
         }
     }
-    bar.finish_and_clear();
+    drop(bar);
     let path = args.json.as_deref().unwrap_or(Path::new("the search's result"));
     verify::verify(&certificate, &world, path, |_| true)?;
     files::print(&table(&certificate))
 }
 
-/// The searches to make in turn: wider and wider, and at last as finely as the truck can be steered.
+/// The searches to make in turn: the widths as given, then the widest with a choice at every step.
 fn passes(widths: &[usize], hold: usize) -> Vec<Pass> {
     let mut passes: Vec<Pass> = widths.iter().map(|&width| Pass { width, hold }).collect();
     if let Some(&width) = widths.iter().max()
@@ -140,8 +140,9 @@ fn passes(widths: &[usize], hold: usize) -> Vec<Pass> {
     passes
 }
 
-/// Searches from one start until a pass arrives or all have been made. Of those that did not, the one that got furthest is told.
-fn attempt(world: &Arc<World>, route: u32, start: &Start, passes: &[Pass], policy: Option<&Policy>) -> Result<Found, Error> {
+/// Searches from one start until a pass arrives or all have been made. Without an arrival the result is the pass with
+/// the most progress.
+fn attempt(world: &Arc<World>, route: u32, start: &Start, passes: &[Pass], policy: Option<&LearnedPolicy>) -> Result<Found, Error> {
     let mut env_steps = 0;
     let mut best: Option<(Pass, Outcome)> = None;
     for &pass in passes {
@@ -168,7 +169,7 @@ fn attempt(world: &Arc<World>, route: u32, start: &Start, passes: &[Pass], polic
     })
 }
 
-/// What a person reads: the budget, the sums, and every route that was not completed from a start.
+/// The result as text: the budget, the sums, and every route and start that was not completed.
 fn table(certificate: &Certificate) -> String {
     let mut text = String::new();
     let passes: Vec<String> = certificate.passes.iter().map(|pass| format!("{} (held {})", pass.width, pass.hold)).collect();

@@ -1,8 +1,8 @@
-//! Compares a roundabout file with a measured one and prints how far apart their kerbs and lanes are.
+//! Compares a roundabout with a measured one and prints the distances between their kerbs and lanes.
 
 use std::path::PathBuf;
 
-use offtrack::reader::{read_text, shortened};
+use offtrack::reader::read_text;
 use offtrack::roundabout::Roundabout;
 use offtrack_comparison::FILE_LIMIT;
 use offtrack_comparison::deviation::{Measured, deviations};
@@ -10,12 +10,13 @@ use offtrack_comparison::deviation::{Measured, deviations};
 use offtrack_training::error::Error;
 use offtrack_training::files;
 
-/// Compare a roundabout with a measured one: road edges with solid gutters, and lane centre lines, within 45 m of the centre.
+/// Compare a roundabout with a measured one: road edges with solid gutters, and lane centre lines, within 45 m of the
+/// centre.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A roundabout's name, or the path of its file.
     roundabout: String,
-    /// Its measured counterpart, a JSON file as tests/data/measured/16m.json.
+    /// Its measured counterpart as JSON: tests/data/measured/16m.json.
     measured: PathBuf,
 }
 
@@ -23,8 +24,8 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Error> {
     let roundabout = Roundabout::find(&args.roundabout)?;
     let text = read_text(&args.measured, FILE_LIMIT)?;
-    let wrong = |message: String| Error::Contents { file: args.measured.clone(), message };
-    let measured: Measured = serde_json::from_str(&text).map_err(|error| wrong(shortened(&error.to_string(), 600)))?;
+    let wrong = |message: String| Error::contents(&args.measured, message);
+    let measured: Measured = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     let rows = deviations(&roundabout, &measured).map_err(|error| wrong(error.to_string()))?;
     let mut table = format!("{:<14} {:>21} {:>30}\n", roundabout.name, "measured to model", "model to measured");
     table += &format!("{:<14} {:>8} {:>8} {:>8} {:>12} {:>8} {:>8}\n", "", "worst m", "mean m", "points", "worst m", "mean m", "points");

@@ -5,29 +5,29 @@ use offtrack_training::error::Error;
 #[cfg(feature = "gpu")]
 use offtrack_training::files;
 
-/// List the devices that `--device gpu` can run on, best first; the one chosen unasked is marked.
+/// List the devices that `--device gpu` can run on, best first; the default one is marked.
 #[derive(Debug, clap::Args)]
 pub struct Args {}
 
-/// Where a command steps its trucks.
+/// What steps the trucks of a command.
 #[derive(Debug, clap::Args)]
 pub struct Choice {
     /// What steps the trucks: `cpu`, all cores of the processor, or `gpu`, compute shaders on a device.
     #[arg(long, default_value = "cpu", value_parser = ["cpu", "gpu"])]
     device: String,
-    /// With --device gpu: part of an adapter's name, see `offtrack devices`. Without it the first of that list.
+    /// With --device gpu: part of an adapter's name, as `offtrack devices` lists it. Without it the first of that list.
     #[arg(long)]
     adapter: Option<String>,
 }
 
 impl Choice {
-    /// Opens what was chosen.
+    /// Opens the device.
     pub fn open(&self) -> Result<Device, Error> {
         match (self.device.as_str(), &self.adapter) {
             ("gpu", adapter) => device::open(adapter.as_deref()),
             (_, None) => Ok(Device::processor()),
             (_, Some(name)) => {
-                let expected = "the processor is none: add --device gpu, or leave --adapter out".to_owned();
+                let expected = "the processor has no adapter: add --device gpu, or leave --adapter out".to_owned();
                 Err(Error::Flag { flag: "--adapter", value: name.clone(), expected })
             }
         }
@@ -41,7 +41,7 @@ pub fn run(_: &Args) -> Result<(), Error> {
 
     let adapters = gpu::adapters();
     if adapters.is_empty() {
-        // The error says what was looked for and how to get one.
+        // The error names what was tried and what to install.
         device::open(None)?;
     }
     let mut rows = vec![["", "adapter", "interface", "driver", "kind", "largest buffer"].map(str::to_owned)];
@@ -55,7 +55,7 @@ pub fn run(_: &Args) -> Result<(), Error> {
         let cells: Vec<String> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:width$}")).collect();
         files::print(&format!("{}\n", cells.join("  ").trim_end()))?;
     }
-    files::print("* chosen where --adapter names none\n")
+    files::print("* the default, without --adapter\n")
 }
 
 /// Runs the command.

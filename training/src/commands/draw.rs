@@ -1,13 +1,15 @@
-//! Draws a roundabout as a picture, with what a truck sweeps on one of its routes, or writes its polygons and waypoints as JSON.
+//! Draws a roundabout, or a truck's swept path on one of its routes, or writes polygons and waypoints as JSON.
 
 use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use offtrack::reader::shown;
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::Route;
 use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
+use offtrack::shipped::{Kind, Source};
 use offtrack::vehicle::Vehicle;
-use offtrack_drawing::sheet::{self, Straights};
+use offtrack_drawing::figure::{self, Straights};
 use offtrack_drawing::sweep::Sweep;
 use offtrack_drawing::{polygons, rasterised};
 
@@ -21,11 +23,12 @@ pub struct Args {
     roundabout: String,
     /// The file to write: .svg, .png, or .json for polygons and waypoints.
     ///
-    /// JSON: {"solids": [[[x, y], ...], ...], "drivable": [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x, y, heading], ...]}]} in
-    /// metres and radians, x east, y north, the ring's centre at the origin. No polygon repeats its first point at its end; curves are
-    /// within 1 cm. `drivable` is the surface's outer boundary, then one hole for each island. `solids` are the islands, then the ground beyond
-    /// the outer boundary as two polygons, north and south, up to 5 m past the kerbs. So a point is drivable when an odd number of
-    /// `drivable` contain it, and solid when any of `solids` does.
+    /// JSON: {"solids": [[[x, y], ...], ...], "drivable": [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x,
+    /// y, heading], ...]}]} in metres and radians, x east, y north, the ring's centre at the origin. No polygon repeats
+    /// its first point at its end; curves are within 1 cm. `drivable` is the surface's outer boundary, then one hole
+    /// for each island. `solids` are the islands, then the ground beyond the outer boundary as two polygons, north and
+    /// south, up to 5 m past the kerbs. So a point is drivable when an odd number of `drivable` contain it, and solid
+    /// when any of `solids` does.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// Draw the swept path on this route: N-left-3, or 16m/N-left-3. JSON then lists this route alone.
@@ -40,7 +43,7 @@ pub struct Args {
     /// With --route: speed at which the front axle follows the lane's centre [km/h].
     #[arg(long, default_value_t = 30.0, requires = "route")]
     speed_kmh: f64,
-    /// Whether a gutter is road.
+    /// Whether gutters may be driven on.
     #[arg(long, default_value = "drivable", value_parser = PossibleValuesParser::new(["drivable", "solid"]).map(gutter))]
     gutter: Gutter,
     /// Length of the routes before the ring [m].
@@ -54,7 +57,7 @@ pub struct Args {
     size: u32,
 }
 
-/// What can be written.
+/// The format of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Svg,
@@ -71,13 +74,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if !(1.0..=90.0).contains(&args.speed_kmh) {
         return Err(Error::Flag {
             flag: "--speed-kmh",
-            value: format!("{} km/h", args.speed_kmh),
+            value: format!("{} km/h", shown(args.speed_kmh)),
             expected: "must lie in 1..90 km/h".into(),
         });
     }
     length("--approach", args.approach)?;
     length("--departure", args.departure)?;
-    let roundabout = Roundabout::read(&scenario_file("roundabout", "roundabouts", &args.roundabout)?)?;
+    let roundabout = Roundabout::find(&args.roundabout)?;
     let routes = roundabout.routes(args.approach, args.departure, WAYPOINT_SPACING).map_err(|leaves| {
         let (flag, value) = if leaves.part == "approach" { ("--approach", args.approach) } else { ("--departure", args.departure) };
         Error::Flag { flag, value: format!("{value} m"), expected: leaves.to_string() }
@@ -90,10 +93,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let straights = Straights { approach: args.approach, departure: args.departure };
     let page = match route {
-        None => sheet::of_all(&roundabout, &routes, straights, args.gutter),
+        None => figure::roundabout(&roundabout, &routes, straights, args.gutter),
         Some(route) => {
             let sweep = sweep(args, &roundabout, route)?;
-            sheet::of_sweep(&roundabout, &routes, straights, args.gutter, &sweep)
+            figure::swept_path(&roundabout, &routes, straights, args.gutter, &sweep)
         }
     };
     let svg = page.map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?;
@@ -106,14 +109,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
 }
 
 fn sweep<'a>(args: &Args, roundabout: &Roundabout, route: &'a Route) -> Result<Sweep<'a>, Error> {
-    let file = scenario_file("--vehicle", "vehicles", &args.vehicle)?;
-    let vehicle = Vehicle::read(&file)?;
+    let vehicle = Vehicle::find(&args.vehicle)?;
     if !vehicle.loads.contains_key(&args.load) {
         let loads: Vec<&str> = vehicle.loads.keys().map(String::as_str).collect();
         let expected = format!("the vehicle has {}", loads.join(", "));
         return Err(Error::Flag { flag: "--load", value: args.load.clone(), expected });
     }
-    let name = file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = Source::find(Kind::Vehicle, &args.vehicle)?.stem();
     let driven = format!("{name}, {}, {} km/h", args.load, args.speed_kmh);
     Ok(Sweep::new(&vehicle, &args.load, args.speed_kmh / 3.6, &roundabout.kerbs(args.gutter), route, driven))
 }
@@ -138,19 +140,7 @@ fn length(flag: &'static str, value: f64) -> Result<(), Error> {
     if (5.0..=500.0).contains(&value) {
         return Ok(());
     }
-    Err(Error::Flag { flag, value: format!("{value} m"), expected: "must lie in 5..500 m".into() })
-}
-
-/// A file by its path, or by its name in a folder of the scenarios.
-fn scenario_file(flag: &'static str, folder: &str, name: &str) -> Result<PathBuf, Error> {
-    let path = Path::new(name);
-    if path.extension().is_some_and(|extension| extension == "toml") || path.is_file() {
-        return Ok(path.to_owned());
-    }
-    files::benchmark(&format!("{folder}/{name}")).map_err(|_| {
-        let expected = format!("give the name of a file under scenarios/{folder}/ or a path ending in .toml");
-        Error::Flag { flag, value: name.to_owned(), expected }
-    })
+    Err(Error::Flag { flag, value: format!("{} m", shown(value)), expected: "must lie in 5..500 m".into() })
 }
 
 /// The route with this name; the roundabout's own name before it may be left out.

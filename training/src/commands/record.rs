@@ -1,11 +1,11 @@
-//! Records one episode: as data, as a moving picture, or as a still with the swept paths of both units.
+//! Records one episode: as data, as a film, or as a still with the swept paths of both units.
 //!
-//! The truck drives among those of an examination with the same seed, so that its episode is the very one that `evaluate` counts.
+//! The truck drives in the batch of an evaluation with the same seed, so that its episode is the one that `evaluate`
+//! counts.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use indicatif::{ProgressBar, ProgressStyle};
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::Route;
 use offtrack::scenario::{Scenario, Split};
@@ -14,49 +14,48 @@ use offtrack::world::World;
 
 use offtrack_drawing::episode::Scene;
 use offtrack_drawing::recording::{Map, Measures, Recorder, Recording, centre_line};
-use offtrack_drawing::{Failure, film, rasterised};
+use offtrack_drawing::{film, rasterised};
 use offtrack_training::error::Error;
-use offtrack_training::evaluation::policies::{self as drivers, Driver, PURSUIT_LOOK_AHEAD};
+use offtrack_training::evaluation::policies::Policy;
 use offtrack_training::files;
+
+use super::{policies, progress};
 
 /// Record one episode: as a film, as a picture with the swept paths of both units, or as data.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A policy file, `pursuit` (pure pursuit of the centre line) or `random`. Without it the policy that comes with the program.
-    #[arg(long)]
-    policy: Option<String>,
-    /// One of the benchmark's routes, to learn on or to be examined on: 20m/N-left-3.
+    #[command(flatten)]
+    policy: policies::Choice,
+    /// One of the benchmark's routes, of either split: 20m/N-left-3.
     #[arg(long)]
     route: String,
     /// The file to write: .gif, .png, .svg, or .json for data.
     ///
-    /// A film runs at twice the truck's speed and shows what it senses. JSON: {"benchmark", "route", "policy", "seed", "episode",
-    /// "episodes", "step" [s], "ended", "vehicle": measures and mounts, "actions": [[steer angle, speed], ...], "map": {"drivable", "lanes"},
-    /// "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state after step n, the step that ended the episode included.
-    /// Metres, seconds and radians, x east, y north, the ring's centre at the origin.
+    /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed",
+    /// "episode", "episodes", "step" [s], "ended", "vehicle": dimensions and sensors, "actions": [[steer angle, speed],
+    /// ...], "map": {"drivable", "lanes"}, "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state
+    /// after step n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's
+    /// centre at the origin.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// A benchmark's name, or the path of its file.
     #[arg(long, default_value = "attard2023")]
     benchmark: String,
-    /// What the start poses are drawn from.
+    /// Seed of the start poses and of random actions.
     #[arg(long, default_value_t = 0)]
     seed: u32,
-    /// Which of the route's episodes in an examination, from 0.
+    /// Which of the route's episodes in an evaluation, from 0.
     #[arg(long, default_value_t = 0)]
     episode: usize,
-    /// How many episodes a route that examination has.
+    /// How many episodes a route that evaluation has: start poses depend on it.
     #[arg(long, default_value_t = 30)]
     episodes: usize,
-    /// Width of a film or a PNG [pixels]; 720 and 1000 where nothing is said.
+    /// Width of a film or a PNG [pixels]; by default 720 for a film, 1000 for a PNG.
     #[arg(long)]
     size: Option<u32>,
-    /// With `pursuit`: distance to the point pursued [m].
-    #[arg(long, default_value_t = PURSUIT_LOOK_AHEAD, allow_negative_numbers = true)]
-    look_ahead: f32,
 }
 
-/// What can be written.
+/// The format of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Gif,
@@ -80,17 +79,23 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = format!("must lie in 0..{}: --episodes says how many there are", args.episodes - 1);
         return Err(Error::Flag { flag: "--episode", value: args.episode.to_string(), expected });
     }
-    let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
+    let scenario = Scenario::find(&args.benchmark)?;
     let chosen = Chosen::new(&scenario, &args.route)?;
     let world = Arc::new(World::bake(&scenario));
-    let mut driver = drivers::named(args.policy.as_deref(), &scenario.name, args.look_ahead, args.seed, &world)?;
-    let recording = recorded(args, &scenario, &world, &chosen, driver.as_mut())?;
+    let mut policy = args.policy.open(&scenario, &world, args.seed)?;
+    let recording = recorded(args, &scenario, &world, &chosen, policy.as_mut())?;
     let bytes = bytes(format, args.size, &recording, &chosen, scenario.gutter);
     files::write_whole(&args.output, &bytes.map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?)
 }
 
 /// The recording in the format asked for.
-fn bytes(format: Format, size: Option<u32>, recording: &Recording, chosen: &Chosen, gutter: Gutter) -> Result<Vec<u8>, Failure> {
+fn bytes(
+    format: Format,
+    size: Option<u32>,
+    recording: &Recording,
+    chosen: &Chosen,
+    gutter: Gutter,
+) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
     if format == Format::Json {
         let mut text = serde_json::to_string(recording)?;
         text.push('\n');
@@ -99,13 +104,11 @@ fn bytes(format: Format, size: Option<u32>, recording: &Recording, chosen: &Chos
     let scene = Scene::new(recording, chosen.roundabout, gutter, chosen.route)?;
     if format != Format::Gif {
         let svg = scene.still();
-        return if format == Format::Png { rasterised(&svg, size.unwrap_or(1000)) } else { Ok(svg.into_bytes()) };
+        return if format == Format::Png { Ok(rasterised(&svg, size.unwrap_or(1000))?) } else { Ok(svg.into_bytes()) };
     }
-    let pages = film::pages(recording.frames.len(), recording.step);
-    let bar = progress("drawing", "pages", pages.len() as u64);
-    let film = film::gif(&scene, &pages, size.unwrap_or(720), || bar.inc(1))?;
-    bar.finish_and_clear();
-    Ok(film)
+    let frames = film::frames(recording.frames.len(), recording.step);
+    let bar = progress::Bar::new("drawing", "frames", frames.len());
+    Ok(film::gif(&scene, &frames, size.unwrap_or(720), || bar.advance())?)
 }
 
 fn format(output: &Path) -> Result<Format, Error> {
@@ -121,31 +124,26 @@ fn format(output: &Path) -> Result<Format, Error> {
     }
 }
 
-fn progress(what: &str, of: &str, length: u64) -> ProgressBar {
-    let template = format!("{what} {{bar:30}} {{pos}} {of}, {{elapsed}}");
-    ProgressBar::new(length).with_style(ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()))
-}
-
-/// A route of a benchmark, where it runs and where it stands in its split.
+/// A route of a benchmark, its roundabout, and its index in its split.
 struct Chosen<'a> {
     route: &'a Route,
     roundabout: &'a Roundabout,
     split: Split,
-    place: usize,
+    in_split: usize,
 }
 
 impl<'a> Chosen<'a> {
     fn new(scenario: &'a Scenario, name: &str) -> Result<Chosen<'a>, Error> {
-        let Some((index, (place, route))) = scenario.routes().enumerate().find(|(_, (_, route))| route.name == name) else {
+        let Some((index, (roundabout, route))) = scenario.routes().enumerate().find(|(_, (_, route))| route.name == name) else {
             return Err(Error::Flag { flag: "--route", value: name.to_owned(), expected: known(scenario, name) });
         };
         let within = |split: Split| Some((split, scenario.split(split).iter().position(|&other| other as usize == index)?));
         let (split, in_split) = within(Split::Test).or_else(|| within(Split::Train)).expect("a benchmark's route is in one of its splits");
-        Ok(Chosen { route, roundabout: &scenario.places[place].roundabout, split, place: in_split })
+        Ok(Chosen { route, roundabout: &scenario.places[roundabout].roundabout, split, in_split })
     }
 }
 
-/// The routes that a wrong name may have meant: those of the roundabout it begins with, or one of each.
+/// Routes to suggest for an unknown name: those of the roundabout that it begins with, or one of each roundabout.
 fn known(scenario: &Scenario, name: &str) -> String {
     let of = |place: &offtrack::scenario::Place| place.routes.iter().map(|route| route.name.clone()).collect::<Vec<_>>();
     let meant = scenario.places.iter().find(|place| name.split('/').next() == Some(&place.roundabout.name));
@@ -157,27 +155,27 @@ fn known(scenario: &Scenario, name: &str) -> String {
     }
 }
 
-/// Drives the examination that the episode belongs to until the episode has ended.
-fn recorded(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chosen, driver: &mut dyn Driver) -> Result<Recording, Error> {
+/// Drives the batch of the evaluation until the episode has ended.
+fn recorded(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chosen, policy: &mut dyn Policy) -> Result<Recording, Error> {
     let trucks: Vec<u32> = scenario.split(chosen.split).iter().flat_map(|&route| std::iter::repeat_n(route, args.episodes)).collect();
-    let env = chosen.place * args.episodes + args.episode;
+    let env = chosen.in_split * args.episodes + args.episode;
     let limit = world.routes[trucks[env] as usize].step_limit;
     let mut simulator = Simulator::new(world.clone(), trucks.len(), args.seed, RouteChoice::Fixed(trucks))?;
     let mut recorder = Recorder::new(world, simulator.batch(), [env]);
-    let bar = progress("driving", "steps", limit.into());
+    let bar = progress::Bar::new("driving", "steps", limit as usize);
     let mut actions = Vec::new();
     while recorder.is_running() {
-        driver.act(world, simulator.batch(), &mut actions);
+        policy.choose(world, simulator.batch(), &mut actions);
         simulator.step(&actions)?;
         recorder.follow(world, simulator.batch());
-        bar.inc(1);
+        bar.advance();
     }
-    bar.finish_and_clear();
+    drop(bar);
     let track = recorder.finish().remove(0);
     Ok(Recording {
         benchmark: scenario.name.clone(),
         route: chosen.route.name.clone(),
-        policy: driver.name().to_owned(),
+        policy: policy.name().to_owned(),
         seed: args.seed,
         episode: args.episode,
         episodes: args.episodes,

@@ -1,6 +1,7 @@
-//! Measures env steps per second against the number of trucks: on the processor or on a device, by what drives, and stage by stage.
+//! `offtrack scale`: env steps per second against the number of trucks, on the processor or on a device, by mode and by
+//! stage.
 //!
-//! A size that an adapter cannot hold is a result too: it stands in the file with the reason, and the others go on.
+//! A size that an adapter cannot hold is a result too: it is in the file with the reason, and the others go on.
 
 mod measure;
 mod mode;
@@ -37,11 +38,11 @@ pub struct Args {
     /// Numbers of trucks, separated by commas; `256..1048576` is a range in steps of four times as many.
     #[arg(long, default_value = "64,256,1024,4096,16384")]
     envs: String,
-    /// What drives, separated by commas.
+    /// Where the actions come from, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "random")]
     mode: Vec<Mode>,
-    /// With `--mode training`: the training file, `training/configs/gpu.toml` unasked. `--envs` takes the place of its number of trucks, and
-    /// its memory is as small as an update allows.
+    /// With `--mode training`: the training file, its path or name; without it `gpu`. `--envs` replaces its number of
+    /// trucks, and its replay buffer is as small as an update allows.
     #[arg(long)]
     config: Option<PathBuf>,
     /// Time for each number of trucks and each mode [s].
@@ -101,7 +102,7 @@ pub(crate) struct Updates {
     batch: usize,
 }
 
-/// One number of trucks, driven one way.
+/// One number of trucks in one mode.
 #[derive(Debug, Serialize)]
 struct Run {
     mode: Mode,
@@ -110,7 +111,7 @@ struct Run {
     outcome: Outcome,
 }
 
-/// What came of it.
+/// Its result.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 enum Outcome {
@@ -149,7 +150,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
     let world = Arc::new(World::bake(&scenario));
     let learner = match args.mode.iter().any(|mode| *mode != Mode::Random) {
-        true => Some(Learner::read(&scenario.name, &args.config.clone().unwrap_or_else(mode::default_config), &world)?),
+        true => Some(Learner::read(&scenario.name, &args.config.clone().unwrap_or_else(|| PathBuf::from("gpu")), &world)?),
         false => None,
     };
     let mut scale = Scale {
@@ -166,7 +167,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
             rays: N_RAYS,
             values: N_VALUES,
             holds: "physics, collision, progress, rays, observation, reward, and a new episode where one ended",
-            rays_counted: "those of every step, and once more those of each episode begun anew",
+            rays_counted: "those of every step, and once more those after each reset",
             speeds: "medians over windows, nothing read back within one; stages are timed apart, each over the whole batch",
             learning: learner.as_ref().filter(|_| args.mode.contains(&Mode::Training)).map(Learner::updates),
         },
@@ -178,19 +179,20 @@ pub fn run(args: &Args) -> Result<(), Error> {
         ProgressStyle::with_template("measuring {bar:30} {pos}/{len} {msg}, {elapsed}").unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
     let routes = [scenario.split(Split::Train), scenario.split(Split::Test)].concat();
-    let (mut refusal, mut shared) = (None, None);
+    let (mut refusal, mut backend) = (None, None);
     for &envs in &envs {
         for &mode in &args.mode {
             bar.set_message(format!("{envs} trucks, {}", mode.name()));
             bar.tick();
             let (engine, adapter) = (&device.engine, device.adapter());
-            let setting = Setting { engine, adapter, shared: &mut shared, world: &world, routes: &routes, envs, learner: learner.as_ref() };
-            let outcome = offtrack_training::device::caught(|| measured(mode.drive(setting)?.as_mut(), args.seconds));
+            let setting =
+                Setting { engine, adapter, backend: &mut backend, world: &world, routes: &routes, envs, learner: learner.as_ref() };
+            let outcome = offtrack_training::device::caught(|| measured(&mut mode.driven(setting)?, args.seconds));
             let outcome = match outcome {
                 Ok(measured) => Outcome::Measured(Box::new(measured)),
                 Err(error) => {
-                    // What broke a device must not spoil the next size.
-                    (device, shared) = (args.device.open()?, None);
+                    // A broken device must not spoil the next size.
+                    (device, backend) = (args.device.open()?, None);
                     let outcome = Outcome::Refused { error: error.to_string() };
                     refusal.get_or_insert(error);
                     outcome
@@ -205,7 +207,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     bar.finish_and_clear();
     match refusal {
-        // Nothing at all came of it.
+        // Nothing could be measured.
         Some(error) if scale.runs.iter().all(|run| run.measured().is_none()) => Err(error),
         _ => Ok(()),
     }
@@ -252,7 +254,7 @@ fn write(args: &Args, scale: &Scale, title: &str) -> Result<(), Error> {
 }
 
 /// For `map_err` on a picture being drawn.
-fn failed(file: &Path) -> impl FnOnce(offtrack_drawing::Failure) -> Error {
+fn failed(file: &Path) -> impl FnOnce(offtrack_drawing::Error) -> Error {
     let file = file.to_owned();
     move |source| Error::Write { file, source: std::io::Error::other(source) }
 }

@@ -1,4 +1,5 @@
-//! `offtrack trace`: drives the trajectory cases of a file with the simulator's own equations and prints the states it was asked for.
+//! `offtrack trace`: drives the trajectory cases of a file with the simulator's equations of motion and prints the
+//! states asked for.
 
 use std::path::{Path, PathBuf};
 
@@ -11,10 +12,11 @@ use serde_json::Value;
 use offtrack_training::error::Error;
 use offtrack_training::files::{print, write_json};
 
-/// Drive the trajectory cases of a file of reference vectors and print where the truck is at the instants they ask for.
+/// Drive the trajectory cases of a file of reference vectors and print the truck's state at the times they ask for.
 ///
-/// A case says its vehicle, `dt`, `init`, `commands` and `t_end`; its instants are `times` or those of `expected`. One sub-step is `dt`
-/// long; an instant between two of them is reached by a part of one. Cases of other kinds are named and left out.
+/// A case has a vehicle, `dt`, `init`, `commands` and `t_end`; its times are `times` or those of `expected`. A sub-step
+/// is `dt` long; a time between two sub-steps is reached with a shorter one. Cases of another kind are named on
+/// standard error and skipped.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// JSON file with `cases`, in the format of tests/data/physics_vectors.json
@@ -27,21 +29,21 @@ pub struct Args {
 #[derive(Serialize)]
 struct Report {
     cases: Vec<Traced>,
-    not_taken: Vec<NotTaken>,
+    skipped: Vec<Skipped>,
 }
 
 /// A case of a kind that is not a truck's trajectory.
 #[derive(Serialize)]
-struct NotTaken {
+struct Skipped {
     id: String,
     kind: String,
 }
 
-/// Reads the cases, drives those that can be driven, prints or writes the report.
+/// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     let report = report(&args.cases)?;
-    for NotTaken { id, kind } in &report.not_taken {
-        eprintln!("offtrack: {}: case {id:?} is not taken: its kind is {kind:?}, not \"trajectory\"", args.cases.display());
+    for Skipped { id, kind } in &report.skipped {
+        eprintln!("offtrack: {}: case {id:?} is skipped: its kind is {kind:?}, not \"trajectory\"", args.cases.display());
     }
     match &args.output {
         Some(file) => write_json(file, &report),
@@ -54,11 +56,11 @@ pub fn run(args: &Args) -> Result<(), Error> {
 }
 
 fn report(file: &Path) -> Result<Report, Error> {
-    let wrong = |message: String| Error::Contents { file: file.to_owned(), message };
+    let wrong = |message: String| Error::contents(file, message);
     let text = read_text(file, FILE_LIMIT)?;
-    let written: Value = serde_json::from_str(&text).map_err(|error| wrong(format!("no JSON: {error}")))?;
-    let cases = written["cases"].as_array().ok_or_else(|| wrong("cases: missing or no list; a list of cases is needed".to_owned()))?;
-    let mut report = Report { cases: Vec::new(), not_taken: Vec::new() };
+    let written: Value = serde_json::from_str(&text).map_err(|error| wrong(format!("is not JSON: {error}")))?;
+    let cases = written["cases"].as_array().ok_or_else(|| wrong("cases: missing or not a list; a list of cases is needed".to_owned()))?;
+    let mut report = Report { cases: Vec::new(), skipped: Vec::new() };
     for (index, case) in cases.iter().enumerate() {
         let text = |key: &str| {
             let text = case[key].as_str().map(str::to_owned);
@@ -66,10 +68,10 @@ fn report(file: &Path) -> Result<Report, Error> {
         };
         let (id, kind) = (text("id")?, text("kind")?);
         if kind == "trajectory" {
-            let case = Case::deserialize(case).map_err(|error| wrong(shortened(&format!("case {id:?}: {error}"), 600)))?;
+            let case = Case::deserialize(case).map_err(|error| wrong(format!("case {id:?}: {error}")))?;
             report.cases.push(trace(&case).map_err(|error| wrong(error.to_string()))?);
         } else {
-            report.not_taken.push(NotTaken { id, kind });
+            report.skipped.push(Skipped { id, kind });
         }
     }
     Ok(report)
@@ -84,17 +86,17 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_vectors_is_driven_and_what_is_not_is_named() {
+    fn trajectories_are_driven_and_other_cases_are_named() {
         let report = report(&vectors()).unwrap();
-        assert_eq!((report.cases.len(), report.not_taken.len()), (22, 8));
-        assert_eq!(report.not_taken[0].kind, "closed_form");
+        assert_eq!((report.cases.len(), report.skipped.len()), (22, 8));
+        assert_eq!(report.skipped[0].kind, "closed_form");
         let printed = serde_json::to_value(&report).unwrap();
         let state = printed["cases"][0]["states"][1].as_object().unwrap();
         let keys = "t x y psi1 psi2 gamma v delta hitch trailer_axle ay1 ay2 ltr1_qs ltr2_qs ltr2_dyn";
         assert!(keys.split(' ').all(|key| state.contains_key(key)));
     }
 
-    /// What is said of the vectors once `from` stands as `to` in their file.
+    /// The error for the vectors with `from` replaced by `to`.
     fn refusal(from: &str, to: &str) -> String {
         let text = std::fs::read_to_string(vectors()).unwrap();
         let changed = text.replacen(from, to, 1);
@@ -103,15 +105,15 @@ mod tests {
         let file = folder.path().join("cases.json");
         std::fs::write(&file, changed).unwrap();
         let Err(error) = report(&file) else { panic!("{from} -> {to} was accepted") };
-        assert_eq!(error.exit_code(), 2);
+        assert!(error.is_wrong_input());
         error.to_string()
     }
 
     #[test]
-    fn a_wrong_file_is_told_its_case_key_and_value() {
+    fn an_error_names_case_key_and_value() {
         for (from, to, expected) in [
-            ("\"cases\"", "\"cassettes\"", "cases: missing or no list"),
-            ("{", "[", "no JSON"),
+            ("\"cases\"", "\"cassettes\"", "cases: missing or not a list"),
+            ("{", "[", "is not JSON"),
             ("\"L1\"", "\"l1\"", "case \"straight_30\": missing field `L1`"),
             ("\"dt\": 0.05", "\"dt\": -1", "case \"straight_30\": dt: -1 s; must lie in 0.0001..0.2 s"),
             ("\"t_end\": 10", "\"t_end\": 4", "case \"straight_30\": expected[1].t: 5 s; must lie in 0..4 s"),

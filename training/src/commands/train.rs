@@ -1,43 +1,48 @@
-//! The main job: trucks drive, the learner learns, and at the end the driver is examined on routes it never saw.
+//! `offtrack train`: trains a policy, then evaluates it on the test routes.
 //!
-//! Everything is written as it comes: the config at once, a row of figures every few seconds, the policy and a checkpoint every few
-//! minutes. A run that is stopped leaves a driver that can be examined and all that it takes to go on.
+//! Everything is written as it comes: the training file at once, a row of metrics every few seconds, policy and
+//! checkpoint every few minutes. A stopped run leaves a policy that can be evaluated, and all that it takes to
+//! continue.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
+use offtrack::reader::read_text;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
+use offtrack_training::device::Device;
+use offtrack_training::error::Error;
+use offtrack_training::evaluation::Evaluation;
+use offtrack_training::evaluation::page::Page;
+use offtrack_training::evaluation::report::Report;
+use offtrack_training::files;
+use offtrack_training::learner::backend::Backend;
+use offtrack_training::learner::checkpoint::Stored;
+use offtrack_training::learner::config::{self, Config};
+use offtrack_training::learner::run::Run;
+use offtrack_training::learner::run::folder::Folder;
+use offtrack_training::learner::run::metrics_file::MetricsFile;
+use offtrack_training::learner::run::progress::Progress;
+use offtrack_training::learner::run::resume::Resumed;
+use offtrack_training::learner::training::Training;
+use offtrack_training::policy::LearnedPolicy;
+use offtrack_training::provenance;
 use serde::Serialize;
 use serde_json::json;
 
-use offtrack_training::device::Device;
-use offtrack_training::error::Error;
-use offtrack_training::evaluation::Examination;
-use offtrack_training::evaluation::page::Page;
-use offtrack_training::evaluation::policies::Learned;
-use offtrack_training::evaluation::report::Report;
-use offtrack_training::files;
-#[cfg(feature = "gpu")]
-use offtrack_training::learner::bridge::device::Shared;
-use offtrack_training::learner::checkpoint::Stored;
-use offtrack_training::learner::config::{self, Config};
-use offtrack_training::learner::run::folder::Folder;
-use offtrack_training::learner::run::metrics::Figures;
-use offtrack_training::learner::run::progress::Progress;
-use offtrack_training::learner::run::resume::Resumed;
-use offtrack_training::learner::run::{self, Run};
-use offtrack_training::policy::Policy;
-use offtrack_training::provenance;
+use super::{progress, terminal};
 
-/// Episodes on each route in the closing examination.
+/// Episodes on each route in the final evaluation.
 const EPISODES: usize = 30;
+/// Most bytes of the metrics that the page shows.
+const METRICS_LIMIT: u64 = 64 << 20;
 
-/// Learn to drive, then examine the driver on the test routes.
+/// Train a policy, then evaluate it on the test routes.
 #[derive(Debug, Default, clap::Args)]
 pub struct Args {
-    /// A training file; without it training/configs/default.toml.
+    /// A training file: its path, or one of `default`, `gpu`, `as-run` and `paper`, which come with the program.
+    /// Without it `default`, in a program built for graphics devices `gpu`.
     config: Option<PathBuf>,
     /// Name of the run's folder; must be new. Without it the training file's name, numbered.
     #[arg(long)]
@@ -48,287 +53,215 @@ pub struct Args {
     /// Another seed than the training file's.
     #[arg(long)]
     seed: Option<u32>,
-    /// Another time to learn for [min].
+    /// Another training time [min].
     #[arg(long, allow_negative_numbers = true)]
     minutes: Option<f64>,
-    /// Another number of env steps to learn for.
+    /// Another number of env steps.
     #[arg(long)]
     steps: Option<u64>,
     /// Another number of trucks.
     #[arg(long)]
     envs: Option<usize>,
-    /// Part of the name of another graphics adapter, see `offtrack devices`.
+    /// Part of another graphics adapter's name, see `offtrack devices`.
     #[arg(long)]
     adapter: Option<String>,
-    /// Another value of one of the training file's keys, as in `learning.n_steps=5`; nothing after the `=` leaves the key out. May be
-    /// given several times.
+    /// Another value of one of the training file's keys, as in `learning.n_steps=5`; nothing after the `=` removes the
+    /// key. May be given several times.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
-    /// Goes on with a run that was stopped, from the last checkpoint in its folder, as its own config.toml says. With --minutes or --steps
-    /// it learns for so long in all; learning rates fall until that end, so with a later one they are higher from here on than they
-    /// would have been, and a finished run goes on too. With `steps` alone the result is that of a run never stopped, bit for bit on the
-    /// same machine and program.
+    /// Continue a run that was stopped or killed, from the last checkpoint in its folder, by its own config.toml.
+    /// --minutes or --steps give another budget, counted from the run's beginning; a finished run continues too. The
+    /// learning-rate schedule ends with the budget, so with a larger one the rates are higher from here on. With a
+    /// budget of steps alone the result is that of a run never stopped, bit for bit on the same machine and program.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "name", "out", "seed", "envs", "adapter", "settings"])]
     resume: Option<PathBuf>,
 }
 
-/// What a run came to, as written to `report.json`.
+/// A run's result, as written to `report.json`.
 #[derive(Debug, Serialize)]
 struct Finished {
-    /// The run was stopped before its time.
+    /// The run was stopped before its budget was spent.
     interrupted: bool,
     seed: u32,
-    /// Time spent learning [s].
+    /// Training time [s].
     seconds: f64,
     env_steps: u64,
     episodes: u64,
     updates: u64,
-    /// Share of the last training episodes that arrived.
+    /// Fraction of the latest training episodes that arrived.
     training_success: Option<f64>,
-    /// How many episodes that is a share of, and each row of the metrics a mean over.
-    training_window: usize,
+    /// Number of those episodes; each row of the metrics is a mean over as many.
+    training_window: u64,
     machine: String,
     /// Where trucks and learner were.
     device: String,
     commit: String,
-    /// The closing examination; none after an interruption.
+    /// The final evaluation; none after an interruption.
     evaluation: Option<Report>,
 }
 
-/// Where a run writes, and where it begins.
-struct Begun {
+/// What a run is trained on.
+struct Worlds {
+    /// The benchmark that the policy is evaluated on.
+    benchmark: Scenario,
+    benchmark_world: Arc<World>,
+    /// The benchmark that it is trained on.
+    training: Scenario,
+    training_world: Arc<World>,
+}
+
+/// A new run's folder, or that of one that continues from a checkpoint.
+struct Opened {
     folder: Folder,
-    figures: Figures,
-    /// What it goes on from.
+    metrics: MetricsFile,
     stored: Option<Stored>,
 }
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
-    let default = || {
-        let here = PathBuf::from(if cfg!(feature = "gpu") { "training/configs/gpu.toml" } else { "training/configs/default.toml" });
-        if here.is_file() { here } else { files::repository().join(here) }
-    };
-    let file = args.config.clone().unwrap_or_else(default);
     let resumed = args.resume.as_ref().map(|folder| Resumed::open(folder, args.minutes, args.steps)).transpose()?;
-    let config = match &resumed {
-        Some(resumed) => resumed.config.clone(),
-        None => {
-            let mut config = Config::read_with(&file, &args.settings)?;
-            config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
-            if let Some(adapter) = &args.adapter {
-                if config.device == config::Device::Cpu {
-                    let expected = "the training file learns on the processor: leave it out, or add --set device=gpu".to_owned();
-                    return Err(Error::Flag { flag: "--adapter", value: adapter.clone(), expected });
-                }
-                config.adapter = Some(adapter.clone());
-            }
-            config
-        }
-    };
-    let scenario = Scenario::read(&files::benchmark(&config.benchmark)?)?;
-    let practice = practice(&config, &scenario)?;
-    let (world, practice_world) = (Arc::new(World::bake(&scenario)), Arc::new(World::bake(&practice)));
-    if practice_world.actions != world.actions {
-        let expected = format!("its actions and vehicle lock must be those of {}, on which the driver is examined", scenario.name);
-        return Err(Error::Flag { flag: "practice", value: practice.name, expected });
-    }
-    // What cannot learn leaves no folder behind.
-    let place = Place::open(&config)?;
-    let Begun { folder, figures, stored } = match resumed {
-        Some(Resumed { folder, figures, stored, .. }) => Begun { folder, figures, stored: Some(stored) },
+    let default = if cfg!(feature = "gpu") { "gpu" } else { "default" };
+    let file = args.config.clone().unwrap_or_else(|| PathBuf::from(default));
+    let config = resumed.as_ref().map_or_else(|| config(args, &file), |resumed| Ok(resumed.config.clone()))?;
+    let worlds = Worlds::read(&config)?;
+    let routes = worlds.training.split(Split::Train).to_vec();
+    let n_routes = routes.len();
+    // All that can be wrong with the input is found before a folder is made.
+    let backend = Backend::open(&config)?;
+    let training = backend.guarded(|| Training::new(&backend, &config, worlds.training_world.clone(), routes))?;
+    let Opened { folder, metrics, stored } = match resumed {
+        Some(Resumed { folder, metrics, stored, .. }) => Opened { folder, metrics, stored },
         None => {
             let runs = args.out.clone().unwrap_or_else(|| PathBuf::from("runs"));
             let folder = Folder::create(&runs, args.name.as_deref(), &file, &config)?;
-            Begun { figures: Figures::create(folder.metrics())?, stored: None, folder }
+            Opened { metrics: MetricsFile::create(folder.metrics())?, stored: None, folder }
         }
     };
-    let routes = practice.split(Split::Train).to_vec();
-    let n_routes = routes.len();
-    let mut run = Job::new(place, &config, routes.clone(), practice_world, &folder, Progress::new(&config, figures))?;
-    let mut doing = "learning".to_owned();
+    let progress = Progress::new(&config, metrics, Box::new(progress::TrainingDisplay::new()));
+    let mut run = Run::new(backend, &config, &worlds.training_world, training, &folder, progress);
+    let mut doing = "training".to_owned();
     if let Some(stored) = stored {
-        run.restore(&stored, routes)?;
-        if args.minutes.is_some() || args.steps.is_some() {
-            folder.write_config(&config)?;
-        }
-        // What an examination said of the driver before is not said of the one to come.
+        run.restore(&stored)?;
+        // The earlier evaluation was of another policy.
         files::write_json(&folder.report(), &Finished { interrupted: true, ..finished(&config, &run) })?;
         let _ = std::fs::remove_file(folder.page());
-        doing = format!("going on after {} env steps and {:.2} min,", run.progress().env_steps(), run.progress().seconds() / 60.0);
+        doing = format!("continuing after {} env steps and {:.2} min", run.progress.env_steps(), run.progress.seconds() / 60.0);
     }
-    // A run goes on when nobody reads its lines.
-    let _ = files::print(&format!(
-        "{}: {doing} on {n_routes} training routes of {}, {}\n",
-        folder.path().display(),
-        practice.name,
-        run.device()
-    ));
+    if args.resume.is_some() && (args.minutes.is_some() || args.steps.is_some()) {
+        folder.write_config(&config)?;
+    }
+    // Training goes on when nobody reads its lines.
+    let path = folder.path().display();
+    let _ = files::print(&format!("{path}: {doing} on {n_routes} training routes of {}, {}\n", worlds.training.name, run.device()));
     let stop = stop_flag();
     run.learn(|| 0 < stop.load(Ordering::Relaxed))?;
-    let mut finished = finished(&config, &run);
+    let finished = finished(&config, &run);
     let written = run.close();
     let policy = run.policy()?;
     drop(run);
-    if finished.interrupted {
+    conclude(&folder, &worlds, finished, policy, written)
+}
+
+/// The training file with what the command line changes.
+fn config(args: &Args, file: &Path) -> Result<Config, Error> {
+    let mut config = Config::read_with(file, &args.settings)?;
+    config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
+    if let Some(adapter) = &args.adapter {
+        if config.device == config::Device::Cpu {
+            let expected = "the training file uses the processor: leave it out, or add --set device=gpu".to_owned();
+            return Err(Error::Flag { flag: "--adapter", value: adapter.clone(), expected });
+        }
+        config.adapter = Some(adapter.clone());
+    }
+    Ok(config)
+}
+
+impl Worlds {
+    /// Both benchmarks of a training file. None of the routes that the policy is evaluated on may be among those it is
+    /// trained on.
+    fn read(config: &Config) -> Result<Worlds, Error> {
+        let benchmark = Scenario::find(&config.benchmark)?;
+        let training = Scenario::find(config.training_benchmark.as_ref().unwrap_or(&config.benchmark))?;
+        let wrong = |expected: String| Error::Flag { flag: "training_benchmark", value: training.name.clone(), expected };
+        let test = benchmark.split_names(Split::Test);
+        if let Some(route) = training.split_names(Split::Train).into_iter().find(|route| test.contains(route)) {
+            return Err(wrong(format!("{route} is a test route of {} and must not be trained on", benchmark.name)));
+        }
+        if training.split(Split::Train).is_empty() {
+            return Err(wrong("it has no routes under `train`".to_owned()));
+        }
+        let (benchmark_world, training_world) = (Arc::new(World::bake(&benchmark)), Arc::new(World::bake(&training)));
+        if training_world.actions != benchmark_world.actions {
+            let name = &benchmark.name;
+            return Err(wrong(format!("its actions and vehicle lock must be those of {name}, on which the policy is evaluated")));
+        }
+        Ok(Worlds { benchmark, benchmark_world, training, training_world })
+    }
+}
+
+/// Evaluates the policy of a run that was not interrupted, and writes what the run leaves behind. `written` says
+/// whether its last checkpoint could be written.
+fn conclude(
+    folder: &Folder,
+    worlds: &Worlds,
+    mut finished: Finished,
+    policy: LearnedPolicy,
+    written: Result<(), Error>,
+) -> Result<(), Error> {
+    let path = folder.path().display();
+    if finished.interrupted || worlds.benchmark.split(Split::Test).is_empty() {
         files::write_json(&folder.report(), &finished)?;
         written?;
-        let path = folder.path().display();
-        return files::print(&format!("stopped: policy and figures are in {path}; not examined; train --resume {path} goes on\n"));
+        return files::print(&match finished.interrupted {
+            true => format!("stopped: policy and metrics are in {path}; not evaluated; train --resume {path} continues\n"),
+            false => format!("written: {path}\n"),
+        });
     }
-    if scenario.split(Split::Test).is_empty() {
-        files::write_json(&folder.report(), &finished)?;
-        written?;
-        return files::print(&format!("written: {}\n", folder.path().display()));
-    }
-    let mut driver = Learned { name: folder.policy().display().to_string(), policy };
-    let examination = Examination {
-        scenario: &scenario,
-        world: &world,
+    let mut policy = LearnedPolicy { name: folder.policy().display().to_string(), ..policy };
+    let evaluation = Evaluation {
+        scenario: &worlds.benchmark,
+        world: &worlds.benchmark_world,
         split: Split::Test,
         episodes: EPISODES,
         seed: 0,
         record: true,
         device: &Device::processor(),
     };
-    let (report, tracks) = examination.report(&mut driver)?;
-    let table = report.table();
+    let (report, tracks) = {
+        let bar = progress::Bar::new("evaluating", "episodes", 0);
+        evaluation.report(&mut policy, &mut |done, all| bar.set(done, all))?
+    };
+    let table = report.table(terminal::width());
     finished.evaluation = Some(report.clone());
     files::write_json(&folder.report(), &finished)?;
-    let metrics = std::fs::read_to_string(folder.metrics()).map_err(Error::read(&folder.metrics()))?;
-    Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run: json!(finished), metrics: Some(metrics) }
-        .write(&folder.page())?;
-    files::print(&format!("{table}written: {}\n", folder.path().display()))?;
-    // The examination is not lost where something else could not be written.
+    let metrics = Some(read_text(&folder.metrics(), METRICS_LIMIT)?);
+    let (scenario, world) = (&worlds.benchmark, &worlds.benchmark_world);
+    Page { scenario, world, evaluation: &report, tracks: &tracks, run: json!(finished), metrics }.write(&folder.page())?;
+    files::print(&format!("{table}written: {path}\n"))?;
+    // The evaluation is not lost where something else could not be written.
     written
 }
 
-/// Where a run can be.
-enum Place {
-    Host,
-    #[cfg(feature = "gpu")]
-    Device(Box<Shared>),
-}
-
-impl Place {
-    /// The place that the config names, ready to work.
-    fn open(config: &Config) -> Result<Place, Error> {
-        match config.device {
-            config::Device::Cpu => Ok(Place::Host),
-            #[cfg(feature = "gpu")]
-            config::Device::Gpu => Ok(Place::Device(Box::new(Shared::open(config.adapter.as_deref())?))),
-            #[cfg(not(feature = "gpu"))]
-            config::Device::Gpu => {
-                let expected = "this program was built without the feature `gpu`: build it with `--features gpu`, or set device = \"cpu\"";
-                Err(Error::Flag { flag: "device", value: "\"gpu\"".to_owned(), expected: expected.to_owned() })
-            }
-        }
-    }
-}
-
-/// A run, where its config wants it.
-enum Job {
-    Host(Box<Run>),
-    #[cfg(feature = "gpu")]
-    Device(Box<run::device::DeviceRun>),
-}
-
-impl Job {
-    fn new(place: Place, config: &Config, routes: Vec<u32>, world: Arc<World>, folder: &Folder, progress: Progress) -> Result<Job, Error> {
-        match place {
-            Place::Host => Ok(Job::Host(Box::new(Run::new(config, routes, world, folder, progress)?))),
-            #[cfg(feature = "gpu")]
-            Place::Device(shared) => {
-                Ok(Job::Device(Box::new(run::device::DeviceRun::new(*shared, config, routes, world, folder, progress)?)))
-            }
-        }
-    }
-
-    /// What it runs on.
-    fn device(&self) -> String {
-        match self {
-            Job::Host(_) => "cpu".to_owned(),
-            #[cfg(feature = "gpu")]
-            Job::Device(run) => run.device(),
-        }
-    }
-
-    fn progress(&self) -> &Progress {
-        match self {
-            Job::Host(run) => &run.progress,
-            #[cfg(feature = "gpu")]
-            Job::Device(run) => &run.progress,
-        }
-    }
-
-    fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {
-        match self {
-            Job::Host(run) => run.learn(stopped),
-            #[cfg(feature = "gpu")]
-            Job::Device(run) => run.learn(stopped),
-        }
-    }
-
-    /// Goes on from a checkpoint, on the same routes as before.
-    #[cfg_attr(not(feature = "gpu"), expect(unused_variables, reason = "trucks on the processor are in the checkpoint"))]
-    fn restore(&mut self, stored: &Stored, routes: Vec<u32>) -> Result<(), Error> {
-        match self {
-            Job::Host(run) => run.restore(stored),
-            #[cfg(feature = "gpu")]
-            Job::Device(run) => run.restore(stored, routes),
-        }
-    }
-
-    fn policy(&self) -> Result<Policy, Error> {
-        match self {
-            Job::Host(run) => Ok(run.policy()),
-            #[cfg(feature = "gpu")]
-            Job::Device(run) => run.policy(),
-        }
-    }
-
-    fn close(&mut self) -> Result<(), Error> {
-        match self {
-            Job::Host(run) => run.close(),
-            #[cfg(feature = "gpu")]
-            Job::Device(run) => run.close(),
-        }
-    }
-}
-
-/// What is practised on: the benchmark, or what the config names in its place. No route that the driver will be examined on may be in it.
-fn practice(config: &Config, benchmark: &Scenario) -> Result<Scenario, Error> {
-    let practice = Scenario::read(&files::benchmark(config.practice.as_ref().unwrap_or(&config.benchmark))?)?;
-    let examined = benchmark.split_names(Split::Test);
-    if let Some(route) = practice.split_names(Split::Train).into_iter().find(|route| examined.contains(route)) {
-        let expected = format!("{route} is a test route of {} and must not be practised on", benchmark.name);
-        return Err(Error::Flag { flag: "practice", value: practice.name, expected });
-    }
-    if practice.split(Split::Train).is_empty() {
-        let expected = "it has no routes under `train` to learn on".to_owned();
-        return Err(Error::Flag { flag: "practice", value: practice.name, expected });
-    }
-    Ok(practice)
-}
-
-/// Counts Ctrl-C: the first lets the step in hand finish and everything be written, the second ends the process.
+/// Counts Ctrl-C, SIGTERM and SIGHUP: the first lets the step in hand finish and everything be written, the second ends
+/// the process.
 fn stop_flag() -> Arc<AtomicU8> {
     let stop = Arc::new(AtomicU8::new(0));
     let flag = stop.clone();
-    // Without a handler Ctrl-C ends the process at once; the last policy and checkpoint are whole all the same.
+    // Without a handler a signal ends the process at once; the last policy and checkpoint are whole all the same.
     let _ = ctrlc::set_handler(move || {
         if 0 < flag.fetch_add(1, Ordering::Relaxed) {
+            files::remove_temporaries();
             std::process::exit(130);
         }
     });
     stop
 }
 
-/// What a run has come to before its examination.
-fn finished(config: &Config, run: &Job) -> Finished {
-    let progress = run.progress();
+/// A run's result before its evaluation.
+fn finished(config: &Config, run: &Run) -> Finished {
+    let progress = &run.progress;
     Finished {
-        interrupted: progress.share() < 1.0,
+        interrupted: progress.fraction() < 1.0,
         seed: config.seed,
         seconds: progress.seconds(),
         env_steps: progress.env_steps(),

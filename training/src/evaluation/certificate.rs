@@ -1,4 +1,5 @@
-//! Which routes of a benchmark can be completed: searched for, written to a file, and driven again before it is believed.
+//! Which routes of a benchmark can be completed: action sequences are searched for, written to a file, and driven again
+//! when it is read.
 
 pub mod beam; // the search
 pub mod file; // what it found
@@ -13,7 +14,8 @@ use offtrack::world::World;
 use crate::error::Error;
 use file::Certificate;
 
-/// Indices of the certified ones among `routes`: those completed from every start, as driving their sequences again has shown.
+/// The certified ones among `routes`, as indices of the world: those completed from every start. Their sequences are
+/// driven again first.
 pub fn certified(path: &Path, scenario: &Scenario, world: &Arc<World>, routes: &[u32]) -> Result<Vec<u32>, Error> {
     let certificate = Certificate::read(path)?;
     certificate.check(scenario, world, path)?;

@@ -1,6 +1,6 @@
-//! The page that shows a driver's examination, and the training run behind it: one HTML file that opens anywhere and loads nothing.
+//! The page of an evaluation and of the training run behind it: one HTML file that loads no other file.
 //!
-//! The report stands in it whole, so that every figure can be checked; so does every episode, as columns of small differences, gzipped.
+//! It holds the whole report, so that every figure can be checked, and every episode as gzipped columns of differences.
 
 mod tracks;
 
@@ -22,7 +22,7 @@ pub const MOST_EPISODES: usize = 4000;
 
 const TEMPLATE: &str = include_str!("page/report.html");
 const STYLE: &str = include_str!("page/style.css");
-/// In the order in which they stand on the page; the last one begins.
+/// In the order of the page; the last one starts the others.
 const SCRIPTS: [&str; 9] = [
     include_str!("page/elements.js"),
     include_str!("page/data.js"),
@@ -35,33 +35,33 @@ const SCRIPTS: [&str; 9] = [
     include_str!("page/main.js"),
 ];
 
-/// What a page shows.
+/// The contents of a page.
 #[derive(Debug)]
 pub struct Page<'a> {
     /// The benchmark.
     pub scenario: &'a Scenario,
     /// The benchmark, baked.
     pub world: &'a World,
-    /// The examination.
+    /// The report of the evaluation.
     pub evaluation: &'a Report,
-    /// Its episodes: as many for each route as the next, in the order of the report's routes.
+    /// Its episodes, the same number for each route, in the order of the report's routes.
     pub tracks: &'a [Track],
-    /// The training run as its `report.json` has it; empty when only the examination is known.
+    /// The training run as in its `report.json`; `Null` without one.
     pub run: Value,
-    /// The rows of the run's `metrics.csv`.
+    /// The text of the run's `metrics.csv`.
     pub metrics: Option<String>,
 }
 
 /// Roundabouts, routes, truck and episodes, as the page's scripts read them.
 #[derive(Serialize)]
 struct Ground<'a> {
-    /// Time between two frames [s].
+    /// Time between two frames \[s].
     step: f64,
     vehicle: Measures,
     n_rays: usize,
     maps: Vec<Map>,
     routes: Vec<Route<'a>>,
-    /// Name and unit of each column of the recorded episodes, in the order in which they lie.
+    /// Name and unit of each column of the recorded episodes, in the order of the data.
     columns: Vec<(String, f64)>,
     episodes: Vec<Episode>,
     machine: String,
@@ -83,7 +83,7 @@ struct Episode {
     /// Which of the route's episodes, from 0.
     number: usize,
     ended: &'static str,
-    /// The start and one for each step.
+    /// One for the start and one for each step.
     n_frames: usize,
 }
 
@@ -104,7 +104,7 @@ impl Page<'_> {
             escaped(&format!("{:.1} % of {} episodes arrived, {benchmark} {split} routes", 100.0 * summary.success, summary.episodes));
         let page = filled(&[
             ("title", &title),
-            ("heading", &escaped(&format!("A driver examined on {benchmark}, {split} routes"))),
+            ("heading", &escaped(&format!("Evaluation on {benchmark}, {split} routes"))),
             ("style", STYLE),
             ("report", &script_json(&self.run)),
             ("ground", &script_json(&json!(ground))),
@@ -116,22 +116,22 @@ impl Page<'_> {
     }
 
     fn ground(&self, columns: Vec<(String, f64)>) -> Ground<'_> {
-        let examined = &self.evaluation.routes;
+        let evaluated = &self.evaluation.routes;
         let found: Vec<_> =
-            examined.iter().filter_map(|route| self.scenario.routes().find(|(_, known)| known.name == route.name)).collect();
-        let mut places: Vec<usize> = found.iter().map(|&(place, _)| place).collect();
-        places.dedup();
-        let per_route = (self.tracks.len() / examined.len().max(1)).max(1);
+            evaluated.iter().filter_map(|route| self.scenario.routes().find(|(_, known)| known.name == route.name)).collect();
+        let mut roundabouts: Vec<usize> = found.iter().map(|&(roundabout, _)| roundabout).collect();
+        roundabouts.dedup();
+        let per_route = (self.tracks.len() / evaluated.len().max(1)).max(1);
         Ground {
             step: self.scenario.step,
             vehicle: Measures::of(self.world),
             n_rays: self.world.rays.len(),
-            maps: places.iter().map(|&place| Map::of(&self.scenario.places[place].roundabout, self.scenario.gutter)).collect(),
+            maps: roundabouts.iter().map(|&index| Map::of(&self.scenario.places[index].roundabout, self.scenario.gutter)).collect(),
             routes: found
                 .iter()
-                .map(|&(place, route)| Route {
+                .map(|&(index, route)| Route {
                     name: &route.name,
-                    roundabout: places.iter().position(|&other| other == place).unwrap_or(0),
+                    roundabout: roundabouts.iter().position(|&other| other == index).unwrap_or(0),
                     centre_line: recording::centre_line(route),
                 })
                 .collect(),
@@ -153,7 +153,7 @@ impl Page<'_> {
     }
 }
 
-/// The template with each `{{name}}` replaced by its value, once: what a value holds is never looked at.
+/// The template with each `{{name}}` replaced by its value. Values are not searched for names.
 fn filled(values: &[(&str, &str)]) -> String {
     let mut page = String::new();
     let mut rest = TEMPLATE;
@@ -180,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_place_of_the_template_is_filled_and_what_fills_it_is_left_as_it_is() {
+    fn every_name_of_the_template_is_replaced_and_values_stay_as_they_are() {
         let names = ["title", "heading", "style", "report", "ground", "metrics", "tracks", "script"];
         let page = filled(&names.map(|name| (name, "{{title}}<kept>")));
         assert_eq!(page.matches("{{title}}<kept>").count(), names.len());

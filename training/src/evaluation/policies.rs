@@ -1,6 +1,7 @@
-//! Who drives: a learned policy, pure pursuit of the centre line, or chance. The last two are what a learner must beat.
+//! What chooses the actions: a learned policy, pure pursuit of the centre line, or actions drawn uniformly at random.
+//! The last two are the baselines that a learner must beat.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use offtrack::layout::{Action, Truck, WaypointRow};
 use offtrack::random::{self, Draw};
@@ -8,72 +9,66 @@ use offtrack::simulator::Batch;
 use offtrack::world::World;
 
 use crate::error::Error;
-use crate::files;
-use crate::policy::Policy;
+use crate::policy::LearnedPolicy;
 
-/// The best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of attard2023 [m].
-pub const PURSUIT_LOOK_AHEAD: f32 = 7.0;
+/// Pure pursuit's default look-ahead distance: the best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of
+/// attard2023 \[m].
+pub const LOOK_AHEAD: f32 = 7.0;
 
 /// Chooses an action for every truck of a batch.
-pub trait Driver {
-    /// Name for reports: the policy's file, `pursuit` or `random`.
+pub trait Policy {
+    /// Name for reports: a policy file, a shipped policy, `pursuit` or `random`.
     fn name(&self) -> &str;
 
-    /// Writes one index into the action table a truck, `[n_envs]`.
-    fn act(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>);
+    /// Writes the index of each truck's action in the world's action table, `[n_envs]`.
+    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>);
 }
 
-/// The driver that a command's `--policy` names: `pursuit`, `random` or a policy's file, which must suit the world; none is the policy that
-/// comes with the program for `benchmark`. `look_ahead` is pure pursuit's [m], `seed` that of chance.
-pub fn named(policy: Option<&str>, benchmark: &str, look_ahead: f32, seed: u32, world: &World) -> Result<Box<dyn Driver>, Error> {
-    if !(1.0..=50.0).contains(&look_ahead) {
-        let value = format!("{look_ahead} m");
-        return Err(Error::Flag { flag: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
+/// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its
+/// benchmark. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where
+/// there is none, the one for attard2023. `look_ahead` is pure pursuit's \[m], `seed` that of random actions.
+pub fn find(policy: Option<&str>, benchmark: &str, look_ahead: f32, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
+    let learned = match policy {
+        Some("pursuit") => return Ok(Box::new(PurePursuit { look_ahead })),
+        Some("random") => return Ok(Box::new(UniformRandom { seed })),
+        Some(name) => learned(name)?,
+        None => LearnedPolicy::shipped_or_default(benchmark)?,
+    };
+    learned.check(world)?;
+    Ok(Box::new(learned))
+}
+
+/// A learned policy by the path of its file, or a shipped one by its benchmark. A file comes first.
+pub fn learned(name: &str) -> Result<LearnedPolicy, Error> {
+    if LearnedPolicy::shipped_names().contains(&name) && !Path::new(name).is_file() {
+        return LearnedPolicy::shipped(name);
     }
-    match policy {
-        Some("pursuit") => Ok(Box::new(Pursuit { look_ahead })),
-        Some("random") => Ok(Box::new(Chance { seed })),
-        file => {
-            let file = file.map_or_else(|| files::shipped_policy(benchmark), PathBuf::from);
-            let policy = Policy::load(&file)?;
-            policy.check(world, &file)?;
-            Ok(Box::new(Learned { name: file.display().to_string(), policy }))
-        }
-    }
+    LearnedPolicy::load(Path::new(name))
 }
 
-/// The action that a policy holds for best.
-#[derive(Debug)]
-pub struct Learned {
-    /// Name for reports.
-    pub name: String,
-    /// The policy.
-    pub policy: Policy,
-}
-
-impl Driver for Learned {
+impl Policy for LearnedPolicy {
     fn name(&self) -> &str {
         &self.name
     }
 
-    fn act(&mut self, _: &World, batch: &Batch, actions: &mut Vec<u32>) {
-        *actions = self.policy.act(&batch.observation);
+    fn choose(&mut self, _: &World, batch: &Batch, actions: &mut Vec<u32>) {
+        *actions = self.act(&batch.observation);
     }
 }
 
-/// Any action, each as likely as the next.
+/// Actions drawn uniformly at random.
 #[derive(Debug)]
-pub struct Chance {
-    /// What the actions are drawn from.
+pub struct UniformRandom {
+    /// Seed of the draws.
     pub seed: u32,
 }
 
-impl Driver for Chance {
+impl Policy for UniformRandom {
     fn name(&self) -> &str {
         "random"
     }
 
-    fn act(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
+    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
         actions.clear();
         actions.extend(batch.truck.iter().enumerate().map(|(env, truck)| {
             let [word, ..] = random::words(self.seed, env as u32, truck.episode, (Draw::Action as u32).wrapping_add(truck.steps));
@@ -82,22 +77,22 @@ impl Driver for Chance {
     }
 }
 
-/// Pure pursuit: the arc that leads the drive axle to a point of the centre line some way ahead, at the highest target speed.
+/// Pure pursuit: steers the drive axle along the arc to a point of the centre line at the look-ahead distance, at the
+/// highest target speed. It follows the line well and ignores the trailer.
 ///
-/// R. Coulter, "Implementation of the Pure Pursuit Path Tracking Algorithm" (Carnegie Mellon, 1992). It follows the line well and knows
-/// nothing of the trailer.
+/// R. Coulter, "Implementation of the Pure Pursuit Path Tracking Algorithm" (Carnegie Mellon, 1992).
 #[derive(Debug)]
-pub struct Pursuit {
-    /// Distance from the drive axle to the point pursued [m].
+pub struct PurePursuit {
+    /// Look-ahead distance: from the drive axle to the target point \[m].
     pub look_ahead: f32,
 }
 
-impl Driver for Pursuit {
+impl Policy for PurePursuit {
     fn name(&self) -> &str {
         "pursuit"
     }
 
-    fn act(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
+    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
         actions.clear();
         actions.extend(batch.truck.iter().zip(&batch.progress).map(|(truck, progress)| {
             let waypoints = world.route_waypoints(truck.route);
@@ -107,17 +102,17 @@ impl Driver for Pursuit {
     }
 }
 
-impl Pursuit {
-    /// Steer angle of the arc to the pursued point [rad].
+impl PurePursuit {
+    /// Steer angle of the arc to the target point \[rad].
     fn steering(&self, wheelbase: f32, truck: &Truck, waypoints: &[WaypointRow], next: usize) -> f32 {
         let pair = |index: usize| (waypoints[index - 1].position, waypoints[index].position);
-        // The first stretch of the line that reaches far enough away; its beginning lies within the distance.
+        // The first segment that ends beyond the look-ahead distance; it starts within it.
         let first = next.clamp(1, waypoints.len() - 1);
         let beyond = |&index: &usize| self.look_ahead <= truck.position.distance(waypoints[index].position);
         let index = (first..waypoints.len()).find(beyond).unwrap_or(waypoints.len() - 1);
         let (from, to) = pair(index);
         let (mut near, mut far) = (0.0f32, 1.0f32);
-        // Halving finds the point at the distance on a stretch of a few metres to a millimetre.
+        // Bisection finds the target point to a millimetre on a segment of a few metres.
         for _ in 0..12 {
             let middle = 0.5 * (near + far);
             if truck.position.distance(from.lerp(to, middle)) < self.look_ahead { near = middle } else { far = middle }
@@ -128,7 +123,7 @@ impl Pursuit {
     }
 }
 
-/// The action that steers nearest to `steering` among those nearest to `speed`.
+/// The action nearest to `speed` and, among those, nearest to `steering`.
 fn nearest(actions: &[Action], steering: f32, speed: f32) -> u32 {
     let cost = |action: &Action| (action.speed - speed).abs() * 1e3 + (action.steering - steering).abs();
     let best = actions.iter().enumerate().min_by(|(_, a), (_, b)| cost(a).total_cmp(&cost(b)));

@@ -1,12 +1,12 @@
-//! The result of an evaluation: every episode counted, per route and in all, as JSON and as a table.
+//! The result of an evaluation: every episode counted, for each route and in all. It is serialised as JSON; `table`
+//! prints it.
 
 use std::collections::BTreeMap;
-use std::fmt::Write;
 
 use offtrack::layout::Ended;
 use serde::Serialize;
 
-/// What one episode came to.
+/// The figures of one episode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Episode {
     /// Why it ended.
@@ -15,30 +15,30 @@ pub struct Episode {
     pub steps: u32,
     /// Sum of the rewards.
     pub reward: f64,
-    /// Mean distance to the lane centre [m].
+    /// Mean distance to the lane centre \[m].
     pub lane_distance_mean: f64,
-    /// Largest distance to the lane centre [m].
+    /// Largest distance to the lane centre \[m].
     pub lane_distance_max: f64,
-    /// Smallest distance of the tractor to a kerb [m].
+    /// Smallest distance of the tractor to a kerb \[m].
     pub tractor_clearance_min: f64,
-    /// Smallest distance of the trailer to a kerb [m].
+    /// Smallest distance of the trailer to a kerb \[m].
     pub trailer_clearance_min: f64,
     /// Largest load transfer ratio of either unit.
     pub load_transfer_ratio_peak: f64,
-    /// Largest articulation [rad].
+    /// Largest articulation \[rad].
     pub articulation_peak: f64,
-    /// Largest distance of the trailer axle from the path of the front axle [m].
+    /// Largest distance of the trailer axle from the path of the front axle \[m].
     pub off_tracking_peak: f64,
 }
 
-/// Episodes taken together. Means are over episodes; extremes over all of them.
+/// The figures of several episodes: means over the episodes, and extremes of all.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// Episodes run.
     pub episodes: usize,
     /// Episodes that arrived.
     pub arrived: usize,
-    /// Share that arrived.
+    /// Fraction that arrived.
     pub success: f64,
     /// Lower end of its 95 % Wilson interval.
     pub success_low: f64,
@@ -46,34 +46,34 @@ pub struct Summary {
     pub success_high: f64,
     /// Episodes by end code.
     pub ends: BTreeMap<&'static str, usize>,
-    /// Episodes that failed in their first step: the start pose stands on or against a kerb, and no action helps.
+    /// Episodes that failed in their first step: the truck starts on or against a kerb, and no action helps.
     pub lost_at_start: usize,
-    /// Mean distance to the lane centre, all episodes [m].
+    /// Mean distance to the lane centre, all episodes \[m].
     pub lane_distance_mean: f64,
-    /// The same of those that arrived; none when none did [m].
+    /// The same of those that arrived, `None` if none did \[m].
     pub lane_distance_mean_arrived: Option<f64>,
-    /// Largest distance to the lane centre [m].
+    /// Largest distance to the lane centre \[m].
     pub lane_distance_max: f64,
-    /// The same of those that arrived [m].
+    /// The same of those that arrived \[m].
     pub lane_distance_max_arrived: Option<f64>,
-    /// Smallest distance of the tractor to a kerb [m].
+    /// Smallest distance of the tractor to a kerb \[m].
     pub tractor_clearance_min: f64,
-    /// Smallest distance of the trailer to a kerb [m].
+    /// Smallest distance of the trailer to a kerb \[m].
     pub trailer_clearance_min: f64,
     /// Largest load transfer ratio.
     pub load_transfer_ratio_peak: f64,
-    /// Largest articulation [deg].
+    /// Largest articulation \[deg].
     pub articulation_peak_deg: f64,
-    /// Largest off-tracking [m].
+    /// Largest off-tracking \[m].
     pub off_tracking_peak: f64,
-    /// Mean time of an episode [s].
+    /// Mean time of an episode \[s].
     pub time_mean: f64,
     /// Mean sum of rewards.
     pub reward_mean: f64,
 }
 
 impl Summary {
-    /// `episodes` taken together, none when there are none; a step takes `step` seconds.
+    /// The figures of `episodes`, `None` without an episode. A step takes `step` seconds.
     pub fn of<'a>(episodes: impl Iterator<Item = &'a Episode> + Clone, step: f64) -> Option<Summary> {
         let count = episodes.clone().count();
         if count == 0 {
@@ -114,14 +114,14 @@ impl Summary {
     }
 }
 
-/// The 95 % interval of a share `successes / trials` (E. Wilson, "Probable Inference, the Law of Succession, and Statistical
-/// Inference", 1927).
+/// The 95 % Wilson interval of the fraction `successes / trials` (E. Wilson, "Probable Inference, the Law of
+/// Succession, and Statistical Inference", 1927).
 pub fn wilson(successes: usize, trials: usize) -> (f64, f64) {
     const Z: f64 = 1.959_964;
     let (n, p) = (trials as f64, successes as f64 / trials as f64);
     let centre = (p + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
     let half = Z / (1.0 + Z * Z / n) * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
-    // The interval holds the share itself, to the last bit too.
+    // Rounding must not exclude the fraction itself.
     ((centre - half).clamp(0.0, p), (centre + half).clamp(p, 1.0))
 }
 
@@ -132,7 +132,7 @@ pub struct RouteReport {
     pub name: String,
     /// A truck whose front axle follows the centre line touches no kerb.
     pub own_lane_suffices: bool,
-    /// Its episodes taken together.
+    /// Figures of its episodes.
     #[serde(flatten)]
     pub summary: Summary,
 }
@@ -144,92 +144,24 @@ pub struct Report {
     pub benchmark: String,
     /// `train` or `test`.
     pub split: &'static str,
-    /// Who drove.
+    /// Name of the policy.
     pub policy: String,
-    /// What the start poses were drawn from.
+    /// Seed of the start poses.
     pub seed: u32,
     /// Where the simulator ran.
     pub engine: String,
-    /// All episodes taken together.
+    /// Figures of all episodes.
     #[serde(flatten)]
     pub summary: Summary,
     /// Episodes on the routes whose own lane suffices.
     pub own_lane_suffices: Option<Summary>,
     /// Episodes on the routes that need deviation.
     pub needs_deviation: Option<Summary>,
-    /// Episodes on the routes shown to be possible; none where no certificate was given or it certifies none of them.
+    /// Episodes on the certified routes; `None` without a certificate or without a certified route.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certified: Option<Summary>,
     /// Each route.
     pub routes: Vec<RouteReport>,
-}
-
-impl Report {
-    /// The table that a person reads: a line a route, then the sums.
-    pub fn table(&self) -> String {
-        let mut text = String::new();
-        let head = format!(
-            "{:<18} {:>9} {:>8} {:>15} {:>5} {:>6} {:>6} {:>8} {:>8} {:>5} {:>6} {:>7} {:>6}  ends",
-            "route",
-            "arrived",
-            "success",
-            "95 % interval",
-            "lane",
-            "mean m",
-            "max m",
-            "tractor",
-            "trailer",
-            "LTR",
-            "artic",
-            "offtrk",
-            "time s"
-        );
-        let _ = writeln!(text, "{head}\n{}", "-".repeat(head.len() + 8));
-        for route in &self.routes {
-            let lane = if route.own_lane_suffices { "own" } else { "wide" };
-            line(&mut text, &route.name, lane, &route.summary);
-        }
-        let _ = writeln!(text, "{}", "-".repeat(head.len() + 8));
-        if let Some(summary) = &self.own_lane_suffices {
-            line(&mut text, "own lane suffices", "own", summary);
-        }
-        if let Some(summary) = &self.needs_deviation {
-            line(&mut text, "needs deviation", "wide", summary);
-        }
-        if let Some(summary) = &self.certified {
-            line(&mut text, "certified", "", summary);
-        }
-        line(&mut text, "all", "", &self.summary);
-        text
-    }
-}
-
-fn line(text: &mut String, name: &str, lane: &str, summary: &Summary) {
-    let ends: Vec<String> = summary
-        .ends
-        .iter()
-        .filter(|&(&name, &count)| name != Ended::Arrived.name() && 0 < count)
-        .map(|(name, count)| format!("{name} {count}"))
-        .collect();
-    let _ = writeln!(
-        text,
-        "{:<18} {:>9} {:>6.1} % {:>5.1} .. {:>5.1} % {:>5} {:>6.2} {:>6.2} {:>8.2} {:>8.2} {:>5.2} {:>4.0} d {:>7.2} {:>6.1}  {}",
-        name,
-        format!("{}/{}", summary.arrived, summary.episodes),
-        100.0 * summary.success,
-        100.0 * summary.success_low,
-        100.0 * summary.success_high,
-        lane,
-        summary.lane_distance_mean,
-        summary.lane_distance_max,
-        summary.tractor_clearance_min,
-        summary.trailer_clearance_min,
-        summary.load_transfer_ratio_peak,
-        summary.articulation_peak_deg,
-        summary.off_tracking_peak,
-        summary.time_mean,
-        ends.join(", "),
-    );
 }
 
 #[cfg(test)]
@@ -237,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_wilson_interval_is_the_published_one() {
+    fn the_wilson_interval_has_the_published_values() {
         // The study's own result, 506 of 690, and the two ends of the scale.
         let (low, high) = wilson(506, 690);
         assert!((low - 0.6991).abs() < 5e-4 && (high - 0.7650).abs() < 5e-4, "{low} {high}");

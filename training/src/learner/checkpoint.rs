@@ -1,10 +1,11 @@
-//! A checkpoint's file: named columns of numbers, written where they lie and read back as they were.
+//! A checkpoint's file: named columns of numbers.
 //!
-//! The format is safetensors, as a policy's is. The metadata's entry names the format's version and what the run is, and has a checksum
-//! over all columns: a file that is cut or changed is refused.
+//! The format is safetensors, as a policy's is. The metadata's entry has the format's version, the training file, and a
+//! checksum over all columns: a file that is cut or changed is refused. Floats in it are finite.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -14,17 +15,26 @@ use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, Metadata, TensorInfo};
 use serde::{Deserialize, Serialize};
 
+use offtrack::reader::read_bytes;
+
 use crate::error::Error;
 
 /// Key of the metadata's one entry.
 const KEY: &str = "offtrack-checkpoint";
 /// Version of the columns' meaning.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
+/// Most bytes of a checkpoint: 200 million transitions.
+const LIMIT: u64 = 64 << 30;
 
 /// What a column holds.
-pub trait Number: Pod {
+pub trait Number: Pod + Display {
     /// Its type as the file names it.
     const DTYPE: Dtype;
+
+    /// Whether it is a number at all.
+    fn is_finite(&self) -> bool {
+        true
+    }
 }
 
 impl Number for u8 {
@@ -38,9 +48,17 @@ impl Number for u64 {
 }
 impl Number for f32 {
     const DTYPE: Dtype = Dtype::F32;
+
+    fn is_finite(&self) -> bool {
+        f32::is_finite(*self)
+    }
 }
 impl Number for f64 {
     const DTYPE: Dtype = Dtype::F64;
+
+    fn is_finite(&self) -> bool {
+        f64::is_finite(*self)
+    }
 }
 
 /// The metadata's entry.
@@ -49,7 +67,7 @@ struct Description {
     version: u32,
     /// The run's training file.
     config: String,
-    /// CRC-32 of what it practises on.
+    /// CRC-32 of the world that it is trained in.
     world: u32,
     /// CRC-32 of this description with a 0 here, followed by each column's name and bytes in the order of names.
     checksum: u32,
@@ -76,7 +94,8 @@ impl<'a> Columns<'a> {
         self.0.push(Column { name: name.into(), dtype: T::DTYPE, bytes });
     }
 
-    /// Writes the file, of a run with this training file in this world. What was at `path` is lost at once: write beside the last good file.
+    /// Writes the file of a run with this training file in this world. What was at `path` is lost at once: write beside
+    /// the last good file.
     pub fn write(&self, path: &Path, config: String, world: u32) -> std::io::Result<File> {
         let mut description = Description { version: VERSION, config, world, checksum: 0 };
         let named = self.0.iter().map(|column| (column.name.as_str(), column.bytes.as_ref()));
@@ -116,13 +135,13 @@ pub struct Stored {
 impl Stored {
     /// Reads a checkpoint. One that is cut, changed, of another version, or was never one is refused.
     pub fn read(path: &Path) -> Result<Stored, Error> {
-        let bytes = std::fs::read(path).map_err(Error::read(path))?;
+        let bytes = read_bytes(path, LIMIT)?;
         Stored::from_bytes(path, bytes).map_err(|message| Error::Contents { file: path.to_owned(), message })
     }
 
-    /// What is wrong is said in words.
+    /// The error is a message without the file's name.
     fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<Stored, String> {
-        let damaged = |what: String| format!("is no checkpoint, or a damaged one: {what}; put a copy of it back or begin the run anew");
+        let damaged = |what: String| format!("is no checkpoint, or a damaged one: {what}; put a copy of it back or begin a new run");
         let (n, header) = SafeTensors::read_metadata(&bytes).map_err(|error| damaged(error.to_string()))?;
         let entry = header.metadata().as_ref().and_then(|metadata| metadata.get(KEY));
         let entry = entry.ok_or_else(|| damaged(format!("its metadata has no entry `{KEY}`")))?;
@@ -130,7 +149,7 @@ impl Stored {
         if version.version != VERSION {
             let found = version.version;
             return Err(format!(
-                "is a checkpoint of version {found}, this program goes on from version {VERSION}: go on with the program that wrote it"
+                "is a checkpoint of version {found}, this program continues from version {VERSION}: continue with the program that wrote it"
             ));
         }
         let mut description: Description = serde_json::from_str(entry).map_err(|error| damaged(error.to_string()))?;
@@ -150,7 +169,7 @@ impl Stored {
         &self.description.config
     }
 
-    /// CRC-32 of what that run practises on.
+    /// CRC-32 of the world that the run is trained in.
     pub fn world(&self) -> u32 {
         self.description.world
     }
@@ -166,7 +185,10 @@ impl Stored {
         let bytes = bytes.ok_or_else(|| self.error(format!("has no column `{name}` of type {:?}", T::DTYPE)))?;
         let mut numbers = vec![T::zeroed(); bytes.len() / size_of::<T>()];
         cast_slice_mut(&mut numbers).copy_from_slice(bytes);
-        Ok(numbers)
+        match numbers.iter().position(|number| !number.is_finite()) {
+            Some(index) => Err(self.error(format!("its column `{name}` has {} at {index}: put a sound copy back", numbers[index]))),
+            None => Ok(numbers),
+        }
     }
 
     /// A column that must have `n` numbers.
@@ -275,11 +297,11 @@ mod tests {
     #[test]
     fn a_checkpoint_of_another_version_is_refused_by_its_version() {
         let whole = written();
-        let text = br#"{\"version\":1,"#;
+        let text = br#"{\"version\":2,"#;
         let at = whole.windows(text.len()).position(|window| window == text).unwrap() + text.len() - 2;
         let mut other = whole;
-        other[at] = b'2';
+        other[at] = b'3';
         let message = read(other).unwrap_err();
-        assert!(message.contains("version 2, this program goes on from version 1"), "{message}");
+        assert!(message.contains("version 3, this program continues from version 2"), "{message}");
     }
 }

@@ -1,5 +1,5 @@
-//! Random numbers whose state can be kept in a checkpoint: xoshiro256++ of D. Blackman and S. Vigna, "Scrambled Linear Pseudorandom Number
-//! Generators" (2021). The simulator needs none: its numbers are functions of where they are drawn.
+//! Random numbers whose state can be kept in a checkpoint: xoshiro256++ of D. Blackman and S. Vigna, "Scrambled Linear
+//! Pseudorandom Number Generators" (2021). The simulator needs none: its numbers are functions of where they are drawn.
 
 use rand::{RngCore, SeedableRng};
 

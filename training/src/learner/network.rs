@@ -16,8 +16,8 @@ pub struct Mlp {
 }
 
 impl Mlp {
-    /// Layers between the given sizes. Weights are drawn from He's uniform distribution ("Delving Deep into Rectifiers", 2015), those of the
-    /// last layer times `last_gain`; biases are 0.
+    /// Layers between the given sizes. Weights are drawn from He's uniform distribution ("Delving Deep into
+    /// Rectifiers", 2015), those of the last layer times `last_gain`; biases are 0.
     pub fn new(sizes: &[usize], last_gain: f32, rng: &mut impl Rng, device: &Device) -> Mlp {
         let n_layers = sizes.len() - 1;
         let layers = sizes.windows(2).enumerate().map(|(index, ends)| {
@@ -30,8 +30,8 @@ impl Mlp {
         Mlp { layers: layers.collect(), norms: Vec::new() }
     }
 
-    /// The same layers with every hidden one's output normalised over its units.
-    pub fn normalised(self) -> Mlp {
+    /// The same layers with layer normalisation before each rectifier.
+    pub fn with_layer_norm(self) -> Mlp {
         let hidden = self.layers.len() - 1;
         let norm = |layer: &Linear| LayerNormConfig::new(layer.weight.dims()[1]).init(&layer.weight.device());
         Mlp { norms: self.layers[..hidden].iter().map(norm).collect(), layers: self.layers }

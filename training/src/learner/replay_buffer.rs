@@ -1,9 +1,9 @@
-//! The learner's memory: the latest transitions of every truck, in a ring on the host.
+//! The replay buffer on the host: the latest transitions of every truck, in a ring.
 //!
-//! Rows lie in the order of time, `n_envs` to a slot, so what follows a row stands in the next slot. Only where the clock ended an episode
-//! does it not: those few observations are kept beside the ring.
+//! Rows are in the order of time, `n_envs` to a slot, so the next observation of a row is in the next slot. Only where
+//! an episode was truncated it is not: those few observations are kept beside the ring.
 
-mod priority;
+mod priorities;
 mod state;
 
 use std::collections::HashMap;
@@ -12,12 +12,12 @@ use offtrack::layout::Ended;
 use rand::Rng;
 
 use crate::learner::config;
-use priority::Priorities;
+use priorities::Priorities;
 
 /// One step of every truck, as the simulator's columns have it. All are `[n_envs]`.
 #[derive(Debug, Clone, Copy)]
 pub struct Rows<'a, const N: usize> {
-    /// What the action was chosen for.
+    /// Observation that the action was chosen for.
     pub observation: &'a [[f32; N]],
     /// Index into the action table.
     pub action: &'a [u32],
@@ -25,43 +25,43 @@ pub struct Rows<'a, const N: usize> {
     pub reward: &'a [f32],
     /// Code of [`Ended`].
     pub ended: &'a [u32],
-    /// What the action led to.
+    /// Observation after the step.
     pub next_observation: &'a [[f32; N]],
 }
 
-/// Transitions over up to `n_steps` steps each, drawn from the memory. All are `[batch]`.
+/// Sampled transitions over up to `n_steps` steps each. All are `[batch]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample<const N: usize> {
-    /// What the first action was chosen for.
+    /// Observation that the first action was chosen for.
     pub observation: Vec<[f32; N]>,
     /// The first action.
     pub action: Vec<u32>,
-    /// Discounted sum of the rewards on the way.
+    /// Discounted sum of the rewards of those steps.
     pub reward: Vec<f32>,
-    /// Weight of the value of `next_observation`: discount ^ steps, and 0 where the task was over on the way.
+    /// Discount of the value of `next_observation`: gamma ^ steps, and 0 where the episode terminated.
     pub discount: Vec<f32>,
-    /// What the last step on the way led to.
+    /// Observation after the last step.
     pub next_observation: Vec<[f32; N]>,
-    /// Weight in the critics' loss: 1, or less where priorities made the transition likely.
+    /// Importance-sampling weight in the critics' loss: 1 without priorities.
     pub weight: Vec<f32>,
-    /// Where the transitions lie, for [`Memory::learned`].
+    /// Rows of the transitions, for [`ReplayBuffer::set_td_errors`].
     pub row: Vec<usize>,
 }
 
-/// What a row's step left behind.
+/// Where the next observation of a row is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum After {
-    /// The next slot.
+    /// In the next slot.
     Next,
-    /// Nothing: the task was over.
-    Over,
-    /// An observation in `cut`: the clock ran out.
-    Cut,
+    /// Nowhere: the episode terminated.
+    Terminated,
+    /// In `truncated`: the time limit ended the episode.
+    Truncated,
 }
 
 /// A ring of the latest steps of every truck.
 #[derive(Debug)]
-pub struct Memory<const N: usize> {
+pub struct ReplayBuffer<const N: usize> {
     n_envs: usize,
     n_slots: usize,
     /// Slots written since the beginning; slot `count % n_slots` is the next to be written.
@@ -70,18 +70,18 @@ pub struct Memory<const N: usize> {
     action: Vec<u32>,
     reward: Vec<f32>,
     after: Vec<After>,
-    cut: HashMap<usize, [f32; N]>,
-    /// Steps that must follow a transition before it can be drawn.
+    truncated: HashMap<usize, [f32; N]>,
+    /// Steps that must follow a transition before it can be sampled.
     n_steps: usize,
     priorities: Option<Priorities>,
 }
 
-impl<const N: usize> Memory<N> {
-    /// Room for at least `settings.capacity` transitions of `n_envs` trucks, to be drawn over `n_steps` steps each. The room is taken as
-    /// it is filled.
-    pub fn new(n_envs: usize, n_steps: usize, settings: &config::Memory) -> Memory<N> {
+impl<const N: usize> ReplayBuffer<N> {
+    /// A buffer for at least `settings.capacity` transitions of `n_envs` trucks, sampled over `n_steps` steps each.
+    /// Memory is allocated as it is filled.
+    pub fn new(n_envs: usize, n_steps: usize, settings: &config::ReplayBuffer) -> ReplayBuffer<N> {
         let n_slots = settings.capacity.div_ceil(n_envs);
-        Memory {
+        ReplayBuffer {
             n_envs,
             n_slots,
             n_steps,
@@ -91,7 +91,7 @@ impl<const N: usize> Memory<N> {
             action: Vec::new(),
             reward: Vec::new(),
             after: Vec::new(),
-            cut: HashMap::new(),
+            truncated: HashMap::new(),
         }
     }
 
@@ -105,7 +105,7 @@ impl<const N: usize> Memory<N> {
         &self.observation
     }
 
-    /// Keeps one step of every truck and forgets the oldest one once the ring is full.
+    /// Appends one step of every truck; it replaces the oldest one once the ring is full.
     pub fn append(&mut self, rows: Rows<N>) {
         let first = self.count % self.n_slots * self.n_envs;
         if self.observation.len() == first {
@@ -122,47 +122,53 @@ impl<const N: usize> Memory<N> {
         for (env, &code) in rows.ended.iter().enumerate() {
             let row = first + env;
             let ended = Ended::from_code(code).unwrap_or(Ended::Running);
-            if self.after[row] == After::Cut {
-                self.cut.remove(&row);
+            if self.after[row] == After::Truncated {
+                self.truncated.remove(&row);
             }
             self.after[row] = if ended.terminated() {
-                After::Over
+                After::Terminated
             } else if ended.truncated() {
-                self.cut.insert(row, rows.next_observation[env]);
-                After::Cut
+                self.truncated.insert(row, rows.next_observation[env]);
+                After::Truncated
             } else {
                 After::Next
             };
         }
         if let Some(priorities) = &mut self.priorities {
-            // What was here is gone; the slot that now has enough followers can be drawn.
-            (first..first + self.n_envs).for_each(|row| priorities.dismiss(row));
+            // The old rows are gone; the slot that enough steps follow from now on can be sampled.
+            (first..first + self.n_envs).for_each(|row| priorities.exclude(row));
             if self.n_steps <= self.count {
                 let ready = (self.count - self.n_steps) % self.n_slots * self.n_envs;
-                (ready..ready + self.n_envs).for_each(|row| priorities.admit(row));
+                (ready..ready + self.n_envs).for_each(|row| priorities.include(row));
             }
         }
         self.count += 1;
     }
 
-    /// Whether there is a step that enough others follow, so that one can be drawn.
+    /// Whether any held transition can be sampled: one that enough steps follow.
     pub fn can_sample(&self) -> bool {
         self.n_steps < self.slots_held()
     }
 
-    /// Takes note of the error of each row of a sample, `[batch]`; what has no priorities has no use for it.
-    pub fn learned(&mut self, sample: &Sample<N>, errors: &[f32]) {
+    /// Whether sampling follows priorities, so that TD errors are needed.
+    pub fn has_priorities(&self) -> bool {
+        self.priorities.is_some()
+    }
+
+    /// Sets priorities from the absolute TD error of each sampled row, both `[batch]`. Without priorities it does
+    /// nothing.
+    pub fn set_td_errors(&mut self, rows: &[usize], errors: &[f32]) {
         if let Some(priorities) = &mut self.priorities {
-            sample.row.iter().zip(errors).for_each(|(&row, &error)| priorities.learned(row, error));
+            rows.iter().zip(errors).for_each(|(&row, &error)| priorities.set_td_error(row, error));
         }
     }
 
-    /// Draws `batch` transitions, each held one as likely as the next or by its priority, and follows each for `n_steps` steps or to its
-    /// episode's end.
+    /// Samples `batch` transitions, uniformly at random or by priority, each over `n_steps` steps or to the end of its
+    /// episode.
     ///
-    /// The sum of rewards is R. Sutton's n-step return ("Learning to Predict by the Methods of Temporal Differences", 1988), without a
-    /// correction for actions that today's policy would not choose. [`Memory::can_sample`] must hold.
-    pub fn sample(&self, batch: usize, discount: f32, rng: &mut impl Rng) -> Sample<N> {
+    /// The sum of rewards is R. Sutton's n-step return ("Learning to Predict by the Methods of Temporal Differences",
+    /// 1988), without an off-policy correction. [`ReplayBuffer::can_sample`] must hold.
+    pub fn sample(&self, batch: usize, gamma: f32, rng: &mut impl Rng) -> Sample<N> {
         let held = self.slots_held();
         let oldest = self.count - held;
         let mut sample = Sample {
@@ -179,12 +185,12 @@ impl<const N: usize> Memory<N> {
                 // The last `n_steps` slots are not yet followed by enough others.
                 None => (rng.random_range(oldest..self.count - self.n_steps), rng.random_range(0..self.n_envs)),
                 Some(priorities) => {
-                    let row = priorities.draw(index, batch, rng);
-                    let place = row / self.n_envs;
-                    (oldest + (place + self.n_slots - oldest % self.n_slots) % self.n_slots, row % self.n_envs)
+                    let row = priorities.sample(index, batch, rng);
+                    let index = row / self.n_envs;
+                    (oldest + (index + self.n_slots - oldest % self.n_slots) % self.n_slots, row % self.n_envs)
                 }
             };
-            self.follow(slot, env, discount, &mut sample);
+            self.follow(slot, env, gamma, &mut sample);
         }
         if let Some(priorities) = &self.priorities {
             sample.weight = priorities.weights(&sample.row, (held - self.n_steps) * self.n_envs);
@@ -192,7 +198,7 @@ impl<const N: usize> Memory<N> {
         sample
     }
 
-    fn follow(&self, slot: usize, env: usize, discount: f32, sample: &mut Sample<N>) {
+    fn follow(&self, slot: usize, env: usize, gamma: f32, sample: &mut Sample<N>) {
         let row_of = |slot: usize| slot % self.n_slots * self.n_envs + env;
         let first = row_of(slot);
         let mut reward = 0.0;
@@ -200,11 +206,11 @@ impl<const N: usize> Memory<N> {
         let mut next = None;
         for row in (slot..slot + self.n_steps).map(row_of) {
             reward += weight * self.reward[row];
-            weight *= discount;
+            weight *= gamma;
             match self.after[row] {
                 After::Next => continue,
-                After::Over => weight = 0.0,
-                After::Cut => next = self.cut.get(&row),
+                After::Terminated => weight = 0.0,
+                After::Truncated => next = self.truncated.get(&row),
             }
             break;
         }
@@ -213,7 +219,7 @@ impl<const N: usize> Memory<N> {
         sample.action.push(self.action[first]);
         sample.reward.push(reward);
         sample.discount.push(weight);
-        // After an episode's end this is another episode's observation: its weight is then 0.
+        // After the end of an episode this is another episode's observation: its discount is 0.
         sample.next_observation.push(*next.unwrap_or(&self.observation[row_of(slot + self.n_steps)]));
     }
 

@@ -1,7 +1,7 @@
-//! Measures trucks that are driven: medians over windows, since other work on a machine disturbs some windows, not most.
+//! Measures env steps per second: medians over windows, since other work on a machine disturbs some windows, not most.
 //!
-//! Steps are asked of a device in runs, and waited for once a run: waiting for each would measure the wait, and never waiting would pile
-//! up commands without bounds.
+//! Steps are queued on a device in runs and waited for once a run: waiting for each would measure the wait, and never
+//! waiting would queue without bound.
 
 use std::time::{Duration, Instant};
 
@@ -10,8 +10,9 @@ use offtrack::simulator::Tally;
 use offtrack::stages::STAGES;
 use serde::Serialize;
 
-use super::mode::Drive;
 use offtrack_training::error::Error;
+
+use super::mode::Driven;
 
 /// A window lasts this long, or a fifth of the time for a size where that is shorter [s].
 const WINDOW: f64 = 0.25;
@@ -42,19 +43,20 @@ pub(super) struct Measured {
     pub fastest_window: f64,
     /// The same speed in rays.
     pub rays_per_second: f64,
-    /// Steps of the whole batch before the first window, in which the episodes, all begun at once, spread out.
+    /// Steps of the whole batch before the first window, in which the episodes, all started at once, spread out.
     pub steps_before: u64,
     /// Steps of the whole batch in all windows.
     pub steps: u64,
     /// Env steps in all windows, as the trucks were counted where they were stepped.
     pub env_steps: u64,
-    /// Episodes that ended in the windows, each begun anew in the same step.
+    /// Episodes that ended in the windows; each truck was reset in the same step.
     pub episodes: u64,
-    /// Steps asked for before they are waited for.
+    /// Steps queued before they are waited for.
     pub steps_a_wait: u64,
     /// Memory of the columns.
     pub bytes_per_truck: f64,
-    /// Median time of each stage when the batch is stepped a stage at a time [ns a truck]; empty where a step is more than the stages.
+    /// Median time of each stage when the batch is stepped a stage at a time [ns a truck]; empty where a step is more
+    /// than the stages.
     #[serde(serialize_with = "as_map")]
     pub stages: Vec<(&'static str, f64)>,
 }
@@ -64,25 +66,26 @@ fn as_map<S: serde::Serializer>(pairs: &[(&'static str, f64)], serializer: S) ->
     serializer.collect_map(pairs.iter().copied())
 }
 
-/// Drives for about so many seconds: a fifth for the trucks to spread out, three fifths for whole steps, the rest a stage at a time.
-pub(super) fn measured(drive: &mut dyn Drive, seconds: f64) -> Result<Measured, Error> {
-    let envs = drive.simulator().n_envs();
-    let (steps_before, steps_a_wait) = spread_out(drive, 0.2 * seconds)?;
+/// Steps the trucks for about so many seconds: a fifth for the trucks to spread out, three fifths for whole steps, the
+/// rest a stage at a time.
+pub(super) fn measured(driven: &mut Driven, seconds: f64) -> Result<Measured, Error> {
+    let envs = driven.simulator().n_envs();
+    let (steps_before, steps_a_wait) = spread_out(driven, 0.2 * seconds)?;
     let window = WINDOW.min(0.2 * seconds);
-    let before = drive.simulator().tally()?;
+    let before = driven.simulator().tally()?;
     let (mut speeds, mut steps) = (Vec::new(), 0);
     let begun = Instant::now();
     while begun.elapsed().as_secs_f64() < 0.6 * seconds {
         let (mut done, begun) = (0, Instant::now());
         while begun.elapsed().as_secs_f64() < window {
-            asked(drive, steps_a_wait)?;
+            step_and_wait(driven, steps_a_wait)?;
             done += steps_a_wait;
         }
         speeds.push((done * envs as u64) as f64 / begun.elapsed().as_secs_f64());
         steps += done;
     }
-    let after = drive.simulator().tally()?;
-    let stages = stage_times(drive, 0.2 * seconds)?;
+    let after = driven.simulator().tally()?;
+    let stages = stage_times(driven, 0.2 * seconds)?;
     let since = |count: fn(&Tally) -> u64| count(&after) - count(&before);
     let (env_steps, episodes) = (since(Tally::env_steps), since(Tally::episodes));
     let speed = median(&mut speeds);
@@ -98,20 +101,20 @@ pub(super) fn measured(drive: &mut dyn Drive, seconds: f64) -> Result<Measured, 
         env_steps,
         episodes,
         steps_a_wait,
-        bytes_per_truck: drive.simulator().bytes() as f64 / envs as f64,
+        bytes_per_truck: driven.simulator().bytes() as f64 / envs as f64,
         stages,
     })
 }
 
 /// Steps for so many seconds: how many, and how many make a run.
-fn spread_out(drive: &mut dyn Drive, seconds: f64) -> Result<(u64, u64), Error> {
+fn spread_out(driven: &mut Driven, seconds: f64) -> Result<(u64, u64), Error> {
     // The first step may compile what it needs.
-    asked(drive, 1)?;
+    step_and_wait(driven, 1)?;
     let (mut steps, mut run) = (1, 1);
     let begun = Instant::now();
     while begun.elapsed().as_secs_f64() < seconds {
         let begun = Instant::now();
-        asked(drive, run)?;
+        step_and_wait(driven, run)?;
         steps += run;
         if begun.elapsed().as_secs_f64() < 0.5 * RUN && run < RUN_MOST {
             run *= 2;
@@ -121,20 +124,20 @@ fn spread_out(drive: &mut dyn Drive, seconds: f64) -> Result<(u64, u64), Error> 
 }
 
 /// A run of steps, done when it returns.
-fn asked(drive: &mut dyn Drive, steps: u64) -> Result<(), Error> {
+fn step_and_wait(driven: &mut Driven, steps: u64) -> Result<(), Error> {
     for _ in 0..steps {
-        drive.step()?;
+        driven.step()?;
     }
-    drive.wait()
+    driven.wait()
 }
 
 /// Median times of the stages, timed for so many seconds, once at least [ns a truck].
-fn stage_times(drive: &mut dyn Drive, seconds: f64) -> Result<Vec<(&'static str, f64)>, Error> {
-    let envs = drive.simulator().n_envs() as f64;
+fn stage_times(driven: &mut Driven, seconds: f64) -> Result<Vec<(&'static str, f64)>, Error> {
+    let envs = driven.simulator().n_envs() as f64;
     let mut times: [Vec<f64>; STAGES.len()] = Default::default();
     let begun = Instant::now();
     while times[0].is_empty() || begun.elapsed().as_secs_f64() < seconds && times[0].len() < STAGE_SAMPLES {
-        let Some(lasted) = drive.step_by_stage()? else { return Ok(Vec::new()) };
+        let Some(lasted) = driven.step_by_stage()? else { return Ok(Vec::new()) };
         for (times, time) in times.iter_mut().zip(lasted) {
             times.push(Duration::as_secs_f64(&time) * 1e9 / envs);
         }

@@ -1,10 +1,6 @@
-//! What drives the trucks while they are measured.
+//! What chooses the actions of the trucks while they are measured.
 
-#[cfg(feature = "gpu")]
-mod device;
-mod host;
-
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,62 +8,57 @@ use offtrack::layout::N_VALUES;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::stages::STAGES;
 use offtrack::world::World;
+use offtrack_training::error::Error;
+use offtrack_training::learner::backend::Backend;
+use offtrack_training::learner::config::Config;
+use offtrack_training::learner::network::Mlp;
+use offtrack_training::learner::rollout::Rollout;
+use offtrack_training::learner::training::Training;
+use offtrack_training::policy::LearnedPolicy;
 use rand::SeedableRng;
 use rand::rngs::SmallRng;
 use serde::Serialize;
 
 use super::Updates;
-use offtrack_training::error::Error;
-use offtrack_training::files;
-use offtrack_training::learner::config::Config;
-use offtrack_training::learner::network::Mlp;
-use offtrack_training::policy::Policy;
 
 /// Hidden layers of the study's own learner.
 const LARGE: [usize; 3] = [512, 512, 1024];
 
-/// A device with the learner's tensors on it; a program without the feature has none.
-#[cfg(feature = "gpu")]
-pub(super) type Shared = offtrack_training::learner::bridge::device::Shared;
-#[cfg(not(feature = "gpu"))]
-pub(super) type Shared = std::convert::Infallible;
-
-/// A way to drive.
+/// Where the actions come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Mode {
-    /// Actions drawn where the trucks are stepped, each as likely as the next
+    /// Uniformly random actions, drawn where the trucks are stepped
     Random,
-    /// Actions drawn from what the policy that comes with the program gives for each observation
+    /// Actions sampled from the distribution of the policy that comes with the program
     Policy,
-    /// The same by an untrained network with hidden layers of 512, 512 and 1024
+    /// The same with an untrained network with hidden layers of 512, 512 and 1024
     LargePolicy,
-    /// A training run under way: every step kept, and the updates of the training file after it
+    /// The training loop: every step remembered, and the updates of the training file after it
     Training,
 }
 
-/// What those modes need that more than chance drives.
+/// What modes with a network need.
 #[derive(Debug)]
 pub(super) struct Learner {
-    policy: Policy,
+    policy: LearnedPolicy,
     config: Config,
 }
 
 impl Learner {
     /// The policy that comes with the program for `benchmark`, and a training file.
     pub(super) fn read(benchmark: &str, config: &Path, world: &World) -> Result<Learner, Error> {
-        let file = files::shipped_policy(benchmark);
-        let policy = Policy::load(&file)?;
-        policy.check(world, &file)?;
+        let policy = LearnedPolicy::shipped_or_default(benchmark)?;
+        policy.check(world)?;
         Ok(Learner { policy, config: Config::read(config)? })
     }
 
-    /// What a step of a training run holds beside the trucks' own.
+    /// What a step of the training loop holds beside the trucks' own.
     pub(super) fn updates(&self) -> Updates {
         Updates { updates_per_step: self.config.learning.updates_per_step, batch: self.config.learning.batch }
     }
 
-    /// The network that drives where nothing is learned.
+    /// The network of a mode without updates.
     fn actor(&self, mode: Mode) -> Mlp {
         match mode {
             Mode::LargePolicy => {
@@ -78,52 +69,85 @@ impl Learner {
         }
     }
 
-    /// The training file for so many trucks. The memory has room for what comes before the first update and for the steps that an update
-    /// needs of each truck: a larger one is no slower, and would keep small adapters from being measured.
-    fn config(&self, envs: usize) -> Config {
+    /// The training file for so many trucks, with the smallest replay buffer that the mode can do with: a larger one is
+    /// no slower, and would keep small adapters from being measured.
+    fn config(&self, mode: Mode, envs: usize) -> Config {
         let mut config = Config { n_envs: envs, ..self.config.clone() };
-        config.memory.capacity = config.memory.warmup.max(envs * (config.learning.n_steps + 2));
+        config.replay_buffer.capacity = match mode {
+            Mode::Training => config.replay_buffer.warmup.max(envs * (config.learning.n_steps + 2)),
+            _ => envs,
+        };
         config
     }
 }
 
-/// Where and how many.
+/// Where the trucks are, and how many.
 pub(super) struct Setting<'a> {
     /// What steps the trucks.
     pub engine: &'a Engine,
     /// Name of its adapter.
-    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "the processor needs none"))]
     pub adapter: &'a str,
-    /// The same with tensors on it, once someone has needed that.
-    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "the processor needs none"))]
-    pub shared: &'a mut Option<Shared>,
-    /// Where they drive.
+    /// The same for tensors too, once a mode has needed that.
+    pub backend: &'a mut Option<Backend>,
+    /// The world.
     pub world: &'a Arc<World>,
-    /// Routes that their episodes run on.
+    /// Routes of the episodes.
     pub routes: &'a [u32],
-    /// How many there are.
+    /// Number of trucks.
     pub envs: usize,
-    /// For modes in which more than chance drives.
+    /// For modes with a network.
     pub learner: Option<&'a Learner>,
 }
 
-/// Trucks that are driven one step after the other.
-pub(super) trait Drive {
-    /// Asks for one step of every truck. A device may still be at it afterwards.
-    fn step(&mut self) -> Result<(), Error>;
+/// Trucks that are stepped in a mode.
+pub(super) enum Driven {
+    /// See [`Mode::Random`].
+    Random(Simulator),
+    /// See [`Mode::Policy`] and [`Mode::LargePolicy`].
+    Acting { rollout: Box<dyn Rollout>, actor: Mlp },
+    /// See [`Mode::Training`].
+    Training(Box<Training>),
+}
 
-    /// Waits until all that was asked for is done.
-    fn wait(&mut self) -> Result<(), Error> {
-        Ok(self.simulator().wait()?)
+impl Driven {
+    /// Requests one step of every truck. A device may still be at it afterwards.
+    pub(super) fn step(&mut self) -> Result<(), Error> {
+        match self {
+            Driven::Random(simulator) => simulator.step_at_random(),
+            Driven::Acting { rollout, actor } => rollout.drive(actor)?,
+            Driven::Training(training) => {
+                training.act(0)?;
+                training.learn(1.0)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits until all that was requested is done.
+    pub(super) fn wait(&mut self) -> Result<(), Error> {
+        match self {
+            Driven::Random(simulator) => Ok(simulator.wait()?),
+            Driven::Acting { rollout, .. } => rollout.wait(),
+            Driven::Training(training) => training.rollout().wait(),
+        }
     }
 
     /// One step a stage at a time with the time of each; none where a step is more than the stages.
-    fn step_by_stage(&mut self) -> Result<Option<[Duration; STAGES.len()]>, Error> {
-        Ok(None)
+    pub(super) fn step_by_stage(&mut self) -> Result<Option<[Duration; STAGES.len()]>, Error> {
+        match self {
+            Driven::Random(simulator) => Ok(Some(simulator.step_at_random_by_stage()?)),
+            _ => Ok(None),
+        }
     }
 
     /// The trucks.
-    fn simulator(&self) -> &Simulator;
+    pub(super) fn simulator(&self) -> &Simulator {
+        match self {
+            Driven::Random(simulator) => simulator,
+            Driven::Acting { rollout, .. } => rollout.simulator(),
+            Driven::Training(training) => training.rollout().simulator(),
+        }
+    }
 }
 
 impl Mode {
@@ -137,47 +161,30 @@ impl Mode {
         }
     }
 
-    /// Trucks that are driven this way.
-    pub(super) fn drive(self, setting: Setting) -> Result<Box<dyn Drive>, Error> {
-        let Some(learner) = setting.learner.filter(|_| self != Mode::Random) else {
-            return Ok(Box::new(Random(setting.simulator()?)));
+    /// Trucks that are stepped this way, at the start of their first episodes.
+    pub(super) fn driven(self, setting: Setting) -> Result<Driven, Error> {
+        let Setting { engine, adapter, backend, world, routes, envs, learner } = setting;
+        let Some(learner) = learner.filter(|_| self != Mode::Random) else {
+            let choice = RouteChoice::Drawn(routes.to_vec());
+            return Ok(Driven::Random(Simulator::on(engine.clone(), world.clone(), envs, 0, choice)?));
         };
-        #[cfg(feature = "gpu")]
-        if matches!(setting.engine, Engine::Gpu { .. }) {
-            return device::drive(self, setting, learner);
+        let opened = match backend.take() {
+            Some(backend) => backend,
+            None if matches!(engine, Engine::Cpu) => Backend::Host,
+            None => Backend::on_device(Some(adapter))?,
+        };
+        let backend = backend.insert(opened);
+        let config = learner.config(self, envs);
+        if self != Mode::Training {
+            let mut rollout = backend.rollout(&config, world, routes.to_vec(), None)?;
+            rollout.set_normalisation(&learner.policy.normalisation);
+            return Ok(Driven::Acting { rollout, actor: learner.actor(self).on(&backend.placement().plain()) });
         }
-        host::drive(self, &setting, learner)
-    }
-}
-
-impl Setting<'_> {
-    /// The trucks, about to begin.
-    fn simulator(&self) -> Result<Simulator, Error> {
-        let choice = RouteChoice::Drawn(self.routes.to_vec());
-        Ok(Simulator::on(self.engine.clone(), self.world.clone(), self.envs, 0, choice)?)
-    }
-}
-
-/// The training file that is measured where none is named.
-pub(super) fn default_config() -> PathBuf {
-    let here = PathBuf::from("training/configs/gpu.toml");
-    if here.is_file() { here } else { files::repository().join(here) }
-}
-
-/// See [`Mode::Random`].
-struct Random(Simulator);
-
-impl Drive for Random {
-    fn step(&mut self) -> Result<(), Error> {
-        self.0.step_at_random();
-        Ok(())
-    }
-
-    fn step_by_stage(&mut self) -> Result<Option<[Duration; STAGES.len()]>, Error> {
-        Ok(Some(self.0.step_at_random_by_stage()?))
-    }
-
-    fn simulator(&self) -> &Simulator {
-        &self.0
+        let mut training = Training::new(backend, &config, world.clone(), routes.to_vec())?;
+        while training.rollout().n_transitions() < config.replay_buffer.warmup || !training.rollout().can_sample() {
+            training.rollout_mut().step_at_random()?;
+        }
+        training.set_normalisation(learner.policy.normalisation.clone());
+        Ok(Driven::Training(Box::new(training)))
     }
 }

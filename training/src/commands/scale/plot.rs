@@ -6,7 +6,6 @@ use glam::DVec2;
 
 use super::mode::Mode;
 use super::{Measured, Scale};
-use offtrack_drawing::Failure;
 use offtrack_drawing::chart::{Chart, Kind, LINES, Line, Panel};
 use offtrack_training::error::Error;
 
@@ -27,7 +26,7 @@ pub(super) fn is_png(file: &Path) -> bool {
 }
 
 /// The picture as SVG text; `device` is the name of what stepped the trucks.
-pub(super) fn drawn(scale: &Scale, device: &str) -> Result<String, Failure> {
+pub(super) fn drawn(scale: &Scale, device: &str) -> Result<String, offtrack_drawing::Error> {
     let mut modes: Vec<Mode> = Vec::new();
     for run in &scale.runs {
         if !modes.contains(&run.mode) {

@@ -1,4 +1,5 @@
-//! Drives the sequences of a certificate again, all at once, through the simulator's own step: nothing in the file is taken on trust.
+//! Drives the sequences of a certificate again, in one batch of the simulator: no claim of the file is believed
+//! unchecked.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,17 +18,19 @@ struct Sequence<'a> {
     actions: Vec<u32>,
 }
 
-/// Fails with the first route whose sequence does not arrive; says how many arrived. Routes of the certificate must be the world's; only
-/// those that `wanted` picks are driven.
+/// Drives the sequences of the routes that `wanted` accepts and gives their number, or the first that does not arrive.
+/// Every such route must be one of the world's.
 pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted: impl Fn(&str) -> bool) -> Result<usize, Error> {
-    let wrong = |message: String| Error::Contents { file: path.to_owned(), message };
+    let wrong = |message: String| Error::contents(path, message);
     let (mut sequences, mut routes) = (Vec::new(), Vec::new());
     for route in certificate.routes.iter().filter(|route| wanted(&route.name)) {
         let index = world.route_names.iter().position(|name| *name == route.name);
         let index = index.ok_or_else(|| wrong(format!("has a route {} that the benchmark does not have", route.name)))?;
         for (found, &[offset, heading]) in route.found.iter().zip(&certificate.starts).filter(|(found, _)| found.arrived()) {
             let damaged = |message| wrong(format!("is a damaged certificate: {}: {message}", route.name));
-            let actions = file::actions(&found.actions, world.params.n_actions).map_err(damaged)?;
+            // Beyond the time limit of its route no action changes the outcome.
+            let limit = world.routes[index].step_limit as usize;
+            let actions = file::actions(&found.actions, world.params.n_actions, limit).map_err(damaged)?;
             routes.push(index as u32);
             sequences.push(Sequence { route: &route.name, start: Start { offset, heading }, actions });
         }
@@ -38,7 +41,7 @@ pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted
     let starts: Vec<Start> = sequences.iter().map(|sequence| sequence.start).collect();
     let mut simulator = Simulator::new(world.clone(), routes.len(), 0, RouteChoice::Fixed(routes))?;
     simulator.reset_from(&starts).map_err(|error| wrong(format!("is a damaged certificate: {error}")))?;
-    // What a truck does after its sequence is nobody's concern, so how it stood at the sequence's end is noted there.
+    // A truck drives on after its sequence, so its end code is taken at the sequence's last step.
     let mut ended = vec![Ended::Running as u32; sequences.len()];
     for step in 0..sequences.iter().map(|sequence| sequence.actions.len()).max().unwrap_or(0) {
         let actions: Vec<u32> = sequences.iter().map(|sequence| sequence.actions.get(step).copied().unwrap_or(0)).collect();

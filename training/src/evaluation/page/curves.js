@@ -1,4 +1,4 @@
-// How training went: a line a figure over env steps or minutes, one pointer for all of them.
+// Training curves over env steps or minutes, with one pointer for all of them.
 
 const HEIGHT = 210, LEFT = 50, RIGHT = 10, TOP = 10, BOTTOM = 36;
 
@@ -12,7 +12,7 @@ function curvesOf(report, metrics) {
   ].filter(({ column }) => metrics[column] !== undefined);
 }
 
-/** Draws one curve into its figure for its present width. */
+/** Draws one curve into its figure for its current width. */
 function drawCurve(figure, curve, metrics, axis) {
   const xs = axis === "minutes" ? metrics.seconds.map((seconds) => seconds / 60) : metrics.env_steps;
   const ys = metrics[curve.column];
@@ -37,7 +37,7 @@ function drawCurve(figure, curve, metrics, axis) {
   figure.at = { x, end, width, xs };
 }
 
-/** Shows the section when there are figures to show. */
+/** Shows the section if there are figures. */
 function showTraining({ report, metrics }) {
   if (metrics === null || metrics.env_steps === undefined || metrics.seconds === undefined) return;
   byId("training").hidden = false;

@@ -1,6 +1,7 @@
-// What the page was given: the report, the roundabouts, the training figures and every recorded episode.
+// The data blocks of the page: the report, the roundabouts, the training figures and every recorded episode.
 //
-// Episodes lie column by column: for each column and episode the difference to the frame before, as zigzag varint, all of it gzipped.
+// Episodes lie column by column: for each column and episode the difference to the frame before, as zigzag varint, all
+// of it gzipped.
 
 /** The text of a data block. */
 const block = (id) => byId(id).textContent.trim();
@@ -25,7 +26,7 @@ async function inflated(text) {
   const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const { readable, writable } = new DecompressionStream("gzip");
   const writer = writable.getWriter();
-  // What is wrong with the bytes is told by the other end.
+  // The reading end reports an error in the bytes.
   const written = writer.write(packed).then(() => writer.close()).catch(() => {});
   const [bytes] = await Promise.all([new Response(readable).arrayBuffer(), written]);
   return new Uint8Array(bytes);
@@ -53,11 +54,11 @@ function decoded(bytes, columns, lengths) {
       }
     }
   }
-  if (at !== bytes.length) throw new Error(`the recorded episodes hold ${bytes.length} bytes where ${at} were expected`);
+  if (at !== bytes.length) throw new Error(`the recorded episodes hold ${bytes.length} bytes ${at} were expected`);
   return found;
 }
 
-/** Everything, read once. */
+/** All data of the page. */
 async function readPage() {
   const report = JSON.parse(block("report"));
   const ground = JSON.parse(block("ground"));
@@ -74,19 +75,19 @@ async function readPage() {
 /** Difference of two headings, in [-pi, pi]. */
 const wrapped = (angle) => Math.atan2(Math.sin(angle), Math.cos(angle));
 
-/** What an episode shows at `frame`, a fraction allowed: poses and figures between two frames lie between theirs. */
+/** The state of an episode at `frame`: linear interpolation between two frames. */
 function instant(page, episode, frame) {
   const { columns, ground } = page, rig = ground.vehicle;
   const last = episode.n_frames - 1;
-  const at = Math.min(Math.max(frame, 0), last), lower = Math.min(Math.floor(at), Math.max(last - 1, 0)), share = at - lower;
+  const at = Math.min(Math.max(frame, 0), last), lower = Math.min(Math.floor(at), Math.max(last - 1, 0)), part = at - lower;
   const here = episode.first + lower, next = here + Math.min(1, last);
-  const between = (name) => columns[name][here] + share * (columns[name][next] - columns[name][here]);
-  const turned = (name) => columns[name][here] + share * wrapped(columns[name][next] - columns[name][here]);
+  const between = (name) => columns[name][here] + part * (columns[name][next] - columns[name][here]);
+  const turned = (name) => columns[name][here] + part * wrapped(columns[name][next] - columns[name][here]);
   const x = between("x"), y = between("y"), heading = turned("heading"), trailerHeading = turned("trailer_heading");
   const ranges = Array.from({ length: ground.n_rays }, (_, ray) => {
     const [a, b] = [columns["range_" + ray][here], columns["range_" + ray][next]];
-    // A ray that jumps to another kerb does so at once.
-    return Math.abs(b - a) < 3 ? a + share * (b - a) : share < 0.5 ? a : b;
+    // A ray that jumps to another kerb is not interpolated.
+    return Math.abs(b - a) < 3 ? a + part * (b - a) : part < 0.5 ? a : b;
   });
   return {
     x, y, heading, trailerHeading, ranges,

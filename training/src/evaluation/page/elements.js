@@ -1,4 +1,4 @@
-// Nodes of the page from a line each, and numbers as the page writes them.
+// Functions that make nodes of the page, and numbers in the page's format.
 
 /** The element with this id. */
 const byId = (id) => document.getElementById(id);
@@ -20,12 +20,12 @@ const html = (tag, attributes = {}, ...children) => filled(document.createElemen
 /** The same in SVG. */
 const svg = (tag, attributes = {}, ...children) => filled(document.createElementNS("http://www.w3.org/2000/svg", tag), attributes, children);
 
-/** A narrow space that does not break, between a number and its unit. */
+/** The narrow no-break space between a number and its unit. */
 const GAP = "\u202f";
 
-/** `value` with so many decimals; a minus sign that is one. */
+/** `value` with this number of decimals and a typographic minus sign. */
 const decimal = (value, decimals) => value.toFixed(decimals).replace(/^-(?=.*[1-9])/, "\u2212").replace(/^-/, "");
-const percent = (share) => decimal(100 * share, 1) + GAP + "%";
+const percent = (fraction) => decimal(100 * fraction, 1) + GAP + "%";
 const metres = (value) => (value === null || value === undefined ? "\u2013" : decimal(value, 2) + GAP + "m");
 const whole = (value) => Math.round(value).toLocaleString("en-GB");
 const degrees = (value, decimals = 0) => decimal(value, decimals) + "°";
@@ -49,7 +49,7 @@ function wilson(successes, trials) {
   return [Math.min(Math.max(centre - half, 0), p), Math.max(Math.min(centre + half, 1), p)];
 }
 
-/** Round values from about `low` to about `high`, about `count` of them. */
+/** About `count` round values within `low` to `high`. */
 function ticks(low, high, count) {
   const rough = (high - low || 1) / count;
   const power = 10 ** Math.floor(Math.log10(rough));
@@ -59,13 +59,13 @@ function ticks(low, high, count) {
   return found;
 }
 
-/** A share of 0 to 1 as a bar on its track, with its interval. */
-function shareBar(share, low, high, colour, height) {
+/** A fraction of 0 to 1 as a bar on its track, with its interval. */
+function fractionBar(fraction, low, high, colour, height) {
   const at = (value) => 100 * value + "%", middle = height / 2;
   const whisker = (x1, x2, y1, y2) => svg("line", { x1: at(x1), x2: at(x2), y1, y2, stroke: "var(--ink)", "stroke-width": 1.5 });
   return svg("svg", { height, "aria-hidden": "true" },
     svg("rect", { x: 0, width: "100%", height, rx: 3, fill: "var(--track)" }),
-    svg("rect", { x: 0, width: at(share), height, rx: 3, fill: colour, "fill-opacity": 0.82 }),
+    svg("rect", { x: 0, width: at(fraction), height, rx: 3, fill: colour, "fill-opacity": 0.82 }),
     whisker(low, high, middle, middle), whisker(low, low, middle - 4, middle + 4), whisker(high, high, middle - 4, middle + 4));
 }
 

@@ -1,4 +1,4 @@
-// Reads what the page was given and fills it. An error is shown on the page, never swallowed.
+// Reads the data blocks and fills the page. An error is shown on the page.
 
 const troubles = [];
 
@@ -10,7 +10,7 @@ function trouble(error) {
 window.addEventListener("error", (event) => trouble(event.error ?? event.message));
 window.addEventListener("unhandledrejection", (event) => trouble(event.reason));
 
-/** A part that fails leaves the others standing. */
+/** An error in one part leaves the others working. */
 function attempt(part) {
   try {
     return part();

@@ -1,9 +1,9 @@
-// The replay: which episode, which moment of it, and the figures of that moment. A link ending in #20m/W-left-3/4/7.5 opens the fifth
-// episode of that route at 7.5 s.
+// The replay of one episode, with the figures of the current frame. A link ending in #20m/W-left-3/4/7.5 opens the
+// fifth episode of that route at 7.5 s.
 
 const toDegrees = (angle) => (180 * angle) / Math.PI;
 
-/** What is read off a moment: name, value, words. Each is also a small curve over the episode. */
+/** The figures of a frame: name, value, text. Each is also a small curve over the episode. */
 const READINGS = [
   ["Speed", (now) => 3.6 * now.speed, (value) => `${decimal(value, 1)}${GAP}km/h`],
   ["Steer angle", (now) => toDegrees(now.steering), (value) => `${degrees(Math.abs(value), 1)} ${value < 0 ? "right" : "left"}`],
@@ -15,7 +15,7 @@ const READINGS = [
   ["Lane distance", (now) => now.laneDistance, metres],
 ];
 
-/** A value over the episode with a line at the present moment. */
+/** A value over the episode with a line at the current frame. */
 function sparkline(values) {
   const low = Math.min(...values, 0), high = Math.max(...values, low + 1e-3), last = Math.max(values.length - 1, 1);
   const y = (value) => 21 - (20 * (value - low)) / (high - low);
@@ -31,7 +31,7 @@ class Replay {
     this.page = page;
     this.frame = 0;
     this.playing = false;
-    /** Calls back when the next picture is due. */
+    /** Calls back for the next picture. */
     this.onFrame = (callback) => requestAnimationFrame(callback);
     this.canvas = byId("scene");
     this.order = this.routesInOrder();
@@ -90,7 +90,7 @@ class Replay {
     this.seek(Number((seconds / this.page.ground.step).toFixed(6)));
   }
 
-  /** Opens what the address asks for; false when it asks for no episode. */
+  /** Opens the episode that the address names; false if it names none. */
   openLink() {
     const asked = location.hash.match(/^#([^/]+\/[^/]+)\/(\d+)(?:\/(\d+(?:\.\d+)?))?$/);
     const route = asked && this.page.ground.routes.findIndex(({ name }) => name === asked[1]);
@@ -121,7 +121,7 @@ class Replay {
   }
 
   play(playing) {
-    // At the end, playing begins again.
+    // At the end, playing starts again.
     if (playing && this.frame >= this.episode.n_frames - 1) this.seek(0);
     this.playing = playing;
     byId("play").textContent = playing ? "❚❚" : "▶";
@@ -139,13 +139,13 @@ class Replay {
     this.onFrame(tick);
   }
 
-  /** One frame on or back, from a whole one. */
+  /** Some frames forwards or back, from a whole frame. */
   step(frames) {
     this.play(false);
     this.seek(Math.round(this.frame) + frames);
   }
 
-  /** The next episode of the list, or the one before. */
+  /** The next episode of the list, or the previous one. */
   turn(by) {
     const index = this.listed.indexOf(this.episode) + by;
     if (0 <= index && index < this.listed.length) this.openEpisode(this.listed[index]);
@@ -154,7 +154,7 @@ class Replay {
   onKey(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const tag = event.target.tagName;
-    // What has keys of its own keeps them.
+    // Controls with keys of their own keep them.
     if (tag === "SELECT" || tag === "SUMMARY" || (event.key === " " && tag === "BUTTON") || (event.key.startsWith("Arrow") && tag === "INPUT" && event.target.type === "range")) return;
     const inside = byId("replay").contains(event.target), box = this.canvas.getBoundingClientRect();
     const visible = box.top < window.innerHeight && 0 < box.bottom;

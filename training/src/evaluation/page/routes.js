@@ -1,5 +1,5 @@
-// A row a route, grouped by roundabout: success with its interval, ends by code, distance to the lane centre, peak load transfer ratio and
-// articulation. A table, so that each bar stands beside its number.
+// A row a route, grouped by roundabout: success with its interval, ends by code, distance to the lane centre, peak load
+// transfer ratio and articulation. A table, so that each bar stands beside its number.
 
 const METRICS = [["success", "Success"], ["ends", "Ends"], ["lane", "Lane"], ["transfer", "LTR"], ["articulation", "Articulation"]];
 
@@ -8,7 +8,7 @@ const endColour = (name) => `var(--end-${name})`;
 /** The roundabout of `20m/N-left-3`. */
 const roundaboutOf = (route) => route.split("/")[0];
 
-/** Routes taken together by roundabout, in the report's order. */
+/** Routes grouped by roundabout, in the report's order. */
 function grouped(routes) {
   const groups = new Map();
   for (const route of routes) {
@@ -22,7 +22,7 @@ function figure(kind, drawing, text, number) {
   return html("td", { class: `figure ${kind}`, style: number && `--number: ${number}px` }, html("div", { class: "cell" }, drawing, html("span", {}, text)));
 }
 
-/** A length from 0 as a bar, a further mark beyond it, a limit as a line. */
+/** A value from 0 as a bar, with a mark for a second value and a line for a limit. */
 function lengthBar(value, scale, { mark, limit } = {}) {
   const at = (value) => (100 * Math.min(Math.max(value / scale, 0), 1)).toFixed(2) + "%";
   const line = (value, colour) => svg("line", { x1: at(value), x2: at(value), y1: 1, y2: 15, stroke: colour, "stroke-width": 2 });
@@ -53,7 +53,7 @@ function cells(summary, scales) {
   const ends = figure("ends", endsBar(summary.ends, summary.episodes), failures.count === 0 ? "all arrived" : `${failures.count} failed`, 76);
   ends.title = failures.words || "all arrived";
   return [
-    figure("success", shareBar(summary.success, summary.success_low, summary.success_high, "var(--good)", 16),
+    figure("success", fractionBar(summary.success, summary.success_low, summary.success_high, "var(--good)", 16),
       `${summary.arrived}/${summary.episodes}  ${decimal(100 * summary.success, 0)}${GAP}%`, 92),
     ends,
     figure("lane", lengthBar(summary.lane_distance_mean, scales.lane, { mark: summary.lane_distance_max }), metres(summary.lane_distance_mean), 50),
@@ -62,8 +62,8 @@ function cells(summary, scales) {
   ];
 }
 
-/** Several routes' figures as one route's. */
-function together(routes) {
+/** The figures of several routes as those of one. */
+function merged(routes) {
   const sum = (value) => routes.reduce((total, route) => total + value(route), 0);
   const most = (value) => Math.max(...routes.map(value));
   const episodes = sum((route) => route.episodes), arrived = sum((route) => route.arrived);
@@ -78,7 +78,7 @@ function together(routes) {
   };
 }
 
-/** Fills the table; `open` is called with the name of a route that is chosen. */
+/** Fills the table; `open` is called with the name of the chosen route. */
 function showRoutes(page, open) {
   const { evaluation } = page, { routes } = evaluation;
   const most = (value) => Math.max(...routes.map(value));
@@ -91,7 +91,7 @@ function showRoutes(page, open) {
   table.dataset.metric = "success";
   const heads = ["Success, 95 % interval", "Ends", "Lane distance, mean | most", "Peak LTR, limit 1", "Peak articulation"];
   const bodies = [...grouped(routes)].map(([roundabout, members]) => html("tbody", {},
-    html("tr", { class: "group" }, html("th", { scope: "rowgroup" }, roundabout), ...cells(together(members), scales)),
+    html("tr", { class: "group" }, html("th", { scope: "rowgroup" }, roundabout), ...cells(merged(members), scales)),
     ...members.map((route) => html("tr", { class: "route" },
       html("th", { scope: "row" },
         html("button", { type: "button", class: "link", "aria-label": `Replay ${route.name}`, onclick: () => open(route.name) }, route.name.split("/").slice(1).join("/") || route.name),

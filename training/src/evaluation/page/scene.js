@@ -1,11 +1,11 @@
-// One instant of an episode from above: kerbs, route, both axles' paths, sensors, the truck.
+// One frame of an episode from above: kerbs, route, both axles' paths, sensors, the truck.
 //
 // Everything is drawn in metres, x east and y north; widths of lines are in pixels and divided by the scale.
 
-/** Around what is shown, and across what a close-up shows [m]. */
+/** Margin around the map, and width of a close-up [m]. */
 const MARGIN = 9, CLOSE_UP = 46;
 
-/** The colours of the page's light or dark dress, by name. */
+/** The colours of the page's light or dark theme, by name. */
 function colours() {
   const style = getComputedStyle(document.documentElement);
   return (name) => style.getPropertyValue("--" + name).trim();
@@ -18,7 +18,7 @@ const lineOf = (points, closed) => {
   return path;
 };
 
-/** What stays the same through an episode, ready to draw. */
+/** The parts of the picture that are constant over an episode. */
 function sceneOf(page, episode) {
   const { ground, columns } = page, route = ground.routes[episode.route], map = ground.maps[route.roundabout];
   const road = new Path2D(), lanes = new Path2D();
@@ -41,7 +41,7 @@ function viewOf(scene, now, width, height, follow) {
   return { x: (west + east) / 2, y: (south + north) / 2, scale };
 }
 
-/** Runs `draw` in the frame of a unit. */
+/** Runs `draw` in the coordinates of a unit. */
 function within(context, x, y, heading, draw) {
   context.save();
   context.translate(x, y);

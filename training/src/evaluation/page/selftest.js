@@ -1,4 +1,5 @@
-// Opened with #selftest the page examines itself and writes what came of it into the document, for a test that reads the document.
+// Opened with #selftest the page checks itself and writes the result into the document, for a test that reads the
+// document.
 
 /** Each check throws when it does not hold. */
 const CHECKS = {
@@ -32,6 +33,9 @@ const CHECKS = {
     same(document.querySelectorAll("#route-table tr.route").length, page.evaluation.routes.length);
     holds(document.querySelectorAll("#route-table tr.route svg").length === 5 * page.evaluation.routes.length, "5 charts a route");
     holds(byId("verdict").textContent.includes(percent(page.evaluation.success)), "headline");
+    same(document.querySelectorAll("#figures thead th").length, comparable(page.evaluation) ? 2 : 1, "columns of the figures");
+    same(document.querySelectorAll("#figures tbody td").length, (comparable(page.evaluation) ? 2 : 1) * document.querySelectorAll("#figures tbody tr").length, "cells");
+    same(byId("study").hidden, !comparable(page.evaluation), "study hidden");
     const curves = [...document.querySelectorAll("#curves .curve")];
     same(byId("training").hidden, page.metrics === null, "training section hidden");
     if (page.metrics !== null) {
@@ -54,7 +58,7 @@ const CHECKS = {
     holds(2 <= replay.frame, `the replay advances: frame ${replay.frame}`);
     key(" ");
     holds(!replay.playing, "space pauses");
-    holds(drawn() !== start, "another moment is another picture");
+    holds(drawn() !== start, "another frame is another picture");
     const before = Math.round(replay.frame);
     key("ArrowRight");
     same(replay.frame, before + 1, "one frame on");
@@ -64,7 +68,7 @@ const CHECKS = {
     holds(drawn() !== without, "sensors are drawn");
     byId("scrub").value = replay.episode.n_frames - 1;
     byId("scrub").dispatchEvent(new Event("input"));
-    same(replay.frame, replay.episode.n_frames - 1, "the last moment");
+    same(replay.frame, replay.episode.n_frames - 1, "the last frame");
   },
   "failed episodes are listed first": ({ page, replay }) => {
     for (const route of page.ground.routes.keys()) {
@@ -81,10 +85,10 @@ function holds(truth, what) {
   if (!truth) throw new Error(`${what}: does not hold`);
 }
 function same(found, expected, what = "") {
-  if (found !== expected) throw new Error(`${what}: ${found} where ${expected} was expected`);
+  if (found !== expected) throw new Error(`${what}: ${found}, expected ${expected}`);
 }
 function close(found, expected, tolerance, what) {
-  if (!(Math.abs(found - expected) <= tolerance)) throw new Error(`${what}: ${found} where ${expected} was expected`);
+  if (!(Math.abs(found - expected) <= tolerance)) throw new Error(`${what}: ${found}, expected ${expected}`);
 }
 
 /** Runs every check and writes a line for each. */

@@ -1,7 +1,8 @@
-//! Recorded episodes in few bytes: whole numbers of a unit, column by column, the difference to the frame before as a zigzag varint (seven
-//! bits a byte, lowest first, the eighth says that more follow; 0, -1, 1, -2 are 0, 1, 2, 3), gzipped, in base64.
+//! Recorded episodes in few bytes: whole numbers of a unit, column by column, the difference to the previous frame as a
+//! zigzag varint (seven bits a byte, lowest first, the eighth bit set if more follow; 0, -1, 1, -2 are 0, 1, 2, 3),
+//! gzipped, in base64.
 //!
-//! Each episode begins again from 0. `data.js` is the other end.
+//! The first difference of each episode is to 0. `data.js` decodes them.
 
 use std::io::Write;
 
@@ -13,25 +14,25 @@ use offtrack::layout::N_RAYS;
 
 use offtrack_drawing::recording::{Frame, Track};
 
-/// Lengths are kept to this [m].
+/// Resolution of lengths \[m].
 const LENGTH: f64 = 0.01;
-/// Angles are kept to this [rad].
+/// Resolution of angles \[rad].
 const ANGLE: f64 = 1e-4;
-/// Speeds [m/s] and load transfer ratios are kept to this.
+/// Resolution of speeds [m/s] and of load transfer ratios.
 const HUNDREDTH: f64 = 0.01;
-/// Ranges are kept to one part in this of a sensor's reach.
+/// Resolution of ranges: this many parts of a sensor's reach.
 const RANGE_PARTS: f64 = 255.0;
 
-/// One figure of every frame.
+/// One value of every frame.
 pub(super) struct Column {
-    /// As the page's scripts call it.
+    /// Its name in the page's scripts.
     pub(super) name: String,
-    /// What its whole numbers count.
+    /// The unit of its whole numbers.
     pub(super) unit: f64,
     value: Box<dyn Fn(&Frame) -> f32>,
 }
 
-/// What is kept of a frame. The trailer's place follows from the tractor's and both headings.
+/// The values kept of a frame. The trailer's position follows from the tractor's and both headings.
 pub(super) fn columns(sensor_range: f32) -> Vec<Column> {
     let column = |name: &str, unit: f64, value: fn(&Frame) -> f32| Column { name: name.to_owned(), unit, value: Box::new(value) };
     let mut columns = vec![
@@ -56,7 +57,7 @@ pub(super) fn columns(sensor_range: f32) -> Vec<Column> {
     columns
 }
 
-/// All tracks as a text.
+/// All tracks as base64.
 pub(super) fn packed(tracks: &[Track], columns: &[Column]) -> std::io::Result<String> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(&differences(tracks, columns))?;
@@ -93,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whole_numbers_are_written_as_protocol_buffers_write_them() {
+    fn whole_numbers_are_encoded_as_in_protocol_buffers() {
         // The table of Protocol Buffers' documentation of its encoding, and its varint of 150 (75 as zigzag).
         for (value, expected) in
             [(0, &[0][..]), (-1, &[1]), (1, &[2]), (-2, &[3]), (75, &[0x96, 0x01]), (i32::MIN, &[255, 255, 255, 255, 15])]

@@ -16,7 +16,7 @@ fn scenario() -> Scenario {
     Scenario::read(&files::repository().join(Path::new("scenarios/attard2023.toml"))).unwrap()
 }
 
-/// The world on the other side of the x axis: traffic keeps left and turns clockwise.
+/// The world mirrored at the x axis: left-hand traffic, clockwise.
 fn mirrored(scenario: &Scenario) -> World {
     let mut world = World::bake(scenario);
     let flip = glam::Vec2::new(1.0, -1.0);
@@ -39,7 +39,7 @@ fn mirrored(scenario: &Scenario) -> World {
 }
 
 #[test]
-fn a_mirrored_truck_in_a_mirrored_world_sees_the_mirror_image_and_is_paid_the_same() {
+fn a_mirrored_truck_in_a_mirrored_world_has_mirrored_observations_and_the_same_rewards() {
     let scenario = scenario();
     let world = World::bake(&scenario);
     let mirror = Mirror::of(&world).unwrap();
@@ -54,7 +54,7 @@ fn a_mirrored_truck_in_a_mirrored_world_sees_the_mirror_image_and_is_paid_the_sa
     };
     let (mut real, mut image) = (begin(world, 1.0), begin(mirrored(&scenario), -1.0));
     let rng = &mut Generator::seed_from_u64(5);
-    let (mut n_ranges, mut n_grazing, mut n_steps, mut turned) = (0, 0, 0, 0.0f32);
+    let (mut n_ranges, mut n_grazing, mut n_steps, mut mirrored) = (0, 0, 0, 0.0f32);
     for _ in 0..60 {
         let held: Vec<bool> = real.batch().truck.iter().zip(&image.batch().truck).map(|(one, other)| one.held + other.held > 0).collect();
         // Mostly straight on, so that trucks come as far as the ring.
@@ -71,7 +71,7 @@ fn a_mirrored_truck_in_a_mirrored_world_sees_the_mirror_image_and_is_paid_the_sa
             assert!(one.ended[env] != other.ended[env] || (one.reward[env] - other.reward[env]).abs() < 0.1);
             let expected = mirror.observation(&one.next_observation[env]);
             for (index, (found, expected)) in other.next_observation[env].iter().zip(expected).enumerate() {
-                turned = turned.max((expected - one.next_observation[env][index]).abs());
+                mirrored = mirrored.max((expected - one.next_observation[env][index]).abs());
                 if (RANGES..RANGES + N_RAYS).contains(&index) {
                     // A ray is right to 2 cm of the 20 m that it reaches, but for one that grazes a kerb.
                     n_ranges += 1;
@@ -86,7 +86,7 @@ fn a_mirrored_truck_in_a_mirrored_world_sees_the_mirror_image_and_is_paid_the_sa
     assert!(10_000 < n_steps, "{n_steps}");
     assert!(1000 * n_grazing < n_ranges, "{n_grazing} of {n_ranges}");
     // What was compared was not the same to both sides.
-    assert!(1.0 < turned, "{turned}");
+    assert!(1.0 < mirrored, "{mirrored}");
 }
 
 fn nearest(clearance: &Clearance) -> f32 {
@@ -109,7 +109,10 @@ fn an_action_table_or_sensors_without_an_image_are_refused() {
     let mut world = World::bake(&scenario());
     world.actions[8].steering *= 0.9;
     let message = Mirror::of(&world).unwrap_err().to_string();
-    assert!(message.starts_with("learning.mirror: true; steering -32.0 deg is in the action table and its opposite is not"), "{message}");
+    assert!(
+        message.starts_with("learning.mirror_augmentation: true; steering -32.0 deg is in the action table and its opposite is not"),
+        "{message}"
+    );
     let mut world = World::bake(&scenario());
     world.rays[3].origin.x += 0.5;
     let message = Mirror::of(&world).unwrap_err().to_string();
@@ -117,7 +120,7 @@ fn an_action_table_or_sensors_without_an_image_are_refused() {
 }
 
 #[test]
-fn half_of_a_sample_is_turned_whole_transitions_at_a_time() {
+fn half_of_a_sample_is_mirrored_whole_transitions_at_a_time() {
     let mirror = Mirror::of(&World::bake(&scenario())).unwrap();
     let one = [0.1; N_VALUES];
     let rows = 2000;
@@ -130,15 +133,15 @@ fn half_of_a_sample_is_turned_whole_transitions_at_a_time() {
         weight: vec![1.0; rows],
         row: vec![0; rows],
     };
-    mirror.turn_half(&mut sample, &mut Generator::seed_from_u64(1));
-    let mut n_turned = 0;
+    mirror.mirror_half(&mut sample, &mut Generator::seed_from_u64(1));
+    let mut n_mirrored = 0;
     for row in 0..rows {
-        let turned = sample.action[row] == 2;
-        n_turned += usize::from(turned);
-        let expected = |seen: [f32; N_VALUES]| if turned { mirror.observation(&seen) } else { seen };
+        let mirrored = sample.action[row] == 2;
+        n_mirrored += usize::from(mirrored);
+        let expected = |seen: [f32; N_VALUES]| if mirrored { mirror.observation(&seen) } else { seen };
         assert_eq!((sample.observation[row], sample.next_observation[row]), (expected(one), expected([0.2; N_VALUES])));
-        assert!(turned || sample.action[row] == 6);
+        assert!(mirrored || sample.action[row] == 6);
     }
     // Four deviations of 2,000 throws of a coin.
-    assert!(n_turned.abs_diff(rows / 2) < 90, "{n_turned}");
+    assert!(n_mirrored.abs_diff(rows / 2) < 90, "{n_mirrored}");
 }

@@ -2,7 +2,7 @@ use super::*;
 use rand::SeedableRng;
 use rand::rngs::SmallRng;
 
-const DISCOUNT: f32 = 0.9;
+const GAMMA: f32 = 0.9;
 
 /// The history of one truck: each step's reward and end. Step `t` is observed as `t`, and leads to `1000 + t`.
 type History = Vec<(f32, Ended)>;
@@ -20,11 +20,11 @@ fn histories(n_steps: usize) -> [History; 2] {
 /// With and without priorities.
 const SETTINGS: [Option<config::Priority>; 2] = [None, Some(config::Priority { exponent: 0.6, correction: 0.4 })];
 
-fn filled(histories: &[History; 2], n_steps: usize, capacity: usize, priority: Option<config::Priority>) -> Memory<2> {
-    let mut memory = Memory::new(2, n_steps, &config::Memory { capacity, warmup: 1, priority });
+fn filled(histories: &[History; 2], n_steps: usize, capacity: usize, priority: Option<config::Priority>) -> ReplayBuffer<2> {
+    let mut buffer = ReplayBuffer::new(2, n_steps, &config::ReplayBuffer { capacity, warmup: 1, priority });
     for (step, (first, second)) in histories[0].iter().zip(&histories[1]).enumerate() {
         let of = |value: usize| [0, 1].map(|env| [value as f32, env as f32]);
-        memory.append(Rows {
+        buffer.append(Rows {
             observation: &of(step),
             action: &[step as u32, step as u32 + 1],
             reward: &[first.0, second.0],
@@ -32,7 +32,7 @@ fn filled(histories: &[History; 2], n_steps: usize, capacity: usize, priority: O
             next_observation: &of(1000 + step),
         });
     }
-    memory
+    buffer
 }
 
 /// The n-step return as its definition reads, from one truck's whole history: (reward, discount, observed next).
@@ -40,19 +40,19 @@ fn reference(history: &History, start: usize, n_steps: usize) -> (f32, f32, Opti
     let mut reward = 0.0;
     for n in 0..n_steps {
         let (step_reward, ended) = history[start + n];
-        reward += DISCOUNT.powi(n as i32) * step_reward;
+        reward += GAMMA.powi(n as i32) * step_reward;
         if ended.terminated() {
             return (reward, 0.0, None);
         }
         if ended.truncated() {
-            return (reward, DISCOUNT.powi(n as i32 + 1), Some((1000 + start + n) as f32));
+            return (reward, GAMMA.powi(n as i32 + 1), Some((1000 + start + n) as f32));
         }
     }
-    (reward, DISCOUNT.powi(n_steps as i32), Some((start + n_steps) as f32))
+    (reward, GAMMA.powi(n_steps as i32), Some((start + n_steps) as f32))
 }
 
-fn check(memory: &Memory<2>, histories: &[History; 2], n_steps: usize) -> Vec<usize> {
-    let sample = memory.sample(4000, DISCOUNT, &mut SmallRng::seed_from_u64(1));
+fn check(buffer: &ReplayBuffer<2>, histories: &[History; 2], n_steps: usize) -> Vec<usize> {
+    let sample = buffer.sample(4000, GAMMA, &mut SmallRng::seed_from_u64(1));
     let mut starts = Vec::new();
     for row in 0..4000 {
         let [step, env] = sample.observation[row].map(|value| value as usize);
@@ -77,7 +77,7 @@ fn returns_over_several_steps_equal_their_definition() {
     for n_steps in [1, 2, 5] {
         for priority in SETTINGS {
             let starts = check(&filled(&histories, n_steps, 200, priority), &histories, n_steps);
-            assert_eq!(starts, (0..60 - n_steps).collect::<Vec<_>>(), "every step that enough others follow can be drawn");
+            assert_eq!(starts, (0..60 - n_steps).collect::<Vec<_>>(), "every step that enough others follow can be sampled");
         }
     }
 }
@@ -86,47 +86,47 @@ fn returns_over_several_steps_equal_their_definition() {
 fn a_full_ring_holds_the_latest_steps_alone() {
     let histories = histories(103);
     for priority in SETTINGS {
-        let memory = filled(&histories, 3, 40, priority);
-        assert_eq!(memory.len(), 40);
+        let buffer = filled(&histories, 3, 40, priority);
+        assert_eq!(buffer.len(), 40);
         // 20 slots, the last three of which nothing follows far enough.
-        assert_eq!(check(&memory, &histories, 3), (83..100).collect::<Vec<_>>());
+        assert_eq!(check(&buffer, &histories, 3), (83..100).collect::<Vec<_>>());
     }
 }
 
 #[test]
-fn a_forgotten_time_out_leaves_nothing_behind() {
+fn a_replaced_truncation_leaves_nothing_behind() {
     let histories = histories(1000);
-    let memory = filled(&histories, 3, 40, None);
-    let held = memory.after.iter().filter(|&&after| after == After::Cut).count();
+    let buffer = filled(&histories, 3, 40, None);
+    let held = buffer.after.iter().filter(|&&after| after == After::Truncated).count();
     assert!(0 < held);
-    assert_eq!(memory.cut.len(), held);
+    assert_eq!(buffer.truncated.len(), held);
 }
 
 #[test]
-fn only_a_followed_step_can_be_drawn() {
+fn only_a_step_that_enough_others_follow_can_be_sampled() {
     let histories = histories(4);
     assert!(filled(&histories, 3, 40, None).can_sample());
     assert!(!filled(&histories, 4, 40, None).can_sample());
 }
 
 #[test]
-fn the_same_seed_draws_the_same_sample() {
-    let memory = filled(&histories(60), 3, 200, None);
-    let draw = |seed| memory.sample(50, DISCOUNT, &mut SmallRng::seed_from_u64(seed));
+fn the_same_seed_gives_the_same_sample() {
+    let buffer = filled(&histories(60), 3, 200, None);
+    let draw = |seed| buffer.sample(50, GAMMA, &mut SmallRng::seed_from_u64(seed));
     assert_eq!(draw(4), draw(4));
     assert_ne!(draw(4), draw(5));
 }
 
 #[test]
-fn what_was_learned_with_a_large_error_is_drawn_more_often_and_weighs_less() {
-    let mut memory = filled(&histories(60), 3, 200, SETTINGS[1]);
-    let all = memory.sample(4000, DISCOUNT, &mut SmallRng::seed_from_u64(1));
+fn a_transition_with_a_large_td_error_is_sampled_more_often_and_weighs_less() {
+    let mut buffer = filled(&histories(60), 3, 200, SETTINGS[1]);
+    let all = buffer.sample(4000, GAMMA, &mut SmallRng::seed_from_u64(1));
     assert!(all.weight.iter().all(|weight| (weight - 1.0).abs() < 1e-6), "new transitions are equal");
     let errors: Vec<f32> = all.row.iter().map(|&row| if row == 10 { 8.0 } else { 0.5 }).collect();
-    memory.learned(&all, &errors);
-    let again = memory.sample(4000, DISCOUNT, &mut SmallRng::seed_from_u64(2));
+    buffer.set_td_errors(&all.row, &errors);
+    let again = buffer.sample(4000, GAMMA, &mut SmallRng::seed_from_u64(2));
     let of = |wanted: bool| again.row.iter().zip(&again.weight).filter(move |&(&row, _)| (row == 10) == wanted);
-    // 114 transitions: 16^0.6 = 5.28 of 118.28 shares; the draws are stratified.
+    // 114 transitions: 16^0.6 = 5.28 of 118.28 of the sum; sampling is stratified.
     assert!((of(true).count() as f64 - 4000.0 * 5.28 / 118.28).abs() < 20.0, "{}", of(true).count());
     // 5.28^-0.4 of the weight of the others, whose weight is the largest.
     assert!(of(false).all(|(_, weight)| (weight - 1.0).abs() < 1e-5));

@@ -1,4 +1,4 @@
-//! The folder of a run: made anew, and never written into by another.
+//! The folder of a run: created for it, and never written by another.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use crate::learner::config::Config;
 pub struct Folder(PathBuf);
 
 impl Folder {
-    /// Makes `runs/name`, or `runs/<training file's name>` with the first free number, and writes the config into it.
+    /// Creates `runs/name`, or `runs/<training file's name>` with the first free number, and writes the config into it.
     pub fn create(runs: &Path, name: Option<&str>, config_file: &Path, config: &Config) -> Result<Folder, Error> {
         std::fs::create_dir_all(runs).map_err(Error::write(runs))?;
         let path = match name {
@@ -23,17 +23,18 @@ impl Folder {
         Ok(folder)
     }
 
-    /// The folder of a run that is to go on.
+    /// The folder of a run that continues. Temporary files of a killed process are removed.
     pub fn of(path: &Path) -> Result<Folder, Error> {
         let folder = Folder(path.to_owned());
         if folder.config().is_file() {
+            let _ = std::fs::remove_file(folder.checkpoint_part());
             return Ok(folder);
         }
-        let expected = "the folder of a run is needed, with the config.toml and the checkpoint.safetensors that it left".to_owned();
+        let expected = "the folder of a run is needed, with the config.toml that it left".to_owned();
         Err(Error::Flag { flag: "--resume", value: path.display().to_string(), expected })
     }
 
-    /// Writes what the run is to do.
+    /// Writes the training file as used.
     pub fn write_config(&self, config: &Config) -> Result<(), Error> {
         files::write_whole(&self.config(), config.to_toml().as_bytes())
     }
@@ -73,12 +74,12 @@ impl Folder {
         &self.0
     }
 
-    /// What the run is to do.
+    /// The training file as used.
     pub fn config(&self) -> PathBuf {
         self.0.join("config.toml")
     }
 
-    /// All that it takes to go on, replaced in one move each time it is written.
+    /// All that it takes to continue, replaced in one move each time.
     pub fn checkpoint(&self) -> PathBuf {
         self.0.join("checkpoint.safetensors")
     }
@@ -88,17 +89,17 @@ impl Folder {
         self.0.join("checkpoint.part")
     }
 
-    /// The driver, replaced in one move each time it is saved.
+    /// The policy, replaced in one move each time.
     pub fn policy(&self) -> PathBuf {
         self.0.join("policy.safetensors")
     }
 
-    /// A row of figures every few seconds.
+    /// A row of metrics every few seconds.
     pub fn metrics(&self) -> PathBuf {
         self.0.join("metrics.csv")
     }
 
-    /// What the run came to.
+    /// The report.
     pub fn report(&self) -> PathBuf {
         self.0.join("report.json")
     }

@@ -1,4 +1,4 @@
-//! A device that the simulator and the tensor library share, and the buffers behind tensors.
+//! A graphics device that the simulator and the tensor library share, and the buffers behind tensors.
 
 use std::sync::{Arc, Mutex};
 
@@ -11,20 +11,20 @@ use offtrack::gpu::{self, Slice};
 
 use crate::error::Error;
 
-/// A graphics device with both on it.
+/// The device, as either knows it.
 #[derive(Clone)]
 pub struct Shared {
-    /// As the simulator knows it.
+    /// For the simulator.
     pub gpu: gpu::Device,
-    /// As the tensor library knows it.
+    /// For tensors.
     pub tensors: Device,
-    /// Hands nothing over, to see what comes of it.
+    /// Skips the flush, to show that it is needed.
     #[cfg(test)]
-    pub(super) is_careless: bool,
+    pub(super) skips_flush: bool,
 }
 
 impl Shared {
-    /// Opens a device and hands it to the tensor library too.
+    /// Opens the first adapter whose name contains `adapter`, and gives it to the tensor library too.
     pub fn open(adapter: Option<&str>) -> Result<Shared, Error> {
         let gpu = gpu::Device::open(adapter).map_err(offtrack::simulator::Error::from)?;
         let setup = WgpuSetup {
@@ -39,17 +39,24 @@ impl Shared {
             gpu,
             tensors,
             #[cfg(test)]
-            is_careless: false,
+            skips_flush: false,
         })
     }
 
-    /// Hands over what the tensor library has gathered, so that what is submitted next comes after it.
-    pub(super) fn hand_over(&self) -> Result<(), Error> {
+    /// Submits the tensor operations that the library has queued, so that the next submission comes after them.
+    pub(super) fn flush(&self) -> Result<(), Error> {
         #[cfg(test)]
-        if self.is_careless {
+        if self.skips_flush {
             return Ok(());
         }
         self.tensors.flush().map_err(|error| Error::Device(error.to_string()))
+    }
+
+    /// Waits for both, the simulator and the tensors.
+    pub fn wait(&self) -> Result<(), Error> {
+        // Queued tensor operations would not be waited for.
+        self.tensors.flush().map_err(|error| Error::Device(error.to_string()))?;
+        Ok(self.gpu.wait().map_err(offtrack::simulator::Error::from)?)
     }
 
     /// An error if the device has failed.
@@ -58,17 +65,17 @@ impl Shared {
     }
 }
 
-/// A buffer that a tensor owns. It stays where it is as long as this is held.
+/// A buffer that a tensor owns. It is not moved while this is held.
 pub(super) struct Owned {
     pub(super) slice: Slice,
     _held: Arc<dyn Send + Sync>,
 }
 
-/// Where a tensor's values lie: 32-bit ones, one after the other.
-fn owned(tensor: Handleful) -> Result<Owned, Error> {
-    let Handleful { client, handle, contiguous } = tensor;
+/// The buffer of a contiguous tensor of 32-bit values.
+fn owned(tensor: Located) -> Result<Owned, Error> {
+    let Located { client, handle, contiguous } = tensor;
     if !contiguous {
-        return Err(Error::Device("a tensor's values do not lie one after the other".to_owned()));
+        return Err(Error::Device("a tensor is not contiguous, or not of 32-bit values".to_owned()));
     }
     let held = client.get_resource::<WgpuServer<AutoCompiler>>(handle).map_err(|error| Error::Device(error.to_string()))?;
     let resource = held.resource();
@@ -76,23 +83,23 @@ fn owned(tensor: Handleful) -> Result<Owned, Error> {
     Ok(Owned { slice, _held: Arc::new(Mutex::new(held)) })
 }
 
-/// What is taken of a tensor to find its buffer.
-struct Handleful {
+/// What finds a tensor's buffer.
+struct Located {
     client: Client,
     handle: Handle,
     contiguous: bool,
 }
 
-/// The buffer behind a tensor of numbers.
+/// The buffer of a tensor of floats.
 pub(super) fn floats<const D: usize>(tensor: &Tensor<D>) -> Result<Owned, Error> {
     let primitive = tensor.clone().try_into_primitive::<Wgpu>().map_err(|error| Error::Device(format!("{error:?}")))?;
     let contiguous = primitive.is_contiguous() && primitive.dtype == DType::F32;
-    owned(Handleful { contiguous, client: primitive.client, handle: primitive.handle })
+    owned(Located { contiguous, client: primitive.client, handle: primitive.handle })
 }
 
-/// The buffer behind a tensor of whole numbers.
+/// The buffer of a tensor of integers.
 pub(super) fn integers<const D: usize>(tensor: &Tensor<D, Int>) -> Result<Owned, Error> {
     let primitive = tensor.clone().try_into_primitive::<Wgpu>().map_err(|error| Error::Device(format!("{error:?}")))?;
     let contiguous = primitive.is_contiguous() && primitive.dtype == DType::I32;
-    owned(Handleful { contiguous, client: primitive.client, handle: primitive.handle })
+    owned(Located { contiguous, client: primitive.client, handle: primitive.handle })
 }

@@ -1,4 +1,4 @@
-//! The page: a map with axes under a title, a legend below. Composes what the other parts draw.
+//! A figure: a map with axes below a title and above a legend.
 
 use std::fmt::Write;
 
@@ -8,15 +8,15 @@ use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::{Lane, Route};
 use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Group, Path, Rectangle};
-use ttf_parser::FaceParsingError;
 
+use crate::Error;
 use crate::legend::{self, Entry};
 use crate::lettering::{Align, Lettering};
-use crate::road::Ground;
+use crate::road::Road;
 use crate::sweep::Sweep;
 
-/// Colours that remain apart for colour-blind readers and in grey: the hues are those of P. Tol's "vibrant" scheme. Those of areas are
-/// multiples of 15, so that a PNG, which has no others, shows them as they are.
+/// Colours that differ for colour-blind readers and in grey: the hues of P. Tol's "vibrant" scheme. Channels of areas
+/// are multiples of 15, which the quantisation of a PNG leaves as they are.
 pub(crate) mod colour {
     pub const INK: &str = "#1a1a1a";
     pub const FAINT: &str = "#6e6e6e";
@@ -39,50 +39,52 @@ pub(crate) mod colour {
     pub const RAY: &str = "#aa3377";
 }
 
-/// Width of the page [px].
-pub const WIDTH: f64 = 1000.0;
-/// From the page's left, right and upper edge to the map [px].
+/// Width of the page \[px].
+pub(crate) const WIDTH: f64 = 1000.0;
+/// Margins from the page's left, right and upper edge to the map \[px].
 const LEFT: f64 = 48.0;
 const RIGHT: f64 = 16.0;
 const TOP: f64 = 72.0;
-/// Room for the numbers under the map [px].
+/// Height of the numbers below the map \[px].
 const AXIS: f64 = 30.0;
-/// Room around the routes [m].
+/// Margin around the routes \[m].
 const MARGIN: f64 = 8.0;
-/// With a swept path: how much is shown of a route before and after the ring [m].
+/// With a swept path: length of the route shown before and after the ring \[m].
 const SHOWN: f64 = 25.0;
 
-/// Lengths of the routes before and after the ring [m].
+/// Lengths of the routes before and after the ring \[m].
 #[derive(Debug, Clone, Copy)]
 pub struct Straights {
+    /// Length before the ring \[m].
     pub approach: f64,
+    /// Length after the ring \[m].
     pub departure: f64,
 }
 
-/// From the roundabout's frame to the page: x right, y up, metres; to x right, y down, pixels.
-pub struct View {
-    /// South-west and north-east corner of the map [m].
+/// The transformation from the roundabout (metres, x east, y north) to the page (pixels, x right, y down).
+pub(crate) struct View {
+    /// South-west and north-east corner of the map \[m].
     pub low: DVec2,
     pub high: DVec2,
     /// Pixels in a metre [px/m].
     pub scale: f64,
-    /// Upper left corner of the map on the page [px].
+    /// Upper left corner of the map on the page \[px].
     corner: DVec2,
 }
 
-/// How a map lies on its page.
-pub struct Layout {
-    /// Upper left corner of the map [px].
+/// Position and size of a map on its page.
+pub(crate) struct Layout {
+    /// Upper left corner of the map \[px].
     pub corner: DVec2,
-    /// Width of the map [px].
+    /// Width of the map \[px].
     pub width: f64,
-    /// Room around what must be shown [m].
+    /// Margin around the points that must be shown \[m].
     pub margin: f64,
-    /// Least width of the map as a share of its height.
+    /// Least ratio of the map's width to its height.
     pub ratio: f64,
 }
 
-/// The layout of a picture for print. A map much higher than wide leaves no room for the page below it.
+/// The layout of a still. The ratio limits the height of the page.
 const PRINTED: Layout = Layout { corner: DVec2::new(LEFT, TOP), width: WIDTH - LEFT - RIGHT, margin: MARGIN, ratio: 0.85 };
 
 impl View {
@@ -95,14 +97,14 @@ impl View {
     pub fn laid_out(points: impl Iterator<Item = DVec2>, layout: &Layout) -> View {
         let (low, high) = points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
         let (low, high) = (low - layout.margin, high + layout.margin);
-        // A map much wider than high leaves no room for the legend.
+        // The map is at least half as high as wide.
         let centre = (low + high) / 2.0;
         let extent = high - low;
         let extent = extent.max(DVec2::new(extent.y * layout.ratio, extent.x * 0.5));
         View { low: centre - extent / 2.0, high: centre + extent / 2.0, scale: layout.width / extent.x, corner: layout.corner }
     }
 
-    /// Where `p` lies on the page [px].
+    /// Where `p` lies on the page \[px].
     pub fn point(&self, p: DVec2) -> DVec2 {
         self.corner + DVec2::new(p.x - self.low.x, self.high.y - p.y) * self.scale
     }
@@ -122,7 +124,7 @@ impl View {
             match *piece {
                 Piece::Segment { to, .. } => self.step(&mut data, 'L', to),
                 Piece::Arc { radius, sweep, .. } => {
-                    // Path data cannot tell a whole circle from none: arcs go in halves.
+                    // Path data cannot express a whole circle as one arc, so arcs are halved.
                     let (r, turn) = (number(radius * self.scale), u8::from(sweep < 0.0));
                     for end in [piece.point_at(piece.length() / 2.0), piece.end()] {
                         self.step(&mut data, format!("A{r} {r} 0 0 {turn} "), end);
@@ -164,24 +166,23 @@ impl View {
     }
 }
 
-/// A number for path data: to a hundredth of a pixel, no longer than it must be.
-pub fn number(value: f64) -> f64 {
+/// A number for path data, rounded to a hundredth of a pixel.
+pub(crate) fn number(value: f64) -> f64 {
     (value * 100.0).round() / 100.0
 }
 
-/// The roundabout with all its routes, as SVG text.
-pub fn of_all(roundabout: &Roundabout, routes: &[Route], straights: Straights, gutter: Gutter) -> Result<String, FaceParsingError> {
+/// The roundabout with all its routes, as SVG text. `straights` are the lengths that `routes` were made with.
+///
+/// # Errors
+///
+/// [`Error::Typeface`].
+pub fn roundabout(roundabout: &Roundabout, routes: &[Route], straights: Straights, gutter: Gutter) -> Result<String, Error> {
     let lettering = Lettering::new()?;
     let view = View::around(routes.iter().flat_map(|route| &route.waypoints).map(|waypoint| waypoint.position));
-    let ground = Ground::new(&view, &lettering, roundabout, routes, straights, gutter);
-    let map = Group::new()
-        .add(ground.surface())
-        .add(ground.distances())
-        .add(ground.lanes())
-        .add(ground.kerbs())
-        .add(ground.routes())
-        .add(ground.arm_names());
-    let legend: Vec<Entry> = ground.legend().into_iter().chain(ground.route_legend()).collect();
+    let road = Road::new(&view, &lettering, roundabout, routes, straights, gutter);
+    let map =
+        Group::new().add(road.surface()).add(road.distances()).add(road.lanes()).add(road.kerbs()).add(road.routes()).add(road.arm_names());
+    let legend: Vec<Entry> = road.legend().into_iter().chain(road.route_legend()).collect();
     let title = format!("Roundabout {}: {} arms, {} routes", roundabout.name, roundabout.arms().count(), routes.len());
     let [inner, outer] = Lane::BOTH.map(|lane| roundabout.lane_radius(lane));
     let radius = roundabout.outer_radius();
@@ -190,23 +191,17 @@ pub fn of_all(roundabout: &Roundabout, routes: &[Route], straights: Straights, g
 }
 
 /// What a truck sweeps on one of the routes, as SVG text.
-pub fn of_sweep(
-    roundabout: &Roundabout,
-    routes: &[Route],
-    straights: Straights,
-    gutter: Gutter,
-    sweep: &Sweep,
-) -> Result<String, FaceParsingError> {
+pub fn swept_path(roundabout: &Roundabout, routes: &[Route], straights: Straights, gutter: Gutter, sweep: &Sweep) -> Result<String, Error> {
     let lettering = Lettering::new()?;
     let line = sweep.route.centre_line.part(straights.approach - SHOWN, sweep.route.centre_line.length() - straights.departure + SHOWN);
     let view = View::around(line.polyline(0.1).into_iter());
-    let ground = Ground::new(&view, &lettering, roundabout, routes, straights, gutter);
-    let solids = Path::new().set("d", view.frame() + &ground.kerb_data()).set("clip-rule", "evenodd");
+    let road = Road::new(&view, &lettering, roundabout, routes, straights, gutter);
+    let solids = Path::new().set("d", view.frame() + &road.kerb_data()).set("clip-rule", "evenodd");
     let definitions = sweep.shapes(&view).add(ClipPath::new().set("id", "solids").add(solids));
     let overlaps = Group::new().set("clip-path", "url(#solids)").add(sweep.overlaps());
-    let map = Group::new().add(ground.surface()).add(sweep.areas()).add(ground.distances()).add(ground.lanes()).add(overlaps);
-    let map = map.add(ground.kerbs()).add(sweep.marks(&view, &lettering)).add(ground.arm_names());
-    let legend: Vec<Entry> = sweep.legend().into_iter().chain(ground.legend()).collect();
+    let map = Group::new().add(road.surface()).add(sweep.areas()).add(road.distances()).add(road.lanes()).add(overlaps);
+    let map = map.add(road.kerbs()).add(sweep.marks(&view, &lettering)).add(road.arm_names());
+    let legend: Vec<Entry> = sweep.legend().into_iter().chain(road.legend()).collect();
     let verdict = if sweep.suffices { "its own lane suffices" } else { "its own lane does not suffice" };
     let title = format!("{}: {verdict}", sweep.route.name);
     let subtitle = format!("Swept path of {}, front axle on the lane's centre: {}.", sweep.driven, sweep.summary());
@@ -214,7 +209,7 @@ pub fn of_sweep(
 }
 
 /// A whole page as SVG text.
-pub fn composed(
+pub(crate) fn composed(
     view: &View,
     lettering: &Lettering,
     title: &str,
@@ -266,20 +261,20 @@ fn axes(view: &View, lettering: &Lettering) -> Group {
     group.add(Path::new().set("d", data).set("stroke", colour::INK).set("stroke-width", 1.2))
 }
 
-/// Ten metres, in the map's lower right corner.
-pub fn scale_bar(view: &View, lettering: &Lettering) -> Group {
+/// A bar of ten metres in the map's lower right corner.
+pub(crate) fn scale_bar(view: &View, lettering: &Lettering) -> Group {
     let right = view.point(DVec2::new(view.high.x, view.low.y)) - DVec2::new(16.0, 14.0);
     let length = 10.0 * view.scale;
     let box_corner = right - DVec2::new(length + 14.0, 32.0);
-    let ground = Rectangle::new().set("x", number(box_corner.x)).set("y", number(box_corner.y)).set("rx", 4);
-    let ground = ground.set("width", number(length + 24.0)).set("height", 42).set("fill", "white").set("fill-opacity", 0.85);
+    let paper = Rectangle::new().set("x", number(box_corner.x)).set("y", number(box_corner.y)).set("rx", 4);
+    let paper = paper.set("width", number(length + 24.0)).set("height", 42).set("fill", "white").set("fill-opacity", 0.85);
     let data = format!("M{} {}v6h{}v-6", number(right.x - length), number(right.y - 6.0), number(length));
     let bar = Path::new().set("d", data).set("fill", "none").set("stroke", colour::INK).set("stroke-width", 2.0);
     let words = lettering.text("10 m", right - DVec2::new(length / 2.0, 10.0), 15.0, Align::Middle, colour::INK);
-    Group::new().add(ground).add(bar).add(words)
+    Group::new().add(paper).add(bar).add(words)
 }
 
-/// With a minus sign where there is one.
+/// A coordinate with a typographic minus sign.
 fn metres(value: f64) -> String {
     if value < 0.0 { format!("\u{2212}{}", -value) } else { value.abs().to_string() }
 }
