@@ -22,7 +22,7 @@ const WHOLE_BITS: u32 = 0x7f_ffff;
 /// Signed distance to the kerbs of one roundabout.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
-    /// South-west corner of the grid [m].
+    /// South-west corner of the grid \[m].
     pub origin: Vec2,
     /// Cells in a metre [1/m].
     pub cells_per_metre: f32,
@@ -37,7 +37,7 @@ pub struct Field {
     /// exceed the distance, because a march may underestimate it. So the finest blocks, at kinks between two kerbs, are
     /// not read there.
     pub march_cells: Vec<u32>,
-    /// Blocks of distances at the sub-cells' corners [m]. A block has one row of pairs per row of sub-cells, from the
+    /// Blocks of distances at the sub-cells' corners \[m]. A block has one row of pairs per row of sub-cells, from the
     /// south, and in it one pair per line of corners, from the west: the distances at the row's southern and northern
     /// edge. So the four corners of a sub-cell are adjacent.
     pub values: Vec<[f32; 2]>,
@@ -46,7 +46,7 @@ pub struct Field {
 /// The field at several points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Samples<const N: usize> {
-    /// Signed distance [m].
+    /// Signed distance \[m].
     pub distance: [f32; N],
     /// Derivative to the east.
     pub east: [f32; N],
@@ -55,7 +55,7 @@ pub(crate) struct Samples<const N: usize> {
 }
 
 impl Field {
-    /// Signed distance at `p`. Outside the grid everything is solid and the value keeps falling [m].
+    /// Signed distance at `p`. Outside the grid everything is solid and the value keeps falling \[m].
     ///
     /// Up to 5 m from a kerb the error is at most 1 cm, or 3 cm within 0.5 m of a kink of the distance; on a smooth
     /// kerb it is at most 1 mm.
@@ -111,7 +111,7 @@ impl Field {
         Samples { distance, east, north }
     }
 
-    /// Size of the tables [bytes].
+    /// Size of the tables \[bytes].
     pub fn bytes(&self) -> usize {
         size_of_val(self.cells.as_slice()) + size_of_val(self.march_cells.as_slice()) + size_of_val(self.values.as_slice())
     }

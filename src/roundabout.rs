@@ -101,22 +101,22 @@ impl Roundabout {
         self.arms.iter().map(|arm| arm.name.as_str())
     }
 
-    /// Radius of the central island's kerb face [m].
+    /// Radius of the central island's kerb face \[m].
     pub fn island_radius(&self) -> f64 {
         self.ring.island_radius
     }
 
-    /// Width of the strip between a kerb's face and the lane beside it [m].
+    /// Width of the strip between a kerb's face and the lane beside it \[m].
     pub fn gutter(&self) -> f64 {
         self.ring.gutter
     }
 
-    /// Radius of the outer kerb's face; approaches and departures are measured from this circle [m].
+    /// Radius of the outer kerb's face; approaches and departures are measured from this circle \[m].
     pub fn outer_radius(&self) -> f64 {
         self.ring.outer()
     }
 
-    /// Radius of the ring lane's centre line [m].
+    /// Radius of the ring lane's centre line \[m].
     pub fn lane_radius(&self, lane: Lane) -> f64 {
         lane::radius(&self.ring, lane)
     }
@@ -144,7 +144,7 @@ impl Roundabout {
     }
 
     /// All routes, five per entry, ordered by entry arm, lane and exit. They lead from `approach` before the ring to
-    /// `departure` after it, with waypoints every `spacing` [m].
+    /// `departure` after it, with waypoints every `spacing` \[m].
     ///
     /// # Errors
     ///

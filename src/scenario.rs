@@ -15,13 +15,13 @@ use crate::route::Route;
 use crate::shipped::{Kind, Source};
 use crate::vehicle::Vehicle;
 
-/// Default length of a route before the ring [m].
+/// Default length of a route before the ring \[m].
 pub const APPROACH: f64 = 40.0;
-/// Default length of a route after the ring [m].
+/// Default length of a route after the ring \[m].
 pub const DEPARTURE: f64 = 35.0;
-/// Default distance between waypoints [m].
+/// Default distance between waypoints \[m].
 pub const WAYPOINT_SPACING: f64 = 2.0;
-/// Default width of the distance field's cells [m].
+/// Default width of the distance field's cells \[m].
 pub const FIELD_CELL: f64 = 0.5;
 
 /// The two disjoint sets of a benchmark's routes.
@@ -61,29 +61,29 @@ pub struct Scenario {
     pub vehicle: Vehicle,
     /// Name of one of the vehicle's loads.
     pub load: String,
-    /// Lock of the front wheels in place of the vehicle's own [rad].
+    /// Lock of the front wheels in place of the vehicle's own \[rad].
     pub steer_max: Option<f64>,
     /// Whether a gutter may be driven on.
     pub gutter: Gutter,
-    /// Duration of a step [s].
+    /// Duration of a step \[s].
     pub step: f64,
     /// Physics sub-steps in a step.
     pub n_substeps: u32,
-    /// Width of the distance field's cells [m].
+    /// Width of the distance field's cells \[m].
     pub cell: f64,
     /// Steer levels as fractions of the lock, left positive.
     pub steer_levels: Vec<f64>,
     /// Target speeds [m/s].
     pub speeds: Vec<f64>,
-    /// Range of the distance sensors [m].
+    /// Range of the distance sensors \[m].
     pub sensor_range: f64,
-    /// Largest lateral offset at the start [m].
+    /// Largest lateral offset at the start \[m].
     pub start_offset: f64,
-    /// Largest heading error at the start [rad].
+    /// Largest heading error at the start \[rad].
     pub start_heading: f64,
-    /// Distance to the next waypoint beyond which the truck has strayed [m].
+    /// Distance to the next waypoint beyond which the truck has strayed \[m].
     pub stray_distance: f64,
-    /// Articulation beyond which the truck is jackknifed [rad].
+    /// Articulation beyond which the truck is jackknifed \[rad].
     pub jackknife_angle: f64,
     /// Load transfer ratio from which the truck has rolled over.
     pub rollover_ratio: f64,
@@ -93,11 +93,11 @@ pub struct Scenario {
     pub waypoint_weight: f64,
     /// Weight of the lane-distance term in the reward of each step.
     pub lane_distance_weight: f64,
-    /// Distance to the lane centre at which that term is 1 [m].
+    /// Distance to the lane centre at which that term is 1 \[m].
     pub lane_distance_limit: f64,
     /// Weight of the clearance term in the reward of each step.
     pub clearance_weight: f64,
-    /// Clearance to a kerb below which that term counts [m].
+    /// Clearance to a kerb below which that term counts \[m].
     pub clearance_limit: f64,
     /// Reward for a failure.
     pub failure_weight: f64,
@@ -164,7 +164,7 @@ impl Scenario {
         self.places.iter().enumerate().flat_map(|(index, place)| place.routes.iter().map(move |route| (index, route)))
     }
 
-    /// The action table for a lock [rad]: (steer angle, target speed) pairs, the speed varying slowest.
+    /// The action table for a lock \[rad]: (steer angle, target speed) pairs, the speed varying slowest.
     pub fn actions(&self, lock: f32) -> Vec<Action> {
         let pair = |speed: f64, level: f64| Action { steering: level as f32 * lock, speed: speed as f32 };
         self.speeds.iter().flat_map(|&speed| self.steer_levels.iter().map(move |&level| pair(speed, level))).collect()

@@ -40,23 +40,23 @@ pub struct Vehicle {
 /// The towing unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tractor {
-    /// Front axle ahead of the drive axle [m].
+    /// Front axle ahead of the drive axle \[m].
     pub wheelbase: f64,
-    /// Fifth wheel ahead of the drive axle, negative when behind [m].
+    /// Fifth wheel ahead of the drive axle, negative when behind \[m].
     pub fifth_wheel: f64,
-    /// Front end ahead of the front axle [m].
+    /// Front end ahead of the front axle \[m].
     pub front_overhang: f64,
-    /// Rear end behind the drive axle [m].
+    /// Rear end behind the drive axle \[m].
     pub rear_overhang: f64,
-    /// Width of the outline [m].
+    /// Width of the outline \[m].
     pub width: f64,
-    /// Largest steer angle [rad].
+    /// Largest steer angle \[rad].
     pub steer_max: f64,
     /// Fastest change of the steer angle [rad/s].
     pub steer_rate: f64,
     /// Lateral acceleration that the tyres can hold, in units of gravity.
     pub friction: f64,
-    /// Mass [kg].
+    /// Mass \[kg].
     pub mass: f64,
     /// Its roll.
     pub suspension: Suspension,
@@ -65,20 +65,20 @@ pub struct Tractor {
 /// The towed unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trailer {
-    /// Kingpin ahead of the axle group's centre [m].
+    /// Kingpin ahead of the axle group's centre \[m].
     pub wheelbase: f64,
-    /// Front end ahead of the kingpin [m].
+    /// Front end ahead of the kingpin \[m].
     pub kingpin_to_front: f64,
-    /// Rear end behind the kingpin [m].
+    /// Rear end behind the kingpin \[m].
     pub kingpin_to_rear: f64,
-    /// Width of the outline [m].
+    /// Width of the outline \[m].
     pub width: f64,
 }
 
 /// A load of the trailer, and how the truck moves with it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Load {
-    /// Mass of the trailer with its load [kg].
+    /// Mass of the trailer with its load \[kg].
     pub mass: f64,
     /// Slip angle of an axle per lateral acceleration [rad/(m/s^2)].
     pub slip: f64,
@@ -106,11 +106,11 @@ pub struct SpeedControl {
 /// Positions of the distance sensors, each in its unit's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensors {
-    /// Tractor sensors, from 90 deg left to 90 deg right: (ahead of the drive axle, left) [m].
+    /// Tractor sensors, from 90 deg left to 90 deg right: (ahead of the drive axle, left) \[m].
     pub tractor_mounts: [DVec2; N_TRACTOR_RAYS],
-    /// Foremost trailer sensor, behind the trailer's front end [m].
+    /// Foremost trailer sensor, behind the trailer's front end \[m].
     pub trailer_first: f64,
-    /// Rearmost trailer sensor, behind the trailer's front end [m].
+    /// Rearmost trailer sensor, behind the trailer's front end \[m].
     pub trailer_last: f64,
 }
 
@@ -160,7 +160,7 @@ impl Vehicle {
     }
 
     /// Reach of the straight truck behind and ahead of the middle of its wheelbase, the point that follows a route,
-    /// when it is turned by up to `heading` [rad] against the route [m].
+    /// when it is turned by up to `heading` \[rad] against the route \[m].
     pub fn reach(&self, heading: f64) -> (f64, f64) {
         let Tractor { wheelbase, fifth_wheel, front_overhang, rear_overhang, width, .. } = self.tractor;
         let behind_axle = (self.trailer.kingpin_to_rear - fifth_wheel).max(rear_overhang);
@@ -174,13 +174,13 @@ impl Vehicle {
         (turned(0.5 * wheelbase + behind_axle), turned(ahead_of_axle - 0.5 * wheelbase))
     }
 
-    /// Mass of tractor, trailer and load [kg].
+    /// Mass of tractor, trailer and load \[kg].
     pub fn gross_mass(&self, load: &Load) -> f64 {
         self.tractor.mass + load.mass
     }
 
     /// Radius of the circle inside the trailer's axle group when the tractor's outer front corner runs on a circle of
-    /// radius `outer` [m]; `None` if the combination cannot turn so tightly. Directive 96/53/EC requires 5.30 m at
+    /// radius `outer` \[m]; `None` if the combination cannot turn so tightly. Directive 96/53/EC requires 5.30 m at
     /// 12.50 m.
     pub fn turning_circle_inner_radius(&self, outer: f64) -> Option<f64> {
         let Tractor { wheelbase, front_overhang, width, .. } = self.tractor;
@@ -189,8 +189,8 @@ impl Vehicle {
         Some(steady.trailer_radius - 0.5 * self.trailer.width)
     }
 
-    /// The constants that the stages need, for one of the loads and sub-steps of `substep` [s]. `steer_max` replaces
-    /// the vehicle's own lock [rad].
+    /// The constants that the stages need, for one of the loads and sub-steps of `substep` \[s]. `steer_max` replaces
+    /// the vehicle's own lock \[rad].
     ///
     /// # Panics
     ///

@@ -6,25 +6,25 @@ use rayon::prelude::*;
 use super::{Field, LEVEL_BITS};
 use crate::geometry::{Nearby, Outline};
 
-/// Solid ground kept around the outline [m].
+/// Solid ground kept around the outline \[m].
 const MARGIN: f64 = 1.0;
-/// Finest sub-cell [m]. A kink in the middle of one is off by half of it: 1.6 cm.
+/// Finest sub-cell \[m]. A kink in the middle of one is off by half of it: 1.6 cm.
 const FINEST: f64 = 1.0 / 32.0;
 /// Cells a side of a tile; its cells use one culled outline.
 const TILE: usize = 4;
-/// Up to this distance from a kerb a ray may end, and a grazing ray multiplies the error by 11 [m].
+/// Up to this distance from a kerb a ray may end, and a grazing ray multiplies the error by 11 \[m].
 const SURFACE: f64 = 0.4;
-/// Largest error there [m].
+/// Largest error there \[m].
 const SURFACE_TOLERANCE: f64 = 5e-4;
-/// Up to this distance from a kerb the stated accuracy holds [m].
+/// Up to this distance from a kerb the stated accuracy holds \[m].
 const PROMISED: f64 = 6.0;
-/// Largest error there except at kinks [m].
+/// Largest error there except at kinks \[m].
 const TOLERANCE: f64 = 8e-3;
 
 /// In sub-cells up to this width an error above [`TOLERANCE`] is that of a kink: a kerb bend of 0.2 m radius is
-/// interpolated better [m].
+/// interpolated better \[m].
 const KINK: f64 = 0.125;
-/// Largest error there at the sampled points, so that between them it stays below 3 cm [m].
+/// Largest error there at the sampled points, so that between them it stays below 3 cm \[m].
 const KINK_TOLERANCE: f64 = 0.018;
 
 /// One cell's block.
@@ -102,7 +102,7 @@ fn blocks(nearby: &Nearby, corner: DVec2, cell: f64) -> Blocks {
     Blocks { march: march.filter(|march| march.level < exact.level), exact }
 }
 
-/// Largest error where the distance is `exact` and sub-cells are `step` wide [m].
+/// Largest error where the distance is `exact` and sub-cells are `step` wide \[m].
 fn tolerance(exact: f64, step: f64) -> f64 {
     if exact.abs() < SURFACE {
         SURFACE_TOLERANCE
@@ -114,7 +114,7 @@ fn tolerance(exact: f64, step: f64) -> f64 {
 }
 
 /// The coarsest block whose errors are all allowed, else the finest. The arguments of `allowed` are the interpolation's
-/// error, the exact distance and the sub-cells' width [m].
+/// error, the exact distance and the sub-cells' width \[m].
 fn block(nearby: &Nearby, corner: DVec2, cell: f64, allowed: impl Fn(f64, f64, f64) -> bool) -> Block {
     let finest = (cell / FINEST).log2().ceil().clamp(0.0, f64::from((1 << LEVEL_BITS) - 1)) as u32;
     let mut level = 0;
@@ -137,7 +137,7 @@ fn block(nearby: &Nearby, corner: DVec2, cell: f64, allowed: impl Fn(f64, f64, f
     }
 }
 
-/// The error of interpolation between the corners of a sub-cell, and the exact distance, at points all over it [m].
+/// The error of interpolation between the corners of a sub-cell, and the exact distance, at points all over it \[m].
 fn errors(
     nearby: &Nearby,
     corner: DVec2,

@@ -10,9 +10,9 @@ use crate::geometry::{Curve, Outline};
 use crate::reader::{Error, Reader, differing, shown};
 use crate::route::Lane;
 
-/// Half the width of a truck and 5 cm: a lane whose centre line is nearer to a kerb cannot be driven [m].
+/// Half the width of a truck and 5 cm: a lane whose centre line is nearer to a kerb cannot be driven \[m].
 const NEAREST: f64 = 1.3;
-/// Width of a truck: two lanes whose centre lines are nearer to each other cannot both be driven [m].
+/// Width of a truck: two lanes whose centre lines are nearer to each other cannot both be driven \[m].
 const LANES_APART: f64 = 2.5;
 
 /// A rounding arc that does not fit between its neighbours.
@@ -56,7 +56,7 @@ pub(super) fn fault(reader: &Reader, arms: &[Arm], arm: usize, corner: Option<&s
     }
 }
 
-/// Two arms that overlap: `length` of ring is left between their kerbs, a negative length [m].
+/// Two arms that overlap: `length` of ring is left between their kerbs, a negative length \[m].
 pub(super) fn no_room(reader: &Reader, arms: &[Arm], arm: usize, length: f64) -> Error {
     let next = &arms[(arm + 1) % arms.len()];
     reader.invalid(
@@ -209,7 +209,7 @@ pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lan
     Ok(())
 }
 
-/// Stations along a curve at which it is checked [m].
+/// Stations along a curve at which it is checked \[m].
 fn stations(curve: &Curve) -> impl Iterator<Item = f64> {
     const STEP: f64 = 0.25;
     (0..=(curve.length() / STEP) as usize).map(|step| step as f64 * STEP)

@@ -18,7 +18,7 @@ struct Lead {
     /// In the direction of travel: inwards for an entry, outwards for an exit.
     curve: Curve,
     /// Direction from the centre to where the curve meets the ring lane, relative to the arm's bearing, in (-pi, pi]
-    /// [rad].
+    /// \[rad].
     angle: f64,
 }
 
@@ -34,7 +34,7 @@ pub(super) struct Lanes {
     around: Vec<Option<Curve>>,
 }
 
-/// Radius of a ring lane's centre line [m].
+/// Radius of a ring lane's centre line \[m].
 pub(super) fn radius(ring: &Ring, lane: Lane) -> f64 {
     let inner = ring.island_radius + ring.gutter + ring.lane_width / 2.0;
     match lane {
@@ -51,7 +51,7 @@ pub(super) fn exits(n_arms: usize) -> impl Iterator<Item = (Lane, u32)> {
 }
 
 /// The stations at which a line first reaches and last leaves the circle of radius `outer` around the ring's centre; if
-/// it passes outside, the station nearest to the centre, twice [m].
+/// it passes outside, the station nearest to the centre, twice \[m].
 pub(super) fn ring_stations(line: &Curve, outer: f64) -> (f64, f64) {
     let circle = Curve::circle(DVec2::ZERO, outer);
     let mut begin = 0.0;
@@ -133,7 +133,7 @@ impl Lanes {
         lane == Lane::Right && exit == 1 && self.around[entry].is_some()
     }
 
-    /// The angle along which a route follows the ring; negative if it would have to leave before it arrives [rad].
+    /// The angle along which a route follows the ring; negative if it would have to leave before it arrives \[rad].
     fn sweep(&self, entry: usize, lane: Lane, exit: u32) -> f64 {
         let exit_arm = (entry + exit as usize) % self.bearings.len();
         let between = if exit_arm == entry { TAU } else { (self.bearings[exit_arm] - self.bearings[entry]).rem_euclid(TAU) };

@@ -7,7 +7,7 @@ use super::alignment::{Alignment, Way};
 use crate::geometry::Bend;
 use crate::reader::{Error, Reader, shown};
 
-/// The smallest radius of a bend in a lane; no vehicle follows a smaller one [m].
+/// The smallest radius of a bend in a lane; no vehicle follows a smaller one \[m].
 const SHARPEST_LANE: f64 = 1.0;
 
 /// The file as written. Its values are not checked yet.
@@ -73,16 +73,16 @@ struct WrittenPoint {
 /// The ring around the central island.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ring {
-    /// Radius of the island's kerb face [m].
+    /// Radius of the island's kerb face \[m].
     pub(super) island_radius: f64,
-    /// Width of the strip between a kerb's face and the lane beside it [m].
+    /// Width of the strip between a kerb's face and the lane beside it \[m].
     pub(super) gutter: f64,
-    /// Width of each of the two lanes [m].
+    /// Width of each of the two lanes \[m].
     pub(super) lane_width: f64,
 }
 
 impl Ring {
-    /// Radius of the outer kerb's face [m].
+    /// Radius of the outer kerb's face \[m].
     pub(super) fn outer(&self) -> f64 {
         self.island_radius + 2.0 * (self.gutter + self.lane_width)
     }
@@ -99,15 +99,15 @@ pub(super) struct Carriageway {
 #[derive(Debug, Clone)]
 pub(super) struct Arm {
     pub(super) name: String,
-    /// Counter-clockwise from east [rad].
+    /// Counter-clockwise from east \[rad].
     pub(super) bearing: f64,
-    /// Distance from the ring's centre to the solid edge that ends the arm [m].
+    /// Distance from the ring's centre to the solid edge that ends the arm \[m].
     pub(super) length: f64,
     pub(super) entry: Carriageway,
     pub(super) exit: Carriageway,
-    /// Radius that joins the entry's kerb to the next arm's exit kerb outside the ring [m].
+    /// Radius that joins the entry's kerb to the next arm's exit kerb outside the ring \[m].
     pub(super) kerb_corner: Option<f64>,
-    /// The same for the right lane to the first exit; without it that lane lies beside such a kerb [m].
+    /// The same for the right lane to the first exit; without it that lane lies beside such a kerb \[m].
     pub(super) lane_corner: Option<f64>,
     /// Corners of the splitter island's kerb face in the arm's frame; empty if there is no island.
     pub(super) splitter: Vec<Bend>,
@@ -212,7 +212,7 @@ impl WrittenWay {
 }
 
 impl WrittenAlignment {
-    /// `least` is the smallest radius of a bend [m].
+    /// `least` is the smallest radius of a bend \[m].
     fn checked(self, reader: &Reader, key: &str, way: Way, length: f64, least: f64) -> Result<Alignment, Error> {
         reader.count(&format!("{key}.points"), self.points.len(), 1..=8)?;
         let last = self.points.len() - 1;
