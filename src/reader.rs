@@ -1,6 +1,8 @@
-//! Reads files of a limited size and checks their values one key at a time. Every error names the file and, where there is one, the key.
+//! Reads files of a limited size and checks their values one key at a time. Every error names the file and, where there
+//! is one, the key.
 //!
-//! Messages stay short whatever the file holds: long lines and values are cut, large numbers are printed with an exponent.
+//! Messages stay short whatever the file holds: long lines and values are cut, large numbers are printed with an
+//! exponent.
 
 mod message;
 #[cfg(test)]
@@ -73,12 +75,12 @@ pub enum Error {
     },
 }
 
-/// Maximum size of a scenario, vehicle or roundabout file: a hundred times the largest shipped one [bytes].
+/// Maximum size of a scenario, vehicle or roundabout file: a hundred times the largest shipped one \[bytes].
 pub const TEXT_LIMIT: u64 = 1 << 20;
 
-/// Maximum length of a key or value in a message [characters].
+/// Maximum length of a key or value in a message \[characters].
 const LONGEST_VALUE: usize = 100;
-/// Maximum length of what a message asks for [characters].
+/// Maximum length of what a message asks for \[characters].
 const LONGEST_EXPECTED: usize = 600;
 
 /// The bytes of a regular file of at most `limit` bytes.

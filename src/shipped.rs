@@ -1,7 +1,8 @@
-//! The scenario files that come with the library: every TOML file under `scenarios/`, embedded, so that a name finds the same file
-//! wherever the program runs.
+//! The scenario files that come with the library: every TOML file under `scenarios/`, embedded, so that a name finds
+//! the same file wherever the program runs.
 //!
-//! An embedded file refers to others by relative path, as a file on disk does; such a path is resolved among the embedded files.
+//! An embedded file refers to others by relative path, as a file on disk does; such a path is resolved among the
+//! embedded files.
 
 use std::fmt;
 use std::path::{Component, Path, PathBuf};
@@ -67,7 +68,8 @@ impl Kind {
     }
 }
 
-/// A scenario file: on disk or embedded in the library. Displayed as errors name it, `scenarios/attard2023.toml (built in)`.
+/// A scenario file: on disk or embedded in the library. Displayed as errors name it, `scenarios/attard2023.toml (built
+/// in)`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Source {
     /// A file on disk.
@@ -89,7 +91,8 @@ impl Source {
         }
     }
 
-    /// A file on disk where `name_or_path` ends in `.toml` or is the path of a file, else the shipped file of that name.
+    /// A file on disk where `name_or_path` ends in `.toml` or is the path of a file, else the shipped file of that
+    /// name.
     ///
     /// # Errors
     ///
@@ -102,7 +105,8 @@ impl Source {
         Source::named(kind, name_or_path)
     }
 
-    /// The file that this one refers to by `path`, relative to its own folder: on disk from a file on disk, embedded from an embedded one.
+    /// The file that this one refers to by `path`, relative to its own folder: on disk from a file on disk, embedded
+    /// from an embedded one.
     pub fn relative(&self, path: &Path) -> Source {
         let folder = |file: &Path| file.parent().unwrap_or(Path::new("")).to_owned();
         match self {

@@ -1,8 +1,8 @@
 //! Distances between a roundabout's curves and measured lines: road edges and lane centre lines, in both directions.
 //!
-//! Measured road edges are the lanes' edges, so they are compared with the outline of [`Gutter::Solid`]. Two kinds of points are left out:
-//! those farther than [`WITHIN`] from the centre, and those whose nearest counterpart is the loose end of a measured line, beyond which
-//! nothing was measured.
+//! Measured road edges are the lanes' edges, so they are compared with the outline of [`Gutter::Solid`]. Two kinds of
+//! points are left out: those farther than [`WITHIN`] from the centre, and those whose nearest counterpart is the loose
+//! end of a measured line, beyond which nothing was measured.
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Piece};
@@ -11,22 +11,22 @@ use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::Lane;
 use serde::{Deserialize, Serialize};
 
-/// Distance from the ring's centre within which points are compared [m].
+/// Distance from the ring's centre within which points are compared \[m].
 pub const WITHIN: f64 = 45.0;
 
-/// Maximum magnitude of a measured coordinate [m].
+/// Maximum magnitude of a measured coordinate \[m].
 pub const FARTHEST: f64 = 1000.0;
 
-/// Maximum length of all measured lines together [m].
+/// Maximum length of all measured lines together \[m].
 pub const LONGEST: f64 = 20_000.0;
 
-/// Spacing of the points at which lines are compared [m].
+/// Spacing of the points at which lines are compared \[m].
 const STEP: f64 = 0.5;
 
-/// A measured line: points joined by straights [m].
+/// A measured line: points joined by straights \[m].
 pub type Line = Vec<[f64; 2]>;
 
-/// A measured roundabout, its ring's centre at the origin [m].
+/// A measured roundabout, its ring's centre at the origin \[m].
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measured {
@@ -61,9 +61,9 @@ pub struct MeasuredRoute {
 /// Distances of a set of points from the curves they should lie on.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Spread {
-    /// The largest distance [m].
+    /// The largest distance \[m].
     pub worst: f64,
-    /// The mean distance [m].
+    /// The mean distance \[m].
     pub mean: f64,
     /// Number of points that were compared.
     pub points: usize,
@@ -96,7 +96,7 @@ pub enum Error {
     TooFar {
         /// The coordinate's key: line, point, and 0 for x or 1 for y, `kerbs[2][17][0]`.
         key: String,
-        /// The coordinate [m].
+        /// The coordinate \[m].
         value: String,
     },
     /// More line than any roundabout has.
@@ -104,7 +104,7 @@ pub enum Error {
     TooLong {
         /// The key of the line that exceeds the limit.
         key: String,
-        /// Length of all lines up to this one [m].
+        /// Length of all lines up to this one \[m].
         length: String,
     },
 }
@@ -260,6 +260,18 @@ mod tests {
         let mut measured = measured();
         measured.routes.push(MeasuredRoute { entry: "E".into(), lane: Lane::Right, exit: 3, stretches: vec![] });
         assert_eq!(refusal(&measured), "routes[0]: E-right-3; the roundabout has no such route");
+    }
+
+    #[test]
+    fn nested_arrays_up_to_the_size_limit_are_refused_without_overflowing_the_stack() {
+        let depth = crate::FILE_LIMIT as usize / 2 - 8;
+        let arrays = format!("{{\"island\":{}{}}}", "[".repeat(depth), "]".repeat(depth));
+        for text in [arrays.as_str(), &arrays[..depth], &"{\"cases\":".repeat(depth / 9)] {
+            assert!(text.len() as u64 <= crate::FILE_LIMIT);
+            assert!(serde_json::from_str::<Measured>(text).is_err());
+            assert!(serde_json::from_str::<crate::trace::Case>(text).is_err());
+            assert!(serde_json::from_str::<serde_json::Value>(text).is_err());
+        }
     }
 
     #[test]

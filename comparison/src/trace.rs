@@ -1,8 +1,8 @@
 //! A truck driven open loop by the simulator's own [`drive`](offtrack::cpu::drive), for comparison with reference
 //! trajectories.
 //!
-//! `tests/data/physics_vectors.json` holds such cases. A state between two instants of the sub-step grid is computed on a copy, from the
-//! grid instant before it, so that a request for a state never changes later ones.
+//! `tests/data/physics_vectors.json` holds such cases. A state between two instants of the sub-step grid is computed on
+//! a copy, from the grid instant before it, so that a request for a state never changes later ones.
 
 mod case;
 
@@ -14,7 +14,7 @@ use serde::Serialize;
 
 pub use case::{Case, CaseVehicle, Command, Error, Init, Instant};
 
-/// Instants closer together than this are the same [s].
+/// Instants closer together than this are the same \[s].
 const SAME_INSTANT: f64 = 1e-7;
 
 /// The result of a case.
@@ -26,32 +26,32 @@ pub struct Traced {
     pub states: Vec<State>,
     /// Largest magnitudes over all sub-steps; `None` if the truck jackknifed, because they mean nothing after that.
     pub peak: Option<Peak>,
-    /// Time at which the articulation passed its limit, interpolated within the sub-step [s].
+    /// Time at which the articulation passed its limit, interpolated within the sub-step \[s].
     pub t_jackknife: Option<f64>,
 }
 
 /// The truck at an instant. Headings are unwrapped: they continue from the case's initial headings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct State {
-    /// Time [s].
+    /// Time \[s].
     pub t: f64,
-    /// Middle of the drive axle [m].
+    /// Middle of the drive axle \[m].
     pub x: f64,
-    /// Middle of the drive axle [m].
+    /// Middle of the drive axle \[m].
     pub y: f64,
-    /// Tractor's heading [rad].
+    /// Tractor's heading \[rad].
     pub psi1: f64,
-    /// Trailer's heading [rad].
+    /// Trailer's heading \[rad].
     pub psi2: f64,
-    /// Articulation, `psi1 - psi2` [rad].
+    /// Articulation, `psi1 - psi2` \[rad].
     pub gamma: f64,
     /// Speed [m/s].
     pub v: f64,
-    /// Steer angle [rad].
+    /// Steer angle \[rad].
     pub delta: f64,
-    /// Fifth wheel [m].
+    /// Fifth wheel \[m].
     pub hitch: [f64; 2],
-    /// Middle of the trailer's axle group [m].
+    /// Middle of the trailer's axle group \[m].
     pub trailer_axle: [f64; 2],
     /// Lateral acceleration of the tractor [m/s^2].
     pub ay1: f64,
@@ -80,7 +80,7 @@ pub struct Peak {
     pub ltr1_dyn: f64,
     /// Load transfer ratio of the trailer.
     pub ltr2_dyn: f64,
-    /// Articulation [rad].
+    /// Articulation \[rad].
     pub gamma: f64,
 }
 
@@ -93,8 +93,8 @@ pub fn trace(case: &Case) -> Result<Traced, Error> {
     trace_by(case, moved)
 }
 
-/// Drives a case with the caller's replacement for [`moved`]. Its arguments are the rig, the length of the sub-step [s], the control and
-/// the truck.
+/// Drives a case with the caller's replacement for [`moved`]. Its arguments are the rig, the length of the sub-step
+/// \[s], the control and the truck.
 ///
 /// # Errors
 ///
@@ -129,12 +129,12 @@ pub fn trace_by(case: &Case, mut moved: impl FnMut(&Rig, f32, &Control, &Moving)
 #[derive(Clone)]
 struct Run<'a> {
     case: &'a Case,
-    /// Current time [s].
+    /// Current time \[s].
     t: f64,
     /// Index of the last sub-step of the grid that has begun.
     grid: u32,
     moving: Moving,
-    /// Unwrapped headings, in addition to the truck's wrapped ones [rad].
+    /// Unwrapped headings, in addition to the truck's wrapped ones \[rad].
     psi1: f64,
     psi2: f64,
 }
@@ -154,7 +154,8 @@ impl Run<'_> {
         Run { case, t: 0.0, grid: 0, moving: Moving { truck, motion }, psi1: init.psi1, psi2: init.psi2 }
     }
 
-    /// The end of the next sub-step: the grid's next instant, or a command or the case's end before it. `None` at the end.
+    /// The end of the next sub-step: the grid's next instant, or a command or the case's end before it. `None` at the
+    /// end.
     fn next_instant(&self) -> Option<f64> {
         let later = |&t: &f64| self.t + SAME_INSTANT < t;
         let grid = f64::from(self.grid + 1) * self.case.dt;

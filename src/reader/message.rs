@@ -1,8 +1,8 @@
 //! Error messages of bounded length: numbers, values and lines of a file in a form that can be read on a terminal.
 
-/// Maximum length of the parser's own words [characters].
+/// Maximum length of the parser's own words \[characters].
 const LONGEST_MESSAGE: usize = 600;
-/// Maximum length of a line that is repeated [characters].
+/// Maximum length of a line that is repeated \[characters].
 const LONGEST_LINE: usize = 100;
 
 /// `value` in at most two dozen characters: with an exponent from 1e7 on and below 1e-4.

@@ -1,4 +1,5 @@
-//! What can be wrong between the parts of a roundabout: arcs that do not fit, kerbs that cross, lanes that run into a kerb.
+//! Faults between the parts of a roundabout: arcs that do not fit, kerbs that cross, lanes that meet a kerb or each
+//! other.
 
 use glam::DVec2;
 
@@ -9,19 +10,19 @@ use crate::geometry::{Curve, Outline};
 use crate::reader::{Error, Reader, differing, shown};
 use crate::route::Lane;
 
-/// Half the width of a truck: a lane's centre line nearer to a kerb than this cannot be driven [m].
+/// Half the width of a truck and 5 cm: a lane whose centre line is nearer to a kerb cannot be driven \[m].
 const NEAREST: f64 = 1.3;
-/// Width of a truck: two lanes whose centre lines are nearer to each other cannot both be driven [m].
+/// Width of a truck: two lanes whose centre lines are nearer to each other cannot both be driven \[m].
 const LANES_APART: f64 = 2.5;
 
 /// A rounding arc that does not fit between its neighbours.
 pub(super) fn too_large(reader: &Reader, key: &str, radius: f64, largest: f64) -> Error {
-    // Down to whole centimetres, so that the number named does fit.
+    // Rounded down to centimetres, so that the radius in the message does fit.
     let largest = (largest * 100.0).floor() / 100.0;
     reader.invalid(key, format_args!("{} m", shown(radius)), format!("does not fit between its neighbours: at most {} m", shown(largest)))
 }
 
-/// An alignment that is no curve. `corner` is the key of the arc between this arm and the next, where there is one.
+/// An alignment that gives no curve. `corner` is the key of the arc between this arm and the next, if there is one.
 pub(super) fn fault(reader: &Reader, arms: &[Arm], arm: usize, corner: Option<&str>, part: &str, way: Way, fault: Fault) -> Error {
     let next = (arm + 1) % arms.len();
     let alignment = |arm: usize, way: Way| {
@@ -55,7 +56,7 @@ pub(super) fn fault(reader: &Reader, arms: &[Arm], arm: usize, corner: Option<&s
     }
 }
 
-/// Two arms whose kerbs would need `length` metres of ring between them, a negative length.
+/// Two arms that overlap: `length` of ring is left between their kerbs, a negative length \[m].
 pub(super) fn no_room(reader: &Reader, arms: &[Arm], arm: usize, length: f64) -> Error {
     let next = &arms[(arm + 1) % arms.len()];
     reader.invalid(
@@ -65,13 +66,13 @@ pub(super) fn no_room(reader: &Reader, arms: &[Arm], arm: usize, length: f64) ->
     )
 }
 
-/// A way through that would leave the ring before it arrives there.
+/// A route that would have to leave the ring before it arrives there.
 pub(super) fn backwards(reader: &Reader, arms: &[Arm], entry: usize, lane: Lane, exit: u32, length: f64) -> Error {
     let to = &arms[(entry + exit as usize) % arms.len()].name;
     reader.invalid(
         format!("arm[{entry}].entry.{}", lane.name()),
         format_args!("{} m of ring on the way to {to}", differing(length, 0.0)),
-        "must not be negative nor a whole turn: change ring_radius, or give corner.lane_radius where it is the right lane's first exit",
+        "must lie between 0 and a whole turn: change ring_radius, or give corner.lane_radius if it is the right lane's first exit",
     )
 }
 
@@ -89,7 +90,7 @@ pub(super) fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) ->
     for first in 0..n {
         for second in first..n {
             if cross(&corners[first], (first != second).then_some(&corners[second])) {
-                // Corners follow their arms: neighbouring corners share the arm between them.
+                // Corner i lies between arms i and i + 1: neighbouring corners have the arm between them in common.
                 let (a, b) = if first == second { (first, (first + 1) % n) } else { (first, second) };
                 return Err(reader.invalid(
                     format!("arm[{b}]"),
@@ -120,7 +121,7 @@ pub(super) fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) ->
     Ok(())
 }
 
-/// Whether two curves cross, or, without a second, whether the first crosses itself away from its joints.
+/// Whether two curves cross or, without a second, whether the first crosses itself other than at its joints.
 fn cross(curve: &Curve, other: Option<&Curve>) -> bool {
     let joint = |index: usize, p: DVec2| p.distance(curve.pieces[index].end()) < 1e-6;
     (0..curve.pieces.len()).any(|index| {
@@ -135,7 +136,7 @@ fn cross(curve: &Curve, other: Option<&Curve>) -> bool {
     })
 }
 
-/// A splitter island keeps out of the ring and of the loops placed before it.
+/// A splitter island lies outside the ring and does not meet the earlier loops.
 pub(super) fn splitter(reader: &Reader, ring: &Ring, arm: usize, island: &Curve, loops: &[Curve]) -> Result<(), Error> {
     let key = format!("arm[{arm}].splitter");
     let refused = |value: String, expected: &str| Err(reader.invalid(&key, value, expected));
@@ -166,11 +167,11 @@ pub(super) fn lanes_clear_of_kerbs(reader: &Reader, kerbs: &Outline, arms: &[Arm
     Ok(())
 }
 
-/// The lanes of an arm lie beside each other all the way from the arm's end to the ring, those that enter left of those that leave, seen
-/// from the ring.
+/// The lanes of an arm lie beside each other from the arm's end to the ring; those that enter lie left of those that
+/// leave, seen from the ring.
 ///
-/// At the arm's end, where all lanes are parallel, their order is checked. From there on no two may come too near, so none can cross
-/// another.
+/// At the arm's end, where all lanes are parallel, their order is checked. Beyond, no two may come nearer than
+/// [`LANES_APART`], so none crosses another.
 pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lanes) -> Result<(), Error> {
     const FROM_LEFT: [(Way, Lane); 4] =
         [(Way::Entry, Lane::Right), (Way::Entry, Lane::Left), (Way::Exit, Lane::Left), (Way::Exit, Lane::Right)];
@@ -178,7 +179,7 @@ pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lan
     for (index, arm) in arms.iter().enumerate() {
         let curve = |(way, lane)| lanes.curve(index, way, lane);
         let left = DVec2::from_angle(arm.bearing).perp();
-        let offset = |place: (Way, Lane)| curve(place).point_at(if place.0 == Way::Entry { 0.0 } else { f64::INFINITY }).dot(left);
+        let offset = |lane: (Way, Lane)| curve(lane).point_at(if lane.0 == Way::Entry { 0.0 } else { f64::INFINITY }).dot(left);
         for pair in FROM_LEFT.windows(2) {
             if offset(pair[0]) - offset(pair[1]) < LANES_APART {
                 return Err(reader.invalid(
@@ -195,16 +196,10 @@ pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lan
         for (first, &one) in FROM_LEFT.iter().enumerate() {
             for &other in &FROM_LEFT[first + 1..] {
                 let distance = |p: DVec2| curve(other).distance(p);
-                if let Some(place) = stations(curve(one)).map(|s| curve(one).point_at(s)).find(|&p| distance(p) < LANES_APART) {
+                if let Some(p) = stations(curve(one)).map(|s| curve(one).point_at(s)).find(|&p| distance(p) < LANES_APART) {
                     return Err(reader.invalid(
                         format!("arm[{index}].{}", named(one)),
-                        format_args!(
-                            "{} m from {} at ({:.1}, {:.1})",
-                            differing(distance(place), LANES_APART),
-                            named(other),
-                            place.x,
-                            place.y
-                        ),
+                        format_args!("{} m from {} at ({:.1}, {:.1})", differing(distance(p), LANES_APART), named(other), p.x, p.y),
                         format!("the centre lines of an arm's lanes must keep {LANES_APART} m from each other"),
                     ));
                 }
@@ -214,7 +209,7 @@ pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lan
     Ok(())
 }
 
-/// Stations along a curve at which it is checked [m].
+/// Stations along a curve at which it is checked \[m].
 fn stations(curve: &Curve) -> impl Iterator<Item = f64> {
     const STEP: f64 = 0.25;
     (0..=(curve.length() / STEP) as usize).map(|step| step as f64 * STEP)
@@ -226,9 +221,9 @@ fn clear(reader: &Reader, kerbs: &Outline, curve: &Curve, key: &str) -> Result<(
     let stations = stations(curve).filter(|s| free.contains(s));
     match stations.map(|s| curve.point_at(s)).find(|&p| kerbs.signed_distance(p) < NEAREST) {
         None => Ok(()),
-        Some(place) => Err(reader.invalid(
+        Some(p) => Err(reader.invalid(
             key,
-            format_args!("{} m from a kerb at ({:.1}, {:.1})", differing(kerbs.signed_distance(place), NEAREST), place.x, place.y),
+            format_args!("{} m from a kerb at ({:.1}, {:.1})", differing(kerbs.signed_distance(p), NEAREST), p.x, p.y),
             format!("a lane's centre line must keep {NEAREST} m from every kerb and splitter island"),
         )),
     }

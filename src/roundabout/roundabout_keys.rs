@@ -1,16 +1,16 @@
-//! A roundabout's file as written, and the checks that need one value or one arm at a time.
+//! A roundabout file as written, and the checks of single values and of the order of arms.
 
 use glam::DVec2;
 use serde::Deserialize;
 
 use super::alignment::{Alignment, Way};
 use crate::geometry::Bend;
-use crate::reader::{Error, Reader};
+use crate::reader::{Error, Reader, shown};
 
-/// The smallest radius of a bend in a lane: below it nothing on wheels follows [m].
+/// The smallest radius of a bend in a lane; no vehicle follows a smaller one \[m].
 const SHARPEST_LANE: f64 = 1.0;
 
-/// The file as written. Nothing here is trusted yet.
+/// The file as written. Its values are not checked yet.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Written {
@@ -73,16 +73,16 @@ struct WrittenPoint {
 /// The ring around the central island.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ring {
-    /// Of the island's kerb face [m].
+    /// Radius of the island's kerb face \[m].
     pub(super) island_radius: f64,
-    /// Between a kerb face and the lane beside it [m].
+    /// Width of the strip between a kerb's face and the lane beside it \[m].
     pub(super) gutter: f64,
-    /// Of each of the two lanes [m].
+    /// Width of each of the two lanes \[m].
     pub(super) lane_width: f64,
 }
 
 impl Ring {
-    /// Radius of the outer kerb's face [m].
+    /// Radius of the outer kerb's face \[m].
     pub(super) fn outer(&self) -> f64 {
         self.island_radius + 2.0 * (self.gutter + self.lane_width)
     }
@@ -92,24 +92,24 @@ impl Ring {
 #[derive(Debug, Clone)]
 pub(super) struct Carriageway {
     pub(super) kerb: Alignment,
-    /// Centre lines, left and right.
+    /// Centre lines of the left and the right lane.
     pub(super) lanes: [Alignment; 2],
 }
 
 #[derive(Debug, Clone)]
 pub(super) struct Arm {
     pub(super) name: String,
-    /// Counter-clockwise from east [rad].
+    /// Counter-clockwise from east \[rad].
     pub(super) bearing: f64,
-    /// From the ring's centre to the solid edge that ends the arm [m].
+    /// Distance from the ring's centre to the solid edge that ends the arm \[m].
     pub(super) length: f64,
     pub(super) entry: Carriageway,
     pub(super) exit: Carriageway,
-    /// Radius where the entry's kerb goes over into the next arm's exit kerb without touching the ring [m].
+    /// Radius that joins the entry's kerb to the next arm's exit kerb outside the ring \[m].
     pub(super) kerb_corner: Option<f64>,
-    /// The same for the right lane on its way to the first exit; without it that lane lies beside such a kerb [m].
+    /// The same for the right lane to the first exit; without it that lane lies beside such a kerb \[m].
     pub(super) lane_corner: Option<f64>,
-    /// Corners of the splitter island's kerb face in the arm's frame; empty where there is none.
+    /// Corners of the splitter island's kerb face in the arm's frame; empty if there is no island.
     pub(super) splitter: Vec<Bend>,
 }
 
@@ -120,7 +120,7 @@ impl Arm {
 }
 
 impl Written {
-    /// Ring and arms, every value within its range and arms in order.
+    /// Ring and arms, with every value within its range and the arms in order.
     pub(super) fn checked(self, reader: &Reader) -> Result<(Ring, Vec<Arm>), Error> {
         let ring = Ring {
             island_radius: reader.within("ring.island_radius", self.ring.island_radius, 2.0..=200.0, "m")?,
@@ -160,7 +160,7 @@ impl WrittenArm {
             return Err(reader.invalid(
                 key("name"),
                 format!("{:?}", self.name),
-                "must be 1 to 20 letters and digits: it is a part of route names",
+                "must be 1 to 20 letters and digits, because it is part of route names",
             ));
         }
         let bearing = reader.within(&key("bearing_deg"), self.bearing_deg, -360.0..=360.0, "deg")?.to_radians();
@@ -170,7 +170,7 @@ impl WrittenArm {
         let splitter = splitter.map(|(point, written)| {
             let at = |name: &str| key(&format!("splitter[{point}].{name}"));
             let radius =
-                written.radius.ok_or_else(|| reader.invalid(at("radius"), "missing", "every corner of a splitter island has one"))?;
+                written.radius.ok_or_else(|| reader.invalid(at("radius"), "missing", "every corner of a splitter island needs one"))?;
             let along = reader.within(&at("along"), written.along, 0.0..=length, "m")?;
             let offset = reader.within(&at("offset"), written.offset, -200.0..=200.0, "m")?;
             Ok(Bend { at: DVec2::new(along, offset), radius: reader.within(&at("radius"), radius, 0.1..=1000.0, "m")? })
@@ -201,7 +201,7 @@ impl WrittenWay {
                 reader.invalid(
                     format!("{key}.{name}"),
                     "missing",
-                    "this kerb bends too sharply to place the lane beside it: give its points",
+                    "this kerb bends too sharply for a lane beside it: give the lane's points",
                 )
             }),
         };
@@ -212,7 +212,7 @@ impl WrittenWay {
 }
 
 impl WrittenAlignment {
-    /// `least` is the smallest radius of a bend [m].
+    /// `least` is the smallest radius of a bend \[m].
     fn checked(self, reader: &Reader, key: &str, way: Way, length: f64, least: f64) -> Result<Alignment, Error> {
         reader.count(&format!("{key}.points"), self.points.len(), 1..=8)?;
         let last = self.points.len() - 1;
@@ -225,20 +225,20 @@ impl WrittenAlignment {
             if before <= along {
                 return Err(reader.invalid(
                     at("along"),
-                    format_args!("{along} m"),
-                    format!("must be less than {before} m: points lead inwards"),
+                    format_args!("{} m", shown(along)),
+                    format!("must be less than {} m, because points lead inwards", shown(before)),
                 ));
             }
             let offset = reader.within(&at("offset"), point.offset, -200.0..=200.0, "m")?;
             let radius = match (point.radius, index == last) {
                 (Some(radius), false) => reader.within(&at("radius"), radius, least..=1000.0, "m")?,
                 (None, true) => 0.0,
-                (None, false) => return Err(reader.invalid(at("radius"), "missing", "only the last point, an aim, has none")),
+                (None, false) => return Err(reader.invalid(at("radius"), "missing", "every point but the last needs one")),
                 (Some(radius), true) => {
                     return Err(reader.invalid(
                         at("radius"),
-                        format_args!("{radius} m"),
-                        "the last point is an aim and has none: see ring_radius",
+                        format_args!("{} m", shown(radius)),
+                        "the last point has none: ring_radius rounds the corner into the ring",
                     ));
                 }
             };

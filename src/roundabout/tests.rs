@@ -1,10 +1,10 @@
-//! What a roundabout's file may say and what it may not.
+//! Which roundabout files are accepted, and how the others are refused.
 
 use proptest::prelude::*;
 
 use super::*;
 
-/// A roundabout with four straight arms: the fewest keys that make one.
+/// A roundabout with four straight arms and only the required keys.
 fn plain() -> String {
     let mut text = String::from("[ring]\nisland_radius = 15.0\ngutter = 0.5\nlane_width = 3.7\n");
     for (index, name) in ["E", "N", "W", "S"].iter().enumerate() {
@@ -29,7 +29,7 @@ fn refusal(from: &str, nth: usize, to: &str) -> String {
 }
 
 #[test]
-fn the_fewest_keys_make_a_roundabout_with_lanes_beside_its_kerbs() {
+fn the_required_keys_give_a_roundabout_with_lanes_beside_its_kerbs() {
     let roundabout = read(&plain()).unwrap();
     let kerbs = roundabout.kerbs(Gutter::Drivable);
     let right = roundabout.lanes.curve(0, alignment::Way::Entry, Lane::Right);
@@ -41,7 +41,7 @@ fn the_fewest_keys_make_a_roundabout_with_lanes_beside_its_kerbs() {
 }
 
 #[test]
-fn every_entry_has_its_five_routes_by_name() {
+fn every_entry_has_five_routes_with_names() {
     let names: Vec<String> = read(&plain()).unwrap().routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect();
     let of_north: Vec<&str> =
         names.iter().filter_map(|name| name.split_once('/')).map(|(_, way)| way).filter(|way| way.starts_with("N-")).collect();
@@ -56,7 +56,7 @@ fn three_arms_give_the_left_lane_all_three_exits() {
 }
 
 #[test]
-fn a_route_begins_and_ends_where_it_was_asked_to() {
+fn a_route_has_the_requested_approach_and_departure() {
     let roundabout = read(&plain()).unwrap();
     let outer = roundabout.outer_radius();
     for route in roundabout.routes(40.0, 35.0, 2.0).unwrap() {

@@ -1,4 +1,4 @@
-//! A benchmark file as written: keys, types and defaults. Nothing here is trusted yet.
+//! A benchmark file as written: keys, types and defaults. Its values are not checked yet.
 
 use std::path::PathBuf;
 

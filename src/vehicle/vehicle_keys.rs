@@ -1,4 +1,4 @@
-//! A vehicle file as written, and the checks that make a [`Vehicle`] of it.
+//! A vehicle file as written, and the checks that turn it into a [`Vehicle`].
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use crate::layout::N_TRACTOR_RAYS;
 use crate::reader::{Error, Reader};
 use crate::shipped::Source;
 
-/// The file. Nothing here is trusted yet.
+/// The file as written. Its values are not checked yet.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
@@ -92,7 +92,7 @@ struct WrittenSensors {
     trailer_last: Option<f64>,
 }
 
-/// Truck tyres on dry asphalt.
+/// Friction of truck tyres on dry asphalt.
 fn dry_asphalt() -> f64 {
     0.7
 }

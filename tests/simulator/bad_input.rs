@@ -1,4 +1,5 @@
-//! Wrong files: every scenario file is broken in every place, and each time the reader must answer with the file's name, never panic.
+//! Wrong files: every value of every scenario file is broken in turn, and the reader must return an error that names
+//! the file, never panic.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,7 +19,7 @@ fn scenarios() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
 }
 
-/// Every scenario file, relative to the folder of scenarios.
+/// Every scenario file, relative to `scenarios/`.
 fn files() -> Vec<PathBuf> {
     let mut files = Vec::new();
     for folder in ["", "roundabouts", "vehicles"] {
@@ -34,12 +35,12 @@ fn files() -> Vec<PathBuf> {
     files
 }
 
-/// Reads a file as what its folder says it is.
+/// Reads a file of the kind that belongs in its folder.
 fn read(path: &Path) -> Result<(), Error> {
     match path.parent().and_then(Path::file_name).and_then(|folder| folder.to_str()) {
         Some("roundabouts") => {
             let roundabout = Roundabout::read(path)?;
-            // What was accepted must be usable.
+            // An accepted roundabout must be usable.
             for gutter in [Gutter::Drivable, Gutter::Solid] {
                 assert!(roundabout.kerbs(gutter).signed_distance(glam::DVec2::new(3.0, -7.0)).is_finite());
             }
@@ -51,7 +52,7 @@ fn read(path: &Path) -> Result<(), Error> {
     }
 }
 
-/// A copy of all scenarios, so that one file at a time can be broken.
+/// A copy of all scenario files, so that one file at a time can be broken.
 fn copy() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for file in files() {
@@ -62,7 +63,7 @@ fn copy() -> tempfile::TempDir {
     folder
 }
 
-/// Reads the broken text in place of `file`; the error, if it is one, names that file or the one it led to.
+/// Reads the broken text instead of `file`. An error must name a file of the folder.
 fn broken(folder: &Path, file: &Path, text: &[u8]) -> Result<(), String> {
     let path = folder.join(file);
     std::fs::write(&path, text).unwrap();
@@ -100,15 +101,15 @@ fn values(text: &str) -> Vec<(usize, usize)> {
 }
 
 #[test]
-fn no_wrong_value_in_any_place_of_any_file_makes_a_reader_panic() {
+fn no_wrong_value_of_any_key_makes_a_reader_panic() {
     let folder = copy();
     let nasty = ["0", "-1.0", "nan", "inf", "-inf", "1e300", "1000000000", "0.001", "\"text\"", "true", "[]", "{}", "\"\""];
     let (mut tried, mut refused) = (0, 0);
     for file in files() {
         let text = std::fs::read_to_string(scenarios().join(&file)).unwrap();
-        let places = values(&text);
-        assert!(10 < places.len(), "{}: {} values found", file.display(), places.len());
-        for (from, to) in places {
+        let found = values(&text);
+        assert!(10 < found.len(), "{}: {} values found", file.display(), found.len());
+        for (from, to) in found {
             for value in nasty {
                 tried += 1;
                 refused +=
@@ -116,7 +117,7 @@ fn no_wrong_value_in_any_place_of_any_file_makes_a_reader_panic() {
             }
         }
     }
-    // Most of these values make no sense anywhere: a reader that accepts them checks nothing.
+    // Most of these values make no sense for any key: a reader that accepts them checks nothing.
     assert!(5000 < tried && 4 * tried < 5 * refused, "{refused} of {tried} refused");
 }
 
@@ -197,11 +198,12 @@ fn a_route_that_leaves_no_room_for_the_whole_truck_is_refused_with_the_longest_t
         assert!(40.0 < length && length < too_long, "{length}");
         broken(folder.path(), file, with(length).as_bytes()).unwrap();
         broken(folder.path(), file, with(length + 0.01).as_bytes()).unwrap_err();
-        // At the longest approach the truck starts clear of the solid edge that ends its arm, whatever its heading error.
+        // At the longest approach the truck starts clear of the solid edge that ends its arm, whatever its heading
+        // error.
         if part == "approach" {
             std::fs::write(folder.path().join("longest.toml"), with(length)).unwrap();
             let mut world = World::bake(&Scenario::read(&folder.path().join("longest.toml")).unwrap()).unwrap();
-            // Some right lanes lie so near to the kerb that a truck 0.3 m aside, turned by 2 deg, touches that.
+            // On some right lanes a truck that starts 0.3 m aside, turned by 2 deg, touches the kerb.
             world.params.start_offset = 0.0;
             let n_routes = world.routes.len() as u32;
             let routes: Vec<u32> = (0..8 * n_routes).map(|env| env % n_routes).collect();
@@ -233,12 +235,12 @@ fn a_missing_file_or_key_is_named_with_the_benchmark_and_the_key() {
 }
 
 #[test]
-fn what_is_no_file_of_reasonable_size_is_refused_and_never_read_to_its_end() {
+fn pipes_devices_folders_and_large_files_are_refused_as_every_kind_of_file() {
     let folder = tempfile::tempdir().unwrap();
     for kind in ["", "roundabouts", "vehicles"] {
-        let place = folder.path().join(kind);
-        std::fs::create_dir_all(&place).unwrap();
-        let [pipe, zero, directory, large] = ["pipe.toml", "zero.toml", "folder.toml", "large.toml"].map(|name| place.join(name));
+        let below = folder.path().join(kind);
+        std::fs::create_dir_all(&below).unwrap();
+        let [pipe, zero, directory, large] = ["pipe.toml", "zero.toml", "folder.toml", "large.toml"].map(|name| below.join(name));
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
         std::os::unix::fs::symlink("/dev/zero", &zero).unwrap();
         std::fs::create_dir(&directory).unwrap();

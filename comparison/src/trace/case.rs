@@ -31,15 +31,15 @@ pub struct Case {
     pub id: String,
     /// The truck.
     pub vehicle: CaseVehicle,
-    /// Length of a sub-step [s].
+    /// Length of a sub-step \[s].
     pub dt: f64,
     /// Initial state.
     pub init: Init,
     /// Commands in order of time.
     pub commands: Vec<Command>,
-    /// End of the case [s].
+    /// End of the case \[s].
     pub t_end: f64,
-    /// Instants to report, ascending; those of `expected` where absent [s].
+    /// Instants to report, ascending; those of `expected` where absent \[s].
     pub times: Option<Vec<f64>>,
     /// Reference states. Only their instants are used here.
     #[serde(default)]
@@ -50,17 +50,17 @@ pub struct Case {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[expect(non_snake_case, reason = "the format's own symbols")]
 pub struct CaseVehicle {
-    /// Wheelbase [m].
+    /// Wheelbase \[m].
     pub L1: f64,
-    /// Fifth wheel ahead of the drive axle [m].
+    /// Fifth wheel ahead of the drive axle \[m].
     pub a: f64,
-    /// Kingpin to axle group [m].
+    /// Kingpin to axle group \[m].
     pub L2: f64,
     /// Slip factor [rad/(m/s^2)].
     pub K: f64,
     /// Lateral acceleration that the tyres can hold, in units of gravity; unlimited where absent.
     pub mu: Option<f64>,
-    /// Lock [rad].
+    /// Lock \[rad].
     pub delta_max: f64,
     /// Steer rate [rad/s].
     pub delta_rate: f64,
@@ -68,30 +68,30 @@ pub struct CaseVehicle {
     pub a_max: f64,
     /// Strongest braking, negative [m/s^2].
     pub a_min: f64,
-    /// Articulation beyond which the truck is jackknifed [rad].
+    /// Articulation beyond which the truck is jackknifed \[rad].
     #[serde(default = "right_angle")]
     pub gamma_max: f64,
-    /// Track of the tractor [m].
+    /// Track of the tractor \[m].
     pub T1: f64,
-    /// Height of the tractor's centre of gravity [m].
+    /// Height of the tractor's centre of gravity \[m].
     pub h1: f64,
-    /// Height of the tractor's roll centre [m].
+    /// Height of the tractor's roll centre \[m].
     pub hr1: f64,
     /// Roll gain of the tractor [rad/g].
     pub Rphi1: f64,
-    /// Roll frequency of the tractor [Hz].
+    /// Roll frequency of the tractor \[Hz].
     pub fn1: f64,
     /// Roll damping of the tractor.
     pub zeta1: f64,
-    /// Track of the trailer [m].
+    /// Track of the trailer \[m].
     pub T2: f64,
-    /// Height of the trailer's centre of gravity [m].
+    /// Height of the trailer's centre of gravity \[m].
     pub h2: f64,
-    /// Height of the trailer's roll centre [m].
+    /// Height of the trailer's roll centre \[m].
     pub hr2: f64,
     /// Roll gain of the trailer [rad/g].
     pub Rphi2: f64,
-    /// Roll frequency of the trailer [Hz].
+    /// Roll frequency of the trailer \[Hz].
     pub fn2: f64,
     /// Roll damping of the trailer.
     pub zeta2: f64,
@@ -100,26 +100,26 @@ pub struct CaseVehicle {
 /// Initial state of a case.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Init {
-    /// Middle of the drive axle [m].
+    /// Middle of the drive axle \[m].
     pub x: f64,
-    /// Middle of the drive axle [m].
+    /// Middle of the drive axle \[m].
     pub y: f64,
-    /// Tractor's heading [rad].
+    /// Tractor's heading \[rad].
     pub psi1: f64,
-    /// Trailer's heading [rad].
+    /// Trailer's heading \[rad].
     pub psi2: f64,
     /// Speed [m/s].
     pub v: f64,
-    /// Steer angle [rad].
+    /// Steer angle \[rad].
     pub delta: f64,
 }
 
 /// A command, in force until the next one.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Command {
-    /// Time from which it is in force [s].
+    /// Time from which it is in force \[s].
     pub t: f64,
-    /// Target steer angle [rad].
+    /// Target steer angle \[rad].
     pub delta_cmd: f64,
     /// Target acceleration [m/s^2].
     pub a_cmd: f64,
@@ -128,7 +128,7 @@ pub struct Command {
 /// An instant to report.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Instant {
-    /// Time [s].
+    /// Time \[s].
     pub t: f64,
 }
 
@@ -181,7 +181,7 @@ impl CaseVehicle {
 }
 
 impl Case {
-    /// Checks every value and gives the instants to report, ascending [s].
+    /// Checks every value and gives the instants to report, ascending \[s].
     pub(super) fn checked_times(&self) -> Result<Vec<f64>, Error> {
         let vehicle = &self.vehicle;
         let (any, positive, speed) = (-1e5..=1e5, 1e-3..=1e3, -60.0..=60.0);
