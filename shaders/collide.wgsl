@@ -1,8 +1,9 @@
 // Measures the clearances: from each unit's rectangle to the nearest solid edge.
 //
-// A rectangle is a capsule, all points within half its width of a stretch of its centre line, and four corners. Points of the stretch are
-// sampled for the capsule, so that a solid that lies wholly under the unit is found too, and the corners themselves. The distance is
-// 1-Lipschitz, so two samples bound it between them; the middle is sampled only where the bound is not tight enough.
+// A rectangle is a capsule, all points within half its width of a stretch of its centre line, and four corners. Points
+// of the stretch are sampled for the capsule, so that a solid that lies wholly under the unit is found too, and the
+// corners themselves. The distance is 1-Lipschitz, so two samples bound it between them; the middle is sampled only
+// where the bound is not tight enough.
 
 @compute @workgroup_size(WORKGROUP)
 fn collide(thread: Thread) {
@@ -64,8 +65,8 @@ fn point_of(body: Body, n_points: u32, index: u32) -> vec2<f32> {
     return vec2<f32>(select(body.front, body.rear, corner < 2u), select(-body.half_width, body.half_width, corner % 2u == 0u));
 }
 
-// One of a body's lines: the pieces of its centre line, then two from each corner. These run along the unit's end to its middle, and along
-// its side to where the capsule takes over: both touch the capsule's end.
+// One of a body's lines: the pieces of its centre line, then two from each corner. These run along the unit's end to
+// its middle, and along its side to where the capsule takes over: both touch the capsule's end.
 fn line_of(body: Body, n_points: u32, index: u32) -> Line {
     if index < n_points - 1u {
         return Line(point_of(body, n_points, index), point_of(body, n_points, index + 1u), body.half_width);
@@ -103,8 +104,8 @@ fn is_undecided(least: f32, line: Line, span: Span) -> bool {
     return bound(line, span) < least - max(FRACTION * least, TOLERANCE);
 }
 
-// Clearance of one rectangle whose frame has its origin at `position` and the unit vector `heading` as x axis. `n_points` of its centre line
-// and its corners are sampled first. `spans` is working memory.
+// Clearance of one rectangle whose frame has its origin at `position` and the unit vector `heading` as x axis.
+// `n_points` of its centre line and its corners are sampled first. `spans` is working memory.
 fn body_clearance(
     field: FieldRow,
     body: Body,

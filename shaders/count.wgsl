@@ -2,7 +2,8 @@
 //
 // A workgroup first sums over its own trucks, so that few threads of the device contend for the same words.
 
-// Steps of the workgroup's trucks by end code, then the sum of the lower halves of their rewards, then that of the upper halves.
+// Steps of the workgroup's trucks by end code, then the sum of the lower halves of their rewards, then that of the
+// upper halves.
 var<workgroup> counted: array<atomic<i32>, N_SUMS + 1u>;
 
 @compute @workgroup_size(WORKGROUP)

@@ -1,7 +1,8 @@
 // Moves the truck: a single-track tractor pulling a trailer hitched near its drive axle.
 //
-// Tyre slip shifts each unit's no-slip point forward by `slip * speed²`; zero slip is pure kinematics. The midpoint rule integrates it. Steer
-// angle and speed change linearly within a sub-step: constant ones would cost decimetres in a turn.
+// Tyre slip shifts each unit's no-slip point forward by `slip * speed²`; zero slip is pure kinematics. The midpoint
+// rule integrates it. Steer angle and speed change linearly within a sub-step: constant ones would cost decimetres in a
+// turn.
 
 @compute @workgroup_size(WORKGROUP)
 fn drive(thread: Thread) {

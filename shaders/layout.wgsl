@@ -68,9 +68,11 @@ const N_TRAILER: u32 = 12u;
 const TOLERANCE: f32 = 0.01f;
 // Error that is tolerated as a fraction of the clearance: far from a kerb a centimetre does not matter.
 const FRACTION: f32 = 0.5f;
-// Most undecided spans: at first 11 and 8 of a trailer, then at most 8 more for each of the 8 halvings from 2.5 m to 1 cm.
+// Most undecided spans: at first 11 and 8 of a trailer, then at most 8 more for each of the 8 halvings from 2.5 m
+// to 1 cm.
 const N_SPANS: u32 = 96u;
-// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide between them.
+// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide
+// between them.
 const GAP: f32 = 0.05f;
 // A step this short is never taken back [m].
 const SHORT: f32 = 0.25f;
@@ -78,7 +80,8 @@ const SHORT: f32 = 0.25f;
 const CLOSE: f32 = 0.15f;
 // This close to a kerb the ray has met it [m].
 const MET: f32 = 0.004f;
-// Head-on, a ray has met the kerb from this far off: a straight kerb's position is known to a few millimetres then [m].
+// Head-on, a ray has met the kerb from this far off: a straight kerb's position is known to a few millimetres then
+// [m].
 const MET_HEAD_ON: f32 = 0.02f;
 // Slope of a ray 5 deg from grazing; flatter ones are not followed to the last centimetre.
 const GRAZING: f32 = 0.087f;
@@ -179,7 +182,8 @@ struct Truck {
     held: u32,
 }
 
-// Where a truck begins its route: fractions of the largest start errors, each in -1..=1; zeros are the lane centre.
+// Where a truck begins its route: fractions of the largest start errors, each in -1..=1; zeros are the lane
+// centre.
 struct Start {
     // Fraction of the largest lateral offset, left positive.
     offset: f32,
@@ -189,8 +193,8 @@ struct Start {
 
 // Distance from a unit's outline to the nearest solid edge, at most 0 where they touch [m].
 //
-// Contact is exact to 2 cm. Otherwise the value is at least the true distance less the field's error, and at most twice the true
-// distance plus 2 cm: far from a kerb fewer points are sampled.
+// Contact is exact to 2 cm. Otherwise the value is at least the true distance less the field's error, and at most
+// twice the true distance plus 2 cm: far from a kerb fewer points are sampled.
 struct Clearance {
     // Of the tractor [m].
     tractor: f32,
@@ -438,7 +442,7 @@ struct BatchFacts {
 @group(0) @binding(17) var<storage, read_write> ranges: array<f32>;
 //  The observation before the next action, [n_envs, 69].
 @group(0) @binding(18) var<storage, read_write> observation: array<f32>;
-//  The observation after the last action; differs from `observation` only where an episode ended, [n_envs, 69].
+//  The observation after the last action, another one only where an episode ended, [n_envs, 69].
 @group(0) @binding(19) var<storage, read_write> next_observation: array<f32>;
 //  Codes of [`crate::layout::Ended`] for the last step, [n_envs].
 @group(0) @binding(20) var<storage, read_write> ended: array<u32>;

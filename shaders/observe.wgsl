@@ -17,7 +17,8 @@ fn observe_after_reset(thread: Thread) {
     observed(env, true);
 }
 
-// Writes a value of a truck's observation: to the one before the next action after a reset, otherwise to the one after the last action.
+// Writes a value of a truck's observation: to the one before the next action after a reset, otherwise to the one after
+// the last action.
 fn put(env: u32, after_reset: bool, index: u32, value: f32) {
     if after_reset {
         observation[env * N_VALUES + index] = value;

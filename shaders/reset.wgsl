@@ -1,7 +1,7 @@
 // Begins the next episode of a truck whose last one ended, within the same step.
 //
-// Route and pose are functions of (seed, env, episode) alone. A truck on a fixed route drives it once and is then held. Other kernels then
-// sense and observe the trucks that began another episode.
+// Route and pose are functions of (seed, env, episode) alone. A truck on a fixed route drives it once and is then held.
+// Other kernels then sense and observe the trucks that began another episode.
 
 @compute @workgroup_size(WORKGROUP)
 fn reset(thread: Thread) {

@@ -1,7 +1,8 @@
 // Measures the ranges: from each sensor along its ray to the kerb.
 //
-// Over-relaxed sphere tracing of the field (B. Keinert et al., "Enhanced Sphere Tracing", 2014), a thread for each ray: a step is as long as the
-// field's slope along the ray allows, and is taken back unless the free circles at both of its ends overlap.
+// Over-relaxed sphere tracing of the field (B. Keinert et al., "Enhanced Sphere Tracing", 2014), a thread for each ray:
+// a step is as long as the field's slope along the ray allows, and is taken back unless the free circles at both of its
+// ends overlap.
 
 @compute @workgroup_size(WORKGROUP)
 fn sense(thread: Thread) {
@@ -34,7 +35,8 @@ fn range_of(env: u32, index: u32) -> f32 {
 
 // Within 2 cm of the exact distance, except for rays that come within 2 cm of a kerb at less than 5 deg to it.
 fn traced(field: FieldRow, origin: vec2<f32>, ahead: vec2<f32>, reach: f32) -> f32 {
-    // Distances along the ray of the next sample and of the start of the last accepted step, and the radius of the free circle there [m].
+    // Distances along the ray of the next sample and of the start of the last accepted step, and the radius of the free
+    // circle there [m].
     var along = 0.0;
     var base = 0.0;
     var free = 0.0;

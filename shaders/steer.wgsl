@@ -12,8 +12,8 @@ fn steer(thread: Thread) {
 
 // The control for the next `duration` seconds of a truck at `speed` [m/s] that was controlled by `before`.
 //
-// PI controller with anti-windup: the integral is reset to 0 while the error is large, and kept while the acceleration asked for is out of
-// reach. Otherwise a long approach to the target speed would overshoot it.
+// PI controller with anti-windup: the integral is reset to 0 while the error is large, and kept while the acceleration
+// asked for is out of reach. Otherwise a long approach to the target speed would overshoot it.
 fn controlled(rig: Rig, duration: f32, action: Action, speed: f32, before: Control) -> Control {
     let error = action.speed - speed;
     let near = abs(error) <= rig.speed_integral_band;

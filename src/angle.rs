@@ -38,7 +38,8 @@ pub fn wrapped(angle: f32) -> f32 {
 
 /// Angle of (x, y) from the x axis in (-pi, pi], 0 for the origin; within 4e-7 of the true one.
 ///
-/// S. Moshier's Cephes polynomial for the arc tangent. Library functions of different engines differ by more than its error.
+/// S. Moshier's Cephes polynomial for the arc tangent. Library functions of different engines differ by more than its
+/// error.
 #[inline]
 pub fn arc_tangent(y: f32, x: f32) -> f32 {
     let (small, large) = (x.abs().min(y.abs()), x.abs().max(y.abs()));
@@ -58,7 +59,8 @@ const ROUNDER: f32 = 12_582_912.0;
 
 /// Sine and cosine in plain arithmetic, within 1.2e-7 of the true ones for an angle within a few turns of 0.
 ///
-/// S. Moshier's Cephes polynomials for an eighth of a turn. As fast as the library's, whose last bits differ between engines.
+/// S. Moshier's Cephes polynomials for an eighth of a turn. As fast as the library's, whose last bits differ between
+/// engines.
 #[inline]
 pub fn sin_cos(angle: f32) -> (f32, f32) {
     // Added to a number this large, an angle is rounded to whole quarters, which stand in the lowest bits.

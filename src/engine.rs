@@ -22,7 +22,8 @@ pub use batch::{Batch, RouteChoice};
 pub use error::Error;
 pub use tally::Tally;
 
-/// A batch on its engine. The caller has checked every index and number of rows; `world` is the one that the batch was made for.
+/// A batch on its engine. The caller has checked every index and number of rows; `world` is the one that the batch was
+/// made for.
 pub(crate) trait EngineBatch: Any + Debug + Send + Sync {
     /// Trucks in the batch.
     fn n_envs(&self) -> usize;

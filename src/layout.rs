@@ -1,7 +1,7 @@
 //! The rows and constants that both engines share: defined here and nowhere else.
 //!
-//! Each struct is plain data without padding (vectors first, then scalars), so that a column of them can be copied to a device as it is.
-//! SI units and radians throughout; headings lie in (-pi, pi].
+//! Each struct is plain data without padding (vectors first, then scalars), so that a column of them can be copied to a
+//! device as it is. SI units and radians throughout; headings lie in (-pi, pi].
 
 pub mod buffers;
 pub(crate) mod columns;
@@ -77,7 +77,8 @@ crate::shared! {
         pub held: u32,
     }
 
-    /// Where a truck begins its route: fractions of the largest start errors, each in -1..=1; zeros are the lane centre.
+    /// Where a truck begins its route: fractions of the largest start errors, each in -1..=1; zeros are the lane
+    /// centre.
     pub struct Start {
         /// Fraction of the largest lateral offset, left positive.
         pub offset: f32,
@@ -87,8 +88,8 @@ crate::shared! {
 
     /// Distance from a unit's outline to the nearest solid edge, at most 0 where they touch [m].
     ///
-    /// Contact is exact to 2 cm. Otherwise the value is at least the true distance less the field's error, and at most twice the true
-    /// distance plus 2 cm: far from a kerb fewer points are sampled.
+    /// Contact is exact to 2 cm. Otherwise the value is at least the true distance less the field's error, and at most
+    /// twice the true distance plus 2 cm: far from a kerb fewer points are sampled.
     pub struct Clearance {
         /// Of the tractor [m].
         pub tractor: f32,

@@ -1,7 +1,7 @@
 //! Many trucks through many roundabouts at once.
 //!
-//! A [`scenario::Scenario`] is read from a file and baked into a [`world::World`]. A [`simulator::Simulator`] steps a batch of trucks through
-//! it on the CPU or on a GPU, every step the same [`stages`] in the same order.
+//! A [`scenario::Scenario`] is read from a file and baked into a [`world::World`]. A [`simulator::Simulator`] steps a
+//! batch of trucks through it on the CPU or on a GPU, every step the same [`stages`] in the same order.
 
 // In reading order: a module uses only those above it.
 pub mod reader; // files: errors with file, key, value and what would do

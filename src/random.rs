@@ -1,6 +1,7 @@
 //! Random numbers as a pure function of (seed, env, episode, draw): no generator state, the same bits on every engine.
 //!
-//! The mixer is pcg4d of M. Jarzynski and M. Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020): u32 arithmetic alone.
+//! The mixer is pcg4d of M. Jarzynski and M. Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020): u32
+//! arithmetic alone.
 
 use crate::shared::constants;
 
@@ -77,7 +78,8 @@ mod tests {
                 products += f64::from(here[0] * there[0]);
             }
         }
-        // The mean of n uniform numbers in [-1, 1) has a deviation of 1/sqrt(3 n), a product's of 1/(3 sqrt(n)): five of each.
+        // The mean of n uniform numbers in [-1, 1) has a deviation of 1/sqrt(3 n), a product's of 1/(3 sqrt(n)): five
+        // of each.
         let limit = 5.0 / (3.0 * n as f64).sqrt();
         assert!(sums.iter().all(|sum| (sum / n as f64).abs() < limit), "{sums:?}");
         assert!((products / n as f64).abs() < 5.0 / (3.0 * (n as f64).sqrt()), "{products}");

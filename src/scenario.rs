@@ -3,6 +3,7 @@
 //! Every error names file, key, value and what would do; it is found here or in the reader of the part it belongs to, never later.
 
 mod benchmark_keys;
+mod check;
 
 use std::path::Path;
 
@@ -13,6 +14,7 @@ use crate::route::Route;
 use crate::shipped::{Kind, Source};
 use crate::vehicle::Vehicle;
 use benchmark_keys::{Written, WrittenChoice, WrittenRoundabout, WrittenRoutes};
+pub use check::Invalid;
 
 /// Length of a route before the ring where a benchmark says nothing else [m].
 pub const APPROACH: f64 = 40.0;

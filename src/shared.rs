@@ -1,6 +1,7 @@
 //! Macros for what is written once and read twice: by Rust, and by WGSL in the words printed here.
 //!
-//! [`shared!`](crate::shared!) declares structs, `constants!` constants, [`named!`](crate::named!) closed lists of names.
+//! [`shared!`](crate::shared!) declares structs, `constants!` constants, [`named!`](crate::named!) closed lists of
+//! names.
 
 use glam::Vec2;
 

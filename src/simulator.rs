@@ -42,7 +42,8 @@ impl Simulator {
 
     /// `n_envs` trucks on an engine, reset and ready for their first action.
     ///
-    /// Fails where the routes do not fit the world or the number of trucks, or the columns neither the host's memory nor the device's.
+    /// Fails where the routes do not fit the world or the number of trucks, or the columns neither the host's memory
+    /// nor the device's.
     pub fn on(engine: Engine, world: Arc<World>, n_envs: usize, seed: u32, choice: RouteChoice) -> Result<Simulator, Error> {
         check_routes(&world, n_envs, &choice)?;
         let batch: Box<dyn EngineBatch> = match engine {
@@ -72,8 +73,8 @@ impl Simulator {
 
     /// The columns, as the last step or reset left them.
     ///
-    /// From a device they are read when they are first asked for after a step. From a lost device nothing can be read: the columns are then
-    /// those last read, and the next step fails.
+    /// From a device they are read when they are first asked for after a step. From a lost device nothing can be read:
+    /// the columns are then those last read, and the next step fails.
     pub fn batch(&self) -> &Batch {
         self.batch.columns()
     }
@@ -95,7 +96,8 @@ impl Simulator {
         self.batch.reset(&self.world);
     }
 
-    /// Begins episode 0 of every truck at a stated pose, `[n_envs]`, rather than a drawn one. Wrong starts leave the batch as it was.
+    /// Begins episode 0 of every truck at a stated pose, `[n_envs]`, rather than a drawn one. Wrong starts leave the
+    /// batch as it was.
     pub fn reset_from(&mut self, starts: &[Start]) -> Result<(), Error> {
         let n_envs = self.n_envs();
         if starts.len() != n_envs {
@@ -109,10 +111,11 @@ impl Simulator {
         self.batch.reset_from(&self.world, starts)
     }
 
-    /// Makes row `i` what row `indices[i]` was, so that one truck can go on in several ways: the batch then has `indices.len()` trucks.
+    /// Makes row `i` what row `indices[i]` was, so that one truck can go on in several ways: the batch then has
+    /// `indices.len()` trucks.
     ///
-    /// A truck that was ended and held stays so. A fixed route moves with its truck; what is drawn later depends on the new row. An error
-    /// leaves the batch as it was.
+    /// A truck that was ended and held stays so. A fixed route moves with its truck; what is drawn later depends on the
+    /// new row. An error leaves the batch as it was.
     pub fn gather(&mut self, indices: &[u32]) -> Result<(), Error> {
         let n_envs = self.n_envs();
         if indices.is_empty() {
@@ -124,8 +127,8 @@ impl Simulator {
         self.batch.gather(&self.world, indices)
     }
 
-    /// Goes on from the bytes of every column that [`Batch::columns`] gave: with the same world, engine, seed and routes every later step is
-    /// the same bit for bit. Wrong columns leave the batch as it was.
+    /// Goes on from the bytes of every column that [`Batch::columns`] gave: with the same world, engine, seed and
+    /// routes every later step is the same bit for bit. Wrong columns leave the batch as it was.
     pub fn restore<'a>(&mut self, bytes_of: impl Fn(Column) -> Option<&'a [u8]>) -> Result<(), Error> {
         let mut batch = self.batch().blank()?;
         let n_envs = batch.n_envs();
@@ -139,7 +142,8 @@ impl Simulator {
         self.batch.replace(batch)
     }
 
-    /// One step of every truck, `actions` being `[n_envs]` indices into the action table. Wrong actions leave the batch as it was.
+    /// One step of every truck, `actions` being `[n_envs]` indices into the action table. Wrong actions leave the batch
+    /// as it was.
     pub fn step(&mut self, actions: &[u32]) -> Result<(), Error> {
         let n_envs = self.n_envs();
         if actions.len() != n_envs {
@@ -157,7 +161,8 @@ impl Simulator {
         self.batch.step_at_random(&self.world);
     }
 
-    /// [`Simulator::step_at_random`] a stage at a time over the whole batch, for timing: the same result, and the time of each stage.
+    /// [`Simulator::step_at_random`] a stage at a time over the whole batch, for timing: the same result, and the time
+    /// of each stage.
     pub fn step_at_random_by_stage(&mut self) -> Result<[Duration; N_STAGES], Error> {
         self.batch.step_at_random_by_stage(&self.world)
     }

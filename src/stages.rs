@@ -1,4 +1,5 @@
-//! One step, in order. Both engines run these stages: the CPU by the function, the device by the kernels of the same name.
+//! One step, in order. Both engines run these stages: the CPU by the function, the device by the kernels of the same
+//! name.
 
 use crate::shared::Named;
 

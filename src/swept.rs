@@ -39,10 +39,11 @@ pub fn corners(body: &Body, origin: DVec2, heading: f64) -> [DVec2; 4] {
     [origin + front * ahead + side, origin + rear * ahead + side, origin + rear * ahead - side, origin + front * ahead - side]
 }
 
-/// Poses every `spacing` metres of a truck whose front axle runs along `centre_line` at `speed`; both units start in line with it.
+/// Poses every `spacing` metres of a truck whose front axle runs along `centre_line` at `speed`; both units start in
+/// line with it.
 ///
-/// The front axle's velocity points along the line; slip moves the tractor's turning point ahead by `slip * speed^2`, which shortens the
-/// lever of the turn, as in the single-track equations of [`crate::engine::cpu::drive`].
+/// The front axle's velocity points along the line; slip moves the tractor's turning point ahead by `slip * speed^2`,
+/// which shortens the lever of the turn, as in the single-track equations of [`crate::engine::cpu::drive`].
 pub fn swept_path(rig: &Rig, centre_line: &Curve, speed: f64, spacing: f64) -> Vec<Pose> {
     let wheelbase = f64::from(rig.wheelbase);
     let (fifth_wheel, trailer_wheelbase) = (f64::from(rig.fifth_wheel), f64::from(rig.trailer_wheelbase));

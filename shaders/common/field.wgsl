@@ -35,7 +35,8 @@ fn field_sample(field: FieldRow, first_cell: u32, p: vec2<f32>) -> Sample {
     );
 }
 
-// The whole part of 0 <= x <= last + 1, at most `last`. A whole x may count as the end of the part before it: interpolation agrees.
+// The whole part of 0 <= x <= last + 1, at most `last`. A whole x may count as the end of the part before it:
+// interpolation agrees.
 fn whole_part(x: vec2<f32>, last: vec2<f32>) -> vec2<f32> {
     return min(max(round(x - 0.5), vec2<f32>(0.0)), last);
 }

@@ -1,6 +1,7 @@
 // Random numbers as a pure function of (seed, env, episode, draw): no generator state, the same bits on every engine.
 //
-// The mixer is pcg4d of M. Jarzynski and M. Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020): u32 arithmetic alone.
+// The mixer is pcg4d of M. Jarzynski and M. Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020): u32 arithmetic
+// alone.
 
 // Four random words.
 fn words(seed: u32, env: u32, episode: u32, draw: u32) -> vec4<u32> {

@@ -60,7 +60,8 @@ macro_rules! batch {
                 Ok(Batch { seed, choice, tally: Tally::default(), $($name: zeros(n_envs)?,)* })
             }
 
-            /// The rows `indices` of this batch, in that order and as often as they are named: row `i` goes on as row `indices[i]` was.
+            /// The rows `indices` of this batch, in that order and as often as they are named: row `i` goes on as row
+            /// `indices[i]` was.
             pub(crate) fn gathered(&self, indices: &[u32]) -> Result<Batch, Error> {
                 let choice = match &self.choice {
                     RouteChoice::Fixed(routes) => RouteChoice::Fixed(indices.iter().map(|&index| routes[index as usize]).collect()),
@@ -75,7 +76,8 @@ macro_rules! batch {
                 Ok(batch)
             }
 
-            /// Every column as its bytes: with them a batch goes on where it was, see [`crate::simulator::Simulator::restore`].
+            /// Every column as its bytes: with them a batch goes on where it was, see
+            /// [`crate::simulator::Simulator::restore`].
             pub fn columns(&self) -> [(Column, &[u8]); N_COLUMNS] {
                 [$((Column::$variant, cast_slice(&self.$name)),)*]
             }

@@ -1,6 +1,7 @@
 //! The engine of compute shaders: a device, and the kernels of `shaders/` compiled for it.
 //!
-//! A device is opened once and shared: by the batches of this crate, and by other code that computes on it and passes its buffers in.
+//! A device is opened once and shared: by the batches of this crate, and by other code that computes on it and passes
+//! its buffers in.
 
 mod adapter;
 mod batch;

@@ -1,7 +1,8 @@
 //! The columns of a batch, declared once.
 //!
-//! [`columns!`] hands the list to a macro: here to the one that makes [`Column`], in `engine/batch.rs` to the one that makes a batch and a row
-//! of it. The buffers on a device, their WGSL declarations and the tests' tables follow from [`Column`].
+//! [`columns!`] hands the list to a macro: here to the one that makes [`Column`], in `engine/batch.rs` to the one that
+//! makes a batch and a row of it. The buffers on a device, their WGSL declarations and the tests' tables follow from
+//! [`Column`].
 
 use super::{Clearance, Control, N_RAYS, N_VALUES, Progress, RewardTerms, Truck};
 use crate::shared::{Named, Shared};
@@ -24,7 +25,7 @@ macro_rules! columns {
             Ranges ranges: [f32; N_RAYS],
             /// The observation before the next action
             Observation observation: [f32; N_VALUES],
-            /// The observation after the last action; differs from `observation` only where an episode ended
+            /// The observation after the last action, another one only where an episode ended
             NextObservation next_observation: [f32; N_VALUES],
             /// Codes of [`crate::layout::Ended`] for the last step
             Ended ended: u32,

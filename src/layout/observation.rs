@@ -17,8 +17,8 @@ pub struct Values {
 
 /// What each of the [`N_VALUES`] values of an observation is.
 ///
-/// Values lie in 0..=1, angles in -1..=1. "Next waypoint" is the next one to pass; beyond the end of a route its last waypoint repeats. The
-/// truck's reference point is the middle of the tractor's wheelbase.
+/// Values lie in 0..=1, angles in -1..=1. "Next waypoint" is the next one to pass; beyond the end of a route its last
+/// waypoint repeats. The truck's reference point is the middle of the tractor's wheelbase.
 ///
 /// | values | name | what |
 /// |---|---|---|

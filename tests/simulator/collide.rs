@@ -63,7 +63,8 @@ fn a_unit_touches_a_kerb_exactly_when_its_rectangle_does_to_two_centimetres() {
                 let [wrong, different] = verdicts(&kerbs, rig, &trucks, &exact, &simulator.batch().clearance, 0.02);
                 println!("{name} {gutter:?}, {on}: {different} of {} differ within 2 cm, {touching} touch", 2 * n);
                 assert_eq!(wrong, 0, "{name}");
-                // Of all poses about one in 200 is so close a call that a field off by a centimetre may decide it otherwise.
+                // Of all poses about one in 200 is so close a call that a field off by a centimetre may decide it
+                // otherwise.
                 assert!(different < 2 * n as usize / 200, "{name}: {different}");
             }
         }

@@ -219,7 +219,8 @@ fn the_sensors_see_the_road_ahead_at_the_start_of_every_route() {
         let n = world.routes.len();
         let simulator = batch_on(&engine, &world, n, 0, RouteChoice::Fixed((0..n as u32).collect()));
         for (env, ranges) in simulator.batch().ranges.iter().enumerate() {
-            // The tractor's middle ray looks down its own lane, which may bend; the first trailer rays meet the kerbs a few metres aside.
+            // The tractor's middle ray looks down its own lane, which may bend; the first trailer rays meet the kerbs a
+            // few metres aside.
             assert!(10.0 < ranges[N_RAYS - 7], "{}: {}", world.route_names[env], ranges[N_RAYS - 7]);
             assert!(0.3 < ranges[0] && 0.3 < ranges[1], "{}", world.route_names[env]);
         }

@@ -22,6 +22,7 @@ mod on_device;
 mod parity;
 mod physics;
 mod pinned;
+mod refused;
 mod restarts;
 mod sense;
 mod shaders;
@@ -31,7 +32,7 @@ mod shipped;
 fn benchmark(name: &str) -> (Scenario, World) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(name).with_extension("toml");
     let scenario = Scenario::read(&path).unwrap();
-    let world = World::bake(&scenario);
+    let world = World::bake(&scenario).unwrap();
     (scenario, world)
 }
 

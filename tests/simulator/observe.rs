@@ -1,4 +1,5 @@
-//! The observation against a plain, slow reference: each value worked out on its own, in f64, from the route's own waypoints.
+//! The observation against a plain, slow reference: each value worked out on its own, in f64, from the route's own
+//! waypoints.
 
 use std::f64::consts::PI;
 
@@ -135,8 +136,8 @@ fn worst_differences(shift: usize) -> [f64; 69] {
 
 #[test]
 fn every_value_of_the_observation_is_what_its_definition_says() {
-    // Positions reach 100 m, where an f32 is good to 4e-6 m; a chord's circumcentre multiplies that by radius over chord, an angle at a
-    // waypoint 2 m away by a half.
+    // Positions reach 100 m, where an f32 is good to 4e-6 m; a chord's circumcentre multiplies that by radius over
+    // chord, an angle at a waypoint 2 m away by a half.
     for (index, difference) in worst_differences(0).into_iter().enumerate() {
         assert!(difference < 2e-5, "value {index} is off by {difference}");
     }

@@ -23,7 +23,8 @@ use states::{ENOUGH, N_ENVS, on_each_roundabout, put, varied, world};
 /// Columns, and a change of the world.
 type Written = (&'static [Column], Option<fn(&mut World)>);
 
-/// What a stage writes, and one number of the world that it notices to be off by a thousandth. Two stages use no number of the world.
+/// What a stage writes, and one number of the world that it notices to be off by a thousandth. Two stages use no number
+/// of the world.
 fn written(stage: Stage) -> Written {
     match stage {
         Stage::Steer => (&[Column::Control], Some(|world| world.params.rig.speed_gain *= 1.001)),

@@ -8,7 +8,8 @@ use offtrack::simulator::{Engine, RouteChoice};
 
 use crate::{batch_on, benchmark};
 
-/// Hashes of the columns, in the order of [`offtrack::layout::Column`]: 512 trucks on all routes of a benchmark, 300 random steps, seed 7.
+/// Hashes of the columns, in the order of [`offtrack::layout::Column`]: 512 trucks on all routes of a benchmark, 300
+/// random steps, seed 7.
 const PINNED: [(&str, [u64; 11]); 3] = [
     (
         "attard2023",

@@ -43,7 +43,8 @@ fn a_stated_start_equal_to_the_drawn_one_is_the_same() {
             .collect();
         simulator.step_at_random();
         simulator.reset_from(&starts).unwrap();
-        // A reset keeps the columns that describe the last step: only those that the next action depends on are compared.
+        // A reset keeps the columns that describe the last step: only those that the next action depends on are
+        // compared.
         let stated = simulator.batch();
         // A stated start is worked out on the host: a device's own may differ from it in the last bit of a place.
         let exact = name == "CPU";
@@ -58,7 +59,8 @@ fn a_stated_start_equal_to_the_drawn_one_is_the_same() {
 fn a_gathered_truck_goes_on_as_the_one_it_was() {
     let world = Arc::new(benchmark("attard2023").1);
     let all: Vec<u32> = (0..40).collect();
-    // Each truck holds one action: those that steer straight (4, 13, ...) are still on the approach when others have met a kerb.
+    // Each truck holds one action: those that steer straight (4, 13, ...) are still on the approach when others have
+    // met a kerb.
     let actions = |trucks: &[u32]| -> Vec<u32> { trucks.iter().map(|truck| truck % 9).collect() };
     for (_, engine) in engines() {
         let driven = || {

@@ -16,6 +16,9 @@ pub enum Error {
     /// A file cannot be read, or is a wrong scenario, vehicle or roundabout.
     #[error(transparent)]
     Input(#[from] offtrack::reader::Error),
+    /// No truck could be stepped in the scenario.
+    #[error(transparent)]
+    Scenario(#[from] offtrack::scenario::Invalid),
     /// A batch cannot be made or stepped.
     #[error(transparent)]
     Simulator(#[from] offtrack::simulator::Error),

@@ -14,7 +14,7 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scenario = Scenario::named("attard2023")?;
-//! let world = Arc::new(World::bake(&scenario));
+//! let world = Arc::new(World::bake(&scenario)?);
 //! let policy = LearnedPolicy::shipped("attard2023")?;
 //! let routes = scenario.split(Split::Test).to_vec();
 //! let mut simulator = Simulator::new(world, routes.len(), 0, RouteChoice::Fixed(routes))?;

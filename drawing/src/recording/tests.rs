@@ -12,7 +12,7 @@ fn scenario() -> Scenario {
 /// Two trucks on the first two test routes that steer hard left until each collides: their tracks, and the batch after
 /// every step.
 fn driven(scenario: &Scenario) -> (Arc<World>, Vec<Track>, Vec<Batch>) {
-    let world = Arc::new(World::bake(scenario));
+    let world = Arc::new(World::bake(scenario).unwrap());
     let routes = scenario.split(Split::Test)[..2].to_vec();
     let mut simulator = Simulator::new(world.clone(), 2, 3, RouteChoice::Fixed(routes)).unwrap();
     let mut recorder = Recorder::new(&world, simulator.batch(), [1, 0]);

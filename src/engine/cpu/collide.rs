@@ -1,8 +1,9 @@
 //! Measures the clearances: from each unit's rectangle to the nearest solid edge.
 //!
-//! A rectangle is a capsule, all points within half its width of a stretch of its centre line, and four corners. Points of the stretch are
-//! sampled for the capsule, so that a solid that lies wholly under the unit is found too, and the corners themselves. The distance is
-//! 1-Lipschitz, so two samples bound it between them; the middle is sampled only where the bound is not tight enough.
+//! A rectangle is a capsule, all points within half its width of a stretch of its centre line, and four corners. Points
+//! of the stretch are sampled for the capsule, so that a solid that lies wholly under the unit is found too, and the
+//! corners themselves. The distance is 1-Lipschitz, so two samples bound it between them; the middle is sampled only
+//! where the bound is not tight enough.
 
 use glam::Vec2;
 use multiversion::multiversion;
@@ -29,7 +30,8 @@ constants! {
     const TOLERANCE: f32 = 0.01;
     /// Error that is tolerated as a fraction of the clearance: far from a kerb a centimetre does not matter.
     const FRACTION: f32 = 0.5;
-    /// Most undecided spans: at first 11 and 8 of a trailer, then at most 8 more for each of the 8 halvings from 2.5 m to 1 cm.
+    /// Most undecided spans: at first 11 and 8 of a trailer, then at most 8 more for each of the 8 halvings from 2.5 m
+    /// to 1 cm.
     const N_SPANS: usize = 96;
 }
 
@@ -87,8 +89,8 @@ fn point(body: &Body, n_points: usize, index: usize) -> Vec2 {
     Vec2::new(if corner < 2 { body.rear } else { body.front }, if corner.is_multiple_of(2) { body.half_width } else { -body.half_width })
 }
 
-/// One of a body's lines: the pieces of its centre line, then two from each corner. These run along the unit's end to its middle, and along
-/// its side to where the capsule takes over: both touch the capsule's end.
+/// One of a body's lines: the pieces of its centre line, then two from each corner. These run along the unit's end to
+/// its middle, and along its side to where the capsule takes over: both touch the capsule's end.
 #[inline(always)]
 fn line(body: &Body, n_points: usize, index: usize) -> Line {
     if index < n_points - 1 {
@@ -126,8 +128,8 @@ fn bound(line: &Line, span: &Span) -> f32 {
     0.5 * (span.at_begin + span.at_end - width(span.part) * line.begin.distance(line.end)) - line.radius
 }
 
-/// Clearance of one rectangle whose frame has its origin at `position` and the unit vector `heading` as x axis. `N` points of its centre
-/// line and its corners are the `ALL` samples taken first.
+/// Clearance of one rectangle whose frame has its origin at `position` and the unit vector `heading` as x axis. `N`
+/// points of its centre line and its corners are the `ALL` samples taken first.
 #[inline(always)]
 fn body_clearance<const N: usize, const ALL: usize>(field: &Field, body: &Body, position: Vec2, heading: Vec2) -> f32 {
     let points: [Vec2; ALL] = std::array::from_fn(|index| point(body, N, index));

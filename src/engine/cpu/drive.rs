@@ -1,7 +1,8 @@
 //! Moves the truck: a single-track tractor pulling a trailer hitched near its drive axle.
 //!
-//! Tyre slip shifts each unit's no-slip point forward by `slip * speed²`; zero slip is pure kinematics. The midpoint rule integrates it. Steer
-//! angle and speed change linearly within a sub-step: constant ones would cost decimetres in a turn.
+//! Tyre slip shifts each unit's no-slip point forward by `slip * speed²`; zero slip is pure kinematics. The midpoint
+//! rule integrates it. Steer angle and speed change linearly within a sub-step: constant ones would cost decimetres in
+//! a turn.
 
 use glam::Vec2;
 
@@ -125,7 +126,8 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
     }
 }
 
-/// A unit's (roll, roll rate) one sub-step later. The lateral acceleration of the sub-step's middle stands for its mean.
+/// A unit's (roll, roll rate) one sub-step later. The lateral acceleration of the sub-step's middle stands for its
+/// mean.
 #[inline]
 fn rolled(roll: &Roll, state: Vec2, lateral_acceleration: f32) -> Vec2 {
     let [a, b, c, d] = roll.transition;

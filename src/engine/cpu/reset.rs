@@ -1,6 +1,7 @@
 //! Begins the next episode of a truck whose last one ended, within the same step.
 //!
-//! Route and pose are functions of (seed, env, episode) alone. A truck on a fixed route drives it once and is then held.
+//! Route and pose are functions of (seed, env, episode) alone. A truck on a fixed route drives it once and is then
+//! held.
 
 use crate::angle::{direction, wrapped};
 use crate::engine::cpu::follow::{followed, reference_point};

@@ -1,8 +1,9 @@
 //! Measures the ranges: from each sensor along its ray to the kerb.
 //!
-//! Over-relaxed sphere tracing of the field (B. Keinert et al., "Enhanced Sphere Tracing", 2014): a step is as long as the field's slope along
-//! the ray allows, and is taken back unless the free circles at both of its ends overlap. All rays of a truck are traced side by side; once
-//! half of them have ended, the others are packed into a bundle of half the width.
+//! Over-relaxed sphere tracing of the field (B. Keinert et al., "Enhanced Sphere Tracing", 2014): a step is as long as
+//! the field's slope along the ray allows, and is taken back unless the free circles at both of its ends overlap. All
+//! rays of a truck are traced side by side; once half of them have ended, the others are packed into a bundle of half
+//! the width.
 
 use multiversion::multiversion;
 
@@ -19,7 +20,8 @@ const WIDE: usize = N_RAYS.next_power_of_two();
 const NO_RAY: u32 = WIDE as u32 - 1;
 const _: () = assert!(N_RAYS < WIDE);
 constants! {
-    /// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide between them.
+    /// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide
+    /// between them.
     const GAP: f32 = 0.05;
     /// A step this short is never taken back [m].
     const SHORT: f32 = 0.25;
@@ -27,7 +29,8 @@ constants! {
     const CLOSE: f32 = 0.15;
     /// This close to a kerb the ray has met it [m].
     const MET: f32 = 0.004;
-    /// Head-on, a ray has met the kerb from this far off: a straight kerb's position is known to a few millimetres then [m].
+    /// Head-on, a ray has met the kerb from this far off: a straight kerb's position is known to a few millimetres then
+    /// [m].
     const MET_HEAD_ON: f32 = 0.02;
     /// Slope of a ray 5 deg from grazing; flatter ones are not followed to the last centimetre.
     const GRAZING: f32 = 0.087;

@@ -15,8 +15,8 @@ pub fn steer(world: &World, row: &mut Row) {
 
 /// The control for the next `step` seconds of a truck at `speed` [m/s] that was controlled by `before`.
 ///
-/// PI controller with anti-windup: the integral is reset to 0 while the error is large, and kept while the acceleration asked for is out of
-/// reach. Otherwise a long approach to the target speed would overshoot it.
+/// PI controller with anti-windup: the integral is reset to 0 while the error is large, and kept while the acceleration
+/// asked for is out of reach. Otherwise a long approach to the target speed would overshoot it.
 #[inline]
 pub fn controlled(rig: &Rig, step: f32, action: &Action, speed: f32, before: &Control) -> Control {
     let error = action.speed - speed;

@@ -21,8 +21,8 @@ pub struct Adapter {
     pub binding_max: u64,
 }
 
-/// The interfaces that are searched for adapters. OpenGL is left out: a machine without a driver would offer it and compute wrongly or not at
-/// all.
+/// The interfaces that are searched for adapters. OpenGL is left out: a machine without a driver would offer it and
+/// compute wrongly or not at all.
 const BACKENDS: Backends = Backends::VULKAN.union(Backends::METAL).union(Backends::DX12);
 
 /// The interfaces that were searched, as an error names them.

@@ -1,4 +1,5 @@
-//! A batch on a device: columns in its memory, stepped by kernels. Nothing is copied to the host unless the caller asks for it.
+//! A batch on a device: columns in its memory, stepped by kernels. Nothing is copied to the host unless the caller asks
+//! for it.
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
@@ -61,7 +62,8 @@ impl Batch {
         self.buffers.column(column)
     }
 
-    /// Adds a step with the actions in their column to the caller's commands. The caller submits them and calls [`Batch::stepped`].
+    /// Adds a step with the actions in their column to the caller's commands. The caller submits them and calls
+    /// [`Batch::stepped`].
     pub fn add_step(&self, encoder: &mut CommandEncoder) {
         self.add_stages(encoder, &STAGES);
     }

@@ -24,7 +24,8 @@ pub struct Kernels<K> {
 }
 
 impl<K: Named> Kernels<K> {
-    /// Compiles an entry point of `source` for each of `K`. The bindings are storage buffers with these accesses, in their order.
+    /// Compiles an entry point of `source` for each of `K`. The bindings are storage buffers with these accesses, in
+    /// their order.
     pub fn compile(device: &wgpu::Device, label: &str, source: String, accesses: impl IntoIterator<Item = Access>) -> Kernels<K> {
         let module = device.create_shader_module(ShaderModuleDescriptor { label: Some(label), source: ShaderSource::Wgsl(source.into()) });
         let bindings: Vec<BindGroupLayoutEntry> = (0..).zip(accesses).map(|(binding, access)| bound(binding, access)).collect();

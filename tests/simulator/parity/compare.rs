@@ -18,7 +18,8 @@ pub struct Bound {
 
 /// Equal to the last bit: integers, flags, and copied values.
 const SAME: Bound = within(0.0);
-/// Five units in the last place of a position up to 128 m from the middle, of 7.6e-6 m each: engines sum in different orders.
+/// Five units in the last place of a position up to 128 m from the middle, of 7.6e-6 m each: engines sum in different
+/// orders.
 const POSITION: Bound = within(4e-5);
 /// Eight units in the last place of an angle in (-pi, pi], of 2.4e-7 rad each.
 const ANGLE: Bound = Bound { turn: std::f32::consts::TAU, ..within(2e-6) };

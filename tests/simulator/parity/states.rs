@@ -47,8 +47,8 @@ fn picked(env: usize, draw: u32, n: usize) -> usize {
     index_below(words(SEED, env as u32, 1, draw)[0], n as u32) as usize
 }
 
-/// Before a step: a quarter of the trucks where 40 random steps have brought them, the others anywhere near their routes, slow and fast,
-/// bent and leaning. On fixed routes one in sixteen is held.
+/// Before a step: a quarter of the trucks where 40 random steps have brought them, the others anywhere near their
+/// routes, slow and fast, bent and leaning. On fixed routes one in sixteen is held.
 pub fn varied(world: &Arc<World>, fixed: bool) -> (RouteChoice, Batch) {
     let all: Vec<u32> = (0..world.routes.len() as u32).collect();
     let mut simulator = Simulator::new(world.clone(), N_ENVS, SEED, RouteChoice::Drawn(all.clone())).unwrap();

@@ -141,7 +141,7 @@ impl Learner {
         config.learning = Learning { hidden: hidden.to_vec(), batch, ..config.learning };
         let scenario = Scenario::named(BENCHMARK)?;
         let routes = scenario.split(Split::Train).to_vec();
-        let mut training = Training::new(&Backend::Host, &config, Arc::new(World::bake(&scenario)), routes)?;
+        let mut training = Training::new(&Backend::Host, &config, Arc::new(World::bake(&scenario)?), routes)?;
         while !training.is_warm()? {
             training.act(0)?;
         }

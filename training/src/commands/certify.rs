@@ -76,7 +76,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
     let certificate = Certificate::read(path)?;
     let scenario = Scenario::find(benchmark.unwrap_or(&certificate.benchmark))?;
-    let world = Arc::new(World::bake(&scenario));
+    let world = Arc::new(World::bake(&scenario)?);
     certificate.check(&scenario, &world, path)?;
     let arrived = verify::verify(&certificate, &world, path, |_| true)?;
     files::print(&format!("{}{arrived} sequences driven again: all arrived\n", table(&certificate)))
@@ -85,7 +85,7 @@ fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
 /// Searches every route from every start.
 fn certify(args: &Args) -> Result<(), Error> {
     let scenario = Scenario::find(args.benchmark.as_deref().unwrap_or("attard2023"))?;
-    let world = Arc::new(World::bake(&scenario));
+    let world = Arc::new(World::bake(&scenario)?);
     let policy = args.policy.as_deref().map(policies::learned).transpose()?;
     if let Some(policy) = &policy {
         policy.check(&world)?;

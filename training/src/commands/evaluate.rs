@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let device = args.device.open()?;
     let scenario = Scenario::find(&args.benchmark)?;
-    let world = Arc::new(World::bake(&scenario));
+    let world = Arc::new(World::bake(&scenario)?);
     let mut policy = args.policy.open(&scenario, &world, args.seed)?;
     let split = if args.split == "train" { Split::Train } else { Split::Test };
     let n_episodes = args.episodes * scenario.split(split).len();

@@ -81,7 +81,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let scenario = Scenario::find(&args.benchmark)?;
     let chosen = Chosen::new(&scenario, &args.route)?;
-    let world = Arc::new(World::bake(&scenario));
+    let world = Arc::new(World::bake(&scenario)?);
     let mut policy = args.policy.open(&scenario, &world, args.seed)?;
     let recording = recorded(args, &scenario, &world, &chosen, policy.as_mut())?;
     let bytes = bytes(format, args.size, &recording, &chosen, scenario.gutter);

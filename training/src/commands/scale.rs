@@ -148,7 +148,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let mut device = args.device.open()?;
     let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
-    let world = Arc::new(World::bake(&scenario));
+    let world = Arc::new(World::bake(&scenario)?);
     let learner = match args.mode.iter().any(|mode| *mode != Mode::Random) {
         true => Some(Learner::read(&scenario.name, &args.config.clone().unwrap_or_else(|| PathBuf::from("gpu")), &world)?),
         false => None,

@@ -242,7 +242,7 @@ mod tests {
     use super::*;
 
     fn world() -> Arc<World> {
-        Arc::new(World::bake(&offtrack::scenario::Scenario::named("attard2023").unwrap()))
+        Arc::new(World::bake(&offtrack::scenario::Scenario::named("attard2023").unwrap()).unwrap())
     }
 
     #[test]

@@ -18,7 +18,7 @@ fn scenario() -> Scenario {
 
 /// The world mirrored at the x axis: left-hand traffic, clockwise.
 fn mirrored(scenario: &Scenario) -> World {
-    let mut world = World::bake(scenario);
+    let mut world = World::bake(scenario).unwrap();
     let flip = glam::Vec2::new(1.0, -1.0);
     for waypoint in &mut world.waypoints {
         waypoint.position *= flip;
@@ -41,7 +41,7 @@ fn mirrored(scenario: &Scenario) -> World {
 #[test]
 fn a_mirrored_truck_in_a_mirrored_world_has_mirrored_observations_and_the_same_rewards() {
     let scenario = scenario();
-    let world = World::bake(&scenario);
+    let world = World::bake(&scenario).unwrap();
     let mirror = Mirror::of(&world).unwrap();
     let n_routes = world.routes.len();
     let routes: Vec<u32> = (0..4 * n_routes).map(|env| (env % n_routes) as u32).collect();
@@ -95,7 +95,7 @@ fn nearest(clearance: &Clearance) -> f32 {
 
 #[test]
 fn the_image_of_an_image_is_the_thing_itself_and_the_middle_stays() {
-    let mirror = Mirror::of(&World::bake(&scenario())).unwrap();
+    let mirror = Mirror::of(&World::bake(&scenario()).unwrap()).unwrap();
     let seen: [f32; N_VALUES] = std::array::from_fn(|index| 0.01 * index as f32 - 0.3);
     assert_eq!(mirror.observation(&mirror.observation(&seen)), seen);
     assert_ne!(mirror.observation(&seen), seen);
@@ -106,14 +106,14 @@ fn the_image_of_an_image_is_the_thing_itself_and_the_middle_stays() {
 
 #[test]
 fn an_action_table_or_sensors_without_an_image_are_refused() {
-    let mut world = World::bake(&scenario());
+    let mut world = World::bake(&scenario()).unwrap();
     world.actions[8].steering *= 0.9;
     let message = Mirror::of(&world).unwrap_err().to_string();
     assert!(
         message.starts_with("learning.mirror_augmentation: true; steering -32.0 deg is in the action table and its opposite is not"),
         "{message}"
     );
-    let mut world = World::bake(&scenario());
+    let mut world = World::bake(&scenario()).unwrap();
     world.rays[3].origin.x += 0.5;
     let message = Mirror::of(&world).unwrap_err().to_string();
     assert!(message.contains("distance sensor 2 has no image"), "{message}");
@@ -121,7 +121,7 @@ fn an_action_table_or_sensors_without_an_image_are_refused() {
 
 #[test]
 fn half_of_a_sample_is_mirrored_whole_transitions_at_a_time() {
-    let mirror = Mirror::of(&World::bake(&scenario())).unwrap();
+    let mirror = Mirror::of(&World::bake(&scenario()).unwrap()).unwrap();
     let one = [0.1; N_VALUES];
     let rows = 2000;
     let mut sample = Sample {

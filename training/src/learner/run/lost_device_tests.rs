@@ -17,7 +17,7 @@ fn run(folder: &Path, settings: &[&str]) -> (Run, Folder, Shared) {
     let config = Config::read_with(Path::new("gpu"), &settings).unwrap();
     let folder = Folder::create(folder, Some("run"), Path::new("gpu"), &config).unwrap();
     let scenario = Scenario::named("attard2023").unwrap();
-    let (world, routes) = (Arc::new(World::bake(&scenario)), scenario.split(Split::Train).to_vec());
+    let (world, routes) = (Arc::new(World::bake(&scenario).unwrap()), scenario.split(Split::Train).to_vec());
     let progress = Progress::new(&config, MetricsFile::create(folder.metrics()).unwrap(), Box::new(()));
     let shared = Shared::open(None).unwrap();
     let backend = Backend::Device(Box::new(shared.clone()));

@@ -8,7 +8,7 @@ use crate::files;
 
 fn training() -> (Arc<World>, Vec<u32>) {
     let scenario = Scenario::read(&files::benchmark("attard2023").unwrap()).unwrap();
-    (Arc::new(World::bake(&scenario)), scenario.split(Split::Train).to_vec())
+    (Arc::new(World::bake(&scenario).unwrap()), scenario.split(Split::Train).to_vec())
 }
 
 fn config(settings: &[&str]) -> Config {
