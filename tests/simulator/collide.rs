@@ -72,7 +72,7 @@ fn a_unit_touches_a_kerb_exactly_when_its_rectangle_does_to_two_centimetres() {
 }
 
 #[test]
-fn a_rectangle_five_centimetres_too_wide_is_found_out() {
+fn a_rectangle_five_centimetres_too_wide_is_noticed() {
     let world = benchmark("attard2023").1;
     let rig = &world.params.rig;
     let mut wide = world.clone();

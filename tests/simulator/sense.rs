@@ -16,13 +16,13 @@ use crate::{benchmark, engines};
 /// Error that a range may have [m].
 const TOLERANCE: f64 = 0.02;
 
-/// Where a truck's ray begins and its unit vector.
+/// Origin and unit vector of a truck's ray.
 fn placed(world: &World, truck: &Truck, ray: usize) -> (DVec2, DVec2) {
     let trailer = (truck.trailer_position(&world.params.rig), truck.trailer_heading);
-    let (place, heading) = if ray < N_TRAILER_RAYS { trailer } else { (truck.position, truck.heading) };
+    let (position, heading) = if ray < N_TRAILER_RAYS { trailer } else { (truck.position, truck.heading) };
     let heading = Vec2::from_angle(heading);
     let ray = world.rays[ray];
-    ((place + heading.rotate(ray.origin)).as_dvec2(), heading.rotate(ray.direction).as_dvec2().normalize())
+    ((position + heading.rotate(ray.origin)).as_dvec2(), heading.rotate(ray.direction).as_dvec2().normalize())
 }
 
 /// Whether the ray comes within 2 cm of a kerb at less than 5 deg to it, or leaves it again, before or where it ends.
@@ -77,7 +77,7 @@ fn a_range_is_the_distance_along_the_ray_to_the_kerb_to_two_centimetres() {
 }
 
 #[test]
-fn ranges_to_kerbs_five_centimetres_off_are_found_out() {
+fn ranges_to_kerbs_five_centimetres_off_are_noticed() {
     let world = benchmark("attard2023").1;
     let (_, kerbs, _) = places(Gutter::Drivable).swap_remove(0);
     let other = Field::bake(&kerbs.offset(0.05), 0.5);
@@ -107,7 +107,7 @@ fn a_sensor_inside_a_kerb_reads_nothing_and_one_in_the_open_its_reach() {
 }
 
 #[test]
-fn a_truck_that_is_nowhere_still_gets_ranges() {
+fn a_truck_at_a_position_that_is_not_finite_still_gets_ranges() {
     let world = benchmark("attard2023").1;
     let (_, _, field) = places(Gutter::Drivable).swap_remove(0);
     let nowhere = [f32::NAN, f32::INFINITY, 1e9].map(|x| Truck { position: Vec2::new(x, 0.0), ..Truck::default() });
