@@ -200,7 +200,7 @@ fn a_route_that_leaves_no_room_for_the_whole_truck_is_refused_with_the_longest_t
         // At the longest approach the truck starts clear of the solid edge that ends its arm, whatever its heading error.
         if part == "approach" {
             std::fs::write(folder.path().join("longest.toml"), with(length)).unwrap();
-            let mut world = World::bake(&Scenario::read(&folder.path().join("longest.toml")).unwrap());
+            let mut world = World::bake(&Scenario::read(&folder.path().join("longest.toml")).unwrap()).unwrap();
             // Some right lanes lie so near to the kerb that a truck 0.3 m aside, turned by 2 deg, touches that.
             world.params.start_offset = 0.0;
             let n_routes = world.routes.len() as u32;
