@@ -7,8 +7,15 @@ fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
 
-/// Every Rust file below `src`, as its path there and its text without comments.
+/// Every Rust file of the simulator.
 fn files() -> Vec<(String, String)> {
+    let files = files_below(&source());
+    assert!(50 <= files.len(), "{}", files.len());
+    files
+}
+
+/// Every Rust file below a folder, as its path there and its text without comments.
+fn files_below(folder: &Path) -> Vec<(String, String)> {
     fn walk(folder: &Path, files: &mut Vec<PathBuf>) {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
@@ -16,13 +23,18 @@ fn files() -> Vec<(String, String)> {
         }
     }
     let mut found = Vec::new();
-    walk(&source(), &mut found);
+    walk(folder, &mut found);
+    found.retain(|path| path.extension().is_some_and(|extension| extension == "rs"));
     found.sort_unstable();
     let text = |path: &Path| fs::read_to_string(path).unwrap().lines().map(code).collect::<Vec<_>>().join("\n");
-    let files: Vec<_> =
-        found.iter().map(|path| (path.strip_prefix(source()).unwrap().to_str().unwrap().replace('\\', "/"), text(path))).collect();
-    assert!(50 <= files.len(), "{}", files.len());
-    files
+    let name = |path: &Path| path.strip_prefix(folder).unwrap().to_str().unwrap().replace('\\', "/");
+    found.iter().map(|path| (name(path), text(path))).collect()
+}
+
+/// Files that name the feature `gpu`, and how often.
+fn naming_gpu(files: Vec<(String, String)>) -> Vec<(String, usize)> {
+    let counts = files.into_iter().map(|(file, text)| (file, text.matches("feature = \"gpu\"").count()));
+    counts.filter(|(_, count)| 0 < *count).collect()
 }
 
 /// A line without its comment.
@@ -87,11 +99,28 @@ fn names_after_crate_are_found_also_in_braces() {
 }
 
 #[test]
-fn the_feature_gpu_is_named_only_where_an_engine_is_chosen() {
-    let counts = files().into_iter().map(|(file, text)| (file, text.matches("feature = \"gpu\"").count()));
-    let found: Vec<(String, usize)> = counts.filter(|(_, count)| 0 < *count).collect();
-    let expected = [("engine/error.rs", 2), ("engine.rs", 1), ("lib.rs", 1), ("simulator.rs", 4)];
-    assert_eq!(found, expected.map(|(file, count)| (file.to_owned(), count)));
+fn the_feature_gpu_is_named_only_where_an_engine_or_device_is_chosen() {
+    let expected = |files: &[(&str, usize)]| files.iter().map(|&(file, count)| (file.to_owned(), count)).collect::<Vec<_>>();
+    let simulator = [("engine/error.rs", 2), ("engine.rs", 1), ("lib.rs", 1), ("simulator.rs", 4)];
+    assert_eq!(naming_gpu(files()), expected(&simulator));
+    let training = files_below(&Path::new(env!("CARGO_MANIFEST_DIR")).join("training/src"));
+    assert!(60 <= training.len(), "{}", training.len());
+    // The choice of a device, the list of devices, the default training file, and tests on a device.
+    let chosen = [
+        ("commands/devices.rs", 3),
+        ("commands/train.rs", 1),
+        ("device.rs", 8),
+        ("learner/backend.rs", 8),
+        ("learner/rollout.rs", 1),
+        ("learner/run.rs", 1),
+        ("learner/sac/tests.rs", 1),
+    ];
+    assert_eq!(naming_gpu(training), expected(&chosen));
+    for other in ["drawing/src", "comparison/src"] {
+        let files = files_below(&Path::new(env!("CARGO_MANIFEST_DIR")).join(other));
+        assert!(5 <= files.len() || other == "comparison/src", "{other}: {}", files.len());
+        assert_eq!(naming_gpu(files), []);
+    }
 }
 
 #[test]

@@ -38,3 +38,8 @@ pub mod files; // results, written whole
 pub mod learner; // how a policy is learned
 pub mod policy; // a policy and its file
 pub mod provenance; // machine and commit of a result
+
+/// The README's examples, compiled and run as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;
