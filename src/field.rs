@@ -8,7 +8,7 @@ mod bake;
 
 use glam::Vec2;
 
-use crate::layout::constants;
+use crate::shared::constants;
 
 constants! {
     /// Bits of a cell's word that hold the logarithm of its sub-cells a side; the rest is where its block begins.

@@ -26,8 +26,9 @@ const ROOM: f64 = 1.35;
 /// Least ratio of the ends of an axis.
 const REACH: f64 = 12.0;
 
-/// Colours for lines that colour-blind readers can distinguish: P. Tol's "muted" scheme.
-pub const LINES: [&str; 9] = ["#332288", "#cc6677", "#117733", "#88ccee", "#882255", "#ddaa33", "#44aa99", "#999933", "#aa4499"];
+/// Colours for lines that colour-blind readers can distinguish: P. Tol's "muted" scheme and one more.
+pub const LINES: [&str; 10] =
+    ["#332288", "#cc6677", "#117733", "#88ccee", "#882255", "#ddaa33", "#44aa99", "#999933", "#aa4499", "#661100"];
 
 /// A picture of panels.
 pub struct Chart {

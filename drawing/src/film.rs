@@ -58,7 +58,7 @@ pub fn gif(scene: &Scene, frames: &[usize], width: u32, mut drawn: impl FnMut())
         before = indices;
         drawn();
     }
-    Ok(encoder.into_inner().map_err(gif::EncodingError::from)?)
+    Ok(encoder.into_inner()?)
 }
 
 /// The least rectangle with all pixels that differ, in a picture `width` pixels wide; the whole picture if `before` is

@@ -10,15 +10,15 @@ use std::sync::Arc;
 use glam::{DVec2, Vec2};
 use offtrack::field::Field;
 use offtrack::geometry::Outline;
-use offtrack::layout::Truck;
+use offtrack::layout::{Column, Truck};
 use offtrack::random::{signed_unit, words};
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
-use offtrack::stages::STAGES;
+use offtrack::stages::Stage;
 use offtrack::world::World;
 use rayon::prelude::*;
 
-use crate::{batch_on, column};
+use crate::batch_on;
 
 /// Every roundabout of the repository, its kerbs and their field.
 pub(crate) fn places(gutter: Gutter) -> Vec<(String, Outline, Field)> {
@@ -50,14 +50,14 @@ pub(crate) fn pose(kerbs: &Outline, index: u32, beyond: f64) -> Truck {
 }
 
 /// Trucks among the kerbs of `field` after one stage on an engine.
-pub(crate) fn after_stage(engine: &Engine, world: &World, field: &Field, trucks: &[Truck], stage: &str) -> Simulator {
+pub(crate) fn after_stage(engine: &Engine, world: &World, field: &Field, trucks: &[Truck], stage: Stage) -> Simulator {
     let mut world = world.clone();
     world.fields = vec![field.clone()];
     world.routes.iter_mut().for_each(|route| route.roundabout = 0);
     let mut simulator = batch_on(engine, &Arc::new(world), trucks.len(), 0, RouteChoice::Drawn(vec![0]));
     let batch = simulator.batch().clone();
-    simulator.restore(|name| Some(if name == "truck" { bytemuck::cast_slice(trucks) } else { column(&batch, name) })).unwrap();
-    simulator.run_stage(STAGES.iter().find(|known| known.name == stage).unwrap());
+    simulator.restore(|column| Some(if column == Column::Truck { bytemuck::cast_slice(trucks) } else { batch.column(column) })).unwrap();
+    simulator.run_stage(stage);
     simulator
 }
 

@@ -6,6 +6,7 @@ use offtrack::geometry::Outline;
 use offtrack::layout::{N_RAYS, N_TRAILER_RAYS, Truck};
 use offtrack::roundabout::Gutter;
 use offtrack::simulator::Engine;
+use offtrack::stages::Stage;
 use offtrack::world::World;
 use rayon::prelude::*;
 
@@ -38,7 +39,7 @@ fn grazes(kerbs: &Outline, origin: DVec2, direction: DVec2, end: f64) -> bool {
 fn errors(engine: &Engine, world: &World, kerbs: &Outline, field: &Field, n: u32) -> [usize; 3] {
     let reach = world.params.sensor_range;
     let trucks: Vec<Truck> = (0..n).into_par_iter().map(|index| pose(kerbs, index, 0.0)).collect();
-    let simulator = after_stage(engine, world, field, &trucks, "sense");
+    let simulator = after_stage(engine, world, field, &trucks, Stage::Sense);
     let sensed = &simulator.batch().ranges;
     let count = |(truck, found): (&Truck, &[f32; N_RAYS])| {
         let mut counts = [0; 3];
@@ -93,7 +94,7 @@ fn a_sensor_inside_a_kerb_reads_nothing_and_one_in_the_open_its_reach() {
     near_sighted.params.sensor_range = 0.1;
     for (_, engine) in engines() {
         let tractor_ranges = |world: &World, truck| -> Vec<f32> {
-            let simulator = after_stage(&engine, world, &field, &[truck], "sense");
+            let simulator = after_stage(&engine, world, &field, &[truck], Stage::Sense);
             simulator.batch().ranges[0][N_TRAILER_RAYS..].to_vec()
         };
         // The middle of a roundabout is solid.
@@ -110,7 +111,7 @@ fn a_truck_that_is_nowhere_still_gets_ranges() {
     let (_, _, field) = places(Gutter::Drivable).swap_remove(0);
     let nowhere = [f32::NAN, f32::INFINITY, 1e9].map(|x| Truck { position: Vec2::new(x, 0.0), ..Truck::default() });
     for (_, engine) in engines() {
-        let simulator = after_stage(&engine, &world, &field, &nowhere, "sense");
+        let simulator = after_stage(&engine, &world, &field, &nowhere, Stage::Sense);
         let found = &simulator.batch().ranges;
         assert!(found.as_flattened().iter().all(|range| (0.0..=20.0).contains(range)), "{found:?}");
     }

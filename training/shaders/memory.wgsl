@@ -4,8 +4,8 @@
 
 // Samples an action for every truck from the actor's output.
 @compute @workgroup_size(WORKGROUP)
-fn choose(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let env = thread_of(group, groups, local);
+fn choose(thread: Thread) {
+    let env = index_of(thread);
     if facts.n_envs <= env { return; }
     let first = env * facts.n_actions;
     var most = logits[first];
@@ -31,26 +31,26 @@ fn choose(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) grou
 
 // Stores observations and actions before a step; a thread a value.
 @compute @workgroup_size(WORKGROUP)
-fn store_before(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let thread = thread_of(group, groups, local);
-    let env = thread / N_VALUES;
+fn store_before(thread: Thread) {
+    let element = index_of(thread);
+    let env = element / N_VALUES;
     if facts.n_envs <= env { return; }
     let row = now.slot * facts.n_envs + env;
-    held_observation[row * N_VALUES + thread % N_VALUES] = observation[thread];
-    if thread % N_VALUES == 0u {
+    held_observation[row * N_VALUES + element % N_VALUES] = observation[element];
+    if element % N_VALUES == 0u {
         held_action[row] = action[env];
     }
 }
 
 // Stores what the step led to; a thread a value.
 @compute @workgroup_size(WORKGROUP)
-fn store_after(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let thread = thread_of(group, groups, local);
-    let env = thread / N_VALUES;
+fn store_after(thread: Thread) {
+    let element = index_of(thread);
+    let env = element / N_VALUES;
     if facts.n_envs <= env { return; }
     let row = now.slot * facts.n_envs + env;
-    held_next[row * N_VALUES + thread % N_VALUES] = next_observation[thread];
-    if thread % N_VALUES == 0u {
+    held_next[row * N_VALUES + element % N_VALUES] = next_observation[element];
+    if element % N_VALUES == 0u {
         held_reward[row] = reward[env];
         held_ended[row] = ended[env];
     }
@@ -60,10 +60,10 @@ fn store_after(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
 //
 // The sum of rewards is R. Sutton's n-step return ("Learning to Predict by the Methods of Temporal Differences", 1988).
 @compute @workgroup_size(WORKGROUP)
-fn sample(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let thread = thread_of(group, groups, local);
-    let index = thread / N_VALUES;
-    let value = thread % N_VALUES;
+fn sample(thread: Thread) {
+    let element = index_of(thread);
+    let index = element / N_VALUES;
+    let value = element % N_VALUES;
     if facts.n_rows <= index { return; }
     let drawn = words(facts.sampling_seed, index, now.sample, 0u);
     let slot = now.oldest + index_below(drawn.x, now.n_ready);
@@ -94,8 +94,8 @@ fn sample(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) grou
     if is_mirrored { image = images[value]; }
     // The same noise on both, so that their difference stays what it is.
     let noise = normalisation[value].noise * signed_unit(words(facts.sampling_seed, index, now.sample, 1u + value).x);
-    sampled_observation[thread] = normalised(image.factor * held_observation[first * N_VALUES + image.index], value) + noise;
-    sampled_next[thread] = normalised(image.factor * held_next[last * N_VALUES + image.index], value) + noise;
+    sampled_observation[element] = normalised(image.factor * held_observation[first * N_VALUES + image.index], value) + noise;
+    sampled_next[element] = normalised(image.factor * held_next[last * N_VALUES + image.index], value) + noise;
 }
 
 // A value, normalised and clipped.

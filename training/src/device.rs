@@ -100,6 +100,6 @@ pub fn has_failed(error: &Error) -> bool {
 
 /// Whether the error is a failure of the device rather than wrong input.
 #[cfg(not(feature = "gpu"))]
-pub fn has_failed(_: &Error) -> bool {
-    false
+pub fn has_failed(error: &Error) -> bool {
+    matches!(error, Error::Device(_))
 }

@@ -66,7 +66,6 @@ pub enum Error {
         ended: &'static str,
     },
     /// The graphics device failed, or cannot do what the learner needs of it.
-    #[cfg(feature = "gpu")]
     #[error("the graphics device: {0}")]
     Device(String),
     /// The learner's threads cannot be started.

@@ -34,7 +34,7 @@ Exit codes:
 
 /// Tractor-trailers learn to drive through roundabouts.
 #[derive(Debug, Parser)]
-#[command(name = "offtrack", version, about, after_help = AFTER_HELP)]
+#[command(name = "offtrack", version, after_help = AFTER_HELP)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,

@@ -8,16 +8,16 @@ use std::sync::{Arc, OnceLock};
 use bytemuck::bytes_of;
 use glam::DVec2;
 use offtrack::cpu::drive::{Moving, motion};
-use offtrack::layout::Rig;
+use offtrack::layout::{Column, Rig};
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
-use offtrack::stages::STAGES;
+use offtrack::stages::Stage;
 use offtrack::world::World;
 use offtrack_comparison::trace::{Case, CaseVehicle, Command, Init, Traced, trace, trace_by};
 use serde_json::Value;
 
 use steady::{path_follow, rollover_static, single_track, steady_envelope, steady_state, steady_state_limit};
 
-use crate::{batch_on, benchmark, column, engines};
+use crate::{batch_on, benchmark, engines};
 
 /// The largest ratio of an error to its tolerance, and its quantity.
 #[derive(Debug, Clone, Default)]
@@ -84,13 +84,13 @@ fn traced(engine: &Engine, case: &Case) -> Traced {
         });
         let simulator = &mut simulators[index].2;
         let batch = simulator.batch().clone();
-        let given = |name: &str| match name {
-            "control" => bytes_of(control),
-            "truck" => bytes_of(&moving.truck),
-            _ => column(&batch, name),
+        let given = |column| match column {
+            Column::Control => bytes_of(control),
+            Column::Truck => bytes_of(&moving.truck),
+            other => batch.column(other),
         };
-        simulator.restore(|name| Some(given(name))).unwrap();
-        simulator.run_stage(STAGES.iter().find(|stage| stage.name == "drive").unwrap());
+        simulator.restore(|column| Some(given(column))).unwrap();
+        simulator.run_stage(Stage::Drive);
         let truck = simulator.batch().truck[0];
         Moving { truck, motion: motion(rig, truck.speed, truck.steering, truck.heading - truck.trailer_heading) }
     })

@@ -17,15 +17,15 @@ pub struct Choice {
     #[arg(long)]
     policy: Option<String>,
     /// With `pursuit`: look-ahead distance [m].
-    #[arg(long, default_value_t = LOOK_AHEAD, allow_negative_numbers = true)]
-    look_ahead: f32,
+    #[arg(long, default_value_t = LOOK_AHEAD.into(), allow_negative_numbers = true)]
+    look_ahead: f64,
 }
 
 impl Choice {
     /// Opens the policy for a benchmark; `seed` is that of random actions.
     pub fn open(&self, scenario: &Scenario, world: &World, seed: u32) -> Result<Box<dyn Policy>, Error> {
         if !(1.0..=50.0).contains(&self.look_ahead) {
-            let value = format!("{} m", shown(self.look_ahead.into()));
+            let value = format!("{} m", shown(self.look_ahead));
             return Err(Error::Flag { flag: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
         }
         if self.policy.is_none() && !LearnedPolicy::shipped_names().contains(&scenario.name.as_str()) {
@@ -35,6 +35,6 @@ impl Choice {
                 scenario.name
             );
         }
-        policies::find(self.policy.as_deref(), &scenario.name, self.look_ahead, seed, world)
+        policies::find(self.policy.as_deref(), &scenario.name, self.look_ahead as f32, seed, world)
     }
 }

@@ -262,7 +262,7 @@ fn failed(file: &Path) -> impl FnOnce(offtrack_drawing::Error) -> Error {
 fn heading(scale: &Scale, device: &offtrack_training::device::Device) -> String {
     let Step { dt, substeps, holds, .. } = &scale.step;
     let threads = if scale.engine == "cpu" { format!(", {} threads", scale.threads) } else { String::new() };
-    let names: String = measure::STAGE_NAMES.iter().map(|name| format!("{name:>8}")).collect();
+    let names: String = measure::STAGE_NAMES.iter().map(|name| format!(" {name:>7}")).collect();
     format!(
         "{}{threads}; a step is {dt} s in {substeps} sub-steps, {N_RAYS} rays, {N_VALUES} values: {holds}\n\
          {:>8} {:>9} {:>14} {:>14}   ns a truck, a stage at a time:{names}\n",
@@ -279,7 +279,8 @@ fn row(run: &Run) -> String {
     match outcome {
         Outcome::Refused { error } => format!("{envs:>8} {:>9} {error}\n", mode.name()),
         Outcome::Measured(measured) => {
-            let stages: String = measured.stages.iter().map(|(_, time)| format!("{time:>8.1}")).collect();
+            let stages: String =
+                measured.stages.iter().map(|(name, time)| format!(" {time:>width$.1}", width = name.len().max(7))).collect();
             let (steps, rays) = (measured.env_steps_per_second, measured.rays_per_second);
             format!("{envs:>8} {:>9} {steps:>14.0} {rays:>14.0}                                 {stages}\n", mode.name())
         }

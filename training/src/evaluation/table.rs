@@ -15,8 +15,8 @@ const COLUMNS: [(&str, &str); 10] = [
     ("lane m", "distance of the tractor's middle, half way between its axles, to the lane's centre: mean and largest"),
     ("tractor m, trailer m", "smallest distance of the unit's outline to a kerb; negative: it overlaps the kerb"),
     ("LTR", "largest load transfer ratio of either unit: 0 on even wheels, 1 when a wheel lifts off"),
-    ("artic. deg", "largest articulation, the angle between tractor and trailer"),
-    ("off-track m", "largest off-tracking: the distance of the trailer's axles to the path of the tractor's front axle"),
+    ("artic deg", "largest articulation, the angle between tractor and trailer"),
+    ("off-track", "largest off-tracking: distance of the trailer's axles to the path of the tractor's front axle [m]"),
     ("time s", "mean duration of an episode"),
 ];
 
@@ -53,8 +53,8 @@ const ALL: [Column; 13] = [
     Column { head: ["tractor", "m"], rank: 5, text: |line| format!("{:.2}", line.summary.tractor_clearance_min) },
     Column { head: ["trailer", "m"], rank: 6, text: |line| format!("{:.2}", line.summary.trailer_clearance_min) },
     Column { head: ["", "LTR"], rank: 7, text: |line| format!("{:.2}", line.summary.load_transfer_ratio_peak) },
-    Column { head: ["artic.", "deg"], rank: 8, text: |line| format!("{:.0}", line.summary.articulation_peak_deg) },
-    Column { head: ["off-", "track m"], rank: 9, text: |line| format!("{:.2}", line.summary.off_tracking_peak) },
+    Column { head: ["artic", "deg"], rank: 8, text: |line| format!("{:.0}", line.summary.articulation_peak_deg) },
+    Column { head: ["off-", "track"], rank: 9, text: |line| format!("{:.2}", line.summary.off_tracking_peak) },
     Column { head: ["time", "s"], rank: 10, text: |line| format!("{:.1}", line.summary.time_mean) },
 ];
 
@@ -88,7 +88,7 @@ impl Report {
             }
         }
         if !left_out.is_empty() {
-            let names: Vec<String> = left_out.iter().map(|column| column.head.join(" ").trim().to_owned()).collect();
+            let names: Vec<String> = left_out.iter().map(|column| column.head.join(" ").trim().replace("- ", "-")).collect();
             push_wrapped(
                 &mut text,
                 &format!("Left out for want of width: {}. A wider terminal and --json have them.", names.join(", ")),

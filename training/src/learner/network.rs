@@ -66,7 +66,6 @@ impl Mlp {
     }
 
     /// The same network on a device; waits for the one that it is on.
-    #[cfg(feature = "gpu")]
     pub fn on(&self, device: &Device) -> Mlp {
         self.with_parameters(self.parameters().into_iter().map(|(_, values)| values).collect(), device)
     }

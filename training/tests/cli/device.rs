@@ -46,7 +46,7 @@ fn assert_measured(run: &Value, envs: u64, rays: f64) {
     assert!((speed("rays_per_second") / median - rays_a_step).abs() < 0.01, "{run}");
     assert_eq!(speed("bytes_per_truck"), 796.0);
     let stages = run["stages"].as_object().unwrap();
-    assert!(stages.len() == STAGES.len() && STAGES.iter().all(|stage| stages.contains_key(stage.name)), "{run}");
+    assert!(stages.len() == STAGES.len() && STAGES.iter().all(|stage| stages.contains_key(stage.name())), "{run}");
     assert!(stages.values().all(|time| 0.0 <= time.as_f64().unwrap()) && 0.0 < stages["sense"].as_f64().unwrap(), "{run}");
 }
 

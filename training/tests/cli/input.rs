@@ -161,5 +161,5 @@ fn the_help_says_what_happens_without_a_command_and_lists_the_exit_codes() {
     assert!(help.contains("Without a command `offtrack` trains"), "{help}");
     assert!(["  0 ", "  1 ", "  2 ", "  130 "].iter().all(|code| help.contains(code)), "{help}");
     let help = printed(&["evaluate", "--help"]);
-    assert!(["lane: own", "off-track m:", "LTR: largest load transfer ratio"].iter().all(|words| help.contains(words)), "{help}");
+    assert!(["lane: own", "off-track: largest", "LTR: largest load transfer ratio"].iter().all(|words| help.contains(words)), "{help}");
 }

@@ -27,7 +27,7 @@ const STAGE_SAMPLES: usize = 100;
 pub(super) const STAGE_NAMES: [&str; STAGES.len()] = {
     let (mut names, mut stage) = ([""; STAGES.len()], 0);
     while stage < STAGES.len() {
-        names[stage] = STAGES[stage].name;
+        names[stage] = STAGES[stage].name();
         stage += 1;
     }
     names

@@ -60,7 +60,7 @@ pub(super) fn drawn(scale: &Scale, device: &str) -> Result<String, offtrack_draw
             step.dt, step.substeps, step.rays, step.values
         ),
     ];
-    Ok(Chart { title: "Env steps per second against the number of trucks".to_owned(), subtitles, panels }.drawn()?)
+    Chart { title: "Env steps per second against the number of trucks".to_owned(), subtitles, panels }.drawn()
 }
 
 /// What drives, in the legend.

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use burn::tensor::{Tensor, TensorData};
 use bytemuck::{bytes_of, cast_slice};
 use offtrack::gpu::{Kernels, Slice};
-use offtrack::layout::{Ended, N_VALUES};
+use offtrack::layout::{Column, Ended, N_VALUES};
 use offtrack::random;
 use offtrack::simulator::{Engine, RouteChoice, Simulator, Tally};
 use offtrack::world::World;
@@ -40,7 +40,7 @@ pub struct DeviceRollout {
     routes: Vec<u32>,
     mirror: Option<Mirror>,
     shared: Shared,
-    kernels: Kernels,
+    kernels: Kernels<Kernel>,
     simulator: Simulator,
     facts: Facts,
     buffers: Buffers,
@@ -97,7 +97,7 @@ impl DeviceRollout {
         };
         shared.flush()?;
         let column = floats(&observation)?;
-        let engine = Engine::Gpu { device: shared.gpu.clone(), columns: vec![("observation", column.slice.clone())] };
+        let engine = Engine::Gpu { device: shared.gpu.clone(), columns: vec![(Column::Observation, column.slice.clone())] };
         let simulator = Simulator::on(engine, world.clone(), n_envs, config.seed, RouteChoice::Drawn(routes.clone()))?;
         let facts = Facts {
             n_envs: n_envs as u32,
@@ -151,7 +151,7 @@ impl DeviceRollout {
         let (reward, discount, next) =
             (floats(&self.sample.reward)?, floats(&self.sample.discount)?, floats(&self.sample.next_observation)?);
         let batch = self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
-        let column = |name: &str| batch.column(name).cloned().ok_or_else(|| Error::Device(format!("the simulator has no column {name}")));
+        let column = |column: Column| batch.column(column).clone();
         let held = (self.facts.n_slots * self.facts.n_envs) as usize;
         let row_bytes = N_VALUES * size_of::<f32>();
         let buffers = Buffers::new(vec![
@@ -160,11 +160,11 @@ impl DeviceRollout {
             (Binding::normalisation, empty(N_VALUES * size_of::<Normal>())),
             (Binding::images, filled(cast_slice(&images))),
             (Binding::action_images, filled(cast_slice(&actions))),
-            (Binding::action, column("action")?),
-            (Binding::observation, column("observation")?),
-            (Binding::next_observation, column("next_observation")?),
-            (Binding::ended, column("ended")?),
-            (Binding::reward, column("reward")?),
+            (Binding::action, column(Column::Action)),
+            (Binding::observation, column(Column::Observation)),
+            (Binding::next_observation, column(Column::NextObservation)),
+            (Binding::ended, column(Column::Ended)),
+            (Binding::reward, column(Column::Reward)),
             (Binding::held_observation, empty(held * row_bytes)),
             (Binding::held_next, empty(held * row_bytes)),
             (Binding::held_action, empty(held * 4)),

@@ -1,7 +1,7 @@
 //! Trucks and replay buffer on the host.
 
 use burn::tensor::{Device, Tensor, TensorData};
-use offtrack::layout::{Ended, N_VALUES};
+use offtrack::layout::{Column, Ended, N_VALUES};
 use offtrack::random;
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;
@@ -164,8 +164,8 @@ impl Rollout for HostRollout {
     }
 
     fn save<'a>(&'a self, columns: &mut Columns<'a>) {
-        for (name, bytes) in self.simulator.batch().columns() {
-            columns.put(column_name(name), bytes);
+        for (column, bytes) in self.simulator.batch().columns() {
+            columns.put(column_name(column), bytes);
         }
         columns.put("rollout, acting", &self.acting.state[..]);
         columns.put("rollout, sampling", &self.sampling.state[..]);
@@ -174,7 +174,7 @@ impl Rollout for HostRollout {
     }
 
     fn restore(&mut self, stored: &Stored, _: u64) -> Result<(), Error> {
-        self.simulator.restore(|name| stored.bytes(&column_name(name))).map_err(|error| stored.error(error.to_string()))?;
+        self.simulator.restore(|column| stored.bytes(&column_name(column))).map_err(|error| stored.error(error.to_string()))?;
         let generator = |name: &str| {
             let generator = Generator { state: stored.array(name)? };
             // From all zeros every number would be zero.
@@ -186,8 +186,8 @@ impl Rollout for HostRollout {
     }
 }
 
-fn column_name(column: &str) -> String {
-    format!("batch, {column}")
+fn column_name(column: Column) -> String {
+    format!("batch, {}", column.name())
 }
 
 /// A sample as tensors, in [`N_SHARDS`] shards of nearly the same size. Both observations of a transition get the same

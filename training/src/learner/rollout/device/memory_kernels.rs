@@ -2,10 +2,11 @@
 //! compiled.
 
 use offtrack::gpu::{Kernels, Slice};
+use offtrack::layout::N_VALUES;
 use offtrack::layout::buffers::Access;
-use offtrack::layout::shared::Shared as _;
-use offtrack::layout::{N_VALUES, shared_wgsl};
+use offtrack::shared::Shared as _;
 use offtrack::stages::SHADERS;
+use offtrack::wgsl;
 use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, BufferBinding, CommandEncoder, ComputePassDescriptor, Device};
 
 offtrack::shared! {
@@ -136,7 +137,7 @@ impl Buffers {
     }
 
     /// A bind group of all of them, with another buffer of logits where one is given.
-    pub(super) fn group(&self, device: &Device, kernels: &Kernels, logits: Option<&Slice>) -> BindGroup {
+    pub(super) fn group(&self, device: &Device, kernels: &Kernels<Kernel>, logits: Option<&Slice>) -> BindGroup {
         let entry = |(binding, own): &(Binding, Slice)| {
             let own = if *binding == Binding::logits { logits.unwrap_or(own).clone() } else { own.clone() };
             (*binding as u32, own)
@@ -153,31 +154,21 @@ impl Buffers {
     }
 }
 
-/// The kernels' entry points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kernel {
-    /// Samples an action for every truck from the actor's output.
-    Choose,
-    /// Stores observations and actions before a step.
-    StoreBefore,
-    /// Stores what the step led to.
-    StoreAfter,
-    /// Samples transitions.
-    Sample,
+offtrack::named! {
+    /// The kernels' entry points.
+    pub enum Kernel {
+        /// Samples an action for every truck from the actor's output.
+        Choose = "choose",
+        /// Stores observations and actions before a step.
+        StoreBefore = "store_before",
+        /// Stores what the step led to.
+        StoreAfter = "store_after",
+        /// Samples transitions.
+        Sample = "sample",
+    }
 }
 
 impl Kernel {
-    const ALL: [Kernel; 4] = [Kernel::Choose, Kernel::StoreBefore, Kernel::StoreAfter, Kernel::Sample];
-
-    fn entry(self) -> &'static str {
-        match self {
-            Kernel::Choose => "choose",
-            Kernel::StoreBefore => "store_before",
-            Kernel::StoreAfter => "store_after",
-            Kernel::Sample => "sample",
-        }
-    }
-
     /// Threads that it needs: one a truck, or one a value.
     fn threads(self, facts: &Facts) -> u64 {
         let (envs, rows, values) = (u64::from(facts.n_envs), u64::from(facts.n_rows), N_VALUES as u64);
@@ -193,20 +184,20 @@ impl Kernel {
 fn source() -> String {
     let common = SHADERS.iter().filter(|(name, _)| ["common/thread", "common/random"].contains(name)).map(|(_, text)| *text);
     let bindings: String = Binding::ALL.map(Binding::declaration).concat();
-    let own = [shared_wgsl(), printed_structs(), bindings];
+    let own = [wgsl::shared(), printed_structs(), bindings];
     own.iter().map(String::as_str).chain(common).chain([include_str!("../../../../shaders/memory.wgsl")]).collect()
 }
 
 /// Compiles the kernels. A tensor's buffer is a slice of a page that other tensors use too, and a page is bound either
 /// to be read or to be written, so all bindings may be written.
-pub(super) fn compile(device: &Device) -> Kernels {
+pub(super) fn compile(device: &Device) -> Kernels<Kernel> {
     let access = [Access::ReadWrite; Binding::ALL.len()];
-    Kernels::compile(device, "replay buffer", source(), access, Kernel::ALL.map(Kernel::entry))
+    Kernels::compile(device, "replay buffer", source(), access)
 }
 
 /// Adds a kernel to the commands.
-pub(super) fn add(kernels: &Kernels, encoder: &mut CommandEncoder, group: &BindGroup, kernel: Kernel, facts: &Facts) {
+pub(super) fn add(kernels: &Kernels<Kernel>, encoder: &mut CommandEncoder, group: &BindGroup, kernel: Kernel, facts: &Facts) {
     let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
     pass.set_bind_group(0, group, &[]);
-    kernels.dispatch(&mut pass, kernel.entry(), kernel.threads(facts));
+    kernels.dispatch(&mut pass, kernel, kernel.threads(facts));
 }

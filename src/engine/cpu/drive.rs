@@ -1,17 +1,18 @@
 //! Moves the truck: a single-track tractor pulling a trailer hitched near its drive axle.
 //!
-//! Tyre slip shifts each unit's no-slip point forward by `slip * speed²`; zero slip is pure kinematics. Integrated with the midpoint rule,
-//! steer angle and speed changing linearly inside a sub-step: holding them through one would cost decimetres in a turn.
+//! Tyre slip shifts each unit's no-slip point forward by `slip * speed²`; zero slip is pure kinematics. The midpoint rule integrates it. Steer
+//! angle and speed change linearly within a sub-step: constant ones would cost decimetres in a turn.
 
 use glam::Vec2;
 
 use crate::angle::{sin_cos, wrapped};
-use crate::cpu::Row;
-use crate::layout::{Control, Rig, Roll, Truck, constants};
+use crate::engine::Row;
+use crate::layout::{Control, Rig, Roll, Truck};
+use crate::shared::constants;
 use crate::world::World;
 
 constants! {
-    /// The furthest that slip shifts a no-slip point [m]: the linear tyre behind it is not to be believed beyond.
+    /// Largest shift of a no-slip point [m]: the linear tyre model is not valid beyond.
     pub const SLIP_LEVER_MAX: f32 = 1.5;
     /// Keeps a quotient finite at a standstill [m^2/s^2].
     const SPEED_SQUARED_MIN: f32 = 0.01;
@@ -36,16 +37,16 @@ pub fn driven(rig: &Rig, substep: f32, n_substeps: u32, control: &Control, truck
     Truck { tractor_load_transfer_ratio: tractor_ratio, trailer_load_transfer_ratio: trailer_ratio, ..moving.truck }
 }
 
-/// A truck and how it moves there: the end of one sub-step is the beginning of the next.
+/// A truck and its motion there: the end of one sub-step is the start of the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moving {
     /// The truck.
     pub truck: Truck,
-    /// How it moves.
+    /// Its motion.
     pub motion: Motion,
 }
 
-/// How both units turn at one instant.
+/// Motion of both units at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Of the tractor [rad/s].
@@ -60,10 +61,10 @@ pub struct Motion {
     pub trailer_lateral_acceleration: f32,
 }
 
-/// How a truck with this speed [m/s], steer angle and articulation [rad] moves.
+/// Motion of a truck with this speed [m/s], steer angle and articulation [rad].
 #[inline]
 pub fn motion(rig: &Rig, speed: f32, steering: f32, articulation: f32) -> Motion {
-    // What the tyres hold bounds the curvature.
+    // The tyres' grip bounds the curvature.
     let curvature_max = rig.lateral_acceleration_max / (speed * speed).max(SPEED_SQUARED_MIN);
     let (sin, cos) = sin_cos(steering);
     let curvature = limited(sin / (cos * rig.wheelbase), curvature_max);
@@ -132,7 +133,7 @@ fn rolled(roll: &Roll, state: Vec2, lateral_acceleration: f32) -> Vec2 {
     Vec2::new(a * state.x + b * state.y + angle * lateral_acceleration, c * state.x + d * state.y + rate * lateral_acceleration)
 }
 
-/// Share of a unit's weight that has moved to its right wheels, for its (roll, roll rate): from 1 on the left ones lift.
+/// Fraction of a unit's weight that has moved to its right wheels, for its (roll, roll rate): at 1 the left ones lift.
 #[inline]
 pub fn load_transfer_ratio(roll: &Roll, state: Vec2, lateral_acceleration: f32) -> f32 {
     roll.per_acceleration * lateral_acceleration + roll.per_roll * state.x + roll.per_roll_rate * state.y

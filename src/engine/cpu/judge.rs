@@ -1,13 +1,13 @@
-//! Judges the step: whether and why the episode ended, and what the step was worth.
+//! Judges the step: whether and why the episode ended, and the reward.
 //!
-//! Failure wins over arrival, everything wins over the clock.
+//! Failure wins over arrival, everything wins over the time limit.
 
 use crate::angle::wrapped;
-use crate::cpu::Row;
+use crate::engine::Row;
 use crate::layout::{Clearance, Ended, Params, Progress, RewardTerms, RouteRow, Truck};
 use crate::world::World;
 
-/// Counts the step and writes the end code, the reward's terms and the reward.
+/// Advances the truck's number of steps and writes the end code, the reward's terms and the reward.
 pub fn judge(world: &World, row: &mut Row) {
     row.truck.steps += 1;
     let route = &world.routes[row.truck.route as usize];

@@ -1,8 +1,8 @@
-//! Draws an action by chance, each as likely as the next.
+//! Draws an action uniformly at random.
 //!
-//! Beside the stages of a step: a driver that needs nothing, for measuring speed and filling a memory.
+//! Not a stage of a step, but a policy that needs no learner: for measuring speed and filling a replay buffer.
 
-use crate::cpu::Row;
+use crate::engine::Row;
 use crate::random::{Draw, index_below, words};
 use crate::world::World;
 

@@ -1,13 +1,14 @@
-//! Writes the observation: the 69 values that a driver sees.
+//! Writes the observation after the action: 69 values, see [`OBSERVATION`](crate::layout::OBSERVATION).
 //!
-//! What depends on the waypoint alone was worked out when the world was baked (see [`crate::world`]).
+//! Values that depend on the next waypoint alone are looked up in a table that [`crate::world`] bakes.
 
 use glam::Vec2;
 
 use crate::angle::{PI, arc_tangent, wrapped};
-use crate::cpu::Row;
-use crate::cpu::follow::{distance_to_segment, reference_point};
-use crate::layout::{N_RAYS, N_VALUES, Params, PreviewRow, Progress, RouteRow, Truck, WaypointRow, constants};
+use crate::engine::Row;
+use crate::engine::cpu::follow::{distance_to_segment, reference_point};
+use crate::layout::{N_RAYS, N_VALUES, Params, PreviewRow, Progress, RouteRow, Truck, WaypointRow};
+use crate::shared::constants;
 use crate::world::World;
 
 constants! {
@@ -17,39 +18,44 @@ constants! {
     pub const WAYPOINT_SCALE: f32 = 20.0;
     /// Distance to the lane centre that is observed as 1 [m].
     pub const LANE_SCALE: f32 = 10.0;
-    /// How many waypoints angles are taken to.
+    /// Number of waypoints that angles are taken to.
     pub const N_LOOK_AHEAD: usize = 5;
     /// Waypoints beyond the next one that angles are taken to.
     pub const LOOK_AHEAD: [usize; N_LOOK_AHEAD] = [0, 2, 5, 7, 10];
-    /// Where values begin in an observation: distances to the next two waypoints.
+    /// Index of the distances to the next two waypoints.
     const DISTANCES_AT: usize = 1;
-    /// Distances to their crossing lines.
+    /// Index of the distances to their crossing lines.
     const CROSSINGS_AT: usize = 3;
-    /// Distance to the lane centre.
+    /// Index of the distance to the lane centre.
     const LANE_AT: usize = 5;
-    /// Angles at the waypoint behind, from those ahead to the truck.
+    /// Index of the angles at the waypoint behind, from those ahead to the truck.
     const BEARINGS_AT: usize = 6;
-    /// Headings of the tractor against the lane's ahead.
+    /// Index of the tractor's headings relative to the lane's ahead.
     const HEADINGS_AT: usize = 11;
-    /// Headings of the trailer against them.
+    /// Index of the trailer's.
     const TRAILER_HEADINGS_AT: usize = 16;
-    /// Articulation.
+    /// Index of the articulation.
     const ARTICULATION_AT: usize = 21;
-    /// Curvatures of the route.
+    /// Index of the curvatures of the route.
     const CURVATURES_AT: usize = 22;
-    /// How many they are.
+    /// Number of curvatures.
     const N_CURVATURES: usize = 8;
-    /// Distance sensors.
+    /// Index of the ranges.
     const RANGES_AT: usize = 30;
-    /// Radii ahead.
+    /// Index of the radii ahead.
     const RADII_AT: usize = 59;
 }
 
-/// Writes what the step led to.
+/// Writes the row's next observation.
 pub fn observe(world: &World, row: &mut Row) {
+    *row.next_observation = observation_of(world, row);
+}
+
+/// The observation of the row's truck.
+pub(super) fn observation_of(world: &World, row: &Row) -> [f32; N_VALUES] {
     let route = &world.routes[row.truck.route as usize];
     let (waypoints, previews) = (world.route_waypoints(row.truck.route), world.route_previews(row.truck.route));
-    *row.next_observation = observed(&world.params, route, waypoints, previews, row.truck, row.progress, row.ranges);
+    observed(&world.params, route, waypoints, previews, row.truck, row.progress, row.ranges)
 }
 
 /// The 69 values.
@@ -97,4 +103,41 @@ pub fn observed(
 #[inline]
 fn angle_between(from: Vec2, to: Vec2) -> f32 {
     arc_tangent(from.perp_dot(to), from.dot(to))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::{N_TRAILER_RAYS, OBSERVATION};
+
+    #[test]
+    fn the_documented_order_of_values_is_the_one_that_is_written() {
+        let written = [
+            ("waypoint_distance", DISTANCES_AT),
+            ("crossing_distance", CROSSINGS_AT),
+            ("lane_distance", LANE_AT),
+            ("bearing", BEARINGS_AT),
+            ("heading", HEADINGS_AT),
+            ("trailer_heading", TRAILER_HEADINGS_AT),
+            ("articulation", ARTICULATION_AT),
+            ("future_curvature", CURVATURES_AT),
+            ("current_curvature", CURVATURES_AT + N_CURVATURES / 2),
+            ("trailer_range", RANGES_AT),
+            ("tractor_range", RANGES_AT + N_TRAILER_RAYS),
+            ("radius", RADII_AT),
+        ];
+        let documented = OBSERVATION.map(|values| (values.name, values.first));
+        assert_eq!(documented[0], ("speed", 0));
+        assert_eq!(documented[1..], written);
+        // The scales and the look-ahead stand in the docs, too.
+        let doc = |name: &str| OBSERVATION.iter().find(|values| values.name == name).map(|values| values.doc).unwrap_or_default();
+        for (name, scale) in [("speed", SPEED_SCALE), ("waypoint_distance", WAYPOINT_SCALE), ("lane_distance", LANE_SCALE)] {
+            assert!(doc(name).contains(&format!("/ {scale} m")), "{name}: {}", doc(name));
+        }
+        assert!(
+            ["bearing", "heading", "trailer_heading"]
+                .iter()
+                .all(|name| { OBSERVATION.iter().any(|values| values.name == *name && values.n == N_LOOK_AHEAD) })
+        );
+    }
 }

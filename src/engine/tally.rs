@@ -1,23 +1,23 @@
-//! Counts what happened: steps by how they ended, and their rewards.
+//! Sums over all steps of a batch: steps by how they ended, and rewards.
 //!
-//! Beside the stages of a step: integers alone, so that the order of counting changes nothing, whoever counts.
+//! Integers alone, so that the order of summation changes nothing on any engine.
 
-use crate::cpu::Row;
-use crate::layout::{Ended, constants};
+use crate::layout::Ended;
+use crate::shared::constants;
 
 constants! {
     /// Sums in a tally: steps by their end code, then the rewards.
     pub const N_SUMS: usize = 9;
-    /// The sum of the rewards.
+    /// Index of the sum of the rewards.
     pub const REWARD_SUM: usize = 8;
-    /// Parts that a reward of 1 is counted in.
-    pub const REWARD_PARTS: f32 = 256.0;
+    /// Units that a reward of 1 is counted in.
+    pub const REWARD_UNITS: f32 = 256.0;
 }
 
 /// Sums over all steps of all trucks since the batch was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Tally {
-    /// Steps by their end code, and the rewards in parts of [`REWARD_PARTS`].
+    /// Steps by their end code, then the rewards, 256 units to 1.
     pub sums: [i64; N_SUMS],
 }
 
@@ -37,34 +37,28 @@ impl Tally {
         self.env_steps() - self.ended(Ended::Running)
     }
 
-    /// Sum of all rewards, each rounded to a part.
+    /// Sum of all rewards, each rounded to 1/256.
     pub fn reward(&self) -> f64 {
-        self.sums[REWARD_SUM] as f64 / f64::from(REWARD_PARTS)
+        self.sums[REWARD_SUM] as f64 / f64::from(REWARD_UNITS)
     }
 
-    /// What happened since the tally was `earlier`.
+    /// This tally less an `earlier` one of the same batch.
     pub fn since(mut self, earlier: &Tally) -> Tally {
         self.sums.iter_mut().zip(earlier.sums).for_each(|(sum, earlier)| *sum -= earlier);
         self
     }
 
-    /// Counts the step just made of one truck.
+    /// Adds a step with this end code and reward.
     #[inline]
-    pub(crate) fn with(mut self, row: &Row) -> Tally {
-        self.sums[*row.ended as usize % REWARD_SUM] += 1;
-        self.sums[REWARD_SUM] += parts(*row.reward);
-        self
+    pub(crate) fn add_step(&mut self, ended: u32, reward: f32) {
+        self.sums[ended as usize % REWARD_SUM] += 1;
+        self.sums[REWARD_SUM] += (reward * REWARD_UNITS).round_ties_even() as i64;
     }
 
-    /// Both sums together.
+    /// The sum of both.
+    #[inline]
     pub(crate) fn plus(mut self, other: Tally) -> Tally {
         self.sums.iter_mut().zip(other.sums).for_each(|(sum, other)| *sum += other);
         self
     }
-}
-
-/// A reward in whole parts.
-#[inline]
-fn parts(reward: f32) -> i64 {
-    (reward * REWARD_PARTS).round_ties_even() as i64
 }

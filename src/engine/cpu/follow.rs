@@ -1,15 +1,15 @@
-//! Follows the route: which waypoints were passed, how far off the lane centre the truck is.
+//! Follows the route: which waypoints were passed, and the distance to the lane centre.
 //!
-//! The point that is followed is the middle of the tractor's wheelbase.
+//! The reference point is the middle of the tractor's wheelbase.
 
 use glam::Vec2;
 
 use crate::angle::{TINY, direction};
-use crate::cpu::Row;
+use crate::engine::Row;
 use crate::layout::{Progress, Truck, WaypointRow};
 use crate::world::World;
 
-/// Moves the row's progress on to where its truck is now.
+/// Updates the row's progress.
 pub fn follow(world: &World, row: &mut Row) {
     let waypoints = world.route_waypoints(row.truck.route);
     let point = reference_point(world.params.rig.wheelbase, row.truck);
@@ -37,7 +37,7 @@ pub fn followed(waypoints: &[WaypointRow], point: Vec2, next: u32, reach: f32) -
     }
 }
 
-/// The point is beyond the line through the waypoint at right angles to its heading, and within reach of it.
+/// Whether the point is beyond the line through the waypoint at right angles to its heading, and within reach of it.
 fn is_passed(waypoint: &WaypointRow, point: Vec2, reach: f32) -> bool {
     let offset = point - waypoint.position;
     0.0 <= offset.dot(waypoint.direction) && offset.length_squared() <= reach * reach
@@ -47,8 +47,8 @@ fn is_passed(waypoint: &WaypointRow, point: Vec2, reach: f32) -> bool {
 #[inline]
 pub fn distance_to_segment(point: Vec2, from: Vec2, to: Vec2) -> f32 {
     let along = to - from;
-    let share = (point - from).dot(along) / along.length_squared().max(TINY);
-    point.distance(from + share.clamp(0.0, 1.0) * along)
+    let fraction = (point - from).dot(along) / along.length_squared().max(TINY);
+    point.distance(from + fraction.clamp(0.0, 1.0) * along)
 }
 
 #[cfg(test)]

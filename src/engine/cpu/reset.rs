@@ -3,30 +3,29 @@
 //! Route and pose are functions of (seed, env, episode) alone. A truck on a fixed route drives it once and is then held.
 
 use crate::angle::{direction, wrapped};
-use crate::cpu::follow::{followed, reference_point};
-use crate::cpu::{RouteChoice, Row, observe, sense};
+use crate::engine::cpu::follow::{followed, reference_point};
+use crate::engine::cpu::{observe, sense};
+use crate::engine::{RouteChoice, Row};
 use crate::layout::{Control, Ended, Params, Start, Truck, WaypointRow};
 use crate::random::{self, Draw};
 use crate::world::World;
 
-/// Hands the observation on, or begins a new episode where one ended.
+/// Begins and observes another episode where one ended, or holds the truck.
 pub fn reset(world: &World, row: &mut Row) {
-    *row.observation = *row.next_observation;
     if *row.ended == Ended::Running as u32 {
         return;
     }
     match row.choice {
         RouteChoice::Fixed(_) => row.truck.held = 1,
         RouteChoice::Drawn(_) => {
-            // The new truck is sensed and observed with the stages' own code, which writes `next_observation`.
-            let led_to = *row.next_observation;
             begin(world, row, row.truck.episode + 1);
-            *row.next_observation = led_to;
+            sense::sense(world, row);
+            *row.observation = observe::observation_of(world, row);
         }
     }
 }
 
-/// Puts the truck at the start of `episode`, at a pose drawn for it, and writes what it sees there to both observations.
+/// Puts the truck at the start of `episode`, at a pose drawn for it.
 pub fn begin(world: &World, row: &mut Row, episode: u32) {
     let [offset, heading, ..] = random::words(row.seed, row.env, episode, Draw::Pose as u32).map(random::signed_unit);
     begin_from(world, row, episode, &Start { offset, heading });
@@ -47,14 +46,11 @@ pub fn begin_from(world: &World, row: &mut Row, episode: u32, start: &Start) {
     let point = reference_point(world.params.rig.wheelbase, row.truck);
     *row.progress = followed(waypoints, point, 1, world.params.stray_distance);
     row.progress.passed = 0;
-    sense::sense(world, row);
-    observe::observe(world, row);
-    *row.observation = *row.next_observation;
 }
 
-/// A truck at `waypoint`, where the lane has this heading [rad]: trailer straight, moved aside and turned as `start` says.
-pub fn started(params: &Params, waypoint: &WaypointRow, heading: f32, start: &Start) -> Truck {
-    let heading = wrapped(heading + start.heading * params.start_heading);
+/// A truck at `waypoint`, where the lane has this heading [rad]: trailer straight, offset and turned as `start` says.
+pub fn started(params: &Params, waypoint: &WaypointRow, lane_heading: f32, start: &Start) -> Truck {
+    let heading = wrapped(lane_heading + start.heading * params.start_heading);
     let point = waypoint.position + start.offset * params.start_offset * waypoint.direction.perp();
     Truck {
         position: point - 0.5 * params.rig.wheelbase * direction(heading),

@@ -1,11 +1,23 @@
-//! Structs and constants that are written once and read twice: by Rust, and by WGSL in the words printed here.
+//! Macros for what is written once and read twice: by Rust, and by WGSL in the words printed here.
+//!
+//! [`shared!`](crate::shared!) declares structs, `constants!` constants, [`named!`](crate::named!) closed lists of names.
 
 use glam::Vec2;
 
 /// A type that WGSL has too.
 pub trait Shared {
-    /// Its name there.
+    /// Its name in WGSL.
     fn wgsl() -> String;
+
+    /// Name in WGSL of what a buffer of such values is an array of: arrays lie flat in it.
+    fn element() -> String {
+        Self::wgsl()
+    }
+
+    /// What each further index of such a buffer counts to, as ", 29"; empty where a value is one element.
+    fn lengths() -> String {
+        String::new()
+    }
 }
 
 impl Shared for f32 {
@@ -30,11 +42,17 @@ impl<T: Shared, const N: usize> Shared for [T; N] {
     fn wgsl() -> String {
         format!("array<{}, {N}>", T::wgsl())
     }
+    fn element() -> String {
+        T::element()
+    }
+    fn lengths() -> String {
+        format!(", {N}{}", T::lengths())
+    }
 }
 
-/// A value that WGSL can be told.
+/// A value that can be written as a WGSL literal.
 pub trait Literal {
-    /// Its type there.
+    /// Its type in WGSL.
     fn type_name() -> String;
     /// The value as WGSL reads it, to the last bit.
     fn literal(&self) -> String;
@@ -77,12 +95,59 @@ impl<T: Literal, const N: usize> Literal for [T; N] {
     }
 }
 
-/// Prints a comment's lines, as `///` hands them over, at a depth.
+/// Prints the lines of a doc comment as a WGSL comment, indented by `depth`.
 pub fn comment(depth: &str, lines: &[&str]) -> String {
     lines.iter().map(|line| format!("{depth}//{line}\n")).collect()
 }
 
-/// Structs of plain data, each with its twin in WGSL: beside them `structs` says where their fields lie, and `printed_structs` gives the twins.
+/// One of a closed list of names: an unknown one cannot be written.
+pub trait Named: Copy + Eq + std::fmt::Debug + 'static {
+    /// Every one, in order.
+    const ALL: &'static [Self];
+
+    /// The name.
+    fn name(self) -> &'static str;
+
+    /// Its index in [`Named::ALL`].
+    fn index(self) -> usize;
+}
+
+/// An enum that is a closed list of names, see [`Named`](crate::shared::Named).
+#[macro_export]
+macro_rules! named {
+    ($(#[doc = $doc:literal])* pub enum $list:ident { $($(#[doc = $item_doc:literal])* $item:ident = $name:literal,)* }) => {
+        $(#[doc = $doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum $list {
+            $($(#[doc = $item_doc])* $item,)*
+        }
+
+        impl $list {
+            /// The name.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $($list::$item => $name,)*
+                }
+            }
+        }
+
+        impl $crate::shared::Named for $list {
+            const ALL: &'static [$list] = &[$($list::$item,)*];
+
+            fn name(self) -> &'static str {
+                $list::name(self)
+            }
+
+            fn index(self) -> usize {
+                self as usize
+            }
+        }
+    };
+}
+
+/// Structs of plain data, each with its twin in WGSL.
+///
+/// Beside them `structs` says where their fields lie, and `printed_structs` gives the twins.
 #[macro_export]
 macro_rules! shared {
     ($($(#[doc = $doc:literal])* pub struct $name:ident { $($(#[doc = $field_doc:literal])* pub $field:ident: $type:ty,)* })*) => {
@@ -94,7 +159,7 @@ macro_rules! shared {
                 $($(#[doc = $field_doc])* pub $field: $type,)*
             }
 
-            impl $crate::layout::shared::Shared for $name {
+            impl $crate::shared::Shared for $name {
                 fn wgsl() -> String {
                     stringify!($name).to_owned()
                 }
@@ -102,7 +167,7 @@ macro_rules! shared {
         )*
 
         /// Every shared struct: its name, its size [bytes], and the name and the offset [bytes] of each field.
-        #[allow(dead_code, reason = "asked by tests alone where no one else looks at a layout")]
+        #[allow(dead_code, reason = "used by tests alone where no other code looks at a layout")]
         pub fn structs() -> Vec<(&'static str, usize, Vec<(&'static str, usize)>)> {
             vec![$((
                 stringify!($name),
@@ -112,14 +177,14 @@ macro_rules! shared {
         }
 
         /// The structs in WGSL.
-        fn printed_structs() -> String {
+        pub(crate) fn printed_structs() -> String {
             let mut printed = String::new();
             $(
-                printed += &$crate::layout::shared::comment("", &[$($doc),*]);
+                printed += &$crate::shared::comment("", &[$($doc),*]);
                 printed += &format!("struct {} {{\n", stringify!($name));
                 $(
-                    printed += &$crate::layout::shared::comment("    ", &[$($field_doc),*]);
-                    printed += &format!("    {}: {},\n", stringify!($field), <$type as $crate::layout::shared::Shared>::wgsl());
+                    printed += &$crate::shared::comment("    ", &[$($field_doc),*]);
+                    printed += &format!("    {}: {},\n", stringify!($field), <$type as $crate::shared::Shared>::wgsl());
                 )*
                 printed += "}\n\n";
             )*
@@ -135,7 +200,7 @@ macro_rules! constants {
 
         /// The constants above in WGSL.
         pub(crate) fn printed_constants() -> String {
-            use $crate::layout::shared::{Literal, comment};
+            use $crate::shared::{Literal, comment};
             let mut printed = String::new();
             $(
                 printed += &comment("", &[$($doc),*]);

@@ -1,10 +1,10 @@
-//! What a device alone can do: drift from the processor, be missing, too small, lost.
+//! What only a device can do: drift from the CPU, be missing, be too small, be lost, hold external columns.
 
 use std::sync::{Arc, OnceLock};
 
 use offtrack::angle::wrapped;
 use offtrack::gpu::{Columns, Device, Error, Slice, adapters};
-use offtrack::layout::Truck;
+use offtrack::layout::{Column, Truck};
 use offtrack::simulator::{self, Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 
@@ -28,29 +28,29 @@ fn full() -> (Arc<World>, RouteChoice) {
 }
 
 #[test]
-fn after_400_steps_every_truck_is_in_the_same_step_of_the_same_episode_as_on_the_processor() {
+fn after_400_steps_every_truck_is_in_the_same_step_of_the_same_episode_as_on_the_cpu() {
     let (world, choice) = full();
     let n_envs = 4096;
     let mut device = batch_on(&engine(), &world, n_envs, 5, choice.clone());
-    let mut processor = batch_on(&Engine::Cpu, &world, n_envs, 5, choice);
+    let mut cpu = batch_on(&Engine::Cpu, &world, n_envs, 5, choice);
     for _ in 0..400 {
         device.step_at_random();
-        processor.step_at_random();
+        cpu.step_at_random();
     }
-    let (here, there) = (processor.batch(), device.batch());
+    let (here, there) = (cpu.batch(), device.batch());
     let trucks = || here.truck.iter().zip(&there.truck);
     let moment = |truck: &Truck| (truck.route, truck.episode, truck.steps, truck.held);
     let shared = trucks().filter(|(here, there)| moment(here) == moment(there)).count();
-    let place = trucks().map(|(here, there)| here.position.distance(there.position)).fold(0.0, f32::max);
+    let distance = trucks().map(|(here, there)| here.position.distance(there.position)).fold(0.0, f32::max);
     let turned = |angle: fn(&Truck) -> f32| trucks().map(|(here, there)| wrapped(angle(here) - angle(there)).abs()).fold(0.0, f32::max);
     let angle = turned(|truck| truck.heading).max(turned(|truck| truck.trailer_heading));
-    println!("{shared} of {n_envs} in the same step of the same episode, at most {place} m and {angle} rad apart");
+    println!("{shared} of {n_envs} in the same step of the same episode, at most {distance} m and {angle} rad apart");
     assert_eq!(shared, n_envs);
-    let (here, there) = (processor.tally().unwrap(), device.tally().unwrap());
+    let (here, there) = (cpu.tally().unwrap(), device.tally().unwrap());
     assert!(10 * n_envs < here.episodes() as usize, "too few episodes to say anything");
     assert_eq!(here.sums[..8], there.sums[..8]);
-    // A millimetre and a milliradian are asked for; sums in another order cost a few units in the last place a step.
-    assert!(place < 1e-3 && angle < 1e-3, "{place} m, {angle} rad");
+    // Engines sum in different orders: a few units in the last place a step.
+    assert!(distance < 1e-3 && angle < 1e-3, "{distance} m, {angle} rad");
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn a_batch_too_large_for_the_adapter_is_refused_with_what_would_fit() {
     let (world, choice) = full();
     let limits = device().device.limits();
     let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    // A truck takes 69 values of 4 bytes in the widest columns and none in a wider one.
+    // The widest columns have 69 values of 4 bytes.
     let largest = (limit / (69 * 4)) as usize;
     let new = |n_envs| Simulator::on(engine(), world.clone(), n_envs, 0, choice.clone());
     let error = new(largest + 1).unwrap_err();
@@ -82,15 +82,15 @@ fn a_batch_too_large_for_the_adapter_is_refused_with_what_would_fit() {
     assert!(
         [&(largest + 1).to_string(), "observation", &limit.to_string(), &largest.to_string()].iter().all(|part| message.contains(*part))
     );
-    // An absurd number is refused as well rather than wrapped around.
+    // The number of bytes does not wrap around.
     for absurd in [1 << 62, usize::MAX] {
         assert!(matches!(new(absurd), Err(simulator::Error::Gpu(Error::TooManyTrucks { .. }))));
     }
-    // The device is none the worse for it.
+    // The device still works.
     assert!(new(8).is_ok());
 }
 
-/// A column in memory of the caller's.
+/// An external column.
 fn slice(n_bytes: u64) -> Slice {
     let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
     let descriptor = wgpu::BufferDescriptor { label: None, size: n_bytes, usage, mapped_at_creation: false };
@@ -98,31 +98,31 @@ fn slice(n_bytes: u64) -> Slice {
 }
 
 #[test]
-fn columns_of_the_callers_are_stepped_in_place_and_refused_when_too_small_or_gathered() {
+fn external_columns_are_stepped_in_place_and_refused_when_too_small_or_gathered() {
     let (world, choice) = full();
     let with = |columns| Simulator::on(Engine::Gpu { device: device().clone(), columns }, world.clone(), 100, 4, choice.clone());
-    let error = with(vec![("reward", slice(396))]).unwrap_err();
+    let error = with(vec![(Column::Reward, slice(396))]).unwrap_err();
     assert_eq!(error, Error::ColumnSize { column: "reward", found: 396, n_envs: 100, needed: 400 }.into());
     assert_eq!(error.to_string(), "reward: 396 bytes; 100 trucks need 400");
 
-    let mut foreign = with(vec![("observation", slice(100 * 276)), ("action", slice(1024))]).unwrap();
+    let mut external = with(vec![(Column::Observation, slice(100 * 276)), (Column::Action, slice(1024))]).unwrap();
     let mut own = batch_on(&engine(), &world, 100, 4, choice.clone());
-    for simulator in [&mut foreign, &mut own] {
+    for simulator in [&mut external, &mut own] {
         (0..60).for_each(|_| simulator.step_at_random());
     }
-    assert!(foreign.batch().observation == own.batch().observation && foreign.batch().truck == own.batch().truck);
-    assert_eq!(foreign.gather(&[1, 2]).unwrap_err(), Error::ForeignColumns.into());
-    assert!(foreign.batch().truck == own.batch().truck && foreign.step(&[0; 100]).is_ok());
+    assert!(external.batch().observation == own.batch().observation && external.batch().truck == own.batch().truck);
+    assert_eq!(external.gather(&[1, 2]).unwrap_err(), Error::ExternalColumns.into());
+    assert!(external.batch().truck == own.batch().truck && external.step(&[0; 100]).is_ok());
 }
 
 #[test]
-fn a_device_that_is_lost_fails_the_next_step_and_whatever_else_is_asked_of_it() {
+fn a_lost_device_fails_the_next_step_and_every_other_request() {
     let (world, choice) = full();
     let device = Device::open(None).unwrap();
     let new = || Simulator::on(Engine::Gpu { device: device.clone(), columns: Columns::new() }, world.clone(), 64, 0, choice.clone());
     let mut simulator = new().unwrap();
     simulator.step(&[4; 64]).unwrap();
-    // A device on which work is under way is gone once that is done.
+    // A device with work under way is lost once that is done.
     simulator.wait().unwrap();
     device.device.destroy();
     let error = simulator.step(&[4; 64]).unwrap_err();
