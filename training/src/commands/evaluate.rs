@@ -97,7 +97,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
 /// What was evaluated, and the table.
 fn printed(report: &Report, episodes: usize) -> String {
     let Report { benchmark, split, policy, seed, .. } = report;
-    format!("policy {policy}; benchmark {benchmark}, {split} routes; {episodes} episodes a route, seed {seed}\n\n")
+    let noun = if episodes == 1 { "episode" } else { "episodes" };
+    format!("policy {policy}; benchmark {benchmark}, {split} routes; {episodes} {noun} a route, seed {seed}\n\n")
         + &report.table(terminal::width())
 }
 

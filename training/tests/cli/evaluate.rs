@@ -124,7 +124,7 @@ fn the_shipped_policy_and_benchmark_are_found_wherever_the_program_runs_and_by_n
         succeed(&output);
         let printed = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(
-            printed.starts_with("policy attard2023 (shipped); benchmark attard2023, test routes; 1 episodes a route, seed 0\n"),
+            printed.starts_with("policy attard2023 (shipped); benchmark attard2023, test routes; 1 episode a route, seed 0\n"),
             "{printed}"
         );
     }
