@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Measures and tests everything on a machine with a graphics device, with programs that were built elsewhere, in under eight
-# minutes: the list of devices, the simulator's tests, speed against the number of trucks, and a training run. A part that
-# fails or takes too long is named at the end; the others still run.
+# Measures and tests everything on a machine with a graphics device, with programs that were built elsewhere, in under
+# eight minutes: the list of devices, the simulator's tests, speed against the number of trucks, and a training run. A
+# part that fails or takes too long is named at the end; the others still run.
 #
 #     benches/on-a-gpu.sh OFFTRACK TESTS OUT
 #
@@ -15,10 +15,10 @@
 #                  libglvnd0 libglx0), used where the system has no loader; they are unpacked into a temporary folder
 # BUILT_AT         path of this repository when the programs were built: the tests read its files there, so the script
 #                  makes a link at that path if nothing is there
-# OFFTRACK_COMMIT  the commit that the programs were built from, for the results, where git cannot tell
-# ADAPTER          part of an adapter's name, see `offtrack devices`
-# FILTER           test name filters separated by spaces, such as `device parity`; without it all tests run
-# TRAINING_OPTIONS more options for the training run, such as `--set replay_buffer.capacity=100000` for an adapter with little
+# OFFTRACK_COMMIT  the commit that the programs were built from, for the results, where git cannot tell ADAPTER
+# part of an adapter's name, see `offtrack devices` FILTER           test name filters separated by spaces, such as
+# `device parity`; without it all tests run TRAINING_OPTIONS more options for the training run, such as `--set
+# replay_buffer.capacity=100000` for an adapter with little
 #                  memory
 # ENVS, MODES, SECONDS_EACH, TRAINING, MINUTES   what is measured, as below
 set -uo pipefail
