@@ -15,11 +15,11 @@
 #                  libglvnd0 libglx0), used where the system has no loader; they are unpacked into a temporary folder
 # BUILT_AT         path of this repository when the programs were built: the tests read its files there, so the script
 #                  makes a link at that path if nothing is there
-# OFFTRACK_COMMIT  the commit that the programs were built from, for the results, where git cannot tell ADAPTER
-# part of an adapter's name, see `offtrack devices` FILTER           test name filters separated by spaces, such as
-# `device parity`; without it all tests run TRAINING_OPTIONS more options for the training run, such as `--set
-# replay_buffer.capacity=100000` for an adapter with little
-#                  memory
+# OFFTRACK_COMMIT  the commit that the programs were built from, for the results, where git cannot tell
+# ADAPTER          part of an adapter's name, see `offtrack devices`
+# FILTER           test name filters separated by spaces, such as `device parity`; without it all tests run
+# TRAINING_OPTIONS more options for the training run, such as `--set replay_buffer.capacity=100000` for an adapter with
+#                  little memory
 # ENVS, MODES, SECONDS_EACH, TRAINING, MINUTES   what is measured, as below
 set -uo pipefail
 if [ $# -ne 3 ]; then
