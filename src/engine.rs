@@ -1,6 +1,6 @@
 //! The two engines, and what they share: the columns of a batch, their sums, and the errors.
 //!
-//! Neither engine knows the other. [`crate::simulator`] chooses one and drives it through [`EngineBatch`].
+//! Neither engine knows the other. [`crate::simulator`] chooses one and drives it through `EngineBatch`.
 
 mod batch;
 pub mod cpu; // the CPU engine: all cores, a truck at a time
@@ -28,7 +28,7 @@ pub(crate) trait EngineBatch: Any + Debug + Send + Sync {
     /// Trucks in the batch.
     fn n_envs(&self) -> usize;
 
-    /// Memory of the columns [bytes].
+    /// Memory of the columns \[bytes].
     fn bytes(&self) -> usize;
 
     /// The columns on the host.

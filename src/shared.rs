@@ -98,7 +98,8 @@ impl<T: Literal, const N: usize> Literal for [T; N] {
 
 /// Prints the lines of a doc comment as a WGSL comment, indented by `depth`.
 pub fn comment(depth: &str, lines: &[&str]) -> String {
-    lines.iter().map(|line| format!("{depth}//{line}\n")).collect()
+    // Brackets are escaped for rustdoc, which takes a unit for a link.
+    lines.iter().map(|line| format!("{depth}//{}\n", line.replace("\\[", "["))).collect()
 }
 
 /// One of a closed list of names: an unknown one cannot be written.
@@ -167,7 +168,7 @@ macro_rules! shared {
             }
         )*
 
-        /// Every shared struct: its name, its size [bytes], and the name and the offset [bytes] of each field.
+        /// Every shared struct: its name, its size \[bytes], and the name and the offset \[bytes] of each field.
         #[allow(dead_code, reason = "used by tests alone where no other code looks at a layout")]
         pub fn structs() -> Vec<(&'static str, usize, Vec<(&'static str, usize)>)> {
             vec![$((

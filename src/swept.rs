@@ -10,29 +10,29 @@ use crate::layout::{Body, Rig};
 /// Pose of both units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// Middle of the drive axle [m].
+    /// Middle of the drive axle \[m].
     pub position: DVec2,
-    /// Heading of the tractor [rad].
+    /// Heading of the tractor \[rad].
     pub heading: f64,
-    /// Middle of the trailer's axle group [m].
+    /// Middle of the trailer's axle group \[m].
     pub trailer_position: DVec2,
-    /// Heading of the trailer [rad].
+    /// Heading of the trailer \[rad].
     pub trailer_heading: f64,
 }
 
 impl Pose {
-    /// Corners of the tractor's outline, counter-clockwise from front left [m].
+    /// Corners of the tractor's outline, counter-clockwise from front left \[m].
     pub fn tractor_corners(&self, rig: &Rig) -> [DVec2; 4] {
         corners(&rig.tractor_body, self.position, self.heading)
     }
 
-    /// Corners of the trailer's outline, counter-clockwise from front left [m].
+    /// Corners of the trailer's outline, counter-clockwise from front left \[m].
     pub fn trailer_corners(&self, rig: &Rig) -> [DVec2; 4] {
         corners(&rig.trailer_body, self.trailer_position, self.trailer_heading)
     }
 }
 
-/// Corners of a body in a frame at `origin` with `heading`, counter-clockwise from front left [m].
+/// Corners of a body in a frame at `origin` with `heading`, counter-clockwise from front left \[m].
 pub fn corners(body: &Body, origin: DVec2, heading: f64) -> [DVec2; 4] {
     let ahead = DVec2::from_angle(heading);
     let (front, rear, side) = (f64::from(body.front), f64::from(body.rear), f64::from(body.half_width) * ahead.perp());

@@ -1,6 +1,6 @@
 //! The CPU engine: the columns of a batch, stepped a truck at a time by all cores.
 //!
-//! A truck's step reads and writes its own [`Row`] and reads the shared [`World`], so the number of threads and the
+//! A truck's step reads and writes its own `Row` and reads the shared [`World`], so the number of threads and the
 //! truck's index in the batch cannot change a result.
 
 pub mod collide;

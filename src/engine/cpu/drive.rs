@@ -13,7 +13,7 @@ use crate::shared::constants;
 use crate::world::World;
 
 constants! {
-    /// Largest shift of a no-slip point [m]: the linear tyre model is not valid beyond.
+    /// Largest shift of a no-slip point \[m]: the linear tyre model is not valid beyond.
     pub const SLIP_LEVER_MAX: f32 = 1.5;
     /// Keeps a quotient finite at a standstill [m^2/s^2].
     const SPEED_SQUARED_MIN: f32 = 0.01;
@@ -50,19 +50,19 @@ pub struct Moving {
 /// Motion of both units at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    /// Of the tractor [rad/s].
+    /// Of the tractor \[rad/s].
     pub yaw_rate: f32,
-    /// Of the trailer [rad/s].
+    /// Of the trailer \[rad/s].
     pub trailer_yaw_rate: f32,
-    /// Speed of the drive axle to the left [m/s].
+    /// Speed of the drive axle to the left \[m/s].
     pub side_speed: f32,
-    /// Of the tractor, to the left [m/s^2].
+    /// Of the tractor, to the left \[m/s^2].
     pub lateral_acceleration: f32,
-    /// Of the trailer's axle group, to the left [m/s^2].
+    /// Of the trailer's axle group, to the left \[m/s^2].
     pub trailer_lateral_acceleration: f32,
 }
 
-/// Motion of a truck with this speed [m/s], steer angle and articulation [rad].
+/// Motion of a truck with this speed \[m/s], steer angle and articulation \[rad].
 #[inline]
 pub fn motion(rig: &Rig, speed: f32, steering: f32, articulation: f32) -> Motion {
     // The tyres' grip bounds the curvature.

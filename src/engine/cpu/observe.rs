@@ -12,11 +12,11 @@ use crate::shared::constants;
 use crate::world::World;
 
 constants! {
-    /// Speed that is observed as 1 [m/s].
+    /// Speed that is observed as 1 \[m/s].
     pub const SPEED_SCALE: f32 = 27.8;
-    /// Distance to a waypoint or its crossing line that is observed as 1 [m].
+    /// Distance to a waypoint or its crossing line that is observed as 1 \[m].
     pub const WAYPOINT_SCALE: f32 = 20.0;
-    /// Distance to the lane centre that is observed as 1 [m].
+    /// Distance to the lane centre that is observed as 1 \[m].
     pub const LANE_SCALE: f32 = 10.0;
     /// Number of waypoints that angles are taken to.
     pub const N_LOOK_AHEAD: usize = 5;
@@ -99,7 +99,7 @@ pub fn observed(
     values
 }
 
-/// Signed angle from `from` to `to`, left positive [rad].
+/// Signed angle from `from` to `to`, left positive \[rad].
 #[inline]
 fn angle_between(from: Vec2, to: Vec2) -> f32 {
     arc_tangent(from.perp_dot(to), from.dot(to))

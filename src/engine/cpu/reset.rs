@@ -49,7 +49,7 @@ pub fn begin_from(world: &World, row: &mut Row, episode: u32, start: &Start) {
     row.progress.passed = 0;
 }
 
-/// A truck at `waypoint`, where the lane has this heading [rad]: trailer straight, offset and turned as `start` says.
+/// A truck at `waypoint`, where the lane has this heading \[rad]: trailer straight, offset and turned as `start` says.
 pub fn started(params: &Params, waypoint: &WaypointRow, lane_heading: f32, start: &Start) -> Truck {
     let heading = wrapped(lane_heading + start.heading * params.start_heading);
     let point = waypoint.position + start.offset * params.start_offset * waypoint.direction.perp();

@@ -14,9 +14,9 @@ use crate::shared::Named;
 pub struct Slice {
     /// The buffer; shaders may write to it, and it may be copied from and to.
     pub buffer: Buffer,
-    /// Offset of the slice [bytes].
+    /// Offset of the slice \[bytes].
     pub offset: u64,
-    /// Its length [bytes].
+    /// Its length \[bytes].
     pub size: u64,
 }
 
