@@ -46,7 +46,7 @@ def main():
         "benchmark": gpu["benchmark"],
         "step": gpu["step"],
         "rounds": args.rounds,
-        "times": "ns a truck, medians over rounds; on a device by its own clock, without the copy of the observation",
+        "times": "ns a truck, medians over rounds; on a device by its own clock",
         "ratio": "the device's time over the CPU's: the median of the rounds' ratios, with the lowest and the highest",
         "ratio_of_fastest": "the same for each engine's fastest round, which other programs disturb least",
         "sizes": [compared(rounds, index) for index in range(len(cpu["runs"]))],
