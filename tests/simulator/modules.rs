@@ -112,7 +112,7 @@ fn the_feature_gpu_is_named_only_where_an_engine_or_device_is_chosen() {
         ("device.rs", 8),
         ("learner/backend.rs", 8),
         ("learner/rollout.rs", 1),
-        ("learner/run.rs", 1),
+        ("learner/run/lost_device_tests.rs", 1),
         ("learner/sac/tests.rs", 1),
     ];
     assert_eq!(naming_gpu(training), expected(&chosen));

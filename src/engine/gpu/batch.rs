@@ -137,7 +137,7 @@ impl Batch {
     fn read_tally(&self) -> Result<Tally, Error> {
         let bytes = self.device.read(std::slice::from_ref(self.buffers.tally()))?;
         // Two words of 32 bits, the lower first.
-        let mut sums = bytes[0].chunks_exact(size_of::<i64>()).map(|sum| bytemuck::pod_read_unaligned::<[u32; 2]>(sum));
+        let mut sums = bytes[0].chunks_exact(size_of::<i64>()).map(bytemuck::pod_read_unaligned::<[u32; 2]>);
         let mut next = || sums.next().map_or(0, |[low, high]| (u64::from(low) | u64::from(high) << 32) as i64);
         Ok(Tally { sums: std::array::from_fn(|_| next()) })
     }

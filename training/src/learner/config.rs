@@ -187,7 +187,7 @@ impl Config {
             [] => file.display().to_string(),
             _ => format!("{} with --set {}", file.display(), settings.join(" --set ")),
         };
-        let wrong = |error: toml::de::Error| Error::contents(Path::new(&origin), error.to_string().trim().to_owned());
+        let wrong = |error: toml::de::Error| Error::contents(Path::new(&origin), error.to_string().trim());
         let config: Config = table.try_into().map_err(wrong)?;
         config.check(&Reader::of(Path::new(&origin)))?;
         Ok(config)

@@ -96,7 +96,7 @@ impl<const N: usize> ReplayBuffer<N> {
     }
 
     /// Transitions held.
-    pub fn len(&self) -> usize {
+    pub fn n_transitions(&self) -> usize {
         self.observation.len()
     }
 

@@ -5,7 +5,7 @@
 
 pub mod checkpointer;
 pub mod folder;
-#[cfg(all(test, feature = "gpu"))]
+#[cfg(test)]
 mod lost_device_tests;
 pub mod metrics_file;
 pub mod progress;

@@ -87,7 +87,7 @@ fn a_full_ring_holds_the_latest_steps_alone() {
     let histories = histories(103);
     for priority in SETTINGS {
         let buffer = filled(&histories, 3, 40, priority);
-        assert_eq!(buffer.len(), 40);
+        assert_eq!(buffer.n_transitions(), 40);
         // 20 slots, the last three of which nothing follows far enough.
         assert_eq!(check(&buffer, &histories, 3), (83..100).collect::<Vec<_>>());
     }

@@ -95,7 +95,7 @@ impl Rollout for HostRollout {
     }
 
     fn n_transitions(&self) -> usize {
-        self.replay_buffer.len()
+        self.replay_buffer.n_transitions()
     }
 
     fn can_sample(&self) -> bool {

@@ -1,3 +1,7 @@
+//! A run whose device fails, and one that learns on a device.
+
+#![cfg(feature = "gpu")]
+
 use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
