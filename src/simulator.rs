@@ -7,7 +7,7 @@ use crate::engine::EngineBatch;
 #[cfg(feature = "gpu")]
 use crate::engine::gpu;
 pub use crate::engine::{Batch, Error, RouteChoice, Tally};
-use crate::layout::{Column, Start, Truck};
+use crate::layout::{Column, Start};
 use crate::stages::{N_STAGES, Stage};
 use crate::world::World;
 
@@ -212,32 +212,5 @@ fn check_indices(world: &World, batch: &Batch) -> Result<(), Error> {
             return Err(Error::OutsideWorld { column: Column::Progress.name(), env, found: progress.waypoint, limit });
         }
     }
-    check_finite(batch)
-}
-
-/// An error if a stored float is not finite.
-fn check_finite(batch: &Batch) -> Result<(), Error> {
-    for (column, bytes) in batch.columns() {
-        // All columns but four hold floats alone.
-        let floats: Vec<f32> = match column {
-            Column::Action | Column::Ended => continue,
-            Column::Truck => batch.truck.iter().flat_map(floats_of).collect(),
-            Column::Progress => batch.progress.iter().flat_map(|at| [at.lane_distance, at.waypoint_distance]).collect(),
-            _ => bytes.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect(),
-        };
-        if let Some(index) = floats.iter().position(|value| !value.is_finite()) {
-            let env = index * batch.n_envs() / floats.len();
-            return Err(Error::NotFinite { column: column.name(), env, found: floats[index].to_string() });
-        }
-    }
     Ok(())
-}
-
-fn floats_of(truck: &Truck) -> [f32; 12] {
-    let Truck { position, heading, trailer_heading, speed, steering, .. } = *truck;
-    let Truck { tractor_roll, tractor_roll_rate, trailer_roll, trailer_roll_rate, .. } = *truck;
-    let [tractor, trailer] = [truck.tractor_load_transfer_ratio, truck.trailer_load_transfer_ratio];
-    let rolls = [tractor_roll, tractor_roll_rate, trailer_roll, trailer_roll_rate, tractor, trailer];
-    let motion = [position.x, position.y, heading, trailer_heading, speed, steering];
-    std::array::from_fn(|index| if index < 6 { motion[index] } else { rolls[index - 6] })
 }

@@ -106,16 +106,6 @@ pub enum Error {
         /// What the world has.
         limit: String,
     },
-    /// A stored number that is not finite.
-    #[error("{column}[{env}]: {found}; stored numbers must be finite")]
-    NotFinite {
-        /// The column's name.
-        column: &'static str,
-        /// Index of the truck.
-        env: usize,
-        /// The number.
-        found: String,
-    },
     /// The device.
     #[cfg(feature = "gpu")]
     #[error(transparent)]

@@ -199,7 +199,7 @@ mod on_a_device {
         let place = Place::new();
         let arguments = ["train", &place.text("tiny.toml"), "--out", &place.text("runs"), "--set", "device=gpu"];
         let said = refusal(&offtrack(&[&arguments[..], &["--adapter", "abacus"]].concat()), 2);
-        assert!(said.contains("adapter \"abacus\": not there; this machine has "), "{said}");
+        assert!(said.contains("adapter \"abacus\": not found; this machine has "), "{said}");
         assert!(!std::path::Path::new(&place.text("runs")).exists());
     }
 

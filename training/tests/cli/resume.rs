@@ -243,8 +243,8 @@ fn a_checkpoint_with_a_right_checksum_and_wrong_contents_is_refused_by_its_colum
         ("replay buffer, priorities", &0f64.to_le_bytes(), "`replay buffer, priorities` has one where none may be, or lacks one"),
         ("rollout, acting", &[0; 32], "`rollout, acting` is all zeros"),
         ("batch, action", &77u32.to_le_bytes(), "action[0]: 77"),
-        ("batch, truck", &f32::NAN.to_le_bytes(), "truck[0]: NaN; stored numbers must be finite"),
-        ("batch, reward", &f32::INFINITY.to_le_bytes(), "reward[0]: inf"),
+        ("batch, truck", &f32::NAN.to_le_bytes(), "`batch, truck` has NaN"),
+        ("batch, reward", &f32::INFINITY.to_le_bytes(), "`batch, reward` has inf"),
     ];
     for (column, value, expected) in cases {
         std::fs::write(place.file(file), with_column(&whole, column, |bytes| bytes[..value.len()].copy_from_slice(value))).unwrap();

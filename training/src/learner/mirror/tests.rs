@@ -116,7 +116,7 @@ fn an_action_table_or_sensors_without_an_image_are_refused() {
     let mut world = World::bake(&scenario()).unwrap();
     world.rays[3].origin.x += 0.5;
     let message = Mirror::of(&world).unwrap_err().to_string();
-    assert!(message.contains("distance sensor 2 has no image"), "{message}");
+    assert!(message.contains("distance sensor 2 has no mirror image"), "{message}");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use burn::tensor::{Device, Tensor, TensorData};
 use offtrack::layout::{Column, Ended, N_VALUES};
 use offtrack::random;
-use offtrack::simulator::{RouteChoice, Simulator};
+use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 use rand::{Rng, SeedableRng};
 use std::sync::Arc;
@@ -175,6 +175,7 @@ impl Rollout for HostRollout {
 
     fn restore(&mut self, stored: &Stored, _: u64) -> Result<(), Error> {
         self.simulator.restore(|column| stored.bytes(&column_name(column))).map_err(|error| stored.error(error.to_string()))?;
+        check_finite(self.simulator.batch(), stored)?;
         let generator = |name: &str| {
             let generator = Generator { state: stored.array(name)? };
             // From all zeros every number would be zero.
@@ -184,6 +185,24 @@ impl Rollout for HostRollout {
         self.episode_rewards = stored.exactly("rollout, episode rewards", self.config.n_envs)?;
         self.replay_buffer.restore(stored, self.n_actions() as u32)
     }
+}
+
+/// An error if a truck of a checkpoint has a number that is not finite.
+fn check_finite(batch: &Batch, stored: &Stored) -> Result<(), Error> {
+    for (column, bytes) in batch.columns() {
+        let floats: Vec<f32> = match column {
+            // Indices, or floats beside indices.
+            Column::Action | Column::Ended | Column::Progress => continue,
+            Column::Truck => {
+                batch.truck.iter().flat_map(|truck| [truck.position.x, truck.position.y, truck.heading, truck.speed]).collect()
+            }
+            _ => bytes.chunks_exact(size_of::<f32>()).map(bytemuck::pod_read_unaligned).collect(),
+        };
+        if let Some(value) = floats.iter().find(|value| !value.is_finite()) {
+            return Err(stored.error(format!("its column `{}` has {value}: put a sound copy back", column_name(column))));
+        }
+    }
+    Ok(())
 }
 
 fn column_name(column: Column) -> String {

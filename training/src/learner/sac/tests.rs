@@ -363,7 +363,9 @@ fn an_update_on_a_device_is_that_on_the_host() {
             // Adam's first steps.
             let (difference, name) = furthest(&host, &on_device);
             assert!(difference < 3e-4, "{name}: {difference}");
-            assert!(0.003 < furthest(&host, &new(3, Placement::Host)).0, "three steps of 0.0015 are seen");
+            let mut begun = new(3, Placement::Host);
+            begun.update(vec![random_batch(0, &Device::flex())], 0.0);
+            assert!(0.003 < furthest(&host, &begun).0, "three steps of 0.0015 are seen");
             let ((found, n_updates), (expected, _)) = (on_device.take_sums(), host.take_sums());
             assert_eq!((n_updates, on_device.take_sums().1), (3, 0));
             for (found, expected) in [
