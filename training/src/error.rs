@@ -74,9 +74,9 @@ pub enum Error {
     /// The learner's threads cannot be started.
     #[error("threads to learn with cannot be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
-    /// The learner has broken down.
+    /// Training has diverged.
     #[error(
-        "{what} is {value} after {env_steps} env steps{also}: the learner has broken down; {kept}; lower learning rates or a smaller reward_scale would do"
+        "{what} is {value} after {env_steps} env steps{also}: training has diverged; {kept}; lower learning rates or a smaller reward_scale would do"
     )]
     Diverged {
         /// Which figure or parameter.

@@ -166,6 +166,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
 fn config(args: &Args, file: &Path) -> Result<Config, Error> {
     let mut config = Config::read_with(file, &args.settings)?;
     config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
+    let flag = args.steps.map(|steps| PathBuf::from(format!("--steps {steps}")));
+    config.check_budget(flag.as_deref().unwrap_or(file))?;
     if let Some(adapter) = &args.adapter {
         if config.device == config::Device::Cpu {
             let expected = "the training file uses the processor: leave it out, or add --set device=gpu".to_owned();

@@ -284,28 +284,26 @@ fn two_runs_never_share_a_folder() {
 }
 
 #[test]
-fn a_learner_that_breaks_down_stops_with_the_step_the_parameter_and_the_last_good_checkpoint() {
+fn a_learner_that_diverges_stops_with_the_step_the_parameter_and_the_last_good_checkpoint() {
     let place = place();
     let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
     let wild = [
         ("reward_scale = 0.01", "reward_scale = 1e6"),
-        ("actor_rate = 3e-4", "actor_rate = 1.0"),
-        ("critic_rate = 3e-4", "critic_rate = 1.0"),
+        ("actor_learning_rate = 3e-4", "actor_learning_rate = 1.0"),
+        ("critic_learning_rate = 3e-4", "critic_learning_rate = 1.0"),
     ];
     let wild = wild.iter().fold(training, |text, (from, to)| text.replace(from, to)).replace("rate = 3e-4 }", "rate = 1.0 }");
     std::fs::write(place.file("tiny.toml"), wild).unwrap();
     let message = refusal(&place.train(&[&["--name", "run"], &ENDLESS[..]].concat()), 1);
-    for expected in
-        ["env steps", "the learner has broken down", "checkpoint.safetensors is the last good checkpoint", "lower learning rates"]
-    {
+    for expected in ["env steps", "training has diverged", "checkpoint.safetensors is the last good checkpoint", "lower learning rates"] {
         assert!(message.contains(expected), "{message}");
     }
     assert!(
-        ["critic 1, layer", "critic 2, layer", "actor, layer", "entropy weight"].iter().any(|name| message.contains(name)),
+        ["critic 1, layer", "critic 2, layer", "actor, layer", "entropy coefficient"].iter().any(|name| message.contains(name)),
         "{message}"
     );
-    // It is good as far as it goes: it can be read, and breaks down again.
-    assert!(refusal(&resume(&place, "run", &[]), 1).contains("broken down"));
+    // It is good as far as it goes: it can be read, and training diverges again.
+    assert!(refusal(&resume(&place, "run", &[]), 1).contains("diverged"));
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! What can be wrong with a training file: ranges of single values, and values that do not go together.
 
+use std::path::Path;
+
 use offtrack::reader::Reader;
 
 use super::{Config, Device, Learning};
@@ -39,17 +41,6 @@ impl Config {
             let expected = format!("must hold more than learning.n_steps = {} steps of n_envs = {} trucks", learning.n_steps, self.n_envs);
             return Err(reader.invalid("replay_buffer.capacity", replay_buffer.capacity, expected).into());
         }
-        // With fewer steps no update would ever be made.
-        let before_updates = (replay_buffer.warmup as u64).max((learning.n_steps as u64 + 1) * self.n_envs as u64);
-        if let Some(steps) = self.steps.filter(|&steps| steps <= before_updates) {
-            let (warmup, n_steps) = (replay_buffer.warmup, learning.n_steps);
-            let expected = format!(
-                "must be above {before_updates}, or nothing is learned: updates begin after replay_buffer.warmup = {warmup} env steps \
-                 and learning.n_steps + 1 = {} steps of each truck",
-                n_steps + 1
-            );
-            return Err(reader.invalid("steps", steps, expected).into());
-        }
         if self.device == Device::Gpu {
             let without = [("exploration", self.exploration.is_some()), ("replay_buffer.priority", replay_buffer.priority.is_some())];
             if let Some((key, _)) = without.into_iter().find(|(_, given)| *given) {
@@ -57,6 +48,19 @@ impl Config {
             }
         }
         Ok(())
+    }
+
+    /// An error if a budget of steps ends before the first update: nothing would be learned. `origin` is the file or the
+    /// flag that gives it.
+    pub fn check_budget(&self, origin: &Path) -> Result<(), Error> {
+        let (warmup, n_steps) = (self.replay_buffer.warmup, self.learning.n_steps + 1);
+        let before_updates = (warmup as u64).max(n_steps as u64 * self.n_envs as u64);
+        let Some(steps) = self.steps.filter(|&steps| steps <= before_updates) else { return Ok(()) };
+        let expected = format!(
+            "must be above {before_updates}, or nothing is learned: updates begin after replay_buffer.warmup = {warmup} env steps \
+             and learning.n_steps + 1 = {n_steps} steps of each truck"
+        );
+        Err(Reader::of(origin).invalid("steps", steps, expected).into())
     }
 }
 

@@ -85,7 +85,7 @@ impl Checkpointer {
         // These are newer, whether or not those could be written.
         self.wait();
         if self.since.replace(Instant::now()).is_some() {
-            self.next *= 2;
+            self.next = self.interval.min(self.next.saturating_mul(2));
         }
         let written = columns.write(&self.part, config, world);
         let (part, whole, policy_file, metrics) = (self.part.clone(), self.file.clone(), self.policy.clone(), self.metrics.clone());
