@@ -113,7 +113,7 @@ fn the_feature_gpu_is_named_only_where_an_engine_or_device_is_chosen() {
         ("learner/backend.rs", 8),
         ("learner/rollout.rs", 1),
         ("learner/run/lost_device_tests.rs", 1),
-        ("learner/sac/tests.rs", 1),
+        ("learner/sac/device_tests.rs", 1),
     ];
     assert_eq!(naming_gpu(training), expected(&chosen));
     for other in ["drawing/src", "comparison/src"] {

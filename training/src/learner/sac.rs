@@ -294,4 +294,6 @@ fn update([critic_loss, actor_loss, entropy, value]: [f32; 4]) -> Update {
 }
 
 #[cfg(test)]
+mod device_tests;
+#[cfg(test)]
 mod tests;
