@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Times each stage of a step on the processor and, by the same shaders as a graphics card, on a device, in turns on the same machine.
+"""Times each stage of a step on the CPU and on a device, in turns on the same machine.
 
-A round is one run of `offtrack scale` on each engine; a ratio is the device's time over the processor's in the same round, and the median
-of the rounds is kept: other work on the machine comes and goes more slowly than the rounds. Standard library only.
+A round is one run of `offtrack scale` on each engine. A ratio is the device's time over the CPU's in the same round, and
+the median of the rounds is reported: load from other programs changes more slowly than the rounds. Standard library only.
 
     python3 benches/engines.py --offtrack target/release/offtrack --json docs/benchmarks/engines.json
 """
@@ -16,7 +16,7 @@ import tempfile
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-# Both engines do the same work a stage; a ratio beyond this wants an explanation.
+# Both engines do the same work in a stage. A ratio beyond this needs an explanation.
 FAIR = 3.0
 
 
@@ -46,9 +46,9 @@ def main():
         "benchmark": gpu["benchmark"],
         "step": gpu["step"],
         "rounds": args.rounds,
-        "times": "ns a truck, medians over rounds; on a device by its own clock, without the copy of observations between two stages",
-        "ratio": "the device's time over the processor's: the median of the rounds' ratios, with the lowest and the highest",
-        "ratio_of_fastest": "the same of each engine's fastest round: what other work on the machine disturbs least",
+        "times": "ns a truck, medians over rounds; on a device by its own clock",
+        "ratio": "the device's time over the CPU's: the median of the rounds' ratios, with the lowest and the highest",
+        "ratio_of_fastest": "the same for each engine's fastest round, which other programs disturb least",
         "sizes": [compared(rounds, index) for index in range(len(cpu["runs"]))],
     }
     for size in result["sizes"]:
@@ -58,7 +58,7 @@ def main():
 
 
 def scaled(args, engine):
-    """What `offtrack scale` measures on an engine."""
+    """The result of `offtrack scale` on an engine."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scale.json"
         command = [args.offtrack, "scale", "--device", engine, "--envs", args.envs, "--seconds", str(args.seconds), "--json", file]
@@ -100,7 +100,7 @@ def pair(runs, time):
 
 
 def show(size):
-    print(f"{size['envs']} trucks{'processor':>16}{'device':>12}{'ratio':>8}{'fastest':>9}   lowest to highest")
+    print(f"{size['envs']} trucks{'CPU':>16}{'device':>12}{'ratio':>8}{'fastest':>9}   lowest to highest")
     for name, row in [("whole step", size["step"]), *size["stages"].items()]:
         mark = " *" if name in size["beyond_three_times"] else ""
         print(f"  {name:12}{row['cpu']:12.1f} ns{row['gpu']:9.1f} ns{row['ratio']:8.2f}{row['ratio_of_fastest']:9.2f}   {row['lowest']:.2f} to {row['highest']:.2f}{mark}")

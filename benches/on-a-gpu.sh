@@ -1,23 +1,25 @@
 #!/usr/bin/env bash
-# Everything there is to find out on a machine with a graphics device, from programs that were built elsewhere, in under eight minutes:
-# the devices, the simulator's tests, which run on a device too, speed against the number of trucks, and a training run. A part that fails
-# or takes too long is named at the end, and the others go on.
+# Measures and tests everything on a machine with a graphics device, with programs that were built elsewhere, in under
+# eight minutes: the list of devices, the simulator's tests, speed against the number of trucks, and a training run. A
+# part that fails or takes too long is named at the end; the others still run.
 #
 #     benches/on-a-gpu.sh OFFTRACK TESTS OUT
 #
 # OFFTRACK  the program, from `cargo build --release --features gpu`
-# TESTS     the simulator's test binary: the last line of `cargo test --release --features gpu -p offtrack --test simulator --no-run` names it
-# OUT       a folder for everything that comes of it
+# TESTS     the simulator's test binary, named in the last line of
+#           `cargo test --release --features gpu -p offtrack --test simulator --no-run`
+# OUT       a folder for all results
 #
-# From the environment, all optional:
-# VULKAN_DEBS      a folder of Debian packages with the Vulkan loader (libvulkan1 and what a driver asks for: libegl1 libgl1 libglvnd0
-#                  libglx0), used where the system has no loader; they are unpacked into a temporary folder
-# BUILT_AT         where this repository stood when the programs were built: the tests read its files there, so a link is put there where
-#                  nothing is
-# OFFTRACK_COMMIT  the commit that the programs were built from, for results, where git cannot tell
+# Environment variables, all optional:
+# VULKAN_DEBS      a folder of Debian packages with the Vulkan loader (libvulkan1, and what drivers need: libegl1 libgl1
+#                  libglvnd0 libglx0), used where the system has no loader; they are unpacked into a temporary folder
+# BUILT_AT         path of this repository when the programs were built: the tests read its files there, so the script
+#                  makes a link at that path if nothing is there
+# OFFTRACK_COMMIT  the commit that the programs were built from, for the results, where git cannot tell
 # ADAPTER          part of an adapter's name, see `offtrack devices`
-# FILTER           words of which a test's name has one, such as `device parity`; without it all tests run
-# TRAINING_OPTIONS more options for the training run, such as `--set memory.capacity=100000` where an adapter has little memory
+# FILTER           test name filters separated by spaces, such as `device parity`; without it all tests run
+# TRAINING_OPTIONS more options for the training run, such as `--set replay_buffer.capacity=100000` for an adapter with
+#                  little memory
 # ENVS, MODES, SECONDS_EACH, TRAINING, MINUTES   what is measured, as below
 set -uo pipefail
 if [ $# -ne 3 ]; then
@@ -39,7 +41,7 @@ read -ra options <<<"${TRAINING_OPTIONS:-}"
 adapter=(${ADAPTER:+--adapter "$ADAPTER"})
 failed=()
 
-# part NAME SECONDS COMMAND...: runs a part of it, for so long at most, with what it says in OUT/NAME.txt.
+# part NAME SECONDS COMMAND...: runs a command with a time limit; its output goes to OUT/NAME.txt.
 part() {
     local name=$1 limit=$2 begun=$SECONDS code
     shift 2
@@ -64,7 +66,7 @@ if ! ldconfig -p | grep -q 'libvulkan\.so\.1'; then
         echo "no Vulkan loader: install libvulkan1, or set VULKAN_DEBS to a folder of its package" >&2
     fi
 fi
-# The driver: what the loader finds by itself, else where NVIDIA's driver puts its description.
+# The driver: what the loader finds by itself, else the places where NVIDIA's driver puts its description.
 is_hardware() { "$offtrack" devices 2>/dev/null | grep -qE '  (discrete|integrated|virtual)  '; }
 if [ -z "${VK_DRIVER_FILES:-}" ] && ! is_hardware; then
     for description in {/usr/share,/etc,/usr/local/share,/usr/local/nvidia/share}/vulkan/icd.d/nvidia_icd*.json; do
@@ -80,7 +82,7 @@ if [ -n "${BUILT_AT:-}" ] && [ ! -e "$BUILT_AT" ]; then
 fi
 
 part devices 30 "$offtrack" devices
-# shellcheck disable=SC2086 # several words are several filters
+# shellcheck disable=SC2086 # each word is a filter
 part tests 150 "$tests" $filter --nocapture
 grep -q '^running 0 tests' "$out/tests.txt" && failed+=("tests (none was run)")
 smi=

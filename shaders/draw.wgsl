@@ -1,10 +1,10 @@
-// Draws an action by chance, each as likely as the next.
+// Draws an action uniformly at random.
 //
-// Beside the stages of a step: a driver that needs nothing, for measuring speed and filling a memory.
+// Not a stage of a step, but a policy that needs no learner: for measuring speed and filling a replay buffer.
 
 @compute @workgroup_size(WORKGROUP)
-fn draw(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let env = thread_of(group, groups, local);
+fn draw(thread: Thread) {
+    let env = index_of(thread);
     if batch.n_envs <= env { return; }
     action[env] = drawn(batch.seed, env, truck[env].episode, truck[env].steps, params.n_actions);
 }

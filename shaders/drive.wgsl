@@ -1,11 +1,12 @@
 // Moves the truck: a single-track tractor pulling a trailer hitched near its drive axle.
 //
-// Tyre slip shifts each unit's no-slip point forward by `slip * speed²`; zero slip is pure kinematics. Integrated with the midpoint rule,
-// steer angle and speed changing linearly inside a sub-step: holding them through one would cost decimetres in a turn.
+// Tyre slip shifts each unit's no-slip point forward by `slip * speed²`; zero slip is pure kinematics. The midpoint
+// rule integrates it. Steer angle and speed change linearly within a sub-step: constant ones would cost decimetres in a
+// turn.
 
 @compute @workgroup_size(WORKGROUP)
-fn drive(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let env = thread_of(group, groups, local);
+fn drive(thread: Thread) {
+    let env = index_of(thread);
     if !is_driving(env) { return; }
     truck[env] = driven(params.rig, params.substep, params.n_substeps, control[env], truck[env]);
 }
@@ -26,13 +27,13 @@ fn driven(rig: Rig, substep: f32, n_substeps: u32, control: Control, truck: Truc
     return after;
 }
 
-// A truck and how it moves there: the end of one sub-step is the beginning of the next.
+// A truck and its motion there: the end of one sub-step is the start of the next.
 struct Moving {
     truck: Truck,
     motion: Motion,
 }
 
-// How both units turn at one instant.
+// Motion of both units at one instant.
 struct Motion {
     // Of the tractor [rad/s].
     yaw_rate: f32,
@@ -46,9 +47,9 @@ struct Motion {
     trailer_lateral_acceleration: f32,
 }
 
-// How a truck with this speed [m/s], steer angle and articulation [rad] moves.
+// Motion of a truck with this speed [m/s], steer angle and articulation [rad].
 fn motion(rig: Rig, speed: f32, steering: f32, articulation: f32) -> Motion {
-    // What the tyres hold bounds the curvature.
+    // The tyres' grip bounds the curvature.
     let curvature_max = rig.lateral_acceleration_max / max(speed * speed, SPEED_SQUARED_MIN);
     let steered = sin_cos(steering);
     let curvature = limited(steered.x / (steered.y * rig.wheelbase), curvature_max);
@@ -107,7 +108,7 @@ fn rolled(roll: Roll, state: vec2<f32>, lateral_acceleration: f32) -> vec2<f32> 
     );
 }
 
-// Share of a unit's weight that has moved to its right wheels, for its (roll, roll rate): from 1 on the left ones lift.
+// Fraction of a unit's weight that has moved to its right wheels, for its (roll, roll rate): at 1 the left ones lift.
 fn load_transfer_ratio(roll: Roll, state: vec2<f32>, lateral_acceleration: f32) -> f32 {
     return roll.per_acceleration * lateral_acceleration + roll.per_roll * state.x + roll.per_roll_rate * state.y;
 }

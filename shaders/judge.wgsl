@@ -1,10 +1,10 @@
-// Judges the step: whether and why the episode ended, and what the step was worth.
+// Judges the step: whether and why the episode ended, and the reward.
 //
-// Failure wins over arrival, everything wins over the clock.
+// Failure wins over arrival, everything wins over the time limit.
 
 @compute @workgroup_size(WORKGROUP)
-fn judge(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let env = thread_of(group, groups, local);
+fn judge(thread: Thread) {
+    let env = index_of(thread);
     if !is_driving(env) { return; }
     truck[env].steps += 1u;
     let code = ending(params, routes[truck[env].route], truck[env], clearance[env], progress[env]);

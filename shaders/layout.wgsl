@@ -1,5 +1,7 @@
-// What shaders share with Rust. Printed from src/layout.rs and the constants beside each stage: change those.
+// What shaders share with Rust. Printed by src/wgsl.rs from the layout and the constants beside each stage: change those.
 
+// Threads of a workgroup.
+const WORKGROUP: u32 = 64u;
 // Values in an observation.
 const N_VALUES: u32 = 69u;
 // Distance sensors on the trailer, left and right alternating, front to rear.
@@ -30,27 +32,25 @@ const QUARTER: array<f32, 3> = array<f32, 3>(1.5703125f, 0.0004837513f, 7.54979e
 const SINE: array<f32, 3> = array<f32, 3>(-0.00019515296f, 0.008332161f, -0.16666655f);
 // That of the cosine.
 const COSINE: array<f32, 3> = array<f32, 3>(2.4433157e-5f, -0.0013887316f, 0.041666646f);
-// The smallest number that is divided by.
+// The smallest divisor.
 const TINY: f32 = 1.1754944e-38f;
 // Bits of a cell's word that hold the logarithm of its sub-cells a side; the rest is where its block begins.
 const LEVEL_BITS: u32 = 3u;
-// Factor that tells neighbouring counters apart, of D. Lehmer's kind of generator.
+// Factor of the linear congruential step that each counter goes through first.
 const FACTOR: u32 = 1664525u;
-// What is added then.
+// Addend of that step.
 const ADDEND: u32 = 1013904223u;
-// A word has this many bits below those that an f32 holds.
+// Lowest bits of a word that an f32 cannot hold.
 const SPARE_BITS: u32 = 8u;
-// What the others count in.
+// Unit of the bits above them.
 const UNIT: f32 = 1.1920929e-7f;
-// [`Draw::Route`] as shaders name it.
+// `Draw::Route`.
 const DRAW_ROUTE: u32 = 0u;
-// [`Draw::Pose`].
+// `Draw::Pose`.
 const DRAW_POSE: u32 = 1u;
-// [`Draw::Action`].
+// `Draw::Action`.
 const DRAW_ACTION: u32 = 2u;
-// Threads of a workgroup.
-const WORKGROUP: u32 = 64u;
-// The furthest that slip shifts a no-slip point [m]: the linear tyre behind it is not to be believed beyond.
+// Largest shift of a no-slip point [m]: the linear tyre model is not valid beyond.
 const SLIP_LEVER_MAX: f32 = 1.5f;
 // Keeps a quotient finite at a standstill [m^2/s^2].
 const SPEED_SQUARED_MIN: f32 = 0.01f;
@@ -60,17 +60,19 @@ const LANES: u32 = 8u;
 const N_FIRST: u32 = 16u;
 // Further than any clearance [m].
 const FAR: f32 = 3.4028235e38f;
-// Points of a tractor's centre line sampled first; with its corners they fill one bundle.
+// Points of a tractor's centre line sampled first: with its corners as many as are sampled at once.
 const N_TRACTOR: u32 = 4u;
-// Points of a trailer's centre line sampled first; with its corners they fill two.
+// Points of a trailer's centre line sampled first: with its corners twice as many.
 const N_TRAILER: u32 = 12u;
-// Doubt that is left [m].
-const DOUBT: f32 = 0.01f;
-// Part of a clearance that may be left in doubt: what is far off need not be known to the centimetre.
-const SHARE: f32 = 0.5f;
-// Room for spans in doubt: at first 11 and 8 of a trailer, then at most 8 more for each of the 8 halvings from 2.5 m to 1 cm.
+// Error of a clearance that is always tolerated [m].
+const TOLERANCE: f32 = 0.01f;
+// Error that is tolerated as a fraction of the clearance: far from a kerb a centimetre does not matter.
+const FRACTION: f32 = 0.5f;
+// Most undecided spans: at first 11 and 8 of a trailer, then at most 8 more for each of the 8 halvings from 2.5 m
+// to 1 cm.
 const N_SPANS: u32 = 96u;
-// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide between them.
+// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide
+// between them.
 const GAP: f32 = 0.05f;
 // A step this short is never taken back [m].
 const SHORT: f32 = 0.25f;
@@ -78,13 +80,14 @@ const SHORT: f32 = 0.25f;
 const CLOSE: f32 = 0.15f;
 // This close to a kerb the ray has met it [m].
 const MET: f32 = 0.004f;
-// Head-on, a ray has met the kerb from this much further off: a straight kerb's place is known to a few millimetres then [m].
+// Head-on, a ray has met the kerb from this far off: a straight kerb's position is known to a few millimetres then
+// [m].
 const MET_HEAD_ON: f32 = 0.02f;
 // Slope of a ray 5 deg from grazing; flatter ones are not followed to the last centimetre.
 const GRAZING: f32 = 0.087f;
-// Part of the farthest hope that is tried, so that the circles do meet where the field is off by a little.
+// Fraction of the longest step that is tried, so that the circles overlap where the field is slightly off.
 const CAUTION: f32 = 0.98f;
-// Samples after which a ray that creeps along a kerb ends where it is: the longest range in the shortest creeping steps takes fewer.
+// Most samples of a ray. A ray along a kerb at the longest range takes fewer.
 const SAMPLES_MAX: u32 = 128u;
 // Speed that is observed as 1 [m/s].
 const SPEED_SCALE: f32 = 27.8f;
@@ -92,38 +95,38 @@ const SPEED_SCALE: f32 = 27.8f;
 const WAYPOINT_SCALE: f32 = 20.0f;
 // Distance to the lane centre that is observed as 1 [m].
 const LANE_SCALE: f32 = 10.0f;
-// How many waypoints angles are taken to.
+// Number of waypoints that angles are taken to.
 const N_LOOK_AHEAD: u32 = 5u;
 // Waypoints beyond the next one that angles are taken to.
 const LOOK_AHEAD: array<u32, 5> = array<u32, 5>(0u, 2u, 5u, 7u, 10u);
-// Where values begin in an observation: distances to the next two waypoints.
+// Index of the distances to the next two waypoints.
 const DISTANCES_AT: u32 = 1u;
-// Distances to their crossing lines.
+// Index of the distances to their crossing lines.
 const CROSSINGS_AT: u32 = 3u;
-// Distance to the lane centre.
+// Index of the distance to the lane centre.
 const LANE_AT: u32 = 5u;
-// Angles at the waypoint behind, from those ahead to the truck.
+// Index of the angles at the waypoint behind, from those ahead to the truck.
 const BEARINGS_AT: u32 = 6u;
-// Headings of the tractor against the lane's ahead.
+// Index of the tractor's headings relative to the lane's ahead.
 const HEADINGS_AT: u32 = 11u;
-// Headings of the trailer against them.
+// Index of the trailer's.
 const TRAILER_HEADINGS_AT: u32 = 16u;
-// Articulation.
+// Index of the articulation.
 const ARTICULATION_AT: u32 = 21u;
-// Curvatures of the route.
+// Index of the curvatures of the route.
 const CURVATURES_AT: u32 = 22u;
-// How many they are.
+// Number of curvatures.
 const N_CURVATURES: u32 = 8u;
-// Distance sensors.
+// Index of the ranges.
 const RANGES_AT: u32 = 30u;
-// Radii ahead.
+// Index of the radii ahead.
 const RADII_AT: u32 = 59u;
 // Sums in a tally: steps by their end code, then the rewards.
 const N_SUMS: u32 = 9u;
-// The sum of the rewards.
+// Index of the sum of the rewards.
 const REWARD_SUM: u32 = 8u;
-// Parts that a reward of 1 is counted in.
-const REWARD_PARTS: f32 = 256.0f;
+// Units that a reward of 1 is counted in.
+const REWARD_UNITS: f32 = 256.0f;
 
 // Why an episode ended.
 const RUNNING: u32 = 0u;
@@ -135,7 +138,7 @@ const JACKKNIFED: u32 = 5u;
 const STRAYED: u32 = 6u;
 const TIMED_OUT: u32 = 7u;
 
-// What drives one truck through a step.
+// What the steer stage asks of a truck for a step: a steer angle and an acceleration.
 struct Control {
     // Steer angle asked for [rad].
     steering: f32,
@@ -171,24 +174,27 @@ struct Truck {
     trailer_load_transfer_ratio: f32,
     // Index of the route in the world.
     route: u32,
-    // Episodes this truck has begun before this one.
+    // Index of the episode, counted for each truck from 0.
     episode: u32,
     // Steps taken in this episode.
     steps: u32,
-    // The truck stands still because its episode has ended and nobody began another (0 or 1).
+    // Whether the truck's only episode has ended, so that no stage changes it any more (0 or 1).
     held: u32,
 }
 
-// Where a truck begins its route: shares of the largest start errors, each in -1..=1; zeros are the lane centre.
+// Where a truck begins its route: fractions of the largest start errors, each in -1..=1; zeros are the lane
+// centre.
 struct Start {
-    // Share of the largest lateral offset, left positive.
+    // Fraction of the largest lateral offset, left positive.
     offset: f32,
-    // Share of the largest heading error, counter-clockwise positive.
+    // Fraction of the largest heading error, counter-clockwise positive.
     heading: f32,
 }
 
-// Distance from a unit's outline to the nearest solid edge, negative where they touch [m]. Touching is exact to 2 cm; the distance is
-// never less than the true one by more than the field's error, and at most twice it plus 2 cm: far from a kerb fewer points are sampled.
+// Distance from a unit's outline to the nearest solid edge, at most 0 where they touch [m].
+//
+// Contact is exact to 2 cm. Otherwise the value is at least the true distance less the field's error, and at most
+// twice the true distance plus 2 cm: far from a kerb fewer points are sampled.
 struct Clearance {
     // Of the tractor [m].
     tractor: f32,
@@ -202,7 +208,7 @@ struct Progress {
     lane_distance: f32,
     // Distance from the reference point to the next waypoint [m].
     waypoint_distance: f32,
-    // Next waypoint to pass, counted from the route's first; the route's number of waypoints once all are passed.
+    // Index of the next waypoint to pass on the route; the route's number of waypoints once all are passed.
     waypoint: u32,
     // Waypoints passed in this step.
     passed: u32,
@@ -214,7 +220,7 @@ struct RewardTerms {
     waypoints: f32,
     // Distance to the lane centre, limited and scaled to 0..1.
     lane_distance: f32,
-    // How far the nearer unit is within the margin kept from kerbs, 0 outside it to 1 at a kerb.
+    // Depth of the nearer unit in the margin kept from kerbs, from 0 outside it to 1 at a kerb.
     clearance: f32,
     // 1 when the episode failed in this step.
     failure: f32,
@@ -242,7 +248,7 @@ struct Body {
 struct Roll {
     // Row-major transition of (roll, roll rate) over one sub-step.
     transition: array<f32, 4>,
-    // What a lateral acceleration of 1 m/s^2 held through the sub-step adds to (roll, roll rate).
+    // Change of (roll, roll rate) by a lateral acceleration of 1 m/s^2 held through the sub-step.
     input: array<f32, 2>,
     // Load transfer ratio per m/s^2 of lateral acceleration.
     per_acceleration: f32,
@@ -276,7 +282,7 @@ struct Rig {
     speed_gain: f32,
     // Speed control: acceleration per integral of the speed error [1/s^2].
     speed_integral_gain: f32,
-    // Speed control: speed error beyond which nothing is integrated [m/s].
+    // Speed control: speed error beyond which the integral is reset to 0 [m/s].
     speed_integral_band: f32,
     // Speed control: strongest braking it asks for, negative [m/s^2].
     speed_braking: f32,
@@ -298,7 +304,7 @@ struct Action {
     speed: f32,
 }
 
-// What every truck of a batch shares beside the world: vehicle, time, weights.
+// Vehicle, time and weights, shared by all trucks.
 struct Params {
     // The vehicle.
     rig: Rig,
@@ -308,7 +314,7 @@ struct Params {
     n_substeps: u32,
     // Entries of the action table.
     n_actions: u32,
-    // Reach of a distance sensor [m].
+    // Range of a distance sensor [m].
     sensor_range: f32,
     // Largest lateral offset at the start [m].
     start_offset: f32,
@@ -316,7 +322,7 @@ struct Params {
     start_heading: f32,
     // Speed at the start [m/s].
     start_speed: f32,
-    // A waypoint further off than this is neither passed nor within reach: the truck has strayed [m].
+    // Distance to the next waypoint beyond which it cannot be passed and the truck has strayed [m].
     stray_distance: f32,
     // Articulation beyond which the truck is jackknifed [rad].
     jackknife_angle: f32,
@@ -338,13 +344,13 @@ struct Params {
 
 // One waypoint of one route.
 struct WaypointRow {
-    // Place on the lane centre [m].
+    // Position on the lane centre [m].
     position: vec2<f32>,
     // Unit vector along the lane.
     direction: vec2<f32>,
 }
 
-// What an observation needs of the route around one waypoint.
+// The values of an observation that depend on the next waypoint alone.
 struct PreviewRow {
     // Heading of the lane [rad].
     heading: f32,
@@ -378,23 +384,23 @@ struct FieldRow {
     columns: u32,
     // Cells from south to north.
     rows: u32,
-    // Where its cells begin.
+    // Index of its first cell.
     first_cell: u32,
-    // Where those for marching begin.
+    // Index of its first cell for marching.
     first_march_cell: u32,
-    // Where its blocks' pairs begin.
+    // Index of the first pair of its blocks.
     first_pair: u32,
 }
 
-// What the trucks of a batch share.
+// Facts that the trucks of a batch share.
 struct BatchFacts {
     // Trucks.
     n_envs: u32,
-    // What routes, poses and random actions are drawn from.
+    // Seed of routes, poses and random actions.
     seed: u32,
     // Routes to draw from.
     n_routes: u32,
-    // Each truck runs the route of its own place once and is then held (0 or 1).
+    // Whether each truck runs the route of its own index once and is then held (0 or 1).
     fixed: u32,
 }
 
@@ -416,31 +422,33 @@ struct BatchFacts {
 @group(0) @binding(7) var<storage, read> previews: array<PreviewRow>;
 // Every route.
 @group(0) @binding(8) var<storage, read> routes: array<RouteRow>;
-// What the trucks of a batch share.
+// Facts that the trucks of a batch share.
 @group(0) @binding(9) var<storage, read> batch: BatchFacts;
-// Routes that episodes run on: to be drawn from, or one a truck.
+// Routes that episodes run on: to be drawn from, or one for each truck.
 @group(0) @binding(10) var<storage, read> choice: array<u32>;
-// Index into the action table, [n_envs].
-@group(0) @binding(11) var<storage, read_write> action: array<u32>;
-// What drives each truck, [n_envs].
-@group(0) @binding(12) var<storage, read_write> control: array<Control>;
-// The trucks, [n_envs].
-@group(0) @binding(13) var<storage, read_write> truck: array<Truck>;
-// Distances to the kerbs, [n_envs].
-@group(0) @binding(14) var<storage, read_write> clearance: array<Clearance>;
-// Places along the routes, [n_envs].
-@group(0) @binding(15) var<storage, read_write> progress: array<Progress>;
-// Distance sensors [m], [n_envs, N_RAYS].
-@group(0) @binding(16) var<storage, read_write> ranges: array<f32>;
-// What the next action sees, [n_envs, N_VALUES].
-@group(0) @binding(17) var<storage, read_write> observation: array<f32>;
-// What the last action led to, [n_envs, N_VALUES].
-@group(0) @binding(18) var<storage, read_write> next_observation: array<f32>;
-// Why each episode ended in the step just made, [n_envs].
-@group(0) @binding(19) var<storage, read_write> ended: array<u32>;
-// What the reward weighs, [n_envs].
-@group(0) @binding(20) var<storage, read_write> terms: array<RewardTerms>;
-// Rewards of the step just made, [n_envs].
-@group(0) @binding(21) var<storage, read_write> reward: array<f32>;
+// Where each truck begins when the caller says so, [n_envs].
+@group(0) @binding(11) var<storage, read> starts: array<Start>;
+//  Index into the action table, [n_envs].
+@group(0) @binding(12) var<storage, read_write> action: array<u32>;
+//  Steer angle and acceleration asked of each truck, [n_envs].
+@group(0) @binding(13) var<storage, read_write> control: array<Control>;
+//  The trucks, [n_envs].
+@group(0) @binding(14) var<storage, read_write> truck: array<Truck>;
+//  Distances to the kerbs [m], [n_envs].
+@group(0) @binding(15) var<storage, read_write> clearance: array<Clearance>;
+//  Progress along the routes, [n_envs].
+@group(0) @binding(16) var<storage, read_write> progress: array<Progress>;
+//  Distance sensors [m], [n_envs, 29].
+@group(0) @binding(17) var<storage, read_write> ranges: array<f32>;
+//  The observation before the next action, [n_envs, 69].
+@group(0) @binding(18) var<storage, read_write> observation: array<f32>;
+//  The observation after the last action, another one only where an episode ended, [n_envs, 69].
+@group(0) @binding(19) var<storage, read_write> next_observation: array<f32>;
+//  Codes of [`crate::layout::Ended`] for the last step, [n_envs].
+@group(0) @binding(20) var<storage, read_write> ended: array<u32>;
+//  Physical amounts that the reward weighs, [n_envs].
+@group(0) @binding(21) var<storage, read_write> terms: array<RewardTerms>;
+//  Rewards of the last step, [n_envs].
+@group(0) @binding(22) var<storage, read_write> reward: array<f32>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(22) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(23) var<storage, read_write> tally: array<atomic<u32>>;

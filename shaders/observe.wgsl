@@ -1,25 +1,26 @@
-// Writes the observation: the 69 values that a driver sees.
+// Writes the observation after the action: 69 values, see src/layout/observation.rs.
 //
-// What depends on the waypoint alone was worked out when the world was baked (see src/world.rs).
+// Values that depend on the next waypoint alone are looked up in a table that src/world.rs bakes.
 
 @compute @workgroup_size(WORKGROUP)
-fn observe(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let env = thread_of(group, groups, local);
+fn observe(thread: Thread) {
+    let env = index_of(thread);
     if !is_driving(env) { return; }
     observed(env, false);
 }
 
-// What the trucks that began another episode see there.
+// The first observation of the trucks that began another episode.
 @compute @workgroup_size(WORKGROUP)
-fn observe_begun(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let env = thread_of(group, groups, local);
+fn observe_after_reset(thread: Thread) {
+    let env = index_of(thread);
     if !has_begun(env) { return; }
     observed(env, true);
 }
 
-// Writes one of a truck's values: to what the next action sees if its episode has just begun, else to what the last one led to.
-fn put(env: u32, begun: bool, index: u32, value: f32) {
-    if begun {
+// Writes a value of a truck's observation: to the one before the next action after a reset, otherwise to the one after
+// the last action.
+fn put(env: u32, after_reset: bool, index: u32, value: f32) {
+    if after_reset {
         observation[env * N_VALUES + index] = value;
     } else {
         next_observation[env * N_VALUES + index] = value;
@@ -27,40 +28,40 @@ fn put(env: u32, begun: bool, index: u32, value: f32) {
 }
 
 // The 69 values.
-fn observed(env: u32, begun: bool) {
+fn observed(env: u32, after_reset: bool) {
     let truck = truck[env];
     let route = routes[truck.route];
     let last = route.n_waypoints - 1u;
     let next = min(progress[env].waypoint, last);
-    let place = reference_point(params.rig.wheelbase, truck);
-    put(env, begun, 0u, clamp(truck.speed / SPEED_SCALE, 0.0, 1.0));
+    let point = reference_point(params.rig.wheelbase, truck);
+    put(env, after_reset, 0u, clamp(truck.speed / SPEED_SCALE, 0.0, 1.0));
     for (var n = 0u; n < 2u; n++) {
         let waypoint = waypoints[route.first + min(next + n, last)];
         let normal = perpendicular(waypoint.direction);
         let left = waypoint.position + route.crossing_left * normal;
         let right = waypoint.position - route.crossing_right * normal;
-        put(env, begun, DISTANCES_AT + n, min(distance(place, waypoint.position) / WAYPOINT_SCALE, 1.0));
-        put(env, begun, CROSSINGS_AT + n, min(distance_to_segment(place, left, right) / WAYPOINT_SCALE, 1.0));
+        put(env, after_reset, DISTANCES_AT + n, min(distance(point, waypoint.position) / WAYPOINT_SCALE, 1.0));
+        put(env, after_reset, CROSSINGS_AT + n, min(distance_to_segment(point, left, right) / WAYPOINT_SCALE, 1.0));
     }
-    put(env, begun, LANE_AT, min(progress[env].lane_distance / LANE_SCALE, 1.0));
+    put(env, after_reset, LANE_AT, min(progress[env].lane_distance / LANE_SCALE, 1.0));
     let behind = waypoints[route.first + max(next, 1u) - 1u].position;
     for (var n = 0u; n < N_LOOK_AHEAD; n++) {
         let index = route.first + min(next + LOOK_AHEAD[n], last);
         let heading = previews[index].heading;
-        put(env, begun, BEARINGS_AT + n, angle_between(waypoints[index].position - behind, place - behind) / PI);
-        put(env, begun, HEADINGS_AT + n, wrapped(truck.heading - heading) / PI);
-        put(env, begun, TRAILER_HEADINGS_AT + n, wrapped(truck.trailer_heading - heading) / PI);
+        put(env, after_reset, BEARINGS_AT + n, angle_between(waypoints[index].position - behind, point - behind) / PI);
+        put(env, after_reset, HEADINGS_AT + n, wrapped(truck.heading - heading) / PI);
+        put(env, after_reset, TRAILER_HEADINGS_AT + n, wrapped(truck.trailer_heading - heading) / PI);
     }
-    put(env, begun, ARTICULATION_AT, wrapped(truck.heading - truck.trailer_heading) / PI);
+    put(env, after_reset, ARTICULATION_AT, wrapped(truck.heading - truck.trailer_heading) / PI);
     let preview = route.first + next;
     for (var n = 0u; n < N_CURVATURES; n++) {
-        put(env, begun, CURVATURES_AT + n, previews[preview].values[n]);
+        put(env, after_reset, CURVATURES_AT + n, previews[preview].values[n]);
     }
     for (var n = 0u; n < N_RAYS; n++) {
-        put(env, begun, RANGES_AT + n, ranges[env * N_RAYS + n] / params.sensor_range);
+        put(env, after_reset, RANGES_AT + n, ranges[env * N_RAYS + n] / params.sensor_range);
     }
     for (var n = N_CURVATURES; n < N_PREVIEW; n++) {
-        put(env, begun, RADII_AT + n - N_CURVATURES, previews[preview].values[n]);
+        put(env, after_reset, RADII_AT + n - N_CURVATURES, previews[preview].values[n]);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use crate::layout::constants;
+use crate::shared::constants;
 
 constants! {
     /// Half a turn.
@@ -25,11 +25,11 @@ constants! {
     const SINE: [f32; 3] = [-1.951_529_6e-4, 8.332_161e-3, -0.166_666_55];
     /// That of the cosine.
     const COSINE: [f32; 3] = [2.443_315_7e-5, -1.388_731_6e-3, 4.166_664_6e-2];
-    /// The smallest number that is divided by.
+    /// The smallest divisor.
     pub const TINY: f32 = f32::MIN_POSITIVE;
 }
 
-/// `angle` brought into (-pi, pi], for an angle within a few turns of it.
+/// `angle` wrapped into (-pi, pi], for an angle within a few turns of it.
 #[inline]
 pub fn wrapped(angle: f32) -> f32 {
     let turned = angle - TAU * (angle * (1.0 / TAU)).round_ties_even();
@@ -38,7 +38,8 @@ pub fn wrapped(angle: f32) -> f32 {
 
 /// Angle of (x, y) from the x axis in (-pi, pi], 0 for the origin; within 4e-7 of the true one.
 ///
-/// S. Moshier's Cephes polynomial for the arc tangent; library functions of different engines differ by more than this is off.
+/// S. Moshier's Cephes polynomial for the arc tangent. Library functions of different engines differ by more than its
+/// error.
 #[inline]
 pub fn arc_tangent(y: f32, x: f32) -> f32 {
     let (small, large) = (x.abs().min(y.abs()), x.abs().max(y.abs()));
@@ -58,10 +59,11 @@ const ROUNDER: f32 = 12_582_912.0;
 
 /// Sine and cosine in plain arithmetic, within 1.2e-7 of the true ones for an angle within a few turns of 0.
 ///
-/// S. Moshier's Cephes polynomials for an eighth of a turn. As fast as the library's, whose last bits differ from engine to engine.
+/// S. Moshier's Cephes polynomials for an eighth of a turn. As fast as the library's, whose last bits differ between
+/// engines.
 #[inline]
 pub fn sin_cos(angle: f32) -> (f32, f32) {
-    // Added to a number this large, a fraction is rounded away and the whole stands in the lowest bits.
+    // Added to a number this large, an angle is rounded to whole quarters, which stand in the lowest bits.
     let shifted = angle * FRAC_2_PI + ROUNDER;
     let quarter = shifted.to_bits();
     let count = shifted - ROUNDER;

@@ -1,26 +1,28 @@
-//! The signed distance to the kerbs as a table: positive on the drivable surface, negative in what is solid.
+//! The signed distance to the kerbs as a table: positive on the drivable surface, negative in the solid area.
 //!
-//! A grid of square cells, each with its own bilinear block of 1, 2, 4, ... sub-cells a side, as many as its part of the distance needs:
-//! one on a plain road, many where the nearest kerb changes or a nose bends the distance. Two flat arrays hold it all.
+//! A grid of square cells, each subdivided into a bilinear block of 1, 2, 4, ... sub-cells a side as its part of the
+//! distance requires: one on a plain road, many where the nearest kerb changes or bends sharply. The blocks are stored
+//! in flat arrays.
 
 mod bake;
 
 use glam::Vec2;
 
-use crate::layout::constants;
+use crate::shared::constants;
 
 constants! {
     /// Bits of a cell's word that hold the logarithm of its sub-cells a side; the rest is where its block begins.
     const LEVEL_BITS: u32 = 3;
 }
-/// From here on f32 has no fractions: adding it to a smaller number leaves the whole part in the lower bits.
+/// 2^23. An f32 of this size has no fraction, so adding it to a smaller number leaves the integer part in the lower
+/// bits.
 const WHOLE: f32 = 8_388_608.0;
 const WHOLE_BITS: u32 = 0x7f_ffff;
 
 /// Signed distance to the kerbs of one roundabout.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
-    /// South-west corner of the grid [m].
+    /// South-west corner of the grid \[m].
     pub origin: Vec2,
     /// Cells in a metre [1/m].
     pub cells_per_metre: f32,
@@ -28,33 +30,35 @@ pub struct Field {
     pub columns: u32,
     /// Cells from south to north.
     pub rows: u32,
-    /// A word a cell, `[rows, columns]`: `block << 3 | level`, block the index of its first pair in `values`, 2^level sub-cells a side.
+    /// One word per cell, `[rows, columns]`: `block << 3 | level`. `block` is the index of its first pair in `values`;
+    /// the cell has 2^level sub-cells a side.
     pub cells: Vec<u32>,
-    /// The same for marching through free space: away from the kerbs a coarser block wherever that says no more than the distance, since
-    /// a march may take it for shorter than it is. Kinks between two kerbs, which take the finest blocks, are never touched by one.
+    /// The same for sphere tracing through free space. Away from the kerbs a coarser block is used wherever it does not
+    /// exceed the distance, because a march may underestimate it. So the finest blocks, at kinks between two kerbs, are
+    /// not read there.
     pub march_cells: Vec<u32>,
-    /// Blocks of distances at the sub-cells' corners [m]. A block has a row of pairs for each row of sub-cells from the south, a pair for
-    /// each line of corners from the west: the distance at the row's southern edge and at its northern. So the four corners of a sub-cell
-    /// lie side by side.
+    /// Blocks of distances at the sub-cells' corners \[m]. A block has one row of pairs per row of sub-cells, from the
+    /// south, and in it one pair per line of corners, from the west: the distances at the row's southern and northern
+    /// edge. So the four corners of a sub-cell are adjacent.
     pub values: Vec<[f32; 2]>,
 }
 
-/// What the field is at several points at once.
+/// The field at several points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Samples<const N: usize> {
-    /// Signed distance [m].
+    /// Signed distance \[m].
     pub distance: [f32; N],
-    /// Its slope to the east.
+    /// Derivative to the east.
     pub east: [f32; N],
-    /// Its slope to the north.
+    /// Derivative to the north.
     pub north: [f32; N],
 }
 
 impl Field {
-    /// Signed distance at `p`; it goes on falling outside the grid, where all is solid [m].
+    /// Signed distance at `p`. Outside the grid everything is solid and the value keeps falling \[m].
     ///
-    /// Within 1 cm of the exact distance wherever that is at most 5 m from a kerb and 0.5 m from a kink of the distance, within 3 cm at a
-    /// kink, within 1 mm on a smooth kerb.
+    /// Up to 5 m from a kerb the error is at most 1 cm, or 3 cm within 0.5 m of a kink of the distance; on a smooth
+    /// kerb it is at most 1 mm.
     #[inline]
     pub fn distance(&self, p: Vec2) -> f32 {
         let extent = Vec2::new(self.columns as f32, self.rows as f32) / self.cells_per_metre;
@@ -62,7 +66,7 @@ impl Field {
         self.sample(&self.cells, &[p.x], &[p.y]).distance[0] - outside.length()
     }
 
-    /// The field at `N` points, by `cells` or `march_cells`; a point outside the grid, or one that is no number, reads the border.
+    /// The field at `N` points, by `cells` or `march_cells`. A point outside the grid, or a NaN, reads the border.
     #[inline(always)]
     pub(crate) fn sample<const N: usize>(&self, cells: &[u32], x: &[f32; N], y: &[f32; N]) -> Samples<N> {
         let (last_column, last_row) = (self.columns as f32 - 1.0, self.rows as f32 - 1.0);
@@ -107,30 +111,31 @@ impl Field {
         Samples { distance, east, north }
     }
 
-    /// Memory that the tables take [bytes].
+    /// Size of the tables \[bytes].
     pub fn bytes(&self) -> usize {
         size_of_val(self.cells.as_slice()) + size_of_val(self.march_cells.as_slice()) + size_of_val(self.values.as_slice())
     }
 }
 
-/// `x` brought into 0..limit; 0 for what is no number, which `clamp` would keep.
+/// `x` clamped to 0..limit; 0 for NaN, which `clamp` would keep.
 #[inline(always)]
 fn clamped(x: f32, limit: f32) -> f32 {
     let x = if 0.0 < x { x } else { 0.0 };
     if x < limit { x } else { limit }
 }
 
-/// The whole part of 0 <= x <= last + 1, at most `last`. A whole x may count as the end of the part before it: interpolation agrees.
+/// The integer part of 0 <= x <= last + 1, at most `last`. An integer x may count as the end of the cell before it:
+/// interpolation agrees.
 #[inline(always)]
 fn whole_part(x: f32, last: f32) -> f32 {
-    // Library functions would be called lane by lane without SSE4.1; rounding by addition is two instructions on anything.
+    // Without SSE4.1, `floor` is a call for each lane; rounding by addition is two instructions everywhere.
     let shifted = x + (WHOLE - 0.5);
     let shifted = if WHOLE < shifted { shifted } else { WHOLE };
     let whole = shifted - WHOLE;
     if whole < last { whole } else { last }
 }
 
-/// A whole number below 2^23 as an index.
+/// An integer below 2^23 as an index.
 #[inline(always)]
 fn as_index(whole: f32) -> u32 {
     (whole + WHOLE).to_bits() & WHOLE_BITS
@@ -165,15 +170,16 @@ mod tests {
             for radius in [3.0, 8.0, 8.95, 9.05] {
                 let p = radius * direction;
                 let Samples { east, north, .. } = field.sample(&field.cells, &[p.x], &[p.y]);
-                // A bilinear cell of 0.5 m, 3 m from the centre of curvature, turns by up to 5 deg where the exact slope does not.
+                // A bilinear cell of 0.5 m, 3 m from the centre of curvature, turns by up to 5 deg where the exact
+                // slope does not.
                 assert!((Vec2::new(east[0], north[0]) + direction).length() < 0.1, "{p}: {east:?} {north:?}");
             }
         }
     }
 
     #[test]
-    fn a_block_is_where_its_cell_says_and_as_large() {
-        // Its centre is a kink, within reach of the promise: both the coarsest and the finest blocks occur.
+    fn every_block_has_the_position_and_size_of_its_cells_word() {
+        // Its centre is a kink, within the range of the stated accuracy: both the coarsest and the finest blocks occur.
         let field = disc(4.0);
         let mut ends: Vec<(u32, u32)> = field
             .cells
@@ -185,7 +191,7 @@ mod tests {
             })
             .collect();
         ends.sort_unstable();
-        // Where marching needs no other block both tables name the same one.
+        // Where marching needs no other block both tables have the same one.
         ends.dedup();
         assert!(ends.windows(2).all(|pair| pair[0].1 == pair[1].0));
         assert_eq!((ends[0].0, ends[ends.len() - 1].1), (0, field.values.len() as u32));

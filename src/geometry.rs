@@ -1,7 +1,7 @@
 //! Exact plane geometry: segments, arcs, the curves they form, and the outlines that curves enclose.
 //!
-//! Right-handed frame, x east, y north, metres and radians. Nothing here is a polygon pretending to be round: distances, crossings and
-//! rays are computed on the arcs themselves.
+//! Right-handed frame, x east, y north, metres and radians. Arcs are not approximated by polygons: distances, crossings
+//! and rays are computed on the arcs themselves.
 
 mod alignment;
 mod meeting;
@@ -22,26 +22,26 @@ pub use outline::{Nearby, Outline};
 pub enum Piece {
     /// A straight piece.
     Segment {
-        /// Where it begins [m].
+        /// Where it begins \[m].
         from: DVec2,
-        /// Where it ends [m].
+        /// Where it ends \[m].
         to: DVec2,
     },
     /// A circular piece.
     Arc {
-        /// Centre of its circle [m].
+        /// Centre of its circle \[m].
         centre: DVec2,
-        /// Radius of its circle, positive [m].
+        /// Radius of its circle, positive \[m].
         radius: f64,
-        /// Direction from the centre to its beginning [rad].
+        /// Direction from the centre to its beginning \[rad].
         from: f64,
-        /// Angle covered, positive counter-clockwise, at most a full turn either way [rad].
+        /// Angle covered, positive counter-clockwise, at most a full turn either way \[rad].
         sweep: f64,
     },
 }
 
 impl Piece {
-    /// Length along the piece [m].
+    /// Length along the piece \[m].
     pub fn length(&self) -> f64 {
         match *self {
             Piece::Segment { from, to } => from.distance(to),
@@ -49,7 +49,7 @@ impl Piece {
         }
     }
 
-    /// First point [m].
+    /// First point \[m].
     pub fn start(&self) -> DVec2 {
         match *self {
             Piece::Segment { from, .. } => from,
@@ -57,7 +57,7 @@ impl Piece {
         }
     }
 
-    /// Last point [m].
+    /// Last point \[m].
     pub fn end(&self) -> DVec2 {
         match *self {
             Piece::Segment { to, .. } => to,
@@ -65,7 +65,7 @@ impl Piece {
         }
     }
 
-    /// The point `s` metres from the beginning, `s` within the piece [m].
+    /// The point `s` metres from the beginning, `s` within the piece \[m].
     pub fn point_at(&self, s: f64) -> DVec2 {
         match *self {
             Piece::Segment { from, to } => from + (to - from).normalize_or_zero() * s,
@@ -73,7 +73,7 @@ impl Piece {
         }
     }
 
-    /// Direction of travel `s` metres from the beginning, in (-pi, pi] [rad].
+    /// Direction of travel `s` metres from the beginning, in (-pi, pi] \[rad].
     pub fn heading_at(&self, s: f64) -> f64 {
         match *self {
             Piece::Segment { from, to } => (to - from).to_angle(),
@@ -81,13 +81,13 @@ impl Piece {
         }
     }
 
-    /// Distance from `p` to the nearest point of the piece [m].
+    /// Distance from `p` to the nearest point of the piece \[m].
     pub fn distance(&self, p: DVec2) -> f64 {
         match *self {
             Piece::Segment { from, to } => {
                 let along = to - from;
-                let share = ((p - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-                p.distance(from + share * along)
+                let fraction = ((p - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                p.distance(from + fraction * along)
             }
             Piece::Arc { centre, radius, .. } => {
                 let out = p - centre;
@@ -96,7 +96,7 @@ impl Piece {
         }
     }
 
-    /// The same piece travelled the other way.
+    /// The same piece in the opposite direction.
     pub fn reversed(&self) -> Piece {
         match *self {
             Piece::Segment { from, to } => Piece::Segment { from: to, to: from },
@@ -104,7 +104,7 @@ impl Piece {
         }
     }
 
-    /// The same piece turned counter-clockwise around the origin by `angle` [rad].
+    /// The same piece turned counter-clockwise around the origin by `angle` \[rad].
     pub fn turned(&self, angle: f64) -> Piece {
         let turn = DVec2::from_angle(angle);
         match *self {
@@ -113,7 +113,7 @@ impl Piece {
         }
     }
 
-    /// The same piece on the other side of the x axis.
+    /// The mirror image of the piece in the x axis.
     pub fn mirrored(&self) -> Piece {
         let mirror = DVec2::new(1.0, -1.0);
         match *self {
@@ -132,7 +132,8 @@ impl Piece {
         }
     }
 
-    /// The piece `distance` to the left of this one, or to the right of it where negative; `None` for an arc that would shrink to nothing [m].
+    /// The piece `distance` to the left of this one, or to the right of it if negative; `None` if an arc would shrink
+    /// to nothing \[m].
     pub fn beside(&self, distance: f64) -> Option<Piece> {
         match *self {
             Piece::Segment { from, to } => {
@@ -157,13 +158,13 @@ impl Piece {
         }
     }
 
-    /// How far along the piece its point nearest to `p` lies, for `p` on the piece [m].
+    /// Station of `p`, a point of the piece: its distance from the beginning along the piece \[m].
     pub(crate) fn station(&self, p: DVec2) -> f64 {
         match *self {
             Piece::Segment { from, to } => (p - from).dot((to - from).normalize_or_zero()).clamp(0.0, self.length()),
             Piece::Arc { centre, radius, from, sweep } => {
                 let turned = ((p - centre).to_angle() - from) * sweep.signum();
-                // Rounding may put a point at the beginning just before it: that is the beginning, not nearly a full turn.
+                // Rounding may put a point just before the beginning, which must not count as nearly a full turn.
                 let slack = (TAU - sweep.abs()) / 2.0;
                 let turned = (turned + slack).rem_euclid(TAU) - slack;
                 turned.clamp(0.0, sweep.abs()) * radius
@@ -185,27 +186,27 @@ impl Curve {
         Curve { pieces: vec![Piece::Arc { centre, radius, from: 0.0, sweep: TAU }] }
     }
 
-    /// Length along the curve [m].
+    /// Length along the curve \[m].
     pub fn length(&self) -> f64 {
         self.pieces.iter().map(Piece::length).sum()
     }
 
-    /// The point `s` metres from the beginning, `s` clamped to the curve; the origin for a curve without pieces [m].
+    /// The point `s` metres from the beginning, `s` clamped to the curve; the origin for a curve without pieces \[m].
     pub fn point_at(&self, s: f64) -> DVec2 {
         self.piece_at(s).map_or(DVec2::ZERO, |(piece, s)| piece.point_at(s))
     }
 
-    /// Direction of travel `s` metres from the beginning, `s` clamped to the curve, in (-pi, pi] [rad].
+    /// Direction of travel `s` metres from the beginning, `s` clamped to the curve, in (-pi, pi] \[rad].
     pub fn heading_at(&self, s: f64) -> f64 {
         self.piece_at(s).map_or(0.0, |(piece, s)| piece.heading_at(s))
     }
 
-    /// Distance from `p` to the nearest point of the curve; infinite for a curve without pieces [m].
+    /// Distance from `p` to the nearest point of the curve; infinite for a curve without pieces \[m].
     pub fn distance(&self, p: DVec2) -> f64 {
         self.pieces.iter().map(|piece| piece.distance(p)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Points on the curve, both ends included, whose chords leave it by at most `tolerance` [m].
+    /// Points on the curve, both ends included, whose chords leave it by at most `tolerance` \[m].
     pub fn polyline(&self, tolerance: f64) -> Vec<DVec2> {
         let mut points: Vec<DVec2> = self.pieces.first().map(Piece::start).into_iter().collect();
         for piece in &self.pieces {
@@ -221,17 +222,17 @@ impl Curve {
         points
     }
 
-    /// The same curve travelled the other way.
+    /// The same curve in the opposite direction.
     pub fn reversed(&self) -> Curve {
         Curve { pieces: self.pieces.iter().rev().map(Piece::reversed).collect() }
     }
 
-    /// The same curve turned counter-clockwise around the origin by `angle` [rad].
+    /// The same curve turned counter-clockwise around the origin by `angle` \[rad].
     pub fn turned(&self, angle: f64) -> Curve {
         Curve { pieces: self.pieces.iter().map(|piece| piece.turned(angle)).collect() }
     }
 
-    /// The same curve on the other side of the x axis, in the same order of travel.
+    /// The mirror image of the curve in the x axis, in the same order of travel.
     pub fn mirrored(&self) -> Curve {
         Curve { pieces: self.pieces.iter().map(Piece::mirrored).collect() }
     }
@@ -251,7 +252,7 @@ impl Curve {
         Curve { pieces }
     }
 
-    /// How far along the curve its point nearest to `p` lies [m].
+    /// Station of the curve's point nearest to `p`: its distance from the beginning along the curve \[m].
     pub fn station(&self, p: DVec2) -> f64 {
         let mut begin = 0.0;
         let mut best = (f64::INFINITY, 0.0);
@@ -265,7 +266,7 @@ impl Curve {
         best.1
     }
 
-    /// The area a closed curve goes around, positive counter-clockwise [m²].
+    /// The area enclosed by a closed curve, positive counter-clockwise \[m²].
     pub fn signed_area(&self) -> f64 {
         let area = |piece: &Piece| match *piece {
             Piece::Segment { from, to } => from.perp_dot(to) / 2.0,
@@ -290,7 +291,7 @@ impl Curve {
     }
 }
 
-/// `angle` brought into (-pi, pi] [rad].
+/// `angle` brought into (-pi, pi] \[rad].
 pub fn wrapped(angle: f64) -> f64 {
     PI - (PI - angle).rem_euclid(TAU)
 }

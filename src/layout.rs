@@ -1,18 +1,25 @@
-//! The rows and constants that every engine shares: defined here and nowhere else.
+//! The rows and constants that both engines share: defined here and nowhere else.
 //!
-//! Each struct is plain data without padding (vectors first, then scalars), so that a column of them can be copied to a device as it is.
-//! SI units and radians throughout; headings lie in (-pi, pi].
+//! Each struct is plain data without padding (vectors first, then scalars), so that a column of them can be copied to a
+//! device as it is. SI units and radians throughout; headings lie in (-pi, pi].
 
 pub mod buffers;
-pub mod shared;
+pub(crate) mod columns;
+mod ended;
+mod observation;
 
 use glam::Vec2;
 
 use crate::angle::direction;
-use crate::{angle, cpu, field, random};
-pub(crate) use shared::constants;
+use crate::shared::constants;
+pub use columns::{Column, N_COLUMNS};
+pub use ended::Ended;
+pub(crate) use ended::printed_codes;
+pub use observation::{OBSERVATION, Values};
 
 constants! {
+    /// Threads of a workgroup.
+    pub const WORKGROUP: u32 = 64;
     /// Values in an observation.
     pub const N_VALUES: usize = 69;
     /// Distance sensors on the trailer, left and right alternating, front to rear.
@@ -26,74 +33,77 @@ constants! {
 }
 
 crate::shared! {
-    /// What drives one truck through a step.
+    /// What the steer stage asks of a truck for a step: a steer angle and an acceleration.
     pub struct Control {
-        /// Steer angle asked for [rad].
+        /// Steer angle asked for \[rad].
         pub steering: f32,
-        /// Acceleration asked for [m/s^2].
+        /// Acceleration asked for \[m/s^2].
         pub acceleration: f32,
-        /// Integral of the speed error [m].
+        /// Integral of the speed error \[m].
         pub speed_error_integral: f32,
     }
 
     /// One tractor and its trailer.
     pub struct Truck {
-        /// Middle of the drive axle [m].
+        /// Middle of the drive axle \[m].
         pub position: Vec2,
-        /// Heading of the tractor, counter-clockwise from +x [rad].
+        /// Heading of the tractor, counter-clockwise from +x \[rad].
         pub heading: f32,
-        /// Heading of the trailer, counter-clockwise from +x [rad].
+        /// Heading of the trailer, counter-clockwise from +x \[rad].
         pub trailer_heading: f32,
-        /// Speed of the drive axle along the tractor's heading [m/s].
+        /// Speed of the drive axle along the tractor's heading \[m/s].
         pub speed: f32,
-        /// Steer angle of the front axle, left positive [rad].
+        /// Steer angle of the front axle, left positive \[rad].
         pub steering: f32,
-        /// Roll angle of the tractor [rad].
+        /// Roll angle of the tractor \[rad].
         pub tractor_roll: f32,
-        /// Roll rate of the tractor [rad/s].
+        /// Roll rate of the tractor \[rad/s].
         pub tractor_roll_rate: f32,
-        /// Roll angle of the trailer [rad].
+        /// Roll angle of the trailer \[rad].
         pub trailer_roll: f32,
-        /// Roll rate of the trailer [rad/s].
+        /// Roll rate of the trailer \[rad/s].
         pub trailer_roll_rate: f32,
-        /// Load transfer ratio of the tractor, the largest of the step in magnitude, signed [1].
+        /// Load transfer ratio of the tractor, the largest of the step in magnitude, signed \[1].
         pub tractor_load_transfer_ratio: f32,
-        /// Load transfer ratio of the trailer, the largest of the step in magnitude, signed [1].
+        /// Load transfer ratio of the trailer, the largest of the step in magnitude, signed \[1].
         pub trailer_load_transfer_ratio: f32,
         /// Index of the route in the world.
         pub route: u32,
-        /// Episodes this truck has begun before this one.
+        /// Index of the episode, counted for each truck from 0.
         pub episode: u32,
         /// Steps taken in this episode.
         pub steps: u32,
-        /// The truck stands still because its episode has ended and nobody began another (0 or 1).
+        /// Whether the truck's only episode has ended, so that no stage changes it any more (0 or 1).
         pub held: u32,
     }
 
-    /// Where a truck begins its route: shares of the largest start errors, each in -1..=1; zeros are the lane centre.
+    /// Where a truck begins its route: fractions of the largest start errors, each in -1..=1; zeros are the lane
+    /// centre.
     pub struct Start {
-        /// Share of the largest lateral offset, left positive.
+        /// Fraction of the largest lateral offset, left positive.
         pub offset: f32,
-        /// Share of the largest heading error, counter-clockwise positive.
+        /// Fraction of the largest heading error, counter-clockwise positive.
         pub heading: f32,
     }
 
-    /// Distance from a unit's outline to the nearest solid edge, negative where they touch [m]. Touching is exact to 2 cm; the distance is
-    /// never less than the true one by more than the field's error, and at most twice it plus 2 cm: far from a kerb fewer points are sampled.
+    /// Distance from a unit's outline to the nearest solid edge, at most 0 where they touch \[m].
+    ///
+    /// Contact is exact to 2 cm. Otherwise the value is at least the true distance less the field's error, and at most
+    /// twice the true distance plus 2 cm: far from a kerb fewer points are sampled.
     pub struct Clearance {
-        /// Of the tractor [m].
+        /// Of the tractor \[m].
         pub tractor: f32,
-        /// Of the trailer [m].
+        /// Of the trailer \[m].
         pub trailer: f32,
     }
 
     /// How far along its route a truck is.
     pub struct Progress {
-        /// Distance from the reference point to the lane centre [m].
+        /// Distance from the reference point to the lane centre \[m].
         pub lane_distance: f32,
-        /// Distance from the reference point to the next waypoint [m].
+        /// Distance from the reference point to the next waypoint \[m].
         pub waypoint_distance: f32,
-        /// Next waypoint to pass, counted from the route's first; the route's number of waypoints once all are passed.
+        /// Index of the next waypoint to pass on the route; the route's number of waypoints once all are passed.
         pub waypoint: u32,
         /// Waypoints passed in this step.
         pub passed: u32,
@@ -105,7 +115,7 @@ crate::shared! {
         pub waypoints: f32,
         /// Distance to the lane centre, limited and scaled to 0..1.
         pub lane_distance: f32,
-        /// How far the nearer unit is within the margin kept from kerbs, 0 outside it to 1 at a kerb.
+        /// Depth of the nearer unit in the margin kept from kerbs, from 0 outside it to 1 at a kerb.
         pub clearance: f32,
         /// 1 when the episode failed in this step.
         pub failure: f32,
@@ -113,7 +123,7 @@ crate::shared! {
 
     /// One distance sensor, fixed to a unit. A tractor's frame starts at the drive axle, a trailer's at its axle group.
     pub struct Ray {
-        /// Mount in the unit's frame, x forward, y left [m].
+        /// Mount in the unit's frame, x forward, y left \[m].
         pub origin: Vec2,
         /// Unit vector in the unit's frame.
         pub direction: Vec2,
@@ -121,11 +131,11 @@ crate::shared! {
 
     /// A rectangle fixed to a unit's frame.
     pub struct Body {
-        /// Front end, ahead of the frame's origin [m].
+        /// Front end, ahead of the frame's origin \[m].
         pub front: f32,
-        /// Rear end, ahead of the frame's origin (negative when behind) [m].
+        /// Rear end, ahead of the frame's origin (negative when behind) \[m].
         pub rear: f32,
-        /// Half of the width [m].
+        /// Half of the width \[m].
         pub half_width: f32,
     }
 
@@ -133,7 +143,7 @@ crate::shared! {
     pub struct Roll {
         /// Row-major transition of (roll, roll rate) over one sub-step.
         pub transition: [f32; 4],
-        /// What a lateral acceleration of 1 m/s^2 held through the sub-step adds to (roll, roll rate).
+        /// Change of (roll, roll rate) by a lateral acceleration of 1 m/s^2 held through the sub-step.
         pub input: [f32; 2],
         /// Load transfer ratio per m/s^2 of lateral acceleration.
         pub per_acceleration: f32,
@@ -145,31 +155,31 @@ crate::shared! {
 
     /// The vehicle as the stages need it.
     pub struct Rig {
-        /// Front axle ahead of the drive axle [m].
+        /// Front axle ahead of the drive axle \[m].
         pub wheelbase: f32,
-        /// Fifth wheel ahead of the drive axle [m].
+        /// Fifth wheel ahead of the drive axle \[m].
         pub fifth_wheel: f32,
-        /// Kingpin ahead of the trailer's axle group [m].
+        /// Kingpin ahead of the trailer's axle group \[m].
         pub trailer_wheelbase: f32,
-        /// Slip factor [rad/(m/s^2)].
+        /// Slip factor \[rad/(m/s^2)].
         pub slip: f32,
-        /// Largest steer angle [rad].
+        /// Largest steer angle \[rad].
         pub steer_max: f32,
-        /// Fastest change of the steer angle [rad/s].
+        /// Fastest change of the steer angle \[rad/s].
         pub steer_rate: f32,
-        /// Strongest braking, negative [m/s^2].
+        /// Strongest braking, negative \[m/s^2].
         pub acceleration_min: f32,
-        /// Strongest drive [m/s^2].
+        /// Strongest drive \[m/s^2].
         pub acceleration_max: f32,
-        /// Lateral acceleration that the tyres can hold [m/s^2].
+        /// Lateral acceleration that the tyres can hold \[m/s^2].
         pub lateral_acceleration_max: f32,
-        /// Speed control: acceleration per speed error [1/s].
+        /// Speed control: acceleration per speed error \[1/s].
         pub speed_gain: f32,
-        /// Speed control: acceleration per integral of the speed error [1/s^2].
+        /// Speed control: acceleration per integral of the speed error \[1/s^2].
         pub speed_integral_gain: f32,
-        /// Speed control: speed error beyond which nothing is integrated [m/s].
+        /// Speed control: speed error beyond which the integral is reset to 0 \[m/s].
         pub speed_integral_band: f32,
-        /// Speed control: strongest braking it asks for, negative [m/s^2].
+        /// Speed control: strongest braking it asks for, negative \[m/s^2].
         pub speed_braking: f32,
         /// The tractor's outline.
         pub tractor_body: Body,
@@ -183,43 +193,43 @@ crate::shared! {
 
     /// One entry of the action table.
     pub struct Action {
-        /// Steer angle asked for [rad].
+        /// Steer angle asked for \[rad].
         pub steering: f32,
-        /// Speed asked for [m/s].
+        /// Speed asked for \[m/s].
         pub speed: f32,
     }
 
-    /// What every truck of a batch shares beside the world: vehicle, time, weights.
+    /// Vehicle, time and weights, shared by all trucks.
     pub struct Params {
         /// The vehicle.
         pub rig: Rig,
-        /// Time of one sub-step [s].
+        /// Time of one sub-step \[s].
         pub substep: f32,
         /// Sub-steps in a step.
         pub n_substeps: u32,
         /// Entries of the action table.
         pub n_actions: u32,
-        /// Reach of a distance sensor [m].
+        /// Range of a distance sensor \[m].
         pub sensor_range: f32,
-        /// Largest lateral offset at the start [m].
+        /// Largest lateral offset at the start \[m].
         pub start_offset: f32,
-        /// Largest heading error at the start [rad].
+        /// Largest heading error at the start \[rad].
         pub start_heading: f32,
-        /// Speed at the start [m/s].
+        /// Speed at the start \[m/s].
         pub start_speed: f32,
-        /// A waypoint further off than this is neither passed nor within reach: the truck has strayed [m].
+        /// Distance to the next waypoint beyond which it cannot be passed and the truck has strayed \[m].
         pub stray_distance: f32,
-        /// Articulation beyond which the truck is jackknifed [rad].
+        /// Articulation beyond which the truck is jackknifed \[rad].
         pub jackknife_angle: f32,
         /// Load transfer ratio from which the truck has rolled over.
         pub rollover_ratio: f32,
-        /// Distance to the lane centre at which its reward term is 1 [m].
+        /// Distance to the lane centre at which its reward term is 1 \[m].
         pub lane_distance_limit: f32,
         /// Reward for each waypoint passed.
         pub waypoint_weight: f32,
         /// Reward for the lane-distance term, each step.
         pub lane_distance_weight: f32,
-        /// Margin kept from kerbs, within which the clearance term counts [m].
+        /// Margin kept from kerbs, within which the clearance term counts \[m].
         pub clearance_limit: f32,
         /// Reward for the clearance term, each step.
         pub clearance_weight: f32,
@@ -229,15 +239,15 @@ crate::shared! {
 
     /// One waypoint of one route.
     pub struct WaypointRow {
-        /// Place on the lane centre [m].
+        /// Position on the lane centre \[m].
         pub position: Vec2,
         /// Unit vector along the lane.
         pub direction: Vec2,
     }
 
-    /// What an observation needs of the route around one waypoint.
+    /// The values of an observation that depend on the next waypoint alone.
     pub struct PreviewRow {
-        /// Heading of the lane [rad].
+        /// Heading of the lane \[rad].
         pub heading: f32,
         /// Scaled as observed: 4 future curvatures, 4 current ones, 10 radii ahead.
         pub values: [f32; N_PREVIEW],
@@ -253,145 +263,47 @@ crate::shared! {
         pub roundabout: u32,
         /// Steps after which an episode is timed out.
         pub step_limit: u32,
-        /// Reach of a waypoint's crossing line to the left [m].
+        /// Reach of a waypoint's crossing line to the left \[m].
         pub crossing_left: f32,
-        /// Reach of a waypoint's crossing line to the right [m].
+        /// Reach of a waypoint's crossing line to the right \[m].
         pub crossing_right: f32,
     }
 
     /// One roundabout's field among the tables of all fields.
     pub struct FieldRow {
-        /// South-west corner of the grid [m].
+        /// South-west corner of the grid \[m].
         pub origin: Vec2,
-        /// Cells in a metre [1/m].
+        /// Cells in a metre \[1/m].
         pub cells_per_metre: f32,
         /// Cells from west to east.
         pub columns: u32,
         /// Cells from south to north.
         pub rows: u32,
-        /// Where its cells begin.
+        /// Index of its first cell.
         pub first_cell: u32,
-        /// Where those for marching begin.
+        /// Index of its first cell for marching.
         pub first_march_cell: u32,
-        /// Where its blocks' pairs begin.
+        /// Index of the first pair of its blocks.
         pub first_pair: u32,
     }
 
-    /// What the trucks of a batch share.
+    /// Facts that the trucks of a batch share.
     pub struct BatchFacts {
         /// Trucks.
         pub n_envs: u32,
-        /// What routes, poses and random actions are drawn from.
+        /// Seed of routes, poses and random actions.
         pub seed: u32,
         /// Routes to draw from.
         pub n_routes: u32,
-        /// Each truck runs the route of its own place once and is then held (0 or 1).
+        /// Whether each truck runs the route of its own index once and is then held (0 or 1).
         pub fixed: u32,
     }
 }
 
 impl Truck {
-    /// Middle of the trailer's axle group [m].
+    /// Middle of the trailer's axle group \[m].
     #[inline]
     pub fn trailer_position(&self, rig: &Rig) -> Vec2 {
         self.position + rig.fifth_wheel * direction(self.heading) - rig.trailer_wheelbase * direction(self.trailer_heading)
     }
-}
-
-/// Why an episode ended. Failure wins over arrival, everything wins over the clock.
-#[repr(u32)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Ended {
-    /// It has not.
-    Running,
-    /// The last waypoint was passed.
-    Arrived,
-    /// The tractor's outline touched a kerb.
-    TractorCollided,
-    /// The trailer's outline touched a kerb.
-    TrailerCollided,
-    /// A unit's wheels lifted.
-    RolledOver,
-    /// The articulation passed its limit.
-    Jackknifed,
-    /// The next waypoint is out of reach.
-    Strayed,
-    /// The steps ran out.
-    TimedOut,
-}
-
-impl Ended {
-    /// Every code, in the order of its number.
-    pub const ALL: [Ended; 8] = [
-        Ended::Running,
-        Ended::Arrived,
-        Ended::TractorCollided,
-        Ended::TrailerCollided,
-        Ended::RolledOver,
-        Ended::Jackknifed,
-        Ended::Strayed,
-        Ended::TimedOut,
-    ];
-
-    /// The code as reports name it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Ended::Running => "running",
-            Ended::Arrived => "arrived",
-            Ended::TractorCollided => "tractor_collided",
-            Ended::TrailerCollided => "trailer_collided",
-            Ended::RolledOver => "rolled_over",
-            Ended::Jackknifed => "jackknifed",
-            Ended::Strayed => "strayed",
-            Ended::TimedOut => "timed_out",
-        }
-    }
-
-    /// The code with this number in an `ended` column.
-    pub fn from_code(code: u32) -> Option<Ended> {
-        Ended::ALL.get(code as usize).copied()
-    }
-
-    /// The task itself is over: the value after it is 0.
-    pub fn terminated(self) -> bool {
-        !matches!(self, Ended::Running | Ended::TimedOut)
-    }
-
-    /// Only the clock ran out: the value after it is that of `next_observation`.
-    pub fn truncated(self) -> bool {
-        self == Ended::TimedOut
-    }
-
-    /// The episode is over and the truck did not arrive because of something it did.
-    pub fn failed(self) -> bool {
-        self.terminated() && self != Ended::Arrived
-    }
-}
-
-/// `shaders/layout.wgsl`: all that shaders share with Rust.
-pub fn wgsl() -> String {
-    [shared_wgsl(), buffers::printed()].concat()
-}
-
-/// The constants and structs alone, for shaders with buffers of their own.
-pub fn shared_wgsl() -> String {
-    let ends = Ended::ALL.map(|ended| format!("const {}: u32 = {}u;\n", ended.name().to_uppercase(), ended as u32));
-    [
-        "// What shaders share with Rust. Printed from src/layout.rs and the constants beside each stage: change those.\n\n".to_owned(),
-        printed_constants(),
-        angle::printed_constants(),
-        field::printed_constants(),
-        random::printed_constants(),
-        cpu::printed_constants(),
-        cpu::drive::printed_constants(),
-        cpu::collide::printed_constants(),
-        cpu::sense::printed_constants(),
-        cpu::observe::printed_constants(),
-        cpu::count::printed_constants(),
-        "\n// Why an episode ended.\n".to_owned(),
-        ends.concat(),
-        "\n".to_owned(),
-        printed_structs(),
-    ]
-    .concat()
 }

@@ -1,27 +1,28 @@
 //! Random numbers as a pure function of (seed, env, episode, draw): no generator state, the same bits on every engine.
 //!
-//! The mixer is pcg4d of M. Jarzynski and M. Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020): u32 arithmetic alone.
+//! The mixer is pcg4d of M. Jarzynski and M. Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020): u32
+//! arithmetic alone.
 
-use crate::layout::constants;
+use crate::shared::constants;
 
 constants! {
-    /// Factor that tells neighbouring counters apart, of D. Lehmer's kind of generator.
+    /// Factor of the linear congruential step that each counter goes through first.
     const FACTOR: u32 = 1_664_525;
-    /// What is added then.
+    /// Addend of that step.
     const ADDEND: u32 = 1_013_904_223;
-    /// A word has this many bits below those that an f32 holds.
+    /// Lowest bits of a word that an f32 cannot hold.
     const SPARE_BITS: u32 = 8;
-    /// What the others count in.
+    /// Unit of the bits above them.
     const UNIT: f32 = 1.0 / 8_388_608.0;
-    /// [`Draw::Route`] as shaders name it.
+    /// `Draw::Route`.
     const DRAW_ROUTE: u32 = Draw::Route as u32;
-    /// [`Draw::Pose`].
+    /// `Draw::Pose`.
     const DRAW_POSE: u32 = Draw::Pose as u32;
-    /// [`Draw::Action`].
+    /// `Draw::Action`.
     const DRAW_ACTION: u32 = Draw::Action as u32;
 }
 
-/// What a number is drawn for: each purpose has its own stream.
+/// What a number is drawn for: each has its own stream.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Draw {
@@ -53,7 +54,7 @@ pub fn signed_unit(word: u32) -> f32 {
     (word >> SPARE_BITS) as f32 * UNIT - 1.0
 }
 
-/// A word as an index below `n`, as even as 32 bits allow.
+/// A word as an index below `n`, uniform to within 2^-32.
 pub fn index_below(word: u32, n: u32) -> u32 {
     ((u64::from(word) * u64::from(n)) >> 32) as u32
 }
@@ -77,7 +78,8 @@ mod tests {
                 products += f64::from(here[0] * there[0]);
             }
         }
-        // The mean of n uniform numbers in [-1, 1) has a deviation of 1/sqrt(3 n), a product's of 1/(3 sqrt(n)): five of each.
+        // The mean of n uniform numbers in [-1, 1) has a deviation of 1/sqrt(3 n), a product's of 1/(3 sqrt(n)): five
+        // of each.
         let limit = 5.0 / (3.0 * n as f64).sqrt();
         assert!(sums.iter().all(|sum| (sum / n as f64).abs() < limit), "{sums:?}");
         assert!((products / n as f64).abs() < 5.0 / (3.0 * (n as f64).sqrt()), "{products}");

@@ -1,39 +1,39 @@
 //! A roundabout by its parameters: ring, arms, kerbs, lanes and splitter islands, as arcs and segments.
 //!
-//! Right-hand traffic around an island at the origin. Whatever parameters make no roundabout is refused when the file is read, so that
-//! kerbs and lanes of a [`Roundabout`] in hand never fail.
+//! Right-hand traffic around an island at the origin. Parameters that describe no roundabout are refused when the file
+//! is read, so the kerbs and lanes of a [`Roundabout`] never fail.
 
 mod alignment;
 mod check;
-pub mod deviation;
 mod kerb;
 mod lane;
+mod roundabout_keys;
 #[cfg(test)]
 mod tests;
-mod written;
 
 use std::path::Path;
 
 use glam::DVec2;
 
 use crate::geometry::{Curve, Outline};
+use crate::reader::{Error, Reader};
 use crate::route::{Lane, LeavesWorld, Route, waypoints};
-use crate::scenario::{Error, Reader};
+use crate::shipped::{Kind, Source};
 use lane::Lanes;
-use written::{Arm, Ring, Written};
+use roundabout_keys::{Arm, Ring, Written};
 
-/// Whether trucks may use the strip between the driving lanes and the kerb.
+/// Whether trucks may drive on the gutter, the strip between the lanes and the kerb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Gutter {
-    /// The kerb face is solid, the gutter is road.
+    /// The kerb's face is solid; the gutter is road.
     #[default]
     Drivable,
-    /// The lane's edge is solid: kerbs grown by the gutter.
+    /// The lane's edge is solid: kerbs are grown by the gutter's width.
     Solid,
 }
 
-/// A roundabout, checked.
+/// A checked roundabout.
 #[derive(Debug, Clone)]
 pub struct Roundabout {
     /// The file's stem, `20m`.
@@ -45,14 +45,54 @@ pub struct Roundabout {
 }
 
 impl Roundabout {
-    /// Reads a roundabout. Everything that can be wrong with one is found here, with its key.
+    /// Reads a roundabout file. Every fault that a roundabout can have is found here.
+    ///
+    /// # Errors
+    ///
+    /// The file and, for a value that makes no sense, its key, the value and what would do.
     pub fn read(path: &Path) -> Result<Roundabout, Error> {
-        let (reader, written) = Reader::read::<Written>(path)?;
+        Roundabout::from_source(&Source::Disk(path.to_owned()))
+    }
+
+    /// A roundabout that comes with the library: `16m`, `20m`, `32m`, `40m` or `50m`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::UnknownName`], which lists the known names.
+    pub fn named(name: &str) -> Result<Roundabout, Error> {
+        Roundabout::from_source(&Source::named(Kind::Roundabout, name)?)
+    }
+
+    /// Reads a file where `name_or_path` ends in `.toml` or is the path of a file; else the same as
+    /// [`Roundabout::named`].
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Roundabout::read`] and [`Roundabout::named`].
+    pub fn find(name_or_path: &str) -> Result<Roundabout, Error> {
+        Roundabout::from_source(&Source::find(Kind::Roundabout, name_or_path)?)
+    }
+
+    /// A roundabout from the text of a roundabout file. `name` is its name, and stands for the file in errors.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Roundabout::read`].
+    pub fn from_toml(name: &str, text: &str) -> Result<Roundabout, Error> {
+        Roundabout::parsed(name.to_owned(), Path::new(name), text)
+    }
+
+    pub(crate) fn from_source(source: &Source) -> Result<Roundabout, Error> {
+        Roundabout::parsed(source.stem(), &source.shown(), &source.text()?)
+    }
+
+    fn parsed(name: String, file: &Path, text: &str) -> Result<Roundabout, Error> {
+        let (reader, written) = Reader::parse::<Written>(file, text)?;
         let (ring, arms) = written.checked(&reader)?;
         let kerbs = kerb::kerbs(&reader, &ring, &arms)?;
         let lanes = Lanes::new(&reader, &ring, &arms)?;
         check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes)?;
-        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        check::lanes_beside_each_other(&reader, &arms, &lanes)?;
         Ok(Roundabout { name, ring, arms, kerbs, lanes })
     }
 
@@ -61,17 +101,27 @@ impl Roundabout {
         self.arms.iter().map(|arm| arm.name.as_str())
     }
 
-    /// Radius of the outer kerb's face; approaches and departures are counted from this circle [m].
+    /// Radius of the central island's kerb face \[m].
+    pub fn island_radius(&self) -> f64 {
+        self.ring.island_radius
+    }
+
+    /// Width of the strip between a kerb's face and the lane beside it \[m].
+    pub fn gutter(&self) -> f64 {
+        self.ring.gutter
+    }
+
+    /// Radius of the outer kerb's face; approaches and departures are measured from this circle \[m].
     pub fn outer_radius(&self) -> f64 {
         self.ring.outer()
     }
 
-    /// Radius of the ring lane's centre line [m].
+    /// Radius of the ring lane's centre line \[m].
     pub fn lane_radius(&self, lane: Lane) -> f64 {
         lane::radius(&self.ring, lane)
     }
 
-    /// The edge of what can be driven on.
+    /// The edge of the drivable surface.
     pub fn kerbs(&self, gutter: Gutter) -> Outline {
         match gutter {
             Gutter::Drivable => self.kerbs.clone(),
@@ -79,14 +129,26 @@ impl Roundabout {
         }
     }
 
-    /// The centre lines of all lanes: two around the ring, two in and two out on every arm.
+    /// The centre lines of all lanes: two around the ring, then for every arm two that enter, then for every arm two
+    /// that leave.
     pub fn lanes(&self) -> Vec<Curve> {
         let rings = Lane::BOTH.map(|lane| Curve::circle(DVec2::ZERO, self.lane_radius(lane)));
         rings.into_iter().chain(self.lanes.curves().cloned()).collect()
     }
 
-    /// All routes, five an entry, by entry arm, then lane, then exit: from `approach` before the ring to `departure` after it, waypoints
-    /// every `spacing` [m]. Fails where an arm is too short.
+    /// The centre line of a route from the end of its entry arm to the end of its exit arm, or `None` if there is no
+    /// such route.
+    pub fn line(&self, entry: &str, lane: Lane, exit: u32) -> Option<Curve> {
+        let entry = self.arms().position(|arm| arm == entry)?;
+        lane::exits(self.arms.len()).any(|way| way == (lane, exit)).then(|| self.lanes.route(entry, lane, exit))
+    }
+
+    /// All routes, five per entry, ordered by entry arm, lane and exit. They lead from `approach` before the ring to
+    /// `departure` after it, with waypoints every `spacing` \[m].
+    ///
+    /// # Errors
+    ///
+    /// An arm that is too short, with the longest approach or departure that fits.
     pub fn routes(&self, approach: f64, departure: f64, spacing: f64) -> Result<Vec<Route>, LeavesWorld> {
         let mut routes = Vec::new();
         for (entry, arm) in self.arms.iter().enumerate() {
@@ -119,6 +181,8 @@ impl Roundabout {
                     waypoints: waypoints(&centre_line, spacing),
                     centre_line,
                     crossing,
+                    before: reaches - approach,
+                    after: after - departure,
                 });
             }
         }

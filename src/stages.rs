@@ -1,26 +1,85 @@
-//! One step, in order. Every engine runs these stages under these names.
+//! One step, in order. Both engines run these stages: the CPU by the function, the device by the kernels of the same
+//! name.
 
-use crate::cpu::{self, Row};
-use crate::world::World;
+use crate::shared::Named;
 
-/// A stage: its name, its CPU entry point and its kernels.
-#[derive(Debug, Clone, Copy)]
-pub struct Stage {
-    /// What it does, a verb.
-    pub name: &'static str,
-    /// Does it to one truck.
-    pub cpu: fn(&World, &mut Row),
-    /// Do it to all trucks, one after the other.
-    pub kernels: &'static [Kernel],
+crate::named! {
+    /// A stage of a step, in the order of a step.
+    pub enum Stage {
+        /// Turns the action into a steer angle and an acceleration to hold for the step.
+        Steer = "steer",
+        /// Moves the truck.
+        Drive = "drive",
+        /// Measures the clearances.
+        Collide = "collide",
+        /// Follows the route.
+        Follow = "follow",
+        /// Measures the ranges.
+        Sense = "sense",
+        /// Writes the observation after the action.
+        Observe = "observe",
+        /// Decides whether and why the episode ended, and the reward.
+        Judge = "judge",
+        /// Adds the step to the tally.
+        Count = "count",
+        /// Copies the observation after the action to the one before the next action.
+        CopyObservation = "copy_observation",
+        /// Begins the next episode where one ended, and observes it.
+        Reset = "reset",
+    }
 }
 
-/// An entry point of a shader.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Kernel {
-    /// Its name.
-    pub entry: &'static str,
-    /// What a thread works on.
-    pub threads: Threads,
+/// Stages of a step.
+pub const N_STAGES: usize = Stage::ALL.len();
+
+/// The stages of a step, first to last.
+pub const STAGES: [Stage; N_STAGES] = {
+    let mut stages = [Stage::Steer; N_STAGES];
+    let mut index = 0;
+    while index < N_STAGES {
+        stages[index] = Stage::ALL[index];
+        index += 1;
+    }
+    stages
+};
+
+/// What every truck goes through after it was put somewhere.
+pub const OBSERVE_ALL: [Stage; 3] = [Stage::Sense, Stage::Observe, Stage::CopyObservation];
+
+crate::named! {
+    /// An entry point of the shaders.
+    pub enum Kernel {
+        /// Draws a random action for every truck.
+        Draw = "draw",
+        /// Begins episode 0 of every truck at a drawn pose.
+        Restart = "restart",
+        /// Begins episode 0 of every truck at a stated pose.
+        RestartFrom = "restart_from",
+        /// [`Stage::Steer`].
+        Steer = "steer",
+        /// [`Stage::Drive`].
+        Drive = "drive",
+        /// [`Stage::Collide`].
+        Collide = "collide",
+        /// [`Stage::Follow`].
+        Follow = "follow",
+        /// [`Stage::Sense`].
+        Sense = "sense",
+        /// [`Stage::Observe`].
+        Observe = "observe",
+        /// [`Stage::Judge`].
+        Judge = "judge",
+        /// [`Stage::Count`].
+        Count = "count",
+        /// [`Stage::CopyObservation`].
+        CopyObservation = "copy_observation",
+        /// [`Stage::Reset`]: route and pose.
+        Reset = "reset",
+        /// [`Stage::Reset`]: ranges of the trucks that began another episode.
+        SenseAfterReset = "sense_after_reset",
+        /// [`Stage::Reset`]: observations of the trucks that began another episode.
+        ObserveAfterReset = "observe_after_reset",
+    }
 }
 
 /// What a thread of a kernel works on.
@@ -30,38 +89,41 @@ pub enum Threads {
     Truck,
     /// One of a truck's rays.
     Ray,
+    /// One of the values of a truck's observation.
+    Value,
 }
 
-const fn per_truck(entry: &'static str) -> Kernel {
-    Kernel { entry, threads: Threads::Truck }
+impl Stage {
+    /// The kernels that do it to all trucks, one after the other.
+    pub const fn kernels(self) -> &'static [Kernel] {
+        match self {
+            Stage::Steer => &[Kernel::Steer],
+            Stage::Drive => &[Kernel::Drive],
+            Stage::Collide => &[Kernel::Collide],
+            Stage::Follow => &[Kernel::Follow],
+            Stage::Sense => &[Kernel::Sense],
+            Stage::Observe => &[Kernel::Observe],
+            Stage::Judge => &[Kernel::Judge],
+            Stage::Count => &[Kernel::Count],
+            Stage::CopyObservation => &[Kernel::CopyObservation],
+            Stage::Reset => &[Kernel::Reset, Kernel::SenseAfterReset, Kernel::ObserveAfterReset],
+        }
+    }
 }
 
-const fn per_ray(entry: &'static str) -> Kernel {
-    Kernel { entry, threads: Threads::Ray }
+impl Kernel {
+    /// What a thread works on.
+    pub const fn threads(self) -> Threads {
+        match self {
+            Kernel::Sense | Kernel::SenseAfterReset => Threads::Ray,
+            Kernel::CopyObservation => Threads::Value,
+            _ => Threads::Truck,
+        }
+    }
 }
-
-/// The stages of a step, first to last. The step is counted with `judge`; before `reset` what the last action led to is copied to what the
-/// next one sees, and trucks that begin anew are sensed and observed once more.
-pub const STAGES: [Stage; 8] = [
-    Stage { name: "steer", cpu: cpu::steer::steer, kernels: &[per_truck("steer")] },
-    Stage { name: "drive", cpu: cpu::drive::drive, kernels: &[per_truck("drive")] },
-    Stage { name: "collide", cpu: cpu::collide::collide, kernels: &[per_truck("collide")] },
-    Stage { name: "follow", cpu: cpu::follow::follow, kernels: &[per_truck("follow")] },
-    Stage { name: "sense", cpu: cpu::sense::sense, kernels: &[per_ray("sense")] },
-    Stage { name: "observe", cpu: cpu::observe::observe, kernels: &[per_truck("observe")] },
-    Stage { name: "judge", cpu: cpu::judge::judge, kernels: &[per_truck("judge"), per_truck("count")] },
-    Stage { name: "reset", cpu: cpu::reset::reset, kernels: &[per_truck("reset"), per_ray("sense_begun"), per_truck("observe_begun")] },
-];
-
-/// Kernels beside a step: actions by chance, and the beginning of every truck's first episode.
-pub const BESIDE: [Kernel; 2] = [DRAW, RESTART];
-/// Draws an action for every truck.
-pub const DRAW: Kernel = per_truck("draw");
-/// Begins episode 0 of every truck.
-pub const RESTART: Kernel = per_truck("restart");
 
 /// The shader files in the order in which they make one module.
-pub const SHADERS: [(&str, &str); 16] = [
+pub const SHADERS: [(&str, &str); 17] = [
     ("layout", include_str!("../shaders/layout.wgsl")),
     ("common/thread", include_str!("../shaders/common/thread.wgsl")),
     ("common/angle", include_str!("../shaders/common/angle.wgsl")),
@@ -77,5 +139,6 @@ pub const SHADERS: [(&str, &str); 16] = [
     ("observe", include_str!("../shaders/observe.wgsl")),
     ("judge", include_str!("../shaders/judge.wgsl")),
     ("count", include_str!("../shaders/count.wgsl")),
+    ("copy_observation", include_str!("../shaders/copy_observation.wgsl")),
     ("reset", include_str!("../shaders/reset.wgsl")),
 ];

@@ -1,53 +1,54 @@
-//! The path that both units sweep when the front axle follows a lane's centre line exactly: what a driver who never leaves the line needs.
+//! The path that both units sweep when the front axle follows a lane's centre line exactly.
 //!
-//! This is a fact about vehicle, speed and line, worked out in f64 apart from any batch; pictures and reports use it.
+//! It depends on vehicle, speed and line alone and is computed in f64. Pictures and reports use it.
 
 use glam::DVec2;
 
 use crate::geometry::{Curve, Outline};
 use crate::layout::{Body, Rig};
 
-/// Where both units stand.
+/// Pose of both units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// Middle of the drive axle [m].
+    /// Middle of the drive axle \[m].
     pub position: DVec2,
-    /// Heading of the tractor [rad].
+    /// Heading of the tractor \[rad].
     pub heading: f64,
-    /// Middle of the trailer's axle group [m].
+    /// Middle of the trailer's axle group \[m].
     pub trailer_position: DVec2,
-    /// Heading of the trailer [rad].
+    /// Heading of the trailer \[rad].
     pub trailer_heading: f64,
 }
 
 impl Pose {
-    /// Corners of the tractor's outline, counter-clockwise from front left [m].
+    /// Corners of the tractor's outline, counter-clockwise from front left \[m].
     pub fn tractor_corners(&self, rig: &Rig) -> [DVec2; 4] {
         corners(&rig.tractor_body, self.position, self.heading)
     }
 
-    /// Corners of the trailer's outline, counter-clockwise from front left [m].
+    /// Corners of the trailer's outline, counter-clockwise from front left \[m].
     pub fn trailer_corners(&self, rig: &Rig) -> [DVec2; 4] {
         corners(&rig.trailer_body, self.trailer_position, self.trailer_heading)
     }
 }
 
-/// Corners of a body in a frame at `origin` with `heading`, counter-clockwise from front left [m].
+/// Corners of a body in a frame at `origin` with `heading`, counter-clockwise from front left \[m].
 pub fn corners(body: &Body, origin: DVec2, heading: f64) -> [DVec2; 4] {
     let ahead = DVec2::from_angle(heading);
     let (front, rear, side) = (f64::from(body.front), f64::from(body.rear), f64::from(body.half_width) * ahead.perp());
     [origin + front * ahead + side, origin + rear * ahead + side, origin + rear * ahead - side, origin + front * ahead - side]
 }
 
-/// Poses about every `spacing` metres of a truck whose front axle runs along `centre_line` at `speed`, beginning straight.
+/// Poses every `spacing` metres of a truck whose front axle runs along `centre_line` at `speed`; both units start in
+/// line with it.
 ///
-/// The front axle's velocity points along the line; slip moves the tractor's turning point ahead by `slip * speed^2`, which shortens the
-/// lever of the turn, as in the single-track equations of [`crate::cpu::drive`].
+/// The front axle's velocity points along the line; slip moves the tractor's turning point ahead by `slip * speed^2`,
+/// which shortens the lever of the turn, as in the single-track equations of [`crate::engine::cpu::drive`].
 pub fn swept_path(rig: &Rig, centre_line: &Curve, speed: f64, spacing: f64) -> Vec<Pose> {
     let wheelbase = f64::from(rig.wheelbase);
     let (fifth_wheel, trailer_wheelbase) = (f64::from(rig.fifth_wheel), f64::from(rig.trailer_wheelbase));
     // The same bound as in the simulator's equations keeps both levers positive.
-    let slip = (f64::from(rig.slip) * speed * speed).min(crate::cpu::drive::SLIP_LEVER_MAX.into());
+    let slip = (f64::from(rig.slip) * speed * speed).min(crate::engine::cpu::drive::SLIP_LEVER_MAX.into());
     let rates = |line: f64, heading: f64, trailer_heading: f64| {
         let steering = line - heading;
         let along = speed * steering.cos();
@@ -84,7 +85,7 @@ pub fn swept_path(rig: &Rig, centre_line: &Curve, speed: f64, spacing: f64) -> V
     poses
 }
 
-/// No pose of the path touches a solid: a truck on this route need not leave its lane.
+/// Whether no pose of the path touches a solid: then a truck on this route need not leave its lane.
 pub fn own_lane_suffices(rig: &Rig, kerbs: &Outline, path: &[Pose]) -> bool {
     !path
         .iter()

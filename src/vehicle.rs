@@ -1,13 +1,14 @@
-//! Tractor, trailer and load: their measures as a vehicle file gives them, and what the stages need of them.
+//! Tractor, trailer and load: their dimensions as a vehicle file gives them, and what the stages need of them.
 //!
-//! The trailer's suspension is the load's: an empty trailer and a full tank lean differently on the same axles.
+//! The trailer's suspension belongs to the load: an empty trailer and a full tank roll differently on the same axles.
 
 mod single_track;
 mod suspension;
-mod written;
+mod vehicle_keys;
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use std::path::Path;
 
 use glam::{DVec2, Vec2};
 
@@ -15,67 +16,69 @@ pub use single_track::{SingleTrack, Steady};
 pub use suspension::Suspension;
 
 use crate::layout::{Body, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, Ray, Rig};
+use crate::reader::Error;
+use crate::shipped::{Kind, Source};
 
 /// Acceleration of free fall [m/s^2].
 pub const GRAVITY: f64 = 9.81;
 
-/// A tractor and its trailer with every load that they may carry. SI units and radians.
+/// A tractor, its trailer, and every load that the trailer may carry. SI units and radians.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vehicle {
     /// The towing unit.
     pub tractor: Tractor,
     /// The towed unit.
     pub trailer: Trailer,
-    /// What the trailer may carry, by name.
+    /// Loads of the trailer, by name.
     pub loads: BTreeMap<String, Load>,
-    /// How the target speed is held.
+    /// Control of the speed.
     pub speed_control: SpeedControl,
-    /// Where the distance sensors sit.
+    /// Positions of the distance sensors.
     pub sensors: Sensors,
 }
 
 /// The towing unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tractor {
-    /// Front axle ahead of the drive axle [m].
+    /// Front axle ahead of the drive axle \[m].
     pub wheelbase: f64,
-    /// Fifth wheel ahead of the drive axle, negative when behind [m].
+    /// Fifth wheel ahead of the drive axle, negative when behind \[m].
     pub fifth_wheel: f64,
-    /// Front end ahead of the front axle [m].
+    /// Front end ahead of the front axle \[m].
     pub front_overhang: f64,
-    /// Rear end behind the drive axle [m].
+    /// Rear end behind the drive axle \[m].
     pub rear_overhang: f64,
-    /// Width of the outline [m].
+    /// Width of the outline \[m].
     pub width: f64,
-    /// Largest steer angle [rad].
+    /// Largest steer angle \[rad].
     pub steer_max: f64,
     /// Fastest change of the steer angle [rad/s].
     pub steer_rate: f64,
     /// Lateral acceleration that the tyres can hold, in units of gravity.
     pub friction: f64,
-    /// Mass [kg].
+    /// Mass \[kg].
     pub mass: f64,
-    /// How it leans.
+    /// Its roll.
     pub suspension: Suspension,
 }
 
 /// The towed unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trailer {
-    /// Kingpin ahead of the axle group's centre [m].
+    /// Kingpin ahead of the axle group's centre \[m].
     pub wheelbase: f64,
-    /// Front end ahead of the kingpin [m].
+    /// Front end ahead of the kingpin \[m].
     pub kingpin_to_front: f64,
-    /// Rear end behind the kingpin [m].
+    /// Rear end behind the kingpin \[m].
     pub kingpin_to_rear: f64,
-    /// Width of the outline [m].
+    /// Width of the outline \[m].
     pub width: f64,
 }
 
-/// What the trailer carries and how the whole then moves.
+/// A load of the trailer, and how the truck moves with it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Load {
-    /// Mass of the trailer with its load [kg].
+    /// Mass of the trailer with its load \[kg].
     pub mass: f64,
     /// Slip angle of an axle per lateral acceleration [rad/(m/s^2)].
     pub slip: f64,
@@ -83,36 +86,63 @@ pub struct Load {
     pub acceleration_min: f64,
     /// Strongest drive [m/s^2].
     pub acceleration_max: f64,
-    /// How the loaded trailer leans.
+    /// Roll of the loaded trailer.
     pub suspension: Suspension,
 }
 
-/// Proportional-integral control of the speed.
+/// A PI controller of the speed with anti-windup.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpeedControl {
     /// Acceleration per speed error [1/s].
     pub gain: f64,
     /// Acceleration per integral of the speed error [1/s^2].
     pub integral_gain: f64,
-    /// Speed error beyond which nothing is integrated [m/s].
+    /// Speed error beyond which the integral is reset to 0 [m/s].
     pub integral_band: f64,
-    /// Strongest braking that is asked for, negative [m/s^2].
+    /// Strongest braking that the controller requests, negative [m/s^2].
     pub braking: f64,
 }
 
-/// Where the distance sensors sit, each in its unit's frame.
+/// Positions of the distance sensors, each in its unit's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensors {
-    /// The tractor's, from left 90 deg to right 90 deg: ahead of the drive axle, left [m].
+    /// Tractor sensors, from 90 deg left to 90 deg right: (ahead of the drive axle, left) \[m].
     pub tractor_mounts: [DVec2; N_TRACTOR_RAYS],
-    /// The trailer's foremost, behind the trailer's front end [m].
+    /// Foremost trailer sensor, behind the trailer's front end \[m].
     pub trailer_first: f64,
-    /// The trailer's rearmost, behind the trailer's front end [m].
+    /// Rearmost trailer sensor, behind the trailer's front end \[m].
     pub trailer_last: f64,
 }
 
 impl Vehicle {
-    /// Lengths that decide where the trailer goes.
+    /// Reads a vehicle file. Every fault that a vehicle can have is found here.
+    ///
+    /// # Errors
+    ///
+    /// The file and, for a value that makes no sense, its key, the value and what would do.
+    pub fn read(path: &Path) -> Result<Vehicle, Error> {
+        Vehicle::from_source(&Source::Disk(path.to_owned()))
+    }
+
+    /// A vehicle that comes with the library: `daf_xf`, `eu_4x2_13m6` or `us_wb62`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::UnknownName`], which lists the known names.
+    pub fn named(name: &str) -> Result<Vehicle, Error> {
+        Vehicle::from_source(&Source::named(Kind::Vehicle, name)?)
+    }
+
+    /// Reads a file where `name_or_path` ends in `.toml` or is the path of a file; else the same as [`Vehicle::named`].
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Vehicle::read`] and [`Vehicle::named`].
+    pub fn find(name_or_path: &str) -> Result<Vehicle, Error> {
+        Vehicle::from_source(&Source::find(Kind::Vehicle, name_or_path)?)
+    }
+
+    /// The lengths that decide the trailer's path.
     pub fn single_track(&self) -> SingleTrack {
         SingleTrack { wheelbase: self.tractor.wheelbase, fifth_wheel: self.tractor.fifth_wheel, trailer_wheelbase: self.trailer.wheelbase }
     }
@@ -129,13 +159,29 @@ impl Vehicle {
         Body { front: (wheelbase + kingpin_to_front) as f32, rear: (wheelbase - kingpin_to_rear) as f32, half_width: (0.5 * width) as f32 }
     }
 
-    /// Mass of tractor, trailer and load [kg].
+    /// Reach of the straight truck behind and ahead of the middle of its wheelbase, the point that follows a route,
+    /// when it is turned by up to `heading` \[rad] against the route \[m].
+    pub fn reach(&self, heading: f64) -> (f64, f64) {
+        let Tractor { wheelbase, fifth_wheel, front_overhang, rear_overhang, width, .. } = self.tractor;
+        let behind_axle = (self.trailer.kingpin_to_rear - fifth_wheel).max(rear_overhang);
+        let ahead_of_axle = (wheelbase + front_overhang).max(fifth_wheel + self.trailer.kingpin_to_front);
+        let half_width = 0.5 * width.max(self.trailer.width);
+        // A corner reaches furthest once it is turned into the direction of travel.
+        let turned = |length: f64| {
+            let turn = heading.min((half_width / length).atan());
+            length * turn.cos() + half_width * turn.sin()
+        };
+        (turned(0.5 * wheelbase + behind_axle), turned(ahead_of_axle - 0.5 * wheelbase))
+    }
+
+    /// Mass of tractor, trailer and load \[kg].
     pub fn gross_mass(&self, load: &Load) -> f64 {
         self.tractor.mass + load.mass
     }
 
-    /// Radius of the circle that the inner side of the trailer's axle group keeps clear when the tractor's outer front corner runs on a
-    /// circle of radius `outer` [m]; `None` where the combination cannot. Directive 96/53/EC asks for 5.30 m at 12.50 m.
+    /// Radius of the circle inside the trailer's axle group when the tractor's outer front corner runs on a circle of
+    /// radius `outer` \[m]; `None` if the combination cannot turn so tightly. Directive 96/53/EC requires 5.30 m at
+    /// 12.50 m.
     pub fn turning_circle_inner_radius(&self, outer: f64) -> Option<f64> {
         let Tractor { wheelbase, front_overhang, width, .. } = self.tractor;
         let corner = outer.powi(2) - (wheelbase + front_overhang).powi(2);
@@ -143,13 +189,12 @@ impl Vehicle {
         Some(steady.trailer_radius - 0.5 * self.trailer.width)
     }
 
-    /// The vehicle as the stages need it, with the load of that name and its roll discretised for sub-steps of `substep` [s].
-    ///
-    /// `steer_max` replaces the vehicle's own lock [rad].
+    /// The constants that the stages need, for one of the loads and sub-steps of `substep` \[s]. `steer_max` replaces
+    /// the vehicle's own lock \[rad].
     ///
     /// # Panics
     ///
-    /// When the vehicle has no such load: whoever read the name has compared it with [`Vehicle::loads`].
+    /// If [`Vehicle::loads`] has no load of this name.
     pub fn rig(&self, load: &str, substep: f32, steer_max: Option<f64>) -> Rig {
         let load = &self.loads[load];
         Rig {
@@ -173,21 +218,21 @@ impl Vehicle {
         }
     }
 
-    /// The distance sensors as an observation has them: the trailer's left and right in turn from front to rear, then the tractor's from
-    /// left to right.
+    /// The distance sensors in the order of an observation: the trailer's from front to rear, left and right
+    /// alternating, then the tractor's from left to right.
     pub fn rays(&self) -> [Ray; N_RAYS] {
         let body = self.trailer_body();
         let Sensors { trailer_first, trailer_last, .. } = self.sensors;
         std::array::from_fn(|index| {
             if index < N_TRAILER_RAYS {
-                let share = (index / 2) as f64 / (N_TRAILER_RAYS / 2 - 1) as f64;
-                let behind_front = trailer_first + share * (trailer_last - trailer_first);
+                let fraction = (index / 2) as f64 / (N_TRAILER_RAYS / 2 - 1) as f64;
+                let behind_front = trailer_first + fraction * (trailer_last - trailer_first);
                 let side = if index % 2 == 0 { 1.0 } else { -1.0 };
                 Ray { origin: Vec2::new(body.front - behind_front as f32, side * body.half_width), direction: Vec2::new(0.0, side) }
             } else {
-                let place = index - N_TRAILER_RAYS;
-                let angle = PI * (0.5 - place as f64 / (N_TRACTOR_RAYS - 1) as f64);
-                Ray { origin: self.sensors.tractor_mounts[place].as_vec2(), direction: DVec2::from_angle(angle).as_vec2() }
+                let mount = index - N_TRAILER_RAYS;
+                let angle = PI * (0.5 - mount as f64 / (N_TRACTOR_RAYS - 1) as f64);
+                Ray { origin: self.sensors.tractor_mounts[mount].as_vec2(), direction: DVec2::from_angle(angle).as_vec2() }
             }
         })
     }

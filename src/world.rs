@@ -1,6 +1,6 @@
-//! What all trucks share: the roundabouts baked into fields, the routes as a table of waypoints, the vehicle and the weights.
+//! What all trucks share: the roundabouts baked into fields, the routes as a table of waypoints, vehicle and weights.
 //!
-//! A `World` in hand can always be stepped: everything that can be wrong was found while its scenario was read.
+//! A `World` in hand can always be stepped: everything that can be wrong is found when its scenario is read or baked.
 
 use std::f64::consts::PI;
 
@@ -9,13 +9,13 @@ use glam::{DVec2, Vec2};
 use crate::field::Field;
 use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, RouteRow, WaypointRow};
 use crate::route::{Route, Waypoint};
-use crate::scenario::Scenario;
+use crate::scenario::{Invalid, Scenario};
 
 /// Waypoints to the corner of each observed curvature.
 const CURVATURE_STEPS: [usize; 4] = [5, 7, 10, 12];
 /// Waypoints in each chord of the observed radii.
 const CHORD: usize = 5;
-/// Radius that is observed as 1 [m].
+/// Radius that is observed as 1 \[m].
 const RADIUS_SCALE: f64 = 100.0;
 
 /// The shared, unchanging part of a batch.
@@ -40,8 +40,11 @@ pub struct World {
 }
 
 impl World {
-    /// Works out everything that does not change while trucks drive.
-    pub fn bake(scenario: &Scenario) -> World {
+    /// Computes everything that does not change while trucks drive.
+    ///
+    /// Fails on a scenario that was changed after it was read so that no truck could be stepped.
+    pub fn bake(scenario: &Scenario) -> Result<World, Invalid> {
+        scenario.check()?;
         let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
         let rig = scenario.vehicle.rig(&scenario.load, substep, scenario.steer_max);
         let actions = scenario.actions(rig.steer_max);
@@ -62,7 +65,7 @@ impl World {
             waypoints.extend(route.waypoints.iter().map(waypoint_row));
             previews.extend((0..route.waypoints.len()).map(|index| preview_row(&route.waypoints, index)));
         }
-        World {
+        Ok(World {
             params: Params {
                 rig,
                 substep,
@@ -89,10 +92,10 @@ impl World {
             previews,
             routes,
             route_names,
-        }
+        })
     }
 
-    /// Memory that its tables take, whatever the number of trucks [bytes].
+    /// Memory that its tables take, whatever the number of trucks \[bytes].
     pub fn bytes(&self) -> usize {
         let routes = size_of_val(self.waypoints.as_slice()) + size_of_val(self.previews.as_slice()) + size_of_val(self.routes.as_slice());
         let vehicle = size_of_val(&self.params) + size_of_val(self.actions.as_slice()) + size_of_val(&self.rays);
@@ -145,13 +148,14 @@ fn preview_row(waypoints: &[Waypoint], index: usize) -> PreviewRow {
     PreviewRow { heading: waypoints[index].heading as f32, values }
 }
 
-/// Angle at `corner` between `from` and `to`: pi when the three lie in line, and when two of them are the same point [rad].
+/// Angle at `corner` between `from` and `to`: pi when the three lie in line, and when two of them coincide \[rad].
 fn corner(from: DVec2, corner: DVec2, to: DVec2) -> f64 {
     let (back, ahead) = (from - corner, to - corner);
     if back == DVec2::ZERO || ahead == DVec2::ZERO { PI } else { back.angle_to(ahead).abs() }
 }
 
-/// Distance from `middle` to the meeting point of the bisectors of the two chords that join there; infinite when they are parallel [m].
+/// Distance from `middle` to the intersection of the bisectors of the two chords that join there; infinite when they
+/// are parallel \[m].
 fn turning_radius(from: DVec2, middle: DVec2, to: DVec2) -> f64 {
     let (first, second) = (middle - from, to - middle);
     // Radius of the circle through three points: the product of the sides over four times the area.

@@ -1,6 +1,6 @@
-"""Env steps per second of highway-env's `roundabout-v0` and of `offtrack scale`, one after the other on the same machine.
+"""Env steps per second of highway-env's `roundabout-v0` and of `offtrack scale`, in turn on the same machine.
 
-A step is not the same thing on both sides: the result says what it is on either, see README.md beside this file.
+A step differs between the two: the result says what it is in each, see README.md beside this file.
 """
 
 import argparse
@@ -22,11 +22,11 @@ import highway_env
 import numpy as np
 
 gymnasium.register_envs(highway_env)
-gymnasium.logger.min_level = gymnasium.logger.ERROR  # it advises to take roundabout-v1, which differs in which cars see each other
+gymnasium.logger.min_level = gymnasium.logger.ERROR  # it recommends roundabout-v1, which differs in which cars see each other
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-WINDOW = 0.5  # s; other work on the machine disturbs some windows, not most
-# The cheapest of the observations with which one can drive: times to collision, by lane and speed, over the next seconds.
+WINDOW = 0.5  # s; other programs disturb some windows, not most
+# The cheapest observation that is enough to drive: times to collision, by lane and speed, over the next seconds.
 CHEAPEST = {"type": "TimeToCollision", "horizon": 5}
 VARIANTS = [
     ("defaults", {}),
@@ -128,7 +128,7 @@ class Vector:
 
 
 def measured(name, config, peer, seconds):
-    """The median over windows of half a second, after one to warm up."""
+    """The median over windows of half a second, after one window of warm-up."""
     speeds, n = [], 0
     begun = time.perf_counter()
     while len(speeds) < 4 or time.perf_counter() - begun < seconds:

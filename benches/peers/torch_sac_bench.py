@@ -1,4 +1,4 @@
-"""Time of one update of a discrete twin-Q soft actor-critic, by PyTorch and by `offtrack bench`, in turns on the same machine.
+"""Time of one update of a discrete twin-Q SAC, in PyTorch and by `offtrack bench`, in turns on the same machine.
 
 Both do the same work, see README.md beside this file.
 """
@@ -22,7 +22,7 @@ from torch import nn
 REPOSITORY = Path(__file__).resolve().parents[2]
 N_VALUES, N_ACTIONS = 69, 9
 CELLS = [([512, 512, 1024], 256), ([512, 512, 1024], 1024), ([256, 256], 256), ([256, 256], 1024)]
-WINDOW = 8  # updates timed in one go
+WINDOW = 8  # updates timed together
 
 
 def main():
@@ -60,9 +60,9 @@ def main():
         "seconds_a_round": args.seconds,
         "values": N_VALUES,
         "actions": N_ACTIONS,
-        "times": "milliseconds an update, its batch at hand: medians over rounds; offtrack_with_sampling draws the batch as well",
+        "times": "milliseconds an update, its batch ready: medians over rounds; offtrack_with_sampling draws the batch as well",
         "ratio": "offtrack's time over PyTorch's: the median of the rounds' ratios",
-        "fastest": "the shortest of all windows: what other work on the machine disturbed least",
+        "fastest": "the shortest of all windows, which other programs disturbed least",
         "cells": cells,
     }
     if args.json:
@@ -70,7 +70,7 @@ def main():
 
 
 def compared(hidden, batch, args):
-    """One size: rounds of the program and of PyTorch in turns, the ratio of each pair."""
+    """One size: rounds of offtrack and of PyTorch in turns, and the ratio of each pair."""
     sizes = ["--hidden", ",".join(map(str, hidden)), "--batch", str(batch), "--seconds", str(args.seconds)]
     command = [args.offtrack, "bench", "--lines", *sizes]
     learner = Learner(hidden, batch)
@@ -100,7 +100,7 @@ def compared(hidden, batch, args):
 
 
 def network(hidden):
-    """Linear layers with rectifiers between them."""
+    """Linear layers with ReLU between them."""
     sizes = [N_VALUES, *hidden, N_ACTIONS]
     layers = []
     for inputs, outputs in zip(sizes, sizes[1:]):
@@ -109,30 +109,30 @@ def network(hidden):
 
 
 def frozen(module_hidden, module):
-    """A copy that no gradient moves."""
+    """A copy without gradients: a target network, or the EMA of the actor."""
     copy = network(module_hidden)
     copy.load_state_dict(module.state_dict())
     return copy.requires_grad_(False)
 
 
 class Learner:
-    """The update of training/src/sac.rs, line by line."""
+    """The update of training/src/learner/sac.rs, line by line."""
 
     def __init__(self, hidden, batch):
         self.batch = batch
         self.actor, self.first, self.second = (network(hidden) for _ in range(3))
         self.targets = [frozen(hidden, critic) for critic in (self.first, self.second)]
-        self.average = frozen(hidden, self.actor)
+        self.ema = frozen(hidden, self.actor)
         self.critic_parameters = [*self.first.parameters(), *self.second.parameters()]
         self.target_parameters = [parameter for target in self.targets for parameter in target.parameters()]
         self.actor_parameters = list(self.actor.parameters())
-        self.average_parameters = list(self.average.parameters())
+        self.ema_parameters = list(self.ema.parameters())
         self.critic_optimizer = torch.optim.Adam(self.critic_parameters, lr=3e-4, eps=1e-5, fused=True)
         self.actor_optimizer = torch.optim.Adam(self.actor_parameters, lr=3e-4, eps=1e-5, fused=True)
-        self.log_weight, self.moments, self.updates = math.log(0.05), [0.0, 0.0], 0
+        self.log_alpha, self.moments, self.updates = math.log(0.05), [0.0, 0.0], 0
 
     def transitions(self):
-        """A batch at hand."""
+        """A batch of transitions."""
         return (
             torch.rand(self.batch, N_VALUES) * 2 - 1,
             torch.randint(N_ACTIONS, (self.batch, 1)),
@@ -143,20 +143,20 @@ class Learner:
         )
 
     def update(self, observation, action, reward, discount, next_observation, weight):
-        alpha = math.exp(self.log_weight)
-        # Soft value of what follows: expectation over actions.
+        alpha = math.exp(self.log_alpha)
+        # Soft value of the next state: expectation over actions.
         with torch.no_grad():
             log_probs = self.actor(next_observation).log_softmax(1)
             q = (self.targets[0](next_observation) + self.targets[1](next_observation)) * 0.5
             value = (log_probs.exp() * (q - alpha * log_probs)).sum(1, keepdim=True)
             target = reward + discount * value
 
-        # Each critic learns the value of the action that was taken.
+        # Each critic is fitted to the TD target of the action that was taken.
         values = [self.first(observation), self.second(observation)]
         taken = [q.gather(1, action) for q in values]
         critic_loss = (((taken[0] - target).square() + (taken[1] - target).square()) * weight).mean()
 
-        # The actor learns from the same values, as constants.
+        # The actor's loss takes the same values as constants.
         q = ((values[0] + values[1]) * 0.5).detach()
         log_probs = self.actor(observation).log_softmax(1)
         probs = log_probs.exp()
@@ -171,24 +171,24 @@ class Learner:
             optimizer.zero_grad(set_to_none=True)
             loss.backward()
             optimizer.step()
-        self.lead(entropy)
+        self.update_entropy_coefficient(entropy)
         with torch.no_grad():
             torch._foreach_lerp_(self.target_parameters, self.critic_parameters, 0.005)
-            torch._foreach_lerp_(self.average_parameters, self.actor_parameters, 0.005)
+            torch._foreach_lerp_(self.ema_parameters, self.actor_parameters, 0.005)
         return critic_loss.item(), actor_loss.item(), entropy, value, errors
 
-    def lead(self, entropy):
-        """One of Adam's steps for the entropy's weight, a number on the host as in offtrack."""
+    def update_entropy_coefficient(self, entropy):
+        """One Adam step of the entropy coefficient, a number on the host as in offtrack."""
         self.updates += 1
-        gradient = math.exp(self.log_weight) * (entropy - 0.1 * math.log(N_ACTIONS))
+        gradient = math.exp(self.log_alpha) * (entropy - 0.1 * math.log(N_ACTIONS))
         corrected = []
         for index, (value, decay) in enumerate(((gradient, 0.9), (gradient * gradient, 0.999))):
             self.moments[index] = decay * self.moments[index] + (1 - decay) * value
             corrected.append(self.moments[index] / (1 - decay**self.updates))
-        self.log_weight -= 3e-4 * corrected[0] / (math.sqrt(corrected[1]) + 1e-8)
+        self.log_alpha -= 3e-4 * corrected[0] / (math.sqrt(corrected[1]) + 1e-8)
 
     def round(self, seconds):
-        """The windows' times an update [ms], after a tenth of the time to warm up."""
+        """Time of an update in each window [ms], after a tenth of the time as warm-up."""
         begun, windows = time.perf_counter(), []
         while time.perf_counter() - begun < 0.1 * seconds:
             self.update(*self.transitions())

@@ -1,6 +1,6 @@
 // Angles in plain f32 arithmetic, so that every engine can compute the same bits.
 
-// `angle` brought into (-pi, pi], for an angle within a few turns of it.
+// `angle` wrapped into (-pi, pi], for an angle within a few turns of it.
 fn wrapped(angle: f32) -> f32 {
     let turned = angle - TAU * round(angle * (1.0 / TAU));
     return select(turned, turned + TAU, turned <= -PI);
@@ -8,7 +8,8 @@ fn wrapped(angle: f32) -> f32 {
 
 // Angle of (x, y) from the x axis in (-pi, pi], 0 for the origin; within 4e-7 of the true one.
 //
-// S. Moshier's Cephes polynomial for the arc tangent; library functions of different engines differ by more than this is off.
+// S. Moshier's Cephes polynomial for the arc tangent. Library functions of different engines differ by more than its
+// error.
 fn arc_tangent(y: f32, x: f32) -> f32 {
     let small = min(abs(x), abs(y));
     let large = max(abs(x), abs(y));
@@ -25,8 +26,8 @@ fn arc_tangent(y: f32, x: f32) -> f32 {
 
 // Sine and cosine in plain arithmetic, within 1.2e-7 of the true ones for an angle within a few turns of 0.
 //
-// S. Moshier's Cephes polynomials for an eighth of a turn. A driver may be free to cancel the CPU's addition of a large number, so rounding
-// is asked for by name.
+// S. Moshier's Cephes polynomials for an eighth of a turn. A graphics driver may optimise the CPU's addition of a large
+// number away, so this rounds explicitly.
 fn sin_cos(angle: f32) -> vec2<f32> {
     let count = round(angle * FRAC_2_PI);
     let quarter = u32(i32(count));

@@ -1,6 +1,7 @@
 // Random numbers as a pure function of (seed, env, episode, draw): no generator state, the same bits on every engine.
 //
-// The mixer is pcg4d of M. Jarzynski and M. Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020): u32 arithmetic alone.
+// The mixer is pcg4d of M. Jarzynski and M. Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020): u32 arithmetic
+// alone.
 
 // Four random words.
 fn words(seed: u32, env: u32, episode: u32, draw: u32) -> vec4<u32> {
@@ -22,7 +23,7 @@ fn signed_unit(word: u32) -> f32 {
     return f32(word >> SPARE_BITS) * UNIT - 1.0;
 }
 
-// A word as an index below `n`, as even as 32 bits allow: the upper half of their product.
+// A word as an index below `n`, uniform to within 2^-32: the upper half of their product.
 fn index_below(word: u32, n: u32) -> u32 {
     let low = (word & 0xffffu) * (n & 0xffffu);
     let middle = (word >> 16u) * (n & 0xffffu) + (low >> 16u);

@@ -1,16 +1,16 @@
-// Where things are on a truck, and which trucks there is work on.
+// Positions on a truck, and which trucks a kernel works on.
 
 // Middle of the trailer's axle group [m].
 fn trailer_position(rig: Rig, truck: Truck) -> vec2<f32> {
     return truck.position + rig.fifth_wheel * direction(truck.heading) - rig.trailer_wheelbase * direction(truck.trailer_heading);
 }
 
-// Whether there is such a truck, and its episode goes on.
+// Whether there is such a truck and it is not held.
 fn is_driving(env: u32) -> bool {
     return env < batch.n_envs && truck[env].held == 0u;
 }
 
-// Whether there is such a truck, and it began another episode in this step.
+// Whether there is such a truck and it began another episode in this step.
 fn has_begun(env: u32) -> bool {
     return env < batch.n_envs && ended[env] != RUNNING && batch.fixed == 0u;
 }

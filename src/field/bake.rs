@@ -6,24 +6,25 @@ use rayon::prelude::*;
 use super::{Field, LEVEL_BITS};
 use crate::geometry::{Nearby, Outline};
 
-/// Solid ground kept around the outline [m].
+/// Solid ground kept around the outline \[m].
 const MARGIN: f64 = 1.0;
-/// Finest sub-cell [m]. A kink in the middle of one is off by half of it: 1.6 cm.
+/// Finest sub-cell \[m]. A kink in the middle of one is off by half of it: 1.6 cm.
 const FINEST: f64 = 1.0 / 32.0;
-/// Cells a side of a tile, which share one culled outline.
+/// Cells a side of a tile; its cells use one culled outline.
 const TILE: usize = 4;
-/// Up to this distance from a kerb [m] a ray may end here, and a grazing one multiplies the error by 11.
+/// Up to this distance from a kerb a ray may end, and a grazing ray multiplies the error by 11 \[m].
 const SURFACE: f64 = 0.4;
-/// Error allowed there [m].
+/// Largest error there \[m].
 const SURFACE_TOLERANCE: f64 = 5e-4;
-/// Up to this distance from a kerb [m] the field promises its accuracy.
+/// Up to this distance from a kerb the stated accuracy holds \[m].
 const PROMISED: f64 = 6.0;
-/// Error allowed there, kinks apart [m].
+/// Largest error there except at kinks \[m].
 const TOLERANCE: f64 = 8e-3;
 
-/// Up to this sub-cell [m] an error above [`TOLERANCE`] is that of a kink: the bend of a nose of 0.2 m is interpolated better.
+/// In sub-cells up to this width an error above [`TOLERANCE`] is that of a kink: a kerb bend of 0.2 m radius is
+/// interpolated better \[m].
 const KINK: f64 = 0.125;
-/// Error allowed there at the places looked at, so that between them it stays below 3 cm [m].
+/// Largest error there at the sampled points, so that between them it stays below 3 cm \[m].
 const KINK_TOLERANCE: f64 = 0.018;
 
 /// One cell's block.
@@ -32,14 +33,15 @@ struct Block {
     values: Vec<[f32; 2]>,
 }
 
-/// A cell's blocks: one for all uses, and one for marching where a coarser one will do.
+/// A cell's blocks: an exact one, and a coarser one for marching where that suffices.
 struct Blocks {
     exact: Block,
     march: Option<Block>,
 }
 
 impl Field {
-    /// The field of `outline` in cells of `cell` metres a side, by all cores. Smaller cells are no more accurate, only laid out otherwise.
+    /// The field of `outline` in cells of `cell` metres a side, computed on all cores. The cell width changes the
+    /// layout, not the accuracy.
     pub fn bake(outline: &Outline, cell: f64) -> Field {
         let (low, high) = outline.bounds();
         let origin = low - MARGIN;
@@ -63,7 +65,7 @@ impl Field {
             })
             .collect();
         let (mut cells, mut march_cells, mut values) = (vec![0; columns * rows], vec![0; columns * rows], Vec::new());
-        // What marches read lies together, before what only the exact blocks need.
+        // The blocks that marches read come first, for locality.
         for (index, blocks) in tiles.iter().flatten() {
             march_cells[*index] = placed(&mut values, blocks.march.as_ref().unwrap_or(&blocks.exact));
         }
@@ -82,7 +84,7 @@ impl Field {
     }
 }
 
-/// Appends a block's values and gives the word that finds them.
+/// Appends a block's values and returns the cell's word.
 fn placed(values: &mut Vec<[f32; 2]>, block: &Block) -> u32 {
     let word = (values.len() as u32) << LEVEL_BITS | block.level;
     values.extend_from_slice(&block.values);
@@ -100,7 +102,7 @@ fn blocks(nearby: &Nearby, corner: DVec2, cell: f64) -> Blocks {
     Blocks { march: march.filter(|march| march.level < exact.level), exact }
 }
 
-/// Error allowed where the distance is `exact` and sub-cells are `step` wide [m].
+/// Largest error where the distance is `exact` and sub-cells are `step` wide \[m].
 fn tolerance(exact: f64, step: f64) -> f64 {
     if exact.abs() < SURFACE {
         SURFACE_TOLERANCE
@@ -111,8 +113,8 @@ fn tolerance(exact: f64, step: f64) -> f64 {
     }
 }
 
-/// The coarsest block whose errors are all allowed, else the finest. `allowed` is asked with what interpolation adds to the exact distance,
-/// that distance, and the sub-cells' width [m].
+/// The coarsest block whose errors are all allowed, else the finest. The arguments of `allowed` are the interpolation's
+/// error, the exact distance and the sub-cells' width \[m].
 fn block(nearby: &Nearby, corner: DVec2, cell: f64, allowed: impl Fn(f64, f64, f64) -> bool) -> Block {
     let finest = (cell / FINEST).log2().ceil().clamp(0.0, f64::from((1 << LEVEL_BITS) - 1)) as u32;
     let mut level = 0;
@@ -135,17 +137,18 @@ fn block(nearby: &Nearby, corner: DVec2, cell: f64, allowed: impl Fn(f64, f64, f
     }
 }
 
-/// What interpolating between the corners of a sub-cell adds to the exact distance, and that distance, at places all over it [m].
+/// The error of interpolation between the corners of a sub-cell, and the exact distance, at points all over it \[m].
 fn errors(
     nearby: &Nearby,
     corner: DVec2,
     step: f64,
     [south_west, south_east, north_west, north_east]: [f64; 4],
 ) -> impl Iterator<Item = (f64, f64)> {
-    // Smooth parts err most in the middle or on an edge; a kink that cuts off a corner shows at the point near that corner.
-    const PLACES: [(f64, f64); 9] =
+    // In smooth parts the error is largest in the middle or on an edge; a kink across a corner shows at the point near
+    // that corner.
+    const POINTS: [(f64, f64); 9] =
         [(0.5, 0.5), (0.2, 0.2), (0.8, 0.8), (0.2, 0.8), (0.8, 0.2), (0.5, 0.0), (0.0, 0.5), (0.5, 1.0), (1.0, 0.5)];
-    PLACES.into_iter().map(move |(u, v)| {
+    POINTS.into_iter().map(move |(u, v)| {
         let exact = nearby.signed_distance(corner + DVec2::new(u, v) * step);
         let (south, north) = (south_west + u * (south_east - south_west), north_west + u * (north_east - north_west));
         (south + v * (north - south) - exact, exact)

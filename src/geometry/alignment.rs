@@ -1,4 +1,4 @@
-//! Curves as road engineers describe them: points joined by straights, each corner rounded by an arc, the last straight led into a circle.
+//! Road alignments: points joined by straights, each corner rounded by an arc, the last straight led into a circle.
 
 use std::f64::consts::TAU;
 
@@ -6,25 +6,29 @@ use glam::DVec2;
 
 use super::{Curve, Piece};
 
-/// A corner of an alignment: where two straights would meet, and the radius of the arc that rounds it.
+/// A corner of an alignment: the intersection of two straights, and the radius of the arc that rounds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bend {
-    /// Where the straights would meet [m].
+    /// Intersection of the straights \[m].
     pub at: DVec2,
-    /// Radius of the arc between them; 0 leaves the corner sharp [m].
+    /// Radius of the arc between them; 0 leaves the corner sharp \[m].
     pub radius: f64,
 }
 
 /// A bend that does not fit: its arc would begin before the one before it ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Misfit {
-    /// Which of the bends, from 0.
+    /// Index of the bend.
     pub bend: usize,
-    /// The largest radius that fits, all others unchanged [m].
+    /// The largest radius that fits, all others unchanged \[m].
     pub largest: f64,
 }
 
-/// The curve along `bends`, whose first and last only say where it begins and ends; `closed` joins the last to the first, all rounded.
+/// The curve along `bends`. The first and the last are its ends; if it is `closed`, they are joined and rounded too.
+///
+/// # Errors
+///
+/// The first bend whose arc does not fit.
 pub fn rounded(bends: &[Bend], closed: bool) -> Result<Curve, Misfit> {
     let n = bends.len();
     let inner = |index: usize| closed || (0 < index && index + 1 < n);
@@ -52,15 +56,17 @@ pub fn rounded(bends: &[Bend], closed: bool) -> Result<Curve, Misfit> {
     Ok(Curve { pieces })
 }
 
-/// The arc of `radius` that leads the straight from `origin` in `direction` (of length 1) into the circle around the origin of the plane,
-/// travelled counter-clockwise, and the direction from the plane's origin to where it arrives [rad].
+/// The arc of `radius` that leads the straight from `origin` in `direction` (of length 1) into the circle of radius
+/// `circle` around the plane's origin, which is travelled counter-clockwise, and the direction from the plane's origin
+/// to the point of contact \[rad].
 ///
-/// A straight that would cut the circle is led in by a right turn, from outside; one that would pass it, by a left turn wider than the
-/// circle, around it. `None` where no such arc begins ahead.
+/// A straight that would cut the circle is led in by a right turn from outside; one that would pass it, by a left turn
+/// wider than the circle. `None` if no such arc begins ahead.
 pub fn to_circle(origin: DVec2, direction: DVec2, circle: f64, radius: f64) -> Option<(Piece, f64)> {
     let (ahead, left) = (-origin.dot(direction), direction.perp_dot(-origin));
     let turn = if left < circle { -1.0 } else { 1.0 };
-    // The arc's centre lies `radius` to the side of the straight; tangent circles have their centres this far apart.
+    // The arc's centre lies `radius` beside the straight, and `apart` from the circle's centre because the circles are
+    // tangent.
     let apart = circle - turn * radius;
     let begin = ahead - (apart.powi(2) - (left - turn * radius).powi(2)).sqrt();
     if begin.is_nan() || begin < 0.0 || (0.0 < turn && radius <= circle) {
@@ -68,7 +74,7 @@ pub fn to_circle(origin: DVec2, direction: DVec2, circle: f64, radius: f64) -> O
     }
     let centre = origin + direction * begin + direction.perp() * turn * radius;
     let from = (direction.perp() * -turn).to_angle();
-    // Both turns arrive on the line through the two centres: between them, or beyond the circle's.
+    // The point of contact is on the line through the two centres: between them, or beyond the circle's.
     let arrival = (centre * -turn).to_angle();
     let until = (-centre).to_angle();
     let sweep = turn * (turn * (until - from)).rem_euclid(TAU);
@@ -76,7 +82,7 @@ pub fn to_circle(origin: DVec2, direction: DVec2, circle: f64, radius: f64) -> O
 }
 
 struct Rounding {
-    /// From the bend's point to either end of its arc [m].
+    /// From the bend's point to either end of its arc \[m].
     tangent: f64,
     begin: DVec2,
     end: DVec2,

@@ -1,17 +1,17 @@
-//! Where two pieces meet: the crossings of segments and arcs, exactly.
+//! Exact intersections of segments and arcs.
 
 use glam::DVec2;
 
 use super::Piece;
 
 impl Piece {
-    /// The points that two pieces share, touching included; stretches that coincide are not listed.
+    /// The common points of two pieces, including points of contact; stretches that coincide are not listed.
     pub(crate) fn meetings(&self, other: &Piece) -> Vec<DVec2> {
         match (*self, *other) {
             (Piece::Segment { from, to }, _) => {
                 let along = to - from;
-                let on = |share: &f64| (0.0..=1.0).contains(share);
-                other.on_line(from, along).into_iter().flatten().filter(on).map(|share| from + share * along).collect()
+                let on = |fraction: &f64| (0.0..=1.0).contains(fraction);
+                other.on_line(from, along).into_iter().flatten().filter(on).map(|fraction| from + fraction * along).collect()
             }
             (Piece::Arc { .. }, Piece::Segment { .. }) => other.meetings(self),
             (Piece::Arc { centre, radius, .. }, Piece::Arc { centre: other_centre, radius: other_radius, .. }) => {
@@ -22,7 +22,7 @@ impl Piece {
                 }
                 let ahead = (distance * distance + radius * radius - other_radius * other_radius) / (2.0 * distance);
                 let square = radius * radius - ahead * ahead;
-                // Tangent circles meet in one point although rounding may part them.
+                // Tangent circles meet in one point, although rounding may separate them.
                 if square < -1e-9 * radius * radius {
                     return Vec::new();
                 }
@@ -40,8 +40,8 @@ impl Piece {
             Piece::Segment { from, to } => {
                 let across = to - from;
                 let turn = along.perp_dot(across);
-                let share = (from - origin).perp_dot(along) / turn;
-                let hit = turn != 0.0 && (0.0..=1.0).contains(&share);
+                let fraction = (from - origin).perp_dot(along) / turn;
+                let hit = turn != 0.0 && (0.0..=1.0).contains(&fraction);
                 [hit.then(|| (from - origin).perp_dot(across) / turn), None]
             }
             Piece::Arc { centre, radius, .. } => {
@@ -51,7 +51,7 @@ impl Piece {
                 if square < 0.0 || a == 0.0 {
                     return [None, None];
                 }
-                let on = |share: &f64| self.faces(out + *share * along);
+                let on = |fraction: &f64| self.faces(out + *fraction * along);
                 [Some((-b - square.sqrt()) / a).filter(on), Some((-b + square.sqrt()) / a).filter(on)]
             }
         }

@@ -1,7 +1,7 @@
 //! The edge of what can be driven on: closed curves, with exact distance, side, rays and overlap.
 //!
-//! A point is drivable when a ray from it crosses the loops an odd number of times: inside the outer boundary, outside island and
-//! splitters. Loops are kept with the drivable side on their left.
+//! A point is drivable if a ray from it crosses the loops an odd number of times, that is, inside the outer boundary
+//! and outside the islands. Loops have the drivable side on their left.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -10,7 +10,7 @@ use glam::DVec2;
 use super::offset::grown;
 use super::{Curve, Piece};
 
-/// Closed loops that part the drivable surface from what is solid.
+/// Closed loops that separate the drivable surface from the solid area.
 #[derive(Debug, Clone)]
 pub struct Outline {
     /// The loops, each with the drivable side on its left.
@@ -19,7 +19,7 @@ pub struct Outline {
     rises: Vec<Rise>,
 }
 
-/// A piece with what its distance needs, computed once.
+/// A piece with precomputed values for its distance.
 #[derive(Debug, Clone, Copy)]
 struct Placed {
     piece: Piece,
@@ -59,8 +59,8 @@ impl Placed {
     }
 }
 
-/// A stretch of the outline along which y only rises or only falls; neighbours share their ends to the last bit, so that a horizontal
-/// ray through a vertex is counted once.
+/// A stretch of the outline along which y only rises or only falls. Neighbours have bit-identical ends, so that a
+/// horizontal ray through a vertex is counted once.
 #[derive(Debug, Clone, Copy)]
 struct Rise {
     from: DVec2,
@@ -97,7 +97,7 @@ impl Outline {
         Outline { loops, pieces, rises: rises.concat() }
     }
 
-    /// Distance from `p` to the nearest point of the outline, whichever side `p` is on [m].
+    /// Unsigned distance from `p` to the outline \[m].
     pub fn distance(&self, p: DVec2) -> f64 {
         nearest(&self.pieces, p)
     }
@@ -107,13 +107,13 @@ impl Outline {
         odd(&self.rises, p)
     }
 
-    /// Distance from `p` to the outline, positive on the drivable surface, negative in what is solid [m].
+    /// Distance from `p` to the outline, positive on the drivable surface, negative in the solid area \[m].
     pub fn signed_distance(&self, p: DVec2) -> f64 {
         if self.contains(p) { self.distance(p) } else { -self.distance(p) }
     }
 
-    /// Distance along the ray from `origin` in `direction` (of length 1) to the outline; `range` where nothing is met before, 0 from
-    /// inside a solid [m].
+    /// Distance along the ray from `origin` in `direction` (of length 1) to the outline; `range` where nothing is met
+    /// before, 0 from inside a solid \[m].
     pub fn ray(&self, origin: DVec2, direction: DVec2, range: f64) -> f64 {
         if !self.contains(origin) {
             return 0.0;
@@ -122,10 +122,10 @@ impl Outline {
         hits.filter(|&hit| 0.0 <= hit).fold(range, f64::min)
     }
 
-    /// Whether the rectangle with these corners, in order around it, shares a point with anything solid.
+    /// Whether the rectangle with these corners, in order around it, touches the solid area.
     pub fn intersects_rectangle(&self, corners: &[DVec2; 4]) -> bool {
         let edges: [Piece; 4] = std::array::from_fn(|i| Piece::Segment { from: corners[i], to: corners[(i + 1) % 4] });
-        // A solid's boundary that meets no edge lies wholly inside the rectangle or wholly outside it.
+        // A loop that meets no edge lies completely inside the rectangle or completely outside it.
         let within = |p: DVec2| {
             let sides = edges.map(|edge| (edge.end() - edge.start()).perp_dot(p - edge.start()));
             sides.iter().all(|&side| 0.0 <= side) || sides.iter().all(|&side| side <= 0.0)
@@ -135,7 +135,7 @@ impl Outline {
             || self.loops.iter().any(|curve| within(curve.point_at(0.0)))
     }
 
-    /// The corners (west south, east north) of the smallest upright rectangle around the outline [m].
+    /// The corners (west south, east north) of the smallest upright rectangle around the outline \[m].
     pub fn bounds(&self) -> (DVec2, DVec2) {
         let ends = self.rises.iter().flat_map(|rise| {
             let bulge = rise.arc.and_then(|(centre, radius, side)| {
@@ -147,11 +147,13 @@ impl Outline {
         ends.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
     }
 
-    /// What suffices for signed distances of points within `radius` of `centre`: far fewer pieces than the whole.
+    /// The part of the outline that suffices for signed distances of points within `radius` of `centre`: far fewer
+    /// pieces than the whole.
     pub fn near(&self, centre: DVec2, radius: f64) -> Nearby {
         let distances: Vec<f64> = self.pieces.iter().map(|placed| placed.distance(centre)).collect();
         let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
-        // A point within `radius` is at most `least + radius` from the outline and sees each piece at most `radius` nearer than the centre.
+        // A point within `radius` is at most `least + radius` from the outline and sees each piece at most `radius`
+        // nearer than the centre.
         let reach = least + 2.0 * radius + 1e-9;
         let pieces = self.pieces.iter().zip(&distances).filter(|&(_, &distance)| distance <= reach).map(|(placed, _)| *placed).collect();
         let side = if radius < least {
@@ -163,13 +165,14 @@ impl Outline {
         Nearby { pieces, side }
     }
 
-    /// The outline with everything solid grown by `distance`: at every point of the new outline the old one is `distance` away [m].
+    /// The outline with the solid area grown by `distance`: every point of the new outline is `distance` from the old
+    /// one \[m].
     pub fn offset(&self, distance: f64) -> Outline {
         Outline::new(grown(self, distance))
     }
 }
 
-/// A part of an [`Outline`] that gives exact signed distances around one place.
+/// A part of an [`Outline`] that gives exact signed distances in one neighbourhood.
 #[derive(Debug, Clone)]
 pub struct Nearby {
     pieces: Vec<Placed>,
@@ -178,15 +181,15 @@ pub struct Nearby {
 
 #[derive(Debug, Clone)]
 enum Side {
-    /// No outline comes this near: every point is on one side.
+    /// No outline within the radius: all points are on one side.
     Same(bool),
     /// The stretches that a ray to the east from any of the points may cross.
     Mixed(Vec<Rise>),
 }
 
 impl Nearby {
-    /// Distance from `p` to the whole outline, positive on the drivable surface; exact for the points that [`Outline::near`] was asked
-    /// about [m].
+    /// Signed distance from `p` to the whole outline, exact for points within the radius given to [`Outline::near`]
+    /// \[m].
     pub fn signed_distance(&self, p: DVec2) -> f64 {
         let drivable = match &self.side {
             Side::Same(drivable) => *drivable,

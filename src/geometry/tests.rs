@@ -1,4 +1,4 @@
-//! Exact geometry against brute force: dense polylines stand for the arcs.
+//! Exact geometry against brute force on dense polylines.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -6,7 +6,8 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// A square of 60 m with rounded corners, two of them fillets of 4 m and 0.3 m turning into the road, around a round island and a splitter.
+/// A square of 60 m with rounded corners, two of them fillets of 4 m and 0.3 m turning into the road, around a round
+/// island and a splitter.
 fn outline() -> Outline {
     let bend = |x: f64, y: f64, radius: f64| Bend { at: DVec2::new(x, y), radius };
     let square = [
@@ -49,9 +50,9 @@ proptest! {
     }
 
     #[test]
-    fn what_is_near_gives_the_distances_of_the_whole(centre in point(), radius in 0.0..6.0, angle in 0.0..TAU, share in 0.0..1.0) {
+    fn what_is_near_gives_the_distances_of_the_whole(centre in point(), radius in 0.0..6.0, angle in 0.0..TAU, fraction in 0.0..1.0) {
         let outline = outline();
-        let p = centre + DVec2::from_angle(angle) * radius * share;
+        let p = centre + DVec2::from_angle(angle) * radius * fraction;
         prop_assert_eq!(outline.near(centre, radius).signed_distance(p), outline.signed_distance(p));
     }
 
@@ -61,7 +62,8 @@ proptest! {
         let direction = DVec2::from_angle(angle);
         let ray = outline.ray(origin, direction, 20.0);
         if outline.contains(origin) {
-            // No chord is crossed before the ray's end, and the end lies on the outline: grazing rays have no sharper test.
+            // No chord is crossed before the ray's end, and the end lies on the outline: grazing rays have no sharper
+            // test.
             let clear = |&(from, to): &(DVec2, DVec2)| Piece::Segment { from: origin, to: origin + direction * (ray - 0.01).max(0.0) }.meetings(&Piece::Segment { from, to }).is_empty();
             prop_assert!(ray < 0.02 || chords(&outline).iter().all(clear));
             prop_assert!(ray == 20.0 || outline.distance(origin + direction * ray) < 1e-9);

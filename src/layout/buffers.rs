@@ -1,11 +1,9 @@
-//! The buffers that shaders see: one bind group, a binding each, in this order.
+//! The buffers that the kernels of a step see: one bind group, a binding each, in this order.
 
 use glam::Vec2;
 
-use super::shared::{Shared, comment};
-use super::{
-    Action, BatchFacts, Clearance, Control, FieldRow, Params, PreviewRow, Progress, Ray, RewardTerms, RouteRow, Truck, WaypointRow,
-};
+use super::{Action, BatchFacts, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, RouteRow, Start, WaypointRow};
+use crate::shared::{Named, Shared, comment};
 
 /// What shaders may do to a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,84 +12,130 @@ pub enum Access {
     Read,
     /// Read and write it.
     ReadWrite,
-    /// Count in it.
+    /// Add to its words from all threads at once.
     Count,
 }
 
-/// One buffer.
-#[derive(Debug, Clone, Copy)]
-pub struct Buffer {
-    /// Its name in WGSL; that of the column for those of a batch.
-    pub name: &'static str,
-    /// What it holds.
-    pub doc: &'static str,
-    /// Type of an element in WGSL.
-    pub element: fn() -> String,
-    /// Whether it is one element rather than an array of them.
-    pub single: bool,
+/// What a buffer is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Buffer {
+    /// What trucks share.
+    Table(Table),
+    /// A column of the batch.
+    Column(Column),
+    /// Sums over all steps.
+    Tally,
+}
+
+crate::named! {
+    /// What trucks share: first the world, then what belongs to one batch.
+    pub enum Table {
+        /// Vehicle, time and weights.
+        Params = "params",
+        /// The action table.
+        Actions = "actions",
+        /// The distance sensors.
+        Rays = "rays",
+        /// A field for each roundabout.
+        Fields = "fields",
+        /// Cells of all fields.
+        Cells = "cells",
+        /// Blocks of distances of all fields.
+        Corners = "corners",
+        /// Every route's waypoints.
+        Waypoints = "waypoints",
+        /// What is observed at each of them.
+        Previews = "previews",
+        /// Every route.
+        Routes = "routes",
+        /// Facts that the trucks of a batch share.
+        Batch = "batch",
+        /// Routes that episodes run on.
+        Choice = "choice",
+        /// Where trucks begin when the caller says so.
+        Starts = "starts",
+    }
+}
+
+/// Tables in the bind group.
+pub const N_TABLES: usize = Table::ALL.len();
+/// Buffers in the bind group: tables, columns, tally.
+pub const N_BUFFERS: usize = N_TABLES + N_COLUMNS + 1;
+
+/// Every buffer; its index is its binding.
+pub const BUFFERS: [Buffer; N_BUFFERS] = {
+    let mut buffers = [Buffer::Tally; N_BUFFERS];
+    let mut binding = 0;
+    while binding < N_BUFFERS - 1 {
+        buffers[binding] =
+            if binding < N_TABLES { Buffer::Table(Table::ALL[binding]) } else { Buffer::Column(Column::ALL[binding - N_TABLES]) };
+        binding += 1;
+    }
+    buffers
+};
+
+impl Buffer {
+    /// Its name in WGSL.
+    pub fn name(self) -> &'static str {
+        match self {
+            Buffer::Table(table) => table.name(),
+            Buffer::Column(column) => column.name(),
+            Buffer::Tally => "tally",
+        }
+    }
+
     /// What shaders may do.
-    pub access: Access,
+    pub fn access(self) -> Access {
+        match self {
+            Buffer::Table(_) => Access::Read,
+            Buffer::Column(_) => Access::ReadWrite,
+            Buffer::Tally => Access::Count,
+        }
+    }
+
+    /// What it holds, and its type in WGSL.
+    fn declared(self) -> (String, String) {
+        match self {
+            Buffer::Table(table) => table.declared(),
+            Buffer::Column(column) => (format!("{}, {}.", column.doc(), column.shape()), format!("array<{}>", column.element())),
+            Buffer::Tally => {
+                ("Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].".to_owned(), "array<atomic<u32>>".to_owned())
+            }
+        }
+    }
 }
 
-const fn single(name: &'static str, doc: &'static str, element: fn() -> String) -> Buffer {
-    Buffer { name, doc, element, single: true, access: Access::Read }
+impl Table {
+    fn declared(self) -> (String, String) {
+        fn rows<T: Shared>() -> String {
+            format!("array<{}>", T::element())
+        }
+        let (doc, kind) = match self {
+            Table::Params => ("Vehicle, time and weights.", Params::wgsl()),
+            Table::Actions => ("The action table.", rows::<Action>()),
+            Table::Rays => ("The distance sensors, trailer's first.", rows::<Ray>()),
+            Table::Fields => ("A field for each roundabout.", rows::<FieldRow>()),
+            Table::Cells => ("Cells of all fields: of each first its own, then those for marching.", rows::<u32>()),
+            Table::Corners => ("Blocks of distances of all fields; a pair is the southern and the northern one [m].", rows::<Vec2>()),
+            Table::Waypoints => ("Every route's waypoints, one route after the other.", rows::<WaypointRow>()),
+            Table::Previews => ("What is observed at each of them.", rows::<PreviewRow>()),
+            Table::Routes => ("Every route.", rows::<RouteRow>()),
+            Table::Batch => ("Facts that the trucks of a batch share.", BatchFacts::wgsl()),
+            Table::Choice => ("Routes that episodes run on: to be drawn from, or one for each truck.", rows::<u32>()),
+            Table::Starts => ("Where each truck begins when the caller says so, [n_envs].", rows::<Start>()),
+        };
+        (doc.to_owned(), kind)
+    }
 }
-
-const fn table(name: &'static str, doc: &'static str, element: fn() -> String) -> Buffer {
-    Buffer { name, doc, element, single: false, access: Access::Read }
-}
-
-const fn column(name: &'static str, doc: &'static str, element: fn() -> String) -> Buffer {
-    Buffer { name, doc, element, single: false, access: Access::ReadWrite }
-}
-
-/// Buffers in the bind group.
-pub const N_BUFFERS: usize = 23;
-/// The first column of a batch. Before it stand the tables of the world, then the batch's facts and routes.
-pub const FIRST_COLUMN: usize = 11;
-
-/// Every buffer; its place is its binding.
-pub const BUFFERS: [Buffer; N_BUFFERS] = [
-    single("params", "Vehicle, time and weights.", Params::wgsl),
-    table("actions", "The action table.", Action::wgsl),
-    table("rays", "The distance sensors, trailer's first.", Ray::wgsl),
-    table("fields", "A field for each roundabout.", FieldRow::wgsl),
-    table("cells", "Cells of all fields: of each first its own, then those for marching.", u32::wgsl),
-    table("corners", "Blocks of distances of all fields; a pair is the southern and the northern one [m].", Vec2::wgsl),
-    table("waypoints", "Every route's waypoints, one route after the other.", WaypointRow::wgsl),
-    table("previews", "What is observed at each of them.", PreviewRow::wgsl),
-    table("routes", "Every route.", RouteRow::wgsl),
-    single("batch", "What the trucks of a batch share.", BatchFacts::wgsl),
-    table("choice", "Routes that episodes run on: to be drawn from, or one a truck.", u32::wgsl),
-    column("action", "Index into the action table, [n_envs].", u32::wgsl),
-    column("control", "What drives each truck, [n_envs].", Control::wgsl),
-    column("truck", "The trucks, [n_envs].", Truck::wgsl),
-    column("clearance", "Distances to the kerbs, [n_envs].", Clearance::wgsl),
-    column("progress", "Places along the routes, [n_envs].", Progress::wgsl),
-    column("ranges", "Distance sensors [m], [n_envs, N_RAYS].", f32::wgsl),
-    column("observation", "What the next action sees, [n_envs, N_VALUES].", f32::wgsl),
-    column("next_observation", "What the last action led to, [n_envs, N_VALUES].", f32::wgsl),
-    column("ended", "Why each episode ended in the step just made, [n_envs].", u32::wgsl),
-    column("terms", "What the reward weighs, [n_envs].", RewardTerms::wgsl),
-    column("reward", "Rewards of the step just made, [n_envs].", f32::wgsl),
-    Buffer {
-        name: "tally",
-        doc: "Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].",
-        element: u32::wgsl,
-        single: false,
-        access: Access::Count,
-    },
-];
 
 /// The declarations in WGSL.
-pub(super) fn printed() -> String {
+pub(crate) fn printed() -> String {
     let mut printed = String::new();
-    for (binding, Buffer { name, doc, element, single, access }) in BUFFERS.iter().enumerate() {
-        let element = if *access == Access::Count { format!("atomic<{}>", element()) } else { element() };
-        let mode = if *access == Access::Read { "read" } else { "read_write" };
-        let kind = if *single { element } else { format!("array<{element}>") };
+    for (binding, buffer) in BUFFERS.into_iter().enumerate() {
+        let (doc, kind) = buffer.declared();
+        let mode = if buffer.access() == Access::Read { "read" } else { "read_write" };
         printed += &comment("", &[&format!(" {doc}")]);
-        printed += &format!("@group(0) @binding({binding}) var<storage, {mode}> {name}: {kind};\n");
+        printed += &format!("@group(0) @binding({binding}) var<storage, {mode}> {}: {kind};\n", buffer.name());
     }
     printed
 }

@@ -1,7 +1,8 @@
-//! A kerb or a lane of one carriageway: bends on the way from the arm's end towards the ring, and the arc that leads into the ring.
+//! A kerb or a lane of one carriageway: bends on the way from the arm's end towards the ring, and the arc that leads
+//! into the ring.
 //!
-//! Kept as seen by a driver who enters: `along` the arm's bearing, `offset` to the driver's right. An exit is the mirror image of an entry
-//! until it is placed.
+//! Coordinates are those of an entry: x along the arm's bearing, y to the right of a vehicle that enters. An exit is
+//! stored as its mirror image.
 
 use glam::DVec2;
 
@@ -22,7 +23,7 @@ impl Way {
         }
     }
 
-    /// From an entering driver's frame into the world.
+    /// From the alignment's frame into the world.
     pub(super) fn placed(self, curve: &Curve, bearing: f64) -> Curve {
         match self {
             Way::Entry => curve.turned(bearing),
@@ -39,15 +40,15 @@ impl Way {
 /// Why an alignment is no curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Fault {
-    /// The arc at this point does not fit; the largest radius that does [m].
+    /// The arc at this point does not fit; largest radius that does \[m].
     Point(usize, f64),
     /// No arc of `ring_radius` leads the last straight into the ring.
     Ring,
     /// The last straights of two arms do not meet.
     Apart,
-    /// The arc between two arms does not fit; the largest radius that does [m].
+    /// The arc between two arms does not fit; largest radius that does \[m].
     Corner(f64),
-    /// The arc at this point of the next arm does not fit; the largest radius that does [m].
+    /// The arc at this point of the next arm does not fit; largest radius that does \[m].
     NextPoint(usize, f64),
 }
 
@@ -59,8 +60,8 @@ pub(super) struct Alignment {
 }
 
 impl Alignment {
-    /// From the arm's end until it touches the circle of radius `circle` around the ring's centre, and the direction from the centre to
-    /// that point [rad].
+    /// The curve from the arm's end to where it touches the circle of radius `circle` around the ring's centre, and the
+    /// direction from the centre to that point \[rad].
     pub(super) fn lead(&self, circle: f64) -> Result<(Curve, f64), Fault> {
         let (legs, origin, direction) = self.last_straight();
         let (arc, arrival) = to_circle(origin, direction, circle, self.ring_radius).ok_or(Fault::Ring)?;
@@ -71,8 +72,8 @@ impl Alignment {
         Ok((curve, arrival))
     }
 
-    /// The alignment `distance` to the left of this one, which leads to the circle of radius `circle`; `None` where a bend is too sharp
-    /// for it [m].
+    /// The alignment `distance` to the left of this one, which leads to the circle of radius `circle`; `None` if a bend
+    /// is too sharp for it \[m].
     pub(super) fn beside(&self, distance: f64, circle: f64) -> Option<Alignment> {
         let n = self.bends.len();
         let direction = |index: usize| (self.bends[index + 1].at - self.bends[index].at).normalize_or_zero();
@@ -96,20 +97,21 @@ impl Alignment {
         (0.0 < ring_radius).then_some(Alignment { bends, ring_radius })
     }
 
-    /// All bends but the aim, and the last straight: where it begins, and its direction.
+    /// All bends but the last, and the origin and direction of the last straight.
     fn last_straight(&self) -> (&[Bend], DVec2, DVec2) {
         let n = self.bends.len();
         let origin = self.bends[n - 2].at;
         (&self.bends[..n - 1], origin, (self.bends[n - 1].at - origin).normalize_or_zero())
     }
 
-    /// The arm's end is no point of the file: the points count from the bend after it.
+    /// The first bend is the arm's end, which is not a point of the file: point 0 is bend 1.
     fn fault(&self, misfit: Misfit) -> Fault {
         if misfit.bend == 0 || self.bends.len() <= misfit.bend + 1 { Fault::Ring } else { Fault::Point(misfit.bend - 1, misfit.largest) }
     }
 }
 
-/// The curve from the end of one arm to the end of the next that leaves the ring aside: the last straights meet, rounded by `radius` [m].
+/// The curve from the end of one arm to the end of the next outside the ring: the corner of the last straights, rounded
+/// by `radius` \[m].
 pub(super) fn around(entry: (&Alignment, f64), exit: (&Alignment, f64), radius: f64) -> Result<Curve, Fault> {
     let placed = |alignment: &Alignment, way: Way, bearing: f64| -> Vec<Bend> {
         alignment.bends.iter().map(|bend| Bend { at: way.point(bend.at, bearing), radius: bend.radius }).collect()
@@ -120,13 +122,13 @@ pub(super) fn around(entry: (&Alignment, f64), exit: (&Alignment, f64), radius: 
     let (from, after_from) = (bends[bends.len() - 1].at, after[after.len() - 1].at);
     let (ahead, after_ahead) = (aim.at - from, after_aim.at - after_from);
     let turn = ahead.perp_dot(after_ahead);
-    let share = (after_from - from).perp_dot(after_ahead) / turn;
-    let after_share = (after_from - from).perp_dot(ahead) / turn;
-    if !(share.is_finite() && 0.0 < share && 0.0 < after_share) {
+    let fraction = (after_from - from).perp_dot(after_ahead) / turn;
+    let after_fraction = (after_from - from).perp_dot(ahead) / turn;
+    if !(fraction.is_finite() && 0.0 < fraction && 0.0 < after_fraction) {
         return Err(Fault::Apart);
     }
     let corner = bends.len();
-    bends.push(Bend { at: from + share * ahead, radius });
+    bends.push(Bend { at: from + fraction * ahead, radius });
     let total = bends.len() + after.len();
     bends.extend(after.into_iter().rev());
     rounded(&bends, false).map_err(|misfit| match misfit.bend {

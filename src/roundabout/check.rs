@@ -1,25 +1,28 @@
-//! What can be wrong between the parts of a roundabout: arcs that do not fit, kerbs that cross, lanes that run into a kerb.
+//! Faults between the parts of a roundabout: arcs that do not fit, kerbs that cross, lanes that meet a kerb or each
+//! other.
 
 use glam::DVec2;
 
 use super::alignment::{Fault, Way};
 use super::lane::Lanes;
-use super::written::{Arm, Ring};
+use super::roundabout_keys::{Arm, Ring};
 use crate::geometry::{Curve, Outline};
+use crate::reader::{Error, Reader, differing, shown};
 use crate::route::Lane;
-use crate::scenario::{Error, Reader};
 
-/// Half the width of a truck: a lane's centre line nearer to a kerb than this cannot be driven [m].
+/// Half the width of a truck and 5 cm: a lane whose centre line is nearer to a kerb cannot be driven \[m].
 const NEAREST: f64 = 1.3;
+/// Width of a truck: two lanes whose centre lines are nearer to each other cannot both be driven \[m].
+const LANES_APART: f64 = 2.5;
 
 /// A rounding arc that does not fit between its neighbours.
 pub(super) fn too_large(reader: &Reader, key: &str, radius: f64, largest: f64) -> Error {
-    // Down to whole centimetres, so that the number named does fit.
+    // Rounded down to centimetres, so that the radius in the message does fit.
     let largest = (largest * 100.0).floor() / 100.0;
-    reader.invalid(key, format_args!("{radius} m"), format!("does not fit between its neighbours: at most {largest} m"))
+    reader.invalid(key, format_args!("{} m", shown(radius)), format!("does not fit between its neighbours: at most {} m", shown(largest)))
 }
 
-/// An alignment that is no curve. `corner` is the key of the arc between this arm and the next, where there is one.
+/// An alignment that gives no curve. `corner` is the key of the arc between this arm and the next, if there is one.
 pub(super) fn fault(reader: &Reader, arms: &[Arm], arm: usize, corner: Option<&str>, part: &str, way: Way, fault: Fault) -> Error {
     let next = (arm + 1) % arms.len();
     let alignment = |arm: usize, way: Way| {
@@ -42,34 +45,34 @@ pub(super) fn fault(reader: &Reader, arms: &[Arm], arm: usize, corner: Option<&s
         Fault::Corner(largest) => too_large(reader, &corner_key, corner_radius, largest),
         Fault::Apart => reader.invalid(
             corner_key,
-            format_args!("{corner_radius} m"),
+            format_args!("{} m", shown(corner_radius)),
             format!("the last straights of {} and {} do not meet ahead of both", arms[arm].name, arms[next].name),
         ),
         Fault::Ring => reader.invalid(
             format!("arm[{arm}].{}.{part}.ring_radius", way.name()),
-            format_args!("{} m", alignment(arm, way).ring_radius),
+            format_args!("{} m", shown(alignment(arm, way).ring_radius)),
             "no such arc leads the last straight into the ring after the last point: aim nearer to the centre or change the radius",
         ),
     }
 }
 
-/// Two arms whose kerbs would need `length` metres of ring between them, a negative length.
+/// Two arms that overlap: `length` of ring is left between their kerbs, a negative length \[m].
 pub(super) fn no_room(reader: &Reader, arms: &[Arm], arm: usize, length: f64) -> Error {
     let next = &arms[(arm + 1) % arms.len()];
     reader.invalid(
         format!("arm[{arm}].entry.kerb"),
-        format_args!("{:.2} m of ring left before {}", length, next.name),
+        format_args!("{} m of ring left before {}", differing(length, 0.0), next.name),
         format!("arms {} and {} overlap: move them apart, or join their kerbs with corner.kerb_radius", arms[arm].name, next.name),
     )
 }
 
-/// A way through that would leave the ring before it arrives there.
+/// A route that would have to leave the ring before it arrives there.
 pub(super) fn backwards(reader: &Reader, arms: &[Arm], entry: usize, lane: Lane, exit: u32, length: f64) -> Error {
     let to = &arms[(entry + exit as usize) % arms.len()].name;
     reader.invalid(
         format!("arm[{entry}].entry.{}", lane.name()),
-        format_args!("{length:.2} m of ring on the way to {to}"),
-        "must not be negative nor a whole turn: change ring_radius, or give corner.lane_radius where it is the right lane's first exit",
+        format_args!("{} m of ring on the way to {to}", differing(length, 0.0)),
+        "must lie between 0 and a whole turn: change ring_radius, or give corner.lane_radius if it is the right lane's first exit",
     )
 }
 
@@ -87,7 +90,7 @@ pub(super) fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) ->
     for first in 0..n {
         for second in first..n {
             if cross(&corners[first], (first != second).then_some(&corners[second])) {
-                // Corners follow their arms: neighbouring corners share the arm between them.
+                // Corner i lies between arms i and i + 1: neighbouring corners have the arm between them in common.
                 let (a, b) = if first == second { (first, (first + 1) % n) } else { (first, second) };
                 return Err(reader.invalid(
                     format!("arm[{b}]"),
@@ -118,7 +121,7 @@ pub(super) fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) ->
     Ok(())
 }
 
-/// Whether two curves cross, or, without a second, whether the first crosses itself away from its joints.
+/// Whether two curves cross or, without a second, whether the first crosses itself other than at its joints.
 fn cross(curve: &Curve, other: Option<&Curve>) -> bool {
     let joint = |index: usize, p: DVec2| p.distance(curve.pieces[index].end()) < 1e-6;
     (0..curve.pieces.len()).any(|index| {
@@ -133,19 +136,17 @@ fn cross(curve: &Curve, other: Option<&Curve>) -> bool {
     })
 }
 
-/// A splitter island keeps out of the ring and of the loops placed before it.
+/// A splitter island lies outside the ring and does not meet the earlier loops.
 pub(super) fn splitter(reader: &Reader, ring: &Ring, arm: usize, island: &Curve, loops: &[Curve]) -> Result<(), Error> {
     let key = format!("arm[{arm}].splitter");
     let refused = |value: String, expected: &str| Err(reader.invalid(&key, value, expected));
     if cross(island, None) {
         return refused("crosses itself".into(), "corners must go around the island once");
     }
-    let nearest = island.distance(DVec2::ZERO);
-    if nearest < ring.outer() - ring.gutter {
-        return refused(
-            format!("{nearest:.2} m from the ring's centre"),
-            &format!("must stay out of the ring: {:.2} m", ring.outer() - ring.gutter),
-        );
+    let (nearest, edge) = (island.distance(DVec2::ZERO), ring.outer() - ring.gutter);
+    if nearest < edge {
+        let value = format!("{} m from the ring's centre", differing(nearest, edge));
+        return refused(value, &format!("must stay out of the ring: {} m", shown(edge)));
     }
     if loops.iter().any(|other| cross(island, Some(other))) || !Outline::new(loops.to_vec()).contains(island.point_at(0.0)) {
         return refused("meets a kerb".into(), "must lie on the road, away from the kerbs and other islands");
@@ -166,17 +167,63 @@ pub(super) fn lanes_clear_of_kerbs(reader: &Reader, kerbs: &Outline, arms: &[Arm
     Ok(())
 }
 
-fn clear(reader: &Reader, kerbs: &Outline, curve: &Curve, key: &str) -> Result<(), Error> {
+/// The lanes of an arm lie beside each other from the arm's end to the ring; those that enter lie left of those that
+/// leave, seen from the ring.
+///
+/// At the arm's end, where all lanes are parallel, their order is checked. Beyond, no two may come nearer than
+/// [`LANES_APART`], so none crosses another.
+pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lanes) -> Result<(), Error> {
+    const FROM_LEFT: [(Way, Lane); 4] =
+        [(Way::Entry, Lane::Right), (Way::Entry, Lane::Left), (Way::Exit, Lane::Left), (Way::Exit, Lane::Right)];
+    let named = |(way, lane): (Way, Lane)| format!("{}.{}", way.name(), lane.name());
+    for (index, arm) in arms.iter().enumerate() {
+        let curve = |(way, lane)| lanes.curve(index, way, lane);
+        let left = DVec2::from_angle(arm.bearing).perp();
+        let offset = |lane: (Way, Lane)| curve(lane).point_at(if lane.0 == Way::Entry { 0.0 } else { f64::INFINITY }).dot(left);
+        for pair in FROM_LEFT.windows(2) {
+            if offset(pair[0]) - offset(pair[1]) < LANES_APART {
+                return Err(reader.invalid(
+                    format!("arm[{index}].{}", named(pair[0])),
+                    format_args!("{:.2} m left of the bearing at the arm's end", offset(pair[0])),
+                    format!(
+                        "must lie at least {LANES_APART} m left of {}, which is at {:.2} m: move the kerbs apart, or give the lanes' points",
+                        named(pair[1]),
+                        offset(pair[1])
+                    ),
+                ));
+            }
+        }
+        for (first, &one) in FROM_LEFT.iter().enumerate() {
+            for &other in &FROM_LEFT[first + 1..] {
+                let distance = |p: DVec2| curve(other).distance(p);
+                if let Some(p) = stations(curve(one)).map(|s| curve(one).point_at(s)).find(|&p| distance(p) < LANES_APART) {
+                    return Err(reader.invalid(
+                        format!("arm[{index}].{}", named(one)),
+                        format_args!("{} m from {} at ({:.1}, {:.1})", differing(distance(p), LANES_APART), named(other), p.x, p.y),
+                        format!("the centre lines of an arm's lanes must keep {LANES_APART} m from each other"),
+                    ));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Stations along a curve at which it is checked \[m].
+fn stations(curve: &Curve) -> impl Iterator<Item = f64> {
     const STEP: f64 = 0.25;
-    let length = curve.length();
+    (0..=(curve.length() / STEP) as usize).map(|step| step as f64 * STEP)
+}
+
+fn clear(reader: &Reader, kerbs: &Outline, curve: &Curve, key: &str) -> Result<(), Error> {
     // An arm's end is a solid edge that every lane meets.
-    let free = 2.0 * NEAREST..length - 2.0 * NEAREST;
-    let stations = (0..=(length / STEP) as usize).map(|step| step as f64 * STEP).filter(|s| free.contains(s));
+    let free = 2.0 * NEAREST..curve.length() - 2.0 * NEAREST;
+    let stations = stations(curve).filter(|s| free.contains(s));
     match stations.map(|s| curve.point_at(s)).find(|&p| kerbs.signed_distance(p) < NEAREST) {
         None => Ok(()),
-        Some(place) => Err(reader.invalid(
+        Some(p) => Err(reader.invalid(
             key,
-            format_args!("{:.2} m from a kerb at ({:.1}, {:.1})", kerbs.signed_distance(place), place.x, place.y),
+            format_args!("{} m from a kerb at ({:.1}, {:.1})", differing(kerbs.signed_distance(p), NEAREST), p.x, p.y),
             format!("a lane's centre line must keep {NEAREST} m from every kerb and splitter island"),
         )),
     }

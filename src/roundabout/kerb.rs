@@ -1,4 +1,5 @@
-//! The outline of a roundabout: a kerb from each arm to the next, arms closed at their ends, central and splitter islands.
+//! The outline of a roundabout: a kerb from each arm to the next, arms closed at their ends, central and splitter
+//! islands.
 
 use std::f64::consts::TAU;
 
@@ -6,11 +7,11 @@ use glam::DVec2;
 
 use super::alignment::{Way, around, ring_arc};
 use super::check;
-use super::written::{Arm, Ring};
+use super::roundabout_keys::{Arm, Ring};
 use crate::geometry::{Curve, Outline, Piece, rounded, wrapped};
-use crate::scenario::{Error, Reader};
+use crate::reader::{Error, Reader};
 
-/// The kerb faces as an outline; fails where they cross each other.
+/// The kerb faces as an outline. Fails if they cross each other.
 pub(super) fn kerbs(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<Outline, Error> {
     let corners: Vec<Curve> = (0..arms.len()).map(|arm| corner(reader, ring, arms, arm)).collect::<Result<_, _>>()?;
     check::corners_apart(reader, arms, &corners)?;

@@ -1,4 +1,4 @@
-//! The centre lines of a roundabout's lanes, checked to be joined smoothly, and the ways through that they make.
+//! The centre lines of a roundabout's lanes, and the routes that they form.
 
 use std::f64::consts::TAU;
 
@@ -7,21 +7,22 @@ use glam::DVec2;
 use super::alignment::{Way, around, ring_arc};
 use super::check;
 use super::kerb::corner;
-use super::written::{Arm, Ring};
+use super::roundabout_keys::{Arm, Ring};
 use crate::geometry::{Curve, Piece, wrapped};
+use crate::reader::{Error, Reader};
 use crate::route::Lane;
-use crate::scenario::{Error, Reader};
 
 /// One end of a route: from an arm's end to the ring, in the world.
 #[derive(Debug, Clone)]
 struct Lead {
-    /// Inwards for an entry, outwards for an exit.
+    /// In the direction of travel: inwards for an entry, outwards for an exit.
     curve: Curve,
-    /// Direction from the centre to where the curve meets the ring lane, relative to the arm's bearing, in (-pi, pi] [rad].
+    /// Direction from the centre to where the curve meets the ring lane, relative to the arm's bearing, in (-pi, pi]
+    /// \[rad].
     angle: f64,
 }
 
-/// Every lane of every arm, and the right lanes' ways to the first exit that pass outside the ring.
+/// Every lane of every arm, and the right lanes to the first exit that pass outside the ring.
 #[derive(Debug, Clone)]
 pub(super) struct Lanes {
     radii: [f64; 2],
@@ -33,7 +34,7 @@ pub(super) struct Lanes {
     around: Vec<Option<Curve>>,
 }
 
-/// Radius of a ring lane's centre line [m].
+/// Radius of a ring lane's centre line \[m].
 pub(super) fn radius(ring: &Ring, lane: Lane) -> f64 {
     let inner = ring.island_radius + ring.gutter + ring.lane_width / 2.0;
     match lane {
@@ -42,15 +43,15 @@ pub(super) fn radius(ring: &Ring, lane: Lane) -> f64 {
     }
 }
 
-/// The exits that each entry lane leads to, on a roundabout of so many arms; the last is a U-turn.
+/// The exits that each entry lane leads to on a roundabout of `n_arms`; the last is a U-turn.
 pub(super) fn exits(n_arms: usize) -> impl Iterator<Item = (Lane, u32)> {
     let n_arms = n_arms as u32;
     let left = n_arms.saturating_sub(2).max(1)..=n_arms;
     left.map(|exit| (Lane::Left, exit)).chain((1..=n_arms.min(2)).map(|exit| (Lane::Right, exit)))
 }
 
-/// Where a line first reaches and last leaves the circle of radius `outer` around the ring's centre; where it comes nearest to the centre
-/// if it passes outside [m].
+/// The stations at which a line first reaches and last leaves the circle of radius `outer` around the ring's centre; if
+/// it passes outside, the station nearest to the centre, twice \[m].
 pub(super) fn ring_stations(line: &Curve, outer: f64) -> (f64, f64) {
     let circle = Curve::circle(DVec2::ZERO, outer);
     let mut begin = 0.0;
@@ -65,7 +66,7 @@ pub(super) fn ring_stations(line: &Curve, outer: f64) -> (f64, f64) {
 }
 
 impl Lanes {
-    /// All lanes; fails where one does not lead into the ring or a way through would have to go backwards.
+    /// All lanes. Fails if a lane does not lead into the ring or a route would have to go backwards.
     pub(super) fn new(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<Lanes, Error> {
         let lead = |index: usize, way: Way, lane: Lane| -> Result<Lead, Error> {
             let arm = &arms[index];
@@ -106,12 +107,12 @@ impl Lanes {
         &leads[arm][lane as usize].curve
     }
 
-    /// The right lane's way from an arm to the next that leaves the ring aside, where there is one.
+    /// The right lane from an arm to the next outside the ring, if there is one.
     pub(super) fn first_exit(&self, arm: usize) -> Option<&Curve> {
         self.around[arm].as_ref()
     }
 
-    /// The whole way from the end of the entry arm to the end of the exit arm.
+    /// The whole route from the end of the entry arm to the end of the exit arm.
     pub(super) fn route(&self, entry: usize, lane: Lane, exit: u32) -> Curve {
         if let (true, Some(curve)) = (self.outside(entry, lane, exit), &self.around[entry]) {
             return curve.clone();
@@ -127,12 +128,12 @@ impl Lanes {
         line
     }
 
-    /// Whether a route leaves the ring aside.
+    /// Whether a route passes outside the ring.
     fn outside(&self, entry: usize, lane: Lane, exit: u32) -> bool {
         lane == Lane::Right && exit == 1 && self.around[entry].is_some()
     }
 
-    /// How far a route follows the ring; negative where it would have to leave before it arrives [rad].
+    /// The angle along which a route follows the ring; negative if it would have to leave before it arrives \[rad].
     fn sweep(&self, entry: usize, lane: Lane, exit: u32) -> f64 {
         let exit_arm = (entry + exit as usize) % self.bearings.len();
         let between = if exit_arm == entry { TAU } else { (self.bearings[exit_arm] - self.bearings[entry]).rem_euclid(TAU) };
@@ -140,7 +141,8 @@ impl Lanes {
     }
 }
 
-/// The right lane's way from an arm to the next where the kerb between them leaves the ring aside: beside that kerb, or by an arc of its own.
+/// The right lane from an arm to the next where it passes outside the ring: beside the kerb between them, or with an
+/// arc of its own.
 fn first_exit(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -> Result<Option<Curve>, Error> {
     let (arm, next) = (&arms[index], &arms[(index + 1) % arms.len()]);
     if let Some(radius) = arm.lane_corner {

@@ -1,40 +1,42 @@
-//! How a unit leans in a turn and when its wheels lift: one degree of freedom, a mass above a roll centre on springs and dampers.
+//! Roll of a unit in a turn, and when its wheels lift: one degree of freedom, a mass above a roll centre on springs and
+//! dampers.
 //!
-//! Quasi-static part after T. Gillespie, "Fundamentals of Vehicle Dynamics" (1992), chapter 9.
+//! The quasi-static part follows T. Gillespie, "Fundamentals of Vehicle Dynamics" (1992), chapter 9.
 
 use crate::layout::Roll;
 use crate::vehicle::GRAVITY;
 
-/// What makes a unit lean.
+/// Parameters of a unit's roll.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Suspension {
-    /// Height of the centre of gravity [m].
+    /// Height of the centre of gravity \[m].
     pub centre_of_gravity: f64,
-    /// Height of the roll centre [m].
+    /// Height of the roll centre \[m].
     pub roll_centre: f64,
-    /// Distance between the wheels of an axle [m].
+    /// Distance between the wheels of an axle \[m].
     pub track: f64,
-    /// Roll angle per lateral acceleration in units of gravity [rad].
+    /// Roll angle per lateral acceleration in units of gravity \[rad].
     pub roll_gain: f64,
-    /// Undamped natural frequency of the roll [Hz].
+    /// Undamped natural frequency of the roll \[Hz].
     pub roll_frequency: f64,
     /// Damping ratio of the roll, below 1.
     pub roll_damping: f64,
 }
 
 impl Suspension {
-    /// Lateral acceleration, held, at which the inner wheels lift, in units of gravity.
+    /// Constant lateral acceleration at which the inner wheels lift, in units of gravity.
     pub fn rollover_threshold(&self) -> f64 {
         let lever = self.centre_of_gravity - self.roll_centre;
         0.5 * self.track / (self.centre_of_gravity + self.roll_gain * lever)
     }
 
-    /// Load transfer ratio under a lateral acceleration held for long [m/s^2].
+    /// Load transfer ratio under a constant lateral acceleration [m/s^2].
     pub fn quasi_static_load_transfer_ratio(&self, lateral_acceleration: f64) -> f64 {
         lateral_acceleration / GRAVITY / self.rollover_threshold()
     }
 
-    /// The roll discretised exactly for sub-steps of `substep` seconds with the lateral acceleration held through each.
+    /// The exact discretisation of the roll for sub-steps of `substep` seconds, with constant lateral acceleration in
+    /// each.
     pub fn roll(&self, substep: f64) -> Roll {
         let Suspension { centre_of_gravity, roll_centre, track, roll_gain, roll_frequency, roll_damping } = *self;
         let natural = std::f64::consts::TAU * roll_frequency;
@@ -44,7 +46,7 @@ impl Suspension {
         let lag = roll_damping * natural / damped;
         let transition =
             [decay * (cos + lag * sin), decay * sin / damped, -decay * natural * natural / damped * sin, decay * (cos - lag * sin)];
-        // A held acceleration draws the state to its equilibrium, at rest at `settled` per m/s^2.
+        // Under constant acceleration the state converges to rest at a roll of `settled` per m/s^2.
         let settled = roll_gain / GRAVITY;
         let input = [(1.0 - transition[0]) * settled, -transition[2] * settled];
         let lever = centre_of_gravity - roll_centre;

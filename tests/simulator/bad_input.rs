@@ -1,11 +1,16 @@
-//! Wrong files: every scenario file is broken in every place, and each time the reader must answer with the file's name, never panic.
+//! Wrong files: every value of every scenario file is broken in turn, and the reader must return an error that names
+//! the file, never panic.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use offtrack::layout::Ended;
+use offtrack::reader::Error;
 use offtrack::roundabout::{Gutter, Roundabout};
-use offtrack::scenario::{Error, Scenario};
-use offtrack::simulator::{self, RouteChoice, Simulator};
+use offtrack::scenario::Scenario;
+use offtrack::simulator::{self, Engine, RouteChoice, Simulator};
 use offtrack::vehicle::Vehicle;
+use offtrack::world::World;
 use proptest::prelude::*;
 
 use crate::{batch_on, benchmark, engines};
@@ -14,7 +19,7 @@ fn scenarios() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
 }
 
-/// Every scenario file, relative to the folder of scenarios.
+/// Every scenario file, relative to `scenarios/`.
 fn files() -> Vec<PathBuf> {
     let mut files = Vec::new();
     for folder in ["", "roundabouts", "vehicles"] {
@@ -30,12 +35,12 @@ fn files() -> Vec<PathBuf> {
     files
 }
 
-/// Reads a file as what its folder says it is.
+/// Reads a file of the kind that belongs in its folder.
 fn read(path: &Path) -> Result<(), Error> {
     match path.parent().and_then(Path::file_name).and_then(|folder| folder.to_str()) {
         Some("roundabouts") => {
             let roundabout = Roundabout::read(path)?;
-            // What was accepted must be usable.
+            // An accepted roundabout must be usable.
             for gutter in [Gutter::Drivable, Gutter::Solid] {
                 assert!(roundabout.kerbs(gutter).signed_distance(glam::DVec2::new(3.0, -7.0)).is_finite());
             }
@@ -47,7 +52,7 @@ fn read(path: &Path) -> Result<(), Error> {
     }
 }
 
-/// A copy of all scenarios, so that one file at a time can be broken.
+/// A copy of all scenario files, so that one file at a time can be broken.
 fn copy() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for file in files() {
@@ -58,7 +63,7 @@ fn copy() -> tempfile::TempDir {
     folder
 }
 
-/// Reads the broken text in place of `file`; the error, if it is one, names that file or the one it led to.
+/// Reads the broken text instead of `file`. An error must name a file of the folder.
 fn broken(folder: &Path, file: &Path, text: &[u8]) -> Result<(), String> {
     let path = folder.join(file);
     std::fs::write(&path, text).unwrap();
@@ -96,15 +101,15 @@ fn values(text: &str) -> Vec<(usize, usize)> {
 }
 
 #[test]
-fn no_wrong_value_in_any_place_of_any_file_makes_a_reader_panic() {
+fn no_wrong_value_of_any_key_makes_a_reader_panic() {
     let folder = copy();
     let nasty = ["0", "-1.0", "nan", "inf", "-inf", "1e300", "1000000000", "0.001", "\"text\"", "true", "[]", "{}", "\"\""];
     let (mut tried, mut refused) = (0, 0);
     for file in files() {
         let text = std::fs::read_to_string(scenarios().join(&file)).unwrap();
-        let places = values(&text);
-        assert!(10 < places.len(), "{}: {} values found", file.display(), places.len());
-        for (from, to) in places {
+        let found = values(&text);
+        assert!(10 < found.len(), "{}: {} values found", file.display(), found.len());
+        for (from, to) in found {
             for value in nasty {
                 tried += 1;
                 refused +=
@@ -112,7 +117,7 @@ fn no_wrong_value_in_any_place_of_any_file_makes_a_reader_panic() {
             }
         }
     }
-    // Most of these values make no sense anywhere: a reader that accepts them checks nothing.
+    // Most of these values make no sense for any key: a reader that accepts them checks nothing.
     assert!(5000 < tried && 4 * tried < 5 * refused, "{refused} of {tried} refused");
 }
 
@@ -139,9 +144,10 @@ fn no_missing_line_cut_or_unknown_key_makes_a_reader_panic() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
-    fn no_scrambled_bytes_make_a_reader_panic(which in 0usize..12, edits in prop::collection::vec((any::<prop::sample::Index>(), 0x20u8..0x7f), 1..6)) {
+    fn no_scrambled_bytes_make_a_reader_panic(which in any::<prop::sample::Index>(), edits in prop::collection::vec((any::<prop::sample::Index>(), 0x20u8..0x7f), 1..6)) {
         let folder = copy();
-        let file = &files()[which];
+        let files = files();
+        let file = which.get(&files);
         let mut text = std::fs::read(scenarios().join(file)).unwrap();
         for (at, byte) in edits {
             let at = at.index(text.len());
@@ -172,6 +178,79 @@ fn a_wrong_value_is_named_with_file_key_value_and_what_would_do() {
     }
     let missing = Scenario::read(Path::new("no/such/file.toml")).unwrap_err().to_string();
     assert!(missing.contains("no/such/file.toml"), "{missing}");
+}
+
+#[test]
+fn a_route_that_leaves_no_room_for_the_whole_truck_is_refused_with_the_longest_that_fits() {
+    let folder = copy();
+    let file = Path::new("attard2023.toml");
+    let text = std::fs::read_to_string(scenarios().join(file)).unwrap();
+    for (part, too_long, reach) in [("approach", 65.0, "13.02 m of the arm behind"), ("departure", 68.0, "3.18 m of the arm ahead")] {
+        let with = |length: f64| text.replacen("[sensors]", &format!("[routes]\n{part} = {length}\n\n[sensors]"), 1);
+        let message = broken(folder.path(), file, with(too_long).as_bytes()).unwrap_err();
+        assert!(message.contains(&format!("routes.{part}: {too_long} m; the truck needs {reach}")), "{message}");
+        // The first roundabout that is too small is named: follow the messages down to a length that fits all of them.
+        let mut length = too_long;
+        for _ in 0..5 {
+            let Err(message) = broken(folder.path(), file, with(length).as_bytes()) else { break };
+            length = message.split("at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        }
+        assert!(40.0 < length && length < too_long, "{length}");
+        broken(folder.path(), file, with(length).as_bytes()).unwrap();
+        broken(folder.path(), file, with(length + 0.01).as_bytes()).unwrap_err();
+        // At the longest approach the truck starts clear of the solid edge that ends its arm, whatever its heading
+        // error.
+        if part == "approach" {
+            std::fs::write(folder.path().join("longest.toml"), with(length)).unwrap();
+            let mut world = World::bake(&Scenario::read(&folder.path().join("longest.toml")).unwrap()).unwrap();
+            // On some right lanes a truck that starts 0.3 m aside, turned by 2 deg, touches the kerb.
+            world.params.start_offset = 0.0;
+            let n_routes = world.routes.len() as u32;
+            let routes: Vec<u32> = (0..8 * n_routes).map(|env| env % n_routes).collect();
+            let n_envs = routes.len();
+            let mut simulator = batch_on(&Engine::Cpu, &Arc::new(world), n_envs, 0, RouteChoice::Fixed(routes));
+            simulator.step(&vec![4; n_envs]).unwrap();
+            assert!(simulator.batch().ended.iter().all(|&ended| ended == Ended::Running as u32));
+        }
+    }
+}
+
+#[test]
+fn a_missing_file_or_key_is_named_with_the_benchmark_and_the_key() {
+    let folder = copy();
+    let file = Path::new("attard2023.toml");
+    let text = std::fs::read_to_string(scenarios().join(file)).unwrap();
+    let benchmark = folder.path().join(file).display().to_string();
+    for (from, to, expected) in [
+        ("vehicles/daf_xf.toml", "vehicles/daf.toml", ": vehicle: \"vehicles/daf.toml\"; "),
+        ("roundabouts/32m.toml", "roundabouts/17m.toml", ": roundabout[1].file: \"roundabouts/17m.toml\"; "),
+        ("roundabouts/32m.toml", "roundabouts", ": roundabout[1].file: \"roundabouts\"; "),
+        ("vehicle = \"vehicles/daf_xf.toml\"", "", ": missing field `vehicle` at the top level"),
+        ("file = \"roundabouts/32m.toml\"", "", ": roundabout[1]: missing field `file`"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        let message = broken(folder.path(), file, text.replacen(from, to, 1).as_bytes()).unwrap_err();
+        assert!(message.starts_with(&benchmark) && message.contains(expected), "{message}");
+    }
+}
+
+#[test]
+fn pipes_devices_folders_and_large_files_are_refused_as_every_kind_of_file() {
+    let folder = tempfile::tempdir().unwrap();
+    for kind in ["", "roundabouts", "vehicles"] {
+        let below = folder.path().join(kind);
+        std::fs::create_dir_all(&below).unwrap();
+        let [pipe, zero, directory, large] = ["pipe.toml", "zero.toml", "folder.toml", "large.toml"].map(|name| below.join(name));
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        std::os::unix::fs::symlink("/dev/zero", &zero).unwrap();
+        std::fs::create_dir(&directory).unwrap();
+        std::fs::write(&large, vec![b'#'; 2 << 20]).unwrap();
+        for path in [&pipe, &zero, &directory] {
+            let message = read(path).unwrap_err().to_string();
+            assert_eq!(message, format!("{}: is not a regular file; a file is needed", path.display()));
+        }
+        assert!(read(&large).unwrap_err().to_string().ends_with("large.toml: is larger than 1 MiB, the most that is read of such a file"));
+    }
 }
 
 #[test]

@@ -6,17 +6,18 @@ use offtrack::geometry::{Curve, Outline, Piece};
 use offtrack::layout::{Body, Clearance, Rig, Truck};
 use offtrack::roundabout::Gutter;
 use offtrack::simulator::Simulator;
+use offtrack::stages::Stage;
 use rayon::prelude::*;
 
 use crate::field::{after_stage, places, pose};
 use crate::{benchmark, engines};
 
 /// Corners of a unit's rectangle grown by `margin` on all sides [m].
-fn corners(body: &Body, place: Vec2, heading: f32, margin: f64) -> [DVec2; 4] {
-    let (place, ahead) = (place.as_dvec2(), DVec2::from_angle(f64::from(heading)));
+fn corners(body: &Body, position: Vec2, heading: f32, margin: f64) -> [DVec2; 4] {
+    let (position, ahead) = (position.as_dvec2(), DVec2::from_angle(f64::from(heading)));
     let (front, rear) = (f64::from(body.front) + margin, f64::from(body.rear) - margin);
     let side = f64::from(body.half_width) + margin;
-    [(front, side), (rear, side), (rear, -side), (front, -side)].map(|(x, y)| place + ahead * x + ahead.perp() * y)
+    [(front, side), (rear, side), (rear, -side), (front, -side)].map(|(x, y)| position + ahead * x + ahead.perp() * y)
 }
 
 /// Corners of the tractor's rectangle and of the trailer's.
@@ -58,11 +59,12 @@ fn a_unit_touches_a_kerb_exactly_when_its_rectangle_does_to_two_centimetres() {
             let touching = exact.as_flattened().iter().filter(|touches| **touches).count();
             assert!(n as usize / 10 < touching && touching < 2 * n as usize * 9 / 10, "{name}: {touching}");
             for (on, engine) in engines() {
-                let simulator = after_stage(&engine, &world, &field, &trucks, "collide");
+                let simulator = after_stage(&engine, &world, &field, &trucks, Stage::Collide);
                 let [wrong, different] = verdicts(&kerbs, rig, &trucks, &exact, &simulator.batch().clearance, 0.02);
                 println!("{name} {gutter:?}, {on}: {different} of {} differ within 2 cm, {touching} touch", 2 * n);
                 assert_eq!(wrong, 0, "{name}");
-                // Of all poses about one in 200 is so close a call that a field off by a centimetre may decide it otherwise.
+                // Of all poses about one in 200 is so close a call that a field off by a centimetre may decide it
+                // otherwise.
                 assert!(different < 2 * n as usize / 200, "{name}: {different}");
             }
         }
@@ -70,7 +72,7 @@ fn a_unit_touches_a_kerb_exactly_when_its_rectangle_does_to_two_centimetres() {
 }
 
 #[test]
-fn a_rectangle_five_centimetres_too_wide_is_found_out() {
+fn a_rectangle_five_centimetres_too_wide_is_noticed() {
     let world = benchmark("attard2023").1;
     let rig = &world.params.rig;
     let mut wide = world.clone();
@@ -78,7 +80,7 @@ fn a_rectangle_five_centimetres_too_wide_is_found_out() {
     let (_, kerbs, field) = places(Gutter::Drivable).swap_remove(0);
     let trucks: Vec<Truck> = (0..20_000).into_par_iter().map(|index| pose(&kerbs, index, 0.5)).collect();
     for (_, engine) in engines() {
-        let simulator = after_stage(&engine, &wide, &field, &trucks, "collide");
+        let simulator = after_stage(&engine, &wide, &field, &trucks, Stage::Collide);
         let mut found = trucks.iter().zip(&simulator.batch().clearance);
         assert!(found.any(|(truck, found)| found.trailer <= 0.0 && !touches(&kerbs, rig, truck, 0.02)[1]));
     }
@@ -90,7 +92,8 @@ fn a_clearance_is_the_distance_or_up_to_twice_that() {
     let rig = &world.params.rig;
     for (name, kerbs, field) in places(Gutter::Drivable) {
         let trucks: Vec<Truck> = (0..2_000).into_par_iter().map(|index| pose(&kerbs, index, 0.0)).collect();
-        let found: Vec<Simulator> = engines().iter().map(|(_, engine)| after_stage(engine, &world, &field, &trucks, "collide")).collect();
+        let found: Vec<Simulator> =
+            engines().iter().map(|(_, engine)| after_stage(engine, &world, &field, &trucks, Stage::Collide)).collect();
         (0..2_000).into_par_iter().for_each(|index| {
             for (unit, corners) in units(rig, &trucks[index], 0.0).into_iter().enumerate() {
                 if kerbs.intersects_rectangle(&corners) {
@@ -125,7 +128,7 @@ fn a_solid_wholly_under_a_unit_is_touched() {
     for x in under {
         let field = Field::bake(&post(x), 0.5);
         for (name, engine) in engines() {
-            let found = after_stage(&engine, &world, &field, &[truck], "collide").batch().clearance[0];
+            let found = after_stage(&engine, &world, &field, &[truck], Stage::Collide).batch().clearance[0];
             assert!(found.trailer <= 0.0 && 0.0 < found.tractor, "post at {x} on the {name}: {found:?}");
         }
     }

@@ -1,4 +1,5 @@
-//! The baked distance against the exact outlines of every roundabout, and what else the tests of its users share.
+//! The baked distance against the exact outlines of every roundabout, and helpers for the tests of the stages that use
+//! it.
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails as the test itself does")]
 
@@ -9,15 +10,15 @@ use std::sync::Arc;
 use glam::{DVec2, Vec2};
 use offtrack::field::Field;
 use offtrack::geometry::Outline;
-use offtrack::layout::Truck;
+use offtrack::layout::{Column, Truck};
 use offtrack::random::{signed_unit, words};
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
-use offtrack::stages::STAGES;
+use offtrack::stages::Stage;
 use offtrack::world::World;
 use rayon::prelude::*;
 
-use crate::{batch_on, column};
+use crate::batch_on;
 
 /// Every roundabout of the repository, its kerbs and their field.
 pub(crate) fn places(gutter: Gutter) -> Vec<(String, Outline, Field)> {
@@ -34,7 +35,8 @@ pub(crate) fn places(gutter: Gutter) -> Vec<(String, Outline, Field)> {
     files.iter().map(|file| place(file)).collect()
 }
 
-/// A truck in any pose whose drive axle lies on the road or at most `beyond` behind a kerb; the same for the same `index`.
+/// A truck at a random pose with its drive axle on the road or at most `beyond` behind a kerb; a function of `index`
+/// [m].
 pub(crate) fn pose(kerbs: &Outline, index: u32, beyond: f64) -> Truck {
     let (low, high) = kerbs.bounds();
     let mut tries = (0..).map(|attempt| words(11, index, attempt, 0).map(signed_unit));
@@ -48,14 +50,14 @@ pub(crate) fn pose(kerbs: &Outline, index: u32, beyond: f64) -> Truck {
 }
 
 /// Trucks among the kerbs of `field` after one stage on an engine.
-pub(crate) fn after_stage(engine: &Engine, world: &World, field: &Field, trucks: &[Truck], stage: &str) -> Simulator {
+pub(crate) fn after_stage(engine: &Engine, world: &World, field: &Field, trucks: &[Truck], stage: Stage) -> Simulator {
     let mut world = world.clone();
     world.fields = vec![field.clone()];
     world.routes.iter_mut().for_each(|route| route.roundabout = 0);
     let mut simulator = batch_on(engine, &Arc::new(world), trucks.len(), 0, RouteChoice::Drawn(vec![0]));
     let batch = simulator.batch().clone();
-    simulator.restore(|name| Some(if name == "truck" { bytemuck::cast_slice(trucks) } else { column(&batch, name) })).unwrap();
-    simulator.run_stage(STAGES.iter().find(|known| known.name == stage).unwrap());
+    simulator.restore(|column| Some(if column == Column::Truck { bytemuck::cast_slice(trucks) } else { batch.column(column) })).unwrap();
+    simulator.run_stage(stage);
     simulator
 }
 
@@ -74,7 +76,7 @@ fn near_kerbs(kerbs: &Outline, field: &Field) -> Vec<(DVec2, f64, f64)> {
     (0..200_000).into_par_iter().map(point).filter(|(_, exact, _)| exact.abs() < 5.0).collect()
 }
 
-/// The exact distance has a kink near `p`: a smooth one falls or rises by a metre a metre all around.
+/// Whether the exact distance has a kink near `p`. Where it is smooth, its gradient has length 1.
 fn kinked(kerbs: &Outline, p: DVec2) -> bool {
     let at = |x: f64, y: f64| kerbs.signed_distance(p + DVec2::new(x, y));
     (-5..=5).any(|i| {
@@ -111,11 +113,11 @@ fn a_field_is_within_three_centimetres_of_the_exact_distance_and_within_one_away
 }
 
 #[test]
-fn a_field_of_other_kerbs_is_found_out() {
+fn a_field_of_other_kerbs_fails_the_comparison() {
     let (_, kerbs, _) = places(Gutter::Drivable).swap_remove(0);
     let other = Field::bake(&kerbs.offset(0.05), 0.5);
     let points = near_kerbs(&kerbs, &other);
-    // Everywhere but where the nearest kerb has a corner that growing moves less.
+    // At corners of the kerb, growing moves the outline less.
     let off = points.iter().filter(|(_, exact, baked)| 0.03 < (exact - baked).abs()).count();
     assert!(points.len() * 9 / 10 < off, "{off} of {}", points.len());
 }
@@ -131,7 +133,7 @@ fn the_size_of_a_cell_changes_the_layout_and_not_the_accuracy() {
 }
 
 #[test]
-fn beyond_the_grid_all_is_solid_and_ever_deeper() {
+fn beyond_the_grid_everything_is_solid_and_the_distance_keeps_falling() {
     let (_, kerbs, field) = places(Gutter::Drivable).swap_remove(0);
     let (low, high) = kerbs.bounds();
     for direction in (0..64).map(|i| Vec2::from_angle(i as f32 * 0.1)) {
@@ -146,10 +148,12 @@ fn beyond_the_grid_all_is_solid_and_ever_deeper() {
 }
 
 #[test]
-fn a_place_that_is_no_number_reads_something() {
+fn a_point_that_is_not_finite_reads_as_solid() {
     let (.., field) = places(Gutter::Drivable).swap_remove(0);
-    for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX] {
-        let _ = field.distance(Vec2::new(x, 1.0));
-        let _ = field.distance(Vec2::new(1.0, x));
+    for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN] {
+        for point in [Vec2::new(x, 1.0), Vec2::new(1.0, x), Vec2::splat(x)] {
+            // NaN fails this comparison too.
+            assert!(field.distance(point) < 0.0, "{point}: {}", field.distance(point));
+        }
     }
 }

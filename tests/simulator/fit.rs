@@ -1,11 +1,11 @@
-//! The five roundabouts against what was measured: road edges and lane centre lines, both ways.
+//! The five roundabouts against the measured ones: road edges and lane centre lines, in both directions.
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its file must fail")]
 
 use std::path::{Path, PathBuf};
 
 use offtrack::geometry::{Piece, wrapped};
-use offtrack::roundabout::deviation::{Measured, deviations};
 use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack_comparison::deviation::{Measured, deviations};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 const NAMES: [&str; 5] = ["16m", "20m", "32m", "40m", "50m"];
@@ -39,7 +39,7 @@ fn kerbs_and_lanes_lie_within_a_metre_of_the_measured_and_ring_kerbs_within_30_c
         let rows = deviations(&roundabout(name), &measured(name)).unwrap();
         assert!(15 < rows.len(), "{name}: only {} rows", rows.len());
         for row in rows {
-            // The task's bounds: 0.3 m on the ring itself, 1.0 m elsewhere.
+            // The bounds of scenarios/README.md: 0.3 m on the ring itself, 1.0 m elsewhere.
             let bound = if row.what == "island" || row.what == "ring" { 0.3 } else { 1.0 };
             assert!(row.from_measured.worst < bound, "{name}: {row:?}");
             assert!(row.from_model.worst < bound, "{name}: {row:?}");
@@ -48,7 +48,7 @@ fn kerbs_and_lanes_lie_within_a_metre_of_the_measured_and_ring_kerbs_within_30_c
 }
 
 #[test]
-fn a_roundabout_turned_by_three_degrees_is_told_from_the_measured_one() {
+fn a_roundabout_turned_by_three_degrees_fails_the_comparison() {
     let text = std::fs::read_to_string(file("40m")).unwrap();
     let turned: String = text
         .lines()
@@ -74,7 +74,7 @@ fn five_routes_leave_every_entry_each_smooth_and_clear_of_the_kerbs() {
         for route in routes {
             for joint in route.centre_line.pieces.windows(2) {
                 let turn = wrapped(joint[1].heading_at(0.0) - joint[0].heading_at(joint[0].length()));
-                // Angles pass through several sums of f64.
+                // Angles are sums of several f64.
                 assert!(turn.abs() < 1e-6, "{}: a kink of {turn} rad", route.name);
                 assert!(joint[0].end().distance(joint[1].start()) < 1e-6, "{}: a gap", route.name);
             }
@@ -86,7 +86,7 @@ fn five_routes_leave_every_entry_each_smooth_and_clear_of_the_kerbs() {
             }
             let nearest = (0..(route.centre_line.length() * 4.0) as usize).map(|step| route.centre_line.point_at(step as f64 / 4.0));
             let nearest = nearest.map(|p| kerbs.signed_distance(p)).fold(f64::INFINITY, f64::min);
-            // Half a lane less a hand's breadth: some measured right lanes are 3.5 m wide.
+            // Half a lane of 3.7 m less 5 cm: some measured right lanes are 3.5 m wide.
             assert!(1.8 <= nearest, "{}: {nearest} m from a kerb", route.name);
         }
     }

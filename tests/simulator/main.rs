@@ -6,46 +6,46 @@ use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::scenario::Scenario;
-use offtrack::simulator::{Batch, Engine, RouteChoice, Simulator};
+use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 
 mod bad_input;
 mod collide;
-#[cfg(feature = "gpu")]
-mod device;
 mod episodes;
 mod field;
 mod fit;
+mod modules;
 mod observe;
+#[cfg(feature = "gpu")]
+mod on_device;
 #[cfg(feature = "gpu")]
 mod parity;
 mod physics;
+mod pinned;
+mod refused;
+mod restarts;
 mod sense;
 mod shaders;
+mod shipped;
 
 /// A benchmark of the repository, read and baked.
 fn benchmark(name: &str) -> (Scenario, World) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(name).with_extension("toml");
     let scenario = Scenario::read(&path).unwrap();
-    let world = World::bake(&scenario);
+    let world = World::bake(&scenario).unwrap();
     (scenario, world)
 }
 
-/// Every engine that the build has, by its name: what a batch promises holds on each of them.
+/// Every engine of the build with its name: the tests of a batch run on each of them.
 fn engines() -> Vec<(&'static str, Engine)> {
     Vec::from([
-        ("processor", Engine::Cpu),
+        ("CPU", Engine::Cpu),
         #[cfg(feature = "gpu")]
-        ("device", device::engine()),
+        ("device", on_device::engine()),
     ])
 }
 
 /// A batch on an engine.
 fn batch_on(engine: &Engine, world: &Arc<World>, n_envs: usize, seed: u32, choice: RouteChoice) -> Simulator {
     Simulator::on(engine.clone(), world.clone(), n_envs, seed, choice).unwrap()
-}
-
-/// The bytes of a batch's column.
-fn column<'a>(batch: &'a Batch, name: &str) -> &'a [u8] {
-    batch.columns().into_iter().find(|(column, _)| *column == name).unwrap().1
 }

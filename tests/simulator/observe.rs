@@ -1,4 +1,5 @@
-//! The observation against a plain, slow reference: each value worked out on its own, in f64, from the route's own waypoints.
+//! The observation against a plain, slow reference: each value computed on its own, in f64, from the route's own
+//! waypoints.
 
 use std::f64::consts::PI;
 
@@ -16,8 +17,8 @@ fn wrapped(angle: f64) -> f64 {
 }
 
 fn distance_to_segment(p: DVec2, a: DVec2, b: DVec2) -> f64 {
-    let share = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
-    p.distance(a + share * (b - a))
+    let fraction = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+    p.distance(a + fraction * (b - a))
 }
 
 /// Everything that the truck is and sees, as the reference needs it.
@@ -62,8 +63,8 @@ impl View<'_> {
         let truck = &self.truck;
         let (heading, trailer) = (f64::from(truck.heading), f64::from(truck.trailer_heading));
         let tractor = truck.position.as_dvec2() + 0.5 * self.wheelbase * DVec2::from_angle(heading);
-        let ahead = |place: usize| i + [0, 2, 5, 7, 10][place];
-        let steps = |place: usize| [5, 7, 10, 12][place];
+        let ahead = |n: usize| i + [0, 2, 5, 7, 10][n];
+        let steps = |n: usize| [5, 7, 10, 12][n];
         match index {
             0 => (f64::from(truck.speed) / 27.8).clamp(0.0, 1.0),
             1 | 2 => (tractor.distance(self.w(i + index as i64 - 1)) / 20.0).min(1.0),
@@ -135,15 +136,15 @@ fn worst_differences(shift: usize) -> [f64; 69] {
 
 #[test]
 fn every_value_of_the_observation_is_what_its_definition_says() {
-    // Positions reach 100 m, where an f32 is good to 4e-6 m; a chord's circumcentre multiplies that by radius over chord, an angle at a
-    // waypoint 2 m away by a half.
+    // Positions reach 100 m, where an f32 is good to 4e-6 m; a chord's circumcentre multiplies that by radius over
+    // chord, an angle at a waypoint 2 m away by a half.
     for (index, difference) in worst_differences(0).into_iter().enumerate() {
         assert!(difference < 2e-5, "value {index} is off by {difference}");
     }
 }
 
 #[test]
-fn the_comparison_notices_values_that_stand_one_place_off() {
+fn the_comparison_notices_values_that_are_shifted_by_one() {
     let noticed = worst_differences(1).into_iter().filter(|&difference| 1e-3 < difference).count();
     assert_eq!(noticed, 69);
 }

@@ -1,4 +1,4 @@
-//! Stage by stage and step by step, the device beside the processor: from the same states, value by value.
+//! The device against the CPU, stage by stage and step by step: from the same states, value by value.
 
 mod compare;
 mod states;
@@ -8,33 +8,46 @@ use std::sync::Arc;
 use glam::Vec2;
 use offtrack::angle::wrapped;
 use offtrack::cpu::follow::reference_point;
-use offtrack::layout::{Ended, Truck, WaypointRow};
+use offtrack::layout::{Column, Ended, Truck, WaypointRow};
 use offtrack::random::{Draw, index_below, signed_unit, words};
 use offtrack::roundabout::Gutter;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
-use offtrack::stages::STAGES;
+use offtrack::stages::{STAGES, Stage};
 use offtrack::world::World;
 
-use crate::device::engine;
-use crate::{batch_on, column, engines};
+use crate::on_device::engine;
+use crate::{batch_on, engines};
 use compare::{Agreement, agreements};
 use states::{ENOUGH, N_ENVS, on_each_roundabout, put, varied, world};
 
-/// A stage's name, what it writes, and one number of the world that it would notice to be off by a thousandth.
-type Touched = (&'static str, &'static [&'static str], fn(&mut World));
+/// Columns, and a change of the world.
+type Written = (&'static [Column], Option<fn(&mut World)>);
 
-const TOUCHED: [Touched; 8] = [
-    ("steer", &["control"], |world| world.params.rig.speed_gain *= 1.001),
-    ("drive", &["truck"], |world| world.params.rig.trailer_wheelbase *= 1.001),
-    ("collide", &["clearance"], |world| world.params.rig.trailer_body.half_width *= 1.001),
-    ("follow", &["progress"], |world| world.params.rig.wheelbase *= 1.001),
-    ("sense", &["ranges"], |world| world.rays.iter_mut().for_each(|ray| ray.origin *= 1.001)),
-    ("observe", &["next_observation"], |world| world.params.sensor_range *= 1.001),
-    ("judge", &["truck", "ended", "terms", "reward"], |world| world.params.lane_distance_limit *= 1.001),
-    ("reset", &["truck", "control", "progress", "ranges", "observation"], |world| world.params.start_offset *= 1.001),
-];
+/// What a stage writes, and one number of the world that it notices to be off by a thousandth. Two stages use no number
+/// of the world.
+fn written(stage: Stage) -> Written {
+    match stage {
+        Stage::Steer => (&[Column::Control], Some(|world| world.params.rig.speed_gain *= 1.001)),
+        Stage::Drive => (&[Column::Truck], Some(|world| world.params.rig.trailer_wheelbase *= 1.001)),
+        Stage::Collide => (&[Column::Clearance], Some(|world| world.params.rig.trailer_body.half_width *= 1.001)),
+        Stage::Follow => (&[Column::Progress], Some(|world| world.params.rig.wheelbase *= 1.001)),
+        Stage::Sense => (&[Column::Ranges], Some(|world| world.rays.iter_mut().for_each(|ray| ray.origin *= 1.001))),
+        Stage::Observe => (&[Column::NextObservation], Some(|world| world.params.sensor_range *= 1.001)),
+        Stage::Judge => {
+            (&[Column::Truck, Column::Ended, Column::Terms, Column::Reward], Some(|world| world.params.lane_distance_limit *= 1.001))
+        }
+        Stage::Count => (&[], None),
+        Stage::CopyObservation => (&[Column::Observation], None),
+        Stage::Reset => (
+            &[Column::Truck, Column::Control, Column::Progress, Column::Ranges, Column::Observation],
+            Some(|world| {
+                world.params.start_offset *= 1.001;
+            }),
+        ),
+    }
+}
 
-/// A quantity this near to where a decision falls may be decided otherwise by an engine that is off by as much as it may be.
+/// A quantity this near to a threshold may fall on either side of it within the engines' bounds.
 const MARGIN: f32 = 1e-4;
 
 fn simulators(world: &Arc<World>, choice: &RouteChoice) -> [Simulator; 2] {
@@ -48,13 +61,13 @@ fn wrong_device(world: &World, choice: &RouteChoice, change: fn(&mut World)) -> 
     batch_on(&engine(), &Arc::new(world), N_ENVS, 3, choice.clone())
 }
 
-/// Whether something about a truck was decided by less than the margin, in the step or the stage that led from `before` to `after`.
+/// Whether a decision about a truck was closer than the margin, in the step or stage that led from `before` to `after`.
 fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bool {
     let (params, truck, clearance) = (&world.params, &after.truck[env], &after.clearance[env]);
     let near = |value: f32, limit: f32| (value - limit).abs() < MARGIN;
     let point = reference_point(params.rig.wheelbase, truck);
     let waypoints = world.route_waypoints(truck.route);
-    // Those that were passed and the next one.
+    // The waypoints that were passed, and the next one.
     let tried = before.progress[env].waypoint as usize..waypoints.len().min(after.progress[env].waypoint as usize + 1);
     let at_a_line = waypoints.get(tried).unwrap_or_default().iter().any(|waypoint| {
         let offset = point - waypoint.position;
@@ -73,7 +86,7 @@ fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bo
         || near(after.progress[env].waypoint_distance, params.stray_distance)
 }
 
-/// Which trucks are to agree: all but the few whose fate is a close call.
+/// Which trucks must agree: all but the few with a close call.
 fn judged(world: &World, before: &Batch, after: &Batch) -> Vec<bool> {
     let judged: Vec<bool> = (0..N_ENVS).map(|env| !is_close_call(world, before, after, env)).collect();
     let left_out = judged.iter().filter(|judged| !**judged).count();
@@ -82,8 +95,8 @@ fn judged(world: &World, before: &Batch, after: &Batch) -> Vec<bool> {
 }
 
 /// The agreement of two batches in some columns.
-fn compared(here: &Batch, there: &Batch, columns: &[&str], counted: &[bool]) -> Vec<Agreement> {
-    columns.iter().flat_map(|name| agreements(name, column(here, name), column(there, name), counted)).collect()
+fn compared(here: &Batch, there: &Batch, columns: &[Column], counted: &[bool]) -> Vec<Agreement> {
+    columns.iter().flat_map(|&column| agreements(column, here.column(column), there.column(column), counted)).collect()
 }
 
 fn assert_agreement(what: &str, compared: &[Agreement]) {
@@ -94,13 +107,13 @@ fn assert_agreement(what: &str, compared: &[Agreement]) {
 }
 
 /// The rows of held trucks and the columns other than `written` are as they were.
-fn assert_untouched(before: &Batch, after: &Batch, written: &[&str]) {
-    for (name, bytes) in before.columns() {
-        let now = column(after, name);
-        assert!(written.contains(&name) || bytes == now, "{name}");
+fn assert_untouched(before: &Batch, after: &Batch, written: &[Column]) {
+    for (column, bytes) in before.columns() {
+        let now = after.column(column);
+        assert!(written.contains(&column) || bytes == now, "{column:?}");
         let width = bytes.len() / N_ENVS;
         let held = (0..N_ENVS).filter(|&env| before.truck[env].held == 1);
-        assert!(held.map(|env| env * width..(env + 1) * width).all(|row| bytes[row.clone()] == now[row]), "{name} of held trucks");
+        assert!(held.map(|env| env * width..(env + 1) * width).all(|row| bytes[row.clone()] == now[row]), "{column:?} of held trucks");
     }
 }
 
@@ -112,19 +125,19 @@ fn every_stage_does_the_same_to_every_value_and_touches_no_other() {
         let counts = on_each_roundabout(&world, &before);
         assert!(counts.len() == 5 && counts.iter().all(|&count| ENOUGH <= count), "{counts:?}");
         assert_eq!(before.truck.iter().filter(|truck| truck.held == 1).count(), if fixed { N_ENVS / 16 } else { 0 });
-        let [mut processor, mut device] = simulators(&world, &choice);
-        for (stage, (name, written, change)) in STAGES.iter().zip(TOUCHED) {
-            assert_eq!(stage.name, name);
-            for simulator in [&mut processor, &mut device] {
+        let [mut cpu, mut device] = simulators(&world, &choice);
+        for stage in STAGES {
+            let (name, (written, change)) = (stage.name(), written(stage));
+            for simulator in [&mut cpu, &mut device] {
                 put(simulator, &before);
                 simulator.run_stage(stage);
             }
-            let here = processor.batch();
+            let here = cpu.batch();
             let counted = judged(&world, &before, here);
             let fails = |there: &Batch| compared(here, there, written, &counted).iter().any(|agreement| !agreement.holds());
-            assert!(fails(&before), "{name}: nothing at all would pass");
-            // On fixed routes no truck begins anew.
-            if !fixed {
+            assert!(written.is_empty() || fails(&before), "{name}: a stage that changes nothing would pass");
+            // On fixed routes no truck begins another episode.
+            if let (false, Some(change)) = (fixed, change) {
                 let mut wrong = wrong_device(&world, &choice, change);
                 put(&mut wrong, &before);
                 wrong.run_stage(stage);
@@ -135,7 +148,7 @@ fn every_stage_does_the_same_to_every_value_and_touches_no_other() {
             assert_untouched(&before, device.batch(), written);
             before = here.clone();
         }
-        let [here, there] = [&processor, &device].map(|simulator| simulator.tally().unwrap());
+        let [here, there] = [&cpu, &device].map(|simulator| simulator.tally().unwrap());
         assert_eq!(here, there);
         assert_eq!(here.env_steps() as usize, before.truck.len() - if fixed { N_ENVS / 16 } else { 0 });
     }
@@ -145,31 +158,31 @@ fn every_stage_does_the_same_to_every_value_and_touches_no_other() {
 fn a_whole_step_from_any_state_ends_alike_for_every_reason_there_is() {
     let world = world(Gutter::Drivable);
     let (choice, before) = varied(&world, false);
-    let [mut processor, mut device] = simulators(&world, &choice);
+    let [mut cpu, mut device] = simulators(&world, &choice);
     let mut wrong = wrong_device(&world, &choice, |world| world.params.rig.wheelbase *= 1.001);
-    // What the end was decided by is overwritten where another episode begins.
-    for simulator in [&mut processor, &mut device] {
+    // Reset overwrites what decided the end: look at it before.
+    for simulator in [&mut cpu, &mut device] {
         put(simulator, &before);
-        STAGES[..STAGES.len() - 1].iter().for_each(|stage| simulator.run_stage(stage));
+        STAGES[..STAGES.len() - 1].iter().for_each(|&stage| simulator.run_stage(stage));
     }
-    let counted = judged(&world, &before, processor.batch());
-    let decisive = compared(processor.batch(), device.batch(), &["truck", "clearance", "progress"], &counted);
+    let counted = judged(&world, &before, cpu.batch());
+    let decisive = compared(cpu.batch(), device.batch(), &[Column::Truck, Column::Clearance, Column::Progress], &counted);
     assert!(decisive.iter().all(|agreement| agreement.worst < MARGIN), "the margin is too small: {decisive:?}");
     let mut codes = [0; Ended::ALL.len()];
-    processor.batch().ended.iter().zip(&counted).filter(|(_, counted)| **counted).for_each(|(&code, _)| codes[code as usize] += 1);
+    cpu.batch().ended.iter().zip(&counted).filter(|(_, counted)| **counted).for_each(|(&code, _)| codes[code as usize] += 1);
     println!("{codes:?}");
     assert!(codes.iter().all(|&count| 100 <= count), "{codes:?}");
-    for simulator in [&mut processor, &mut device, &mut wrong] {
+    for simulator in [&mut cpu, &mut device, &mut wrong] {
         put(simulator, &before);
         simulator.step(&before.action).unwrap();
     }
-    let here = processor.batch();
-    let names: Vec<&str> = here.columns().map(|(name, _)| name).into();
+    let here = cpu.batch();
+    let columns = here.columns().map(|(column, _)| column);
     for there in [&before, wrong.batch()] {
-        assert!(compared(here, there, &names, &counted).iter().any(|agreement| !agreement.holds()));
-        assert!(compared(here, there, &["ended"], &counted).iter().any(|agreement| !agreement.holds()));
+        assert!(compared(here, there, &columns, &counted).iter().any(|agreement| !agreement.holds()));
+        assert!(compared(here, there, &[Column::Ended], &counted).iter().any(|agreement| !agreement.holds()));
     }
-    assert_agreement("step", &compared(here, device.batch(), &names, &counted));
+    assert_agreement("step", &compared(here, device.batch(), &columns, &counted));
 }
 
 #[test]
@@ -191,15 +204,15 @@ fn the_largest_rewards_that_a_benchmark_may_give_are_summed_alike() {
 
 #[test]
 fn routes_poses_and_actions_are_drawn_alike_to_the_last_bit() {
-    // Where a pose is nothing but what was drawn for it.
+    // A world where a pose consists of its drawn numbers alone.
     let mut world = World::clone(&world(Gutter::Drivable));
     (world.params.start_offset, world.params.start_heading, world.params.rig.wheelbase) = (1.0, 1.0, 0.0);
     world.waypoints.iter_mut().for_each(|waypoint| *waypoint = WaypointRow { position: Vec2::ZERO, direction: Vec2::X });
     world.previews.iter_mut().for_each(|preview| preview.heading = 0.0);
     let world = Arc::new(world);
     let (n_envs, seed, n_actions) = (16_384, 0xdead_beef, world.params.n_actions);
-    // More entries than half a word counts.
-    let routes: Vec<u32> = (0..70_001).map(|place| place % world.routes.len() as u32).collect();
+    // More entries than 16 bits count.
+    let routes: Vec<u32> = (0..70_001).map(|index| index % world.routes.len() as u32).collect();
     for (name, engine) in engines() {
         let mut simulator = batch_on(&engine, &world, n_envs, seed, RouteChoice::Drawn(routes.clone()));
         for round in 0..4 {
@@ -220,8 +233,8 @@ fn routes_poses_and_actions_are_drawn_alike_to_the_last_bit() {
             assert!(agreeing(seed + 1) < n_envs / 5, "another seed would pass");
 
             put(&mut simulator, &before);
-            simulator.run_stage(&STAGES[STAGES.len() - 1]);
-            let begun = |seed: u32, env: u32, episode: u32| {
+            simulator.run_stage(Stage::Reset);
+            let first = |seed: u32, env: u32, episode: u32| {
                 let [offset, heading, ..] = words(seed, env, episode, Draw::Pose as u32).map(signed_unit);
                 (routes[index_below(words(seed, env, episode, Draw::Route as u32)[0], routes.len() as u32) as usize], offset, heading)
             };
@@ -229,7 +242,7 @@ fn routes_poses_and_actions_are_drawn_alike_to_the_last_bit() {
             let agreeing = |seed| {
                 let agrees = |(env, (before, after)): &(u32, (&Truck, &Truck))| {
                     after.episode == before.episode + 1
-                        && begun(seed, *env, after.episode) == (after.route, after.position.y, after.heading)
+                        && first(seed, *env, after.episode) == (after.route, after.position.y, after.heading)
                 };
                 trucks.clone().filter(agrees).count()
             };

@@ -1,6 +1,6 @@
-//! The truck's physics: reference vectors, properties that hold for any control, and what the vehicle files say.
+//! The truck's physics: reference vectors, properties that hold for any control, and the vehicle files.
 
-#![expect(clippy::unwrap_used, reason = "a test whose own means fail has failed")]
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails as the test itself does")]
 
 mod circulation;
 mod properties;

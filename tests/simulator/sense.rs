@@ -6,6 +6,7 @@ use offtrack::geometry::Outline;
 use offtrack::layout::{N_RAYS, N_TRAILER_RAYS, Truck};
 use offtrack::roundabout::Gutter;
 use offtrack::simulator::Engine;
+use offtrack::stages::Stage;
 use offtrack::world::World;
 use rayon::prelude::*;
 
@@ -15,13 +16,13 @@ use crate::{benchmark, engines};
 /// Error that a range may have [m].
 const TOLERANCE: f64 = 0.02;
 
-/// Where a truck's ray begins and its unit vector.
+/// Origin and unit vector of a truck's ray.
 fn placed(world: &World, truck: &Truck, ray: usize) -> (DVec2, DVec2) {
     let trailer = (truck.trailer_position(&world.params.rig), truck.trailer_heading);
-    let (place, heading) = if ray < N_TRAILER_RAYS { trailer } else { (truck.position, truck.heading) };
+    let (position, heading) = if ray < N_TRAILER_RAYS { trailer } else { (truck.position, truck.heading) };
     let heading = Vec2::from_angle(heading);
     let ray = world.rays[ray];
-    ((place + heading.rotate(ray.origin)).as_dvec2(), heading.rotate(ray.direction).as_dvec2().normalize())
+    ((position + heading.rotate(ray.origin)).as_dvec2(), heading.rotate(ray.direction).as_dvec2().normalize())
 }
 
 /// Whether the ray comes within 2 cm of a kerb at less than 5 deg to it, or leaves it again, before or where it ends.
@@ -34,11 +35,12 @@ fn grazes(kerbs: &Outline, origin: DVec2, direction: DVec2, end: f64) -> bool {
     })
 }
 
-/// Rays in error, rays in error that graze a kerb, and rays that met one, for `n` trucks sensing `field` among `kerbs` on an engine.
+/// Rays in error, rays in error that graze a kerb, and rays that met one, for `n` trucks sensing `field` among `kerbs`
+/// on an engine.
 fn errors(engine: &Engine, world: &World, kerbs: &Outline, field: &Field, n: u32) -> [usize; 3] {
     let reach = world.params.sensor_range;
     let trucks: Vec<Truck> = (0..n).into_par_iter().map(|index| pose(kerbs, index, 0.0)).collect();
-    let simulator = after_stage(engine, world, field, &trucks, "sense");
+    let simulator = after_stage(engine, world, field, &trucks, Stage::Sense);
     let sensed = &simulator.batch().ranges;
     let count = |(truck, found): (&Truck, &[f32; N_RAYS])| {
         let mut counts = [0; 3];
@@ -75,7 +77,7 @@ fn a_range_is_the_distance_along_the_ray_to_the_kerb_to_two_centimetres() {
 }
 
 #[test]
-fn ranges_to_kerbs_five_centimetres_off_are_found_out() {
+fn ranges_to_kerbs_five_centimetres_off_are_noticed() {
     let world = benchmark("attard2023").1;
     let (_, kerbs, _) = places(Gutter::Drivable).swap_remove(0);
     let other = Field::bake(&kerbs.offset(0.05), 0.5);
@@ -93,7 +95,7 @@ fn a_sensor_inside_a_kerb_reads_nothing_and_one_in_the_open_its_reach() {
     near_sighted.params.sensor_range = 0.1;
     for (_, engine) in engines() {
         let tractor_ranges = |world: &World, truck| -> Vec<f32> {
-            let simulator = after_stage(&engine, world, &field, &[truck], "sense");
+            let simulator = after_stage(&engine, world, &field, &[truck], Stage::Sense);
             simulator.batch().ranges[0][N_TRAILER_RAYS..].to_vec()
         };
         // The middle of a roundabout is solid.
@@ -105,12 +107,12 @@ fn a_sensor_inside_a_kerb_reads_nothing_and_one_in_the_open_its_reach() {
 }
 
 #[test]
-fn a_truck_that_is_nowhere_still_gets_ranges() {
+fn a_truck_at_a_position_that_is_not_finite_still_gets_ranges() {
     let world = benchmark("attard2023").1;
     let (_, _, field) = places(Gutter::Drivable).swap_remove(0);
     let nowhere = [f32::NAN, f32::INFINITY, 1e9].map(|x| Truck { position: Vec2::new(x, 0.0), ..Truck::default() });
     for (_, engine) in engines() {
-        let simulator = after_stage(&engine, &world, &field, &nowhere, "sense");
+        let simulator = after_stage(&engine, &world, &field, &nowhere, Stage::Sense);
         let found = &simulator.batch().ranges;
         assert!(found.as_flattened().iter().all(|range| (0.0..=20.0).contains(range)), "{found:?}");
     }

@@ -1,4 +1,4 @@
-//! The shader files beside what they are printed from and paired with.
+//! The shader files: printed from Rust, complete, and valid.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use offtrack::stages::SHADERS;
 #[test]
 fn the_printed_layout_is_current() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders/layout.wgsl");
-    let printed = offtrack::layout::wgsl();
+    let printed = offtrack::wgsl::layout();
     if std::env::var_os("PRINT_LAYOUT").is_some() {
         fs::write(&path, &printed).unwrap();
     }
@@ -37,8 +37,8 @@ fn every_shader_file_is_part_of_the_module() {
 }
 
 #[test]
-fn every_kernel_has_a_twin_on_the_processor_and_every_twin_a_kernel() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/cpu");
+fn every_shader_of_a_stage_has_a_twin_on_the_cpu_and_every_twin_a_shader() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/engine/cpu");
     let mut found: Vec<String> =
         fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_str().unwrap().replace(".rs", "")).collect();
     found.sort_unstable();
@@ -51,7 +51,8 @@ fn every_kernel_has_a_twin_on_the_processor_and_every_twin_a_kernel() {
 #[cfg(feature = "gpu")]
 mod module {
     use offtrack::layout::structs;
-    use offtrack::stages::{BESIDE, SHADERS, STAGES};
+    use offtrack::shared::Named;
+    use offtrack::stages::{Kernel, SHADERS, STAGES};
     use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
     use wgpu::naga::{Module, TypeInner, front::wgsl};
 
@@ -68,13 +69,16 @@ mod module {
         let module = module();
         Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).unwrap();
         let mut found: Vec<&str> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
-        let mut known: Vec<&str> = STAGES.iter().flat_map(|stage| stage.kernels).chain(&BESIDE).map(|kernel| kernel.entry).collect();
+        let mut known: Vec<&str> = Kernel::ALL.iter().map(|kernel| kernel.name()).collect();
         found.sort_unstable();
         known.sort_unstable();
         assert_eq!(found, known);
+        let of_stages: Vec<Kernel> = STAGES.iter().flat_map(|stage| stage.kernels()).copied().collect();
+        let beside = [Kernel::Draw, Kernel::Restart, Kernel::RestartFrom];
+        assert!(Kernel::ALL.iter().all(|kernel| beside.contains(kernel) != of_stages.contains(kernel)), "a kernel without a stage");
     }
 
-    /// Struct by struct what WGSL makes of it, against Rust.
+    /// Differences between the layouts of WGSL and of Rust, struct by struct.
     fn differences(module: &Module) -> Vec<String> {
         let mut differences = Vec::new();
         for (name, size, fields) in structs() {
@@ -99,7 +103,7 @@ mod module {
     fn every_field_is_where_wgsl_looks_for_it() {
         assert_eq!(differences(&module()), Vec::<String>::new());
         assert!(15 <= structs().len());
-        // The comparison sees fields that moved and a struct that grew.
+        // The comparison notices fields that moved and a struct that grew.
         let layout = SHADERS[0].1;
         let grown = layout.replacen("    tractor: f32,\n", "    tractor: vec2<f32>,\n", 1);
         assert_ne!(layout, grown);

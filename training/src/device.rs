@@ -1,4 +1,4 @@
-//! What steps trucks: the processor, or a device and its name in results; and the command that lists devices.
+//! What steps trucks: the processor, or a device and its name in results.
 //!
 //! The only file here that asks whether the program was built with the feature `gpu`.
 
@@ -9,24 +9,10 @@ use offtrack::simulator::Engine;
 use crate::error::Error;
 use crate::provenance;
 
-/// What would do where a program without the feature is asked for a device.
+/// The error text where a program without the feature is asked for a device.
 #[cfg(not(feature = "gpu"))]
-const NOT_BUILT_IN: &str = "this program was built without the feature gpu; `cargo build --release --features gpu` builds one that has it";
-
-/// List the devices that `--device gpu` can run on, best first; the one chosen unasked is marked.
-#[derive(Debug, clap::Args)]
-pub struct Args {}
-
-/// Where a command steps its trucks.
-#[derive(Debug, clap::Args)]
-pub struct Choice {
-    /// What steps the trucks: `cpu`, all cores of the processor, or `gpu`, compute shaders on a device.
-    #[arg(long, default_value = "cpu", value_parser = ["cpu", "gpu"])]
-    device: String,
-    /// With --device gpu: part of an adapter's name, see `offtrack devices`. Without it the first of that list.
-    #[arg(long)]
-    adapter: Option<String>,
-}
+pub const NOT_BUILT_IN: &str =
+    "this program was built without the feature gpu; `cargo build --release --features gpu` builds one that has it";
 
 /// An engine and its name.
 #[derive(Debug, Clone)]
@@ -35,7 +21,7 @@ pub struct Device {
     pub engine: Engine,
     /// `cpu` or `gpu`.
     pub kind: &'static str,
-    /// Name for results: `cpu` for the processor, which results name elsewhere; else the adapter's with its interface and driver.
+    /// Name for results: `cpu`, whose processor results name elsewhere, or the adapter with its interface and driver.
     pub name: String,
     adapter: String,
 }
@@ -46,33 +32,20 @@ impl Device {
         Device { engine: Engine::Cpu, kind: "cpu", name: "cpu".to_owned(), adapter: String::new() }
     }
 
-    /// The adapter's own name, by which it can be opened again.
+    /// The adapter's own name, with which it can be opened again.
     pub fn adapter(&self) -> &str {
         &self.adapter
     }
 
-    /// Name for people: that of the processor or the adapter.
+    /// Name for people: of the processor or of the adapter.
     pub fn title(&self) -> String {
         if self.kind == "cpu" { provenance::machine() } else { self.name.clone() }
     }
 }
 
-impl Choice {
-    /// Opens what was chosen.
-    pub fn open(&self) -> Result<Device, Error> {
-        match (self.device.as_str(), &self.adapter) {
-            ("gpu", adapter) => open(adapter.as_deref()),
-            (_, None) => Ok(Device::processor()),
-            (_, Some(name)) => {
-                let expected = "the processor is none: add --device gpu, or leave --adapter out".to_owned();
-                Err(Error::Flag { flag: "--adapter", value: name.clone(), expected })
-            }
-        }
-    }
-}
-
+/// Opens the first adapter whose name contains `adapter`.
 #[cfg(feature = "gpu")]
-fn open(adapter: Option<&str>) -> Result<Device, Error> {
+pub fn open(adapter: Option<&str>) -> Result<Device, Error> {
     use offtrack::gpu;
 
     match gpu::Device::open(adapter) {
@@ -81,19 +54,20 @@ fn open(adapter: Option<&str>) -> Result<Device, Error> {
             Ok(Device { engine: Engine::Gpu { device, columns: gpu::Columns::new() }, kind: "gpu", name, adapter })
         }
         Err(gpu::Error::UnknownAdapter { name, found }) => {
-            let expected = format!("no adapter's name has this in it: there is {}", found.join(", "));
+            let expected = format!("no adapter's name contains this; there is {}", found.join(", "));
             Err(Error::Flag { flag: "--adapter", value: name, expected })
         }
         Err(error) => Err(simulator::Error::from(error).into()),
     }
 }
 
+/// Opens the first adapter whose name contains `adapter`.
 #[cfg(not(feature = "gpu"))]
-fn open(_: Option<&str>) -> Result<Device, Error> {
+pub fn open(_: Option<&str>) -> Result<Device, Error> {
     Err(Error::Flag { flag: "--device", value: "gpu".to_owned(), expected: format!("{NOT_BUILT_IN}, or leave --device out") })
 }
 
-/// The outcome of `work`, an error where it panicked: the tensor library knows no other answer to a device that fails.
+/// The outcome of `work`, or an error if it panicked: the tensor library panics when its device fails.
 #[cfg(feature = "gpu")]
 pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
@@ -103,8 +77,8 @@ pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     let outcome = catch_unwind(AssertUnwindSafe(work));
     set_hook(hook);
     outcome.unwrap_or_else(|panic| {
-        let said = panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|&said| said.to_owned()));
-        Err(Error::Device(said.unwrap_or_else(|| "it failed".to_owned())))
+        let message = panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|&message| message.to_owned()));
+        Err(Error::Device(message.unwrap_or_else(|| "it failed".to_owned())))
     })
 }
 
@@ -114,7 +88,7 @@ pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     work()
 }
 
-/// Whether the device failed, rather than that something was asked wrongly.
+/// Whether the error is a failure of the device rather than wrong input.
 #[cfg(feature = "gpu")]
 pub fn has_failed(error: &Error) -> bool {
     use offtrack::gpu;
@@ -124,38 +98,8 @@ pub fn has_failed(error: &Error) -> bool {
     matches!(error, Error::Device(_)) || matches!(error, Error::Simulator(error) if broken(error))
 }
 
-/// Whether the device failed, rather than that something was asked wrongly.
+/// Whether the error is a failure of the device rather than wrong input.
 #[cfg(not(feature = "gpu"))]
-pub fn has_failed(_: &Error) -> bool {
-    false
-}
-
-/// Runs the command.
-#[cfg(feature = "gpu")]
-pub fn run(_: &Args) -> Result<(), Error> {
-    use offtrack::gpu;
-
-    let adapters = gpu::adapters();
-    if adapters.is_empty() {
-        // The error says what was looked for and how to get one.
-        open(None)?;
-    }
-    let mut rows = vec![["", "adapter", "interface", "driver", "kind", "largest buffer"].map(str::to_owned)];
-    rows.extend(adapters.into_iter().enumerate().map(|(index, adapter)| {
-        let mark = if index == 0 { "*" } else { "" };
-        let largest = format!("{} MiB", adapter.binding_max >> 20);
-        [mark.to_owned(), adapter.name, adapter.interface, adapter.driver, adapter.kind.to_owned(), largest]
-    }));
-    let widths: [usize; 6] = std::array::from_fn(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0));
-    for row in rows {
-        let cells: Vec<String> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:width$}")).collect();
-        crate::files::print(&format!("{}\n", cells.join("  ").trim_end()))?;
-    }
-    crate::files::print("* chosen where --adapter names none\n")
-}
-
-/// Runs the command.
-#[cfg(not(feature = "gpu"))]
-pub fn run(_: &Args) -> Result<(), Error> {
-    Err(Error::Flag { flag: "devices", value: "none can be listed".to_owned(), expected: NOT_BUILT_IN.to_owned() })
+pub fn has_failed(error: &Error) -> bool {
+    matches!(error, Error::Device(_))
 }

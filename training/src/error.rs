@@ -1,42 +1,51 @@
-//! What can go wrong in a command, and the exit code that says so: 2 for wrong input, 1 for a failure.
+//! What can go wrong while training, evaluating or drawing: one error type for this crate, above those of the
+//! simulator's edges ([`offtrack::reader::Error`] for files, [`offtrack::simulator::Error`] for batches and devices).
 
 use std::path::{Path, PathBuf};
 
+use offtrack::reader::shortened;
+
 use crate::device;
 
-/// Why a command stopped.
+/// Most characters of a message about the contents of a file.
+const LONGEST_MESSAGE: usize = 600;
+
+/// Why training, an evaluation or a command stopped. [`Error::is_wrong_input`] tells wrong input from a failure.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A scenario, vehicle or roundabout file is wrong.
+    /// A file cannot be read, or is a wrong scenario, vehicle or roundabout.
     #[error(transparent)]
-    Scenario(#[from] offtrack::scenario::Error),
-    /// A batch was asked for that cannot be.
+    Input(#[from] offtrack::reader::Error),
+    /// No truck could be stepped in this scenario.
+    #[error(transparent)]
+    Scenario(#[from] offtrack::scenario::Invalid),
+    /// A batch cannot be made or stepped.
     #[error(transparent)]
     Simulator(#[from] offtrack::simulator::Error),
-    /// A command-line argument makes no sense.
+    /// A setting is out of range or unknown: a command-line argument, or a key of the same meaning.
     #[error("{flag}: {value}; {expected}")]
     Flag {
         /// The argument's name.
         flag: &'static str,
-        /// What was given.
+        /// The value given.
         value: String,
-        /// What would do.
+        /// What is allowed.
         expected: String,
     },
-    /// A file that a command was pointed to has wrong contents.
+    /// A file has wrong contents.
     #[error("{}: {message}", file.display())]
     Contents {
         /// The file.
         file: PathBuf,
-        /// What is wrong with it and what would do.
+        /// What is wrong and what would do.
         message: String,
     },
-    /// A file that a command was pointed to cannot be read.
+    /// A file of a run cannot be read.
     #[error("{}: cannot be read: {source}", file.display())]
     Read {
         /// The file.
         file: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A result cannot be written.
@@ -44,31 +53,30 @@ pub enum Error {
     Write {
         /// The file or folder.
         file: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// A certificate's sequence does not do what the file says.
+    /// An action sequence of a certificate does not arrive.
     #[error("{}: {route} from ({:+}, {:+}) of the largest start errors: the sequence does not arrive: {ended}", file.display(), start[0], start[1])]
     NotVerified {
         /// The certificate.
         file: PathBuf,
         /// The route.
         route: String,
-        /// The start, as shares of the largest errors.
+        /// The start: lateral offset and heading error as fractions of the largest ones.
         start: [f32; 2],
-        /// How the episode stood at the sequence's end.
+        /// The end code after the last action of the sequence.
         ended: &'static str,
     },
     /// The graphics device failed, or cannot do what the learner needs of it.
-    #[cfg(feature = "gpu")]
     #[error("the graphics device: {0}")]
     Device(String),
     /// The learner's threads cannot be started.
     #[error("threads to learn with cannot be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
-    /// The learner has broken down.
+    /// Training has diverged.
     #[error(
-        "{what} is {value} after {env_steps} env steps{also}: the learner has broken down; {kept}; lower learning rates or a smaller reward_scale would do"
+        "{what} is {value} after {env_steps} env steps{also}: training has diverged; {kept}; lower learning rates or a smaller reward_scale would do"
     )]
     Diverged {
         /// Which figure or parameter.
@@ -85,13 +93,16 @@ pub enum Error {
 }
 
 impl Error {
-    /// What the process exits with.
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            error if device::has_failed(error) => 1,
-            Error::Write { .. } | Error::Threads(_) | Error::Diverged { .. } | Error::NotVerified { .. } => 1,
-            _ => 2,
-        }
+    /// Whether the input was wrong: a file, a setting or a batch asked for. Otherwise something failed on valid input:
+    /// a device, a disk, the learner, or a certificate.
+    pub fn is_wrong_input(&self) -> bool {
+        let failed = matches!(self, Error::Write { .. } | Error::Threads(_) | Error::Diverged { .. } | Error::NotVerified { .. });
+        !failed && !device::has_failed(self)
+    }
+
+    /// A file has wrong contents. A long message, which may repeat a part of the file, is shortened.
+    pub fn contents(file: &Path, message: impl AsRef<str>) -> Error {
+        Error::Contents { file: file.to_owned(), message: shortened(message.as_ref(), LONGEST_MESSAGE) }
     }
 
     /// For `map_err` on a file being written.
@@ -104,5 +115,17 @@ impl Error {
     pub fn read(file: &Path) -> impl FnOnce(std::io::Error) -> Error {
         let file = file.to_owned();
         move |source| Error::Read { file, source }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_file_is_wrong_input_and_a_full_disk_is_not() {
+        let wrong = Error::Contents { file: "a".into(), message: "is wrong".into() };
+        let full = Error::write(Path::new("a"))(std::io::Error::from(std::io::ErrorKind::StorageFull));
+        assert!(wrong.is_wrong_input() && !full.is_wrong_input());
     }
 }

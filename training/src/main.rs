@@ -1,46 +1,40 @@
-//! The command line: reads what is asked for, prints an error and chooses the exit code (2 for wrong input, 1 for a failure).
+//! The command line: reads the arguments, runs one command, prints its error and chooses the exit code.
 
-mod bench;
-mod bridge;
-mod certify;
-mod checkpoint;
-mod config;
-mod deviations;
-mod device;
-mod draw;
-mod drivers;
-mod error;
-mod evaluate;
-mod exploration;
-mod files;
-mod generator;
-mod memory;
-mod mirror;
-mod network;
-mod page;
-mod policy;
-mod provenance;
-mod record;
-mod recording;
-mod report;
-mod sac;
-mod scale;
-mod scaling;
-mod trace;
-mod train;
+mod commands;
 
 use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use offtrack_training::error::Error;
+use offtrack_training::{files, provenance};
 
-/// A large batch's tensors come and go thousands of times a second; the system's allocator takes a third of an update's time.
+use commands::{bench, certify, deviations, devices, draw, evaluate, record, scale, trace, train};
+
+/// Batches of tensors are allocated thousands of times a second; the system's allocator takes a third of an update's
+/// time.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// Tractor-trailers learn to drive through roundabouts. Without a command: `train`.
+/// Exit code of a failure on valid input.
+const FAILED: u8 = 1;
+/// Exit code of wrong input; clap exits with it too.
+const WRONG_INPUT: u8 = 2;
+/// Exit code after Ctrl-C, as shells give it: 128 and the number of the signal.
+const INTERRUPTED: i32 = 130;
+
+const AFTER_HELP: &str = "\
+Without a command `offtrack` trains, as `offtrack train` does.
+
+Exit codes:
+  0    done; training that Ctrl-C stopped once, with everything written
+  1    failed on valid input: device, disk, learner, or a certificate that does not hold
+  2    wrong input: arguments or files
+  130  interrupted: by Ctrl-C, in training by a second one";
+
+/// Tractor-trailers learn to drive through roundabouts.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(name = "offtrack", version, after_help = AFTER_HELP)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -52,7 +46,7 @@ enum Command {
     Evaluate(evaluate::Args),
     Scale(scale::Args),
     Bench(bench::Args),
-    Devices(device::Args),
+    Devices(devices::Args),
     Certify(certify::Args),
     Draw(draw::Args),
     Record(record::Args),
@@ -61,13 +55,21 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    provenance::set_commit(offtrack_commit::commit!());
     let command = Cli::parse().command.unwrap_or(Command::Train(train::Args::default()));
+    if !matches!(command, Command::Train(_)) {
+        // Training has a handler of its own, which stops the run and writes it.
+        let _ = ctrlc::set_handler(|| {
+            files::remove_temporaries();
+            std::process::exit(INTERRUPTED);
+        });
+    }
     let done = match &command {
         Command::Train(args) => train::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Scale(args) => scale::run(args),
         Command::Bench(args) => bench::run(args),
-        Command::Devices(args) => device::run(args),
+        Command::Devices(args) => devices::run(args),
         Command::Certify(args) => certify::run(args),
         Command::Draw(args) => draw::run(args),
         Command::Record(args) => record::run(args),
@@ -77,9 +79,13 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // Where nobody reads it, the exit code still tells.
+            // With standard error closed, the exit code is all that is left.
             let _ = writeln!(std::io::stderr(), "offtrack: {error}");
-            ExitCode::from(error.exit_code())
+            ExitCode::from(exit_code(&error))
         }
     }
+}
+
+fn exit_code(error: &Error) -> u8 {
+    if error.is_wrong_input() { WRONG_INPUT } else { FAILED }
 }

@@ -1,57 +1,58 @@
-//! How far apart two engines' columns are, value by value, and how far they may be.
+//! Differences between the columns of two engines, value by value, and their bounds.
 
 use std::fmt;
 
 use bytemuck::cast_slice;
-use offtrack::layout::N_RAYS;
+use offtrack::layout::{Column, N_RAYS};
 
-/// How far apart two engines may be in a value.
+/// Bound of the difference between two engines in a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bound {
-    /// But for one value in a thousand up to this; 0 for what is equal to the last bit.
+    /// Bound of all values but one in a thousand; 0 for values that are equal to the last bit.
     usual: f32,
-    /// Up to this in any case.
+    /// Bound of all values.
     rarely: f32,
-    /// A value and one that is this much larger are the same.
+    /// Period: two values that differ by it are the same.
     turn: f32,
 }
 
-/// Not at all: integers, flags, and what is copied.
+/// Equal to the last bit: integers, flags, and copied values.
 const SAME: Bound = within(0.0);
-/// Five units in the last place of a place up to 128 m from the middle, of 7.6e-6 m each: sums are taken in another order.
-const PLACE: Bound = within(4e-5);
+/// Five units in the last place of a position up to 128 m from the middle, of 7.6e-6 m each: engines sum in different
+/// orders.
+const POSITION: Bound = within(4e-5);
 /// Eight units in the last place of an angle in (-pi, pi], of 2.4e-7 rad each.
 const ANGLE: Bound = Bound { turn: std::f32::consts::TAU, ..within(2e-6) };
-/// The same as a share of half a turn.
+/// The same as a fraction of half a turn.
 const TURN: Bound = Bound { turn: 2.0, ..ANGLE };
-/// As many units of what stays below 2.
+/// Eight units of values below 2.
 const SMALL: Bound = within(1e-6);
-/// Of speeds, accelerations, roll rates and what else stays below 16.
+/// Eight units of speeds, accelerations, roll rates and other values below 16.
 const MIDDLING: Bound = within(8e-6);
-/// A span that one engine alone found worth a closer look may hold up to half of a clearance of up to 2 m.
-const CLEARANCE: Bound = Bound { rarely: 1.0, ..PLACE };
-/// A march that creeps up to a kerb may end a sample later on one engine; each ends within 2 cm of the kerb.
+/// A span that only one engine halves may reduce a clearance of up to 2 m by half.
+const CLEARANCE: Bound = Bound { rarely: 1.0, ..POSITION };
+/// A ray along a kerb may end a sample later on one engine; each ends within 2 cm of the kerb.
 const RANGE: Bound = Bound { rarely: 0.05, ..within(1e-4) };
 /// The same over a reach of 20 m.
 const SCALED_RANGE: Bound = Bound { rarely: 2.5e-3, ..within(5e-6) };
-/// The angle at a waypoint to a truck that stands on it turns with the last bits of the truck's place.
+/// The angle at a waypoint to a truck that stands on it depends on the last bits of the truck's position.
 const BEARING: Bound = Bound { usual: 1e-4, rarely: 1e-2, ..TURN };
-/// Differences of places over 10 m or 20 m.
-const SCALED_PLACE: Bound = within(4e-6);
-/// A hundred points for a waypoint, 500 for a failure: four units in the last place.
+/// Differences of positions over 10 m or 20 m.
+const SCALED_POSITION: Bound = within(4e-6);
+/// 100 for a waypoint, 500 for a failure: four units in the last place.
 const REWARD: Bound = within(1.2e-4);
 
 const fn within(bound: f32) -> Bound {
     Bound { usual: bound, rarely: bound, turn: f32::INFINITY }
 }
 
-/// The values of a column's row: their names, how many in a row are called so, and how far apart engines may be in them.
-pub fn values(column: &str) -> &'static [(&'static str, usize, Bound)] {
+/// The values of a column's row: name, number of values, bound.
+pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
     match column {
-        "action" | "ended" => &[("", 1, SAME)],
-        "control" => &[("steering", 1, SAME), ("acceleration", 1, MIDDLING), ("speed_error_integral", 1, MIDDLING)],
-        "truck" => &[
-            ("position", 2, PLACE),
+        Column::Action | Column::Ended => &[("", 1, SAME)],
+        Column::Control => &[("steering", 1, SAME), ("acceleration", 1, MIDDLING), ("speed_error_integral", 1, MIDDLING)],
+        Column::Truck => &[
+            ("position", 2, POSITION),
             ("heading", 1, ANGLE),
             ("trailer_heading", 1, ANGLE),
             ("speed", 1, MIDDLING),
@@ -67,14 +68,16 @@ pub fn values(column: &str) -> &'static [(&'static str, usize, Bound)] {
             ("steps", 1, SAME),
             ("held", 1, SAME),
         ],
-        "clearance" => &[("tractor", 1, CLEARANCE), ("trailer", 1, CLEARANCE)],
-        "progress" => &[("lane_distance", 1, PLACE), ("waypoint_distance", 1, PLACE), ("waypoint", 1, SAME), ("passed", 1, SAME)],
-        "ranges" => &[("", N_RAYS, RANGE)],
-        "observation" | "next_observation" => &[
+        Column::Clearance => &[("tractor", 1, CLEARANCE), ("trailer", 1, CLEARANCE)],
+        Column::Progress => {
+            &[("lane_distance", 1, POSITION), ("waypoint_distance", 1, POSITION), ("waypoint", 1, SAME), ("passed", 1, SAME)]
+        }
+        Column::Ranges => &[("", N_RAYS, RANGE)],
+        Column::Observation | Column::NextObservation => &[
             ("speed", 1, SMALL),
-            ("distances", 2, SCALED_PLACE),
-            ("crossings", 2, SCALED_PLACE),
-            ("lane", 1, SCALED_PLACE),
+            ("distances", 2, SCALED_POSITION),
+            ("crossings", 2, SCALED_POSITION),
+            ("lane", 1, SCALED_POSITION),
             ("bearings", 5, BEARING),
             ("headings", 5, TURN),
             ("trailer_headings", 5, TURN),
@@ -83,13 +86,14 @@ pub fn values(column: &str) -> &'static [(&'static str, usize, Bound)] {
             ("ranges", N_RAYS, SCALED_RANGE),
             ("radii", 10, SAME),
         ],
-        "terms" => &[("waypoints", 1, SAME), ("lane_distance", 1, SCALED_PLACE), ("clearance", 1, CLEARANCE), ("failure", 1, SAME)],
-        "reward" => &[("", 1, REWARD)],
-        other => panic!("{other} is no column"),
+        Column::Terms => {
+            &[("waypoints", 1, SAME), ("lane_distance", 1, SCALED_POSITION), ("clearance", 1, CLEARANCE), ("failure", 1, SAME)]
+        }
+        Column::Reward => &[("", 1, REWARD)],
     }
 }
 
-/// What came of comparing all values of one name.
+/// The comparison of all values of one name.
 #[derive(Debug, Clone)]
 pub struct Agreement {
     /// Column and name.
@@ -98,15 +102,15 @@ pub struct Agreement {
     pub n: usize,
     /// Equal to the last bit.
     pub equal: usize,
-    /// Further apart than is usual.
+    /// Beyond the usual bound.
     pub unusual: usize,
-    /// The largest difference, infinite between what is no number and what is one, or between integers.
+    /// The largest difference; infinite between NaN and a number, and between integers.
     pub worst: f32,
     bound: Bound,
 }
 
 impl Agreement {
-    /// Whether the engines are as near each other as they must be.
+    /// Whether the differences are within the bound.
     pub fn holds(&self) -> bool {
         let bound = &self.bound;
         if *bound == SAME { self.equal == self.n } else { self.worst <= bound.rarely && 1000 * self.unusual <= self.n }
@@ -120,27 +124,27 @@ impl fmt::Display for Agreement {
     }
 }
 
-/// How far two words of a value are apart.
+/// Difference between two words of a value.
 fn apart(here: u32, there: u32, bound: Bound) -> f32 {
     if here == there {
         return 0.0;
     }
     let difference = (f32::from_bits(here) - f32::from_bits(there)).abs();
     let difference = difference.min((difference - bound.turn).abs());
-    // No number is the furthest of all, and so is another integer.
+    // NaN and another integer are infinitely far.
     if difference.is_nan() || bound == SAME { f32::INFINITY } else { difference }
 }
 
 /// Compares a column of two batches, in the rows where `counted` says so.
-pub fn agreements(column: &str, here: &[u8], there: &[u8], counted: &[bool]) -> Vec<Agreement> {
+pub fn agreements(column: Column, here: &[u8], there: &[u8], counted: &[bool]) -> Vec<Agreement> {
     let (here, there): (&[u32], &[u32]) = (cast_slice(here), cast_slice(there));
     let width = here.len() / counted.len();
     let names = values(column);
-    assert_eq!(names.iter().map(|(_, n, _)| n).sum::<usize>(), width, "{column}");
-    assert_eq!(here.len(), there.len(), "{column}");
+    assert_eq!(names.iter().map(|(_, n, _)| n).sum::<usize>(), width, "{column:?}");
+    assert_eq!(here.len(), there.len(), "{column:?}");
     let mut first = 0;
     let compared = names.iter().map(|&(name, n_words, bound)| {
-        let value = if name.is_empty() { column.to_owned() } else { format!("{column}.{name}") };
+        let value = if name.is_empty() { column.name().to_owned() } else { format!("{}.{name}", column.name()) };
         let mut agreement = Agreement { value, n: 0, equal: 0, unusual: 0, worst: 0.0, bound };
         for row in (0..counted.len()).filter(|&row| counted[row]) {
             for word in (row * width + first)..(row * width + first + n_words) {

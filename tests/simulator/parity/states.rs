@@ -1,4 +1,4 @@
-//! Trucks in all kinds of states on every route of every roundabout, for comparing engines from there.
+//! Trucks in all kinds of states on every route of every roundabout, from which engines are compared.
 
 use std::sync::{Arc, OnceLock};
 
@@ -10,9 +10,9 @@ use offtrack::roundabout::Gutter;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 
-use crate::{benchmark, column};
+use crate::benchmark;
 
-/// Trucks: with all routes as likely as each other every roundabout has more than [`ENOUGH`].
+/// Trucks: with routes drawn uniformly at random every roundabout has more than [`ENOUGH`].
 pub const N_ENVS: usize = 28_672;
 /// States that each roundabout must have.
 pub const ENOUGH: usize = 4096;
@@ -31,10 +31,10 @@ pub fn world(gutter: Gutter) -> Arc<World> {
 
 /// Makes a simulator's columns those of `batch`.
 pub fn put(simulator: &mut Simulator, batch: &Batch) {
-    simulator.restore(|name| Some(column(batch, name))).unwrap();
+    simulator.restore(|column| Some(batch.column(column))).unwrap();
 }
 
-/// What the states are drawn from, beside the truck's place in the batch.
+/// Seed of the states.
 const SEED: u32 = 23;
 
 /// Numbers in [-1, 1) for a truck.
@@ -47,8 +47,8 @@ fn picked(env: usize, draw: u32, n: usize) -> usize {
     index_below(words(SEED, env as u32, 1, draw)[0], n as u32) as usize
 }
 
-/// Before a step: a quarter of the trucks where 40 random steps have brought them, the others anywhere near their routes, slow and fast,
-/// bent and leaning. On fixed routes one in sixteen is held.
+/// Before a step: a quarter of the trucks where 40 random steps have brought them, the others anywhere near their
+/// routes, slow and fast, bent and leaning. On fixed routes one in sixteen is held.
 pub fn varied(world: &Arc<World>, fixed: bool) -> (RouteChoice, Batch) {
     let all: Vec<u32> = (0..world.routes.len() as u32).collect();
     let mut simulator = Simulator::new(world.clone(), N_ENVS, SEED, RouteChoice::Drawn(all.clone())).unwrap();
@@ -99,7 +99,7 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
         steps: if kind == 3 { world.routes[route as usize].step_limit } else { picked(env, 3, 200) as u32 },
         held: 0,
     };
-    // Up to the end, where a truck that has passed the last waypoint stands; one in sixteen is told a waypoint too far away.
+    // Up to the last waypoint; one truck in sixteen has a next waypoint that is too far away.
     let far = if kind == 4 { 10 } else { 0 };
     batch.progress[env].waypoint = (near + far).clamp(1, last) as u32;
     let [integral, ..] = drawn(env, 3);

@@ -1,4 +1,4 @@
-//! What holds of the motion whatever the driver does.
+//! Properties of the motion that hold for any control.
 
 use std::f32::consts::PI;
 
@@ -43,7 +43,7 @@ fn driven_through(rig: &Rig, truck: Truck, controls: &[Control]) -> Truck {
     controls.iter().fold(truck, |truck, control| driven(rig, SUBSTEP, 2, control, &truck))
 }
 
-/// Largest difference of two trucks' places [m] and headings [rad].
+/// Largest difference of two trucks' positions [m] and headings [rad].
 fn apart(a: &Truck, b: &Truck) -> (f32, f32) {
     let headings = wrapped(a.heading - b.heading).abs().max(wrapped(a.trailer_heading - b.trailer_heading).abs());
     (a.position.distance(b.position), headings)
@@ -61,7 +61,7 @@ fn mirrored(truck: &Truck) -> Truck {
 
 proptest! {
     #[test]
-    fn no_control_makes_a_truck_leave_the_numbers_or_its_limits(
+    fn under_any_control_the_state_stays_finite_and_within_its_limits(
         rig in rigs(),
         truck in trucks(-5.0..25.0, PI),
         controls in controls(4.0, 30.0, 200),
@@ -84,15 +84,15 @@ proptest! {
         let opposite: Vec<Control> = controls.iter().map(|control| Control { steering: -control.steering, ..*control }).collect();
         let here = driven_through(&rig, truck, &controls);
         let there = driven_through(&rig, mirrored(&truck), &opposite);
-        let (place, heading) = apart(&mirrored(&here), &there);
-        // Every rounding is mirrored too; only -pi, which becomes pi, is not, and reversing widens what that costs.
-        prop_assert!(place < 1e-3 && heading < 1e-3, "{here:?} {there:?}");
+        let (position, heading) = apart(&mirrored(&here), &there);
+        // Every rounding is mirrored too, except at -pi, which becomes pi; in reverse that error grows.
+        prop_assert!(position < 1e-3 && heading < 1e-3, "{here:?} {there:?}");
         prop_assert!((here.trailer_load_transfer_ratio + there.trailer_load_transfer_ratio).abs() < 1e-3);
         prop_assert!((here.tractor_load_transfer_ratio + there.tractor_load_transfer_ratio).abs() < 1e-3);
     }
 
     #[test]
-    fn a_truck_drives_the_same_path_from_any_place_in_any_direction(
+    fn a_truck_drives_the_same_path_from_any_position_in_any_direction(
         rig in rigs(),
         truck in trucks(5.0..10.0, 0.8),
         controls in controls(0.3, 0.5, 60),
@@ -108,21 +108,22 @@ proptest! {
         };
         let here = driven_through(&rig, truck, &controls);
         let there = driven_through(&rig, moved(&truck), &controls);
-        let (place, heading) = apart(&moved(&here), &there);
-        // 120 sub-steps of 1.5e-5 m (half an ulp at 200 m, twice) and 2.4e-7 rad (an ulp of pi), which turns 60 m of way.
-        prop_assert!(place < 4e-3 && heading < 1e-4, "{place} m {heading} rad");
+        let (position, heading) = apart(&moved(&here), &there);
+        // 120 sub-steps of 1.5e-5 m (half an ulp at 200 m, twice) and 2.4e-7 rad (an ulp of pi), which turns 60 m of
+        // way.
+        prop_assert!(position < 4e-3 && heading < 1e-4, "{position} m {heading} rad");
         prop_assert!((here.trailer_load_transfer_ratio - there.trailer_load_transfer_ratio).abs() < 1e-3);
     }
 }
 
 #[test]
-fn a_mirrored_path_is_told_from_one_that_is_not() {
+fn a_path_that_is_not_mirrored_fails_the_comparison() {
     let rig = vehicle("daf_xf").rig("empty", SUBSTEP, None);
     let controls = [Control { steering: 0.3, ..Control::default() }; 20];
     let truck = Truck { speed: 8.0, ..Truck::default() };
     let here = driven_through(&rig, truck, &controls);
-    let (place, heading) = apart(&mirrored(&here), &driven_through(&rig, truck, &controls));
-    assert!(1.0 < place && 0.1 < heading);
+    let (position, heading) = apart(&mirrored(&here), &driven_through(&rig, truck, &controls));
+    assert!(1.0 < position && 0.1 < heading);
 }
 
 #[test]
@@ -139,7 +140,7 @@ fn a_step_reports_the_largest_load_transfer_among_its_sub_steps() {
 }
 
 #[test]
-fn the_path_is_held_to_what_the_tyres_hold() {
+fn the_path_is_limited_to_what_the_tyres_can_hold() {
     let rig = vehicle("daf_xf").rig("empty", SUBSTEP, None);
     let control = Control { steering: rig.steer_max, ..Control::default() };
     let truck = Truck { speed: 30.0 / 3.6, steering: rig.steer_max, ..Truck::default() };

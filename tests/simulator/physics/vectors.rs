@@ -1,27 +1,25 @@
-//! The reference vectors, each kind computed with the simulator's own functions and held to the tolerances that stand beside it.
+//! The reference vectors: each kind is computed with the simulator's own functions and compared within the tolerances
+//! of its file.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+mod steady;
+
 use std::sync::{Arc, OnceLock};
 
 use bytemuck::bytes_of;
 use glam::DVec2;
 use offtrack::cpu::drive::{Moving, motion};
-use offtrack::geometry::{Curve, Piece};
-use offtrack::layout::Rig;
+use offtrack::layout::{Column, Rig};
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
-use offtrack::stages::STAGES;
-use offtrack::swept::swept_path;
-use offtrack::trace::{Case, CaseVehicle, Command, Init, Traced, trace, trace_by};
-use offtrack::vehicle::{SingleTrack, Suspension};
+use offtrack::stages::Stage;
 use offtrack::world::World;
+use offtrack_comparison::trace::{Case, CaseVehicle, Command, Init, Traced, trace, trace_by};
 use serde_json::Value;
 
-use super::{VEHICLES, vehicle};
-use crate::{batch_on, benchmark, column, engines};
+use steady::{path_follow, rollover_static, single_track, steady_envelope, steady_state, steady_state_limit};
 
-const FOOT: f64 = 0.3048;
+use crate::{batch_on, benchmark, engines};
 
-/// The largest error over its tolerance, and what it was of.
+/// The largest ratio of an error to its tolerance, and its quantity.
 #[derive(Debug, Clone, Default)]
 struct Worst {
     ratio: f64,
@@ -31,7 +29,7 @@ struct Worst {
 impl Worst {
     fn see(&mut self, what: &str, error: f64, tolerance: f64) {
         let ratio = error.abs() / tolerance;
-        // No number is the worst of all.
+        // NaN counts as the largest error.
         if ratio.is_nan() || self.ratio < ratio {
             *self =
                 Worst { ratio: if ratio.is_nan() { f64::INFINITY } else { ratio }, what: format!("{what}: {error:e} of {tolerance:e}") };
@@ -69,17 +67,13 @@ fn rows(case: &Value) -> &[Value] {
     case["rows"].as_array().unwrap()
 }
 
-/// Any case's vehicle, for cases that only say where the axles are.
+/// A vehicle for cases that only give the positions of the axles.
 fn kinematic(row: &Value) -> CaseVehicle {
     let any: CaseVehicle = serde_json::from_value(case("straight_30")["vehicle"].clone()).unwrap();
     CaseVehicle { L1: number(row, "L1"), a: number(row, "a"), L2: number(row, "L2"), K: 0.0, delta_max: 1.5, gamma_max: 10.0, ..any }
 }
 
-fn single_track(row: &Value) -> SingleTrack {
-    SingleTrack { wheelbase: number(row, "L1"), fifth_wheel: number(row, "a"), trailer_wheelbase: number(row, "L2") }
-}
-
-/// Drives a case on an engine, a sub-step at a time: each is one drive stage of a world that has this rig.
+/// Drives a case on an engine, a sub-step at a time. Each is one drive stage of a world that has this rig.
 fn traced(engine: &Engine, case: &Case) -> Traced {
     let mut simulators: Vec<(Rig, f32, Simulator)> = Vec::new();
     trace_by(case, |rig, substep, control, moving| {
@@ -90,13 +84,13 @@ fn traced(engine: &Engine, case: &Case) -> Traced {
         });
         let simulator = &mut simulators[index].2;
         let batch = simulator.batch().clone();
-        let given = |name: &str| match name {
-            "control" => bytes_of(control),
-            "truck" => bytes_of(&moving.truck),
-            _ => column(&batch, name),
+        let given = |column| match column {
+            Column::Control => bytes_of(control),
+            Column::Truck => bytes_of(&moving.truck),
+            other => batch.column(other),
         };
-        simulator.restore(|name| Some(given(name))).unwrap();
-        simulator.run_stage(STAGES.iter().find(|stage| stage.name == "drive").unwrap());
+        simulator.restore(|column| Some(given(column))).unwrap();
+        simulator.run_stage(Stage::Drive);
         let truck = simulator.batch().truck[0];
         Moving { truck, motion: motion(rig, truck.speed, truck.steering, truck.heading - truck.trailer_heading) }
     })
@@ -112,7 +106,7 @@ fn alone(engine: &Engine, rig: &Rig, substep: f32) -> Simulator {
 }
 
 /// The state that a truck reaches `t` seconds after `init` under one command.
-fn driven(engine: &Engine, vehicle: CaseVehicle, init: Init, command: Command, t: f64) -> offtrack::trace::State {
+fn driven(engine: &Engine, vehicle: CaseVehicle, init: Init, command: Command, t: f64) -> offtrack_comparison::trace::State {
     let case =
         Case { id: String::new(), vehicle, dt: 0.05, init, commands: vec![command], t_end: t, times: Some(vec![t]), expected: vec![] };
     traced(engine, &case).states[0]
@@ -123,7 +117,7 @@ fn trajectory(engine: &Engine, written: &Value, changed: impl Fn(&mut Case)) -> 
     assert_eq!(case.dt, 0.05);
     changed(&mut case);
     let traced = traced(engine, &case);
-    assert!(!matches!(engine, Engine::Cpu) || traced == trace(&case).unwrap(), "{}: a trace is no drive", case.id);
+    assert!(!matches!(engine, Engine::Cpu) || traced == trace(&case).unwrap(), "{}: a trace differs from the drive stage", case.id);
     compare(&traced, written)
 }
 
@@ -179,71 +173,6 @@ fn closed_form(engine: &Engine, written: &Value) -> Worst {
     worst
 }
 
-fn steady_state(written: &Value) -> Worst {
-    let mut worst = Worst::default();
-    let (length, angle) = (number(&written["tolerance"], "length"), number(&written["tolerance"], "angle"));
-    for row in rows(written) {
-        let track = single_track(row);
-        let steady = track.at_front_radius(number(row, "Rf"));
-        worst.see_option("gamma", steady.map(|steady| steady.articulation), &row["gamma"], angle);
-        worst.see_option("R2", steady.map(|steady| steady.trailer_radius), &row["R2"], length);
-        worst.see_option("offtracking", steady.map(|steady| steady.off_tracking()), &row["offtracking"], length);
-        if let Some(steady) = steady {
-            worst.see("delta", steady.steering - number(row, "delta"), angle);
-            worst.see("R1", steady.tractor_radius - number(row, "R1"), length);
-            worst.see("RH", steady.fifth_wheel_radius - number(row, "RH"), length);
-            // In a steady turn of the simulator's own both units turn at one rate.
-            let turning = motion(&kinematic(row).rig(0.05), 5.0, steady.steering as f32, steady.articulation as f32);
-            worst.see("rates", f64::from(turning.yaw_rate - turning.trailer_yaw_rate), 1e-5);
-        }
-    }
-    worst
-}
-
-fn steady_state_limit(written: &Value) -> Worst {
-    let mut worst = Worst::default();
-    for row in rows(written) {
-        let critical = single_track(row).critical_steering();
-        worst.see("critical", critical - number(row, "delta_critical"), number(&written["tolerance"], "angle"));
-        assert!(single_track(row).at_steering(critical - 1e-3).is_some() && single_track(row).at_steering(critical + 1e-3).is_none());
-    }
-    worst
-}
-
-fn steady_envelope(written: &Value) -> Worst {
-    let mut worst = Worst::default();
-    let length = number(&written["tolerance"], "length_m");
-    for row in rows(written) {
-        // The directive's construction has the kingpin above the drive axle.
-        let track = SingleTrack { wheelbase: 3.6, fifth_wheel: 0.0, trailer_wheelbase: number(row, "L2") };
-        let steady = track.at_tractor_radius(number(row, "RH")).unwrap();
-        worst.see("R2", steady.trailer_radius - number(row, "R2"), length);
-        worst.see("inner", steady.trailer_radius - 0.5 * number(row, "width") - number(row, "r_inner"), length);
-    }
-    worst
-}
-
-fn rollover_static(written: &Value) -> Worst {
-    let mut worst = Worst::default();
-    let tolerance = |key: &str| number(&written["tolerance"], key);
-    for row in rows(written) {
-        for name in VEHICLES {
-            let load = &vehicle(name).loads[row["preset"].as_str().unwrap()];
-            assert_eq!(load.mass, number(row, "m2"));
-            let suspension = load.suspension;
-            let rigid = Suspension { roll_gain: 0.0, ..suspension };
-            worst.see("rigid", rigid.rollover_threshold() - number(row, "srt_rigid_g"), tolerance("g"));
-            worst.see("srt", suspension.rollover_threshold() - number(row, "srt_g"), tolerance("g"));
-            let ratio = suspension.quasi_static_load_transfer_ratio(0.3 * 9.81);
-            worst.see("ltr", ratio - number(row, "ltr_qs_at_0p3g"), tolerance("ltr"));
-            let keys = ["fn2", "zeta2", "hr2", "T2", "Rphi2"].map(|key| number(row, key));
-            let Suspension { roll_frequency, roll_damping, roll_centre, track, roll_gain, .. } = suspension;
-            assert_eq!([roll_frequency, roll_damping, roll_centre, track, roll_gain], keys);
-        }
-    }
-    worst
-}
-
 fn cross_check(engine: &Engine, written: &Value) -> Worst {
     let mut worst = Worst::default();
     let (pos, angle) = (number(&written["tolerance"], "pos"), number(&written["tolerance"], "angle"));
@@ -257,53 +186,6 @@ fn cross_check(engine: &Engine, written: &Value) -> Worst {
         worst.see("pos", DVec2::new(state.x, state.y).distance(DVec2::new(number(check, "x"), number(check, "y"))), pos);
         for (key, value) in [("psi1", state.psi1), ("gamma", state.gamma), ("delta", state.delta), ("v", state.v)] {
             worst.see(key, value - number(check, key), angle);
-        }
-    }
-    worst
-}
-
-/// Least distances of a point on the drive axle and one on the trailer's axle group, both `aside` metres left of the middle, from the
-/// centre of a left turn, the front axle on a straight, an arc and a straight [m].
-fn least_radii(rig: &Rig, radius: f64, turn: f64, aside: f64) -> (f64, f64) {
-    let arc = Piece::Arc { centre: DVec2::ZERO, radius, from: -FRAC_PI_2, sweep: turn };
-    let approach = Piece::Segment { from: arc.start() - DVec2::X, to: arc.start() };
-    let departure = Piece::Segment { from: arc.end(), to: arc.end() + 30.0 * DVec2::from_angle(turn) };
-    let poses = swept_path(rig, &Curve { pieces: vec![approach, arc, departure] }, 1.0, 0.05);
-    let radius = |axle: DVec2, heading: f64| (axle + aside * DVec2::from_angle(heading).perp()).length();
-    let drive = poses.iter().map(|pose| radius(pose.position, pose.heading)).fold(f64::INFINITY, f64::min);
-    let trailer = poses.iter().map(|pose| radius(pose.trailer_position, pose.trailer_heading)).fold(f64::INFINITY, f64::min);
-    (drive, trailer)
-}
-
-fn path_follow(written: &Value) -> Worst {
-    let mut worst = Worst::default();
-    for row in rows(written) {
-        // A vehicle without a trailer pulls one that nobody looks at.
-        let length = |key: &str| row[key].as_f64().map(|feet| feet * FOOT);
-        let rig = Rig {
-            wheelbase: length("L1_ft").unwrap() as f32,
-            fifth_wheel: length("a_ft").unwrap_or(0.0) as f32,
-            trailer_wheelbase: length("L2_ft").unwrap_or(10.0) as f32,
-            ..Rig::default()
-        };
-        let radius = length("CTR_ft").or(length("R_ft")).unwrap();
-        let turn = number(row, "turn_deg") / 360.0 * TAU;
-        if let Some(width) = length("width_ft") {
-            let (drive, trailer) = least_radii(&rig, radius, turn, 0.5 * width);
-            let inside = if row["L2_ft"].is_null() { drive } else { trailer } / FOOT;
-            let tolerance = number(&written["tolerance"], "length_ft");
-            worst.see(&format!("{} published", row["vehicle"]), inside - number(row, "published_min_inside_radius_ft"), tolerance);
-            // The reference is the same equation, sampled every 5 cm here; without a trailer it looks no further than the turn's end, which
-            // leaves out the last 0.038 ft of a city bus.
-            let sampling = if row["L2_ft"].is_null() { 0.05 } else { 0.01 };
-            let error = inside - number(row, "reference_min_inside_radius_ft");
-            worst.see(&format!("{} reference", row["vehicle"]), error, sampling);
-        } else {
-            let (drive, trailer) = least_radii(&rig, radius, turn, 0.0);
-            let tolerance = number(&written["tolerance"], "length_in");
-            let inches = |least: f64| (radius - least) / FOOT * 12.0;
-            worst.see("drive axles", inches(drive) - number(row, "published_drive_in"), tolerance);
-            worst.see("trailer axles", inches(trailer) - number(row, "published_trailer_in"), tolerance);
         }
     }
     worst
@@ -333,7 +215,7 @@ fn every_reference_vector_holds_within_its_own_tolerance() {
     }
 }
 
-/// How far the case is missed, on whichever engine comes nearest, once something about it is changed.
+/// The smallest error ratio over all engines once something about the case is changed.
 fn missed(id: &str, changed: impl Fn(&mut Case)) -> f64 {
     engines().iter().map(|(_, engine)| trajectory(engine, &case(id), &changed).ratio).fold(f64::INFINITY, f64::min)
 }
@@ -363,11 +245,11 @@ fn tyres_that_hold_seven_tenths_of_gravity_fail_the_one_vector_that_asks_for_mor
 }
 
 #[test]
-fn an_instant_between_two_sub_steps_lies_on_the_arc_and_disturbs_no_other() {
+fn an_instant_between_two_sub_steps_lies_on_the_arc_and_changes_no_other() {
     let mut case: Case = serde_json::from_value(case("circle_R10_20")).unwrap();
     case.times = Some(vec![4.0]);
     let alone = trace(&case).unwrap();
-    // A command between two sub-steps that says nothing new.
+    // A command between two sub-steps that repeats the one before it.
     case.commands.push(Command { t: 1.23, ..case.commands[0].clone() });
     case.times = Some(vec![0.07, 1.0 / 3.0, 4.0]);
     let among = trace(&case).unwrap();

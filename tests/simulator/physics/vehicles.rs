@@ -1,4 +1,4 @@
-//! The vehicle files: what they say, and what a wrong one is told.
+//! The vehicle files, and the errors of wrong ones.
 
 use std::f32::consts::FRAC_PI_2;
 use std::path::Path;
@@ -20,7 +20,7 @@ fn every_vehicle_file_reads_and_has_the_four_loads() {
 }
 
 #[test]
-fn a_rig_has_the_files_measures_in_metres_and_radians() {
+fn a_rig_has_the_files_dimensions_in_metres_and_radians() {
     let rig = vehicle("daf_xf").rig("empty", 0.05, None);
     assert_eq!([rig.wheelbase, rig.fifth_wheel, rig.trailer_wheelbase, rig.slip], [3.543, 0.408, 7.756, 0.0136]);
     assert!((rig.steer_max - 0.698_131_7).abs() < 1e-6 && (rig.steer_rate - 0.349_065_85).abs() < 1e-6);
@@ -33,7 +33,7 @@ fn a_rig_has_the_files_measures_in_metres_and_radians() {
 #[test]
 fn the_european_set_keeps_the_directives_turning_circle_free_and_a_longer_trailer_does_not() {
     let european = vehicle("eu_4x2_13m6");
-    // Worked out to the centimetre for the directive's outer circle of 12.50 m; it asks for 5.30 m.
+    // Reference to the centimetre for the directive's outer circle of 12.50 m; it requires 5.30 m.
     let inner = european.turning_circle_inner_radius(12.5).unwrap();
     assert!((inner - 5.41).abs() < 0.005, "{inner}");
     let mut longer = european;
@@ -44,17 +44,17 @@ fn the_european_set_keeps_the_directives_turning_circle_free_and_a_longer_traile
 }
 
 #[test]
-fn steering_angles_beyond_which_a_truck_folds_up_are_those_known() {
+fn critical_steering_angles_are_those_of_the_reference() {
     let critical = |name| vehicle(name).single_track().critical_steering().to_degrees();
-    // Known to a tenth of a degree.
+    // The reference has one decimal.
     assert!((critical("eu_4x2_13m6") - 25.1).abs() < 0.05, "{}", critical("eu_4x2_13m6"));
-    // AASHTO's long trailer cannot follow its tractor round and round at full lock.
+    // AASHTO's long trailer has no steady turn at full lock.
     let american = vehicle("us_wb62");
     assert_eq!(american.single_track().at_steering(american.tractor.steer_max), None);
 }
 
 #[test]
-fn units_roll_over_where_the_presets_say() {
+fn units_roll_over_at_the_thresholds_of_the_presets() {
     for name in VEHICLES {
         let vehicle = vehicle(name);
         // The table rounds 0.858 down.
@@ -67,7 +67,7 @@ fn units_roll_over_where_the_presets_say() {
 }
 
 #[test]
-fn sensors_stand_where_an_observation_expects_them() {
+fn sensors_are_where_an_observation_expects_them() {
     let vehicle = vehicle("daf_xf");
     let rays = vehicle.rays();
     let body = vehicle.trailer_body();
@@ -75,20 +75,20 @@ fn sensors_stand_where_an_observation_expects_them() {
     assert_eq!(rays[1].origin, Vec2::new(body.front, -body.half_width));
     assert!((rays[N_TRAILER_RAYS - 1].origin - Vec2::new(body.rear, -body.half_width)).length() < 1e-5);
     let gap = rays[0].origin.x - rays[2].origin.x;
-    for place in 0..8 {
-        assert_eq!([rays[2 * place].direction, rays[2 * place + 1].direction], [Vec2::Y, Vec2::NEG_Y]);
+    for pair in 0..8 {
+        assert_eq!([rays[2 * pair].direction, rays[2 * pair + 1].direction], [Vec2::Y, Vec2::NEG_Y]);
         // An f32 of 10 m has an ulp of 1e-6.
-        assert!((rays[2 * place].origin.x - (body.front - place as f32 * gap)).abs() < 1e-5);
+        assert!((rays[2 * pair].origin.x - (body.front - pair as f32 * gap)).abs() < 1e-5);
     }
-    for (place, ray) in rays[N_TRAILER_RAYS..].iter().enumerate() {
+    for (mount, ray) in rays[N_TRAILER_RAYS..].iter().enumerate() {
         assert_eq!(ray.origin, Vec2::new(vehicle.tractor_body().front, 0.0));
-        let angle = FRAC_PI_2 - place as f32 * 15.0f32.to_radians();
-        assert!((ray.direction - Vec2::from_angle(angle)).length() < 1e-6, "{place}");
+        let angle = FRAC_PI_2 - mount as f32 * 15.0f32.to_radians();
+        assert!((ray.direction - Vec2::from_angle(angle)).length() < 1e-6, "{mount}");
     }
     assert_eq!(rays.len(), N_RAYS);
 }
 
-/// What reading the study's truck says once `from` stands as `to` in its file.
+/// The error for the study's truck with `from` replaced by `to` in its file.
 fn refusal(from: &str, to: &str) -> String {
     let text = std::fs::read_to_string(vehicle_file("daf_xf")).unwrap();
     assert!(text.contains(from), "{from}");
@@ -99,7 +99,7 @@ fn refusal(from: &str, to: &str) -> String {
 }
 
 #[test]
-fn a_wrong_vehicle_file_is_told_its_key_its_value_and_what_would_do() {
+fn a_wrong_vehicle_file_is_refused_with_its_key_its_value_and_what_would_do() {
     let wrong = [
         ("wheelbase = 3.543", "wheelbase = -3.5", "tractor.wheelbase: -3.5 m; must lie in 2..10 m"),
         ("wheelbase = 3.543", "wheelbase = nan", "tractor.wheelbase: NaN m"),
@@ -127,7 +127,7 @@ fn a_wrong_vehicle_file_is_told_its_key_its_value_and_what_would_do() {
 #[test]
 fn a_file_can_move_its_sensors() {
     let text = std::fs::read_to_string(vehicle_file("daf_xf")).unwrap();
-    let mounts: Vec<String> = (0..13).map(|place| format!("[4.5, {}]", 1.2 - 0.2 * f64::from(place))).collect();
+    let mounts: Vec<String> = (0..13).map(|mount| format!("[4.5, {}]", 1.2 - 0.2 * f64::from(mount))).collect();
     let sensors = format!("[sensors]\ntrailer_first = 1.0\ntrailer_last = 8.0\ntractor_mounts = [{}]\n", mounts.join(", "));
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("truck.toml");

@@ -7,22 +7,22 @@ use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
-use crate::scaling::Scaling;
+use crate::learner::normalisation::Normalisation;
 
 /// Key of the metadata's one entry.
 const KEY: &str = "offtrack";
 /// Version of the description's meaning.
 const VERSION: u32 = 1;
-/// Layers a policy can have: more than any config asks for.
+/// Most layers of a policy: more than any training file asks for.
 const MOST_LAYERS: usize = 64;
 
-/// What the file holds, as plain numbers.
+/// The file's contents as plain numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Contents {
     pub(super) benchmark: String,
-    /// Steer angle [rad] and speed [m/s] of each action.
+    /// Steer angle \[rad] and speed [m/s] of each action.
     pub(super) actions: Vec<[f32; 2]>,
-    pub(super) scaling: Scaling,
+    pub(super) normalisation: Normalisation,
     /// Weights `[inputs * outputs]`, inputs varying slowest, and biases `[outputs]`, from the observation on.
     pub(super) layers: Vec<(Vec<f32>, Vec<f32>)>,
 }
@@ -57,15 +57,15 @@ impl Contents {
         serialize(views, Some(metadata)).expect("a header of a few names and shapes can be written")
     }
 
-    /// What is wrong is said in words; the caller knows the file's name.
+    /// The error is a sentence without the file's name: the caller adds it.
     pub(super) fn from_bytes(bytes: &[u8]) -> Result<Contents, String> {
-        let unreadable = |error| format!("is no policy file, or a damaged one: {error}");
+        let unreadable = |error| format!("is not a policy file, or is damaged: {error}");
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(unreadable)?;
         let tensors = SafeTensors::deserialize(bytes).map_err(unreadable)?;
         let text = header.metadata().as_ref().and_then(|metadata| metadata.get(KEY));
-        let text = text.ok_or_else(|| format!("is no policy file: its metadata has no entry `{KEY}`; `offtrack train` writes one"))?;
+        let text = text.ok_or_else(|| format!("is not a policy file: its metadata has no entry `{KEY}`; `offtrack train` writes one"))?;
         let mut description: Description =
-            serde_json::from_str(text).map_err(|error| format!("is no policy file, or a damaged one: its description: {error}"))?;
+            serde_json::from_str(text).map_err(|error| format!("is not a policy file, or is damaged: its description: {error}"))?;
         if description.version != VERSION {
             return Err(format!("is a policy file of version {}; this program reads version {VERSION}", description.version));
         }
@@ -83,36 +83,52 @@ impl Contents {
         let found = std::mem::take(&mut description.checksum);
         let expected = checksum(&description, read.iter().map(|(_, tensor)| tensor.data()));
         if found != expected {
-            return Err(format!("is damaged: its checksum is {found:08x} where its contents give {expected:08x}; fetch or train it again"));
+            return Err(format!(
+                "is damaged: its checksum is {found:08x} and its contents give {expected:08x}; download it or train it again"
+            ));
         }
         Contents::from_tensors(description, &read)
     }
 
-    /// The numbers of a file whose checksum was right: only its shapes can still be those of another kind of policy.
+    /// The numbers of a file whose checksum is right. Shapes may still be those of another observation or action table,
+    /// and values may not be finite.
     fn from_tensors(description: Description, tensors: &[(String, TensorView)]) -> Result<Contents, String> {
+        for (name, tensor) in tensors {
+            if let Some((index, value)) = floats(tensor.data()).into_iter().enumerate().find(|(_, value)| !value.is_finite()) {
+                return Err(format!(
+                    "is a policy that cannot drive: {name}[{index}] is {value}; every number must be finite; train it again"
+                ));
+            }
+        }
+        if let Some((index, _)) = description.actions.iter().enumerate().find(|(_, action)| !action.iter().all(|value| value.is_finite())) {
+            return Err(format!("is a policy that cannot drive: actions[{index}] is not finite; train it again"));
+        }
         let mut sizes = vec![N_VALUES];
         let mut numbers = tensors.iter().map(|(_, tensor)| floats(tensor.data()));
         let mut next = || numbers.next().unwrap_or_default();
-        let scaling = Scaling { mean: next(), factor: next() };
+        let normalisation = Normalisation { mean: next(), factor: next() };
         let layers: Vec<_> = (0..description.layers).map(|_| (next(), next())).collect();
         sizes.extend(layers.iter().map(|(_, biases)| biases.len()));
         let fits = |((weights, _), ends): (&(Vec<f32>, Vec<f32>), &[usize])| 0 < ends[1] && weights.len() == ends[0] * ends[1];
         let chain = layers.iter().zip(sizes.windows(2)).all(fits);
-        if scaling.mean.len() != N_VALUES || scaling.factor.len() != N_VALUES || !chain || sizes.last() != Some(&description.actions.len())
+        if normalisation.mean.len() != N_VALUES
+            || normalisation.factor.len() != N_VALUES
+            || !chain
+            || sizes.last() != Some(&description.actions.len())
         {
             return Err(format!(
-                "is a policy of another shape: {} observed values and layers of {:?}; {N_VALUES} values and {} actions are needed",
-                scaling.mean.len(),
+                "is a policy of another shape: {} observation values and layers of {:?}; {N_VALUES} values and {} actions are needed",
+                normalisation.mean.len(),
                 &sizes[1..],
                 description.actions.len()
             ));
         }
-        Ok(Contents { benchmark: description.benchmark, actions: description.actions, scaling, layers })
+        Ok(Contents { benchmark: description.benchmark, actions: description.actions, normalisation, layers })
     }
 
     /// Every tensor in the order of [`names`].
     fn tensors(&self) -> Vec<Named> {
-        let vectors = [&self.scaling.mean, &self.scaling.factor].map(|values| (vec![values.len()], values));
+        let vectors = [&self.normalisation.mean, &self.normalisation.factor].map(|values| (vec![values.len()], values));
         let layers = self.layers.iter().flat_map(|(weights, biases)| {
             let outputs = biases.len();
             [(vec![weights.len() / outputs.max(1), outputs], weights), (vec![outputs], biases)]
@@ -127,7 +143,7 @@ impl Contents {
     }
 }
 
-/// A tensor on its way into a file.
+/// A tensor to be written.
 struct Named {
     name: String,
     shape: Vec<usize>,
@@ -136,9 +152,9 @@ struct Named {
 
 /// Names of a policy's tensors in the order of reading.
 fn names(n_layers: usize) -> impl Iterator<Item = String> {
-    let scaling = ["observation.mean", "observation.factor"].map(str::to_owned);
+    let normalisation = ["observation.mean", "observation.factor"].map(str::to_owned);
     let layers = (0..n_layers).flat_map(|index| ["weight", "bias"].map(|part| format!("actor.{index}.{part}")));
-    scaling.into_iter().chain(layers)
+    normalisation.into_iter().chain(layers)
 }
 
 fn floats(bytes: &[u8]) -> Vec<f32> {

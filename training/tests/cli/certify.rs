@@ -1,10 +1,12 @@
-//! `offtrack certify`: what was found arrives again, what was changed does not, and files for something else are refused.
+//! `offtrack certify`: sequences found arrive again, changed ones do not, and files for other conditions are refused.
+
+use std::process::Command;
 
 use serde_json::Value;
 
 use crate::place::{Place, offtrack, refusal, succeed};
 
-/// A certificate of the short benchmark, searched as quickly as it can be.
+/// A certificate of the short benchmark, from the narrowest search that completes it.
 fn certified() -> Place {
     let place = Place::new();
     let benchmark = place.text("short.toml");
@@ -16,7 +18,7 @@ fn verify(place: &Place, benchmark: &str) -> std::process::Output {
     offtrack(&["certify", "--benchmark", benchmark, "--verify", &place.text("certificate.json")])
 }
 
-/// Writes the certificate again with something changed in it.
+/// Rewrites the certificate with a change.
 fn change(place: &Place, change: impl Fn(&mut Value)) {
     let mut certificate = place.json("certificate.json");
     let before = certificate.clone();
@@ -61,7 +63,7 @@ fn a_changed_or_shortened_sequence_is_a_failure_that_names_its_route_and_start()
 }
 
 #[test]
-fn a_file_that_is_no_whole_certificate_is_refused_by_its_name() {
+fn a_damaged_certificate_is_refused_by_its_name() {
     let place = certified();
     let whole = std::fs::read(place.file("certificate.json")).unwrap();
     let refused = |expected: &str| {
@@ -70,9 +72,9 @@ fn a_file_that_is_no_whole_certificate_is_refused_by_its_name() {
         std::fs::write(place.file("certificate.json"), &whole).unwrap();
     };
     std::fs::write(place.file("certificate.json"), &whole[..whole.len() / 2]).unwrap();
-    refused("is no certificate, or a damaged one");
+    refused("is not a certificate, or is damaged");
     std::fs::write(place.file("certificate.json"), "{}").unwrap();
-    refused("is no certificate, or a damaged one");
+    refused("is not a certificate, or is damaged");
     change(&place, |certificate| certificate["version"] = 2.into());
     refused("version 2");
     change(&place, |certificate| certificate["routes"][0]["found"][0]["actions"] = "5x20".into());
@@ -81,6 +83,8 @@ fn a_file_that_is_no_whole_certificate_is_refused_by_its_name() {
     refused("must lie in -1..1");
     change(&place, |certificate| certificate["starts"] = Value::Array(Vec::new()));
     refused("starts: empty");
+    change(&place, |certificate| certificate["routes"][1] = certificate["routes"][0].clone());
+    refused("16m/E-right-1: is there twice");
     change(&place, |certificate| drop(certificate["routes"][0]["found"].as_array_mut().unwrap().pop()));
     refused("4 entries");
     change(&place, |certificate| certificate["routes"][0]["name"] = "20m/N-left-9".into());
@@ -90,7 +94,7 @@ fn a_file_that_is_no_whole_certificate_is_refused_by_its_name() {
 }
 
 #[test]
-fn a_certificate_made_under_other_conditions_is_refused_by_what_differs() {
+fn a_certificate_made_under_other_conditions_is_refused_by_the_condition_that_differs() {
     let place = certified();
     let short = std::fs::read_to_string(place.file("short.toml")).unwrap();
     for (from, to, expected) in [
@@ -107,7 +111,7 @@ fn a_certificate_made_under_other_conditions_is_refused_by_what_differs() {
 }
 
 #[test]
-fn an_evaluation_tells_success_over_the_certified_routes_apart() {
+fn an_evaluation_reports_the_success_on_certified_routes() {
     let place = certified();
     let (certificate, report) = (place.text("certificate.json"), place.text("report.json"));
     let evaluate = || place.evaluate(&["--policy", "pursuit", "--episodes", "2", "--certified", &certificate, "--json", &report]);
@@ -121,7 +125,7 @@ fn an_evaluation_tells_success_over_the_certified_routes_apart() {
     assert_eq!(report["certified"]["episodes"], 2);
     assert_eq!(report["certified"]["arrived"], report["routes"][0]["arrived"]);
     assert!(String::from_utf8_lossy(&output.stdout).lines().any(|line| line.starts_with("certified ")));
-    // What the file claims is driven again first.
+    // The sequences of the file are driven again first.
     change(&place, |certificate| certificate["routes"][1]["found"][0]["actions"] = "2x5".into());
     assert!(refusal(&evaluate(), 1).contains("20m/E-right-1"));
     change(&place, |certificate| drop(certificate["routes"].as_array_mut().unwrap().remove(1)));
@@ -153,4 +157,54 @@ fn a_policy_may_be_among_the_candidates_and_must_fit_the_benchmark() {
     assert_eq!((&certificate["policy"], &certificate["split"]), (&Value::from(policy.as_str()), &Value::from("train")));
     assert_eq!(certificate["routes"].as_array().map(Vec::len), Some(1));
     assert!(refusal(&certify("attard2023"), 2).contains("another action table"));
+}
+
+#[test]
+fn a_result_states_the_commit_of_the_build_and_not_that_of_the_sources_when_it_runs() {
+    let place = certified();
+    // A git that says something else when the program runs.
+    let fake = place.file("git");
+    std::fs::write(&fake, "#!/bin/sh\necho 0123456789ab\n").unwrap();
+    assert!(Command::new("chmod").args(["+x", fake.to_str().unwrap()]).status().unwrap().success());
+    let path = format!("{}:{}", fake.parent().unwrap().display(), std::env::var("PATH").unwrap());
+    let output = Command::new(env!("CARGO_BIN_EXE_offtrack"))
+        .env("PATH", path)
+        .args([
+            "certify",
+            "--benchmark",
+            &place.text("short.toml"),
+            "--widths",
+            "16",
+            "--split",
+            "train",
+            "--json",
+            &place.text("again.json"),
+        ])
+        .output()
+        .unwrap();
+    succeed(&output);
+    assert_eq!(place.json("again.json")["commit"], place.json("certificate.json")["commit"]);
+    assert_ne!(place.json("again.json")["commit"], "0123456789ab");
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupted_search_exits_with_130_and_leaves_no_temporary_file() {
+    let place = Place::new();
+    let arguments = ["certify", "--benchmark", "attard2023", "--json", &place.text("certificate.json")];
+    let search = Command::new(env!("CARGO_BIN_EXE_offtrack"))
+        .args(arguments)
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    // The first write shows that the search has begun.
+    while !place.file("certificate.json").is_file() {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    assert!(Command::new("kill").args(["-INT", &search.id().to_string()]).status().unwrap().success());
+    assert_eq!(search.wait_with_output().unwrap().status.code(), Some(130));
+    let names: Vec<String> =
+        std::fs::read_dir(place.file("")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    assert!(names.iter().all(|name| !name.ends_with(".tmp")), "{names:?}");
 }

@@ -1,4 +1,5 @@
-//! Devices from outside: which there are, what is said where one cannot be had, and the speed measured on either engine.
+//! Devices from outside: which there are, what is said where one cannot be had, and the speed measured on either
+//! engine.
 
 use offtrack::stages::STAGES;
 use serde_json::Value;
@@ -8,7 +9,7 @@ use crate::place::{Place, offtrack, refusal, succeed};
 /// Over in a moment.
 const MOMENT: [&str; 2] = ["--seconds", "0.1"];
 
-/// Modes that take a network.
+/// Modes with a network.
 const NETWORKS: [&str; 3] = ["policy", "large-policy", "training"];
 
 /// `scale` for a moment on a list of sizes, as JSON.
@@ -17,8 +18,8 @@ fn scaled(place: &Place, arguments: &[&str]) -> Value {
     place.json("scale.json")
 }
 
-/// The modes in which networks drive, in the order asked for: each counted where it was stepped, without times of stages.
-fn assert_networks_drove(scale: &Value, envs: u64) {
+/// The modes with a network, in the order asked for: each counted where it was stepped, without times of stages.
+fn assert_networks_acted(scale: &Value, envs: u64) {
     let runs = scale["runs"].as_array().unwrap();
     let modes: Vec<&str> = runs.iter().map(|run| run["mode"].as_str().unwrap()).collect();
     assert_eq!(modes, NETWORKS);
@@ -45,7 +46,7 @@ fn assert_measured(run: &Value, envs: u64, rays: f64) {
     assert!((speed("rays_per_second") / median - rays_a_step).abs() < 0.01, "{run}");
     assert_eq!(speed("bytes_per_truck"), 796.0);
     let stages = run["stages"].as_object().unwrap();
-    assert!(stages.len() == STAGES.len() && STAGES.iter().all(|stage| stages.contains_key(stage.name)), "{run}");
+    assert!(stages.len() == STAGES.len() && STAGES.iter().all(|stage| stages.contains_key(stage.name())), "{run}");
     assert!(stages.values().all(|time| 0.0 <= time.as_f64().unwrap()) && 0.0 < stages["sense"].as_f64().unwrap(), "{run}");
 }
 
@@ -88,10 +89,10 @@ fn a_scale_is_drawn_as_a_png_too() {
 }
 
 #[test]
-fn networks_drive_and_learn_on_the_processor() {
+fn networks_act_and_learn_on_the_processor() {
     let place = Place::new();
     let scale = scaled(&place, &["--envs", "16", "--mode", &NETWORKS.join(","), "--config", &place.text("tiny.toml")]);
-    assert_networks_drove(&scale, 16);
+    assert_networks_acted(&scale, 16);
     assert!(scale["step"]["learning"].is_object() && scaled(&place, &["--envs", "1"])["step"]["learning"].is_null());
     let said = refusal(&offtrack(&["scale", "--mode", "training", "--config", "no.toml"]), 2);
     assert!(said.contains("no.toml: cannot be read"), "{said}");
@@ -101,7 +102,7 @@ fn networks_drive_and_learn_on_the_processor() {
 fn an_adapter_for_a_training_run_on_the_processor_is_refused() {
     let place = Place::new();
     let said = refusal(&offtrack(&["train", &place.text("tiny.toml"), "--out", &place.text("runs"), "--adapter", "abacus"]), 2);
-    assert!(said.contains("--adapter: abacus; the training file learns on the processor"), "{said}");
+    assert!(said.contains("--adapter: abacus; the training file uses the processor"), "{said}");
 }
 
 #[cfg(not(feature = "gpu"))]
@@ -109,7 +110,7 @@ fn an_adapter_for_a_training_run_on_the_processor_is_refused() {
 fn a_training_file_for_a_device_is_refused_by_a_program_without_the_feature() {
     let place = Place::new();
     let said = refusal(&offtrack(&["train", &place.text("tiny.toml"), "--out", &place.text("runs"), "--set", "device=gpu"]), 2);
-    assert!(said.contains("device: \"gpu\"; this program was built without the feature `gpu`"), "{said}");
+    assert!(said.contains("device: \"gpu\"; this program was built without the feature gpu"), "{said}");
     assert!(!std::path::Path::new(&place.text("runs")).exists());
 }
 
@@ -198,19 +199,19 @@ mod on_a_device {
         let place = Place::new();
         let arguments = ["train", &place.text("tiny.toml"), "--out", &place.text("runs"), "--set", "device=gpu"];
         let said = refusal(&offtrack(&[&arguments[..], &["--adapter", "abacus"]].concat()), 2);
-        assert!(said.contains("adapter \"abacus\": not there; this machine has "), "{said}");
+        assert!(said.contains("adapter \"abacus\": not found; this machine has "), "{said}");
         assert!(!std::path::Path::new(&place.text("runs")).exists());
     }
 
     #[test]
-    fn networks_drive_and_learn_on_the_device() {
+    fn networks_act_and_learn_on_the_device() {
         let place = Place::new();
         let arguments = ["--device", "gpu", "--envs", "16", "--mode", &NETWORKS.join(","), "--config", &place.text("tiny.toml")];
-        assert_networks_drove(&scaled(&place, &arguments), 16);
+        assert_networks_acted(&scaled(&place, &arguments), 16);
     }
 
     #[test]
-    fn drivers_arrive_as_often_on_every_route_as_on_the_processor() {
+    fn policies_arrive_as_often_on_every_route_as_on_the_processor() {
         let place = Place::new();
         let arrived = |arguments: &[&str]| {
             let fixed = ["evaluate", "--episodes", "3", "--json", &place.text("report.json")];
@@ -225,7 +226,8 @@ mod on_a_device {
         assert_eq!(processor.0, "cpu");
         assert!(device.0.contains('(') && !device.0.contains("cpu"), "{}", device.0);
         assert_eq!((processor.1.len(), &processor.1), (23, &device.1));
-        // A driver that fails on two routes of three, and other starts: equal counts are no accident of one that always arrives.
+        // A policy that fails on two routes of three, and other starts: equal counts are no accident of one that always
+        // arrives.
         let pursuit = ["--policy", "pursuit", "--device", "gpu"];
         let device = arrived(&pursuit).1;
         assert_eq!(arrived(&pursuit[..2]).1, device);

@@ -1,4 +1,4 @@
-//! `offtrack draw`: what it writes is what the library says of the roundabout.
+//! `offtrack draw`: its files agree with the library's roundabout.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -20,7 +20,7 @@ fn the_polygons_follow_the_kerbs_within_a_centimetre_both_ways() {
         let beside = |p: DVec2| drivable.iter().flat_map(sides).map(|(a, b)| to_segment(p, a, b)).fold(f64::INFINITY, f64::min);
         let along = kerbs.loops.iter().flat_map(|curve| (0..1000).map(move |n| curve.point_at(curve.length() * f64::from(n) / 1000.0)));
         assert!(along.map(beside).fold(0.0, f64::max) < 0.01);
-        // The comparison must be able to fail: with every other corner left out the polygons leave the kerbs.
+        // The comparison can fail: without every other corner the polygons leave the kerbs.
         let coarse: Vec<Polygon> = drivable.iter().map(|polygon| polygon.iter().step_by(2).copied().collect()).collect();
         assert!(0.01 < furthest(&coarse, &kerbs));
     }
@@ -94,7 +94,7 @@ fn every_extension_gets_a_file_of_its_kind() {
     succeed(&[&place("20m"), "-o", text(&svg)]);
     let written = std::fs::read_to_string(&svg).expect("written");
     assert!(written.starts_with("<svg ") && written.contains("Roundabout 20m: 4 arms, 20 routes"));
-    assert!(!written.contains("<text"), "letters are outlines: no font is needed to look at a picture");
+    assert!(!written.contains("<text"), "letters are outlines, so that a picture needs no font");
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 2, "nothing else is left behind");
 }
 
@@ -124,12 +124,14 @@ fn wrong_input_is_refused_with_exit_code_2_and_says_what_would_do() {
     refuse(
         &[&place, "-o", svg, "--route", "N-left-3", "--vehicle", "bus"],
         2,
-        "--vehicle: bus; give the name of a file under scenarios/vehicles/",
+        "vehicle: bus; must be a path ending in .toml or one of daf_xf, ",
     );
     refuse(&[&place, "-o", svg, "--load", "laden"], 2, "--route <ROUTE>");
     refuse(&[&place, "-o", svg, "--route", "N-left-3", "--speed-kmh", "0"], 2, "--speed-kmh: 0 km/h; must lie in 1..90 km/h");
+    refuse(&[&place, "-o", svg, "--route", "N-left-3", "--speed-kmh", "1e308"], 2, "--speed-kmh: 1e308 km/h; must lie in 1..90 km/h");
+    refuse(&[&place, "-o", svg, "--approach", "1e308"], 2, "--approach: 1e308 m; must lie in 5..500 m");
     refuse(&[&place, "-o", svg, "--approach", "400"], 2, "--approach: 400 m; approach of 400 m leaves arm");
-    refuse(&["21m", "-o", svg], 2, "roundabout: 21m; give the name of a file under scenarios/roundabouts/");
+    refuse(&["21m", "-o", svg], 2, "roundabout: 21m; must be a path ending in .toml or one of 16m, ");
     refuse(&["nowhere.toml", "-o", svg], 2, "nowhere.toml: cannot be read");
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0, "a refused picture leaves nothing behind");
 }
@@ -154,8 +156,8 @@ fn sides(polygon: &Polygon) -> impl Iterator<Item = (DVec2, DVec2)> {
 }
 
 fn to_segment(p: DVec2, a: DVec2, b: DVec2) -> f64 {
-    let share = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
-    p.distance(a.lerp(b, share))
+    let fraction = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+    p.distance(a.lerp(b, fraction))
 }
 
 fn contains(polygon: &Polygon, p: DVec2) -> bool {

@@ -1,7 +1,8 @@
-//! `offtrack evaluate`: every episode counted, the same again with the same seed, and files that are no policy refused.
+//! `offtrack evaluate`: every episode is counted, equal seeds give equal reports, and wrong policy files are refused.
 
 use std::process::{Command, Stdio};
 
+use offtrack_training::policy::LearnedPolicy;
 use serde_json::Value;
 
 use crate::place::{Place, offtrack, refusal, repository, succeed};
@@ -26,24 +27,24 @@ fn every_episode_is_counted_once_by_its_end_and_once_by_its_route() {
         }
         let arrived: u64 = routes.iter().map(|route| count(&route["arrived"])).sum();
         assert_eq!(arrived, count(&report["arrived"]));
-        let [low, share, high] = ["success_low", "success", "success_high"].map(|key| report[key].as_f64().unwrap());
-        assert!(low <= share && share <= high && (share - arrived as f64 / 6.0).abs() < 1e-9, "{low} {share} {high}");
+        let [low, success, high] = ["success_low", "success", "success_high"].map(|key| report[key].as_f64().unwrap());
+        assert!(low <= success && success <= high && (success - arrived as f64 / 6.0).abs() < 1e-9, "{low} {success} {high}");
     }
 }
 
 #[test]
-fn the_same_seed_gives_the_same_report_byte_for_byte_and_another_seed_another() {
+fn equal_seeds_give_equal_reports_and_another_seed_gives_another() {
     let place = Place::new();
     let report = |seed: &str| {
         succeed(&place.evaluate(&["--policy", "random", "--episodes", "2", "--seed", seed, "--json", &place.text("report.json")]));
         std::fs::read_to_string(place.file("report.json")).unwrap()
     };
     assert_eq!(report("4"), report("4"));
-    assert_ne!(report("4").replace("\"seed\": 4", ""), report("5").replace("\"seed\": 5", ""), "more than the seed's own line differs");
+    assert_ne!(report("4").replace("\"seed\": 4", ""), report("5").replace("\"seed\": 5", ""), "not only the line of the seed differs");
 }
 
 #[test]
-fn a_file_that_is_no_whole_policy_is_refused_by_its_name() {
+fn a_damaged_policy_file_is_refused_by_its_name() {
     let place = Place::new();
     succeed(&place.train(&["--name", "run", "--steps", "600"]));
     let policy = place.text("runs/run/policy.safetensors");
@@ -51,9 +52,12 @@ fn a_file_that_is_no_whole_policy_is_refused_by_its_name() {
     let bytes = std::fs::read(&policy).unwrap();
     std::fs::write(place.file("cut"), &bytes[..bytes.len() / 2]).unwrap();
     std::fs::write(place.file("changed"), bytes.iter().rev().copied().collect::<Vec<u8>>()).unwrap();
-    for (name, expected) in
-        [("cut", "is no policy file"), ("changed", "is no policy file"), ("tiny.toml", "is no policy file"), ("missing", "cannot be read")]
-    {
+    for (name, expected) in [
+        ("cut", "is not a policy file"),
+        ("changed", "is not a policy file"),
+        ("tiny.toml", "is not a policy file"),
+        ("missing", "cannot be read"),
+    ] {
         let said = refusal(&place.evaluate(&["--policy", &place.text(name), "--episodes", "1"]), 2);
         assert!(said.contains(&place.text(name)) && said.contains(expected), "{said}");
     }
@@ -71,7 +75,7 @@ fn a_report_that_cannot_be_written_is_a_failure() {
 }
 
 #[test]
-fn a_reader_that_has_gone_costs_the_table_and_not_the_report() {
+fn a_closed_standard_output_costs_the_table_and_not_the_report() {
     let place = Place::new();
     let mut evaluation = Command::new(env!("CARGO_BIN_EXE_offtrack"))
         .args(["evaluate", "--benchmark", &place.text("short.toml"), "--policy", "random", "--episodes", "1"])
@@ -87,7 +91,7 @@ fn a_reader_that_has_gone_costs_the_table_and_not_the_report() {
 }
 
 #[test]
-fn without_a_policy_the_one_that_comes_with_the_program_drives_as_its_report_says() {
+fn without_a_policy_the_shipped_one_drives_as_its_report_says() {
     let place = Place::new();
     for benchmark in ["attard2023", "attard2023-as-run"] {
         let shipped = repository().join("training/policies").join(benchmark);
@@ -105,9 +109,60 @@ fn without_a_policy_the_one_that_comes_with_the_program_drives_as_its_report_say
             &place.text("report.json"),
         ]));
         let report = place.json("report.json");
-        assert!(report["policy"].as_str().unwrap().ends_with(&format!("training/policies/{benchmark}/policy.safetensors")));
+        assert_eq!(report["policy"], format!("{benchmark} (shipped)"));
         let [found, expected] = [&report, reported].map(|report| report["success"].as_f64().unwrap());
-        // 230 episodes from other starts than the report's 690: two standard errors of a share of 0.9 are 0.04.
+        // 230 episodes with other starts than the report's 690: two standard errors of a fraction of 0.9 are 0.04.
         assert!((found - expected).abs() < 0.05, "{benchmark}: {found} {expected}");
+    }
+}
+
+#[test]
+fn the_shipped_policy_and_benchmark_are_found_wherever_the_program_runs_and_by_name() {
+    let elsewhere = tempfile::tempdir().unwrap();
+    for arguments in [&["evaluate", "--episodes", "1"][..], &["evaluate", "--episodes", "1", "--policy", "attard2023"]] {
+        let output = Command::new(env!("CARGO_BIN_EXE_offtrack")).current_dir(elsewhere.path()).args(arguments).output().unwrap();
+        succeed(&output);
+        let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(
+            printed.starts_with("policy attard2023 (shipped); benchmark attard2023, test routes; 1 episode a route, seed 0\n"),
+            "{printed}"
+        );
+    }
+}
+
+#[test]
+fn a_benchmark_without_a_policy_of_its_own_is_driven_by_the_one_for_attard2023_and_says_so() {
+    let output = offtrack(&["evaluate", "--benchmark", "attard2023-full", "--episodes", "1"]);
+    let said = refusal(&output, 0);
+    assert!(said.contains("no policy comes with the program for attard2023-full; the one for attard2023 drives"), "{said}");
+    assert!(String::from_utf8_lossy(&output.stdout).starts_with("policy attard2023 (shipped); benchmark attard2023-full"));
+}
+
+#[test]
+fn a_policy_that_is_not_finite_is_refused_by_file_and_tensor() {
+    let place = Place::new();
+    let mut policy = LearnedPolicy::shipped("attard2023").unwrap();
+    policy.normalisation.mean[7] = f32::NAN;
+    std::fs::write(place.file("nan.safetensors"), policy.to_bytes()).unwrap();
+    let said = refusal(&offtrack(&["evaluate", "--episodes", "1", "--policy", &place.text("nan.safetensors")]), 2);
+    assert!(said.contains("nan.safetensors: is a policy that cannot drive: observation.mean[7] is NaN"), "{said}");
+}
+
+#[test]
+fn the_table_fits_the_terminal() {
+    let place = Place::new();
+    for (columns, limit) in [(None, 100), (Some("60"), 60), (Some("120"), 120)] {
+        let mut evaluation = Command::new(env!("CARGO_BIN_EXE_offtrack"));
+        evaluation.args(["evaluate", "--benchmark", &place.text("short.toml"), "--policy", "random", "--episodes", "30"]);
+        match columns {
+            Some(columns) => evaluation.env("COLUMNS", columns),
+            None => evaluation.env_remove("COLUMNS"),
+        };
+        let output = evaluation.output().unwrap();
+        succeed(&output);
+        let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+        let table = printed.split_once("\n\n").unwrap().1;
+        assert!(table.lines().all(|line| line.chars().count() <= limit), "{limit}: {printed}");
+        assert!(table.contains("load transfer ratio"), "{printed}");
     }
 }

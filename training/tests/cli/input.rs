@@ -1,13 +1,16 @@
-//! Wrong input of every command: exit code 2, what was wrong by its name and value, and what would do.
+//! Wrong input of every command: exit code 2, and an error with name, value and what would do.
 
-use crate::place::{Place, offtrack, refusal};
+use crate::place::{Place, offtrack, refusal, succeed};
 
 #[test]
-fn a_wrong_argument_is_named_with_its_value_and_what_would_do() {
-    let cases: [(&[&str], &[&str]); 29] = [
+fn a_wrong_argument_is_reported_with_its_value_and_what_would_do() {
+    let cases: [(&[&str], &[&str]); 31] = [
         (&["evaluate", "--policy", "random", "--episodes", "0"], &["--episodes: 0; must lie in 1..100000"]),
         (&["evaluate", "--policy", "random", "--episodes", "many"], &["'many'", "--episodes"]),
-        (&["evaluate", "--policy", "random", "--benchmark", "nowhere"], &["benchmark: nowhere", "scenarios/"]),
+        (
+            &["evaluate", "--policy", "random", "--benchmark", "nowhere"],
+            &["benchmark: nowhere; must be a path ending in .toml or one of attard2023,"],
+        ),
         (&["evaluate", "--policy", "random", "--benchmark", "nowhere.toml"], &["nowhere.toml: cannot be read"]),
         (&["evaluate", "--policy", "random", "--split", "all"], &["'all'", "--split", "test, train"]),
         (&["evaluate", "--policy", "random", "--seed", "-1"], &["-1"]),
@@ -23,8 +26,8 @@ fn a_wrong_argument_is_named_with_its_value_and_what_would_do() {
         (&["scale", "--plot", "speed.pdf"], &["--plot: speed.pdf; must end in .svg or .png"]),
         (&["scale", "--mode", "blind"], &["'blind'", "random"]),
         (&["scale", "--device", "tpu"], &["'tpu'", "cpu, gpu"]),
-        (&["scale", "--adapter", "H200"], &["--adapter: H200; the processor is none: add --device gpu"]),
-        (&["evaluate", "--adapter", "H200"], &["--adapter: H200; the processor is none: add --device gpu"]),
+        (&["scale", "--adapter", "H200"], &["--adapter: H200; the processor has no adapter: add --device gpu"]),
+        (&["evaluate", "--adapter", "H200"], &["--adapter: H200; the processor has no adapter: add --device gpu"]),
         (&["bench", "--seconds", "-1"], &["--seconds: -1 s; must lie in 0.1..3600 s"]),
         (&["bench", "--hidden", "256,0"], &["--hidden: 0; sizes must lie in 1..8192"]),
         (&["bench", "--batch", "1"], &["--batch: 1; must lie in 2..1048576"]),
@@ -33,6 +36,8 @@ fn a_wrong_argument_is_named_with_its_value_and_what_would_do() {
         (&["train", "--wings", "2"], &["'--wings'"]),
         (&["trace", "no.json"], &["no.json: cannot be read"]),
         (&["deviations", "no.toml", "no.json"], &["no.toml: cannot be read"]),
+        (&["deviations", "17m", "no.json"], &["roundabout: 17m; must be a path ending in .toml or one of 16m,"]),
+        (&["deviations", "16m", "no.json"], &["no.json: cannot be read"]),
         (&["fly"], &["'fly'"]),
     ];
     for (arguments, expected) in cases {
@@ -53,19 +58,19 @@ fn runs_below_a_file_are_a_failure_that_names_the_folder() {
 fn trajectories_are_printed_and_cases_of_another_kind_are_named() {
     let output = offtrack(&["trace", "tests/data/physics_vectors.json"]);
     let said = refusal(&output, 0);
-    assert_eq!(said.lines().filter(|line| line.contains("is not taken: its kind is")).count(), 8, "{said}");
+    assert_eq!(said.lines().filter(|line| line.contains("is skipped: its kind is")).count(), 8, "{said}");
     let printed: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(printed["cases"].as_array().map(Vec::len), Some(22));
 }
 
 #[test]
-fn a_trajectory_that_cannot_be_is_refused_by_its_file_case_and_key() {
+fn a_wrong_trajectory_case_is_refused_by_its_file_case_and_key() {
     let place = Place::new();
     let vectors = std::fs::read_to_string(crate::place::repository().join("tests/data/physics_vectors.json")).unwrap();
     for (from, to, expected) in [
         ("\"dt\": 0.05", "\"dt\": -1", "case \"straight_30\": dt: -1 s"),
         ("\"L1\"", "\"l1\"", "case \"straight_30\": missing field `L1`"),
-        ("{", "[", "no JSON"),
+        ("{", "[", "is not JSON"),
     ] {
         let changed = vectors.replacen(from, to, 1);
         assert_ne!(changed, vectors);
@@ -73,4 +78,88 @@ fn a_trajectory_that_cannot_be_is_refused_by_its_file_case_and_key() {
         let said = refusal(&offtrack(&["trace", &place.text("cases.json")]), 2);
         assert!(said.contains(&place.text("cases.json")) && said.contains(expected), "{said}");
     }
+}
+
+/// The commands that read a file which is not TOML, with `file` as that file.
+fn readers(file: &str) -> [Vec<&str>; 5] {
+    [
+        vec!["evaluate", "--episodes", "1", "--policy", file],
+        vec!["evaluate", "--episodes", "1", "--policy", "random", "--certified", file],
+        vec!["certify", "--verify", file],
+        vec!["trace", file],
+        vec!["deviations", "16m", file],
+    ]
+}
+
+#[test]
+#[cfg(unix)]
+fn a_pipe_a_device_and_a_folder_are_refused_at_once_by_every_command_that_reads_a_file() {
+    let place = Place::new();
+    let pipe = place.text("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for file in [pipe.as_str(), "/dev/zero", &place.text("")] {
+        for arguments in readers(file) {
+            let said = refusal(&offtrack(&arguments), 2);
+            assert!(said.contains("is not a regular file"), "{arguments:?}: {said}");
+        }
+    }
+    // A run's report and figures.
+    std::fs::create_dir_all(place.file("run/report.json")).unwrap();
+    let page = place.text("page.html");
+    let arguments = ["--policy", "random", "--episodes", "1", "--html", &page, "--run"];
+    let said = refusal(&place.evaluate(&[&arguments[..], &[&place.text("run")]].concat()), 2);
+    assert!(said.contains("report.json: is not a regular file"), "{said}");
+}
+
+#[test]
+fn a_file_larger_than_any_of_its_kind_is_refused_before_it_is_read() {
+    let place = Place::new();
+    // Sparse: it takes no room on the disk.
+    std::fs::File::create(place.file("large")).unwrap().set_len(1 << 36).unwrap();
+    for arguments in readers(&place.text("large")) {
+        let said = refusal(&offtrack(&arguments), 2);
+        assert!(said.contains("is larger than"), "{arguments:?}: {said}");
+    }
+}
+
+#[test]
+fn deeply_nested_json_is_an_error_and_no_abort() {
+    let place = Place::new();
+    std::fs::write(place.file("deep.json"), "[".repeat(10_000_000)).unwrap();
+    for arguments in &readers(&place.text("deep.json"))[1..] {
+        let said = refusal(&offtrack(arguments), 2);
+        assert!(said.len() < 500, "{arguments:?}: {said}");
+    }
+}
+
+#[test]
+fn a_long_value_is_not_repeated_whole() {
+    let place = Place::new();
+    let long = "x".repeat(1_000_000);
+    std::fs::write(place.file("cases.json"), format!(r#"{{"cases": [{{"id": ["{long}"]}}]}}"#)).unwrap();
+    let said = refusal(&offtrack(&["trace", &place.text("cases.json")]), 2);
+    assert!(said.contains("cases[0].id") && said.contains("must be text") && said.len() < 1000, "{}", said.len());
+    std::fs::write(place.file("measured.json"), format!(r#"{{"{long}": 1}}"#)).unwrap();
+    let said = refusal(&offtrack(&["deviations", "16m", &place.text("measured.json")]), 2);
+    assert!(said.contains("unknown field") && said.len() < 1000, "{}", said.len());
+}
+
+#[test]
+fn a_roundabout_is_found_by_its_name_or_its_path() {
+    for roundabout in ["16m", "scenarios/roundabouts/16m.toml"] {
+        let output = offtrack(&["deviations", roundabout, "tests/data/measured/16m.json"]);
+        succeed(&output);
+        assert!(String::from_utf8_lossy(&output.stdout).contains("splitters"));
+    }
+}
+
+#[test]
+fn the_help_says_what_happens_without_a_command_and_lists_the_exit_codes() {
+    let printed = |arguments: &[&str]| String::from_utf8_lossy(&offtrack(arguments).stdout).into_owned();
+    assert_eq!(printed(&["--version"]), format!("offtrack {}\n", env!("CARGO_PKG_VERSION")));
+    let help = printed(&["--help"]);
+    assert!(help.contains("Without a command `offtrack` trains"), "{help}");
+    assert!(["  0 ", "  1 ", "  2 ", "  130 "].iter().all(|code| help.contains(code)), "{help}");
+    let help = printed(&["evaluate", "--help"]);
+    assert!(["lane: own", "off-track: largest", "LTR: largest load transfer ratio"].iter().all(|words| help.contains(words)), "{help}");
 }

@@ -28,17 +28,17 @@ fn assert_whole_rows(place: &Place) {
 }
 
 #[test]
-fn an_interrupted_run_leaves_a_driver_and_says_that_it_was_interrupted() {
+fn a_stopped_run_leaves_a_policy_and_says_that_it_was_interrupted() {
     let place = Place::new();
     let patient = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
-    // Interrupted while it learns or soon before, and while it is certain to be still driving by chance.
+    // Stopped while it learns or soon before, and while its actions are certainly still random.
     let endless = patient.replace("capacity = 2000, warmup = 400", "capacity = 100000000, warmup = 100000000");
     assert_ne!(endless, patient);
-    for training in [patient, endless] {
+    for (training, signal) in [(&patient, "-INT"), (&patient, "-TERM"), (&patient, "-HUP"), (&endless, "-INT")] {
         std::fs::write(place.file("tiny.toml"), training).unwrap();
         let run = begun(&place);
         std::thread::sleep(Duration::from_millis(500));
-        let output = ended(run, "-INT");
+        let output = ended(run, signal);
         succeed(&output);
         assert!(String::from_utf8_lossy(&output.stdout).contains("stopped: "));
         let report = place.json("runs/run/report.json");
@@ -51,21 +51,22 @@ fn an_interrupted_run_leaves_a_driver_and_says_that_it_was_interrupted() {
 }
 
 #[test]
-fn a_killed_run_leaves_a_whole_driver_or_none() {
+fn a_run_killed_in_its_first_seconds_leaves_a_policy_and_a_checkpoint_to_continue_from() {
     let place = Place::new();
+    // With the default interval of two minutes: the first checkpoint is written at once.
     let run = begun(&place);
-    std::thread::sleep(Duration::from_millis(300));
+    let checkpoint = place.file("runs/run/checkpoint.safetensors");
+    let policy = place.file("runs/run/policy.safetensors");
+    while !(checkpoint.is_file() && policy.is_file()) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
     assert_eq!(ended(run, "-KILL").status.code(), None);
     assert_whole_rows(&place);
-    let policy = place.file("runs/run/policy.safetensors");
-    if policy.exists() {
-        succeed(&place.evaluate(&["--policy", policy.to_str().unwrap(), "--episodes", "1"]));
-    }
-    // What it was to do is known, and can be begun again.
-    let config = place.text("runs/run/config.toml");
-    let again = Command::new(env!("CARGO_BIN_EXE_offtrack"))
-        .args(["train", &config, "--steps", "600", "--name", "again", "--out", &place.text("runs")])
+    succeed(&place.evaluate(&["--policy", policy.to_str().unwrap(), "--episodes", "1"]));
+    let resumed = Command::new(env!("CARGO_BIN_EXE_offtrack"))
+        .args(["train", "--resume", &place.text("runs/run"), "--steps", "2000"])
         .output()
         .unwrap();
-    succeed(&again);
+    succeed(&resumed);
+    assert_eq!(place.json("runs/run/report.json")["env_steps"], 2000);
 }

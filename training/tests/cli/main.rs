@@ -1,6 +1,6 @@
-//! The program from outside, as its users run it.
+//! The command line, run as its users run it.
 
-#![expect(clippy::unwrap_used, reason = "what a helper of a test cannot do fails the test")]
+#![expect(clippy::unwrap_used, reason = "a failure of a test's helper fails the test")]
 
 mod bench;
 mod certify;

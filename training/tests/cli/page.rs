@@ -1,4 +1,4 @@
-//! `report.html`, opened in a browser: with `#selftest` the page checks itself and writes what came of it into its document.
+//! `report.html`, opened in a browser: with `#selftest` the page checks itself and writes the result into its document.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -15,22 +15,28 @@ fn browser() -> PathBuf {
     found.expect("a browser opens the page in this test: install the package `chromium`")
 }
 
-/// What the page says of itself.
+/// The outcome of the page's checks of itself.
 fn selftest(page: &Path) -> String {
+    let document = opened(page);
+    let (_, outcome) = document.rsplit_once("<pre id=\"selftest\">").unwrap_or_else(|| panic!("no outcome in {document}"));
+    outcome.to_owned()
+}
+
+/// The document that the page has made of itself after its checks.
+fn opened(page: &Path) -> String {
     let profile = tempfile::tempdir().unwrap();
     let output = Command::new(browser())
         // The sandbox cannot start for root, as in most containers; the page is our own.
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"])
         .arg(format!("--user-data-dir={}", profile.path().display()))
-        // Time of the page's clock: waiting costs none of ours.
+        // Milliseconds of the page's clock, which does not wait for real time.
         .args(["--virtual-time-budget=60000", "--dump-dom"])
         .arg(format!("file://{}#selftest", page.display()))
         .output()
         .unwrap();
-    let document = String::from_utf8_lossy(&output.stdout).into_owned();
-    let said = || String::from_utf8_lossy(&output.stderr).into_owned();
-    let (_, outcome) = document.rsplit_once("<pre id=\"selftest\">").unwrap_or_else(|| panic!("no outcome; {}", said()));
-    outcome.to_owned()
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.stdout.is_empty(), "{said}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
 /// A data block of the page.
@@ -53,12 +59,12 @@ fn a_training_run_leaves_a_page_that_holds_its_report_and_passes_its_own_checks(
     assert_eq!(serde_json::from_str::<Value>(block(&text, "metrics")).unwrap(), read(&place.file("runs/run/metrics.csv")));
     let outcome = selftest(&page);
     assert!(outcome.starts_with("selftest passed\n"), "{outcome}");
-    // The only address in it is the name of SVG: a page that loads nothing opens anywhere.
+    // Its only address is the name space of SVG: the page loads no other file.
     assert_eq!(text.matches("http://").count() + text.matches("https://").count(), text.matches("\"http://www.w3.org/2000/svg\"").count());
 }
 
 #[test]
-fn a_page_of_an_examination_alone_passes_its_own_checks_and_one_with_a_wrong_figure_does_not() {
+fn a_page_of_an_evaluation_alone_passes_its_own_checks_and_one_with_a_wrong_figure_fails_them() {
     let place = Place::new();
     let page = place.file("page.html");
     let arguments = ["--policy", "pursuit", "--episodes", "2", "--html", &place.text("page.html"), "--json", &place.text("report.json")];
@@ -68,7 +74,7 @@ fn a_page_of_an_examination_alone_passes_its_own_checks_and_one_with_a_wrong_fig
     let outcome = selftest(&page);
     assert!(outcome.starts_with("selftest passed\n"), "{outcome}");
 
-    // A character of the recorded episodes exchanged, and a figure of the report two centimetres off.
+    // A changed character of the recorded episodes, and a figure of the report that is two centimetres off.
     let tracks = block(&text, "tracks");
     let middle = tracks.len() / 2;
     let other = if tracks.as_bytes()[middle] == b'A' { "B" } else { "A" };
@@ -117,4 +123,17 @@ fn a_page_that_would_be_too_large_or_cannot_be_written_is_refused() {
     let below_a_file = place.text("tiny.toml/page.html");
     let said = refusal(&place.evaluate(&["--policy", "random", "--episodes", "1", "--html", &below_a_file]), 1);
     assert!(said.contains(&below_a_file) && said.contains("cannot be written"), "{said}");
+}
+
+#[test]
+fn only_a_page_of_the_studys_benchmark_has_a_column_for_the_study() {
+    let place = Place::new();
+    let page = place.file("page.html");
+    let column = |document: &str| document.contains("<th scope=\"col\">Attard and Bajada (2023), SAC</th>");
+    succeed(&place.evaluate(&["--policy", "random", "--episodes", "1", "--html", &place.text("page.html")]));
+    let document = opened(&page);
+    assert!(document.contains("selftest passed") && !column(&document));
+    succeed(&offtrack(&["evaluate", "--policy", "random", "--episodes", "1", "--html", &place.text("page.html")]));
+    let document = opened(&page);
+    assert!(document.contains("selftest passed") && column(&document));
 }

@@ -1,11 +1,11 @@
-//! A folder with a small benchmark and a small training file, and the program run on them.
+//! A folder with a small benchmark and a small training file, and helpers that run the program on them.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde_json::Value;
 
-/// A benchmark of one route to learn on and two to be examined on.
+/// A benchmark of one training route and two test routes.
 const BENCHMARK: &str = r#"
 vehicle = "vehicles/daf_xf.toml"
 load = "empty"
@@ -23,34 +23,34 @@ file = "roundabouts/20m.toml"
 test = ["E-right-1", "W-left-3"]
 "#;
 
-/// A learner small enough that a run takes a second.
+/// A learner so small that a run takes a second.
 const TRAINING: &str = r#"
 benchmark = "BENCHMARK"
 seed = 5
 n_envs = 8
 steps = 1600
-memory = { capacity = 2000, warmup = 400 }
+replay_buffer = { capacity = 2000, warmup = 400 }
 
 [learning]
 hidden = [16]
 batch = 32
 updates_per_step = 1
 n_steps = 3
-discount = 0.97
+gamma = 0.97
 reward_scale = 0.01
-scale_observations = true
-actor_rate = 3e-4
-critic_rate = 3e-4
-last_rate = 0.1
+normalise_observations = true
+actor_learning_rate = 3e-4
+critic_learning_rate = 3e-4
+final_learning_rate_fraction = 0.1
 layer_norm = false
-critics = "average"
-target_rate = 0.005
-target_every = 1
-average_rate = 0.005
-entropy = { in_target = true, share = 0.25, weight = 0.05, rate = 3e-4 }
+critics = "mean"
+tau = 0.005
+target_interval = 1
+actor_ema_rate = 0.005
+entropy = { in_target = true, target_fraction = 0.25, coefficient = 0.05, learning_rate = 3e-4 }
 "#;
 
-/// A folder with `short.toml`, a benchmark, `tiny.toml`, a training file for it, and room for `runs`.
+/// A temporary folder with the benchmark `short.toml` and the training file `tiny.toml`; runs go to `runs`.
 pub struct Place(tempfile::TempDir);
 
 impl Place {
@@ -78,7 +78,7 @@ impl Place {
         self.training(arguments).output().unwrap()
     }
 
-    /// A run not yet begun.
+    /// A training command that has not been started.
     pub fn training(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_offtrack"));
         command.args(["train", &self.text("tiny.toml"), "--out", &self.text("runs")]).args(arguments);
@@ -108,7 +108,7 @@ pub fn succeed(output: &Output) {
     assert!(output.status.success(), "{}", said(output));
 }
 
-/// What was said of a command that had to end with `code`.
+/// Standard error of a command that must end with exit code `code`.
 pub fn refusal(output: &Output, code: i32) -> String {
     let said = said(output);
     assert_eq!(output.status.code(), Some(code), "{said}");

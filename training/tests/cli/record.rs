@@ -1,4 +1,4 @@
-//! `offtrack record`: the episode that an examination counts, as data, film and picture.
+//! `offtrack record`: the episode that an evaluation counts, as data, film and picture.
 
 use std::io::Cursor;
 
@@ -24,7 +24,7 @@ fn recording(place: &Place, output: &str, arguments: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn the_episodes_recorded_are_those_that_the_examination_counts() {
+fn the_episodes_recorded_are_those_that_the_evaluation_counts() {
     let place = Place::new();
     succeed(&place.evaluate(&["--policy", "random", "--episodes", "3", "--seed", "7", "--json", &place.text("report.json")]));
     let report = place.json("report.json");
@@ -97,7 +97,7 @@ fn a_still_has_the_size_asked_for_and_says_how_the_episode_ended() {
     let ended = place.json("a.json")["ended"].as_str().unwrap().replace('_', " ");
     let still = std::fs::read_to_string(place.file("a.svg")).unwrap();
     assert!(still.contains(&format!("{ROUTE}, pure pursuit: {ended} after ")), "{ended}");
-    assert!(!still.contains("<text"), "letters are outlines: no font is needed to look at a picture");
+    assert!(!still.contains("<text"), "letters are outlines, so that a picture needs no font");
 }
 
 #[test]

@@ -4,19 +4,21 @@
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
+use serde_json::Value;
+
 use crate::place::{Place, offtrack, refusal, succeed};
 
 const ENDLESS: [&str; 2] = ["--steps", "1000000000"];
-/// Columns of the metrics that the clock has a part in.
+/// Columns of the metrics that depend on the clock.
 const TIMES: [&str; 3] = ["seconds", "steps_per_second", "updates_per_second"];
 
 /// A place whose runs write a checkpoint every few milliseconds, and use what needs most state.
 fn place() -> Place {
     let place = Place::new();
     let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
-    let state = "exploration = { first = 0.5, last = 0.1, steps = 1200, spread = 1.0 }\n";
-    let memory = "warmup = 400, priority = { exponent = 0.6, correction = 0.4 }";
-    let changed = training.replace("warmup = 400", memory).replace("layer_norm = false", "layer_norm = true");
+    let state = "exploration = { initial_fraction = 0.5, final_fraction = 0.1, steps = 1200, spread = 1.0 }\n";
+    let buffer = "warmup = 400, priority = { exponent = 0.6, correction = 0.4 }";
+    let changed = training.replace("warmup = 400", buffer).replace("layer_norm = false", "layer_norm = true");
     std::fs::write(place.file("tiny.toml"), format!("checkpoint_minutes = 0.0001\n{state}{changed}")).unwrap();
     place
 }
@@ -44,8 +46,8 @@ fn bytes(place: &Place, file: &str) -> Vec<u8> {
     std::fs::read(place.file(file)).unwrap()
 }
 
-/// The rows of a run's metrics without the columns that the clock has a part in.
-fn figures(place: &Place, run: &str) -> Vec<Vec<String>> {
+/// The rows of a run's metrics without the columns that depend on the clock.
+fn metrics(place: &Place, run: &str) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(place.file(&format!("runs/{run}/metrics.csv"))).unwrap();
     let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
     assert!(TIMES.iter().all(|time| names.contains(time)), "{names:?}");
@@ -54,10 +56,10 @@ fn figures(place: &Place, run: &str) -> Vec<Vec<String>> {
     text.lines().map(timeless).collect()
 }
 
-/// The env steps that a run said it goes on after.
-fn went_on_after(output: &Output) -> u64 {
+/// The env steps after which a run said it continues.
+fn continued_after(output: &Output) -> u64 {
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    let steps = said.split_once("going on after ").and_then(|(_, rest)| rest.split_once(" env steps")).map(|(steps, _)| steps.parse());
+    let steps = said.split_once("continuing after ").and_then(|(_, rest)| rest.split_once(" env steps")).map(|(steps, _)| steps.parse());
     steps.unwrap_or_else(|| panic!("{said}{}", String::from_utf8_lossy(&output.stderr))).unwrap()
 }
 
@@ -89,15 +91,15 @@ fn a_run_killed_and_stopped_on_the_way_equals_one_never_stopped_bit_for_bit() {
         wait_until("another checkpoint", || bytes(&place, "runs/parts/checkpoint.safetensors") != before);
         let output = interrupted(run);
         succeed(&output);
-        stops.push(went_on_after(&output));
+        stops.push(continued_after(&output));
         assert_eq!(place.json("runs/parts/report.json")["interrupted"], true, "40000 steps are over too soon for this test");
     }
     let output = resume(&place, "parts", &[]);
     succeed(&output);
-    stops.push(went_on_after(&output));
+    stops.push(continued_after(&output));
     assert!(stops.is_sorted() && stops[0] < stops[2], "{stops:?}");
     assert!(bytes(&place, "runs/parts/policy.safetensors") == bytes(&place, "runs/whole/policy.safetensors"), "{stops:?}");
-    let (parts, whole) = (figures(&place, "parts"), figures(&place, "whole"));
+    let (parts, whole) = (metrics(&place, "parts"), metrics(&place, "whole"));
     assert!(100 < whole.len(), "{}", whole.len());
     assert_eq!(parts, whole);
     let evaluation = |run: &str| place.json(&format!("runs/{run}/report.json"))["evaluation"]["routes"].clone();
@@ -119,15 +121,13 @@ fn twenty_kills_while_checkpoints_are_written_each_leave_a_good_one() {
         run.kill().unwrap();
         run.wait().unwrap();
         caught += u32::from(part.is_file());
-        // Left over from the kill; the next run's own is waited for.
-        let _ = std::fs::remove_file(&part);
         let before = bytes(&place, "runs/run/checkpoint.safetensors");
         run = begun(resumed(&place, "run", &[]));
         wait_until("another checkpoint", || bytes(&place, "runs/run/checkpoint.safetensors") != before);
     }
     let output = interrupted(run);
     succeed(&output);
-    assert!(0 < went_on_after(&output));
+    assert!(0 < continued_after(&output));
     assert!(0 < caught, "no kill met a checkpoint being written");
     let before = place.json("runs/run/report.json")["env_steps"].as_u64().unwrap();
     succeed(&resume(&place, "run", &["--steps", &(before + 80).to_string()]));
@@ -142,7 +142,7 @@ fn a_finished_run_goes_on_only_with_a_larger_budget() {
     assert!(message.contains("it has finished") && message.contains("--steps"), "{message}");
     let message = refusal(&resume(&place, "run", &["--steps", "800"]), 2);
     assert!(message.contains("800 env steps: more are needed"), "{message}");
-    // The budget that was asked for stays with the run; what the examination said of the driver before is gone.
+    // The budget that was asked for stays with the run; the evaluation of the earlier policy is gone.
     assert_eq!(place.json("runs/run/report.json")["interrupted"], false);
     let before = bytes(&place, "runs/run/checkpoint.safetensors");
     let run = begun(resumed(&place, "run", &ENDLESS));
@@ -154,7 +154,7 @@ fn a_finished_run_goes_on_only_with_a_larger_budget() {
     let reached = place.json("runs/run/report.json")["env_steps"].as_u64().unwrap();
     succeed(&resume(&place, "run", &["--steps", &(reached + 80).to_string()]));
     assert_eq!(place.json("runs/run/report.json")["interrupted"], false);
-    // An examination that was lost is made good.
+    // A lost evaluation is made up for.
     std::fs::remove_file(place.file("runs/run/report.json")).unwrap();
     succeed(&resume(&place, "run", &[]));
     assert_eq!(place.json("runs/run/report.json")["evaluation"]["split"], "test");
@@ -179,19 +179,98 @@ fn a_run_that_cannot_go_on_is_refused_with_the_file_and_what_would_do() {
     refused(checkpoint, &changed, &[checkpoint, "checksum"]);
     refused(checkpoint, &bytes(&place, "runs/run/policy.safetensors"), &[checkpoint, "no checkpoint"]);
     let config = String::from_utf8(bytes(&place, "runs/run/config.toml")).unwrap();
-    let other = config.replace("discount = 0.97", "discount = 0.9");
+    let other = config.replace("gamma = 0.97", "gamma = 0.9");
     assert_ne!(other, config);
     refused("runs/run/config.toml", other.as_bytes(), &["runs/run/config.toml", "is not the training file that the checkpoint"]);
     refused("runs/run/metrics.csv", b"seconds,env_steps\n", &["runs/run/metrics.csv", "columns"]);
     let benchmark = String::from_utf8(bytes(&place, "short.toml")).unwrap();
-    refused("short.toml", benchmark.replace("waypoint = 100.0", "waypoint = 99.0").as_bytes(), &[checkpoint, "short.toml was another"]);
-    std::fs::remove_file(place.file(checkpoint)).unwrap();
-    let message = refusal(&resume(&place, "run", &[]), 2);
-    assert!(message.contains("it has no checkpoint.safetensors"), "{message}");
+    refused("short.toml", benchmark.replace("waypoint = 100.0", "waypoint = 99.0").as_bytes(), &[checkpoint, "short.toml was different"]);
     let message = refusal(&resume(&place, "elsewhere", &[]), 2);
     assert!(message.contains("--resume") && message.contains("the folder of a run is needed"), "{message}");
     let message = refusal(&offtrack(&["train", "--resume", &place.text("runs/run"), "--seed", "3"]), 2);
     assert!(message.contains("cannot be used with '--seed"), "{message}");
+}
+
+/// A checkpoint with its column `name` changed, and the checksum that goes with it: as a program with a fault would
+/// have written it.
+fn with_column(whole: &[u8], name: &str, change: impl FnOnce(&mut [u8])) -> Vec<u8> {
+    let n = u64::from_le_bytes(whole[..8].try_into().unwrap()) as usize;
+    let mut header: Value = serde_json::from_slice(&whole[8..8 + n]).unwrap();
+    let mut body = whole[8 + n..].to_vec();
+    let range = |header: &Value, name: &str| {
+        let offsets = &header[name]["data_offsets"];
+        offsets[0].as_u64().unwrap() as usize..offsets[1].as_u64().unwrap() as usize
+    };
+    change(&mut body[range(&header, name)]);
+    let mut description: serde_json::Map<String, Value> =
+        serde_json::from_str(header["__metadata__"]["offtrack-checkpoint"].as_str().unwrap()).unwrap();
+    // CRC-32 of the description with a 0 for it, then each column's name and bytes in the order of names.
+    let text = |checksum: u64, description: &serde_json::Map<String, Value>| {
+        let config = serde_json::to_string(&description["config"]).unwrap();
+        format!(r#"{{"version":{},"config":{config},"world":{},"checksum":{checksum}}}"#, description["version"], description["world"])
+    };
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(text(0, &description).as_bytes());
+    let mut names: Vec<String> = header.as_object().unwrap().keys().filter(|name| *name != "__metadata__").cloned().collect();
+    names.sort();
+    for name in names {
+        hasher.update(name.as_bytes());
+        hasher.update(&body[range(&header, &name)]);
+    }
+    description["checksum"] = hasher.finalize().into();
+    header["__metadata__"]["offtrack-checkpoint"] = text(description["checksum"].as_u64().unwrap(), &description).into();
+    let mut header = serde_json::to_vec(&header).unwrap();
+    header.resize(header.len().next_multiple_of(8), b' ');
+    [&(header.len() as u64).to_le_bytes()[..], &header, &body].concat()
+}
+
+#[test]
+fn a_checkpoint_with_a_right_checksum_and_wrong_contents_is_refused_by_its_column() {
+    let place = place();
+    succeed(&place.train(&["--name", "run", "--steps", "1200"]));
+    let file = "runs/run/checkpoint.safetensors";
+    let whole = bytes(&place, file);
+    let cases: [(&str, &[u8], &str); 14] = [
+        ("actor, layer 1, weight", &f32::NAN.to_le_bytes(), "`actor, layer 1, weight` has NaN at 0"),
+        ("entropy coefficient", &f32::INFINITY.to_le_bytes(), "`entropy coefficient` has inf at 0"),
+        ("normalisation, mean", &f32::NAN.to_le_bytes(), "`normalisation, mean` has NaN"),
+        ("replay buffer, action", &77u32.to_le_bytes(), "`replay buffer, action` has action 77; the table has 0..5"),
+        ("replay buffer, reward", &f32::NAN.to_le_bytes(), "`replay buffer, reward` has NaN"),
+        ("replay buffer, after", &[9], "`replay buffer, after` has an unknown code"),
+        ("replay buffer, after", &[2], "`replay buffer, truncated rows` does not list the rows"),
+        ("replay buffer, priorities", &f64::NAN.to_le_bytes(), "`replay buffer, priorities` has NaN"),
+        ("replay buffer, priorities", &(-1.0f64).to_le_bytes(), "`replay buffer, priorities` has one that is negative"),
+        ("replay buffer, priorities", &0f64.to_le_bytes(), "`replay buffer, priorities` has one where none may be, or lacks one"),
+        ("rollout, acting", &[0; 32], "`rollout, acting` is all zeros"),
+        ("batch, action", &77u32.to_le_bytes(), "action[0]: 77"),
+        ("batch, truck", &f32::NAN.to_le_bytes(), "`batch, truck` has NaN"),
+        ("batch, reward", &f32::INFINITY.to_le_bytes(), "`batch, reward` has inf"),
+    ];
+    for (column, value, expected) in cases {
+        std::fs::write(place.file(file), with_column(&whole, column, |bytes| bytes[..value.len()].copy_from_slice(value))).unwrap();
+        let message = refusal(&resume(&place, "run", &ENDLESS), 2);
+        assert!(message.contains(file) && message.contains(expected), "{column}: {message}");
+    }
+    // The change itself is sound: with the same bytes the run continues.
+    std::fs::write(place.file(file), with_column(&whole, "rollout, acting", |_| ())).unwrap();
+    succeed(&resume(&place, "run", &["--steps", "1300"]));
+}
+
+#[test]
+fn a_run_killed_before_its_first_checkpoint_starts_from_the_beginning() {
+    let place = place();
+    succeed(&place.train(&["--name", "whole", "--steps", "1200"]));
+    succeed(&place.train(&["--name", "run", "--steps", "1200"]));
+    for file in ["checkpoint.safetensors", "policy.safetensors", "metrics.csv", "report.json", "report.html"] {
+        std::fs::remove_file(place.file(&format!("runs/run/{file}"))).unwrap();
+    }
+    std::fs::write(place.file("runs/run/checkpoint.part"), b"half").unwrap();
+    succeed(&resume(&place, "run", &[]));
+    assert!(bytes(&place, "runs/run/policy.safetensors") == bytes(&place, "runs/whole/policy.safetensors"));
+    assert_eq!(metrics(&place, "run"), metrics(&place, "whole"));
+    let left: Vec<String> =
+        std::fs::read_dir(place.file("runs/run")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    assert!(left.iter().all(|name| !name.ends_with(".part") && !name.contains(".tmp")), "{left:?}");
 }
 
 #[test]
@@ -205,28 +284,26 @@ fn two_runs_never_share_a_folder() {
 }
 
 #[test]
-fn a_learner_that_breaks_down_stops_with_the_step_the_parameter_and_the_last_good_checkpoint() {
+fn a_learner_that_diverges_stops_with_the_step_the_parameter_and_the_last_good_checkpoint() {
     let place = place();
     let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
     let wild = [
         ("reward_scale = 0.01", "reward_scale = 1e6"),
-        ("actor_rate = 3e-4", "actor_rate = 1.0"),
-        ("critic_rate = 3e-4", "critic_rate = 1.0"),
+        ("actor_learning_rate = 3e-4", "actor_learning_rate = 1.0"),
+        ("critic_learning_rate = 3e-4", "critic_learning_rate = 1.0"),
     ];
     let wild = wild.iter().fold(training, |text, (from, to)| text.replace(from, to)).replace("rate = 3e-4 }", "rate = 1.0 }");
     std::fs::write(place.file("tiny.toml"), wild).unwrap();
     let message = refusal(&place.train(&[&["--name", "run"], &ENDLESS[..]].concat()), 1);
-    for expected in
-        ["env steps", "the learner has broken down", "checkpoint.safetensors is the last good checkpoint", "lower learning rates"]
-    {
+    for expected in ["env steps", "training has diverged", "checkpoint.safetensors is the last good checkpoint", "lower learning rates"] {
         assert!(message.contains(expected), "{message}");
     }
     assert!(
-        ["critic 1, layer", "critic 2, layer", "actor, layer", "entropy weight"].iter().any(|name| message.contains(name)),
+        ["critic 1, layer", "critic 2, layer", "actor, layer", "entropy coefficient"].iter().any(|name| message.contains(name)),
         "{message}"
     );
-    // It is good as far as it goes: it can be read, and breaks down again.
-    assert!(refusal(&resume(&place, "run", &[]), 1).contains("broken down"));
+    // It is good as far as it goes: it can be read, and training diverges again.
+    assert!(refusal(&resume(&place, "run", &[]), 1).contains("diverged"));
 }
 
 #[test]
@@ -250,7 +327,7 @@ fn what_cannot_be_written_is_reported_once_and_written_once_it_can_be() {
 }
 
 #[test]
-fn a_full_disk_fails_a_run_only_at_its_end_after_the_examination() {
+fn a_full_disk_fails_a_run_only_at_its_end_after_the_evaluation() {
     let place = place();
     // Files of at most 500 blocks of 512 bytes: all fit but the checkpoint.
     let program = env!("CARGO_BIN_EXE_offtrack");
@@ -258,11 +335,12 @@ fn a_full_disk_fails_a_run_only_at_its_end_after_the_examination() {
     let line = format!("trap '' XFSZ; ulimit -f 500; exec {program} train {training} --out {runs} --name run");
     let output = Command::new("sh").args(["-c", &line]).output().unwrap();
     let message = refusal(&output, 1);
-    // A run so short may meet the full disk at its end alone.
-    assert!(message.matches("the run goes on").count() <= 1, "{message}");
+    // So short a run may meet the full disk at its end alone.
+    assert!(message.matches("training goes on").count() <= 1, "{message}");
     assert!(message.lines().last().unwrap().contains("checkpoint.safetensors: cannot be written: File too large"), "{message}");
     assert!(!place.file("runs/run/checkpoint.part").exists());
-    // One from the beginning, when the memory was short, may have fitted: it is whole, and with room the run goes on from it.
+    // One from the beginning, when the replay buffer was small, may have fitted: it is whole, and with room the run
+    // continues from it.
     if place.file("runs/run/checkpoint.safetensors").exists() {
         succeed(&resume(&place, "run", &[]));
     }

@@ -17,7 +17,7 @@ fn the_same_seed_and_steps_give_the_same_policy_byte_for_byte_and_another_seed_a
 }
 
 #[test]
-fn a_run_leaves_its_config_figures_policy_and_report() {
+fn a_run_leaves_its_config_metrics_policy_and_report() {
     let place = Place::new();
     succeed(&place.train(&["--steps", "2400"]));
     let run = place.file("runs").join("tiny-1");
@@ -68,10 +68,10 @@ fn a_run_that_cannot_be_is_refused_before_a_folder_is_made() {
 }
 
 #[test]
-fn practice_on_an_examined_route_or_with_other_actions_is_refused_before_a_folder_is_made() {
+fn training_on_a_test_route_or_with_other_actions_is_refused_before_a_folder_is_made() {
     let place = Place::new();
     let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
-    std::fs::write(place.file("tiny.toml"), format!("practice = \"{}\"\n{training}", place.text("practice.toml"))).unwrap();
+    std::fs::write(place.file("tiny.toml"), format!("training_benchmark = \"{}\"\n{training}", place.text("training.toml"))).unwrap();
     let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
     for (from, to, expected) in [
         ("test = ", "train = ", "20m/E-right-1 is a test route of short"),
@@ -79,11 +79,44 @@ fn practice_on_an_examined_route_or_with_other_actions_is_refused_before_a_folde
         ("load =", "steer_max_deg = 30.0\nload =", "its actions and vehicle lock must be those of short"),
     ] {
         assert!(benchmark.contains(from), "{from}");
-        std::fs::write(place.file("practice.toml"), benchmark.replacen(from, to, 1)).unwrap();
+        std::fs::write(place.file("training.toml"), benchmark.replacen(from, to, 1)).unwrap();
         let message = refusal(&place.train(&[]), 2);
-        assert!(message.contains("practice: practice") && message.contains(expected), "{message}");
+        assert!(message.contains("training_benchmark: training") && message.contains(expected), "{message}");
         assert!(!place.file("runs").exists());
     }
-    std::fs::write(place.file("practice.toml"), &benchmark).unwrap();
+    std::fs::write(place.file("training.toml"), &benchmark).unwrap();
     succeed(&place.train(&["--steps", "800"]));
+}
+
+#[test]
+fn a_mirror_that_the_actions_do_not_have_is_refused_before_a_folder_is_made() {
+    let place = Place::new();
+    let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
+    std::fs::write(place.file("short.toml"), benchmark.replacen("-0.8, -0.4,", "-0.8, -0.5,", 1)).unwrap();
+    let arguments = ["--name", "run", "--set", "learning.mirror_augmentation=true"];
+    let message = refusal(&place.train(&arguments), 2);
+    assert!(message.contains("learning.mirror_augmentation: true; steering") && message.contains("its opposite is not"), "{message}");
+    assert!(!place.file("runs").exists());
+    // So the corrected retry may have the same name.
+    std::fs::write(place.file("short.toml"), benchmark).unwrap();
+    succeed(&place.train(&arguments));
+}
+
+#[test]
+fn a_budget_too_small_for_any_update_is_refused() {
+    let place = Place::new();
+    let message = refusal(&place.train(&["--steps", "400"]), 2);
+    assert!(message.contains("--steps 400: steps: 400; must be above 400, or nothing is learned"), "{message}");
+    assert!(!place.file("runs").exists());
+}
+
+#[test]
+fn a_training_file_is_found_by_its_name() {
+    let place = Place::new();
+    let message = refusal(&offtrack(&["train", "papre", "--out", &place.text("runs")]), 2);
+    assert!(message.contains("papre: is no training file: the program comes with default, gpu, as-run, paper"), "{message}");
+    let arguments =
+        ["train", "paper", "--steps", "12000", "--set", "learning.hidden=[8]", "--set", "device=cpu", "--out", &place.text("runs")];
+    let message = refusal(&offtrack(&[&arguments[..], &["--set", "benchmark=nowhere"]].concat()), 2);
+    assert!(message.contains("nowhere"), "{message}");
 }

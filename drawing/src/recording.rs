@@ -1,0 +1,260 @@
+//! A recording: the states of one truck through an episode, step by step, independent of any picture of it.
+//!
+//! Frame 0 is the start, before any action; frame n is the state after step n, up to and including the step that ended
+//! the episode. Numbers are rounded when they are recorded (lengths to 1 mm, angles to 0.1 mrad), so that a file holds
+//! the recording exactly.
+
+use offtrack::angle::wrapped;
+use offtrack::cpu::collide;
+use offtrack::layout::{Body, Clearance, Ended, N_RAYS, N_TRAILER_RAYS, Ray};
+use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::route::Route;
+use offtrack::simulator::Batch;
+use offtrack::world::World;
+use serde::{Deserialize, Serialize};
+
+use crate::polygons::{self, Polygon};
+
+/// Resolution of lengths, speeds, rewards and load transfer ratios: parts of a unit.
+const MILLI: f64 = 1e3;
+/// Resolution of angles, parts of a radian: about a millimetre at the end of a trailer.
+const ANGLE: f64 = 1e4;
+
+/// One truck after one step, less than 250 bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Frame {
+    /// Middle of the drive axle, x east, y north \[m].
+    pub position: [f32; 2],
+    /// Of the tractor, counter-clockwise from east, in (-pi, pi] \[rad].
+    pub heading: f32,
+    /// Middle of the trailer's axle group \[m].
+    pub trailer_position: [f32; 2],
+    /// Of the trailer \[rad].
+    pub trailer_heading: f32,
+    /// Tractor's heading minus the trailer's, in (-pi, pi] \[rad].
+    pub articulation: f32,
+    /// Of the front axle, left positive \[rad].
+    pub steering: f32,
+    /// Of the drive axle [m/s].
+    pub speed: f32,
+    /// Index of the last action in the action table; `None` at the start.
+    pub action: Option<u32>,
+    /// From the reference point to the lane centre \[m].
+    pub lane_distance: f32,
+    /// From the tractor's outline to the nearest kerb, negative where they overlap \[m].
+    pub tractor_clearance: f32,
+    /// From the trailer's outline to the nearest kerb \[m].
+    pub trailer_clearance: f32,
+    /// Of the tractor, the largest of the step in magnitude, signed.
+    pub tractor_load_transfer_ratio: f32,
+    /// Of the trailer, the largest of the step in magnitude, signed.
+    pub trailer_load_transfer_ratio: f32,
+    /// Of the step; 0 at the start.
+    pub reward: f32,
+    /// Distance along each ray to the kerb, the trailer's 16 first, left and right alternating, front to rear, then the
+    /// tractor's 13 from left to right \[m].
+    pub ranges: [f32; N_RAYS],
+}
+
+impl Frame {
+    /// Truck `env` after the last step.
+    fn after_step(world: &World, batch: &Batch, env: usize) -> Frame {
+        Frame {
+            action: Some(batch.action[env]),
+            reward: to(MILLI, batch.reward[env]),
+            ..Frame::new(world, batch, env, batch.clearance[env])
+        }
+    }
+
+    /// Truck `env` after a reset. A reset computes no clearance, so it is computed here.
+    fn at_start(world: &World, batch: &Batch, env: usize) -> Frame {
+        let truck = &batch.truck[env];
+        Frame::new(world, batch, env, collide::clearance(world.route_field(truck.route), &world.params.rig, truck))
+    }
+
+    fn new(world: &World, batch: &Batch, env: usize, clearance: Clearance) -> Frame {
+        let truck = &batch.truck[env];
+        Frame {
+            position: truck.position.to_array().map(|value| to(MILLI, value)),
+            heading: to(ANGLE, truck.heading),
+            trailer_position: truck.trailer_position(&world.params.rig).to_array().map(|value| to(MILLI, value)),
+            trailer_heading: to(ANGLE, truck.trailer_heading),
+            articulation: to(ANGLE, wrapped(truck.heading - truck.trailer_heading)),
+            steering: to(ANGLE, truck.steering),
+            speed: to(MILLI, truck.speed),
+            action: None,
+            lane_distance: to(MILLI, batch.progress[env].lane_distance),
+            tractor_clearance: to(MILLI, clearance.tractor),
+            trailer_clearance: to(MILLI, clearance.trailer),
+            tractor_load_transfer_ratio: to(MILLI, truck.tractor_load_transfer_ratio),
+            trailer_load_transfer_ratio: to(MILLI, truck.trailer_load_transfer_ratio),
+            reward: 0.0,
+            ranges: batch.ranges[env].map(|range| to(MILLI, range)),
+        }
+    }
+}
+
+/// One truck's episode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// The truck's index in its batch.
+    pub env: usize,
+    /// Why the episode ended; `Running` before its end.
+    pub ended: Ended,
+    /// The start, then one frame a step.
+    pub frames: Vec<Frame>,
+}
+
+/// Records some trucks of a batch while it is stepped. Made for [`offtrack::simulator::RouteChoice::Fixed`], where a
+/// truck is held after its episode: the first episode of each truck is kept.
+#[derive(Debug)]
+pub struct Recorder {
+    tracks: Vec<Track>,
+}
+
+impl Recorder {
+    /// Records the start; the batch has just been reset.
+    pub fn new(world: &World, batch: &Batch, envs: impl IntoIterator<Item = usize>) -> Recorder {
+        let track = |env| Track { env, ended: Ended::Running, frames: vec![Frame::at_start(world, batch, env)] };
+        Recorder { tracks: envs.into_iter().map(track).collect() }
+    }
+
+    /// Records the last step of the trucks whose episode has not ended.
+    pub fn follow(&mut self, world: &World, batch: &Batch) {
+        for track in self.tracks.iter_mut().filter(|track| track.ended == Ended::Running) {
+            track.frames.push(Frame::after_step(world, batch, track.env));
+            track.ended = Ended::from_code(batch.ended[track.env]).unwrap_or(Ended::Running);
+        }
+    }
+
+    /// Whether an episode has not ended yet.
+    pub fn is_running(&self) -> bool {
+        self.tracks.iter().any(|track| track.ended == Ended::Running)
+    }
+
+    /// The episodes, in the order of `envs`.
+    pub fn finish(self) -> Vec<Track> {
+        self.tracks
+    }
+}
+
+/// A rectangle in its unit's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Rectangle {
+    /// Front end, ahead of the frame's origin \[m].
+    pub front: f32,
+    /// Rear end, ahead of the frame's origin (negative when behind) \[m].
+    pub rear: f32,
+    /// Half of the width \[m].
+    pub half_width: f32,
+}
+
+impl From<Rectangle> for Body {
+    fn from(Rectangle { front, rear, half_width }: Rectangle) -> Body {
+        Body { front, rear, half_width }
+    }
+}
+
+/// Dimensions of the truck for drawing it. The origin of the tractor is the frame's `position`, that of the trailer
+/// `trailer_position`; x forward, y left.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Measures {
+    /// Front axle ahead of the drive axle \[m].
+    pub wheelbase: f32,
+    /// Fifth wheel ahead of the drive axle \[m].
+    pub fifth_wheel: f32,
+    /// Kingpin ahead of the trailer's axle group \[m].
+    pub trailer_wheelbase: f32,
+    /// The tractor's outline.
+    pub tractor_body: Rectangle,
+    /// The trailer's outline.
+    pub trailer_body: Rectangle,
+    /// The trailer's sensors in the order of `ranges`: mount and unit vector, x, y, dx, dy.
+    pub trailer_rays: Vec<[f32; 4]>,
+    /// The tractor's sensors.
+    pub tractor_rays: Vec<[f32; 4]>,
+    /// Reach of a sensor \[m].
+    pub sensor_range: f32,
+}
+
+impl Measures {
+    /// Of the vehicle of a world.
+    pub fn of(world: &World) -> Measures {
+        let rig = &world.params.rig;
+        let body =
+            |body: &Body| Rectangle { front: to(MILLI, body.front), rear: to(MILLI, body.rear), half_width: to(MILLI, body.half_width) };
+        let ray = |ray: &Ray| [to(MILLI, ray.origin.x), to(MILLI, ray.origin.y), to(1e6, ray.direction.x), to(1e6, ray.direction.y)];
+        let (trailer, tractor) = world.rays.split_at(N_TRAILER_RAYS);
+        Measures {
+            wheelbase: to(MILLI, rig.wheelbase),
+            fifth_wheel: to(MILLI, rig.fifth_wheel),
+            trailer_wheelbase: to(MILLI, rig.trailer_wheelbase),
+            tractor_body: body(&rig.tractor_body),
+            trailer_body: body(&rig.trailer_body),
+            trailer_rays: trailer.iter().map(ray).collect(),
+            tractor_rays: tractor.iter().map(ray).collect(),
+            sensor_range: world.params.sensor_range,
+        }
+    }
+}
+
+/// A roundabout as lines of points \[m].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Map {
+    /// Polygons around the drivable area: the outer boundary counter-clockwise, then each island clockwise, without a
+    /// repeated first point. A point is drivable if an odd number of them contain it.
+    pub drivable: Vec<Polygon>,
+    /// The lanes' centre lines.
+    pub lanes: Vec<Polygon>,
+}
+
+impl Map {
+    /// Of a roundabout; `gutter` says whether gutters are drivable. Points lie within 1 cm of the curves.
+    pub fn of(roundabout: &Roundabout, gutter: Gutter) -> Map {
+        Map { drivable: polygons::drivable(&roundabout.kerbs(gutter)), lanes: roundabout.lanes().iter().map(polygons::line).collect() }
+    }
+}
+
+/// A route's centre line as points within 1 cm of it \[m].
+pub fn centre_line(route: &Route) -> Polygon {
+    polygons::line(&route.centre_line)
+}
+
+/// One episode with all data that a picture of it needs; the JSON of the command `record`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Recording {
+    /// The benchmark's name.
+    pub benchmark: String,
+    /// The route's name.
+    pub route: String,
+    /// Name of the policy.
+    pub policy: String,
+    /// Seed of the start pose.
+    pub seed: u32,
+    /// Index of the episode among those of its route in an evaluation with that seed.
+    pub episode: usize,
+    /// Episodes on each route in that evaluation: the start pose depends on it.
+    pub episodes: usize,
+    /// Time between two frames \[s].
+    pub step: f64,
+    /// Why the episode ended, by its name in reports.
+    pub ended: String,
+    /// The truck.
+    pub vehicle: Measures,
+    /// The action table: steer angle \[rad] and speed asked for [m/s].
+    pub actions: Vec<[f32; 2]>,
+    /// The roundabout.
+    pub map: Map,
+    /// The route's centre line \[m].
+    pub centre_line: Polygon,
+    /// The start, then one frame a step.
+    pub frames: Vec<Frame>,
+}
+
+/// `value` rounded to `parts` of a unit. A zero has no sign.
+fn to(parts: f64, value: f32) -> f32 {
+    ((f64::from(value) * parts).round() / parts) as f32 + 0.0
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,178 @@
+//! The layers of a map: solids, gutters, distances, lanes, routes and the names of the arms.
+
+use std::f64::consts::FRAC_PI_4;
+
+use glam::DVec2;
+use offtrack::field::Field;
+use offtrack::geometry::{Curve, Outline};
+use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::route::{Lane, Route};
+use offtrack::scenario::FIELD_CELL;
+use svg::node::element::{Group, Path};
+
+use crate::figure::{Straights, View, colour};
+use crate::isolines::isolines;
+use crate::legend::{Entry, Swatch, chevron};
+use crate::lettering::{Align, Lettering};
+
+/// Least distance between arrows of one colour \[m].
+const APART: f64 = 5.0;
+/// From the ring to the name of an arm \[m].
+const TO_NAME: f64 = 23.0;
+
+const LANE_DASHES: &str = "6 5";
+
+/// A roundabout in a view; each method draws one layer.
+pub(crate) struct Road<'a> {
+    view: &'a View,
+    lettering: &'a Lettering,
+    roundabout: &'a Roundabout,
+    routes: &'a [Route],
+    straights: Straights,
+    gutter: Gutter,
+    kerbs: Outline,
+}
+
+impl<'a> Road<'a> {
+    pub(crate) fn new(
+        view: &'a View,
+        lettering: &'a Lettering,
+        roundabout: &'a Roundabout,
+        routes: &'a [Route],
+        straights: Straights,
+        gutter: Gutter,
+    ) -> Road<'a> {
+        Road { view, lettering, roundabout, routes, straights, gutter, kerbs: roundabout.kerbs(gutter) }
+    }
+
+    /// Path data of the edges of the drivable area.
+    pub(crate) fn kerb_data(&self) -> String {
+        self.view.loops(&self.kerbs.loops)
+    }
+
+    /// Solid ground, gutters and road.
+    pub(crate) fn surface(&self) -> Group {
+        let fill = |outline: &Outline, colour: &str| {
+            Path::new().set("d", self.view.loops(&outline.loops)).set("fill", colour).set("fill-rule", "evenodd")
+        };
+        let solid = self.view.polygon(&[
+            self.view.low,
+            DVec2::new(self.view.high.x, self.view.low.y),
+            self.view.high,
+            DVec2::new(self.view.low.x, self.view.high.y),
+        ]);
+        Group::new()
+            .add(Path::new().set("d", solid).set("fill", colour::SOLID))
+            .add(fill(&self.roundabout.kerbs(Gutter::Drivable), colour::GUTTER))
+            .add(fill(&self.roundabout.kerbs(Gutter::Solid), colour::ROAD))
+    }
+
+    /// Lines of equal distance to the kerbs.
+    pub(crate) fn distances(&self) -> Group {
+        let field = Field::bake(&self.kerbs, FIELD_CELL);
+        let lines: String = isolines(&field, self.view).iter().map(|ring| self.view.line(ring)).collect();
+        let lines = Path::new().set("d", lines).set("fill", "none").set("stroke", colour::CONTOUR).set("stroke-width", 0.8);
+        Group::new().add(lines)
+    }
+
+    /// The centre lines of the lanes.
+    pub(crate) fn lanes(&self) -> Group {
+        let lanes: String = self.roundabout.lanes().iter().map(|lane| self.view.curve(lane)).collect();
+        let lanes = Path::new().set("d", lanes).set("fill", "none").set("stroke", colour::LANE).set("stroke-width", 0.9);
+        Group::new().add(lanes.set("stroke-dasharray", LANE_DASHES))
+    }
+
+    /// The edges of the drivable area.
+    pub(crate) fn kerbs(&self) -> Group {
+        Group::new().add(Path::new().set("d", self.kerb_data()).set("fill", "none").set("stroke", colour::KERB).set("stroke-width", 1.6))
+    }
+
+    /// All routes, with arrows on their approach, around the ring and on their departure.
+    pub(crate) fn routes(&self) -> Group {
+        let mut lines = Group::new();
+        let mut arrows: Vec<(DVec2, f64, Lane)> = Vec::new();
+        for route in self.routes {
+            let line = Path::new().set("d", self.view.curve(&route.centre_line)).set("fill", "none");
+            lines = lines.add(line.set("stroke", lane_colour(route.lane)).set("stroke-width", 1.6));
+            for s in self.arrow_stations(&route.centre_line) {
+                let at = route.centre_line.point_at(s);
+                let heading = route.centre_line.heading_at(s);
+                // Routes share lanes: one arrow serves all of them.
+                let shares = |&(other, towards, lane): &(DVec2, f64, Lane)| {
+                    lane == route.lane && other.distance(at) < APART && 0.0 < (towards - heading).cos()
+                };
+                if !arrows.iter().any(shares) {
+                    arrows.push((at, heading, route.lane));
+                }
+            }
+        }
+        arrows.into_iter().fold(lines, |group, (at, heading, lane)| {
+            group.add(chevron(self.view.point(at), DVec2::from_angle(-heading), lane_colour(lane)))
+        })
+    }
+
+    /// Stations of the arrows of a route: two on its approach, one at every eighth of the ring, two on its departure
+    /// \[m].
+    fn arrow_stations(&self, line: &Curve) -> Vec<f64> {
+        let eighth = |s: f64| (line.point_at(s).to_angle() / FRAC_PI_4).floor();
+        let (enters, leaves) = (self.straights.approach, line.length() - self.straights.departure);
+        let around = (0..).map(|step| enters + 0.2 * f64::from(step)).take_while(|&s| s < leaves);
+        let mut stations: Vec<f64> = around.filter(|&s| eighth(s) != eighth(s + 0.2)).collect();
+        stations.extend([0.3, 0.75].into_iter().flat_map(|part| [part * enters, leaves + part * self.straights.departure]));
+        stations
+    }
+
+    /// The arms' names, between their carriageways.
+    pub(crate) fn arm_names(&self) -> Group {
+        let mut group = Group::new();
+        let Straights { approach, departure } = self.straights;
+        let away = TO_NAME.min(approach).min(departure);
+        for (arm, name) in self.roundabout.arms().enumerate() {
+            // The U-turn enters and leaves on the left lanes of its arm.
+            let last = self.roundabout.arms().count() as u32;
+            let Some(u_turn) = self.routes.iter().find(|route| route.entry == arm && route.exit == last) else { continue };
+            let line = &u_turn.centre_line;
+            let at = (line.point_at(approach - away) + line.point_at(line.length() - departure + away)) / 2.0;
+            if self.view.shows(at, 2.0) {
+                let at = self.view.point(at) + DVec2::new(0.0, 7.0);
+                group = group.add(self.lettering.text_on_map(name, at, 20.0, Align::Middle, colour::INK));
+            }
+        }
+        group
+    }
+
+    /// The legend's lines for a map with distances.
+    pub(crate) fn legend(&self) -> Vec<Entry> {
+        let [solid, gutter, edge, lane] = self.surface_legend();
+        vec![solid, gutter, edge, Entry::new(Swatch::Line(colour::CONTOUR, 1.2, ""), "distance to it, each metre"), lane]
+    }
+
+    /// The legend's lines for surface, kerbs and lanes.
+    pub(crate) fn surface_legend(&self) -> [Entry; 4] {
+        let gutter = match self.gutter {
+            Gutter::Drivable => "gutter, drivable",
+            Gutter::Solid => "gutter, solid",
+        };
+        [
+            Entry::new(Swatch::Area(colour::SOLID), "solid"),
+            Entry::new(Swatch::Area(colour::GUTTER), gutter),
+            Entry::new(Swatch::Line(colour::KERB, 1.6, ""), "edge of what is drivable"),
+            Entry::new(Swatch::Line(colour::LANE, 0.9, LANE_DASHES), "lane centre"),
+        ]
+    }
+
+    /// The legend's lines for the routes.
+    pub(crate) fn route_legend(&self) -> [Entry; 2] {
+        [
+            Entry::new(Swatch::Arrow(lane_colour(Lane::Left)), "route from a left lane"),
+            Entry::new(Swatch::Arrow(lane_colour(Lane::Right)), "route from a right lane"),
+        ]
+    }
+}
+
+fn lane_colour(lane: Lane) -> &'static str {
+    match lane {
+        Lane::Left => colour::LEFT,
+        Lane::Right => colour::RIGHT,
+    }
+}

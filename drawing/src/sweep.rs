@@ -1,0 +1,247 @@
+//! The swept path of a truck whose front axle follows a route's centre line, and where it leaves the road.
+
+use glam::DVec2;
+use offtrack::geometry::Outline;
+use offtrack::layout::Rig;
+use offtrack::route::Route;
+use offtrack::swept::{Pose, own_lane_suffices, swept_path};
+use offtrack::vehicle::Vehicle;
+use svg::node::element::{Circle, Definitions, Group, Path, Use};
+
+use crate::figure::{View, colour, number};
+use crate::legend::{Entry, Swatch};
+use crate::lettering::{Align, Lettering};
+
+/// Distance between poses \[m].
+const SPACING: f64 = 0.25;
+/// Distance between the trucks that are drawn \[m].
+const BETWEEN_TRUCKS: f64 = 22.0;
+/// Distance between the points of an outline at which clearance is computed \[m].
+const BETWEEN_POINTS: f64 = 0.05;
+
+/// A truck's swept path along a route.
+pub struct Sweep<'a> {
+    /// The route.
+    pub route: &'a Route,
+    /// Vehicle, load and speed, for the title.
+    pub driven: String,
+    /// Whether no pose touches solid ground.
+    pub suffices: bool,
+    poses: Vec<Pose>,
+    rig: Rig,
+    units: [Unit; 2],
+}
+
+/// The swept path of one unit.
+struct Unit {
+    name: &'static str,
+    colour: &'static str,
+    light: &'static str,
+    corners: Vec<[DVec2; 4]>,
+    /// Least signed distance of the outline from the kerbs \[m].
+    clearance: f64,
+    /// For each section on which the unit overlaps solid ground: its deepest point, and the depth \[m].
+    overlaps: Vec<(DVec2, f64)>,
+}
+
+impl<'a> Sweep<'a> {
+    /// The path of `vehicle` with this load at `speed` [m/s]. `kerbs` are the roundabout's, `driven` is vehicle, load
+    /// and speed in words.
+    ///
+    /// # Panics
+    ///
+    /// If the vehicle does not have the load.
+    pub fn new(vehicle: &Vehicle, load: &str, speed: f64, kerbs: &Outline, route: &'a Route, driven: String) -> Sweep<'a> {
+        // Path and outlines depend on neither the sub-step nor the lock.
+        let rig = vehicle.rig(load, 0.05, None);
+        let poses = swept_path(&rig, &route.centre_line, speed, SPACING);
+        let tractor = poses.iter().map(|pose| pose.tractor_corners(&rig)).collect();
+        let trailer = poses.iter().map(|pose| pose.trailer_corners(&rig)).collect();
+        Sweep {
+            route,
+            driven,
+            suffices: own_lane_suffices(&rig, kerbs, &poses),
+            units: [
+                Unit::new("tractor", colour::TRACTOR, colour::SWEPT_BY_TRACTOR, tractor, kerbs),
+                Unit::new("trailer", colour::TRAILER, colour::SWEPT_BY_TRAILER, trailer, kerbs),
+            ],
+            poses,
+            rig,
+        }
+    }
+
+    /// The least clearance of both units, or how far each overlaps a kerb, in words.
+    pub fn summary(&self) -> String {
+        let [tractor, trailer] = self.units.each_ref().map(|unit| {
+            if unit.overlaps.is_empty() {
+                format!("{} clear by {:.2} m", unit.name, unit.clearance)
+            } else {
+                format!("{} {:.2} m over a kerb", unit.name, -unit.clearance.min(0.0))
+            }
+        });
+        format!("{tractor}, {trailer}")
+    }
+
+    /// Definitions of the swept areas, which are used twice.
+    pub(crate) fn shapes(&self, view: &View) -> Definitions {
+        // Half of the poses are dense enough.
+        let drawn = |unit: &Unit| unit.corners.iter().step_by(2).chain(unit.corners.last()).copied().collect::<Vec<_>>();
+        let area = |unit: &Unit| swept_area(view, &drawn(unit));
+        self.units.iter().fold(Definitions::new(), |all, unit| all.add(Path::new().set("id", unit.name).set("d", area(unit))))
+    }
+
+    /// The swept areas, to be drawn below the kerbs. The tractor's hides the trailer's: what remains of it is the
+    /// off-tracking.
+    pub(crate) fn areas(&self) -> Group {
+        self.units.iter().rev().fold(Group::new(), |group, unit| group.add(unit.area(unit.light)))
+    }
+
+    /// The areas again, to be clipped to solid ground.
+    pub(crate) fn overlaps(&self) -> Group {
+        self.units.iter().fold(Group::new(), |group, unit| group.add(unit.area(colour::OVERLAP)))
+    }
+
+    /// Trucks, paths of the axles, and a ring with its depth around each overlap.
+    pub(crate) fn marks(&self, view: &View, lettering: &Lettering) -> Group {
+        let mut group = Group::new();
+        let every = (BETWEEN_TRUCKS / SPACING) as usize;
+        for unit in self.units.iter().rev() {
+            for corners in unit.corners.iter().step_by(every) {
+                let body = Path::new().set("d", view.polygon(corners)).set("fill", unit.colour).set("fill-opacity", 0.22);
+                group = group.add(body.set("stroke", unit.colour).set("stroke-width", 1.5));
+            }
+        }
+        let front = |pose: &Pose| pose.position + f64::from(self.rig.wheelbase) * DVec2::from_angle(pose.heading);
+        let drive = |pose: &Pose| pose.position;
+        let trailer = |pose: &Pose| pose.trailer_position;
+        let line = |points: Vec<DVec2>, colour: &str, dashes: &str| {
+            let path = Path::new().set("d", view.line(&points)).set("fill", "none").set("stroke", colour).set("stroke-width", 1.6);
+            if dashes.is_empty() { path } else { path.set("stroke-dasharray", dashes) }
+        };
+        group = group.add(line(self.poses.iter().map(trailer).collect(), colour::TRAILER_AXLES, ""));
+        group = group.add(line(self.poses.iter().map(drive).collect(), colour::DRIVE_AXLE, DASHES));
+        group = group.add(line(self.poses.iter().map(front).collect(), colour::INK, ""));
+        for (unit, below) in self.units.iter().zip([false, true]) {
+            for &(deepest, depth) in &unit.overlaps {
+                let at = view.point(deepest);
+                let ring = Circle::new().set("cx", number(at.x)).set("cy", number(at.y)).set("r", 11).set("fill", "none");
+                group = group.add(ring.set("stroke", colour::OVERLAP).set("stroke-width", 2.2));
+                let words = format!("{} {depth:.2} m", unit.name);
+                let corner = at + DVec2::new(16.0, if below { 18.0 } else { -8.0 });
+                group = group.add(lettering.text_on_map(&words, corner, 15.0, Align::Left, colour::OVERLAP));
+            }
+        }
+        group
+    }
+
+    /// The lines of the legend.
+    pub(crate) fn legend(&self) -> Vec<Entry> {
+        let mut entries = vec![
+            Entry::new(Swatch::Area(colour::SWEPT_BY_TRACTOR), "swept by the tractor"),
+            Entry::new(Swatch::Area(colour::SWEPT_BY_TRAILER), "swept by the trailer alone"),
+            Entry::new(Swatch::Line(colour::INK, 1.6, ""), "front axle = lane centre"),
+            Entry::new(Swatch::Line(colour::DRIVE_AXLE, 1.6, DASHES), "drive axle"),
+            Entry::new(Swatch::Line(colour::TRAILER_AXLES, 1.6, ""), "trailer axles"),
+        ];
+        if !self.suffices {
+            entries.push(Entry::new(Swatch::Ring(colour::OVERLAP), "swept beyond a kerb, deepest there"));
+        }
+        entries
+    }
+}
+
+const DASHES: &str = "7 4";
+
+impl Unit {
+    fn new(name: &'static str, colour: &'static str, light: &'static str, corners: Vec<[DVec2; 4]>, kerbs: &Outline) -> Unit {
+        let mut unit = Unit { name, colour, light, corners, clearance: f64::INFINITY, overlaps: Vec::new() };
+        let mut overlapping = false;
+        for corners in &unit.corners {
+            let (deepest, distance) = nearest(corners, kerbs);
+            unit.clearance = unit.clearance.min(distance);
+            // A narrow nose may lie between two points of the outline: the overlap is decided exactly.
+            let overlaps = kerbs.intersects_rectangle(corners);
+            if overlaps {
+                let depth = -distance.min(0.0);
+                match unit.overlaps.last_mut().filter(|_| overlapping) {
+                    Some(section) if depth <= section.1 => {}
+                    Some(section) => *section = (deepest, depth),
+                    None => unit.overlaps.push((deepest, depth)),
+                }
+            }
+            overlapping = overlaps;
+        }
+        unit
+    }
+
+    fn area(&self, colour: &str) -> Use {
+        Use::new().set("href", format!("#{}", self.name)).set("fill", colour)
+    }
+}
+
+/// Path data of the area that a rectangle sweeps through the poses `corners`, for the non-zero fill rule.
+pub(crate) fn swept_area(view: &View, corners: &[[DVec2; 4]]) -> String {
+    // Hulls of neighbouring poses leave no teeth where a corner swings out. All have one orientation: the non-zero fill
+    // is their union.
+    corners.windows(2).map(|pair| view.polygon(&hull(pair.concat()))).collect()
+}
+
+/// The point of a rectangle's outline with the least signed distance from the kerbs, and that distance \[m].
+pub(crate) fn nearest(corners: &[DVec2; 4], kerbs: &Outline) -> (DVec2, f64) {
+    let centre = (corners[0] + corners[2]) / 2.0;
+    let nearby = kerbs.near(centre, corners[0].distance(centre));
+    let points = (0..4).flat_map(|side| {
+        let (from, to) = (corners[side], corners[(side + 1) % 4]);
+        let n = (from.distance(to) / BETWEEN_POINTS).ceil();
+        (0..n as usize).map(move |step| from.lerp(to, step as f64 / n))
+    });
+    points.map(|p| (p, nearby.signed_distance(p))).fold((centre, f64::INFINITY), |least, here| if here.1 < least.1 { here } else { least })
+}
+
+/// The corners of the convex hull, counter-clockwise (A. M. Andrew, "Another efficient algorithm for convex hulls in
+/// two dimensions", 1979).
+fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let chain = |points: &mut dyn Iterator<Item = DVec2>| {
+        let mut kept: Vec<DVec2> = Vec::new();
+        for p in points {
+            while let [.., a, b] = kept[..]
+                && (b - a).perp_dot(p - b) <= 0.0
+            {
+                kept.pop();
+            }
+            kept.push(p);
+        }
+        // Its last point is the other chain's first.
+        kept.pop();
+        kept
+    };
+    let mut hull = chain(&mut points.iter().copied());
+    hull.extend(chain(&mut points.iter().rev().copied()));
+    hull
+}
+
+#[cfg(test)]
+mod tests {
+    use offtrack::geometry::Curve;
+
+    use super::*;
+
+    #[test]
+    fn a_hull_of_two_squares_has_their_outer_corners_counter_clockwise() {
+        let square = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
+        let shifted = square.map(|p| p + DVec2::new(1.0, 0.5));
+        let expected = [(0.0, 0.0), (2.0, 0.0), (3.0, 0.5), (3.0, 2.5), (1.0, 2.5), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
+        assert_eq!(hull([square, shifted].concat()), expected);
+    }
+
+    #[test]
+    fn the_point_of_a_body_nearest_to_a_kerb_may_lie_on_a_side() {
+        let kerb = Outline::new(vec![Curve::circle(DVec2::ZERO, 50.0), Curve::circle(DVec2::new(0.0, -3.0), 2.0)]);
+        let body = [(6.0, 1.2), (-6.0, 1.2), (-6.0, -1.2), (6.0, -1.2)].map(|(x, y)| DVec2::new(x, y));
+        let (at, depth) = nearest(&body, &kerb);
+        // The circle reaches up to y = -1, 0.2 m into the body; its nearest point to the side's middle lies straight
+        // below.
+        assert!((depth + 0.2).abs() < 1e-9 && at.distance(DVec2::new(0.0, -1.2)) < 1e-9, "{at} {depth}");
+    }
+}

@@ -1,0 +1,66 @@
+//! The two engines, and what they share: the columns of a batch, their sums, and the errors.
+//!
+//! Neither engine knows the other. [`crate::simulator`] chooses one and drives it through `EngineBatch`.
+
+mod batch;
+pub mod cpu; // the CPU engine: all cores, a truck at a time
+mod error;
+#[cfg(feature = "gpu")]
+pub mod gpu; // the engine of compute shaders
+mod memory;
+pub(crate) mod tally;
+
+use std::any::Any;
+use std::fmt::Debug;
+use std::time::Duration;
+
+use crate::layout::Start;
+use crate::stages::{N_STAGES, Stage};
+use crate::world::World;
+pub(crate) use batch::Row;
+pub use batch::{Batch, RouteChoice};
+pub use error::Error;
+pub use tally::Tally;
+
+/// A batch on its engine. The caller has checked every index and number of rows; `world` is the one that the batch was
+/// made for.
+pub(crate) trait EngineBatch: Any + Debug + Send + Sync {
+    /// Trucks in the batch.
+    fn n_envs(&self) -> usize;
+
+    /// Memory of the columns \[bytes].
+    fn bytes(&self) -> usize;
+
+    /// The columns on the host.
+    fn columns(&self) -> &Batch;
+
+    /// Sums since the batch was made.
+    fn tally(&self) -> Result<Tally, Error>;
+
+    /// Begins episode 0 of every truck.
+    fn reset(&mut self, world: &World);
+
+    /// The same at stated poses, one for each truck.
+    fn reset_from(&mut self, world: &World, starts: &[Start]) -> Result<(), Error>;
+
+    /// Makes the batch one of the rows `indices`.
+    fn gather(&mut self, world: &World, indices: &[u32]) -> Result<(), Error>;
+
+    /// Replaces the columns.
+    fn replace(&mut self, batch: Batch) -> Result<(), Error>;
+
+    /// One step of every truck.
+    fn step(&mut self, world: &World, actions: &[u32]) -> Result<(), Error>;
+
+    /// One step of every truck with random actions.
+    fn step_at_random(&mut self, world: &World);
+
+    /// The same a stage at a time: the time of each.
+    fn step_at_random_by_stage(&mut self, world: &World) -> Result<[Duration; N_STAGES], Error>;
+
+    /// One stage over every truck.
+    fn run_stage(&mut self, world: &World, stage: Stage);
+
+    /// Waits until every step asked for is done.
+    fn wait(&self) -> Result<(), Error>;
+}

@@ -1,0 +1,147 @@
+//! The columns of a batch on the host, and one truck's row of them.
+
+use bytemuck::{cast_slice, cast_slice_mut};
+use rayon::prelude::*;
+
+use super::{Error, Tally, memory};
+use crate::layout::columns::{columns, row_bytes};
+use crate::layout::{Clearance, Column, Control, N_COLUMNS, N_RAYS, N_VALUES, Progress, RewardTerms, Truck};
+
+/// Rows that a thread takes at least: fewer cost more to hand out than to step.
+const ROWS_MIN: usize = 16;
+
+/// Which route an episode runs on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RouteChoice {
+    /// Drawn uniformly at random for every episode. Episodes follow each other: no truck is ever held.
+    Drawn(Vec<u32>),
+    /// Truck `env` runs `routes[env]` once: when its episode has ended it is held until the batch is reset.
+    Fixed(Vec<u32>),
+}
+
+impl RouteChoice {
+    /// The routes to draw from, or one for each truck.
+    pub fn routes(&self) -> &[u32] {
+        let (RouteChoice::Drawn(routes) | RouteChoice::Fixed(routes)) = self;
+        routes
+    }
+}
+
+macro_rules! batch {
+    ($($(#[doc = $doc:literal])* $variant:ident $name:ident: $type:ty,)*) => {
+        /// One truck's row of the columns while a stage works on it.
+        #[derive(Debug)]
+        pub struct Row<'a> {
+            /// The batch's seed.
+            pub seed: u32,
+            /// The truck's index in the batch.
+            pub env: u32,
+            /// Routes that episodes run on, as indices into the world's table.
+            pub choice: &'a RouteChoice,
+            /// What this truck adds to the batch's tally.
+            pub tally: Tally,
+            $($(#[doc = $doc])* pub $name: &'a mut $type,)*
+        }
+
+        /// The columns of a batch: `n_envs` rows each.
+        #[derive(Debug, Clone)]
+        pub struct Batch {
+            seed: u32,
+            choice: RouteChoice,
+            /// Sums since the batch was made.
+            pub(crate) tally: Tally,
+            $($(#[doc = $doc])* pub $name: Vec<$type>,)*
+        }
+
+        impl Batch {
+            /// `n_envs` trucks that have yet to be reset.
+            pub(crate) fn new(n_envs: usize, seed: u32, choice: RouteChoice) -> Result<Batch, Error> {
+                check_size(n_envs)?;
+                Ok(Batch { seed, choice, tally: Tally::default(), $($name: zeros(n_envs)?,)* })
+            }
+
+            /// The rows `indices` of this batch, in that order and as often as they are named: row `i` goes on as row
+            /// `indices[i]` was.
+            pub(crate) fn gathered(&self, indices: &[u32]) -> Result<Batch, Error> {
+                let choice = match &self.choice {
+                    RouteChoice::Fixed(routes) => RouteChoice::Fixed(indices.iter().map(|&index| routes[index as usize]).collect()),
+                    RouteChoice::Drawn(routes) => RouteChoice::Drawn(routes.clone()),
+                };
+                let mut batch = Batch { tally: self.tally, ..Batch::new(indices.len(), self.seed, choice)? };
+                $(
+                    for (row, &index) in batch.$name.iter_mut().zip(indices) {
+                        *row = self.$name[index as usize];
+                    }
+                )*
+                Ok(batch)
+            }
+
+            /// Every column as its bytes: with them a batch goes on where it was, see
+            /// [`crate::simulator::Simulator::restore`].
+            pub fn columns(&self) -> [(Column, &[u8]); N_COLUMNS] {
+                [$((Column::$variant, cast_slice(&self.$name)),)*]
+            }
+
+            /// The same to be written to.
+            pub(crate) fn columns_mut(&mut self) -> [(Column, &mut [u8]); N_COLUMNS] {
+                [$((Column::$variant, cast_slice_mut(&mut self.$name)),)*]
+            }
+
+            /// Every row, divided among all cores.
+            pub(crate) fn rows(&mut self) -> impl ParallelIterator<Item = Row<'_>> {
+                let (seed, choice) = (self.seed, &self.choice);
+                let rows = ($(&mut self.$name,)*).into_par_iter().enumerate().with_min_len(ROWS_MIN);
+                rows.map(move |(env, ($($name,)*))| Row { seed, env: env as u32, choice, tally: Tally::default(), $($name,)* })
+            }
+        }
+    };
+}
+
+columns!(batch);
+
+impl Batch {
+    /// Trucks in the batch.
+    pub fn n_envs(&self) -> usize {
+        self.truck.len()
+    }
+
+    /// Seed of its routes, poses and random actions.
+    pub fn seed(&self) -> u32 {
+        self.seed
+    }
+
+    /// Which routes its episodes run on.
+    pub fn choice(&self) -> &RouteChoice {
+        &self.choice
+    }
+
+    /// Sums over all steps since the batch was made.
+    pub fn tally(&self) -> Tally {
+        self.tally
+    }
+
+    /// As many trucks with the same seed, routes and tally, and all columns zero.
+    pub(crate) fn blank(&self) -> Result<Batch, Error> {
+        Ok(Batch { tally: self.tally, ..Batch::new(self.n_envs(), self.seed, self.choice.clone())? })
+    }
+
+    /// The bytes of a column.
+    pub fn column(&self, column: Column) -> &[u8] {
+        self.columns()[column as usize].1
+    }
+}
+
+/// An error if the columns of so many trucks do not fit into the host's memory. More than a `u32` counts never fit.
+fn check_size(n_envs: usize) -> Result<(), Error> {
+    let width = row_bytes();
+    let available = memory::available().unwrap_or(u64::MAX);
+    let fitting = (available / width as u64).min(u32::MAX.into());
+    if n_envs as u64 <= fitting { Ok(()) } else { Err(Error::BatchTooLarge { n_envs, n_bytes: n_envs as u128 * width as u128, fitting }) }
+}
+
+/// A column of zeros, whose memory is taken page by page when it is first written to.
+fn zeros<T: bytemuck::Zeroable>(n_envs: usize) -> Result<Vec<T>, Error> {
+    // The system refuses although it said that so much was free.
+    let refused = |()| Error::BatchTooLarge { n_envs, n_bytes: n_envs as u128 * row_bytes() as u128, fitting: 0 };
+    bytemuck::allocation::try_zeroed_vec(n_envs).map_err(refused)
+}

@@ -1,0 +1,137 @@
+//! The CPU engine: the columns of a batch, stepped a truck at a time by all cores.
+//!
+//! A truck's step reads and writes its own `Row` and reads the shared [`World`], so the number of threads and the
+//! truck's index in the batch cannot change a result.
+
+pub mod collide;
+pub mod copy_observation;
+pub mod count;
+pub mod draw;
+pub mod drive;
+pub mod follow;
+pub mod judge;
+pub mod observe;
+pub mod reset;
+pub mod sense;
+pub mod steer;
+
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use super::{Batch, EngineBatch, Error, Row, Tally};
+use crate::layout::Start;
+use crate::stages::{N_STAGES, OBSERVE_ALL, STAGES, Stage};
+use crate::world::World;
+
+/// Does a stage to one truck.
+type Entry = fn(&World, &mut Row);
+
+/// The function of a stage.
+fn entry(stage: Stage) -> Entry {
+    match stage {
+        Stage::Steer => steer::steer,
+        Stage::Drive => drive::drive,
+        Stage::Collide => collide::collide,
+        Stage::Follow => follow::follow,
+        Stage::Sense => sense::sense,
+        Stage::Observe => observe::observe,
+        Stage::Judge => judge::judge,
+        Stage::Count => count::count,
+        Stage::CopyObservation => copy_observation::copy_observation,
+        Stage::Reset => reset::reset,
+    }
+}
+
+/// Does `stages` to one truck.
+fn run(world: &World, row: &mut Row, stages: &[Stage]) {
+    stages.iter().for_each(|&stage| entry(stage)(world, row));
+}
+
+/// Does `stages` to every truck that is not held: all of them to one row while it is in the cache, then to the next.
+fn run_all(world: &World, batch: &mut Batch, stages: &[Stage]) {
+    let driving = batch.rows().filter(|row| row.truck.held == 0);
+    let tallies = driving.map(|mut row| {
+        run(world, &mut row, stages);
+        row.tally
+    });
+    let tally = tallies.reduce(Tally::default, Tally::plus);
+    batch.tally = batch.tally.plus(tally);
+}
+
+/// Puts every truck where `begin` says and observes it there.
+fn restart(world: &World, batch: &mut Batch, begin: impl Fn(&mut Row) + Sync) {
+    batch.rows().for_each(|mut row| {
+        begin(&mut row);
+        run(world, &mut row, &OBSERVE_ALL);
+    });
+}
+
+fn draw_all(world: &World, batch: &mut Batch) {
+    batch.rows().for_each(|mut row| draw::draw(world, &mut row));
+}
+
+impl EngineBatch for Batch {
+    fn n_envs(&self) -> usize {
+        Batch::n_envs(self)
+    }
+
+    fn bytes(&self) -> usize {
+        Batch::columns(self).iter().map(|(_, column)| column.len()).sum()
+    }
+
+    fn columns(&self) -> &Batch {
+        self
+    }
+
+    fn tally(&self) -> Result<Tally, Error> {
+        Ok(self.tally)
+    }
+
+    fn reset(&mut self, world: &World) {
+        restart(world, self, |row| reset::begin(world, row, 0));
+    }
+
+    fn reset_from(&mut self, world: &World, starts: &[Start]) -> Result<(), Error> {
+        restart(world, self, |row| reset::begin_from(world, row, 0, &starts[row.env as usize]));
+        Ok(())
+    }
+
+    fn gather(&mut self, _: &World, indices: &[u32]) -> Result<(), Error> {
+        *self = self.gathered(indices)?;
+        Ok(())
+    }
+
+    fn replace(&mut self, batch: Batch) -> Result<(), Error> {
+        *self = batch;
+        Ok(())
+    }
+
+    fn step(&mut self, world: &World, actions: &[u32]) -> Result<(), Error> {
+        self.action.copy_from_slice(actions);
+        run_all(world, self, &STAGES);
+        Ok(())
+    }
+
+    fn step_at_random(&mut self, world: &World) {
+        draw_all(world, self);
+        run_all(world, self, &STAGES);
+    }
+
+    fn step_at_random_by_stage(&mut self, world: &World) -> Result<[Duration; N_STAGES], Error> {
+        draw_all(world, self);
+        Ok(STAGES.map(|stage| {
+            let start = Instant::now();
+            self.run_stage(world, stage);
+            start.elapsed()
+        }))
+    }
+
+    fn run_stage(&mut self, world: &World, stage: Stage) {
+        run_all(world, self, &[stage]);
+    }
+
+    fn wait(&self) -> Result<(), Error> {
+        Ok(())
+    }
+}

@@ -1,0 +1,11 @@
+//! Copies the observation after the action to the observation before the next action.
+//!
+//! The reset stage then replaces it where another episode begins.
+
+use crate::engine::Row;
+use crate::world::World;
+
+/// Copies the row's observation.
+pub fn copy_observation(_: &World, row: &mut Row) {
+    *row.observation = *row.next_observation;
+}

@@ -1,0 +1,160 @@
+//! Moves the truck: a single-track tractor pulling a trailer hitched near its drive axle.
+//!
+//! Tyre slip shifts each unit's no-slip point forward by `slip * speed²`; zero slip is pure kinematics. The midpoint
+//! rule integrates it. Steer angle and speed change linearly within a sub-step: constant ones would cost decimetres in
+//! a turn.
+
+use glam::Vec2;
+
+use crate::angle::{sin_cos, wrapped};
+use crate::engine::Row;
+use crate::layout::{Control, Rig, Roll, Truck};
+use crate::shared::constants;
+use crate::world::World;
+
+constants! {
+    /// Largest shift of a no-slip point \[m]: the linear tyre model is not valid beyond.
+    pub const SLIP_LEVER_MAX: f32 = 1.5;
+    /// Keeps a quotient finite at a standstill [m^2/s^2].
+    const SPEED_SQUARED_MIN: f32 = 0.01;
+}
+
+/// One step of the truck: its sub-steps, and the largest load transfer ratio of each unit among them.
+pub fn drive(world: &World, row: &mut Row) {
+    let params = &world.params;
+    *row.truck = driven(&params.rig, params.substep, params.n_substeps, row.control, row.truck);
+}
+
+/// The truck after `n_substeps` sub-steps of `substep` seconds, for which the rig's roll is discretised.
+#[inline]
+pub fn driven(rig: &Rig, substep: f32, n_substeps: u32, control: &Control, truck: &Truck) -> Truck {
+    let mut moving = Moving { truck: *truck, motion: motion(rig, truck.speed, truck.steering, truck.heading - truck.trailer_heading) };
+    let (mut tractor_ratio, mut trailer_ratio) = (0.0, 0.0);
+    for _ in 0..n_substeps {
+        moving = moved(rig, substep, control, &moving);
+        tractor_ratio = larger_in_magnitude(tractor_ratio, moving.truck.tractor_load_transfer_ratio);
+        trailer_ratio = larger_in_magnitude(trailer_ratio, moving.truck.trailer_load_transfer_ratio);
+    }
+    Truck { tractor_load_transfer_ratio: tractor_ratio, trailer_load_transfer_ratio: trailer_ratio, ..moving.truck }
+}
+
+/// A truck and its motion there: the end of one sub-step is the start of the next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moving {
+    /// The truck.
+    pub truck: Truck,
+    /// Its motion.
+    pub motion: Motion,
+}
+
+/// Motion of both units at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// Of the tractor \[rad/s].
+    pub yaw_rate: f32,
+    /// Of the trailer \[rad/s].
+    pub trailer_yaw_rate: f32,
+    /// Speed of the drive axle to the left \[m/s].
+    pub side_speed: f32,
+    /// Of the tractor, to the left \[m/s^2].
+    pub lateral_acceleration: f32,
+    /// Of the trailer's axle group, to the left \[m/s^2].
+    pub trailer_lateral_acceleration: f32,
+}
+
+/// Motion of a truck with this speed \[m/s], steer angle and articulation \[rad].
+#[inline]
+pub fn motion(rig: &Rig, speed: f32, steering: f32, articulation: f32) -> Motion {
+    // The tyres' grip bounds the curvature.
+    let curvature_max = rig.lateral_acceleration_max / (speed * speed).max(SPEED_SQUARED_MIN);
+    let (sin, cos) = sin_cos(steering);
+    let curvature = limited(sin / (cos * rig.wheelbase), curvature_max);
+    let yaw_rate = speed * curvature;
+    let side_speed = -limited(rig.slip * speed * speed.abs(), SLIP_LEVER_MAX) * yaw_rate;
+    let hitch_side_speed = side_speed + rig.fifth_wheel * yaw_rate;
+    let (sin, cos) = sin_cos(articulation);
+    let trailer_speed = speed * cos - hitch_side_speed * sin;
+    let lever = rig.trailer_wheelbase - limited(rig.slip * trailer_speed * trailer_speed.abs(), SLIP_LEVER_MAX);
+    let trailer_yaw_rate = (speed * sin + hitch_side_speed * cos) / lever;
+    Motion {
+        yaw_rate,
+        trailer_yaw_rate,
+        side_speed,
+        lateral_acceleration: speed * yaw_rate,
+        trailer_lateral_acceleration: trailer_speed * trailer_yaw_rate,
+    }
+}
+
+/// The truck one sub-step later, with its load transfer ratios there.
+#[inline]
+pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Moving {
+    let truck = &start.truck;
+    let turn = limited(limited(control.steering, rig.steer_max) - truck.steering, rig.steer_rate * substep);
+    let steering = truck.steering + turn;
+    let acceleration = control.acceleration.max(rig.acceleration_min).min(rig.acceleration_max);
+    let speed = truck.speed + acceleration * substep;
+
+    let half = 0.5 * substep;
+    let articulation = truck.heading - truck.trailer_heading;
+    let middle_speed = truck.speed + acceleration * half;
+    let middle_articulation = articulation + half * (start.motion.yaw_rate - start.motion.trailer_yaw_rate);
+    let middle = motion(rig, middle_speed, truck.steering + 0.5 * turn, middle_articulation);
+    let (sin, cos) = sin_cos(truck.heading + half * start.motion.yaw_rate);
+    let velocity = Vec2::new(middle_speed * cos - middle.side_speed * sin, middle_speed * sin + middle.side_speed * cos);
+
+    let heading = wrapped(truck.heading + substep * middle.yaw_rate);
+    let trailer_heading = wrapped(truck.trailer_heading + substep * middle.trailer_yaw_rate);
+    let end = motion(rig, speed, steering, heading - trailer_heading);
+    let tractor = rolled(&rig.tractor_roll, Vec2::new(truck.tractor_roll, truck.tractor_roll_rate), middle.lateral_acceleration);
+    let trailer = rolled(&rig.trailer_roll, Vec2::new(truck.trailer_roll, truck.trailer_roll_rate), middle.trailer_lateral_acceleration);
+    Moving {
+        truck: Truck {
+            position: truck.position + substep * velocity,
+            heading,
+            trailer_heading,
+            speed,
+            steering,
+            tractor_roll: tractor.x,
+            tractor_roll_rate: tractor.y,
+            trailer_roll: trailer.x,
+            trailer_roll_rate: trailer.y,
+            tractor_load_transfer_ratio: load_transfer_ratio(&rig.tractor_roll, tractor, end.lateral_acceleration),
+            trailer_load_transfer_ratio: load_transfer_ratio(&rig.trailer_roll, trailer, end.trailer_lateral_acceleration),
+            ..*truck
+        },
+        motion: end,
+    }
+}
+
+/// A unit's (roll, roll rate) one sub-step later. The lateral acceleration of the sub-step's middle stands for its
+/// mean.
+#[inline]
+fn rolled(roll: &Roll, state: Vec2, lateral_acceleration: f32) -> Vec2 {
+    let [a, b, c, d] = roll.transition;
+    let [angle, rate] = roll.input;
+    Vec2::new(a * state.x + b * state.y + angle * lateral_acceleration, c * state.x + d * state.y + rate * lateral_acceleration)
+}
+
+/// Fraction of a unit's weight that has moved to its right wheels, for its (roll, roll rate): at 1 the left ones lift.
+#[inline]
+pub fn load_transfer_ratio(roll: &Roll, state: Vec2, lateral_acceleration: f32) -> f32 {
+    roll.per_acceleration * lateral_acceleration + roll.per_roll * state.x + roll.per_roll_rate * state.y
+}
+
+/// `value` kept within `limit` of 0.
+#[inline]
+fn limited(value: f32, limit: f32) -> f32 {
+    if value < -limit {
+        -limit
+    } else if limit < value {
+        limit
+    } else {
+        value
+    }
+}
+
+/// Whichever is larger in magnitude.
+#[inline]
+fn larger_in_magnitude(a: f32, b: f32) -> f32 {
+    if a.abs() < b.abs() { b } else { a }
+}

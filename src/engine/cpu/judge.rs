@@ -1,0 +1,60 @@
+//! Judges the step: whether and why the episode ended, and the reward.
+//!
+//! Failure wins over arrival, everything wins over the time limit.
+
+use crate::angle::wrapped;
+use crate::engine::Row;
+use crate::layout::{Clearance, Ended, Params, Progress, RewardTerms, RouteRow, Truck};
+use crate::world::World;
+
+/// Advances the truck's number of steps and writes the end code, the reward's terms and the reward.
+pub fn judge(world: &World, row: &mut Row) {
+    row.truck.steps += 1;
+    let route = &world.routes[row.truck.route as usize];
+    let ended = ending(&world.params, route, row.truck, row.clearance, row.progress);
+    *row.ended = ended as u32;
+    *row.terms = weighed(&world.params, row.clearance, row.progress, ended);
+    *row.reward = rewarded(&world.params, row.terms);
+}
+
+/// Why the episode ended, [`Ended::Running`] when it did not.
+pub fn ending(params: &Params, route: &RouteRow, truck: &Truck, clearance: &Clearance, progress: &Progress) -> Ended {
+    let articulation = wrapped(truck.heading - truck.trailer_heading);
+    let load_transfer_ratio = truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs());
+    let arrived = route.n_waypoints <= progress.waypoint;
+    if clearance.tractor <= 0.0 {
+        Ended::TractorCollided
+    } else if clearance.trailer <= 0.0 {
+        Ended::TrailerCollided
+    } else if params.rollover_ratio <= load_transfer_ratio {
+        Ended::RolledOver
+    } else if params.jackknife_angle < articulation.abs() {
+        Ended::Jackknifed
+    } else if !arrived && params.stray_distance < progress.waypoint_distance {
+        Ended::Strayed
+    } else if arrived {
+        Ended::Arrived
+    } else if route.step_limit < truck.steps {
+        Ended::TimedOut
+    } else {
+        Ended::Running
+    }
+}
+
+/// The physical amounts that the reward weighs.
+pub fn weighed(params: &Params, clearance: &Clearance, progress: &Progress, ended: Ended) -> RewardTerms {
+    RewardTerms {
+        waypoints: progress.passed as f32,
+        lane_distance: (progress.lane_distance / params.lane_distance_limit).min(1.0),
+        clearance: (1.0 - clearance.tractor.min(clearance.trailer) / params.clearance_limit).clamp(0.0, 1.0),
+        failure: if ended.failed() { 1.0 } else { 0.0 },
+    }
+}
+
+/// The weighted sum.
+pub fn rewarded(params: &Params, terms: &RewardTerms) -> f32 {
+    params.waypoint_weight * terms.waypoints
+        + params.lane_distance_weight * terms.lane_distance
+        + params.clearance_weight * terms.clearance
+        + params.failure_weight * terms.failure
+}

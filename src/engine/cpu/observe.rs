@@ -1,0 +1,143 @@
+//! Writes the observation after the action: 69 values, see [`OBSERVATION`](crate::layout::OBSERVATION).
+//!
+//! Values that depend on the next waypoint alone are looked up in a table that [`crate::world`] bakes.
+
+use glam::Vec2;
+
+use crate::angle::{PI, arc_tangent, wrapped};
+use crate::engine::Row;
+use crate::engine::cpu::follow::{distance_to_segment, reference_point};
+use crate::layout::{N_RAYS, N_VALUES, Params, PreviewRow, Progress, RouteRow, Truck, WaypointRow};
+use crate::shared::constants;
+use crate::world::World;
+
+constants! {
+    /// Speed that is observed as 1 \[m/s].
+    pub const SPEED_SCALE: f32 = 27.8;
+    /// Distance to a waypoint or its crossing line that is observed as 1 \[m].
+    pub const WAYPOINT_SCALE: f32 = 20.0;
+    /// Distance to the lane centre that is observed as 1 \[m].
+    pub const LANE_SCALE: f32 = 10.0;
+    /// Number of waypoints that angles are taken to.
+    pub const N_LOOK_AHEAD: usize = 5;
+    /// Waypoints beyond the next one that angles are taken to.
+    pub const LOOK_AHEAD: [usize; N_LOOK_AHEAD] = [0, 2, 5, 7, 10];
+    /// Index of the distances to the next two waypoints.
+    const DISTANCES_AT: usize = 1;
+    /// Index of the distances to their crossing lines.
+    const CROSSINGS_AT: usize = 3;
+    /// Index of the distance to the lane centre.
+    const LANE_AT: usize = 5;
+    /// Index of the angles at the waypoint behind, from those ahead to the truck.
+    const BEARINGS_AT: usize = 6;
+    /// Index of the tractor's headings relative to the lane's ahead.
+    const HEADINGS_AT: usize = 11;
+    /// Index of the trailer's.
+    const TRAILER_HEADINGS_AT: usize = 16;
+    /// Index of the articulation.
+    const ARTICULATION_AT: usize = 21;
+    /// Index of the curvatures of the route.
+    const CURVATURES_AT: usize = 22;
+    /// Number of curvatures.
+    const N_CURVATURES: usize = 8;
+    /// Index of the ranges.
+    const RANGES_AT: usize = 30;
+    /// Index of the radii ahead.
+    const RADII_AT: usize = 59;
+}
+
+/// Writes the row's next observation.
+pub fn observe(world: &World, row: &mut Row) {
+    *row.next_observation = observation_of(world, row);
+}
+
+/// The observation of the row's truck.
+pub(super) fn observation_of(world: &World, row: &Row) -> [f32; N_VALUES] {
+    let route = &world.routes[row.truck.route as usize];
+    let (waypoints, previews) = (world.route_waypoints(row.truck.route), world.route_previews(row.truck.route));
+    observed(&world.params, route, waypoints, previews, row.truck, row.progress, row.ranges)
+}
+
+/// The 69 values.
+pub fn observed(
+    params: &Params,
+    route: &RouteRow,
+    waypoints: &[WaypointRow],
+    previews: &[PreviewRow],
+    truck: &Truck,
+    progress: &Progress,
+    ranges: &[f32; N_RAYS],
+) -> [f32; N_VALUES] {
+    let last = waypoints.len() - 1;
+    let next = (progress.waypoint as usize).min(last);
+    let point = reference_point(params.rig.wheelbase, truck);
+    let mut values = [0.0; N_VALUES];
+    values[0] = (truck.speed / SPEED_SCALE).clamp(0.0, 1.0);
+    for n in 0..2 {
+        let waypoint = &waypoints[(next + n).min(last)];
+        let normal = waypoint.direction.perp();
+        let (left, right) = (waypoint.position + route.crossing_left * normal, waypoint.position - route.crossing_right * normal);
+        values[DISTANCES_AT + n] = (point.distance(waypoint.position) / WAYPOINT_SCALE).min(1.0);
+        values[CROSSINGS_AT + n] = (distance_to_segment(point, left, right) / WAYPOINT_SCALE).min(1.0);
+    }
+    values[LANE_AT] = (progress.lane_distance / LANE_SCALE).min(1.0);
+    let behind = waypoints[next.max(1) - 1].position;
+    for (n, ahead) in LOOK_AHEAD.into_iter().enumerate() {
+        let index = (next + ahead).min(last);
+        let heading = previews[index].heading;
+        values[BEARINGS_AT + n] = angle_between(waypoints[index].position - behind, point - behind) / PI;
+        values[HEADINGS_AT + n] = wrapped(truck.heading - heading) / PI;
+        values[TRAILER_HEADINGS_AT + n] = wrapped(truck.trailer_heading - heading) / PI;
+    }
+    values[ARTICULATION_AT] = wrapped(truck.heading - truck.trailer_heading) / PI;
+    let preview = &previews[next].values;
+    values[CURVATURES_AT..RANGES_AT].copy_from_slice(&preview[..N_CURVATURES]);
+    for (value, range) in values[RANGES_AT..RADII_AT].iter_mut().zip(ranges) {
+        *value = range / params.sensor_range;
+    }
+    values[RADII_AT..].copy_from_slice(&preview[N_CURVATURES..]);
+    values
+}
+
+/// Signed angle from `from` to `to`, left positive \[rad].
+#[inline]
+fn angle_between(from: Vec2, to: Vec2) -> f32 {
+    arc_tangent(from.perp_dot(to), from.dot(to))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::{N_TRAILER_RAYS, OBSERVATION};
+
+    #[test]
+    fn the_documented_order_of_values_is_the_one_that_is_written() {
+        let written = [
+            ("waypoint_distance", DISTANCES_AT),
+            ("crossing_distance", CROSSINGS_AT),
+            ("lane_distance", LANE_AT),
+            ("bearing", BEARINGS_AT),
+            ("heading", HEADINGS_AT),
+            ("trailer_heading", TRAILER_HEADINGS_AT),
+            ("articulation", ARTICULATION_AT),
+            ("future_curvature", CURVATURES_AT),
+            ("current_curvature", CURVATURES_AT + N_CURVATURES / 2),
+            ("trailer_range", RANGES_AT),
+            ("tractor_range", RANGES_AT + N_TRAILER_RAYS),
+            ("radius", RADII_AT),
+        ];
+        let documented = OBSERVATION.map(|values| (values.name, values.first));
+        assert_eq!(documented[0], ("speed", 0));
+        assert_eq!(documented[1..], written);
+        // The scales and the look-ahead stand in the docs, too.
+        let doc = |name: &str| OBSERVATION.iter().find(|values| values.name == name).map(|values| values.doc).unwrap_or_default();
+        for (name, scale) in [("speed", SPEED_SCALE), ("waypoint_distance", WAYPOINT_SCALE), ("lane_distance", LANE_SCALE)] {
+            assert!(doc(name).contains(&format!("/ {scale} m")), "{name}: {}", doc(name));
+        }
+        assert!(
+            ["bearing", "heading", "trailer_heading"]
+                .iter()
+                .all(|name| { OBSERVATION.iter().any(|values| values.name == *name && values.n == N_LOOK_AHEAD) })
+        );
+    }
+}

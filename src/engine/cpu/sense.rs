@@ -1,0 +1,225 @@
+//! Measures the ranges: from each sensor along its ray to the kerb.
+//!
+//! Over-relaxed sphere tracing of the field (B. Keinert et al., "Enhanced Sphere Tracing", 2014): a step is as long as
+//! the field's slope along the ray allows, and is taken back unless the free circles at both of its ends overlap. All
+//! rays of a truck are traced side by side; once half of them have ended, the others are packed into a bundle of half
+//! the width.
+
+use multiversion::multiversion;
+
+use crate::angle::direction;
+use crate::engine::Row;
+use crate::field::{Field, Samples};
+use crate::layout::{N_RAYS, N_TRAILER_RAYS, Ray, Rig, Truck};
+use crate::shared::constants;
+use crate::world::World;
+
+/// Rays in the widest bundle: all of a truck's.
+const WIDE: usize = N_RAYS.next_power_of_two();
+/// Index of a lane without a ray among the ranges.
+const NO_RAY: u32 = WIDE as u32 - 1;
+const _: () = assert!(N_RAYS < WIDE);
+constants! {
+    /// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide
+    /// between them.
+    const GAP: f32 = 0.05;
+    /// A step this short is never taken back \[m].
+    const SHORT: f32 = 0.25;
+    /// Closer to a kerb than this, it is taken for straight \[m].
+    const CLOSE: f32 = 0.15;
+    /// This close to a kerb the ray has met it \[m].
+    const MET: f32 = 0.004;
+    /// Head-on, a ray has met the kerb from this far off: a straight kerb's position is known to a few millimetres then
+    /// \[m].
+    const MET_HEAD_ON: f32 = 0.02;
+    /// Slope of a ray 5 deg from grazing; flatter ones are not followed to the last centimetre.
+    const GRAZING: f32 = 0.087;
+    /// Fraction of the longest step that is tried, so that the circles overlap where the field is slightly off.
+    const CAUTION: f32 = 0.98;
+    /// Most samples of a ray. A ray along a kerb at the longest range takes fewer.
+    const SAMPLES_MAX: u32 = 128;
+}
+
+/// Fills the row's ranges.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub fn sense(world: &World, row: &mut Row) {
+    *row.ranges = ranges(world.route_field(row.truck.route), &world.params.rig, &world.rays, row.truck, world.params.sensor_range);
+}
+
+/// Distance along each ray to the kerb: `reach` where none is met before, 0 from inside one \[m].
+///
+/// Within 2 cm of the exact distance, except for rays that come within 2 cm of a kerb at less than 5 deg to it.
+#[inline(always)]
+pub fn ranges(field: &Field, rig: &Rig, rays: &[Ray; N_RAYS], truck: &Truck, reach: f32) -> [f32; N_RAYS] {
+    let mut bundle = Bundle::<WIDE>::new(rig, rays, truck);
+    let mut found = [0.0; WIDE];
+    let mut samples = 0;
+    bundle.trace(field, reach, WIDE / 2, &mut samples);
+    bundle.note(&mut found);
+    let mut bundle: Bundle<{ WIDE / 2 }> = bundle.survivors();
+    bundle.trace(field, reach, WIDE / 4, &mut samples);
+    bundle.note(&mut found);
+    let mut bundle: Bundle<{ WIDE / 4 }> = bundle.survivors();
+    bundle.trace(field, reach, 0, &mut samples);
+    bundle.note(&mut found);
+    std::array::from_fn(|ray| found[ray])
+}
+
+/// Rays that are traced side by side.
+#[derive(Clone, Copy)]
+struct Bundle<const N: usize> {
+    /// Where each ray begins \[m].
+    origin_x: [f32; N],
+    origin_y: [f32; N],
+    /// Its unit vector.
+    direction_x: [f32; N],
+    direction_y: [f32; N],
+    /// Distance along it of the next sample, or where it ended \[m].
+    along: [f32; N],
+    /// Distance along it of the start of the last accepted step \[m].
+    base: [f32; N],
+    /// Radius of the free circle there \[m].
+    free: [f32; N],
+    /// 1 until the ray has ended.
+    going: [u32; N],
+    /// Its index among the ranges.
+    ray: [u32; N],
+}
+
+impl<const N: usize> Bundle<N> {
+    /// No rays.
+    #[inline(always)]
+    fn empty() -> Bundle<N> {
+        Bundle {
+            origin_x: [0.0; N],
+            origin_y: [0.0; N],
+            direction_x: [0.0; N],
+            direction_y: [0.0; N],
+            along: [0.0; N],
+            base: [0.0; N],
+            free: [0.0; N],
+            going: [0; N],
+            ray: [NO_RAY; N],
+        }
+    }
+
+    /// Traces the rays until at most `enough` of them are left; `samples` were taken on each before.
+    #[inline(always)]
+    fn trace(&mut self, field: &Field, reach: f32, enough: usize, samples: &mut u32) {
+        while *samples < SAMPLES_MAX {
+            *samples += 1;
+            if self.advance(field, reach) as usize <= enough {
+                break;
+            }
+        }
+    }
+
+    /// Takes one sample on every ray; returns how many are still going.
+    #[inline(always)]
+    fn advance(&mut self, field: &Field, reach: f32) -> u32 {
+        let (mut x, mut y) = ([0.0; N], [0.0; N]);
+        for n in 0..N {
+            x[n] = self.origin_x[n] + self.along[n] * self.direction_x[n];
+            y[n] = self.origin_y[n] + self.along[n] * self.direction_y[n];
+        }
+        let Samples { distance, east, north } = field.sample(&field.march_cells, &x, &y);
+        let mut left = 0;
+        for n in 0..N {
+            let (along, distance) = (self.along[n], distance[n]);
+            let radius = distance.abs();
+            let closing = -(self.direction_x[n] * east[n] + self.direction_y[n] * north[n]);
+
+            let bridged = larger(self.free[n] + radius + GAP, SHORT);
+            // Deep in a solid the slope may be that of its far side.
+            let accepted = (along - self.base[n] <= bridged) & (-CLOSE < distance);
+            let near = radius <= larger(MET_HEAD_ON * closing * closing, MET);
+            let met = accepted & near & ((0.0 < closing) | (distance < 0.0));
+            let beyond = accepted & (reach <= along + distance);
+            let inside = (along <= 0.0) & (distance <= 0.0);
+
+            // Distance to a straight kerb; and between two circles that touch each other and the same straight kerb.
+            let to_kerb = larger(smaller(distance / larger(closing, GRAZING), SHORT), -SHORT);
+            let to_circle = 2.0 * CAUTION * distance / (1.0 + larger(closing, 0.0));
+            let step = if met | (distance < CLOSE) { to_kerb } else { to_circle };
+            let next = if accepted { along + step } else { self.base[n] + self.free[n] };
+            let next = if beyond { reach } else { larger(smaller(next, reach), 0.0) };
+            let next = if inside { 0.0 } else { next };
+
+            self.base[n] = if accepted { along } else { self.base[n] };
+            self.free[n] = if accepted { radius } else { self.free[n] };
+            self.along[n] = if self.going[n] == 1 { next } else { along };
+            self.going[n] &= u32::from(!(met | beyond | inside));
+            left += self.going[n];
+        }
+        left
+    }
+
+    /// Writes the rays' distances; those still going are written again later.
+    #[inline(always)]
+    fn note(&self, found: &mut [f32; WIDE]) {
+        for n in 0..N {
+            found[self.ray[n] as usize % WIDE] = self.along[n];
+        }
+    }
+
+    /// The rays still going, at most `M`, in a bundle that has room for them.
+    #[inline(always)]
+    fn survivors<const M: usize>(&mut self) -> Bundle<M> {
+        let mut left = 0;
+        for n in 0..N {
+            // Every ray moves up and is overwritten if it has ended: a branch would be mispredicted.
+            self.origin_x[left] = self.origin_x[n];
+            self.origin_y[left] = self.origin_y[n];
+            self.direction_x[left] = self.direction_x[n];
+            self.direction_y[left] = self.direction_y[n];
+            self.along[left] = self.along[n];
+            self.base[left] = self.base[n];
+            self.free[left] = self.free[n];
+            self.ray[left] = self.ray[n];
+            left += self.going[n] as usize;
+        }
+        let mut kept = Bundle::empty();
+        kept.origin_x.copy_from_slice(&self.origin_x[..M]);
+        kept.origin_y.copy_from_slice(&self.origin_y[..M]);
+        kept.direction_x.copy_from_slice(&self.direction_x[..M]);
+        kept.direction_y.copy_from_slice(&self.direction_y[..M]);
+        kept.along.copy_from_slice(&self.along[..M]);
+        kept.base.copy_from_slice(&self.base[..M]);
+        kept.free.copy_from_slice(&self.free[..M]);
+        for m in 0..M {
+            kept.going[m] = u32::from(m < left);
+            kept.ray[m] = if m < left { self.ray[m] } else { NO_RAY };
+        }
+        kept
+    }
+}
+
+impl Bundle<WIDE> {
+    /// The truck's rays at their sensors.
+    #[inline(always)]
+    fn new(rig: &Rig, rays: &[Ray; N_RAYS], truck: &Truck) -> Bundle<WIDE> {
+        let tractor = (truck.position, direction(truck.heading));
+        let trailer = (truck.trailer_position(rig), direction(truck.trailer_heading));
+        let mut bundle = Bundle::empty();
+        for (n, ray) in rays.iter().enumerate() {
+            let (position, heading) = if n < N_TRAILER_RAYS { trailer } else { tractor };
+            let (origin, direction) = (position + heading.rotate(ray.origin), heading.rotate(ray.direction));
+            (bundle.origin_x[n], bundle.origin_y[n]) = (origin.x, origin.y);
+            (bundle.direction_x[n], bundle.direction_y[n]) = (direction.x, direction.y);
+            (bundle.going[n], bundle.ray[n]) = (1, n as u32);
+        }
+        bundle
+    }
+}
+
+/// The larger of two numbers in one instruction; `b` where `a` is NaN.
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if b < a { a } else { b }
+}
+
+/// The smaller of two numbers in one instruction; `b` where `a` is NaN.
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}

@@ -1,0 +1,113 @@
+//! What can go wrong with a batch.
+
+#[cfg(feature = "gpu")]
+use super::gpu;
+
+/// What a caller can get wrong about a batch, and how a device can fail.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// A batch needs a truck.
+    #[error("n_envs: 0; a batch needs at least 1 truck")]
+    EmptyBatch,
+    /// The columns do not fit into the host's memory.
+    #[error("n_envs: {n_envs}; the columns would take {n_bytes} bytes, more than this machine has free: at most {fitting} trucks fit")]
+    BatchTooLarge {
+        /// Trucks asked for.
+        n_envs: usize,
+        /// Bytes that their columns would take.
+        n_bytes: u128,
+        /// Trucks whose columns fit.
+        fitting: u64,
+    },
+    /// An episode needs a route to run on.
+    #[error("routes: empty; at least 1 route is needed")]
+    NoRoutes,
+    /// A route that the world does not have.
+    #[error("routes: {route}; the world has routes 0..{n_routes}")]
+    UnknownRoute {
+        /// The index asked for.
+        route: u32,
+        /// Routes in the world.
+        n_routes: usize,
+    },
+    /// Fixed routes must be one for each truck.
+    #[error("routes: {n_routes} for {n_envs} trucks; one each is needed")]
+    RouteCount {
+        /// Routes given.
+        n_routes: usize,
+        /// Trucks in the batch.
+        n_envs: usize,
+    },
+    /// Starts must be one for each truck.
+    #[error("starts: {n_starts} for {n_envs} trucks; one each is needed")]
+    StartCount {
+        /// Starts given.
+        n_starts: usize,
+        /// Trucks in the batch.
+        n_envs: usize,
+    },
+    /// A start beyond the benchmark's largest errors.
+    #[error("starts[{env}]: {fraction} of the largest start error; must lie in -1..1")]
+    UnknownStart {
+        /// Index of its truck.
+        env: usize,
+        /// The fraction of the largest error.
+        fraction: String,
+    },
+    /// A row that the batch does not have.
+    #[error("indices[{position}]: {index}; the batch has trucks 0..{n_envs}")]
+    UnknownTruck {
+        /// Its position among the indices.
+        position: usize,
+        /// The index asked for.
+        index: u32,
+        /// Trucks in the batch.
+        n_envs: usize,
+    },
+    /// Actions must be one for each truck.
+    #[error("actions: {n_actions} for {n_envs} trucks; one each is needed")]
+    ActionCount {
+        /// Actions given.
+        n_actions: usize,
+        /// Trucks in the batch.
+        n_envs: usize,
+    },
+    /// An action outside the table.
+    #[error("actions[{env}]: {action}; must lie in 0..{limit}")]
+    UnknownAction {
+        /// Index of its truck.
+        env: usize,
+        /// The action.
+        action: u32,
+        /// Entries of the action table.
+        limit: u32,
+    },
+    /// A stored column that does not fit the batch.
+    #[error("{column}: {}; a batch of {n_envs} trucks needs {n_bytes} bytes", .found.map_or("missing".to_owned(), |found| format!("{found} bytes")))]
+    ColumnSize {
+        /// The column's name.
+        column: &'static str,
+        /// Bytes given, none where the column is missing.
+        found: Option<usize>,
+        /// Trucks in the batch.
+        n_envs: usize,
+        /// Bytes needed.
+        n_bytes: usize,
+    },
+    /// A stored truck that cannot be in this world.
+    #[error("{column}[{env}]: {found}; the world has {limit}")]
+    OutsideWorld {
+        /// The column's name.
+        column: &'static str,
+        /// Index of the truck.
+        env: usize,
+        /// The index found there.
+        found: u32,
+        /// What the world has.
+        limit: String,
+    },
+    /// The device.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] gpu::Error),
+}

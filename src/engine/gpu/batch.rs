@@ -1,0 +1,227 @@
+//! A batch on a device: columns in its memory, stepped by kernels. Nothing is copied to the host unless the caller asks
+//! for it.
+
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Duration;
+
+use bytemuck::cast_slice;
+use wgpu::{CommandEncoder, ComputePassDescriptor, ComputePassTimestampWrites};
+
+use super::buffers::{Buffers, check_size};
+use super::tables::Tables;
+use super::{Columns, Device, Error, Slice, kernels, stage_times};
+use crate::engine::{self, EngineBatch, RouteChoice, Tally};
+use crate::layout::buffers::Table;
+use crate::layout::{BatchFacts, Column, Start};
+use crate::stages::{Kernel, N_STAGES, OBSERVE_ALL, STAGES, Stage};
+use crate::world::World;
+
+/// A batch of trucks on a device.
+#[derive(Debug)]
+pub struct Batch {
+    device: Device,
+    n_envs: usize,
+    buffers: Buffers,
+    /// Whether some columns are external.
+    external: bool,
+    /// The columns as they are, once the host has read them.
+    seen: OnceLock<engine::Batch>,
+    /// Room for them until then.
+    room: Mutex<Option<engine::Batch>>,
+}
+
+impl Batch {
+    /// `n_envs` trucks that have yet to be reset, with the caller's `columns` where it has any.
+    pub(crate) fn new(
+        device: &Device,
+        world: &World,
+        n_envs: usize,
+        seed: u32,
+        choice: RouteChoice,
+        columns: Columns,
+    ) -> Result<Batch, engine::Error> {
+        check_size(device, n_envs)?;
+        let facts = BatchFacts {
+            n_envs: n_envs as u32,
+            seed,
+            n_routes: choice.routes().len() as u32,
+            fixed: matches!(choice, RouteChoice::Fixed(_)).into(),
+        };
+        let buffers = Buffers::new(device, &Tables::new(world, facts, choice.routes()), n_envs, &columns)?;
+        let room = Mutex::new(Some(engine::Batch::new(n_envs, seed, choice)?));
+        Ok(Batch { device: device.clone(), n_envs, buffers, external: !columns.is_empty(), seen: OnceLock::new(), room })
+    }
+
+    /// Where it lives.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// A column, to be bound elsewhere or copied from.
+    pub fn column(&self, column: Column) -> &Slice {
+        self.buffers.column(column)
+    }
+
+    /// Adds a step with the actions in their column to the caller's commands. The caller submits them and calls
+    /// [`Batch::stepped`].
+    pub fn add_step(&self, encoder: &mut CommandEncoder) {
+        self.add_stages(encoder, &STAGES);
+    }
+
+    /// Adds the drawing of random actions to the caller's commands.
+    pub fn add_draw(&self, encoder: &mut CommandEncoder) {
+        self.add_pass(encoder, [Kernel::Draw], None);
+    }
+
+    /// Says that the caller submitted commands that change the batch: what the host read before is out of date.
+    pub fn stepped(&mut self) {
+        if let Some(batch) = self.seen.take() {
+            *self.room.get_mut().unwrap_or_else(PoisonError::into_inner) = Some(batch);
+        }
+    }
+
+    /// Adds stages in one pass.
+    fn add_stages(&self, encoder: &mut CommandEncoder, stages: &[Stage]) {
+        self.add_pass(encoder, stages.iter().flat_map(|stage| stage.kernels()).copied(), None);
+    }
+
+    /// Adds a pass of kernels, one after the other.
+    pub(super) fn add_pass(
+        &self,
+        encoder: &mut CommandEncoder,
+        kernels: impl IntoIterator<Item = Kernel>,
+        timestamp_writes: Option<ComputePassTimestampWrites>,
+    ) {
+        let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor { label: None, timestamp_writes });
+        pass.set_bind_group(0, &self.buffers.group, &[]);
+        for kernel in kernels {
+            self.device.kernels().dispatch(&mut pass, kernel, kernels::threads(kernel, self.n_envs));
+        }
+    }
+
+    /// Submits commands that change the batch.
+    pub(super) fn submit(&mut self, add: impl FnOnce(&Batch, &mut CommandEncoder)) {
+        self.stepped();
+        let mut encoder = self.device.device.create_command_encoder(&Default::default());
+        add(self, &mut encoder);
+        self.device.queue.submit([encoder.finish()]);
+    }
+
+    /// Begins episode 0 of every truck by a kernel and observes it there.
+    fn restart(&mut self, kernel: Kernel) {
+        self.submit(|batch, encoder| {
+            batch.add_pass(encoder, [kernel], None);
+            batch.observe_all(encoder);
+        });
+    }
+
+    /// Senses and observes every truck where it stands.
+    fn observe_all(&self, encoder: &mut CommandEncoder) {
+        self.add_stages(encoder, &OBSERVE_ALL);
+    }
+
+    fn write(&self, slice: &Slice, bytes: &[u8]) {
+        self.device.queue.write_buffer(&slice.buffer, slice.offset, bytes);
+    }
+
+    /// Uploads the columns and the tally of `batch`, which has as many trucks.
+    fn upload(&mut self, batch: &engine::Batch) {
+        self.stepped();
+        for (column, bytes) in batch.columns() {
+            self.write(self.column(column), bytes);
+        }
+        let sums: Vec<u64> = batch.tally.sums.iter().map(|&sum| sum as u64).collect();
+        self.write(self.buffers.tally(), cast_slice(&sums));
+    }
+
+    fn read_tally(&self) -> Result<Tally, Error> {
+        let bytes = self.device.read(std::slice::from_ref(self.buffers.tally()))?;
+        // Two words of 32 bits, the lower first.
+        let mut sums = bytes[0].chunks_exact(size_of::<i64>()).map(bytemuck::pod_read_unaligned::<[u32; 2]>);
+        let mut next = || sums.next().map_or(0, |[low, high]| (u64::from(low) | u64::from(high) << 32) as i64);
+        Ok(Tally { sums: std::array::from_fn(|_| next()) })
+    }
+}
+
+impl EngineBatch for Batch {
+    fn n_envs(&self) -> usize {
+        self.n_envs
+    }
+
+    fn bytes(&self) -> usize {
+        self.buffers.columns().iter().map(|slice| slice.size as usize).sum()
+    }
+
+    fn columns(&self) -> &engine::Batch {
+        self.seen.get_or_init(|| {
+            let room = self.room.lock().unwrap_or_else(PoisonError::into_inner).take();
+            let mut batch = room.expect("what was seen is given back as room before it is read again");
+            // A device that fails here fails at the next step, which returns the error.
+            if let Ok(contents) = self.device.read(self.buffers.columns()) {
+                for ((_, column), bytes) in batch.columns_mut().into_iter().zip(contents) {
+                    column.copy_from_slice(&bytes);
+                }
+            }
+            batch.tally = self.read_tally().unwrap_or(batch.tally);
+            batch
+        })
+    }
+
+    fn tally(&self) -> Result<Tally, engine::Error> {
+        Ok(self.read_tally()?)
+    }
+
+    fn reset(&mut self, _: &World) {
+        self.restart(Kernel::Restart);
+    }
+
+    fn reset_from(&mut self, _: &World, starts: &[Start]) -> Result<(), engine::Error> {
+        self.device.check()?;
+        self.write(self.buffers.table(Table::Starts), cast_slice(starts));
+        self.restart(Kernel::RestartFrom);
+        Ok(self.device.check()?)
+    }
+
+    fn gather(&mut self, world: &World, indices: &[u32]) -> Result<(), engine::Error> {
+        if self.external {
+            return Err(Error::ExternalColumns.into());
+        }
+        let host = self.columns().gathered(indices)?;
+        let mut batch = Batch::new(&self.device, world, indices.len(), host.seed(), host.choice().clone(), Columns::new())?;
+        batch.upload(&host);
+        *self = batch;
+        Ok(())
+    }
+
+    fn replace(&mut self, batch: engine::Batch) -> Result<(), engine::Error> {
+        self.upload(&batch);
+        Ok(self.device.check()?)
+    }
+
+    fn step(&mut self, _: &World, actions: &[u32]) -> Result<(), engine::Error> {
+        self.device.check()?;
+        self.write(self.column(Column::Action), cast_slice(actions));
+        self.submit(Batch::add_step);
+        Ok(())
+    }
+
+    fn step_at_random(&mut self, _: &World) {
+        self.submit(|batch, encoder| {
+            batch.add_draw(encoder);
+            batch.add_step(encoder);
+        });
+    }
+
+    fn step_at_random_by_stage(&mut self, _: &World) -> Result<[Duration; N_STAGES], engine::Error> {
+        self.submit(Batch::add_draw);
+        Ok(stage_times::step_by_stage(self)?)
+    }
+
+    fn run_stage(&mut self, _: &World, stage: Stage) {
+        self.submit(|batch, encoder| batch.add_stages(encoder, &[stage]));
+    }
+
+    fn wait(&self) -> Result<(), engine::Error> {
+        Ok(self.device.wait()?)
+    }
+}

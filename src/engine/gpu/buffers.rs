@@ -1,0 +1,99 @@
+//! The buffers of a batch on a device, and the bind group that kernels see them through.
+
+use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buffer, BufferBinding};
+
+use super::tables::Tables;
+use super::{Device, Error};
+use crate::engine::tally::N_SUMS;
+use crate::layout::buffers::{BUFFERS, Buffer as Shared, N_TABLES, Table};
+use crate::layout::{Column, N_COLUMNS};
+use crate::shared::Named;
+
+/// Part of a buffer.
+#[derive(Debug, Clone)]
+pub struct Slice {
+    /// The buffer; shaders may write to it, and it may be copied from and to.
+    pub buffer: Buffer,
+    /// Offset of the slice \[bytes].
+    pub offset: u64,
+    /// Its length \[bytes].
+    pub size: u64,
+}
+
+/// External columns: those that lie in memory of the caller. The others are the batch's own. Each is laid out as
+/// [`crate::simulator::Batch`] has it; of two entries for one column the first counts.
+pub type Columns = Vec<(Column, Slice)>;
+
+/// Every buffer of a batch.
+#[derive(Debug)]
+pub(super) struct Buffers {
+    /// In the order of [`BUFFERS`].
+    slices: Vec<Slice>,
+    pub(super) group: BindGroup,
+}
+
+impl Buffers {
+    /// Uploads the tables and makes the columns that are not external.
+    pub(super) fn new(device: &Device, tables: &Tables, n_envs: usize, external: &Columns) -> Result<Buffers, Error> {
+        let made = BUFFERS.into_iter().map(|buffer| match buffer {
+            Shared::Table(table) => Ok(device.filled(table.name(), &tables.bytes(table))),
+            Shared::Column(column) => column_slice(device, column, n_envs, external),
+            Shared::Tally => Ok(device.empty(buffer.name(), (2 * N_SUMS * size_of::<u32>()) as u64)),
+        });
+        let slices: Vec<Slice> = made.collect::<Result<_, Error>>()?;
+        let entries = (0..).zip(&slices).map(|(binding, slice)| BindGroupEntry {
+            binding,
+            resource: BindingResource::Buffer(BufferBinding {
+                buffer: &slice.buffer,
+                offset: slice.offset,
+                size: std::num::NonZero::new(slice.size),
+            }),
+        });
+        let entries: Vec<BindGroupEntry> = entries.collect();
+        let layout = &device.kernels().layout;
+        let group = device.device.create_bind_group(&BindGroupDescriptor { label: Some("batch"), layout, entries: &entries });
+        device.check()?;
+        Ok(Buffers { slices, group })
+    }
+
+    pub(super) fn table(&self, table: Table) -> &Slice {
+        &self.slices[table.index()]
+    }
+
+    pub(super) fn column(&self, column: Column) -> &Slice {
+        &self.slices[N_TABLES + column.index()]
+    }
+
+    /// All columns, in the order of [`Column`].
+    pub(super) fn columns(&self) -> &[Slice] {
+        &self.slices[N_TABLES..][..N_COLUMNS]
+    }
+
+    pub(super) fn tally(&self) -> &Slice {
+        &self.slices[N_TABLES + N_COLUMNS]
+    }
+}
+
+/// The caller's slice for a column, or a buffer of zeros.
+fn column_slice(device: &Device, column: Column, n_envs: usize, external: &Columns) -> Result<Slice, Error> {
+    let needed = (n_envs * column.width()) as u64;
+    match external.iter().find(|(known, _)| *known == column) {
+        None => Ok(device.empty(column.name(), needed)),
+        Some((_, slice)) if needed <= slice.size => Ok(Slice { size: needed, ..slice.clone() }),
+        Some((_, slice)) => Err(Error::ColumnSize { column: column.name(), found: slice.size, n_envs, needed }),
+    }
+}
+
+/// An error if a column of so many trucks is larger than the adapter's largest buffer.
+pub(super) fn check_size(device: &Device, n_envs: usize) -> Result<(), Error> {
+    let limits = device.device.limits();
+    let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    for column in Column::ALL {
+        let n_bytes = (n_envs as u64).saturating_mul(column.width() as u64);
+        if limit < n_bytes {
+            let (adapter, fitting) = (device.adapter.get_info().name, limit / column.width() as u64);
+            return Err(Error::TooManyTrucks { n_envs, buffer: column.name(), n_bytes, adapter, limit, fitting });
+        }
+    }
+    Ok(())
+}

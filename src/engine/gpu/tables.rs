@@ -1,0 +1,61 @@
+//! What trucks share, as the bytes that shaders read.
+
+use std::borrow::Cow;
+
+use bytemuck::{bytes_of, cast_slice};
+
+use crate::layout::buffers::Table;
+use crate::layout::{BatchFacts, FieldRow, Start};
+use crate::world::World;
+
+/// The contents of every [`Table`].
+pub(super) struct Tables<'a> {
+    world: &'a World,
+    facts: BatchFacts,
+    choice: &'a [u32],
+    // All fields, one after the other.
+    fields: Vec<FieldRow>,
+    cells: Vec<u32>,
+    corners: Vec<[f32; 2]>,
+}
+
+impl<'a> Tables<'a> {
+    pub(super) fn new(world: &'a World, facts: BatchFacts, choice: &'a [u32]) -> Tables<'a> {
+        let mut tables = Tables { world, facts, choice, fields: Vec::new(), cells: Vec::new(), corners: Vec::new() };
+        for field in &world.fields {
+            let first_cell = tables.cells.len() as u32;
+            tables.cells.extend(&field.cells);
+            let first_march_cell = tables.cells.len() as u32;
+            tables.cells.extend(&field.march_cells);
+            tables.fields.push(FieldRow {
+                origin: field.origin,
+                cells_per_metre: field.cells_per_metre,
+                columns: field.columns,
+                rows: field.rows,
+                first_cell,
+                first_march_cell,
+                first_pair: tables.corners.len() as u32,
+            });
+            tables.corners.extend(&field.values);
+        }
+        tables
+    }
+
+    /// A table's bytes.
+    pub(super) fn bytes(&self, table: Table) -> Cow<'_, [u8]> {
+        Cow::Borrowed(match table {
+            Table::Params => bytes_of(&self.world.params),
+            Table::Actions => cast_slice(&self.world.actions),
+            Table::Rays => cast_slice(&self.world.rays),
+            Table::Fields => cast_slice(&self.fields),
+            Table::Cells => cast_slice(&self.cells),
+            Table::Corners => cast_slice(&self.corners),
+            Table::Waypoints => cast_slice(&self.world.waypoints),
+            Table::Previews => cast_slice(&self.world.previews),
+            Table::Routes => cast_slice(&self.world.routes),
+            Table::Batch => bytes_of(&self.facts),
+            Table::Choice => cast_slice(self.choice),
+            Table::Starts => return Cow::Owned(vec![0; self.facts.n_envs as usize * size_of::<Start>()]),
+        })
+    }
+}

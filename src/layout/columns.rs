@@ -1,0 +1,109 @@
+//! The columns of a batch, declared once.
+//!
+//! [`columns!`] hands the list to a macro: here to the one that makes [`Column`], in `engine/batch.rs` to the one that
+//! makes a batch and a row of it. The buffers on a device, their WGSL declarations and the tests' tables follow from
+//! [`Column`].
+
+use super::{Clearance, Control, N_RAYS, N_VALUES, Progress, RewardTerms, Truck};
+use crate::shared::{Named, Shared};
+
+/// Calls `$then` with every column: doc, variant of [`Column`], name, type of a row. The types are those of `layout`.
+macro_rules! columns {
+    ($then:ident) => {
+        $then! {
+            /// Index into the action table
+            Action action: u32,
+            /// Steer angle and acceleration asked of each truck
+            Control control: Control,
+            /// The trucks
+            Truck truck: Truck,
+            /// Distances to the kerbs \[m]
+            Clearance clearance: Clearance,
+            /// Progress along the routes
+            Progress progress: Progress,
+            /// Distance sensors \[m]
+            Ranges ranges: [f32; N_RAYS],
+            /// The observation before the next action
+            Observation observation: [f32; N_VALUES],
+            /// The observation after the last action, another one only where an episode ended
+            NextObservation next_observation: [f32; N_VALUES],
+            /// Codes of [`crate::layout::Ended`] for the last step
+            Ended ended: u32,
+            /// Physical amounts that the reward weighs
+            Terms terms: RewardTerms,
+            /// Rewards of the last step
+            Reward reward: f32,
+        }
+    };
+}
+
+pub(crate) use columns;
+
+macro_rules! column_names {
+    ($($(#[doc = $doc:literal])* $variant:ident $name:ident: $type:ty,)*) => {
+        /// A column of a batch.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum Column {
+            $($(#[doc = $doc])* $variant,)*
+        }
+
+        impl Column {
+            /// Its name.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Column::$variant => stringify!($name),)*
+                }
+            }
+
+            /// Bytes of a row.
+            pub const fn width(self) -> usize {
+                match self {
+                    $(Column::$variant => size_of::<$type>(),)*
+                }
+            }
+
+            /// What its rows hold.
+            pub(super) const fn doc(self) -> &'static str {
+                match self {
+                    $(Column::$variant => concat!($($doc),*),)*
+                }
+            }
+
+            /// Type of an element in WGSL, where arrays lie flat.
+            pub(super) fn element(self) -> String {
+                match self {
+                    $(Column::$variant => <$type>::element(),)*
+                }
+            }
+
+            /// Its shape.
+            pub(super) fn shape(self) -> String {
+                match self {
+                    $(Column::$variant => format!("[n_envs{}]", <$type>::lengths()),)*
+                }
+            }
+        }
+
+        impl Named for Column {
+            const ALL: &'static [Column] = &[$(Column::$variant,)*];
+
+            fn name(self) -> &'static str {
+                Column::name(self)
+            }
+
+            fn index(self) -> usize {
+                self as usize
+            }
+        }
+    };
+}
+
+columns!(column_names);
+
+/// Columns of a batch.
+pub const N_COLUMNS: usize = Column::ALL.len();
+
+/// Bytes of all columns for each truck.
+pub(crate) fn row_bytes() -> usize {
+    Column::ALL.iter().map(|column| column.width()).sum()
+}

@@ -1,0 +1,100 @@
+//! Error messages of bounded length: numbers, values and lines of a file in a form that can be read on a terminal.
+
+/// Maximum length of the parser's own words \[characters].
+const LONGEST_MESSAGE: usize = 600;
+/// Maximum length of a line that is repeated \[characters].
+const LONGEST_LINE: usize = 100;
+
+/// `value` in at most two dozen characters: with an exponent from 1e7 on and below 1e-4.
+pub fn shown(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 || !size.is_finite() || (1e-4..1e7).contains(&size) { value.to_string() } else { format!("{value:e}") }
+}
+
+/// `value` rounded to two decimals, or to as many more as it takes to differ from `limit`.
+pub fn differing(value: f64, limit: f64) -> String {
+    let rounded = (2..17).map(|decimals| format!("{value:.decimals$}"));
+    let mut differing = rounded.filter(|text| text.len() < 24 && text.parse() != Ok(limit));
+    differing.next().unwrap_or_else(|| shown(value))
+}
+
+/// `text` where it has at most `limit` characters, else its beginning and its end around an ellipsis.
+pub fn shortened(text: &str, limit: usize) -> String {
+    let n = text.chars().count();
+    if n <= limit {
+        return text.to_owned();
+    }
+    let tail = limit / 3;
+    let head: String = text.chars().take(limit - tail - 1).collect();
+    let tail: String = text.chars().skip(n - tail).collect();
+    format!("{head}…{tail}")
+}
+
+/// What the TOML parser says of `text`, with the line, the table and the part of the line around the fault.
+pub(super) fn malformed(text: &str, error: &toml::de::Error) -> String {
+    let message = shortened(error.message().trim_end(), LONGEST_MESSAGE).replace('\n', ", ");
+    let Some(span) = error.span() else { return message };
+    let at = (0..=span.start.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
+    let table = table_at(text, at);
+    if table.is_none() && message.starts_with("missing field") {
+        return format!("{message} at the top level");
+    }
+    let begin = text[..at].rfind('\n').map_or(0, |end| end + 1);
+    let line = text[begin..].lines().next().unwrap_or("");
+    let (number, column) = (text[..begin].matches('\n').count() + 1, text[begin..at].chars().count());
+    let table = table.map(|table| format!("{}: ", shortened(&table, LONGEST_LINE))).unwrap_or_default();
+    format!("line {number}, column {}: {table}{message}; the line is: {}", column + 1, excerpt(line, column))
+}
+
+/// The part of a line around a column, with an ellipsis where it was cut.
+fn excerpt(line: &str, column: usize) -> String {
+    let n = line.chars().count();
+    if n <= LONGEST_LINE {
+        return line.trim().to_owned();
+    }
+    let from = column.saturating_sub(LONGEST_LINE / 2).min(n - LONGEST_LINE);
+    let part: String = line.chars().skip(from).take(LONGEST_LINE).collect();
+    let cut = |cut: bool| if cut { "…" } else { "" };
+    format!("{}{part}{}", cut(0 < from), cut(from + LONGEST_LINE < n))
+}
+
+/// The table that byte `at` lies in, `arm[1].entry.kerb`; `None` at the top level.
+fn table_at(text: &str, at: usize) -> Option<String> {
+    let end = text[at..].find('\n').map_or(text.len(), |end| at + end);
+    // Name and number of the arrays of tables opened so far.
+    let mut arrays: Vec<(&str, usize)> = Vec::new();
+    let mut table = None;
+    for line in text[..end].lines() {
+        let Some((name, array)) = header(line) else { continue };
+        if array {
+            // Arrays inside the array are counted from 0 in each of its tables.
+            arrays.retain(|(known, _)| !known.strip_prefix(name).is_some_and(|rest| rest.starts_with('.')));
+            match arrays.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, count)) => *count += 1,
+                None => arrays.push((name, 1)),
+            }
+        }
+        table = Some(name);
+    }
+    let table = table?;
+    let mut path = String::new();
+    let mut begin = 0;
+    for end in table.match_indices('.').map(|(dot, _)| dot).chain([table.len()]) {
+        path += &table[begin..end];
+        if let Some((_, count)) = arrays.iter().find(|(known, _)| *known == &table[..end]) {
+            path += &format!("[{}]", count - 1);
+        }
+        begin = end;
+    }
+    Some(path)
+}
+
+/// The name in a table's header, and whether the table is one of an array.
+fn header(line: &str) -> Option<(&str, bool)> {
+    let line = line.trim_start();
+    let array = line.starts_with("[[");
+    let (name, rest) = if array { line[2..].split_once("]]")? } else { line.strip_prefix('[')?.split_once(']')? };
+    let (name, rest) = (name.trim(), rest.trim_start());
+    let named = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') && !name.contains([',', '"', '\'', '[', ' ']);
+    (named && (rest.is_empty() || rest.starts_with('#'))).then_some((name, array))
+}

@@ -1,0 +1,250 @@
+//! A roundabout file as written, and the checks of single values and of the order of arms.
+
+use glam::DVec2;
+use serde::Deserialize;
+
+use super::alignment::{Alignment, Way};
+use crate::geometry::Bend;
+use crate::reader::{Error, Reader, shown};
+
+/// The smallest radius of a bend in a lane; no vehicle follows a smaller one \[m].
+const SHARPEST_LANE: f64 = 1.0;
+
+/// The file as written. Its values are not checked yet.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Written {
+    ring: WrittenRing,
+    arm: Vec<WrittenArm>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenRing {
+    island_radius: f64,
+    gutter: f64,
+    lane_width: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenArm {
+    name: String,
+    bearing_deg: f64,
+    length: f64,
+    entry: WrittenWay,
+    exit: WrittenWay,
+    #[serde(default)]
+    corner: WrittenCorner,
+    #[serde(default)]
+    splitter: Vec<WrittenPoint>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenWay {
+    kerb: WrittenAlignment,
+    left: Option<WrittenAlignment>,
+    right: Option<WrittenAlignment>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenAlignment {
+    points: Vec<WrittenPoint>,
+    ring_radius: f64,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct WrittenCorner {
+    kerb_radius: Option<f64>,
+    lane_radius: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenPoint {
+    along: f64,
+    offset: f64,
+    radius: Option<f64>,
+}
+
+/// The ring around the central island.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Ring {
+    /// Radius of the island's kerb face \[m].
+    pub(super) island_radius: f64,
+    /// Width of the strip between a kerb's face and the lane beside it \[m].
+    pub(super) gutter: f64,
+    /// Width of each of the two lanes \[m].
+    pub(super) lane_width: f64,
+}
+
+impl Ring {
+    /// Radius of the outer kerb's face \[m].
+    pub(super) fn outer(&self) -> f64 {
+        self.island_radius + 2.0 * (self.gutter + self.lane_width)
+    }
+}
+
+/// The three alignments of a carriageway.
+#[derive(Debug, Clone)]
+pub(super) struct Carriageway {
+    pub(super) kerb: Alignment,
+    /// Centre lines of the left and the right lane.
+    pub(super) lanes: [Alignment; 2],
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Arm {
+    pub(super) name: String,
+    /// Counter-clockwise from east \[rad].
+    pub(super) bearing: f64,
+    /// Distance from the ring's centre to the solid edge that ends the arm \[m].
+    pub(super) length: f64,
+    pub(super) entry: Carriageway,
+    pub(super) exit: Carriageway,
+    /// Radius that joins the entry's kerb to the next arm's exit kerb outside the ring \[m].
+    pub(super) kerb_corner: Option<f64>,
+    /// The same for the right lane to the first exit; without it that lane lies beside such a kerb \[m].
+    pub(super) lane_corner: Option<f64>,
+    /// Corners of the splitter island's kerb face in the arm's frame; empty if there is no island.
+    pub(super) splitter: Vec<Bend>,
+}
+
+impl Arm {
+    pub(super) fn way(&self, way: Way) -> &Carriageway {
+        if way == Way::Entry { &self.entry } else { &self.exit }
+    }
+}
+
+impl Written {
+    /// Ring and arms, with every value within its range and the arms in order.
+    pub(super) fn checked(self, reader: &Reader) -> Result<(Ring, Vec<Arm>), Error> {
+        let ring = Ring {
+            island_radius: reader.within("ring.island_radius", self.ring.island_radius, 2.0..=200.0, "m")?,
+            gutter: reader.within("ring.gutter", self.ring.gutter, 0.0..=3.0, "m")?,
+            lane_width: reader.within("ring.lane_width", self.ring.lane_width, 2.5..=8.0, "m")?,
+        };
+        reader.count("arm", self.arm.len(), 2..=8)?;
+        let arms: Vec<Arm> =
+            self.arm.into_iter().enumerate().map(|(index, arm)| arm.checked(reader, index, &ring)).collect::<Result<_, _>>()?;
+        let mut around = 0.0;
+        for (index, arm) in arms.iter().enumerate() {
+            let key = |name: &str| format!("arm[{index}].{name}");
+            if let Some(other) = arms[..index].iter().position(|other| other.name == arm.name) {
+                return Err(reader.invalid(key("name"), &arm.name, format!("arm[{other}] has this name already")));
+            }
+            let next = &arms[(index + 1) % arms.len()];
+            around += (next.bearing - arm.bearing).rem_euclid(std::f64::consts::TAU);
+            let gap = (next.bearing - arm.bearing).rem_euclid(std::f64::consts::TAU);
+            if gap == 0.0 || 1e-6 < around - std::f64::consts::TAU {
+                let index = (index + 1) % arms.len();
+                let bearing = next.bearing.to_degrees();
+                return Err(reader.invalid(
+                    format!("arm[{index}].bearing_deg"),
+                    format_args!("{bearing:.1} deg"),
+                    format!("arms must follow each other counter-clockwise, and {} comes before {}", arm.name, next.name),
+                ));
+            }
+        }
+        Ok((ring, arms))
+    }
+}
+
+impl WrittenArm {
+    fn checked(self, reader: &Reader, index: usize, ring: &Ring) -> Result<Arm, Error> {
+        let key = |name: &str| format!("arm[{index}].{name}");
+        if self.name.is_empty() || 20 < self.name.len() || !self.name.chars().all(|c| c.is_ascii_alphanumeric()) {
+            return Err(reader.invalid(
+                key("name"),
+                format!("{:?}", self.name),
+                "must be 1 to 20 letters and digits, because it is part of route names",
+            ));
+        }
+        let bearing = reader.within(&key("bearing_deg"), self.bearing_deg, -360.0..=360.0, "deg")?.to_radians();
+        let length = reader.within(&key("length"), self.length, ring.outer() + 10.0..=1000.0, "m")?;
+        let radius = |name: &str, value: Option<f64>| value.map(|value| reader.within(&key(name), value, 0.1..=1000.0, "m")).transpose();
+        let splitter = self.splitter.iter().enumerate();
+        let splitter = splitter.map(|(point, written)| {
+            let at = |name: &str| key(&format!("splitter[{point}].{name}"));
+            let radius =
+                written.radius.ok_or_else(|| reader.invalid(at("radius"), "missing", "every corner of a splitter island needs one"))?;
+            let along = reader.within(&at("along"), written.along, 0.0..=length, "m")?;
+            let offset = reader.within(&at("offset"), written.offset, -200.0..=200.0, "m")?;
+            Ok(Bend { at: DVec2::new(along, offset), radius: reader.within(&at("radius"), radius, 0.1..=1000.0, "m")? })
+        });
+        let splitter: Vec<Bend> = splitter.collect::<Result<_, Error>>()?;
+        if !splitter.is_empty() {
+            reader.count(&key("splitter"), splitter.len(), 3..=16)?;
+        }
+        Ok(Arm {
+            kerb_corner: radius("corner.kerb_radius", self.corner.kerb_radius)?,
+            lane_corner: radius("corner.lane_radius", self.corner.lane_radius)?,
+            entry: self.entry.checked(reader, &key("entry"), Way::Entry, length, ring)?,
+            exit: self.exit.checked(reader, &key("exit"), Way::Exit, length, ring)?,
+            name: self.name,
+            bearing,
+            length,
+            splitter,
+        })
+    }
+}
+
+impl WrittenWay {
+    fn checked(self, reader: &Reader, key: &str, way: Way, length: f64, ring: &Ring) -> Result<Carriageway, Error> {
+        let kerb = self.kerb.checked(reader, &format!("{key}.kerb"), way, length, 0.0)?;
+        let lane = |written: Option<WrittenAlignment>, name: &str, distance: f64| match written {
+            Some(written) => written.checked(reader, &format!("{key}.{name}"), way, length, SHARPEST_LANE),
+            None => kerb.beside(distance, ring.outer()).ok_or_else(|| {
+                reader.invalid(
+                    format!("{key}.{name}"),
+                    "missing",
+                    "this kerb bends too sharply for a lane beside it: give the lane's points",
+                )
+            }),
+        };
+        let right = ring.gutter + ring.lane_width / 2.0;
+        let lanes = [lane(self.left, "left", right + ring.lane_width)?, lane(self.right, "right", right)?];
+        Ok(Carriageway { kerb, lanes })
+    }
+}
+
+impl WrittenAlignment {
+    /// `least` is the smallest radius of a bend \[m].
+    fn checked(self, reader: &Reader, key: &str, way: Way, length: f64, least: f64) -> Result<Alignment, Error> {
+        reader.count(&format!("{key}.points"), self.points.len(), 1..=8)?;
+        let last = self.points.len() - 1;
+        let side = if way == Way::Entry { 1.0 } else { -1.0 };
+        let mut bends = vec![Bend { at: DVec2::new(length, side * self.points[0].offset), radius: 0.0 }];
+        for (index, point) in self.points.iter().enumerate() {
+            let at = |name: &str| format!("{key}.points[{index}].{name}");
+            let along = reader.within(&at("along"), point.along, -length..=length, "m")?;
+            let before = bends[index].at.x;
+            if before <= along {
+                return Err(reader.invalid(
+                    at("along"),
+                    format_args!("{} m", shown(along)),
+                    format!("must be less than {} m, because points lead inwards", shown(before)),
+                ));
+            }
+            let offset = reader.within(&at("offset"), point.offset, -200.0..=200.0, "m")?;
+            let radius = match (point.radius, index == last) {
+                (Some(radius), false) => reader.within(&at("radius"), radius, least..=1000.0, "m")?,
+                (None, true) => 0.0,
+                (None, false) => return Err(reader.invalid(at("radius"), "missing", "every point but the last needs one")),
+                (Some(radius), true) => {
+                    return Err(reader.invalid(
+                        at("radius"),
+                        format_args!("{} m", shown(radius)),
+                        "the last point has none: ring_radius rounds the corner into the ring",
+                    ));
+                }
+            };
+            bends.push(Bend { at: DVec2::new(along, side * offset), radius });
+        }
+        let ring_radius = reader.within(&format!("{key}.ring_radius"), self.ring_radius, 0.1..=1000.0, "m")?;
+        Ok(Alignment { bends, ring_radius })
+    }
+}

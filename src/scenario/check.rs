@@ -1,0 +1,167 @@
+//! The check of a scenario that was changed in memory: everything that baking and stepping rely on.
+//!
+//! A scenario that was read from a file has passed narrower ranges already; its fields are public, so it can be changed
+//! afterwards.
+
+use std::fmt::Display;
+
+use super::Scenario;
+use crate::vehicle::{Suspension, Vehicle};
+
+/// A value with which no truck could be stepped.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{key}: {value}; {expected}")]
+pub struct Invalid {
+    /// Path of the field in [`Scenario`].
+    pub key: String,
+    /// The value found.
+    pub value: String,
+    /// What would do.
+    pub expected: String,
+}
+
+/// Any magnitude that f32 computes with safely.
+const FINITE: [f64; 2] = [-1e9, 1e9];
+/// A length, a time, a mass: not 0.
+const POSITIVE: [f64; 2] = [1e-6, 1e9];
+/// A steer angle [rad].
+const LOCK: [f64; 2] = [1e-3, 1.5];
+
+impl Scenario {
+    /// An error if the scenario has a value with which no truck could be stepped.
+    ///
+    /// [`World::bake`](crate::world::World::bake) calls it.
+    pub fn check(&self) -> Result<(), Invalid> {
+        if !self.vehicle.loads.contains_key(&self.load) {
+            let loads: Vec<&str> = self.vehicle.loads.keys().map(String::as_str).collect();
+            return Err(invalid("load", format_args!("{:?}", self.load), format!("the vehicle has {}", loads.join(", "))));
+        }
+        self.check_numbers()?;
+        list("steer_levels", &self.steer_levels, [-1.0, 1.0])?;
+        list("speeds", &self.speeds, [0.01, 100.0])?;
+        self.check_routes()?;
+        check_vehicle(&self.vehicle)
+    }
+
+    fn check_numbers(&self) -> Result<(), Invalid> {
+        if let Some(lock) = self.steer_max {
+            within("steer_max", lock, LOCK)?;
+        }
+        within("n_substeps", f64::from(self.n_substeps), [1.0, 10_000.0])?;
+        // Beyond these widths the field would fill the memory, or miss the kerbs.
+        within("cell", self.cell, [0.05, 2.0])?;
+        let positive = [
+            ("step", self.step),
+            ("sensor_range", self.sensor_range),
+            ("stray_distance", self.stray_distance),
+            ("jackknife_angle", self.jackknife_angle),
+            ("rollover_ratio", self.rollover_ratio),
+            ("time_limit", self.time_limit),
+            ("lane_distance_limit", self.lane_distance_limit),
+            ("clearance_limit", self.clearance_limit),
+        ];
+        let finite = [
+            ("start_offset", self.start_offset),
+            ("start_heading", self.start_heading),
+            ("waypoint_weight", self.waypoint_weight),
+            ("lane_distance_weight", self.lane_distance_weight),
+            ("clearance_weight", self.clearance_weight),
+            ("failure_weight", self.failure_weight),
+        ];
+        positive.into_iter().try_for_each(|(key, value)| within(key, value, POSITIVE))?;
+        finite.into_iter().try_for_each(|(key, value)| within(key, value, FINITE))
+    }
+
+    /// Every route leads somewhere, and there is one.
+    fn check_routes(&self) -> Result<(), Invalid> {
+        if self.places.iter().all(|place| place.routes.is_empty()) {
+            return Err(invalid("places", "no routes", "at least one route is needed"));
+        }
+        for (index, place) in self.places.iter().enumerate() {
+            for (number, route) in place.routes.iter().enumerate() {
+                let key = format!("places[{index}].routes[{number}]");
+                if route.waypoints.len() < 2 {
+                    let found = format_args!("{} waypoints", route.waypoints.len());
+                    return Err(invalid(&format!("{key}.waypoints"), found, "at least 2 are needed"));
+                }
+                within(&format!("{key}.crossing.0"), route.crossing.0, FINITE)?;
+                within(&format!("{key}.crossing.1"), route.crossing.1, FINITE)?;
+                for (at, waypoint) in route.waypoints.iter().enumerate() {
+                    let values = [waypoint.position.x, waypoint.position.y, waypoint.heading];
+                    values.into_iter().try_for_each(|value| within(&format!("{key}.waypoints[{at}]"), value, FINITE))?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
+    let Vehicle { tractor, trailer, loads, speed_control, sensors } = vehicle;
+    let positive = [
+        ("tractor.wheelbase", tractor.wheelbase),
+        ("tractor.width", tractor.width),
+        ("tractor.steer_rate", tractor.steer_rate),
+        ("tractor.friction", tractor.friction),
+        ("tractor.mass", tractor.mass),
+        ("trailer.wheelbase", trailer.wheelbase),
+        ("trailer.width", trailer.width),
+    ];
+    let finite = [
+        ("tractor.fifth_wheel", tractor.fifth_wheel),
+        ("tractor.front_overhang", tractor.front_overhang),
+        ("tractor.rear_overhang", tractor.rear_overhang),
+        ("trailer.kingpin_to_front", trailer.kingpin_to_front),
+        ("trailer.kingpin_to_rear", trailer.kingpin_to_rear),
+        ("speed_control.gain", speed_control.gain),
+        ("speed_control.integral_gain", speed_control.integral_gain),
+        ("speed_control.integral_band", speed_control.integral_band),
+        ("speed_control.braking", speed_control.braking),
+        ("sensors.trailer_first", sensors.trailer_first),
+        ("sensors.trailer_last", sensors.trailer_last),
+    ];
+    let key = |key: &str| format!("vehicle.{key}");
+    within(&key("tractor.steer_max"), tractor.steer_max, LOCK)?;
+    positive.into_iter().try_for_each(|(name, value)| within(&key(name), value, POSITIVE))?;
+    finite.into_iter().try_for_each(|(name, value)| within(&key(name), value, FINITE))?;
+    for (index, mount) in sensors.tractor_mounts.iter().enumerate() {
+        let name = key(&format!("sensors.tractor_mounts[{index}]"));
+        within(&name, mount.x, FINITE)?;
+        within(&name, mount.y, FINITE)?;
+    }
+    check_suspension(&key("tractor.suspension"), &tractor.suspension)?;
+    for (name, load) in loads {
+        let key = key(&format!("loads.{name}"));
+        within(&format!("{key}.mass"), load.mass, POSITIVE)?;
+        within(&format!("{key}.slip"), load.slip, FINITE)?;
+        within(&format!("{key}.acceleration_min"), load.acceleration_min, FINITE)?;
+        within(&format!("{key}.acceleration_max"), load.acceleration_max, FINITE)?;
+        check_suspension(&format!("{key}.suspension"), &load.suspension)?;
+    }
+    Ok(())
+}
+
+fn check_suspension(key: &str, suspension: &Suspension) -> Result<(), Invalid> {
+    within(&format!("{key}.centre_of_gravity"), suspension.centre_of_gravity, POSITIVE)?;
+    within(&format!("{key}.roll_centre"), suspension.roll_centre, FINITE)?;
+    within(&format!("{key}.track"), suspension.track, POSITIVE)?;
+    within(&format!("{key}.roll_gain"), suspension.roll_gain, FINITE)?;
+    within(&format!("{key}.roll_frequency"), suspension.roll_frequency, POSITIVE)?;
+    within(&format!("{key}.roll_damping"), suspension.roll_damping, [0.0, 0.9999])
+}
+
+fn list(key: &str, values: &[f64], range: [f64; 2]) -> Result<(), Invalid> {
+    if values.is_empty() {
+        return Err(invalid(key, "empty", "at least one value is needed"));
+    }
+    values.iter().enumerate().try_for_each(|(index, &value)| within(&format!("{key}[{index}]"), value, range))
+}
+
+/// NaN lies in no range.
+fn within(key: &str, value: f64, [least, most]: [f64; 2]) -> Result<(), Invalid> {
+    if (least..=most).contains(&value) { Ok(()) } else { Err(invalid(key, value, format!("must lie in {least}..{most}"))) }
+}
+
+fn invalid(key: &str, value: impl Display, expected: impl Into<String>) -> Invalid {
+    Invalid { key: key.to_owned(), value: value.to_string(), expected: expected.into() }
+}

@@ -1,0 +1,216 @@
+//! Macros for what is written once and read twice: by Rust, and by WGSL in the words printed here.
+//!
+//! [`shared!`](crate::shared!) declares structs, `constants!` constants, [`named!`](crate::named!) closed lists of
+//! names.
+
+use glam::Vec2;
+
+/// A type that WGSL has too.
+pub trait Shared {
+    /// Its name in WGSL.
+    fn wgsl() -> String;
+
+    /// Name in WGSL of what a buffer of such values is an array of: arrays lie flat in it.
+    fn element() -> String {
+        Self::wgsl()
+    }
+
+    /// What each further index of such a buffer counts to, as ", 29"; empty where a value is one element.
+    fn lengths() -> String {
+        String::new()
+    }
+}
+
+impl Shared for f32 {
+    fn wgsl() -> String {
+        "f32".to_owned()
+    }
+}
+
+impl Shared for u32 {
+    fn wgsl() -> String {
+        "u32".to_owned()
+    }
+}
+
+impl Shared for Vec2 {
+    fn wgsl() -> String {
+        "vec2<f32>".to_owned()
+    }
+}
+
+impl<T: Shared, const N: usize> Shared for [T; N] {
+    fn wgsl() -> String {
+        format!("array<{}, {N}>", T::wgsl())
+    }
+    fn element() -> String {
+        T::element()
+    }
+    fn lengths() -> String {
+        format!(", {N}{}", T::lengths())
+    }
+}
+
+/// A value that can be written as a WGSL literal.
+pub trait Literal {
+    /// Its type in WGSL.
+    fn type_name() -> String;
+    /// The value as WGSL reads it, to the last bit.
+    fn literal(&self) -> String;
+}
+
+impl Literal for f32 {
+    fn type_name() -> String {
+        f32::wgsl()
+    }
+    fn literal(&self) -> String {
+        format!("{self:?}f")
+    }
+}
+
+impl Literal for u32 {
+    fn type_name() -> String {
+        u32::wgsl()
+    }
+    fn literal(&self) -> String {
+        format!("{self}u")
+    }
+}
+
+impl Literal for usize {
+    fn type_name() -> String {
+        u32::wgsl()
+    }
+    fn literal(&self) -> String {
+        format!("{self}u")
+    }
+}
+
+impl<T: Literal, const N: usize> Literal for [T; N] {
+    fn type_name() -> String {
+        format!("array<{}, {N}>", T::type_name())
+    }
+    fn literal(&self) -> String {
+        let values: Vec<String> = self.iter().map(Literal::literal).collect();
+        format!("{}({})", Self::type_name(), values.join(", "))
+    }
+}
+
+/// Prints the lines of a doc comment as a WGSL comment, indented by `depth`.
+pub fn comment(depth: &str, lines: &[&str]) -> String {
+    // Brackets are escaped for rustdoc, which takes a unit for a link.
+    lines.iter().map(|line| format!("{depth}//{}\n", line.replace("\\[", "["))).collect()
+}
+
+/// One of a closed list of names: an unknown one cannot be written.
+pub trait Named: Copy + Eq + std::fmt::Debug + 'static {
+    /// Every one, in order.
+    const ALL: &'static [Self];
+
+    /// The name.
+    fn name(self) -> &'static str;
+
+    /// Its index in [`Named::ALL`].
+    fn index(self) -> usize;
+}
+
+/// An enum that is a closed list of names, see [`Named`](crate::shared::Named).
+#[macro_export]
+macro_rules! named {
+    ($(#[doc = $doc:literal])* pub enum $list:ident { $($(#[doc = $item_doc:literal])* $item:ident = $name:literal,)* }) => {
+        $(#[doc = $doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum $list {
+            $($(#[doc = $item_doc])* $item,)*
+        }
+
+        impl $list {
+            /// The name.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $($list::$item => $name,)*
+                }
+            }
+        }
+
+        impl $crate::shared::Named for $list {
+            const ALL: &'static [$list] = &[$($list::$item,)*];
+
+            fn name(self) -> &'static str {
+                $list::name(self)
+            }
+
+            fn index(self) -> usize {
+                self as usize
+            }
+        }
+    };
+}
+
+/// Structs of plain data, each with its twin in WGSL.
+///
+/// Beside them `structs` says where their fields lie, and `printed_structs` gives the twins.
+#[macro_export]
+macro_rules! shared {
+    ($($(#[doc = $doc:literal])* pub struct $name:ident { $($(#[doc = $field_doc:literal])* pub $field:ident: $type:ty,)* })*) => {
+        $(
+            $(#[doc = $doc])*
+            #[repr(C)]
+            #[derive(Debug, Clone, Copy, PartialEq, Default, bytemuck::Pod, bytemuck::Zeroable)]
+            pub struct $name {
+                $($(#[doc = $field_doc])* pub $field: $type,)*
+            }
+
+            impl $crate::shared::Shared for $name {
+                fn wgsl() -> String {
+                    stringify!($name).to_owned()
+                }
+            }
+        )*
+
+        /// Every shared struct: its name, its size \[bytes], and the name and the offset \[bytes] of each field.
+        #[allow(dead_code, reason = "used by tests alone where no other code looks at a layout")]
+        pub fn structs() -> Vec<(&'static str, usize, Vec<(&'static str, usize)>)> {
+            vec![$((
+                stringify!($name),
+                size_of::<$name>(),
+                vec![$((stringify!($field), std::mem::offset_of!($name, $field)),)*],
+            ),)*]
+        }
+
+        /// The structs in WGSL.
+        pub(crate) fn printed_structs() -> String {
+            let mut printed = String::new();
+            $(
+                printed += &$crate::shared::comment("", &[$($doc),*]);
+                printed += &format!("struct {} {{\n", stringify!($name));
+                $(
+                    printed += &$crate::shared::comment("    ", &[$($field_doc),*]);
+                    printed += &format!("    {}: {},\n", stringify!($field), <$type as $crate::shared::Shared>::wgsl());
+                )*
+                printed += "}\n\n";
+            )*
+            printed
+        }
+    };
+}
+
+/// Constants, each with its twin in WGSL.
+macro_rules! constants {
+    ($($(#[doc = $doc:literal])* $visibility:vis const $name:ident: $type:ty = $value:expr;)*) => {
+        $($(#[doc = $doc])* $visibility const $name: $type = $value;)*
+
+        /// The constants above in WGSL.
+        pub(crate) fn printed_constants() -> String {
+            use $crate::shared::{Literal, comment};
+            let mut printed = String::new();
+            $(
+                printed += &comment("", &[$($doc),*]);
+                printed += &format!("const {}: {} = {};\n", stringify!($name), <$type>::type_name(), $name.literal());
+            )*
+            printed
+        }
+    };
+}
+
+pub(crate) use constants;

@@ -1,0 +1,33 @@
+//! What shaders share with Rust, printed as WGSL.
+
+use crate::engine::cpu;
+use crate::engine::tally;
+use crate::layout::{self, buffers};
+use crate::{angle, field, random};
+
+/// `shaders/layout.wgsl`: constants, structs and the buffers of a step.
+pub fn layout() -> String {
+    [shared(), buffers::printed()].concat()
+}
+
+/// Constants and structs alone, for shaders with buffers of their own.
+pub fn shared() -> String {
+    [
+        "// What shaders share with Rust. Printed by src/wgsl.rs from the layout and the constants beside each stage: change those.\n\n"
+            .to_owned(),
+        layout::printed_constants(),
+        angle::printed_constants(),
+        field::printed_constants(),
+        random::printed_constants(),
+        cpu::drive::printed_constants(),
+        cpu::collide::printed_constants(),
+        cpu::sense::printed_constants(),
+        cpu::observe::printed_constants(),
+        tally::printed_constants(),
+        "\n".to_owned(),
+        layout::printed_codes(),
+        "\n".to_owned(),
+        layout::printed_structs(),
+    ]
+    .concat()
+}

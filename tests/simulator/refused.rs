@@ -1,0 +1,104 @@
+//! Batches and scenarios that are refused: too large for the memory, or with values that no truck could be stepped
+//! with.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use offtrack::layout::Column;
+use offtrack::scenario::Scenario;
+use offtrack::shared::Named;
+use offtrack::simulator::{Error, RouteChoice, Simulator};
+use offtrack::world::World;
+
+use crate::benchmark;
+
+#[test]
+fn a_batch_too_large_for_the_memory_is_refused_with_its_size_and_what_would_fit() {
+    let world = Arc::new(benchmark("attard2023").1);
+    let width: usize = Column::ALL.iter().map(|column| column.width()).sum();
+    let new = |n_envs| Simulator::new(world.clone(), n_envs, 0, RouteChoice::Drawn(vec![0]));
+    for n_envs in [1 << 40, 1 << 62, usize::MAX] {
+        let error = new(n_envs).unwrap_err();
+        let Error::BatchTooLarge { n_envs: found, n_bytes, fitting } = error else { panic!("{error}") };
+        assert_eq!((found, n_bytes), (n_envs, n_envs as u128 * width as u128));
+        assert!(1_000 < fitting && fitting < 1 << 32, "{fitting}");
+        let message = error.to_string();
+        assert!([n_envs.to_string(), n_bytes.to_string(), fitting.to_string()].iter().all(|part| message.contains(part)), "{message}");
+    }
+    // More than the machine has, less than it grants: filling the columns would end the process.
+    let Err(Error::BatchTooLarge { fitting, .. }) = new(1 << 40) else { panic!() };
+    assert!(matches!(new(2 * fitting as usize), Err(Error::BatchTooLarge { .. })));
+}
+
+#[test]
+fn gathering_more_rows_than_fit_is_refused_and_leaves_the_batch() {
+    let world = Arc::new(benchmark("attard2023").1);
+    let mut simulator = Simulator::new(world, 2, 0, RouteChoice::Drawn(vec![0])).unwrap();
+    assert_eq!(simulator.gather(&[0, 2]).unwrap_err(), Error::UnknownTruck { position: 1, index: 2, n_envs: 2 });
+    assert_eq!(simulator.n_envs(), 2);
+}
+
+fn scenario() -> Scenario {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/attard2023.toml");
+    Scenario::read(&path).unwrap()
+}
+
+/// The message about a scenario after a change.
+fn refused(change: impl FnOnce(&mut Scenario)) -> String {
+    let mut scenario = scenario();
+    change(&mut scenario);
+    World::bake(&scenario).map(|_| "accepted".to_owned()).unwrap_or_else(|error| error.to_string())
+}
+
+#[test]
+fn a_scenario_changed_in_memory_is_checked_before_it_is_baked() {
+    assert_eq!(refused(|_| ()), "accepted");
+    assert!(refused(|scenario| scenario.load = "feathers".to_owned()).starts_with("load: \"feathers\"; the vehicle has "));
+    assert_eq!(refused(|scenario| scenario.speeds.clear()), "speeds: empty; at least one value is needed");
+    assert_eq!(refused(|scenario| scenario.steer_levels.clear()), "steer_levels: empty; at least one value is needed");
+    assert_eq!(refused(|scenario| scenario.speeds[0] = f64::NAN), "speeds[0]: NaN; must lie in 0.01..100");
+    assert!(refused(|scenario| scenario.places.clear()).starts_with("places: no routes; "));
+    assert!(refused(|scenario| scenario.places[0].routes[0].waypoints.truncate(1)).contains("1 waypoints; at least 2"));
+    assert!(refused(|scenario| scenario.n_substeps = 0).starts_with("n_substeps: 0; "));
+    assert!(refused(|scenario| scenario.cell = 1e-9).starts_with("cell: 0.000000001; "));
+}
+
+#[test]
+fn a_number_of_a_scenario_that_is_not_one_is_refused_by_its_name() {
+    type Field = (&'static str, fn(&mut Scenario) -> &mut f64);
+    let fields: [Field; 21] = [
+        ("step", |s| &mut s.step),
+        ("cell", |s| &mut s.cell),
+        ("steer_max", |s| s.steer_max.insert(0.0)),
+        ("steer_levels[0]", |s| &mut s.steer_levels[0]),
+        ("sensor_range", |s| &mut s.sensor_range),
+        ("start_offset", |s| &mut s.start_offset),
+        ("start_heading", |s| &mut s.start_heading),
+        ("stray_distance", |s| &mut s.stray_distance),
+        ("jackknife_angle", |s| &mut s.jackknife_angle),
+        ("rollover_ratio", |s| &mut s.rollover_ratio),
+        ("time_limit", |s| &mut s.time_limit),
+        ("waypoint_weight", |s| &mut s.waypoint_weight),
+        ("lane_distance_weight", |s| &mut s.lane_distance_weight),
+        ("lane_distance_limit", |s| &mut s.lane_distance_limit),
+        ("clearance_weight", |s| &mut s.clearance_weight),
+        ("clearance_limit", |s| &mut s.clearance_limit),
+        ("failure_weight", |s| &mut s.failure_weight),
+        ("vehicle.tractor.wheelbase", |s| &mut s.vehicle.tractor.wheelbase),
+        ("vehicle.trailer.kingpin_to_rear", |s| &mut s.vehicle.trailer.kingpin_to_rear),
+        ("vehicle.tractor.suspension.track", |s| &mut s.vehicle.tractor.suspension.track),
+        ("vehicle.speed_control.gain", |s| &mut s.vehicle.speed_control.gain),
+    ];
+    let mut scenario = scenario();
+    for (name, field) in fields {
+        let lock = scenario.steer_max;
+        for wrong in [f64::NAN, f64::INFINITY, 1e308] {
+            let before = std::mem::replace(field(&mut scenario), wrong);
+            let error = scenario.check().unwrap_err();
+            assert_eq!(error.key, name, "{error}");
+            *field(&mut scenario) = before;
+            scenario.steer_max = lock;
+        }
+    }
+    assert!(scenario.check().is_ok());
+}

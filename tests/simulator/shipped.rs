@@ -1,0 +1,95 @@
+//! The embedded scenario files against the folder they come from, and how names and paths find them.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::scenario::Scenario;
+use offtrack::shipped::{FILES, Kind};
+use offtrack::vehicle::Vehicle;
+
+fn scenarios() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
+}
+
+/// Path below `folder` and text of every TOML file in it, at any depth.
+fn on_disk(folder: &Path, below: &Path, files: &mut BTreeMap<String, String>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let below = below.join(path.file_name().unwrap());
+        if path.is_dir() {
+            on_disk(&path, &below, files);
+        } else if path.extension().is_some_and(|extension| extension == "toml") {
+            files.insert(below.to_str().unwrap().to_owned(), std::fs::read_to_string(path).unwrap());
+        }
+    }
+}
+
+#[test]
+fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
+    let mut files = BTreeMap::new();
+    on_disk(&scenarios(), Path::new(""), &mut files);
+    let embedded: BTreeMap<String, String> = FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
+    assert_eq!((files.len(), FILES.len()), (13, 13), "five benchmarks, five roundabouts, three vehicles");
+    assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
+    assert_eq!([Kind::Benchmark, Kind::Roundabout, Kind::Vehicle].map(|kind| kind.names().count()), [5, 5, 3]);
+}
+
+#[test]
+fn every_name_gives_what_its_file_gives() {
+    for name in Kind::Benchmark.names() {
+        let named = Scenario::named(name).unwrap();
+        let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();
+        assert_eq!(format!("{named:?}"), format!("{read:?}"));
+        assert_eq!(named.name, name);
+    }
+    for name in Kind::Roundabout.names() {
+        assert_eq!(Roundabout::named(name).unwrap().name, name);
+    }
+    for name in Kind::Vehicle.names() {
+        Vehicle::named(name).unwrap();
+    }
+}
+
+#[test]
+fn an_unknown_name_is_refused_with_the_names_there_are() {
+    let benchmark = Scenario::find("nowhere").unwrap_err().to_string();
+    assert!(benchmark.starts_with("benchmark: nowhere; must be a path ending in .toml or one of attard2023, "), "{benchmark}");
+    assert_eq!(
+        Roundabout::find("17m").unwrap_err().to_string(),
+        "roundabout: 17m; must be a path ending in .toml or one of 16m, 20m, 32m, 40m, 50m"
+    );
+    assert_eq!(
+        Vehicle::named("bus").unwrap_err().to_string(),
+        "vehicle: bus; must be a path ending in .toml or one of daf_xf, eu_4x2_13m6, us_wb62"
+    );
+    // A name is not a path below the folder, nor one kind's name another's.
+    for name in ["roundabouts/16m", "../scenarios/attard2023", "16m", ""] {
+        Scenario::named(name).unwrap_err();
+    }
+}
+
+#[test]
+fn a_path_is_read_from_disk_whatever_the_embedded_files_are_called() {
+    let folder = tempfile::tempdir().unwrap();
+    let wrong = folder.path().join("attard2023.toml");
+    assert!(Scenario::find(wrong.to_str().unwrap()).unwrap_err().to_string().contains("attard2023.toml: cannot be read"));
+    std::fs::write(&wrong, "no_such_key = 1").unwrap();
+    assert!(Scenario::find(wrong.to_str().unwrap()).unwrap_err().to_string().contains("no_such_key"));
+    // An existing file needs no extension.
+    let bare = folder.path().join("truck");
+    std::fs::copy(scenarios().join("vehicles/us_wb62.toml"), &bare).unwrap();
+    assert_eq!(Vehicle::find(bare.to_str().unwrap()).unwrap(), Vehicle::named("us_wb62").unwrap());
+}
+
+#[test]
+fn a_roundabout_can_be_made_from_text() {
+    let text = std::fs::read_to_string(scenarios().join("roundabouts/16m.toml")).unwrap();
+    let made = Roundabout::from_toml("copy", &text).unwrap();
+    assert_eq!(made.name, "copy");
+    let kerbs = |roundabout: &Roundabout| format!("{:?}", roundabout.kerbs(Gutter::Solid));
+    assert_eq!(kerbs(&made), kerbs(&Roundabout::named("16m").unwrap()));
+    assert!(made.routes(40.0, 35.0, 2.0).unwrap()[0].name.starts_with("copy/E-left-"));
+    let message = Roundabout::from_toml("random 7", &text.replace("gutter = 0.5", "gutter = -1")).unwrap_err().to_string();
+    assert_eq!(message, "random 7: ring.gutter: -1 m; must lie in 0..3 m");
+}

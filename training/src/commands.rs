@@ -1,0 +1,15 @@
+//! The commands, one file each, and what several of them share.
+
+pub mod bench;
+pub mod certify;
+pub mod deviations;
+pub mod devices;
+pub mod draw;
+pub mod evaluate;
+mod policies; // flags: which policy
+mod progress; // the bar on a terminal
+pub mod record;
+pub mod scale;
+mod terminal; // how wide a table may be
+pub mod trace;
+pub mod train;

@@ -1,0 +1,201 @@
+//! Shows which routes can be completed at all: searches for action sequences that complete each from several starts,
+//! and drives them again.
+//!
+//! A route that no search completed may still be possible: the report names the searches made and the progress of the
+//! best candidate.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use offtrack::layout::{Ended, Start};
+use offtrack::scenario::{Scenario, Split};
+use offtrack::world::World;
+
+use offtrack_training::error::Error;
+use offtrack_training::evaluation::certificate::beam::{self, Outcome, Pass};
+use offtrack_training::evaluation::certificate::file::{self, Certificate, CertifiedRoute, Found};
+use offtrack_training::evaluation::certificate::verify;
+use offtrack_training::evaluation::policies;
+use offtrack_training::files;
+use offtrack_training::policy::LearnedPolicy;
+
+use super::progress;
+
+/// On the lane centre, and the four corners of the largest start errors.
+const STARTS: [Start; 5] = [
+    Start { offset: 0.0, heading: 0.0 },
+    Start { offset: 1.0, heading: 1.0 },
+    Start { offset: 1.0, heading: -1.0 },
+    Start { offset: -1.0, heading: 1.0 },
+    Start { offset: -1.0, heading: -1.0 },
+];
+
+/// Show which routes of a benchmark can be completed: search for actions that complete each of them.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A benchmark's name, or the path of its file. Without it attard2023; with --verify the file's own.
+    #[arg(long)]
+    benchmark: Option<String>,
+    /// Which routes: `test`, `train` or `all`.
+    #[arg(long, default_value = "all", value_parser = ["test", "train", "all"])]
+    split: String,
+    /// A policy file, or the name of a shipped policy: its own action sequence is then among the candidates.
+    #[arg(long)]
+    policy: Option<String>,
+    /// Beam widths (candidates kept at each depth), tried in turn until one arrives, separated by commas.
+    #[arg(long, value_delimiter = ',', default_value = "64,512,4096")]
+    widths: Vec<usize>,
+    /// Steps that each chosen action is held for. The widest search is repeated with 1.
+    #[arg(long, default_value_t = 3)]
+    hold: usize,
+    /// Write the certificate to this file as JSON, after every route.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Drive the sequences of this file again and search for nothing.
+    #[arg(long, conflicts_with_all = ["split", "policy", "widths", "hold", "json"])]
+    verify: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Error> {
+    if let Some(width) = args.widths.iter().find(|width| !(1..=1 << 18).contains(*width)) {
+        return Err(Error::Flag { flag: "--widths", value: width.to_string(), expected: "must lie in 1..262144".into() });
+    }
+    if !(1..=50).contains(&args.hold) {
+        return Err(Error::Flag { flag: "--hold", value: args.hold.to_string(), expected: "must lie in 1..50".into() });
+    }
+    match &args.verify {
+        Some(file) => again(file, args.benchmark.as_deref()),
+        None => certify(args),
+    }
+}
+
+/// Drives a certificate's sequences again.
+fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
+    let certificate = Certificate::read(path)?;
+    let scenario = Scenario::find(benchmark.unwrap_or(&certificate.benchmark))?;
+    let world = Arc::new(World::bake(&scenario)?);
+    certificate.check(&scenario, &world, path)?;
+    let arrived = verify::verify(&certificate, &world, path, |_| true)?;
+    files::print(&format!("{}{arrived} sequences driven again: all arrived\n", table(&certificate)))
+}
+
+/// Searches every route from every start.
+fn certify(args: &Args) -> Result<(), Error> {
+    let scenario = Scenario::find(args.benchmark.as_deref().unwrap_or("attard2023"))?;
+    let world = Arc::new(World::bake(&scenario)?);
+    let policy = args.policy.as_deref().map(policies::learned).transpose()?;
+    if let Some(policy) = &policy {
+        policy.check(&world)?;
+    }
+    let mut routes: Vec<u32> = [Split::Train, Split::Test]
+        .into_iter()
+        .filter(|split| args.split == "all" || args.split == split.name())
+        .flat_map(|split| scenario.split(split).to_vec())
+        .collect();
+    routes.sort_unstable();
+    if routes.is_empty() {
+        let expected = format!("the benchmark {} has no such routes", scenario.name);
+        return Err(Error::Flag { flag: "--split", value: args.split.clone(), expected });
+    }
+    let passes = passes(&args.widths, args.hold);
+    let name = policy.as_ref().map(|policy| policy.name.clone());
+    let mut certificate = Certificate::new(&scenario, &world, &args.split, name, passes.clone(), &STARTS);
+    let started = Instant::now();
+    let bar = progress::Bar::new("certifying", "starts", routes.len() * STARTS.len());
+    let mut failures = 0;
+    for route in routes {
+        let name = world.route_names[route as usize].clone();
+        let mut found = Vec::new();
+        for start in &STARTS {
+            bar.say(format!("{failures} not completed, {name}"));
+            let one = attempt(&world, route, start, &passes, policy.as_ref())?;
+            failures += usize::from(!one.arrived());
+            certificate.env_steps += one.env_steps;
+            found.push(one);
+            bar.advance();
+        }
+        certificate.routes.push(CertifiedRoute { name, found });
+        certificate.seconds = started.elapsed().as_secs_f64();
+        if let Some(path) = &args.json {
+            certificate.write(path)?;
+        }
+    }
+    drop(bar);
+    let path = args.json.as_deref().unwrap_or(Path::new("the search's result"));
+    verify::verify(&certificate, &world, path, |_| true)?;
+    files::print(&table(&certificate))
+}
+
+/// The searches to make in turn: the widths as given, then the widest with a choice at every step.
+fn passes(widths: &[usize], hold: usize) -> Vec<Pass> {
+    let mut passes: Vec<Pass> = widths.iter().map(|&width| Pass { width, hold }).collect();
+    if let Some(&width) = widths.iter().max()
+        && 1 < hold
+    {
+        passes.push(Pass { width, hold: 1 });
+    }
+    passes
+}
+
+/// Searches from one start until a pass arrives or all have been made. Without an arrival the result is the pass with
+/// the most progress.
+fn attempt(world: &Arc<World>, route: u32, start: &Start, passes: &[Pass], policy: Option<&LearnedPolicy>) -> Result<Found, Error> {
+    let mut env_steps = 0;
+    let mut best: Option<(Pass, Outcome)> = None;
+    for &pass in passes {
+        let outcome = beam::search(world, route, start, pass, policy)?;
+        env_steps += outcome.env_steps;
+        let arrived = outcome.ended == Ended::Arrived;
+        let further = |best: &Outcome| (best.progress, best.steps) < (outcome.progress, outcome.steps);
+        if arrived || best.as_ref().is_none_or(|(_, best)| further(best)) {
+            best = Some((pass, outcome));
+        }
+        if arrived {
+            break;
+        }
+    }
+    let (pass, outcome) = best.expect("there is a width, so there was a pass");
+    Ok(Found {
+        ended: outcome.ended.name().to_owned(),
+        progress: (outcome.progress * 1e3).round() / 1e3,
+        steps: outcome.steps,
+        width: pass.width,
+        hold: pass.hold,
+        env_steps,
+        actions: file::runs(&outcome.actions),
+    })
+}
+
+/// The result as text: the budget, the sums, and every route and start that was not completed.
+fn table(certificate: &Certificate) -> String {
+    let mut text = String::new();
+    let passes: Vec<String> = certificate.passes.iter().map(|pass| format!("{} (held {})", pass.width, pass.hold)).collect();
+    let all: Vec<&Found> = certificate.routes.iter().flat_map(|route| &route.found).collect();
+    let _ = writeln!(
+        text,
+        "{}, {} routes: searched with {} candidates at each depth, {} env steps, {:.0} s",
+        certificate.benchmark,
+        certificate.split,
+        passes.join(", then "),
+        certificate.env_steps,
+        certificate.seconds
+    );
+    for pass in &certificate.passes {
+        let by = all.iter().filter(|found| found.arrived() && (found.width, found.hold) == (pass.width, pass.hold)).count();
+        let _ = writeln!(text, "  {by} starts completed with {} (held {})", pass.width, pass.hold);
+    }
+    for route in &certificate.routes {
+        for (found, [offset, heading]) in route.found.iter().zip(&certificate.starts).filter(|(found, _)| !found.arrived()) {
+            let (furthest, ended, steps) = (100.0 * found.progress, &found.ended, found.steps);
+            let from = format!("from ({offset:+}, {heading:+})");
+            let _ = writeln!(text, "  {:<18} {from}: not completed; {ended} after {furthest:.0} % of the way, step {steps}", route.name);
+        }
+    }
+    let routes = certificate.routes.iter().filter(|route| route.certified()).count();
+    let arrived = all.iter().filter(|found| found.arrived()).count();
+    let _ = writeln!(text, "{routes}/{} routes completed from every start, {arrived}/{} starts", certificate.routes.len(), all.len());
+    text
+}

@@ -1,0 +1,115 @@
+//! `offtrack evaluate`: a policy on every route of a benchmark's split, as a table, as JSON, as a page.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use offtrack::reader;
+use offtrack::scenario::{Scenario, Split};
+use offtrack::world::World;
+use offtrack_training::error::Error;
+use offtrack_training::evaluation::certificate::certified;
+use offtrack_training::evaluation::page::{MOST_EPISODES, Page};
+use offtrack_training::evaluation::report::{Episode, Report, Summary};
+use offtrack_training::evaluation::{Evaluation, legend};
+use offtrack_training::files;
+use serde_json::Value;
+
+use super::{devices, policies, progress, terminal};
+
+/// Most bytes of a run's report and of its figures.
+const RUN_LIMIT: u64 = 64 << 20;
+
+/// Evaluate a policy on a benchmark's routes.
+#[derive(Debug, clap::Args)]
+#[command(after_help = format!("Columns of the table:\n{}", legend(100)))]
+pub struct Args {
+    #[command(flatten)]
+    policy: policies::Choice,
+    /// A benchmark's name, or the path of its file.
+    #[arg(long, default_value = "attard2023")]
+    benchmark: String,
+    /// Which routes: `test` (unseen in training) or `train`.
+    #[arg(long, default_value = "test", value_parser = ["test", "train"])]
+    split: String,
+    /// Episodes on each route.
+    #[arg(long, default_value_t = 30)]
+    episodes: usize,
+    /// Seed of the start poses and of random actions.
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
+    /// Write the report to this file as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Write a page to this file that shows the report and every episode, for a browser.
+    #[arg(long)]
+    html: Option<PathBuf>,
+    /// With --html: the folder of the training run that the policy comes from, to show its curves too.
+    #[arg(long, requires = "html")]
+    run: Option<PathBuf>,
+    /// A certificate of `offtrack certify`: success over the routes that it shows to be possible is reported too.
+    #[arg(long)]
+    certified: Option<PathBuf>,
+    #[command(flatten)]
+    device: devices::Choice,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Error> {
+    if !(1..=100_000).contains(&args.episodes) {
+        return Err(Error::Flag { flag: "--episodes", value: args.episodes.to_string(), expected: "must lie in 1..100000".into() });
+    }
+    let device = args.device.open()?;
+    let scenario = Scenario::find(&args.benchmark)?;
+    let world = Arc::new(World::bake(&scenario)?);
+    let mut policy = args.policy.open(&scenario, &world, args.seed)?;
+    let split = if args.split == "train" { Split::Train } else { Split::Test };
+    let n_episodes = args.episodes * scenario.split(split).len();
+    if args.html.is_some() && MOST_EPISODES < n_episodes {
+        let expected = format!("{n_episodes} in all; a page holds {MOST_EPISODES} at most: ask for fewer, or leave --html out");
+        return Err(Error::Flag { flag: "--episodes", value: args.episodes.to_string(), expected });
+    }
+    let (run, metrics) = match &args.run {
+        Some(folder) => read_run(folder)?,
+        None => (Value::Null, None),
+    };
+    let possible = args.certified.as_ref().map(|file| certified(file, &scenario, &world, scenario.split(split))).transpose()?;
+    let (episodes, seed, record) = (args.episodes, args.seed, args.html.is_some());
+    let evaluation = Evaluation { scenario: &scenario, world: &world, split, episodes, seed, record, device: &device };
+    let (finished, tracks) = {
+        let bar = progress::Bar::new("evaluating", "episodes", n_episodes);
+        evaluation.drive(policy.as_mut(), &mut |done, all| bar.set(done, all))?
+    };
+    let mut report = evaluation.summarised(policy.name(), &finished);
+    report.certified = possible.and_then(|possible| {
+        let chunks = scenario.split(split).iter().zip(finished.chunks(args.episodes));
+        let kept: Vec<&Episode> = chunks.filter(|(route, _)| possible.contains(route)).flat_map(|(_, chunk)| chunk).collect();
+        Summary::of(kept.into_iter(), scenario.step)
+    });
+    if let Some(file) = &args.json {
+        files::write_json(file, &report)?;
+    }
+    if let Some(file) = &args.html {
+        Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run, metrics }.write(file)?;
+    }
+    files::print(&printed(&report, args.episodes))
+}
+
+/// What was evaluated, and the table.
+fn printed(report: &Report, episodes: usize) -> String {
+    let Report { benchmark, split, policy, seed, .. } = report;
+    let noun = if episodes == 1 { "episode" } else { "episodes" };
+    format!("policy {policy}; benchmark {benchmark}, {split} routes; {episodes} {noun} a route, seed {seed}\n\n")
+        + &report.table(terminal::width())
+}
+
+/// A run's report, and the text of its metrics.csv.
+fn read_run(folder: &Path) -> Result<(Value, Option<String>), Error> {
+    let [report, metrics] = ["report.json", "metrics.csv"].map(|name| folder.join(name));
+    let wrong = |message: String| Error::contents(&report, message);
+    let text = reader::read_text(&report, RUN_LIMIT)?;
+    let run: Value = serde_json::from_str(&text).map_err(|error| wrong(format!("{error}; a run's report is needed")))?;
+    if run.get("env_steps").is_none() {
+        return Err(wrong("has no env_steps; a run's report is needed, as `train` writes it".to_owned()));
+    }
+    Ok((run, Some(reader::read_text(&metrics, RUN_LIMIT)?)))
+}

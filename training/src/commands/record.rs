@@ -1,0 +1,190 @@
+//! Records one episode: as data, as a film, or as a still with the swept paths of both units.
+//!
+//! The truck drives in the batch of an evaluation with the same seed, so that its episode is the one that `evaluate`
+//! counts.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::route::Route;
+use offtrack::scenario::{Scenario, Split};
+use offtrack::simulator::{RouteChoice, Simulator};
+use offtrack::world::World;
+
+use offtrack_drawing::episode::Scene;
+use offtrack_drawing::recording::{Map, Measures, Recorder, Recording, centre_line};
+use offtrack_drawing::{film, rasterised};
+use offtrack_training::error::Error;
+use offtrack_training::evaluation::policies::Policy;
+use offtrack_training::files;
+
+use super::{policies, progress};
+
+/// Record one episode: as a film, as a picture with the swept paths of both units, or as data.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    policy: policies::Choice,
+    /// One of the benchmark's routes, of either split: 20m/N-left-3.
+    #[arg(long)]
+    route: String,
+    /// The file to write: .gif, .png, .svg, or .json for data.
+    ///
+    /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed",
+    /// "episode", "episodes", "step" [s], "ended", "vehicle": dimensions and sensors, "actions": [[steer angle, speed],
+    /// ...], "map": {"drivable", "lanes"}, "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state
+    /// after step n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's
+    /// centre at the origin.
+    #[arg(short, long, verbatim_doc_comment)]
+    output: PathBuf,
+    /// A benchmark's name, or the path of its file.
+    #[arg(long, default_value = "attard2023")]
+    benchmark: String,
+    /// Seed of the start poses and of random actions.
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
+    /// Which of the route's episodes in an evaluation, from 0.
+    #[arg(long, default_value_t = 0)]
+    episode: usize,
+    /// How many episodes a route that evaluation has: start poses depend on it.
+    #[arg(long, default_value_t = 30)]
+    episodes: usize,
+    /// Width of a film or a PNG [pixels]; by default 720 for a film, 1000 for a PNG.
+    #[arg(long)]
+    size: Option<u32>,
+}
+
+/// The format of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Gif,
+    Png,
+    Svg,
+    Json,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Error> {
+    let format = format(&args.output)?;
+    if let Some(size) = args.size
+        && !(200..=4000).contains(&size)
+    {
+        return Err(Error::Flag { flag: "--size", value: size.to_string(), expected: "must lie in 200..4000 pixels".into() });
+    }
+    if !(1..=100_000).contains(&args.episodes) {
+        return Err(Error::Flag { flag: "--episodes", value: args.episodes.to_string(), expected: "must lie in 1..100000".into() });
+    }
+    if args.episodes <= args.episode {
+        let expected = format!("must lie in 0..{}: --episodes says how many there are", args.episodes - 1);
+        return Err(Error::Flag { flag: "--episode", value: args.episode.to_string(), expected });
+    }
+    let scenario = Scenario::find(&args.benchmark)?;
+    let chosen = Chosen::new(&scenario, &args.route)?;
+    let world = Arc::new(World::bake(&scenario)?);
+    let mut policy = args.policy.open(&scenario, &world, args.seed)?;
+    let recording = recorded(args, &scenario, &world, &chosen, policy.as_mut())?;
+    let bytes = bytes(format, args.size, &recording, &chosen, scenario.gutter);
+    files::write_whole(&args.output, &bytes.map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?)
+}
+
+/// The recording in the format asked for.
+fn bytes(
+    format: Format,
+    size: Option<u32>,
+    recording: &Recording,
+    chosen: &Chosen,
+    gutter: Gutter,
+) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
+    if format == Format::Json {
+        let mut text = serde_json::to_string(recording)?;
+        text.push('\n');
+        return Ok(text.into_bytes());
+    }
+    let scene = Scene::new(recording, chosen.roundabout, gutter, chosen.route)?;
+    if format != Format::Gif {
+        let svg = scene.still();
+        return if format == Format::Png { Ok(rasterised(&svg, size.unwrap_or(1000))?) } else { Ok(svg.into_bytes()) };
+    }
+    let frames = film::frames(recording.frames.len(), recording.step);
+    let bar = progress::Bar::new("drawing", "frames", frames.len());
+    Ok(film::gif(&scene, &frames, size.unwrap_or(720), || bar.advance())?)
+}
+
+fn format(output: &Path) -> Result<Format, Error> {
+    match output.extension().and_then(|extension| extension.to_str()) {
+        Some("gif") => Ok(Format::Gif),
+        Some("png") => Ok(Format::Png),
+        Some("svg") => Ok(Format::Svg),
+        Some("json") => Ok(Format::Json),
+        _ => {
+            let value = output.display().to_string();
+            Err(Error::Flag { flag: "--output", value, expected: "must end in .gif, .png, .svg or .json".into() })
+        }
+    }
+}
+
+/// A route of a benchmark, its roundabout, and its index in its split.
+struct Chosen<'a> {
+    route: &'a Route,
+    roundabout: &'a Roundabout,
+    split: Split,
+    in_split: usize,
+}
+
+impl<'a> Chosen<'a> {
+    fn new(scenario: &'a Scenario, name: &str) -> Result<Chosen<'a>, Error> {
+        let Some((index, (roundabout, route))) = scenario.routes().enumerate().find(|(_, (_, route))| route.name == name) else {
+            return Err(Error::Flag { flag: "--route", value: name.to_owned(), expected: known(scenario, name) });
+        };
+        let within = |split: Split| Some((split, scenario.split(split).iter().position(|&other| other as usize == index)?));
+        let (split, in_split) = within(Split::Test).or_else(|| within(Split::Train)).expect("a benchmark's route is in one of its splits");
+        Ok(Chosen { route, roundabout: &scenario.places[roundabout].roundabout, split, in_split })
+    }
+}
+
+/// Routes to suggest for an unknown name: those of the roundabout that it begins with, or one of each roundabout.
+fn known(scenario: &Scenario, name: &str) -> String {
+    let of = |place: &offtrack::scenario::Place| place.routes.iter().map(|route| route.name.clone()).collect::<Vec<_>>();
+    let meant = scenario.places.iter().find(|place| name.split('/').next() == Some(&place.roundabout.name));
+    let names = meant.map_or_else(|| scenario.places.iter().filter_map(|place| of(place).first().cloned()).collect(), of);
+    let (from, list) = (&scenario.name, names.join(", "));
+    match meant {
+        Some(place) => format!("of {} the benchmark {from} has {list}", place.roundabout.name),
+        None => format!("a route of the benchmark {from} is needed, such as {list}"),
+    }
+}
+
+/// Drives the batch of the evaluation until the episode has ended.
+fn recorded(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chosen, policy: &mut dyn Policy) -> Result<Recording, Error> {
+    let trucks: Vec<u32> = scenario.split(chosen.split).iter().flat_map(|&route| std::iter::repeat_n(route, args.episodes)).collect();
+    let env = chosen.in_split * args.episodes + args.episode;
+    let limit = world.routes[trucks[env] as usize].step_limit;
+    let mut simulator = Simulator::new(world.clone(), trucks.len(), args.seed, RouteChoice::Fixed(trucks))?;
+    let mut recorder = Recorder::new(world, simulator.batch(), [env]);
+    let bar = progress::Bar::new("driving", "steps", limit as usize);
+    let mut actions = Vec::new();
+    while recorder.is_running() {
+        policy.choose(world, simulator.batch(), &mut actions);
+        simulator.step(&actions)?;
+        recorder.follow(world, simulator.batch());
+        bar.advance();
+    }
+    drop(bar);
+    let track = recorder.finish().remove(0);
+    Ok(Recording {
+        benchmark: scenario.name.clone(),
+        route: chosen.route.name.clone(),
+        policy: policy.name().to_owned(),
+        seed: args.seed,
+        episode: args.episode,
+        episodes: args.episodes,
+        step: scenario.step,
+        ended: track.ended.name().to_owned(),
+        vehicle: Measures::of(world),
+        actions: world.actions.iter().map(|action| [action.steering, action.speed]).collect(),
+        map: Map::of(chosen.roundabout, scenario.gutter),
+        centre_line: centre_line(chosen.route),
+        frames: track.frames,
+    })
+}

@@ -1,0 +1,279 @@
+//! `offtrack train`: trains a policy, then evaluates it on the test routes.
+//!
+//! Everything is written as it comes: the training file at once, a row of metrics every few seconds, policy and
+//! checkpoint every few minutes. A stopped run leaves a policy that can be evaluated, and all that it takes to
+//! continue.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use offtrack::reader::read_text;
+use offtrack::scenario::{Scenario, Split};
+use offtrack::world::World;
+use offtrack_training::device::Device;
+use offtrack_training::error::Error;
+use offtrack_training::evaluation::Evaluation;
+use offtrack_training::evaluation::page::Page;
+use offtrack_training::evaluation::report::Report;
+use offtrack_training::files;
+use offtrack_training::learner::backend::Backend;
+use offtrack_training::learner::checkpoint::Stored;
+use offtrack_training::learner::config::{self, Config};
+use offtrack_training::learner::run::Run;
+use offtrack_training::learner::run::folder::Folder;
+use offtrack_training::learner::run::metrics_file::MetricsFile;
+use offtrack_training::learner::run::progress::Progress;
+use offtrack_training::learner::run::resume::Resumed;
+use offtrack_training::learner::training::Training;
+use offtrack_training::policy::LearnedPolicy;
+use offtrack_training::provenance;
+use serde::Serialize;
+use serde_json::json;
+
+use super::{progress, terminal};
+
+/// Episodes on each route in the final evaluation.
+const EPISODES: usize = 30;
+/// Most bytes of the metrics that the page shows.
+const METRICS_LIMIT: u64 = 64 << 20;
+
+/// Train a policy, then evaluate it on the test routes.
+#[derive(Debug, Default, clap::Args)]
+pub struct Args {
+    /// A training file: its path, or one of `default`, `gpu`, `as-run` and `paper`, which come with the program.
+    /// Without it `default`, in a program built for graphics devices `gpu`.
+    config: Option<PathBuf>,
+    /// Name of the run's folder; must be new. Without it the training file's name, numbered.
+    #[arg(long)]
+    name: Option<String>,
+    /// Folder of runs.
+    #[arg(long, default_value = "runs")]
+    out: Option<PathBuf>,
+    /// Another seed than the training file's.
+    #[arg(long)]
+    seed: Option<u32>,
+    /// Another training time [min].
+    #[arg(long, allow_negative_numbers = true)]
+    minutes: Option<f64>,
+    /// Another number of env steps.
+    #[arg(long)]
+    steps: Option<u64>,
+    /// Another number of trucks.
+    #[arg(long)]
+    envs: Option<usize>,
+    /// Part of another graphics adapter's name, see `offtrack devices`.
+    #[arg(long)]
+    adapter: Option<String>,
+    /// Another value of one of the training file's keys, as in `learning.n_steps=5`; nothing after the `=` removes the
+    /// key. May be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
+    /// Continue a run that was stopped or killed, from the last checkpoint in its folder, by its own config.toml.
+    /// --minutes or --steps give another budget, counted from the run's beginning; a finished run continues too. The
+    /// learning-rate schedule ends with the budget, so with a larger one the rates are higher from here on. With a
+    /// budget of steps alone the result is that of a run never stopped, bit for bit on the same machine and program.
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "name", "out", "seed", "envs", "adapter", "settings"])]
+    resume: Option<PathBuf>,
+}
+
+/// A run's result, as written to `report.json`.
+#[derive(Debug, Serialize)]
+struct Finished {
+    /// The run was stopped before its budget was spent.
+    interrupted: bool,
+    seed: u32,
+    /// Training time [s].
+    seconds: f64,
+    env_steps: u64,
+    episodes: u64,
+    updates: u64,
+    /// Fraction of the latest training episodes that arrived.
+    training_success: Option<f64>,
+    /// Number of those episodes; each row of the metrics is a mean over as many.
+    training_window: u64,
+    machine: String,
+    /// Where trucks and learner were.
+    device: String,
+    commit: String,
+    /// The final evaluation; none after an interruption.
+    evaluation: Option<Report>,
+}
+
+/// What a run is trained on.
+struct Worlds {
+    /// The benchmark that the policy is evaluated on.
+    benchmark: Scenario,
+    benchmark_world: Arc<World>,
+    /// The benchmark that it is trained on.
+    training: Scenario,
+    training_world: Arc<World>,
+}
+
+/// A new run's folder, or that of one that continues from a checkpoint.
+struct Opened {
+    folder: Folder,
+    metrics: MetricsFile,
+    stored: Option<Stored>,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Error> {
+    let resumed = args.resume.as_ref().map(|folder| Resumed::open(folder, args.minutes, args.steps)).transpose()?;
+    let default = if cfg!(feature = "gpu") { "gpu" } else { "default" };
+    let file = args.config.clone().unwrap_or_else(|| PathBuf::from(default));
+    let config = resumed.as_ref().map_or_else(|| config(args, &file), |resumed| Ok(resumed.config.clone()))?;
+    let worlds = Worlds::read(&config)?;
+    let routes = worlds.training.split(Split::Train).to_vec();
+    let n_routes = routes.len();
+    // All that can be wrong with the input is found before a folder is made.
+    let backend = Backend::open(&config)?;
+    let training = backend.guarded(|| Training::new(&backend, &config, worlds.training_world.clone(), routes))?;
+    let Opened { folder, metrics, stored } = match resumed {
+        Some(Resumed { folder, metrics, stored, .. }) => Opened { folder, metrics, stored },
+        None => {
+            let runs = args.out.clone().unwrap_or_else(|| PathBuf::from("runs"));
+            let folder = Folder::create(&runs, args.name.as_deref(), &file, &config)?;
+            Opened { metrics: MetricsFile::create(folder.metrics())?, stored: None, folder }
+        }
+    };
+    let progress = Progress::new(&config, metrics, Box::new(progress::TrainingDisplay::new()));
+    let mut run = Run::new(backend, &config, &worlds.training_world, training, &folder, progress);
+    let mut doing = "training".to_owned();
+    if let Some(stored) = stored {
+        run.restore(&stored)?;
+        // The earlier evaluation was of another policy.
+        files::write_json(&folder.report(), &Finished { interrupted: true, ..finished(&config, &run) })?;
+        let _ = std::fs::remove_file(folder.page());
+        doing = format!("continuing after {} env steps and {:.2} min", run.progress.env_steps(), run.progress.seconds() / 60.0);
+    }
+    if args.resume.is_some() && (args.minutes.is_some() || args.steps.is_some()) {
+        folder.write_config(&config)?;
+    }
+    // Training goes on when nobody reads its lines.
+    let path = folder.path().display();
+    let _ = files::print(&format!("{path}: {doing} on {n_routes} training routes of {}, {}\n", worlds.training.name, run.device()));
+    let stop = stop_flag();
+    run.learn(|| 0 < stop.load(Ordering::Relaxed))?;
+    let finished = finished(&config, &run);
+    let written = run.close();
+    let policy = run.policy()?;
+    drop(run);
+    conclude(&folder, &worlds, finished, policy, written)
+}
+
+/// The training file with what the command line changes.
+fn config(args: &Args, file: &Path) -> Result<Config, Error> {
+    let mut config = Config::read_with(file, &args.settings)?;
+    config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
+    let flag = args.steps.map(|steps| PathBuf::from(format!("--steps {steps}")));
+    config.check_budget(flag.as_deref().unwrap_or(file))?;
+    if let Some(adapter) = &args.adapter {
+        if config.device == config::Device::Cpu {
+            let expected = "the training file uses the processor: leave it out, or add --set device=gpu".to_owned();
+            return Err(Error::Flag { flag: "--adapter", value: adapter.clone(), expected });
+        }
+        config.adapter = Some(adapter.clone());
+    }
+    Ok(config)
+}
+
+impl Worlds {
+    /// Both benchmarks of a training file. None of the routes that the policy is evaluated on may be among those it is
+    /// trained on.
+    fn read(config: &Config) -> Result<Worlds, Error> {
+        let benchmark = Scenario::find(&config.benchmark)?;
+        let training = Scenario::find(config.training_benchmark.as_ref().unwrap_or(&config.benchmark))?;
+        let wrong = |expected: String| Error::Flag { flag: "training_benchmark", value: training.name.clone(), expected };
+        let test = benchmark.split_names(Split::Test);
+        if let Some(route) = training.split_names(Split::Train).into_iter().find(|route| test.contains(route)) {
+            return Err(wrong(format!("{route} is a test route of {} and must not be trained on", benchmark.name)));
+        }
+        if training.split(Split::Train).is_empty() {
+            return Err(wrong("it has no routes under `train`".to_owned()));
+        }
+        let (benchmark_world, training_world) = (Arc::new(World::bake(&benchmark)?), Arc::new(World::bake(&training)?));
+        if training_world.actions != benchmark_world.actions {
+            let name = &benchmark.name;
+            return Err(wrong(format!("its actions and vehicle lock must be those of {name}, on which the policy is evaluated")));
+        }
+        Ok(Worlds { benchmark, benchmark_world, training, training_world })
+    }
+}
+
+/// Evaluates the policy of a run that was not interrupted, and writes what the run leaves behind. `written` says
+/// whether its last checkpoint could be written.
+fn conclude(
+    folder: &Folder,
+    worlds: &Worlds,
+    mut finished: Finished,
+    policy: LearnedPolicy,
+    written: Result<(), Error>,
+) -> Result<(), Error> {
+    let path = folder.path().display();
+    if finished.interrupted || worlds.benchmark.split(Split::Test).is_empty() {
+        files::write_json(&folder.report(), &finished)?;
+        written?;
+        return files::print(&match finished.interrupted {
+            true => format!("stopped: policy and metrics are in {path}; not evaluated; train --resume {path} continues\n"),
+            false => format!("written: {path}\n"),
+        });
+    }
+    let mut policy = LearnedPolicy { name: folder.policy().display().to_string(), ..policy };
+    let evaluation = Evaluation {
+        scenario: &worlds.benchmark,
+        world: &worlds.benchmark_world,
+        split: Split::Test,
+        episodes: EPISODES,
+        seed: 0,
+        record: true,
+        device: &Device::processor(),
+    };
+    let (report, tracks) = {
+        let bar = progress::Bar::new("evaluating", "episodes", 0);
+        evaluation.report(&mut policy, &mut |done, all| bar.set(done, all))?
+    };
+    let table = report.table(terminal::width());
+    finished.evaluation = Some(report.clone());
+    files::write_json(&folder.report(), &finished)?;
+    let metrics = Some(read_text(&folder.metrics(), METRICS_LIMIT)?);
+    let (scenario, world) = (&worlds.benchmark, &worlds.benchmark_world);
+    Page { scenario, world, evaluation: &report, tracks: &tracks, run: json!(finished), metrics }.write(&folder.page())?;
+    files::print(&format!("{table}written: {path}\n"))?;
+    // The evaluation is not lost where something else could not be written.
+    written
+}
+
+/// Counts Ctrl-C, SIGTERM and SIGHUP: the first lets the step in hand finish and everything be written, the second ends
+/// the process.
+fn stop_flag() -> Arc<AtomicU8> {
+    let stop = Arc::new(AtomicU8::new(0));
+    let flag = stop.clone();
+    // Without a handler a signal ends the process at once; the last policy and checkpoint are whole all the same.
+    let _ = ctrlc::set_handler(move || {
+        if 0 < flag.fetch_add(1, Ordering::Relaxed) {
+            files::remove_temporaries();
+            std::process::exit(130);
+        }
+    });
+    stop
+}
+
+/// A run's result before its evaluation.
+fn finished(config: &Config, run: &Run) -> Finished {
+    let progress = &run.progress;
+    Finished {
+        interrupted: progress.fraction() < 1.0,
+        seed: config.seed,
+        seconds: progress.seconds(),
+        env_steps: progress.env_steps(),
+        episodes: progress.episodes(),
+        updates: progress.updates(),
+        training_success: progress.success(),
+        training_window: progress.window(),
+        machine: provenance::machine(),
+        device: run.device(),
+        commit: provenance::commit(),
+        evaluation: None,
+    }
+}

@@ -1,0 +1,102 @@
+// The data blocks of the page: the report, the roundabouts, the training figures and every recorded episode.
+//
+// Episodes lie column by column: for each column and episode the difference to the frame before, as zigzag varint, all
+// of it gzipped.
+
+/** The text of a data block. */
+const block = (id) => byId(id).textContent.trim();
+
+/** Rows of a CSV file as one array of numbers a column; a cell without a number is NaN. Null without a file or rows. */
+function columnsOf(csv) {
+  if (csv === null) return null;
+  const lines = csv.split("\n").filter((line) => line.trim() !== "");
+  if (lines.length < 2) return null;
+  const rows = lines.slice(1).map((line) => line.split(","));
+  const number = (cell) => (cell === undefined || cell.trim() === "" ? NaN : Number(cell));
+  const columns = {};
+  // Columns are found by name; a file with more or fewer of them is fine, a last row cut short is not.
+  const names = lines[0].split(",");
+  const complete = rows.filter((row) => row.length === names.length);
+  names.forEach((name, index) => { columns[name.trim()] = complete.map((row) => number(row[index])); });
+  return complete.length === 0 ? null : columns;
+}
+
+/** The bytes of a base64 text that holds a gzip file. */
+async function inflated(text) {
+  const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const { readable, writable } = new DecompressionStream("gzip");
+  const writer = writable.getWriter();
+  // The reading end reports an error in the bytes.
+  const written = writer.write(packed).then(() => writer.close()).catch(() => {});
+  const [bytes] = await Promise.all([new Response(readable).arrayBuffer(), written]);
+  return new Uint8Array(bytes);
+}
+
+/** One array of numbers a column, all episodes one after the other, `columns` as [name, unit of the integers]. */
+function decoded(bytes, columns, lengths) {
+  const total = lengths.reduce((sum, length) => sum + length, 0);
+  const found = {};
+  let at = 0, index = 0;
+  for (const [name, unit] of columns) {
+    const values = (found[name] = new Float32Array(total));
+    index = 0;
+    for (const length of lengths) {
+      let value = 0;
+      for (const end = index + length; index < end; index++) {
+        let word = 0, shift = 0, byte;
+        do {
+          byte = bytes[at++];
+          word |= (byte & 0x7f) << shift;
+          shift += 7;
+        } while (byte & 0x80);
+        value += (word >>> 1) ^ -(word & 1);
+        values[index] = value * unit;
+      }
+    }
+  }
+  if (at !== bytes.length) throw new Error(`the recorded episodes hold ${bytes.length} bytes ${at} were expected`);
+  return found;
+}
+
+/** All data of the page. */
+async function readPage() {
+  const report = JSON.parse(block("report"));
+  const ground = JSON.parse(block("ground"));
+  const columns = decoded(await inflated(block("tracks")), ground.columns, ground.episodes.map((episode) => episode.n_frames));
+  let first = 0;
+  const episodes = ground.episodes.map((episode) => {
+    const whole = { ...episode, first, failed: episode.ended !== "arrived", seconds: (episode.n_frames - 1) * ground.step };
+    first += episode.n_frames;
+    return whole;
+  });
+  return { report, evaluation: report.evaluation, ground, columns, episodes, metrics: columnsOf(JSON.parse(block("metrics"))) };
+}
+
+/** Difference of two headings, in [-pi, pi]. */
+const wrapped = (angle) => Math.atan2(Math.sin(angle), Math.cos(angle));
+
+/** The state of an episode at `frame`: linear interpolation between two frames. */
+function instant(page, episode, frame) {
+  const { columns, ground } = page, rig = ground.vehicle;
+  const last = episode.n_frames - 1;
+  const at = Math.min(Math.max(frame, 0), last), lower = Math.min(Math.floor(at), Math.max(last - 1, 0)), part = at - lower;
+  const here = episode.first + lower, next = here + Math.min(1, last);
+  const between = (name) => columns[name][here] + part * (columns[name][next] - columns[name][here]);
+  const turned = (name) => columns[name][here] + part * wrapped(columns[name][next] - columns[name][here]);
+  const x = between("x"), y = between("y"), heading = turned("heading"), trailerHeading = turned("trailer_heading");
+  const ranges = Array.from({ length: ground.n_rays }, (_, ray) => {
+    const [a, b] = [columns["range_" + ray][here], columns["range_" + ray][next]];
+    // A ray that jumps to another kerb is not interpolated.
+    return Math.abs(b - a) < 3 ? a + part * (b - a) : part < 0.5 ? a : b;
+  });
+  return {
+    x, y, heading, trailerHeading, ranges,
+    trailerX: x + rig.fifth_wheel * Math.cos(heading) - rig.trailer_wheelbase * Math.cos(trailerHeading),
+    trailerY: y + rig.fifth_wheel * Math.sin(heading) - rig.trailer_wheelbase * Math.sin(trailerHeading),
+    time: at * ground.step,
+    steering: between("steering"), speed: between("speed"), laneDistance: between("lane_distance"),
+    articulation: wrapped(heading - trailerHeading),
+    tractorClearance: between("tractor_clearance"), trailerClearance: between("trailer_clearance"),
+    tractorTransfer: between("tractor_load_transfer"), trailerTransfer: between("trailer_load_transfer"),
+  };
+}

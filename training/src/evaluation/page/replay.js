@@ -1,0 +1,185 @@
+// The replay of one episode, with the figures of the current frame. A link ending in #20m/W-left-3/4/7.5 opens the
+// fifth episode of that route at 7.5 s.
+
+const toDegrees = (angle) => (180 * angle) / Math.PI;
+
+/** The figures of a frame: name, value, text. Each is also a small curve over the episode. */
+const READINGS = [
+  ["Speed", (now) => 3.6 * now.speed, (value) => `${decimal(value, 1)}${GAP}km/h`],
+  ["Steer angle", (now) => toDegrees(now.steering), (value) => `${degrees(Math.abs(value), 1)} ${value < 0 ? "right" : "left"}`],
+  ["Articulation", (now) => toDegrees(now.articulation), (value) => degrees(value, 1)],
+  ["LTR, tractor", (now) => now.tractorTransfer, (value) => decimal(value, 2)],
+  ["LTR, trailer", (now) => now.trailerTransfer, (value) => decimal(value, 2)],
+  ["Tractor to kerb", (now) => now.tractorClearance, metres],
+  ["Trailer to kerb", (now) => now.trailerClearance, metres],
+  ["Lane distance", (now) => now.laneDistance, metres],
+];
+
+/** A value over the episode with a line at the current frame. */
+function sparkline(values) {
+  const low = Math.min(...values, 0), high = Math.max(...values, low + 1e-3), last = Math.max(values.length - 1, 1);
+  const y = (value) => 21 - (20 * (value - low)) / (high - low);
+  const path = values.map((value, frame) => `${frame === 0 ? "M" : "L"}${((100 * frame) / last).toFixed(2)} ${y(value).toFixed(2)}`).join("");
+  return svg("svg", { viewBox: "0 0 100 22", preserveAspectRatio: "none", "aria-hidden": "true" },
+    svg("line", { class: "grid", x1: 0, x2: 100, y1: y(0), y2: y(0), "vector-effect": "non-scaling-stroke" }),
+    svg("path", { class: "curve", d: path, "vector-effect": "non-scaling-stroke" }),
+    svg("line", { class: "cursor", y1: 0, y2: 22, "vector-effect": "non-scaling-stroke" }));
+}
+
+class Replay {
+  constructor(page) {
+    this.page = page;
+    this.frame = 0;
+    this.playing = false;
+    /** Calls back for the next picture. */
+    this.onFrame = (callback) => requestAnimationFrame(callback);
+    this.canvas = byId("scene");
+    this.order = this.routesInOrder();
+    this.fillRoutes();
+    this.listen();
+    if (!this.openLink()) this.openRoute(this.order.flatMap(([, routes]) => routes).sort((a, b) => b.failed - a.failed)[0].route);
+  }
+
+  /** Roundabouts with their routes, those with most failures first. */
+  routesInOrder() {
+    const { ground, episodes } = this.page, found = new Map();
+    ground.routes.forEach(({ name }, route) => {
+      const own = episodes.filter((episode) => episode.route === route);
+      if (own.length === 0) return;
+      const group = roundaboutOf(name);
+      found.set(group, [...(found.get(group) ?? []), { route, name, failed: own.filter((episode) => episode.failed).length, count: own.length }]);
+    });
+    for (const routes of found.values()) routes.sort((a, b) => b.failed - a.failed);
+    return [...found];
+  }
+
+  fillRoutes() {
+    byId("route").replaceChildren(...this.order.map(([group, routes]) => html("optgroup", { label: group }, ...routes.map(({ route, name, failed, count }) =>
+      html("option", { value: route }, `${name}: ${failed === 0 ? "all" : count - failed} of ${count} arrived`)))));
+  }
+
+  openRoute(route) {
+    byId("route").value = route;
+    const own = this.page.episodes.filter((episode) => episode.route === Number(route));
+    this.listed = own.toSorted((a, b) => b.failed - a.failed || a.number - b.number);
+    byId("episodes").replaceChildren(...this.listed.map((episode) => html("button", {
+      type: "button", class: episode.failed ? "failed" : "", style: `--end: ${endColour(episode.ended)}`,
+      "aria-label": `Episode ${episode.number}: ${endWords(episode.ended)}`, title: `${endWords(episode.ended)} after ${decimal(episode.seconds, 1)} s`,
+      onclick: () => this.openEpisode(episode),
+    }, (episode.failed ? "×" : "") + episode.number)));
+    this.openEpisode(this.listed[0]);
+  }
+
+  /** Opens the route of this name and shows it. */
+  openName(name) {
+    this.openRoute(this.page.ground.routes.findIndex((route) => route.name === name));
+    byId("replay").scrollIntoView({ block: "start" });
+    this.canvas.focus({ preventScroll: true });
+  }
+
+  openEpisode(episode, seconds = 0) {
+    this.episode = episode;
+    this.scene = sceneOf(this.page, episode);
+    press(byId("episodes"), byId("episodes").children[this.listed.indexOf(episode)]);
+    byId("ending").textContent = `${episode.failed ? "Failed: " + endWords(episode.ended) : "Arrived"} after ${decimal(episode.seconds, 1)}${GAP}s`;
+    byId("ending").style.setProperty("--end", endColour(episode.ended));
+    const moments = Array.from({ length: episode.n_frames }, (_, frame) => instant(this.page, episode, frame));
+    byId("readings").replaceChildren(...READINGS.map(([name, value]) =>
+      html("div", {}, html("dt", {}, name), html("dd", {}), sparkline(moments.map(value)))));
+    byId("scrub").max = episode.n_frames - 1;
+    this.seek(Number((seconds / this.page.ground.step).toFixed(6)));
+  }
+
+  /** Opens the episode that the address names; false if it names none. */
+  openLink() {
+    const asked = location.hash.match(/^#([^/]+\/[^/]+)\/(\d+)(?:\/(\d+(?:\.\d+)?))?$/);
+    const route = asked && this.page.ground.routes.findIndex(({ name }) => name === asked[1]);
+    const episode = asked && this.page.episodes.find((episode) => episode.route === route && episode.number === Number(asked[2]));
+    if (!episode) return false;
+    this.openRoute(route);
+    this.openEpisode(episode, Number(asked[3] ?? 0));
+    return true;
+  }
+
+  seek(frame) {
+    this.frame = Math.min(Math.max(frame, 0), this.episode.n_frames - 1);
+    this.show();
+  }
+
+  show() {
+    const { page, episode, frame } = this, now = instant(page, episode, frame);
+    drawScene(this.canvas, page, this.scene, now, frame, { rays: byId("rays").checked, follow: byId("follow").checked });
+    byId("scrub").value = frame;
+    byId("scrub").setAttribute("aria-valuetext", `${decimal(now.time, 1)} s`);
+    byId("clock").textContent = `${decimal(now.time, 1)} / ${decimal(episode.seconds, 1)}${GAP}s`;
+    const along = (100 * frame) / Math.max(episode.n_frames - 1, 1);
+    READINGS.forEach(([, value, words], index) => {
+      const reading = byId("readings").children[index];
+      reading.querySelector("dd").textContent = words(value(now));
+      for (const end of ["x1", "x2"]) reading.querySelector(".cursor").setAttribute(end, along);
+    });
+  }
+
+  play(playing) {
+    // At the end, playing starts again.
+    if (playing && this.frame >= this.episode.n_frames - 1) this.seek(0);
+    this.playing = playing;
+    byId("play").textContent = playing ? "❚❚" : "▶";
+    byId("play").setAttribute("aria-label", playing ? "Pause" : "Play");
+    if (!playing) return;
+    let before = performance.now();
+    const tick = () => {
+      if (!this.playing) return;
+      const time = performance.now(), passed = (time - before) / 1000;
+      before = time;
+      this.seek(this.frame + (passed * Number(byId("rate").value)) / this.page.ground.step);
+      if (this.frame >= this.episode.n_frames - 1) this.play(false);
+      else this.onFrame(tick);
+    };
+    this.onFrame(tick);
+  }
+
+  /** Some frames forwards or back, from a whole frame. */
+  step(frames) {
+    this.play(false);
+    this.seek(Math.round(this.frame) + frames);
+  }
+
+  /** The next episode of the list, or the previous one. */
+  turn(by) {
+    const index = this.listed.indexOf(this.episode) + by;
+    if (0 <= index && index < this.listed.length) this.openEpisode(this.listed[index]);
+  }
+
+  onKey(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const tag = event.target.tagName;
+    // Controls with keys of their own keep them.
+    if (tag === "SELECT" || tag === "SUMMARY" || (event.key === " " && tag === "BUTTON") || (event.key.startsWith("Arrow") && tag === "INPUT" && event.target.type === "range")) return;
+    const inside = byId("replay").contains(event.target), box = this.canvas.getBoundingClientRect();
+    const visible = box.top < window.innerHeight && 0 < box.bottom;
+    if (!inside && !(event.target === document.body && visible)) return;
+    const actions = {
+      " ": () => this.play(!this.playing), ArrowLeft: () => this.step(event.shiftKey ? -10 : -1), ArrowRight: () => this.step(event.shiftKey ? 10 : 1),
+      // Outside the replay these two scroll the page.
+      ...(inside ? { ArrowUp: () => this.turn(-1), ArrowDown: () => this.turn(1) } : {}),
+    };
+    if (!actions[event.key]) return;
+    event.preventDefault();
+    actions[event.key]();
+  }
+
+  listen() {
+    byId("route").addEventListener("change", (event) => this.openRoute(event.target.value));
+    byId("play").addEventListener("click", () => this.play(!this.playing));
+    byId("scrub").addEventListener("input", (event) => { this.play(false); this.seek(Number(event.target.value)); });
+    for (const id of ["rays", "follow"]) byId(id).addEventListener("change", () => this.show());
+    document.addEventListener("keydown", (event) => this.onKey(event));
+    window.addEventListener("hashchange", () => this.openLink());
+    window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.show());
+    new ResizeObserver(() => this.show()).observe(this.canvas);
+    const legend = [["kerb", "kerb"], ["route", "route's lane centre"], ["tractor", "tractor, path of its drive axle"], ["trailer", "trailer, path of its axles"], ["ray", "distance sensors"]];
+    byId("scene-legend").replaceChildren(...legend.map(([colour, words]) =>
+      html("li", {}, html("i", { class: "thin", style: `--swatch: var(--${colour})` }), words)));
+  }
+}

@@ -1,0 +1,131 @@
+//! What chooses the actions: a learned policy, pure pursuit of the centre line, or actions drawn uniformly at random.
+//! The last two are the baselines that a learner must beat.
+
+use std::path::Path;
+
+use offtrack::layout::{Action, Truck, WaypointRow};
+use offtrack::random::{self, Draw};
+use offtrack::simulator::Batch;
+use offtrack::world::World;
+
+use crate::error::Error;
+use crate::policy::LearnedPolicy;
+
+/// Pure pursuit's default look-ahead distance: the best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of
+/// attard2023 \[m].
+pub const LOOK_AHEAD: f32 = 7.0;
+
+/// Chooses an action for every truck of a batch.
+pub trait Policy {
+    /// Name for reports: a policy file, a shipped policy, `pursuit` or `random`.
+    fn name(&self) -> &str;
+
+    /// Writes the index of each truck's action in the world's action table, `[n_envs]`.
+    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>);
+}
+
+/// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its
+/// benchmark. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where
+/// there is none, the one for attard2023. `look_ahead` is pure pursuit's \[m], `seed` that of random actions.
+pub fn find(policy: Option<&str>, benchmark: &str, look_ahead: f32, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
+    let learned = match policy {
+        Some("pursuit") => return Ok(Box::new(PurePursuit { look_ahead })),
+        Some("random") => return Ok(Box::new(UniformRandom { seed })),
+        Some(name) => learned(name)?,
+        None => LearnedPolicy::shipped_or_default(benchmark)?,
+    };
+    learned.check(world)?;
+    Ok(Box::new(learned))
+}
+
+/// A learned policy by the path of its file, or a shipped one by its benchmark. A file comes first.
+pub fn learned(name: &str) -> Result<LearnedPolicy, Error> {
+    if LearnedPolicy::shipped_names().contains(&name) && !Path::new(name).is_file() {
+        return LearnedPolicy::shipped(name);
+    }
+    LearnedPolicy::load(Path::new(name))
+}
+
+impl Policy for LearnedPolicy {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn choose(&mut self, _: &World, batch: &Batch, actions: &mut Vec<u32>) {
+        *actions = self.act(&batch.observation);
+    }
+}
+
+/// Actions drawn uniformly at random.
+#[derive(Debug)]
+pub struct UniformRandom {
+    /// Seed of the draws.
+    pub seed: u32,
+}
+
+impl Policy for UniformRandom {
+    fn name(&self) -> &str {
+        "random"
+    }
+
+    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
+        actions.clear();
+        actions.extend(batch.truck.iter().enumerate().map(|(env, truck)| {
+            let [word, ..] = random::words(self.seed, env as u32, truck.episode, (Draw::Action as u32).wrapping_add(truck.steps));
+            random::index_below(word, world.params.n_actions)
+        }));
+    }
+}
+
+/// Pure pursuit: steers the drive axle along the arc to a point of the centre line at the look-ahead distance, at the
+/// highest target speed. It follows the line well and ignores the trailer.
+///
+/// R. Coulter, "Implementation of the Pure Pursuit Path Tracking Algorithm" (Carnegie Mellon, 1992).
+#[derive(Debug)]
+pub struct PurePursuit {
+    /// Look-ahead distance: from the drive axle to the target point \[m].
+    pub look_ahead: f32,
+}
+
+impl Policy for PurePursuit {
+    fn name(&self) -> &str {
+        "pursuit"
+    }
+
+    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
+        actions.clear();
+        actions.extend(batch.truck.iter().zip(&batch.progress).map(|(truck, progress)| {
+            let waypoints = world.route_waypoints(truck.route);
+            let steering = self.steering(world.params.rig.wheelbase, truck, waypoints, progress.waypoint as usize);
+            nearest(&world.actions, steering, world.params.start_speed)
+        }));
+    }
+}
+
+impl PurePursuit {
+    /// Steer angle of the arc to the target point \[rad].
+    fn steering(&self, wheelbase: f32, truck: &Truck, waypoints: &[WaypointRow], next: usize) -> f32 {
+        let pair = |index: usize| (waypoints[index - 1].position, waypoints[index].position);
+        // The first segment that ends beyond the look-ahead distance; it starts within it.
+        let first = next.clamp(1, waypoints.len() - 1);
+        let beyond = |&index: &usize| self.look_ahead <= truck.position.distance(waypoints[index].position);
+        let index = (first..waypoints.len()).find(beyond).unwrap_or(waypoints.len() - 1);
+        let (from, to) = pair(index);
+        let (mut near, mut far) = (0.0f32, 1.0f32);
+        // Bisection finds the target point to a millimetre on a segment of a few metres.
+        for _ in 0..12 {
+            let middle = 0.5 * (near + far);
+            if truck.position.distance(from.lerp(to, middle)) < self.look_ahead { near = middle } else { far = middle }
+        }
+        let ahead = from.lerp(to, far) - truck.position;
+        let bearing = glam::Vec2::from_angle(-truck.heading).rotate(ahead);
+        (2.0 * wheelbase * bearing.y / ahead.length_squared().max(1.0)).atan()
+    }
+}
+
+/// The action nearest to `speed` and, among those, nearest to `steering`.
+fn nearest(actions: &[Action], steering: f32, speed: f32) -> u32 {
+    let cost = |action: &Action| (action.speed - speed).abs() * 1e3 + (action.steering - steering).abs();
+    let best = actions.iter().enumerate().min_by(|(_, a), (_, b)| cost(a).total_cmp(&cost(b)));
+    best.map_or(0, |(index, _)| index as u32)
+}

@@ -1,0 +1,244 @@
+//! A report as text: a line a route, then the sums, within a given width, and what each column means.
+
+use std::fmt::Write;
+
+use offtrack::layout::Ended;
+
+use super::report::{Report, Summary};
+
+/// What each column of the table says.
+const COLUMNS: [(&str, &str); 10] = [
+    ("arrived", "episodes that arrived, of all"),
+    ("success", "the same as a percentage"),
+    ("95 % interval", "Wilson interval of the success"),
+    ("lane", "own: a truck whose front axle follows the lane's centre touches no kerb; wide: it has to swing out of its lane"),
+    ("lane m", "distance of the tractor's middle, half way between its axles, to the lane's centre: mean and largest"),
+    ("tractor m, trailer m", "smallest distance of the unit's outline to a kerb; negative: it overlaps the kerb"),
+    ("LTR", "largest load transfer ratio of either unit: 0 on even wheels, 1 when a wheel lifts off"),
+    ("artic deg", "largest articulation, the angle between tractor and trailer"),
+    ("off-track", "largest off-tracking: distance of the trailer's axles to the path of the tractor's front axle [m]"),
+    ("time s", "mean duration of an episode"),
+];
+
+/// Spaces between two columns.
+const GAP: usize = 1;
+
+/// One column: two lines of heading, and its text for a line of the table.
+struct Column {
+    head: [&'static str; 2],
+    /// Columns with the highest rank are left out first where the table is too wide. Rank 0 always stays.
+    rank: u32,
+    text: fn(&Line) -> String,
+}
+
+/// One line of the table.
+struct Line<'a> {
+    name: &'a str,
+    lane: &'static str,
+    summary: &'a Summary,
+}
+
+const ALL: [Column; 13] = [
+    Column { head: ["", "route"], rank: 0, text: |line| line.name.to_owned() },
+    Column { head: ["", "arrived"], rank: 0, text: |line| format!("{}/{}", line.summary.arrived, line.summary.episodes) },
+    Column { head: ["success", "%"], rank: 0, text: |line| format!("{:.1}", 100.0 * line.summary.success) },
+    Column {
+        head: ["95 %", "interval"],
+        rank: 1,
+        text: |line| format!("{:.1}..{:.1}", 100.0 * line.summary.success_low, 100.0 * line.summary.success_high),
+    },
+    Column { head: ["", "lane"], rank: 2, text: |line| line.lane.to_owned() },
+    Column { head: ["lane m", "mean"], rank: 3, text: |line| format!("{:.2}", line.summary.lane_distance_mean) },
+    Column { head: ["lane m", "max"], rank: 4, text: |line| format!("{:.2}", line.summary.lane_distance_max) },
+    Column { head: ["tractor", "m"], rank: 5, text: |line| format!("{:.2}", line.summary.tractor_clearance_min) },
+    Column { head: ["trailer", "m"], rank: 6, text: |line| format!("{:.2}", line.summary.trailer_clearance_min) },
+    Column { head: ["", "LTR"], rank: 7, text: |line| format!("{:.2}", line.summary.load_transfer_ratio_peak) },
+    Column { head: ["artic", "deg"], rank: 8, text: |line| format!("{:.0}", line.summary.articulation_peak_deg) },
+    Column { head: ["off-", "track"], rank: 9, text: |line| format!("{:.2}", line.summary.off_tracking_peak) },
+    Column { head: ["time", "s"], rank: 10, text: |line| format!("{:.1}", line.summary.time_mean) },
+];
+
+impl Report {
+    /// The table that a person reads, at most `width` characters wide where that leaves room for the route and its
+    /// success: a line a route, then the sums, then what the columns mean.
+    pub fn table(&self, width: usize) -> String {
+        let routes: Vec<Line> = self
+            .routes
+            .iter()
+            .map(|route| Line { name: &route.name, lane: lane(route.own_lane_suffices), summary: &route.summary })
+            .collect();
+        let sums = [
+            ("lane own", lane(true), self.own_lane_suffices.as_ref()),
+            ("lane wide", lane(false), self.needs_deviation.as_ref()),
+            ("certified", "", self.certified.as_ref()),
+            ("all", "", Some(&self.summary)),
+        ];
+        let sums: Vec<Line> = sums.into_iter().filter_map(|(name, lane, summary)| Some(Line { name, lane, summary: summary? })).collect();
+        let (columns, left_out) = fitting(width, &routes, &sums);
+        let mut text = String::new();
+        for row in 0..2 {
+            push(&mut text, &columns, |column| column.head[row].to_owned());
+        }
+        let rule = "-".repeat(text.lines().map(str::len).max().unwrap_or(0));
+        for lines in [&routes, &sums] {
+            let _ = writeln!(text, "{rule}");
+            for line in lines {
+                push(&mut text, &columns, |column| (column.text)(line));
+                push_failures(&mut text, line.summary, width);
+            }
+        }
+        if !left_out.is_empty() {
+            let names: Vec<String> = left_out.iter().map(|column| column.head.join(" ").trim().replace("- ", "-")).collect();
+            push_wrapped(
+                &mut text,
+                &format!("Left out for want of width: {}. A wider terminal and --json have them.", names.join(", ")),
+                width,
+            );
+        }
+        text + "\n" + &legend(width)
+    }
+}
+
+/// What the columns mean, a line each, wrapped to `width` characters.
+pub fn legend(width: usize) -> String {
+    let mut text = String::new();
+    for (name, meaning) in COLUMNS {
+        push_wrapped(&mut text, &format!("{name}: {meaning}"), width);
+    }
+    text
+}
+
+fn lane(own_suffices: bool) -> &'static str {
+    if own_suffices { "own" } else { "wide" }
+}
+
+/// The columns that fit, each with its width, and those left out.
+fn fitting(width: usize, routes: &[Line], sums: &[Line]) -> (Vec<(&'static Column, usize)>, Vec<&'static Column>) {
+    let widest = |column: &Column| {
+        let cells = routes.iter().chain(sums).map(|line| (column.text)(line).chars().count());
+        cells.chain(column.head.map(str::len)).max().unwrap_or(0)
+    };
+    let mut columns: Vec<(&Column, usize)> = ALL.iter().map(|column| (column, widest(column))).collect();
+    let mut left_out = Vec::new();
+    let total = |columns: &[(&Column, usize)]| columns.iter().map(|(_, width)| width + GAP).sum::<usize>() - GAP;
+    while width < total(&columns) {
+        let last = (0..columns.len()).max_by_key(|&index| columns[index].0.rank).filter(|&index| 0 < columns[index].0.rank);
+        let Some(last) = last else { break };
+        left_out.insert(0, columns.remove(last).0);
+    }
+    (columns, left_out)
+}
+
+/// Appends a line of cells: the first column to the left, the others to the right.
+fn push(text: &mut String, columns: &[(&Column, usize)], cell: impl Fn(&Column) -> String) {
+    let mut line = String::new();
+    for (index, (column, width)) in columns.iter().enumerate() {
+        let cell = cell(column);
+        // Writing to a string cannot fail.
+        let _ = if index == 0 { write!(line, "{cell:<width$}") } else { write!(line, "{:GAP$}{cell:>width$}", "") };
+    }
+    text.push_str(line.trim_end());
+    text.push('\n');
+}
+
+/// Appends how the episodes that did not arrive ended, on a line of its own; nothing where all arrived.
+fn push_failures(text: &mut String, summary: &Summary, width: usize) {
+    let failures = summary.ends.iter().filter(|&(&name, &count)| name != Ended::Arrived.name() && 0 < count);
+    let words: Vec<String> = failures.map(|(name, count)| format!("{count} {}", name.replace('_', " "))).collect();
+    if !words.is_empty() {
+        push_wrapped(text, &format!("  not arrived: {}", words.join(", ")), width);
+    }
+}
+
+/// Appends `words` in lines of at most `width` characters; those after the first are indented.
+fn push_wrapped(text: &mut String, words: &str, width: usize) {
+    let indent = words.len() - words.trim_start().len();
+    let mut line = " ".repeat(indent);
+    let mut empty = true;
+    for word in words.split_whitespace() {
+        if !empty && width < line.chars().count() + 1 + word.chars().count() {
+            text.push_str(&line);
+            text.push('\n');
+            line = " ".repeat(indent + 4);
+            empty = true;
+        }
+        if !empty {
+            line.push(' ');
+        }
+        line.push_str(word);
+        empty = false;
+    }
+    text.push_str(&line);
+    text.push('\n');
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::report::{Episode, RouteReport};
+    use super::*;
+
+    /// A report with the widest figures that an evaluation gives.
+    fn report() -> Report {
+        let episode = |ended| Episode {
+            ended,
+            steps: 999,
+            reward: -500.0,
+            lane_distance_mean: 10.25,
+            lane_distance_max: 19.25,
+            tractor_clearance_min: -10.25,
+            trailer_clearance_min: -10.25,
+            load_transfer_ratio_peak: 1.5,
+            articulation_peak: 1.9,
+            off_tracking_peak: 10.25,
+        };
+        let mut episodes = vec![episode(Ended::Arrived); 692];
+        episodes.extend([episode(Ended::TractorCollided), episode(Ended::TrailerCollided), episode(Ended::TimedOut)]);
+        let summary = Summary::of(episodes.iter(), 0.1).unwrap();
+        let route = |own_lane_suffices| RouteReport { name: "40m/SW-right-1".to_owned(), own_lane_suffices, summary: summary.clone() };
+        Report {
+            benchmark: "attard2023".to_owned(),
+            split: "test",
+            policy: "random".to_owned(),
+            seed: 0,
+            engine: "cpu".to_owned(),
+            summary: summary.clone(),
+            own_lane_suffices: Some(summary.clone()),
+            needs_deviation: Some(summary.clone()),
+            certified: Some(summary.clone()),
+            routes: vec![route(true), route(false)],
+        }
+    }
+
+    #[test]
+    fn a_table_is_no_wider_than_the_terminal() {
+        let widest = |width: usize| report().table(width).lines().map(|line| line.chars().count()).max().unwrap();
+        for width in [40, 60, 79, 80, 100, 120, 200] {
+            assert!(widest(width) <= width, "{width}: {}\n{}", widest(width), report().table(width));
+        }
+        // Narrower than that, routes and their success stay all the same.
+        assert!(report().table(10).contains("692/695"));
+    }
+
+    #[test]
+    fn a_table_of_100_columns_has_every_figure_and_a_narrower_one_names_what_it_leaves_out() {
+        let (whole, narrow) = (report().table(100), report().table(80));
+        assert!(!whole.contains("Left out") && whole.contains("time"), "{whole}");
+        assert!(narrow.contains("Left out for want of width:") && narrow.contains("time s."), "{narrow}");
+    }
+
+    #[test]
+    fn every_heading_is_explained_below_the_table() {
+        let legend = legend(1000);
+        let table = report().table(100);
+        for column in &ALL[1..] {
+            let word = column.head.iter().flat_map(|head| head.split(' ')).find(|word| 1 < word.len() && *word != "95").unwrap();
+            assert!(legend.contains(word), "{word}");
+        }
+        assert!(table.contains("own: a truck whose front axle follows") && table.contains("load transfer ratio"), "{table}");
+    }
+
+    #[test]
+    fn failures_are_counted_below_their_line() {
+        assert!(report().table(100).contains("  not arrived: 1 timed out, 1 tractor collided, 1 trailer collided\n"));
+    }
+}

@@ -1,0 +1,19 @@
+//! The learner: discrete soft actor-critic, its replay buffer, and the training loop, on the processor or on a graphics
+//! device.
+//!
+//! Start with [`training`], the loop, then [`sac`], the algorithm. [`rollout`] is what differs between processor and
+//! device.
+
+pub mod training; // the loop: act, learn
+pub mod sac; // soft actor-critic
+pub mod network; // multi-layer perceptrons
+pub mod rollout; // acting, stepping, remembering, sampling: on the host, on a device
+pub mod replay_buffer; // transitions on the host
+pub mod normalisation; // of observations
+pub mod mirror; // mirror augmentation
+pub mod exploration; // random actions among the policy's
+pub mod backend; // the choice of processor or device
+pub mod config; // a training file
+pub mod run; // a training run in its folder
+pub mod checkpoint; // all state in a file
+pub mod generator; // random numbers with a state

@@ -1,0 +1,93 @@
+//! Where a training run is: on the processor, or on a graphics device. The one place of the learner that chooses.
+
+use std::sync::Arc;
+
+use offtrack::world::World;
+
+use crate::device;
+use crate::error::Error;
+use crate::learner::config::{Config, Device};
+use crate::learner::mirror::Mirror;
+#[cfg(feature = "gpu")]
+use crate::learner::rollout::device::{DeviceRollout, Shared};
+use crate::learner::rollout::{Rollout, host::HostRollout};
+use crate::learner::sac::Placement;
+
+/// The processor, or an opened device.
+#[derive(Clone)]
+pub enum Backend {
+    /// Trucks, replay buffer and learner in the processor's memory.
+    Host,
+    /// All of them on one device.
+    #[cfg(feature = "gpu")]
+    Device(Box<Shared>),
+}
+
+impl Backend {
+    /// What a training file asks for.
+    pub fn open(config: &Config) -> Result<Backend, Error> {
+        match config.device {
+            Device::Cpu => Ok(Backend::Host),
+            Device::Gpu => Backend::on_device(config.adapter.as_deref()),
+        }
+    }
+
+    /// The first device whose adapter's name contains `adapter`.
+    #[cfg(feature = "gpu")]
+    pub fn on_device(adapter: Option<&str>) -> Result<Backend, Error> {
+        Ok(Backend::Device(Box::new(Shared::open(adapter)?)))
+    }
+
+    /// An error: this program has no devices.
+    #[cfg(not(feature = "gpu"))]
+    pub fn on_device(_: Option<&str>) -> Result<Backend, Error> {
+        let expected = format!("{}; or set device = \"cpu\"", device::NOT_BUILT_IN);
+        Err(Error::Flag { flag: "device", value: "\"gpu\"".to_owned(), expected })
+    }
+
+    /// Its name in results: `cpu`, or the adapter's with its interface and driver.
+    pub fn name(&self) -> String {
+        match self {
+            Backend::Host => "cpu".to_owned(),
+            #[cfg(feature = "gpu")]
+            Backend::Device(shared) => shared.gpu.name(),
+        }
+    }
+
+    /// Where the learner's tensors are.
+    pub fn placement(&self) -> Placement {
+        match self {
+            Backend::Host => Placement::Host,
+            #[cfg(feature = "gpu")]
+            Backend::Device(shared) => Placement::Device(shared.tensors.clone()),
+        }
+    }
+
+    /// Trucks and a replay buffer there.
+    pub fn rollout(
+        &self,
+        config: &Config,
+        world: &Arc<World>,
+        routes: Vec<u32>,
+        mirror: Option<Mirror>,
+    ) -> Result<Box<dyn Rollout>, Error> {
+        match self {
+            Backend::Host => Ok(Box::new(HostRollout::new(config, world, routes, mirror)?)),
+            #[cfg(feature = "gpu")]
+            Backend::Device(shared) => Ok(Box::new(DeviceRollout::new(shared, config, world, routes, mirror)?)),
+        }
+    }
+
+    /// The result of `work`. On a device a panic becomes an error, for the tensor library panics where a device fails.
+    pub fn guarded<T>(&self, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+        match self {
+            Backend::Host => work(),
+            #[cfg(feature = "gpu")]
+            Backend::Device(shared) => device::caught(work).map_err(|error| match error {
+                // What the driver reported says more than the panic that followed.
+                Error::Device(message) => Error::Device(shared.check().err().map_or(message, |error| error.to_string())),
+                error => error,
+            }),
+        }
+    }
+}

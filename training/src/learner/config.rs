@@ -1,0 +1,225 @@
+//! A training file: what is trained on, for how long, and how. `training/configs/default.toml` explains every key.
+//!
+//! A file may name another one as its `base` and give only the keys that differ.
+
+mod check;
+mod file;
+mod set;
+
+use std::path::Path;
+
+use offtrack::reader::Reader;
+use serde::{Deserialize, Serialize};
+
+use crate::error::Error;
+
+/// A training file. Unknown keys are refused; one in hand has been checked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// The benchmark whose test routes the policy is evaluated on: a name, or the path of a file.
+    pub benchmark: String,
+    /// The benchmark whose training routes it is trained on; none for `benchmark` itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub training_benchmark: Option<String>,
+    /// Where the trucks and the learner are.
+    #[serde(default)]
+    pub device: Device,
+    /// Part of the graphics adapter's name; none for the first that is found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adapter: Option<String>,
+    /// Seed of routes, poses, networks, actions and samples.
+    pub seed: u32,
+    /// Number of trucks.
+    pub n_envs: usize,
+    /// Training time \[min].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub minutes: Option<f64>,
+    /// Env steps of all trucks together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steps: Option<u64>,
+    /// Time between two checkpoints \[min].
+    #[serde(default = "checkpoint_minutes")]
+    pub checkpoint_minutes: f64,
+    /// Random actions among the policy's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exploration: Option<Exploration>,
+    /// The replay buffer.
+    pub replay_buffer: ReplayBuffer,
+    /// The learner.
+    pub learning: Learning,
+}
+
+fn checkpoint_minutes() -> f64 {
+    2.0
+}
+
+/// Where the trucks and the learner are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Device {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// A graphics device, both on the same one.
+    Gpu,
+}
+
+/// Random actions in place of some of the policy's: epsilon-greedy exploration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Exploration {
+    /// Fraction of random actions at the beginning.
+    pub initial_fraction: f64,
+    /// The same from `steps` on.
+    pub final_fraction: f64,
+    /// Env steps over which it goes from one to the other.
+    pub steps: u64,
+    /// How differently the trucks explore: the fraction of truck i of n is raised to the power 1 + spread i / (n - 1).
+    #[serde(default)]
+    pub spread: f64,
+}
+
+/// The replay buffer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReplayBuffer {
+    /// Transitions held.
+    pub capacity: usize,
+    /// Transitions before the first update.
+    pub warmup: usize,
+    /// Prioritised sampling; none samples uniformly.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub priority: Option<Priority>,
+}
+
+/// Transitions are sampled in proportion to a power of their TD error.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Priority {
+    /// Power of the TD error.
+    pub exponent: f64,
+    /// Power of the importance-sampling weights: 0 corrects nothing, 1 all of the bias.
+    pub correction: f64,
+}
+
+/// The learner.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Learning {
+    /// Sizes of the hidden layers of the actor and the critics.
+    pub hidden: Vec<usize>,
+    /// Transitions in an update.
+    pub batch: usize,
+    /// Updates after each step of all trucks.
+    pub updates_per_step: usize,
+    /// Steps of the n-step return.
+    pub n_steps: usize,
+    /// Discount factor.
+    pub gamma: f64,
+    /// Factor of the rewards.
+    pub reward_scale: f64,
+    /// Observations are normalised to mean 0 and standard deviation 1.
+    pub normalise_observations: bool,
+    /// Uniform noise on the normalised observations of a sample, up to this; 0 for none.
+    #[serde(default)]
+    pub observation_noise: f64,
+    /// Half of the sampled transitions are mirrored left to right.
+    #[serde(default)]
+    pub mirror_augmentation: bool,
+    /// Adam's learning rate of the actor at the beginning.
+    pub actor_learning_rate: f64,
+    /// Adam's learning rate of the critics at the beginning.
+    pub critic_learning_rate: f64,
+    /// Fraction of the learning rates that is left at the end; the schedule is linear.
+    pub final_learning_rate_fraction: f64,
+    /// Layer normalisation in the critics' hidden layers.
+    pub layer_norm: bool,
+    /// How the two critics' values are combined.
+    pub critics: Critics,
+    /// How far the target critics move toward the critics at a time; 1 copies them.
+    pub tau: f64,
+    /// Updates between two such moves.
+    pub target_interval: usize,
+    /// How far the EMA of the actor, which becomes the policy, moves toward the actor in each update.
+    pub actor_ema_rate: f64,
+    /// The entropy term.
+    pub entropy: Entropy,
+}
+
+/// How the two critics' values are combined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Critics {
+    /// Their mean.
+    Mean,
+    /// The lower of the two.
+    Minimum,
+}
+
+/// The entropy term.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entropy {
+    /// The TD target includes the entropy of the next state; otherwise the actor's loss alone does.
+    pub in_target: bool,
+    /// Entropy that the coefficient is adapted to, as a fraction of the largest possible; none keeps the coefficient.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target_fraction: Option<f64>,
+    /// The coefficient, at the beginning or throughout.
+    pub coefficient: f64,
+    /// Adam's learning rate of the coefficient's logarithm.
+    pub learning_rate: f64,
+}
+
+impl Config {
+    /// Reads a training file by its path or its name, `default`. Everything that can be wrong with it is found here,
+    /// with its key.
+    pub fn read(file: &Path) -> Result<Config, Error> {
+        Config::read_with(file, &[])
+    }
+
+    /// The same with some of its keys set to other values, each `KEY=VALUE`.
+    pub fn read_with(file: &Path, settings: &[String]) -> Result<Config, Error> {
+        let mut table = file::resolved(file)?;
+        set::set(&mut table, settings)?;
+        let origin = match settings {
+            [] => file.display().to_string(),
+            _ => format!("{} with --set {}", file.display(), settings.join(" --set ")),
+        };
+        let wrong = |error: toml::de::Error| Error::contents(Path::new(&origin), error.to_string().trim());
+        let config: Config = table.try_into().map_err(wrong)?;
+        config.check(&Reader::of(Path::new(&origin)))?;
+        Ok(config)
+    }
+
+    /// Values from the command line replace the file's. `--minutes` or `--steps` replaces the whole budget.
+    pub fn override_with(&mut self, seed: Option<u32>, minutes: Option<f64>, steps: Option<u64>, envs: Option<usize>) -> Result<(), Error> {
+        self.seed = seed.unwrap_or(self.seed);
+        self.n_envs = envs.unwrap_or(self.n_envs);
+        if minutes.is_some() || steps.is_some() {
+            (self.minutes, self.steps) = (minutes, steps);
+        }
+        // The file has been checked, so an error here comes from these flags.
+        let flags = [
+            minutes.map(|minutes| format!("--minutes {minutes}")),
+            steps.map(|steps| format!("--steps {steps}")),
+            envs.map(|envs| format!("--envs {envs}")),
+        ];
+        self.check(&Reader::of(Path::new(&flags.into_iter().flatten().collect::<Vec<_>>().join(" "))))
+    }
+
+    /// Whether a run with this config can continue one with the other: only budget and checkpoint interval may differ.
+    pub fn is_same_run(&self, other: &Config) -> bool {
+        let Config { minutes, steps, checkpoint_minutes, .. } = *self;
+        *self == Config { minutes, steps, checkpoint_minutes, ..other.clone() }
+    }
+
+    /// The training file that this config would be read from, without a `base`.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("numbers, words and lists of numbers can all be written as TOML")
+    }
+}
+
+#[cfg(test)]
+mod tests;

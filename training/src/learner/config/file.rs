@@ -1,0 +1,85 @@
+//! Training files by path or name, with their `base` merged in.
+
+use std::path::{Path, PathBuf};
+
+use offtrack::reader::{self, TEXT_LIMIT, read_text, shortened};
+use toml::{Table, Value};
+
+use crate::error::Error;
+
+/// The training files that come with the program.
+const SHIPPED: [(&str, &str); 4] = [
+    ("default", include_str!("../../../configs/default.toml")),
+    ("gpu", include_str!("../../../configs/gpu.toml")),
+    ("as-run", include_str!("../../../configs/as-run.toml")),
+    ("paper", include_str!("../../../configs/paper.toml")),
+];
+/// Bases of bases: more than anyone needs, fewer than a circle.
+const DEPTH: usize = 8;
+
+/// A training file's keys, its own over those of its base.
+pub(super) fn resolved(file: &Path) -> Result<Table, Error> {
+    with_bases(file, 0)
+}
+
+fn with_bases(file: &Path, depth: usize) -> Result<Table, Error> {
+    let mut table = table(file)?;
+    let invalid =
+        |value: String, expected: String| reader::Error::Invalid { file: file.to_owned(), key: "base".to_owned(), value, expected };
+    let base = match table.remove("base") {
+        None => return Ok(table),
+        Some(Value::String(base)) if depth < DEPTH => base,
+        Some(Value::String(base)) => {
+            let expected = format!("at most {DEPTH} files may follow each other: one of them is its own base");
+            return Err(invalid(format!("{base:?}"), expected).into());
+        }
+        Some(other) => return Err(invalid(other.to_string(), "must be the name or the path of a training file".to_owned()).into()),
+    };
+    let path = match shipped(file).is_some() || shipped(Path::new(&base)).is_some() && !beside(file, &base).is_file() {
+        true => PathBuf::from(base.trim_end_matches(".toml")),
+        false => beside(file, &base),
+    };
+    let mut merged = with_bases(&path, depth + 1)?;
+    merge(&mut merged, table);
+    Ok(merged)
+}
+
+fn beside(file: &Path, base: &str) -> PathBuf {
+    file.parent().unwrap_or(Path::new("")).join(base)
+}
+
+/// The text of a training file that comes with the program, by its name.
+fn shipped(name: &Path) -> Option<&'static str> {
+    let name = name.to_str()?;
+    SHIPPED.iter().find(|(known, _)| *known == name && !Path::new(name).is_file()).map(|(_, text)| *text)
+}
+
+fn table(file: &Path) -> Result<Table, Error> {
+    let text = match shipped(file) {
+        Some(text) => text.to_owned(),
+        None if is_name(file) => {
+            let known: Vec<&str> = SHIPPED.iter().map(|(name, _)| *name).collect();
+            let expected = format!("is no training file: the program comes with {}; or give a path ending in .toml", known.join(", "));
+            return Err(Error::Contents { file: file.to_owned(), message: expected });
+        }
+        None => read_text(file, TEXT_LIMIT)?,
+    };
+    let malformed =
+        |error: toml::de::Error| reader::Error::Malformed { file: file.to_owned(), message: shortened(&error.to_string(), 400) };
+    Ok(toml::from_str(&text).map_err(malformed)?)
+}
+
+/// A word that could be a name: no path, and no such file here.
+fn is_name(file: &Path) -> bool {
+    file.components().count() == 1 && file.extension().is_none() && !file.exists()
+}
+
+/// Puts `over`'s keys into `under`, tables key by key.
+fn merge(under: &mut Table, over: Table) {
+    for (key, value) in over {
+        match (under.get_mut(&key), value) {
+            (Some(Value::Table(under)), Value::Table(over)) => merge(under, over),
+            (_, value) => drop(under.insert(key, value)),
+        }
+    }
+}

@@ -1,0 +1,258 @@
+use super::*;
+use crate::files;
+
+fn default_file() -> String {
+    std::fs::read_to_string(files::repository().join("training/configs/default.toml")).unwrap()
+}
+
+/// What reading `text` as a training file gives.
+fn read(text: &str) -> Result<Config, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("fast.toml");
+    std::fs::write(&file, text).unwrap();
+    Config::read(&file).map_err(|error| {
+        let message = error.to_string();
+        assert!(message.starts_with(file.to_str().unwrap()), "{message}");
+        assert!(error.is_wrong_input());
+        message
+    })
+}
+
+/// The default file with the line of `key` changed; an empty line takes it out.
+fn with(key: &str, line: &str) -> Result<Config, String> {
+    let mut changed = 0;
+    let text = default_file();
+    let lines: Vec<&str> = text
+        .lines()
+        .map(|old| {
+            let found = old.strip_prefix(key).is_some_and(|rest| rest.starts_with(" ="));
+            changed += usize::from(found);
+            if found { line } else { old }
+        })
+        .collect();
+    assert_eq!(changed, 1, "{key}");
+    read(&lines.join("\n"))
+}
+
+#[test]
+fn the_default_file_reads_and_is_written_back_the_same() {
+    let config = read(&default_file()).unwrap();
+    assert_eq!(read(&config.to_toml()).unwrap(), config);
+}
+
+#[test]
+fn every_value_out_of_its_range_is_refused_with_its_key_and_what_would_do() {
+    let out_of_range = [
+        ("n_envs", "n_envs = 0", "n_envs: 0; must lie in 1..1048576"),
+        ("steps", "minutes = 0.0", "minutes: 0 min; must lie in 0.01..100000 min"),
+        ("steps", "minutes = nan", "minutes: NaN min"),
+        ("steps", "minutes = 1.0\nsteps = 0", "steps: 0; must lie in"),
+        ("checkpoint_minutes", "checkpoint_minutes = 0.0", "checkpoint_minutes: 0 min; must lie in 0.0001..100000 min"),
+        ("capacity", "capacity = 10", "replay_buffer.capacity: 10; must lie in 1000.."),
+        ("warmup", "warmup = 0", "replay_buffer.warmup: 0; must lie in 1.."),
+        ("warmup", "warmup = 90000000", "replay_buffer.warmup: 90000000; must lie in 1.."),
+        ("hidden", "hidden = []", "learning.hidden: 0; must lie in 1..8"),
+        ("hidden", "hidden = [64, 0]", "learning.hidden[1]: 0; must lie in 1..8192"),
+        ("batch", "batch = 1", "learning.batch: 1; must lie in 2.."),
+        ("updates_per_step", "updates_per_step = 0", "learning.updates_per_step: 0; must lie in 1.."),
+        ("n_steps", "n_steps = 0", "learning.n_steps: 0; must lie in 1..100"),
+        ("gamma", "gamma = 1.01", "learning.gamma: 1.01; must lie in 0..1"),
+        ("gamma", "gamma = -0.1", "learning.gamma: -0.1; must lie in 0..1"),
+        ("reward_scale", "reward_scale = 0.0", "learning.reward_scale: 0; must lie in"),
+        ("actor_learning_rate", "actor_learning_rate = 0.0", "learning.actor_learning_rate: 0; must lie in"),
+        ("critic_learning_rate", "critic_learning_rate = inf", "learning.critic_learning_rate: inf; must lie in"),
+        ("tau", "tau = 1.5", "learning.tau: 1.5; must lie in"),
+        ("target_interval", "target_interval = 0", "learning.target_interval: 0; must lie in"),
+        ("actor_ema_rate", "actor_ema_rate = 0.0", "learning.actor_ema_rate: 0; must lie in"),
+        ("target_fraction", "target_fraction = 1.1", "learning.entropy.target_fraction: 1.1; must lie in 0..1"),
+        ("coefficient", "coefficient = 0.0", "learning.entropy.coefficient: 0; must lie in"),
+        ("learning_rate", "learning_rate = -1.0", "learning.entropy.learning_rate: -1; must lie in"),
+    ];
+    for (key, line, expected) in out_of_range {
+        let message = with(key, line).unwrap_err();
+        assert!(message.contains(expected), "{line}: {message}");
+    }
+}
+
+#[test]
+fn a_key_that_is_unknown_missing_or_of_another_type_is_refused_by_its_name() {
+    for (key, line, expected) in [
+        ("batch", "bacth = 512", "unknown field `bacth`"),
+        ("batch", "", "missing field `batch`"),
+        ("batch", "batch = -4", "invalid value"),
+        ("seed", "seed = 4294967296", "invalid value"),
+        ("critics", "critics = \"median\"", "unknown variant `median`"),
+        ("hidden", "hidden = 256", "invalid type"),
+    ] {
+        let message = with(key, line).unwrap_err();
+        assert!(message.contains(expected), "{line}: {message}");
+    }
+}
+
+#[test]
+fn a_run_that_nothing_would_end_is_refused() {
+    let message = with("steps", "").unwrap_err();
+    assert!(message.contains("`minutes`, `steps` or both"), "{message}");
+    assert!(with("steps", "minutes = 1000.0").is_ok());
+}
+
+#[test]
+fn a_replay_buffer_too_small_for_its_trucks_is_refused() {
+    let text = default_file().replace("n_envs = 512", "n_envs = 65536").replace("capacity = 600000", "capacity = 655360");
+    let message = read(&text).unwrap_err();
+    // Of ten slots none is followed by ten others.
+    assert!(message.contains("replay_buffer.capacity: 655360; must hold more than learning.n_steps = 10"), "{message}");
+}
+
+#[test]
+fn the_command_line_replaces_keys_and_a_budget_there_replaces_both() {
+    let mut config = with("steps", "minutes = 5.0\nsteps = 70000").unwrap();
+    config.override_with(Some(3), None, Some(1000), Some(16)).unwrap();
+    assert_eq!((config.seed, config.n_envs, config.minutes, config.steps), (3, 16, None, Some(1000)));
+    let message = config.override_with(None, None, None, Some(0)).unwrap_err().to_string();
+    assert_eq!(message, "--envs 0: n_envs: 0; must lie in 1..1048576");
+}
+
+#[test]
+fn a_key_that_works_on_the_processor_alone_is_refused_for_a_device() {
+    let on_device = format!("device = \"gpu\"\n{}", default_file());
+    assert_eq!(read(&on_device).unwrap().device, Device::Gpu);
+    let exploration = "[exploration]\ninitial_fraction = 1.0\nfinal_fraction = 0.1\nsteps = 1000\n";
+    let priority = "[replay_buffer.priority]\nexponent = 0.6\ncorrection = 0.4\n";
+    for (key, table) in [("exploration", exploration), ("replay_buffer.priority", priority)] {
+        assert!(read(&format!("{}\n{table}", default_file())).is_ok(), "{key}");
+        let message = read(&format!("{on_device}\n{table}")).unwrap_err().to_string();
+        assert!(message.contains(&format!("{key}: given; works with device = \"cpu\" alone")), "{message}");
+    }
+}
+
+#[test]
+fn any_value_of_any_key_is_taken_or_refused_by_its_key() {
+    let text = default_file();
+    let keys: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).filter_map(|line| Some(line.split_once(" = ")?.0)).collect();
+    assert_eq!(keys.len(), 29, "{keys:?}");
+    let mut taken = 0;
+    for key in keys {
+        for value in [
+            "0",
+            "-1",
+            "0.0",
+            "-0.5",
+            "nan",
+            "inf",
+            "-inf",
+            "1e300",
+            "9223372036854775807",
+            "\"\"",
+            "\"text\"",
+            "[]",
+            "[[]]",
+            "{}",
+            "true",
+            "1979-05-27",
+        ] {
+            match with(key, &format!("{key} = {value}")) {
+                Ok(config) => {
+                    taken += 1;
+                    assert_eq!(read(&config.to_toml()).as_ref(), Ok(&config), "{key} = {value}");
+                }
+                Err(message) => assert!(message.contains(key), "{key} = {value}: {message}"),
+            }
+        }
+    }
+    // Zeros where they mean something, and any text for a benchmark's name.
+    assert!((4..20).contains(&taken), "{taken}");
+}
+
+/// What reading the default file with some keys set gives.
+fn with_set(settings: &[&str]) -> Result<Config, String> {
+    let file = files::repository().join("training/configs/default.toml");
+    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+    Config::read_with(&file, &settings).map_err(|error| error.to_string())
+}
+
+#[test]
+fn single_keys_can_be_set_added_and_taken_out() {
+    let config = with_set(&[
+        "learning.n_steps=7",
+        "replay_buffer.priority.exponent=0.6",
+        "replay_buffer.priority.correction = 0.4",
+        "training_benchmark=",
+    ])
+    .unwrap();
+    assert_eq!(config.learning.n_steps, 7);
+    assert_eq!(config.replay_buffer.priority, Some(Priority { exponent: 0.6, correction: 0.4 }));
+    assert_eq!(config.training_benchmark, None);
+    let words = with_set(&["learning.critics=minimum", "training_benchmark=elsewhere", "learning.hidden=[8, 8]"]).unwrap();
+    assert_eq!(
+        (words.learning.critics, words.training_benchmark.as_deref(), words.learning.hidden),
+        (Critics::Minimum, Some("elsewhere"), vec![8, 8])
+    );
+}
+
+#[test]
+fn a_key_set_wrongly_is_refused_with_what_would_do() {
+    for (setting, expected) in [
+        ("learning.n_steps", "--set: learning.n_steps; KEY=VALUE is needed"),
+        ("=5", "--set: =5; a key is needed before"),
+        ("learning..n_steps=5", "joined by single points"),
+        ("seed.low=5", "seed is a value and has no keys below it"),
+        ("learning.n_steps=0", "--set learning.n_steps=0: learning.n_steps: 0; must lie in 1..100"),
+        ("learning.n_step=1", "unknown field `n_step`"),
+        ("learning.hidden=wide", "--set learning.hidden=wide: invalid type: string"),
+    ] {
+        let message = with_set(&[setting]).unwrap_err();
+        assert!(message.contains(expected), "{setting}: {message}");
+    }
+}
+
+#[test]
+fn every_training_file_reads_by_path_and_by_name() {
+    let folder = files::repository().join("training/configs");
+    let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert_eq!(files.len(), 4);
+    for file in files {
+        let by_path = Config::read(&file).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(Config::read(Path::new(file.file_stem().unwrap())).unwrap(), by_path);
+    }
+    let message = Config::read(Path::new("papre")).unwrap_err().to_string();
+    assert!(message.contains("papre: is no training file: the program comes with default, gpu, as-run, paper"), "{message}");
+}
+
+#[test]
+fn a_file_gives_only_what_differs_from_its_base() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let read = |name: &str| Config::read(&folder.path().join(name)).map_err(|error| error.to_string());
+    write("own.toml", &default_file());
+    write("longer.toml", "base = \"own.toml\"\nsteps = 40000\n[learning]\ngamma = 0.5\n[learning.entropy]\ncoefficient = 0.1\n");
+    write("longest.toml", "base = \"longer.toml\"\nsteps = 50000\n");
+    let (own, longest) = (read("own.toml").unwrap(), read("longest.toml").unwrap());
+    assert_eq!((longest.steps, longest.learning.gamma, longest.learning.entropy.coefficient), (Some(50_000), 0.5, 0.1));
+    assert_eq!(
+        (&longest.learning.hidden, longest.learning.entropy.learning_rate),
+        (&own.learning.hidden, own.learning.entropy.learning_rate)
+    );
+    // By name too, wherever the file is.
+    write("named.toml", "base = \"default\"\nseed = 9\n");
+    assert_eq!(read("named.toml").unwrap(), Config { seed: 9, ..own });
+    write("circle.toml", "base = \"circle.toml\"\n");
+    write("wrong.toml", "base = 3\n");
+    write("missing.toml", "base = \"no.toml\"\n");
+    for (file, expected) in [
+        ("circle.toml", "base: \"circle.toml\"; at most 8 files may follow each other"),
+        ("wrong.toml", "base: 3; must be the name or the path"),
+        ("missing.toml", "no.toml: cannot be read"),
+    ] {
+        let message = read(file).unwrap_err();
+        assert!(message.contains(expected), "{message}");
+    }
+}
+
+#[test]
+fn a_budget_that_ends_before_the_first_update_is_refused() {
+    let checked = |steps: &str| with("steps", steps).unwrap().check_budget(Path::new("fast.toml")).map_err(|error| error.to_string());
+    let message = checked("steps = 20000").unwrap_err();
+    assert!(message.contains("fast.toml: steps: 20000; must be above 20000, or nothing is learned"), "{message}");
+    assert_eq!(checked("steps = 20001"), Ok(()));
+}

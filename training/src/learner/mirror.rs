@@ -1,0 +1,87 @@
+//! Mirror augmentation: transitions mirrored left to right.
+//!
+//! A truck and its sensors are symmetric, so the mirror image of a transition is a valid transition of left-hand
+//! traffic. A learner that samples both has seen every bend in both directions.
+
+use offtrack::layout::{Action, N_TRACTOR_RAYS, N_TRAILER_RAYS, N_VALUES, Ray};
+use offtrack::world::World;
+use rand::Rng;
+
+use crate::error::Error;
+use crate::learner::replay_buffer::Sample;
+
+/// Signed values of an observation, left positive: angles to waypoints, headings, articulation.
+const SIGNED: std::ops::Range<usize> = 6..22;
+/// Index of the first distance sensor in an observation.
+const RANGES: usize = 30;
+/// Tolerance of two sensors' mounts or two steer angles that are mirror images [m, rad]: f32 rounds at 1e-6 of a few
+/// metres.
+const SAME: f32 = 1e-4;
+
+/// The mirror image of observations and actions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mirror {
+    /// Index of the value that each value is mirrored from, and its factor, `[values]`.
+    values: [(usize, f32); N_VALUES],
+    /// Index of each action's mirror image, `[actions]`.
+    actions: Vec<u32>,
+}
+
+impl Mirror {
+    /// The mirror of a world. Its action table and its sensors must be symmetric.
+    pub fn of(world: &World) -> Result<Mirror, Error> {
+        let refused = |expected: String| Error::Flag { flag: "learning.mirror_augmentation", value: "true".to_owned(), expected };
+        let mut values = std::array::from_fn(|index| (index, if SIGNED.contains(&index) { -1.0 } else { 1.0 }));
+        for (index, ray) in world.rays.iter().enumerate() {
+            // The image of a trailer's sensor is one of the trailer's.
+            let unit = if index < N_TRAILER_RAYS { 0..N_TRAILER_RAYS } else { N_TRAILER_RAYS..N_TRAILER_RAYS + N_TRACTOR_RAYS };
+            let image = unit.into_iter().find(|&other| are_images(ray, &world.rays[other]));
+            let image = image.ok_or_else(|| {
+                refused(format!("the vehicle's distance sensor {index} has no mirror image: leave learning.mirror_augmentation out"))
+            })?;
+            values[RANGES + index].0 = RANGES + image;
+        }
+        let image = |action: &Action| {
+            let same = |other: &Action| (action.steering + other.steering).abs() <= SAME && (action.speed - other.speed).abs() <= SAME;
+            world.actions.iter().position(same).map(|index| index as u32).ok_or_else(|| {
+                let degrees = action.steering.to_degrees();
+                refused(format!(
+                    "steering {degrees:.1} deg is in the action table and its opposite is not: leave learning.mirror_augmentation out"
+                ))
+            })
+        };
+        Ok(Mirror { values, actions: world.actions.iter().map(image).collect::<Result<_, _>>()? })
+    }
+
+    /// Index of the value that each value is mirrored from, and its factor, `[values]`; and each action's mirror image,
+    /// `[actions]`.
+    pub fn images(&self) -> ([(usize, f32); N_VALUES], Vec<u32>) {
+        (self.values, self.actions.clone())
+    }
+
+    /// The mirror image of an observation.
+    pub fn observation(&self, seen: &[f32; N_VALUES]) -> [f32; N_VALUES] {
+        self.values.map(|(index, factor)| factor * seen[index])
+    }
+
+    /// Mirrors each transition with probability 0.5.
+    pub fn mirror_half(&self, sample: &mut Sample<N_VALUES>, rng: &mut impl Rng) {
+        let rows = sample.observation.iter_mut().zip(&mut sample.next_observation).zip(&mut sample.action);
+        for ((observation, next_observation), action) in rows {
+            if rng.random() {
+                *observation = self.observation(observation);
+                *next_observation = self.observation(next_observation);
+                *action = self.actions[*action as usize];
+            }
+        }
+    }
+}
+
+/// Whether two sensors of a unit are mirror images about its centre line.
+fn are_images(one: &Ray, other: &Ray) -> bool {
+    let mirror = glam::Vec2::new(1.0, -1.0);
+    one.origin.abs_diff_eq(mirror * other.origin, SAME) && one.direction.abs_diff_eq(mirror * other.direction, SAME)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,137 @@
+//! The network of actor and critics alike: a stack of linear layers with rectifiers between them.
+
+use burn::module::{Module, Param};
+use burn::nn::{LayerNorm, LayerNormConfig, Linear};
+use burn::tensor::activation::{log_softmax, relu};
+use burn::tensor::{Device, Tensor, TensorData};
+use rand::Rng;
+
+/// Linear layers, a rectifier after each but the last.
+#[derive(Module, Debug, Default)]
+pub struct Mlp {
+    /// The layers, from the observation on; weights are `[inputs, outputs]`.
+    pub layers: Vec<Linear>,
+    /// Normalisations before the rectifiers, one each or none at all (J. Ba and others, "Layer Normalization", 2016).
+    pub norms: Vec<LayerNorm>,
+}
+
+impl Mlp {
+    /// Layers between the given sizes. Weights are drawn from He's uniform distribution ("Delving Deep into
+    /// Rectifiers", 2015), those of the last layer times `last_gain`; biases are 0.
+    pub fn new(sizes: &[usize], last_gain: f32, rng: &mut impl Rng, device: &Device) -> Mlp {
+        let n_layers = sizes.len() - 1;
+        let layers = sizes.windows(2).enumerate().map(|(index, ends)| {
+            let [inputs, outputs] = [ends[0], ends[1]];
+            let gain = if index + 1 == n_layers { last_gain } else { 1.0 };
+            let limit = gain * (6.0 / inputs as f32).sqrt();
+            let weights: Vec<f32> = (0..inputs * outputs).map(|_| limit * rng.random_range(-1.0..1.0f32)).collect();
+            layer(weights, vec![0.0; outputs], device)
+        });
+        Mlp { layers: layers.collect(), norms: Vec::new() }
+    }
+
+    /// The same layers with layer normalisation before each rectifier.
+    pub fn with_layer_norm(self) -> Mlp {
+        let hidden = self.layers.len() - 1;
+        let norm = |layer: &Linear| LayerNormConfig::new(layer.weight.dims()[1]).init(&layer.weight.device());
+        Mlp { norms: self.layers[..hidden].iter().map(norm).collect(), layers: self.layers }
+    }
+
+    /// From an observation `[B, inputs]` to one value an action `[B, A]`.
+    pub fn forward(&self, observation: Tensor<2>) -> Tensor<2> {
+        let mut output = observation;
+        for (index, layer) in self.layers.iter().enumerate() {
+            output = layer.forward(output);
+            if let Some(norm) = self.norms.get(index) {
+                output = norm.forward(output);
+            }
+            if index + 1 < self.layers.len() {
+                output = relu(output);
+            }
+        }
+        output
+    }
+
+    /// Every parameter with its name, in the order in which a module shows them.
+    pub fn parameters(&self) -> Vec<(String, Vec<f32>)> {
+        let layers = self.layers.iter().zip(1..).flat_map(|(layer, number)| {
+            let biases = layer.bias.as_ref().map(|bias| (format!("layer {number}, bias"), values(bias)));
+            [Some((format!("layer {number}, weight"), values(&layer.weight))), biases].into_iter().flatten()
+        });
+        let norms = self.norms.iter().zip(1..).flat_map(|(norm, number)| {
+            let shift = norm.beta.as_ref().map(|beta| (format!("normalisation {number}, shift"), values(beta)));
+            [Some((format!("normalisation {number}, scale"), values(&norm.gamma))), shift].into_iter().flatten()
+        });
+        layers.chain(norms).collect()
+    }
+
+    /// The same network on a device; waits for the one that it is on.
+    pub fn on(&self, device: &Device) -> Mlp {
+        self.with_parameters(self.parameters().into_iter().map(|(_, values)| values).collect(), device)
+    }
+
+    /// A network of the same sizes with other parameters, as many and as long as [`Mlp::parameters`] gives.
+    pub fn with_parameters(&self, parameters: Vec<Vec<f32>>, device: &Device) -> Mlp {
+        let mut parameters = parameters.into_iter();
+        let mut next = || parameters.next().unwrap_or_default();
+        let layers = self.layers.iter().map(|_| layer(next(), next(), device)).collect();
+        let norm = |norm: &LayerNorm| {
+            let mut norm = norm.clone();
+            norm.gamma = vector(next(), device);
+            norm.beta = norm.beta.map(|_| vector(next(), device));
+            norm
+        };
+        Mlp { layers, norms: self.norms.iter().map(norm).collect() }
+    }
+}
+
+fn values<const D: usize>(parameter: &Param<Tensor<D>>) -> Vec<f32> {
+    parameter.val().into_data().try_to_vec().expect("parameters are made of f32 values")
+}
+
+fn vector(values: Vec<f32>, device: &Device) -> Param<Tensor<1>> {
+    let shape = [values.len()];
+    Param::from_data(TensorData::new(values, shape), device)
+}
+
+/// A layer with the given weights `[inputs, outputs]` and biases `[outputs]`.
+pub fn layer(weights: Vec<f32>, biases: Vec<f32>, device: &Device) -> Linear {
+    let shape = [weights.len() / biases.len(), biases.len()];
+    Linear { weight: Param::from_data(TensorData::new(weights, shape), device), bias: Some(vector(biases, device)) }
+}
+
+/// Probabilities and their logarithms, `[B, A]` each, of an actor's output `[B, A]`.
+pub fn distribution(logits: Tensor<2>) -> (Tensor<2>, Tensor<2>) {
+    let log_probs = log_softmax(logits, 1);
+    (log_probs.clone().exp(), log_probs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand::rngs::SmallRng;
+
+    fn weights(network: &Mlp) -> Vec<f32> {
+        network.layers.iter().flat_map(|layer| layer.weight.val().into_data().try_to_vec::<f32>().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_rectifier_stands_between_the_layers_and_none_after_the_last() {
+        let device = Device::flex();
+        let network = Mlp {
+            layers: vec![layer(vec![1.0, -1.0], vec![0.0, 0.5], &device), layer(vec![-2.0, 3.0], vec![1.0], &device)],
+            norms: Vec::new(),
+        };
+        let output = network.forward(Tensor::from_data([[2.0], [-1.0]], &device));
+        // relu(2), relu(-1.5) -> -4 + 0 + 1; relu(-1), relu(1.5) -> 0 + 4.5 + 1.
+        assert_eq!(output.into_data().try_to_vec::<f32>().unwrap(), [-3.0, 5.5]);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_network() {
+        let network = |seed| Mlp::new(&[4, 8, 2], 1.0, &mut SmallRng::seed_from_u64(seed), &Device::flex());
+        assert_eq!(weights(&network(1)), weights(&network(1)));
+        assert_ne!(weights(&network(1)), weights(&network(2)));
+    }
+}

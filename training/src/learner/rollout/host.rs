@@ -1,0 +1,255 @@
+//! Trucks and replay buffer on the host.
+
+use burn::tensor::{Device, Tensor, TensorData};
+use offtrack::layout::{Column, Ended, N_VALUES};
+use offtrack::random;
+use offtrack::simulator::{Batch, RouteChoice, Simulator};
+use offtrack::world::World;
+use rand::{Rng, SeedableRng};
+use std::sync::Arc;
+
+use super::{Episodes, Rollout};
+use crate::error::Error;
+use crate::learner::checkpoint::{Columns, Stored};
+use crate::learner::config::{Config, Learning};
+use crate::learner::generator::Generator;
+use crate::learner::mirror::Mirror;
+use crate::learner::network::Mlp;
+use crate::learner::normalisation::Normalisation;
+use crate::learner::replay_buffer::{ReplayBuffer, Rows, Sample};
+use crate::learner::sac::{N_SHARDS, Transitions};
+use crate::policy::sampled;
+
+/// See the module.
+pub struct HostRollout {
+    config: Config,
+    simulator: Simulator,
+    replay_buffer: ReplayBuffer<N_VALUES>,
+    /// Random numbers of actions and of samples.
+    acting: Generator,
+    sampling: Generator,
+    /// None without mirror augmentation.
+    mirror: Option<Mirror>,
+    normalisation: Normalisation,
+    /// Observations before the step in hand.
+    observation: Vec<[f32; N_VALUES]>,
+    /// Rows of the latest sample.
+    sampled_rows: Vec<usize>,
+    /// Sum of each truck's rewards in its episode so far, `[n_envs]`.
+    episode_rewards: Vec<f32>,
+    ended: Vec<Episodes>,
+}
+
+impl HostRollout {
+    /// Trucks at the start of their first episodes, and an empty replay buffer. A mirror that the world does not have
+    /// is an error.
+    pub fn new(config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<HostRollout, Error> {
+        let stream = |purpose: u32| Generator::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
+        Ok(HostRollout {
+            simulator: Simulator::new(world.clone(), config.n_envs, config.seed, RouteChoice::Drawn(routes))?,
+            replay_buffer: ReplayBuffer::new(config.n_envs, config.learning.n_steps, &config.replay_buffer),
+            acting: stream(1),
+            sampling: stream(2),
+            mirror,
+            normalisation: Normalisation::none(N_VALUES),
+            observation: Vec::new(),
+            sampled_rows: Vec::new(),
+            episode_rewards: vec![0.0; config.n_envs],
+            ended: Vec::new(),
+            config: config.clone(),
+        })
+    }
+
+    fn choose(&mut self, actor: &Mlp) -> Vec<u32> {
+        let logits = logits(actor, &self.normalisation, &self.simulator.batch().observation);
+        sampled(&logits, self.n_actions(), &mut self.acting)
+    }
+
+    fn n_actions(&self) -> usize {
+        self.simulator.world().actions.len()
+    }
+
+    /// Appends the step just made to the replay buffer, and counts the episodes that it ended.
+    fn remember(&mut self) {
+        let batch = self.simulator.batch();
+        self.replay_buffer.append(Rows {
+            observation: &self.observation,
+            action: &batch.action,
+            reward: &batch.reward,
+            ended: &batch.ended,
+            next_observation: &batch.next_observation,
+        });
+        for ((sum, &reward), &code) in self.episode_rewards.iter_mut().zip(&batch.reward).zip(&batch.ended) {
+            *sum += reward;
+            if code != Ended::Running as u32 {
+                let arrived = u64::from(code == Ended::Arrived as u32);
+                self.ended.push(Episodes { count: 1, arrived, reward: f64::from(std::mem::take(sum)) });
+            }
+        }
+    }
+}
+
+impl Rollout for HostRollout {
+    fn simulator(&self) -> &Simulator {
+        &self.simulator
+    }
+
+    fn n_transitions(&self) -> usize {
+        self.replay_buffer.n_transitions()
+    }
+
+    fn can_sample(&self) -> bool {
+        self.replay_buffer.can_sample()
+    }
+
+    fn observations(&self) -> Result<Vec<[f32; N_VALUES]>, Error> {
+        Ok(self.replay_buffer.observations().to_vec())
+    }
+
+    fn set_normalisation(&mut self, normalisation: &Normalisation) {
+        self.normalisation = normalisation.clone();
+    }
+
+    fn step_at_random(&mut self) -> Result<(), Error> {
+        self.observation.clone_from(&self.simulator.batch().observation);
+        self.simulator.step_at_random();
+        self.remember();
+        Ok(())
+    }
+
+    fn step(&mut self, actor: &Mlp, env_steps: u64) -> Result<(), Error> {
+        self.observation.clone_from(&self.simulator.batch().observation);
+        let (mut actions, n_actions) = (self.choose(actor), self.n_actions());
+        if let Some(exploration) = &self.config.exploration {
+            exploration.explore(env_steps, n_actions, &mut actions, &mut self.acting);
+        }
+        self.simulator.step(&actions)?;
+        self.remember();
+        Ok(())
+    }
+
+    fn drive(&mut self, actor: &Mlp) -> Result<(), Error> {
+        let actions = self.choose(actor);
+        Ok(self.simulator.step(&actions)?)
+    }
+
+    fn sample(&mut self) -> Result<Vec<Transitions>, Error> {
+        let learning = &self.config.learning;
+        let mut sample = self.replay_buffer.sample(learning.batch, learning.gamma as f32, &mut self.sampling);
+        if let Some(mirror) = &self.mirror {
+            mirror.mirror_half(&mut sample, &mut self.sampling);
+        }
+        self.sampled_rows.clone_from(&sample.row);
+        Ok(shards(&sample, &self.normalisation, learning, &mut self.sampling))
+    }
+
+    fn set_td_errors(&mut self, errors: Vec<Tensor<2>>) {
+        if self.replay_buffer.has_priorities() {
+            let read = |errors: Tensor<2>| errors.into_data().try_to_vec::<f32>().expect("TD errors of f32 critics are f32");
+            let errors: Vec<f32> = errors.into_iter().flat_map(read).collect();
+            self.replay_buffer.set_td_errors(&self.sampled_rows, &errors);
+        }
+    }
+
+    fn take_episodes(&mut self, _: bool) -> Result<Vec<Episodes>, Error> {
+        Ok(std::mem::take(&mut self.ended))
+    }
+
+    fn wait(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn save<'a>(&'a self, columns: &mut Columns<'a>) {
+        for (column, bytes) in self.simulator.batch().columns() {
+            columns.put(column_name(column), bytes);
+        }
+        columns.put("rollout, acting", &self.acting.state[..]);
+        columns.put("rollout, sampling", &self.sampling.state[..]);
+        columns.put("rollout, episode rewards", &self.episode_rewards[..]);
+        self.replay_buffer.save(columns);
+    }
+
+    fn restore(&mut self, stored: &Stored, _: u64) -> Result<(), Error> {
+        self.simulator.restore(|column| stored.bytes(&column_name(column))).map_err(|error| stored.error(error.to_string()))?;
+        check_finite(self.simulator.batch(), stored)?;
+        let generator = |name: &str| {
+            let generator = Generator { state: stored.array(name)? };
+            // From all zeros every number would be zero.
+            if generator.state == [0; 4] { Err(stored.error(format!("its column `{name}` is all zeros"))) } else { Ok(generator) }
+        };
+        (self.acting, self.sampling) = (generator("rollout, acting")?, generator("rollout, sampling")?);
+        self.episode_rewards = stored.exactly("rollout, episode rewards", self.config.n_envs)?;
+        self.replay_buffer.restore(stored, self.n_actions() as u32)
+    }
+}
+
+/// An error if a truck of a checkpoint has a number that is not finite.
+fn check_finite(batch: &Batch, stored: &Stored) -> Result<(), Error> {
+    for (column, bytes) in batch.columns() {
+        let floats: Vec<f32> = match column {
+            // Indices, or floats beside indices.
+            Column::Action | Column::Ended | Column::Progress => continue,
+            Column::Truck => {
+                batch.truck.iter().flat_map(|truck| [truck.position.x, truck.position.y, truck.heading, truck.speed]).collect()
+            }
+            _ => bytes.chunks_exact(size_of::<f32>()).map(bytemuck::pod_read_unaligned).collect(),
+        };
+        if let Some(value) = floats.iter().find(|value| !value.is_finite()) {
+            return Err(stored.error(format!("its column `{}` has {value}: put a sound copy back", column_name(column))));
+        }
+    }
+    Ok(())
+}
+
+fn column_name(column: Column) -> String {
+    format!("batch, {}", column.name())
+}
+
+/// A sample as tensors, in [`N_SHARDS`] shards of nearly the same size. Both observations of a transition get the same
+/// noise, so that their difference stays what it is.
+pub fn shards<const N: usize>(
+    sample: &Sample<N>,
+    normalisation: &Normalisation,
+    learning: &Learning,
+    rng: &mut impl Rng,
+) -> Vec<Transitions> {
+    let device = Device::flex();
+    let n_rows = sample.action.len();
+    let (reward_scale, noise) = (learning.reward_scale as f32, learning.observation_noise as f32);
+    let mut shard = |index: usize| {
+        let rows = n_rows * index / N_SHARDS..n_rows * (index + 1) / N_SHARDS;
+        let shape = [rows.len(), 1];
+        let actions: Vec<i32> = sample.action[rows.clone()].iter().map(|&action| action as i32).collect();
+        let rewards: Vec<f32> = sample.reward[rows.clone()].iter().map(|reward| reward * reward_scale).collect();
+        let mut normalised = [&sample.observation, &sample.next_observation].map(|column| normalisation.apply(&column[rows.clone()]));
+        if 0.0 < noise {
+            let [observation, next] = &mut normalised;
+            for (value, next) in observation.iter_mut().zip(next) {
+                let added = rng.random_range(-noise..noise);
+                *value += added;
+                *next += added;
+            }
+        }
+        let [observation, next_observation] = normalised.map(|values| Tensor::from_data(TensorData::new(values, [rows.len(), N]), &device));
+        Transitions {
+            observation,
+            action: Tensor::from_data(TensorData::new(actions, shape), &device),
+            reward: Tensor::from_data(TensorData::new(rewards, shape), &device),
+            discount: Tensor::from_data(TensorData::new(sample.discount[rows.clone()].to_vec(), shape), &device),
+            next_observation,
+            weight: Tensor::from_data(TensorData::new(sample.weight[rows].to_vec(), shape), &device),
+        }
+    };
+    (0..N_SHARDS).map(&mut shard).collect()
+}
+
+/// The network's output for each observation, `[rows * actions]`.
+pub fn logits<const N: usize>(network: &Mlp, normalisation: &Normalisation, observations: &[[f32; N]]) -> Vec<f32> {
+    let data = TensorData::new(normalisation.apply(observations), [observations.len(), N]);
+    let output = network.forward(Tensor::from_data(data, &Device::flex())).into_data();
+    output.try_to_vec().expect("the layers' weights are f32, and so is their output")
+}

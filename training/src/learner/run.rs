@@ -1,0 +1,217 @@
+//! A training run in its folder: the loop, its rows of metrics, its checkpoints, and its end.
+//!
+//! With a budget of steps alone, a run depends on its state and on nothing else: one that continues from a checkpoint
+//! equals one that was never stopped, bit for bit. With minutes the learning rates follow the clock.
+
+pub mod checkpointer;
+pub mod folder;
+#[cfg(test)]
+mod lost_device_tests;
+pub mod metrics_file;
+pub mod progress;
+pub mod resume;
+mod window;
+
+use bytemuck::{bytes_of, cast_slice};
+use offtrack::world::World;
+
+use crate::device;
+use crate::error::Error;
+use crate::learner::backend::Backend;
+use crate::learner::checkpoint::{Columns, Stored};
+use crate::learner::config::Config;
+use crate::learner::sac::not_finite;
+use crate::learner::training::Training;
+use crate::policy::LearnedPolicy;
+use checkpointer::{Checkpointer, Written};
+use folder::Folder;
+use progress::Progress;
+
+/// A run under way.
+pub struct Run {
+    config: Config,
+    backend: Backend,
+    /// CRC-32 of the world.
+    fingerprint: u32,
+    training: Training,
+    /// How far it is.
+    pub progress: Progress,
+    checkpointer: Checkpointer,
+}
+
+impl Run {
+    /// A run at its beginning. Its first checkpoint is written at once.
+    pub fn new(backend: Backend, config: &Config, world: &World, training: Training, folder: &Folder, progress: Progress) -> Run {
+        Run {
+            fingerprint: fingerprint(world),
+            training,
+            progress,
+            checkpointer: Checkpointer::new(folder, config.checkpoint_minutes),
+            config: config.clone(),
+            backend,
+        }
+    }
+
+    /// Where it runs, as results name it.
+    pub fn device(&self) -> String {
+        self.backend.name()
+    }
+
+    /// Trains until the budget is spent or `stopped` says so. A diverged learner and a failed device are errors; a file
+    /// that cannot be written is reported and tried again.
+    pub fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {
+        let backend = self.backend.clone();
+        match backend.guarded(|| self.learn_until(&stopped)) {
+            Err(error) if device::has_failed(&error) => {
+                let message = match error {
+                    Error::Device(message) => message,
+                    error => error.to_string(),
+                };
+                Err(Error::Device(format!("{message}; {}", self.last_checkpoint())))
+            }
+            result => result,
+        }
+    }
+
+    fn learn_until(&mut self, stopped: &impl Fn() -> bool) -> Result<(), Error> {
+        while self.progress.fraction() < 1.0 && !stopped() {
+            let is_warm = self.training.is_warm()?;
+            self.training.act(self.progress.env_steps())?;
+            self.progress.stepped(self.config.n_envs as u64);
+            self.count_episodes(false)?;
+            if is_warm {
+                self.training.learn(self.rate_factor())?;
+                self.progress.updated(self.config.learning.updates_per_step as u64);
+                if let Some((what, value)) = self.training.sac().diverged() {
+                    return Err(self.diverged(what, value));
+                }
+                if self.progress.is_row_due() {
+                    self.write_row()?;
+                }
+                self.progress.show_if_due();
+            }
+            self.checkpoint_if_due()?;
+        }
+        self.count_episodes(true)
+    }
+
+    /// The linear learning-rate schedule.
+    fn rate_factor(&self) -> f64 {
+        1.0 - (1.0 - self.config.learning.final_learning_rate_fraction) * self.progress.fraction()
+    }
+
+    fn count_episodes(&mut self, wait: bool) -> Result<(), Error> {
+        for episodes in self.training.rollout_mut().take_episodes(wait)? {
+            self.progress.ended(episodes);
+        }
+        Ok(())
+    }
+
+    /// Writes a row of metrics, once its figures have been checked.
+    fn write_row(&mut self) -> Result<(), Error> {
+        self.add_sums()?;
+        let entropy_coefficient = self.training.sac().entropy_coefficient();
+        self.progress.write_row(entropy_coefficient);
+        Ok(())
+    }
+
+    /// Takes the figures of the updates since the last row from the learner.
+    fn add_sums(&mut self) -> Result<(), Error> {
+        self.training.rollout().check()?;
+        self.count_episodes(true)?;
+        let (sums, n_updates) = self.training.sac_mut().take_sums();
+        self.progress.add_sums(&sums);
+        match not_finite(&sums).filter(|_| 0 < n_updates) {
+            Some((what, value)) => Err(self.diverged(what, value)),
+            None => Ok(()),
+        }
+    }
+
+    /// The policy as it is; waits for a device.
+    pub fn policy(&self) -> Result<LearnedPolicy, Error> {
+        self.training.policy()
+    }
+
+    /// Writes the last checkpoint, policy and row. Everything is tried before the first failure is returned.
+    pub fn close(&mut self) -> Result<(), Error> {
+        self.check()?;
+        self.begin_checkpoint()?;
+        let written = self.checkpointer.wait();
+        // The last row is not in the checkpoint: a run that continues takes it back.
+        self.add_sums()?;
+        let row = self.progress.finish(self.training.sac().entropy_coefficient());
+        written.map_or(Ok(()), |Written { checkpoint, policy }| checkpoint.and(policy)).and(row)
+    }
+
+    fn checkpoint_if_due(&mut self) -> Result<(), Error> {
+        if let Some(Written { checkpoint, policy }) = self.checkpointer.finished() {
+            self.progress.note(self.checkpointer.file(), checkpoint);
+            self.progress.note(self.checkpointer.policy(), policy);
+        }
+        if self.checkpointer.is_due() {
+            self.check()?;
+            self.begin_checkpoint()?;
+        }
+        Ok(())
+    }
+
+    /// Begins to write a checkpoint and the policy.
+    fn begin_checkpoint(&mut self) -> Result<(), Error> {
+        let policy = self.policy()?.to_bytes();
+        let mut columns = Columns::default();
+        self.progress.save(&mut columns);
+        self.training.save(&mut columns);
+        self.checkpointer.begin(&columns, self.config.to_toml(), self.fingerprint, policy);
+        Ok(())
+    }
+
+    /// Continues from a checkpoint of this run.
+    pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
+        if stored.world() != self.fingerprint {
+            let what = self.config.training_benchmark.as_ref().unwrap_or(&self.config.benchmark);
+            let message = format!("was written when {what} was different: put its scenario, vehicle and roundabout files back");
+            return Err(stored.error(message));
+        }
+        self.progress.restore(stored)?;
+        self.training.restore(stored, self.progress.updates())
+    }
+
+    /// Fails where a number of the learner is not finite. A checkpoint holds only finite numbers.
+    fn check(&mut self) -> Result<(), Error> {
+        self.training.rollout().check()?;
+        match self.training.sac().broken() {
+            Some((what, value)) => Err(self.diverged(&what, value)),
+            None => Ok(()),
+        }
+    }
+
+    /// The error of a learner that diverged: where it shows, and what there is to go back to.
+    fn diverged(&mut self, what: &str, value: f32) -> Error {
+        let also = self.training.sac().broken().filter(|(name, _)| name != what).map(|(name, _)| format!(", so is {name}"));
+        let (also, kept) = (also.unwrap_or_default(), self.last_checkpoint());
+        Error::Diverged { what: what.to_owned(), value, also, env_steps: self.progress.env_steps(), kept }
+    }
+
+    /// What there is to go back to, in words.
+    fn last_checkpoint(&mut self) -> String {
+        // One that is being written was sound when it was begun. Whether it could be written shows in the folder.
+        let _ = self.checkpointer.wait();
+        self.checkpointer.last_good()
+    }
+}
+
+/// CRC-32 of all that trucks drive by.
+fn fingerprint(world: &World) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(bytes_of(&world.params));
+    hasher.update(cast_slice(&world.actions));
+    hasher.update(cast_slice(&world.rays));
+    hasher.update(cast_slice(&world.waypoints));
+    hasher.update(cast_slice(&world.previews));
+    hasher.update(cast_slice(&world.routes));
+    for field in &world.fields {
+        hasher.update(cast_slice(&field.cells));
+        hasher.update(cast_slice(&field.values));
+    }
+    hasher.finalize()
+}

@@ -1,0 +1,158 @@
+//! The training loop's two halves, act and learn, on any backend: what `train`, `scale` and `bench` run.
+
+use std::sync::Arc;
+
+use offtrack::layout::N_VALUES;
+use offtrack::world::World;
+
+use super::backend::Backend;
+use super::checkpoint::{Columns, Stored};
+use super::config::Config;
+use super::mirror::Mirror;
+use super::normalisation::Normalisation;
+use super::rollout::Rollout;
+use super::sac::{Sac, Transitions};
+use crate::error::Error;
+use crate::policy::LearnedPolicy;
+
+/// Trucks, replay buffer and learner.
+pub struct Training {
+    config: Config,
+    world: Arc<World>,
+    /// None without mirror augmentation.
+    mirror: Option<Mirror>,
+    rollout: Box<dyn Rollout>,
+    sac: Sac,
+    /// None while actions are random.
+    normalisation: Option<Normalisation>,
+}
+
+impl Training {
+    /// Trucks at the start of their first episodes on `routes`, an empty replay buffer, and a learner with random
+    /// weights. All that can be wrong with a config in this world is an error here.
+    pub fn new(backend: &Backend, config: &Config, world: Arc<World>, routes: Vec<u32>) -> Result<Training, Error> {
+        let mirror = config.learning.mirror_augmentation.then(|| Mirror::of(&world)).transpose()?;
+        Ok(Training {
+            rollout: backend.rollout(config, &world, routes, mirror.clone())?,
+            sac: Sac::new(&config.learning, N_VALUES, world.actions.len(), u64::from(config.seed), backend.placement())?,
+            normalisation: None,
+            config: config.clone(),
+            mirror,
+            world,
+        })
+    }
+
+    /// Trucks and replay buffer.
+    pub fn rollout(&self) -> &dyn Rollout {
+        self.rollout.as_ref()
+    }
+
+    /// The same, to be stepped.
+    pub fn rollout_mut(&mut self) -> &mut dyn Rollout {
+        self.rollout.as_mut()
+    }
+
+    /// The learner.
+    pub fn sac(&self) -> &Sac {
+        &self.sac
+    }
+
+    /// The same, to be updated.
+    pub fn sac_mut(&mut self) -> &mut Sac {
+        &mut self.sac
+    }
+
+    /// Whether the policy acts already; until then actions are random.
+    pub fn is_acting(&self) -> bool {
+        self.normalisation.is_some()
+    }
+
+    /// Uses this normalisation, and the policy from here on.
+    pub fn set_normalisation(&mut self, normalisation: Normalisation) {
+        self.rollout.set_normalisation(&normalisation);
+        self.normalisation = Some(normalisation);
+    }
+
+    /// Whether the replay buffer is full enough for updates. The first time it is, the normalisation is computed from
+    /// it.
+    pub fn is_warm(&mut self) -> Result<bool, Error> {
+        let is_warm = self.config.replay_buffer.warmup <= self.rollout.n_transitions() && self.rollout.can_sample();
+        if is_warm && self.normalisation.is_none() {
+            let normalisation = self.found_normalisation()?;
+            self.set_normalisation(normalisation);
+        }
+        Ok(is_warm)
+    }
+
+    /// Acts: one step of every truck, by the actor or at random, remembered. `env_steps` were made before.
+    pub fn act(&mut self, env_steps: u64) -> Result<(), Error> {
+        if self.is_acting() { self.rollout.step(&self.sac.actor(), env_steps) } else { self.rollout.step_at_random() }
+    }
+
+    /// Learns: the updates after one step of all trucks. Learning rates are multiplied by `rate_factor`.
+    pub fn learn(&mut self, rate_factor: f64) -> Result<(), Error> {
+        for _ in 0..self.config.learning.updates_per_step {
+            self.update(rate_factor)?;
+        }
+        Ok(())
+    }
+
+    /// One update on a new sample.
+    pub fn update(&mut self, rate_factor: f64) -> Result<(), Error> {
+        let sample = self.rollout.sample()?;
+        self.update_on(sample, rate_factor);
+        Ok(())
+    }
+
+    /// One update on the latest sample.
+    pub fn update_on(&mut self, sample: Vec<Transitions>, rate_factor: f64) {
+        let errors = self.sac.update(sample, rate_factor);
+        self.rollout.set_td_errors(errors);
+    }
+
+    /// The normalisation of the observations held.
+    fn found_normalisation(&self) -> Result<Normalisation, Error> {
+        if !self.config.learning.normalise_observations || self.rollout.n_transitions() == 0 {
+            return Ok(Normalisation::none(N_VALUES));
+        }
+        let mut observations = self.rollout.observations()?;
+        // What is learned from is symmetric.
+        if let Some(mirror) = &self.mirror {
+            let images: Vec<_> = observations.iter().map(|observation| mirror.observation(observation)).collect();
+            observations.extend(images);
+        }
+        Ok(Normalisation::of(&observations))
+    }
+
+    /// The policy: the EMA of the actor. Waits for a device.
+    pub fn policy(&self) -> Result<LearnedPolicy, Error> {
+        Ok(LearnedPolicy {
+            name: "the policy in training".to_owned(),
+            benchmark: self.config.benchmark.clone(),
+            actions: self.world.actions.clone(),
+            normalisation: self.normalisation.clone().map_or_else(|| self.found_normalisation(), Ok)?,
+            actor: self.sac.actor_ema(),
+        })
+    }
+
+    /// Adds all state to a checkpoint. Waits for a device.
+    pub fn save<'a>(&'a self, columns: &mut Columns<'a>) {
+        if let Some(Normalisation { mean, factor }) = &self.normalisation {
+            columns.put("normalisation, mean", &mean[..]);
+            columns.put("normalisation, factor", &factor[..]);
+        }
+        self.sac.save(columns);
+        self.rollout.save(columns);
+    }
+
+    /// Continues from a checkpoint, after `n_updates`.
+    pub fn restore(&mut self, stored: &Stored, n_updates: u64) -> Result<(), Error> {
+        self.rollout.restore(stored, n_updates)?;
+        self.sac.restore(stored)?;
+        if stored.bytes("normalisation, mean").is_some() {
+            let values = |name: &str| stored.exactly(name, N_VALUES);
+            self.set_normalisation(Normalisation { mean: values("normalisation, mean")?, factor: values("normalisation, factor")? });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,45 @@
+//! Policies for tractor-trailers in roundabouts: learned, loaded, evaluated.
+//!
+//! A policy that comes with the project, one truck on each route that it never saw in training, until every episode has
+//! ended:
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use offtrack::layout::Ended;
+//! use offtrack::scenario::{Scenario, Split};
+//! use offtrack::simulator::{RouteChoice, Simulator};
+//! use offtrack::world::World;
+//! use offtrack_training::policy::LearnedPolicy;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scenario = Scenario::named("attard2023")?;
+//! let world = Arc::new(World::bake(&scenario)?);
+//! let policy = LearnedPolicy::shipped("attard2023")?;
+//! let routes = scenario.split(Split::Test).to_vec();
+//! let mut simulator = Simulator::new(world, routes.len(), 0, RouteChoice::Fixed(routes))?;
+//! while simulator.batch().ended.contains(&(Ended::Running as u32)) {
+//!     simulator.step(&policy.act(&simulator.batch().observation))?;
+//! }
+//! let arrived = simulator.batch().ended.iter().filter(|&&ended| ended == Ended::Arrived as u32).count();
+//! println!("{arrived} of {} trucks arrived", simulator.n_envs());
+//! # assert!(20 <= arrived && simulator.n_envs() == 23, "{arrived}");
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! The command line `offtrack` is the binary of this package; the feature `cli`, on by default, builds it. Without the
+//! feature `gpu` no graphics crate is built.
+
+pub mod device; // what steps the trucks
+pub mod error;
+pub mod evaluation; // how good a policy is
+pub mod files; // results, written whole
+pub mod learner; // how a policy is learned
+pub mod policy; // a policy and its file
+pub mod provenance; // machine and commit of a result
+
+/// The README's examples, compiled and run as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;
