@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::reader::{self, TEXT_LIMIT, read_text, shortened};
+use offtrack::reader::{Reader, TEXT_LIMIT, read_text};
 use toml::{Table, Value};
 
 use crate::error::Error;
@@ -24,8 +24,7 @@ pub(super) fn resolved(file: &Path) -> Result<Table, Error> {
 
 fn with_bases(file: &Path, depth: usize) -> Result<Table, Error> {
     let mut table = table(file)?;
-    let invalid =
-        |value: String, expected: String| reader::Error::Invalid { file: file.to_owned(), key: "base".to_owned(), value, expected };
+    let invalid = |value: String, expected: String| Reader::of(file).invalid("base", value, expected);
     let base = match table.remove("base") {
         None => return Ok(table),
         Some(Value::String(base)) if depth < DEPTH => base,
@@ -64,9 +63,7 @@ fn table(file: &Path) -> Result<Table, Error> {
         }
         None => read_text(file, TEXT_LIMIT)?,
     };
-    let malformed =
-        |error: toml::de::Error| reader::Error::Malformed { file: file.to_owned(), message: shortened(&error.to_string(), 400) };
-    Ok(toml::from_str(&text).map_err(malformed)?)
+    Ok(Reader::parse(file, &text)?.1)
 }
 
 /// A word that could be a name: no path, and no such file here.
