@@ -20,7 +20,8 @@ use crate::reader::{Error, Reader};
 use crate::route::{Lane, LeavesWorld, Route, waypoints};
 use crate::shipped::{Kind, Source};
 use lane::Lanes;
-use roundabout_keys::{Arm, Ring, Written};
+use roundabout_keys::Written;
+use roundabout_keys::{Arm, Ring};
 
 /// Whether trucks may drive on the gutter, the strip between the lanes and the kerb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Deserialize, serde::Serialize)]
@@ -88,6 +89,11 @@ impl Roundabout {
 
     fn parsed(name: String, file: &Path, text: &str) -> Result<Roundabout, Error> {
         let (reader, written) = Reader::parse::<Written>(file, text)?;
+        Roundabout::checked(name, reader, written)
+    }
+
+    /// The roundabout that `written` describes, checked as a file is; `reader` names its origin in errors.
+    pub(crate) fn checked(name: String, reader: Reader, written: Written) -> Result<Roundabout, Error> {
         let (ring, arms) = written.checked(&reader)?;
         let kerbs = kerb::kerbs(&reader, &ring, &arms)?;
         let lanes = Lanes::new(&reader, &ring, &arms)?;

@@ -1,7 +1,7 @@
 //! A roundabout file as written, and the checks of single values and of the order of arms.
 
 use glam::DVec2;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::alignment::{Alignment, Way};
 use crate::geometry::Bend;
@@ -11,63 +11,74 @@ use crate::reader::{Error, Reader, shown};
 const SHARPEST_LANE: f64 = 1.0;
 
 /// The file as written. Its values are not checked yet.
-#[derive(Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Written {
-    ring: WrittenRing,
-    arm: Vec<WrittenArm>,
+pub(crate) struct Written {
+    pub(crate) ring: WrittenRing,
+    pub(crate) arm: Vec<WrittenArm>,
 }
 
-#[derive(Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct WrittenRing {
-    island_radius: f64,
-    gutter: f64,
-    lane_width: f64,
+pub(crate) struct WrittenRing {
+    pub(crate) island_radius: f64,
+    pub(crate) gutter: f64,
+    pub(crate) lane_width: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct WrittenArm {
-    name: String,
-    bearing_deg: f64,
-    length: f64,
-    entry: WrittenWay,
-    exit: WrittenWay,
-    #[serde(default)]
-    corner: WrittenCorner,
-    #[serde(default)]
-    splitter: Vec<WrittenPoint>,
+pub(crate) struct WrittenArm {
+    pub(crate) name: String,
+    pub(crate) bearing_deg: f64,
+    pub(crate) length: f64,
+    pub(crate) entry: WrittenWay,
+    pub(crate) exit: WrittenWay,
+    #[serde(default, skip_serializing_if = "WrittenCorner::is_empty")]
+    pub(crate) corner: WrittenCorner,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) splitter: Vec<WrittenPoint>,
 }
 
-#[derive(Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct WrittenWay {
-    kerb: WrittenAlignment,
-    left: Option<WrittenAlignment>,
-    right: Option<WrittenAlignment>,
+pub(crate) struct WrittenWay {
+    pub(crate) kerb: WrittenAlignment,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) left: Option<WrittenAlignment>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) right: Option<WrittenAlignment>,
 }
 
-#[derive(Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct WrittenAlignment {
-    points: Vec<WrittenPoint>,
-    ring_radius: f64,
+pub(crate) struct WrittenAlignment {
+    pub(crate) points: Vec<WrittenPoint>,
+    pub(crate) ring_radius: f64,
 }
 
-#[derive(Deserialize, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct WrittenCorner {
-    kerb_radius: Option<f64>,
-    lane_radius: Option<f64>,
+pub(crate) struct WrittenCorner {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) kerb_radius: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) lane_radius: Option<f64>,
 }
 
-#[derive(Deserialize)]
+impl WrittenCorner {
+    fn is_empty(&self) -> bool {
+        *self == WrittenCorner::default()
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct WrittenPoint {
-    along: f64,
-    offset: f64,
-    radius: Option<f64>,
+pub(crate) struct WrittenPoint {
+    pub(crate) along: f64,
+    pub(crate) offset: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) radius: Option<f64>,
 }
 
 /// The ring around the central island.
