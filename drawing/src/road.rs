@@ -128,7 +128,7 @@ impl<'a> Road<'a> {
         let Straights { approach, departure } = self.straights;
         let away = TO_NAME.min(approach).min(departure);
         for (arm, name) in self.roundabout.arms().enumerate() {
-            // The U-turn enters and leaves on the left lanes of its arm.
+            // The U-turn enters and leaves on its arm's lanes farthest from the kerbs.
             let last = self.roundabout.arms().count() as u32;
             let Some(u_turn) = self.routes.iter().find(|route| route.entry == arm && route.exit == last) else { continue };
             let line = &u_turn.centre_line;
