@@ -89,6 +89,16 @@ fn left_lanes_lead_into_an_exit_of_one_lane_or_are_refused_by_name() {
     assert!(read(&one_lane).is_ok(), "{}", refusal_of(&one_lane));
 }
 
+#[test]
+fn a_file_with_every_kind_of_lane_is_written_as_it_was_read() {
+    let text = with_lanes("lanes = 3", "lanes = 1", "lanes = 2").replace("length = 100.0", "length = 100.0\nlane_width = 4.0");
+    let written: Written = toml::from_str(&text).unwrap();
+    let again = toml::to_string(&written).unwrap();
+    assert_eq!(toml::from_str::<Written>(&again).unwrap(), written, "{again}");
+    assert!(again.contains("lanes = 3") && again.contains("lane_width = 4.0"), "{again}");
+    assert!(!toml::to_string(&toml::from_str::<Written>(&plain()).unwrap()).unwrap().contains("lanes"));
+}
+
 proptest! {
     #[test]
     fn two_ring_lanes_lie_where_they_always_lay_to_the_last_bit(island in 1.5..200.0, gutter in 0.0..3.0, width in 2.5..8.0) {
@@ -98,5 +108,39 @@ proptest! {
         prop_assert_eq!([0, 1].map(|lane| ring.lane_radius(lane).to_bits()), [inner + width, inner].map(f64::to_bits));
         prop_assert_eq!(ring.crossing(Lane::Left), (half, half + width));
         prop_assert_eq!(ring.crossing(Lane::Right), (half + width, half));
+    }
+}
+
+proptest! {
+    // Three of four draws are refused.
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn what_is_accepted_has_smooth_routes(
+        lanes in (1usize..=3, 1usize..=2, 1usize..=2), island in 1.5..30.0, width in 2.5..12.0, arm_width in 2.5..5.0,
+        offset in 4.0f64..12.0, aim in -10.0..25.0, ring_radius in 3.0..60.0,
+    ) {
+        let kerb = |side: f64| format!(
+            "points = [{{ along = 90.0, offset = {:?}, radius = 30.0 }}, {{ along = 0.0, offset = {:?} }}]", side * offset, side * aim,
+        );
+        let [ring, entry, exit] = [lanes.0, lanes.1, lanes.2].map(|lanes| format!("lanes = {lanes}"));
+        let text = with_lanes(&ring, &entry, &exit)
+            .replace("lane_width = 3.7", &format!("lane_width = {width:?}"))
+            .replace("length = 100.0", &format!("length = 200.0\nlane_width = {arm_width:?}"))
+            .replace("island_radius = 15.0", &format!("island_radius = {island:?}"))
+            .replace("points = [{ along = 30.0, offset = 8.5 }]", &kerb(1.0))
+            .replace("points = [{ along = 30.0, offset = -8.5 }]", &kerb(-1.0))
+            .replace("ring_radius = 15.0", &format!("ring_radius = {ring_radius:?}"));
+        let Ok(roundabout) = read(&text) else { return Err(TestCaseError::reject("refused")) };
+        let n_lines = if lanes.1 == 1 { 4 } else { 5 };
+        let routes = roundabout.routes(40.0, 35.0, 2.0).unwrap();
+        prop_assert_eq!(routes.len(), 4 * n_lines);
+        for route in routes {
+            for joint in route.centre_line.pieces.windows(2) {
+                let turn = crate::geometry::wrapped(joint[1].heading_at(0.0) - joint[0].heading_at(joint[0].length()));
+                // Angles are sums of several f64.
+                prop_assert!(turn.abs() < 1e-6 && joint[0].end().distance(joint[1].start()) < 1e-6, "{}", route.name);
+            }
+        }
     }
 }
