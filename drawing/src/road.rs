@@ -128,7 +128,7 @@ impl<'a> Road<'a> {
         let Straights { approach, departure } = self.straights;
         let away = TO_NAME.min(approach).min(departure);
         for (arm, name) in self.roundabout.arms().enumerate() {
-            // The U-turn enters and leaves on the left lanes of its arm.
+            // The U-turn enters and leaves on its arm's lanes farthest from the kerbs.
             let last = self.roundabout.arms().count() as u32;
             let Some(u_turn) = self.routes.iter().find(|route| route.entry == arm && route.exit == last) else { continue };
             let line = &u_turn.centre_line;
@@ -162,11 +162,13 @@ impl<'a> Road<'a> {
     }
 
     /// The legend's lines for the routes.
-    pub(crate) fn route_legend(&self) -> [Entry; 2] {
-        [
-            Entry::new(Swatch::Arrow(lane_colour(Lane::Left)), "route from a left lane"),
-            Entry::new(Swatch::Arrow(lane_colour(Lane::Right)), "route from a right lane"),
-        ]
+    pub(crate) fn route_legend(&self) -> impl Iterator<Item = Entry> {
+        let words = |lane| match lane {
+            Lane::Left => "route from a left lane",
+            Lane::Right => "route from a right lane",
+        };
+        let shown = Lane::BOTH.into_iter().filter(|lane| self.routes.iter().any(|route| route.lane == *lane));
+        shown.map(move |lane| Entry::new(Swatch::Arrow(lane_colour(lane)), words(lane)))
     }
 }
 
