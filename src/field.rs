@@ -5,6 +5,7 @@
 //! and the lesser value counts. The blocks are stored in one flat array, in 16 bits a value.
 
 mod bake;
+mod kept;
 
 use glam::Vec2;
 
@@ -55,6 +56,20 @@ fn word(kind: Kind, level: u32, ridge_level: u32, first: u32) -> u32 {
 /// bits.
 const WHOLE: f32 = 8_388_608.0;
 const WHOLE_BITS: u32 = 0x7f_ffff;
+
+/// One past the last pair that a cell's word refers to.
+fn end(word: u32) -> usize {
+    let pairs = |shift: u32| {
+        let size = 1usize << (word >> shift & LEVEL_MASK);
+        size * (size + 1)
+    };
+    let blocks = match word >> KIND_SHIFT & KIND_MASK {
+        RIDGE => pairs(0) + 2 * pairs(RIDGE_SHIFT),
+        LESSER | GREATER => 2 * pairs(0),
+        _ => pairs(0),
+    };
+    ((word >> LEVEL_BITS) * PAIRS_PER_UNIT) as usize + blocks
+}
 
 /// Signed distance to the kerbs of one roundabout.
 #[derive(Debug, Clone, PartialEq)]
@@ -286,28 +301,17 @@ mod tests {
     fn every_block_has_the_position_and_size_of_its_cells_word() {
         // Its centre is a kink, within the range of the stated accuracy: both the coarsest and the finest blocks occur.
         let field = disc(4.0);
-        let sizes = |word: u32| {
-            let size = |shift: u32| 1 << (word >> shift & LEVEL_MASK);
-            match word >> KIND_SHIFT & KIND_MASK {
-                RIDGE => vec![size(0), size(RIDGE_SHIFT), size(RIDGE_SHIFT)],
-                LESSER | GREATER => vec![size(0); 2],
-                _ => vec![size(0)],
-            }
-        };
-        let mut ends: Vec<(u32, u32)> = field
+        let mut ends: Vec<(usize, usize)> = field
             .cells
             .iter()
-            .map(|&word| {
-                let first = (word >> LEVEL_BITS) * PAIRS_PER_UNIT;
-                (first, first + sizes(word).iter().map(|size| size * (size + 1)).sum::<u32>())
-            })
+            .map(|&word| (((word >> LEVEL_BITS) * PAIRS_PER_UNIT) as usize, end(word)))
             // The block of cells deep in a solid, if there are such cells or not.
             .chain([(0, 2)])
             .collect();
         ends.sort_unstable();
         ends.dedup();
         assert!(ends.windows(2).all(|pair| pair[0].1 == pair[1].0));
-        assert_eq!((ends[0].0, ends[ends.len() - 1].1), (0, field.values.len() as u32));
+        assert_eq!((ends[0].0, ends[ends.len() - 1].1), (0, field.values.len()));
         assert!(ends.iter().any(|(begin, end)| end - begin == 2) && ends.iter().any(|(begin, end)| 50 < end - begin));
     }
 }
