@@ -10,6 +10,12 @@ mod lane;
 mod roundabout_keys;
 #[cfg(test)]
 mod tests;
+mod text;
+
+/// A roundabout as a file has it.
+pub(crate) mod written {
+    pub(crate) use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenCorner, WrittenPoint, WrittenRing, WrittenWay};
+}
 
 use std::path::Path;
 
@@ -32,6 +38,21 @@ pub enum Gutter {
     Drivable,
     /// The lane's edge is solid: kerbs are grown by the gutter's width.
     Solid,
+}
+
+/// Stages of the check of a roundabout, in their order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Stage {
+    /// Single values, and the order of the arms.
+    Values,
+    /// Kerbs that fit and do not cross, splitter islands on the road.
+    Kerbs,
+    /// Lanes that lead into the ring, and routes that follow it.
+    Lanes,
+    /// Lanes clear of kerbs.
+    Clear,
+    /// Lanes of an arm beside each other.
+    Beside,
 }
 
 /// A checked roundabout.
@@ -94,11 +115,17 @@ impl Roundabout {
 
     /// The roundabout that `written` describes, checked as a file is; `reader` names its origin in errors.
     pub(crate) fn checked(name: String, reader: Reader, written: Written) -> Result<Roundabout, Error> {
-        let (ring, arms) = written.checked(&reader)?;
-        let kerbs = kerb::kerbs(&reader, &ring, &arms)?;
-        let lanes = Lanes::new(&reader, &ring, &arms)?;
-        check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes)?;
-        check::lanes_beside_each_other(&reader, &arms, &lanes)?;
+        Roundabout::staged(name, reader, written).map_err(|(_, error)| error)
+    }
+
+    /// The same; an error says in which stage of the check it was found.
+    pub(crate) fn staged(name: String, reader: Reader, written: Written) -> Result<Roundabout, (Stage, Error)> {
+        let at = |stage: Stage| move |error: Error| (stage, error);
+        let (ring, arms) = written.checked(&reader).map_err(at(Stage::Values))?;
+        let kerbs = kerb::kerbs(&reader, &ring, &arms).map_err(at(Stage::Kerbs))?;
+        let lanes = Lanes::new(&reader, &ring, &arms).map_err(at(Stage::Lanes))?;
+        check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes).map_err(at(Stage::Clear))?;
+        check::lanes_beside_each_other(&reader, &arms, &lanes).map_err(at(Stage::Beside))?;
         Ok(Roundabout { name, ring, arms, kerbs, lanes })
     }
 
