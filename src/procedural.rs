@@ -15,7 +15,7 @@ mod rules;
 mod tests;
 
 use crate::reader::Error;
-use crate::roundabout::Roundabout;
+use crate::roundabout::{Gutter, Roundabout};
 use crate::roundabout::written::Written;
 
 pub use distribution::Distribution;
@@ -41,20 +41,13 @@ impl Road {
     pub fn text(&self) -> String {
         self.written.to_string()
     }
-
-    /// Least distance of a route's centre line from a kerb \[m]. `approach` and `departure` are the lengths of the
-    /// routes before and after the ring \[m].
-    pub fn lane_clearance(&self, approach: f64, departure: f64) -> f64 {
-        lane_clearance(&self.roundabout, approach, departure)
-    }
 }
 
 /// Least distance of a route's centre line from a kerb, `NaN` where the arms are too short for such routes \[m].
 /// `approach` and `departure` are the lengths of the routes before and after the ring \[m].
 pub fn lane_clearance(roundabout: &Roundabout, approach: f64, departure: f64) -> f64 {
     let Ok(routes) = roundabout.routes(approach, departure, 5.0) else { return f64::NAN };
-    let kerbs = roundabout.kerbs(crate::roundabout::Gutter::Drivable);
-    routes.iter().map(|route| rules::clearance(&kerbs, &route.centre_line, 0.25, 0.0)).fold(f64::INFINITY, f64::min)
+    rules::lane_clearance(&roundabout.kerbs(Gutter::Drivable), &routes, 0.0)
 }
 
 /// Why a draw is no road.
@@ -80,13 +73,15 @@ pub enum Reason {
     ArmTooShort,
     /// A start pose nearer to a kerb than the distribution allows.
     StartOnKerb,
+    /// Gutters that leave no road between them, so that solid gutters would close the road.
+    Gutter,
     /// A route nearer to a kerb than the distribution allows.
     RouteNearKerb,
 }
 
 impl Reason {
     /// All reasons, in the order in which they are looked for.
-    pub const ALL: [Reason; 11] = [
+    pub const ALL: [Reason; 12] = [
         Reason::ArmsTooNear,
         Reason::TooSharp,
         Reason::NoArc,
@@ -97,6 +92,7 @@ impl Reason {
         Reason::LanesTooNear,
         Reason::ArmTooShort,
         Reason::StartOnKerb,
+        Reason::Gutter,
         Reason::RouteNearKerb,
     ];
 
@@ -113,6 +109,7 @@ impl Reason {
             Reason::LanesTooNear => "lanes of an arm nearer than 2.5 m to each other",
             Reason::ArmTooShort => "an arm too short for its routes",
             Reason::StartOnKerb => "a start pose too near to a kerb",
+            Reason::Gutter => "kerbs that meet once moved by the gutter",
             Reason::RouteNearKerb => "a route nearer to a kerb than the rules allow",
         }
     }

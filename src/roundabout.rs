@@ -25,7 +25,7 @@ use crate::geometry::{Curve, Outline};
 use crate::reader::{Error, Reader};
 use crate::route::{Lane, LeavesWorld, Route, waypoints};
 use crate::shipped::{Kind, Source};
-use lane::Lanes;
+use lane::{Lanes, RouteLine};
 use roundabout_keys::Written;
 use roundabout_keys::{Arm, Ring};
 
@@ -149,9 +149,9 @@ impl Roundabout {
         self.ring.outer()
     }
 
-    /// Radius of the ring lane's centre line \[m].
-    pub fn lane_radius(&self, lane: Lane) -> f64 {
-        lane::radius(&self.ring, lane)
+    /// Radii of the centre lines of the ring's lanes, the innermost first \[m].
+    pub fn lane_radii(&self) -> Vec<f64> {
+        (0..self.ring.lanes).rev().map(|from_kerb| self.ring.lane_radius(from_kerb)).collect()
     }
 
     /// The edge of the drivable surface.
@@ -162,62 +162,54 @@ impl Roundabout {
         }
     }
 
-    /// The centre lines of all lanes: two around the ring, then for every arm two that enter, then for every arm two
-    /// that leave.
+    /// The centre lines of all lanes: those around the ring, the innermost first, then for every arm those that enter,
+    /// then for every arm those that leave, the left one first.
     pub fn lanes(&self) -> Vec<Curve> {
-        let rings = Lane::BOTH.map(|lane| Curve::circle(DVec2::ZERO, self.lane_radius(lane)));
-        rings.into_iter().chain(self.lanes.curves().cloned()).collect()
+        let rings = self.lane_radii().into_iter().map(|radius| Curve::circle(DVec2::ZERO, radius));
+        rings.chain(self.lanes.curves().cloned()).collect()
     }
 
     /// The centre line of a route from the end of its entry arm to the end of its exit arm, or `None` if there is no
     /// such route.
     pub fn line(&self, entry: &str, lane: Lane, exit: u32) -> Option<Curve> {
         let entry = self.arms().position(|arm| arm == entry)?;
-        lane::exits(self.arms.len()).any(|way| way == (lane, exit)).then(|| self.lanes.route(entry, lane, exit))
+        self.lanes.routes().iter().find(|route| (route.entry, route.lane, route.exit) == (entry, lane, exit)).map(|route| route.line.clone())
     }
 
-    /// All routes, five per entry, ordered by entry arm, lane and exit. They lead from `approach` before the ring to
-    /// `departure` after it, with waypoints every `spacing` \[m].
+    /// All routes, ordered by entry arm, lane and exit. They lead from `approach` before the ring to `departure` after
+    /// it, with waypoints every `spacing` \[m].
     ///
     /// # Errors
     ///
     /// An arm that is too short, with the longest approach or departure that fits.
     pub fn routes(&self, approach: f64, departure: f64, spacing: f64) -> Result<Vec<Route>, LeavesWorld> {
         let mut routes = Vec::new();
-        for (entry, arm) in self.arms.iter().enumerate() {
-            for (lane, exit) in lane::exits(self.arms.len()) {
-                let exit_arm = &self.arms[(entry + exit as usize) % self.arms.len()];
-                let line = self.lanes.route(entry, lane, exit);
-                let leaves = |part, asked, longest, arm: &Arm| {
-                    let (arm, roundabout) = (arm.name.clone(), self.name.clone());
-                    Err(LeavesWorld { part, asked, longest, arm, roundabout })
-                };
-                let (reaches, left) = lane::ring_stations(&line, self.ring.outer());
-                let after = line.length() - left;
-                if reaches < approach {
-                    return leaves("approach", approach, reaches, arm);
-                }
-                if after < departure {
-                    return leaves("departure", departure, after, exit_arm);
-                }
-                let centre_line = line.part(reaches - approach, left + departure);
-                let half = self.ring.lane_width / 2.0;
-                let crossing = match lane {
-                    Lane::Left => (half, half + self.ring.lane_width),
-                    Lane::Right => (half + self.ring.lane_width, half),
-                };
-                routes.push(Route {
-                    name: format!("{}/{}-{}-{exit}", self.name, arm.name, lane.name()),
-                    entry,
-                    lane,
-                    exit,
-                    waypoints: waypoints(&centre_line, spacing),
-                    centre_line,
-                    crossing,
-                    before: reaches - approach,
-                    after: after - departure,
-                });
+        for &RouteLine { entry, lane, exit, ref line } in self.lanes.routes() {
+            let (arm, exit_arm) = (&self.arms[entry], &self.arms[(entry + exit as usize) % self.arms.len()]);
+            let leaves = |part, asked, longest, arm: &Arm| {
+                let (arm, roundabout) = (arm.name.clone(), self.name.clone());
+                Err(LeavesWorld { part, asked, longest, arm, roundabout })
+            };
+            let (reaches, left) = lane::ring_stations(line, self.ring.outer());
+            let after = line.length() - left;
+            if reaches < approach {
+                return leaves("approach", approach, reaches, arm);
             }
+            if after < departure {
+                return leaves("departure", departure, after, exit_arm);
+            }
+            let centre_line = line.part(reaches - approach, left + departure);
+            routes.push(Route {
+                name: format!("{}/{}-{}-{exit}", self.name, arm.name, lane.name()),
+                entry,
+                lane,
+                exit,
+                waypoints: waypoints(&centre_line, spacing),
+                centre_line,
+                crossing: self.ring.crossing(lane),
+                before: reaches - approach,
+                after: after - departure,
+            });
         }
         Ok(routes)
     }

@@ -1,20 +1,20 @@
 //! A route through a roundabout: the centre line of its lanes, and waypoints along it.
 //!
-//! A route keeps its lane: from the left entry lane through the inner ring lane to the left exit lane, or right, outer,
-//! right.
+//! A route keeps its lane, counted from the kerb on carriageways and ring alike; into an exit of one lane it leaves the
+//! ring by that.
 
 use glam::DVec2;
 
 use crate::geometry::Curve;
 use crate::reader::shown;
 
-/// One of the two lanes of a carriageway, in the direction of travel.
+/// A lane of a carriageway or of the ring, counted from the kerb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Lane {
-    /// The lane beside the splitter island; leads into the inner lane of the ring.
+    /// The second from the kerb; an entry's leads into the second of the ring.
     Left,
-    /// The lane beside the kerb; leads into the outer lane of the ring.
+    /// The first from the kerb; an entry's leads into the first of the ring.
     Right,
 }
 
@@ -27,6 +27,14 @@ impl Lane {
         match self {
             Lane::Left => "left",
             Lane::Right => "right",
+        }
+    }
+
+    /// Number of lanes between this one and the kerb.
+    pub(crate) fn from_kerb(self) -> usize {
+        match self {
+            Lane::Left => 1,
+            Lane::Right => 0,
         }
     }
 }
@@ -56,7 +64,7 @@ pub struct Route {
     /// Points along the centre line at the requested spacing, from its beginning to its end; only the last two may be
     /// nearer to each other.
     pub waypoints: Vec<Waypoint>,
-    /// Reach of a waypoint's crossing line to its left and to its right; it covers both lanes of the carriageway \[m].
+    /// Reach of a waypoint's crossing line to its left and to its right; it covers all lanes of the ring \[m].
     pub crossing: (f64, f64),
     /// Length of lane between the entry arm's end and the route's beginning \[m].
     pub before: f64,

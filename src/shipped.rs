@@ -21,6 +21,7 @@ pub const FILES: &[(&str, &str)] = embedded![
     "attard2023-as-run-training.toml",
     "attard2023-full.toml",
     "attard2023-training.toml",
+    "distributions/mixed.toml",
     "distributions/wide.toml",
     "roundabouts/16m.toml",
     "roundabouts/20m.toml",

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use glam::DVec2;
 use offtrack::geometry::{Curve, Piece};
 use offtrack::roundabout::{Gutter, Roundabout};
-use offtrack::route::{Lane, Route};
+use offtrack::route::Route;
 use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Group, Path, Rectangle};
 
@@ -184,9 +184,13 @@ pub fn roundabout(roundabout: &Roundabout, routes: &[Route], straights: Straight
         Group::new().add(road.surface()).add(road.distances()).add(road.lanes()).add(road.kerbs()).add(road.routes()).add(road.arm_names());
     let legend: Vec<Entry> = road.legend().into_iter().chain(road.route_legend()).collect();
     let title = format!("Roundabout {}: {} arms, {} routes", roundabout.name, roundabout.arms().count(), routes.len());
-    let [inner, outer] = Lane::BOTH.map(|lane| roundabout.lane_radius(lane));
+    let lanes: Vec<String> = roundabout.lane_radii().iter().map(|radius| format!("{radius:.2} m")).collect();
+    let centres = match &lanes[..] {
+        [inner @ .., last] if !inner.is_empty() => format!("centres at {} and {last}", inner.join(", ")),
+        only => format!("centre at {}", only.concat()),
+    };
     let radius = roundabout.outer_radius();
-    let subtitle = format!("Lane centres at {inner:.2} m and {outer:.2} m, outer kerb at {radius:.2} m from the centre.");
+    let subtitle = format!("Lane {centres}, outer kerb at {radius:.2} m from the centre.");
     Ok(composed(&view, &lettering, &title, &subtitle, Definitions::new(), map, &legend))
 }
 

@@ -87,6 +87,17 @@ impl<'a> Road<'a> {
         Group::new().add(Path::new().set("d", self.kerb_data()).set("fill", "none").set("stroke", colour::KERB).set("stroke-width", 1.6))
     }
 
+    /// The centre lines of the lanes for a small map.
+    pub(crate) fn thin_lanes(&self) -> Group {
+        self.lanes().set("stroke-width", 0.5).set("opacity", 0.55)
+    }
+
+    /// The edges of the drivable area for a small map.
+    pub(crate) fn thin_kerbs(&self) -> Group {
+        let kerbs = Path::new().set("d", self.kerb_data()).set("fill", "none").set("stroke", colour::KERB);
+        Group::new().add(kerbs.set("stroke-width", 0.8))
+    }
+
     /// All routes, with arrows on their approach, around the ring and on their departure.
     pub(crate) fn routes(&self) -> Group {
         let mut lines = Group::new();
@@ -128,7 +139,7 @@ impl<'a> Road<'a> {
         let Straights { approach, departure } = self.straights;
         let away = TO_NAME.min(approach).min(departure);
         for (arm, name) in self.roundabout.arms().enumerate() {
-            // The U-turn enters and leaves on the left lanes of its arm.
+            // The U-turn enters and leaves on its arm's lanes farthest from the kerbs.
             let last = self.roundabout.arms().count() as u32;
             let Some(u_turn) = self.routes.iter().find(|route| route.entry == arm && route.exit == last) else { continue };
             let line = &u_turn.centre_line;

@@ -14,10 +14,16 @@ const BETWEEN: f64 = 1.0;
 /// Part of the straight between the two bends of an S-bend by which they lengthen it at either end.
 const S_TANGENT: f64 = 0.3;
 
-/// What all arms of a road have in common \[m].
+/// Turn below which a splitter island has no corner \[rad].
+const LEAST_TURN: f64 = 0.04;
+
+/// What all arms of a road have in common: lengths \[m], and the ring's number of lanes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ring {
     pub(super) outer: f64,
+    pub(super) lanes: usize,
+    pub(super) ring_lane_width: f64,
+    /// Of the carriageways' lanes.
     pub(super) lane_width: f64,
     pub(super) gutter: f64,
 }
@@ -34,8 +40,10 @@ pub(super) struct Arm {
 #[derive(Debug, Clone)]
 pub(super) struct Carriageway {
     pub(super) kerb: Line,
-    /// Right and left lane where they do not lie beside the kerb.
-    pub(super) lanes: Option<[Line; 2]>,
+    /// Number of lanes.
+    n_lanes: usize,
+    /// Its lanes from the kerb where they do not lie beside it; else none.
+    lanes: Vec<Line>,
 }
 
 /// What both carriageways follow.
@@ -66,9 +74,9 @@ impl Arm {
         if !draws.happens(place, Q::HasSplitter, keys.splitters.share) {
             return Vec::new();
         }
-        // Beyond both lanes and a gutter on either side.
-        let beside = 2.0 * (ring.gutter + ring.lane_width);
-        let (Some(entry), Some(exit)) = (self.entry.kerb.beside(beside), self.exit.kerb.beside(beside)) else { return Vec::new() };
+        // Beyond the lanes and a gutter on either side.
+        let inner = |way: &Carriageway| way.kerb.beside(2.0 * ring.gutter + way.n_lanes as f64 * ring.lane_width);
+        let (Some(entry), Some(exit)) = (inner(&self.entry), inner(&self.exit)) else { return Vec::new() };
         let width = |x: f64| entry.y(x) + exit.y(x);
         let nose = ring.outer + 0.1;
         let steps = (0..).map(|step| nose + f64::from(step) * STEP);
@@ -81,10 +89,17 @@ impl Arm {
             points
         };
         let (left, right) = (side(&entry), side(&exit));
-        let around = left.into_iter().chain(right.into_iter().rev().map(|at| DVec2::new(at.x, -at.y)));
+        let around: Vec<DVec2> = left.into_iter().chain(right.into_iter().rev().map(|at| DVec2::new(at.x, -at.y))).collect();
+        let n = around.len();
+        let turn = |index: usize| {
+            let [before, here, after] = [index + n - 1, index, index + 1].map(|index| around[index % n]);
+            (here - before).angle_to(after - here).abs()
+        };
+        // Corners that hardly turn would be arcs of millimetres.
+        let corners = (0..n).filter(|&index| LEAST_TURN < turn(index)).map(|index| around[index]);
         let radius = millimetres(draws.within(place, Q::SplitterRadius, keys.splitters.corner_radius));
         let corner = |at: DVec2| WrittenPoint { along: millimetres(at.x), offset: millimetres(at.y), radius: Some(radius) };
-        around.map(corner).collect()
+        corners.map(corner).collect()
     }
 }
 
@@ -128,7 +143,8 @@ fn carriageway(
     side: f64,
     length: f64,
 ) -> Result<Carriageway, Reason> {
-    let half_width = 2.0 * ring.lane_width + ring.gutter + course.median + keys.kerb.deviation * draws.normal(place, Q::KerbOffset);
+    let n_lanes = if ring.lanes == 1 || draws.happens(place, Q::IsSingle, keys.lanes.single_share) { 1 } else { 2 };
+    let half_width = n_lanes as f64 * ring.lane_width + ring.gutter + course.median + keys.kerb.deviation * draws.normal(place, Q::KerbOffset);
     let beside = side * course.beside;
     let mut bends = Vec::new();
     let bend = |x: f64, y: f64, radius: f64| Bend { at: DVec2::new(x, y), radius };
@@ -170,27 +186,27 @@ fn carriageway(
     let mut kerb = Line { bends, direction, ring_radius: least };
     kerb.ring_radius = draws.log_within(place, Q::KerbArc, [least, most.min(kerb.widest_arc(ring.outer)).max(least)]);
     kerb.fit(ring.outer)?;
-    let mut lanes = None;
+    let mut lanes = Vec::new();
     if draws.happens(place, Q::HasLanes, keys.lanes.share) {
-        let lane = |beside: f64, offset: Q, radius: Q| {
-            let distance = beside + keys.lanes.deviation * (2.0 * draws.unit(place, offset) - 1.0);
+        for (from_kerb, offset, radius) in [(0.0, Q::RightOffset, Q::RightRadius), (1.0, Q::LeftOffset, Q::LeftRadius)].into_iter().take(n_lanes) {
+            let distance = ring.gutter + (from_kerb + 0.5) * ring.lane_width;
+            let distance = distance + keys.lanes.deviation * (2.0 * draws.unit(place, offset) - 1.0);
             let mut lane = kerb.beside(distance).ok_or(Reason::TooSharp)?;
             let [least, most] = keys.lanes.ring_radius.map(|factor| factor * lane.ring_radius);
-            let circle = ring.outer - beside;
+            let circle = ring.outer - ring.gutter - (from_kerb + 0.5) * ring.ring_lane_width;
             lane.ring_radius = draws.log_within(place, radius, [least, most.min(lane.widest_arc(circle)).max(least)]);
             lane.fit(circle)?;
-            Ok(lane)
-        };
-        let right = ring.gutter + 0.5 * ring.lane_width;
-        lanes = Some([lane(right, Q::RightOffset, Q::RightRadius)?, lane(right + ring.lane_width, Q::LeftOffset, Q::LeftRadius)?]);
+            lanes.push(lane);
+        }
     }
-    Ok(Carriageway { kerb, lanes })
+    Ok(Carriageway { kerb, n_lanes, lanes })
 }
 
 impl Carriageway {
     /// The carriageway as a file has it. `side` is 1 for an entry, -1 for an exit.
-    pub(super) fn written(&self, side: f64) -> WrittenWay {
-        let lane = |index: usize| self.lanes.as_ref().map(|lanes| lanes[index].written(side));
-        WrittenWay { kerb: self.kerb.written(side), right: lane(0), left: lane(1) }
+    pub(super) fn written(&self, side: f64, ring: &Ring) -> WrittenWay {
+        let lane = |from_kerb: usize| self.lanes.get(from_kerb).map(|lane| lane.written(side));
+        let lanes = (self.n_lanes != ring.lanes.min(2)).then_some(self.n_lanes);
+        WrittenWay { lanes, kerb: self.kerb.written(side), right: lane(0), left: lane(1) }
     }
 }

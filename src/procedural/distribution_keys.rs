@@ -14,6 +14,9 @@ pub(super) type Range = [f64; 2];
 #[serde(deny_unknown_fields)]
 pub(super) struct Keys {
     pub(super) ring: Ring,
+    /// Rings of one lane; needed where `ring.lanes` has any.
+    #[serde(default)]
+    pub(super) single: Option<Single>,
     pub(super) arms: Arms,
     pub(super) axis: Axis,
     pub(super) median: Median,
@@ -32,6 +35,9 @@ pub(super) struct Keys {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Ring {
+    /// Weights of rings of one, two and three lanes.
+    #[serde(default = "two_lanes")]
+    pub(super) lanes: [f64; 3],
     /// Log-uniform \[m].
     pub(super) island_radius: Range,
     /// Islands below this radius are `small_weight` times as frequent as log-uniform draws would have them \[m].
@@ -42,6 +48,21 @@ pub(super) struct Ring {
     pub(super) narrow_radius: f64,
     pub(super) narrow_lane_width: f64,
     pub(super) gutter: Range,
+}
+
+fn two_lanes() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
+}
+
+/// A ring of one lane: its own island and lane, so wide that a truck gets around.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Single {
+    /// Log-uniform \[m].
+    pub(super) island_radius: Range,
+    /// Of the ring's lane; it is widened up to the greatest where the outer radius would be less than `outer_radius`.
+    pub(super) lane_width: Range,
+    pub(super) outer_radius: f64,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -125,6 +146,9 @@ pub(super) struct Kerb {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Lanes {
+    /// Of carriageways with one lane, on rings of two or three.
+    #[serde(default)]
+    pub(super) single_share: f64,
     pub(super) share: f64,
     pub(super) deviation: f64,
     /// Log-uniform, as a multiple of that of a lane beside the kerb.
@@ -166,10 +190,10 @@ pub(super) struct Rules {
 impl Keys {
     /// An error for the first value out of its range.
     pub(super) fn check(&self, reader: &Reader) -> Result<(), Error> {
-        let Keys { ring, arms, axis, median, widening, s_bend, straight, flared, bend, kerb, lanes, corners, splitters, rules } = self;
+        let Keys { ring, single, arms, axis, median, widening, s_bend, straight, flared, bend, kerb, lanes, corners, splitters, rules } = self;
         let ranges: [(&str, Range, RangeInclusive<f64>, &str); 17] = [
-            ("ring.island_radius", ring.island_radius, 2.0..=200.0, "m"),
-            ("ring.lane_width", ring.lane_width, 2.5..=8.0, "m"),
+            ("ring.island_radius", ring.island_radius, 1.5..=200.0, "m"),
+            ("ring.lane_width", ring.lane_width, 2.5..=12.0, "m"),
             ("ring.gutter", ring.gutter, 0.0..=3.0, "m"),
             ("arms.length", arms.length, 15.0..=500.0, "m"),
             ("median.half_width", median.half_width, 0.0..=10.0, "m"),
@@ -186,19 +210,24 @@ impl Keys {
             ("corners.kerb_radius", corners.kerb_radius, 0.2..=200.0, "m"),
             ("splitters.corner_radius", splitters.corner_radius, 0.1..=2.0, "m"),
         ];
-        for (key, [low, high], limits, unit) in ranges {
-            reader.within(key, low, limits.clone(), unit)?;
-            reader.within(key, high, limits, unit)?;
-            if high < low {
-                let value = format!("[{}, {}] {unit}", shown(low), shown(high));
-                return Err(reader.invalid(key, value.trim_end(), "the least value comes first"));
+        ranges.into_iter().try_for_each(|(key, values, limits, unit)| range(reader, key, values, limits, unit))?;
+        weights(reader, "ring.lanes", &ring.lanes)?;
+        match single {
+            Some(single) => {
+                range(reader, "single.island_radius", single.island_radius, 1.5..=200.0, "m")?;
+                range(reader, "single.lane_width", single.lane_width, 2.5..=12.0, "m")?;
+                reader.within("single.outer_radius", single.outer_radius, 5.0..=200.0, "m")?;
             }
+            None if 0.0 < ring.lanes[0] => {
+                return Err(reader.invalid("single", "missing", "rings of one lane, which ring.lanes has, need this table"));
+            }
+            None => {}
         }
-        let values: [(&str, f64, RangeInclusive<f64>, &str); 29] = [
-            ("ring.small_radius", ring.small_radius, 2.0..=200.0, "m"),
+        let values: [(&str, f64, RangeInclusive<f64>, &str); 30] = [
+            ("ring.small_radius", ring.small_radius, 1.5..=200.0, "m"),
             ("ring.small_weight", ring.small_weight, 0.1..=100.0, "times"),
-            ("ring.narrow_radius", ring.narrow_radius, 2.0..=200.0, "m"),
-            ("ring.narrow_lane_width", ring.narrow_lane_width, 2.5..=8.0, "m"),
+            ("ring.narrow_radius", ring.narrow_radius, 1.5..=200.0, "m"),
+            ("ring.narrow_lane_width", ring.narrow_lane_width, 2.5..=12.0, "m"),
             ("arms.five_from", arms.five_from, 5.0..=500.0, "m"),
             ("arms.gap_variation", arms.gap_variation, 0.0..=0.9, ""),
             // Names by eight directions of the compass need arms that are farther apart than those.
@@ -213,6 +242,7 @@ impl Keys {
             ("straight.angle_deg", straight.angle_deg, -30.0..=30.0, "deg"),
             ("straight.angle_deviation_deg", straight.angle_deviation_deg, 0.0..=15.0, "deg"),
             ("kerb.deviation", kerb.deviation, 0.0..=3.0, "m"),
+            ("lanes.single_share", lanes.single_share, 0.0..=1.0, ""),
             ("lanes.share", lanes.share, 0.0..=1.0, ""),
             ("lanes.deviation", lanes.deviation, 0.0..=3.0, "m"),
             ("splitters.share", splitters.share, 0.0..=1.0, ""),
@@ -248,6 +278,17 @@ impl Keys {
         }
         Ok(())
     }
+}
+
+/// A range within `limits`, in order.
+fn range(reader: &Reader, key: &str, [low, high]: Range, limits: RangeInclusive<f64>, unit: &str) -> Result<(), Error> {
+    reader.within(key, low, limits.clone(), unit)?;
+    reader.within(key, high, limits, unit)?;
+    if low <= high {
+        return Ok(());
+    }
+    let value = format!("[{}, {}] {unit}", shown(low), shown(high));
+    Err(reader.invalid(key, value.trim_end(), "the least value comes first"))
 }
 
 /// Weights of 0..1 of which one is not 0.

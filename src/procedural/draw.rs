@@ -16,9 +16,7 @@ const COMPASS: [&str; 8] = ["E", "NE", "N", "NW", "W", "SW", "S", "SE"];
 
 /// The roundabout of an attempt, or why there is none. It is not checked as a file is.
 pub(super) fn drawn(keys: &Keys, draws: &Draws) -> Result<Written, Reason> {
-    let written_ring = ring(keys, draws);
-    let WrittenRing { island_radius, gutter, lane_width } = written_ring;
-    let ring = Ring { outer: island_radius + 2.0 * (gutter + lane_width), lane_width, gutter };
+    let (written_ring, ring) = ring(keys, draws);
     let bearings = bearings(keys, draws, &ring)?;
     let arms: Vec<Arm> = (0..bearings.len()).map(|arm| Arm::drawn(keys, draws, &ring, arm)).collect::<Result<_, _>>()?;
     let share = keys.corners.shares[draws.index(Place::Ring, Q::CornerShare, &keys.corners.weights)];
@@ -36,8 +34,9 @@ pub(super) fn drawn(keys: &Keys, draws: &Draws) -> Result<Written, Reason> {
             name: COMPASS[(bearings[index] / 45.0).round() as usize % 8].to_owned(),
             bearing_deg: bearings[index],
             length: arm.length,
-            entry: arm.entry.written(1.0),
-            exit: arm.exit.written(-1.0),
+            lane_width: (ring.lane_width != ring.ring_lane_width).then_some(ring.lane_width),
+            entry: arm.entry.written(1.0, &ring),
+            exit: arm.exit.written(-1.0, &ring),
             corner,
             splitter: arm.splitter(keys, draws, &ring, index),
         }
@@ -45,7 +44,30 @@ pub(super) fn drawn(keys: &Keys, draws: &Draws) -> Result<Written, Reason> {
     Ok(Written { ring: written_ring, arm: written.collect() })
 }
 
-fn ring(keys: &Keys, draws: &Draws) -> WrittenRing {
+/// The ring as a file has it, and what the arms need of it.
+fn ring(keys: &Keys, draws: &Draws) -> (WrittenRing, Ring) {
+    let place = Place::Ring;
+    let gutter = millimetres(draws.within(place, Q::Gutter, keys.ring.gutter));
+    let lanes = 1 + draws.index(place, Q::RingLanes, &keys.ring.lanes);
+    let (island, narrowest) = match keys.single.as_ref().filter(|_| lanes == 1) {
+        Some(single) => (draws.log_within(place, Q::IslandRadius, single.island_radius), keys.ring.lane_width[0]),
+        None => island(keys, draws),
+    };
+    let (island, lane_width) = (millimetres(island), millimetres(draws.within(place, Q::LaneWidth, [narrowest, keys.ring.lane_width[1]])));
+    let ring_lane_width = match keys.single.as_ref().filter(|_| lanes == 1) {
+        Some(single) => {
+            let needed = single.outer_radius - island - 2.0 * gutter;
+            millimetres(draws.within(place, Q::RingLaneWidth, single.lane_width).max(needed).min(single.lane_width[1]))
+        }
+        None => lane_width,
+    };
+    let outer = island + 2.0 * gutter + lanes as f64 * ring_lane_width;
+    let written = WrittenRing { island_radius: island, gutter, lane_width: ring_lane_width, lanes: (lanes != 2).then_some(lanes) };
+    (written, Ring { outer, lanes, ring_lane_width, lane_width, gutter })
+}
+
+/// Radius of the island of a ring of two or three lanes, and the least width of its lanes \[m].
+fn island(keys: &Keys, draws: &Draws) -> (f64, f64) {
     let ring = &keys.ring;
     let [least, most] = ring.island_radius;
     // Log-uniform below the small radius, and above.
@@ -57,12 +79,7 @@ fn ring(keys: &Keys, draws: &Draws) -> WrittenRing {
         false => middle * (fraction - weights[0]).exp(),
     };
     let [narrowest, widest] = ring.lane_width;
-    let narrowest = if island < ring.narrow_radius { narrowest.max(ring.narrow_lane_width).min(widest) } else { narrowest };
-    WrittenRing {
-        island_radius: millimetres(island),
-        gutter: millimetres(draws.within(Place::Ring, Q::Gutter, ring.gutter)),
-        lane_width: millimetres(draws.within(Place::Ring, Q::LaneWidth, [narrowest, widest])),
-    }
+    (island, if island < ring.narrow_radius { narrowest.max(ring.narrow_lane_width).min(widest) } else { narrowest })
 }
 
 /// Bearings of the arms in hundredths of a degree, counter-clockwise from the first \[deg].

@@ -14,6 +14,8 @@ pub(super) enum Quantity {
     Arms = 3,
     FirstBearing = 4,
     CornerShare = 5,
+    RingLanes = 6,
+    RingLaneWidth = 7,
     Gap = 16,
     Length = 17,
     IsBeside = 18,
@@ -44,6 +46,7 @@ pub(super) enum Quantity {
     LeftOffset = 74,
     LeftRadius = 75,
     WideningRadius = 76,
+    IsSingle = 77,
 }
 
 /// What a number belongs to.

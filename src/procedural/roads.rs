@@ -14,7 +14,7 @@ const CHUNK: u32 = 64;
 /// Words of a road in an entry: index, attempt and the counts of refused draws.
 const WORDS: usize = 2 + Reason::ALL.len();
 /// Kind and version of the entries.
-const KIND: &str = "roads-1";
+pub(super) const KIND: &str = "roads-1";
 
 /// Roads of a cache's entry: the attempt that was valid, and the draws refused before it.
 type Known = BTreeMap<u32, (u32, Refused)>;
@@ -65,12 +65,12 @@ impl Distribution {
     }
 
     /// All that the roads of a chunk depend on.
-    fn key(&self, seed: u32, chunk: u32) -> Vec<u8> {
+    pub(super) fn key(&self, seed: u32, chunk: u32) -> Vec<u8> {
         [self.text.as_bytes(), &seed.to_le_bytes(), &chunk.to_le_bytes()].concat()
     }
 }
 
-fn bytes(known: &Known) -> Vec<u8> {
+pub(super) fn bytes(known: &Known) -> Vec<u8> {
     let words = known.iter().flat_map(|(&index, &(attempt, Refused(counts)))| [index, attempt].into_iter().chain(counts));
     words.flat_map(u32::to_le_bytes).collect()
 }

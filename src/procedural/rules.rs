@@ -1,5 +1,7 @@
 //! What a random road keeps beside what every roundabout file must.
 
+use std::f64::consts::TAU;
+
 use glam::DVec2;
 
 use super::Reason;
@@ -27,7 +29,10 @@ impl Rules {
                 }
             }
         }
-        match routes.iter().any(|route| clearance(&kerbs, &route.centre_line, 0.25, self.lane_clearance) < self.lane_clearance) {
+        if !is_sound(&roundabout.kerbs(Gutter::Solid), kerbs.loops.len()) {
+            return Err(Reason::Gutter);
+        }
+        match lane_clearance(&kerbs, &routes, self.lane_clearance) < self.lane_clearance {
             true => Err(Reason::RouteNearKerb),
             false => Ok(()),
         }
@@ -48,9 +53,39 @@ impl Rules {
     }
 }
 
+/// Whether an outline has so many loops and each is closed: kerbs moved by the gutter may have merged.
+fn is_sound(outline: &Outline, n_loops: usize) -> bool {
+    let joined = |(one, next): (&Piece, &Piece)| one.end().distance(next.start()) < 1e-6;
+    let closed = |curve: &Curve| curve.pieces.iter().zip(curve.pieces.iter().cycle().skip(1)).all(joined);
+    outline.loops.len() == n_loops && outline.loops.iter().all(closed)
+}
+
+/// Least distance from a route to an outline; once it is below `enough`, less is not looked for \[m].
+pub(super) fn lane_clearance(kerbs: &Outline, routes: &[Route], enough: f64) -> f64 {
+    let mut pieces: Vec<Piece> = Vec::new();
+    for &piece in routes.iter().flat_map(|route| &route.centre_line.pieces) {
+        // Routes share their pieces, and together follow all of a ring lane.
+        let piece = match piece {
+            Piece::Arc { centre: DVec2::ZERO, radius, .. } => Piece::Arc { centre: DVec2::ZERO, radius, from: 0.0, sweep: TAU },
+            piece => piece,
+        };
+        if !pieces.contains(&piece) {
+            pieces.push(piece);
+        }
+    }
+    let mut least = f64::INFINITY;
+    for piece in pieces {
+        if least < enough {
+            break;
+        }
+        least = least.min(clearance(kerbs, &Curve { pieces: vec![piece] }, 0.25, enough));
+    }
+    least
+}
+
 /// Least distance from a curve to an outline, at stations `step` apart. Once it is below `enough`, a point below is
 /// not looked for any more \[m].
-pub(super) fn clearance(kerbs: &Outline, curve: &Curve, step: f64, enough: f64) -> f64 {
+fn clearance(kerbs: &Outline, curve: &Curve, step: f64, enough: f64) -> f64 {
     let (length, mut s, mut least) = (curve.length(), 0.0, f64::INFINITY);
     while s <= length && enough <= least {
         let distance = kerbs.distance(curve.point_at(s));

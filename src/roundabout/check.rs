@@ -1,6 +1,8 @@
 //! Faults between the parts of a roundabout: arcs that do not fit, kerbs that cross, lanes that meet a kerb or each
 //! other.
 
+use std::fmt::{Display, Formatter};
+
 use glam::DVec2;
 
 use super::alignment::{Fault, Way};
@@ -28,8 +30,8 @@ pub(super) fn fault(reader: &Reader, arms: &[Arm], arm: usize, corner: Option<&s
     let alignment = |arm: usize, way: Way| {
         let carriageway = arms[arm].way(way);
         match part {
-            "left" => &carriageway.lanes[0],
-            "right" => &carriageway.lanes[1],
+            "left" => carriageway.lane(Lane::Left),
+            "right" => carriageway.lane(Lane::Right),
             _ => &carriageway.kerb,
         }
     };
@@ -54,6 +56,19 @@ pub(super) fn fault(reader: &Reader, arms: &[Arm], arm: usize, corner: Option<&s
             "no such arc leads the last straight into the ring after the last point: aim nearer to the centre or change the radius",
         ),
     }
+}
+
+/// An exit's only lane that routes from left lanes cannot reach from their ring lane, of radius `circle` \[m].
+pub(super) fn no_merge(reader: &Reader, arms: &[Arm], arm: usize, circle: f64) -> Error {
+    reader.invalid(
+        format!("arm[{arm}].exit.right.ring_radius"),
+        format_args!("{} m", shown(arms[arm].exit.lane(Lane::Right).ring_radius)),
+        format!(
+            "left lanes lead here by the ring lane of {} m, and no such arc joins it to the last straight of an exit of one lane: aim \
+             nearer to the centre, change the radius, or give the exit two lanes",
+            shown(circle)
+        ),
+    )
 }
 
 /// Two arms that overlap: `length` of ring is left between their kerbs, a negative length \[m].
@@ -81,6 +96,19 @@ pub(super) fn no_way_beside(reader: &Reader, arms: &[Arm], arm: usize) -> Error 
     let next = &arms[(arm + 1) % arms.len()];
     let expected =
         format!("the kerb from {} to {} turns too sharply for a lane beside it: give the lane's radius", arms[arm].name, next.name);
+    reader.invalid(format!("arm[{arm}].corner.lane_radius"), "missing", expected)
+}
+
+/// A kerb between two arms with lanes of different widths: no lane lies beside it all along.
+pub(super) fn widths_differ(reader: &Reader, arms: &[Arm], arm: usize) -> Error {
+    let next = &arms[(arm + 1) % arms.len()];
+    let expected = format!(
+        "lanes are {} m wide on {} and {} m on {}: give the radius of the lane between them",
+        shown(arms[arm].lane_width),
+        arms[arm].name,
+        shown(next.lane_width),
+        next.name
+    );
     reader.invalid(format!("arm[{arm}].corner.lane_radius"), "missing", expected)
 }
 
@@ -157,8 +185,13 @@ pub(super) fn splitter(reader: &Reader, ring: &Ring, arm: usize, island: &Curve,
 /// Every lane keeps half a truck's width from every kerb, splitters included.
 pub(super) fn lanes_clear_of_kerbs(reader: &Reader, kerbs: &Outline, arms: &[Arm], lanes: &Lanes) -> Result<(), Error> {
     for index in 0..arms.len() {
-        for (way, lane) in [(Way::Entry, Lane::Left), (Way::Entry, Lane::Right), (Way::Exit, Lane::Left), (Way::Exit, Lane::Right)] {
-            clear(reader, kerbs, lanes.curve(index, way, lane), &format!("arm[{index}].{}.{}", way.name(), lane.name()))?;
+        for way in [Way::Entry, Way::Exit] {
+            for (lane, curve) in lanes.of(index, way).rev() {
+                clear(reader, kerbs, curve, &format!("arm[{index}].{}.{}", way.name(), lane.name()))?;
+            }
+        }
+        if let Some(curve) = lanes.merge(index) {
+            clear(reader, kerbs, curve, &format!("arm[{index}].exit.right"))?;
         }
         if let Some(curve) = lanes.first_exit(index) {
             clear(reader, kerbs, curve, &format!("arm[{index}].corner.lane_radius"))?;
@@ -173,33 +206,36 @@ pub(super) fn lanes_clear_of_kerbs(reader: &Reader, kerbs: &Outline, arms: &[Arm
 /// At the arm's end, where all lanes are parallel, their order is checked. Beyond, no two may come nearer than
 /// [`LANES_APART`], so none crosses another.
 pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lanes) -> Result<(), Error> {
-    const FROM_LEFT: [(Way, Lane); 4] =
-        [(Way::Entry, Lane::Right), (Way::Entry, Lane::Left), (Way::Exit, Lane::Left), (Way::Exit, Lane::Right)];
-    let named = |(way, lane): (Way, Lane)| format!("{}.{}", way.name(), lane.name());
     for (index, arm) in arms.iter().enumerate() {
-        let curve = |(way, lane)| lanes.curve(index, way, lane);
+        let named = |way: Way| move |(lane, curve)| Beside { way, lane, curve };
+        let entries = lanes.of(index, Way::Entry).map(named(Way::Entry));
+        let mut from_left: Vec<Beside> = entries.chain(lanes.of(index, Way::Exit).rev().map(named(Way::Exit))).collect();
         let left = DVec2::from_angle(arm.bearing).perp();
-        let offset = |lane: (Way, Lane)| curve(lane).point_at(if lane.0 == Way::Entry { 0.0 } else { f64::INFINITY }).dot(left);
-        for pair in FROM_LEFT.windows(2) {
-            if offset(pair[0]) - offset(pair[1]) < LANES_APART {
+        let offset = |lane: &Beside| lane.curve.point_at(if lane.way == Way::Entry { 0.0 } else { f64::INFINITY }).dot(left);
+        for pair in from_left.windows(2) {
+            if offset(&pair[0]) - offset(&pair[1]) < LANES_APART {
                 return Err(reader.invalid(
-                    format!("arm[{index}].{}", named(pair[0])),
-                    format_args!("{:.2} m left of the bearing at the arm's end", offset(pair[0])),
+                    format!("arm[{index}].{}", pair[0]),
+                    format_args!("{:.2} m left of the bearing at the arm's end", offset(&pair[0])),
                     format!(
                         "must lie at least {LANES_APART} m left of {}, which is at {:.2} m: move the kerbs apart, or give the lanes' points",
-                        named(pair[1]),
-                        offset(pair[1])
+                        pair[1],
+                        offset(&pair[1])
                     ),
                 ));
             }
         }
-        for (first, &one) in FROM_LEFT.iter().enumerate() {
-            for &other in &FROM_LEFT[first + 1..] {
-                let distance = |p: DVec2| curve(other).distance(p);
-                if let Some(p) = nearer(curve(one), 0.0, f64::INFINITY, LANES_APART, distance) {
+        let n_lanes = from_left.len();
+        from_left.extend(lanes.merge(index).map(|curve| Beside { way: Way::Exit, lane: Lane::Right, curve }));
+        for (first, one) in from_left.iter().enumerate() {
+            // The way of left routes into an exit's only lane joins that lane.
+            let until = if one.way == Way::Entry { from_left.len() } else { n_lanes };
+            for other in &from_left[(first + 1).min(until)..until] {
+                let distance = |p: DVec2| other.curve.distance(p);
+                if let Some(p) = nearer(one.curve, 0.0, f64::INFINITY, LANES_APART, distance) {
                     return Err(reader.invalid(
-                        format!("arm[{index}].{}", named(one)),
-                        format_args!("{} m from {} at ({:.1}, {:.1})", differing(distance(p), LANES_APART), named(other), p.x, p.y),
+                        format!("arm[{index}].{one}"),
+                        format_args!("{} m from {other} at ({:.1}, {:.1})", differing(distance(p), LANES_APART), p.x, p.y),
                         format!("the centre lines of an arm's lanes must keep {LANES_APART} m from each other"),
                     ));
                 }
@@ -207,6 +243,19 @@ pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lan
         }
     }
     Ok(())
+}
+
+/// A lane of an arm; shown as its key, `entry.left`.
+struct Beside<'a> {
+    way: Way,
+    lane: Lane,
+    curve: &'a Curve,
+}
+
+impl Display for Beside<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}.{}", self.way.name(), self.lane.name())
+    }
 }
 
 /// The first of the points every 25 cm along a curve, from station `from` to `to`, at which `distance` is below

@@ -1,6 +1,9 @@
 //! The centre lines of a roundabout's lanes, and the routes that they form.
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry as Slot;
 use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
 
 use glam::DVec2;
 
@@ -22,32 +25,39 @@ struct Lead {
     angle: f64,
 }
 
-/// Every lane of every arm, and the right lanes to the first exit that pass outside the ring.
+/// A route from the end of its entry arm to the end of its exit arm.
+#[derive(Debug, Clone)]
+pub(super) struct RouteLine {
+    /// Index of the entry arm.
+    pub(super) entry: usize,
+    pub(super) lane: Lane,
+    /// Exit number, counted counter-clockwise from the entry.
+    pub(super) exit: u32,
+    pub(super) line: Curve,
+}
+
+/// Every lane of every arm, and the routes that they form.
 #[derive(Debug, Clone)]
 pub(super) struct Lanes {
-    radii: [f64; 2],
-    bearings: Vec<f64>,
-    /// By arm and lane.
-    entries: Vec<[Lead; 2]>,
-    exits: Vec<[Lead; 2]>,
-    /// By entry arm.
+    /// By arm, then from the kerb.
+    entries: Vec<Vec<Lead>>,
+    exits: Vec<Vec<Lead>>,
+    /// By arm of an exit with one lane that routes from left lanes take: that lane, led to their lane of the ring.
+    merges: BTreeMap<usize, Lead>,
+    /// By entry arm: the right lane to the first exit, where it passes outside the ring.
     around: Vec<Option<Curve>>,
+    /// By entry arm, lane and exit.
+    routes: Vec<RouteLine>,
 }
 
-/// Radius of a ring lane's centre line \[m].
-pub(super) fn radius(ring: &Ring, lane: Lane) -> f64 {
-    let inner = ring.island_radius + ring.gutter + ring.lane_width / 2.0;
-    match lane {
-        Lane::Left => inner,
-        Lane::Right => inner + ring.lane_width,
-    }
-}
-
-/// The exits that each entry lane leads to on a roundabout of `n_arms`; the last is a U-turn.
-pub(super) fn exits(n_arms: usize) -> impl Iterator<Item = (Lane, u32)> {
+/// The exits that the lanes of an entry lead to on a roundabout of `n_arms`; the last is a U-turn.
+pub(super) fn exits(n_arms: usize, entry_lanes: usize) -> Vec<(Lane, u32)> {
     let n_arms = n_arms as u32;
-    let left = n_arms.saturating_sub(2).max(1)..=n_arms;
-    left.map(|exit| (Lane::Left, exit)).chain((1..=n_arms.min(2)).map(|exit| (Lane::Right, exit)))
+    let of = |lane: Lane, exits: RangeInclusive<u32>| exits.map(move |exit| (lane, exit));
+    match entry_lanes {
+        1 => of(Lane::Right, 1..=n_arms).collect(),
+        _ => of(Lane::Left, n_arms.saturating_sub(2).max(1)..=n_arms).chain(of(Lane::Right, 1..=n_arms.min(2))).collect(),
+    }
 }
 
 /// The stations at which a line first reaches and last leaves the circle of radius `outer` around the ring's centre; if
@@ -69,42 +79,71 @@ impl Lanes {
     /// All lanes. Fails if a lane does not lead into the ring or a route would have to go backwards.
     pub(super) fn new(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<Lanes, Error> {
         let lead = |index: usize, way: Way, lane: Lane| -> Result<Lead, Error> {
-            let arm = &arms[index];
-            let fault = |fault| check::fault(reader, arms, index, None, lane.name(), way, fault);
-            let (curve, arrival) = arm.way(way).lanes[lane as usize].lead(radius(ring, lane)).map_err(fault)?;
+            let (arm, carriageway) = (&arms[index], arms[index].way(way));
+            let circle = ring.lane_radius(lane.from_kerb());
+            let fault = |fault| match carriageway.lanes.len() <= lane.from_kerb() {
+                true => check::no_merge(reader, arms, index, circle),
+                false => check::fault(reader, arms, index, None, lane.name(), way, fault),
+            };
+            let (curve, arrival) = carriageway.lane(lane).lead(circle).map_err(fault)?;
             let curve = way.placed(&curve, arm.bearing);
             Ok(match way {
                 Way::Entry => Lead { curve, angle: arrival },
                 Way::Exit => Lead { curve: curve.reversed(), angle: -arrival },
             })
         };
-        let leads = |way: Way| -> Result<Vec<[Lead; 2]>, Error> {
-            (0..arms.len()).map(|index| Ok([lead(index, way, Lane::Left)?, lead(index, way, Lane::Right)?])).collect()
+        let leads = |way: Way| -> Result<Vec<Vec<Lead>>, Error> {
+            let of = |index: usize| Lane::BOTH.into_iter().rev().take(arms[index].way(way).lanes.len()).map(|lane| lead(index, way, lane)).collect();
+            (0..arms.len()).map(of).collect()
         };
-        let around = (0..arms.len()).map(|index| first_exit(reader, ring, arms, index)).collect::<Result<_, Error>>()?;
-        let radii = Lane::BOTH.map(|lane| radius(ring, lane));
-        let bearings = arms.iter().map(|arm| arm.bearing).collect();
-        let lanes = Lanes { radii, bearings, entries: leads(Way::Entry)?, exits: leads(Way::Exit)?, around };
-        for entry in 0..arms.len() {
-            for (lane, exit) in exits(arms.len()) {
-                let sweep = lanes.sweep(entry, lane, exit);
-                if !lanes.outside(entry, lane, exit) && !(0.0..=TAU).contains(&sweep) {
-                    return Err(check::backwards(reader, arms, entry, lane, exit, sweep * lanes.radii[lane as usize]));
+        let around: Vec<Option<Curve>> = (0..arms.len()).map(|index| first_exit(reader, ring, arms, index)).collect::<Result<_, Error>>()?;
+        let (entries, exit_leads) = (leads(Way::Entry)?, leads(Way::Exit)?);
+        let (mut merges, mut routes) = (BTreeMap::new(), Vec::new());
+        for (entry, arm) in arms.iter().enumerate() {
+            for (lane, exit) in exits(arms.len(), arm.entry.lanes.len()) {
+                if let (Lane::Right, 1, Some(curve)) = (lane, exit, &around[entry]) {
+                    routes.push(RouteLine { entry, lane, exit, line: curve.clone() });
+                    continue;
                 }
+                let to = (entry + exit as usize) % arms.len();
+                let inward = &entries[entry][lane.from_kerb()];
+                let outward: &Lead = match (exit_leads[to].get(lane.from_kerb()), merges.entry(to)) {
+                    (Some(lead), _) => lead,
+                    (None, Slot::Occupied(merge)) => merge.into_mut(),
+                    (None, Slot::Vacant(none)) => none.insert(lead(to, Way::Exit, lane)?),
+                };
+                // The angle along which the route follows the ring.
+                let between = if to == entry { TAU } else { (arms[to].bearing - arm.bearing).rem_euclid(TAU) };
+                let sweep = between + outward.angle - inward.angle;
+                let radius = ring.lane_radius(lane.from_kerb());
+                if !(0.0..=TAU).contains(&sweep) {
+                    return Err(check::backwards(reader, arms, entry, lane, exit, sweep * radius));
+                }
+                let mut line = inward.curve.clone();
+                if 1e-9 < sweep {
+                    line.pieces.push(ring_arc(radius, wrapped(arm.bearing + inward.angle), sweep));
+                }
+                line.pieces.extend(&outward.curve.pieces);
+                routes.push(RouteLine { entry, lane, exit, line });
             }
         }
-        Ok(lanes)
+        Ok(Lanes { entries, exits: exit_leads, merges, around, routes })
     }
 
-    /// Every lane of every arm, in and out, in the direction of travel.
+    /// Every lane of every arm, in and out, in the direction of travel; of two the left one first.
     pub(super) fn curves(&self) -> impl Iterator<Item = &Curve> {
-        self.entries.iter().chain(&self.exits).flatten().map(|lead| &lead.curve)
+        self.entries.iter().chain(&self.exits).flat_map(|leads| leads.iter().rev()).map(|lead| &lead.curve)
     }
 
-    /// The lane of an arm in the direction of travel.
-    pub(super) fn curve(&self, arm: usize, way: Way, lane: Lane) -> &Curve {
+    /// The lanes of a carriageway in the direction of travel, from the kerb.
+    pub(super) fn of(&self, arm: usize, way: Way) -> impl DoubleEndedIterator<Item = (Lane, &Curve)> + ExactSizeIterator {
         let leads = if way == Way::Entry { &self.entries } else { &self.exits };
-        &leads[arm][lane as usize].curve
+        Lane::BOTH.into_iter().rev().zip(leads[arm].iter().map(|lead| &lead.curve))
+    }
+
+    /// The way of routes from left lanes into an arm's exit of one lane, if there are any.
+    pub(super) fn merge(&self, arm: usize) -> Option<&Curve> {
+        self.merges.get(&arm).map(|lead| &lead.curve)
     }
 
     /// The right lane from an arm to the next outside the ring, if there is one.
@@ -112,32 +151,9 @@ impl Lanes {
         self.around[arm].as_ref()
     }
 
-    /// The whole route from the end of the entry arm to the end of the exit arm.
-    pub(super) fn route(&self, entry: usize, lane: Lane, exit: u32) -> Curve {
-        if let (true, Some(curve)) = (self.outside(entry, lane, exit), &self.around[entry]) {
-            return curve.clone();
-        }
-        let exit_arm = (entry + exit as usize) % self.bearings.len();
-        let (inward, outward) = (&self.entries[entry][lane as usize], &self.exits[exit_arm][lane as usize]);
-        let mut line = inward.curve.clone();
-        let sweep = self.sweep(entry, lane, exit);
-        if 1e-9 < sweep {
-            line.pieces.push(ring_arc(self.radii[lane as usize], wrapped(self.bearings[entry] + inward.angle), sweep));
-        }
-        line.pieces.extend(&outward.curve.pieces);
-        line
-    }
-
-    /// Whether a route passes outside the ring.
-    fn outside(&self, entry: usize, lane: Lane, exit: u32) -> bool {
-        lane == Lane::Right && exit == 1 && self.around[entry].is_some()
-    }
-
-    /// The angle along which a route follows the ring; negative if it would have to leave before it arrives \[rad].
-    fn sweep(&self, entry: usize, lane: Lane, exit: u32) -> f64 {
-        let exit_arm = (entry + exit as usize) % self.bearings.len();
-        let between = if exit_arm == entry { TAU } else { (self.bearings[exit_arm] - self.bearings[entry]).rem_euclid(TAU) };
-        between + self.exits[exit_arm][lane as usize].angle - self.entries[entry][lane as usize].angle
+    /// Every route, ordered by entry arm, lane and exit.
+    pub(super) fn routes(&self) -> &[RouteLine] {
+        &self.routes
     }
 }
 
@@ -146,17 +162,20 @@ impl Lanes {
 fn first_exit(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -> Result<Option<Curve>, Error> {
     let (arm, next) = (&arms[index], &arms[(index + 1) % arms.len()]);
     if let Some(radius) = arm.lane_corner {
-        let (entry, exit) = (&arm.entry.lanes[Lane::Right as usize], &next.exit.lanes[Lane::Right as usize]);
+        let (entry, exit) = (arm.entry.lane(Lane::Right), next.exit.lane(Lane::Right));
         let fault = |fault| check::fault(reader, arms, index, Some("corner.lane_radius"), Lane::Right.name(), Way::Entry, fault);
         return around((entry, arm.bearing), (exit, next.bearing), radius).map(Some).map_err(fault);
     }
     if arm.kerb_corner.is_none() {
         return Ok(None);
     }
+    if arm.lane_width != next.lane_width {
+        return Err(check::widths_differ(reader, arms, index));
+    }
     let kerb = corner(reader, ring, arms, index)?;
     let smooth =
         kerb.pieces.windows(2).all(|joint| wrapped(joint[1].heading_at(0.0) - joint[0].heading_at(joint[0].length())).abs() < 1e-6);
-    let pieces: Option<Vec<Piece>> = kerb.pieces.iter().map(|piece| piece.beside(ring.gutter + ring.lane_width / 2.0)).collect();
+    let pieces: Option<Vec<Piece>> = kerb.pieces.iter().map(|piece| piece.beside(ring.gutter + arm.lane_width / 2.0)).collect();
     match pieces.filter(|_| smooth) {
         Some(pieces) => Ok(Some(Curve { pieces })),
         None => Err(check::no_way_beside(reader, arms, index)),

@@ -1,14 +1,19 @@
 //! A roundabout file as written, and the checks of single values and of the order of arms.
 
+use std::ops::RangeInclusive;
+
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::alignment::{Alignment, Way};
 use crate::geometry::Bend;
 use crate::reader::{Error, Reader, shown};
+use crate::route::Lane;
 
 /// The smallest radius of a bend in a lane; no vehicle follows a smaller one \[m].
 const SHARPEST_LANE: f64 = 1.0;
+/// Widths that a lane may have; a truck uses all of the wide ring lane of a small roundabout \[m].
+const LANE_WIDTHS: RangeInclusive<f64> = 2.5..=12.0;
 
 /// The file as written. Its values are not checked yet.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -24,6 +29,8 @@ pub(crate) struct WrittenRing {
     pub(crate) island_radius: f64,
     pub(crate) gutter: f64,
     pub(crate) lane_width: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) lanes: Option<usize>,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -32,6 +39,8 @@ pub(crate) struct WrittenArm {
     pub(crate) name: String,
     pub(crate) bearing_deg: f64,
     pub(crate) length: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) lane_width: Option<f64>,
     pub(crate) entry: WrittenWay,
     pub(crate) exit: WrittenWay,
     #[serde(default, skip_serializing_if = "WrittenCorner::is_empty")]
@@ -43,6 +52,8 @@ pub(crate) struct WrittenArm {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct WrittenWay {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) lanes: Option<usize>,
     pub(crate) kerb: WrittenAlignment,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) left: Option<WrittenAlignment>,
@@ -88,23 +99,45 @@ pub(super) struct Ring {
     pub(super) island_radius: f64,
     /// Width of the strip between a kerb's face and the lane beside it \[m].
     pub(super) gutter: f64,
-    /// Width of each of the two lanes \[m].
+    /// Width of each lane \[m].
     pub(super) lane_width: f64,
+    /// Number of lanes, 1 to 3.
+    pub(super) lanes: usize,
 }
 
 impl Ring {
     /// Radius of the outer kerb's face \[m].
     pub(super) fn outer(&self) -> f64 {
-        self.island_radius + 2.0 * (self.gutter + self.lane_width)
+        self.island_radius + (2.0 * self.gutter + self.lanes as f64 * self.lane_width)
+    }
+
+    /// Radius of the centre line of the lane that has `from_kerb` lanes outside it \[m].
+    pub(super) fn lane_radius(&self, from_kerb: usize) -> f64 {
+        let innermost = self.island_radius + self.gutter + self.lane_width / 2.0;
+        innermost + (self.lanes - 1 - from_kerb) as f64 * self.lane_width
+    }
+
+    /// From the centre line of a lane to the ring's lane edges on its left and on its right \[m].
+    pub(super) fn crossing(&self, lane: Lane) -> (f64, f64) {
+        let half = self.lane_width / 2.0;
+        let (left, right) = (self.lanes - 1 - lane.from_kerb(), lane.from_kerb());
+        (half + left as f64 * self.lane_width, half + right as f64 * self.lane_width)
     }
 }
 
-/// The three alignments of a carriageway.
+/// The alignments of a carriageway.
 #[derive(Debug, Clone)]
 pub(super) struct Carriageway {
     pub(super) kerb: Alignment,
-    /// Centre lines of the left and the right lane.
-    pub(super) lanes: [Alignment; 2],
+    /// Centre lines of its lanes from the kerb: the right one and, if there are two, the left one.
+    pub(super) lanes: Vec<Alignment>,
+}
+
+impl Carriageway {
+    /// The alignment of a lane, or the only one where there is no such lane.
+    pub(super) fn lane(&self, lane: Lane) -> &Alignment {
+        &self.lanes[lane.from_kerb().min(self.lanes.len() - 1)]
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -114,6 +147,8 @@ pub(super) struct Arm {
     pub(super) bearing: f64,
     /// Distance from the ring's centre to the solid edge that ends the arm \[m].
     pub(super) length: f64,
+    /// Width of the carriageways' lanes \[m].
+    pub(super) lane_width: f64,
     pub(super) entry: Carriageway,
     pub(super) exit: Carriageway,
     /// Radius that joins the entry's kerb to the next arm's exit kerb outside the ring \[m].
@@ -134,9 +169,10 @@ impl Written {
     /// Ring and arms, with every value within its range and the arms in order.
     pub(super) fn checked(self, reader: &Reader) -> Result<(Ring, Vec<Arm>), Error> {
         let ring = Ring {
-            island_radius: reader.within("ring.island_radius", self.ring.island_radius, 2.0..=200.0, "m")?,
+            island_radius: reader.within("ring.island_radius", self.ring.island_radius, 1.5..=200.0, "m")?,
             gutter: reader.within("ring.gutter", self.ring.gutter, 0.0..=3.0, "m")?,
-            lane_width: reader.within("ring.lane_width", self.ring.lane_width, 2.5..=8.0, "m")?,
+            lane_width: reader.within("ring.lane_width", self.ring.lane_width, LANE_WIDTHS, "m")?,
+            lanes: reader.count("ring.lanes", self.ring.lanes.unwrap_or(2), 1..=3)?,
         };
         reader.count("arm", self.arm.len(), 2..=8)?;
         let arms: Vec<Arm> =
@@ -176,6 +212,7 @@ impl WrittenArm {
         }
         let bearing = reader.within(&key("bearing_deg"), self.bearing_deg, -360.0..=360.0, "deg")?.to_radians();
         let length = reader.within(&key("length"), self.length, ring.outer() + 10.0..=1000.0, "m")?;
+        let lane_width = reader.within(&key("lane_width"), self.lane_width.unwrap_or(ring.lane_width), LANE_WIDTHS, "m")?;
         let radius = |name: &str, value: Option<f64>| value.map(|value| reader.within(&key(name), value, 0.1..=1000.0, "m")).transpose();
         let splitter = self.splitter.iter().enumerate();
         let splitter = splitter.map(|(point, written)| {
@@ -193,18 +230,28 @@ impl WrittenArm {
         Ok(Arm {
             kerb_corner: radius("corner.kerb_radius", self.corner.kerb_radius)?,
             lane_corner: radius("corner.lane_radius", self.corner.lane_radius)?,
-            entry: self.entry.checked(reader, &key("entry"), Way::Entry, length, ring)?,
-            exit: self.exit.checked(reader, &key("exit"), Way::Exit, length, ring)?,
+            entry: self.entry.checked(reader, &key("entry"), Way::Entry, length, lane_width, ring)?,
+            exit: self.exit.checked(reader, &key("exit"), Way::Exit, length, lane_width, ring)?,
             name: self.name,
             bearing,
             length,
+            lane_width,
             splitter,
         })
     }
 }
 
 impl WrittenWay {
-    fn checked(self, reader: &Reader, key: &str, way: Way, length: f64, ring: &Ring) -> Result<Carriageway, Error> {
+    fn checked(self, reader: &Reader, key: &str, way: Way, length: f64, lane_width: f64, ring: &Ring) -> Result<Carriageway, Error> {
+        let lanes = reader.count(&format!("{key}.lanes"), self.lanes.unwrap_or(ring.lanes.min(2)), 1..=2)?;
+        if ring.lanes < lanes {
+            let expected = format!("must be at most {}, as many lanes as the ring has: change it or ring.lanes", ring.lanes);
+            return Err(reader.invalid(format!("{key}.lanes"), lanes, expected));
+        }
+        if lanes == 1 && self.left.is_some() {
+            let expected = "this carriageway has one lane, which is `right`: give it two lanes or leave `left` out";
+            return Err(reader.invalid(format!("{key}.left"), "given", expected));
+        }
         let kerb = self.kerb.checked(reader, &format!("{key}.kerb"), way, length, 0.0)?;
         let lane = |written: Option<WrittenAlignment>, name: &str, distance: f64| match written {
             Some(written) => written.checked(reader, &format!("{key}.{name}"), way, length, SHARPEST_LANE),
@@ -216,9 +263,10 @@ impl WrittenWay {
                 )
             }),
         };
-        let right = ring.gutter + ring.lane_width / 2.0;
-        let lanes = [lane(self.left, "left", right + ring.lane_width)?, lane(self.right, "right", right)?];
-        Ok(Carriageway { kerb, lanes })
+        let beside = ring.gutter + lane_width / 2.0;
+        let left = if lanes == 2 { Some(lane(self.left, "left", beside + lane_width)?) } else { None };
+        let right = lane(self.right, "right", beside)?;
+        Ok(Carriageway { lanes: [right].into_iter().chain(left).collect(), kerb })
     }
 }
 

@@ -7,16 +7,18 @@ use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenCorne
 /// TOML. Numbers are written so that reading them gives the same bits.
 impl Display for Written {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
-        let Written { ring: WrittenRing { island_radius, gutter, lane_width }, arm } = self;
+        let Written { ring: WrittenRing { island_radius, gutter, lane_width, lanes }, arm } = self;
         writeln!(f, "[ring]\nisland_radius = {island_radius:?}\ngutter = {gutter:?}\nlane_width = {lane_width:?}")?;
+        lanes.iter().try_for_each(|lanes| writeln!(f, "lanes = {lanes}"))?;
         arm.iter().try_for_each(|arm| arm.fmt(f))
     }
 }
 
 impl Display for WrittenArm {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
-        let WrittenArm { name, bearing_deg, length, entry, exit, corner, splitter } = self;
+        let WrittenArm { name, bearing_deg, length, lane_width, entry, exit, corner, splitter } = self;
         writeln!(f, "\n[[arm]]\nname = {name:?}\nbearing_deg = {bearing_deg:?}\nlength = {length:?}")?;
+        lane_width.iter().try_for_each(|width| writeln!(f, "lane_width = {width:?}"))?;
         let WrittenCorner { kerb_radius, lane_radius } = corner;
         let radius = |name: &str, radius: &Option<f64>| radius.map(|radius| format!("{name} = {radius:?}"));
         let radii: Vec<String> = [radius("kerb_radius", kerb_radius), radius("lane_radius", lane_radius)].into_iter().flatten().collect();
@@ -26,7 +28,8 @@ impl Display for WrittenArm {
         if !splitter.is_empty() {
             writeln!(f, "splitter = [{}\n]", points(splitter)?)?;
         }
-        for (way, WrittenWay { kerb, left, right }) in [("entry", entry), ("exit", exit)] {
+        for (way, WrittenWay { lanes, kerb, left, right }) in [("entry", entry), ("exit", exit)] {
+            lanes.iter().try_for_each(|lanes| writeln!(f, "\n[arm.{way}]\nlanes = {lanes}"))?;
             for (part, alignment) in [("kerb", Some(kerb)), ("right", right.as_ref()), ("left", left.as_ref())] {
                 let Some(WrittenAlignment { points: of, ring_radius }) = alignment else { continue };
                 writeln!(f, "\n[arm.{way}.{part}]\npoints = [{}\n]\nring_radius = {ring_radius:?}", points(of)?)?;
