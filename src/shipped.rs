@@ -23,6 +23,8 @@ pub const FILES: &[(&str, &str)] = embedded![
     "attard2023-training.toml",
     "distributions/mixed.toml",
     "distributions/wide.toml",
+    "random2026.toml",
+    "random2026-training.toml",
     "roundabouts/16m.toml",
     "roundabouts/20m.toml",
     "roundabouts/32m.toml",
