@@ -7,6 +7,7 @@ mod alignment;
 mod check;
 mod kerb;
 mod lane;
+mod ring;
 mod roundabout_keys;
 #[cfg(test)]
 mod tests;
@@ -26,8 +27,8 @@ use crate::reader::{Error, Reader};
 use crate::route::{Lane, LeavesWorld, Route, waypoints};
 use crate::shipped::{Kind, Source};
 use lane::{Lanes, RouteLine};
-use roundabout_keys::Written;
-use roundabout_keys::{Arm, Ring};
+use ring::Ring;
+use roundabout_keys::{Arm, Written};
 
 /// Whether trucks may drive on the gutter, the strip between the lanes and the kerb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Deserialize, serde::Serialize)]
@@ -173,7 +174,11 @@ impl Roundabout {
     /// such route.
     pub fn line(&self, entry: &str, lane: Lane, exit: u32) -> Option<Curve> {
         let entry = self.arms().position(|arm| arm == entry)?;
-        self.lanes.routes().iter().find(|route| (route.entry, route.lane, route.exit) == (entry, lane, exit)).map(|route| route.line.clone())
+        self.lanes
+            .routes()
+            .iter()
+            .find(|route| (route.entry, route.lane, route.exit) == (entry, lane, exit))
+            .map(|route| route.line.clone())
     }
 
     /// All routes, ordered by entry arm, lane and exit. They lead from `approach` before the ring to `departure` after

@@ -30,8 +30,8 @@ impl Lane {
         }
     }
 
-    /// Number of lanes between this one and the kerb.
-    pub(crate) fn from_kerb(self) -> usize {
+    /// Number of lanes between this one and the kerb: its index in lists of lanes.
+    pub(crate) fn index(self) -> usize {
         match self {
             Lane::Left => 1,
             Lane::Right => 0,

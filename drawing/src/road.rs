@@ -173,11 +173,13 @@ impl<'a> Road<'a> {
     }
 
     /// The legend's lines for the routes.
-    pub(crate) fn route_legend(&self) -> [Entry; 2] {
-        [
-            Entry::new(Swatch::Arrow(lane_colour(Lane::Left)), "route from a left lane"),
-            Entry::new(Swatch::Arrow(lane_colour(Lane::Right)), "route from a right lane"),
-        ]
+    pub(crate) fn route_legend(&self) -> impl Iterator<Item = Entry> {
+        let words = |lane| match lane {
+            Lane::Left => "route from a left lane",
+            Lane::Right => "route from a right lane",
+        };
+        let shown = Lane::BOTH.into_iter().filter(|lane| self.routes.iter().any(|route| route.lane == *lane));
+        shown.map(move |lane| Entry::new(Swatch::Arrow(lane_colour(lane)), words(lane)))
     }
 }
 

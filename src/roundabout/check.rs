@@ -7,7 +7,8 @@ use glam::DVec2;
 
 use super::alignment::{Fault, Way};
 use super::lane::Lanes;
-use super::roundabout_keys::{Arm, Ring};
+use super::ring::Ring;
+use super::roundabout_keys::Arm;
 use crate::geometry::{Curve, Outline};
 use crate::reader::{Error, Reader, differing, shown};
 use crate::route::Lane;

@@ -7,7 +7,8 @@ use glam::DVec2;
 
 use super::alignment::{Way, around, ring_arc};
 use super::check;
-use super::roundabout_keys::{Arm, Ring};
+use super::ring::Ring;
+use super::roundabout_keys::Arm;
 use crate::geometry::{Curve, Outline, Piece, rounded, wrapped};
 use crate::reader::{Error, Reader};
 

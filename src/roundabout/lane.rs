@@ -10,7 +10,8 @@ use glam::DVec2;
 use super::alignment::{Way, around, ring_arc};
 use super::check;
 use super::kerb::corner;
-use super::roundabout_keys::{Arm, Ring};
+use super::ring::Ring;
+use super::roundabout_keys::Arm;
 use crate::geometry::{Curve, Piece, wrapped};
 use crate::reader::{Error, Reader};
 use crate::route::Lane;
@@ -80,8 +81,8 @@ impl Lanes {
     pub(super) fn new(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<Lanes, Error> {
         let lead = |index: usize, way: Way, lane: Lane| -> Result<Lead, Error> {
             let (arm, carriageway) = (&arms[index], arms[index].way(way));
-            let circle = ring.lane_radius(lane.from_kerb());
-            let fault = |fault| match carriageway.lanes.len() <= lane.from_kerb() {
+            let circle = ring.lane_radius(lane.index());
+            let fault = |fault| match carriageway.lanes.len() <= lane.index() {
                 true => check::no_merge(reader, arms, index, circle),
                 false => check::fault(reader, arms, index, None, lane.name(), way, fault),
             };
@@ -93,10 +94,13 @@ impl Lanes {
             })
         };
         let leads = |way: Way| -> Result<Vec<Vec<Lead>>, Error> {
-            let of = |index: usize| Lane::BOTH.into_iter().rev().take(arms[index].way(way).lanes.len()).map(|lane| lead(index, way, lane)).collect();
+            let of = |index: usize| {
+                Lane::BOTH.into_iter().rev().take(arms[index].way(way).lanes.len()).map(|lane| lead(index, way, lane)).collect()
+            };
             (0..arms.len()).map(of).collect()
         };
-        let around: Vec<Option<Curve>> = (0..arms.len()).map(|index| first_exit(reader, ring, arms, index)).collect::<Result<_, Error>>()?;
+        let around: Vec<Option<Curve>> =
+            (0..arms.len()).map(|index| first_exit(reader, ring, arms, index)).collect::<Result<_, Error>>()?;
         let (entries, exit_leads) = (leads(Way::Entry)?, leads(Way::Exit)?);
         let (mut merges, mut routes) = (BTreeMap::new(), Vec::new());
         for (entry, arm) in arms.iter().enumerate() {
@@ -106,8 +110,8 @@ impl Lanes {
                     continue;
                 }
                 let to = (entry + exit as usize) % arms.len();
-                let inward = &entries[entry][lane.from_kerb()];
-                let outward: &Lead = match (exit_leads[to].get(lane.from_kerb()), merges.entry(to)) {
+                let inward = &entries[entry][lane.index()];
+                let outward: &Lead = match (exit_leads[to].get(lane.index()), merges.entry(to)) {
                     (Some(lead), _) => lead,
                     (None, Slot::Occupied(merge)) => merge.into_mut(),
                     (None, Slot::Vacant(none)) => none.insert(lead(to, Way::Exit, lane)?),
@@ -115,7 +119,7 @@ impl Lanes {
                 // The angle along which the route follows the ring.
                 let between = if to == entry { TAU } else { (arms[to].bearing - arm.bearing).rem_euclid(TAU) };
                 let sweep = between + outward.angle - inward.angle;
-                let radius = ring.lane_radius(lane.from_kerb());
+                let radius = ring.lane_radius(lane.index());
                 if !(0.0..=TAU).contains(&sweep) {
                     return Err(check::backwards(reader, arms, entry, lane, exit, sweep * radius));
                 }

@@ -1,5 +1,7 @@
 //! Which roundabout files are accepted, and how the others are refused.
 
+mod kinds;
+
 use proptest::prelude::*;
 
 use super::*;

@@ -66,7 +66,7 @@ fn between(low: DVec2, high: DVec2, x: f32, y: f32) -> DVec2 {
 }
 
 /// Random points at most 5 m from a kerb with the exact distance there and the field's.
-fn near_kerbs(kerbs: &Outline, field: &Field) -> Vec<(DVec2, f64, f64)> {
+pub(crate) fn near_kerbs(kerbs: &Outline, field: &Field) -> Vec<(DVec2, f64, f64)> {
     let (low, high) = kerbs.bounds();
     let point = |index: u32| {
         let [x, y, ..] = words(5, index, 0, 0).map(signed_unit);

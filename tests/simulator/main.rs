@@ -14,6 +14,7 @@ mod collide;
 mod episodes;
 mod field;
 mod fit;
+mod kinds;
 mod modules;
 mod observe;
 #[cfg(feature = "gpu")]

@@ -37,7 +37,7 @@ fn grazes(kerbs: &Outline, origin: DVec2, direction: DVec2, end: f64) -> bool {
 
 /// Rays in error, rays in error that graze a kerb, and rays that met one, for `n` trucks sensing `field` among `kerbs`
 /// on an engine.
-fn errors(engine: &Engine, world: &World, kerbs: &Outline, field: &Field, n: u32) -> [usize; 3] {
+pub(crate) fn errors(engine: &Engine, world: &World, kerbs: &Outline, field: &Field, n: u32) -> [usize; 3] {
     let reach = world.params.sensor_range;
     let trucks: Vec<Truck> = (0..n).into_par_iter().map(|index| pose(kerbs, index, 0.0)).collect();
     let simulator = after_stage(engine, world, field, &trucks, Stage::Sense);
