@@ -15,8 +15,8 @@ mod rules;
 mod tests;
 
 use crate::reader::Error;
-use crate::roundabout::{Gutter, Roundabout};
 use crate::roundabout::written::Written;
+use crate::roundabout::{Gutter, Roundabout};
 
 pub use distribution::Distribution;
 

@@ -18,6 +18,7 @@ pub(crate) mod written {
     pub(crate) use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenCorner, WrittenPoint, WrittenRing, WrittenWay};
 }
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use glam::DVec2;
@@ -133,6 +134,12 @@ impl Roundabout {
     /// The names of the arms, counter-clockwise, in the order of the file.
     pub fn arms(&self) -> impl Iterator<Item = &str> {
         self.arms.iter().map(|arm| arm.name.as_str())
+    }
+
+    /// Least angle between the bearings of two neighbouring arms \[rad].
+    pub fn least_gap(&self) -> f64 {
+        let next = self.arms.iter().cycle().skip(1);
+        self.arms.iter().zip(next).map(|(arm, next)| (next.bearing - arm.bearing).rem_euclid(TAU)).fold(TAU, f64::min)
     }
 
     /// Radius of the central island's kerb face \[m].

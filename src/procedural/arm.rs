@@ -144,7 +144,8 @@ fn carriageway(
     length: f64,
 ) -> Result<Carriageway, Reason> {
     let n_lanes = if ring.lanes == 1 || draws.happens(place, Q::IsSingle, keys.lanes.single_share) { 1 } else { 2 };
-    let half_width = n_lanes as f64 * ring.lane_width + ring.gutter + course.median + keys.kerb.deviation * draws.normal(place, Q::KerbOffset);
+    let half_width =
+        n_lanes as f64 * ring.lane_width + ring.gutter + course.median + keys.kerb.deviation * draws.normal(place, Q::KerbOffset);
     let beside = side * course.beside;
     let mut bends = Vec::new();
     let bend = |x: f64, y: f64, radius: f64| Bend { at: DVec2::new(x, y), radius };
@@ -188,7 +189,9 @@ fn carriageway(
     kerb.fit(ring.outer)?;
     let mut lanes = Vec::new();
     if draws.happens(place, Q::HasLanes, keys.lanes.share) {
-        for (from_kerb, offset, radius) in [(0.0, Q::RightOffset, Q::RightRadius), (1.0, Q::LeftOffset, Q::LeftRadius)].into_iter().take(n_lanes) {
+        for (from_kerb, offset, radius) in
+            [(0.0, Q::RightOffset, Q::RightRadius), (1.0, Q::LeftOffset, Q::LeftRadius)].into_iter().take(n_lanes)
+        {
             let distance = ring.gutter + (from_kerb + 0.5) * ring.lane_width;
             let distance = distance + keys.lanes.deviation * (2.0 * draws.unit(place, offset) - 1.0);
             let mut lane = kerb.beside(distance).ok_or(Reason::TooSharp)?;

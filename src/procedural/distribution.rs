@@ -90,12 +90,7 @@ impl Distribution {
     }
 
     /// The road of one attempt.
-    pub(super) fn attempt(
-        &self,
-        seed: u32,
-        index: u32,
-        attempt: u32,
-    ) -> Result<(Roundabout, Written), Reason> {
+    pub(super) fn attempt(&self, seed: u32, index: u32, attempt: u32) -> Result<(Roundabout, Written), Reason> {
         let written = drawn(&self.keys, &Draws { seed, road: index, attempt })?;
         let name = format!("{}/{seed}/{index}", self.name);
         let roundabout = Roundabout::staged(name, Reader::of(&self.file), written.clone()).map_err(|(stage, _)| match stage {

@@ -190,7 +190,8 @@ pub(super) struct Rules {
 impl Keys {
     /// An error for the first value out of its range.
     pub(super) fn check(&self, reader: &Reader) -> Result<(), Error> {
-        let Keys { ring, single, arms, axis, median, widening, s_bend, straight, flared, bend, kerb, lanes, corners, splitters, rules } = self;
+        let Keys { ring, single, arms, axis, median, widening, s_bend, straight, flared, bend, kerb, lanes, corners, splitters, rules } =
+            self;
         let ranges: [(&str, Range, RangeInclusive<f64>, &str); 17] = [
             ("ring.island_radius", ring.island_radius, 1.5..=200.0, "m"),
             ("ring.lane_width", ring.lane_width, 2.5..=12.0, "m"),

@@ -134,7 +134,10 @@ fn a_cache_gives_the_same_roads_and_an_entry_that_is_wrong_is_not_believed() {
         let known = [1, 2, 3].map(|index: u32| (index, (attempt, refused)));
         cache.put(roads::KIND, &distribution.key(4, 0), &roads::bytes(&known.into_iter().collect()));
         let kept = texts(&[1, 2, 3], &loading);
-        assert!(kept.iter().zip(&plain).all(|(kept, plain)| kept.0 == plain.0 || kept.1 != attempt || refused.total() == attempt), "{kept:?}");
+        assert!(
+            kept.iter().zip(&plain).all(|(kept, plain)| kept.0 == plain.0 || kept.1 != attempt || refused.total() == attempt),
+            "{kept:?}"
+        );
     }
 }
 
@@ -142,16 +145,31 @@ fn a_cache_gives_the_same_roads_and_an_entry_that_is_wrong_is_not_believed() {
 fn a_name_gives_distribution_seed_and_index_and_other_names_are_of_files() {
     assert_eq!(address("wide/7/12"), Some(("wide", 7, 12)));
     assert_eq!(address("my/own.toml/0/4294967295"), Some(("my/own.toml", 0, u32::MAX)));
-    for other in ["wide", "wide/7", "/7/12", "wide/7/12/N-left-3", "wide/-7/12", "wide/+7/12", "wide/7/4294967296", "wide//12", "scenarios/roundabouts/16m.toml"] {
+    for other in [
+        "wide",
+        "wide/7",
+        "/7/12",
+        "wide/7/12/N-left-3",
+        "wide/-7/12",
+        "wide/+7/12",
+        "wide/7/4294967296",
+        "wide//12",
+        "scenarios/roundabouts/16m.toml",
+    ] {
         assert_eq!(address(other), None, "{other}");
     }
     let road = find("wide/7/12").unwrap();
     assert_eq!(road.name, "wide/7/12");
     let routes: Vec<String> = road.routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect();
-    let named = |name: &String| name.starts_with("wide/7/12/") && ["E", "NE", "N", "NW", "W", "SW", "S", "SE"].contains(&name["wide/7/12/".len()..].split('-').next().unwrap());
+    let named = |name: &String| {
+        name.starts_with("wide/7/12/")
+            && ["E", "NE", "N", "NW", "W", "SW", "S", "SE"].contains(&name["wide/7/12/".len()..].split('-').next().unwrap())
+    };
     assert!(routes.iter().all(named), "{routes:?}");
     assert_eq!(find("16m").unwrap().name, "16m");
-    assert!(find("narrow/7/12").unwrap_err().to_string().contains("distribution: narrow; must be a path ending in .toml or one of mixed, wide"));
+    assert!(
+        find("narrow/7/12").unwrap_err().to_string().contains("distribution: narrow; must be a path ending in .toml or one of mixed, wide")
+    );
 }
 
 #[test]
@@ -164,7 +182,10 @@ fn the_truck_of_the_rules_is_that_of_daf_xf() {
     let behind = value("trailer", "kingpin_to_rear") - value("tractor", "fifth_wheel") + value("tractor", "wheelbase") / 2.0;
     for distribution in shipped() {
         let rules = distribution.rules();
-        assert!((0.0..0.01).contains(&(rules.truck_ahead - ahead)) && (0.0..0.01).contains(&(rules.truck_behind - behind)), "{ahead} {behind}");
+        assert!(
+            (0.0..0.01).contains(&(rules.truck_ahead - ahead)) && (0.0..0.01).contains(&(rules.truck_behind - behind)),
+            "{ahead} {behind}"
+        );
         assert_eq!(rules.truck_width, value("tractor", "width").max(value("trailer", "width")));
     }
 }
@@ -206,7 +227,8 @@ fn every_wrong_value_of_a_distribution_is_named_with_what_would_do() {
     for (table, values) in &file {
         for (key, value) in values.as_table().unwrap() {
             keys += 1;
-            let line = shipped.split(&format!("[{table}]\n")).nth(1).unwrap().lines().find(|line| line.starts_with(&format!("{key} ="))).unwrap();
+            let line =
+                shipped.split(&format!("[{table}]\n")).nth(1).unwrap().lines().find(|line| line.starts_with(&format!("{key} ="))).unwrap();
             let n = value.as_array().map_or(1, Vec::len);
             for wrong in ["-1e9", "1e9", "nan"] {
                 let list = vec![wrong; n].join(", ");
@@ -214,7 +236,10 @@ fn every_wrong_value_of_a_distribution_is_named_with_what_would_do() {
                 let (before, after) = shipped.split_once(&format!("[{table}]\n")).unwrap();
                 let text = format!("{before}[{table}]\n{}", after.replacen(line, &format!("{key} = {value}"), 1));
                 let message = read(&text).unwrap_err();
-                assert!(message.contains("own.toml: ") && message.contains(&format!("{table}.{key}")) && message.contains("must lie in"), "{message}");
+                assert!(
+                    message.contains("own.toml: ") && message.contains(&format!("{table}.{key}")) && message.contains("must lie in"),
+                    "{message}"
+                );
             }
         }
     }
@@ -223,11 +248,17 @@ fn every_wrong_value_of_a_distribution_is_named_with_what_would_do() {
         assert!(shipped.contains(from), "{from}");
         read(&shipped.replacen(from, to, 1)).unwrap_err()
     };
-    assert!(without("half_width = [0.0, 1.2]", "half_width = [1.2, 0.0]").contains("median.half_width: [1.2, 0] m; the least value comes first"));
+    assert!(
+        without("half_width = [0.0, 1.2]", "half_width = [1.2, 0.0]")
+            .contains("median.half_width: [1.2, 0] m; the least value comes first")
+    );
     assert!(without("shares = [0.3, 0.5, 0.2]", "shares = [0.0, 0.0, 0.0]").contains("arms.shares: all 0; one of them must be above 0"));
     assert!(without("weights = [0.4, 0.35, 0.25]", "weights = [0.4, 0.35]").contains("corners.weights: 2; corners.shares has 3"));
     assert!(without("length = [66.0, 66.0]", "length = [50.0, 66.0]").contains("arms.length: 50 m; must be at least 52.984 m"));
-    assert!(without("[single]\nisland_radius = [1.5, 20.0]\nlane_width = [4.5, 12.0]\nouter_radius = 14.5\n", "").contains("single: missing; rings of one lane"));
+    assert!(
+        without("[single]\nisland_radius = [1.5, 20.0]\nlane_width = [4.5, 12.0]\nouter_radius = 14.5\n", "")
+            .contains("single: missing; rings of one lane")
+    );
     assert!(without("gutter =", "guter =").contains("guter"));
     assert!(Distribution::read(Path::new("no/such.toml")).unwrap_err().to_string().contains("no/such.toml: cannot be read"));
 }
@@ -240,7 +271,10 @@ fn a_distribution_of_which_no_draw_is_valid_is_refused_with_the_reasons() {
     std::fs::write(&path, shipped.replacen("lane_clearance = 1.6", "lane_clearance = 3.0", 1)).unwrap();
     let distribution = Distribution::read(&path).unwrap();
     let message = distribution.road(1, 2).unwrap_err().to_string();
-    assert!(message.contains("narrow.toml: road 2 of seed 1: none of 1000 draws is valid; wider ranges or milder rules are needed"), "{message}");
+    assert!(
+        message.contains("narrow.toml: road 2 of seed 1: none of 1000 draws is valid; wider ranges or milder rules are needed"),
+        "{message}"
+    );
     assert!(message.contains("a route nearer to a kerb than the rules allow"), "{message}");
     assert!(distribution.roads(1, &[2], &Loading::PLAIN).is_err());
 }

@@ -39,13 +39,22 @@ impl Scenario {
     ///
     /// # Errors
     ///
-    /// An arm too short for the benchmark's routes and vehicle; the roundabout's name stands for the file.
+    /// Those of [`Scenario::add`].
     pub fn on(&self, roundabout: Roundabout) -> Result<Scenario, Error> {
+        let mut scenario = Scenario { places: Vec::<Place>::new(), splits: Default::default(), ..self.clone() };
+        scenario.add(roundabout, Split::Test)?;
+        Ok(scenario)
+    }
+
+    /// Adds a roundabout that the benchmark does not have, with all its routes in one split.
+    ///
+    /// # Errors
+    ///
+    /// An arm too short for the benchmark's routes and vehicle; the roundabout's name stands for the file.
+    pub fn add(&mut self, roundabout: Roundabout, split: Split) -> Result<(), Error> {
         let name = roundabout.name.clone();
         let reader = Reader::of(Path::new(&name));
-        let mut scenario = Scenario { places: Vec::<Place>::new(), splits: Default::default(), ..self.clone() };
-        let routes = scenario.routes_of(&reader, &roundabout)?;
-        scenario.place(&reader, roundabout, routes.into_iter().map(|route| (route, Some(Split::Test))))?;
-        Ok(scenario)
+        let routes = self.routes_of(&reader, &roundabout)?;
+        self.place(&reader, roundabout, routes.into_iter().map(|route| (route, Some(split))))
     }
 }
