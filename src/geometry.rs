@@ -201,6 +201,15 @@ impl Curve {
         self.piece_at(s).map_or(0.0, |(piece, s)| piece.heading_at(s))
     }
 
+    /// Radius of the tightest arc; infinite for a curve without arcs \[m].
+    pub fn least_radius(&self) -> f64 {
+        let radius = |piece: &Piece| match *piece {
+            Piece::Arc { radius, .. } => radius,
+            Piece::Segment { .. } => f64::INFINITY,
+        };
+        self.pieces.iter().map(radius).fold(f64::INFINITY, f64::min)
+    }
+
     /// Distance from `p` to the nearest point of the curve; infinite for a curve without pieces \[m].
     pub fn distance(&self, p: DVec2) -> f64 {
         self.pieces.iter().map(|piece| piece.distance(p)).fold(f64::INFINITY, f64::min)

@@ -14,6 +14,7 @@ pub mod layout; // rows, constants, columns and buffers
 pub mod geometry; // arcs, segments, outlines; exact distances
 pub mod route; // lane centre lines -> waypoints
 pub mod roundabout; // parameters -> kerbs and lanes
+pub mod procedural; // random roundabouts, by seed and index
 pub mod field; // the signed distance to the kerbs, baked
 pub mod vehicle; // tractor, trailer, load
 pub mod scenario; // what to drive

@@ -11,7 +11,14 @@ mod ring;
 mod roundabout_keys;
 #[cfg(test)]
 mod tests;
+mod text;
 
+/// A roundabout as a file has it.
+pub(crate) mod written {
+    pub(crate) use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenCorner, WrittenPoint, WrittenRing, WrittenWay};
+}
+
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use glam::DVec2;
@@ -33,6 +40,21 @@ pub enum Gutter {
     Drivable,
     /// The lane's edge is solid: kerbs are grown by the gutter's width.
     Solid,
+}
+
+/// Stages of the check of a roundabout, in their order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Stage {
+    /// Single values, and the order of the arms.
+    Values,
+    /// Kerbs that fit and do not cross, splitter islands on the road.
+    Kerbs,
+    /// Lanes that lead into the ring, and routes that follow it.
+    Lanes,
+    /// Lanes clear of kerbs.
+    Clear,
+    /// Lanes of an arm beside each other.
+    Beside,
 }
 
 /// A checked roundabout.
@@ -95,17 +117,29 @@ impl Roundabout {
 
     /// The roundabout that `written` describes, checked as a file is; `reader` names its origin in errors.
     pub(crate) fn checked(name: String, reader: Reader, written: Written) -> Result<Roundabout, Error> {
-        let (ring, arms) = written.checked(&reader)?;
-        let kerbs = kerb::kerbs(&reader, &ring, &arms)?;
-        let lanes = Lanes::new(&reader, &ring, &arms)?;
-        check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes)?;
-        check::lanes_beside_each_other(&reader, &arms, &lanes)?;
+        Roundabout::staged(name, reader, written).map_err(|(_, error)| error)
+    }
+
+    /// The same; an error says in which stage of the check it was found.
+    pub(crate) fn staged(name: String, reader: Reader, written: Written) -> Result<Roundabout, (Stage, Error)> {
+        let at = |stage: Stage| move |error: Error| (stage, error);
+        let (ring, arms) = written.checked(&reader).map_err(at(Stage::Values))?;
+        let kerbs = kerb::kerbs(&reader, &ring, &arms).map_err(at(Stage::Kerbs))?;
+        let lanes = Lanes::new(&reader, &ring, &arms).map_err(at(Stage::Lanes))?;
+        check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes).map_err(at(Stage::Clear))?;
+        check::lanes_beside_each_other(&reader, &arms, &lanes).map_err(at(Stage::Beside))?;
         Ok(Roundabout { name, ring, arms, kerbs, lanes })
     }
 
     /// The names of the arms, counter-clockwise, in the order of the file.
     pub fn arms(&self) -> impl Iterator<Item = &str> {
         self.arms.iter().map(|arm| arm.name.as_str())
+    }
+
+    /// Least angle between the bearings of two neighbouring arms \[rad].
+    pub fn least_gap(&self) -> f64 {
+        let next = self.arms.iter().cycle().skip(1);
+        self.arms.iter().zip(next).map(|(arm, next)| (next.bearing - arm.bearing).rem_euclid(TAU)).fold(TAU, f64::min)
     }
 
     /// Radius of the central island's kerb face \[m].

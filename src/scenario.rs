@@ -5,11 +5,14 @@
 
 mod benchmark_keys; // the file as written
 mod read; // the file as checked
+mod roads; // its roundabouts and routes
+mod part; // a part of a scenario, or another roundabout in it
 mod check; // a scenario changed in memory
 
 use std::path::Path;
 
 use crate::layout::Action;
+use crate::loading::Loading;
 use crate::reader::Error;
 use crate::roundabout::{Gutter, Roundabout};
 use crate::route::Route;
@@ -26,36 +29,42 @@ pub const WAYPOINT_SPACING: f64 = 2.0;
 /// Default width of the distance field's cells \[m].
 pub const FIELD_CELL: f64 = 1.0;
 
-/// The two disjoint sets of a benchmark's routes.
+/// The three disjoint sets of a benchmark's routes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Split {
     /// Routes for training.
     Train,
+    /// Routes for choosing among policies: neither trained on nor reported.
+    Validation,
     /// Routes for evaluation only.
     Test,
 }
 
 impl Split {
+    /// All splits, in the order of a benchmark file.
+    pub const ALL: [Split; 3] = [Split::Train, Split::Validation, Split::Test];
+
     /// The split's key in a benchmark file.
     pub fn name(self) -> &'static str {
         match self {
             Split::Train => "train",
+            Split::Validation => "validation",
             Split::Test => "test",
         }
     }
 }
 
 /// A roundabout of a benchmark, with the routes that the benchmark uses.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Place {
     /// The roundabout.
     pub roundabout: Roundabout,
-    /// Routes of both splits, each once, in the roundabout's order.
+    /// Routes of all splits, each once, in the roundabout's order.
     pub routes: Vec<Route>,
 }
 
 /// A benchmark: roundabouts, routes and their split, vehicle, actions, reward. SI units and radians.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Scenario {
     /// The file's stem.
     pub name: String,
@@ -103,10 +112,16 @@ pub struct Scenario {
     pub clearance_limit: f64,
     /// Reward for a failure.
     pub failure_weight: f64,
+    /// Length of a route before the ring \[m].
+    pub approach: f64,
+    /// Length of a route after the ring \[m].
+    pub departure: f64,
+    /// Distance between waypoints \[m].
+    pub spacing: f64,
     /// The roundabouts.
     pub places: Vec<Place>,
-    train: Vec<u32>,
-    test: Vec<u32>,
+    /// Routes of each split, in the order of [`Split::ALL`].
+    splits: [Vec<u32>; 3],
 }
 
 impl Scenario {
@@ -116,7 +131,7 @@ impl Scenario {
     ///
     /// The file and, for a value that makes no sense, its key, the value and what would do.
     pub fn read(path: &Path) -> Result<Scenario, Error> {
-        Scenario::from_source(&Source::Disk(path.to_owned()))
+        Scenario::from_source(&Source::Disk(path.to_owned()), &Loading::PLAIN)
     }
 
     /// A benchmark that comes with the library.
@@ -134,7 +149,7 @@ impl Scenario {
     ///
     /// [`Error::UnknownName`], which lists the known names.
     pub fn named(name: &str) -> Result<Scenario, Error> {
-        Scenario::from_source(&Source::named(Kind::Benchmark, name)?)
+        Scenario::from_source(&Source::named(Kind::Benchmark, name)?, &Loading::PLAIN)
     }
 
     /// Reads a file where `name_or_path` ends in `.toml` or is the path of a file; else the same as
@@ -144,15 +159,21 @@ impl Scenario {
     ///
     /// Those of [`Scenario::read`] and [`Scenario::named`].
     pub fn find(name_or_path: &str) -> Result<Scenario, Error> {
-        Scenario::from_source(&Source::find(Kind::Benchmark, name_or_path)?)
+        Scenario::load(name_or_path, &Loading::PLAIN)
+    }
+
+    /// The same, telling of progress, and with a cache of what is known of random roads.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Scenario::find`].
+    pub fn load(name_or_path: &str, loading: &Loading) -> Result<Scenario, Error> {
+        Scenario::from_source(&Source::find(Kind::Benchmark, name_or_path)?, loading)
     }
 
     /// Indices of a split's routes in the world's table.
     pub fn split(&self, split: Split) -> &[u32] {
-        match split {
-            Split::Train => &self.train,
-            Split::Test => &self.test,
-        }
+        &self.splits[split as usize]
     }
 
     /// Names of a split's routes.

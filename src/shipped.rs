@@ -21,6 +21,10 @@ pub const FILES: &[(&str, &str)] = embedded![
     "attard2023-as-run-training.toml",
     "attard2023-full.toml",
     "attard2023-training.toml",
+    "distributions/mixed.toml",
+    "distributions/wide.toml",
+    "random2026.toml",
+    "random2026-training.toml",
     "roundabouts/16m.toml",
     "roundabouts/20m.toml",
     "roundabouts/32m.toml",
@@ -40,6 +44,8 @@ pub enum Kind {
     Roundabout,
     /// Tractor, trailer and loads: `scenarios/vehicles/*.toml`.
     Vehicle,
+    /// Ranges of random roundabouts: `scenarios/distributions/*.toml`.
+    Distribution,
 }
 
 impl Kind {
@@ -49,6 +55,7 @@ impl Kind {
             Kind::Benchmark => "benchmark",
             Kind::Roundabout => "roundabout",
             Kind::Vehicle => "vehicle",
+            Kind::Distribution => "distribution",
         }
     }
 
@@ -58,6 +65,7 @@ impl Kind {
             Kind::Benchmark => "",
             Kind::Roundabout => "roundabouts/",
             Kind::Vehicle => "vehicles/",
+            Kind::Distribution => "distributions/",
         }
     }
 

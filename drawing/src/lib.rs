@@ -4,6 +4,8 @@
 //!   them.
 //! - [`recording::Recorder`] records episodes of a batch, [`episode::Scene`] draws one as a still, [`film::gif`] as a
 //!   film.
+//! - [`sheet::drawn`] draws many roundabouts side by side, [`histograms::Histograms`] how their dimensions are
+//!   distributed.
 //! - [`chart::Chart`] draws measurements over logarithmic axes.
 //! - [`rasterised`] makes a PNG of any of these SVGs. Text is drawn as outlines, so that pictures are equal on every
 //!   machine.
@@ -26,12 +28,14 @@ pub mod chart; // measurements as lines
 pub mod episode; // a recorded episode, still or moving
 pub mod figure; // a map with axes, title and legend
 pub mod film; // a recorded episode as GIF
+pub mod histograms; // how often values are drawn
 mod isolines; // lines of equal distance
 mod legend; // samples and words below a map
 mod lettering; // text as outlines
 pub mod polygons; // curves as points
 pub mod recording; // the states of an episode
 mod road; // the layers of a map
+pub mod sheet; // many roundabouts side by side
 pub mod sweep; // a truck's swept path on a route
 
 use resvg::{tiny_skia, usvg};

@@ -87,6 +87,17 @@ impl<'a> Road<'a> {
         Group::new().add(Path::new().set("d", self.kerb_data()).set("fill", "none").set("stroke", colour::KERB).set("stroke-width", 1.6))
     }
 
+    /// The centre lines of the lanes for a small map.
+    pub(crate) fn thin_lanes(&self) -> Group {
+        self.lanes().set("stroke-width", 0.5).set("opacity", 0.55)
+    }
+
+    /// The edges of the drivable area for a small map.
+    pub(crate) fn thin_kerbs(&self) -> Group {
+        let kerbs = Path::new().set("d", self.kerb_data()).set("fill", "none").set("stroke", colour::KERB);
+        Group::new().add(kerbs.set("stroke-width", 0.8))
+    }
+
     /// All routes, with arrows on their approach, around the ring and on their departure.
     pub(crate) fn routes(&self) -> Group {
         let mut lines = Group::new();

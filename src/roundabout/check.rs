@@ -233,7 +233,7 @@ pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lan
             let until = if one.way == Way::Entry { from_left.len() } else { n_lanes };
             for other in &from_left[(first + 1).min(until)..until] {
                 let distance = |p: DVec2| other.curve.distance(p);
-                if let Some(p) = stations(one.curve).map(|s| one.curve.point_at(s)).find(|&p| distance(p) < LANES_APART) {
+                if let Some(p) = nearer(one.curve, 0.0, f64::INFINITY, LANES_APART, distance) {
                     return Err(reader.invalid(
                         format!("arm[{index}].{one}"),
                         format_args!("{} m from {other} at ({:.1}, {:.1})", differing(distance(p), LANES_APART), p.x, p.y),
@@ -259,17 +259,33 @@ impl Display for Beside<'_> {
     }
 }
 
-/// Stations along a curve at which it is checked \[m].
-fn stations(curve: &Curve) -> impl Iterator<Item = f64> {
+/// The first of the points every 25 cm along a curve, from station `from` to `to`, at which `distance` is below
+/// `limit`. `distance` is to something that does not move, so it changes by at most a metre a metre: stations that
+/// cannot be nearer than `limit` are left out \[m].
+fn nearer(curve: &Curve, from: f64, to: f64, limit: f64, distance: impl Fn(DVec2) -> f64) -> Option<DVec2> {
     const STEP: f64 = 0.25;
-    (0..=(curve.length() / STEP) as usize).map(|step| step as f64 * STEP)
+    let last = (curve.length() / STEP) as usize;
+    let mut step = (from.max(0.0) / STEP).floor() as usize;
+    while step <= last && step as f64 * STEP < to {
+        let p = curve.point_at(step as f64 * STEP);
+        if step as f64 * STEP < from {
+            step += 1;
+            continue;
+        }
+        let distance = distance(p);
+        if distance < limit {
+            return Some(p);
+        }
+        // A micrometre for rounding.
+        step += (((distance - limit - 1e-6) / STEP).floor().max(0.0) as usize).max(1);
+    }
+    None
 }
 
 fn clear(reader: &Reader, kerbs: &Outline, curve: &Curve, key: &str) -> Result<(), Error> {
     // An arm's end is a solid edge that every lane meets.
-    let free = 2.0 * NEAREST..curve.length() - 2.0 * NEAREST;
-    let stations = stations(curve).filter(|s| free.contains(s));
-    match stations.map(|s| curve.point_at(s)).find(|&p| kerbs.signed_distance(p) < NEAREST) {
+    let (from, to) = (2.0 * NEAREST, curve.length() - 2.0 * NEAREST);
+    match nearer(curve, from, to, NEAREST, |p| kerbs.signed_distance(p)) {
         None => Ok(()),
         Some(p) => Err(reader.invalid(
             key,

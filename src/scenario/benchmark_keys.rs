@@ -28,7 +28,9 @@ pub(super) struct Written {
     pub(super) reward: WrittenReward,
     #[serde(default)]
     pub(super) routes: WrittenRoutes,
+    #[serde(default)]
     pub(super) roundabout: Vec<WrittenRoundabout>,
+    pub(super) procedural: Option<WrittenProcedural>,
 }
 
 #[derive(Deserialize)]
@@ -135,7 +137,21 @@ pub(super) struct WrittenRoundabout {
     #[serde(default)]
     pub(super) train: WrittenChoice,
     #[serde(default)]
+    pub(super) validation: WrittenChoice,
+    #[serde(default)]
     pub(super) test: WrittenChoice,
+}
+
+/// Random roads: all routes of a range of indices for each split, from the first to before the second.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WrittenProcedural {
+    pub(super) distribution: PathBuf,
+    pub(super) seed: u32,
+    pub(super) count: usize,
+    pub(super) train: Option<[u32; 2]>,
+    pub(super) validation: Option<[u32; 2]>,
+    pub(super) test: Option<[u32; 2]>,
 }
 
 /// `"all"`, or routes by their name within the roundabout.

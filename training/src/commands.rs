@@ -6,9 +6,11 @@ pub mod deviations;
 pub mod devices;
 pub mod draw;
 pub mod evaluate;
+pub mod generate;
 mod policies; // flags: which policy
 mod progress; // the bar on a terminal
 pub mod record;
+mod roads; // benchmarks and roads by name
 pub mod scale;
 mod terminal; // how wide a table may be
 pub mod trace;

@@ -9,7 +9,7 @@ use clap::{Parser, Subcommand};
 use offtrack_training::error::Error;
 use offtrack_training::{files, provenance};
 
-use commands::{bench, certify, deviations, devices, draw, evaluate, record, scale, trace, train};
+use commands::{bench, certify, deviations, devices, draw, evaluate, generate, record, scale, trace, train};
 
 /// Batches of tensors are allocated thousands of times a second; the system's allocator takes a third of an update's
 /// time.
@@ -49,6 +49,7 @@ enum Command {
     Devices(devices::Args),
     Certify(certify::Args),
     Draw(draw::Args),
+    Generate(generate::Args),
     Record(record::Args),
     Trace(trace::Args),
     Deviations(deviations::Args),
@@ -72,6 +73,7 @@ fn main() -> ExitCode {
         Command::Devices(args) => devices::run(args),
         Command::Certify(args) => certify::run(args),
         Command::Draw(args) => draw::run(args),
+        Command::Generate(args) => generate::run(args),
         Command::Record(args) => record::run(args),
         Command::Trace(args) => trace::run(args),
         Command::Deviations(args) => deviations::run(args),

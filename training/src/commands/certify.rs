@@ -10,7 +10,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use offtrack::layout::{Ended, Start};
-use offtrack::scenario::{Scenario, Split};
+use offtrack::procedural;
+use offtrack::scenario::Split;
 use offtrack::world::World;
 
 use offtrack_training::error::Error;
@@ -21,7 +22,7 @@ use offtrack_training::evaluation::policies;
 use offtrack_training::files;
 use offtrack_training::policy::LearnedPolicy;
 
-use super::progress;
+use super::{progress, roads};
 
 /// On the lane centre, and the four corners of the largest start errors.
 const STARTS: [Start; 5] = [
@@ -38,9 +39,13 @@ pub struct Args {
     /// A benchmark's name, or the path of its file. Without it attard2023; with --verify the file's own.
     #[arg(long)]
     benchmark: Option<String>,
-    /// Which routes: `test`, `train` or `all`.
-    #[arg(long, default_value = "all", value_parser = ["test", "train", "all"])]
+    /// Which routes: `test`, `validation`, `train` or `all`.
+    #[arg(long, default_value = "all", value_parser = ["test", "validation", "train", "all"])]
     split: String,
+    /// Only this route of the split, 20m/N-left-3, or all of a roundabout's, 20m; repeatable. A random road need not be
+    /// in the benchmark: wide/7/12/N-left-3, or all of wide/7/12.
+    #[arg(long)]
+    route: Vec<String>,
     /// A policy file, or the name of a shipped policy: its own action sequence is then among the candidates.
     #[arg(long)]
     policy: Option<String>,
@@ -54,7 +59,7 @@ pub struct Args {
     #[arg(long)]
     json: Option<PathBuf>,
     /// Drive the sequences of this file again and search for nothing.
-    #[arg(long, conflicts_with_all = ["split", "policy", "widths", "hold", "json"])]
+    #[arg(long, conflicts_with_all = ["split", "route", "policy", "widths", "hold", "json"])]
     verify: Option<PathBuf>,
 }
 
@@ -75,7 +80,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
 /// Drives a certificate's sequences again.
 fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
     let certificate = Certificate::read(path)?;
-    let scenario = Scenario::find(benchmark.unwrap_or(&certificate.benchmark))?;
+    let mut scenario = roads::benchmark(benchmark.unwrap_or(&certificate.benchmark))?;
+    // Random roads that the benchmark does not have are drawn again.
+    let is_random = |name: &String| name.rsplit_once('/').is_some_and(|(road, _)| procedural::address(road).is_some());
+    let names: Vec<String> = certificate.routes.iter().map(|route| route.name.clone()).collect();
+    if names.iter().any(is_random) {
+        roads::narrow(&mut scenario, &names, &Split::ALL)?;
+    }
     let world = Arc::new(World::bake(&scenario)?);
     certificate.check(&scenario, &world, path)?;
     let arrived = verify::verify(&certificate, &world, path, |_| true)?;
@@ -84,17 +95,17 @@ fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
 
 /// Searches every route from every start.
 fn certify(args: &Args) -> Result<(), Error> {
-    let scenario = Scenario::find(args.benchmark.as_deref().unwrap_or("attard2023"))?;
+    let mut scenario = roads::benchmark(args.benchmark.as_deref().unwrap_or("attard2023"))?;
+    let splits: Vec<Split> = Split::ALL.into_iter().filter(|split| args.split == "all" || args.split == split.name()).collect();
+    if !args.route.is_empty() {
+        roads::narrow(&mut scenario, &args.route, &splits)?;
+    }
     let world = Arc::new(World::bake(&scenario)?);
     let policy = args.policy.as_deref().map(policies::learned).transpose()?;
     if let Some(policy) = &policy {
         policy.check(&world)?;
     }
-    let mut routes: Vec<u32> = [Split::Train, Split::Test]
-        .into_iter()
-        .filter(|split| args.split == "all" || args.split == split.name())
-        .flat_map(|split| scenario.split(split).to_vec())
-        .collect();
+    let mut routes: Vec<u32> = splits.iter().flat_map(|&split| scenario.split(split).to_vec()).collect();
     routes.sort_unstable();
     if routes.is_empty() {
         let expected = format!("the benchmark {} has no such routes", scenario.name);

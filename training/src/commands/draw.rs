@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use offtrack::procedural;
 use offtrack::reader::shown;
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::Route;
@@ -19,7 +20,8 @@ use offtrack_training::files;
 /// Draw a roundabout, or a truck's swept path on one of its routes.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A roundabout's name, or the path of its file.
+    /// A roundabout's name, the path of its file, or a random road: wide/7/12 is road 12 of seed 7 of the distribution
+    /// wide.
     roundabout: String,
     /// The file to write: .svg, .png, or .json for polygons and waypoints.
     ///
@@ -80,7 +82,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     length("--approach", args.approach)?;
     length("--departure", args.departure)?;
-    let roundabout = Roundabout::find(&args.roundabout)?;
+    let roundabout = procedural::find(&args.roundabout)?;
     let routes = roundabout.routes(args.approach, args.departure, WAYPOINT_SPACING).map_err(|leaves| {
         let (flag, value) = if leaves.part == "approach" { ("--approach", args.approach) } else { ("--departure", args.departure) };
         Error::Flag { flag, value: format!("{value} m"), expected: leaves.to_string() }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use offtrack::reader;
-use offtrack::scenario::{Scenario, Split};
+use offtrack::scenario::Split;
 use offtrack::world::World;
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::certificate::certified;
@@ -14,7 +14,7 @@ use offtrack_training::evaluation::{Evaluation, legend};
 use offtrack_training::files;
 use serde_json::Value;
 
-use super::{devices, policies, progress, terminal};
+use super::{devices, policies, progress, roads, terminal};
 
 /// Most bytes of a run's report and of its figures.
 const RUN_LIMIT: u64 = 64 << 20;
@@ -28,9 +28,13 @@ pub struct Args {
     /// A benchmark's name, or the path of its file.
     #[arg(long, default_value = "attard2023")]
     benchmark: String,
-    /// Which routes: `test` (unseen in training) or `train`.
-    #[arg(long, default_value = "test", value_parser = ["test", "train"])]
+    /// Which routes: `test` (unseen in training), `validation` or `train`.
+    #[arg(long, default_value = "test", value_parser = ["test", "validation", "train"])]
     split: String,
+    /// Only this route of the split, 20m/N-left-3, or all of a roundabout's, 20m; repeatable. A random road need not be
+    /// in the benchmark: wide/7/12/N-left-3, or all of wide/7/12.
+    #[arg(long)]
+    route: Vec<String>,
     /// Episodes on each route.
     #[arg(long, default_value_t = 30)]
     episodes: usize,
@@ -59,10 +63,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return Err(Error::Flag { flag: "--episodes", value: args.episodes.to_string(), expected: "must lie in 1..100000".into() });
     }
     let device = args.device.open()?;
-    let scenario = Scenario::find(&args.benchmark)?;
+    let split = Split::ALL.into_iter().find(|split| split.name() == args.split).unwrap_or(Split::Test);
+    let mut scenario = roads::benchmark(&args.benchmark)?;
+    if !args.route.is_empty() {
+        roads::narrow(&mut scenario, &args.route, &[split])?;
+    }
     let world = Arc::new(World::bake(&scenario)?);
     let mut policy = args.policy.open(&scenario, &world, args.seed)?;
-    let split = if args.split == "train" { Split::Train } else { Split::Test };
     let n_episodes = args.episodes * scenario.split(split).len();
     if args.html.is_some() && MOST_EPISODES < n_episodes {
         let expected = format!("{n_episodes} in all; a page holds {MOST_EPISODES} at most: ask for fewer, or leave --html out");

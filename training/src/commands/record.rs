@@ -6,6 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use offtrack::procedural;
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::Route;
 use offtrack::scenario::{Scenario, Split};
@@ -19,14 +20,14 @@ use offtrack_training::error::Error;
 use offtrack_training::evaluation::policies::Policy;
 use offtrack_training::files;
 
-use super::{policies, progress};
+use super::{policies, progress, roads};
 
 /// Record one episode: as a film, as a picture with the swept paths of both units, or as data.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     policy: policies::Choice,
-    /// One of the benchmark's routes, of either split: 20m/N-left-3.
+    /// One of the benchmark's routes, of any split: 20m/N-left-3; or one of a random road: wide/7/12/N-left-3.
     #[arg(long)]
     route: String,
     /// The file to write: .gif, .png, .svg, or .json for data.
@@ -79,7 +80,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = format!("must lie in 0..{}: --episodes says how many there are", args.episodes - 1);
         return Err(Error::Flag { flag: "--episode", value: args.episode.to_string(), expected });
     }
-    let scenario = Scenario::find(&args.benchmark)?;
+    let scenario = scenario(args)?;
     let chosen = Chosen::new(&scenario, &args.route)?;
     let world = Arc::new(World::bake(&scenario)?);
     let mut policy = args.policy.open(&scenario, &world, args.seed)?;
@@ -135,24 +136,30 @@ struct Chosen<'a> {
 impl<'a> Chosen<'a> {
     fn new(scenario: &'a Scenario, name: &str) -> Result<Chosen<'a>, Error> {
         let Some((index, (roundabout, route))) = scenario.routes().enumerate().find(|(_, (_, route))| route.name == name) else {
-            return Err(Error::Flag { flag: "--route", value: name.to_owned(), expected: known(scenario, name) });
+            return Err(roads::unknown(scenario, name));
         };
         let within = |split: Split| Some((split, scenario.split(split).iter().position(|&other| other as usize == index)?));
-        let (split, in_split) = within(Split::Test).or_else(|| within(Split::Train)).expect("a benchmark's route is in one of its splits");
+        let (split, in_split) = Split::ALL.into_iter().find_map(within).expect("a benchmark's route is in one of its splits");
         Ok(Chosen { route, roundabout: &scenario.places[roundabout].roundabout, split, in_split })
     }
 }
 
-/// Routes to suggest for an unknown name: those of the roundabout that it begins with, or one of each roundabout.
-fn known(scenario: &Scenario, name: &str) -> String {
-    let of = |place: &offtrack::scenario::Place| place.routes.iter().map(|route| route.name.clone()).collect::<Vec<_>>();
-    let meant = scenario.places.iter().find(|place| name.split('/').next() == Some(&place.roundabout.name));
-    let names = meant.map_or_else(|| scenario.places.iter().filter_map(|place| of(place).first().cloned()).collect(), of);
-    let (from, list) = (&scenario.name, names.join(", "));
-    match meant {
-        Some(place) => format!("of {} the benchmark {from} has {list}", place.roundabout.name),
-        None => format!("a route of the benchmark {from} is needed, such as {list}"),
+/// The benchmark with the split of the route that is recorded or, where it does not have the route, on the road of the
+/// route alone.
+fn scenario(args: &Args) -> Result<Scenario, Error> {
+    let mut scenario = roads::benchmark(&args.benchmark)?;
+    let of = |split: &&Split| scenario.split_names(**split).contains(&args.route.as_str());
+    if let Some(&split) = Split::ALL.iter().find(of) {
+        scenario.keep(&[split]);
+        return Ok(scenario);
     }
+    let Some((road, _)) = args.route.rsplit_once('/').filter(|(road, _)| procedural::address(road).is_some()) else {
+        return Err(roads::unknown(&scenario, &args.route));
+    };
+    if scenario.places.iter().any(|place| place.roundabout.name == road) {
+        return Err(roads::unknown(&scenario, &args.route));
+    }
+    Ok(scenario.on(procedural::find(road)?)?)
 }
 
 /// Drives the batch of the evaluation until the episode has ended.

@@ -4,6 +4,7 @@
 //! checkpoint every few minutes. A stopped run leaves a policy that can be evaluated, and all that it takes to
 //! continue.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -31,7 +32,7 @@ use offtrack_training::provenance;
 use serde::Serialize;
 use serde_json::json;
 
-use super::{progress, terminal};
+use super::{progress, roads, terminal};
 
 /// Episodes on each route in the final evaluation.
 const EPISODES: usize = 30;
@@ -182,11 +183,15 @@ impl Worlds {
     /// Both benchmarks of a training file. None of the routes that the policy is evaluated on may be among those it is
     /// trained on.
     fn read(config: &Config) -> Result<Worlds, Error> {
-        let benchmark = Scenario::find(&config.benchmark)?;
-        let training = Scenario::find(config.training_benchmark.as_ref().unwrap_or(&config.benchmark))?;
+        let mut benchmark = roads::benchmark(&config.benchmark)?;
+        let training = roads::benchmark(config.training_benchmark.as_ref().unwrap_or(&config.benchmark))?;
         let wrong = |expected: String| Error::Flag { flag: "training_benchmark", value: training.name.clone(), expected };
-        let test = benchmark.split_names(Split::Test);
-        if let Some(route) = training.split_names(Split::Train).into_iter().find(|route| test.contains(route)) {
+        // The policy is evaluated on the test routes alone; without any it is not evaluated.
+        if !benchmark.split(Split::Test).is_empty() {
+            benchmark.keep(&[Split::Test]);
+        }
+        let test: HashSet<&str> = benchmark.split_names(Split::Test).into_iter().collect();
+        if let Some(route) = training.split_names(Split::Train).into_iter().find(|&route| test.contains(route)) {
             return Err(wrong(format!("{route} is a test route of {} and must not be trained on", benchmark.name)));
         }
         if training.split(Split::Train).is_empty() {
