@@ -8,16 +8,14 @@ mod mode;
 mod plot;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::SystemTime;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use offtrack::layout::{N_RAYS, N_VALUES};
-use offtrack::scenario::{Scenario, Split};
-use offtrack::world::World;
+use offtrack::scenario::Split;
 use serde::Serialize;
 
-use super::devices as device;
+use super::{devices as device, roads};
 pub(crate) use measure::median;
 use measure::{Measured, measured};
 use mode::{Learner, Mode, Setting};
@@ -147,8 +145,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         plot::check(file)?;
     }
     let mut device = args.device.open()?;
-    let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
-    let world = Arc::new(World::bake(&scenario)?);
+    let scenario = roads::benchmark(&args.benchmark)?;
+    let world = roads::world(&scenario)?;
     let learner = match args.mode.iter().any(|mode| *mode != Mode::Random) {
         true => Some(Learner::read(&scenario.name, &args.config.clone().unwrap_or_else(|| PathBuf::from("gpu")), &world)?),
         false => None,
