@@ -23,6 +23,7 @@ mod on_device;
 mod parity;
 mod physics;
 mod pinned;
+mod procedural;
 mod refused;
 mod restarts;
 mod sense;

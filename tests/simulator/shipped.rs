@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use offtrack::procedural::Distribution;
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::scenario::Scenario;
 use offtrack::shipped::{FILES, Kind};
@@ -30,9 +31,10 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
     let mut files = BTreeMap::new();
     on_disk(&scenarios(), Path::new(""), &mut files);
     let embedded: BTreeMap<String, String> = FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
-    assert_eq!((files.len(), FILES.len()), (13, 13), "five benchmarks, five roundabouts, three vehicles");
+    assert_eq!((files.len(), FILES.len()), (17, 17), "seven benchmarks, five roundabouts, three vehicles, two distributions");
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
-    assert_eq!([Kind::Benchmark, Kind::Roundabout, Kind::Vehicle].map(|kind| kind.names().count()), [5, 5, 3]);
+    let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
+    assert_eq!(kinds.map(|kind| kind.names().count()), [7, 5, 3, 2]);
 }
 
 #[test]
@@ -48,6 +50,9 @@ fn every_name_gives_what_its_file_gives() {
     }
     for name in Kind::Vehicle.names() {
         Vehicle::named(name).unwrap();
+    }
+    for name in Kind::Distribution.names() {
+        assert_eq!(Distribution::named(name).unwrap().name, name);
     }
 }
 

@@ -7,6 +7,7 @@ mod certify;
 mod device;
 mod draw;
 mod evaluate;
+mod generate;
 mod input;
 mod interruption;
 mod page;
