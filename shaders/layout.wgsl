@@ -53,7 +53,7 @@ const GREATER: u32 = 3u;
 // Pairs that an index of a word counts: every block has an even number.
 const PAIRS_PER_UNIT: u32 = 2u;
 // What a stored value of 1 means: 0.5 mm. Exact in f32 [m].
-const UNIT: f32 = 0.00048828125f;
+const STORED_UNIT: f32 = 0.00048828125f;
 // Factor of the linear congruential step that each counter goes through first.
 const FACTOR: u32 = 1664525u;
 // Addend of that step.
@@ -398,6 +398,8 @@ struct FieldRow {
     origin: vec2<f32>,
     // Cells in a metre [1/m].
     cells_per_metre: f32,
+    // Slope of the distance where it rises by one stored unit across a cell.
+    slope: f32,
     // Cells from west to east.
     columns: u32,
     // Cells from south to north.
@@ -430,7 +432,7 @@ struct BatchFacts {
 @group(0) @binding(3) var<storage, read> fields: array<FieldRow>;
 // Cells of all fields.
 @group(0) @binding(4) var<storage, read> cells: array<u32>;
-// Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of UNIT.
+// Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of STORED_UNIT.
 @group(0) @binding(5) var<storage, read> corners: array<u32>;
 // Every route's waypoints, one route after the other.
 @group(0) @binding(6) var<storage, read> waypoints: array<WaypointRow>;

@@ -31,7 +31,7 @@ constants! {
     /// Pairs that an index of a word counts: every block has an even number.
     const PAIRS_PER_UNIT: u32 = 2;
     /// What a stored value of 1 means: 0.5 mm. Exact in f32 \[m].
-    const UNIT: f32 = 1.0 / 2048.0;
+    pub(crate) const STORED_UNIT: f32 = 1.0 / 2048.0;
 }
 /// How a cell's blocks make the distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -185,12 +185,12 @@ impl Field {
         let east_pair = read(&self.values[1..], &pair);
         let (mut distance, mut east, mut north) = ([0.0; N], [0.0; N], [0.0; N]);
         for n in 0..N {
-            let scale = size[n] * self.cells_per_metre * UNIT;
+            let scale = size[n] * self.cells_per_metre * STORED_UNIT;
             let (south_west, south_east) = (southern(west_pair[n]), southern(east_pair[n]));
             let (south_rise, north_rise) = (south_east - south_west, northern(east_pair[n]) - northern(west_pair[n]));
             let west_rise = northern(west_pair[n]) - south_west;
             let twist = north_rise - south_rise;
-            distance[n] = UNIT * (south_west + u[n] * south_rise + v[n] * (west_rise + u[n] * twist));
+            distance[n] = STORED_UNIT * (south_west + u[n] * south_rise + v[n] * (west_rise + u[n] * twist));
             east[n] = (south_rise + v[n] * twist) * scale;
             north[n] = (west_rise + u[n] * twist) * scale;
         }

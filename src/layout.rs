@@ -275,6 +275,8 @@ crate::shared! {
         pub origin: Vec2,
         /// Cells in a metre \[1/m].
         pub cells_per_metre: f32,
+        /// Slope of the distance where it rises by one stored unit across a cell.
+        pub slope: f32,
         /// Cells from west to east.
         pub columns: u32,
         /// Cells from south to north.

@@ -40,12 +40,12 @@ fn interpolated(field: FieldRow, first: u32, size: f32, at: vec2<f32>) -> Sample
     let west = unpacked(corners[pair]);
     let east = unpacked(corners[pair + 1u]);
 
-    let scale = size * field.cells_per_metre * UNIT;
+    let scale = size * field.slope;
     let south_rise = east.x - west.x;
     let west_rise = west.y - west.x;
     let twist = (east.y - west.y) - south_rise;
     return Sample(
-        UNIT * (west.x + fraction.x * south_rise + fraction.y * (west_rise + fraction.x * twist)),
+        STORED_UNIT * (west.x + fraction.x * south_rise + fraction.y * (west_rise + fraction.x * twist)),
         vec2<f32>((south_rise + fraction.y * twist) * scale, (west_rise + fraction.x * twist) * scale),
     );
 }

@@ -3,7 +3,7 @@
 use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 
-use super::{Field, Kind, LEVEL_BITS, PAIRS_PER_UNIT, UNIT, word};
+use super::{Field, Kind, LEVEL_BITS, PAIRS_PER_UNIT, STORED_UNIT, word};
 use crate::geometry::{Nearby, Outline};
 
 /// Solid ground kept around the outline \[m].
@@ -167,7 +167,7 @@ fn placed(values: &mut Vec<u32>, block: &Block) -> u32 {
 
 /// A distance as it is stored.
 fn stored(distance: f64) -> i16 {
-    (distance.clamp(-DEEP, FAR) / f64::from(UNIT)).round() as i16
+    (distance.clamp(-DEEP, FAR) / f64::from(STORED_UNIT)).round() as i16
 }
 
 /// The blocks of the cell with its south-western corner at `corner`.
@@ -298,7 +298,7 @@ impl Square {
     fn values(&self, block: &Block) -> impl Iterator<Item = f64> {
         points(block.level).map(move |(column, row, u, v)| {
             let lines = (1 << block.level) + 1;
-            let node = |right: usize, above: usize| f64::from(block.nodes[(row + above) * lines + column + right]) * f64::from(UNIT);
+            let node = |right: usize, above: usize| f64::from(block.nodes[(row + above) * lines + column + right]) * f64::from(STORED_UNIT);
             let (south, north) = (node(0, 0) + u * (node(1, 0) - node(0, 0)), node(0, 1) + u * (node(1, 1) - node(0, 1)));
             south + v * (north - south)
         })

@@ -115,7 +115,7 @@ impl Table {
             Table::Fields => ("A field for each roundabout.", rows::<FieldRow>()),
             Table::Cells => ("Cells of all fields.", rows::<u32>()),
             Table::Corners => (
-                "Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of UNIT.",
+                "Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of STORED_UNIT.",
                 rows::<u32>(),
             ),
             Table::Waypoints => ("Every route's waypoints, one route after the other.", rows::<WaypointRow>()),

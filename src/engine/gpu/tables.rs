@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use bytemuck::{bytes_of, cast_slice};
 
+use crate::field::STORED_UNIT;
 use crate::layout::buffers::Table;
 use crate::layout::{BatchFacts, FieldRow, Start};
 use crate::world::World;
@@ -28,6 +29,7 @@ impl<'a> Tables<'a> {
             tables.fields.push(FieldRow {
                 origin: field.origin,
                 cells_per_metre: field.cells_per_metre,
+                slope: field.cells_per_metre * STORED_UNIT,
                 columns: field.columns,
                 rows: field.rows,
                 first_cell,
