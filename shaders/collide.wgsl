@@ -170,5 +170,5 @@ fn body_clearance(
 // Signed distance at a point of a unit's frame [m].
 fn sampled(field: FieldRow, position: vec2<f32>, heading: vec2<f32>, point: vec2<f32>) -> f32 {
     let p = vec2<f32>(position.x + point.x * heading.x - point.y * heading.y, position.y + point.x * heading.y + point.y * heading.x);
-    return field_sample(field, field.first_cell, p).distance;
+    return field_sample(field, true, p).distance;
 }

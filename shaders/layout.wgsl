@@ -34,8 +34,26 @@ const SINE: array<f32, 3> = array<f32, 3>(-0.00019515296f, 0.008332161f, -0.1666
 const COSINE: array<f32, 3> = array<f32, 3>(2.4433157e-5f, -0.0013887316f, 0.041666646f);
 // The smallest divisor.
 const TINY: f32 = 1.1754944e-38f;
-// Bits of a cell's word that hold the logarithm of its sub-cells a side; the rest is where its block begins.
-const LEVEL_BITS: u32 = 3u;
+// Bits of a cell's word below its block's index.
+const LEVEL_BITS: u32 = 8u;
+// Lowest bits of a word: the logarithm of the sub-cells a side of its first block.
+const LEVEL_MASK: u32 = 7u;
+// Shift of the same of a ridge's other two blocks.
+const RIDGE_SHIFT: u32 = 3u;
+// Shift of a cell's kind.
+const KIND_SHIFT: u32 = 6u;
+// Bits of a kind.
+const KIND_MASK: u32 = 3u;
+// [`Kind::Ridge`].
+const RIDGE: u32 = 1u;
+// [`Kind::Lesser`].
+const LESSER: u32 = 2u;
+// [`Kind::Greater`].
+const GREATER: u32 = 3u;
+// Pairs that an index of a word counts: every block has an even number.
+const PAIRS_PER_UNIT: u32 = 2u;
+// What a stored value of 1 means: 0.5 mm. Exact in f32 [m].
+const UNIT: f32 = 0.00048828125f;
 // Factor of the linear congruential step that each counter goes through first.
 const FACTOR: u32 = 1664525u;
 // Addend of that step.
@@ -386,8 +404,6 @@ struct FieldRow {
     rows: u32,
     // Index of its first cell.
     first_cell: u32,
-    // Index of its first cell for marching.
-    first_march_cell: u32,
     // Index of the first pair of its blocks.
     first_pair: u32,
 }
@@ -412,10 +428,10 @@ struct BatchFacts {
 @group(0) @binding(2) var<storage, read> rays: array<Ray>;
 // A field for each roundabout.
 @group(0) @binding(3) var<storage, read> fields: array<FieldRow>;
-// Cells of all fields: of each first its own, then those for marching.
+// Cells of all fields.
 @group(0) @binding(4) var<storage, read> cells: array<u32>;
-// Blocks of distances of all fields; a pair is the southern and the northern one [m].
-@group(0) @binding(5) var<storage, read> corners: array<vec2<f32>>;
+// Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of UNIT.
+@group(0) @binding(5) var<storage, read> corners: array<u32>;
 // Every route's waypoints, one route after the other.
 @group(0) @binding(6) var<storage, read> waypoints: array<WaypointRow>;
 // What is observed at each of them.

@@ -41,7 +41,7 @@ fn traced(field: FieldRow, origin: vec2<f32>, ahead: vec2<f32>, reach: f32) -> f
     var base = 0.0;
     var free = 0.0;
     for (var n = 0u; n < SAMPLES_MAX; n++) {
-        let sample = field_sample(field, field.first_march_cell, origin + along * ahead);
+        let sample = field_sample(field, false, origin + along * ahead);
         let distance = sample.distance;
         let radius = abs(distance);
         let closing = -(ahead.x * sample.slope.x + ahead.y * sample.slope.y);

@@ -281,8 +281,6 @@ crate::shared! {
         pub rows: u32,
         /// Index of its first cell.
         pub first_cell: u32,
-        /// Index of its first cell for marching.
-        pub first_march_cell: u32,
         /// Index of the first pair of its blocks.
         pub first_pair: u32,
     }

@@ -27,7 +27,7 @@ pub const DEPARTURE: f64 = 35.0;
 /// Default distance between waypoints \[m].
 pub const WAYPOINT_SPACING: f64 = 2.0;
 /// Default width of the distance field's cells \[m].
-pub const FIELD_CELL: f64 = 0.5;
+pub const FIELD_CELL: f64 = 1.0;
 
 /// The three disjoint sets of a benchmark's routes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,13 +3,16 @@
 //! A `World` in hand can always be stepped: everything that can be wrong is found when its scenario is read or baked.
 
 use std::f64::consts::PI;
+use std::sync::atomic::AtomicU64;
 
 use glam::{DVec2, Vec2};
+use rayon::prelude::*;
 
 use crate::field::Field;
 use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, RouteRow, WaypointRow};
+use crate::loading::Loading;
 use crate::route::{Route, Waypoint};
-use crate::scenario::{Invalid, Scenario};
+use crate::scenario::{Invalid, Place, Scenario};
 
 /// Waypoints to the corner of each observed curvature.
 const CURVATURE_STEPS: [usize; 4] = [5, 7, 10, 12];
@@ -44,6 +47,15 @@ impl World {
     ///
     /// Fails on a scenario that was changed after it was read so that no truck could be stepped.
     pub fn bake(scenario: &Scenario) -> Result<World, Invalid> {
+        World::bake_with(scenario, &Loading::PLAIN)
+    }
+
+    /// The same, with fields from a cache and a watcher who is told of each roundabout. All cores work at it.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`World::bake`].
+    pub fn bake_with(scenario: &Scenario, loading: &Loading) -> Result<World, Invalid> {
         scenario.check()?;
         let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
         let rig = scenario.vehicle.rig(&scenario.load, substep, scenario.steer_max);
@@ -87,7 +99,7 @@ impl World {
             },
             actions,
             rays: scenario.vehicle.rays(),
-            fields: scenario.places.iter().map(|place| Field::bake(&place.roundabout.kerbs(scenario.gutter), scenario.cell)).collect(),
+            fields: fields(scenario, loading),
             waypoints,
             previews,
             routes,
@@ -121,6 +133,23 @@ impl World {
     pub fn route_field(&self, route: u32) -> &Field {
         &self.fields[self.routes[route as usize].roundabout as usize]
     }
+}
+
+/// The field of every roundabout.
+fn fields(scenario: &Scenario, loading: &Loading) -> Vec<Field> {
+    let done = AtomicU64::new(0);
+    let field = |place: &Place| {
+        let kerbs = place.roundabout.kerbs(scenario.gutter);
+        let field = match loading.cache {
+            Some(cache) => Field::cached(&kerbs, scenario.cell, cache),
+            None => Field::bake(&kerbs, scenario.cell),
+        };
+        loading.count("baking roads", &done, scenario.places.len());
+        field
+    };
+    let fields = scenario.places.par_iter().map(field).collect();
+    loading.cache.inspect(|cache| cache.prune());
+    fields
 }
 
 /// Steps after which an episode on this route is timed out.

@@ -150,19 +150,7 @@ impl Outline {
     /// The part of the outline that suffices for signed distances of points within `radius` of `centre`: far fewer
     /// pieces than the whole.
     pub fn near(&self, centre: DVec2, radius: f64) -> Nearby {
-        let distances: Vec<f64> = self.pieces.iter().map(|placed| placed.distance(centre)).collect();
-        let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
-        // A point within `radius` is at most `least + radius` from the outline and sees each piece at most `radius`
-        // nearer than the centre.
-        let reach = least + 2.0 * radius + 1e-9;
-        let pieces = self.pieces.iter().zip(&distances).filter(|&(_, &distance)| distance <= reach).map(|(placed, _)| *placed).collect();
-        let side = if radius < least {
-            Side::Same(self.contains(centre))
-        } else {
-            let level = |rise: &&Rise| rise.from.y.min(rise.to.y) <= centre.y + radius && centre.y - radius <= rise.from.y.max(rise.to.y);
-            Side::Mixed(self.rises.iter().filter(level).copied().collect())
-        };
-        Nearby { pieces, side }
+        culled(&self.pieces, &self.rises, centre, radius)
     }
 
     /// The outline with the solid area grown by `distance`: every point of the new outline is `distance` from the old
@@ -187,7 +175,62 @@ enum Side {
     Mixed(Vec<Rise>),
 }
 
+/// The pieces and stretches that suffice within `radius` of `centre`.
+fn culled(pieces: &[Placed], rises: &[Rise], centre: DVec2, radius: f64) -> Nearby {
+    let distances: Vec<f64> = pieces.iter().map(|placed| placed.distance(centre)).collect();
+    let least = distances.iter().copied().fold(f64::INFINITY, f64::min);
+    // A point within `radius` is at most `least + radius` from the outline and sees each piece at most `radius` nearer
+    // than the centre.
+    let reach = least + 2.0 * radius + 1e-9;
+    let pieces = pieces.iter().zip(&distances).filter(|&(_, &distance)| distance <= reach).map(|(placed, _)| *placed).collect();
+    let side = if radius < least {
+        Side::Same(odd(rises, centre))
+    } else {
+        let level = |rise: &&Rise| rise.from.y.min(rise.to.y) <= centre.y + radius && centre.y - radius <= rise.from.y.max(rise.to.y);
+        Side::Mixed(rises.iter().filter(level).copied().collect())
+    };
+    Nearby { pieces, side }
+}
+
 impl Nearby {
+    /// The part of this part that suffices for points within `radius` of `centre`, which lie within this part's own
+    /// radius.
+    pub fn near(&self, centre: DVec2, radius: f64) -> Nearby {
+        let rises: &[Rise] = if let Side::Mixed(rises) = &self.side { rises } else { &[] };
+        let mut nearby = culled(&self.pieces, rises, centre, radius);
+        if let Side::Same(drivable) = self.side {
+            nearby.side = Side::Same(drivable);
+        }
+        nearby
+    }
+
+    /// The piece that is nearest to `p`.
+    pub fn nearest_piece(&self, p: DVec2) -> usize {
+        let all = self.pieces.iter().enumerate().map(|(index, placed)| (placed.distance(p), index));
+        all.fold((f64::INFINITY, 0), |best, other| if other.0 < best.0 { other } else { best }).1
+    }
+
+    /// Distance from `p` to a piece \[m].
+    pub fn piece_distance(&self, piece: usize, p: DVec2) -> f64 {
+        self.pieces[piece].distance(p)
+    }
+
+    /// Signed distance from `p` to a piece extended beyond its ends, to a straight line or a whole circle: positive on
+    /// the drivable side, with the gradient there \[m].
+    pub fn extended(&self, piece: usize, p: DVec2) -> (f64, DVec2) {
+        match self.pieces[piece].piece {
+            Piece::Segment { from, to } => {
+                let left = (to - from).normalize_or_zero().perp();
+                (left.dot(p - from), left)
+            }
+            Piece::Arc { centre, radius, sweep, .. } => {
+                let inwards = sweep.signum();
+                let out = p - centre;
+                (inwards * (radius - out.length()), -inwards * out.normalize_or_zero())
+            }
+        }
+    }
+
     /// Signed distance from `p` to the whole outline, exact for points within the radius given to [`Outline::near`]
     /// \[m].
     pub fn signed_distance(&self, p: DVec2) -> f64 {

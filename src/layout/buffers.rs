@@ -1,7 +1,5 @@
 //! The buffers that the kernels of a step see: one bind group, a binding each, in this order.
 
-use glam::Vec2;
-
 use super::{Action, BatchFacts, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, RouteRow, Start, WaypointRow};
 use crate::shared::{Named, Shared, comment};
 
@@ -115,8 +113,11 @@ impl Table {
             Table::Actions => ("The action table.", rows::<Action>()),
             Table::Rays => ("The distance sensors, trailer's first.", rows::<Ray>()),
             Table::Fields => ("A field for each roundabout.", rows::<FieldRow>()),
-            Table::Cells => ("Cells of all fields: of each first its own, then those for marching.", rows::<u32>()),
-            Table::Corners => ("Blocks of distances of all fields; a pair is the southern and the northern one [m].", rows::<Vec2>()),
+            Table::Cells => ("Cells of all fields.", rows::<u32>()),
+            Table::Corners => (
+                "Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of UNIT.",
+                rows::<u32>(),
+            ),
             Table::Waypoints => ("Every route's waypoints, one route after the other.", rows::<WaypointRow>()),
             Table::Previews => ("What is observed at each of them.", rows::<PreviewRow>()),
             Table::Routes => ("Every route.", rows::<RouteRow>()),

@@ -13,6 +13,7 @@ use offtrack::geometry::Outline;
 use offtrack::layout::{Column, Truck};
 use offtrack::random::{signed_unit, words};
 use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::scenario::FIELD_CELL;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::stages::Stage;
 use offtrack::world::World;
@@ -29,7 +30,7 @@ pub(crate) fn places(gutter: Gutter) -> Vec<(String, Outline, Field)> {
     let place = |file: &Path| {
         let roundabout = Roundabout::read(file).unwrap();
         let kerbs = roundabout.kerbs(gutter);
-        let field = Field::bake(&kerbs, 0.5);
+        let field = Field::bake(&kerbs, FIELD_CELL);
         (roundabout.name, kerbs, field)
     };
     files.iter().map(|file| place(file)).collect()
@@ -115,7 +116,7 @@ fn a_field_is_within_three_centimetres_of_the_exact_distance_and_within_one_away
 #[test]
 fn a_field_of_other_kerbs_fails_the_comparison() {
     let (_, kerbs, _) = places(Gutter::Drivable).swap_remove(0);
-    let other = Field::bake(&kerbs.offset(0.05), 0.5);
+    let other = Field::bake(&kerbs.offset(0.05), FIELD_CELL);
     let points = near_kerbs(&kerbs, &other);
     // At corners of the kerb, growing moves the outline less.
     let off = points.iter().filter(|(_, exact, baked)| 0.03 < (exact - baked).abs()).count();

@@ -98,6 +98,23 @@ fn slice(n_bytes: u64) -> Slice {
 }
 
 #[test]
+fn a_world_too_large_for_the_adapter_is_refused_with_the_number_of_roundabouts_that_would_fit() {
+    let (world, choice) = full();
+    let limits = device().device.limits();
+    let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let mut large = World::clone(&world);
+    // One field that is larger than the limit stands for many. Its zeros are never touched, so they take no memory.
+    large.fields[0].values = vec![0; limit as usize / 4 + 1];
+    let error = Simulator::on(engine(), Arc::new(large), 16, 0, choice).unwrap_err();
+    let simulator::Error::Gpu(Error::WorldTooLarge { table, n_roundabouts, n_bytes, limit: found, fitting, .. }) = &error else {
+        panic!("{error}");
+    };
+    assert_eq!((*table, *n_roundabouts, *found), ("corners", 5, limit));
+    assert!(limit < *n_bytes && *fitting < 5, "{error}");
+    assert!(error.to_string().contains("about 4 such roundabouts fit"), "{error}");
+}
+
+#[test]
 fn external_columns_are_stepped_in_place_and_refused_when_too_small_or_gathered() {
     let (world, choice) = full();
     let with = |columns| Simulator::on(Engine::Gpu { device: device().clone(), columns }, world.clone(), 100, 4, choice.clone());

@@ -10,6 +10,8 @@ use offtrack::stages::Stage;
 use offtrack::world::World;
 use rayon::prelude::*;
 
+use offtrack::scenario::FIELD_CELL;
+
 use crate::field::{after_stage, places, pose};
 use crate::{benchmark, engines};
 
@@ -80,7 +82,7 @@ fn a_range_is_the_distance_along_the_ray_to_the_kerb_to_two_centimetres() {
 fn ranges_to_kerbs_five_centimetres_off_are_noticed() {
     let world = benchmark("attard2023").1;
     let (_, kerbs, _) = places(Gutter::Drivable).swap_remove(0);
-    let other = Field::bake(&kerbs.offset(0.05), 0.5);
+    let other = Field::bake(&kerbs.offset(0.05), FIELD_CELL);
     for (_, engine) in engines() {
         let [wrong, _, met] = errors(&engine, &world, &kerbs, &other, 30);
         assert!(met * 3 / 4 < wrong, "{wrong} of {met}");

@@ -9,26 +9,6 @@ use serde::Serialize;
 
 use crate::error::Error;
 
-/// The file of a benchmark: a path as it is, or a name in `scenarios/` here or, failing that, where the program was
-/// built.
-pub fn benchmark(name: &str) -> Result<PathBuf, Error> {
-    let path = PathBuf::from(name);
-    if path.extension().is_some_and(|extension| extension == "toml") || path.is_file() {
-        return Ok(path);
-    }
-    let here = Path::new("scenarios").join(name).with_extension("toml");
-    let built = repository().join(&here);
-    let candidates = [here, built];
-    match candidates.iter().find(|candidate| candidate.is_file()) {
-        Some(found) => Ok(found.clone()),
-        None => Err(Error::Flag {
-            flag: "benchmark",
-            value: name.to_owned(),
-            expected: format!("no file {}; give the name of a file under scenarios/ or a path ending in .toml", candidates[0].display()),
-        }),
-    }
-}
-
 /// The repository that the program was built from.
 pub fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new(".")).to_owned()

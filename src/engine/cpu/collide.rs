@@ -10,7 +10,7 @@ use multiversion::multiversion;
 
 use crate::angle::direction;
 use crate::engine::Row;
-use crate::field::Field;
+use crate::field::{Field, Purpose};
 use crate::layout::{Body, Clearance, Rig, Truck};
 use crate::shared::constants;
 use crate::world::World;
@@ -161,7 +161,7 @@ fn sampled<const N: usize>(field: &Field, position: Vec2, heading: Vec2, points:
         x[n] = position.x + points[n].x * heading.x - points[n].y * heading.y;
         y[n] = position.y + points[n].x * heading.y + points[n].y * heading.x;
     }
-    field.sample(&field.cells, &x, &y).distance
+    field.sample(Purpose::Exact, &x, &y).distance
 }
 
 /// The undecided spans, last in first out.

@@ -1,24 +1,30 @@
 //! Measures the ranges: from each sensor along its ray to the kerb.
 //!
 //! Over-relaxed sphere tracing of the field (B. Keinert et al., "Enhanced Sphere Tracing", 2014): a step is as long as
-//! the field's slope along the ray allows, and is taken back unless the free circles at both of its ends overlap. All
-//! rays of a truck are traced side by side; once half of them have ended, the others are packed into a bundle of half
-//! the width.
+//! the field's slope along the ray allows, and is taken back unless the free circles at both of its ends overlap. Rays
+//! of a truck are traced side by side; a lane whose ray has ended takes the next one that waits. What a lane's
+//! neighbours are does not change its ray.
 
 use multiversion::multiversion;
 
 use crate::angle::direction;
 use crate::engine::Row;
-use crate::field::{Field, Samples};
+use crate::field::{Field, Purpose, Samples};
 use crate::layout::{N_RAYS, N_TRAILER_RAYS, Ray, Rig, Truck};
 use crate::shared::constants;
 use crate::world::World;
 
-/// Rays in the widest bundle: all of a truck's.
-const WIDE: usize = N_RAYS.next_power_of_two();
-/// Index of a lane without a ray among the ranges.
-const NO_RAY: u32 = WIDE as u32 - 1;
-const _: () = assert!(N_RAYS < WIDE);
+/// Rays that are traced side by side while others wait.
+const LANES: usize = 16;
+/// Rays that are traced side by side at last.
+const FEW: usize = 8;
+/// Lanes that must have ended before waiting rays take their places.
+const REFILL: usize = 4;
+/// Index of a lane without a ray.
+const NO_RAY: usize = N_RAYS;
+/// The order in which rays are traced: those that take the most samples on average first, so that the last ones end
+/// soon. It changes no range.
+const ORDER: [usize; N_RAYS] = [23, 24, 19, 22, 20, 21, 18, 25, 17, 16, 26, 14, 0, 12, 2, 4, 8, 10, 6, 27, 28, 1, 3, 5, 7, 9, 11, 13, 15];
 constants! {
     /// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide
     /// between them.
@@ -51,18 +57,53 @@ pub fn sense(world: &World, row: &mut Row) {
 /// Within 2 cm of the exact distance, except for rays that come within 2 cm of a kerb at less than 5 deg to it.
 #[inline(always)]
 pub fn ranges(field: &Field, rig: &Rig, rays: &[Ray; N_RAYS], truck: &Truck, reach: f32) -> [f32; N_RAYS] {
-    let mut bundle = Bundle::<WIDE>::new(rig, rays, truck);
-    let mut found = [0.0; WIDE];
-    let mut samples = 0;
-    bundle.trace(field, reach, WIDE / 2, &mut samples);
+    let placed = Placed::new(rig, rays, truck);
+    let mut found = [0.0; N_RAYS];
+    let mut bundle = Bundle::<LANES>::empty();
+    let mut waiting = 0;
+    bundle.refill(&placed, &mut waiting, &mut found);
+    loop {
+        let going = bundle.advance(field, reach);
+        if waiting < N_RAYS {
+            if going + REFILL <= LANES {
+                bundle.refill(&placed, &mut waiting, &mut found);
+            }
+        } else if going <= FEW {
+            break;
+        }
+    }
     bundle.note(&mut found);
-    let mut bundle: Bundle<{ WIDE / 2 }> = bundle.survivors();
-    bundle.trace(field, reach, WIDE / 4, &mut samples);
-    bundle.note(&mut found);
-    let mut bundle: Bundle<{ WIDE / 4 }> = bundle.survivors();
-    bundle.trace(field, reach, 0, &mut samples);
-    bundle.note(&mut found);
-    std::array::from_fn(|ray| found[ray])
+    let mut last: Bundle<FEW> = bundle.survivors();
+    while 0 < last.advance(field, reach) {}
+    last.note(&mut found);
+    found
+}
+
+/// The rays of a truck where they begin.
+struct Placed {
+    /// Where each ray begins \[m].
+    origin_x: [f32; N_RAYS],
+    origin_y: [f32; N_RAYS],
+    /// Its unit vector.
+    direction_x: [f32; N_RAYS],
+    direction_y: [f32; N_RAYS],
+}
+
+impl Placed {
+    #[inline(always)]
+    fn new(rig: &Rig, rays: &[Ray; N_RAYS], truck: &Truck) -> Placed {
+        let tractor = (truck.position, direction(truck.heading));
+        let trailer = (truck.trailer_position(rig), direction(truck.trailer_heading));
+        let mut placed =
+            Placed { origin_x: [0.0; N_RAYS], origin_y: [0.0; N_RAYS], direction_x: [0.0; N_RAYS], direction_y: [0.0; N_RAYS] };
+        for (n, ray) in rays.iter().enumerate() {
+            let (position, heading) = if n < N_TRAILER_RAYS { trailer } else { tractor };
+            let (origin, direction) = (position + heading.rotate(ray.origin), heading.rotate(ray.direction));
+            (placed.origin_x[n], placed.origin_y[n]) = (origin.x, origin.y);
+            (placed.direction_x[n], placed.direction_y[n]) = (direction.x, direction.y);
+        }
+        placed
+    }
 }
 
 /// Rays that are traced side by side.
@@ -80,10 +121,10 @@ struct Bundle<const N: usize> {
     base: [f32; N],
     /// Radius of the free circle there \[m].
     free: [f32; N],
-    /// 1 until the ray has ended.
-    going: [u32; N],
+    /// Samples that may still be taken on it; 0 once it has ended.
+    left: [u32; N],
     /// Its index among the ranges.
-    ray: [u32; N],
+    ray: [usize; N],
 }
 
 impl<const N: usize> Bundle<N> {
@@ -98,32 +139,37 @@ impl<const N: usize> Bundle<N> {
             along: [0.0; N],
             base: [0.0; N],
             free: [0.0; N],
-            going: [0; N],
+            left: [0; N],
             ray: [NO_RAY; N],
         }
     }
 
-    /// Traces the rays until at most `enough` of them are left; `samples` were taken on each before.
+    /// Notes the rays that have ended, and gives their lanes to the next ones that wait.
     #[inline(always)]
-    fn trace(&mut self, field: &Field, reach: f32, enough: usize, samples: &mut u32) {
-        while *samples < SAMPLES_MAX {
-            *samples += 1;
-            if self.advance(field, reach) as usize <= enough {
-                break;
+    fn refill(&mut self, placed: &Placed, waiting: &mut usize, found: &mut [f32; N_RAYS]) {
+        for n in 0..N {
+            if self.left[n] == 0 && *waiting < N_RAYS {
+                self.note_lane(n, found);
+                let ray = ORDER[*waiting];
+                *waiting += 1;
+                (self.origin_x[n], self.origin_y[n]) = (placed.origin_x[ray], placed.origin_y[ray]);
+                (self.direction_x[n], self.direction_y[n]) = (placed.direction_x[ray], placed.direction_y[ray]);
+                (self.along[n], self.base[n], self.free[n]) = (0.0, 0.0, 0.0);
+                (self.left[n], self.ray[n]) = (SAMPLES_MAX, ray);
             }
         }
     }
 
     /// Takes one sample on every ray; returns how many are still going.
     #[inline(always)]
-    fn advance(&mut self, field: &Field, reach: f32) -> u32 {
+    fn advance(&mut self, field: &Field, reach: f32) -> usize {
         let (mut x, mut y) = ([0.0; N], [0.0; N]);
         for n in 0..N {
             x[n] = self.origin_x[n] + self.along[n] * self.direction_x[n];
             y[n] = self.origin_y[n] + self.along[n] * self.direction_y[n];
         }
-        let Samples { distance, east, north } = field.sample(&field.march_cells, &x, &y);
-        let mut left = 0;
+        let Samples { distance, east, north } = field.sample(Purpose::March, &x, &y);
+        let mut going = 0;
         for n in 0..N {
             let (along, distance) = (self.along[n], distance[n]);
             let radius = distance.abs();
@@ -147,36 +193,42 @@ impl<const N: usize> Bundle<N> {
 
             self.base[n] = if accepted { along } else { self.base[n] };
             self.free[n] = if accepted { radius } else { self.free[n] };
-            self.along[n] = if self.going[n] == 1 { next } else { along };
-            self.going[n] &= u32::from(!(met | beyond | inside));
-            left += self.going[n];
+            self.along[n] = if 0 < self.left[n] { next } else { along };
+            self.left[n] = if met | beyond | inside { 0 } else { self.left[n].saturating_sub(1) };
+            going += u32::from(0 < self.left[n]);
         }
-        left
+        going as usize
     }
 
-    /// Writes the rays' distances; those still going are written again later.
+    /// Notes every ray's distance.
     #[inline(always)]
-    fn note(&self, found: &mut [f32; WIDE]) {
-        for n in 0..N {
-            found[self.ray[n] as usize % WIDE] = self.along[n];
+    fn note(&self, found: &mut [f32; N_RAYS]) {
+        (0..N).for_each(|n| self.note_lane(n, found));
+    }
+
+    #[inline(always)]
+    fn note_lane(&self, n: usize, found: &mut [f32; N_RAYS]) {
+        if let Some(found) = found.get_mut(self.ray[n]) {
+            *found = self.along[n];
         }
     }
 
     /// The rays still going, at most `M`, in a bundle that has room for them.
     #[inline(always)]
     fn survivors<const M: usize>(&mut self) -> Bundle<M> {
-        let mut left = 0;
+        let mut going = 0;
         for n in 0..N {
             // Every ray moves up and is overwritten if it has ended: a branch would be mispredicted.
-            self.origin_x[left] = self.origin_x[n];
-            self.origin_y[left] = self.origin_y[n];
-            self.direction_x[left] = self.direction_x[n];
-            self.direction_y[left] = self.direction_y[n];
-            self.along[left] = self.along[n];
-            self.base[left] = self.base[n];
-            self.free[left] = self.free[n];
-            self.ray[left] = self.ray[n];
-            left += self.going[n] as usize;
+            self.origin_x[going] = self.origin_x[n];
+            self.origin_y[going] = self.origin_y[n];
+            self.direction_x[going] = self.direction_x[n];
+            self.direction_y[going] = self.direction_y[n];
+            self.along[going] = self.along[n];
+            self.base[going] = self.base[n];
+            self.free[going] = self.free[n];
+            self.left[going] = self.left[n];
+            self.ray[going] = self.ray[n];
+            going += usize::from(0 < self.left[n]);
         }
         let mut kept = Bundle::empty();
         kept.origin_x.copy_from_slice(&self.origin_x[..M]);
@@ -187,28 +239,10 @@ impl<const N: usize> Bundle<N> {
         kept.base.copy_from_slice(&self.base[..M]);
         kept.free.copy_from_slice(&self.free[..M]);
         for m in 0..M {
-            kept.going[m] = u32::from(m < left);
-            kept.ray[m] = if m < left { self.ray[m] } else { NO_RAY };
+            kept.left[m] = if m < going { self.left[m] } else { 0 };
+            kept.ray[m] = if m < going { self.ray[m] } else { NO_RAY };
         }
         kept
-    }
-}
-
-impl Bundle<WIDE> {
-    /// The truck's rays at their sensors.
-    #[inline(always)]
-    fn new(rig: &Rig, rays: &[Ray; N_RAYS], truck: &Truck) -> Bundle<WIDE> {
-        let tractor = (truck.position, direction(truck.heading));
-        let trailer = (truck.trailer_position(rig), direction(truck.trailer_heading));
-        let mut bundle = Bundle::empty();
-        for (n, ray) in rays.iter().enumerate() {
-            let (position, heading) = if n < N_TRAILER_RAYS { trailer } else { tractor };
-            let (origin, direction) = (position + heading.rotate(ray.origin), heading.rotate(ray.direction));
-            (bundle.origin_x[n], bundle.origin_y[n]) = (origin.x, origin.y);
-            (bundle.direction_x[n], bundle.direction_y[n]) = (direction.x, direction.y);
-            (bundle.going[n], bundle.ray[n]) = (1, n as u32);
-        }
-        bundle
     }
 }
 

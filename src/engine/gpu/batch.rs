@@ -7,7 +7,7 @@ use std::time::Duration;
 use bytemuck::cast_slice;
 use wgpu::{CommandEncoder, ComputePassDescriptor, ComputePassTimestampWrites};
 
-use super::buffers::{Buffers, check_size};
+use super::buffers::{Buffers, check_size, check_world};
 use super::tables::Tables;
 use super::{Columns, Device, Error, Slice, kernels, stage_times};
 use crate::engine::{self, EngineBatch, RouteChoice, Tally};
@@ -41,6 +41,7 @@ impl Batch {
         columns: Columns,
     ) -> Result<Batch, engine::Error> {
         check_size(device, n_envs)?;
+        check_world(device, world)?;
         let facts = BatchFacts {
             n_envs: n_envs as u32,
             seed,

@@ -5,9 +5,11 @@ use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buff
 use super::tables::Tables;
 use super::{Device, Error};
 use crate::engine::tally::N_SUMS;
+use crate::field::Field;
 use crate::layout::buffers::{BUFFERS, Buffer as Shared, N_TABLES, Table};
 use crate::layout::{Column, N_COLUMNS};
 use crate::shared::Named;
+use crate::world::World;
 
 /// Part of a buffer.
 #[derive(Debug, Clone)]
@@ -84,10 +86,40 @@ fn column_slice(device: &Device, column: Column, n_envs: usize, external: &Colum
     }
 }
 
+/// The adapter's largest buffer that a shader may see \[bytes].
+fn largest(device: &Device) -> u64 {
+    let limits = device.device.limits();
+    limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+}
+
+/// An error if a table of the world is larger than that.
+pub(super) fn check_world(device: &Device, world: &World) -> Result<(), Error> {
+    let limit = largest(device);
+    let of_fields = |bytes: fn(&Field) -> usize| world.fields.iter().map(bytes).sum::<usize>();
+    let tables = [
+        (Table::Cells, of_fields(|field| size_of_val(field.cells.as_slice()))),
+        (Table::Corners, of_fields(|field| size_of_val(field.values.as_slice()))),
+        (Table::Waypoints, size_of_val(world.waypoints.as_slice())),
+        (Table::Previews, size_of_val(world.previews.as_slice())),
+        (Table::Routes, size_of_val(world.routes.as_slice())),
+    ];
+    let n_roundabouts = world.fields.len();
+    match tables.into_iter().map(|(table, n_bytes)| (table, n_bytes as u64)).find(|(_, n_bytes)| limit < *n_bytes) {
+        None => Ok(()),
+        Some((table, n_bytes)) => Err(Error::WorldTooLarge {
+            table: table.name(),
+            n_roundabouts,
+            n_bytes,
+            adapter: device.adapter.get_info().name,
+            limit,
+            fitting: (u128::from(limit) * n_roundabouts as u128 / u128::from(n_bytes)) as u64,
+        }),
+    }
+}
+
 /// An error if a column of so many trucks is larger than the adapter's largest buffer.
 pub(super) fn check_size(device: &Device, n_envs: usize) -> Result<(), Error> {
-    let limits = device.device.limits();
-    let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let limit = largest(device);
     for column in Column::ALL {
         let n_bytes = (n_envs as u64).saturating_mul(column.width() as u64);
         if limit < n_bytes {

@@ -50,6 +50,25 @@ pub enum Error {
         /// Trucks that would fit.
         fitting: u64,
     },
+    /// The adapter is too small for this world.
+    #[error(
+        "world: the {table} of {n_roundabouts} roundabouts take {n_bytes} bytes where {adapter} allows {limit} in a buffer: about \
+         {fitting} such roundabouts fit"
+    )]
+    WorldTooLarge {
+        /// The table that is too large.
+        table: &'static str,
+        /// Roundabouts of the world.
+        n_roundabouts: usize,
+        /// What the table takes.
+        n_bytes: u64,
+        /// The adapter's name.
+        adapter: String,
+        /// The largest buffer that it binds.
+        limit: u64,
+        /// Roundabouts of this mean size that would fit.
+        fitting: u64,
+    },
     /// The driver refused, failed or lost the device.
     #[error("{adapter}: {message}")]
     Broken {

@@ -16,7 +16,7 @@ pub(super) struct Tables<'a> {
     // All fields, one after the other.
     fields: Vec<FieldRow>,
     cells: Vec<u32>,
-    corners: Vec<[f32; 2]>,
+    corners: Vec<u32>,
 }
 
 impl<'a> Tables<'a> {
@@ -25,15 +25,12 @@ impl<'a> Tables<'a> {
         for field in &world.fields {
             let first_cell = tables.cells.len() as u32;
             tables.cells.extend(&field.cells);
-            let first_march_cell = tables.cells.len() as u32;
-            tables.cells.extend(&field.march_cells);
             tables.fields.push(FieldRow {
                 origin: field.origin,
                 cells_per_metre: field.cells_per_metre,
                 columns: field.columns,
                 rows: field.rows,
                 first_cell,
-                first_march_cell,
                 first_pair: tables.corners.len() as u32,
             });
             tables.corners.extend(&field.values);

@@ -87,7 +87,7 @@ fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
     if names.iter().any(is_random) {
         roads::narrow(&mut scenario, &names, &Split::ALL)?;
     }
-    let world = Arc::new(World::bake(&scenario)?);
+    let world = roads::world(&scenario)?;
     certificate.check(&scenario, &world, path)?;
     let arrived = verify::verify(&certificate, &world, path, |_| true)?;
     files::print(&format!("{}{arrived} sequences driven again: all arrived\n", table(&certificate)))
@@ -100,7 +100,7 @@ fn certify(args: &Args) -> Result<(), Error> {
     if !args.route.is_empty() {
         roads::narrow(&mut scenario, &args.route, &splits)?;
     }
-    let world = Arc::new(World::bake(&scenario)?);
+    let world = roads::world(&scenario)?;
     let policy = args.policy.as_deref().map(policies::learned).transpose()?;
     if let Some(policy) = &policy {
         policy.check(&world)?;

@@ -1,11 +1,9 @@
 //! `offtrack evaluate`: a policy on every route of a benchmark's split, as a table, as JSON, as a page.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use offtrack::reader;
 use offtrack::scenario::Split;
-use offtrack::world::World;
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::certificate::certified;
 use offtrack_training::evaluation::page::{MOST_EPISODES, Page};
@@ -68,7 +66,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if !args.route.is_empty() {
         roads::narrow(&mut scenario, &args.route, &[split])?;
     }
-    let world = Arc::new(World::bake(&scenario)?);
+    let world = roads::world(&scenario)?;
     let mut policy = args.policy.open(&scenario, &world, args.seed)?;
     let n_episodes = args.episodes * scenario.split(split).len();
     if args.html.is_some() && MOST_EPISODES < n_episodes {

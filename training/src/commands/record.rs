@@ -82,7 +82,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let scenario = scenario(args)?;
     let chosen = Chosen::new(&scenario, &args.route)?;
-    let world = Arc::new(World::bake(&scenario)?);
+    let world = roads::world(&scenario)?;
     let mut policy = args.policy.open(&scenario, &world, args.seed)?;
     let recording = recorded(args, &scenario, &world, &chosen, policy.as_mut())?;
     let bytes = bytes(format, args.size, &recording, &chosen, scenario.gutter);

@@ -1,15 +1,20 @@
 //! Benchmarks and roads by name, as commands take them: with a cache, a bar, and single routes in place of a split.
 
+use std::sync::Arc;
+
 use offtrack::loading::{Cache, Loading, Progress};
 use offtrack::procedural;
 use offtrack::reader::shortened;
 use offtrack::roundabout::Roundabout;
 use offtrack::scenario::{Place, Scenario, Split};
 use offtrack::shipped::Kind;
+use offtrack::world::World;
 use offtrack_training::error::Error;
 
 use super::progress::Bar;
 
+/// Roundabouts that are baked without a progress bar.
+const FEW: usize = 20;
 /// Most characters of the list of routes in a message.
 const LONGEST_LIST: usize = 600;
 
@@ -19,6 +24,20 @@ pub fn benchmark(name: &str) -> Result<Scenario, Error> {
     let bar = Bar::new("drawing", "roads", 0);
     let watcher = move |progress: Progress| bar.set(progress.done, progress.total);
     Ok(Scenario::load(name, &Loading { cache: cache.as_ref(), watcher: &watcher })?)
+}
+
+/// The benchmark's world, with the fields of its roundabouts from the user's cache.
+pub fn world(scenario: &Scenario) -> Result<Arc<World>, Error> {
+    let cache = Cache::of_user();
+    let world = {
+        let bar = (FEW < scenario.places.len()).then(|| Bar::new("baking", "roads", scenario.places.len()));
+        let watcher = move |progress: Progress| bar.iter().for_each(|bar| bar.set(progress.done, progress.total));
+        World::bake_with(scenario, &Loading { cache: cache.as_ref(), watcher: &watcher })?
+    };
+    if let Some(failure) = cache.as_ref().and_then(Cache::failure) {
+        eprintln!("note: {failure}; the next command computes them again");
+    }
+    Ok(world.into())
 }
 
 /// Leaves the benchmark the routes that `--route` names: each a route, or all routes of a roundabout. Those of the

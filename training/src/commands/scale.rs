@@ -8,16 +8,14 @@ mod mode;
 mod plot;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::SystemTime;
+use std::time::{Instant, SystemTime};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use offtrack::layout::{N_RAYS, N_VALUES};
-use offtrack::scenario::{Scenario, Split};
-use offtrack::world::World;
+use offtrack::scenario::Split;
 use serde::Serialize;
 
-use super::devices as device;
+use super::{devices as device, roads};
 pub(crate) use measure::median;
 use measure::{Measured, measured};
 use mode::{Learner, Mode, Setting};
@@ -75,6 +73,11 @@ struct Scale {
     step: Step,
     /// Memory of what all trucks share.
     world_bytes: usize,
+    roundabouts: usize,
+    routes: usize,
+    /// Time to read the benchmark and draw its random roads, and to bake its world; a cache makes both shorter.
+    seconds_to_read: f64,
+    seconds_to_bake: f64,
     runs: Vec<Run>,
 }
 
@@ -147,8 +150,11 @@ pub fn run(args: &Args) -> Result<(), Error> {
         plot::check(file)?;
     }
     let mut device = args.device.open()?;
-    let scenario = Scenario::read(&files::benchmark(&args.benchmark)?)?;
-    let world = Arc::new(World::bake(&scenario)?);
+    let start = Instant::now();
+    let scenario = roads::benchmark(&args.benchmark)?;
+    let drawn = start.elapsed();
+    let world = roads::world(&scenario)?;
+    let baked = start.elapsed() - drawn;
     let learner = match args.mode.iter().any(|mode| *mode != Mode::Random) {
         true => Some(Learner::read(&scenario.name, &args.config.clone().unwrap_or_else(|| PathBuf::from("gpu")), &world)?),
         false => None,
@@ -172,13 +178,17 @@ pub fn run(args: &Args) -> Result<(), Error> {
             learning: learner.as_ref().filter(|_| args.mode.contains(&Mode::Training)).map(Learner::updates),
         },
         world_bytes: world.bytes(),
+        roundabouts: world.fields.len(),
+        routes: world.routes.len(),
+        seconds_to_read: drawn.as_secs_f64(),
+        seconds_to_bake: baked.as_secs_f64(),
         runs: Vec::new(),
     };
     files::print(&heading(&scale, &device))?;
     let bar = ProgressBar::new((envs.len() * args.mode.len()) as u64).with_style(
         ProgressStyle::with_template("measuring {bar:30} {pos}/{len} {msg}, {elapsed}").unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
-    let routes = [scenario.split(Split::Train), scenario.split(Split::Test)].concat();
+    let routes = Split::ALL.map(|split| scenario.split(split)).concat();
     let (mut refusal, mut backend) = (None, None);
     for &envs in &envs {
         for &mode in &args.mode {
@@ -263,8 +273,11 @@ fn heading(scale: &Scale, device: &offtrack_training::device::Device) -> String 
     let Step { dt, substeps, holds, .. } = &scale.step;
     let threads = if scale.engine == "cpu" { format!(", {} threads", scale.threads) } else { String::new() };
     let names: String = measure::STAGE_NAMES.iter().map(|name| format!(" {name:>7}")).collect();
+    let Scale { roundabouts, routes, world_bytes, seconds_to_read, seconds_to_bake, .. } = scale;
+    let megabytes = *world_bytes as f64 / 1e6;
     format!(
         "{}{threads}; a step is {dt} s in {substeps} sub-steps, {N_RAYS} rays, {N_VALUES} values: {holds}\n\
+         {roundabouts} roundabouts, {routes} routes, {megabytes:.1} MB; read in {seconds_to_read:.1} s, baked in {seconds_to_bake:.1} s\n\
          {:>8} {:>9} {:>14} {:>14}   ns a truck, a stage at a time:{names}\n",
         device.title(),
         "trucks",

@@ -197,7 +197,7 @@ impl Worlds {
         if training.split(Split::Train).is_empty() {
             return Err(wrong("it has no routes under `train`".to_owned()));
         }
-        let (benchmark_world, training_world) = (Arc::new(World::bake(&benchmark)?), Arc::new(World::bake(&training)?));
+        let (benchmark_world, training_world) = (roads::world(&benchmark)?, roads::world(&training)?);
         if training_world.actions != benchmark_world.actions {
             let name = &benchmark.name;
             return Err(wrong(format!("its actions and vehicle lock must be those of {name}, on which the policy is evaluated")));

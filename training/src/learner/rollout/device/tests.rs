@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::files;
 
 fn training() -> (Arc<World>, Vec<u32>) {
-    let scenario = Scenario::read(&files::benchmark("attard2023").unwrap()).unwrap();
+    let scenario = Scenario::named("attard2023").unwrap();
     (Arc::new(World::bake(&scenario).unwrap()), scenario.split(Split::Train).to_vec())
 }
 
