@@ -92,7 +92,11 @@ impl Panel {
     fn axis(&self) -> Axis {
         let all = || self.values.iter().chain(&self.marks).copied().filter(|value| value.is_finite());
         let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
-        let (low, high) = if low < high { (low, high) } else { (low.min(0.0), low.clamp(0.0, f64::MAX) + 1.0) };
+        let (low, high) = match (low.is_finite(), low < high) {
+            (false, _) => (0.0, 1.0),
+            (true, false) => (low.min(0.0), low.max(0.0) + 1.0),
+            (true, true) => (low, high),
+        };
         let rough = (high - low) / 6.0;
         let power = 10f64.powf(rough.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0].map(|digit| digit * power).into_iter().find(|step| rough <= *step).unwrap_or(10.0 * power);
