@@ -44,6 +44,16 @@ pub struct Panel {
     pub marks: Vec<f64>,
 }
 
+/// The horizontal axis of a panel.
+struct Axis {
+    low: f64,
+    high: f64,
+    /// The first tick, and from one to the next.
+    first: f64,
+    step: f64,
+    n_bins: usize,
+}
+
 impl Histograms {
     /// The picture as SVG text.
     ///
@@ -78,36 +88,45 @@ impl Histograms {
 }
 
 impl Panel {
-    /// Least and greatest of all values, rounded outwards to steps of the axis, and the step.
-    fn axis(&self) -> (f64, f64, f64) {
-        let all = self.values.iter().chain(&self.marks).copied().filter(|value| value.is_finite());
-        let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
-        let (low, high) = if low < high { (low, high) } else { (low.min(0.0), low.max(0.0) + 1.0) };
-        let (low, high) = if low.is_finite() { (low, high) } else { (0.0, 1.0) };
+    /// The axis over all values: its ends are steps for measured values, halves beyond them for counts.
+    fn axis(&self) -> Axis {
+        let all = || self.values.iter().chain(&self.marks).copied().filter(|value| value.is_finite());
+        let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let (low, high) = match (low.is_finite(), low < high) {
+            (false, _) => (0.0, 1.0),
+            (true, false) => (low.min(0.0), low.max(0.0) + 1.0),
+            (true, true) => (low, high),
+        };
         let rough = (high - low) / 6.0;
         let power = 10f64.powf(rough.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0].map(|digit| digit * power).into_iter().find(|step| rough <= *step).unwrap_or(10.0 * power);
-        ((low / step).floor() * step, (high / step).ceil() * step, step)
+        if all().all(|value| value.fract() == 0.0) && high - low < BINS as f64 {
+            let step = step.max(1.0);
+            return Axis { low: low - 0.5, high: high + 0.5, first: low, step, n_bins: (high - low) as usize + 1 };
+        }
+        let (low, high) = ((low / step).floor() * step, (high / step).ceil() * step);
+        Axis { low, high, first: low, step, n_bins: BINS }
     }
 
     /// Values in each bin of the axis.
-    fn counts(&self, low: f64, high: f64) -> [usize; BINS] {
-        let mut counts = [0; BINS];
+    fn counts(&self, axis: &Axis) -> Vec<usize> {
+        let mut counts = vec![0; axis.n_bins];
         for value in self.values.iter().filter(|value| value.is_finite()) {
-            let bin = ((value - low) / (high - low) * BINS as f64) as usize;
-            counts[bin.min(BINS - 1)] += 1;
+            let bin = ((value - axis.low) / (axis.high - axis.low) * axis.n_bins as f64) as usize;
+            counts[bin.min(axis.n_bins - 1)] += 1;
         }
         counts
     }
 
     fn drawn(&self, lettering: &Lettering, corner: DVec2) -> Group {
-        let (low, high, step) = self.axis();
-        let counts = self.counts(low, high);
+        let axis = self.axis();
+        let Axis { low, high, first, step, n_bins } = axis;
+        let counts = self.counts(&axis);
         let most = counts.iter().copied().max().unwrap_or(0).max(1) as f64;
         let base = corner.y + PLOT.y;
         let x = |value: f64| corner.x + (value - low) / (high - low) * PLOT.x;
         let mut bars = String::new();
-        let width = PLOT.x / BINS as f64;
+        let width = PLOT.x / n_bins as f64;
         for (bin, &count) in counts.iter().enumerate().filter(|(_, count)| 0 < **count) {
             let height = count as f64 / most * (PLOT.y - 8.0);
             let left = corner.x + bin as f64 * width;
@@ -116,8 +135,8 @@ impl Panel {
         }
         let mut group = Group::new().add(Path::new().set("d", bars).set("fill", "#c3cdd7"));
         let mut ticks = format!("M{} {base}H{}", corner.x, corner.x + PLOT.x);
-        for tick in 0..=((high - low) / step).round() as usize {
-            let value = low + tick as f64 * step;
+        for tick in 0..=((high - first) / step + 1e-6).floor() as usize {
+            let value = first + tick as f64 * step;
             let _ = write!(ticks, "M{} {base}v5", number(x(value)));
             let words = format!("{}", (value * 1e6).round() / 1e6);
             group = group.add(lettering.text(&words, DVec2::new(x(value), base + 20.0), 13.0, Align::Middle, colour::INK));
@@ -155,14 +174,24 @@ mod tests {
 
     #[test]
     fn every_value_is_counted_once_and_lies_on_the_axis() {
-        for values in [vec![1.0], vec![], vec![0.3, 0.31, 0.9], (0..1000).map(f64::from).collect(), vec![f64::NAN, 2.0, 3.0]] {
+        for values in
+            [vec![1.5], vec![], vec![0.3, 0.31, 0.9], (0..1000).map(f64::from).collect(), vec![f64::NAN, 2.5, 3.0], vec![3.0, 4.0]]
+        {
             let panel = panel(values.clone(), vec![]);
-            let (low, high, step) = panel.axis();
-            assert!(0.0 < step && low < high && (high - low) / step < 12.0, "{values:?}");
+            let axis = panel.axis();
+            assert!(0.0 < axis.step && axis.low < axis.high && (axis.high - axis.low) / axis.step < 12.0, "{values:?}");
             let finite = values.iter().filter(|value| value.is_finite());
-            assert!(finite.clone().all(|value| (low..=high).contains(value)), "{values:?}");
-            assert_eq!(panel.counts(low, high).iter().sum::<usize>(), finite.count(), "{values:?}");
+            assert!(finite.clone().all(|value| (axis.low..=axis.high).contains(value)), "{values:?}");
+            assert_eq!(panel.counts(&axis).iter().sum::<usize>(), finite.count(), "{values:?}");
         }
+    }
+
+    #[test]
+    fn counts_have_a_bar_each_with_the_number_below_its_middle() {
+        let panel = panel(vec![3.0, 3.0, 5.0], vec![4.0]);
+        let axis = panel.axis();
+        assert_eq!((axis.low, axis.high, axis.first, axis.step), (2.5, 5.5, 3.0, 1.0));
+        assert_eq!(panel.counts(&axis), [2, 0, 1]);
     }
 
     #[test]

@@ -148,7 +148,7 @@ fn histograms(distribution: &Distribution, args: &Args, roads: &[Road]) -> Resul
     };
     let picture = Histograms {
         title: format!("{} random roads of {}, and the measured roundabouts", roads.len(), distribution.name),
-        subtitle: format!("Seed {}. A diamond is a measured roundabout; none of them was drawn from.", args.seed),
+        subtitle: format!("Seed {}. Each diamond is a measured roundabout.", args.seed),
         marked,
         panels: vec![
             panel("island radius [m]", &Roundabout::island_radius),

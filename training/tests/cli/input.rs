@@ -12,7 +12,7 @@ fn a_wrong_argument_is_reported_with_its_value_and_what_would_do() {
             &["benchmark: nowhere; must be a path ending in .toml or one of attard2023,"],
         ),
         (&["evaluate", "--policy", "random", "--benchmark", "nowhere.toml"], &["nowhere.toml: cannot be read"]),
-        (&["evaluate", "--policy", "random", "--split", "all"], &["'all'", "--split", "test, train"]),
+        (&["evaluate", "--policy", "random", "--split", "all"], &["'all'", "--split", "test, validation, train"]),
         (&["evaluate", "--policy", "random", "--seed", "-1"], &["-1"]),
         (&["evaluate", "--policy", "pursuit", "--look-ahead", "nan"], &["--look-ahead: NaN m; must lie in 1..50 m"]),
         (&["evaluate", "--policy", "pursuit", "--look-ahead", "-3"], &["--look-ahead: -3 m; must lie in 1..50 m"]),

@@ -8,11 +8,12 @@ use toml::{Table, Value};
 use crate::error::Error;
 
 /// The training files that come with the program.
-const SHIPPED: [(&str, &str); 4] = [
+const SHIPPED: [(&str, &str); 5] = [
     ("default", include_str!("../../../configs/default.toml")),
     ("gpu", include_str!("../../../configs/gpu.toml")),
     ("as-run", include_str!("../../../configs/as-run.toml")),
     ("paper", include_str!("../../../configs/paper.toml")),
+    ("random", include_str!("../../../configs/random.toml")),
 ];
 /// Bases of bases: more than anyone needs, fewer than a circle.
 const DEPTH: usize = 8;
