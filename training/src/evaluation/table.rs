@@ -1,10 +1,15 @@
-//! A report as text: a line a route, then the sums, within a given width, and what each column means.
+//! A report as text: a line a route, then the sums, within a given width, and what each column means. Of many routes
+//! there are the groups and the worst routes alone.
 
 use std::fmt::Write;
 
 use offtrack::layout::Ended;
 
-use super::report::{Report, Summary};
+use super::groups::Group;
+use super::report::{Report, RouteReport, Summary};
+
+/// Lines of the worst roundabouts, and of the worst routes, where there are many routes.
+const WORST: usize = 20;
 
 /// What each column of the table says.
 const COLUMNS: [(&str, &str); 10] = [
@@ -33,13 +38,13 @@ struct Column {
 
 /// One line of the table.
 struct Line<'a> {
-    name: &'a str,
+    name: String,
     lane: &'static str,
     summary: &'a Summary,
 }
 
 const ALL: [Column; 13] = [
-    Column { head: ["", "route"], rank: 0, text: |line| line.name.to_owned() },
+    Column { head: ["", "route"], rank: 0, text: |line| line.name.clone() },
     Column { head: ["", "arrived"], rank: 0, text: |line| format!("{}/{}", line.summary.arrived, line.summary.episodes) },
     Column { head: ["success", "%"], rank: 0, text: |line| format!("{:.1}", 100.0 * line.summary.success) },
     Column {
@@ -58,33 +63,39 @@ const ALL: [Column; 13] = [
     Column { head: ["time", "s"], rank: 10, text: |line| format!("{:.1}", line.summary.time_mean) },
 ];
 
+/// Lines between two rules, and what they leave out.
+struct Section<'a> {
+    lines: Vec<Line<'a>>,
+    note: Option<String>,
+}
+
 impl Report {
     /// The table that a person reads, at most `width` characters wide where that leaves room for the route and its
-    /// success: a line a route, then the sums, then what the columns mean.
+    /// success: a line a route, or where there are many a line for each group and the worst routes; then the sums, then
+    /// what the columns mean.
     pub fn table(&self, width: usize) -> String {
-        let routes: Vec<Line> = self
-            .routes
-            .iter()
-            .map(|route| Line { name: &route.name, lane: lane(route.own_lane_suffices), summary: &route.summary })
-            .collect();
+        let mut sections = if self.has_many_routes() { self.groups_and_worst() } else { vec![whole(self.routes.iter().map(of_route))] };
         let sums = [
             ("lane own", lane(true), self.own_lane_suffices.as_ref()),
             ("lane wide", lane(false), self.needs_deviation.as_ref()),
             ("certified", "", self.certified.as_ref()),
             ("all", "", Some(&self.summary)),
         ];
-        let sums: Vec<Line> = sums.into_iter().filter_map(|(name, lane, summary)| Some(Line { name, lane, summary: summary? })).collect();
-        let (columns, left_out) = fitting(width, &routes, &sums);
+        sections.push(whole(sums.into_iter().filter_map(|(name, lane, summary)| Some(Line { name: name.into(), lane, summary: summary? }))));
+        let (columns, left_out) = fitting(width, &sections);
         let mut text = String::new();
         for row in 0..2 {
             push(&mut text, &columns, |column| column.head[row].to_owned());
         }
         let rule = "-".repeat(text.lines().map(str::len).max().unwrap_or(0));
-        for lines in [&routes, &sums] {
+        for Section { lines, note } in &sections {
             let _ = writeln!(text, "{rule}");
             for line in lines {
                 push(&mut text, &columns, |column| (column.text)(line));
                 push_failures(&mut text, line.summary, width);
+            }
+            if let Some(note) = note {
+                push_wrapped(&mut text, note, width);
             }
         }
         if !left_out.is_empty() {
@@ -96,6 +107,20 @@ impl Report {
             );
         }
         text + "\n" + &legend(width)
+    }
+
+    /// Groups of routes, then the worst roundabouts and the worst routes.
+    fn groups_and_worst(&self) -> Vec<Section<'_>> {
+        let mut roundabouts: Vec<&Group> = self.groups.roundabout.iter().filter(|group| group.summary.arrived < group.summary.episodes).collect();
+        roundabouts.sort_by(|a, b| a.summary.success.total_cmp(&b.summary.success));
+        let roundabouts = roundabouts.into_iter().map(|group| of_group(group, ""));
+        vec![
+            whole(self.groups.island_radius.iter().map(|group| of_group(group, "island "))),
+            whole(self.groups.lane.iter().map(|group| of_group(group, "lane "))),
+            whole(self.groups.exit.iter().map(|group| of_group(group, "exit "))),
+            worst(roundabouts, "roundabouts", self.groups.roundabout.len()),
+            worst(self.failing_routes().into_iter().map(of_route), "routes", self.routes.len()),
+        ]
     }
 }
 
@@ -112,10 +137,33 @@ fn lane(own_suffices: bool) -> &'static str {
     if own_suffices { "own" } else { "wide" }
 }
 
+fn of_route(route: &RouteReport) -> Line<'_> {
+    Line { name: route.name.clone(), lane: lane(route.own_lane_suffices), summary: &route.summary }
+}
+
+fn of_group<'a>(group: &'a Group, kind: &str) -> Line<'a> {
+    Line { name: format!("{kind}{}", group.name), lane: "", summary: &group.summary }
+}
+
+fn whole<'a>(lines: impl Iterator<Item = Line<'a>>) -> Section<'a> {
+    Section { lines: lines.collect(), note: None }
+}
+
+/// The first of the lines, which are those of things that failed, worst first, and a note of how many of `n` there are.
+fn worst<'a>(failing: impl ExactSizeIterator<Item = Line<'a>>, things: &str, n: usize) -> Section<'a> {
+    let n_failing = failing.len();
+    let note = match n_failing {
+        0 => format!("All {n} {things}: every episode arrived."),
+        _ if n_failing <= WORST => format!("On the other {} of {n} {things} every episode arrived.", n - n_failing),
+        _ => format!("The worst {WORST} of {n_failing} {things} with a failure, of {n}; --json and --html have all."),
+    };
+    Section { lines: failing.take(WORST).collect(), note: Some(note) }
+}
+
 /// The columns that fit, each with its width, and those left out.
-fn fitting(width: usize, routes: &[Line], sums: &[Line]) -> (Vec<(&'static Column, usize)>, Vec<&'static Column>) {
+fn fitting(width: usize, sections: &[Section]) -> (Vec<(&'static Column, usize)>, Vec<&'static Column>) {
     let widest = |column: &Column| {
-        let cells = routes.iter().chain(sums).map(|line| (column.text)(line).chars().count());
+        let cells = sections.iter().flat_map(|section| &section.lines).map(|line| (column.text)(line).chars().count());
         cells.chain(column.head.map(str::len)).max().unwrap_or(0)
     };
     let mut columns: Vec<(&Column, usize)> = ALL.iter().map(|column| (column, widest(column))).collect();
@@ -174,27 +222,23 @@ fn push_wrapped(text: &mut String, words: &str, width: usize) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::report::{Episode, RouteReport};
+    use super::super::groups::Groups;
+    use super::super::report::tests::episode;
+    use super::super::report::{Episode, MANY_ROUTES};
     use super::*;
 
     /// A report with the widest figures that an evaluation gives.
     fn report() -> Report {
-        let episode = |ended| Episode {
-            ended,
-            steps: 999,
-            reward: -500.0,
-            lane_distance_mean: 10.25,
-            lane_distance_max: 19.25,
-            tractor_clearance_min: -10.25,
-            trailer_clearance_min: -10.25,
-            load_transfer_ratio_peak: 1.5,
-            articulation_peak: 1.9,
-            off_tracking_peak: 10.25,
-        };
         let mut episodes = vec![episode(Ended::Arrived); 692];
         episodes.extend([episode(Ended::TractorCollided), episode(Ended::TrailerCollided), episode(Ended::TimedOut)]);
         let summary = Summary::of(episodes.iter(), 0.1).unwrap();
-        let route = |own_lane_suffices| RouteReport { name: "40m/SW-right-1".to_owned(), own_lane_suffices, summary: summary.clone() };
+        let route = |own_lane_suffices| RouteReport {
+            name: "40m/SW-right-1".to_owned(),
+            own_lane_suffices,
+            island_radius: 20.0,
+            summary: summary.clone(),
+        };
+        let group = |name: &str| vec![Group { name: name.to_owned(), routes: 2, summary: summary.clone() }];
         Report {
             benchmark: "attard2023".to_owned(),
             split: "test",
@@ -205,6 +249,7 @@ mod tests {
             own_lane_suffices: Some(summary.clone()),
             needs_deviation: Some(summary.clone()),
             certified: Some(summary.clone()),
+            groups: Groups { island_radius: group("22 m and more"), lane: group("right"), exit: group("1"), roundabout: group("40m") },
             routes: vec![route(true), route(false)],
         }
     }
@@ -240,5 +285,47 @@ mod tests {
     #[test]
     fn failures_are_counted_below_their_line() {
         assert!(report().table(100).contains("  not arrived: 1 timed out, 1 tractor collided, 1 trailer collided\n"));
+    }
+
+    /// The same with many routes on as many roundabouts, of which every `one_in`th failed once.
+    fn large_report(one_in: usize) -> Report {
+        let summary = |fails: bool| {
+            let ends = [Ended::Arrived, if fails { Ended::TrailerCollided } else { Ended::Arrived }];
+            let episodes: Vec<Episode> = ends.into_iter().map(episode).collect();
+            Summary::of(episodes.iter(), 0.1).unwrap()
+        };
+        let fails = |index: usize| summary(index.is_multiple_of(one_in));
+        let route = |index: usize| RouteReport {
+            name: format!("wide/7/{index}/SW-right-1"),
+            own_lane_suffices: true,
+            island_radius: 20.0,
+            summary: fails(index),
+        };
+        let mut report = report();
+        report.routes = (0..2 * MANY_ROUTES).map(route).collect();
+        let roundabout = |index: usize| Group { name: format!("wide/7/{index}"), routes: 1, summary: fails(index) };
+        report.groups.roundabout = (0..2 * MANY_ROUTES).map(roundabout).collect();
+        report
+    }
+
+    #[test]
+    fn of_many_routes_the_table_has_the_groups_and_the_worst_routes_and_says_how_many_more_there_are() {
+        let table = large_report(5).table(100);
+        for line in ["island 22 m and more", "lane right", "exit 1", "wide/7/0 ", "wide/7/95/SW-right-1"] {
+            assert!(table.lines().any(|found| found.starts_with(line)), "{line}: {table}");
+        }
+        assert!(!table.contains("wide/7/1/SW") && !table.contains("wide/7/100/SW"), "{table}");
+        assert_eq!(table.matches("SW-right-1").count(), WORST);
+        assert!(table.contains("The worst 20 of 40 routes with a failure, of 200; --json and --html have all.\n"), "{table}");
+        assert!(table.lines().all(|line| line.chars().count() <= 100), "{table}");
+    }
+
+    #[test]
+    fn where_few_or_none_of_many_routes_failed_the_table_says_that_all_others_arrived() {
+        let table = large_report(50).table(100);
+        assert!(table.contains("On the other 196 of 200 routes every episode arrived.\n"), "{table}");
+        let mut report = large_report(50);
+        report.routes.retain(|route| route.summary.success == 1.0);
+        assert!(report.table(100).contains("All 196 routes: every episode arrived.\n"));
     }
 }
