@@ -86,7 +86,7 @@ fn a_page_of_an_evaluation_alone_passes_its_own_checks_and_one_with_a_wrong_figu
         (&key(mean), &key(mean + 0.02), "fails: the recorded frames give the report's figures: distance"),
     ] {
         assert!(text.contains(from), "{from}");
-        std::fs::write(&page, text.replacen(from, to, 1)).unwrap();
+        std::fs::write(&page, text.replace(from, to)).unwrap();
         let outcome = selftest(&page);
         assert!(outcome.starts_with("selftest failed\n") && outcome.contains(expected), "{outcome}");
     }
@@ -117,7 +117,8 @@ fn large(place: &Place, n: usize) -> String {
     let scenarios = repository().join("scenarios");
     let short = read(&place.file("short.toml"));
     let (head, _) = short.split_once("[[roundabout]]").unwrap();
-    let mut benchmark = head.to_owned();
+    // With finer steer levels pure pursuit arrives now and then.
+    let mut benchmark = head.replace("[-0.8, -0.4, 0.0, 0.4, 0.8]", "[-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8]");
     std::fs::create_dir(place.file("roads")).unwrap();
     for index in 0..n {
         let name = format!("roads/r{index}.toml");

@@ -38,6 +38,7 @@ const CHECKS = {
       same(sum((group) => group.episodes), evaluation.episodes, kind);
       same(sum((group) => group.arrived), evaluation.arrived, kind);
       same(sum((group) => group.routes), evaluation.routes.length, kind);
+      close(sum((group) => group.episodes * group.lane_distance_mean) / evaluation.episodes, evaluation.lane_distance_mean, 1e-6, kind);
     }
     if (!many) return;
     const rows = document.querySelectorAll("#group-table tr.member").length;
