@@ -86,8 +86,7 @@ mod tests {
         let routes: Vec<_> = scenario.split(Split::Test).iter().map(|&route| all[route as usize]).collect();
         // Two episodes a route; the second fails on right lanes.
         let ends = |right| [Ended::Arrived, if right { Ended::TrailerCollided } else { Ended::Arrived }];
-        let finished: Vec<Episode> =
-            routes.iter().flat_map(|(_, _, route)| ends(route.lane.name() == "right")).map(episode).collect();
+        let finished: Vec<Episode> = routes.iter().flat_map(|(_, _, route)| ends(route.lane.name() == "right")).map(episode).collect();
         let groups = Groups::of(&routes, &finished, scenario.step);
         for kind in [&groups.island_radius, &groups.lane, &groups.exit, &groups.roundabout] {
             assert_eq!(kind.iter().map(|group| group.routes).sum::<usize>(), routes.len());

@@ -135,11 +135,13 @@ fn a_page_of_many_routes_shows_groups_and_of_many_episodes_those_that_failed_and
     let place = Place::new();
     let (benchmark, page) = (large(&place, 6), place.file("page.html"));
     let evaluate = |episodes: &str| {
-        let output = offtrack(&[
-            &["evaluate", "--benchmark", &benchmark, "--policy", "pursuit", "--episodes", episodes],
-            &["--html", &place.text("page.html"), "--json", &place.text("report.json")][..],
-        ]
-        .concat());
+        let output = offtrack(
+            &[
+                &["evaluate", "--benchmark", &benchmark, "--policy", "pursuit", "--episodes", episodes],
+                &["--html", &place.text("page.html"), "--json", &place.text("report.json")][..],
+            ]
+            .concat(),
+        );
         succeed(&output);
         (String::from_utf8_lossy(&output.stdout).into_owned(), place.json("report.json"), opened(&page))
     };

@@ -63,7 +63,8 @@ impl<'a> Ground<'a> {
     pub(super) fn of(page: &Page<'a>, columns: &'a [Column]) -> Ground<'a> {
         let evaluated = &page.evaluation.routes;
         let per_route = (page.evaluation.summary.episodes / evaluated.len().max(1)).max(1);
-        let by_name: HashMap<&str, (usize, &Route)> = page.scenario.routes().map(|(place, route)| (route.name.as_str(), (place, route))).collect();
+        let by_name: HashMap<&str, (usize, &Route)> =
+            page.scenario.routes().map(|(place, route)| (route.name.as_str(), (place, route))).collect();
         // Places and routes in the order of their first episodes.
         let (mut places, mut shown): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());
         let (mut routes, mut episodes) = (Vec::new(), Vec::new());
@@ -75,7 +76,11 @@ impl<'a> Ground<'a> {
                 if places.last() != Some(&place) {
                     places.push(place);
                 }
-                routes.push(RouteLine { name: &route.name, roundabout: places.len() - 1, centre_line: line(&recording::centre_line(route)) });
+                routes.push(RouteLine {
+                    name: &route.name,
+                    roundabout: places.len() - 1,
+                    centre_line: line(&recording::centre_line(route)),
+                });
             }
             let (route, number) = (routes.len() - 1, track.env % per_route);
             episodes.push(Episode { route, number, ended: track.ended.name(), n_frames: track.frames.len() });
