@@ -55,9 +55,11 @@ function cells(summary, scales) {
   const failures = endsText(summary.ends);
   const ends = figure("ends", endsBar(summary.ends, summary.episodes), failures.count === 0 ? "all arrived" : `${failures.count} failed`, 76);
   ends.title = failures.words || "all arrived";
+  // Of many episodes a whole per cent is many, and their numbers are wide.
+  const many = 1000 <= summary.episodes;
   return [
     figure("success", fractionBar(summary.success, summary.success_low, summary.success_high, "var(--good)", 16),
-      `${summary.arrived}/${summary.episodes}  ${decimal(100 * summary.success, 0)}${GAP}%`, 92),
+      `${summary.arrived}/${summary.episodes}  ${decimal(100 * summary.success, many ? 1 : 0)}${GAP}%`, many ? 132 : 92),
     ends,
     figure("lane", lengthBar(summary.lane_distance_mean, scales.lane, { mark: summary.lane_distance_max }), metres(summary.lane_distance_mean), 50),
     figure("transfer", lengthBar(summary.load_transfer_ratio_peak, scales.transfer, { limit: 1 }), decimal(summary.load_transfer_ratio_peak, 2), 34),
