@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use offtrack::layout::Ended;
 use offtrack::route::Route;
-use offtrack::scenario::{Place, Scenario, Split};
+use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::swept::{own_lane_suffices, swept_path};
 use offtrack::world::World;
@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 use crate::device::Device;
 use crate::error::Error;
-use groups::Groups;
+use groups::{Evaluated, Groups};
 use policies::Policy;
 use report::{Episode, Report, RouteReport, Summary};
 use running::Running;
@@ -139,8 +139,8 @@ impl Evaluation<'_> {
     /// The report of these episodes, which stand as [`Evaluation::drive`] gives them; `policy` is its name.
     pub fn summarised(&self, policy: &str, finished: &[Episode]) -> Report {
         let Evaluation { scenario, split, episodes, seed, device, .. } = *self;
-        let all: Vec<(usize, &Place, &Route)> = scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
-        let routes: Vec<(usize, &Place, &Route)> = scenario.split(split).iter().map(|&route| all[route as usize]).collect();
+        let all: Vec<Evaluated> = scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
+        let routes: Vec<Evaluated> = scenario.split(split).iter().map(|&route| all[route as usize]).collect();
         let own_lane = self.own_lane_suffices(&routes);
         let chunks = || own_lane.iter().zip(finished.chunks(episodes));
         let of_routes = |suffices: bool| {
@@ -167,11 +167,11 @@ impl Evaluation<'_> {
     }
 
     /// Whether the own lane suffices on each route. The kerbs of one roundabout a thread are held.
-    fn own_lane_suffices(&self, routes: &[(usize, &Place, &Route)]) -> Vec<bool> {
+    fn own_lane_suffices(&self, routes: &[Evaluated]) -> Vec<bool> {
         let Evaluation { scenario, world, .. } = *self;
         let (rig, speed) = (&world.params.rig, scenario.cruising_speed());
         let of_one_place: Vec<_> = routes.chunk_by(|(a, ..), (b, ..)| a == b).collect();
-        let suffices = |routes: &&[(usize, &Place, &Route)]| {
+        let suffices = |routes: &&[Evaluated]| {
             let kerbs = routes[0].1.roundabout.kerbs(scenario.gutter);
             let path = |route: &Route| swept_path(rig, &route.centre_line, speed, 0.25);
             routes.iter().map(|(_, _, route)| own_lane_suffices(rig, &kerbs, &path(route))).collect::<Vec<bool>>()

@@ -13,6 +13,9 @@ const BANDS: [f64; 4] = [9.0, 12.0, 16.0, 22.0];
 /// Their names.
 const BAND_NAMES: [&str; BANDS.len() + 1] = ["below 9 m", "9 to 12 m", "12 to 16 m", "16 to 22 m", "22 m and more"];
 
+/// A route that is evaluated: the index of its place in the benchmark, the place, the route.
+pub type Evaluated<'a> = (usize, &'a Place, &'a Route);
+
 /// Episodes on some of the routes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Group {
@@ -39,11 +42,11 @@ pub struct Groups {
 }
 
 impl Groups {
-    /// The groups of `routes`, each with its place and its index in the benchmark; `finished` has as many episodes for
-    /// each of them, in the same order. A step takes `step` seconds.
-    pub fn of(routes: &[(usize, &Place, &Route)], finished: &[Episode], step: f64) -> Groups {
+    /// The groups of `routes`; `finished` has as many episodes for each of them, in the same order. A step takes `step`
+    /// seconds.
+    pub fn of(routes: &[Evaluated], finished: &[Episode], step: f64) -> Groups {
         let episodes: Vec<&[Episode]> = finished.chunks((finished.len() / routes.len().max(1)).max(1)).collect();
-        let by = |key: &dyn Fn(&(usize, &Place, &Route)) -> (usize, String)| {
+        let by = |key: &dyn Fn(&Evaluated) -> (usize, String)| {
             let mut members: BTreeMap<(usize, String), Vec<usize>> = BTreeMap::new();
             for (index, route) in routes.iter().enumerate().take(episodes.len()) {
                 members.entry(key(route)).or_default().push(index);
