@@ -11,6 +11,8 @@ use offtrack_training::policy::LearnedPolicy;
 
 /// Which policy drives.
 #[derive(Debug, clap::Args)]
+// A group of flags is named after its type, and a command may not have two of the same name.
+#[group(skip)]
 pub struct Choice {
     /// A policy file, `pursuit` (pure pursuit of the lane's centre), `random`, or the name of a shipped policy. Without
     /// it the policy shipped for the benchmark or, where there is none, the one for attard2023.

@@ -26,6 +26,7 @@ use offtrack_training::learner::run::folder::Folder;
 use offtrack_training::learner::run::metrics_file::MetricsFile;
 use offtrack_training::learner::run::progress::Progress;
 use offtrack_training::learner::run::resume::Resumed;
+use offtrack_training::learner::run::route_counts::{RouteCounts, WorstRoutes};
 use offtrack_training::learner::training::Training;
 use offtrack_training::policy::LearnedPolicy;
 use offtrack_training::provenance;
@@ -36,6 +37,8 @@ use super::{progress, roads, terminal};
 
 /// Episodes on each route in the final evaluation.
 const EPISODES: usize = 30;
+/// Training routes named at the end.
+const N_WORST: usize = 5;
 /// Most bytes of the metrics that the page shows.
 const METRICS_LIMIT: u64 = 64 << 20;
 
@@ -93,6 +96,9 @@ struct Finished {
     training_success: Option<f64>,
     /// Number of those episodes; each row of the metrics is a mean over as many.
     training_window: u64,
+    /// The training routes with least success; none where the trucks were on a device.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    training_routes: Option<WorstRoutes>,
     machine: String,
     /// Where trucks and learner were.
     device: String,
@@ -139,7 +145,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         }
     };
     let progress = Progress::new(&config, metrics, Box::new(progress::TrainingDisplay::new()));
-    let mut run = Run::new(backend, &config, &worlds.training_world, training, &folder, progress);
+    let counts = RouteCounts::new(&worlds.training, folder.routes());
+    let mut run = Run::new(backend, &config, &worlds.training_world, training, &folder, progress, counts);
     let mut doing = "training".to_owned();
     if let Some(stored) = stored {
         run.restore(&stored)?;
@@ -244,9 +251,20 @@ fn conclude(
     let metrics = Some(read_text(&folder.metrics(), METRICS_LIMIT)?);
     let (scenario, world) = (&worlds.benchmark, &worlds.benchmark_world);
     Page { scenario, world, evaluation: &report, tracks: &tracks, run: json!(finished), metrics }.write(&folder.page())?;
-    files::print(&format!("{table}written: {path}\n"))?;
+    let worst = finished.training_routes.as_ref().map(worst).unwrap_or_default();
+    files::print(&format!("{table}{worst}written: {path}\n"))?;
     // The evaluation is not lost where something else could not be written.
     written
+}
+
+/// A line about the training routes with least success.
+fn worst(WorstRoutes { routes, window, worst }: &WorstRoutes) -> String {
+    let shown: Vec<String> =
+        worst.iter().take(N_WORST).map(|route| format!("{} {:.0} %", route.route, 100.0 * route.recent_success)).collect();
+    if shown.is_empty() {
+        return String::new();
+    }
+    format!("least success of {routes} training routes, latest {window} episodes of each: {}\n", shown.join(", "))
 }
 
 /// Counts Ctrl-C, SIGTERM and SIGHUP: the first lets the step in hand finish and everything be written, the second ends
@@ -276,6 +294,7 @@ fn finished(config: &Config, run: &Run) -> Finished {
         updates: progress.updates(),
         training_success: progress.success(),
         training_window: progress.window(),
+        training_routes: run.routes.worst(),
         machine: provenance::machine(),
         device: run.device(),
         commit: provenance::commit(),

@@ -1,34 +1,34 @@
 //! The page of an evaluation and of the training run behind it: one HTML file that loads no other file.
 //!
-//! It holds the whole report, so that every figure can be checked, and every episode as gzipped columns of differences.
+//! It holds the whole report, so that every figure can be checked, and the episodes that it shows as gzipped columns of
+//! differences. Roundabouts and routes without such an episode are left out.
 
+mod ground;
 mod tracks;
 
 use std::path::Path;
 
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
-use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::error::Error;
 use crate::evaluation::report::Report;
 use crate::files;
-use crate::provenance;
-use offtrack_drawing::recording::{self, Map, Measures, Track};
-
-/// Most episodes that a page holds: about 15 MB.
-pub const MOST_EPISODES: usize = 4000;
+use ground::Ground;
+use offtrack_drawing::recording::Track;
 
 const TEMPLATE: &str = include_str!("page/report.html");
 const STYLE: &str = include_str!("page/style.css");
 /// In the order of the page; the last one starts the others.
-const SCRIPTS: [&str; 9] = [
+const SCRIPTS: [&str; 11] = [
     include_str!("page/elements.js"),
     include_str!("page/data.js"),
     include_str!("page/headline.js"),
     include_str!("page/routes.js"),
+    include_str!("page/groups.js"),
     include_str!("page/curves.js"),
+    include_str!("page/training.js"),
     include_str!("page/scene.js"),
     include_str!("page/replay.js"),
     include_str!("page/selftest.js"),
@@ -44,7 +44,8 @@ pub struct Page<'a> {
     pub world: &'a World,
     /// The report of the evaluation.
     pub evaluation: &'a Report,
-    /// Its episodes, the same number for each route, in the order of the report's routes.
+    /// The episodes that it shows, in order. `env` is the index of an episode among all, of which each of the report's
+    /// routes has the same number.
     pub tracks: &'a [Track],
     /// The training run as in its `report.json`; `Null` without one.
     pub run: Value,
@@ -52,52 +53,23 @@ pub struct Page<'a> {
     pub metrics: Option<String>,
 }
 
-/// Roundabouts, routes, truck and episodes, as the page's scripts read them.
-#[derive(Serialize)]
-struct Ground<'a> {
-    /// Time between two frames \[s].
-    step: f64,
-    vehicle: Measures,
-    n_rays: usize,
-    maps: Vec<Map>,
-    routes: Vec<Route<'a>>,
-    /// Name and unit of each column of the recorded episodes, in the order of the data.
-    columns: Vec<(String, f64)>,
-    episodes: Vec<Episode>,
-    machine: String,
-    commit: String,
-}
-
-#[derive(Serialize)]
-struct Route<'a> {
-    name: &'a str,
-    /// Index into `maps`.
-    roundabout: usize,
-    centre_line: Vec<[f64; 2]>,
-}
-
-#[derive(Serialize)]
-struct Episode {
-    /// Index into `routes`.
-    route: usize,
-    /// Which of the route's episodes, from 0.
-    number: usize,
-    ended: &'static str,
-    /// One for the start and one for each step.
-    n_frames: usize,
-}
-
 impl Page<'_> {
     /// Writes the page to `file`.
     pub fn write(mut self, file: &Path) -> Result<(), Error> {
-        let evaluation = json!(self.evaluation);
+        let columns = tracks::columns(self.world.params.sensor_range);
+        let mut ground = Ground::of(&self, &columns);
+        let mut evaluation = json!(self.evaluation);
+        if self.evaluation.has_many_routes() {
+            // Gzipped with the ground: of thousands of routes this is most of the report.
+            ground.route_reports = Some(rounded(evaluation["routes"].take()));
+        }
+        let ground = json!(ground).to_string();
         match self.run.as_object_mut() {
             Some(run) => drop(run.insert("evaluation".to_owned(), evaluation)),
             None => self.run = json!({ "evaluation": evaluation }),
         }
-        let columns = tracks::columns(self.world.params.sensor_range);
-        let packed = tracks::packed(self.tracks, &columns).map_err(Error::write(file))?;
-        let ground = self.ground(columns.iter().map(|column| (column.name.clone(), column.unit)).collect());
+        let [ground, tracks] = [ground.into_bytes(), tracks::differences(self.tracks, &columns)].map(|bytes| tracks::packed(&bytes));
+        let (ground, tracks) = (ground.map_err(Error::write(file))?, tracks.map_err(Error::write(file))?);
         let summary = &self.evaluation.summary;
         let (benchmark, split) = (&self.evaluation.benchmark, self.evaluation.split);
         let title =
@@ -107,49 +79,22 @@ impl Page<'_> {
             ("heading", &escaped(&format!("Evaluation on {benchmark}, {split} routes"))),
             ("style", STYLE),
             ("report", &script_json(&self.run)),
-            ("ground", &script_json(&json!(ground))),
+            ("ground", &ground),
             ("metrics", &script_json(&json!(self.metrics))),
-            ("tracks", &packed),
+            ("tracks", &tracks),
             ("script", &SCRIPTS.concat()),
         ]);
         files::write_whole(file, page.as_bytes())
     }
+}
 
-    fn ground(&self, columns: Vec<(String, f64)>) -> Ground<'_> {
-        let evaluated = &self.evaluation.routes;
-        let found: Vec<_> =
-            evaluated.iter().filter_map(|route| self.scenario.routes().find(|(_, known)| known.name == route.name)).collect();
-        let mut roundabouts: Vec<usize> = found.iter().map(|&(roundabout, _)| roundabout).collect();
-        roundabouts.dedup();
-        let per_route = (self.tracks.len() / evaluated.len().max(1)).max(1);
-        Ground {
-            step: self.scenario.step,
-            vehicle: Measures::of(self.world),
-            n_rays: self.world.rays.len(),
-            maps: roundabouts.iter().map(|&index| Map::of(&self.scenario.places[index].roundabout, self.scenario.gutter)).collect(),
-            routes: found
-                .iter()
-                .map(|&(index, route)| Route {
-                    name: &route.name,
-                    roundabout: roundabouts.iter().position(|&other| other == index).unwrap_or(0),
-                    centre_line: recording::centre_line(route),
-                })
-                .collect(),
-            columns,
-            episodes: self
-                .tracks
-                .iter()
-                .enumerate()
-                .map(|(index, track)| Episode {
-                    route: index / per_route,
-                    number: index % per_route,
-                    ended: track.ended.name(),
-                    n_frames: track.frames.len(),
-                })
-                .collect(),
-            machine: provenance::machine(),
-            commit: provenance::commit(),
-        }
+/// The same with at most four decimals.
+fn rounded(value: Value) -> Value {
+    match value {
+        Value::Array(values) => values.into_iter().map(rounded).collect(),
+        Value::Object(values) => values.into_iter().map(|(name, value)| (name, rounded(value))).collect(),
+        Value::Number(number) if number.is_f64() => number.as_f64().map_or(Value::Null, |value| json!((1e4 * value).round() / 1e4)),
+        other => other,
     }
 }
 
@@ -192,5 +137,12 @@ mod tests {
         let text = script_json(&json!({ "policy": "</script><script>alert(1)" }));
         assert!(!text.contains('<'), "{text}");
         assert_eq!(serde_json::from_str::<Value>(&text).unwrap()["policy"], "</script><script>alert(1)");
+    }
+
+    #[test]
+    fn of_a_rounded_report_only_fractions_lose_digits() {
+        let value = json!({ "routes": [{ "mean": 0.123_456_78, "least": -2.000_04, "episodes": 123_456_789, "none": null, "name": "a" }] });
+        let expected = json!({ "routes": [{ "mean": 0.1235, "least": -2.0, "episodes": 123_456_789, "none": null, "name": "a" }] });
+        assert_eq!(rounded(value), expected);
     }
 }

@@ -52,7 +52,14 @@ impl Policy for LearnedPolicy {
     }
 
     fn choose(&mut self, _: &World, batch: &Batch, actions: &mut Vec<u32>) {
-        *actions = self.act(&batch.observation);
+        // A held truck needs no action, and before the last episode ends most are held.
+        let driving: Vec<usize> = (0..batch.truck.len()).filter(|&env| batch.truck[env].held == 0).collect();
+        let observations: Vec<_> = driving.iter().map(|&env| batch.observation[env]).collect();
+        actions.clear();
+        actions.resize(batch.truck.len(), 0);
+        for (env, action) in driving.into_iter().zip(self.act(&observations)) {
+            actions[env] = action;
+        }
     }
 }
 

@@ -6,6 +6,11 @@ use std::collections::BTreeMap;
 use offtrack::layout::Ended;
 use serde::Serialize;
 
+use super::groups::Groups;
+
+/// Routes from which on a table and a page show groups of routes, and the worst routes instead of every one.
+pub const MANY_ROUTES: usize = 100;
+
 /// The figures of one episode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Episode {
@@ -132,6 +137,8 @@ pub struct RouteReport {
     pub name: String,
     /// A truck whose front axle follows the centre line touches no kerb.
     pub own_lane_suffices: bool,
+    /// Radius of the roundabout's island \[m].
+    pub island_radius: f64,
     /// Figures of its episodes.
     #[serde(flatten)]
     pub summary: Summary,
@@ -160,13 +167,45 @@ pub struct Report {
     /// Episodes on the certified routes; `None` without a certificate or without a certified route.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certified: Option<Summary>,
+    /// Sums by island radius, lane, exit and roundabout.
+    pub groups: Groups,
     /// Each route.
     pub routes: Vec<RouteReport>,
 }
 
+impl Report {
+    /// Whether there are so many routes that people read their groups first.
+    pub fn has_many_routes(&self) -> bool {
+        MANY_ROUTES <= self.routes.len()
+    }
+
+    /// Routes with an episode that failed, those with the least success first.
+    pub fn failing_routes(&self) -> Vec<&RouteReport> {
+        let mut failing: Vec<&RouteReport> = self.routes.iter().filter(|route| route.summary.arrived < route.summary.episodes).collect();
+        failing.sort_by(|a, b| a.summary.success.total_cmp(&b.summary.success));
+        failing
+    }
+}
+
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+
+    /// An episode with the widest figures that an evaluation gives.
+    pub(in super::super) fn episode(ended: Ended) -> Episode {
+        Episode {
+            ended,
+            steps: 999,
+            reward: -500.0,
+            lane_distance_mean: 10.25,
+            lane_distance_max: 19.25,
+            tractor_clearance_min: -10.25,
+            trailer_clearance_min: -10.25,
+            load_transfer_ratio_peak: 1.5,
+            articulation_peak: 1.9,
+            off_tracking_peak: 10.25,
+        }
+    }
 
     #[test]
     fn the_wilson_interval_has_the_published_values() {

@@ -1,10 +1,15 @@
-//! A report as text: a line a route, then the sums, within a given width, and what each column means.
+//! A report as text: a line a route, then the sums, within a given width, and what each column means. Of many routes
+//! there are the groups and the worst routes alone.
 
 use std::fmt::Write;
 
 use offtrack::layout::Ended;
 
-use super::report::{Report, Summary};
+use super::groups::Group;
+use super::report::{Report, RouteReport, Summary};
+
+/// Lines of the worst roundabouts, and of the worst routes, where there are many routes.
+const WORST: usize = 20;
 
 /// What each column of the table says.
 const COLUMNS: [(&str, &str); 10] = [
@@ -33,13 +38,13 @@ struct Column {
 
 /// One line of the table.
 struct Line<'a> {
-    name: &'a str,
+    name: String,
     lane: &'static str,
     summary: &'a Summary,
 }
 
 const ALL: [Column; 13] = [
-    Column { head: ["", "route"], rank: 0, text: |line| line.name.to_owned() },
+    Column { head: ["", "route"], rank: 0, text: |line| line.name.clone() },
     Column { head: ["", "arrived"], rank: 0, text: |line| format!("{}/{}", line.summary.arrived, line.summary.episodes) },
     Column { head: ["success", "%"], rank: 0, text: |line| format!("{:.1}", 100.0 * line.summary.success) },
     Column {
@@ -58,33 +63,40 @@ const ALL: [Column; 13] = [
     Column { head: ["time", "s"], rank: 10, text: |line| format!("{:.1}", line.summary.time_mean) },
 ];
 
+/// Lines between two rules, and what they leave out.
+struct Section<'a> {
+    lines: Vec<Line<'a>>,
+    note: Option<String>,
+}
+
 impl Report {
     /// The table that a person reads, at most `width` characters wide where that leaves room for the route and its
-    /// success: a line a route, then the sums, then what the columns mean.
+    /// success: a line a route, or where there are many a line for each group and the worst routes; then the sums, then
+    /// what the columns mean.
     pub fn table(&self, width: usize) -> String {
-        let routes: Vec<Line> = self
-            .routes
-            .iter()
-            .map(|route| Line { name: &route.name, lane: lane(route.own_lane_suffices), summary: &route.summary })
-            .collect();
+        let mut sections = if self.has_many_routes() { self.groups_and_worst() } else { vec![whole(self.routes.iter().map(of_route))] };
         let sums = [
             ("lane own", lane(true), self.own_lane_suffices.as_ref()),
             ("lane wide", lane(false), self.needs_deviation.as_ref()),
             ("certified", "", self.certified.as_ref()),
             ("all", "", Some(&self.summary)),
         ];
-        let sums: Vec<Line> = sums.into_iter().filter_map(|(name, lane, summary)| Some(Line { name, lane, summary: summary? })).collect();
-        let (columns, left_out) = fitting(width, &routes, &sums);
+        sections
+            .push(whole(sums.into_iter().filter_map(|(name, lane, summary)| Some(Line { name: name.into(), lane, summary: summary? }))));
+        let (columns, left_out) = fitting(width, &sections);
         let mut text = String::new();
         for row in 0..2 {
             push(&mut text, &columns, |column| column.head[row].to_owned());
         }
         let rule = "-".repeat(text.lines().map(str::len).max().unwrap_or(0));
-        for lines in [&routes, &sums] {
+        for Section { lines, note } in &sections {
             let _ = writeln!(text, "{rule}");
             for line in lines {
                 push(&mut text, &columns, |column| (column.text)(line));
                 push_failures(&mut text, line.summary, width);
+            }
+            if let Some(note) = note {
+                push_wrapped(&mut text, note, width);
             }
         }
         if !left_out.is_empty() {
@@ -96,6 +108,21 @@ impl Report {
             );
         }
         text + "\n" + &legend(width)
+    }
+
+    /// Groups of routes, then the worst roundabouts and the worst routes.
+    fn groups_and_worst(&self) -> Vec<Section<'_>> {
+        let mut roundabouts: Vec<&Group> =
+            self.groups.roundabout.iter().filter(|group| group.summary.arrived < group.summary.episodes).collect();
+        roundabouts.sort_by(|a, b| a.summary.success.total_cmp(&b.summary.success));
+        let roundabouts = roundabouts.into_iter().map(|group| of_group(group, ""));
+        vec![
+            whole(self.groups.island_radius.iter().map(|group| of_group(group, "island "))),
+            whole(self.groups.lane.iter().map(|group| of_group(group, "lane "))),
+            whole(self.groups.exit.iter().map(|group| of_group(group, "exit "))),
+            worst(roundabouts, "roundabouts", self.groups.roundabout.len()),
+            worst(self.failing_routes().into_iter().map(of_route), "routes", self.routes.len()),
+        ]
     }
 }
 
@@ -112,10 +139,33 @@ fn lane(own_suffices: bool) -> &'static str {
     if own_suffices { "own" } else { "wide" }
 }
 
+fn of_route(route: &RouteReport) -> Line<'_> {
+    Line { name: route.name.clone(), lane: lane(route.own_lane_suffices), summary: &route.summary }
+}
+
+fn of_group<'a>(group: &'a Group, kind: &str) -> Line<'a> {
+    Line { name: format!("{kind}{}", group.name), lane: "", summary: &group.summary }
+}
+
+fn whole<'a>(lines: impl Iterator<Item = Line<'a>>) -> Section<'a> {
+    Section { lines: lines.collect(), note: None }
+}
+
+/// The first of the lines, which are those of things that failed, worst first, and a note of how many of `n` there are.
+fn worst<'a>(failing: impl ExactSizeIterator<Item = Line<'a>>, things: &str, n: usize) -> Section<'a> {
+    let n_failing = failing.len();
+    let note = match n_failing {
+        0 => format!("All {n} {things}: every episode arrived."),
+        _ if n_failing <= WORST => format!("On the other {} of {n} {things} every episode arrived.", n - n_failing),
+        _ => format!("The worst {WORST} of {n_failing} {things} with a failure, of {n}; --json and --html have all."),
+    };
+    Section { lines: failing.take(WORST).collect(), note: Some(note) }
+}
+
 /// The columns that fit, each with its width, and those left out.
-fn fitting(width: usize, routes: &[Line], sums: &[Line]) -> (Vec<(&'static Column, usize)>, Vec<&'static Column>) {
+fn fitting(width: usize, sections: &[Section]) -> (Vec<(&'static Column, usize)>, Vec<&'static Column>) {
     let widest = |column: &Column| {
-        let cells = routes.iter().chain(sums).map(|line| (column.text)(line).chars().count());
+        let cells = sections.iter().flat_map(|section| &section.lines).map(|line| (column.text)(line).chars().count());
         cells.chain(column.head.map(str::len)).max().unwrap_or(0)
     };
     let mut columns: Vec<(&Column, usize)> = ALL.iter().map(|column| (column, widest(column))).collect();
@@ -173,72 +223,4 @@ fn push_wrapped(text: &mut String, words: &str, width: usize) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::report::{Episode, RouteReport};
-    use super::*;
-
-    /// A report with the widest figures that an evaluation gives.
-    fn report() -> Report {
-        let episode = |ended| Episode {
-            ended,
-            steps: 999,
-            reward: -500.0,
-            lane_distance_mean: 10.25,
-            lane_distance_max: 19.25,
-            tractor_clearance_min: -10.25,
-            trailer_clearance_min: -10.25,
-            load_transfer_ratio_peak: 1.5,
-            articulation_peak: 1.9,
-            off_tracking_peak: 10.25,
-        };
-        let mut episodes = vec![episode(Ended::Arrived); 692];
-        episodes.extend([episode(Ended::TractorCollided), episode(Ended::TrailerCollided), episode(Ended::TimedOut)]);
-        let summary = Summary::of(episodes.iter(), 0.1).unwrap();
-        let route = |own_lane_suffices| RouteReport { name: "40m/SW-right-1".to_owned(), own_lane_suffices, summary: summary.clone() };
-        Report {
-            benchmark: "attard2023".to_owned(),
-            split: "test",
-            policy: "random".to_owned(),
-            seed: 0,
-            engine: "cpu".to_owned(),
-            summary: summary.clone(),
-            own_lane_suffices: Some(summary.clone()),
-            needs_deviation: Some(summary.clone()),
-            certified: Some(summary.clone()),
-            routes: vec![route(true), route(false)],
-        }
-    }
-
-    #[test]
-    fn a_table_is_no_wider_than_the_terminal() {
-        let widest = |width: usize| report().table(width).lines().map(|line| line.chars().count()).max().unwrap();
-        for width in [40, 60, 79, 80, 100, 120, 200] {
-            assert!(widest(width) <= width, "{width}: {}\n{}", widest(width), report().table(width));
-        }
-        // Narrower than that, routes and their success stay all the same.
-        assert!(report().table(10).contains("692/695"));
-    }
-
-    #[test]
-    fn a_table_of_100_columns_has_every_figure_and_a_narrower_one_names_what_it_leaves_out() {
-        let (whole, narrow) = (report().table(100), report().table(80));
-        assert!(!whole.contains("Left out") && whole.contains("time"), "{whole}");
-        assert!(narrow.contains("Left out for want of width:") && narrow.contains("time s."), "{narrow}");
-    }
-
-    #[test]
-    fn every_heading_is_explained_below_the_table() {
-        let legend = legend(1000);
-        let table = report().table(100);
-        for column in &ALL[1..] {
-            let word = column.head.iter().flat_map(|head| head.split(' ')).find(|word| 1 < word.len() && *word != "95").unwrap();
-            assert!(legend.contains(word), "{word}");
-        }
-        assert!(table.contains("own: a truck whose front axle follows") && table.contains("load transfer ratio"), "{table}");
-    }
-
-    #[test]
-    fn failures_are_counted_below_their_line() {
-        assert!(report().table(100).contains("  not arrived: 1 timed out, 1 tractor collided, 1 trailer collided\n"));
-    }
-}
+mod tests;

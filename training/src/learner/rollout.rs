@@ -8,7 +8,7 @@ pub mod device;
 pub mod host;
 
 use burn::tensor::Tensor;
-use offtrack::layout::N_VALUES;
+use offtrack::layout::{Ended, N_VALUES};
 use offtrack::simulator::Simulator;
 
 use crate::error::Error;
@@ -26,6 +26,15 @@ pub struct Episodes {
     pub arrived: u64,
     /// Sum of their rewards; of several trucks counted together, of all steps since the last count.
     pub reward: f64,
+}
+
+/// An episode that ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RouteEnd {
+    /// Its route, an index in the world.
+    pub route: u32,
+    /// Why it ended.
+    pub ended: Ended,
 }
 
 /// Trucks that are stepped together, and the replay buffer of their transitions.
@@ -64,6 +73,11 @@ pub trait Rollout {
     /// The episodes that ended since this was last called. Where counting them means waiting for a device, none unless
     /// `wait`.
     fn take_episodes(&mut self, wait: bool) -> Result<Vec<Episodes>, Error>;
+
+    /// The same episodes one by one, since this was last called; none where the device counts all trucks together.
+    fn take_route_ends(&mut self) -> Vec<RouteEnd> {
+        Vec::new()
+    }
 
     /// Waits until all that was asked for is done.
     fn wait(&self) -> Result<(), Error>;

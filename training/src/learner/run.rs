@@ -10,6 +10,7 @@ mod lost_device_tests;
 pub mod metrics_file;
 pub mod progress;
 pub mod resume;
+pub mod route_counts;
 mod window;
 
 use bytemuck::{bytes_of, cast_slice};
@@ -26,6 +27,7 @@ use crate::policy::LearnedPolicy;
 use checkpointer::{Checkpointer, Written};
 use folder::Folder;
 use progress::Progress;
+use route_counts::RouteCounts;
 
 /// A run under way.
 pub struct Run {
@@ -36,13 +38,24 @@ pub struct Run {
     training: Training,
     /// How far it is.
     pub progress: Progress,
+    /// How it does on each training route.
+    pub routes: RouteCounts,
     checkpointer: Checkpointer,
 }
 
 impl Run {
     /// A run at its beginning. Its first checkpoint is written at once.
-    pub fn new(backend: Backend, config: &Config, world: &World, training: Training, folder: &Folder, progress: Progress) -> Run {
+    pub fn new(
+        backend: Backend,
+        config: &Config,
+        world: &World,
+        training: Training,
+        folder: &Folder,
+        progress: Progress,
+        routes: RouteCounts,
+    ) -> Run {
         Run {
+            routes,
             fingerprint: fingerprint(world),
             training,
             progress,
@@ -104,6 +117,9 @@ impl Run {
         for episodes in self.training.rollout_mut().take_episodes(wait)? {
             self.progress.ended(episodes);
         }
+        for ended in self.training.rollout_mut().take_route_ends() {
+            self.routes.count(ended);
+        }
         Ok(())
     }
 
@@ -112,6 +128,10 @@ impl Run {
         self.add_sums()?;
         let entropy_coefficient = self.training.sac().entropy_coefficient();
         self.progress.write_row(entropy_coefficient);
+        if self.routes.is_due() {
+            let written = self.routes.write();
+            self.progress.note(self.routes.file(), written);
+        }
         Ok(())
     }
 
@@ -140,7 +160,8 @@ impl Run {
         // The last row is not in the checkpoint: a run that continues takes it back.
         self.add_sums()?;
         let row = self.progress.finish(self.training.sac().entropy_coefficient());
-        written.map_or(Ok(()), |Written { checkpoint, policy }| checkpoint.and(policy)).and(row)
+        let routes = self.routes.write();
+        written.map_or(Ok(()), |Written { checkpoint, policy }| checkpoint.and(policy)).and(row).and(routes)
     }
 
     fn checkpoint_if_due(&mut self) -> Result<(), Error> {
@@ -160,6 +181,7 @@ impl Run {
         let policy = self.policy()?.to_bytes();
         let mut columns = Columns::default();
         self.progress.save(&mut columns);
+        self.routes.save(&mut columns);
         self.training.save(&mut columns);
         self.checkpointer.begin(&columns, self.config.to_toml(), self.fingerprint, policy);
         Ok(())
@@ -173,6 +195,7 @@ impl Run {
             return Err(stored.error(message));
         }
         self.progress.restore(stored)?;
+        self.routes.restore(stored)?;
         self.training.restore(stored, self.progress.updates())
     }
 

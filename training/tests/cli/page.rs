@@ -5,7 +5,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use crate::place::{Place, offtrack, refusal, succeed};
+use crate::place::{Place, offtrack, refusal, repository, succeed};
 
 /// A Chromium, whatever its name.
 fn browser() -> PathBuf {
@@ -86,7 +86,7 @@ fn a_page_of_an_evaluation_alone_passes_its_own_checks_and_one_with_a_wrong_figu
         (&key(mean), &key(mean + 0.02), "fails: the recorded frames give the report's figures: distance"),
     ] {
         assert!(text.contains(from), "{from}");
-        std::fs::write(&page, text.replacen(from, to, 1)).unwrap();
+        std::fs::write(&page, text.replace(from, to)).unwrap();
         let outcome = selftest(&page);
         assert!(outcome.starts_with("selftest failed\n") && outcome.contains(expected), "{outcome}");
     }
@@ -112,12 +112,64 @@ fn a_page_takes_its_curves_from_the_folder_of_a_run() {
     assert!(said.contains("report.json: has no env_steps"), "{said}");
 }
 
+/// A benchmark of `n` roundabouts with 20 test routes each, and its name.
+fn large(place: &Place, n: usize) -> String {
+    let scenarios = repository().join("scenarios");
+    let short = read(&place.file("short.toml"));
+    let (head, _) = short.split_once("[[roundabout]]").unwrap();
+    // With finer steer levels pure pursuit arrives now and then.
+    let mut benchmark = head.replace("[-0.8, -0.4, 0.0, 0.4, 0.8]", "[-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8]");
+    std::fs::create_dir(place.file("roads")).unwrap();
+    for index in 0..n {
+        let name = format!("roads/r{index}.toml");
+        let file = ["20m", "40m"][index % 2];
+        std::fs::copy(scenarios.join(format!("roundabouts/{file}.toml")), place.file(&name)).unwrap();
+        benchmark += &format!("[[roundabout]]\nfile = \"{name}\"\ntest = \"all\"\n");
+    }
+    std::fs::write(place.file("large.toml"), benchmark).unwrap();
+    place.text("large.toml")
+}
+
 #[test]
-fn a_page_that_would_be_too_large_or_cannot_be_written_is_refused() {
+fn a_page_of_many_routes_shows_groups_and_of_many_episodes_those_that_failed_and_a_sample_of_the_others() {
     let place = Place::new();
-    let page = place.text("page.html");
-    let said = refusal(&place.evaluate(&["--policy", "random", "--episodes", "2001", "--html", &page]), 2);
-    assert!(said.contains("--episodes: 2001; 4002 in all; a page holds 4000 at most"), "{said}");
+    let (benchmark, page) = (large(&place, 6), place.file("page.html"));
+    let evaluate = |episodes: &str| {
+        let output = offtrack(
+            &[
+                &["evaluate", "--benchmark", &benchmark, "--policy", "pursuit", "--episodes", episodes],
+                &["--html", &place.text("page.html"), "--json", &place.text("report.json")][..],
+            ]
+            .concat(),
+        );
+        succeed(&output);
+        (String::from_utf8_lossy(&output.stdout).into_owned(), place.json("report.json"), opened(&page))
+    };
+    let says = |document: &str, text: &str| assert!(document.contains(text), "{text} is not in the page");
+
+    let (table, report, document) = evaluate("1");
+    says(&document, "selftest passed");
+    let n_routes = report["routes"].as_array().unwrap().len();
+    assert!(100 <= n_routes && table.contains("exit 3") && table.contains("lane left"), "{table}");
+    assert!(table.matches("-left-").count() + table.matches("-right-").count() <= 20, "{table}");
+    assert_eq!(report["groups"]["roundabout"].as_array().unwrap().len(), 6);
+    assert!(report["routes"][0]["island_radius"].is_f64());
+
+    // More episodes than are all shown; of those that failed there may be more, too.
+    let episodes = 4000 / n_routes + 1;
+    let (_, report, document) = evaluate(&episodes.to_string());
+    says(&document, "selftest passed");
+    let [count, arrived] = ["episodes", "arrived"].map(|key| report[key].as_u64().unwrap());
+    let failed = count - arrived;
+    assert!(4000 < count && 1000 < failed && 400 < arrived, "{failed} of {count} failed");
+    says(&document, "1,400 of ");
+    says(&document, &format!("1,000 of {},{:03} that failed and 400 of ", failed / 1000, failed % 1000));
+    assert!(std::fs::metadata(&page).unwrap().len() < 8 << 20);
+}
+
+#[test]
+fn a_page_that_cannot_be_written_is_refused() {
+    let place = Place::new();
     let said = refusal(&offtrack(&["evaluate", "--policy", "random", "--run", "runs/run"]), 2);
     assert!(said.contains("--html"), "{said}");
     let below_a_file = place.text("tiny.toml/page.html");

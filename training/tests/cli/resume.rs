@@ -102,6 +102,12 @@ fn a_run_killed_and_stopped_on_the_way_equals_one_never_stopped_bit_for_bit() {
     let (parts, whole) = (metrics(&place, "parts"), metrics(&place, "whole"));
     assert!(100 < whole.len(), "{}", whole.len());
     assert_eq!(parts, whole);
+    let routes = bytes(&place, "runs/whole/routes.csv");
+    assert!(bytes(&place, "runs/parts/routes.csv") == routes);
+    // Every training episode counts for its route; here there is one.
+    let row = String::from_utf8(routes).unwrap().lines().nth(1).unwrap().to_owned();
+    let episodes = place.json("runs/whole/report.json")["episodes"].to_string();
+    assert!(row.starts_with("16m/E-right-1,16m,") && row.contains(&format!(",right,1,{episodes},")), "{row}");
     let evaluation = |run: &str| place.json(&format!("runs/{run}/report.json"))["evaluation"]["routes"].clone();
     assert!(evaluation("whole").is_array());
     assert_eq!(evaluation("parts"), evaluation("whole"));

@@ -1,4 +1,4 @@
-// The data blocks of the page: the report, the roundabouts, the training figures and every recorded episode.
+// The data blocks of the page: the report, the roundabouts, the training figures and the recorded episodes.
 //
 // Episodes lie column by column: for each column and episode the difference to the frame before, as zigzag varint, all
 // of it gzipped.
@@ -58,10 +58,29 @@ function decoded(bytes, columns, lengths) {
   return found;
 }
 
+/** The points of a line that is written as a point and differences, in centimetres [m]. */
+function pointsOf(line) {
+  const points = [];
+  for (let index = 0, x = 0, y = 0; index < line.length; index += 2) {
+    x += line[index];
+    y += line[index + 1];
+    points.push([x / 100, y / 100]);
+  }
+  return points;
+}
+
+/** How many episodes of how many are shown. */
+function shownOf(evaluation, episodes) {
+  const failed = episodes.filter((episode) => episode.failed).length;
+  return { failed, ofFailed: evaluation.episodes - evaluation.arrived, arrived: episodes.length - failed, ofArrived: evaluation.arrived };
+}
+
 /** All data of the page. */
 async function readPage() {
   const report = JSON.parse(block("report"));
-  const ground = JSON.parse(block("ground"));
+  const ground = JSON.parse(new TextDecoder().decode(await inflated(block("ground"))));
+  // Of thousands of routes the reports stand in the gzipped block.
+  report.evaluation.routes ??= ground.route_reports;
   const columns = decoded(await inflated(block("tracks")), ground.columns, ground.episodes.map((episode) => episode.n_frames));
   let first = 0;
   const episodes = ground.episodes.map((episode) => {
@@ -69,7 +88,8 @@ async function readPage() {
     first += episode.n_frames;
     return whole;
   });
-  return { report, evaluation: report.evaluation, ground, columns, episodes, metrics: columnsOf(JSON.parse(block("metrics"))) };
+  const { evaluation } = report;
+  return { report, evaluation, ground, columns, episodes, shown: shownOf(evaluation, episodes), metrics: columnsOf(JSON.parse(block("metrics"))) };
 }
 
 /** Difference of two headings, in [-pi, pi]. */

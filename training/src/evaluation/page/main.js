@@ -27,7 +27,8 @@ try {
   const replay = attempt(() => new Replay(page));
   attempt(() => showRoutes(page, (name) => replay?.openName(name)));
   attempt(() => showTraining(page));
-  byId("source").addEventListener("toggle", () => { byId("source").querySelector("pre").textContent = JSON.stringify(page.report, null, 2); }, { once: true });
+  attempt(() => showTrainingRoutes(page));
+  byId("source").addEventListener("toggle", () => { byId("source").querySelector("pre").textContent = JSON.stringify(JSON.parse(block("report")), null, 2); }, { once: true });
   if (testing) await selftest({ page, replay });
 } catch (error) {
   trouble(error);

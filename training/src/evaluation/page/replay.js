@@ -36,6 +36,7 @@ class Replay {
     this.canvas = byId("scene");
     this.order = this.routesInOrder();
     this.fillRoutes();
+    this.sayHowMany();
     this.listen();
     if (!this.openLink()) this.openRoute(this.order.flatMap(([, routes]) => routes).sort((a, b) => b.failed - a.failed)[0].route);
   }
@@ -54,8 +55,17 @@ class Replay {
   }
 
   fillRoutes() {
+    const all = this.page.episodes.length === this.page.evaluation.episodes;
     byId("route").replaceChildren(...this.order.map(([group, routes]) => html("optgroup", { label: group }, ...routes.map(({ route, name, failed, count }) =>
-      html("option", { value: route }, `${name}: ${failed === 0 ? "all" : count - failed} of ${count} arrived`)))));
+      html("option", { value: route }, `${name}: ${failed === 0 ? "all" : count - failed} of ${count}${all ? "" : " here"} arrived`)))));
+  }
+
+  /** Says so where not every episode is here. */
+  sayHowMany() {
+    const { shown, episodes, evaluation } = this.page;
+    byId("shown").hidden = episodes.length === evaluation.episodes;
+    const failed = shown.failed === shown.ofFailed ? `all ${whole(shown.failed)} that failed` : `${whole(shown.failed)} of ${whole(shown.ofFailed)} that failed`;
+    byId("shown").textContent = `${whole(episodes.length)} of ${whole(evaluation.episodes)} episodes are here: ${failed} and ${whole(shown.arrived)} of ${whole(shown.ofArrived)} that arrived, drawn evenly.`;
   }
 
   openRoute(route) {
@@ -92,7 +102,8 @@ class Replay {
 
   /** Opens the episode that the address names; false if it names none. */
   openLink() {
-    const asked = location.hash.match(/^#([^/]+\/[^/]+)\/(\d+)(?:\/(\d+(?:\.\d+)?))?$/);
+    // The last part of a route's name is no number, those before it may be.
+    const asked = location.hash.match(/^#(.+\/[^/]*[^/\d.][^/]*)\/(\d+)(?:\/(\d+(?:\.\d+)?))?$/);
     const route = asked && this.page.ground.routes.findIndex(({ name }) => name === asked[1]);
     const episode = asked && this.page.episodes.find((episode) => episode.route === route && episode.number === Number(asked[2]));
     if (!episode) return false;

@@ -3,10 +3,13 @@
 
 const METRICS = [["success", "Success"], ["ends", "Ends"], ["lane", "Lane"], ["transfer", "LTR"], ["articulation", "Articulation"]];
 
+const ROUTES_CAPTION = "Success, ends, distance to the lane centre, peak load transfer ratio and peak articulation of each route";
+
 const endColour = (name) => `var(--end-${name})`;
 
-/** The roundabout of `20m/N-left-3`. */
-const roundaboutOf = (route) => route.split("/")[0];
+/** The roundabout of `20m/N-left-3`, and what is left of the name. */
+const roundaboutOf = (route) => route.slice(0, Math.max(route.lastIndexOf("/"), 0));
+const withinRoundabout = (route) => route.slice(route.lastIndexOf("/") + 1);
 
 /** Routes grouped by roundabout, in the report's order. */
 function grouped(routes) {
@@ -52,9 +55,11 @@ function cells(summary, scales) {
   const failures = endsText(summary.ends);
   const ends = figure("ends", endsBar(summary.ends, summary.episodes), failures.count === 0 ? "all arrived" : `${failures.count} failed`, 76);
   ends.title = failures.words || "all arrived";
+  // Of many episodes a whole per cent is many, and their numbers are wide.
+  const many = 1000 <= summary.episodes;
   return [
     figure("success", fractionBar(summary.success, summary.success_low, summary.success_high, "var(--good)", 16),
-      `${summary.arrived}/${summary.episodes}  ${decimal(100 * summary.success, 0)}${GAP}%`, 92),
+      `${summary.arrived}/${summary.episodes}  ${decimal(100 * summary.success, many ? 1 : 0)}${GAP}%`, many ? 132 : 92),
     ends,
     figure("lane", lengthBar(summary.lane_distance_mean, scales.lane, { mark: summary.lane_distance_max }), metres(summary.lane_distance_mean), 50),
     figure("transfer", lengthBar(summary.load_transfer_ratio_peak, scales.transfer, { limit: 1 }), decimal(summary.load_transfer_ratio_peak, 2), 34),
@@ -78,34 +83,53 @@ function merged(routes) {
   };
 }
 
-/** Fills the table; `open` is called with the name of the chosen route. */
-function showRoutes(page, open) {
-  const { evaluation } = page, { routes } = evaluation;
-  const most = (value) => Math.max(...routes.map(value));
-  const scales = {
+/** The scales of all bars. */
+function scalesOf({ routes }) {
+  const most = (value) => routes.reduce((most, route) => Math.max(most, value(route)), 0);
+  return {
     lane: Math.max(most((route) => route.lane_distance_max), 1),
     transfer: Math.max(1.05, most((route) => route.load_transfer_ratio_peak)),
     articulation: Math.max(45, most((route) => route.articulation_peak_deg)),
   };
-  const table = byId("route-table");
-  table.dataset.metric = "success";
+}
+
+/** The row of a route; its name opens its replay if one of its episodes is shown. */
+function routeRow(page, route, name, scales, open) {
+  const shown = page.ground.routes.some((other) => other.name === route.name);
+  return html("tr", { class: "route" },
+    html("th", { scope: "row" },
+      shown ? html("button", { type: "button", class: "link", "aria-label": `Replay ${route.name}`, onclick: () => open(route.name) }, name) : html("span", { class: "label" }, name),
+      route.own_lane_suffices ? html("span", { class: "tag" }, "own lane") : null),
+    ...cells(route, scales));
+}
+
+/** A table of rows with these cells. */
+function fillTable(table, caption, first, bodies) {
   const heads = ["Success, 95 % interval", "Ends", "Lane distance, mean | most", "Peak LTR, limit 1", "Peak articulation"];
-  const bodies = [...grouped(routes)].map(([roundabout, members]) => html("tbody", {},
-    html("tr", { class: "group" }, html("th", { scope: "rowgroup" }, roundabout), ...cells(merged(members), scales)),
-    ...members.map((route) => html("tr", { class: "route" },
-      html("th", { scope: "row" },
-        html("button", { type: "button", class: "link", "aria-label": `Replay ${route.name}`, onclick: () => open(route.name) }, route.name.split("/").slice(1).join("/") || route.name),
-        route.own_lane_suffices ? html("span", { class: "tag" }, "own lane") : null),
-      ...cells(route, scales)))));
+  table.dataset.metric ??= "success";
   table.replaceChildren(
-    html("caption", { class: "unseen" }, "Success, ends, distance to the lane centre, peak load transfer ratio and peak articulation of each route"),
-    html("thead", {}, html("tr", {}, html("th", { scope: "col", class: "name" }, "Route"),
+    html("caption", { class: "unseen" }, caption),
+    html("thead", {}, html("tr", {}, html("th", { scope: "col", class: "name" }, first),
       ...heads.map((head, index) => html("th", { scope: "col", class: `figure ${METRICS[index][0]}` }, head)))),
     ...bodies);
+}
+
+/** Fills the tables; `open` is called with the name of the chosen route. */
+function showRoutes(page, open) {
+  const { evaluation } = page, scales = scalesOf(evaluation);
+  const tables = [byId("route-table"), byId("group-table")];
+  if (page.ground.route_reports === undefined) {
+    const bodies = [...grouped(evaluation.routes)].map(([roundabout, members]) => html("tbody", {},
+      html("tr", { class: "group" }, html("th", { scope: "rowgroup" }, roundabout), ...cells(merged(members), scales)),
+      ...members.map((route) => routeRow(page, route, withinRoundabout(route.name), scales, open))));
+    fillTable(tables[0], ROUTES_CAPTION, "Route", bodies);
+  } else {
+    showGroups(page, scales, open);
+  }
   const segments = byId("metric");
   segments.replaceChildren(...METRICS.map(([name, words], index) => html("button", {
     type: "button", "aria-pressed": String(index === 0),
-    onclick: (event) => { table.dataset.metric = name; press(segments, event.currentTarget); },
+    onclick: (event) => { for (const table of tables) table.dataset.metric = name; press(segments, event.currentTarget); },
   }, words)));
   byId("ends-legend").replaceChildren(...Object.entries(evaluation.ends).filter(([name, count]) => 0 < count || name === "arrived").map(([name, count]) =>
     html("li", {}, html("i", { style: `--swatch: ${endColour(name)}` }), `${endWords(name)} ${whole(count)}`)));

@@ -22,13 +22,14 @@ const lineOf = (points, closed) => {
 function sceneOf(page, episode) {
   const { ground, columns } = page, route = ground.routes[episode.route], map = ground.maps[route.roundabout];
   const road = new Path2D(), lanes = new Path2D();
-  for (const loop of map.drivable) road.addPath(lineOf(loop, true));
-  for (const lane of map.lanes) lanes.addPath(lineOf(lane, false));
+  for (const loop of map.drivable) road.addPath(lineOf(pointsOf(loop), true));
+  for (const lane of map.lanes) lanes.addPath(lineOf(pointsOf(lane), false));
+  const centreLine = pointsOf(route.centre_line);
   const poses = Array.from({ length: episode.n_frames }, (_, frame) => instant(page, episode, frame));
-  const seen = [...route.centre_line, ...poses.flatMap((pose) => [[pose.x, pose.y], [pose.trailerX, pose.trailerY]])];
+  const seen = [...centreLine, ...poses.flatMap((pose) => [[pose.x, pose.y], [pose.trailerX, pose.trailerY]])];
   const ends = (axis) => [Math.min(...seen.map((point) => point[axis])), Math.max(...seen.map((point) => point[axis]))];
   return {
-    road, lanes, route: lineOf(route.centre_line, false), bounds: [ends(0), ends(1)], ended: episode.ended, last: episode.n_frames - 1,
+    road, lanes, route: lineOf(centreLine, false), bounds: [ends(0), ends(1)], ended: episode.ended, last: episode.n_frames - 1,
     tractorPath: poses.map((pose) => [pose.x, pose.y]), trailerPath: poses.map((pose) => [pose.trailerX, pose.trailerY]), columns,
   };
 }

@@ -3,41 +3,70 @@
 
 /** Each check throws when it does not hold. */
 const CHECKS = {
-  "every episode is there with the end that the report counts": ({ page }) => {
-    const { evaluation, episodes, ground } = page;
-    same(episodes.length, evaluation.episodes);
-    for (const [name, count] of Object.entries(evaluation.ends)) same(episodes.filter((episode) => episode.ended === name).length, count, name);
+  "every episode is there with the end that the report counts, or every failed one and a sample of the others": ({ page }) => {
+    const { evaluation, episodes, ground, shown } = page, all = episodes.length === evaluation.episodes;
+    same(byId("shown").hidden, all, "a line about episodes left out");
+    if (all) for (const [name, count] of Object.entries(evaluation.ends)) same(episodes.filter((episode) => episode.ended === name).length, count, name);
+    holds(0 < shown.arrived || evaluation.arrived === 0, "some that arrived");
+    holds(byId("shown").textContent.startsWith(`${whole(episodes.length)} of ${whole(evaluation.episodes)} episodes`), "their number");
     for (const route of evaluation.routes) {
-      const own = episodes.filter((episode) => ground.routes[episode.route].name === route.name);
-      same(own.length, route.episodes, route.name);
-      same(own.filter((episode) => !episode.failed).length, route.arrived, route.name);
+      const own = shownOn(page, route);
+      const failed = own.filter((episode) => episode.failed).length, ofFailed = route.episodes - route.arrived;
+      holds(failed <= ofFailed && own.length - failed <= route.arrived, route.name);
+      if (all) same(own.length, route.episodes, route.name);
+      if (shown.failed === shown.ofFailed) same(failed, ofFailed, route.name);
+      if (own.length === route.episodes) for (const [name, count] of Object.entries(route.ends)) same(own.filter((episode) => episode.ended === name).length, count, route.name);
     }
+    same(new Set(ground.routes.map((route) => route.name)).size, ground.routes.length, "routes of the replay");
   },
   "the recorded frames give the report's figures": ({ page }) => {
-    const { evaluation, episodes, columns, ground } = page;
-    const frames = (episode, name) => columns[name].subarray(episode.first + 1, episode.first + episode.n_frames);
-    const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
-    // Lengths are kept to 1 cm, ratios to 0.01 and angles to 1e-4 rad.
-    close(mean(episodes.map((episode) => mean(frames(episode, "lane_distance")))), evaluation.lane_distance_mean, 0.006, "distance to the lane centre");
-    close(mean(episodes.map((episode) => episode.seconds)), evaluation.time_mean, 1e-6, "time");
-    const peak = (name) => Math.max(...episodes.map((episode) => frames(episode, name).reduce((most, value) => Math.max(most, Math.abs(value)), 0)));
-    close(Math.max(peak("tractor_load_transfer"), peak("trailer_load_transfer")), evaluation.load_transfer_ratio_peak, 0.006, "load transfer ratio");
-    const articulation = Math.max(...episodes.map((episode) =>
-      Math.max(...Array.from({ length: episode.n_frames }, (_, frame) => Math.abs(toDegrees(instant(page, episode, frame).articulation))))));
-    close(articulation, evaluation.articulation_peak_deg, 0.02, "articulation");
+    const { evaluation, episodes, ground, columns } = page;
+    if (episodes.length === evaluation.episodes) sameFigures(page, episodes, evaluation);
+    for (const route of evaluation.routes) {
+      const own = shownOn(page, route);
+      if (0 < own.length && own.length === route.episodes) sameFigures(page, own, route, `${route.name}: `);
+    }
     const ranges = Array.from({ length: ground.n_rays }, (_, ray) => columns["range_" + ray].reduce((most, value) => Math.max(most, value), 0));
     // A range is kept to 1/255 of the sensors' reach.
     holds(ranges.every((range) => 0 < range && range <= ground.vehicle.sensor_range * 1.002), "ranges within reach");
   },
+  "groups hold every episode once, and a roundabout shows its routes": ({ page }) => {
+    const { evaluation, ground } = page, many = ground.route_reports !== undefined;
+    for (const id of ["groups", "routes-choice"]) same(byId(id).hidden, !many, id);
+    for (const [kind] of KINDS) {
+      const sum = (value) => evaluation.groups[kind].reduce((total, group) => total + value(group), 0);
+      same(sum((group) => group.episodes), evaluation.episodes, kind);
+      same(sum((group) => group.arrived), evaluation.arrived, kind);
+      same(sum((group) => group.routes), evaluation.routes.length, kind);
+      close(sum((group) => group.episodes * group.lane_distance_mean) / evaluation.episodes, evaluation.lane_distance_mean, 1e-6, kind);
+    }
+    if (!many) return;
+    const rows = document.querySelectorAll("#group-table tr.member").length;
+    const worst = evaluation.groups.roundabout.filter((group) => 0 < failures(group)).length;
+    same(rows, KINDS.slice(0, 3).reduce((total, [kind]) => total + evaluation.groups[kind].length, 0) + Math.min(worst, MOST_ROUNDABOUTS), "rows of groups");
+    const select = byId("roundabout"), listed = () => document.querySelectorAll("#route-table tr.route").length;
+    same(select.options.length, evaluation.groups.roundabout.length + 1, "roundabouts to choose from");
+    for (const group of [evaluation.groups.roundabout[0], evaluation.groups.roundabout.at(-1)]) {
+      select.value = group.name;
+      select.dispatchEvent(new Event("change"));
+      same(listed(), group.routes, group.name);
+    }
+    select.value = "";
+    select.dispatchEvent(new Event("change"));
+    same(listed(), Math.min(evaluation.routes.filter((route) => 0 < failures(route)).length, MOST_ROUTES), "worst routes");
+  },
   "every route has its row and every figure its chart": ({ page }) => {
-    same(document.querySelectorAll("#route-table tr.route").length, page.evaluation.routes.length);
-    holds(document.querySelectorAll("#route-table tr.route svg").length === 5 * page.evaluation.routes.length, "5 charts a route");
+    const rows = document.querySelectorAll("#route-table tr.route").length;
+    if (page.ground.route_reports === undefined) same(rows, page.evaluation.routes.length);
+    same(document.querySelectorAll("#route-table tr.route svg").length, 5 * rows, "5 charts a route");
     holds(byId("verdict").textContent.includes(percent(page.evaluation.success)), "headline");
     same(document.querySelectorAll("#figures thead th").length, comparable(page.evaluation) ? 2 : 1, "columns of the figures");
     same(document.querySelectorAll("#figures tbody td").length, (comparable(page.evaluation) ? 2 : 1) * document.querySelectorAll("#figures tbody tr").length, "cells");
     same(byId("study").hidden, !comparable(page.evaluation), "study hidden");
     const curves = [...document.querySelectorAll("#curves .curve")];
-    same(byId("training").hidden, page.metrics === null, "training section hidden");
+    const worst = page.report.training_routes?.worst?.length ?? 0;
+    same(byId("training").hidden, page.metrics === null && worst === 0, "training section hidden");
+    same(document.querySelectorAll("#training-route-table tbody tr").length, worst, "training routes");
     if (page.metrics !== null) {
       same(curves.length, curvesOf(page.report, page.metrics).length, "curves");
       byId("by-minutes").click();
@@ -80,6 +109,27 @@ const CHECKS = {
     }
   },
 };
+
+/** The episodes of a route that are shown. */
+const shownOn = ({ episodes, ground }, route) => {
+  const index = ground.routes.findIndex(({ name }) => name === route.name);
+  return episodes.filter((episode) => episode.route === index);
+};
+
+/** Throws where the frames of all of a summary's episodes give other figures. */
+function sameFigures(page, episodes, summary, of = "") {
+  const { columns } = page;
+  const frames = (episode, name) => columns[name].subarray(episode.first + 1, episode.first + episode.n_frames);
+  const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
+  // Lengths are kept to 1 cm, ratios to 0.01 and angles to 1e-4 rad.
+  close(mean(episodes.map((episode) => mean(frames(episode, "lane_distance")))), summary.lane_distance_mean, 0.006, of + "distance to the lane centre");
+  close(mean(episodes.map((episode) => episode.seconds)), summary.time_mean, 1e-4, of + "time");
+  const peak = (name) => Math.max(...episodes.map((episode) => frames(episode, name).reduce((most, value) => Math.max(most, Math.abs(value)), 0)));
+  close(Math.max(peak("tractor_load_transfer"), peak("trailer_load_transfer")), summary.load_transfer_ratio_peak, 0.006, of + "load transfer ratio");
+  const articulation = Math.max(...episodes.map((episode) =>
+    Math.max(...Array.from({ length: episode.n_frames }, (_, frame) => Math.abs(toDegrees(instant(page, episode, frame).articulation))))));
+  close(articulation, summary.articulation_peak_deg, 0.02, of + "articulation");
+}
 
 function holds(truth, what) {
   if (!truth) throw new Error(`${what}: does not hold`);

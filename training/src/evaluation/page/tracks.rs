@@ -1,8 +1,7 @@
 //! Recorded episodes in few bytes: whole numbers of a unit, column by column, the difference to the previous frame as a
-//! zigzag varint (seven bits a byte, lowest first, the eighth bit set if more follow; 0, -1, 1, -2 are 0, 1, 2, 3),
-//! gzipped, in base64.
+//! zigzag varint (seven bits a byte, lowest first, the eighth bit set if more follow; 0, -1, 1, -2 are 0, 1, 2, 3).
 //!
-//! The first difference of each episode is to 0. `data.js` decodes them.
+//! The first difference of each episode is to 0. `data.js` decodes them, from gzip in base64.
 
 use std::io::Write;
 
@@ -57,14 +56,15 @@ pub(super) fn columns(sensor_range: f32) -> Vec<Column> {
     columns
 }
 
-/// All tracks as base64.
-pub(super) fn packed(tracks: &[Track], columns: &[Column]) -> std::io::Result<String> {
+/// Bytes as gzip in base64.
+pub(super) fn packed(bytes: &[u8]) -> std::io::Result<String> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-    encoder.write_all(&differences(tracks, columns))?;
+    encoder.write_all(bytes)?;
     Ok(BASE64_STANDARD.encode(encoder.finish()?))
 }
 
-fn differences(tracks: &[Track], columns: &[Column]) -> Vec<u8> {
+/// All tracks.
+pub(super) fn differences(tracks: &[Track], columns: &[Column]) -> Vec<u8> {
     let mut bytes = Vec::new();
     for column in columns {
         for track in tracks {

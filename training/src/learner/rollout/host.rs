@@ -8,7 +8,7 @@ use offtrack::world::World;
 use rand::{Rng, SeedableRng};
 use std::sync::Arc;
 
-use super::{Episodes, Rollout};
+use super::{Episodes, Rollout, RouteEnd};
 use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::config::{Config, Learning};
@@ -33,11 +33,14 @@ pub struct HostRollout {
     normalisation: Normalisation,
     /// Observations before the step in hand.
     observation: Vec<[f32; N_VALUES]>,
+    /// Routes of the step in hand; after it, trucks whose episodes ended are on others.
+    routes: Vec<u32>,
     /// Rows of the latest sample.
     sampled_rows: Vec<usize>,
     /// Sum of each truck's rewards in its episode so far, `[n_envs]`.
     episode_rewards: Vec<f32>,
     ended: Vec<Episodes>,
+    route_ends: Vec<RouteEnd>,
 }
 
 impl HostRollout {
@@ -53,9 +56,11 @@ impl HostRollout {
             mirror,
             normalisation: Normalisation::none(N_VALUES),
             observation: Vec::new(),
+            routes: Vec::new(),
             sampled_rows: Vec::new(),
             episode_rewards: vec![0.0; config.n_envs],
             ended: Vec::new(),
+            route_ends: Vec::new(),
             config: config.clone(),
         })
     }
@@ -69,6 +74,14 @@ impl HostRollout {
         self.simulator.world().actions.len()
     }
 
+    /// Keeps what the step in hand replaces.
+    fn begin_step(&mut self) {
+        let batch = self.simulator.batch();
+        self.observation.clone_from(&batch.observation);
+        self.routes.clear();
+        self.routes.extend(batch.truck.iter().map(|truck| truck.route));
+    }
+
     /// Appends the step just made to the replay buffer, and counts the episodes that it ended.
     fn remember(&mut self) {
         let batch = self.simulator.batch();
@@ -79,10 +92,12 @@ impl HostRollout {
             ended: &batch.ended,
             next_observation: &batch.next_observation,
         });
-        for ((sum, &reward), &code) in self.episode_rewards.iter_mut().zip(&batch.reward).zip(&batch.ended) {
+        let codes = batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running));
+        for (((sum, &reward), ended), &route) in self.episode_rewards.iter_mut().zip(&batch.reward).zip(codes).zip(&self.routes) {
             *sum += reward;
-            if code != Ended::Running as u32 {
-                let arrived = u64::from(code == Ended::Arrived as u32);
+            if ended != Ended::Running {
+                let arrived = u64::from(ended == Ended::Arrived);
+                self.route_ends.push(RouteEnd { route, ended });
                 self.ended.push(Episodes { count: 1, arrived, reward: f64::from(std::mem::take(sum)) });
             }
         }
@@ -111,14 +126,14 @@ impl Rollout for HostRollout {
     }
 
     fn step_at_random(&mut self) -> Result<(), Error> {
-        self.observation.clone_from(&self.simulator.batch().observation);
+        self.begin_step();
         self.simulator.step_at_random();
         self.remember();
         Ok(())
     }
 
     fn step(&mut self, actor: &Mlp, env_steps: u64) -> Result<(), Error> {
-        self.observation.clone_from(&self.simulator.batch().observation);
+        self.begin_step();
         let (mut actions, n_actions) = (self.choose(actor), self.n_actions());
         if let Some(exploration) = &self.config.exploration {
             exploration.explore(env_steps, n_actions, &mut actions, &mut self.acting);
@@ -153,6 +168,10 @@ impl Rollout for HostRollout {
 
     fn take_episodes(&mut self, _: bool) -> Result<Vec<Episodes>, Error> {
         Ok(std::mem::take(&mut self.ended))
+    }
+
+    fn take_route_ends(&mut self) -> Vec<RouteEnd> {
+        std::mem::take(&mut self.route_ends)
     }
 
     fn wait(&self) -> Result<(), Error> {

@@ -99,6 +99,11 @@ impl Folder {
         self.0.join("metrics.csv")
     }
 
+    /// Success on each training route.
+    pub fn routes(&self) -> PathBuf {
+        self.0.join("routes.csv")
+    }
+
     /// The report.
     pub fn report(&self) -> PathBuf {
         self.0.join("report.json")

@@ -26,7 +26,8 @@ fn run(folder: &Path, settings: &[&str]) -> (Run, Folder, Shared) {
     let shared = Shared::open(None).unwrap();
     let backend = Backend::Device(Box::new(shared.clone()));
     let training = Training::new(&backend, &config, world.clone(), routes).unwrap();
-    (Run::new(backend, &config, &world, training, &folder, progress), folder, shared)
+    let routes = RouteCounts::new(&scenario, folder.routes());
+    (Run::new(backend, &config, &world, training, &folder, progress, routes), folder, shared)
 }
 
 #[test]

@@ -12,7 +12,7 @@ use crate::learner::rollout::Episodes;
 use crate::learner::sac::Update;
 
 /// Time between two rows of metrics, and two updates of the display.
-const ROW_EVERY: Duration = Duration::from_secs(5);
+pub(super) const ROW_EVERY: Duration = Duration::from_secs(5);
 /// Rows of a run with a budget of steps alone: equal runs then leave equal rows.
 const N_ROWS: u64 = 500;
 /// Where a run shows how far it is.

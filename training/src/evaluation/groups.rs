@@ -1,0 +1,113 @@
+//! Sums of an evaluation over routes that have something in common.
+
+use std::collections::BTreeMap;
+
+use offtrack::route::Route;
+use offtrack::scenario::Place;
+use serde::Serialize;
+
+use super::report::{Episode, Summary};
+
+/// Island radii from which on a route is in the next band \[m].
+const BANDS: [f64; 4] = [9.0, 12.0, 16.0, 22.0];
+/// Their names.
+const BAND_NAMES: [&str; BANDS.len() + 1] = ["below 9 m", "9 to 12 m", "12 to 16 m", "16 to 22 m", "22 m and more"];
+
+/// A route that is evaluated: the index of its place in the benchmark, the place, the route.
+pub type Evaluated<'a> = (usize, &'a Place, &'a Route);
+
+/// Episodes on some of the routes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Group {
+    /// What the routes have in common: `16m`, `left`, `2`, `9 to 12 m`.
+    pub name: String,
+    /// Their number.
+    pub routes: usize,
+    /// Figures of their episodes.
+    #[serde(flatten)]
+    pub summary: Summary,
+}
+
+/// Every episode once in each of four partitions.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Groups {
+    /// By band of the island's radius, smallest first.
+    pub island_radius: Vec<Group>,
+    /// By the lane of approach.
+    pub lane: Vec<Group>,
+    /// By number of the exit; as many as the roundabout has arms is a U-turn.
+    pub exit: Vec<Group>,
+    /// By roundabout, in the benchmark's order.
+    pub roundabout: Vec<Group>,
+}
+
+impl Groups {
+    /// The groups of `routes`; `finished` has as many episodes for each of them, in the same order. A step takes `step`
+    /// seconds.
+    pub fn of(routes: &[Evaluated], finished: &[Episode], step: f64) -> Groups {
+        let episodes: Vec<&[Episode]> = finished.chunks((finished.len() / routes.len().max(1)).max(1)).collect();
+        let by = |key: &dyn Fn(&Evaluated) -> (usize, String)| {
+            let mut members: BTreeMap<(usize, String), Vec<usize>> = BTreeMap::new();
+            for (index, route) in routes.iter().enumerate().take(episodes.len()) {
+                members.entry(key(route)).or_default().push(index);
+            }
+            let group = |((_, name), members): ((usize, String), Vec<usize>)| {
+                let summary = Summary::of(members.iter().flat_map(|&index| episodes[index]), step)?;
+                Some(Group { name, routes: members.len(), summary })
+            };
+            members.into_iter().filter_map(group).collect()
+        };
+        Groups {
+            island_radius: by(&|(_, place, _)| {
+                let band = band(place.roundabout.island_radius());
+                (band, BAND_NAMES[band].to_owned())
+            }),
+            lane: by(&|(_, _, route)| (0, route.lane.name().to_owned())),
+            exit: by(&|(_, _, route)| (route.exit as usize, route.exit.to_string())),
+            roundabout: by(&|&(index, place, _)| (index, place.roundabout.name.clone())),
+        }
+    }
+}
+
+/// Index of an island's band by its radius \[m].
+fn band(island_radius: f64) -> usize {
+    BANDS.iter().filter(|&&from| from <= island_radius).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use offtrack::layout::Ended;
+    use offtrack::scenario::{Scenario, Split};
+
+    use super::super::report::tests::episode;
+    use super::*;
+
+    #[test]
+    fn every_episode_is_in_one_group_of_each_kind() {
+        let scenario = Scenario::named("attard2023-full").unwrap();
+        let all: Vec<_> = scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
+        let routes: Vec<_> = scenario.split(Split::Test).iter().map(|&route| all[route as usize]).collect();
+        // Two episodes a route; the second fails on right lanes.
+        let ends = |right| [Ended::Arrived, if right { Ended::TrailerCollided } else { Ended::Arrived }];
+        let finished: Vec<Episode> = routes.iter().flat_map(|(_, _, route)| ends(route.lane.name() == "right")).map(episode).collect();
+        let groups = Groups::of(&routes, &finished, scenario.step);
+        for kind in [&groups.island_radius, &groups.lane, &groups.exit, &groups.roundabout] {
+            assert_eq!(kind.iter().map(|group| group.routes).sum::<usize>(), routes.len());
+            assert_eq!(kind.iter().map(|group| group.summary.episodes).sum::<usize>(), finished.len());
+            assert!(kind.iter().all(|group| group.summary.episodes == 2 * group.routes));
+        }
+        let names = |kind: &[Group]| kind.iter().map(|group| group.name.clone()).collect::<Vec<_>>();
+        assert_eq!(names(&groups.lane), ["left", "right"]);
+        assert_eq!(names(&groups.roundabout), ["20m", "40m"]);
+        assert_eq!(names(&groups.exit), ["1", "2", "3", "4"]);
+        let [left, right] = [0, 1].map(|lane: usize| &groups.lane[lane].summary);
+        assert_eq!((left.success, right.success, right.ends["trailer_collided"]), (1.0, 0.5, right.episodes / 2));
+    }
+
+    #[test]
+    fn a_band_begins_at_its_lower_radius() {
+        let names = [7.3, 8.99, 9.0, 11.9, 12.0, 16.0, 21.9, 22.0, 40.0].map(|radius| BAND_NAMES[band(radius)]);
+        let expected = [0, 0, 1, 1, 2, 3, 3, 4, 4].map(|index: usize| BAND_NAMES[index]);
+        assert_eq!(names, expected);
+    }
+}

@@ -1,0 +1,170 @@
+//! One truck's episode while it runs: its figures so far, from one step to the next.
+//!
+//! The paths of both axles are needed for the off-tracking alone. Of them only the part between the trailer and the
+//! front axle is held, so that an episode takes as much memory at its end as at its beginning.
+
+use std::collections::VecDeque;
+
+use glam::Vec2;
+use offtrack::angle::wrapped;
+use offtrack::layout::{Ended, Rig, Truck};
+use offtrack::simulator::Batch;
+
+use super::report::Episode;
+
+/// An episode under way.
+pub(super) struct Running {
+    lane_distance_sum: f64,
+    /// Its figures so far; the mean and the off-tracking follow at its end.
+    episode: Episode,
+    off_tracking: OffTracking,
+}
+
+impl Running {
+    /// At its start.
+    pub(super) fn new(rig: &Rig, truck: &Truck) -> Running {
+        let front = front_axle(rig, truck);
+        let ahead = Vec2::from_angle(truck.heading);
+        Running {
+            lane_distance_sum: 0.0,
+            episode: Episode {
+                ended: Ended::Running,
+                steps: 0,
+                reward: 0.0,
+                lane_distance_mean: 0.0,
+                lane_distance_max: 0.0,
+                tractor_clearance_min: f64::INFINITY,
+                trailer_clearance_min: f64::INFINITY,
+                load_transfer_ratio_peak: 0.0,
+                articulation_peak: 0.0,
+                off_tracking_peak: 0.0,
+            },
+            // The path's first point lies far behind the start, so that the trailer's axle is beside it from the first
+            // step on.
+            off_tracking: OffTracking::new(front - 2.0 * (rig.wheelbase + rig.trailer_wheelbase) * ahead, front),
+        }
+    }
+
+    /// Adds the last step; true if it ended the episode.
+    pub(super) fn follow(&mut self, rig: &Rig, batch: &Batch, env: usize) -> bool {
+        let (truck, progress, clearance) = (&batch.truck[env], &batch.progress[env], &batch.clearance[env]);
+        let raise = |peak: &mut f64, value: f32| *peak = peak.max(f64::from(value));
+        let lower = |least: &mut f64, value: f32| *least = least.min(f64::from(value));
+        self.episode.steps += 1;
+        self.episode.reward += f64::from(batch.reward[env]);
+        self.lane_distance_sum += f64::from(progress.lane_distance);
+        raise(&mut self.episode.lane_distance_max, progress.lane_distance);
+        lower(&mut self.episode.tractor_clearance_min, clearance.tractor);
+        lower(&mut self.episode.trailer_clearance_min, clearance.trailer);
+        raise(&mut self.episode.load_transfer_ratio_peak, truck.tractor_load_transfer_ratio.abs());
+        raise(&mut self.episode.load_transfer_ratio_peak, truck.trailer_load_transfer_ratio.abs());
+        raise(&mut self.episode.articulation_peak, wrapped(truck.heading - truck.trailer_heading).abs());
+        self.off_tracking.push(front_axle(rig, truck), truck.trailer_position(rig));
+        batch.ended[env] != Ended::Running as u32
+    }
+
+    /// Its figures, once it has ended this way.
+    pub(super) fn finish(&mut self, ended: Ended) -> Episode {
+        Episode {
+            ended,
+            lane_distance_mean: self.lane_distance_sum / f64::from(self.episode.steps.max(1)),
+            off_tracking_peak: self.off_tracking.finish(),
+            ..self.episode.clone()
+        }
+    }
+}
+
+/// Middle of the front axle \[m].
+fn front_axle(rig: &Rig, truck: &Truck) -> Vec2 {
+    truck.position + rig.wheelbase * Vec2::from_angle(truck.heading)
+}
+
+/// Largest distance of the trailer's axle from the path of the front axle \[m]. The trailer follows the path in order,
+/// so the search for the nearest segment only moves forwards, and what lies behind it is dropped.
+struct OffTracking {
+    /// The path, from the segment nearest to the trailer on.
+    front: VecDeque<Vec2>,
+    /// Positions of the trailer whose nearest segment may lie beyond the path so far.
+    waiting: VecDeque<Vec2>,
+    most: f64,
+}
+
+impl OffTracking {
+    fn new(from: Vec2, to: Vec2) -> OffTracking {
+        OffTracking { front: VecDeque::from([from, to]), waiting: VecDeque::new(), most: 0.0 }
+    }
+
+    /// Both axles after another step.
+    fn push(&mut self, front: Vec2, trailer: Vec2) {
+        self.front.push_back(front);
+        self.waiting.push_back(trailer);
+        while let Some(&point) = self.waiting.front() {
+            self.advance(point);
+            if self.front.len() <= 2 {
+                // The next step may bring a nearer segment.
+                return;
+            }
+            self.count(point);
+        }
+    }
+
+    /// The largest distance of all, once the path is complete.
+    fn finish(&mut self) -> f64 {
+        while let Some(&point) = self.waiting.front() {
+            self.advance(point);
+            self.count(point);
+        }
+        self.most
+    }
+
+    /// Drops the segments before the nearest one.
+    fn advance(&mut self, point: Vec2) {
+        while 2 < self.front.len() && self.distance(point, 1) <= self.distance(point, 0) {
+            self.front.pop_front();
+        }
+    }
+
+    fn count(&mut self, point: Vec2) {
+        self.most = self.most.max(self.distance(point, 0));
+        self.waiting.pop_front();
+    }
+
+    fn distance(&self, point: Vec2, segment: usize) -> f64 {
+        f64::from(offtrack::cpu::follow::distance_to_segment(point, self.front[segment], self.front[segment + 1]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn off_tracking(front: &[Vec2], trailer: &[Vec2]) -> (f64, usize) {
+        let mut off_tracking = OffTracking::new(front[0], front[1]);
+        let mut held = 0;
+        for (&front, &trailer) in front[2..].iter().zip(trailer) {
+            off_tracking.push(front, trailer);
+            held = held.max(off_tracking.front.len() + off_tracking.waiting.len());
+        }
+        (off_tracking.finish(), held)
+    }
+
+    #[test]
+    fn a_trailer_on_a_smaller_circle_is_off_by_the_difference_of_the_radii() {
+        let at = |radius: f32, step: usize| radius * Vec2::from_angle(0.02 * step as f32);
+        let front: Vec<Vec2> = (0..2000).map(|step| at(20.0, step)).collect();
+        // It waits beside the path's beginning until the front axle is 30 steps ahead.
+        let trailer: Vec<Vec2> = (0..1998usize).map(|step| at(18.0, 1 + step.saturating_sub(30))).collect();
+        let (most, held) = off_tracking(&front, &trailer);
+        // The chords of the path lie up to 1 mm inside its circle.
+        assert!((most - 2.0).abs() < 2e-3, "{most}");
+        assert!((30..40).contains(&held), "{held} points of 2000 steps are held");
+    }
+
+    #[test]
+    fn a_trailer_ahead_of_its_path_waits_for_it() {
+        let line = |from: f32| (0..50).map(move |i| Vec2::new(from + i as f32, 0.0)).collect::<Vec<_>>();
+        // For 10 steps the trailer lies 10 m beyond the path; in the end the path has passed it.
+        let trailer: Vec<Vec2> = (0..48).map(|i| Vec2::new(11.0 + (i as f32).min(30.0), 0.5)).collect();
+        assert_eq!(off_tracking(&line(0.0), &trailer).0, 0.5);
+    }
+}

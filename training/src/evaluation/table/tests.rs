@@ -1,0 +1,106 @@
+use super::super::groups::Groups;
+use super::super::report::tests::episode;
+use super::super::report::{Episode, MANY_ROUTES};
+use super::*;
+
+/// A report with the widest figures that an evaluation gives.
+fn report() -> Report {
+    let mut episodes = vec![episode(Ended::Arrived); 692];
+    episodes.extend([episode(Ended::TractorCollided), episode(Ended::TrailerCollided), episode(Ended::TimedOut)]);
+    let summary = Summary::of(episodes.iter(), 0.1).unwrap();
+    let route = |own_lane_suffices| RouteReport {
+        name: "40m/SW-right-1".to_owned(),
+        own_lane_suffices,
+        island_radius: 20.0,
+        summary: summary.clone(),
+    };
+    let group = |name: &str| vec![Group { name: name.to_owned(), routes: 2, summary: summary.clone() }];
+    Report {
+        benchmark: "attard2023".to_owned(),
+        split: "test",
+        policy: "random".to_owned(),
+        seed: 0,
+        engine: "cpu".to_owned(),
+        summary: summary.clone(),
+        own_lane_suffices: Some(summary.clone()),
+        needs_deviation: Some(summary.clone()),
+        certified: Some(summary.clone()),
+        groups: Groups { island_radius: group("22 m and more"), lane: group("right"), exit: group("1"), roundabout: group("40m") },
+        routes: vec![route(true), route(false)],
+    }
+}
+
+#[test]
+fn a_table_is_no_wider_than_the_terminal() {
+    let widest = |width: usize| report().table(width).lines().map(|line| line.chars().count()).max().unwrap();
+    for width in [40, 60, 79, 80, 100, 120, 200] {
+        assert!(widest(width) <= width, "{width}: {}\n{}", widest(width), report().table(width));
+    }
+    // Narrower than that, routes and their success stay all the same.
+    assert!(report().table(10).contains("692/695"));
+}
+
+#[test]
+fn a_table_of_100_columns_has_every_figure_and_a_narrower_one_names_what_it_leaves_out() {
+    let (whole, narrow) = (report().table(100), report().table(80));
+    assert!(!whole.contains("Left out") && whole.contains("time"), "{whole}");
+    assert!(narrow.contains("Left out for want of width:") && narrow.contains("time s."), "{narrow}");
+}
+
+#[test]
+fn every_heading_is_explained_below_the_table() {
+    let legend = legend(1000);
+    let table = report().table(100);
+    for column in &ALL[1..] {
+        let word = column.head.iter().flat_map(|head| head.split(' ')).find(|word| 1 < word.len() && *word != "95").unwrap();
+        assert!(legend.contains(word), "{word}");
+    }
+    assert!(table.contains("own: a truck whose front axle follows") && table.contains("load transfer ratio"), "{table}");
+}
+
+#[test]
+fn failures_are_counted_below_their_line() {
+    assert!(report().table(100).contains("  not arrived: 1 timed out, 1 tractor collided, 1 trailer collided\n"));
+}
+
+/// The same with many routes on as many roundabouts, of which every `one_in`th failed once.
+fn large_report(one_in: usize) -> Report {
+    let summary = |fails: bool| {
+        let ends = [Ended::Arrived, if fails { Ended::TrailerCollided } else { Ended::Arrived }];
+        let episodes: Vec<Episode> = ends.into_iter().map(episode).collect();
+        Summary::of(episodes.iter(), 0.1).unwrap()
+    };
+    let fails = |index: usize| summary(index.is_multiple_of(one_in));
+    let route = |index: usize| RouteReport {
+        name: format!("wide/7/{index}/SW-right-1"),
+        own_lane_suffices: true,
+        island_radius: 20.0,
+        summary: fails(index),
+    };
+    let mut report = report();
+    report.routes = (0..2 * MANY_ROUTES).map(route).collect();
+    let roundabout = |index: usize| Group { name: format!("wide/7/{index}"), routes: 1, summary: fails(index) };
+    report.groups.roundabout = (0..2 * MANY_ROUTES).map(roundabout).collect();
+    report
+}
+
+#[test]
+fn of_many_routes_the_table_has_the_groups_and_the_worst_routes_and_says_how_many_more_there_are() {
+    let table = large_report(5).table(100);
+    for line in ["island 22 m and more", "lane right", "exit 1", "wide/7/0 ", "wide/7/95/SW-right-1"] {
+        assert!(table.lines().any(|found| found.starts_with(line)), "{line}: {table}");
+    }
+    assert!(!table.contains("wide/7/1/SW") && !table.contains("wide/7/100/SW"), "{table}");
+    assert_eq!(table.matches("SW-right-1").count(), WORST);
+    assert!(table.contains("The worst 20 of 40 routes with a failure, of 200; --json and --html have all.\n"), "{table}");
+    assert!(table.lines().all(|line| line.chars().count() <= 100), "{table}");
+}
+
+#[test]
+fn where_few_or_none_of_many_routes_failed_the_table_says_that_all_others_arrived() {
+    let table = large_report(50).table(100);
+    assert!(table.contains("On the other 196 of 200 routes every episode arrived.\n"), "{table}");
+    let mut report = large_report(50);
+    report.routes.retain(|route| route.summary.success == 1.0);
+    assert!(report.table(100).contains("All 196 routes: every episode arrived.\n"));
+}
