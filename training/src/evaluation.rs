@@ -31,6 +31,12 @@ use shown::{MOST_EPISODES, shown};
 
 pub use table::legend;
 
+/// Episodes on each of so many routes where nobody says how many: 30, and fewer on more than 100 routes, about 3,000 in
+/// all.
+pub fn usual_episodes(n_routes: usize) -> usize {
+    (3000 / n_routes.max(1)).clamp(1, 30)
+}
+
 /// What a policy is evaluated on: a number of episodes on every route of a split, all in one batch, one episode a
 /// truck.
 #[derive(Debug, Clone, Copy)]

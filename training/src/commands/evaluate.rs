@@ -8,7 +8,7 @@ use offtrack_training::error::Error;
 use offtrack_training::evaluation::certificate::certified;
 use offtrack_training::evaluation::page::Page;
 use offtrack_training::evaluation::report::{Episode, Report, Summary};
-use offtrack_training::evaluation::{Driven, Evaluation, legend};
+use offtrack_training::evaluation::{Driven, Evaluation, legend, usual_episodes};
 use offtrack_training::files;
 use serde_json::Value;
 
@@ -33,9 +33,9 @@ pub struct Args {
     /// in the benchmark: wide/7/12/N-left-3, or all of wide/7/12.
     #[arg(long)]
     route: Vec<String>,
-    /// Episodes on each route.
-    #[arg(long, default_value_t = 30)]
-    episodes: usize,
+    /// Episodes on each route \[default: 30, and fewer where there are more than 100 routes: about 3,000 in all\].
+    #[arg(long)]
+    episodes: Option<usize>,
     /// Seed of the start poses and of random actions.
     #[arg(long, default_value_t = 0)]
     seed: u32,
@@ -58,8 +58,8 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
-    if !(1..=100_000).contains(&args.episodes) {
-        return Err(Error::Flag { flag: "--episodes", value: args.episodes.to_string(), expected: "must lie in 1..100000".into() });
+    if let Some(episodes) = args.episodes.filter(|episodes| !(1..=100_000).contains(episodes)) {
+        return Err(Error::Flag { flag: "--episodes", value: episodes.to_string(), expected: "must lie in 1..100000".into() });
     }
     let device = args.device.open()?;
     let split = Split::ALL.into_iter().find(|split| split.name() == args.split).unwrap_or(Split::Test);
@@ -67,23 +67,25 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if !args.route.is_empty() {
         roads::narrow(&mut scenario, &args.route, &[split])?;
     }
+    scenario.keep(&[split]);
     let world = roads::world(&scenario)?;
     let mut policy = args.policy.open(&scenario, &world, args.seed)?;
-    let n_episodes = args.episodes * scenario.split(split).len();
+    let n_routes = scenario.split(split).len();
+    let episodes = args.episodes.unwrap_or_else(|| usual_episodes(n_routes));
     let (run, metrics) = match &args.run {
         Some(folder) => read_run(folder)?,
         None => (Value::Null, None),
     };
     let possible = args.certified.as_ref().map(|file| certified(file, &scenario, &world, scenario.split(split))).transpose()?;
-    let (episodes, seed, record) = (args.episodes, args.seed, args.html.is_some());
+    let (seed, record) = (args.seed, args.html.is_some());
     let evaluation = Evaluation { scenario: &scenario, world: &world, split, episodes, seed, record, device: &device };
     let Driven { episodes: finished, tracks } = {
-        let bar = progress::Bar::new("evaluating", "episodes", n_episodes);
+        let bar = progress::Bar::new("evaluating", "episodes", episodes * n_routes);
         evaluation.drive(policy.as_mut(), &mut |done, all| bar.set(done, all))?
     };
     let mut report = evaluation.summarised(policy.name(), &finished);
     report.certified = possible.and_then(|possible| {
-        let chunks = scenario.split(split).iter().zip(finished.chunks(args.episodes));
+        let chunks = scenario.split(split).iter().zip(finished.chunks(episodes));
         let kept: Vec<&Episode> = chunks.filter(|(route, _)| possible.contains(route)).flat_map(|(_, chunk)| chunk).collect();
         Summary::of(kept.into_iter(), scenario.step)
     });
@@ -93,7 +95,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if let Some(file) = &args.html {
         Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run, metrics }.write(file)?;
     }
-    files::print(&printed(&report, args.episodes))
+    files::print(&printed(&report, episodes))
 }
 
 /// What was evaluated, and the table.

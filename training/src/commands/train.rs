@@ -14,9 +14,9 @@ use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
 use offtrack_training::device::Device;
 use offtrack_training::error::Error;
-use offtrack_training::evaluation::Evaluation;
 use offtrack_training::evaluation::page::Page;
 use offtrack_training::evaluation::report::Report;
+use offtrack_training::evaluation::{Evaluation, usual_episodes};
 use offtrack_training::files;
 use offtrack_training::learner::backend::Backend;
 use offtrack_training::learner::checkpoint::Stored;
@@ -35,8 +35,6 @@ use serde_json::json;
 
 use super::{progress, roads, terminal};
 
-/// Episodes on each route in the final evaluation.
-const EPISODES: usize = 30;
 /// Training routes named at the end.
 const N_WORST: usize = 5;
 /// Most bytes of the metrics that the page shows.
@@ -191,7 +189,8 @@ impl Worlds {
     /// trained on.
     fn read(config: &Config) -> Result<Worlds, Error> {
         let mut benchmark = roads::benchmark(&config.benchmark)?;
-        let training = roads::benchmark(config.training_benchmark.as_ref().unwrap_or(&config.benchmark))?;
+        let mut training = roads::benchmark(config.training_benchmark.as_ref().unwrap_or(&config.benchmark))?;
+        training.keep(&[Split::Train]);
         let wrong = |expected: String| Error::Flag { flag: "training_benchmark", value: training.name.clone(), expected };
         // The policy is evaluated on the test routes alone; without any it is not evaluated.
         if !benchmark.split(Split::Test).is_empty() {
@@ -236,7 +235,7 @@ fn conclude(
         scenario: &worlds.benchmark,
         world: &worlds.benchmark_world,
         split: Split::Test,
-        episodes: EPISODES,
+        episodes: usual_episodes(worlds.benchmark.split(Split::Test).len()),
         seed: 0,
         record: true,
         device: &Device::processor(),
