@@ -34,24 +34,24 @@ const SINE: array<f32, 3> = array<f32, 3>(-0.00019515296f, 0.008332161f, -0.1666
 const COSINE: array<f32, 3> = array<f32, 3>(2.4433157e-5f, -0.0013887316f, 0.041666646f);
 // The smallest divisor.
 const TINY: f32 = 1.1754944e-38f;
-// Bits of a cell's word below its block's index.
-const LEVEL_BITS: u32 = 8u;
-// Lowest bits of a word: the logarithm of the sub-cells a side of its first block.
+// Southern half of a cell's western pair where the cell has blocks elsewhere: no stored distance is as small.
+const ELSEWHERE: u32 = 32768u;
+// Lowest bits of what the northern half says then: the logarithm of the sub-cells a side of its first block.
 const LEVEL_MASK: u32 = 7u;
 // Shift of the same of a ridge's other two blocks.
 const RIDGE_SHIFT: u32 = 3u;
 // Shift of a cell's kind.
 const KIND_SHIFT: u32 = 6u;
-// Bits of a kind.
-const KIND_MASK: u32 = 3u;
 // [`Kind::Ridge`].
 const RIDGE: u32 = 1u;
 // [`Kind::Lesser`].
 const LESSER: u32 = 2u;
 // [`Kind::Greater`].
 const GREATER: u32 = 3u;
-// Pairs that an index of a word counts: every block has an even number.
-const PAIRS_PER_UNIT: u32 = 2u;
+// Cells a side of the tiles that lie together in memory, west to east.
+const TILE_COLUMNS: u32 = 4u;
+// The same south to north.
+const TILE_ROWS: u32 = 2u;
 // What a stored value of 1 means: 0.5 mm. Exact in f32 [m].
 const STORED_UNIT: f32 = 0.00048828125f;
 // Factor of the linear congruential step that each counter goes through first.
@@ -430,8 +430,8 @@ struct BatchFacts {
 @group(0) @binding(2) var<storage, read> rays: array<Ray>;
 // A field for each roundabout.
 @group(0) @binding(3) var<storage, read> fields: array<FieldRow>;
-// Cells of all fields.
-@group(0) @binding(4) var<storage, read> cells: array<u32>;
+// Cells of all fields, two words each.
+@group(0) @binding(4) var<storage, read> cells: array<vec2<u32>>;
 // Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of STORED_UNIT.
 @group(0) @binding(5) var<storage, read> corners: array<u32>;
 // Every route's waypoints, one route after the other.

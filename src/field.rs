@@ -12,24 +12,24 @@ use glam::Vec2;
 use crate::shared::constants;
 
 constants! {
-    /// Bits of a cell's word below its block's index.
-    const LEVEL_BITS: u32 = 8;
-    /// Lowest bits of a word: the logarithm of the sub-cells a side of its first block.
+    /// Southern half of a cell's western pair where the cell has blocks elsewhere: no stored distance is as small.
+    const ELSEWHERE: u32 = 0x8000;
+    /// Lowest bits of what the northern half says then: the logarithm of the sub-cells a side of its first block.
     const LEVEL_MASK: u32 = 7;
     /// Shift of the same of a ridge's other two blocks.
     const RIDGE_SHIFT: u32 = 3;
     /// Shift of a cell's kind.
     const KIND_SHIFT: u32 = 6;
-    /// Bits of a kind.
-    const KIND_MASK: u32 = 3;
     /// [`Kind::Ridge`].
     const RIDGE: u32 = Kind::Ridge as u32;
     /// [`Kind::Lesser`].
     const LESSER: u32 = Kind::Lesser as u32;
     /// [`Kind::Greater`].
     const GREATER: u32 = Kind::Greater as u32;
-    /// Pairs that an index of a word counts: every block has an even number.
-    const PAIRS_PER_UNIT: u32 = 2;
+    /// Cells a side of the tiles that lie together in memory, west to east.
+    const TILE_COLUMNS: u32 = 4;
+    /// The same south to north.
+    const TILE_ROWS: u32 = 2;
     /// What a stored value of 1 means: 0.5 mm. Exact in f32 \[m].
     pub(crate) const STORED_UNIT: f32 = 1.0 / 2048.0;
 }
@@ -47,29 +47,36 @@ enum Kind {
     Greater,
 }
 
-/// A cell's word: kind, levels of the first block and of a ridge's others, and the index of the first pair.
-fn word(kind: Kind, level: u32, ridge_level: u32, first: u32) -> u32 {
-    (first / PAIRS_PER_UNIT) << LEVEL_BITS | (kind as u32) << KIND_SHIFT | ridge_level << RIDGE_SHIFT | level
+/// The cell whose blocks begin at pair `first`.
+fn elsewhere(kind: Kind, level: u32, ridge_level: u32, first: u32) -> [u32; 2] {
+    [((kind as u32) << KIND_SHIFT | ridge_level << RIDGE_SHIFT | level) << 16 | ELSEWHERE, first]
+}
+
+/// The pairs that a cell refers to: the first, and one past the last. None of a cell that is a block itself.
+fn pairs([west, first]: [u32; 2]) -> Option<(usize, usize)> {
+    let size = |shift: u32| {
+        let size = 1usize << (west >> (16 + shift) & LEVEL_MASK);
+        size * (size + 1)
+    };
+    let n_pairs = match west >> (16 + KIND_SHIFT) {
+        RIDGE => size(0) + 2 * size(RIDGE_SHIFT),
+        LESSER | GREATER => 2 * size(0),
+        _ => size(0),
+    };
+    (west & 0xffff == ELSEWHERE).then_some((first as usize, first as usize + n_pairs))
+}
+
+/// Index of a cell: tiles lie row by row, and in a tile its cells do, so that cells near each other share a cache line.
+#[inline(always)]
+fn cell_index(columns: u32, column: u32, row: u32) -> u32 {
+    let (tile_column, tile_row) = (column / TILE_COLUMNS, row / TILE_ROWS);
+    (tile_row * columns + tile_column * TILE_COLUMNS) * TILE_ROWS + row % TILE_ROWS * TILE_COLUMNS + column % TILE_COLUMNS
 }
 
 /// 2^23. An f32 of this size has no fraction, so adding it to a smaller number leaves the integer part in the lower
 /// bits.
 const WHOLE: f32 = 8_388_608.0;
 const WHOLE_BITS: u32 = 0x7f_ffff;
-
-/// One past the last pair that a cell's word refers to.
-fn end(word: u32) -> usize {
-    let pairs = |shift: u32| {
-        let size = 1usize << (word >> shift & LEVEL_MASK);
-        size * (size + 1)
-    };
-    let blocks = match word >> KIND_SHIFT & KIND_MASK {
-        RIDGE => pairs(0) + 2 * pairs(RIDGE_SHIFT),
-        LESSER | GREATER => 2 * pairs(0),
-        _ => pairs(0),
-    };
-    ((word >> LEVEL_BITS) * PAIRS_PER_UNIT) as usize + blocks
-}
 
 /// Signed distance to the kerbs of one roundabout.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,20 +85,22 @@ pub struct Field {
     pub origin: Vec2,
     /// Cells in a metre [1/m].
     pub cells_per_metre: f32,
-    /// Cells from west to east.
+    /// Cells from west to east, a multiple of 4.
     pub columns: u32,
-    /// Cells from south to north.
+    /// Cells from south to north, a multiple of 2.
     pub rows: u32,
-    /// One word per cell, `[rows, columns]`: `index << 8 | kind << 6 | ridge_level << 3 | level`. The cell's blocks
-    /// begin at pair 2 `index` of `values`, one after the other; the first has 2^level sub-cells a side. Of a kind 1 (a
-    /// ridge) the first block is for marching: it is coarse and does not exceed the distance. It is followed by two of
+    /// Two words per cell, in tiles of 4 by 2 cells. Most cells are a block of one sub-cell: the western and the eastern
+    /// pair of distances. Where the lower half of the first word is 0x8000, the cell has other blocks in `values`. They
+    /// begin at the pair that the second word says, one after the other, and the first word's upper half says what they
+    /// are: `kind << 6 | ridge_level << 3 | level`. The first block has 2^level sub-cells a side. Of kind 1 (a ridge)
+    /// the first block is for marching: it is coarse and does not exceed the distance. It is followed by two of
     /// 2^ridge_level sub-cells a side, whose lesser value is the distance. Kinds 2 and 3 have two blocks of one level,
-    /// whose lesser or greater value is the distance. A cell deep in a solid refers to the first block of all.
-    pub cells: Vec<u32>,
+    /// whose lesser or greater value is the distance.
+    pub cells: Vec<[u32; 2]>,
     /// Blocks of distances at the sub-cells' corners, in units of 1/2048 m, two to a word: the southern one in the
     /// lower 16 bits, signed, the northern one in the upper. A block has one row of pairs per row of sub-cells, from
     /// the south, and in it one pair per line of corners, from the west. So the four corners of a sub-cell are
-    /// adjacent.
+    /// adjacent. The first two pairs belong to no cell.
     pub values: Vec<u32>,
 }
 
@@ -104,6 +113,17 @@ pub(crate) struct Samples<const N: usize> {
     pub east: [f32; N],
     /// Derivative to the north.
     pub north: [f32; N],
+}
+
+/// The blocks of `N` points.
+struct Blocks<const N: usize> {
+    /// 1 where the block is the cell itself, `own_west` and `own_east`; else it begins at pair `first`.
+    own: [u32; N],
+    own_west: [u32; N],
+    own_east: [u32; N],
+    first: [u32; N],
+    /// Sub-cells a side.
+    size: [f32; N],
 }
 
 /// What a sample is for.
@@ -138,30 +158,37 @@ impl Field {
             let v = clamped((y[n] - self.origin.y) * self.cells_per_metre, self.rows as f32);
             let (i, j) = (whole_part(u, last_column), whole_part(v, last_row));
             (across[n], up[n]) = (u - i, v - j);
-            cell[n] = as_index(j) * self.columns + as_index(i);
+            cell[n] = cell_index(self.columns, as_index(i), as_index(j));
         }
-        let word = read(&self.cells, &cell);
-        let (mut first, mut size, mut second) = ([0; N], [0.0; N], [0; N]);
+        let (mut own_west, mut own_east) = ([0; N], [0; N]);
+        for n in 0..N {
+            [own_west[n], own_east[n]] = self.cells[cell[n] as usize];
+        }
+        let mut blocks = Blocks { own: [0; N], own_west, own_east, first: [0; N], size: [0.0; N] };
+        let (mut second, mut kind) = ([0; N], [0; N]);
         let mut paired = 0;
         for n in 0..N {
-            let kind = word[n] >> KIND_SHIFT & KIND_MASK;
-            let march_size = power_of_two(word[n] & LEVEL_MASK);
-            let block = (word[n] >> LEVEL_BITS) * PAIRS_PER_UNIT;
+            let own = own_west[n] & 0xffff != ELSEWHERE;
+            let form = if own { 0 } else { own_west[n] >> 16 };
+            kind[n] = form >> KIND_SHIFT;
+            let march_size = power_of_two(form & LEVEL_MASK);
             // Of a ridge the exact distance has its blocks behind the one for marching.
-            let skipped = purpose == Purpose::Exact && kind == RIDGE;
-            size[n] = if skipped { power_of_two(word[n] >> RIDGE_SHIFT & LEVEL_MASK) } else { march_size };
-            first[n] = if skipped { block + n_pairs(march_size) } else { block };
-            let two = if purpose == Purpose::Exact { RIDGE <= kind } else { LESSER <= kind };
-            second[n] = if two { first[n] + n_pairs(size[n]) } else { 0 };
+            let skipped = purpose == Purpose::Exact && kind[n] == RIDGE;
+            let size = if skipped { power_of_two(form >> RIDGE_SHIFT & LEVEL_MASK) } else { march_size };
+            let begin = if own { 0 } else { own_east[n] };
+            let first = if skipped { begin + n_pairs(march_size) } else { begin };
+            let two = if purpose == Purpose::Exact { RIDGE <= kind[n] } else { LESSER <= kind[n] };
+            second[n] = if two { first + n_pairs(size) } else { 0 };
             paired |= second[n];
+            (blocks.own[n], blocks.first[n], blocks.size[n]) = (u32::from(own), first, size);
         }
-        let mut samples = self.interpolated(&first, &size, &across, &up);
+        let mut samples = self.interpolated(&blocks, &across, &up);
         if 0 < paired {
             for n in 0..N {
                 if 0 < second[n] {
-                    let other = self.interpolated(&[second[n]], &[size[n]], &[across[n]], &[up[n]]);
-                    let greater = word[n] >> KIND_SHIFT & KIND_MASK == GREATER;
-                    if (samples.distance[n] < other.distance[0]) == greater {
+                    let block = Blocks { own: [0], own_west: [0], own_east: [0], first: [second[n]], size: [blocks.size[n]] };
+                    let other = self.interpolated(&block, &[across[n]], &[up[n]]);
+                    if (samples.distance[n] < other.distance[0]) == (kind[n] == GREATER) {
                         (samples.distance[n], samples.east[n], samples.north[n]) = (other.distance[0], other.east[0], other.north[0]);
                     }
                 }
@@ -170,25 +197,28 @@ impl Field {
         samples
     }
 
-    /// Blocks at `N` points: their first pairs, sub-cells a side, and fractions of the cell across and up.
+    /// Blocks at `N` points, given as fractions of the cell across and up.
     #[inline(always)]
-    fn interpolated<const N: usize>(&self, first: &[u32; N], size: &[f32; N], across: &[f32; N], up: &[f32; N]) -> Samples<N> {
+    fn interpolated<const N: usize>(&self, blocks: &Blocks<N>, across: &[f32; N], up: &[f32; N]) -> Samples<N> {
         let mut pair = [0; N];
         let (mut u, mut v) = ([0.0; N], [0.0; N]);
         for n in 0..N {
-            let (x, y) = (across[n] * size[n], up[n] * size[n]);
-            let (i, j) = (whole_part(x, size[n] - 1.0), whole_part(y, size[n] - 1.0));
+            let size = blocks.size[n];
+            let (x, y) = (across[n] * size, up[n] * size);
+            let (i, j) = (whole_part(x, size - 1.0), whole_part(y, size - 1.0));
             (u[n], v[n]) = (x - i, y - j);
-            pair[n] = first[n] + as_index(j * (size[n] + 1.0) + i);
+            pair[n] = blocks.first[n] + as_index(j * (size + 1.0) + i);
         }
         let west_pair = read(&self.values, &pair);
         let east_pair = read(&self.values[1..], &pair);
         let (mut distance, mut east, mut north) = ([0.0; N], [0.0; N], [0.0; N]);
         for n in 0..N {
-            let scale = size[n] * self.cells_per_metre * STORED_UNIT;
-            let (south_west, south_east) = (southern(west_pair[n]), southern(east_pair[n]));
-            let (south_rise, north_rise) = (south_east - south_west, northern(east_pair[n]) - northern(west_pair[n]));
-            let west_rise = northern(west_pair[n]) - south_west;
+            let west_pair = if blocks.own[n] == 1 { blocks.own_west[n] } else { west_pair[n] };
+            let east_pair = if blocks.own[n] == 1 { blocks.own_east[n] } else { east_pair[n] };
+            let scale = blocks.size[n] * self.cells_per_metre * STORED_UNIT;
+            let (south_west, south_east) = (southern(west_pair), southern(east_pair));
+            let (south_rise, north_rise) = (south_east - south_west, northern(east_pair) - northern(west_pair));
+            let west_rise = northern(west_pair) - south_west;
             let twist = north_rise - south_rise;
             distance[n] = STORED_UNIT * (south_west + u[n] * south_rise + v[n] * (west_rise + u[n] * twist));
             east[n] = (south_rise + v[n] * twist) * scale;
@@ -301,17 +331,17 @@ mod tests {
     fn every_block_has_the_position_and_size_of_its_cells_word() {
         // Its centre is a kink, within the range of the stated accuracy: both the coarsest and the finest blocks occur.
         let field = disc(4.0);
-        let mut ends: Vec<(usize, usize)> = field
-            .cells
-            .iter()
-            .map(|&word| (((word >> LEVEL_BITS) * PAIRS_PER_UNIT) as usize, end(word)))
-            // The block of cells deep in a solid, if there are such cells or not.
-            .chain([(0, 2)])
-            .collect();
+        let mut ends: Vec<(usize, usize)> = field.cells.iter().filter_map(|&cell| pairs(cell)).collect();
         ends.sort_unstable();
-        ends.dedup();
         assert!(ends.windows(2).all(|pair| pair[0].1 == pair[1].0));
-        assert_eq!((ends[0].0, ends[ends.len() - 1].1), (0, field.values.len()));
-        assert!(ends.iter().any(|(begin, end)| end - begin == 2) && ends.iter().any(|(begin, end)| 50 < end - begin));
+        assert_eq!((ends[0].0, ends[ends.len() - 1].1), (2, field.values.len()));
+        assert!(ends.len() < field.cells.len() && ends.iter().any(|(begin, end)| 50 < end - begin));
+    }
+
+    #[test]
+    fn every_cell_has_an_index_of_its_own() {
+        let mut indices: Vec<u32> = (0..6).flat_map(|row| (0..8).map(move |column| cell_index(8, column, row))).collect();
+        indices.sort_unstable();
+        assert_eq!(indices, (0..48).collect::<Vec<u32>>());
     }
 }

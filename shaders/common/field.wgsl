@@ -16,29 +16,41 @@ fn field_sample(field: FieldRow, exact: bool, p: vec2<f32>) -> Sample {
     let extent = vec2<f32>(f32(field.columns), f32(field.rows));
     let at = clamp((p - field.origin) * field.cells_per_metre, vec2<f32>(0.0), extent);
     let cell = whole_part(at, extent - 1.0);
-    let word = cells[field.first_cell + u32(cell.y) * field.columns + u32(cell.x)];
+    let own = cells[field.first_cell + cell_index(field.columns, u32(cell.x), u32(cell.y))];
+    if (own.x & 0xffffu) != ELSEWHERE { return interpolated(field, own, 1.0, at - cell); }
 
-    let kind = (word >> KIND_SHIFT) & KIND_MASK;
+    let form = own.x >> 16u;
+    let kind = form >> KIND_SHIFT;
     let skipped = exact && kind == RIDGE;
-    let march_size = 1u << (word & LEVEL_MASK);
-    let size = select(march_size, 1u << ((word >> RIDGE_SHIFT) & LEVEL_MASK), skipped);
-    let block = field.first_pair + (word >> LEVEL_BITS) * PAIRS_PER_UNIT;
-    let first = select(block, block + n_pairs(march_size), skipped);
-    let sample = interpolated(field, first, f32(size), at - cell);
+    let march_size = 1u << (form & LEVEL_MASK);
+    let size = select(march_size, 1u << ((form >> RIDGE_SHIFT) & LEVEL_MASK), skipped);
+    let first = field.first_pair + own.y + select(0u, n_pairs(march_size), skipped);
+    let sample = block_sample(field, first, f32(size), at - cell);
     if kind < select(LESSER, RIDGE, exact) { return sample; }
-    let other = interpolated(field, first + n_pairs(size), f32(size), at - cell);
+    let other = block_sample(field, first + n_pairs(size), f32(size), at - cell);
     if (sample.distance < other.distance) == (kind == GREATER) { return other; }
     return sample;
 }
 
+// Index of a cell: tiles lie row by row, and in a tile its cells do.
+fn cell_index(columns: u32, column: u32, row: u32) -> u32 {
+    let tile_column = column / TILE_COLUMNS;
+    let tile_row = row / TILE_ROWS;
+    return (tile_row * columns + tile_column * TILE_COLUMNS) * TILE_ROWS + row % TILE_ROWS * TILE_COLUMNS + column % TILE_COLUMNS;
+}
+
 // A block of `size` sub-cells a side whose pairs begin at `first`, at fractions of the cell.
-fn interpolated(field: FieldRow, first: u32, size: f32, at: vec2<f32>) -> Sample {
+fn block_sample(field: FieldRow, first: u32, size: f32, at: vec2<f32>) -> Sample {
     let within = at * size;
     let sub_cell = whole_part(within, vec2<f32>(size - 1.0));
-    let fraction = within - sub_cell;
     let pair = first + u32(sub_cell.y * (size + 1.0) + sub_cell.x);
-    let west = unpacked(corners[pair]);
-    let east = unpacked(corners[pair + 1u]);
+    return interpolated(field, vec2<u32>(corners[pair], corners[pair + 1u]), size, within - sub_cell);
+}
+
+// Between the western and the eastern pair of a sub-cell, at fractions of it.
+fn interpolated(field: FieldRow, pairs: vec2<u32>, size: f32, fraction: vec2<f32>) -> Sample {
+    let west = unpacked(pairs.x);
+    let east = unpacked(pairs.y);
 
     let scale = size * field.slope;
     let south_rise = east.x - west.x;

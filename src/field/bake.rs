@@ -3,7 +3,7 @@
 use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 
-use super::{Field, Kind, LEVEL_BITS, PAIRS_PER_UNIT, STORED_UNIT, word};
+use super::{Field, Kind, STORED_UNIT, TILE_COLUMNS, TILE_ROWS, cell_index, elsewhere};
 use crate::geometry::{Nearby, Outline};
 
 /// Solid ground kept around the outline \[m].
@@ -60,12 +60,12 @@ enum Cell {
 
 impl Field {
     /// The field of `outline` in cells of `cell` metres a side, computed on all cores. The cell width changes the
-    /// layout, not the accuracy; an outline so large that its blocks could not be numbered gets wider cells.
+    /// layout, not the accuracy.
     pub fn bake(outline: &Outline, cell: f64) -> Field {
         let (low, high) = outline.bounds();
         let origin = low - MARGIN;
-        let count = |extent: f64| ((extent + 2.0 * MARGIN) / cell).ceil().max(1.0) as usize;
-        let (columns, rows) = (count(high.x - low.x), count(high.y - low.y));
+        let count = |extent: f64, tile: u32| (((extent + 2.0 * MARGIN) / cell).ceil().max(1.0) as usize).next_multiple_of(tile as usize);
+        let (columns, rows) = (count(high.x - low.x, TILE_COLUMNS), count(high.y - low.y, TILE_ROWS));
         let (across, up) = (columns.div_ceil(REGION), rows.div_ceil(REGION));
         let grid = Grid { origin, cell, columns, rows };
         let regions: Vec<Vec<(usize, Cell)>> = (0..across * up)
@@ -80,27 +80,26 @@ impl Field {
             .collect();
         let deep = Block { level: 0, nodes: vec![stored(-DEEP); 4] };
         let mut values = Vec::new();
-        let mut cells = vec![word(Kind::Single, 0, 0, placed(&mut values, &deep)); columns * rows];
+        placed(&mut values, &deep);
+        let mut cells = vec![deep.as_cell(); columns * rows];
         for (index, found) in regions.iter().flatten() {
             cells[*index] = match found {
                 Cell::Deep => continue,
-                Cell::Single(block) => word(Kind::Single, block.level, 0, placed(&mut values, block)),
+                Cell::Single(block) if block.level == 0 => block.as_cell(),
+                Cell::Single(block) => elsewhere(Kind::Single, block.level, 0, placed(&mut values, block)),
                 Cell::Ridge(march, [one, other]) => {
                     let first = placed(&mut values, march);
                     placed(&mut values, one);
                     placed(&mut values, other);
-                    word(Kind::Ridge, march.level, one.level, first)
+                    elsewhere(Kind::Ridge, march.level, one.level, first)
                 }
                 Cell::Lesser([one, other]) | Cell::Greater([one, other]) => {
                     let first = placed(&mut values, one);
                     placed(&mut values, other);
                     let kind = if matches!(found, Cell::Lesser(_)) { Kind::Lesser } else { Kind::Greater };
-                    word(kind, one.level, 0, first)
+                    elsewhere(kind, one.level, 0, first)
                 }
             };
-        }
-        if (1 << (32 - LEVEL_BITS)) <= values.len() / PAIRS_PER_UNIT as usize {
-            return Field::bake(outline, 2.0 * cell);
         }
         Field {
             origin: Vec2::new(origin.x as f32, origin.y as f32),
@@ -144,7 +143,10 @@ impl Grid {
             return;
         }
         if size == 1 {
-            cells.push((row * self.columns + column, found(nearby, self.corner(column, row), self.cell)));
+            cells.push((
+                cell_index(self.columns as u32, column as u32, row as u32) as usize,
+                found(nearby, self.corner(column, row), self.cell),
+            ));
             return;
         }
         let half = size / 2;
@@ -156,12 +158,25 @@ impl Grid {
     }
 }
 
+impl Block {
+    /// Pairs of a southern and a northern value, row by row.
+    fn pairs(&self) -> impl Iterator<Item = u32> {
+        let lines = (1 << self.level) + 1;
+        let half = |index: usize| u32::from(self.nodes[index] as u16);
+        (0..lines * (lines - 1)).map(move |index| half(index) | half(index + lines) << 16)
+    }
+
+    /// A block of one sub-cell as a cell.
+    fn as_cell(&self) -> [u32; 2] {
+        let mut pairs = self.pairs();
+        [pairs.next().unwrap_or_default(), pairs.next().unwrap_or_default()]
+    }
+}
+
 /// Appends a block's values and returns the index of its first pair.
 fn placed(values: &mut Vec<u32>, block: &Block) -> u32 {
     let first = values.len() as u32;
-    let lines = (1 << block.level) + 1;
-    let pair = |south: i16, north: i16| u32::from(south as u16) | u32::from(north as u16) << 16;
-    values.extend((0..lines * (lines - 1)).map(|index| pair(block.nodes[index], block.nodes[index + lines])));
+    values.extend(block.pairs());
     first
 }
 

@@ -26,7 +26,7 @@ impl Field {
     fn written(&self) -> Vec<u8> {
         let Field { origin, cells_per_metre, columns, rows, cells, values } = self;
         let head = [origin.x.to_bits(), origin.y.to_bits(), cells_per_metre.to_bits(), *columns, *rows];
-        [&head[..], cells, values].concat().into_iter().flat_map(u32::to_le_bytes).collect()
+        [&head[..], cells.as_flattened(), values].concat().into_iter().flat_map(u32::to_le_bytes).collect()
     }
 }
 
@@ -35,9 +35,12 @@ fn parsed(bytes: &[u8]) -> Option<Field> {
     let mut words = bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
     let [x, y, cells_per_metre, columns, rows] = [words.next()?, words.next()?, words.next()?, words.next()?, words.next()?];
     let n_cells = (columns as usize).checked_mul(rows as usize)?;
-    let cells: Vec<u32> = words.by_ref().take(n_cells).collect();
+    let cells: Vec<[u32; 2]> = (0..n_cells).map_while(|_| Some([words.next()?, words.next()?])).collect();
     let values: Vec<u32> = words.collect();
-    let whole = cells.len() == n_cells && 0 < n_cells && cells.iter().all(|&word| super::end(word) <= values.len());
+    let whole = cells.len() == n_cells
+        && 0 < n_cells
+        && 2 <= values.len()
+        && cells.iter().all(|&cell| super::pairs(cell).is_none_or(|(_, end)| end <= values.len()));
     let origin = Vec2::new(f32::from_bits(x), f32::from_bits(y));
     whole.then(|| Field { origin, cells_per_metre: f32::from_bits(cells_per_metre), columns, rows, cells, values })
 }
@@ -87,6 +90,6 @@ mod tests {
         assert_eq!(parsed(&bytes), Some(field.clone()));
         assert_eq!(parsed(&bytes[..16]), None);
         assert_eq!(parsed(&bytes[..bytes.len() - 4]), None);
-        assert_eq!(parsed(&Field { columns: field.columns + 900, ..field }.written()), None);
+        assert_eq!(parsed(&Field { rows: field.rows + 900, ..field }.written()), None);
     }
 }

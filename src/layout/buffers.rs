@@ -113,7 +113,7 @@ impl Table {
             Table::Actions => ("The action table.", rows::<Action>()),
             Table::Rays => ("The distance sensors, trailer's first.", rows::<Ray>()),
             Table::Fields => ("A field for each roundabout.", rows::<FieldRow>()),
-            Table::Cells => ("Cells of all fields.", rows::<u32>()),
+            Table::Cells => ("Cells of all fields, two words each.", "array<vec2<u32>>".to_owned()),
             Table::Corners => (
                 "Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of STORED_UNIT.",
                 rows::<u32>(),

@@ -16,7 +16,7 @@ pub(super) struct Tables<'a> {
     choice: &'a [u32],
     // All fields, one after the other.
     fields: Vec<FieldRow>,
-    cells: Vec<u32>,
+    cells: Vec<[u32; 2]>,
     corners: Vec<u32>,
 }
 
