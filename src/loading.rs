@@ -22,7 +22,7 @@ pub struct Progress {
 }
 
 /// Who is told of progress, from any thread.
-pub type Watcher = dyn Fn(Progress) + Sync;
+pub type Watcher<'a> = dyn Fn(Progress) + Sync + 'a;
 
 /// What [`crate::scenario::Scenario::load`] and [`crate::world::World::bake_with`] need beside their input.
 #[derive(Clone, Copy)]
@@ -30,7 +30,7 @@ pub struct Loading<'a> {
     /// Where results are kept, if anywhere.
     pub cache: Option<&'a Cache>,
     /// Who is told of progress.
-    pub watcher: &'a Watcher,
+    pub watcher: &'a Watcher<'a>,
 }
 
 impl Loading<'_> {
