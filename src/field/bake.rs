@@ -203,14 +203,15 @@ fn found(nearby: &Nearby, corner: DVec2, cell: f64) -> Cell {
     let finest = (cell / FINEST).log2().ceil().clamp(0.0, 7.0) as u32;
     // Two blocks take 16 bytes and more: where 24 suffice for one, they are not searched for.
     let simple = finest.min(1);
-    let coarsest = |mut levels: std::ops::RangeInclusive<u32>| levels.find_map(|level| Some(square.block(level, exact)).filter(close));
-    if let Some(block) = coarsest(0..=simple) {
+    let coarsest = |mut levels: std::ops::Range<u32>| levels.find_map(|level| Some(square.block(level, exact)).filter(close));
+    if let Some(block) = coarsest(0..simple + 1) {
         return Cell::Single(block);
     }
     if let Some(cell) = kinked(nearby, &square, SURFACE + cell < middle) {
         return cell;
     }
-    Cell::Single(coarsest(simple + 1..=finest).unwrap_or_else(|| square.block(finest, exact)))
+    // The finest one is as close as it gets.
+    Cell::Single(coarsest(simple + 1..finest).unwrap_or_else(|| square.block(finest, exact)))
 }
 
 /// Largest error where the distance is `exact` and sub-cells are `step` wide \[m].

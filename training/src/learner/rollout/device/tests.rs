@@ -4,7 +4,6 @@ use offtrack::random::{index_below, signed_unit, words};
 use offtrack::scenario::{Scenario, Split};
 use std::path::Path;
 
-
 fn training() -> (Arc<World>, Vec<u32>) {
     let scenario = Scenario::named("attard2023").unwrap();
     (Arc::new(World::bake(&scenario).unwrap()), scenario.split(Split::Train).to_vec())
