@@ -7,7 +7,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::SystemTime;
 
 /// How far work is.
@@ -48,6 +48,8 @@ impl Loading<'_> {
 #[derive(Debug)]
 pub struct Cache {
     folder: PathBuf,
+    /// Whether something was kept since the folder was last pruned.
+    has_grown: AtomicBool,
     failure: Mutex<Option<io::Error>>,
 }
 
@@ -59,7 +61,7 @@ const LIMIT: u64 = 4 << 30;
 impl Cache {
     /// A cache in `folder`, which is made when something is kept.
     pub fn new(folder: &Path) -> Cache {
-        Cache { folder: folder.to_owned(), failure: Mutex::new(None) }
+        Cache { folder: folder.to_owned(), has_grown: AtomicBool::new(false), failure: Mutex::new(None) }
     }
 
     /// The user's cache: `$OFFTRACK_CACHE`, else `offtrack` in `$XDG_CACHE_HOME` or in `~/.cache`. `None` where no such
@@ -107,6 +109,7 @@ impl Cache {
     fn try_put(&self, kind: &str, key: &[u8], payload: &[u8]) -> io::Result<()> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         let file = self.file(kind, key);
+        self.has_grown.store(true, Ordering::Relaxed);
         fs::create_dir_all(&self.folder)?;
         let mut content = [MAGIC, &(key.len() as u64).to_le_bytes()[..], key, payload].concat();
         content.extend(fnv_1a(&content).to_le_bytes());
@@ -126,9 +129,12 @@ impl Cache {
         failure.as_ref().map(|error| format!("{}: cannot keep results: {error}", self.folder.display()))
     }
 
-    /// Removes the entries that were written longest ago until the folder has at most 4 GiB.
+    /// Removes the entries that were written longest ago until the folder has at most 4 GiB. Does nothing where nothing
+    /// was kept since the last time.
     pub fn prune(&self) {
-        self.prune_to(LIMIT);
+        if self.has_grown.swap(false, Ordering::Relaxed) {
+            self.prune_to(LIMIT);
+        }
     }
 
     fn prune_to(&self, limit: u64) {
@@ -160,7 +166,7 @@ impl Cache {
 }
 
 /// 64-bit FNV-1a.
-fn fnv_1a(bytes: &[u8]) -> u64 {
+pub(crate) fn fnv_1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 

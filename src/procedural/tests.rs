@@ -6,12 +6,8 @@ use std::path::Path;
 use glam::DVec2;
 
 use super::*;
-use crate::loading::{Cache, Loading};
+use crate::loading::{Cache, Loading, fnv_1a};
 use crate::roundabout::written::WrittenArm;
-
-fn fnv_1a(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
-}
 
 fn shipped() -> [Distribution; 2] {
     ["wide", "mixed"].map(|name| Distribution::named(name).unwrap())

@@ -4,7 +4,6 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use offtrack::loading::{Cache, Loading, Progress};
 use offtrack::procedural::{Distribution, Reason, Refused, Road, lane_clearance};
 use offtrack::roundabout::Roundabout;
 use offtrack::shipped::Kind;
@@ -13,7 +12,7 @@ use offtrack_drawing::{rasterised, sheet};
 use offtrack_training::error::Error;
 use offtrack_training::files;
 
-use super::progress::Bar;
+use super::roads;
 
 /// Roads drawn at most.
 const MOST: u32 = 100_000;
@@ -71,12 +70,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if let Some(folder) = &args.output {
         free(folder, indices.iter().map(|&index| file(index)), args.overwrite)?;
     }
-    let roads = {
-        let bar = Bar::new("drawing", "roads", indices.len());
-        let cache = Cache::of_user();
-        let watcher = move |progress: Progress| bar.set(progress.done, progress.total);
-        distribution.roads(args.seed, &indices, &Loading { cache: cache.as_ref(), watcher: &watcher })?
-    };
+    let roads = roads::loading("drawing", |loading| distribution.roads(args.seed, &indices, loading))?;
     if let Some(folder) = &args.output {
         fs::create_dir_all(folder).map_err(Error::write(folder))?;
         for road in &roads {

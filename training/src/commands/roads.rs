@@ -13,31 +13,37 @@ use offtrack_training::error::Error;
 
 use super::progress::Bar;
 
-/// Roundabouts that are baked without a progress bar.
+/// Roads that take no progress bar.
 const FEW: usize = 20;
 /// Most characters of the list of routes in a message.
 const LONGEST_LIST: usize = 600;
 
 /// A benchmark by its name or path. What is known of random roads is kept in the user's cache.
 pub fn benchmark(name: &str) -> Result<Scenario, Error> {
-    let cache = Cache::of_user();
-    let bar = Bar::new("drawing", "roads", 0);
-    let watcher = move |progress: Progress| bar.set(progress.done, progress.total);
-    Ok(Scenario::load(name, &Loading { cache: cache.as_ref(), watcher: &watcher })?)
+    Ok(loading("drawing", |loading| Scenario::load(name, loading))?)
 }
 
 /// The benchmark's world, with the fields of its roundabouts from the user's cache.
 pub fn world(scenario: &Scenario) -> Result<Arc<World>, Error> {
+    Ok(loading("baking", |loading| World::bake_with(scenario, loading))?.into())
+}
+
+/// Does `work` on roads with the user's cache and, where there are many, a bar.
+pub fn loading<T>(action: &str, work: impl FnOnce(&Loading) -> T) -> T {
     let cache = Cache::of_user();
-    let world = {
-        let bar = (FEW < scenario.places.len()).then(|| Bar::new("baking", "roads", scenario.places.len()));
-        let watcher = move |progress: Progress| bar.iter().for_each(|bar| bar.set(progress.done, progress.total));
-        World::bake_with(scenario, &Loading { cache: cache.as_ref(), watcher: &watcher })?
+    let done = {
+        let bar = Bar::new(action, "roads", 0);
+        let watcher = |progress: Progress| {
+            if FEW < progress.total {
+                bar.set(progress.done, progress.total);
+            }
+        };
+        work(&Loading { cache: cache.as_ref(), watcher: &watcher })
     };
     if let Some(failure) = cache.as_ref().and_then(Cache::failure) {
         eprintln!("note: {failure}; the next command computes them again");
     }
-    Ok(world.into())
+    done
 }
 
 /// Leaves the benchmark the routes that `--route` names: each a route, or all routes of a roundabout. Those of the
