@@ -89,8 +89,8 @@ pub struct Field {
     pub columns: u32,
     /// Cells from south to north, a multiple of 2.
     pub rows: u32,
-    /// Two words per cell, in tiles of 4 by 2 cells. Most cells are a block of one sub-cell: the western and the eastern
-    /// pair of distances. Where the lower half of the first word is 0x8000, the cell has other blocks in `values`. They
+    /// Two words per cell, in tiles of 4 by 2 cells. Most cells are a block of one sub-cell: the western and the
+    /// eastern pair of distances. Where the lower half of the first word is 0x8000, the cell has other blocks in `values`. They
     /// begin at the pair that the second word says, one after the other, and the first word's upper half says what they
     /// are: `kind << 6 | ridge_level << 3 | level`. The first block has 2^level sub-cells a side. Of kind 1 (a ridge)
     /// the first block is for marching: it is coarse and does not exceed the distance. It is followed by two of

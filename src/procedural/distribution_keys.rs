@@ -9,7 +9,8 @@ use crate::reader::{Error, Reader, shown};
 /// Least and greatest value that is drawn.
 pub(super) type Range = [f64; 2];
 
-/// The file. After [`Keys::check`] every value lies in its range; angles stay in degrees, as roundabout files have them.
+/// The file. After [`Keys::check`] every value lies in its range; angles stay in degrees, as roundabout files have
+/// them.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Keys {
