@@ -46,6 +46,9 @@ pub(crate) trait EngineBatch: Any + Debug + Send + Sync {
     /// Makes the batch one of the rows `indices`.
     fn gather(&mut self, world: &World, indices: &[u32]) -> Result<(), Error>;
 
+    /// Draws the routes of later episodes from others, as many as before.
+    fn draw_from(&mut self, routes: &[u32]);
+
     /// Replaces the columns.
     fn replace(&mut self, batch: Batch) -> Result<(), Error>;
 

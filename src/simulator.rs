@@ -32,6 +32,8 @@ pub enum Engine {
 pub struct Simulator {
     world: Arc<World>,
     batch: Box<dyn EngineBatch>,
+    /// Routes that it draws from, none where each truck has its own.
+    drawn: Option<usize>,
 }
 
 impl Simulator {
@@ -46,12 +48,13 @@ impl Simulator {
     /// nor the device's.
     pub fn on(engine: Engine, world: Arc<World>, n_envs: usize, seed: u32, choice: RouteChoice) -> Result<Simulator, Error> {
         check_routes(&world, n_envs, &choice)?;
+        let drawn = matches!(choice, RouteChoice::Drawn(_)).then_some(choice.routes().len());
         let batch: Box<dyn EngineBatch> = match engine {
             Engine::Cpu => Box::new(Batch::new(n_envs, seed, choice)?),
             #[cfg(feature = "gpu")]
             Engine::Gpu { device, columns } => Box::new(gpu::Batch::new(&device, &world, n_envs, seed, choice, columns)?),
         };
-        let mut simulator = Simulator { batch, world };
+        let mut simulator = Simulator { batch, world, drawn };
         simulator.reset();
         Ok(simulator)
     }
@@ -109,6 +112,17 @@ impl Simulator {
             }
         }
         self.batch.reset_from(&self.world, starts)
+    }
+
+    /// Draws the routes of later episodes from these, as many as before; a route that stands twice is drawn twice as
+    /// often. Episodes under way end on their own routes. Wrong routes leave the batch as it was.
+    pub fn draw_from(&mut self, routes: &[u32]) -> Result<(), Error> {
+        if self.drawn != Some(routes.len()) {
+            return Err(Error::DrawnCount { n_routes: routes.len(), drawn: self.drawn });
+        }
+        check_known(&self.world, routes)?;
+        self.batch.draw_from(routes);
+        Ok(())
     }
 
     /// Makes row `i` what row `indices[i]` was, so that one truck can go on in several ways: the batch then has
@@ -187,13 +201,18 @@ fn check_routes(world: &World, n_envs: usize, choice: &RouteChoice) -> Result<()
     if routes.is_empty() {
         return Err(Error::NoRoutes);
     }
-    if let Some(&route) = routes.iter().find(|&&route| world.routes.len() <= route as usize) {
-        return Err(Error::UnknownRoute { route, n_routes: world.routes.len() });
-    }
+    check_known(world, routes)?;
     if matches!(choice, RouteChoice::Fixed(_)) && routes.len() != n_envs {
         return Err(Error::RouteCount { n_routes: routes.len(), n_envs });
     }
     Ok(())
+}
+
+/// An error if the world does not have one of the routes.
+fn check_known(world: &World, routes: &[u32]) -> Result<(), Error> {
+    let n_routes = world.routes.len();
+    let unknown = routes.iter().find(|&&route| n_routes <= route as usize);
+    unknown.map_or(Ok(()), |&route| Err(Error::UnknownRoute { route, n_routes }))
 }
 
 /// An error if a truck's route, waypoint or action is not in the world: stages use them as indices without a check.

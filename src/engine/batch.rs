@@ -115,6 +115,11 @@ impl Batch {
         &self.choice
     }
 
+    /// Draws the routes of later episodes from these.
+    pub(crate) fn set_drawn(&mut self, routes: &[u32]) {
+        self.choice = RouteChoice::Drawn(routes.to_vec());
+    }
+
     /// Sums over all steps since the batch was made.
     pub fn tally(&self) -> Tally {
         self.tally

@@ -102,6 +102,10 @@ impl EngineBatch for Batch {
         Ok(())
     }
 
+    fn draw_from(&mut self, routes: &[u32]) {
+        self.set_drawn(routes);
+    }
+
     fn replace(&mut self, batch: Batch) -> Result<(), Error> {
         *self = batch;
         Ok(())

@@ -30,6 +30,14 @@ pub enum Error {
         /// Routes in the world.
         n_routes: usize,
     },
+    /// Routes to draw from where none are drawn, or of another number than before.
+    #[error("routes: {n_routes} to draw from; this batch {}", .drawn.map_or("runs one fixed route a truck".to_owned(), |drawn| format!("draws from {drawn}, and needs as many")))]
+    DrawnCount {
+        /// Routes given.
+        n_routes: usize,
+        /// Routes that the batch draws from, none where each truck has its own.
+        drawn: Option<usize>,
+    },
     /// Fixed routes must be one for each truck.
     #[error("routes: {n_routes} for {n_envs} trucks; one each is needed")]
     RouteCount {

@@ -86,6 +86,38 @@ fn a_gathered_truck_goes_on_as_the_one_it_was() {
 }
 
 #[test]
+fn later_episodes_draw_from_the_new_routes_and_wrong_ones_change_nothing() {
+    let world = Arc::new(benchmark("attard2023").1);
+    let n_routes = world.routes.len();
+    for (name, engine) in engines() {
+        let mut simulator = batch_on(&engine, &world, 32, 4, RouteChoice::Drawn(vec![0, 1, 2]));
+        let before = rows(simulator.batch());
+        for (routes, expected) in [
+            (vec![0, 1], "routes: 2 to draw from; this batch draws from 3, and needs as many".to_owned()),
+            (vec![0, 1, n_routes as u32], format!("routes: {n_routes}; the world has routes 0..{n_routes}")),
+        ] {
+            assert_eq!(simulator.draw_from(&routes).unwrap_err().to_string(), expected, "{name}");
+        }
+        assert!(rows(simulator.batch()) == before);
+        simulator.draw_from(&[7, 7, 9]).unwrap();
+        assert!(rows(simulator.batch()) == before, "{name}: episodes under way stay on their routes");
+        let mut drawn = Vec::new();
+        for _ in 0..400 {
+            simulator.step_at_random();
+            let begun = simulator.batch().truck.iter().filter(|truck| 0 < truck.episode && truck.steps == 0);
+            drawn.extend(begun.map(|truck| truck.route));
+        }
+        let seven = drawn.iter().filter(|&&route| route == 7).count();
+        assert!(100 < drawn.len() && drawn.iter().all(|route| [7, 9].contains(route)), "{name}: {drawn:?}");
+        // Two of three: 67 %, give or take four standard deviations of 200 draws.
+        assert!((0.53..0.80).contains(&(seven as f64 / drawn.len() as f64)), "{name}: {seven} of {}", drawn.len());
+        let mut fixed = batch_on(&engine, &world, 2, 4, RouteChoice::Fixed(vec![0, 1]));
+        let message = fixed.draw_from(&[0, 1]).unwrap_err().to_string();
+        assert_eq!(message, "routes: 2 to draw from; this batch runs one fixed route a truck", "{name}");
+    }
+}
+
+#[test]
 fn a_restored_batch_goes_on_bit_for_bit_and_wrong_columns_are_refused() {
     let world = Arc::new(benchmark("attard2023").1);
     for (_, engine) in engines() {

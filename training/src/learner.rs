@@ -12,6 +12,7 @@ pub mod replay_buffer; // transitions on the host
 pub mod normalisation; // of observations
 pub mod mirror; // mirror augmentation
 pub mod exploration; // random actions among the policy's
+pub mod level_replay; // routes that fail are drawn more often
 pub mod backend; // the choice of processor or device
 pub mod config; // a training file
 pub mod run; // a training run in its folder

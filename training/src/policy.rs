@@ -56,8 +56,12 @@ impl LearnedPolicy {
     /// is refused.
     pub fn load(file: &Path) -> Result<LearnedPolicy, Error> {
         let bytes = reader::read_bytes(file, FILE_LIMIT)?;
-        let contents = Contents::from_bytes(&bytes).map_err(|message| Error::contents(file, message))?;
-        Ok(LearnedPolicy::new(file.display().to_string(), contents))
+        LearnedPolicy::from_bytes(&file.display().to_string(), &bytes).map_err(|message| Error::contents(file, message))
+    }
+
+    /// The policy of a file's bytes, by the name that reports will have. The error is a message without it.
+    pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<LearnedPolicy, String> {
+        Ok(LearnedPolicy::new(name.to_owned(), Contents::from_bytes(bytes)?))
     }
 
     /// The policy that comes with the project for this benchmark.
@@ -67,10 +71,7 @@ impl LearnedPolicy {
             return Err(Error::Flag { flag: "policy", value: benchmark.to_owned(), expected });
         };
         let name = format!("{benchmark} (shipped)");
-        match Contents::from_bytes(bytes) {
-            Ok(contents) => Ok(LearnedPolicy::new(name, contents)),
-            Err(message) => Err(Error::Contents { file: name.into(), message }),
-        }
+        LearnedPolicy::from_bytes(&name, bytes).map_err(|message| Error::Contents { file: name.clone().into(), message })
     }
 
     /// The policy that comes with the project for this benchmark or, where there is none, the one for `attard2023`:

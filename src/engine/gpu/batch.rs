@@ -194,6 +194,12 @@ impl EngineBatch for Batch {
         Ok(())
     }
 
+    fn draw_from(&mut self, routes: &[u32]) {
+        self.write(self.buffers.table(Table::Choice), cast_slice(routes));
+        let room = self.room.get_mut().unwrap_or_else(PoisonError::into_inner).as_mut();
+        self.seen.get_mut().or(room).into_iter().for_each(|batch| batch.set_drawn(routes));
+    }
+
     fn replace(&mut self, batch: engine::Batch) -> Result<(), engine::Error> {
         self.upload(&batch);
         Ok(self.device.check()?)

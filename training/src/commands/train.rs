@@ -27,6 +27,7 @@ use offtrack_training::learner::run::metrics_file::MetricsFile;
 use offtrack_training::learner::run::progress::Progress;
 use offtrack_training::learner::run::resume::Resumed;
 use offtrack_training::learner::run::route_counts::{RouteCounts, WorstRoutes};
+use offtrack_training::learner::run::validation::{Validation, Validations};
 use offtrack_training::learner::training::Training;
 use offtrack_training::policy::LearnedPolicy;
 use offtrack_training::provenance;
@@ -55,6 +56,9 @@ pub struct Args {
     /// Another seed than the training file's.
     #[arg(long)]
     seed: Option<u32>,
+    /// Begin with a policy instead of random weights: its file, or a shipped one's name.
+    #[arg(long, value_name = "POLICY")]
+    from: Option<String>,
     /// Another training time [min].
     #[arg(long, allow_negative_numbers = true)]
     minutes: Option<f64>,
@@ -75,7 +79,7 @@ pub struct Args {
     /// --minutes or --steps give another budget, counted from the run's beginning; a finished run continues too. The
     /// learning-rate schedule ends with the budget, so with a larger one the rates are higher from here on. With a
     /// budget of steps alone the result is that of a run never stopped, bit for bit on the same machine and program.
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "name", "out", "seed", "envs", "adapter", "settings"])]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "name", "out", "seed", "from", "envs", "adapter", "settings"])]
     resume: Option<PathBuf>,
 }
 
@@ -97,6 +101,9 @@ struct Finished {
     /// The training routes with least success; none where the trucks were on a device.
     #[serde(skip_serializing_if = "Option::is_none")]
     training_routes: Option<WorstRoutes>,
+    /// How the policy did on validation routes, and which one was kept; none without validation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    validation: Option<Validations>,
     machine: String,
     /// Where trucks and learner were.
     device: String,
@@ -133,7 +140,12 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let n_routes = routes.len();
     // All that can be wrong with the input is found before a folder is made.
     let backend = Backend::open(&config)?;
-    let training = backend.guarded(|| Training::new(&backend, &config, worlds.training_world.clone(), routes))?;
+    let validation = validation(&config, &worlds.training)?;
+    let mut training = backend.guarded(|| Training::new(&backend, &config, worlds.training_world.clone(), routes))?;
+    // A run that continues has an actor of its own.
+    if resumed.as_ref().is_none_or(|resumed| resumed.stored.is_none()) {
+        training.begin()?;
+    }
     let Opened { folder, metrics, stored } = match resumed {
         Some(Resumed { folder, metrics, stored, .. }) => Opened { folder, metrics, stored },
         None => {
@@ -145,6 +157,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let progress = Progress::new(&config, metrics, Box::new(progress::TrainingDisplay::new()));
     let counts = RouteCounts::new(&worlds.training, folder.routes());
     let mut run = Run::new(backend, &config, &worlds.training_world, training, &folder, progress, counts);
+    run.validation = validation;
     let mut doing = "training".to_owned();
     if let Some(stored) = stored {
         run.restore(&stored)?;
@@ -174,6 +187,7 @@ fn config(args: &Args, file: &Path) -> Result<Config, Error> {
     config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
     let flag = args.steps.map(|steps| PathBuf::from(format!("--steps {steps}")));
     config.check_budget(flag.as_deref().unwrap_or(file))?;
+    config.from = args.from.clone().or(config.from);
     if let Some(adapter) = &args.adapter {
         if config.device == config::Device::Cpu {
             let expected = "the training file uses the processor: leave it out, or add --set device=gpu".to_owned();
@@ -210,6 +224,17 @@ impl Worlds {
         }
         Ok(Worlds { benchmark, benchmark_world, training, training_world })
     }
+}
+
+/// The validation routes that the config names. None of them may be trained on.
+fn validation(config: &Config, training: &Scenario) -> Result<Option<Validation>, Error> {
+    let Some(settings) = &config.validation else { return Ok(None) };
+    let mut scenario = roads::benchmark(&settings.benchmark)?;
+    if !scenario.split(Split::Validation).is_empty() {
+        scenario.keep(&[Split::Validation]);
+    }
+    let world = roads::world(&scenario)?;
+    Validation::new(settings.clone(), scenario, world, training).map(Some)
 }
 
 /// Evaluates the policy of a run that was not interrupted, and writes what the run leaves behind. `written` says
@@ -294,6 +319,7 @@ fn finished(config: &Config, run: &Run) -> Finished {
         training_success: progress.success(),
         training_window: progress.window(),
         training_routes: run.routes.worst(),
+        validation: run.validation.as_ref().and_then(Validation::report),
         machine: provenance::machine(),
         device: run.device(),
         commit: provenance::commit(),

@@ -28,6 +28,9 @@ pub struct Config {
     /// Part of the graphics adapter's name; none for the first that is found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adapter: Option<String>,
+    /// A policy to begin with, a file or a shipped one's name; none begins with random weights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
     /// Seed of routes, poses, networks, actions and samples.
     pub seed: u32,
     /// Number of trucks.
@@ -44,6 +47,12 @@ pub struct Config {
     /// Random actions among the policy's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exploration: Option<Exploration>,
+    /// Routes that fail are drawn more often; none draws uniformly.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub level_replay: Option<LevelReplay>,
+    /// The policy is tried on validation routes while it learns, and the best one is kept; none keeps the last.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub validation: Option<Validation>,
     /// The replay buffer.
     pub replay_buffer: ReplayBuffer,
     /// The learner.
@@ -78,6 +87,28 @@ pub struct Exploration {
     /// How differently the trucks explore: the fraction of truck i of n is raised to the power 1 + spread i / (n - 1).
     #[serde(default)]
     pub spread: f64,
+}
+
+/// Routes are drawn more often where their episodes sometimes fail.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LevelReplay {
+    /// Fraction of the episodes whose route is drawn by its score; the others' is drawn uniformly.
+    pub fraction: f64,
+    /// Weight of a route's latest episode in its failure rate.
+    pub rate: f64,
+}
+
+/// How the policy is tried while it learns.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Validation {
+    /// The benchmark with the validation routes: a name, or the path of a file.
+    pub benchmark: String,
+    /// Number of validations in a run, at equal parts of its budget.
+    pub times: usize,
+    /// Episodes on each route.
+    pub episodes: usize,
 }
 
 /// The replay buffer.
@@ -143,6 +174,9 @@ pub struct Learning {
     pub target_interval: usize,
     /// How far the EMA of the actor, which becomes the policy, moves toward the actor in each update.
     pub actor_ema_rate: f64,
+    /// Updates of the critics alone at the beginning: a policy that is begun with is kept until they know it.
+    #[serde(default)]
+    pub actor_delay: u64,
     /// The entropy term.
     pub entropy: Entropy,
 }

@@ -11,6 +11,7 @@ pub mod metrics_file;
 pub mod progress;
 pub mod resume;
 pub mod route_counts;
+pub mod validation;
 mod window;
 
 use bytemuck::{bytes_of, cast_slice};
@@ -28,6 +29,7 @@ use checkpointer::{Checkpointer, Written};
 use folder::Folder;
 use progress::Progress;
 use route_counts::RouteCounts;
+use validation::Validation;
 
 /// A run under way.
 pub struct Run {
@@ -40,6 +42,8 @@ pub struct Run {
     pub progress: Progress,
     /// How it does on each training route.
     pub routes: RouteCounts,
+    /// None without validation.
+    pub validation: Option<Validation>,
     checkpointer: Checkpointer,
 }
 
@@ -56,6 +60,7 @@ impl Run {
     ) -> Run {
         Run {
             routes,
+            validation: None,
             fingerprint: fingerprint(world),
             training,
             progress,
@@ -98,14 +103,28 @@ impl Run {
                 if let Some((what, value)) = self.training.sac().diverged() {
                     return Err(self.diverged(what, value));
                 }
-                if self.progress.is_row_due() {
+                let validated = self.validate_if_due()?;
+                if validated || self.progress.is_row_due() {
                     self.write_row()?;
                 }
                 self.progress.show_if_due();
             }
             self.checkpoint_if_due()?;
         }
+        // With a budget of time the clock may have ended the loop just before the last one.
+        if self.validate_if_due()? {
+            self.write_row()?;
+        }
         self.count_episodes(true)
+    }
+
+    /// Lets the policy drive on the validation routes when it is time to; true if it did.
+    fn validate_if_due(&mut self) -> Result<bool, Error> {
+        let fraction = self.progress.fraction();
+        let Some(validation) = self.validation.as_mut().filter(|validation| validation.is_due(fraction)) else { return Ok(false) };
+        let validated = validation.validate(self.training.policy()?, self.progress.env_steps(), fraction)?;
+        self.progress.validated(validated.success, validation.best().map_or(validated.success, |best| best.success));
+        Ok(true)
     }
 
     /// The linear learning-rate schedule.
@@ -147,9 +166,11 @@ impl Run {
         }
     }
 
-    /// The policy as it is; waits for a device.
+    /// The best policy by validation or, without one, the policy as it is; waits for a device.
     pub fn policy(&self) -> Result<LearnedPolicy, Error> {
-        self.training.policy()
+        let best = self.validation.as_ref().and_then(Validation::best_policy);
+        let read = |bytes| LearnedPolicy::from_bytes("best policy", bytes).expect("the bytes were made from a policy that drove");
+        best.map_or_else(|| self.training.policy(), |bytes| Ok(read(bytes)))
     }
 
     /// Writes the last checkpoint, policy and row. Everything is tried before the first failure is returned.
@@ -182,6 +203,7 @@ impl Run {
         let mut columns = Columns::default();
         self.progress.save(&mut columns);
         self.routes.save(&mut columns);
+        self.validation.iter().for_each(|validation| validation.save(&mut columns));
         self.training.save(&mut columns);
         self.checkpointer.begin(&columns, self.config.to_toml(), self.fingerprint, policy);
         Ok(())
@@ -196,6 +218,12 @@ impl Run {
         }
         self.progress.restore(stored)?;
         self.routes.restore(stored)?;
+        if let Some(validation) = &mut self.validation {
+            validation.restore(stored)?;
+            if let (Some(last), Some(best)) = (validation.last(), validation.best()) {
+                self.progress.show_validation(last.success, best.success);
+            }
+        }
         self.training.restore(stored, self.progress.updates())
     }
 

@@ -155,6 +155,13 @@ impl Sac {
         })
     }
 
+    /// Goes on with this actor, and makes it the policy. It must have the layers of the learner's own.
+    pub fn set_actor(&mut self, actor: &Mlp) {
+        let parameters = || actor.parameters().into_iter().map(|(_, values)| values).collect();
+        self.actor = self.actor.with_parameters(parameters(), &self.placement.learning());
+        self.actor_ema = self.actor_ema.with_parameters(parameters(), &self.placement.plain());
+    }
+
     /// The actor, without gradients.
     pub fn actor(&self) -> Mlp {
         self.actor.valid()
@@ -198,10 +205,12 @@ impl Sac {
         let [critics, target] = [&mut self.critics, &mut self.target_critics].map(take);
         (self.critics, self.target_critics) =
             self.critic_optimizer.step(critics, target, critic_gradients, critic_learning_rate * rate_factor, tau);
-        let [actor, ema] = [&mut self.actor, &mut self.actor_ema].map(take);
-        (self.actor, self.actor_ema) =
-            self.actor_optimizer.step(actor, ema, actor_gradients, actor_learning_rate * rate_factor, actor_ema_rate);
-        self.entropy_coefficient.update(&figures[2]);
+        if self.learning.actor_delay < self.n_updates {
+            let [actor, ema] = [&mut self.actor, &mut self.actor_ema].map(take);
+            (self.actor, self.actor_ema) =
+                self.actor_optimizer.step(actor, ema, actor_gradients, actor_learning_rate * rate_factor, actor_ema_rate);
+            self.entropy_coefficient.update(&figures[2]);
+        }
 
         self.sums = added(&self.sums, &figures);
         self.n_summed += 1;

@@ -13,6 +13,7 @@ use super::normalisation::Normalisation;
 use super::rollout::Rollout;
 use super::sac::{Sac, Transitions};
 use crate::error::Error;
+use crate::evaluation::policies;
 use crate::policy::LearnedPolicy;
 
 /// Trucks, replay buffer and learner.
@@ -40,6 +41,23 @@ impl Training {
             mirror,
             world,
         })
+    }
+
+    /// Begins with the policy of the config's key `from`, if it has one: its actor and its normalisation. A policy of
+    /// other actions or layers is an error.
+    pub fn begin(&mut self) -> Result<(), Error> {
+        let Some(from) = &self.config.from else { return Ok(()) };
+        let policy = policies::learned(from)?;
+        policy.check(&self.world)?;
+        let layers = policy.actor.layers.iter().map(|layer| layer.weight.dims()[1]);
+        let hidden: Vec<usize> = layers.take(policy.actor.layers.len() - 1).collect();
+        if hidden != self.config.learning.hidden {
+            let expected = format!("has hidden layers of {hidden:?}: learning.hidden must be equal, not {:?}", self.config.learning.hidden);
+            return Err(Error::Flag { flag: "from", value: from.clone(), expected });
+        }
+        self.sac.set_actor(&policy.actor);
+        self.set_normalisation(policy.normalisation);
+        Ok(())
     }
 
     /// Trucks and replay buffer.

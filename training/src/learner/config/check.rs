@@ -34,6 +34,14 @@ impl Config {
             reader.within("exploration.steps", exploration.steps as f64, 1.0..=1e12, "")?;
             reader.within("exploration.spread", exploration.spread, 0.0..=100.0, "")?;
         }
+        if let Some(level_replay) = self.level_replay {
+            reader.within("level_replay.fraction", level_replay.fraction, 0.0..=0.95, "")?;
+            reader.within("level_replay.rate", level_replay.rate, 0.001..=1.0, "")?;
+        }
+        if let Some(validation) = &self.validation {
+            reader.count("validation.times", validation.times, 1..=10_000)?;
+            reader.count("validation.episodes", validation.episodes, 1..=1_000)?;
+        }
         learning.check(reader)?;
         // A ring of fewer slots than that would hold no step that enough others follow.
         let slots = replay_buffer.capacity / self.n_envs;
@@ -42,7 +50,11 @@ impl Config {
             return Err(reader.invalid("replay_buffer.capacity", replay_buffer.capacity, expected).into());
         }
         if self.device == Device::Gpu {
-            let without = [("exploration", self.exploration.is_some()), ("replay_buffer.priority", replay_buffer.priority.is_some())];
+            let without = [
+                ("exploration", self.exploration.is_some()),
+                ("level_replay", self.level_replay.is_some()),
+                ("replay_buffer.priority", replay_buffer.priority.is_some()),
+            ];
             if let Some((key, _)) = without.into_iter().find(|(_, given)| *given) {
                 return Err(reader.invalid(key, "given", "works with device = \"cpu\" alone: leave one of them out").into());
             }
@@ -81,6 +93,7 @@ impl Learning {
         reader.within("learning.final_learning_rate_fraction", self.final_learning_rate_fraction, 0.0..=1.0, "")?;
         reader.within("learning.tau", self.tau, 1e-6..=1.0, "")?;
         reader.count("learning.target_interval", self.target_interval, 1..=1_000_000)?;
+        reader.within("learning.actor_delay", self.actor_delay as f64, 0.0..=1e9, "updates")?;
         reader.within("learning.actor_ema_rate", self.actor_ema_rate, 1e-6..=1.0, "")?;
         if let Some(fraction) = self.entropy.target_fraction {
             reader.within("learning.entropy.target_fraction", fraction, 0.0..=1.0, "")?;

@@ -13,6 +13,7 @@ use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::config::{Config, Learning};
 use crate::learner::generator::Generator;
+use crate::learner::level_replay::LevelReplay;
 use crate::learner::mirror::Mirror;
 use crate::learner::network::Mlp;
 use crate::learner::normalisation::Normalisation;
@@ -24,6 +25,8 @@ use crate::policy::sampled;
 pub struct HostRollout {
     config: Config,
     simulator: Simulator,
+    /// None where routes are drawn uniformly.
+    level_replay: Option<LevelReplay>,
     replay_buffer: ReplayBuffer<N_VALUES>,
     /// Random numbers of actions and of samples.
     acting: Generator,
@@ -48,8 +51,11 @@ impl HostRollout {
     /// is an error.
     pub fn new(config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<HostRollout, Error> {
         let stream = |purpose: u32| Generator::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
+        let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
+        let choice = RouteChoice::Drawn(level_replay.as_ref().map_or(routes, |replay| replay.list().to_vec()));
         Ok(HostRollout {
-            simulator: Simulator::new(world.clone(), config.n_envs, config.seed, RouteChoice::Drawn(routes))?,
+            simulator: Simulator::new(world.clone(), config.n_envs, config.seed, choice)?,
+            level_replay,
             replay_buffer: ReplayBuffer::new(config.n_envs, config.learning.n_steps, &config.replay_buffer),
             acting: stream(1),
             sampling: stream(2),
@@ -83,7 +89,7 @@ impl HostRollout {
     }
 
     /// Appends the step just made to the replay buffer, and counts the episodes that it ended.
-    fn remember(&mut self) {
+    fn remember(&mut self) -> Result<(), Error> {
         let batch = self.simulator.batch();
         self.replay_buffer.append(Rows {
             observation: &self.observation,
@@ -97,10 +103,18 @@ impl HostRollout {
             *sum += reward;
             if ended != Ended::Running {
                 let arrived = u64::from(ended == Ended::Arrived);
-                self.route_ends.push(RouteEnd { route, ended });
+                let end = RouteEnd { route, ended };
+                self.level_replay.iter_mut().for_each(|replay| replay.count(end));
+                self.route_ends.push(end);
                 self.ended.push(Episodes { count: 1, arrived, reward: f64::from(std::mem::take(sum)) });
             }
         }
+        if let Some(replay) = &mut self.level_replay
+            && replay.stepped()
+        {
+            self.simulator.draw_from(replay.list())?;
+        }
+        Ok(())
     }
 }
 
@@ -128,8 +142,7 @@ impl Rollout for HostRollout {
     fn step_at_random(&mut self) -> Result<(), Error> {
         self.begin_step();
         self.simulator.step_at_random();
-        self.remember();
-        Ok(())
+        self.remember()
     }
 
     fn step(&mut self, actor: &Mlp, env_steps: u64) -> Result<(), Error> {
@@ -139,8 +152,7 @@ impl Rollout for HostRollout {
             exploration.explore(env_steps, n_actions, &mut actions, &mut self.acting);
         }
         self.simulator.step(&actions)?;
-        self.remember();
-        Ok(())
+        self.remember()
     }
 
     fn drive(&mut self, actor: &Mlp) -> Result<(), Error> {
@@ -189,6 +201,7 @@ impl Rollout for HostRollout {
         columns.put("rollout, acting", &self.acting.state[..]);
         columns.put("rollout, sampling", &self.sampling.state[..]);
         columns.put("rollout, episode rewards", &self.episode_rewards[..]);
+        self.level_replay.iter().for_each(|replay| replay.save(columns));
         self.replay_buffer.save(columns);
     }
 
@@ -202,6 +215,10 @@ impl Rollout for HostRollout {
         };
         (self.acting, self.sampling) = (generator("rollout, acting")?, generator("rollout, sampling")?);
         self.episode_rewards = stored.exactly("rollout, episode rewards", self.config.n_envs)?;
+        if let Some(replay) = &mut self.level_replay {
+            replay.restore(stored)?;
+            self.simulator.draw_from(replay.list())?;
+        }
         self.replay_buffer.restore(stored, self.n_actions() as u32)
     }
 }

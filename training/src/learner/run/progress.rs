@@ -46,6 +46,10 @@ pub struct Progress {
     updates: u64,
     /// The latest episodes.
     window: Window,
+    /// Success in the latest validation that no row has yet.
+    validated: Option<f64>,
+    /// The latest validation's success and the best one's, to be shown.
+    validation: Option<(f64, f64)>,
     /// Sums since the last row.
     sums: Update,
     /// Time \[s], steps and updates at the last row.
@@ -74,6 +78,8 @@ impl Progress {
             episodes: 0,
             updates: 0,
             window: Window::default(),
+            validated: None,
+            validation: None,
             sums: Update::default(),
             row_seconds: 0.0,
             row_steps: 0,
@@ -139,6 +145,17 @@ impl Progress {
         self.updates += n_updates;
     }
 
+    /// Notes the success of a validation, for the next row and the display, and the best one's.
+    pub fn validated(&mut self, success: f64, best: f64) {
+        self.validated = Some(success);
+        self.show_validation(success, best);
+    }
+
+    /// Shows the latest validation's success and the best one's.
+    pub fn show_validation(&mut self, success: f64, best: f64) {
+        self.validation = Some((success, best));
+    }
+
     /// Adds sums over the updates since the last row.
     pub fn add_sums(&mut self, sums: &Update) {
         self.sums.critic_loss += sums.critic_loss;
@@ -202,9 +219,10 @@ impl Progress {
         let mean = |sum: f32, decimals: usize| if n == 0 { String::new() } else { format!("{:.decimals$}", sum / n as f32) };
         let success = self.success().map(|success| format!("{success:.4}")).unwrap_or_default();
         let reward = self.window.reward().map(|reward| format!("{reward:.2}")).unwrap_or_default();
+        let validated = self.validated.map(|success| format!("{success:.4}")).unwrap_or_default();
         let Update { critic_loss, actor_loss, entropy, value } = self.sums;
         let row = format!(
-            "{:.1},{},{},{},{success},{reward},{},{},{},{},{entropy_coefficient:.6},{steps_rate:.0},{update_rate:.1}\n",
+            "{:.1},{},{},{},{success},{reward},{},{},{},{},{entropy_coefficient:.6},{steps_rate:.0},{update_rate:.1},{validated}\n",
             self.seconds(),
             self.env_steps,
             self.episodes,
@@ -216,6 +234,7 @@ impl Progress {
         );
         self.metrics.append(&row)?;
         self.sums = Update::default();
+        self.validated = None;
         (self.row_seconds, self.row_steps, self.row_updates) = (self.seconds(), self.env_steps, self.updates);
         Ok(())
     }
@@ -227,8 +246,10 @@ impl Progress {
         let fraction = self.fraction();
         let left = if 0.0 < fraction { self.seconds() * (1.0 - fraction) / fraction } else { 0.0 };
         let success = self.success().map_or_else(|| "-".to_owned(), |success| format!("{:.1} %", 100.0 * success));
+        let validation = self.validation.map(|(last, best)| format!(", validation {:.1} % (best {:.1} %)", 100.0 * last, 100.0 * best));
+        let validation = validation.unwrap_or_default();
         let line = format!(
-            "{:.2} M steps, {steps_rate:.0} steps/s, {update_rate:.0} updates/s, success {success} of the last {}, {}:{:02} left",
+            "{:.2} M steps, {steps_rate:.0} steps/s, {update_rate:.0} updates/s, success {success} of the last {}{validation}, {}:{:02} left",
             self.env_steps as f64 / 1e6,
             self.window.count(),
             left as u64 / 60,

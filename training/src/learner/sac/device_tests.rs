@@ -26,6 +26,7 @@ fn learning() -> Learning {
         tau: 0.1,
         target_interval: 2,
         actor_ema_rate: 0.1,
+        actor_delay: 0,
         entropy: Entropy { in_target: true, target_fraction: Some(0.5), coefficient: 0.1, learning_rate: 0.01 },
     }
 }

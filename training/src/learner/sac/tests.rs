@@ -33,6 +33,7 @@ fn learning() -> Learning {
         tau: 0.1,
         target_interval: 1,
         actor_ema_rate: 0.1,
+        actor_delay: 0,
         entropy: Entropy { in_target: true, target_fraction: None, coefficient: f64::from(ALPHA), learning_rate: 0.01 },
     }
 }
