@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-/// A benchmark of one training route and two test routes.
+/// A benchmark of one training route, one validation route and two test routes.
 const BENCHMARK: &str = r#"
 vehicle = "vehicles/daf_xf.toml"
 load = "empty"
@@ -17,6 +17,7 @@ reward = { waypoint = 100.0, lane_distance = -1.5, lane_distance_limit = 4.0, fa
 [[roundabout]]
 file = "roundabouts/16m.toml"
 train = ["E-right-1"]
+validation = ["N-right-1"]
 
 [[roundabout]]
 file = "roundabouts/20m.toml"

@@ -17,9 +17,11 @@ fn place() -> Place {
     let place = Place::new();
     let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
     let state = "exploration = { initial_fraction = 0.5, final_fraction = 0.1, steps = 1200, spread = 1.0 }\n";
+    let replay = "level_replay = { fraction = 0.5, rate = 0.2 }\n";
+    let validation = format!("validation = {{ benchmark = \"{}\", times = 20, episodes = 2 }}\n", place.text("short.toml"));
     let buffer = "warmup = 400, priority = { exponent = 0.6, correction = 0.4 }";
     let changed = training.replace("warmup = 400", buffer).replace("layer_norm = false", "layer_norm = true");
-    std::fs::write(place.file("tiny.toml"), format!("checkpoint_minutes = 0.0001\n{state}{changed}")).unwrap();
+    std::fs::write(place.file("tiny.toml"), format!("checkpoint_minutes = 0.0001\n{state}{replay}{validation}{changed}")).unwrap();
     place
 }
 
@@ -102,6 +104,11 @@ fn a_run_killed_and_stopped_on_the_way_equals_one_never_stopped_bit_for_bit() {
     let (parts, whole) = (metrics(&place, "parts"), metrics(&place, "whole"));
     assert!(100 < whole.len(), "{}", whole.len());
     assert_eq!(parts, whole);
+    let validated = whole.iter().skip(1).filter(|row| row.last().is_some_and(|success| !success.is_empty())).count();
+    assert_eq!(validated, 20);
+    let validation = |run: &str| place.json(&format!("runs/{run}/report.json"))["validation"].clone();
+    assert_eq!((&validation("whole")["times"], &validation("whole")["episodes"]), (&20.into(), &2.into()));
+    assert_eq!(validation("parts"), validation("whole"));
     let routes = bytes(&place, "runs/whole/routes.csv");
     assert!(bytes(&place, "runs/parts/routes.csv") == routes);
     // Every training episode counts for its route; here there is one.
@@ -315,7 +322,8 @@ fn a_learner_that_diverges_stops_with_the_step_the_parameter_and_the_last_good_c
 #[test]
 fn what_cannot_be_written_is_reported_once_and_written_once_it_can_be() {
     let place = place();
-    succeed(&place.train(&["--name", "run", "--steps", "800"]));
+    // Without validation, which would keep the policy that it has.
+    succeed(&place.train(&["--name", "run", "--steps", "800", "--set", "validation="]));
     // A folder where the next checkpoint is to be written.
     let (part, checkpoint) = (place.file("runs/run/checkpoint.part"), "runs/run/checkpoint.safetensors");
     std::fs::create_dir(&part).unwrap();

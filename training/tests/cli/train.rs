@@ -120,3 +120,83 @@ fn a_training_file_is_found_by_its_name() {
     let message = refusal(&offtrack(&[&arguments[..], &["--set", "benchmark=nowhere"]].concat()), 2);
     assert!(message.contains("nowhere"), "{message}");
 }
+
+/// The training file with these lines before its own.
+fn prepend(place: &Place, lines: &str) {
+    let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
+    std::fs::write(place.file("tiny.toml"), format!("{lines}\n{training}")).unwrap();
+}
+
+#[test]
+fn the_policy_kept_is_the_best_of_the_validations_and_the_last_of_equals() {
+    let place = Place::new();
+    prepend(&place, &format!("validation = {{ benchmark = \"{}\", times = 5, episodes = 3 }}", place.text("short.toml")));
+    succeed(&place.train(&["--name", "run"]));
+    let report = place.json("runs/run/report.json");
+    let validation = &report["validation"];
+    assert_eq!((&validation["routes"], &validation["episodes"], &validation["times"]), (&1.into(), &3.into(), &5.into()));
+    // A learner so small arrives nowhere, so all validations are equal.
+    assert_eq!(validation["best"], validation["last"]);
+    assert_eq!(validation["last"]["env_steps"], report["env_steps"]);
+    let metrics = std::fs::read_to_string(place.file("runs/run/metrics.csv")).unwrap();
+    let (head, rows) = metrics.split_once('\n').unwrap();
+    let column = head.split(',').position(|name| name == "validation_success").unwrap();
+    let validated: Vec<&str> = rows.lines().filter_map(|row| row.split(',').nth(column)).filter(|text| !text.is_empty()).collect();
+    assert_eq!(validated, ["0.0000"; 5]);
+    // Validation changes nothing that is learned.
+    succeed(&place.train(&["--name", "without", "--set", "validation="]));
+    assert!(policy(&place, "run") == policy(&place, "without"));
+}
+
+#[test]
+fn validation_routes_that_are_missing_or_trained_on_are_refused_before_a_folder_is_made() {
+    let place = Place::new();
+    let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
+    std::fs::write(place.file("none.toml"), benchmark.replace("validation = ", "test = ")).unwrap();
+    std::fs::write(place.file("same.toml"), benchmark.replace("train = [\"E-right-1\"]", "").replace("[\"N-right-1\"]", "[\"E-right-1\"]"))
+        .unwrap();
+    for (file, expected) in [("none.toml", "it has no validation routes"), ("same.toml", "16m/E-right-1 is a training route of short")] {
+        let setting = format!("validation.benchmark={}", place.text(file));
+        let arguments = ["--set", &setting, "--set", "validation.times=2", "--set", "validation.episodes=1"];
+        let message = refusal(&place.train(&arguments), 2);
+        assert!(message.contains("validation.benchmark") && message.contains(expected), "{message}");
+    }
+    assert!(!place.file("runs").exists());
+}
+
+#[test]
+fn a_run_that_begins_with_a_policy_keeps_it_until_the_actor_learns() {
+    let place = Place::new();
+    succeed(&place.train(&["--name", "first"]));
+    let first = place.text("runs/first/policy.safetensors");
+    succeed(&place.train(&["--name", "kept", "--seed", "6", "--from", &first, "--set", "learning.actor_delay=1000000"]));
+    assert!(policy(&place, "kept") == policy(&place, "first"));
+    succeed(&place.train(&["--name", "changed", "--seed", "6", "--from", &first]));
+    assert!(policy(&place, "changed") != policy(&place, "first"));
+    // It needs layers and actions of its own size, and to be there.
+    for (arguments, expected) in [
+        (vec!["--from", &first, "--set", "learning.hidden=[8]"], "has hidden layers of [16]: learning.hidden must be equal, not [8]"),
+        (vec!["--from", "attard2023"], "learned with another action table"),
+        (vec!["--from", "nowhere.safetensors"], "nowhere.safetensors"),
+    ] {
+        let message = refusal(&place.train(&[&["--name", "refused"], &arguments[..]].concat()), 2);
+        assert!(message.contains(expected), "{message}");
+    }
+    assert!(!place.file("runs/refused").exists());
+}
+
+#[test]
+fn level_replay_changes_what_is_learned_and_keeps_every_byte_the_same_for_a_seed() {
+    let place = Place::new();
+    let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
+    std::fs::write(place.file("short.toml"), benchmark.replace("train = [\"E-right-1\"]", "train = [\"E-right-1\", \"E-left-3\"]"))
+        .unwrap();
+    let replay = ["--set", "level_replay.fraction=0.5", "--set", "level_replay.rate=0.2"];
+    for (run, settings) in [("uniform", &[][..]), ("one", &replay[..]), ("two", &replay[..])] {
+        succeed(&place.train(&[&["--name", run], settings].concat()));
+    }
+    assert!(policy(&place, "one") == policy(&place, "two"));
+    assert!(policy(&place, "one") != policy(&place, "uniform"));
+    let message = refusal(&place.train(&["--name", "none", "--set", "level_replay.fraction=1.0", "--set", "level_replay.rate=0.2"]), 2);
+    assert!(message.contains("level_replay.fraction: 1; must lie in 0..0.95"), "{message}");
+}

@@ -6,10 +6,11 @@ function curvesOf(report, metrics) {
   const window = report.training_window === undefined ? "" : `, last ${whole(report.training_window)} episodes`;
   return [
     { column: "success", name: `Success${window}`, text: (value) => percent(value), tick: (value) => decimal(100 * value, 0) + GAP + "%", range: [0, 1] },
+    { column: "validation_success", name: "Success on validation routes", text: (value) => percent(value), tick: (value) => decimal(100 * value, 0) + GAP + "%", range: [0, 1] },
     { column: "reward", name: `Mean reward of an episode${window}`, text: (value) => whole(value), tick: short },
     { column: "entropy", name: "Entropy of the policy [nat]", text: (value) => decimal(value, 3), tick: (value) => decimal(value, 1), from: 0 },
     { column: "value", name: "Q value, scaled reward", text: (value) => decimal(value, 2), tick: (value) => String(+value.toFixed(2)) },
-  ].filter(({ column }) => metrics[column] !== undefined);
+  ].filter(({ column }) => (metrics[column] ?? []).some(Number.isFinite));
 }
 
 /** Draws one curve into its figure for its current width. */
