@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::device::Device;
 use crate::error::Error;
 use crate::evaluation::Evaluation;
-use crate::evaluation::report::wilson;
+use crate::evaluation::report::{Summary, wilson};
 use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::config;
 use crate::policy::LearnedPolicy;
@@ -21,6 +21,7 @@ const SEED: u32 = 0;
 
 /// Names of its columns in a checkpoint.
 const COUNTS: &str = "validation, counts";
+const DISTANCES: &str = "validation, lane distances";
 const BEST: &str = "validation, best policy";
 
 /// One validation.
@@ -32,6 +33,8 @@ pub struct Validated {
     pub arrived: u64,
     /// Fraction that arrived.
     pub success: f64,
+    /// Mean distance to the lane centre of those that arrived, `None` if none did \[m].
+    pub lane_distance_mean_arrived: Option<f64>,
 }
 
 /// The validations of a run, as its report has them.
@@ -104,8 +107,10 @@ impl Validation {
         };
         let mut policy = policy;
         let driven = evaluation.drive(&mut policy, &mut |_, _| {})?;
-        let arrived = driven.episodes.iter().filter(|episode| episode.ended == offtrack::layout::Ended::Arrived).count() as u64;
-        let validated = Validated { env_steps, arrived, success: arrived as f64 / driven.episodes.len() as f64 };
+        let summary = Summary::of(driven.episodes.iter(), self.scenario.step).expect("there is a validation route, and an episode on it");
+        let Summary { arrived, success, lane_distance_mean_arrived, .. } = summary;
+        let arrived = arrived as u64;
+        let validated = Validated { env_steps, arrived, success, lane_distance_mean_arrived };
         self.n_made = (fraction * self.settings.times as f64 + 1e-9) as u64;
         self.last = Some(validated);
         if self.best.as_ref().is_none_or(|(best, _)| best.arrived <= arrived) {
@@ -142,6 +147,8 @@ impl Validation {
     pub fn save<'a>(&'a self, columns: &mut Columns<'a>) {
         let (Some(last), Some((best, policy))) = (self.last, &self.best) else { return };
         columns.put(COUNTS, vec![self.n_made, last.env_steps, last.arrived, best.env_steps, best.arrived]);
+        let distance = |validated: Validated| validated.lane_distance_mean_arrived.unwrap_or_default();
+        columns.put(DISTANCES, vec![distance(last), distance(*best)]);
         columns.put(BEST, &policy[..]);
     }
 
@@ -156,12 +163,18 @@ impl Validation {
             let most = last_arrived.max(best_arrived);
             return Err(stored.error(format!("its column `{COUNTS}` has {most} arrivals of {episodes} episodes: put a sound copy back")));
         }
-        let validated = |env_steps, arrived: u64| Validated { env_steps, arrived, success: arrived as f64 / episodes as f64 };
+        let [last_distance, best_distance] = stored.array(DISTANCES)?;
+        let validated = |env_steps, arrived: u64, distance: f64| Validated {
+            env_steps,
+            arrived,
+            success: arrived as f64 / episodes as f64,
+            lane_distance_mean_arrived: (0 < arrived).then_some(distance),
+        };
         let policy: Vec<u8> = stored.column(BEST)?;
         LearnedPolicy::from_bytes("best policy", &policy).map_err(|message| stored.error(format!("its column `{BEST}` {message}")))?;
         self.n_made = n_made;
-        self.last = Some(validated(last_steps, last_arrived));
-        self.best = Some((validated(best_steps, best_arrived), policy));
+        self.last = Some(validated(last_steps, last_arrived, last_distance));
+        self.best = Some((validated(best_steps, best_arrived, best_distance), policy));
         Ok(())
     }
 }
