@@ -4,6 +4,8 @@
 //! checkpoint every few minutes. A stopped run leaves a policy that can be evaluated, and all that it takes to
 //! continue.
 
+mod also;
+
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,6 +14,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use offtrack::reader::read_text;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
+use offtrack_drawing::recording::Track;
 use offtrack_training::device::Device;
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::page::Page;
@@ -34,6 +37,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{progress, roads, terminal};
+use also::{Also, AlsoReport};
 
 /// Training routes named at the end.
 const N_WORST: usize = 5;
@@ -103,6 +107,9 @@ struct Finished {
     commit: String,
     /// The final evaluation; none after an interruption.
     evaluation: Option<Report>,
+    /// Further evaluations, in the order of `also_evaluate`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    also: Vec<AlsoReport>,
 }
 
 /// What a run is trained on.
@@ -113,6 +120,8 @@ struct Worlds {
     /// The benchmark that it is trained on.
     training: Scenario,
     training_world: Arc<World>,
+    /// What else it is evaluated on.
+    also: Vec<Also>,
 }
 
 /// A new run's folder, or that of one that continues from a checkpoint.
@@ -208,7 +217,8 @@ impl Worlds {
             let name = &benchmark.name;
             return Err(wrong(format!("its actions and vehicle lock must be those of {name}, on which the policy is evaluated")));
         }
-        Ok(Worlds { benchmark, benchmark_world, training, training_world })
+        let also = Also::read(config, &training, &training_world.actions)?;
+        Ok(Worlds { benchmark, benchmark_world, training, training_world, also })
     }
 }
 
@@ -222,38 +232,47 @@ fn conclude(
     written: Result<(), Error>,
 ) -> Result<(), Error> {
     let path = folder.path().display();
-    if finished.interrupted || worlds.benchmark.split(Split::Test).is_empty() {
+    if finished.interrupted {
         files::write_json(&folder.report(), &finished)?;
         written?;
-        return files::print(&match finished.interrupted {
-            true => format!("stopped: policy and metrics are in {path}; not evaluated; train --resume {path} continues\n"),
-            false => format!("written: {path}\n"),
-        });
+        return files::print(&format!("stopped: policy and metrics are in {path}; not evaluated; train --resume {path} continues\n"));
     }
     let mut policy = LearnedPolicy { name: folder.policy().display().to_string(), ..policy };
+    let evaluated = evaluate(worlds, &mut policy)?;
+    finished.evaluation = evaluated.as_ref().map(|(report, _)| report.clone());
+    finished.also = worlds.also.iter().map(|also| also.evaluate(&mut policy)).collect::<Result<_, _>>()?;
+    files::write_json(&folder.report(), &finished)?;
+    let mut said = String::new();
+    if let Some((report, tracks)) = evaluated {
+        let metrics = Some(read_text(&folder.metrics(), METRICS_LIMIT)?);
+        let (scenario, world) = (&worlds.benchmark, &worlds.benchmark_world);
+        Page { scenario, world, evaluation: &report, tracks: &tracks, run: json!(finished), metrics }.write(&folder.page())?;
+        said += &report.table(terminal::width());
+    }
+    said += &also::lines(finished.evaluation.as_ref(), &finished.also);
+    said += &finished.training_routes.as_ref().map(worst).unwrap_or_default();
+    files::print(&format!("{said}written: {path}\n"))?;
+    // The evaluation is not lost where something else could not be written.
+    written
+}
+
+/// The evaluation on `benchmark`, with the episodes that its page shows; none where it has no test routes.
+fn evaluate(worlds: &Worlds, policy: &mut LearnedPolicy) -> Result<Option<(Report, Vec<Track>)>, Error> {
+    let n_routes = worlds.benchmark.split(Split::Test).len();
+    if n_routes == 0 {
+        return Ok(None);
+    }
     let evaluation = Evaluation {
         scenario: &worlds.benchmark,
         world: &worlds.benchmark_world,
         split: Split::Test,
-        episodes: usual_episodes(worlds.benchmark.split(Split::Test).len()),
+        episodes: usual_episodes(n_routes),
         seed: 0,
         record: true,
         device: &Device::processor(),
     };
-    let (report, tracks) = {
-        let bar = progress::Bar::new("evaluating", "episodes", 0);
-        evaluation.report(&mut policy, &mut |done, all| bar.set(done, all))?
-    };
-    let table = report.table(terminal::width());
-    finished.evaluation = Some(report.clone());
-    files::write_json(&folder.report(), &finished)?;
-    let metrics = Some(read_text(&folder.metrics(), METRICS_LIMIT)?);
-    let (scenario, world) = (&worlds.benchmark, &worlds.benchmark_world);
-    Page { scenario, world, evaluation: &report, tracks: &tracks, run: json!(finished), metrics }.write(&folder.page())?;
-    let worst = finished.training_routes.as_ref().map(worst).unwrap_or_default();
-    files::print(&format!("{table}{worst}written: {path}\n"))?;
-    // The evaluation is not lost where something else could not be written.
-    written
+    let bar = progress::Bar::new("evaluating", "episodes", 0);
+    Ok(Some(evaluation.report(policy, &mut |done, all| bar.set(done, all))?))
 }
 
 /// A line about the training routes with least success.
@@ -298,5 +317,6 @@ fn finished(config: &Config, run: &Run) -> Finished {
         device: run.device(),
         commit: provenance::commit(),
         evaluation: None,
+        also: Vec::new(),
     }
 }

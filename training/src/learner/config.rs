@@ -2,6 +2,7 @@
 //!
 //! A file may name another one as its `base` and give only the keys that differ.
 
+mod also_evaluate;
 mod check;
 mod file;
 mod set;
@@ -13,6 +14,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 
+pub use also_evaluate::AlsoEvaluate;
+
 /// A training file. Unknown keys are refused; one in hand has been checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -22,6 +25,9 @@ pub struct Config {
     /// The benchmark whose training routes it is trained on; none for `benchmark` itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub training_benchmark: Option<String>,
+    /// Further evaluations of the policy, each `BENCHMARK` or `BENCHMARK/SPLIT`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub also_evaluate: Vec<String>,
     /// Where the trucks and the learner are.
     #[serde(default)]
     pub device: Device,
