@@ -64,7 +64,7 @@ impl Page<'_> {
             ground.route_reports = Some(rounded(evaluation["routes"].take()));
         }
         // A row of the page for each further evaluation; their routes are in the report's own file.
-        for also in self.run["also"].as_array_mut().into_iter().flatten().filter_map(Value::as_object_mut) {
+        for also in self.run.get_mut("also").and_then(Value::as_array_mut).into_iter().flatten().filter_map(Value::as_object_mut) {
             also.retain(|name, _| name != "routes" && name != "groups");
         }
         let ground = json!(ground).to_string();

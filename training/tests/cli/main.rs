@@ -14,4 +14,5 @@ mod page;
 mod place;
 mod record;
 mod resume;
+mod seeds;
 mod train;

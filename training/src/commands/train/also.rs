@@ -88,11 +88,8 @@ fn familiarity(trained_on: usize, n_routes: usize) -> String {
     }
 }
 
-/// A line for each evaluation; none where there is but the one of `benchmark`, whose table says it all.
+/// A line for each evaluation, that on `benchmark` first.
 pub fn lines(evaluation: Option<&Report>, also: &[AlsoReport]) -> String {
-    if also.is_empty() {
-        return String::new();
-    }
     // No test route is trained on.
     let all = evaluation.map(|report| (0, report)).into_iter().chain(also.iter().map(|also| (also.trained_on, &also.report)));
     let named: Vec<(String, usize, &Report)> =
