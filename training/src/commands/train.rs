@@ -80,6 +80,9 @@ pub struct Args {
     /// key. May be given several times.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
+    /// Write the rows of metrics.csv to a TensorBoard event file in the run's folder too.
+    #[arg(long)]
+    tensorboard: bool,
     /// Continue a run that was stopped or killed, from the last checkpoint in its folder, by its own config.toml.
     /// --minutes or --steps give another budget, counted from the run's beginning; a finished run continues too. The
     /// learning-rate schedule ends with the budget, so with a larger one the rates are higher from here on. With a
@@ -155,6 +158,8 @@ impl Prepared {
 struct Manner {
     /// Which of several seeds it is, as lines begin with; none where it is the only one.
     label: Option<String>,
+    /// Rows of metrics go to a TensorBoard event file too.
+    tensorboard: bool,
 }
 
 /// Runs the command.
@@ -176,7 +181,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
             Opened::new(Folder::create(&runs, args.name.as_deref(), &file, &config)?)?
         }
     };
-    train(&config, &worlds, prepared, opened, &Manner { label: None }, &stop_flag())
+    train(&config, &worlds, prepared, opened, &Manner { label: None, tensorboard: args.tensorboard }, &stop_flag())
 }
 
 /// A run from its beginning or its checkpoint to what it leaves behind, or until it is stopped.
@@ -196,6 +201,9 @@ fn train(config: &Config, worlds: &Worlds, prepared: Prepared, opened: Opened, m
     }
     if has_new_budget {
         folder.write_config(config)?;
+    }
+    if manner.tensorboard {
+        run.progress.write_events(folder.path())?;
     }
     // Training goes on when nobody reads its lines.
     let (path, n_routes) = (folder.path().display(), worlds.training.split(Split::Train).len());

@@ -15,4 +15,5 @@ mod place;
 mod record;
 mod resume;
 mod seeds;
+mod tensorboard;
 mod train;

@@ -68,7 +68,7 @@ pub fn run(args: &Args, file: &Path, text: &str) -> Result<(), Error> {
         };
         let opened = group.open(seed, file, &config)?;
         let label = format!("seed {seed}, {} of {}: ", index + 1, seeds.len());
-        train(&config, &worlds, prepared, opened, &Manner { label: Some(label) }, &stop)?;
+        train(&config, &worlds, prepared, opened, &Manner { label: Some(label), tensorboard: args.tensorboard }, &stop)?;
         group.write(&seeds)?;
     }
     let finished = group.all_finished(&seeds)?;
