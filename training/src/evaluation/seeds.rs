@@ -153,9 +153,12 @@ impl SeedsEvaluation {
 
     /// Its column: head, seeds, mean, worst and interval.
     fn cells(&self) -> Vec<String> {
-        let zero_shot = if self.trained_on == 0 { "zero-shot" } else { "trained on" };
+        let familiarity = match self.trained_on {
+            0 => "zero-shot".to_owned(),
+            n => format!("{n} routes trained on"),
+        };
         let lane = |mean: Option<f64>| mean.map(|mean| format!(", {mean:.2} m")).unwrap_or_default();
-        let mut cells = vec![format!("{} {}, {zero_shot}", self.benchmark, self.split)];
+        let mut cells = vec![format!("{} {}, {familiarity}", self.benchmark, self.split)];
         cells.extend(self.seeds.iter().map(|seed| {
             format!("{:.1} % ({}/{}){}", 100.0 * seed.success, seed.arrived, seed.episodes, lane(seed.lane_distance_mean_arrived))
         }));
@@ -257,13 +260,13 @@ mod tests {
     fn each_seed_has_a_row_and_the_worst_is_named() {
         let seeds = Seeds::of(&[3, 4, 5], &[report(3, 90), report(4, 70)]);
         let expected = "\
-| seed          | b test, zero-shot       | b test, trained on        | training |
-|---------------|-------------------------|---------------------------|----------|
-| 3             | 90.0 % (90/100), 0.50 m | 100.0 % (100/100), 0.50 m | 61 s     |
-| 4             | 70.0 % (70/100), 0.50 m | 100.0 % (100/100), 0.50 m | 61 s     |
-| mean          | 80.0 %, 0.50 m          | 100.0 %, 0.50 m           |          |
-| worst         | 70.0 %, seed 4          | 100.0 %, seed 3           |          |
-| 95 % interval | 0.0 to 100.0 %          | 100.0 to 100.0 %          |          |
+| seed          | b test, zero-shot       | b test, 3 routes trained on | training |
+|---------------|-------------------------|-----------------------------|----------|
+| 3             | 90.0 % (90/100), 0.50 m | 100.0 % (100/100), 0.50 m   | 61 s     |
+| 4             | 70.0 % (70/100), 0.50 m | 100.0 % (100/100), 0.50 m   | 61 s     |
+| mean          | 80.0 %, 0.50 m          | 100.0 %, 0.50 m             |          |
+| worst         | 70.0 %, seed 4          | 100.0 %, seed 3             |          |
+| 95 % interval | 0.0 to 100.0 %          | 100.0 to 100.0 %            |          |
 ";
         assert_eq!(seeds.table(), expected);
         let json = serde_json::to_value(&seeds).unwrap();
