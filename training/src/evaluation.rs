@@ -6,6 +6,7 @@ pub mod page; // a report as an HTML page
 pub mod policies; // what chooses the actions: learned, pure pursuit, random
 pub mod report; // figures of an evaluation
 mod running; // an episode under way
+pub mod seeds; // figures of several seeds
 pub mod shown; // which episodes a page shows
 mod table; // a report as text
 

@@ -48,18 +48,21 @@ const LINE_EVERY: Duration = Duration::from_secs(30);
 pub struct TrainingDisplay {
     bar: ProgressBar,
     since_line: Instant,
+    /// Which of several runs it is; begins each line.
+    label: String,
 }
 
 impl TrainingDisplay {
-    /// A bar at its beginning.
-    pub fn new() -> TrainingDisplay {
+    /// A bar at its beginning. `label`, which may be empty, begins each line.
+    pub fn new(label: &str) -> TrainingDisplay {
         let style = ProgressStyle::with_template("{bar:24} {percent:>3} % {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
-        TrainingDisplay { bar: ProgressBar::new(1000).with_style(style), since_line: Instant::now() }
+        TrainingDisplay { bar: ProgressBar::new(1000).with_style(style), since_line: Instant::now(), label: label.to_owned() }
     }
 }
 
 impl Display for TrainingDisplay {
     fn show(&mut self, fraction: f64, line: String) {
+        let line = format!("{}{line}", self.label);
         if std::io::stderr().is_terminal() {
             self.bar.set_position((1000.0 * fraction) as u64);
             self.bar.set_message(line);

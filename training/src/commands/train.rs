@@ -4,14 +4,17 @@
 //! checkpoint every few minutes. A stopped run leaves a policy that can be evaluated, and all that it takes to
 //! continue.
 
-use std::collections::HashSet;
+mod also;
+mod seeds;
+mod worlds;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use offtrack::reader::read_text;
-use offtrack::scenario::{Scenario, Split};
-use offtrack::world::World;
+use offtrack::scenario::Split;
+use offtrack_drawing::recording::Track;
 use offtrack_training::device::Device;
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::page::Page;
@@ -34,7 +37,9 @@ use offtrack_training::provenance;
 use serde::Serialize;
 use serde_json::json;
 
-use super::{progress, roads, terminal};
+use super::{progress, terminal};
+use also::AlsoReport;
+use worlds::Worlds;
 
 /// Training routes named at the end.
 const N_WORST: usize = 5;
@@ -59,6 +64,10 @@ pub struct Args {
     /// Begin with a policy instead of random weights: its file, or a shipped one's name.
     #[arg(long, value_name = "POLICY")]
     from: Option<String>,
+    /// Train several seeds one after another and compare them: a range as in 20..24, both included, or a list as in
+    /// 3,7,9. Each has its own folder seed-N in the run's folder. The same command with the same --name continues.
+    #[arg(long, conflicts_with = "seed")]
+    seeds: Option<String>,
     /// Another training time [min].
     #[arg(long, allow_negative_numbers = true)]
     minutes: Option<f64>,
@@ -75,11 +84,14 @@ pub struct Args {
     /// key. May be given several times.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
+    /// Write the rows of metrics.csv to a TensorBoard event file in the run's folder too.
+    #[arg(long)]
+    tensorboard: bool,
     /// Continue a run that was stopped or killed, from the last checkpoint in its folder, by its own config.toml.
     /// --minutes or --steps give another budget, counted from the run's beginning; a finished run continues too. The
     /// learning-rate schedule ends with the budget, so with a larger one the rates are higher from here on. With a
     /// budget of steps alone the result is that of a run never stopped, bit for bit on the same machine and program.
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "name", "out", "seed", "from", "envs", "adapter", "settings"])]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "name", "out", "seed", "seeds", "from", "envs", "adapter", "settings"])]
     resume: Option<PathBuf>,
 }
 
@@ -110,16 +122,9 @@ struct Finished {
     commit: String,
     /// The final evaluation; none after an interruption.
     evaluation: Option<Report>,
-}
-
-/// What a run is trained on.
-struct Worlds {
-    /// The benchmark that the policy is evaluated on.
-    benchmark: Scenario,
-    benchmark_world: Arc<World>,
-    /// The benchmark that it is trained on.
-    training: Scenario,
-    training_world: Arc<World>,
+    /// Further evaluations, in the order of `also_evaluate`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    also: Vec<AlsoReport>,
 }
 
 /// A new run's folder, or that of one that continues from a checkpoint.
@@ -127,58 +132,99 @@ struct Opened {
     folder: Folder,
     metrics: MetricsFile,
     stored: Option<Stored>,
+    /// The run continues with another budget than its config.toml says.
+    has_new_budget: bool,
+}
+
+impl Opened {
+    fn new(folder: Folder) -> Result<Opened, Error> {
+        Ok(Opened { metrics: MetricsFile::create(folder.metrics())?, stored: None, has_new_budget: false, folder })
+    }
+
+    fn resumed(Resumed { folder, metrics, stored, .. }: Resumed, has_new_budget: bool) -> Opened {
+        Opened { folder, metrics, stored, has_new_budget }
+    }
+}
+
+/// What a run has before its folder.
+struct Prepared {
+    backend: Backend,
+    training: Training,
+    validation: Option<Validation>,
+}
+
+impl Prepared {
+    fn new(config: &Config, worlds: &Worlds) -> Result<Prepared, Error> {
+        let backend = Backend::open(config)?;
+        let routes = worlds.training.split(Split::Train).to_vec();
+        let mut training = backend.guarded(|| Training::new(&backend, config, worlds.training_world.clone(), routes))?;
+        training.begin()?;
+        Ok(Prepared { backend, training, validation: worlds.validation(config)? })
+    }
+}
+
+/// What does not change the policy.
+struct Manner {
+    /// Which of several seeds it is, as lines begin with; none where it is the only one.
+    label: Option<String>,
+    /// Rows of metrics go to a TensorBoard event file too.
+    tensorboard: bool,
 }
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
-    let resumed = args.resume.as_ref().map(|folder| Resumed::open(folder, args.minutes, args.steps)).transpose()?;
     let default = if cfg!(feature = "gpu") { "gpu" } else { "default" };
     let file = args.config.clone().unwrap_or_else(|| PathBuf::from(default));
+    if let Some(seeds) = &args.seeds {
+        return seeds::run(args, &file, seeds);
+    }
+    let resumed = args.resume.as_ref().map(|folder| Resumed::open(folder, args.minutes, args.steps)).transpose()?;
     let config = resumed.as_ref().map_or_else(|| config(args, &file), |resumed| Ok(resumed.config.clone()))?;
     let worlds = Worlds::read(&config)?;
-    let routes = worlds.training.split(Split::Train).to_vec();
-    let n_routes = routes.len();
     // All that can be wrong with the input is found before a folder is made.
-    let backend = Backend::open(&config)?;
-    let validation = validation(&config, &worlds.training)?;
-    let mut training = backend.guarded(|| Training::new(&backend, &config, worlds.training_world.clone(), routes))?;
-    // A run that continues has an actor of its own.
-    if resumed.as_ref().is_none_or(|resumed| resumed.stored.is_none()) {
-        training.begin()?;
-    }
-    let Opened { folder, metrics, stored } = match resumed {
-        Some(Resumed { folder, metrics, stored, .. }) => Opened { folder, metrics, stored },
+    let prepared = Prepared::new(&config, &worlds)?;
+    let opened = match resumed {
+        Some(resumed) => Opened::resumed(resumed, args.minutes.is_some() || args.steps.is_some()),
         None => {
             let runs = args.out.clone().unwrap_or_else(|| PathBuf::from("runs"));
-            let folder = Folder::create(&runs, args.name.as_deref(), &file, &config)?;
-            Opened { metrics: MetricsFile::create(folder.metrics())?, stored: None, folder }
+            Opened::new(Folder::create(&runs, args.name.as_deref(), &file, &config)?)?
         }
     };
-    let progress = Progress::new(&config, metrics, Box::new(progress::TrainingDisplay::new()));
+    train(&config, &worlds, prepared, opened, &Manner { label: None, tensorboard: args.tensorboard }, &stop_flag())
+}
+
+/// A run from its beginning or its checkpoint to what it leaves behind, or until it is stopped.
+fn train(config: &Config, worlds: &Worlds, prepared: Prepared, opened: Opened, manner: &Manner, stop: &AtomicU8) -> Result<(), Error> {
+    let (Prepared { backend, training, validation }, Opened { folder, metrics, stored, has_new_budget }) = (prepared, opened);
+    let label = manner.label.as_deref().unwrap_or_default();
+    let progress = Progress::new(config, metrics, Box::new(progress::TrainingDisplay::new(label)));
     let counts = RouteCounts::new(&worlds.training, folder.routes());
-    let mut run = Run::new(backend, &config, &worlds.training_world, training, &folder, progress, counts);
+    let mut run = Run::new(backend, config, &worlds.training_world, training, &folder, progress, counts);
     run.validation = validation;
     let mut doing = "training".to_owned();
     if let Some(stored) = stored {
         run.restore(&stored)?;
         // The earlier evaluation was of another policy.
-        files::write_json(&folder.report(), &Finished { interrupted: true, ..finished(&config, &run) })?;
+        files::write_json(&folder.report(), &Finished { interrupted: true, ..finished(config, &run) })?;
         let _ = std::fs::remove_file(folder.page());
         doing = format!("continuing after {} env steps and {:.2} min", run.progress.env_steps(), run.progress.seconds() / 60.0);
     }
-    if args.resume.is_some() && (args.minutes.is_some() || args.steps.is_some()) {
-        folder.write_config(&config)?;
+    if has_new_budget {
+        folder.write_config(config)?;
+    }
+    if manner.tensorboard {
+        run.progress.write_events(folder.path())?;
     }
     // Training goes on when nobody reads its lines.
-    let path = folder.path().display();
-    let _ = files::print(&format!("{path}: {doing} on {n_routes} training routes of {}, {}\n", worlds.training.name, run.device()));
-    let stop = stop_flag();
+    let (path, n_routes) = (folder.path().display(), worlds.training.split(Split::Train).len());
+    let on = format!("{n_routes} training routes of {}, {}", worlds.training.name, run.device());
+    let _ = files::print(&format!("{label}{path}: {doing} on {on}\n"));
     run.learn(|| 0 < stop.load(Ordering::Relaxed))?;
-    let finished = finished(&config, &run);
+    let finished = finished(config, &run);
     let written = run.close();
     let policy = run.policy()?;
     drop(run);
-    conclude(&folder, &worlds, finished, policy, written)
+    conclude(&folder, worlds, finished, policy, manner, written)
 }
 
 /// The training file with what the command line changes.
@@ -198,45 +244,6 @@ fn config(args: &Args, file: &Path) -> Result<Config, Error> {
     Ok(config)
 }
 
-impl Worlds {
-    /// Both benchmarks of a training file. None of the routes that the policy is evaluated on may be among those it is
-    /// trained on.
-    fn read(config: &Config) -> Result<Worlds, Error> {
-        let mut benchmark = roads::benchmark(&config.benchmark)?;
-        let mut training = roads::benchmark(config.training_benchmark.as_ref().unwrap_or(&config.benchmark))?;
-        training.keep(&[Split::Train]);
-        let wrong = |expected: String| Error::Flag { flag: "training_benchmark", value: training.name.clone(), expected };
-        // The policy is evaluated on the test routes alone; without any it is not evaluated.
-        if !benchmark.split(Split::Test).is_empty() {
-            benchmark.keep(&[Split::Test]);
-        }
-        let test: HashSet<&str> = benchmark.split_names(Split::Test).into_iter().collect();
-        if let Some(route) = training.split_names(Split::Train).into_iter().find(|&route| test.contains(route)) {
-            return Err(wrong(format!("{route} is a test route of {} and must not be trained on", benchmark.name)));
-        }
-        if training.split(Split::Train).is_empty() {
-            return Err(wrong("it has no routes under `train`".to_owned()));
-        }
-        let (benchmark_world, training_world) = (roads::world(&benchmark)?, roads::world(&training)?);
-        if training_world.actions != benchmark_world.actions {
-            let name = &benchmark.name;
-            return Err(wrong(format!("its actions and vehicle lock must be those of {name}, on which the policy is evaluated")));
-        }
-        Ok(Worlds { benchmark, benchmark_world, training, training_world })
-    }
-}
-
-/// The validation routes that the config names. None of them may be trained on.
-fn validation(config: &Config, training: &Scenario) -> Result<Option<Validation>, Error> {
-    let Some(settings) = &config.validation else { return Ok(None) };
-    let mut scenario = roads::benchmark(&settings.benchmark)?;
-    if !scenario.split(Split::Validation).is_empty() {
-        scenario.keep(&[Split::Validation]);
-    }
-    let world = roads::world(&scenario)?;
-    Validation::new(settings.clone(), scenario, world, training).map(Some)
-}
-
 /// Evaluates the policy of a run that was not interrupted, and writes what the run leaves behind. `written` says
 /// whether its last checkpoint could be written.
 fn conclude(
@@ -244,41 +251,56 @@ fn conclude(
     worlds: &Worlds,
     mut finished: Finished,
     policy: LearnedPolicy,
+    manner: &Manner,
     written: Result<(), Error>,
 ) -> Result<(), Error> {
     let path = folder.path().display();
-    if finished.interrupted || worlds.benchmark.split(Split::Test).is_empty() {
+    if finished.interrupted {
         files::write_json(&folder.report(), &finished)?;
         written?;
-        return files::print(&match finished.interrupted {
-            true => format!("stopped: policy and metrics are in {path}; not evaluated; train --resume {path} continues\n"),
-            false => format!("written: {path}\n"),
-        });
+        return files::print(&format!("stopped: policy and metrics are in {path}; not evaluated; train --resume {path} continues\n"));
     }
     let mut policy = LearnedPolicy { name: folder.policy().display().to_string(), ..policy };
+    let evaluated = evaluate(worlds, &mut policy)?;
+    finished.evaluation = evaluated.as_ref().map(|(report, _)| report.clone());
+    finished.also = worlds.also.iter().map(|also| also.evaluate(&mut policy)).collect::<Result<_, _>>()?;
+    files::write_json(&folder.report(), &finished)?;
+    let mut said = String::new();
+    if let Some((report, tracks)) = evaluated {
+        let metrics = Some(read_text(&folder.metrics(), METRICS_LIMIT)?);
+        let (scenario, world) = (&worlds.benchmark, &worlds.benchmark_world);
+        Page { scenario, world, evaluation: &report, tracks: &tracks, run: json!(finished), metrics }.write(&folder.page())?;
+        if manner.label.is_none() {
+            said += &report.table(terminal::width());
+        }
+    }
+    // One of several seeds has a line for each evaluation in place of a table of its routes.
+    if manner.label.is_some() || !finished.also.is_empty() {
+        said += &also::lines(finished.evaluation.as_ref(), &finished.also);
+    }
+    said += &finished.training_routes.as_ref().map(worst).unwrap_or_default();
+    files::print(&format!("{said}written: {path}\n"))?;
+    // The evaluation is not lost where something else could not be written.
+    written
+}
+
+/// The evaluation on `benchmark`, with the episodes that its page shows; none where it has no test routes.
+fn evaluate(worlds: &Worlds, policy: &mut LearnedPolicy) -> Result<Option<(Report, Vec<Track>)>, Error> {
+    let n_routes = worlds.benchmark.split(Split::Test).len();
+    if n_routes == 0 {
+        return Ok(None);
+    }
     let evaluation = Evaluation {
         scenario: &worlds.benchmark,
         world: &worlds.benchmark_world,
         split: Split::Test,
-        episodes: usual_episodes(worlds.benchmark.split(Split::Test).len()),
+        episodes: usual_episodes(n_routes),
         seed: 0,
         record: true,
         device: &Device::processor(),
     };
-    let (report, tracks) = {
-        let bar = progress::Bar::new("evaluating", "episodes", 0);
-        evaluation.report(&mut policy, &mut |done, all| bar.set(done, all))?
-    };
-    let table = report.table(terminal::width());
-    finished.evaluation = Some(report.clone());
-    files::write_json(&folder.report(), &finished)?;
-    let metrics = Some(read_text(&folder.metrics(), METRICS_LIMIT)?);
-    let (scenario, world) = (&worlds.benchmark, &worlds.benchmark_world);
-    Page { scenario, world, evaluation: &report, tracks: &tracks, run: json!(finished), metrics }.write(&folder.page())?;
-    let worst = finished.training_routes.as_ref().map(worst).unwrap_or_default();
-    files::print(&format!("{table}{worst}written: {path}\n"))?;
-    // The evaluation is not lost where something else could not be written.
-    written
+    let bar = progress::Bar::new("evaluating", "episodes", 0);
+    Ok(Some(evaluation.report(policy, &mut |done, all| bar.set(done, all))?))
 }
 
 /// A line about the training routes with least success.
@@ -324,5 +346,6 @@ fn finished(config: &Config, run: &Run) -> Finished {
         device: run.device(),
         commit: provenance::commit(),
         evaluation: None,
+        also: Vec::new(),
     }
 }

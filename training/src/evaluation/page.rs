@@ -63,6 +63,10 @@ impl Page<'_> {
             // Gzipped with the ground: of thousands of routes this is most of the report.
             ground.route_reports = Some(rounded(evaluation["routes"].take()));
         }
+        // A row of the page for each further evaluation; their routes are in the report's own file.
+        for also in self.run.get_mut("also").and_then(Value::as_array_mut).into_iter().flatten().filter_map(Value::as_object_mut) {
+            also.retain(|name, _| name != "routes" && name != "groups");
+        }
         let ground = json!(ground).to_string();
         match self.run.as_object_mut() {
             Some(run) => drop(run.insert("evaluation".to_owned(), evaluation)),

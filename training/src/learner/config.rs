@@ -2,16 +2,20 @@
 //!
 //! A file may name another one as its `base` and give only the keys that differ.
 
+mod also_evaluate;
 mod check;
 mod file;
 mod set;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use offtrack::reader::Reader;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
+
+pub use also_evaluate::AlsoEvaluate;
 
 /// A training file. Unknown keys are refused; one in hand has been checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,6 +26,9 @@ pub struct Config {
     /// The benchmark whose training routes it is trained on; none for `benchmark` itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub training_benchmark: Option<String>,
+    /// Further evaluations of the policy, each `BENCHMARK` or `BENCHMARK/SPLIT`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub also_evaluate: Vec<String>,
     /// Where the trucks and the learner are.
     #[serde(default)]
     pub device: Device,
@@ -58,6 +65,9 @@ pub struct Config {
     /// The learner.
     pub learning: Learning,
 }
+
+/// Why a config can always be written.
+const WRITABLE: &str = "numbers, words and lists of them can all be written as TOML";
 
 fn checkpoint_minutes() -> f64 {
     2.0
@@ -249,9 +259,33 @@ impl Config {
         *self == Config { minutes, steps, checkpoint_minutes, ..other.clone() }
     }
 
+    /// The first key whose value differs from that of `other`, and the two values, each `nothing` where it is not given.
+    pub fn first_difference(&self, other: &Config) -> Option<(String, String, String)> {
+        let (own, others) = (self.keys(), other.keys());
+        let key = own.keys().chain(others.keys()).filter(|&key| own.get(key) != others.get(key)).min()?;
+        let value = |of: &BTreeMap<String, String>| of.get(key).cloned().unwrap_or_else(|| "nothing".to_owned());
+        Some((key.clone(), value(&own), value(&others)))
+    }
+
+    /// Every key with its tables' names before it, and its value as TOML.
+    fn keys(&self) -> BTreeMap<String, String> {
+        let mut keys = BTreeMap::new();
+        let mut left = vec![(String::new(), toml::Value::try_from(self).expect(WRITABLE))];
+        while let Some((name, value)) = left.pop() {
+            match value {
+                toml::Value::Table(table) => {
+                    let prefix = if name.is_empty() { name } else { name + "." };
+                    left.extend(table.into_iter().map(|(key, value)| (format!("{prefix}{key}"), value)));
+                }
+                value => drop(keys.insert(name, value.to_string())),
+            }
+        }
+        keys
+    }
+
     /// The training file that this config would be read from, without a `base`.
     pub fn to_toml(&self) -> String {
-        toml::to_string(self).expect("numbers, words and lists of numbers can all be written as TOML")
+        toml::to_string(self).expect(WRITABLE)
     }
 }
 

@@ -4,6 +4,7 @@
 //! equals one that was never stopped, bit for bit. With minutes the learning rates follow the clock.
 
 pub mod checkpointer;
+pub mod events_file;
 pub mod folder;
 #[cfg(test)]
 mod lost_device_tests;

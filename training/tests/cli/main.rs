@@ -14,4 +14,6 @@ mod page;
 mod place;
 mod record;
 mod resume;
+mod seeds;
+mod tensorboard;
 mod train;

@@ -189,3 +189,21 @@ fn only_a_page_of_the_studys_benchmark_has_a_column_for_the_study() {
     let document = opened(&page);
     assert!(document.contains("selftest passed") && column(&document));
 }
+
+#[test]
+fn a_page_has_a_row_for_each_further_evaluation_and_their_routes_are_left_to_the_report() {
+    let place = Place::new();
+    let also = format!("also_evaluate=[\"{}/train\"]", place.text("short.toml"));
+    succeed(&place.train(&["--name", "run", "--set", &also]));
+    let page = place.file("runs/run/report.html");
+    let further = |report: &Value| report["also"][0].as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    let shown = further(&serde_json::from_str(block(&read(&page), "report")).unwrap());
+    let mut all = further(&place.json("runs/run/report.json"));
+    all.retain(|name| name != "routes" && name != "groups");
+    assert_eq!(shown, all);
+    let document = opened(&page);
+    assert!(
+        document.contains("Success, short, train routes (1 of them trained on)") && document.contains("selftest passed\n"),
+        "{document}"
+    );
+}

@@ -200,3 +200,65 @@ fn level_replay_changes_what_is_learned_and_keeps_every_byte_the_same_for_a_seed
     let message = refusal(&place.train(&["--name", "none", "--set", "level_replay.fraction=1.0", "--set", "level_replay.rate=0.2"]), 2);
     assert!(message.contains("level_replay.fraction: 1; must lie in 0..0.95"), "{message}");
 }
+
+/// The short benchmark with other splits, as `other.toml`: `short` is trained on 16m/E-right-1.
+fn other_benchmark(place: &Place) -> String {
+    let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
+    let other = benchmark.replace("test = [\"E-right-1\", \"W-left-3\"]", "train = [\"E-right-1\"]\ntest = [\"W-left-3\"]");
+    assert_ne!(other, benchmark);
+    std::fs::write(place.file("other.toml"), other).unwrap();
+    place.text("other.toml")
+}
+
+#[test]
+fn further_evaluations_are_reported_with_the_number_of_routes_trained_on() {
+    let place = Place::new();
+    let other = other_benchmark(&place);
+    let also = format!("also_evaluate=[\"{}/train\", \"{other}/train\", \"{other}\"]", place.text("short.toml"));
+    let output = place.train(&["--name", "run", "--set", &also]);
+    succeed(&output);
+    let report = place.json("runs/run/report.json");
+    let also: Vec<_> =
+        report["also"].as_array().unwrap().iter().map(|also| (&also["benchmark"], &also["split"], &also["trained_on"])).collect();
+    assert_eq!(serde_json::json!(also), serde_json::json!([["short", "train", 1], ["other", "train", 1], ["other", "test", 0]]));
+    let said = String::from_utf8(output.stdout).unwrap();
+    // The same seed, start poses and routes: the same episodes as in the evaluation on `benchmark`.
+    let route = |report: &serde_json::Value| {
+        let routes = report["routes"].as_array().unwrap();
+        routes.iter().find(|route| route["name"] == "20m/W-left-3").unwrap()["episodes"].clone()
+    };
+    assert_eq!(route(&report["also"][2]), route(&report["evaluation"]));
+    for (name, familiarity) in [
+        ("short test", "(zero-shot)"),
+        ("short train", "(trained on)"),
+        ("other train", "(1 of 2 routes trained on)"),
+        ("other test", "(zero-shot)"),
+    ] {
+        let line = said.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("{said}"));
+        assert!(line.ends_with(familiarity) && line.contains("% ("), "{line}");
+    }
+    let page = std::fs::read_to_string(place.file("runs/run/report.html")).unwrap();
+    assert!(page.contains(r#""trained_on":1"#));
+}
+
+#[test]
+fn a_further_evaluation_that_cannot_be_is_refused_before_a_folder_is_made() {
+    let place = Place::new();
+    let other = other_benchmark(&place);
+    let short = std::fs::read_to_string(place.file("short.toml")).unwrap();
+    std::fs::write(place.file("tested.toml"), short.replace("train = ", "test = ")).unwrap();
+    let tested = place.text("tested.toml");
+    let missing = place.text("missing.toml");
+    for (named, expected) in [
+        ("nowhere", "also_evaluate: nowhere/test; benchmark: nowhere; must be"),
+        (missing.as_str(), "missing.toml: cannot be read"),
+        (&format!("{other}/validation"), "other has no routes under `validation`"),
+        ("attard2023/train", "also_evaluate: attard2023/train; its actions and vehicle lock must be those of short"),
+        (&tested, "16m/E-right-1 is trained on, so no test route may be"),
+        (&format!("{other}/all"), "also_evaluate[0]"),
+    ] {
+        let message = refusal(&place.train(&["--set", &format!("also_evaluate=[\"{named}\"]")]), 2);
+        assert!(message.contains("also_evaluate") && message.contains(expected), "{message}");
+        assert!(!place.file("runs").exists());
+    }
+}

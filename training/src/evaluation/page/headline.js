@@ -41,13 +41,16 @@ function showHeadline(page) {
 }
 
 function showFigures({ report, evaluation, ground }, routes, study, certified) {
+  const also = report.also ?? [];
   const own = evaluation.own_lane_suffices, deviating = evaluation.needs_deviation, compared = comparable(evaluation);
   const rows = [
     [`Success, ${routes}`, fraction(evaluation), study && fraction(study)],
     certified && ["Success, certified routes", fraction(certified)],
     own && ["Success where the own lane suffices", fraction(own)],
     own && deviating && ["Success where it does not", fraction(deviating)],
-    compared && evaluation.split === "test" && ["Success, training routes", null, fraction(STUDY.train)],
+    ...also.map((other) => [`Success, ${other.benchmark}, ${other.split} routes (${other.trained_on === 0 ? "zero-shot" : `${whole(other.trained_on)} of them trained on`})`,
+      fraction(other), comparable(other) && STUDY[other.split] && fraction(STUDY[other.split])]),
+    compared && evaluation.split === "test" && !also.some((other) => comparable(other) && other.split === "train") && ["Success, training routes", null, fraction(STUDY.train)],
     ["Mean distance to the lane centre", metres(evaluation.lane_distance_mean), compared && metres(STUDY.laneDistance)],
     own && ["The same where the own lane suffices", metres(own.lane_distance_mean)],
     report.env_steps !== undefined && ["Env steps of training", whole(report.env_steps), compared && whole(STUDY.envSteps)],

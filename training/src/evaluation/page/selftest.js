@@ -60,6 +60,7 @@ const CHECKS = {
     if (page.ground.route_reports === undefined) same(rows, page.evaluation.routes.length);
     same(document.querySelectorAll("#route-table tr.route svg").length, 5 * rows, "5 charts a route");
     holds(byId("verdict").textContent.includes(percent(page.evaluation.success)), "headline");
+    for (const other of page.report.also ?? []) holds(byId("figures").textContent.includes(`${other.benchmark}, ${other.split} routes`), "further evaluations");
     same(document.querySelectorAll("#figures thead th").length, comparable(page.evaluation) ? 2 : 1, "columns of the figures");
     same(document.querySelectorAll("#figures tbody td").length, (comparable(page.evaluation) ? 2 : 1) * document.querySelectorAll("#figures tbody tr").length, "cells");
     same(byId("study").hidden, !comparable(page.evaluation), "study hidden");

@@ -256,3 +256,23 @@ fn a_budget_that_ends_before_the_first_update_is_refused() {
     assert!(message.contains("fast.toml: steps: 20000; must be above 20000, or nothing is learned"), "{message}");
     assert_eq!(checked("steps = 20001"), Ok(()));
 }
+
+#[test]
+fn further_evaluations_are_benchmarks_with_or_without_a_split() {
+    let with_also = |list: &str| with("training_benchmark", &format!("also_evaluate = {list}"));
+    let config = with_also(r#"["attard2023-full", "attard2023-full/train", "own/a.toml/validation", "b.toml"]"#).unwrap();
+    let named: Vec<String> = config.also_evaluated().iter().map(AlsoEvaluate::name).collect();
+    assert_eq!(named, ["attard2023-full/test", "attard2023-full/train", "own/a.toml/validation", "b.toml/test"]);
+    assert_eq!(read(&config.to_toml()).unwrap(), config);
+    for (list, expected) in [
+        (r#"["attard2023/all"]"#, "also_evaluate[0]: \"attard2023/all\"; must be a benchmark's name"),
+        (r#"["random2026", ""]"#, "also_evaluate[1]: \"\"; must be"),
+        (r#"["/train"]"#, "also_evaluate[0]: \"/train\"; must be"),
+        (r#"["attard2023"]"#, "also_evaluate[0]: \"attard2023\"; is evaluated already, as `benchmark`"),
+        (r#"["random2026/test", "random2026"]"#, "also_evaluate[1]: \"random2026\"; is evaluated already"),
+        (r#""random2026""#, "expected a sequence"),
+    ] {
+        let message = with_also(list).unwrap_err();
+        assert!(message.contains(expected), "{list}: {message}");
+    }
+}

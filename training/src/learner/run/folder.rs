@@ -11,14 +11,9 @@ use crate::learner::config::Config;
 pub struct Folder(PathBuf);
 
 impl Folder {
-    /// Creates `runs/name`, or `runs/<training file's name>` with the first free number, and writes the config into it.
+    /// Makes a folder as [`make`] does and writes the config into it.
     pub fn create(runs: &Path, name: Option<&str>, config_file: &Path, config: &Config) -> Result<Folder, Error> {
-        std::fs::create_dir_all(runs).map_err(Error::write(runs))?;
-        let path = match name {
-            Some(name) => Folder::named(runs, name)?,
-            None => Folder::numbered(runs, config_file)?,
-        };
-        let folder = Folder(path);
+        let folder = Folder(make(runs, name, config_file)?);
         folder.write_config(config)?;
         Ok(folder)
     }
@@ -37,36 +32,6 @@ impl Folder {
     /// Writes the training file as used.
     pub fn write_config(&self, config: &Config) -> Result<(), Error> {
         files::write_whole(&self.config(), config.to_toml().as_bytes())
-    }
-
-    fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
-        let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) && !name.starts_with('.') && !name.is_empty();
-        if !plain {
-            let expected = "a name of letters, digits, `-`, `_` and `.` that begins with none of the last is needed".to_owned();
-            return Err(Error::Flag { flag: "--name", value: format!("{name:?}"), expected });
-        }
-        let path = runs.join(name);
-        match std::fs::create_dir(&path) {
-            Ok(()) => Ok(path),
-            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
-                let expected = format!("{} exists and is never overwritten: choose another name", path.display());
-                Err(Error::Flag { flag: "--name", value: name.to_owned(), expected })
-            }
-            Err(error) => Err(Error::write(&path)(error)),
-        }
-    }
-
-    fn numbered(runs: &Path, config_file: &Path) -> Result<PathBuf, Error> {
-        let stem = config_file.file_stem().map_or_else(|| "run".into(), |stem| stem.to_string_lossy());
-        let mut number = 1u32;
-        loop {
-            let path = runs.join(format!("{stem}-{number}"));
-            match std::fs::create_dir(&path) {
-                Ok(()) => return Ok(path),
-                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
-                Err(error) => return Err(Error::write(&path)(error)),
-            }
-        }
     }
 
     /// The folder itself.
@@ -112,5 +77,44 @@ impl Folder {
     /// The same as a page to look at.
     pub fn page(&self) -> PathBuf {
         self.0.join("report.html")
+    }
+}
+
+/// Makes `runs/name`, or `runs/<training file's name>` with the first free number.
+pub fn make(runs: &Path, name: Option<&str>, config_file: &Path) -> Result<PathBuf, Error> {
+    std::fs::create_dir_all(runs).map_err(Error::write(runs))?;
+    match name {
+        Some(name) => named(runs, name),
+        None => numbered(runs, config_file),
+    }
+}
+
+fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
+    let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) && !name.starts_with('.') && !name.is_empty();
+    if !plain {
+        let expected = "a name of letters, digits, `-`, `_` and `.` that begins with none of the last is needed".to_owned();
+        return Err(Error::Flag { flag: "--name", value: format!("{name:?}"), expected });
+    }
+    let path = runs.join(name);
+    match std::fs::create_dir(&path) {
+        Ok(()) => Ok(path),
+        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+            let expected = format!("{} exists and is never overwritten: choose another name", path.display());
+            Err(Error::Flag { flag: "--name", value: name.to_owned(), expected })
+        }
+        Err(error) => Err(Error::write(&path)(error)),
+    }
+}
+
+fn numbered(runs: &Path, config_file: &Path) -> Result<PathBuf, Error> {
+    let stem = config_file.file_stem().map_or_else(|| "run".into(), |stem| stem.to_string_lossy());
+    let mut number = 1u32;
+    loop {
+        let path = runs.join(format!("{stem}-{number}"));
+        match std::fs::create_dir(&path) {
+            Ok(()) => return Ok(path),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
+            Err(error) => return Err(Error::write(&path)(error)),
+        }
     }
 }

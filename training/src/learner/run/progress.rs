@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::metrics_file::MetricsFile;
+use super::events_file::EventsFile;
+use super::metrics_file::{HEAD, MetricsFile};
 use super::window::Window;
 use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
@@ -62,6 +63,8 @@ pub struct Progress {
     shown: (Instant, u64, u64),
     display: Box<dyn Display>,
     metrics: MetricsFile,
+    /// The same rows for TensorBoard.
+    events: Option<EventsFile>,
     /// Files that could not be written when that was last tried.
     unwritten: Vec<PathBuf>,
 }
@@ -88,8 +91,15 @@ impl Progress {
             shown: (Instant::now(), 0, 0),
             display,
             metrics,
+            events: None,
             unwritten: Vec::new(),
         }
+    }
+
+    /// Writes the rows from here on to a TensorBoard event file in `folder` too.
+    pub fn write_events(&mut self, folder: &Path) -> Result<(), Error> {
+        self.events = Some(EventsFile::create(folder, self.row_steps)?);
+        Ok(())
     }
 
     /// Fraction of the budget that is spent: of time or of steps, whichever is larger.
@@ -233,6 +243,10 @@ impl Progress {
             mean(value, 4),
         );
         self.metrics.append(&row)?;
+        if let Some(events) = &mut self.events {
+            let (file, written) = (events.path().to_owned(), events.append(HEAD, &row));
+            self.note(&file, written);
+        }
         self.sums = Update::default();
         self.validated = None;
         (self.row_seconds, self.row_steps, self.row_updates) = (self.seconds(), self.env_steps, self.updates);

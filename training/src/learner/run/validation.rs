@@ -61,7 +61,7 @@ pub struct Validations {
 /// Validation routes, and the best policy so far.
 pub struct Validation {
     settings: config::Validation,
-    scenario: Scenario,
+    scenario: Arc<Scenario>,
     world: Arc<World>,
     /// Validations made.
     n_made: u64,
@@ -72,7 +72,7 @@ pub struct Validation {
 impl Validation {
     /// Of the validation routes of `scenario`, whose world is `world`. A benchmark without any, or with one of the
     /// routes trained on, is an error.
-    pub fn new(settings: config::Validation, scenario: Scenario, world: Arc<World>, training: &Scenario) -> Result<Validation, Error> {
+    pub fn new(settings: config::Validation, scenario: Arc<Scenario>, world: Arc<World>, training: &Scenario) -> Result<Validation, Error> {
         let wrong = |expected: String| Error::Flag { flag: "validation.benchmark", value: settings.benchmark.clone(), expected };
         let routes = scenario.split_names(Split::Validation);
         if routes.is_empty() {
