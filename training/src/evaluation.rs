@@ -2,6 +2,7 @@
 
 pub mod certificate; // routes shown to be possible
 pub mod groups; // routes that have something in common
+pub mod possible; // success over the starts that are shown to be possible
 pub mod page; // a report as an HTML page
 pub mod policies; // what chooses the actions: learned, pure pursuit, random
 pub mod report; // figures of an evaluation
@@ -11,7 +12,8 @@ mod table; // a report as text
 
 use std::sync::Arc;
 
-use offtrack::layout::Ended;
+use offtrack::cpu::reset::drawn_start;
+use offtrack::layout::{Ended, Start};
 use offtrack::route::Route;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
@@ -145,8 +147,7 @@ impl Evaluation<'_> {
     /// The report of these episodes, which stand as [`Evaluation::drive`] gives them; `policy` is its name.
     pub fn summarised(&self, policy: &str, finished: &[Episode]) -> Report {
         let Evaluation { scenario, split, episodes, seed, device, .. } = *self;
-        let all: Vec<Evaluated> = scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
-        let routes: Vec<Evaluated> = scenario.split(split).iter().map(|&route| all[route as usize]).collect();
+        let routes = self.routes();
         let own_lane = self.own_lane_suffices(&routes);
         let chunks = || own_lane.iter().zip(finished.chunks(episodes));
         let of_routes = |suffices: bool| {
@@ -167,9 +168,22 @@ impl Evaluation<'_> {
             own_lane_suffices: of_routes(true),
             needs_deviation: of_routes(false),
             certified: None,
+            possible: None,
             groups: Groups::of(&routes, finished, scenario.step),
             routes: route_reports.collect(),
         }
+    }
+
+    /// The routes of the split, in its order.
+    fn routes(&self) -> Vec<Evaluated<'_>> {
+        let Evaluation { scenario, split, .. } = *self;
+        let all: Vec<Evaluated> = scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
+        scenario.split(split).iter().map(|&route| all[route as usize]).collect()
+    }
+
+    /// The route of an episode as an index of the world, and its start.
+    fn start(&self, episode: usize) -> (u32, Start) {
+        (self.scenario.split(self.split)[episode / self.episodes], drawn_start(self.seed, episode as u32, 0))
     }
 
     /// Whether the own lane suffices on each route. The kerbs of one roundabout a thread are held.

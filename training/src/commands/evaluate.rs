@@ -6,7 +6,9 @@ use offtrack::reader;
 use offtrack::scenario::Split;
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::certificate::certified;
+use offtrack_training::evaluation::certificate::attempt::{HOLD, passes};
 use offtrack_training::evaluation::page::Page;
+use offtrack_training::evaluation::possible::to_search;
 use offtrack_training::evaluation::report::{Episode, Report, Summary};
 use offtrack_training::evaluation::{Driven, Evaluation, legend, usual_episodes};
 use offtrack_training::files;
@@ -52,6 +54,14 @@ pub struct Args {
     /// A certificate of `offtrack certify`: success over the routes that it shows to be possible is reported too.
     #[arg(long)]
     certified: Option<PathBuf>,
+    /// Search for actions that complete the own start of each episode that did not arrive, and report success over the
+    /// episodes whose start is so shown to be possible.
+    #[arg(long)]
+    certify: bool,
+    /// With --certify: beam widths (candidates kept at each depth), tried in turn until one arrives, separated by
+    /// commas. The widest search is repeated with a choice at every step.
+    #[arg(long, value_delimiter = ',', default_value = "64,512", requires = "certify")]
+    widths: Vec<usize>,
     #[command(flatten)]
     device: devices::Choice,
 }
@@ -61,6 +71,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if let Some(episodes) = args.episodes.filter(|episodes| !(1..=100_000).contains(episodes)) {
         return Err(Error::Flag { flag: "--episodes", value: episodes.to_string(), expected: "must lie in 1..100000".into() });
     }
+    let passes = passes(&args.widths, HOLD)?;
     let device = args.device.open()?;
     let split = Split::ALL.into_iter().find(|split| split.name() == args.split).unwrap_or(Split::Test);
     let mut scenario = roads::benchmark(&args.benchmark)?;
@@ -89,6 +100,11 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let kept: Vec<&Episode> = chunks.filter(|(route, _)| possible.contains(route)).flat_map(|(_, chunk)| chunk).collect();
         Summary::of(kept.into_iter(), scenario.step)
     });
+    if args.certify {
+        let n_searches = to_search(&finished).count();
+        let bar = progress::Bar::new("certifying", "starts", n_searches);
+        report.possible = Some(evaluation.possible(&finished, &passes, &|| bar.advance())?);
+    }
     if let Some(file) = &args.json {
         files::write_json(file, &report)?;
     }

@@ -7,6 +7,7 @@ use offtrack::layout::Ended;
 use serde::Serialize;
 
 use super::groups::Groups;
+use super::possible::Possible;
 
 /// Routes from which on a table and a page show groups of routes, and the worst routes instead of every one.
 pub const MANY_ROUTES: usize = 100;
@@ -77,6 +78,13 @@ pub struct Summary {
     pub reward_mean: f64,
 }
 
+impl Episode {
+    /// It failed in its first step: the truck starts on or against a kerb, and no action helps.
+    pub fn lost_at_start(&self) -> bool {
+        self.ended.failed() && self.steps == 1
+    }
+}
+
 impl Summary {
     /// The figures of `episodes`, `None` without an episode. A step takes `step` seconds.
     pub fn of<'a>(episodes: impl Iterator<Item = &'a Episode> + Clone, step: f64) -> Option<Summary> {
@@ -102,7 +110,7 @@ impl Summary {
             success_low,
             success_high,
             ends,
-            lost_at_start: episodes.clone().filter(|episode| episode.ended.failed() && episode.steps == 1).count(),
+            lost_at_start: episodes.clone().filter(|episode| episode.lost_at_start()).count(),
             lane_distance_mean: mean(|episode| episode.lane_distance_mean),
             lane_distance_mean_arrived: (0 < n_arrived)
                 .then(|| arrived.clone().map(|episode| episode.lane_distance_mean).sum::<f64>() / n_arrived as f64),
@@ -167,6 +175,9 @@ pub struct Report {
     /// Episodes on the certified routes; `None` without a certificate or without a certified route.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certified: Option<Summary>,
+    /// Episodes whose own start is shown to be possible; `None` where nobody asked for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub possible: Option<Possible>,
     /// Sums by island radius, lane, exit and roundabout.
     pub groups: Groups,
     /// Each route.

@@ -79,6 +79,7 @@ impl Report {
             ("lane own", lane(true), self.own_lane_suffices.as_ref()),
             ("lane wide", lane(false), self.needs_deviation.as_ref()),
             ("certified", "", self.certified.as_ref()),
+            ("possible", "", self.possible.as_ref().and_then(|possible| possible.summary.as_ref())),
             ("all", "", Some(&self.summary)),
         ];
         sections
@@ -98,6 +99,9 @@ impl Report {
             if let Some(note) = note {
                 push_wrapped(&mut text, note, width);
             }
+        }
+        if let Some(possible) = &self.possible {
+            push_wrapped(&mut text, &possible.note(), width);
         }
         if !left_out.is_empty() {
             let names: Vec<String> = left_out.iter().map(|column| column.head.join(" ").trim().replace("- ", "-")).collect();

@@ -1,4 +1,6 @@
+use super::super::certificate::beam::Pass;
 use super::super::groups::Groups;
+use super::super::possible::Possible;
 use super::super::report::tests::episode;
 use super::super::report::{Episode, MANY_ROUTES};
 use super::*;
@@ -25,6 +27,15 @@ fn report() -> Report {
         own_lane_suffices: Some(summary.clone()),
         needs_deviation: Some(summary.clone()),
         certified: Some(summary.clone()),
+        possible: Some(Possible {
+            summary: Some(summary.clone()),
+            searched: 2,
+            found: 1,
+            env_steps: 1_234_567,
+            passes: vec![Pass { width: 512, hold: 3 }],
+            island_radius: Vec::new(),
+            lane: Vec::new(),
+        }),
         groups: Groups { island_radius: group("22 m and more"), lane: group("right"), exit: group("1"), roundabout: group("40m") },
         routes: vec![route(true), route(false)],
     }
@@ -61,6 +72,13 @@ fn every_heading_is_explained_below_the_table() {
 #[test]
 fn failures_are_counted_below_their_line() {
     assert!(report().table(100).contains("  not arrived: 1 timed out, 1 tractor collided, 1 trailer collided\n"));
+}
+
+#[test]
+fn the_searches_for_possible_starts_are_told_below_the_sums() {
+    let table = report().table(100);
+    assert!(table.lines().any(|line| line.starts_with("possible ") && line.contains("692/695")), "{table}");
+    assert!(table.contains("possible: the episodes that arrived and those whose own start a search completed, 1 of the 2"), "{table}");
 }
 
 /// The same with many routes on as many roundabouts, of which every `one_in`th failed once.
