@@ -24,6 +24,8 @@ pub const FILES: &[(&str, &str)] = embedded![
     "distributions/mixed.toml",
     "distributions/wide.toml",
     "random2026.toml",
+    "random2026-1000.toml",
+    "random2026-10000.toml",
     "random2026-training.toml",
     "roundabouts/16m.toml",
     "roundabouts/20m.toml",
