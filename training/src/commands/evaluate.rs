@@ -5,19 +5,23 @@ use std::path::{Path, PathBuf};
 use offtrack::reader;
 use offtrack::scenario::Split;
 use offtrack_training::error::Error;
-use offtrack_training::evaluation::certificate::certified;
 use offtrack_training::evaluation::certificate::attempt::{HOLD, passes};
+use offtrack_training::evaluation::certificate::certified;
+use offtrack_training::evaluation::failures::Example;
 use offtrack_training::evaluation::page::Page;
 use offtrack_training::evaluation::possible::to_search;
 use offtrack_training::evaluation::report::{Episode, Report, Summary};
-use offtrack_training::evaluation::{Driven, Evaluation, legend, usual_episodes};
+use offtrack_training::evaluation::{Driven, Evaluation, Sequences, legend, usual_episodes};
 use offtrack_training::files;
 use serde_json::Value;
 
-use super::{devices, policies, progress, roads, terminal};
+use super::{devices, policies, progress, record, roads, terminal};
 
 /// Most bytes of a run's report and of its figures.
 const RUN_LIMIT: u64 = 64 << 20;
+
+/// Most causes of failure of which an example is filmed.
+const FILMS: usize = 5;
 
 /// Evaluate a policy on a benchmark's routes.
 #[derive(Debug, clap::Args)]
@@ -54,6 +58,9 @@ pub struct Args {
     /// A certificate of `offtrack certify`: success over the routes that it shows to be possible is reported too.
     #[arg(long)]
     certified: Option<PathBuf>,
+    /// Write films to this folder, of one episode of each of the five commonest causes of failure.
+    #[arg(long)]
+    films: Option<PathBuf>,
     /// Search for actions that complete the own start of each episode that did not arrive, and report success over the
     /// episodes whose start is so shown to be possible.
     #[arg(long)]
@@ -90,7 +97,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let possible = args.certified.as_ref().map(|file| certified(file, &scenario, &world, scenario.split(split))).transpose()?;
     let (seed, record) = (args.seed, args.html.is_some());
     let evaluation = Evaluation { scenario: &scenario, world: &world, split, episodes, seed, record, device: &device };
-    let Driven { episodes: finished, tracks } = {
+    let Driven { episodes: finished, tracks, sequences } = {
         let bar = progress::Bar::new("evaluating", "episodes", episodes * n_routes);
         evaluation.drive(policy.as_mut(), &mut |done, all| bar.set(done, all))?
     };
@@ -103,7 +110,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if args.certify {
         let n_searches = to_search(&finished).count();
         let bar = progress::Bar::new("certifying", "starts", n_searches);
-        report.possible = Some(evaluation.possible(&finished, &passes, &|| bar.advance())?);
+        let (possible, is_possible) = evaluation.possible(&finished, &passes, &|| bar.advance())?;
+        report.failures = evaluation.failures(&finished, Some(&is_possible));
+        report.possible = Some(possible);
     }
     if let Some(file) = &args.json {
         files::write_json(file, &report)?;
@@ -111,7 +120,26 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if let Some(file) = &args.html {
         Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run, metrics }.write(file)?;
     }
+    if let Some(folder) = &args.films {
+        write_films(folder, &evaluation, &report, &sequences)?;
+    }
     files::print(&printed(&report, episodes))
+}
+
+/// Films an example of each of the commonest causes of failure: `1-trailer-on-the-island.gif` and the like.
+fn write_films(folder: &Path, evaluation: &Evaluation, report: &Report, sequences: &Sequences) -> Result<(), Error> {
+    std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
+    let causes = &report.failures[..report.failures.len().min(FILMS)];
+    let indices: Vec<usize> = causes.iter().map(|cause| cause.example.index).collect();
+    let &Evaluation { scenario, world, seed, .. } = evaluation;
+    for (n, (cause, track)) in causes.iter().zip(evaluation.repeated(sequences, &indices)?).enumerate() {
+        let Example { route: name, episode, .. } = &cause.example;
+        let (place, route) = scenario.routes().find(|(_, route)| route.name == *name).expect("a report's routes are the scenario's");
+        let of = record::Of { scenario, world, roundabout: &scenario.places[place].roundabout, route, policy: &report.policy, seed };
+        let file = folder.join(format!("{}-{}.gif", n + 1, cause.cause.replace(' ', "-")));
+        of.write_film(&file, *episode, evaluation.episodes, track)?;
+    }
+    Ok(())
 }
 
 /// What was evaluated, and the table.

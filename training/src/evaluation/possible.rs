@@ -58,8 +58,9 @@ pub fn to_search(finished: &[Episode]) -> impl Iterator<Item = usize> {
 
 impl Evaluation<'_> {
     /// Searches the starts of the episodes that did not arrive; the episodes stand as [`Evaluation::drive`] gives them.
-    /// Every sequence found is driven again. `done` is called after each search, from any thread.
-    pub fn possible(&self, finished: &[Episode], passes: &[Pass], done: &(dyn Fn() + Sync)) -> Result<Possible, Error> {
+    /// Every sequence found is driven again. `done` is called after each search, from any thread. Given beside the
+    /// figures is whether each episode's start is shown to be possible.
+    pub fn possible(&self, finished: &[Episode], passes: &[Pass], done: &(dyn Fn() + Sync)) -> Result<(Possible, Vec<bool>), Error> {
         let searched: Vec<usize> = to_search(finished).collect();
         let starts: Vec<_> = searched.iter().map(|&index| self.start(index)).collect();
         let searches = attempts(self.world, &starts, passes, done)?;
@@ -78,7 +79,7 @@ impl Evaluation<'_> {
         let kept = |(episode, &possible)| if possible { Some(episode) } else { None };
         let possible: Vec<Vec<&Episode>> = chunks.map(|(chunk, possible)| chunk.iter().zip(possible).filter_map(kept).collect()).collect();
         let step = self.scenario.step;
-        Ok(Possible {
+        let figures = Possible {
             summary: Summary::of(possible.iter().flatten().copied(), step),
             searched: searched.len(),
             found: ended.iter().filter(|&&ended| ended == Ended::Arrived).count(),
@@ -86,7 +87,8 @@ impl Evaluation<'_> {
             passes: passes.to_vec(),
             island_radius: groups::by(&routes, &possible, groups::island_radius, step),
             lane: groups::by(&routes, &possible, groups::lane, step),
-        })
+        };
+        Ok((figures, is_possible))
     }
 }
 
@@ -98,12 +100,12 @@ mod tests {
     use offtrack::world::World;
 
     use super::super::Driven;
-    use super::super::policies::{PurePursuit, UniformRandom};
+    use super::super::policies::{Policy, PurePursuit, UniformRandom};
     use super::*;
     use crate::device::Device;
 
     /// A route that a narrow search completes, with the largest start offset given \[m], and what is found of `policy`.
-    fn possible(start_offset: f64, policy: &mut dyn super::super::policies::Policy, pass: Pass) -> (Vec<Episode>, Possible) {
+    fn possible(start_offset: f64, policy: &mut dyn Policy, pass: Pass) -> (Vec<Episode>, Possible) {
         let mut scenario = Scenario::named("attard2023").unwrap();
         scenario.retain(|_, route| route.name == "20m/E-right-1");
         scenario.start_offset = start_offset;
@@ -112,7 +114,7 @@ mod tests {
         let evaluation =
             Evaluation { scenario: &scenario, world: &world, split: Split::Test, episodes: 6, seed: 3, record: false, device: &device };
         let Driven { episodes, .. } = evaluation.drive(policy, &mut |_, _| {}).unwrap();
-        let possible = evaluation.possible(&episodes, &[pass], &|| {}).unwrap();
+        let (possible, _) = evaluation.possible(&episodes, &[pass], &|| {}).unwrap();
         (episodes, possible)
     }
 
