@@ -27,6 +27,7 @@ use crate::geometry::{Curve, Outline};
 use crate::reader::{Error, Reader};
 use crate::route::{Lane, LeavesWorld, Route, waypoints};
 use crate::shipped::{Kind, Source};
+pub use kerb::Kerb;
 use lane::{Lanes, RouteLine};
 use ring::Ring;
 use roundabout_keys::{Arm, Written};
@@ -168,6 +169,22 @@ impl Roundabout {
             Gutter::Drivable => self.kerbs.clone(),
             Gutter::Solid => self.kerbs.offset(self.ring.gutter),
         }
+    }
+
+    /// The kerb whose face is nearest to `p`.
+    pub fn nearest_kerb(&self, p: DVec2) -> Kerb {
+        let all = kerb::order(&self.arms).zip(&self.kerbs.loops).map(|(kerb, face)| (face.distance(p), kerb));
+        all.fold((f64::INFINITY, Kerb::Outer), |best, other| if other.0 < best.0 { other } else { best }).1
+    }
+
+    /// Widths of a route's lane: on the entry arm, in the ring, on the exit arm \[m].
+    pub fn lane_widths(&self, route: &Route) -> [f64; 3] {
+        [self.arms[route.entry].lane_width, self.ring.lane_width, self.arms[self.exit_arm(route)].lane_width]
+    }
+
+    /// Index of the arm that a route leaves by.
+    pub fn exit_arm(&self, route: &Route) -> usize {
+        (route.entry + route.exit as usize) % self.arms.len()
     }
 
     /// The centre lines of all lanes: those around the ring, the innermost first, then for every arm those that enter,

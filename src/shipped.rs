@@ -26,6 +26,8 @@ pub const FILES: &[(&str, &str)] = embedded![
     "random2026.toml",
     "random2026-as-run.toml",
     "random2026-as-run-training.toml",
+    "random2026-1000.toml",
+    "random2026-10000.toml",
     "random2026-training.toml",
     "roundabouts/16m.toml",
     "roundabouts/20m.toml",

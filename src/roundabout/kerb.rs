@@ -12,6 +12,23 @@ use super::roundabout_keys::Arm;
 use crate::geometry::{Curve, Outline, Piece, rounded, wrapped};
 use crate::reader::{Error, Reader};
 
+/// What a kerb belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kerb {
+    /// The outer boundary: from arm to arm, and the arms' ends.
+    Outer,
+    /// The central island.
+    Island,
+    /// The splitter island of the arm with this index.
+    Splitter(usize),
+}
+
+/// The kerbs in the order of the loops that [`kerbs`] makes.
+pub(super) fn order(arms: &[Arm]) -> impl Iterator<Item = Kerb> {
+    let splitters = arms.iter().enumerate().filter(|(_, arm)| !arm.splitter.is_empty()).map(|(index, _)| Kerb::Splitter(index));
+    [Kerb::Outer, Kerb::Island].into_iter().chain(splitters)
+}
+
 /// The kerb faces as an outline. Fails if they cross each other.
 pub(super) fn kerbs(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<Outline, Error> {
     let corners: Vec<Curve> = (0..arms.len()).map(|arm| corner(reader, ring, arms, arm)).collect::<Result<_, _>>()?;

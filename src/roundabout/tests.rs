@@ -67,6 +67,42 @@ fn a_route_has_the_requested_approach_and_departure() {
 }
 
 #[test]
+fn the_kerb_nearest_to_a_point_is_named() {
+    // Splitter islands on the arms N and S, the second and the fourth.
+    let corners = [(24.0, -0.6), (34.0, 0.0), (24.0, 0.6)].map(|(a, o)| format!("{{ along = {a:.1}, offset = {o:.1}, radius = 0.3 }}"));
+    let splitter = format!("length = 100.0\nsplitter = [{}]", corners.join(", "));
+    let text = plain();
+    let mut arms: Vec<String> = text.split("length = 100.0").map(str::to_owned).collect();
+    let rest = arms.split_off(1);
+    let filled = rest
+        .iter()
+        .enumerate()
+        .map(|(index, part)| if index % 2 == 1 { format!("{splitter}{part}") } else { format!("length = 100.0{part}") });
+    let roundabout = read(&(arms.concat() + &filled.collect::<String>())).unwrap();
+    for (x, y, kerb) in [
+        (14.0, 0.0, Kerb::Island),
+        (0.0, 16.0, Kerb::Island),
+        (18.0, 18.0, Kerb::Outer),
+        (50.0, 8.0, Kerb::Outer),
+        (0.0, 25.5, Kerb::Splitter(1)),
+        (0.5, -25.5, Kerb::Splitter(3)),
+    ] {
+        assert_eq!(roundabout.nearest_kerb(DVec2::new(x, y)), kerb, "({x}, {y})");
+    }
+}
+
+#[test]
+fn a_routes_lane_has_the_widths_of_its_arms_and_of_the_ring() {
+    let text = plain().replace("name = \"N\"", "name = \"N\"\nlane_width = 3.5").replace("name = \"W\"", "name = \"W\"\nlane_width = 3.6");
+    let roundabout = read(&text).unwrap();
+    let routes = roundabout.routes(40.0, 35.0, 2.0).unwrap();
+    let widths = |name: &str| roundabout.lane_widths(routes.iter().find(|route| route.name == format!("plain/{name}")).unwrap());
+    assert_eq!(widths("N-right-1"), [3.5, 3.7, 3.6]);
+    assert_eq!(widths("E-left-4"), [3.7, 3.7, 3.7]);
+    assert_eq!(widths("W-left-3"), [3.6, 3.7, 3.5]);
+}
+
+#[test]
 fn an_approach_longer_than_the_arm_is_refused_with_the_longest_that_fits() {
     let roundabout = read(&plain()).unwrap();
     let refused = roundabout.routes(300.0, 35.0, 2.0).unwrap_err();

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use offtrack::procedural::Distribution;
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::scenario::Scenario;
-use offtrack::shipped::{FILES, Kind};
+use offtrack::shipped::{FILES, Kind, Source};
 use offtrack::vehicle::Vehicle;
 
 fn scenarios() -> PathBuf {
@@ -31,15 +31,47 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
     let mut files = BTreeMap::new();
     on_disk(&scenarios(), Path::new(""), &mut files);
     let embedded: BTreeMap<String, String> = FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
-    assert_eq!((files.len(), FILES.len()), (17, 17), "seven benchmarks, five roundabouts, three vehicles, two distributions");
+    assert_eq!((files.len(), FILES.len()), (19, 19), "nine benchmarks, five roundabouts, three vehicles, two distributions");
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [7, 5, 3, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [9, 5, 3, 2]);
+}
+
+/// Benchmarks of so many roads that they are not drawn here.
+const LARGE: [&str; 2] = ["random2026-1000", "random2026-10000"];
+
+#[test]
+fn the_large_benchmarks_are_random2026_with_other_test_roads_that_no_split_shares() {
+    let table = |name: &str| Source::named(Kind::Benchmark, name).unwrap().text().unwrap().parse::<toml::Table>().unwrap();
+    let range = |table: &toml::Table, split: &str| -> Option<(i64, i64)> {
+        let range = table["procedural"].get(split)?.as_array()?;
+        Some((range[0].as_integer()?, range[1].as_integer()?))
+    };
+    let small = table("random2026");
+    let mut ranges: Vec<(i64, i64)> = ["train", "validation", "test"].iter().filter_map(|split| range(&small, split)).collect();
+    for (name, n_roads) in LARGE.into_iter().zip([1000, 10_000]) {
+        let mut large = table(name);
+        let (from, to) = range(&large, "test").unwrap();
+        assert_eq!(to - from, n_roads);
+        assert!(ranges.iter().all(|&(first, end)| end <= from || to <= first), "{name}: {ranges:?}");
+        ranges.push((from, to));
+        // Without the roads the files are the same.
+        let procedural = large["procedural"].as_table_mut().unwrap();
+        assert_eq!(procedural.len(), 4);
+        procedural.remove("test");
+        for key in ["train", "validation", "test", "count"] {
+            procedural.insert(key.to_owned(), small["procedural"][key].clone());
+        }
+        assert_eq!(large, small);
+    }
 }
 
 #[test]
 fn every_name_gives_what_its_file_gives() {
-    for name in Kind::Benchmark.names() {
+    // The two with thousands of roads take minutes; the next test reads them as text.
+    let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
+    assert_eq!(benchmarks.len(), 7);
+    for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();
         assert_eq!(format!("{named:?}"), format!("{read:?}"));

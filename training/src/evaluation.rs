@@ -1,8 +1,11 @@
 //! Evaluates a policy: a number of episodes on every route of a split, every one counted.
 
 pub mod certificate; // routes shown to be possible
+pub mod failures; // why episodes did not arrive
 pub mod groups; // routes that have something in common
+pub mod possible; // success over the starts that are shown to be possible
 pub mod page; // a report as an HTML page
+mod part; // entry, ring and exit of a route
 pub mod policies; // what chooses the actions: learned, pure pursuit, random
 pub mod report; // figures of an evaluation
 mod running; // an episode under way
@@ -12,7 +15,8 @@ mod table; // a report as text
 
 use std::sync::Arc;
 
-use offtrack::layout::Ended;
+use offtrack::cpu::reset::drawn_start;
+use offtrack::layout::{Ended, Start};
 use offtrack::route::Route;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
@@ -25,10 +29,11 @@ use rayon::prelude::*;
 use crate::device::Device;
 use crate::error::Error;
 use groups::{Evaluated, Groups};
+use part::LaneWidths;
 use policies::Policy;
 use report::{Episode, Report, RouteReport, Summary};
 use running::Running;
-use shown::{MOST_EPISODES, shown};
+use shown::shown;
 
 pub use table::legend;
 
@@ -65,6 +70,8 @@ pub struct Driven {
     pub episodes: Vec<Episode>,
     /// If recorded, every state of those that a page shows; `env` is an index into `episodes`.
     pub tracks: Vec<Track>,
+    /// The actions of each, with which it can be driven again.
+    pub sequences: Sequences,
 }
 
 impl Evaluation<'_> {
@@ -77,17 +84,15 @@ impl Evaluation<'_> {
     /// Drives every episode. `progress` is called with the number of finished episodes and the number of all, after
     /// each step that finished one.
     ///
-    /// Of a large evaluation no states are held while the policy drives, only its actions. The episodes to be shown are
-    /// chosen once it is known which failed, and recorded as all trucks repeat these actions: the same actions from the
-    /// same start give the same states, to the last bit.
+    /// No states are held while the policy drives, only its actions. The episodes to be shown are chosen once it is
+    /// known which failed, and recorded as they are driven again.
     pub fn drive(&self, policy: &mut dyn Policy, progress: &mut dyn FnMut(usize, usize)) -> Result<Driven, Error> {
         let mut simulator = self.simulator()?;
         let (world, n_episodes) = (self.world, simulator.n_envs());
         let rig = &world.params.rig;
+        let lanes: Vec<LaneWidths> = self.routes().iter().map(|(_, place, route)| LaneWidths::of(self.scenario, place, route)).collect();
         let mut running: Vec<Running> = simulator.batch().truck.iter().map(|truck| Running::new(rig, truck)).collect();
-        let is_small = n_episodes <= MOST_EPISODES;
-        let mut recorder = Recorder::new(world, simulator.batch(), if self.record && is_small { 0..n_episodes } else { 0..0 });
-        let mut sequences = Sequences(if self.record && !is_small { vec![Vec::new(); n_episodes] } else { Vec::new() });
+        let mut sequences = Sequences(vec![Vec::new(); n_episodes]);
         let mut actions = Vec::new();
         let mut finished: Vec<Option<Episode>> = vec![None; n_episodes];
         let mut n_finished = 0;
@@ -97,9 +102,8 @@ impl Evaluation<'_> {
             sequences.add(&actions, &finished);
             simulator.step(&actions)?;
             let batch = simulator.batch();
-            recorder.follow(world, batch);
             for (env, (running, finished)) in running.iter_mut().zip(&mut finished).enumerate() {
-                if finished.is_none() && running.follow(rig, batch, env) {
+                if finished.is_none() && running.follow(rig, &lanes[env / self.episodes], batch, env) {
                     *finished = Some(running.finish(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running)));
                     n_finished += 1;
                 }
@@ -112,8 +116,8 @@ impl Evaluation<'_> {
         simulator.wait()?;
         drop(simulator);
         let episodes: Vec<Episode> = finished.into_iter().flatten().collect();
-        let tracks = if self.record && !is_small { self.repeated(&sequences, &shown(&episodes))? } else { recorder.finish() };
-        Ok(Driven { episodes, tracks })
+        let tracks = if self.record { self.repeated(&sequences, &shown(&episodes))? } else { Vec::new() };
+        Ok(Driven { episodes, tracks, sequences })
     }
 
     /// One truck an episode, at its start.
@@ -128,26 +132,32 @@ impl Evaluation<'_> {
         Ok(Simulator::on(device.engine.clone(), world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?)
     }
 
-    /// Records the episodes at these indices as all trucks repeat their actions.
-    fn repeated(&self, sequences: &Sequences, indices: &[usize]) -> Result<Vec<Track>, Error> {
-        let mut simulator = self.simulator()?;
-        let mut recorder = Recorder::new(self.world, simulator.batch(), indices.iter().copied());
+    /// Records the episodes at these indices as they are driven again: the same actions from the same start give the
+    /// same states, to the last bit. `env` of a track is the episode's index.
+    pub fn repeated(&self, sequences: &Sequences, indices: &[usize]) -> Result<Vec<Track>, Error> {
+        if indices.is_empty() {
+            return Ok(Vec::new());
+        }
+        let (routes, starts): (Vec<u32>, Vec<Start>) = indices.iter().map(|&index| self.start(index)).unzip();
+        let engine = self.device.engine.clone();
+        let mut simulator = Simulator::on(engine, self.world.clone(), indices.len(), self.seed, RouteChoice::Fixed(routes))?;
+        simulator.reset_from(&starts)?;
+        let mut recorder = Recorder::new(self.world, simulator.batch(), 0..indices.len());
         for step in 0.. {
             if !recorder.is_running() {
                 break;
             }
-            simulator.step(&sequences.at(step))?;
+            simulator.step(&sequences.at(step, indices))?;
             recorder.follow(self.world, simulator.batch());
         }
         simulator.wait()?;
-        Ok(recorder.finish())
+        Ok(recorder.finish().into_iter().zip(indices).map(|(track, &env)| Track { env, ..track }).collect())
     }
 
     /// The report of these episodes, which stand as [`Evaluation::drive`] gives them; `policy` is its name.
     pub fn summarised(&self, policy: &str, finished: &[Episode]) -> Report {
         let Evaluation { scenario, split, episodes, seed, device, .. } = *self;
-        let all: Vec<Evaluated> = scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
-        let routes: Vec<Evaluated> = scenario.split(split).iter().map(|&route| all[route as usize]).collect();
+        let routes = self.routes();
         let own_lane = self.own_lane_suffices(&routes);
         let chunks = || own_lane.iter().zip(finished.chunks(episodes));
         let of_routes = |suffices: bool| {
@@ -168,9 +178,23 @@ impl Evaluation<'_> {
             own_lane_suffices: of_routes(true),
             needs_deviation: of_routes(false),
             certified: None,
+            possible: None,
+            failures: self.failures(finished, None),
             groups: Groups::of(&routes, finished, scenario.step),
             routes: route_reports.collect(),
         }
+    }
+
+    /// The routes of the split, in its order.
+    fn routes(&self) -> Vec<Evaluated<'_>> {
+        let Evaluation { scenario, split, .. } = *self;
+        let all: Vec<Evaluated> = scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
+        scenario.split(split).iter().map(|&route| all[route as usize]).collect()
+    }
+
+    /// The route of an episode as an index of the world, and its start.
+    fn start(&self, episode: usize) -> (u32, Start) {
+        (self.scenario.split(self.split)[episode / self.episodes], drawn_start(self.seed, episode as u32, 0))
     }
 
     /// Whether the own lane suffices on each route. The kerbs of one roundabout a thread are held.
@@ -187,8 +211,9 @@ impl Evaluation<'_> {
     }
 }
 
-/// The actions of each episode, `[episodes][steps]`; of none where they are not needed.
-struct Sequences(Vec<Vec<u32>>);
+/// The actions of each episode, `[episodes][steps]`.
+#[derive(Debug)]
+pub struct Sequences(Vec<Vec<u32>>);
 
 impl Sequences {
     /// Adds the next action of the episodes that have not finished.
@@ -200,8 +225,8 @@ impl Sequences {
         }
     }
 
-    /// The action of each episode at `step`; of one that has ended, any.
-    fn at(&self, step: usize) -> Vec<u32> {
-        self.0.iter().map(|sequence| sequence.get(step).copied().unwrap_or(0)).collect()
+    /// The action at `step` of each of these episodes; of one that has ended, any.
+    fn at(&self, step: usize, indices: &[usize]) -> Vec<u32> {
+        indices.iter().map(|&index| self.0[index].get(step).copied().unwrap_or(0)).collect()
     }
 }

@@ -28,8 +28,13 @@ pub fn reset(world: &World, row: &mut Row) {
 
 /// Puts the truck at the start of `episode`, at a pose drawn for it.
 pub fn begin(world: &World, row: &mut Row, episode: u32) {
-    let [offset, heading, ..] = random::words(row.seed, row.env, episode, Draw::Pose as u32).map(random::signed_unit);
-    begin_from(world, row, episode, &Start { offset, heading });
+    begin_from(world, row, episode, &drawn_start(row.seed, row.env, episode));
+}
+
+/// The start that is drawn for an episode of truck `env`.
+pub fn drawn_start(seed: u32, env: u32, episode: u32) -> Start {
+    let [offset, heading, ..] = random::words(seed, env, episode, Draw::Pose as u32).map(random::signed_unit);
+    Start { offset, heading }
 }
 
 /// The same at a stated pose.

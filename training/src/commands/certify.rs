@@ -6,21 +6,18 @@
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
-use offtrack::layout::{Ended, Start};
+use offtrack::layout::Start;
 use offtrack::procedural;
 use offtrack::scenario::Split;
-use offtrack::world::World;
 
 use offtrack_training::error::Error;
-use offtrack_training::evaluation::certificate::beam::{self, Outcome, Pass};
-use offtrack_training::evaluation::certificate::file::{self, Certificate, CertifiedRoute, Found};
+use offtrack_training::evaluation::certificate::attempt::{HOLD, attempt, passes};
+use offtrack_training::evaluation::certificate::file::{Certificate, CertifiedRoute, Found};
 use offtrack_training::evaluation::certificate::verify;
 use offtrack_training::evaluation::policies;
 use offtrack_training::files;
-use offtrack_training::policy::LearnedPolicy;
 
 use super::{progress, roads};
 
@@ -53,7 +50,7 @@ pub struct Args {
     #[arg(long, value_delimiter = ',', default_value = "64,512,4096")]
     widths: Vec<usize>,
     /// Steps that each chosen action is held for. The widest search is repeated with 1.
-    #[arg(long, default_value_t = 3)]
+    #[arg(long, default_value_t = HOLD)]
     hold: usize,
     /// Write the certificate to this file as JSON, after every route.
     #[arg(long)]
@@ -65,9 +62,6 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
-    if let Some(width) = args.widths.iter().find(|width| !(1..=1 << 18).contains(*width)) {
-        return Err(Error::Flag { flag: "--widths", value: width.to_string(), expected: "must lie in 1..262144".into() });
-    }
     if !(1..=50).contains(&args.hold) {
         return Err(Error::Flag { flag: "--hold", value: args.hold.to_string(), expected: "must lie in 1..50".into() });
     }
@@ -95,6 +89,7 @@ fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
 
 /// Searches every route from every start.
 fn certify(args: &Args) -> Result<(), Error> {
+    let passes = passes(&args.widths, args.hold)?;
     let mut scenario = roads::benchmark(args.benchmark.as_deref().unwrap_or("attard2023"))?;
     let splits: Vec<Split> = Split::ALL.into_iter().filter(|split| args.split == "all" || args.split == split.name()).collect();
     if !args.route.is_empty() {
@@ -111,7 +106,6 @@ fn certify(args: &Args) -> Result<(), Error> {
         let expected = format!("the benchmark {} has no such routes", scenario.name);
         return Err(Error::Flag { flag: "--split", value: args.split.clone(), expected });
     }
-    let passes = passes(&args.widths, args.hold);
     let name = policy.as_ref().map(|policy| policy.name.clone());
     let mut certificate = Certificate::new(&scenario, &world, &args.split, name, passes.clone(), &STARTS);
     let started = Instant::now();
@@ -138,46 +132,6 @@ fn certify(args: &Args) -> Result<(), Error> {
     let path = args.json.as_deref().unwrap_or(Path::new("the search's result"));
     verify::verify(&certificate, &world, path, |_| true)?;
     files::print(&table(&certificate))
-}
-
-/// The searches to make in turn: the widths as given, then the widest with a choice at every step.
-fn passes(widths: &[usize], hold: usize) -> Vec<Pass> {
-    let mut passes: Vec<Pass> = widths.iter().map(|&width| Pass { width, hold }).collect();
-    if let Some(&width) = widths.iter().max()
-        && 1 < hold
-    {
-        passes.push(Pass { width, hold: 1 });
-    }
-    passes
-}
-
-/// Searches from one start until a pass arrives or all have been made. Without an arrival the result is the pass with
-/// the most progress.
-fn attempt(world: &Arc<World>, route: u32, start: &Start, passes: &[Pass], policy: Option<&LearnedPolicy>) -> Result<Found, Error> {
-    let mut env_steps = 0;
-    let mut best: Option<(Pass, Outcome)> = None;
-    for &pass in passes {
-        let outcome = beam::search(world, route, start, pass, policy)?;
-        env_steps += outcome.env_steps;
-        let arrived = outcome.ended == Ended::Arrived;
-        let further = |best: &Outcome| (best.progress, best.steps) < (outcome.progress, outcome.steps);
-        if arrived || best.as_ref().is_none_or(|(_, best)| further(best)) {
-            best = Some((pass, outcome));
-        }
-        if arrived {
-            break;
-        }
-    }
-    let (pass, outcome) = best.expect("there is a width, so there was a pass");
-    Ok(Found {
-        ended: outcome.ended.name().to_owned(),
-        progress: (outcome.progress * 1e3).round() / 1e3,
-        steps: outcome.steps,
-        width: pass.width,
-        hold: pass.hold,
-        env_steps,
-        actions: file::runs(&outcome.actions),
-    })
 }
 
 /// The result as text: the budget, the sums, and every route and start that was not completed.

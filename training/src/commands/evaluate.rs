@@ -5,17 +5,23 @@ use std::path::{Path, PathBuf};
 use offtrack::reader;
 use offtrack::scenario::Split;
 use offtrack_training::error::Error;
+use offtrack_training::evaluation::certificate::attempt::{HOLD, passes};
 use offtrack_training::evaluation::certificate::certified;
+use offtrack_training::evaluation::failures::Example;
 use offtrack_training::evaluation::page::Page;
+use offtrack_training::evaluation::possible::to_search;
 use offtrack_training::evaluation::report::{Episode, Report, Summary};
-use offtrack_training::evaluation::{Driven, Evaluation, legend, usual_episodes};
+use offtrack_training::evaluation::{Driven, Evaluation, Sequences, legend, usual_episodes};
 use offtrack_training::files;
 use serde_json::Value;
 
-use super::{devices, policies, progress, roads, terminal};
+use super::{devices, policies, progress, record, roads, terminal};
 
 /// Most bytes of a run's report and of its figures.
 const RUN_LIMIT: u64 = 64 << 20;
+
+/// Most causes of failure of which an example is filmed.
+const FILMS: usize = 5;
 
 /// Evaluate a policy on a benchmark's routes.
 #[derive(Debug, clap::Args)]
@@ -52,6 +58,17 @@ pub struct Args {
     /// A certificate of `offtrack certify`: success over the routes that it shows to be possible is reported too.
     #[arg(long)]
     certified: Option<PathBuf>,
+    /// Write films to this folder, of one episode of each of the five commonest causes of failure.
+    #[arg(long)]
+    films: Option<PathBuf>,
+    /// Search for actions that complete the own start of each episode that did not arrive, and report success over the
+    /// episodes whose start is so shown to be possible.
+    #[arg(long)]
+    certify: bool,
+    /// With --certify: beam widths (candidates kept at each depth), tried in turn until one arrives, separated by
+    /// commas. The widest search is repeated with a choice at every step.
+    #[arg(long, value_delimiter = ',', default_value = "64,512", requires = "certify")]
+    widths: Vec<usize>,
     #[command(flatten)]
     device: devices::Choice,
 }
@@ -61,6 +78,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if let Some(episodes) = args.episodes.filter(|episodes| !(1..=100_000).contains(episodes)) {
         return Err(Error::Flag { flag: "--episodes", value: episodes.to_string(), expected: "must lie in 1..100000".into() });
     }
+    let passes = passes(&args.widths, HOLD)?;
     let device = args.device.open()?;
     let split = Split::ALL.into_iter().find(|split| split.name() == args.split).unwrap_or(Split::Test);
     let mut scenario = roads::benchmark(&args.benchmark)?;
@@ -79,7 +97,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let possible = args.certified.as_ref().map(|file| certified(file, &scenario, &world, scenario.split(split))).transpose()?;
     let (seed, record) = (args.seed, args.html.is_some());
     let evaluation = Evaluation { scenario: &scenario, world: &world, split, episodes, seed, record, device: &device };
-    let Driven { episodes: finished, tracks } = {
+    let Driven { episodes: finished, tracks, sequences } = {
         let bar = progress::Bar::new("evaluating", "episodes", episodes * n_routes);
         evaluation.drive(policy.as_mut(), &mut |done, all| bar.set(done, all))?
     };
@@ -89,13 +107,39 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let kept: Vec<&Episode> = chunks.filter(|(route, _)| possible.contains(route)).flat_map(|(_, chunk)| chunk).collect();
         Summary::of(kept.into_iter(), scenario.step)
     });
+    if args.certify {
+        let n_searches = to_search(&finished).count();
+        let bar = progress::Bar::new("certifying", "starts", n_searches);
+        let (possible, is_possible) = evaluation.possible(&finished, &passes, &|| bar.advance())?;
+        report.failures = evaluation.failures(&finished, Some(&is_possible));
+        report.possible = Some(possible);
+    }
     if let Some(file) = &args.json {
         files::write_json(file, &report)?;
     }
     if let Some(file) = &args.html {
         Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run, metrics }.write(file)?;
     }
+    if let Some(folder) = &args.films {
+        write_films(folder, &evaluation, &report, &sequences)?;
+    }
     files::print(&printed(&report, episodes))
+}
+
+/// Films an example of each of the commonest causes of failure: `1-trailer-on-the-island.gif` and the like.
+fn write_films(folder: &Path, evaluation: &Evaluation, report: &Report, sequences: &Sequences) -> Result<(), Error> {
+    std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
+    let causes = &report.failures[..report.failures.len().min(FILMS)];
+    let indices: Vec<usize> = causes.iter().map(|cause| cause.example.index).collect();
+    let &Evaluation { scenario, world, seed, .. } = evaluation;
+    for (n, (cause, track)) in causes.iter().zip(evaluation.repeated(sequences, &indices)?).enumerate() {
+        let Example { route: name, episode, .. } = &cause.example;
+        let (place, route) = scenario.routes().find(|(_, route)| route.name == *name).expect("a report's routes are the scenario's");
+        let of = record::Of { scenario, world, roundabout: &scenario.places[place].roundabout, route, policy: &report.policy, seed };
+        let file = folder.join(format!("{}-{}.gif", n + 1, cause.cause.replace(' ', "-")));
+        of.write_film(&file, *episode, evaluation.episodes, track)?;
+    }
+    Ok(())
 }
 
 /// What was evaluated, and the table.

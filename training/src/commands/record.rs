@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use offtrack::procedural;
-use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::roundabout::Roundabout;
 use offtrack::route::Route;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;
 
 use offtrack_drawing::episode::Scene;
-use offtrack_drawing::recording::{Map, Measures, Recorder, Recording, centre_line};
+use offtrack_drawing::recording::{Map, Measures, Recorder, Recording, Track, centre_line};
 use offtrack_drawing::{film, rasterised};
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::policies::Policy;
@@ -84,25 +84,70 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let chosen = Chosen::new(&scenario, &args.route)?;
     let world = roads::world(&scenario)?;
     let mut policy = args.policy.open(&scenario, &world, args.seed)?;
-    let recording = recorded(args, &scenario, &world, &chosen, policy.as_mut())?;
-    let bytes = bytes(format, args.size, &recording, &chosen, scenario.gutter);
-    files::write_whole(&args.output, &bytes.map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?)
+    let track = recorded(args, &scenario, &world, &chosen, policy.as_mut())?;
+    let Chosen { roundabout, route, .. } = chosen;
+    let of = Of { scenario: &scenario, world: &world, roundabout, route, policy: policy.name(), seed: args.seed };
+    let recording = of.recording(args.episode, args.episodes, track);
+    let bytes = bytes(format, args.size, &recording, &of);
+    files::write_whole(&args.output, &bytes.map_err(unwritten(&args.output))?)
+}
+
+/// A failure to draw or to encode a picture.
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+/// The error for a picture that cannot be made.
+fn unwritten(file: &Path) -> impl Fn(Failure) -> Error {
+    |failure| Error::write(file)(std::io::Error::other(failure))
+}
+
+/// What an episode that is recorded belongs to.
+pub(super) struct Of<'a> {
+    pub(super) scenario: &'a Scenario,
+    pub(super) world: &'a World,
+    pub(super) roundabout: &'a Roundabout,
+    pub(super) route: &'a Route,
+    /// The policy's name.
+    pub(super) policy: &'a str,
+    pub(super) seed: u32,
+}
+
+impl Of<'_> {
+    /// The recording of a track: episode `episode` of the `episodes` that the evaluation has on this route.
+    fn recording(&self, episode: usize, episodes: usize, track: Track) -> Recording {
+        let Of { scenario, world, roundabout, route, policy, seed } = *self;
+        Recording {
+            benchmark: scenario.name.clone(),
+            route: route.name.clone(),
+            policy: policy.to_owned(),
+            seed,
+            episode,
+            episodes,
+            step: scenario.step,
+            ended: track.ended.name().to_owned(),
+            vehicle: Measures::of(world),
+            actions: world.actions.iter().map(|action| [action.steering, action.speed]).collect(),
+            map: Map::of(roundabout, scenario.gutter),
+            centre_line: centre_line(route),
+            frames: track.frames,
+        }
+    }
+
+    /// Writes a film of a track, in the usual size.
+    pub(super) fn write_film(&self, file: &Path, episode: usize, episodes: usize, track: Track) -> Result<(), Error> {
+        let recording = self.recording(episode, episodes, track);
+        let bytes = bytes(Format::Gif, None, &recording, self).map_err(unwritten(file))?;
+        files::write_whole(file, &bytes)
+    }
 }
 
 /// The recording in the format asked for.
-fn bytes(
-    format: Format,
-    size: Option<u32>,
-    recording: &Recording,
-    chosen: &Chosen,
-    gutter: Gutter,
-) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
+fn bytes(format: Format, size: Option<u32>, recording: &Recording, of: &Of) -> Result<Vec<u8>, Failure> {
     if format == Format::Json {
         let mut text = serde_json::to_string(recording)?;
         text.push('\n');
         return Ok(text.into_bytes());
     }
-    let scene = Scene::new(recording, chosen.roundabout, gutter, chosen.route)?;
+    let scene = Scene::new(recording, of.roundabout, of.scenario.gutter, of.route)?;
     if format != Format::Gif {
         let svg = scene.still();
         return if format == Format::Png { Ok(rasterised(&svg, size.unwrap_or(1000))?) } else { Ok(svg.into_bytes()) };
@@ -163,7 +208,7 @@ fn scenario(args: &Args) -> Result<Scenario, Error> {
 }
 
 /// Drives the batch of the evaluation until the episode has ended.
-fn recorded(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chosen, policy: &mut dyn Policy) -> Result<Recording, Error> {
+fn recorded(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chosen, policy: &mut dyn Policy) -> Result<Track, Error> {
     let trucks: Vec<u32> = scenario.split(chosen.split).iter().flat_map(|&route| std::iter::repeat_n(route, args.episodes)).collect();
     let env = chosen.in_split * args.episodes + args.episode;
     let limit = world.routes[trucks[env] as usize].step_limit;
@@ -178,20 +223,5 @@ fn recorded(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chose
         bar.advance();
     }
     drop(bar);
-    let track = recorder.finish().remove(0);
-    Ok(Recording {
-        benchmark: scenario.name.clone(),
-        route: chosen.route.name.clone(),
-        policy: policy.name().to_owned(),
-        seed: args.seed,
-        episode: args.episode,
-        episodes: args.episodes,
-        step: scenario.step,
-        ended: track.ended.name().to_owned(),
-        vehicle: Measures::of(world),
-        actions: world.actions.iter().map(|action| [action.steering, action.speed]).collect(),
-        map: Map::of(chosen.roundabout, scenario.gutter),
-        centre_line: centre_line(chosen.route),
-        frames: track.frames,
-    })
+    Ok(recorder.finish().remove(0))
 }

@@ -1,7 +1,8 @@
 //! Which routes of a benchmark can be completed: action sequences are searched for, written to a file, and driven again
 //! when it is read.
 
-pub mod beam; // the search
+pub mod attempt; // searches from one start until one arrives, and from many at once
+pub mod beam; // a search
 pub mod file; // what it found
 pub mod verify; // driving it again
 

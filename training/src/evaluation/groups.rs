@@ -45,28 +45,44 @@ impl Groups {
     /// The groups of `routes`; `finished` has as many episodes for each of them, in the same order. A step takes `step`
     /// seconds.
     pub fn of(routes: &[Evaluated], finished: &[Episode], step: f64) -> Groups {
-        let episodes: Vec<&[Episode]> = finished.chunks((finished.len() / routes.len().max(1)).max(1)).collect();
-        let by = |key: &dyn Fn(&Evaluated) -> (usize, String)| {
-            let mut members: BTreeMap<(usize, String), Vec<usize>> = BTreeMap::new();
-            for (index, route) in routes.iter().enumerate().take(episodes.len()) {
-                members.entry(key(route)).or_default().push(index);
-            }
-            let group = |((_, name), members): ((usize, String), Vec<usize>)| {
-                let summary = Summary::of(members.iter().flat_map(|&index| episodes[index]), step)?;
-                Some(Group { name, routes: members.len(), summary })
-            };
-            members.into_iter().filter_map(group).collect()
-        };
-        Groups {
-            island_radius: by(&|(_, place, _)| {
-                let band = band(place.roundabout.island_radius());
-                (band, BAND_NAMES[band].to_owned())
-            }),
-            lane: by(&|(_, _, route)| (0, route.lane.name().to_owned())),
-            exit: by(&|(_, _, route)| (route.exit as usize, route.exit.to_string())),
-            roundabout: by(&|&(index, place, _)| (index, place.roundabout.name.clone())),
-        }
+        let per_route = (finished.len() / routes.len().max(1)).max(1);
+        let episodes: Vec<Vec<&Episode>> = finished.chunks(per_route).map(|chunk| chunk.iter().collect()).collect();
+        let by = |key| by(routes, &episodes, key, step);
+        Groups { island_radius: by(island_radius), lane: by(lane), exit: by(exit), roundabout: by(roundabout) }
     }
+}
+
+/// What a route has in common with others: its group's position among the groups, and the group's name.
+type Key = fn(&Evaluated) -> (usize, String);
+
+/// The groups of `routes` by `key`, with the given episodes of each route. A group without an episode is left out.
+pub(super) fn by(routes: &[Evaluated], episodes: &[Vec<&Episode>], key: Key, step: f64) -> Vec<Group> {
+    let mut members: BTreeMap<(usize, String), Vec<usize>> = BTreeMap::new();
+    for (index, route) in routes.iter().enumerate().take(episodes.len()) {
+        members.entry(key(route)).or_default().push(index);
+    }
+    let group = |((_, name), members): ((usize, String), Vec<usize>)| {
+        let summary = Summary::of(members.iter().flat_map(|&index| &episodes[index]).copied(), step)?;
+        Some(Group { name, routes: members.len(), summary })
+    };
+    members.into_iter().filter_map(group).collect()
+}
+
+pub(super) fn island_radius((_, place, _): &Evaluated) -> (usize, String) {
+    let band = band(place.roundabout.island_radius());
+    (band, BAND_NAMES[band].to_owned())
+}
+
+pub(super) fn lane((_, _, route): &Evaluated) -> (usize, String) {
+    (0, route.lane.name().to_owned())
+}
+
+fn exit((_, _, route): &Evaluated) -> (usize, String) {
+    (route.exit as usize, route.exit.to_string())
+}
+
+fn roundabout(&(index, place, _): &Evaluated) -> (usize, String) {
+    (index, place.roundabout.name.clone())
 }
 
 /// Index of an island's band by its radius \[m].

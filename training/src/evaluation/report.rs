@@ -3,10 +3,12 @@
 
 use std::collections::BTreeMap;
 
-use offtrack::layout::Ended;
+use offtrack::layout::{Ended, Truck};
 use serde::Serialize;
 
+use super::failures::Cause;
 use super::groups::Groups;
+use super::possible::Possible;
 
 /// Routes from which on a table and a page show groups of routes, and the worst routes instead of every one.
 pub const MANY_ROUTES: usize = 100;
@@ -24,6 +26,8 @@ pub struct Episode {
     pub lane_distance_mean: f64,
     /// Largest distance to the lane centre \[m].
     pub lane_distance_max: f64,
+    /// Fraction of its steps after which the tractor's middle was outside of the route's own lane.
+    pub outside_lane: f64,
     /// Smallest distance of the tractor to a kerb \[m].
     pub tractor_clearance_min: f64,
     /// Smallest distance of the trailer to a kerb \[m].
@@ -34,6 +38,8 @@ pub struct Episode {
     pub articulation_peak: f64,
     /// Largest distance of the trailer axle from the path of the front axle \[m].
     pub off_tracking_peak: f64,
+    /// The truck after its last step.
+    pub last: Truck,
 }
 
 /// The figures of several episodes: means over the episodes, and extremes of all.
@@ -61,6 +67,8 @@ pub struct Summary {
     pub lane_distance_max: f64,
     /// The same of those that arrived \[m].
     pub lane_distance_max_arrived: Option<f64>,
+    /// Mean fraction of an episode's steps outside of its own lane, of those that arrived; `None` if none did.
+    pub outside_lane_mean: Option<f64>,
     /// Smallest distance of the tractor to a kerb \[m].
     pub tractor_clearance_min: f64,
     /// Smallest distance of the trailer to a kerb \[m].
@@ -77,6 +85,13 @@ pub struct Summary {
     pub reward_mean: f64,
 }
 
+impl Episode {
+    /// It failed in its first step: the truck starts on or against a kerb, and no action helps.
+    pub fn lost_at_start(&self) -> bool {
+        self.ended.failed() && self.steps == 1
+    }
+}
+
 impl Summary {
     /// The figures of `episodes`, `None` without an episode. A step takes `step` seconds.
     pub fn of<'a>(episodes: impl Iterator<Item = &'a Episode> + Clone, step: f64) -> Option<Summary> {
@@ -90,6 +105,7 @@ impl Summary {
         let most = |value: fn(&Episode) -> f64| episodes.clone().map(value).fold(f64::NEG_INFINITY, f64::max);
         let least = |value: fn(&Episode) -> f64| episodes.clone().map(value).fold(f64::INFINITY, f64::min);
         let mean = |value: fn(&Episode) -> f64| episodes.clone().map(value).sum::<f64>() / count as f64;
+        let mean_arrived = |value: fn(&Episode) -> f64| (0 < n_arrived).then(|| arrived.clone().map(value).sum::<f64>() / n_arrived as f64);
         let mut ends: BTreeMap<&'static str, usize> =
             Ended::ALL.into_iter().filter(|&ended| ended != Ended::Running).map(|ended| (ended.name(), 0)).collect();
         for episode in episodes.clone() {
@@ -102,12 +118,12 @@ impl Summary {
             success_low,
             success_high,
             ends,
-            lost_at_start: episodes.clone().filter(|episode| episode.ended.failed() && episode.steps == 1).count(),
+            lost_at_start: episodes.clone().filter(|episode| episode.lost_at_start()).count(),
             lane_distance_mean: mean(|episode| episode.lane_distance_mean),
-            lane_distance_mean_arrived: (0 < n_arrived)
-                .then(|| arrived.clone().map(|episode| episode.lane_distance_mean).sum::<f64>() / n_arrived as f64),
+            lane_distance_mean_arrived: mean_arrived(|episode| episode.lane_distance_mean),
             lane_distance_max: most(|episode| episode.lane_distance_max),
-            lane_distance_max_arrived: arrived.map(|episode| episode.lane_distance_max).reduce(f64::max),
+            lane_distance_max_arrived: arrived.clone().map(|episode| episode.lane_distance_max).reduce(f64::max),
+            outside_lane_mean: mean_arrived(|episode| episode.outside_lane),
             tractor_clearance_min: least(|episode| episode.tractor_clearance_min),
             trailer_clearance_min: least(|episode| episode.trailer_clearance_min),
             load_transfer_ratio_peak: most(|episode| episode.load_transfer_ratio_peak),
@@ -167,6 +183,11 @@ pub struct Report {
     /// Episodes on the certified routes; `None` without a certificate or without a certified route.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certified: Option<Summary>,
+    /// Episodes whose own start is shown to be possible; `None` where nobody asked for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub possible: Option<Possible>,
+    /// Why episodes did not arrive, the commonest cause first.
+    pub failures: Vec<Cause>,
     /// Sums by island radius, lane, exit and roundabout.
     pub groups: Groups,
     /// Each route.
@@ -199,11 +220,13 @@ pub(super) mod tests {
             reward: -500.0,
             lane_distance_mean: 10.25,
             lane_distance_max: 19.25,
+            outside_lane: 0.25,
             tractor_clearance_min: -10.25,
             trailer_clearance_min: -10.25,
             load_transfer_ratio_peak: 1.5,
             articulation_peak: 1.9,
             off_tracking_peak: 10.25,
+            last: Truck::default(),
         }
     }
 

@@ -10,12 +10,15 @@ use offtrack::angle::wrapped;
 use offtrack::layout::{Ended, Rig, Truck};
 use offtrack::simulator::Batch;
 
+use super::part::LaneWidths;
 use super::report::Episode;
 
 /// An episode under way.
 pub(super) struct Running {
     lane_distance_sum: f64,
-    /// Its figures so far; the mean and the off-tracking follow at its end.
+    /// Steps after which the tractor's middle was outside of the route's own lane.
+    outside: u32,
+    /// Its figures so far; the means and the off-tracking follow at its end.
     episode: Episode,
     off_tracking: OffTracking,
 }
@@ -27,17 +30,20 @@ impl Running {
         let ahead = Vec2::from_angle(truck.heading);
         Running {
             lane_distance_sum: 0.0,
+            outside: 0,
             episode: Episode {
                 ended: Ended::Running,
                 steps: 0,
                 reward: 0.0,
                 lane_distance_mean: 0.0,
                 lane_distance_max: 0.0,
+                outside_lane: 0.0,
                 tractor_clearance_min: f64::INFINITY,
                 trailer_clearance_min: f64::INFINITY,
                 load_transfer_ratio_peak: 0.0,
                 articulation_peak: 0.0,
                 off_tracking_peak: 0.0,
+                last: *truck,
             },
             // The path's first point lies far behind the start, so that the trailer's axle is beside it from the first
             // step on.
@@ -45,29 +51,33 @@ impl Running {
         }
     }
 
-    /// Adds the last step; true if it ended the episode.
-    pub(super) fn follow(&mut self, rig: &Rig, batch: &Batch, env: usize) -> bool {
+    /// Adds the last step; true if it ended the episode. `lane` is that of the truck's route.
+    pub(super) fn follow(&mut self, rig: &Rig, lane: &LaneWidths, batch: &Batch, env: usize) -> bool {
         let (truck, progress, clearance) = (&batch.truck[env], &batch.progress[env], &batch.clearance[env]);
         let raise = |peak: &mut f64, value: f32| *peak = peak.max(f64::from(value));
         let lower = |least: &mut f64, value: f32| *least = least.min(f64::from(value));
         self.episode.steps += 1;
         self.episode.reward += f64::from(batch.reward[env]);
         self.lane_distance_sum += f64::from(progress.lane_distance);
+        self.outside += u32::from(lane.half_width(progress.waypoint) < progress.lane_distance);
         raise(&mut self.episode.lane_distance_max, progress.lane_distance);
         lower(&mut self.episode.tractor_clearance_min, clearance.tractor);
         lower(&mut self.episode.trailer_clearance_min, clearance.trailer);
         raise(&mut self.episode.load_transfer_ratio_peak, truck.tractor_load_transfer_ratio.abs());
         raise(&mut self.episode.load_transfer_ratio_peak, truck.trailer_load_transfer_ratio.abs());
         raise(&mut self.episode.articulation_peak, wrapped(truck.heading - truck.trailer_heading).abs());
+        self.episode.last = *truck;
         self.off_tracking.push(front_axle(rig, truck), truck.trailer_position(rig));
         batch.ended[env] != Ended::Running as u32
     }
 
     /// Its figures, once it has ended this way.
     pub(super) fn finish(&mut self, ended: Ended) -> Episode {
+        let steps = f64::from(self.episode.steps.max(1));
         Episode {
             ended,
-            lane_distance_mean: self.lane_distance_sum / f64::from(self.episode.steps.max(1)),
+            lane_distance_mean: self.lane_distance_sum / steps,
+            outside_lane: f64::from(self.outside) / steps,
             off_tracking_peak: self.off_tracking.finish(),
             ..self.episode.clone()
         }

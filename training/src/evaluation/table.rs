@@ -5,11 +5,15 @@ use std::fmt::Write;
 
 use offtrack::layout::Ended;
 
+use super::failures::Cause;
 use super::groups::Group;
 use super::report::{Report, RouteReport, Summary};
 
 /// Lines of the worst roundabouts, and of the worst routes, where there are many routes.
 const WORST: usize = 20;
+
+/// Causes of failures that are told.
+const CAUSES: usize = 8;
 
 /// What each column of the table says.
 const COLUMNS: [(&str, &str); 10] = [
@@ -79,6 +83,7 @@ impl Report {
             ("lane own", lane(true), self.own_lane_suffices.as_ref()),
             ("lane wide", lane(false), self.needs_deviation.as_ref()),
             ("certified", "", self.certified.as_ref()),
+            ("possible", "", self.possible.as_ref().and_then(|possible| possible.summary.as_ref())),
             ("all", "", Some(&self.summary)),
         ];
         sections
@@ -99,6 +104,15 @@ impl Report {
                 push_wrapped(&mut text, note, width);
             }
         }
+        if let Some(outside) = self.summary.outside_lane_mean {
+            let own = self.own_lane_suffices.as_ref().and_then(|summary| summary.outside_lane_mean);
+            let own = own.map(|own| format!(", where the own lane suffices {:.1} %", 100.0 * own)).unwrap_or_default();
+            push_wrapped(&mut text, &format!("Outside its own lane for {:.1} % of an episode that arrived{own}.", 100.0 * outside), width);
+        }
+        self.push_causes(&mut text, width);
+        if let Some(possible) = &self.possible {
+            push_wrapped(&mut text, &possible.note(), width);
+        }
         if !left_out.is_empty() {
             let names: Vec<String> = left_out.iter().map(|column| column.head.join(" ").trim().replace("- ", "-")).collect();
             push_wrapped(
@@ -108,6 +122,22 @@ impl Report {
             );
         }
         text + "\n" + &legend(width)
+    }
+
+    /// The commonest causes of failures, and how many more there are.
+    fn push_causes(&self, text: &mut String, width: usize) {
+        let cause = |cause: &Cause| {
+            let possible = cause.possible.map(|possible| format!(" ({possible} from a possible start)")).unwrap_or_default();
+            format!("{} {}{possible}", cause.episodes, cause.cause)
+        };
+        let mut words: Vec<String> = self.failures.iter().take(CAUSES).map(cause).collect();
+        if CAUSES < self.failures.len() {
+            let rest = &self.failures[CAUSES..];
+            words.push(format!("{} for {} other causes", rest.iter().map(|cause| cause.episodes).sum::<usize>(), rest.len()));
+        }
+        if !words.is_empty() {
+            push_wrapped(text, &format!("Not arrived, by cause: {}.", words.join(", ")), width);
+        }
     }
 
     /// Groups of routes, then the worst roundabouts and the worst routes.

@@ -5,24 +5,51 @@ use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::layout::{Ended, Start};
-use offtrack::simulator::{RouteChoice, Simulator};
+use offtrack::simulator::{self, RouteChoice, Simulator};
 use offtrack::world::World;
 
 use super::file::{self, Certificate};
 use crate::error::Error;
 
 /// One sequence to drive.
-struct Sequence<'a> {
-    route: &'a str,
-    start: Start,
-    actions: Vec<u32>,
+#[derive(Debug, Clone)]
+pub struct Sequence {
+    /// Index of the route in the world.
+    pub route: u32,
+    /// Where the truck begins.
+    pub start: Start,
+    /// Its action at each step.
+    pub actions: Vec<u32>,
+}
+
+/// Drives sequences in one batch and gives the end code of each at its last step.
+pub fn driven(world: &Arc<World>, sequences: &[Sequence]) -> Result<Vec<Ended>, simulator::Error> {
+    if sequences.is_empty() {
+        return Ok(Vec::new());
+    }
+    let routes: Vec<u32> = sequences.iter().map(|sequence| sequence.route).collect();
+    let starts: Vec<Start> = sequences.iter().map(|sequence| sequence.start).collect();
+    let mut simulator = Simulator::new(world.clone(), routes.len(), 0, RouteChoice::Fixed(routes))?;
+    simulator.reset_from(&starts)?;
+    // A truck drives on after its sequence, so its end code is taken at the sequence's last step.
+    let mut ended = vec![Ended::Running; sequences.len()];
+    for step in 0..sequences.iter().map(|sequence| sequence.actions.len()).max().unwrap_or(0) {
+        let actions: Vec<u32> = sequences.iter().map(|sequence| sequence.actions.get(step).copied().unwrap_or(0)).collect();
+        simulator.step(&actions)?;
+        for ((ended, sequence), &code) in ended.iter_mut().zip(sequences).zip(&simulator.batch().ended) {
+            if step < sequence.actions.len() {
+                *ended = Ended::from_code(code).unwrap_or(Ended::Running);
+            }
+        }
+    }
+    Ok(ended)
 }
 
 /// Drives the sequences of the routes that `wanted` accepts and gives their number, or the first that does not arrive.
 /// Every such route must be one of the world's.
 pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted: impl Fn(&str) -> bool) -> Result<usize, Error> {
     let wrong = |message: String| Error::contents(path, message);
-    let (mut sequences, mut routes) = (Vec::new(), Vec::new());
+    let mut sequences = Vec::new();
     for route in certificate.routes.iter().filter(|route| wanted(&route.name)) {
         let index = world.route_names.iter().position(|name| *name == route.name);
         let index = index.ok_or_else(|| wrong(format!("has a route {} that the benchmark does not have", route.name)))?;
@@ -31,34 +58,20 @@ pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted
             // Beyond the time limit of its route no action changes the outcome.
             let limit = world.routes[index].step_limit as usize;
             let actions = file::actions(&found.actions, world.params.n_actions, limit).map_err(damaged)?;
-            routes.push(index as u32);
-            sequences.push(Sequence { route: &route.name, start: Start { offset, heading }, actions });
+            sequences.push(Sequence { route: index as u32, start: Start { offset, heading }, actions });
         }
     }
-    if sequences.is_empty() {
-        return Ok(0);
-    }
-    let starts: Vec<Start> = sequences.iter().map(|sequence| sequence.start).collect();
-    let mut simulator = Simulator::new(world.clone(), routes.len(), 0, RouteChoice::Fixed(routes))?;
-    simulator.reset_from(&starts).map_err(|error| wrong(format!("is a damaged certificate: {error}")))?;
-    // A truck drives on after its sequence, so its end code is taken at the sequence's last step.
-    let mut ended = vec![Ended::Running as u32; sequences.len()];
-    for step in 0..sequences.iter().map(|sequence| sequence.actions.len()).max().unwrap_or(0) {
-        let actions: Vec<u32> = sequences.iter().map(|sequence| sequence.actions.get(step).copied().unwrap_or(0)).collect();
-        simulator.step(&actions)?;
-        for ((ended, sequence), &code) in ended.iter_mut().zip(&sequences).zip(&simulator.batch().ended) {
-            if step < sequence.actions.len() {
-                *ended = code;
-            }
-        }
-    }
-    for (sequence, &code) in sequences.iter().zip(&ended) {
-        if code != Ended::Arrived as u32 {
+    let ended = driven(world, &sequences).map_err(|error| match error {
+        simulator::Error::UnknownStart { .. } => wrong(format!("is a damaged certificate: {error}")),
+        error => error.into(),
+    })?;
+    for (sequence, &ended) in sequences.iter().zip(&ended) {
+        if ended != Ended::Arrived {
             return Err(Error::NotVerified {
                 file: path.to_owned(),
-                route: sequence.route.to_owned(),
+                route: world.route_names[sequence.route as usize].clone(),
                 start: [sequence.start.offset, sequence.start.heading],
-                ended: Ended::from_code(code).unwrap_or(Ended::Running).name(),
+                ended: ended.name(),
             });
         }
     }

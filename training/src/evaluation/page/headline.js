@@ -41,11 +41,12 @@ function showHeadline(page) {
 }
 
 function showFigures({ report, evaluation, ground }, routes, study, certified) {
-  const also = report.also ?? [];
+  const { possible } = evaluation, also = report.also ?? [];
   const own = evaluation.own_lane_suffices, deviating = evaluation.needs_deviation, compared = comparable(evaluation);
   const rows = [
     [`Success, ${routes}`, fraction(evaluation), study && fraction(study)],
     certified && ["Success, certified routes", fraction(certified)],
+    possible?.episodes && ["Success, starts shown to be possible", fraction(possible)],
     own && ["Success where the own lane suffices", fraction(own)],
     own && deviating && ["Success where it does not", fraction(deviating)],
     ...also.map((other) => [`Success, ${other.benchmark}, ${other.split} routes (${other.trained_on === 0 ? "zero-shot" : `${whole(other.trained_on)} of them trained on`})`,
@@ -53,6 +54,8 @@ function showFigures({ report, evaluation, ground }, routes, study, certified) {
     compared && evaluation.split === "test" && !also.some((other) => comparable(other) && other.split === "train") && ["Success, training routes", null, fraction(STUDY.train)],
     ["Mean distance to the lane centre", metres(evaluation.lane_distance_mean), compared && metres(STUDY.laneDistance)],
     own && ["The same where the own lane suffices", metres(own.lane_distance_mean)],
+    typeof evaluation.outside_lane_mean === "number" && ["Time outside the own lane, of episodes that arrived", percent(evaluation.outside_lane_mean)],
+    typeof own?.outside_lane_mean === "number" && ["The same where the own lane suffices", percent(own.outside_lane_mean)],
     report.env_steps !== undefined && ["Env steps of training", whole(report.env_steps), compared && whole(STUDY.envSteps)],
   ].filter(Boolean);
   const cell = (value) => (value instanceof Node ? value : html("td", {}, value || "\u2013"));
@@ -63,6 +66,7 @@ function showFigures({ report, evaluation, ground }, routes, study, certified) {
     html("tbody", {}, ...rows.map(([name, ours, theirs]) =>
       html("tr", {}, html("th", { scope: "row" }, name), cell(ours), compared ? cell(theirs) : null))));
   byId("study").hidden = !compared;
+  showCauses(evaluation);
   const facts = [
     ["Episodes evaluated", whole(evaluation.episodes)],
     ["Training time", report.seconds !== undefined && `${decimal(report.seconds / 60, 1)}${GAP}min`],
@@ -74,4 +78,16 @@ function showFigures({ report, evaluation, ground }, routes, study, certified) {
     ["Commit", report.commit ?? ground.commit],
   ];
   byId("facts").replaceChildren(...facts.filter(([, value]) => value).map(([name, value]) => html("div", {}, html("dt", {}, name), html("dd", {}, value))));
+}
+
+/** Why episodes did not arrive, a row a cause, the commonest first. */
+function showCauses({ failures }) {
+  byId("causes").hidden = failures.length === 0;
+  const searched = failures.some((cause) => cause.possible !== undefined);
+  const heads = ["Not arrived, by cause", "Episodes", searched && "From a possible start", "For example"].filter(Boolean);
+  byId("causes").replaceChildren(
+    html("thead", {}, html("tr", {}, ...heads.map((head) => html("th", { scope: "col" }, head)))),
+    html("tbody", {}, ...failures.map(({ cause, episodes, share, possible, example }) => html("tr", {},
+      html("th", { scope: "row" }, cause), html("td", {}, `${whole(episodes)}, ${percent(share)}`),
+      searched ? html("td", {}, whole(possible)) : null, html("td", {}, `${example.route}, episode ${example.episode}`)))));
 }

@@ -1,7 +1,23 @@
+use super::super::certificate::beam::Pass;
+use super::super::failures::Example;
 use super::super::groups::Groups;
+use super::super::possible::Possible;
 use super::super::report::tests::episode;
 use super::super::report::{Episode, MANY_ROUTES};
 use super::*;
+
+fn cause(index: usize) -> Cause {
+    let example = Example {
+        index: 0,
+        route: "40m/SW-right-1".to_owned(),
+        episode: 0,
+        start: [0.0; 2],
+        ended: "strayed",
+        steps: 9,
+        position: [0.0; 2],
+    };
+    Cause { cause: format!("trailer on kerb {index}"), episodes: 20 - index, share: 0.1, possible: Some(index), example }
+}
 
 /// A report with the widest figures that an evaluation gives.
 fn report() -> Report {
@@ -25,6 +41,16 @@ fn report() -> Report {
         own_lane_suffices: Some(summary.clone()),
         needs_deviation: Some(summary.clone()),
         certified: Some(summary.clone()),
+        possible: Some(Possible {
+            summary: Some(summary.clone()),
+            searched: 2,
+            found: 1,
+            env_steps: 1_234_567,
+            passes: vec![Pass { width: 512, hold: 3 }],
+            island_radius: Vec::new(),
+            lane: Vec::new(),
+        }),
+        failures: (0..CAUSES + 2).map(cause).collect(),
         groups: Groups { island_radius: group("22 m and more"), lane: group("right"), exit: group("1"), roundabout: group("40m") },
         routes: vec![route(true), route(false)],
     }
@@ -61,6 +87,26 @@ fn every_heading_is_explained_below_the_table() {
 #[test]
 fn failures_are_counted_below_their_line() {
     assert!(report().table(100).contains("  not arrived: 1 timed out, 1 tractor collided, 1 trailer collided\n"));
+}
+
+#[test]
+fn the_commonest_causes_of_failures_are_told_and_the_others_counted() {
+    let table = report().table(1000);
+    assert!(table.contains("Not arrived, by cause: 20 trailer on kerb 0 (0 from a possible start), 19 trailer on kerb 1 "), "{table}");
+    assert!(table.contains("13 trailer on kerb 7 (7 from a possible start), 23 for 2 other causes.\n"), "{table}");
+}
+
+#[test]
+fn the_time_outside_the_own_lane_is_told() {
+    let expected = "Outside its own lane for 25.0 % of an episode that arrived, where the own lane suffices 25.0 %.\n";
+    assert!(report().table(100).contains(expected));
+}
+
+#[test]
+fn the_searches_for_possible_starts_are_told_below_the_sums() {
+    let table = report().table(100);
+    assert!(table.lines().any(|line| line.starts_with("possible ") && line.contains("692/695")), "{table}");
+    assert!(table.contains("possible: the episodes that arrived and those whose own start a search completed, 1 of the 2"), "{table}");
 }
 
 /// The same with many routes on as many roundabouts, of which every `one_in`th failed once.
