@@ -46,13 +46,13 @@ pub struct Example {
     /// Index among the episodes of its route.
     pub episode: usize,
     /// Lateral offset and heading error of its start, as fractions of the largest ones.
-    pub start: [f32; 2],
+    pub start: [f64; 2],
     /// Why it ended.
     pub ended: &'static str,
     /// Its number of steps.
     pub steps: u32,
     /// Middle of the tractor's drive axle at its end, x east, y north \[m].
-    pub position: [f32; 2],
+    pub position: [f64; 2],
 }
 
 impl Evaluation<'_> {
@@ -84,10 +84,10 @@ impl Evaluation<'_> {
             index,
             route: routes[index / self.episodes].2.name.clone(),
             episode: index % self.episodes,
-            start: [start.offset, start.heading],
+            start: [start.offset, start.heading].map(f64::from),
             ended: episode.ended.name(),
             steps: episode.steps,
-            position: episode.last.position.to_array(),
+            position: episode.last.position.as_dvec2().to_array(),
         }
     }
 
@@ -181,8 +181,9 @@ mod tests {
     fn a_collision_is_named_by_unit_kerb_and_part_of_the_route() {
         on_40m(|evaluation| {
             let routes = evaluation.routes();
-            let index = routes.iter().position(|(_, _, route)| route.lane.name() == "right" && route.exit == 2).unwrap();
+            let index = routes.iter().position(|(_, _, route)| route.lane.name() == "left" && route.exit == 3).unwrap();
             let route = &routes[index];
+            let lane = route.1.roundabout.lane_widths(route.2)[0];
             let line = &route.2.centre_line;
             let cause = |unit: Ended, station: f64, across: f64| {
                 let heading = line.heading_at(station);
@@ -190,11 +191,11 @@ mod tests {
                 evaluation.cause(route, &ended(evaluation, index, unit, position, heading))
             };
             let ring = 0.5 * line.length();
-            // To the right until the wheels are on the kerb; to the left across the other lane onto the island.
-            assert_eq!(cause(Ended::TractorCollided, 20.0, -2.0), "tractor on the outer kerb of the entry");
-            assert_eq!(cause(Ended::TractorCollided, line.length() - 10.0, -2.0), "tractor on the outer kerb of the exit");
-            assert_eq!(cause(Ended::TractorCollided, ring, 5.5), "tractor on the island");
-            assert_eq!(cause(Ended::TrailerCollided, ring + 10.0, 6.5), "trailer on the island");
+            // To the right across the other lane until the wheels are on the kerb; to the left onto the island.
+            assert_eq!(cause(Ended::TractorCollided, 20.0, -2.0 - lane), "tractor on the outer kerb of the entry");
+            assert_eq!(cause(Ended::TractorCollided, line.length() - 10.0, -2.0 - lane), "tractor on the outer kerb of the exit");
+            assert_eq!(cause(Ended::TractorCollided, ring, 2.0), "tractor on the island");
+            assert_eq!(cause(Ended::TrailerCollided, ring, 2.0), "trailer on the island");
             for (other, words) in [(Ended::Strayed, "strayed"), (Ended::TimedOut, "timed out"), (Ended::RolledOver, "rolled over")] {
                 assert_eq!(cause(other, ring, 0.0), words);
             }

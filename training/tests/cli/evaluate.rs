@@ -44,6 +44,66 @@ fn equal_seeds_give_equal_reports_and_another_seed_gives_another() {
 }
 
 #[test]
+fn starts_where_the_policy_failed_are_searched_and_told_apart() {
+    let place = Place::new();
+    let evaluate = |extra: &[&str]| {
+        let report = place.text("report.json");
+        let output = place.evaluate(&[&["--policy", "random", "--episodes", "2", "--json", &report], extra].concat());
+        succeed(&output);
+        (place.json("report.json"), String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let (plain, _) = evaluate(&[]);
+    let (report, printed) = evaluate(&["--certify", "--widths", "16"]);
+    let count = |value: &Value| value.as_u64().unwrap();
+    let possible = &report["possible"];
+    assert!(plain.get("possible").is_none() && plain["failures"][0].get("possible").is_none());
+    assert_eq!(count(&report["arrived"]), 0, "random actions arrive nowhere");
+    // The narrow search completes every route from the corners of the start errors.
+    assert_eq!(["searched", "found", "episodes", "arrived"].map(|key| count(&possible[key])), [4, 4, 4, 0]);
+    assert_eq!(possible["passes"].as_array().unwrap().len(), 2);
+    assert_eq!(possible["lane"].as_array().unwrap().iter().map(|group| count(&group["episodes"])).sum::<u64>(), 4);
+    let causes = report["failures"].as_array().unwrap();
+    assert_eq!(causes.iter().map(|cause| count(&cause["episodes"])).sum::<u64>(), 4);
+    assert!(causes.iter().all(|cause| cause["possible"] == cause["episodes"]), "{causes:?}");
+    assert!(printed.lines().any(|line| line.starts_with("possible ")) && printed.contains("Not arrived, by cause: "), "{printed}");
+    assert!(refusal(&place.evaluate(&["--certify", "--widths", "0"]), 2).contains("--widths: 0; must lie in 1..262144"));
+    refusal(&place.evaluate(&["--widths", "16"]), 2);
+}
+
+#[test]
+fn a_film_of_each_cause_shows_the_episode_that_its_example_names() {
+    let place = Place::new();
+    let films = place.text("films");
+    let flags = ["--policy", "random", "--episodes", "3", "--seed", "7"];
+    succeed(&place.evaluate(&[&flags[..], &["--films", &films, "--json", &place.text("report.json")]].concat()));
+    let report = place.json("report.json");
+    let causes = report["failures"].as_array().unwrap();
+    assert_eq!(std::fs::read_dir(place.file("films")).unwrap().count(), causes.len().min(5));
+    for (n, cause) in causes.iter().take(5).enumerate() {
+        let (example, episode) = (&cause["example"], cause["example"]["episode"].to_string());
+        let (benchmark, output) = (place.text("short.toml"), place.text("episode.json"));
+        let route = example["route"].as_str().unwrap();
+        let named = ["record", "--benchmark", &benchmark, "--route", route, "--episode", &episode, "-o", &output];
+        succeed(&offtrack(&[&named[..], &flags[..]].concat()));
+        let recording = place.json("episode.json");
+        let frames = recording["frames"].as_array().unwrap();
+        assert_eq!(recording["ended"], example["ended"]);
+        assert_eq!(frames.len() as u64, example["steps"].as_u64().unwrap() + 1);
+        for axis in 0..2 {
+            let [film, named] = [&frames[frames.len() - 1], example].map(|state| state["position"][axis].as_f64().unwrap());
+            assert!((film - named).abs() < 1e-3, "a recording is rounded to 1 mm: {film} {named}");
+        }
+        let name = format!("{}-{}.gif", n + 1, cause["cause"].as_str().unwrap().replace(' ', "-"));
+        let mut film = gif::DecodeOptions::new().read_info(std::fs::File::open(place.file("films").join(name)).unwrap()).unwrap();
+        let mut pages = 0;
+        while film.read_next_frame().unwrap().is_some() {
+            pages += 1;
+        }
+        assert_eq!(pages, (frames.len() - 1).div_ceil(2) + 1, "every second frame and the last");
+    }
+}
+
+#[test]
 fn a_damaged_policy_file_is_refused_by_its_name() {
     let place = Place::new();
     succeed(&place.train(&["--name", "run", "--steps", "600"]));
