@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-/// A benchmark of one training route, one validation route and two test routes.
+/// A benchmark of one training route and two test routes.
 const BENCHMARK: &str = r#"
 vehicle = "vehicles/daf_xf.toml"
 load = "empty"
@@ -17,7 +17,6 @@ reward = { waypoint = 100.0, lane_distance = -1.5, lane_distance_limit = 4.0, fa
 [[roundabout]]
 file = "roundabouts/16m.toml"
 train = ["E-right-1"]
-validation = ["N-right-1"]
 
 [[roundabout]]
 file = "roundabouts/20m.toml"
@@ -64,6 +63,18 @@ impl Place {
         std::fs::write(place.file("short.toml"), written).unwrap();
         std::fs::write(place.file("tiny.toml"), TRAINING.replace("BENCHMARK", &place.text("short.toml"))).unwrap();
         place
+    }
+
+    /// Lets the training file choose the policy on a validation route, that of `validated.toml`, which is written too.
+    pub fn validate(&self, times: usize, episodes: usize) {
+        let benchmark = std::fs::read_to_string(self.file("short.toml")).unwrap();
+        let [train, validation] = ["train = [\"E-right-1\"]", "validation = [\"N-right-1\"]"];
+        assert!(benchmark.contains(train));
+        std::fs::write(self.file("validated.toml"), benchmark.replace(train, validation)).unwrap();
+        let training = std::fs::read_to_string(self.file("tiny.toml")).unwrap();
+        let file = self.text("validated.toml");
+        let table = format!("validation = {{ benchmark = \"{file}\", times = {times}, episodes = {episodes} }}");
+        std::fs::write(self.file("tiny.toml"), format!("{table}\n{training}")).unwrap();
     }
 
     pub fn file(&self, name: &str) -> PathBuf {

@@ -18,10 +18,10 @@ fn place() -> Place {
     let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
     let state = "exploration = { initial_fraction = 0.5, final_fraction = 0.1, steps = 1200, spread = 1.0 }\n";
     let replay = "level_replay = { fraction = 0.5, rate = 0.2 }\n";
-    let validation = format!("validation = {{ benchmark = \"{}\", times = 20, episodes = 2 }}\n", place.text("short.toml"));
     let buffer = "warmup = 400, priority = { exponent = 0.6, correction = 0.4 }";
     let changed = training.replace("warmup = 400", buffer).replace("layer_norm = false", "layer_norm = true");
-    std::fs::write(place.file("tiny.toml"), format!("checkpoint_minutes = 0.0001\n{state}{replay}{validation}{changed}")).unwrap();
+    std::fs::write(place.file("tiny.toml"), format!("checkpoint_minutes = 0.0001\n{state}{replay}{changed}")).unwrap();
+    place.validate(20, 2);
     place
 }
 

@@ -121,16 +121,10 @@ fn a_training_file_is_found_by_its_name() {
     assert!(message.contains("nowhere"), "{message}");
 }
 
-/// The training file with these lines before its own.
-fn prepend(place: &Place, lines: &str) {
-    let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
-    std::fs::write(place.file("tiny.toml"), format!("{lines}\n{training}")).unwrap();
-}
-
 #[test]
 fn the_policy_kept_is_the_best_of_the_validations_and_the_last_of_equals() {
     let place = Place::new();
-    prepend(&place, &format!("validation = {{ benchmark = \"{}\", times = 5, episodes = 3 }}", place.text("short.toml")));
+    place.validate(5, 3);
     succeed(&place.train(&["--name", "run"]));
     let report = place.json("runs/run/report.json");
     let validation = &report["validation"];
@@ -152,10 +146,8 @@ fn the_policy_kept_is_the_best_of_the_validations_and_the_last_of_equals() {
 fn validation_routes_that_are_missing_or_trained_on_are_refused_before_a_folder_is_made() {
     let place = Place::new();
     let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
-    std::fs::write(place.file("none.toml"), benchmark.replace("validation = ", "test = ")).unwrap();
-    std::fs::write(place.file("same.toml"), benchmark.replace("train = [\"E-right-1\"]", "").replace("[\"N-right-1\"]", "[\"E-right-1\"]"))
-        .unwrap();
-    for (file, expected) in [("none.toml", "it has no validation routes"), ("same.toml", "16m/E-right-1 is a training route of short")] {
+    std::fs::write(place.file("same.toml"), benchmark.replace("train = ", "validation = ")).unwrap();
+    for (file, expected) in [("short.toml", "it has no validation routes"), ("same.toml", "16m/E-right-1 is a training route of short")] {
         let setting = format!("validation.benchmark={}", place.text(file));
         let arguments = ["--set", &setting, "--set", "validation.times=2", "--set", "validation.episodes=1"];
         let message = refusal(&place.train(&arguments), 2);
