@@ -5,15 +5,17 @@ use std::path::{Path, PathBuf};
 use offtrack::reader::{Reader, TEXT_LIMIT, read_text};
 use toml::{Table, Value};
 
+use super::set;
 use crate::error::Error;
 
 /// The training files that come with the program.
-const SHIPPED: [(&str, &str); 5] = [
+const SHIPPED: [(&str, &str); 6] = [
     ("default", include_str!("../../../configs/default.toml")),
+    ("best", include_str!("../../../configs/best.toml")),
+    ("attard", include_str!("../../../configs/attard.toml")),
     ("gpu", include_str!("../../../configs/gpu.toml")),
     ("as-run", include_str!("../../../configs/as-run.toml")),
     ("paper", include_str!("../../../configs/paper.toml")),
-    ("random", include_str!("../../../configs/random.toml")),
 ];
 /// Bases of bases: more than anyone needs, fewer than a circle.
 const DEPTH: usize = 8;
@@ -27,6 +29,10 @@ fn with_bases(file: &Path, depth: usize) -> Result<Table, Error> {
     let mut table = table(file)?;
     let invalid = |value: String, expected: String| Reader::of(file).invalid("base", value, expected);
     let base = match table.remove("base") {
+        None if table.contains_key("without") => {
+            let expected = "stands beside `base` alone: without a base there is nothing to take out";
+            return Err(Reader::of(file).invalid("without", "given", expected).into());
+        }
         None => return Ok(table),
         Some(Value::String(base)) if depth < DEPTH => base,
         Some(Value::String(base)) => {
@@ -40,8 +46,23 @@ fn with_bases(file: &Path, depth: usize) -> Result<Table, Error> {
         false => beside(file, &base),
     };
     let mut merged = with_bases(&path, depth + 1)?;
+    for key in without(file, &mut table)? {
+        let removed = set::remove(&mut merged, &key);
+        if !removed {
+            let expected = format!("{} has no such key: leave it out", path.display());
+            return Err(Reader::of(file).invalid("without", format!("{key:?}"), expected).into());
+        }
+    }
     merge(&mut merged, table);
     Ok(merged)
+}
+
+/// The keys of its base that a training file does without.
+fn without(file: &Path, table: &mut Table) -> Result<Vec<String>, Error> {
+    let read = |value: Value| value.try_into::<Vec<String>>();
+    let keys = table.remove("without").map(read).transpose();
+    let expected = "must be a list of keys of the base, as in [\"validation\", \"replay_buffer.priority\"]";
+    keys.map(Option::unwrap_or_default).map_err(|error| Reader::of(file).invalid("without", error.message(), expected).into())
 }
 
 fn beside(file: &Path, base: &str) -> PathBuf {

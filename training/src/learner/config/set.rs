@@ -29,6 +29,14 @@ fn one(table: &mut Table, setting: &str) -> Result<(), Error> {
     Ok(())
 }
 
+/// Takes a key out, `replay_buffer.priority`; false where there is none.
+pub(super) fn remove(table: &mut Table, key: &str) -> bool {
+    match key.split_once('.') {
+        None => table.remove(key).is_some(),
+        Some((part, rest)) => table.get_mut(part).and_then(Value::as_table_mut).is_some_and(|inner| remove(inner, rest)),
+    }
+}
+
 /// A TOML value; what is none is a word.
 fn parsed(value: &str) -> Value {
     let read = toml::from_str::<Table>(&format!("value = {value}")).ok();

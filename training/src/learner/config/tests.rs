@@ -281,3 +281,28 @@ fn further_evaluations_are_benchmarks_with_or_without_a_split() {
         assert!(message.contains(expected), "{list}: {message}");
     }
 }
+
+#[test]
+fn a_file_does_without_keys_of_its_base() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("base.toml", &default_file());
+    let read = |text: &str| {
+        write("mine.toml", text);
+        Config::read(&folder.path().join("mine.toml")).map_err(|error| error.to_string())
+    };
+    let whole = read("base = \"base.toml\"").unwrap();
+    assert!(whole.validation.is_some() && whole.replay_buffer.priority.is_some());
+    let mine = read("base = \"base.toml\"\nwithout = [\"validation\", \"replay_buffer.priority\"]").unwrap();
+    assert_eq!((&mine.validation, &mine.replay_buffer.priority), (&None, &None));
+    assert_eq!(mine.learning, whole.learning);
+    for (text, expected) in [
+        ("base = \"base.toml\"\nwithout = [\"validatoin\"]", "without: \"validatoin\"; "),
+        ("base = \"base.toml\"\nwithout = \"validation\"", "must be a list of keys of the base"),
+        ("base = \"base.toml\"\nwithout = [\"seed.x\"]", "has no such key"),
+        ("without = [\"validation\"]", "stands beside `base` alone"),
+    ] {
+        let message = read(text).unwrap_err();
+        assert!(message.contains("mine.toml") && message.contains(expected), "{message}");
+    }
+}
