@@ -35,11 +35,33 @@ COMMON = [
 SMALL = ["learning.batch=256", "learning.updates_per_step=4"]
 LARGE = ["learning.batch=512", "learning.updates_per_step=2"]
 PRIORITY = ["replay_buffer.priority.exponent=0.6", "replay_buffer.priority.correction=0.4"]
+GAMMA = ["learning.gamma=0.99"]
+CHOSEN = SMALL + GAMMA + PRIORITY + ["learning.entropy.coefficient=0.2"]
 REPLAY = ["level_replay.fraction=0.5", "level_replay.rate=0.2"]
 
 # Name, settings, env steps.
 CHOICES = [
-#CHOICES#
+    ("batches of 512, 2 a step", LARGE, 3_200_000),
+    ("512: gamma 0.99", LARGE + ["learning.gamma=0.99"], 3_200_000),
+    ("512: noise 0.1", LARGE + ["learning.observation_noise=0.1"], 3_200_000),
+    ("512: 1,024 trucks, half the updates a step", LARGE + ["n_envs=1024"], 6_400_000),
+    ("512: layer normalisation", LARGE + ["learning.layer_norm=true"], 2_700_000),
+    ("batches of 256, 4 a step", SMALL, 3_200_000),
+    ("batches of 128, 8 a step", ["learning.batch=128", "learning.updates_per_step=8"], 3_200_000),
+    ("256: level replay", SMALL + REPLAY, 3_200_000),
+    ("256: prioritised replay", SMALL + PRIORITY, 3_000_000),
+    ("256: gamma 0.99", SMALL + GAMMA, 3_200_000),
+    ("256: gamma 0.99, noise 0.1", SMALL + GAMMA + ["learning.observation_noise=0.1"], 3_200_000),
+    ("256: gamma 0.99, level replay", SMALL + GAMMA + REPLAY, 3_200_000),
+    ("256: gamma 0.99, prioritised replay", SMALL + GAMMA + PRIORITY, 3_000_000),
+    ("256: gamma 0.98, prioritised replay", SMALL + ["learning.gamma=0.98"] + PRIORITY, 3_000_000),
+    ("chosen: 256, gamma 0.99, prioritised replay, more entropy", CHOSEN, 3_000_000),
+    ("chosen: noise 0.1", CHOSEN + ["learning.observation_noise=0.1"], 3_000_000),
+    ("chosen: level replay", CHOSEN + REPLAY, 3_000_000),
+    ("chosen: learning rates 6e-4", CHOSEN + ["learning.actor_learning_rate=6e-4", "learning.critic_learning_rate=6e-4"], 3_000_000),
+    ("chosen: no mirror augmentation", CHOSEN + ["learning.mirror_augmentation=false"], 3_000_000),
+    ("chosen: three layers of 256", CHOSEN + ["learning.hidden=[256, 256, 256]"], 2_100_000),
+    ("chosen: two layers of 512", CHOSEN + ["learning.hidden=[512, 512]"], 1_100_000),
 ]
 
 
