@@ -20,13 +20,18 @@ fn scenarios() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
 }
 
-/// Every scenario file, relative to `scenarios/`.
+/// Benchmarks that have no key but those of another one.
+const LIKE_OTHERS: [&str; 4] =
+    ["random2026-1000.toml", "random2026-10000.toml", "random2026-as-run.toml", "random2026-as-run-training.toml"];
+
+/// Every other scenario file, relative to `scenarios/`.
 fn files() -> Vec<PathBuf> {
     let mut files = Vec::new();
     for folder in ["", "roundabouts", "vehicles", "distributions"] {
         for entry in std::fs::read_dir(scenarios().join(folder)).unwrap() {
             let path = entry.unwrap().path();
-            if path.extension().is_some_and(|extension| extension == "toml") {
+            let like_another = path.file_name().is_some_and(|name| LIKE_OTHERS.iter().any(|other| name == *other));
+            if path.extension().is_some_and(|extension| extension == "toml") && !like_another {
                 files.push(path.strip_prefix(scenarios()).unwrap().to_owned());
             }
         }
