@@ -205,10 +205,15 @@ impl Sac {
         let [critics, target] = [&mut self.critics, &mut self.target_critics].map(take);
         (self.critics, self.target_critics) =
             self.critic_optimizer.step(critics, target, critic_gradients, critic_learning_rate * rate_factor, tau);
+        // Until the critics know the policy its rates are 0. It is stepped nevertheless: its leaves must be new ones in each
+        // update, or the graph of every update stays in memory.
+        let (actor_learning_rate, actor_ema_rate) = match self.learning.actor_delay < self.n_updates {
+            true => (actor_learning_rate * rate_factor, actor_ema_rate),
+            false => (0.0, 0.0),
+        };
+        let [actor, ema] = [&mut self.actor, &mut self.actor_ema].map(take);
+        (self.actor, self.actor_ema) = self.actor_optimizer.step(actor, ema, actor_gradients, actor_learning_rate, actor_ema_rate);
         if self.learning.actor_delay < self.n_updates {
-            let [actor, ema] = [&mut self.actor, &mut self.actor_ema].map(take);
-            (self.actor, self.actor_ema) =
-                self.actor_optimizer.step(actor, ema, actor_gradients, actor_learning_rate * rate_factor, actor_ema_rate);
             self.entropy_coefficient.update(&figures[2]);
         }
 
