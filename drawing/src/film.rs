@@ -1,4 +1,4 @@
-//! A film of an episode as an animated GIF. All pictures share one palette, and each holds only the pixels that
+//! A film of episodes as an animated GIF. All pictures share one palette, and each holds only the pixels that
 //! changed.
 
 use std::collections::BTreeMap;
@@ -28,7 +28,16 @@ pub fn frames(n_frames: usize, step: f64) -> Vec<usize> {
     (0..last).step_by(stride).chain([last]).collect()
 }
 
-/// The film of these `frames` as a GIF's bytes, `width` pixels wide; `drawn` is called after each picture.
+/// An episode of a film.
+pub struct Take<'a> {
+    /// The episode.
+    pub scene: Scene<'a>,
+    /// Indices of the frames that are shown.
+    pub frames: Vec<usize>,
+}
+
+/// The film of these episodes, one after another, as a GIF's bytes, `width` pixels wide; `drawn` is called after each
+/// picture.
 ///
 /// # Errors
 ///
@@ -36,27 +45,37 @@ pub fn frames(n_frames: usize, step: f64) -> Vec<usize> {
 ///
 /// # Panics
 ///
-/// If `frames` is empty or has an index beyond the recording.
-pub fn gif(scene: &Scene, frames: &[usize], width: u32, mut drawn: impl FnMut()) -> Result<Vec<u8>, Error> {
+/// If there is no take, or if one has no frames or an index beyond its recording.
+pub fn gif(takes: &[Take], width: u32, mut drawn: impl FnMut()) -> Result<Vec<u8>, Error> {
     let options = usvg::Options::default();
-    let background = painted(&usvg::Tree::from_str(&scene.film_background(), &options)?, width, None)?;
-    let picture = |index: usize| painted(&usvg::Tree::from_str(&scene.film_picture(index), &options)?, width, Some(&background));
+    let backgrounds = takes.iter().map(|take| painted(&usvg::Tree::from_str(&take.scene.film_background(), &options)?, width, None));
+    let backgrounds = backgrounds.collect::<Result<Vec<Pixmap>, Error>>()?;
+    let picture = |take: usize, index: usize| {
+        painted(&usvg::Tree::from_str(&takes[take].scene.film_picture(index), &options)?, width, Some(&backgrounds[take]))
+    };
     // The colours of the film: the last picture has the longest paths and the end in words, one half way has the truck
     // in the ring.
-    let samples = [picture(frames[frames.len() / 2])?, picture(frames[frames.len() - 1])?];
+    let sampled =
+        takes.iter().enumerate().flat_map(|(take, Take { frames, .. })| [frames.len() / 2, frames.len() - 1].map(|at| (take, frames[at])));
+    let samples = sampled.map(|(take, index)| picture(take, index)).collect::<Result<Vec<Pixmap>, Error>>()?;
     let palette = Palette::of(&samples);
-    let (width, height) = (background.width(), background.height());
+    // Legends may take another line.
+    let (width, height) = (backgrounds[0].width(), backgrounds.iter().map(Pixmap::height).max().unwrap_or_default());
     let (Ok(wide), Ok(high)) = (u16::try_from(width), u16::try_from(height)) else { return Err(Error::Size { width, height }) };
     let mut encoder = Encoder::new(Vec::new(), wide, high, &palette.colours)?;
     encoder.set_repeat(Repeat::Infinite)?;
+    let white = palette.nearest[palette.nearest.len() - 1];
     let mut before = Vec::new();
-    for (n, &index) in frames.iter().enumerate() {
-        let indices = palette.indices(&picture(index)?);
-        let mut frame = changed(&before, &indices, wide.into());
-        frame.delay = if n + 1 == frames.len() { LAST_SHOWN } else { SHOWN };
-        encoder.write_frame(&frame)?;
-        before = indices;
-        drawn();
+    for (take, Take { frames, .. }) in takes.iter().enumerate() {
+        for (n, &index) in frames.iter().enumerate() {
+            let mut indices = palette.indices(&picture(take, index)?);
+            indices.resize((width * height) as usize, white);
+            let mut frame = changed(&before, &indices, wide.into());
+            frame.delay = if n + 1 == frames.len() { LAST_SHOWN } else { SHOWN };
+            encoder.write_frame(&frame)?;
+            before = indices;
+            drawn();
+        }
     }
     Ok(encoder.into_inner()?)
 }

@@ -1,4 +1,4 @@
-//! Records one episode: as data, as a film, or as a still with the swept paths of both units.
+//! Records episodes: as a film, or one as data or as a still with the swept paths of both units.
 //!
 //! The truck drives in the batch of an evaluation with the same seed, so that its episode is the one that `evaluate`
 //! counts.
@@ -7,29 +7,31 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use offtrack::procedural;
-use offtrack::roundabout::Roundabout;
+use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::Route;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;
 
 use offtrack_drawing::episode::Scene;
+use offtrack_drawing::film::{self, Take};
+use offtrack_drawing::rasterised;
 use offtrack_drawing::recording::{Map, Measures, Recorder, Recording, Track, centre_line};
-use offtrack_drawing::{film, rasterised};
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::policies::Policy;
 use offtrack_training::files;
 
 use super::{policies, progress, roads};
 
-/// Record one episode: as a film, as a picture with the swept paths of both units, or as data.
+/// Record an episode: as a film, as a picture with the swept paths of both units, or as data.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     policy: policies::Choice,
-    /// One of the benchmark's routes, of any split: 20m/N-left-3; or one of a random road: wide/7/12/N-left-3.
-    #[arg(long)]
-    route: String,
+    /// One of the benchmark's routes, of any split: 20m/N-left-3; or one of a random road: wide/7/12/N-left-3. A film may
+    /// have several, each with its own --route, one after another.
+    #[arg(long, required = true)]
+    route: Vec<String>,
     /// The file to write: .gif, .png, .svg, or .json for data.
     ///
     /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed",
@@ -80,16 +82,38 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = format!("must lie in 0..{}: --episodes says how many there are", args.episodes - 1);
         return Err(Error::Flag { flag: "--episode", value: args.episode.to_string(), expected });
     }
-    let scenario = scenario(args)?;
-    let chosen = Chosen::new(&scenario, &args.route)?;
-    let world = roads::world(&scenario)?;
-    let mut policy = args.policy.open(&scenario, &world, args.seed)?;
-    let track = recorded(args, &scenario, &world, &chosen, policy.as_mut())?;
-    let Chosen { roundabout, route, .. } = chosen;
-    let of = Of { scenario: &scenario, world: &world, roundabout, route, policy: policy.name(), seed: args.seed };
-    let recording = of.recording(args.episode, args.episodes, track);
-    let bytes = bytes(format, args.size, &recording, &of);
+    if format != Format::Gif && 1 < args.route.len() {
+        let expected = "must end in .gif: other files hold one episode, one --route".to_owned();
+        return Err(Error::Flag { flag: "--output", value: args.output.display().to_string(), expected });
+    }
+    let scenarios = args.route.iter().map(|route| scenario(args, route)).collect::<Result<Vec<Scenario>, Error>>()?;
+    let chosen = |(scenario, route): (_, &String)| Chosen::new(scenario, route);
+    let chosen = scenarios.iter().zip(&args.route).map(chosen).collect::<Result<Vec<Chosen>, Error>>()?;
+    let mut recordings = Vec::new();
+    for (scenario, chosen) in scenarios.iter().zip(&chosen) {
+        let world = roads::world(scenario)?;
+        let mut policy = args.policy.open(scenario, &world, args.seed)?;
+        let track = recorded(args, scenario, &world, chosen, policy.as_mut())?;
+        let Chosen { roundabout, route, .. } = *chosen;
+        let of = Of { scenario, world: &world, roundabout, route, policy: policy.name(), seed: args.seed };
+        recordings.push(of.recording(args.episode, args.episodes, track));
+    }
+    let recorded = recordings.iter().zip(&scenarios).zip(&chosen).map(|((recording, scenario), chosen)| Recorded {
+        recording,
+        roundabout: chosen.roundabout,
+        gutter: scenario.gutter,
+        route: chosen.route,
+    });
+    let bytes = bytes(format, args.size, &recorded.collect::<Vec<_>>());
     files::write_whole(&args.output, &bytes.map_err(unwritten(&args.output))?)
+}
+
+/// A recording and what is drawn around it.
+struct Recorded<'a> {
+    recording: &'a Recording,
+    roundabout: &'a Roundabout,
+    gutter: Gutter,
+    route: &'a Route,
 }
 
 /// A failure to draw or to encode a picture.
@@ -135,26 +159,31 @@ impl Of<'_> {
     /// Writes a film of a track, in the usual size.
     pub(super) fn write_film(&self, file: &Path, episode: usize, episodes: usize, track: Track) -> Result<(), Error> {
         let recording = self.recording(episode, episodes, track);
-        let bytes = bytes(Format::Gif, None, &recording, self).map_err(unwritten(file))?;
+        let recorded = Recorded { recording: &recording, roundabout: self.roundabout, gutter: self.scenario.gutter, route: self.route };
+        let bytes = bytes(Format::Gif, None, &[recorded]).map_err(unwritten(file))?;
         files::write_whole(file, &bytes)
     }
 }
 
-/// The recording in the format asked for.
-fn bytes(format: Format, size: Option<u32>, recording: &Recording, of: &Of) -> Result<Vec<u8>, Failure> {
+/// The recordings in the format asked for; the first alone, unless it is a film.
+fn bytes(format: Format, size: Option<u32>, recorded: &[Recorded]) -> Result<Vec<u8>, Failure> {
     if format == Format::Json {
-        let mut text = serde_json::to_string(recording)?;
+        let mut text = serde_json::to_string(recorded[0].recording)?;
         text.push('\n');
         return Ok(text.into_bytes());
     }
-    let scene = Scene::new(recording, of.roundabout, of.scenario.gutter, of.route)?;
     if format != Format::Gif {
-        let svg = scene.still();
+        let Recorded { recording, roundabout, gutter, route } = recorded[0];
+        let svg = Scene::new(recording, roundabout, gutter, route)?.still();
         return if format == Format::Png { Ok(rasterised(&svg, size.unwrap_or(1000))?) } else { Ok(svg.into_bytes()) };
     }
-    let frames = film::frames(recording.frames.len(), recording.step);
-    let bar = progress::Bar::new("drawing", "frames", frames.len());
-    Ok(film::gif(&scene, &frames, size.unwrap_or(720), || bar.advance())?)
+    let mut takes = Vec::new();
+    for of in recorded {
+        let frames = film::frames(of.recording.frames.len(), of.recording.step);
+        takes.push(Take { scene: Scene::new(of.recording, of.roundabout, of.gutter, of.route)?, frames });
+    }
+    let bar = progress::Bar::new("drawing", "frames", takes.iter().map(|take| take.frames.len()).sum());
+    Ok(film::gif(&takes, size.unwrap_or(720), || bar.advance())?)
 }
 
 fn format(output: &Path) -> Result<Format, Error> {
@@ -191,18 +220,18 @@ impl<'a> Chosen<'a> {
 
 /// The benchmark with the split of the route that is recorded or, where it does not have the route, on the road of the
 /// route alone.
-fn scenario(args: &Args) -> Result<Scenario, Error> {
+fn scenario(args: &Args, route: &str) -> Result<Scenario, Error> {
     let mut scenario = roads::benchmark(&args.benchmark)?;
-    let of = |split: &&Split| scenario.split_names(**split).contains(&args.route.as_str());
+    let of = |split: &&Split| scenario.split_names(**split).contains(&route);
     if let Some(&split) = Split::ALL.iter().find(of) {
         scenario.keep(&[split]);
         return Ok(scenario);
     }
-    let Some((road, _)) = args.route.rsplit_once('/').filter(|(road, _)| procedural::address(road).is_some()) else {
-        return Err(roads::unknown(&scenario, &args.route));
+    let Some((road, _)) = route.rsplit_once('/').filter(|(road, _)| procedural::address(road).is_some()) else {
+        return Err(roads::unknown(&scenario, route));
     };
     if scenario.places.iter().any(|place| place.roundabout.name == road) {
-        return Err(roads::unknown(&scenario, &args.route));
+        return Err(roads::unknown(&scenario, route));
     }
     Ok(scenario.on(procedural::find(road)?)?)
 }

@@ -84,6 +84,30 @@ fn a_film_has_every_second_frame_and_the_last_in_the_size_asked_for() {
 }
 
 #[test]
+fn a_film_of_several_routes_shows_them_one_after_another_and_other_files_hold_one() {
+    let place = Place::new();
+    let pages = |name: &str| {
+        let mut options = gif::DecodeOptions::new();
+        options.set_color_output(gif::ColorOutput::Indexed);
+        let mut decoder = options.read_info(Cursor::new(std::fs::read(place.file(name)).unwrap())).unwrap();
+        let mut delays = Vec::new();
+        while let Some(page) = decoder.read_next_frame().unwrap() {
+            delays.push(page.delay);
+        }
+        delays
+    };
+    record(&place, "one.gif", &["--size", "200"]);
+    // A random road, which the benchmark does not have.
+    record(&place, "two.gif", &["--size", "200", "--route", "wide/7/12/S-left-1"]);
+    let (one, two) = (pages("one.gif"), pages("two.gif"));
+    assert!(one.len() < two.len() && two.starts_with(&one), "{one:?} {two:?}");
+    assert_eq!(two.iter().filter(|&&delay| delay == 250).count(), 2, "each ends with a rest");
+    let all = recording(&place, "two.png", &["--route", "wide/7/12/S-left-1"]);
+    let said = refusal(&offtrack(&all.iter().map(String::as_str).collect::<Vec<_>>()), 2);
+    assert!(said.contains("must end in .gif: other files hold one episode, one --route"), "{said}");
+}
+
+#[test]
 fn a_still_has_the_size_asked_for_and_says_how_the_episode_ended() {
     let place = Place::new();
     record(&place, "a.png", &["--size", "300"]);
