@@ -11,6 +11,7 @@ report is not repeated, so an interrupted series can go on. Standard library onl
 import argparse
 import json
 import os
+import re
 import statistics
 import subprocess
 import sys
@@ -38,6 +39,14 @@ PRIORITY = ["replay_buffer.priority.exponent=0.6", "replay_buffer.priority.corre
 GAMMA = ["learning.gamma=0.99"]
 CHOSEN = SMALL + GAMMA + PRIORITY + ["learning.entropy.coefficient=0.2"]
 REPLAY = ["level_replay.fraction=0.5", "level_replay.rate=0.2"]
+SLOW = ["replay_buffer.capacity=2000000", "learning.actor_ema_rate=0.001"]
+# Other prices of the training benchmark, by the name of the file that is written with them.
+PRICES = {
+    "clearance-0.5": {"clearance_limit": 0.5},
+    "lane-30": {"lane_distance": -30.0, "clearance_limit": 0.5},
+    "lane-60": {"lane_distance": -60.0, "clearance_limit": 0.5},
+    "lane-60-clearance-1": {"lane_distance": -60.0},
+}
 
 # Name, settings, env steps.
 CHOICES = [
@@ -56,6 +65,27 @@ CHOICES = [
     ("256: gamma 0.99, prioritised replay", SMALL + GAMMA + PRIORITY, 3_000_000),
     ("256: gamma 0.98, prioritised replay", SMALL + ["learning.gamma=0.98"] + PRIORITY, 3_000_000),
     ("chosen: 256, gamma 0.99, prioritised replay, more entropy", CHOSEN, 3_000_000),
+    ("chosen: lane distance -30, clearance within 0.5 m", CHOSEN + ["training_benchmark=lane-30"], 3_000_000),
+    ("chosen: lane distance -60, clearance within 0.5 m", CHOSEN + ["training_benchmark=lane-60"], 3_000_000),
+    ("chosen: clearance within 0.5 m", CHOSEN + ["training_benchmark=clearance-0.5"], 4_800_000),
+    ("chosen: 2,000,000 transitions held, EMA rate 0.001", CHOSEN + SLOW, 4_800_000),
+    (
+        "chosen: 2,000,000 transitions held, EMA rate 0.001, lane distance -60",
+        CHOSEN + SLOW + ["training_benchmark=lane-60-clearance-1"],
+        4_800_000,
+    ),
+    (
+        "chosen: 2,048 trucks, lane distance -60",
+        CHOSEN
+        + ["n_envs=2048", "replay_buffer.capacity=2400000", "replay_buffer.warmup=80000"]
+        + ["training_benchmark=lane-60-clearance-1"],
+        17_200_000,
+    ),
+    (
+        "chosen: noise 0.05, target entropy 0.04",
+        CHOSEN + ["learning.observation_noise=0.05", "learning.entropy.target_fraction=0.04"],
+        4_800_000,
+    ),
     ("chosen: noise 0.1", CHOSEN + ["learning.observation_noise=0.1"], 3_000_000),
     ("chosen: level replay", CHOSEN + REPLAY, 3_000_000),
     ("chosen: learning rates 6e-4", CHOSEN + ["learning.actor_learning_rate=6e-4", "learning.critic_learning_rate=6e-4"], 3_000_000),
@@ -63,6 +93,21 @@ CHOICES = [
     ("chosen: three layers of 256", CHOSEN + ["learning.hidden=[256, 256, 256]"], 2_100_000),
     ("chosen: two layers of 512", CHOSEN + ["learning.hidden=[512, 512]"], 1_100_000),
 ]
+
+
+def write_prices(folder):
+    """The training benchmark with each of PRICES, as `folder`/NAME.toml."""
+    scenarios = Path(__file__).resolve().parents[2] / "scenarios"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, prices in PRICES.items():
+        text = (scenarios / "random2026-training.toml").read_text()
+        for key, value in prices.items():
+            text, found = re.subn(rf"^{key} = .*$", f"{key} = {value}", text, flags=re.MULTILINE)
+            assert found == 1, key
+        for key in ["vehicle", "distribution"]:
+            text, found = re.subn(rf'^{key} = "(.*)"$', rf'{key} = "{scenarios}/\1"', text, flags=re.MULTILINE)
+            assert found == 1, key
+        (folder / f"{name}.toml").write_text(text)
 
 
 def train(core, args, name, settings, steps, seed):
@@ -76,7 +121,10 @@ def train(core, args, name, settings, steps, seed):
         command = [str(args.offtrack), "train", "default", "--name", folder.name, "--out", str(args.runs)]
         command += ["--seed", str(seed), "--steps", str(steps)]
         for setting in COMMON + settings:
-            command += ["--set", setting]
+            key, value = setting.split("=", 1)
+            if value in PRICES:
+                value = args.runs / "scenarios" / f"{value}.toml"
+            command += ["--set", f"{key}={value}"]
         done = subprocess.run(
             command,
             capture_output=True,
@@ -132,7 +180,8 @@ def main():
     available = [int(core) for core in args.cores.split(",")] if args.cores else sorted(os.sched_getaffinity(0))
     for core in available:
         cores.put(core)
-    args.runs.mkdir(parents=True, exist_ok=True)
+    args.runs = args.runs.resolve()
+    write_prices(args.runs / "scenarios")
     wanted = [choice for choice in CHOICES if args.choice is None or choice[0] in args.choice]
 
     def job(name, settings, steps, seed):
