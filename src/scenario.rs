@@ -9,6 +9,7 @@ mod roads; // its roundabouts and routes
 mod part; // a part of a scenario, or another roundabout in it
 mod check; // a scenario changed in memory
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use crate::layout::Action;
@@ -180,6 +181,12 @@ impl Scenario {
     pub fn split_names(&self, split: Split) -> Vec<&str> {
         let names: Vec<&str> = self.routes().map(|(_, route)| route.name.as_str()).collect();
         self.split(split).iter().map(|&route| names[route as usize]).collect()
+    }
+
+    /// Names of a split's routes that another scenario has in its split `of`.
+    pub fn shared_names(&self, split: Split, other: &Scenario, of: Split) -> Vec<&str> {
+        let others: HashSet<&str> = other.split_names(of).into_iter().collect();
+        self.split_names(split).into_iter().filter(|name| others.contains(name)).collect()
     }
 
     /// Every route in the order of the world's table, with its roundabout's index in `places`.

@@ -3,8 +3,6 @@
 //! Their benchmarks are read and checked before the run begins. Each world is baked when its turn comes, so one at a
 //! time is in memory.
 
-use std::collections::HashSet;
-
 use offtrack::layout::Action;
 use offtrack::scenario::{Scenario, Split};
 use offtrack_training::device::Device;
@@ -38,16 +36,14 @@ pub struct AlsoReport {
 impl Also {
     /// Reads the benchmarks that a training file names. `training` is what the policy is trained on, with `actions`.
     pub fn read(config: &Config, training: &Scenario, actions: &[Action]) -> Result<Vec<Also>, Error> {
-        let trained: HashSet<&str> = training.split_names(Split::Train).into_iter().collect();
         let read = |named: AlsoEvaluate| {
             let wrong = |expected: String| Error::Flag { flag: "also_evaluate", value: named.name(), expected };
             let mut scenario = roads::benchmark(&named.benchmark).map_err(|error| wrong(error.to_string()))?;
             scenario.keep(&[named.split]);
-            let routes = scenario.split_names(named.split);
-            if routes.is_empty() {
+            if scenario.split(named.split).is_empty() {
                 return Err(wrong(format!("{} has no routes under `{}`", scenario.name, named.split.name())));
             }
-            let both: Vec<&str> = routes.into_iter().filter(|route| trained.contains(route)).collect();
+            let both = scenario.shared_names(named.split, training, Split::Train);
             if let (Some(route), true) = (both.first(), named.split != Split::Train) {
                 return Err(wrong(format!("{route} is trained on, so no {} route may be: leave it out", named.split.name())));
             }

@@ -1,6 +1,5 @@
 //! The benchmarks of a run, checked against each other: what it is trained on, and what its policy is evaluated on.
 
-use std::collections::HashSet;
 use std::sync::Arc;
 
 use offtrack::scenario::{Scenario, Split};
@@ -38,8 +37,7 @@ impl Worlds {
         if !benchmark.split(Split::Test).is_empty() {
             benchmark.keep(&[Split::Test]);
         }
-        let test: HashSet<&str> = benchmark.split_names(Split::Test).into_iter().collect();
-        if let Some(route) = training.split_names(Split::Train).into_iter().find(|&route| test.contains(route)) {
+        if let Some(route) = training.shared_names(Split::Train, &benchmark, Split::Test).first() {
             return Err(wrong(format!("{route} is a test route of {} and must not be trained on", benchmark.name)));
         }
         if training.split(Split::Train).is_empty() {

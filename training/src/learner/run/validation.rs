@@ -1,7 +1,6 @@
 //! The policy on validation routes while it learns. The best one is kept: a policy is chosen without a look at the routes
 //! that it is reported on.
 
-use std::collections::HashSet;
 use std::sync::Arc;
 
 use offtrack::scenario::{Scenario, Split};
@@ -74,12 +73,10 @@ impl Validation {
     /// routes trained on, is an error.
     pub fn new(settings: config::Validation, scenario: Arc<Scenario>, world: Arc<World>, training: &Scenario) -> Result<Validation, Error> {
         let wrong = |expected: String| Error::Flag { flag: "validation.benchmark", value: settings.benchmark.clone(), expected };
-        let routes = scenario.split_names(Split::Validation);
-        if routes.is_empty() {
+        if scenario.split(Split::Validation).is_empty() {
             return Err(wrong("it has no validation routes; random2026 has some".to_owned()));
         }
-        let trained: HashSet<&str> = training.split_names(Split::Train).into_iter().collect();
-        if let Some(route) = routes.iter().find(|&route| trained.contains(route)) {
+        if let Some(route) = scenario.shared_names(Split::Validation, training, Split::Train).first() {
             return Err(wrong(format!("{route} is a training route of {}: validation needs others", training.name)));
         }
         Ok(Validation { settings, scenario, world, n_made: 0, last: None, best: None })
