@@ -89,31 +89,31 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let scenarios = args.route.iter().map(|route| scenario(args, route)).collect::<Result<Vec<Scenario>, Error>>()?;
     let chosen = |(scenario, route): (_, &String)| Chosen::new(scenario, route);
     let chosen = scenarios.iter().zip(&args.route).map(chosen).collect::<Result<Vec<Chosen>, Error>>()?;
-    let mut recordings = Vec::new();
+    let mut recorded = Vec::new();
     for (scenario, chosen) in scenarios.iter().zip(&chosen) {
         let world = roads::world(scenario)?;
         let mut policy = args.policy.open(scenario, &world, args.seed)?;
-        let track = recorded(args, scenario, &world, chosen, policy.as_mut())?;
+        let track = driven(args, scenario, &world, chosen, policy.as_mut())?;
         let Chosen { roundabout, route, .. } = *chosen;
         let of = Of { scenario, world: &world, roundabout, route, policy: policy.name(), seed: args.seed };
-        recordings.push(of.recording(args.episode, args.episodes, track));
+        recorded.push(of.recorded(args.episode, args.episodes, track));
     }
-    let recorded = recordings.iter().zip(&scenarios).zip(&chosen).map(|((recording, scenario), chosen)| Recorded {
-        recording,
-        roundabout: chosen.roundabout,
-        gutter: scenario.gutter,
-        route: chosen.route,
-    });
-    let bytes = bytes(format, args.size, &recorded.collect::<Vec<_>>());
+    let bytes = bytes(format, args.size, &recorded);
     files::write_whole(&args.output, &bytes.map_err(unwritten(&args.output))?)
 }
 
 /// A recording and what is drawn around it.
 struct Recorded<'a> {
-    recording: &'a Recording,
+    recording: Recording,
     roundabout: &'a Roundabout,
     gutter: Gutter,
     route: &'a Route,
+}
+
+impl Recorded<'_> {
+    fn scene(&self) -> Result<Scene<'_>, Failure> {
+        Ok(Scene::new(&self.recording, self.roundabout, self.gutter, self.route)?)
+    }
 }
 
 /// A failure to draw or to encode a picture.
@@ -125,21 +125,21 @@ fn unwritten(file: &Path) -> impl Fn(Failure) -> Error {
 }
 
 /// What an episode that is recorded belongs to.
-pub(super) struct Of<'a> {
+pub(super) struct Of<'a, 'b> {
     pub(super) scenario: &'a Scenario,
-    pub(super) world: &'a World,
+    pub(super) world: &'b World,
     pub(super) roundabout: &'a Roundabout,
     pub(super) route: &'a Route,
     /// The policy's name.
-    pub(super) policy: &'a str,
+    pub(super) policy: &'b str,
     pub(super) seed: u32,
 }
 
-impl Of<'_> {
+impl<'a> Of<'a, '_> {
     /// The recording of a track: episode `episode` of the `episodes` that the evaluation has on this route.
-    fn recording(&self, episode: usize, episodes: usize, track: Track) -> Recording {
+    fn recorded(&self, episode: usize, episodes: usize, track: Track) -> Recorded<'a> {
         let Of { scenario, world, roundabout, route, policy, seed } = *self;
-        Recording {
+        let recording = Recording {
             benchmark: scenario.name.clone(),
             route: route.name.clone(),
             policy: policy.to_owned(),
@@ -153,14 +153,13 @@ impl Of<'_> {
             map: Map::of(roundabout, scenario.gutter),
             centre_line: centre_line(route),
             frames: track.frames,
-        }
+        };
+        Recorded { recording, roundabout, gutter: scenario.gutter, route }
     }
 
     /// Writes a film of a track, in the usual size.
     pub(super) fn write_film(&self, file: &Path, episode: usize, episodes: usize, track: Track) -> Result<(), Error> {
-        let recording = self.recording(episode, episodes, track);
-        let recorded = Recorded { recording: &recording, roundabout: self.roundabout, gutter: self.scenario.gutter, route: self.route };
-        let bytes = bytes(Format::Gif, None, &[recorded]).map_err(unwritten(file))?;
+        let bytes = bytes(Format::Gif, None, &[self.recorded(episode, episodes, track)]).map_err(unwritten(file))?;
         files::write_whole(file, &bytes)
     }
 }
@@ -168,19 +167,18 @@ impl Of<'_> {
 /// The recordings in the format asked for; the first alone, unless it is a film.
 fn bytes(format: Format, size: Option<u32>, recorded: &[Recorded]) -> Result<Vec<u8>, Failure> {
     if format == Format::Json {
-        let mut text = serde_json::to_string(recorded[0].recording)?;
+        let mut text = serde_json::to_string(&recorded[0].recording)?;
         text.push('\n');
         return Ok(text.into_bytes());
     }
     if format != Format::Gif {
-        let Recorded { recording, roundabout, gutter, route } = recorded[0];
-        let svg = Scene::new(recording, roundabout, gutter, route)?.still();
+        let svg = recorded[0].scene()?.still();
         return if format == Format::Png { Ok(rasterised(&svg, size.unwrap_or(1000))?) } else { Ok(svg.into_bytes()) };
     }
     let mut takes = Vec::new();
     for of in recorded {
         let frames = film::frames(of.recording.frames.len(), of.recording.step);
-        takes.push(Take { scene: Scene::new(of.recording, of.roundabout, of.gutter, of.route)?, frames });
+        takes.push(Take { scene: of.scene()?, frames });
     }
     let bar = progress::Bar::new("drawing", "frames", takes.iter().map(|take| take.frames.len()).sum());
     Ok(film::gif(&takes, size.unwrap_or(720), || bar.advance())?)
@@ -237,7 +235,7 @@ fn scenario(args: &Args, route: &str) -> Result<Scenario, Error> {
 }
 
 /// Drives the batch of the evaluation until the episode has ended.
-fn recorded(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chosen, policy: &mut dyn Policy) -> Result<Track, Error> {
+fn driven(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chosen, policy: &mut dyn Policy) -> Result<Track, Error> {
     let trucks: Vec<u32> = scenario.split(chosen.split).iter().flat_map(|&route| std::iter::repeat_n(route, args.episodes)).collect();
     let env = chosen.in_split * args.episodes + args.episode;
     let limit = world.routes[trucks[env] as usize].step_limit;

@@ -11,12 +11,18 @@ pub(super) enum Part {
     Exit,
 }
 
+/// Stations at which a route's ring and its exit begin \[m].
+fn ring_and_exit(scenario: &Scenario, route: &Route) -> [f64; 2] {
+    [scenario.approach, route.centre_line.length() - scenario.departure]
+}
+
 impl Part {
     /// The part of `route` at `station` metres from its beginning. A route that passes outside the ring has no ring.
     pub(super) fn at(scenario: &Scenario, route: &Route, station: f64) -> Part {
+        let [ring, exit] = ring_and_exit(scenario, route);
         match station {
-            station if station < scenario.approach => Part::Entry,
-            station if station < route.centre_line.length() - scenario.departure => Part::Ring,
+            station if station < ring => Part::Entry,
+            station if station < exit => Part::Ring,
             _ => Part::Exit,
         }
     }
@@ -46,7 +52,7 @@ impl LaneWidths {
     pub(super) fn of(scenario: &Scenario, place: &Place, route: &Route) -> LaneWidths {
         LaneWidths {
             spacing: scenario.spacing,
-            from: [scenario.approach, route.centre_line.length() - scenario.departure],
+            from: ring_and_exit(scenario, route),
             half_widths: place.roundabout.lane_widths(route).map(|width| (0.5 * width) as f32),
         }
     }

@@ -207,13 +207,11 @@ impl Sac {
             self.critic_optimizer.step(critics, target, critic_gradients, critic_learning_rate * rate_factor, tau);
         // Until the critics know the policy its rates are 0. It is stepped nevertheless: its leaves must be new ones in each
         // update, or the graph of every update stays in memory.
-        let (actor_learning_rate, actor_ema_rate) = match self.learning.actor_delay < self.n_updates {
-            true => (actor_learning_rate * rate_factor, actor_ema_rate),
-            false => (0.0, 0.0),
-        };
+        let is_learning = self.learning.actor_delay < self.n_updates;
+        let (rate, ema_rate) = if is_learning { (actor_learning_rate * rate_factor, actor_ema_rate) } else { (0.0, 0.0) };
         let [actor, ema] = [&mut self.actor, &mut self.actor_ema].map(take);
-        (self.actor, self.actor_ema) = self.actor_optimizer.step(actor, ema, actor_gradients, actor_learning_rate, actor_ema_rate);
-        if self.learning.actor_delay < self.n_updates {
+        (self.actor, self.actor_ema) = self.actor_optimizer.step(actor, ema, actor_gradients, rate, ema_rate);
+        if is_learning {
             self.entropy_coefficient.update(&figures[2]);
         }
 
