@@ -6,10 +6,10 @@
 fn draw(thread: Thread) {
     let env = index_of(thread);
     if batch.n_envs <= env { return; }
-    action[env] = drawn(batch.seed, env, truck[env].episode, truck[env].steps, params.n_actions);
+    action[env] = drawn(streams[env], truck[env].episode, truck[env].steps, params.n_actions);
 }
 
 // An action as a function of (seed, env, episode, step).
-fn drawn(seed: u32, env: u32, episode: u32, steps: u32, n_actions: u32) -> u32 {
-    return index_below(words(seed, env, episode, DRAW_ACTION + steps).x, n_actions);
+fn drawn(stream: Stream, episode: u32, steps: u32, n_actions: u32) -> u32 {
+    return index_below(words(stream.seed, stream.env, episode, DRAW_ACTION + steps).x, n_actions);
 }

@@ -12,6 +12,14 @@ const N_TRACTOR_RAYS: u32 = 13u;
 const N_RAYS: u32 = 29u;
 // Values of an observation that depend on the waypoint alone: future and current curvature, radius ahead.
 const N_PREVIEW: u32 = 18u;
+// Bit of [`BeginRow::what`]: the truck begins an episode.
+const BEGINS: u32 = 1u;
+// Bit: the episode is the first of the truck's stream, not the next one.
+const IS_FIRST: u32 = 2u;
+// Bit: its route is stated.
+const HAS_ROUTE: u32 = 4u;
+// Bit: its start is stated.
+const HAS_START: u32 = 8u;
 // Half a turn.
 const PI: f32 = 3.1415927f;
 // A turn.
@@ -145,6 +153,12 @@ const N_SUMS: u32 = 9u;
 const REWARD_SUM: u32 = 8u;
 // Units that a reward of 1 is counted in.
 const REWARD_UNITS: f32 = 256.0f;
+// `Autoreset::SameStep`.
+const SAME_STEP: u32 = 0u;
+// `Autoreset::NextStep`.
+const NEXT_STEP: u32 = 1u;
+// `Autoreset::Disabled`.
+const DISABLED: u32 = 2u;
 
 // Why an episode ended.
 const RUNNING: u32 = 0u;
@@ -196,7 +210,7 @@ struct Truck {
     episode: u32,
     // Steps taken in this episode.
     steps: u32,
-    // Whether the truck's only episode has ended, so that no stage changes it any more (0 or 1).
+    // Whether the truck's episode has ended and no other has begun, so that no stage changes it (0 or 1).
     held: u32,
 }
 
@@ -207,6 +221,25 @@ struct Start {
     offset: f32,
     // Fraction of the largest heading error, counter-clockwise positive.
     heading: f32,
+}
+
+// The stream of random numbers that a truck draws routes, starts and random actions from: a truck with the stream
+// (seed, env) drives as truck `env` of a batch with that seed.
+struct Stream {
+    // Seed.
+    seed: u32,
+    // Index of a truck in a batch of that seed.
+    env: u32,
+}
+
+// What the caller asks of a truck: whether and how it begins an episode.
+struct BeginRow {
+    // Its start, where [`HAS_START`] is set.
+    start: Start,
+    // Index of its route in the world, where [`HAS_ROUTE`] is set.
+    route: u32,
+    // Bits: [`BEGINS`], [`IS_FIRST`], [`HAS_ROUTE`], [`HAS_START`].
+    what: u32,
 }
 
 // Distance from a unit's outline to the nearest solid edge, at most 0 where they touch [m].
@@ -414,12 +447,12 @@ struct FieldRow {
 struct BatchFacts {
     // Trucks.
     n_envs: u32,
-    // Seed of routes, poses and random actions.
-    seed: u32,
     // Routes to draw from.
     n_routes: u32,
-    // Whether each truck runs the route of its own index once and is then held (0 or 1).
+    // Whether each truck runs the route of its own index (0 or 1).
     fixed: u32,
+    // What follows the end of an episode: SAME_STEP, NEXT_STEP or DISABLED.
+    autoreset: u32,
 }
 
 // Vehicle, time and weights.
@@ -444,29 +477,31 @@ struct BatchFacts {
 @group(0) @binding(9) var<storage, read> batch: BatchFacts;
 // Routes that episodes run on: to be drawn from, or one for each truck.
 @group(0) @binding(10) var<storage, read> choice: array<u32>;
-// Where each truck begins when the caller says so, [n_envs].
-@group(0) @binding(11) var<storage, read> starts: array<Start>;
+// The stream of random numbers that each truck draws from, [n_envs].
+@group(0) @binding(11) var<storage, read> streams: array<Stream>;
+// Which trucks begin an episode when the caller says so, and how, [n_envs].
+@group(0) @binding(12) var<storage, read> begins: array<BeginRow>;
 //  Index into the action table, [n_envs].
-@group(0) @binding(12) var<storage, read_write> action: array<u32>;
+@group(0) @binding(13) var<storage, read_write> action: array<u32>;
 //  Steer angle and acceleration asked of each truck, [n_envs].
-@group(0) @binding(13) var<storage, read_write> control: array<Control>;
+@group(0) @binding(14) var<storage, read_write> control: array<Control>;
 //  The trucks, [n_envs].
-@group(0) @binding(14) var<storage, read_write> truck: array<Truck>;
+@group(0) @binding(15) var<storage, read_write> truck: array<Truck>;
 //  Distances to the kerbs [m], [n_envs].
-@group(0) @binding(15) var<storage, read_write> clearance: array<Clearance>;
+@group(0) @binding(16) var<storage, read_write> clearance: array<Clearance>;
 //  Progress along the routes, [n_envs].
-@group(0) @binding(16) var<storage, read_write> progress: array<Progress>;
+@group(0) @binding(17) var<storage, read_write> progress: array<Progress>;
 //  Distance sensors [m], [n_envs, 29].
-@group(0) @binding(17) var<storage, read_write> ranges: array<f32>;
+@group(0) @binding(18) var<storage, read_write> ranges: array<f32>;
 //  The observation before the next action, [n_envs, 69].
-@group(0) @binding(18) var<storage, read_write> observation: array<f32>;
+@group(0) @binding(19) var<storage, read_write> observation: array<f32>;
 //  The observation after the last action, another one only where an episode ended, [n_envs, 69].
-@group(0) @binding(19) var<storage, read_write> next_observation: array<f32>;
+@group(0) @binding(20) var<storage, read_write> next_observation: array<f32>;
 //  Codes of [`crate::layout::Ended`] for the last step, [n_envs].
-@group(0) @binding(20) var<storage, read_write> ended: array<u32>;
+@group(0) @binding(21) var<storage, read_write> ended: array<u32>;
 //  Physical amounts that the reward weighs, [n_envs].
-@group(0) @binding(21) var<storage, read_write> terms: array<RewardTerms>;
+@group(0) @binding(22) var<storage, read_write> terms: array<RewardTerms>;
 //  Rewards of the last step, [n_envs].
-@group(0) @binding(22) var<storage, read_write> reward: array<f32>;
+@group(0) @binding(23) var<storage, read_write> reward: array<f32>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(23) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(24) var<storage, read_write> tally: array<atomic<u32>>;

@@ -15,6 +15,24 @@ fn observe_after_reset(thread: Thread) {
     let env = index_of(thread);
     if !has_begun(env) { return; }
     observed(env, true);
+    // With the other modes it describes the step that ended the last episode.
+    if batch.autoreset == NEXT_STEP { copy_first(env); }
+}
+
+// The first observation of the trucks that the caller named.
+@compute @workgroup_size(WORKGROUP)
+fn observe_begun(thread: Thread) {
+    let env = index_of(thread);
+    if !is_to_begin(env) { return; }
+    observed(env, true);
+    copy_first(env);
+}
+
+// Makes the first observation of an episode the one after the last action too: there was none.
+fn copy_first(env: u32) {
+    for (var n = 0u; n < N_VALUES; n++) {
+        next_observation[env * N_VALUES + n] = observation[env * N_VALUES + n];
+    }
 }
 
 // Writes a value of a truck's observation: to the one before the next action after a reset, otherwise to the one after

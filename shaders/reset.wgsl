@@ -1,48 +1,60 @@
-// Begins the next episode of a truck whose last one ended, within the same step.
+// Begins episodes: within the step that ended the last one, in the step after it, or when the caller says so.
 //
-// Route and pose are functions of (seed, env, episode) alone. A truck on a fixed route drives it once and is then held.
-// Other kernels then sense and observe the trucks that began another episode.
+// Route and pose are functions of (seed, env, episode) alone, where the caller states none. Other kernels then sense and
+// observe the trucks that have begun.
 
+// Begins another episode where one ended, or holds the truck. A truck that was held when the step began begins its next
+// episode with NEXT_STEP.
 @compute @workgroup_size(WORKGROUP)
 fn reset(thread: Thread) {
     let env = index_of(thread);
-    if !is_driving(env) || ended[env] == RUNNING { return; }
-    if batch.fixed == 1u {
-        truck[env].held = 1u;
-    } else {
-        begin(env, truck[env].episode + 1u);
+    if batch.n_envs <= env { return; }
+    if truck[env].held == 1u {
+        if batch.autoreset == NEXT_STEP { begun(env, next()); }
+    } else if ended[env] != RUNNING {
+        if batch.autoreset == SAME_STEP {
+            start(env, next());
+        } else {
+            truck[env].held = 1u;
+        }
     }
 }
 
-// Begins episode 0 of every truck at a drawn pose.
+// Begins an episode where the caller says so. It has no last step.
 @compute @workgroup_size(WORKGROUP)
-fn restart(thread: Thread) {
+fn begin(thread: Thread) {
     let env = index_of(thread);
-    if batch.n_envs <= env { return; }
-    begin(env, 0u);
+    if !is_to_begin(env) { return; }
+    begun(env, begins[env]);
 }
 
-// Begins episode 0 of every truck at a stated pose.
-@compute @workgroup_size(WORKGROUP)
-fn restart_from(thread: Thread) {
-    let env = index_of(thread);
-    if batch.n_envs <= env { return; }
-    begin_from(env, 0u, starts[env]);
+// The next episode, as drawn.
+fn next() -> BeginRow {
+    var begin = BeginRow();
+    begin.what = BEGINS;
+    return begin;
 }
 
-// Puts the truck at the start of `episode`, at a pose drawn for it.
-fn begin(env: u32, episode: u32) {
-    let pose = words(batch.seed, env, episode, DRAW_POSE);
-    begin_from(env, episode, Start(signed_unit(pose.x), signed_unit(pose.y)));
+// An episode that has no last step.
+fn begun(env: u32, begin: BeginRow) {
+    start(env, begin);
+    ended[env] = RUNNING;
+    terms[env] = RewardTerms();
+    reward[env] = 0.0;
 }
 
-// The same at a stated pose.
-fn begin_from(env: u32, episode: u32, start: Start) {
-    var index = env;
-    if batch.fixed == 0u {
-        index = index_below(words(batch.seed, env, episode, DRAW_ROUTE).x, batch.n_routes);
+// Puts the truck at the start of an episode.
+fn start(env: u32, begin: BeginRow) {
+    let stream = streams[env];
+    var episode = 0u;
+    if (begin.what & IS_FIRST) == 0u { episode = truck[env].episode + 1u; }
+    var route = begin.route;
+    if (begin.what & HAS_ROUTE) == 0u { route = route_of(env, episode); }
+    var start = begin.start;
+    if (begin.what & HAS_START) == 0u {
+        let pose = words(stream.seed, stream.env, episode, DRAW_POSE);
+        start = Start(signed_unit(pose.x), signed_unit(pose.y));
     }
-    let route = choice[index];
     let first = routes[route].first;
     var after = started(params, waypoints[first], previews[first].heading, start);
     after.route = route;
@@ -51,6 +63,15 @@ fn begin_from(env: u32, episode: u32, start: Start) {
     truck[env] = after;
     progress[env] = followed(routes[route], reference_point(params.rig.wheelbase, after), 1u, params.stray_distance);
     progress[env].passed = 0u;
+}
+
+// The route of an episode as the batch chooses it.
+fn route_of(env: u32, episode: u32) -> u32 {
+    var index = env;
+    if batch.fixed == 0u {
+        index = index_below(words(streams[env].seed, streams[env].env, episode, DRAW_ROUTE).x, batch.n_routes);
+    }
+    return choice[index];
 }
 
 // A truck at `waypoint`, where the lane has this heading [rad]: trailer straight, offset and turned as `start` says.

@@ -2,6 +2,7 @@
 //!
 //! Neither engine knows the other. [`crate::simulator`] chooses one and drives it through `EngineBatch`.
 
+pub(crate) mod autoreset;
 mod batch;
 pub mod cpu; // the CPU engine: all cores, a truck at a time
 mod error;
@@ -11,12 +12,14 @@ mod memory;
 pub(crate) mod tally;
 
 use std::any::Any;
+use std::borrow::Cow;
 use std::fmt::Debug;
 use std::time::Duration;
 
-use crate::layout::Start;
+use crate::layout::{BeginRow, Column, Stream};
 use crate::stages::{N_STAGES, Stage};
 use crate::world::World;
+pub use autoreset::Autoreset;
 pub(crate) use batch::Row;
 pub use batch::{Batch, RouteChoice};
 pub use error::Error;
@@ -37,11 +40,17 @@ pub(crate) trait EngineBatch: Any + Debug + Send + Sync {
     /// Sums since the batch was made.
     fn tally(&self) -> Result<Tally, Error>;
 
-    /// Begins episode 0 of every truck.
-    fn reset(&mut self, world: &World);
+    /// What each truck draws from, `[n_envs]`.
+    fn streams(&self) -> Vec<Stream>;
 
-    /// The same at stated poses, one for each truck.
-    fn reset_from(&mut self, world: &World, starts: &[Start]) -> Result<(), Error>;
+    /// Begins an episode of the trucks whose row says so, one row for each truck, after the streams have changed.
+    fn begin(&mut self, world: &World, begins: &[BeginRow], streams: Option<&[Stream]>) -> Result<(), Error>;
+
+    /// Sets what follows the end of an episode.
+    fn set_autoreset(&mut self, autoreset: Autoreset);
+
+    /// The bytes of some columns, `[n_envs]` rows each: no other column is read from a device.
+    fn read(&self, columns: &[Column]) -> Result<Vec<Cow<'_, [u8]>>, Error>;
 
     /// Makes the batch one of the rows `indices`.
     fn gather(&mut self, world: &World, indices: &[u32]) -> Result<(), Error>;

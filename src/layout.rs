@@ -30,6 +30,14 @@ constants! {
     pub const N_RAYS: usize = N_TRAILER_RAYS + N_TRACTOR_RAYS;
     /// Values of an observation that depend on the waypoint alone: future and current curvature, radius ahead.
     pub const N_PREVIEW: usize = 18;
+    /// Bit of [`BeginRow::what`]: the truck begins an episode.
+    pub const BEGINS: u32 = 1;
+    /// Bit: the episode is the first of the truck's stream, not the next one.
+    pub const IS_FIRST: u32 = 2;
+    /// Bit: its route is stated.
+    pub const HAS_ROUTE: u32 = 4;
+    /// Bit: its start is stated.
+    pub const HAS_START: u32 = 8;
 }
 
 crate::shared! {
@@ -73,7 +81,7 @@ crate::shared! {
         pub episode: u32,
         /// Steps taken in this episode.
         pub steps: u32,
-        /// Whether the truck's only episode has ended, so that no stage changes it any more (0 or 1).
+        /// Whether the truck's episode has ended and no other has begun, so that no stage changes it (0 or 1).
         pub held: u32,
     }
 
@@ -84,6 +92,25 @@ crate::shared! {
         pub offset: f32,
         /// Fraction of the largest heading error, counter-clockwise positive.
         pub heading: f32,
+    }
+
+    /// The stream of random numbers that a truck draws routes, starts and random actions from: a truck with the stream
+    /// (seed, env) drives as truck `env` of a batch with that seed.
+    pub struct Stream {
+        /// Seed.
+        pub seed: u32,
+        /// Index of a truck in a batch of that seed.
+        pub env: u32,
+    }
+
+    /// What the caller asks of a truck: whether and how it begins an episode.
+    pub struct BeginRow {
+        /// Its start, where [`HAS_START`] is set.
+        pub start: Start,
+        /// Index of its route in the world, where [`HAS_ROUTE`] is set.
+        pub route: u32,
+        /// Bits: [`BEGINS`], [`IS_FIRST`], [`HAS_ROUTE`], [`HAS_START`].
+        pub what: u32,
     }
 
     /// Distance from a unit's outline to the nearest solid edge, at most 0 where they touch \[m].
@@ -291,12 +318,12 @@ crate::shared! {
     pub struct BatchFacts {
         /// Trucks.
         pub n_envs: u32,
-        /// Seed of routes, poses and random actions.
-        pub seed: u32,
         /// Routes to draw from.
         pub n_routes: u32,
-        /// Whether each truck runs the route of its own index once and is then held (0 or 1).
+        /// Whether each truck runs the route of its own index (0 or 1).
         pub fixed: u32,
+        /// What follows the end of an episode: SAME_STEP, NEXT_STEP or DISABLED.
+        pub autoreset: u32,
     }
 }
 

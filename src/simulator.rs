@@ -1,13 +1,14 @@
 //! Many trucks, many steps, on the engine that the caller chooses: the only module that knows both.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Duration;
 
 use crate::engine::EngineBatch;
 #[cfg(feature = "gpu")]
 use crate::engine::gpu;
-pub use crate::engine::{Batch, Error, RouteChoice, Tally};
-use crate::layout::{Column, Start};
+pub use crate::engine::{Autoreset, Batch, Error, RouteChoice, Tally};
+use crate::layout::{BEGINS, BeginRow, Column, HAS_ROUTE, HAS_START, IS_FIRST, Start, Stream};
 use crate::stages::{N_STAGES, Stage};
 use crate::world::World;
 
@@ -25,6 +26,19 @@ pub enum Engine {
         /// External columns: those that lie in memory of the caller.
         columns: gpu::Columns,
     },
+}
+
+/// An episode that the caller begins.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Begin {
+    /// Index of the truck.
+    pub env: usize,
+    /// What the truck draws from on: the episode is the first of this stream. None: the next one of its own stream.
+    pub stream: Option<Stream>,
+    /// Index of the episode's route in the world. None: as the batch chooses it.
+    pub route: Option<u32>,
+    /// The episode's start. None: drawn.
+    pub start: Option<Start>,
 }
 
 /// A batch of trucks in a world.
@@ -89,14 +103,56 @@ impl Simulator {
         batch.downcast_mut()
     }
 
+    /// What each truck draws routes, starts and random actions from, `[n_envs]`.
+    pub fn streams(&self) -> Vec<Stream> {
+        self.batch.streams()
+    }
+
     /// Sums over all steps since the batch was made.
     pub fn tally(&self) -> Result<Tally, Error> {
         self.batch.tally()
     }
 
+    /// The bytes of some columns, as [`Simulator::batch`] has them, `[n_envs]` rows each. From a device these alone are
+    /// read, unless all were read since the last step.
+    pub fn read(&self, columns: &[Column]) -> Result<Vec<Cow<'_, [u8]>>, Error> {
+        self.batch.read(columns)
+    }
+
+    /// What follows the end of an episode from the next step on: before the first call that of
+    /// [`RouteChoice::autoreset`].
+    pub fn set_autoreset(&mut self, autoreset: Autoreset) {
+        self.batch.set_autoreset(autoreset);
+    }
+
     /// Begins episode 0 of every truck.
     pub fn reset(&mut self) {
-        self.batch.reset(&self.world);
+        let begins = vec![BeginRow { what: BEGINS | IS_FIRST, ..BeginRow::default() }; self.n_envs()];
+        // A device that fails here fails at the next step, which returns the error.
+        let _ = self.batch.begin(&self.world, &begins, None);
+    }
+
+    /// Begins an episode of each of these trucks and leaves the others as they are. What follows depends on the truck's
+    /// stream alone: with the stream (seed, env) it drives as truck `env` of a batch with that seed, at any place in a
+    /// batch of any size. Wrong requests leave the batch as it was.
+    pub fn begin(&mut self, requests: &[Begin]) -> Result<(), Error> {
+        let n_envs = self.n_envs();
+        let mut begins = vec![BeginRow::default(); n_envs];
+        let mut has_stream = false;
+        let mut streams = self.batch.streams();
+        for (position, &Begin { env, stream, route, start }) in requests.iter().enumerate() {
+            let Some(begin) = begins.get_mut(env) else {
+                return Err(Error::UnknownTruck { position, index: env, n_envs });
+            };
+            route.map_or(Ok(()), |route| check_known(&self.world, &[route]))?;
+            start.map_or(Ok(()), |start| check_start(env, &start))?;
+            let flag = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
+            let what = BEGINS | flag(stream.is_some(), IS_FIRST) | flag(route.is_some(), HAS_ROUTE) | flag(start.is_some(), HAS_START);
+            *begin = BeginRow { start: start.unwrap_or_default(), route: route.unwrap_or_default(), what };
+            streams[env] = stream.unwrap_or(streams[env]);
+            has_stream |= stream.is_some();
+        }
+        self.batch.begin(&self.world, &begins, has_stream.then_some(streams.as_slice()))
     }
 
     /// Begins episode 0 of every truck at a stated pose, `[n_envs]`, rather than a drawn one. Wrong starts leave the
@@ -107,11 +163,11 @@ impl Simulator {
             return Err(Error::StartCount { n_starts: starts.len(), n_envs });
         }
         for (env, start) in starts.iter().enumerate() {
-            if let Some(fraction) = [start.offset, start.heading].into_iter().find(|fraction| !(-1.0..=1.0).contains(fraction)) {
-                return Err(Error::UnknownStart { env, fraction: fraction.to_string() });
-            }
+            check_start(env, start)?;
         }
-        self.batch.reset_from(&self.world, starts)
+        let what = BEGINS | IS_FIRST | HAS_START;
+        let begins: Vec<BeginRow> = starts.iter().map(|&start| BeginRow { start, route: 0, what }).collect();
+        self.batch.begin(&self.world, &begins, None)
     }
 
     /// Draws the routes of later episodes from these, as many as before; a route that stands twice is drawn twice as
@@ -129,14 +185,14 @@ impl Simulator {
     /// `indices.len()` trucks.
     ///
     /// A truck that was ended and held stays so. A fixed route moves with its truck; what is drawn later depends on the
-    /// new row. An error leaves the batch as it was.
+    /// batch's seed and the new row. An error leaves the batch as it was.
     pub fn gather(&mut self, indices: &[u32]) -> Result<(), Error> {
         let n_envs = self.n_envs();
         if indices.is_empty() {
             return Err(Error::EmptyBatch);
         }
         if let Some((position, &index)) = indices.iter().enumerate().find(|&(_, &index)| n_envs <= index as usize) {
-            return Err(Error::UnknownTruck { position, index, n_envs });
+            return Err(Error::UnknownTruck { position, index: index as usize, n_envs });
         }
         self.batch.gather(&self.world, indices)
     }
@@ -206,6 +262,12 @@ fn check_routes(world: &World, n_envs: usize, choice: &RouteChoice) -> Result<()
         return Err(Error::RouteCount { n_routes: routes.len(), n_envs });
     }
     Ok(())
+}
+
+/// An error if the start lies beyond the benchmark's largest errors.
+fn check_start(env: usize, start: &Start) -> Result<(), Error> {
+    let outside = [start.offset, start.heading].into_iter().find(|fraction| !(-1.0..=1.0).contains(fraction));
+    outside.map_or(Ok(()), |fraction| Err(Error::UnknownStart { env, fraction: fraction.to_string() }))
 }
 
 /// An error if the world does not have one of the routes.

@@ -43,18 +43,16 @@ pub const STAGES: [Stage; N_STAGES] = {
     stages
 };
 
-/// What every truck goes through after it was put somewhere.
-pub const OBSERVE_ALL: [Stage; 3] = [Stage::Sense, Stage::Observe, Stage::CopyObservation];
+/// The kernels that begin an episode of the trucks that the caller named.
+pub const BEGIN: [Kernel; 3] = [Kernel::Begin, Kernel::SenseAfterReset, Kernel::ObserveBegun];
 
 crate::named! {
     /// An entry point of the shaders.
     pub enum Kernel {
         /// Draws a random action for every truck.
         Draw = "draw",
-        /// Begins episode 0 of every truck at a drawn pose.
-        Restart = "restart",
-        /// Begins episode 0 of every truck at a stated pose.
-        RestartFrom = "restart_from",
+        /// Begins an episode of the trucks that the caller named.
+        Begin = "begin",
         /// [`Stage::Steer`].
         Steer = "steer",
         /// [`Stage::Drive`].
@@ -79,6 +77,8 @@ crate::named! {
         SenseAfterReset = "sense_after_reset",
         /// [`Stage::Reset`]: observations of the trucks that began another episode.
         ObserveAfterReset = "observe_after_reset",
+        /// Observes the trucks that the caller named, once they have begun.
+        ObserveBegun = "observe_begun",
     }
 }
 

@@ -1,7 +1,6 @@
 //! What shaders share with Rust, printed as WGSL.
 
-use crate::engine::cpu;
-use crate::engine::tally;
+use crate::engine::{autoreset, cpu, tally};
 use crate::layout::{self, buffers};
 use crate::{angle, field, random};
 
@@ -24,6 +23,7 @@ pub fn shared() -> String {
         cpu::sense::printed_constants(),
         cpu::observe::printed_constants(),
         tally::printed_constants(),
+        autoreset::printed_constants(),
         "\n".to_owned(),
         layout::printed_codes(),
         "\n".to_owned(),

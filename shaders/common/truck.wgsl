@@ -10,7 +10,12 @@ fn is_driving(env: u32) -> bool {
     return env < batch.n_envs && truck[env].held == 0u;
 }
 
-// Whether there is such a truck and it began another episode in this step.
+// Whether there is such a truck and it has begun an episode and made no step of it.
 fn has_begun(env: u32) -> bool {
-    return env < batch.n_envs && ended[env] != RUNNING && batch.fixed == 0u;
+    return env < batch.n_envs && truck[env].steps == 0u && truck[env].held == 0u;
+}
+
+// Whether there is such a truck and the caller says that it begins an episode.
+fn is_to_begin(env: u32) -> bool {
+    return env < batch.n_envs && (begins[env].what & BEGINS) != 0u;
 }

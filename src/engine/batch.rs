@@ -3,9 +3,9 @@
 use bytemuck::{cast_slice, cast_slice_mut};
 use rayon::prelude::*;
 
-use super::{Error, Tally, memory};
+use super::{Autoreset, Error, Tally, memory};
 use crate::layout::columns::{columns, row_bytes};
-use crate::layout::{Clearance, Column, Control, N_COLUMNS, N_RAYS, N_VALUES, Progress, RewardTerms, Truck};
+use crate::layout::{Clearance, Column, Control, N_COLUMNS, N_RAYS, N_VALUES, Progress, RewardTerms, Stream, Truck};
 
 /// Rows that a thread takes at least: fewer cost more to hand out than to step.
 const ROWS_MIN: usize = 16;
@@ -13,9 +13,11 @@ const ROWS_MIN: usize = 16;
 /// Which route an episode runs on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RouteChoice {
-    /// Drawn uniformly at random for every episode. Episodes follow each other: no truck is ever held.
+    /// Drawn uniformly at random for every episode. Episodes follow each other in the same step, unless
+    /// [`crate::simulator::Simulator::set_autoreset`] says otherwise.
     Drawn(Vec<u32>),
-    /// Truck `env` runs `routes[env]` once: when its episode has ended it is held until the batch is reset.
+    /// Truck `env` runs `routes[env]` once, unless `set_autoreset` says otherwise: when its episode has ended it is held
+    /// until the batch is reset.
     Fixed(Vec<u32>),
 }
 
@@ -25,6 +27,14 @@ impl RouteChoice {
         let (RouteChoice::Drawn(routes) | RouteChoice::Fixed(routes)) = self;
         routes
     }
+
+    /// What follows the end of an episode where the caller does not say.
+    pub fn autoreset(&self) -> Autoreset {
+        match self {
+            RouteChoice::Drawn(_) => Autoreset::SameStep,
+            RouteChoice::Fixed(_) => Autoreset::Disabled,
+        }
+    }
 }
 
 macro_rules! batch {
@@ -32,10 +42,12 @@ macro_rules! batch {
         /// One truck's row of the columns while a stage works on it.
         #[derive(Debug)]
         pub struct Row<'a> {
-            /// The batch's seed.
-            pub seed: u32,
+            /// What the truck's routes, starts and random actions are drawn from.
+            pub stream: Stream,
             /// The truck's index in the batch.
             pub env: u32,
+            /// What follows the end of an episode.
+            pub autoreset: Autoreset,
             /// Routes that episodes run on, as indices into the world's table.
             pub choice: &'a RouteChoice,
             /// What this truck adds to the batch's tally.
@@ -48,6 +60,8 @@ macro_rules! batch {
         pub struct Batch {
             seed: u32,
             choice: RouteChoice,
+            autoreset: Autoreset,
+            streams: Vec<Stream>,
             /// Sums since the batch was made.
             pub(crate) tally: Tally,
             $($(#[doc = $doc])* pub $name: Vec<$type>,)*
@@ -57,7 +71,9 @@ macro_rules! batch {
             /// `n_envs` trucks that have yet to be reset.
             pub(crate) fn new(n_envs: usize, seed: u32, choice: RouteChoice) -> Result<Batch, Error> {
                 check_size(n_envs)?;
-                Ok(Batch { seed, choice, tally: Tally::default(), $($name: zeros(n_envs)?,)* })
+                let mut streams: Vec<Stream> = zeros(n_envs)?;
+                (0..).zip(&mut streams).for_each(|(env, stream)| *stream = Stream { seed, env });
+                Ok(Batch { seed, autoreset: choice.autoreset(), choice, streams, tally: Tally::default(), $($name: zeros(n_envs)?,)* })
             }
 
             /// The rows `indices` of this batch, in that order and as often as they are named: row `i` goes on as row
@@ -67,7 +83,7 @@ macro_rules! batch {
                     RouteChoice::Fixed(routes) => RouteChoice::Fixed(indices.iter().map(|&index| routes[index as usize]).collect()),
                     RouteChoice::Drawn(routes) => RouteChoice::Drawn(routes.clone()),
                 };
-                let mut batch = Batch { tally: self.tally, ..Batch::new(indices.len(), self.seed, choice)? };
+                let mut batch = Batch { tally: self.tally, autoreset: self.autoreset, ..Batch::new(indices.len(), self.seed, choice)? };
                 $(
                     for (row, &index) in batch.$name.iter_mut().zip(indices) {
                         *row = self.$name[index as usize];
@@ -89,9 +105,16 @@ macro_rules! batch {
 
             /// Every row, divided among all cores.
             pub(crate) fn rows(&mut self) -> impl ParallelIterator<Item = Row<'_>> {
-                let (seed, choice) = (self.seed, &self.choice);
+                let (streams, choice, autoreset) = (&self.streams, &self.choice, self.autoreset);
                 let rows = ($(&mut self.$name,)*).into_par_iter().enumerate().with_min_len(ROWS_MIN);
-                rows.map(move |(env, ($($name,)*))| Row { seed, env: env as u32, choice, tally: Tally::default(), $($name,)* })
+                rows.map(move |(env, ($($name,)*))| Row {
+                    stream: streams[env],
+                    env: env as u32,
+                    autoreset,
+                    choice,
+                    tally: Tally::default(),
+                    $($name,)*
+                })
             }
         }
     };
@@ -105,7 +128,7 @@ impl Batch {
         self.truck.len()
     }
 
-    /// Seed of its routes, poses and random actions.
+    /// Seed of its routes, poses and random actions, where no truck was given a stream of its own.
     pub fn seed(&self) -> u32 {
         self.seed
     }
@@ -113,6 +136,24 @@ impl Batch {
     /// Which routes its episodes run on.
     pub fn choice(&self) -> &RouteChoice {
         &self.choice
+    }
+
+    /// What follows the end of an episode.
+    pub fn autoreset(&self) -> Autoreset {
+        self.autoreset
+    }
+
+    /// What each truck draws from, `[n_envs]`.
+    pub fn streams(&self) -> &[Stream] {
+        &self.streams
+    }
+
+    pub(crate) fn set_autoreset(&mut self, autoreset: Autoreset) {
+        self.autoreset = autoreset;
+    }
+
+    pub(crate) fn set_streams(&mut self, streams: &[Stream]) {
+        self.streams.copy_from_slice(streams);
     }
 
     /// Draws the routes of later episodes from these.
@@ -125,9 +166,10 @@ impl Batch {
         self.tally
     }
 
-    /// As many trucks with the same seed, routes and tally, and all columns zero.
+    /// As many trucks with the same streams, routes and tally, and all columns zero.
     pub(crate) fn blank(&self) -> Result<Batch, Error> {
-        Ok(Batch { tally: self.tally, ..Batch::new(self.n_envs(), self.seed, self.choice.clone())? })
+        let batch = Batch::new(self.n_envs(), self.seed, self.choice.clone())?;
+        Ok(Batch { tally: self.tally, autoreset: self.autoreset, streams: self.streams.clone(), ..batch })
     }
 
     /// The bytes of a column.

@@ -15,13 +15,14 @@ pub mod reset;
 pub mod sense;
 pub mod steer;
 
+use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use super::{Batch, EngineBatch, Error, Row, Tally};
-use crate::layout::Start;
-use crate::stages::{N_STAGES, OBSERVE_ALL, STAGES, Stage};
+use super::{Autoreset, Batch, EngineBatch, Error, Row, Tally};
+use crate::layout::{BeginRow, Column, Stream};
+use crate::stages::{N_STAGES, STAGES, Stage};
 use crate::world::World;
 
 /// Does a stage to one truck.
@@ -49,22 +50,19 @@ fn run(world: &World, row: &mut Row, stages: &[Stage]) {
 }
 
 /// Does `stages` to every truck that is not held: all of them to one row while it is in the cache, then to the next.
+/// Of them a held truck has the reset alone.
 fn run_all(world: &World, batch: &mut Batch, stages: &[Stage]) {
-    let driving = batch.rows().filter(|row| row.truck.held == 0);
-    let tallies = driving.map(|mut row| {
-        run(world, &mut row, stages);
+    let resets = stages.contains(&Stage::Reset);
+    let tallies = batch.rows().map(|mut row| {
+        if row.truck.held == 0 {
+            run(world, &mut row, stages);
+        } else if resets {
+            reset::reset(world, &mut row);
+        }
         row.tally
     });
     let tally = tallies.reduce(Tally::default, Tally::plus);
     batch.tally = batch.tally.plus(tally);
-}
-
-/// Puts every truck where `begin` says and observes it there.
-fn restart(world: &World, batch: &mut Batch, begin: impl Fn(&mut Row) + Sync) {
-    batch.rows().for_each(|mut row| {
-        begin(&mut row);
-        run(world, &mut row, &OBSERVE_ALL);
-    });
 }
 
 fn draw_all(world: &World, batch: &mut Batch) {
@@ -88,13 +86,25 @@ impl EngineBatch for Batch {
         Ok(self.tally)
     }
 
-    fn reset(&mut self, world: &World) {
-        restart(world, self, |row| reset::begin(world, row, 0));
+    fn streams(&self) -> Vec<Stream> {
+        Batch::streams(self).to_vec()
     }
 
-    fn reset_from(&mut self, world: &World, starts: &[Start]) -> Result<(), Error> {
-        restart(world, self, |row| reset::begin_from(world, row, 0, &starts[row.env as usize]));
+    fn begin(&mut self, world: &World, begins: &[BeginRow], streams: Option<&[Stream]>) -> Result<(), Error> {
+        streams.into_iter().for_each(|streams| self.set_streams(streams));
+        self.rows().for_each(|mut row| {
+            let begin = &begins[row.env as usize];
+            reset::begin(world, &mut row, begin);
+        });
         Ok(())
+    }
+
+    fn set_autoreset(&mut self, autoreset: Autoreset) {
+        Batch::set_autoreset(self, autoreset);
+    }
+
+    fn read(&self, columns: &[Column]) -> Result<Vec<Cow<'_, [u8]>>, Error> {
+        Ok(columns.iter().map(|&column| Cow::Borrowed(self.column(column))).collect())
     }
 
     fn gather(&mut self, _: &World, indices: &[u32]) -> Result<(), Error> {

@@ -68,7 +68,7 @@ pub enum Error {
         /// Its position among the indices.
         position: usize,
         /// The index asked for.
-        index: u32,
+        index: usize,
         /// Trucks in the batch.
         n_envs: usize,
     },

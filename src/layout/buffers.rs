@@ -1,6 +1,6 @@
 //! The buffers that the kernels of a step see: one bind group, a binding each, in this order.
 
-use super::{Action, BatchFacts, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, RouteRow, Start, WaypointRow};
+use super::{Action, BatchFacts, BeginRow, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, RouteRow, Stream, WaypointRow};
 use crate::shared::{Named, Shared, comment};
 
 /// What shaders may do to a buffer.
@@ -50,8 +50,10 @@ crate::named! {
         Batch = "batch",
         /// Routes that episodes run on.
         Choice = "choice",
-        /// Where trucks begin when the caller says so.
-        Starts = "starts",
+        /// The stream of random numbers that each truck draws from.
+        Streams = "streams",
+        /// Which trucks begin an episode when the caller says so, and how.
+        Begins = "begins",
     }
 }
 
@@ -123,7 +125,8 @@ impl Table {
             Table::Routes => ("Every route.", rows::<RouteRow>()),
             Table::Batch => ("Facts that the trucks of a batch share.", BatchFacts::wgsl()),
             Table::Choice => ("Routes that episodes run on: to be drawn from, or one for each truck.", rows::<u32>()),
-            Table::Starts => ("Where each truck begins when the caller says so, [n_envs].", rows::<Start>()),
+            Table::Streams => ("The stream of random numbers that each truck draws from, [n_envs].", rows::<Stream>()),
+            Table::Begins => ("Which trucks begin an episode when the caller says so, and how, [n_envs].", rows::<BeginRow>()),
         };
         (doc.to_owned(), kind)
     }

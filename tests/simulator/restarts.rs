@@ -43,8 +43,7 @@ fn a_stated_start_equal_to_the_drawn_one_is_the_same() {
             .collect();
         simulator.step_at_random();
         simulator.reset_from(&starts).unwrap();
-        // A reset keeps the columns that describe the last step: only those that the next action depends on are
-        // compared.
+        // A reset keeps the clearance of the last step: only what the next action depends on is compared.
         let stated = simulator.batch();
         assert!(stated.truck == drawn.truck && stated.control == drawn.control && stated.progress == drawn.progress, "{name}");
         assert!(stated.ranges == drawn.ranges && stated.observation == drawn.observation, "{name}");

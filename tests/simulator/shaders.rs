@@ -74,7 +74,7 @@ mod module {
         known.sort_unstable();
         assert_eq!(found, known);
         let of_stages: Vec<Kernel> = STAGES.iter().flat_map(|stage| stage.kernels()).copied().collect();
-        let beside = [Kernel::Draw, Kernel::Restart, Kernel::RestartFrom];
+        let beside = [Kernel::Draw, Kernel::Begin, Kernel::ObserveBegun];
         assert!(Kernel::ALL.iter().all(|kernel| beside.contains(kernel) != of_stages.contains(kernel)), "a kernel without a stage");
     }
 

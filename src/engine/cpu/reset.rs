@@ -1,34 +1,46 @@
-//! Begins the next episode of a truck whose last one ended, within the same step.
+//! Begins episodes: within the step that ended the last one, in the step after it, or when the caller says so.
 //!
-//! Route and pose are functions of (seed, env, episode) alone. A truck on a fixed route drives it once and is then
-//! held.
+//! Route and pose are functions of (seed, env, episode) alone, where the caller states none.
 
 use crate::angle::{direction, wrapped};
 use crate::engine::cpu::follow::{followed, reference_point};
 use crate::engine::cpu::{observe, sense};
-use crate::engine::{RouteChoice, Row};
-use crate::layout::{Control, Ended, Params, Start, Truck, WaypointRow};
+use crate::engine::{Autoreset, RouteChoice, Row};
+use crate::layout::{
+    BEGINS, BeginRow, Control, Ended, HAS_ROUTE, HAS_START, IS_FIRST, Params, RewardTerms, Start, Stream, Truck, WaypointRow,
+};
 use crate::random::{self, Draw};
 use crate::world::World;
 
-/// Begins and observes another episode where one ended, or holds the truck.
+/// The next episode, as drawn.
+const NEXT: BeginRow = BeginRow { start: Start { offset: 0.0, heading: 0.0 }, route: 0, what: BEGINS };
+
+/// Begins and observes another episode where one ended, or holds the truck. A truck that was held when the step began
+/// begins its next episode with [`Autoreset::NextStep`].
 pub fn reset(world: &World, row: &mut Row) {
-    if *row.ended == Ended::Running as u32 {
-        return;
-    }
-    match row.choice {
-        RouteChoice::Fixed(_) => row.truck.held = 1,
-        RouteChoice::Drawn(_) => {
-            begin(world, row, row.truck.episode + 1);
-            sense::sense(world, row);
-            *row.observation = observe::observation_of(world, row);
+    if row.truck.held == 1 {
+        if row.autoreset == Autoreset::NextStep {
+            begin(world, row, &NEXT);
+        }
+    } else if *row.ended != Ended::Running as u32 {
+        if row.autoreset == Autoreset::SameStep {
+            start(world, row, &NEXT);
+        } else {
+            row.truck.held = 1;
         }
     }
 }
 
-/// Puts the truck at the start of `episode`, at a pose drawn for it.
-pub fn begin(world: &World, row: &mut Row, episode: u32) {
-    begin_from(world, row, episode, &drawn_start(row.seed, row.env, episode));
+/// Begins and observes an episode where the caller says so. It has no last step.
+pub fn begin(world: &World, row: &mut Row, begin: &BeginRow) {
+    if begin.what & BEGINS == 0 {
+        return;
+    }
+    start(world, row, begin);
+    *row.next_observation = *row.observation;
+    *row.ended = Ended::Running as u32;
+    *row.terms = RewardTerms::default();
+    *row.reward = 0.0;
 }
 
 /// The start that is drawn for an episode of truck `env`.
@@ -37,21 +49,32 @@ pub fn drawn_start(seed: u32, env: u32, episode: u32) -> Start {
     Start { offset, heading }
 }
 
-/// The same at a stated pose.
-pub fn begin_from(world: &World, row: &mut Row, episode: u32, start: &Start) {
-    let route = match row.choice {
-        RouteChoice::Fixed(routes) => routes[row.env as usize],
-        RouteChoice::Drawn(routes) => {
-            let [word, ..] = random::words(row.seed, row.env, episode, Draw::Route as u32);
-            routes[random::index_below(word, routes.len() as u32) as usize]
-        }
-    };
+/// Puts the truck at the start of an episode and observes it there.
+fn start(world: &World, row: &mut Row, begin: &BeginRow) {
+    let Stream { seed, env } = row.stream;
+    let episode = if begin.what & IS_FIRST == 0 { row.truck.episode + 1 } else { 0 };
+    let route = if begin.what & HAS_ROUTE == 0 { route_of(row, episode) } else { begin.route };
+    let start = if begin.what & HAS_START == 0 { drawn_start(seed, env, episode) } else { begin.start };
     let waypoints = world.route_waypoints(route);
     *row.control = Control::default();
-    *row.truck = Truck { route, episode, ..started(&world.params, &waypoints[0], world.route_previews(route)[0].heading, start) };
+    *row.truck = Truck { route, episode, ..started(&world.params, &waypoints[0], world.route_previews(route)[0].heading, &start) };
     let point = reference_point(world.params.rig.wheelbase, row.truck);
     *row.progress = followed(waypoints, point, 1, world.params.stray_distance);
     row.progress.passed = 0;
+    sense::sense(world, row);
+    *row.observation = observe::observation_of(world, row);
+}
+
+/// The route of an episode as the batch chooses it.
+fn route_of(row: &Row, episode: u32) -> u32 {
+    match row.choice {
+        RouteChoice::Fixed(routes) => routes[row.env as usize],
+        RouteChoice::Drawn(routes) => {
+            let Stream { seed, env } = row.stream;
+            let [word, ..] = random::words(seed, env, episode, Draw::Route as u32);
+            routes[random::index_below(word, routes.len() as u32) as usize]
+        }
+    }
 }
 
 /// A truck at `waypoint`, where the lane has this heading \[rad]: trailer straight, offset and turned as `start` says.

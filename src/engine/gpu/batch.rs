@@ -1,19 +1,20 @@
 //! A batch on a device: columns in its memory, stepped by kernels. Nothing is copied to the host unless the caller asks
 //! for it.
 
+use std::borrow::Cow;
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
-use bytemuck::cast_slice;
+use bytemuck::{bytes_of, cast_slice};
 use wgpu::{CommandEncoder, ComputePassDescriptor, ComputePassTimestampWrites};
 
 use super::buffers::{Buffers, check_size, check_world};
 use super::tables::Tables;
 use super::{Columns, Device, Error, Slice, kernels, stage_times};
-use crate::engine::{self, EngineBatch, RouteChoice, Tally};
+use crate::engine::{self, Autoreset, EngineBatch, RouteChoice, Tally};
 use crate::layout::buffers::Table;
-use crate::layout::{BatchFacts, Column, Start};
-use crate::stages::{Kernel, N_STAGES, OBSERVE_ALL, STAGES, Stage};
+use crate::layout::{BatchFacts, BeginRow, Column, Stream};
+use crate::stages::{BEGIN, Kernel, N_STAGES, STAGES, Stage};
 use crate::world::World;
 
 /// A batch of trucks on a device.
@@ -42,14 +43,9 @@ impl Batch {
     ) -> Result<Batch, engine::Error> {
         check_size(device, n_envs)?;
         check_world(device, world)?;
-        let facts = BatchFacts {
-            n_envs: n_envs as u32,
-            seed,
-            n_routes: choice.routes().len() as u32,
-            fixed: matches!(choice, RouteChoice::Fixed(_)).into(),
-        };
-        let buffers = Buffers::new(device, &Tables::new(world, facts, choice.routes()), n_envs, &columns)?;
-        let room = Mutex::new(Some(engine::Batch::new(n_envs, seed, choice)?));
+        let host = engine::Batch::new(n_envs, seed, choice)?;
+        let buffers = Buffers::new(device, &Tables::new(world, &host), n_envs, &columns)?;
+        let room = Mutex::new(Some(host));
         Ok(Batch { device: device.clone(), n_envs, buffers, external: !columns.is_empty(), seen: OnceLock::new(), room })
     }
 
@@ -108,17 +104,10 @@ impl Batch {
         self.device.queue.submit([encoder.finish()]);
     }
 
-    /// Begins episode 0 of every truck by a kernel and observes it there.
-    fn restart(&mut self, kernel: Kernel) {
-        self.submit(|batch, encoder| {
-            batch.add_pass(encoder, [kernel], None);
-            batch.observe_all(encoder);
-        });
-    }
-
-    /// Senses and observes every truck where it stands.
-    fn observe_all(&self, encoder: &mut CommandEncoder) {
-        self.add_stages(encoder, &OBSERVE_ALL);
+    /// The columns on the host, whether they are those of the device or not.
+    fn host(&mut self) -> Option<&mut engine::Batch> {
+        let room = self.room.get_mut().unwrap_or_else(PoisonError::into_inner).as_mut();
+        self.seen.get_mut().or(room)
     }
 
     fn write(&self, slice: &Slice, bytes: &[u8]) {
@@ -172,15 +161,36 @@ impl EngineBatch for Batch {
         Ok(self.read_tally()?)
     }
 
-    fn reset(&mut self, _: &World) {
-        self.restart(Kernel::Restart);
+    fn streams(&self) -> Vec<Stream> {
+        let room = self.room.lock().unwrap_or_else(PoisonError::into_inner);
+        self.seen.get().or(room.as_ref()).map(|batch| batch.streams().to_vec()).unwrap_or_default()
     }
 
-    fn reset_from(&mut self, _: &World, starts: &[Start]) -> Result<(), engine::Error> {
+    fn begin(&mut self, _: &World, begins: &[BeginRow], streams: Option<&[Stream]>) -> Result<(), engine::Error> {
         self.device.check()?;
-        self.write(self.buffers.table(Table::Starts), cast_slice(starts));
-        self.restart(Kernel::RestartFrom);
+        if let Some(streams) = streams {
+            self.write(self.buffers.table(Table::Streams), cast_slice(streams));
+            self.host().into_iter().for_each(|batch| batch.set_streams(streams));
+        }
+        self.write(self.buffers.table(Table::Begins), cast_slice(begins));
+        self.submit(|batch, encoder| batch.add_pass(encoder, BEGIN, None));
         Ok(self.device.check()?)
+    }
+
+    fn set_autoreset(&mut self, autoreset: Autoreset) {
+        if let Some(host) = self.host() {
+            host.set_autoreset(autoreset);
+            let facts = BatchFacts::of(host);
+            self.write(self.buffers.table(Table::Batch), bytes_of(&facts));
+        }
+    }
+
+    fn read(&self, columns: &[Column]) -> Result<Vec<Cow<'_, [u8]>>, engine::Error> {
+        if let Some(seen) = self.seen.get() {
+            return Ok(columns.iter().map(|&column| Cow::Borrowed(seen.column(column))).collect());
+        }
+        let slices: Vec<Slice> = columns.iter().map(|&column| self.column(column).clone()).collect();
+        Ok(self.device.read(&slices)?.into_iter().map(Cow::Owned).collect())
     }
 
     fn gather(&mut self, world: &World, indices: &[u32]) -> Result<(), engine::Error> {
@@ -189,6 +199,7 @@ impl EngineBatch for Batch {
         }
         let host = self.columns().gathered(indices)?;
         let mut batch = Batch::new(&self.device, world, indices.len(), host.seed(), host.choice().clone(), Columns::new())?;
+        batch.set_autoreset(host.autoreset());
         batch.upload(&host);
         *self = batch;
         Ok(())
@@ -196,8 +207,7 @@ impl EngineBatch for Batch {
 
     fn draw_from(&mut self, routes: &[u32]) {
         self.write(self.buffers.table(Table::Choice), cast_slice(routes));
-        let room = self.room.get_mut().unwrap_or_else(PoisonError::into_inner).as_mut();
-        self.seen.get_mut().or(room).into_iter().for_each(|batch| batch.set_drawn(routes));
+        self.host().into_iter().for_each(|batch| batch.set_drawn(routes));
     }
 
     fn replace(&mut self, batch: engine::Batch) -> Result<(), engine::Error> {

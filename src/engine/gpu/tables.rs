@@ -4,16 +4,17 @@ use std::borrow::Cow;
 
 use bytemuck::{bytes_of, cast_slice};
 
+use crate::engine::{Batch, RouteChoice};
 use crate::field::STORED_UNIT;
 use crate::layout::buffers::Table;
-use crate::layout::{BatchFacts, FieldRow, Start};
+use crate::layout::{BatchFacts, BeginRow, FieldRow};
 use crate::world::World;
 
 /// The contents of every [`Table`].
 pub(super) struct Tables<'a> {
     world: &'a World,
+    batch: &'a Batch,
     facts: BatchFacts,
-    choice: &'a [u32],
     // All fields, one after the other.
     fields: Vec<FieldRow>,
     cells: Vec<[u32; 2]>,
@@ -21,8 +22,8 @@ pub(super) struct Tables<'a> {
 }
 
 impl<'a> Tables<'a> {
-    pub(super) fn new(world: &'a World, facts: BatchFacts, choice: &'a [u32]) -> Tables<'a> {
-        let mut tables = Tables { world, facts, choice, fields: Vec::new(), cells: Vec::new(), corners: Vec::new() };
+    pub(super) fn new(world: &'a World, batch: &'a Batch) -> Tables<'a> {
+        let mut tables = Tables { world, batch, facts: BatchFacts::of(batch), fields: Vec::new(), cells: Vec::new(), corners: Vec::new() };
         for field in &world.fields {
             let first_cell = tables.cells.len() as u32;
             tables.cells.extend(&field.cells);
@@ -53,8 +54,21 @@ impl<'a> Tables<'a> {
             Table::Previews => cast_slice(&self.world.previews),
             Table::Routes => cast_slice(&self.world.routes),
             Table::Batch => bytes_of(&self.facts),
-            Table::Choice => cast_slice(self.choice),
-            Table::Starts => return Cow::Owned(vec![0; self.facts.n_envs as usize * size_of::<Start>()]),
+            Table::Choice => cast_slice(self.batch.choice().routes()),
+            Table::Streams => cast_slice(self.batch.streams()),
+            Table::Begins => return Cow::Owned(vec![0; self.batch.n_envs() * size_of::<BeginRow>()]),
         })
+    }
+}
+
+impl BatchFacts {
+    /// Of a batch.
+    pub(super) fn of(batch: &Batch) -> BatchFacts {
+        BatchFacts {
+            n_envs: batch.n_envs() as u32,
+            n_routes: batch.choice().routes().len() as u32,
+            fixed: matches!(batch.choice(), RouteChoice::Fixed(_)).into(),
+            autoreset: batch.autoreset() as u32,
+        }
     }
 }
