@@ -24,8 +24,8 @@ const SHOWN: f64 = 45.0;
 /// Approximate distance between the trucks of a still \[m].
 const BETWEEN_TRUCKS: f64 = 20.0;
 /// Length and gauge of the drawn front wheels \[m].
-const WHEEL: f64 = 1.0;
-const GAUGE: f64 = 2.04;
+pub(crate) const WHEEL: f64 = 1.0;
+pub(crate) const GAUGE: f64 = 2.04;
 const DASHES: &str = "7 4";
 
 /// An episode with its roundabout and route.

@@ -104,6 +104,15 @@ impl View {
         View { low: centre - extent / 2.0, high: centre + extent / 2.0, scale: layout.width / extent.x, corner: layout.corner }
     }
 
+    /// All of the given points with `margin` around them \[m], in the middle of a map that fills a picture of `size`
+    /// \[px].
+    pub fn fitted(points: impl Iterator<Item = DVec2>, size: DVec2, margin: f64) -> View {
+        let (low, high) = points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+        let scale = (size / (high - low + 2.0 * margin)).min_element();
+        let (centre, half) = ((low + high) / 2.0, size / scale / 2.0);
+        View { low: centre - half, high: centre + half, scale, corner: DVec2::ZERO }
+    }
+
     /// Where `p` lies on the page \[px].
     pub fn point(&self, p: DVec2) -> DVec2 {
         self.corner + DVec2::new(p.x - self.low.x, self.high.y - p.y) * self.scale

@@ -57,11 +57,17 @@ pub fn drawn(lettering: &Lettering, entries: &[Entry], corner: DVec2, width: f64
 
 /// A chevron with its tip at `at`, pointing along `direction` \[px].
 pub fn chevron(at: DVec2, direction: DVec2, colour: &str) -> Path {
-    let (back, side) = (direction * -9.0, direction.perp() * 4.6);
-    let [left, notch, right] = [back + side, back * 0.68, back - side].map(|corner| at + corner);
+    let [tip, left, notch, right] = chevron_corners(at, 9.0 * direction);
     let n = number;
-    let data = format!("M{} {}L{} {}L{} {}L{} {}Z", n(at.x), n(at.y), n(left.x), n(left.y), n(notch.x), n(notch.y), n(right.x), n(right.y));
+    let data =
+        format!("M{} {}L{} {}L{} {}L{} {}Z", n(tip.x), n(tip.y), n(left.x), n(left.y), n(notch.x), n(notch.y), n(right.x), n(right.y));
     Path::new().set("d", data).set("fill", colour).set("stroke", "white").set("stroke-width", 0.6)
+}
+
+/// Corners of a chevron with its tip at `at`, as long as `along` and pointing there \[px].
+pub fn chevron_corners(at: DVec2, along: DVec2) -> [DVec2; 4] {
+    let side = along.perp() * (4.6 / 9.0);
+    [at, at - along + side, at - 0.68 * along, at - along - side]
 }
 
 /// The sample of an entry; `at` is the middle of its left edge \[px].

@@ -3,8 +3,9 @@
 use std::fmt::Write;
 
 use glam::DVec2;
+use resvg::tiny_skia;
 use svg::node::element::{Group, Path};
-use ttf_parser::{Face, FaceParsingError, OutlineBuilder};
+use ttf_parser::{Face, FaceParsingError, GlyphId, OutlineBuilder};
 
 use crate::figure::number;
 
@@ -46,19 +47,39 @@ impl Lettering {
         Group::new().add(rim).add(self.text(words, at, size, align, colour))
     }
 
+    /// The outlines of one line of text with its base line at `at` \[px]; `None` for words without any.
+    pub fn path(&self, words: &str, at: DVec2, size: f64, align: Align) -> Option<tiny_skia::Path> {
+        let mut brush = Brush { path: tiny_skia::PathBuilder::new(), at, scale: self.scale(size) };
+        for (glyph, at) in self.placed(words, at, size, align) {
+            brush.at = at;
+            self.face.outline_glyph(glyph, &mut brush);
+        }
+        brush.path.finish()
+    }
+
     fn outlines(&self, words: &str, at: DVec2, size: f64, align: Align) -> Path {
+        let mut pen = Pen { data: String::new(), at, scale: self.scale(size) };
+        for (glyph, at) in self.placed(words, at, size, align) {
+            pen.at = at;
+            // A glyph without an outline, such as a space, draws nothing.
+            self.face.outline_glyph(glyph, &mut pen);
+        }
+        Path::new().set("d", pen.data)
+    }
+
+    /// The glyphs of one line of text, each with the left end of its base line \[px].
+    fn placed(&self, words: &str, at: DVec2, size: f64, align: Align) -> impl Iterator<Item = (GlyphId, DVec2)> {
         let shift = match align {
             Align::Left => 0.0,
             Align::Middle => 0.5,
             Align::Right => 1.0,
         };
-        let mut pen = Pen { data: String::new(), at: at - DVec2::new(shift * self.width(words, size), 0.0), scale: self.scale(size) };
-        for glyph in words.chars().filter_map(|letter| self.face.glyph_index(letter)) {
-            // A glyph without an outline, such as a space, only moves the pen.
-            self.face.outline_glyph(glyph, &mut pen);
-            pen.at.x += f64::from(self.face.glyph_hor_advance(glyph).unwrap_or(0)) * pen.scale;
-        }
-        Path::new().set("d", pen.data)
+        let mut at = at - DVec2::new(shift * self.width(words, size), 0.0);
+        words.chars().filter_map(|letter| self.face.glyph_index(letter)).map(move |glyph| {
+            let left = at;
+            at.x += f64::from(self.face.glyph_hor_advance(glyph).unwrap_or(0)) * self.scale(size);
+            (glyph, left)
+        })
     }
 
     fn scale(&self, size: f64) -> f64 {
@@ -103,5 +124,45 @@ impl OutlineBuilder for Pen {
 
     fn close(&mut self) {
         self.data.push('Z');
+    }
+}
+
+/// Adds a letter's outline to a path that is painted at once.
+struct Brush {
+    path: tiny_skia::PathBuilder,
+    at: DVec2,
+    scale: f64,
+}
+
+impl Brush {
+    fn point(&self, x: f32, y: f32) -> (f32, f32) {
+        let p = self.at + DVec2::new(f64::from(x), -f64::from(y)) * self.scale;
+        (p.x as f32, p.y as f32)
+    }
+}
+
+impl OutlineBuilder for Brush {
+    fn move_to(&mut self, x: f32, y: f32) {
+        let (x, y) = self.point(x, y);
+        self.path.move_to(x, y);
+    }
+
+    fn line_to(&mut self, x: f32, y: f32) {
+        let (x, y) = self.point(x, y);
+        self.path.line_to(x, y);
+    }
+
+    fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
+        let ((x1, y1), (x, y)) = (self.point(x1, y1), self.point(x, y));
+        self.path.quad_to(x1, y1, x, y);
+    }
+
+    fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
+        let ((x1, y1), (x2, y2), (x, y)) = (self.point(x1, y1), self.point(x2, y2), self.point(x, y));
+        self.path.cubic_to(x1, y1, x2, y2, x, y);
+    }
+
+    fn close(&mut self) {
+        self.path.close();
     }
 }

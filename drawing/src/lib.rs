@@ -4,6 +4,7 @@
 //!   them.
 //! - [`recording::Recorder`] records episodes of a batch, [`episode::Scene`] draws one as a still, [`film::gif`] as a
 //!   film.
+//! - [`camera::Camera`] draws a truck as it is now, in RGB pixels, while it is stepped.
 //! - [`sheet::drawn`] draws many roundabouts side by side, [`histograms::Histograms`] how their dimensions are
 //!   distributed.
 //! - [`chart::Chart`] draws measurements over logarithmic axes.
@@ -24,6 +25,7 @@
 //! # }
 //! ```
 
+pub mod camera; // a truck as it is now, in pixels
 pub mod chart; // measurements as lines
 pub mod episode; // a recorded episode, still or moving
 pub mod figure; // a map with axes, title and legend
@@ -55,6 +57,9 @@ pub enum Error {
     /// A film cannot be encoded.
     #[error("the GIF cannot be encoded: {0}")]
     Gif(#[from] gif::EncodingError),
+    /// The side of a camera's square pictures \[pixels] is out of range.
+    #[error("a picture of {0} x {0} pixels cannot be drawn; its side must lie in {low}..={high} pixels", low = camera::SIDES.start(), high = camera::SIDES.end())]
+    Side(u32),
     /// The picture has no pixels, or more than its format can hold.
     #[error("a picture of {width} x {height} pixels cannot be drawn")]
     Size {
