@@ -10,7 +10,7 @@
 //!
 //! # fn main() -> Result<(), offtrack_policy::Error> {
 //! let shipped = Policy::shipped("attard2023")?;
-//! let layer = |inputs: usize, outputs: usize| Layer { weights: vec![0.01; inputs * outputs], biases: vec![0.0; outputs] };
+//! let layer = |inputs, outputs| Layer { weights: vec![0.01; inputs * outputs], biases: vec![0.0; outputs] };
 //! let own = Policy {
 //!     name: "mine".into(),
 //!     layers: vec![layer(N_VALUES, 64), layer(64, 64), layer(64, shipped.actions.len())],

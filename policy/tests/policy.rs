@@ -122,6 +122,31 @@ fn a_small_network_gives_the_values_computed_by_hand() {
     }
 }
 
+/// What the crate says that it computes, one number at a time.
+fn chained(policy: &Policy, observation: &[f32; N_VALUES]) -> Vec<f32> {
+    let Normalisation { mean, factor } = &policy.normalisation;
+    let mut values: Vec<f32> = (0..N_VALUES).map(|at| ((observation[at] - mean[at]) * factor[at]).clamp(-10.0, 10.0)).collect();
+    for (index, Layer { weights, biases }) in policy.layers.iter().enumerate() {
+        let last = index + 1 == policy.layers.len();
+        let sum = |output: usize| {
+            let terms = values.iter().enumerate();
+            terms.fold(0.0f32, |sum, (input, value)| value.mul_add(weights[input * biases.len() + output], sum)) + biases[output]
+        };
+        values = (0..biases.len()).map(|output| if last { sum(output) } else { sum(output).max(0.0) }).collect();
+    }
+    values
+}
+
+#[test]
+fn the_forward_pass_is_a_chain_of_fused_multiply_adds_to_the_last_bit() {
+    let (policy, observations) = (policy(&[33, 16, 7], 9), observations(100));
+    let expected: Vec<f32> = observations.iter().flat_map(|observation| chained(&policy, observation)).collect();
+    assert_eq!(policy.logits(&observations), expected);
+    let mut other = policy;
+    other.layers[1].weights[20] = f32::from_bits(other.layers[1].weights[20].to_bits() + 1);
+    assert_ne!(other.logits(&observations), expected, "the last bit of a weight shows");
+}
+
 #[test]
 fn a_rows_result_depends_on_neither_its_neighbours_nor_its_place_nor_the_threads() {
     // Widths around the blocks of the forward pass, which are 16 outputs and 6 rows.
