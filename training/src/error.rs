@@ -16,6 +16,9 @@ pub enum Error {
     /// A file cannot be read, or is a wrong scenario, vehicle or roundabout.
     #[error(transparent)]
     Input(#[from] offtrack::reader::Error),
+    /// A policy cannot be read, or cannot drive in the world.
+    #[error(transparent)]
+    Policy(#[from] offtrack_policy::Error),
     /// No truck could be stepped in this scenario.
     #[error(transparent)]
     Scenario(#[from] offtrack::scenario::Invalid),

@@ -9,7 +9,6 @@ pub mod sac; // soft actor-critic
 pub mod network; // multi-layer perceptrons
 pub mod rollout; // acting, stepping, remembering, sampling: on the host, on a device
 pub mod replay_buffer; // transitions on the host
-pub mod normalisation; // of observations
 pub mod mirror; // mirror augmentation
 pub mod exploration; // random actions among the policy's
 pub mod level_replay; // routes that fail are drawn more often

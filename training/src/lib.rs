@@ -1,4 +1,4 @@
-//! Policies for tractor-trailers in roundabouts: learned, loaded, evaluated.
+//! Policies for tractor-trailers in roundabouts: learned and evaluated. The crate `offtrack_policy` is their files.
 //!
 //! A policy that comes with the project, one truck on each route that it never saw in training, until every episode has
 //! ended:
@@ -10,12 +10,12 @@
 //! use offtrack::scenario::{Scenario, Split};
 //! use offtrack::simulator::{RouteChoice, Simulator};
 //! use offtrack::world::World;
-//! use offtrack_training::policy::LearnedPolicy;
+//! use offtrack_policy::Policy;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scenario = Scenario::named("attard2023")?;
 //! let world = Arc::new(World::bake(&scenario)?);
-//! let policy = LearnedPolicy::shipped("attard2023")?;
+//! let policy = Policy::shipped("attard2023")?;
 //! let routes = scenario.split(Split::Test).to_vec();
 //! let mut simulator = Simulator::new(world, routes.len(), 0, RouteChoice::Fixed(routes))?;
 //! while simulator.batch().ended.contains(&(Ended::Running as u32)) {
@@ -36,7 +36,6 @@ pub mod error;
 pub mod evaluation; // how good a policy is
 pub mod files; // results, written whole
 pub mod learner; // how a policy is learned
-pub mod policy; // a policy and its file
 pub mod provenance; // machine and commit of a result
 
 /// The README's examples, compiled and run as tests.

@@ -7,7 +7,6 @@ use offtrack::scenario::Scenario;
 use offtrack::world::World;
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::policies::{self, LOOK_AHEAD, Policy};
-use offtrack_training::policy::LearnedPolicy;
 
 /// Which policy drives.
 #[derive(Debug, clap::Args)]
@@ -30,7 +29,7 @@ impl Choice {
             let value = format!("{} m", shown(self.look_ahead));
             return Err(Error::Flag { flag: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
         }
-        if self.policy.is_none() && !LearnedPolicy::shipped_names().contains(&scenario.name.as_str()) {
+        if self.policy.is_none() && !offtrack_policy::Policy::shipped_names().contains(&scenario.name.as_str()) {
             let _ = writeln!(
                 std::io::stderr(),
                 "offtrack: no policy comes with the program for {}; the one for attard2023 drives; --policy chooses another",

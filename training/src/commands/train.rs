@@ -15,6 +15,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use offtrack::reader::read_text;
 use offtrack::scenario::Split;
 use offtrack_drawing::recording::Track;
+use offtrack_policy::Policy;
 use offtrack_training::device::Device;
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::page::Page;
@@ -32,7 +33,6 @@ use offtrack_training::learner::run::resume::Resumed;
 use offtrack_training::learner::run::route_counts::{RouteCounts, WorstRoutes};
 use offtrack_training::learner::run::validation::{Validation, Validations};
 use offtrack_training::learner::training::Training;
-use offtrack_training::policy::LearnedPolicy;
 use offtrack_training::provenance;
 use serde::Serialize;
 use serde_json::json;
@@ -250,7 +250,7 @@ fn conclude(
     folder: &Folder,
     worlds: &Worlds,
     mut finished: Finished,
-    policy: LearnedPolicy,
+    policy: Policy,
     manner: &Manner,
     written: Result<(), Error>,
 ) -> Result<(), Error> {
@@ -260,7 +260,7 @@ fn conclude(
         written?;
         return files::print(&format!("stopped: policy and metrics are in {path}; not evaluated; train --resume {path} continues\n"));
     }
-    let mut policy = LearnedPolicy { name: folder.policy().display().to_string(), ..policy };
+    let mut policy = Policy { name: folder.policy().display().to_string(), ..policy };
     let evaluated = evaluate(worlds, &mut policy)?;
     finished.evaluation = evaluated.as_ref().map(|(report, _)| report.clone());
     finished.also = worlds.also.iter().map(|also| also.evaluate(&mut policy)).collect::<Result<_, _>>()?;
@@ -285,7 +285,7 @@ fn conclude(
 }
 
 /// The evaluation on `benchmark`, with the episodes that its page shows; none where it has no test routes.
-fn evaluate(worlds: &Worlds, policy: &mut LearnedPolicy) -> Result<Option<(Report, Vec<Track>)>, Error> {
+fn evaluate(worlds: &Worlds, policy: &mut Policy) -> Result<Option<(Report, Vec<Track>)>, Error> {
     let n_routes = worlds.benchmark.split(Split::Test).len();
     if n_routes == 0 {
         return Ok(None);

@@ -9,7 +9,6 @@ use offtrack::simulator::Batch;
 use offtrack::world::World;
 
 use crate::error::Error;
-use crate::policy::LearnedPolicy;
 
 /// Pure pursuit's default look-ahead distance: the best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of
 /// attard2023 \[m].
@@ -32,21 +31,21 @@ pub fn find(policy: Option<&str>, benchmark: &str, look_ahead: f32, seed: u32, w
         Some("pursuit") => return Ok(Box::new(PurePursuit { look_ahead })),
         Some("random") => return Ok(Box::new(UniformRandom { seed })),
         Some(name) => learned(name)?,
-        None => LearnedPolicy::shipped_or_default(benchmark)?,
+        None => offtrack_policy::Policy::shipped_or_default(benchmark)?,
     };
     learned.check(world)?;
     Ok(Box::new(learned))
 }
 
 /// A learned policy by the path of its file, or a shipped one by its benchmark. A file comes first.
-pub fn learned(name: &str) -> Result<LearnedPolicy, Error> {
-    if LearnedPolicy::shipped_names().contains(&name) && !Path::new(name).is_file() {
-        return LearnedPolicy::shipped(name);
+pub fn learned(name: &str) -> Result<offtrack_policy::Policy, Error> {
+    if offtrack_policy::Policy::shipped_names().contains(&name) && !Path::new(name).is_file() {
+        return Ok(offtrack_policy::Policy::shipped(name)?);
     }
-    LearnedPolicy::load(Path::new(name))
+    Ok(offtrack_policy::Policy::load(Path::new(name))?)
 }
 
-impl Policy for LearnedPolicy {
+impl Policy for offtrack_policy::Policy {
     fn name(&self) -> &str {
         &self.name
     }

@@ -30,6 +30,21 @@ impl Mlp {
         Mlp { layers: layers.collect(), norms: Vec::new() }
     }
 
+    /// The network of a policy whose activation is the rectifier.
+    pub fn of(layers: &[offtrack_policy::Layer], device: &Device) -> Mlp {
+        let layers = layers.iter().map(|plain| layer(plain.weights.clone(), plain.biases.clone(), device));
+        Mlp { layers: layers.collect(), norms: Vec::new() }
+    }
+
+    /// The layers as a policy has them; waits for the device that they are on.
+    pub fn plain_layers(&self) -> Vec<offtrack_policy::Layer> {
+        let plain = |layer: &Linear| offtrack_policy::Layer {
+            weights: values(&layer.weight),
+            biases: layer.bias.as_ref().map(values).unwrap_or_default(),
+        };
+        self.layers.iter().map(plain).collect()
+    }
+
     /// The same layers with layer normalisation before each rectifier.
     pub fn with_layer_norm(self) -> Mlp {
         let hidden = self.layers.len() - 1;
@@ -106,11 +121,36 @@ pub fn distribution(logits: Tensor<2>) -> (Tensor<2>, Tensor<2>) {
     (log_probs.clone().exp(), log_probs)
 }
 
+/// An action sampled from the softmax of each row of `logits`, `[rows]`.
+pub fn sampled(logits: &[f32], n_actions: usize, rng: &mut impl Rng) -> Vec<u32> {
+    let mut one = |row: &[f32]| {
+        let most = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let sum: f32 = row.iter().map(|logit| (logit - most).exp()).sum();
+        let mut left = sum * rng.random::<f32>();
+        let reached = row.iter().position(|logit| {
+            left -= (logit - most).exp();
+            left < 0.0
+        });
+        // Rounding can leave a remainder after the last action.
+        reached.unwrap_or(n_actions - 1) as u32
+    };
+    logits.chunks_exact(n_actions).map(&mut one).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
+
+    use offtrack::layout::N_VALUES;
+    use offtrack::scenario::{Scenario, Split};
+    use offtrack::simulator::{RouteChoice, Simulator};
+    use offtrack::world::World;
+    use offtrack_policy::Policy;
     use rand::SeedableRng;
     use rand::rngs::SmallRng;
+
+    use crate::learner::rollout::host::logits;
 
     fn weights(network: &Mlp) -> Vec<f32> {
         network.layers.iter().flat_map(|layer| layer.weight.val().into_data().try_to_vec::<f32>().unwrap()).collect()
@@ -133,5 +173,53 @@ mod tests {
         let network = |seed| Mlp::new(&[4, 8, 2], 1.0, &mut SmallRng::seed_from_u64(seed), &Device::flex());
         assert_eq!(weights(&network(1)), weights(&network(1)));
         assert_ne!(weights(&network(1)), weights(&network(2)));
+    }
+
+    #[test]
+    fn actions_are_sampled_with_their_probabilities() {
+        let probs = [0.1f32, 0.6, 0.05, 0.25];
+        let logits: Vec<f32> = probs.map(|prob| prob.ln() + 30.0).repeat(40_000);
+        let actions = sampled(&logits, 4, &mut SmallRng::seed_from_u64(9));
+        for (action, prob) in probs.into_iter().enumerate() {
+            let frequency = actions.iter().filter(|&&drawn| drawn as usize == action).count() as f32 / 40_000.0;
+            // Four standard deviations of a frequency over 40,000 samples.
+            assert!((frequency - prob).abs() < 4.0 * (prob * (1.0 - prob) / 40_000.0).sqrt(), "{action}: {frequency}");
+        }
+    }
+
+    /// Largest difference of two outputs, relative to the largest output of its row.
+    fn difference(found: &[f32], expected: &[f32], n_actions: usize) -> f32 {
+        assert_eq!(found.len(), expected.len());
+        let rows = found.chunks_exact(n_actions).zip(expected.chunks_exact(n_actions));
+        let row = |(found, expected): (&[f32], &[f32])| {
+            let largest = expected.iter().fold(0.0f32, |most, value| most.max(value.abs()));
+            found.iter().zip(expected).fold(0.0f32, |most, (a, b)| most.max((a - b).abs() / largest))
+        };
+        rows.map(row).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn a_policy_drives_as_the_network_that_learned_it() {
+        for name in Policy::shipped_names() {
+            let policy = Policy::shipped(name).unwrap();
+            let scenario = Scenario::named(name).unwrap();
+            let routes = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
+            let mut simulator = Simulator::new(Arc::new(World::bake(&scenario).unwrap()), 1024, 1, routes).unwrap();
+            let network = Mlp::of(&policy.layers, &Device::flex());
+            let mut wrong = policy.clone();
+            wrong.layers[1].weights.iter_mut().for_each(|weight| *weight *= 1.001);
+            for _ in 0..4 {
+                for _ in 0..20 {
+                    simulator.step(&policy.act(&simulator.batch().observation)).unwrap();
+                }
+                let observations: &[[f32; N_VALUES]] = &simulator.batch().observation;
+                let expected = logits(&network, &policy.normalisation, observations);
+                let n_actions = policy.actions.len();
+                // Sums over 256 values may round in another order or without fused multiply-adds.
+                assert!(difference(&policy.logits(observations), &expected, n_actions) < 1e-5);
+                assert!(1e-5 < difference(&wrong.logits(observations), &expected, n_actions), "a wrong weight must show");
+            }
+            assert_eq!(network.plain_layers(), policy.layers);
+        }
     }
 }

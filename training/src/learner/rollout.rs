@@ -10,11 +10,11 @@ pub mod host;
 use burn::tensor::Tensor;
 use offtrack::layout::{Ended, N_VALUES};
 use offtrack::simulator::Simulator;
+use offtrack_policy::Normalisation;
 
 use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::network::Mlp;
-use crate::learner::normalisation::Normalisation;
 use crate::learner::sac::Transitions;
 
 /// Some episodes that ended.

@@ -17,6 +17,7 @@ mod window;
 
 use bytemuck::{bytes_of, cast_slice};
 use offtrack::world::World;
+use offtrack_policy::Policy;
 
 use crate::device;
 use crate::error::Error;
@@ -25,7 +26,6 @@ use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::config::Config;
 use crate::learner::sac::not_finite;
 use crate::learner::training::Training;
-use crate::policy::LearnedPolicy;
 use checkpointer::{Checkpointer, Written};
 use folder::Folder;
 use progress::Progress;
@@ -168,9 +168,9 @@ impl Run {
     }
 
     /// The best policy by validation or, without one, the policy as it is; waits for a device.
-    pub fn policy(&self) -> Result<LearnedPolicy, Error> {
+    pub fn policy(&self) -> Result<Policy, Error> {
         let best = self.validation.as_ref().and_then(Validation::best_policy);
-        let read = |bytes| LearnedPolicy::from_bytes("best policy", bytes).expect("the bytes were made from a policy that drove");
+        let read = |bytes| Policy::from_bytes("best policy", bytes).expect("the bytes were made from a policy that drove");
         best.map_or_else(|| self.training.policy(), |bytes| Ok(read(bytes)))
     }
 

@@ -2,19 +2,20 @@
 
 use std::sync::Arc;
 
+use burn::tensor::Device;
 use offtrack::layout::N_VALUES;
 use offtrack::world::World;
+use offtrack_policy::{Activation, Layer, Normalisation, Policy};
 
 use super::backend::Backend;
 use super::checkpoint::{Columns, Stored};
 use super::config::Config;
 use super::mirror::Mirror;
-use super::normalisation::Normalisation;
+use super::network::Mlp;
 use super::rollout::Rollout;
 use super::sac::{Sac, Transitions};
 use crate::error::Error;
 use crate::evaluation::policies;
-use crate::policy::LearnedPolicy;
 
 /// Trucks, replay buffer and learner.
 pub struct Training {
@@ -49,13 +50,16 @@ impl Training {
         let Some(from) = &self.config.from else { return Ok(()) };
         let policy = policies::learned(from)?;
         policy.check(&self.world)?;
-        let layers = policy.actor.layers.iter().map(|layer| layer.weight.dims()[1]);
-        let hidden: Vec<usize> = layers.take(policy.actor.layers.len() - 1).collect();
+        if policy.activation != Activation::Relu {
+            let expected = format!("has the activation {}: the learner continues with relu alone", policy.activation.name());
+            return Err(Error::Flag { flag: "from", value: from.clone(), expected });
+        }
+        let hidden: Vec<usize> = policy.layers[..policy.layers.len() - 1].iter().map(Layer::n_outputs).collect();
         if hidden != self.config.learning.hidden {
             let expected = format!("has hidden layers of {hidden:?}: learning.hidden must be equal, not {:?}", self.config.learning.hidden);
             return Err(Error::Flag { flag: "from", value: from.clone(), expected });
         }
-        self.sac.set_actor(&policy.actor);
+        self.sac.set_actor(&Mlp::of(&policy.layers, &Device::flex()));
         self.set_normalisation(policy.normalisation);
         Ok(())
     }
@@ -143,13 +147,14 @@ impl Training {
     }
 
     /// The policy: the EMA of the actor. Waits for a device.
-    pub fn policy(&self) -> Result<LearnedPolicy, Error> {
-        Ok(LearnedPolicy {
+    pub fn policy(&self) -> Result<Policy, Error> {
+        Ok(Policy {
             name: "the policy in training".to_owned(),
             benchmark: self.config.benchmark.clone(),
             actions: self.world.actions.clone(),
             normalisation: self.normalisation.clone().map_or_else(|| self.found_normalisation(), Ok)?,
-            actor: self.sac.actor_ema(),
+            layers: self.sac.actor_ema().plain_layers(),
+            activation: Activation::Relu,
         })
     }
 

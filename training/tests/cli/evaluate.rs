@@ -2,7 +2,10 @@
 
 use std::process::{Command, Stdio};
 
-use offtrack_training::policy::LearnedPolicy;
+use offtrack::layout::N_VALUES;
+use offtrack::scenario::Scenario;
+use offtrack::world::World;
+use offtrack_policy::{Activation, Layer, Normalisation, Policy};
 use serde_json::Value;
 
 use crate::place::{Place, offtrack, refusal, repository, succeed};
@@ -127,6 +130,34 @@ fn a_damaged_policy_file_is_refused_by_its_name() {
 }
 
 #[test]
+fn a_network_of_tanh_layers_that_was_trained_elsewhere_is_evaluated_with_the_same_report() {
+    let place = Place::new();
+    let report = |activation: Activation| {
+        let layer = |inputs: usize, outputs: usize| Layer {
+            weights: (0..inputs * outputs).map(|index| ((index * 37 % 101) as f32 - 50.0) / 100.0).collect(),
+            biases: vec![0.0; outputs],
+        };
+        let policy = Policy {
+            name: String::new(),
+            benchmark: "elsewhere".into(),
+            // The table of the short benchmark: fractions of the vehicle's lock, 30 km/h.
+            actions: World::bake(&Scenario::read(&place.file("short.toml")).unwrap()).unwrap().actions,
+            normalisation: Normalisation::none(N_VALUES),
+            layers: vec![layer(N_VALUES, 64), layer(64, 64), layer(64, 5)],
+            activation,
+        };
+        std::fs::write(place.file("elsewhere.safetensors"), policy.to_bytes()).unwrap();
+        let file = place.text("elsewhere.safetensors");
+        succeed(&place.evaluate(&["--policy", &file, "--episodes", "2", "--json", &place.text("report.json")]));
+        let report = place.json("report.json");
+        assert_eq!((&report["policy"], &report["episodes"]), (&Value::from(file), &Value::from(4)));
+        assert_eq!(report["routes"].as_array().unwrap().len(), 2);
+        report["routes"].clone()
+    };
+    assert_ne!(report(Activation::Tanh), report(Activation::Relu), "the activation of the file must matter");
+}
+
+#[test]
 fn a_report_that_cannot_be_written_is_a_failure() {
     let place = Place::new();
     let below_a_file = place.text("tiny.toml/report.json");
@@ -201,7 +232,7 @@ fn a_benchmark_without_a_policy_of_its_own_is_driven_by_the_one_for_attard2023_a
 #[test]
 fn a_policy_that_is_not_finite_is_refused_by_file_and_tensor() {
     let place = Place::new();
-    let mut policy = LearnedPolicy::shipped("attard2023").unwrap();
+    let mut policy = Policy::shipped("attard2023").unwrap();
     policy.normalisation.mean[7] = f32::NAN;
     std::fs::write(place.file("nan.safetensors"), policy.to_bytes()).unwrap();
     let said = refusal(&offtrack(&["evaluate", "--episodes", "1", "--policy", &place.text("nan.safetensors")]), 2);

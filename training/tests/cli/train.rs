@@ -1,5 +1,9 @@
 //! `offtrack train`: what a run leaves behind, and what it refuses to begin.
 
+use std::path::Path;
+
+use offtrack_policy::{Activation, Policy};
+
 use crate::place::{Place, offtrack, refusal, succeed};
 
 fn policy(place: &Place, run: &str) -> Vec<u8> {
@@ -165,11 +169,15 @@ fn a_run_that_begins_with_a_policy_keeps_it_until_the_actor_learns() {
     assert!(policy(&place, "kept") == policy(&place, "first"));
     succeed(&place.train(&["--name", "changed", "--seed", "6", "--from", &first]));
     assert!(policy(&place, "changed") != policy(&place, "first"));
-    // It needs layers and actions of its own size, and to be there.
+    // It needs layers and actions of its own size, rectifiers between them, and to be there.
+    let tanh = place.text("tanh.safetensors");
+    let policy = Policy { activation: Activation::Tanh, ..Policy::load(Path::new(&first)).unwrap() };
+    std::fs::write(&tanh, policy.to_bytes()).unwrap();
     for (arguments, expected) in [
         (vec!["--from", &first, "--set", "learning.hidden=[8]"], "has hidden layers of [16]: learning.hidden must be equal, not [8]"),
         (vec!["--from", "attard2023"], "learned with another action table"),
         (vec!["--from", "nowhere.safetensors"], "nowhere.safetensors"),
+        (vec!["--from", &tanh], "has the activation tanh: the learner continues with relu alone"),
     ] {
         let message = refusal(&place.train(&[&["--name", "refused"], &arguments[..]].concat()), 2);
         assert!(message.contains(expected), "{message}");

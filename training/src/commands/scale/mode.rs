@@ -8,13 +8,13 @@ use offtrack::layout::N_VALUES;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::stages::STAGES;
 use offtrack::world::World;
+use offtrack_policy::Policy;
 use offtrack_training::error::Error;
 use offtrack_training::learner::backend::Backend;
 use offtrack_training::learner::config::Config;
 use offtrack_training::learner::network::Mlp;
 use offtrack_training::learner::rollout::Rollout;
 use offtrack_training::learner::training::Training;
-use offtrack_training::policy::LearnedPolicy;
 use rand::SeedableRng;
 use rand::rngs::SmallRng;
 use serde::Serialize;
@@ -41,14 +41,14 @@ pub(super) enum Mode {
 /// What modes with a network need.
 #[derive(Debug)]
 pub(super) struct Learner {
-    policy: LearnedPolicy,
+    policy: Policy,
     config: Config,
 }
 
 impl Learner {
     /// The policy that comes with the program for `benchmark`, and a training file.
     pub(super) fn read(benchmark: &str, config: &Path, world: &World) -> Result<Learner, Error> {
-        let policy = LearnedPolicy::shipped_or_default(benchmark)?;
+        let policy = Policy::shipped_or_default(benchmark)?;
         policy.check(world)?;
         Ok(Learner { policy, config: Config::read(config)? })
     }
@@ -65,7 +65,7 @@ impl Learner {
                 let sizes = [&[N_VALUES], &LARGE[..], &[self.policy.actions.len()]].concat();
                 Mlp::new(&sizes, 1.0, &mut SmallRng::seed_from_u64(0), &burn::tensor::Device::flex())
             }
-            _ => self.policy.actor.clone(),
+            _ => Mlp::of(&self.policy.layers, &burn::tensor::Device::flex()),
         }
     }
 

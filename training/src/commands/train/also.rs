@@ -5,12 +5,12 @@
 
 use offtrack::layout::Action;
 use offtrack::scenario::{Scenario, Split};
+use offtrack_policy::Policy;
 use offtrack_training::device::Device;
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::report::Report;
 use offtrack_training::evaluation::{Evaluation, usual_episodes};
 use offtrack_training::learner::config::{AlsoEvaluate, Config};
-use offtrack_training::policy::LearnedPolicy;
 use serde::Serialize;
 
 use crate::commands::{progress, roads};
@@ -58,7 +58,7 @@ impl Also {
     }
 
     /// Drives every route as many times as an evaluation usually does.
-    pub fn evaluate(&self, policy: &mut LearnedPolicy) -> Result<AlsoReport, Error> {
+    pub fn evaluate(&self, policy: &mut Policy) -> Result<AlsoReport, Error> {
         let world = roads::world(&self.scenario)?;
         let evaluation = Evaluation {
             scenario: &self.scenario,

@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use offtrack::layout::{Ended, Start};
 use offtrack::world::World;
+use offtrack_policy::Policy;
 
 use super::beam::{self, Outcome, Pass};
 use super::file::{self, Found};
 use crate::error::Error;
-use crate::policy::LearnedPolicy;
 
 /// Steps that each chosen action is held for where nobody says how many.
 pub const HOLD: usize = 3;
@@ -34,7 +34,7 @@ pub fn passes(widths: &[usize], hold: usize) -> Result<Vec<Pass>, Error> {
 
 /// Searches from one start until a pass arrives or all have been made. Without an arrival the result is the pass with
 /// the most progress.
-pub fn attempt(world: &Arc<World>, route: u32, start: &Start, passes: &[Pass], policy: Option<&LearnedPolicy>) -> Result<Found, Error> {
+pub fn attempt(world: &Arc<World>, route: u32, start: &Start, passes: &[Pass], policy: Option<&Policy>) -> Result<Found, Error> {
     let mut env_steps = 0;
     let mut best: Option<(Pass, Outcome)> = None;
     for &pass in passes {

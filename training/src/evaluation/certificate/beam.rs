@@ -11,9 +11,9 @@ use offtrack::angle::wrapped;
 use offtrack::layout::{Ended, Start, Truck};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
+use offtrack_policy::Policy;
 
 use crate::error::Error;
-use crate::policy::LearnedPolicy;
 
 /// Discount of a candidate's cost with each step: what lies long ago says little about what follows.
 const DISCOUNT: f32 = 0.95;
@@ -84,7 +84,7 @@ struct Candidate {
 
 /// Searches for a sequence of actions that completes `route` from `start`. With a `policy`, its own sequence is a
 /// candidate until it fails.
-pub fn search(world: &Arc<World>, route: u32, start: &Start, pass: Pass, policy: Option<&LearnedPolicy>) -> Result<Outcome, Error> {
+pub fn search(world: &Arc<World>, route: u32, start: &Start, pass: Pass, policy: Option<&Policy>) -> Result<Outcome, Error> {
     let mut simulator = Simulator::new(world.clone(), 1, 0, RouteChoice::Fixed(vec![route]))?;
     simulator.reset_from(&[*start])?;
     let mut segments: Vec<Segment> = Vec::new();
@@ -168,7 +168,7 @@ fn distinct(world: &World, steering: f32, last: u32, hold: usize) -> Vec<u32> {
 }
 
 /// Each child's action for the next step: the held one, or the policy's for its observation.
-fn chosen(policy: Option<&LearnedPolicy>, batch: &Batch, children: &[Candidate], straight: u32) -> Vec<u32> {
+fn chosen(policy: Option<&Policy>, batch: &Batch, children: &[Candidate], straight: u32) -> Vec<u32> {
     let own = |env: usize| policy.and_then(|policy| policy.act(&batch.observation[env..=env]).first().copied());
     children.iter().enumerate().map(|(env, child)| child.held.or_else(|| own(env)).unwrap_or(straight)).collect()
 }

@@ -17,6 +17,7 @@ use offtrack::layout::{Column, Ended, N_VALUES};
 use offtrack::random;
 use offtrack::simulator::{Engine, RouteChoice, Simulator, Tally};
 use offtrack::world::World;
+use offtrack_policy::{LIMIT, Normalisation};
 use wgpu::{PollType, SubmissionIndex};
 
 use super::{Episodes, Rollout};
@@ -25,7 +26,6 @@ use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::config::Config;
 use crate::learner::mirror::Mirror;
 use crate::learner::network::Mlp;
-use crate::learner::normalisation::{LIMIT, Normalisation};
 use crate::learner::sac::Transitions;
 use memory_kernels::{Binding, Buffers, Facts, Image, Kernel, Normal, Now};
 pub use shared::Shared;

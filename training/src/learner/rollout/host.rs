@@ -5,6 +5,7 @@ use offtrack::layout::{Column, Ended, N_VALUES};
 use offtrack::random;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
+use offtrack_policy::Normalisation;
 use rand::{Rng, SeedableRng};
 use std::sync::Arc;
 
@@ -15,11 +16,9 @@ use crate::learner::config::{Config, Learning};
 use crate::learner::generator::Generator;
 use crate::learner::level_replay::LevelReplay;
 use crate::learner::mirror::Mirror;
-use crate::learner::network::Mlp;
-use crate::learner::normalisation::Normalisation;
+use crate::learner::network::{Mlp, sampled};
 use crate::learner::replay_buffer::{ReplayBuffer, Rows, Sample};
 use crate::learner::sac::{N_SHARDS, Transitions};
-use crate::policy::sampled;
 
 /// See the module.
 pub struct HostRollout {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
+use offtrack_policy::Policy;
 use serde::Serialize;
 
 use crate::device::Device;
@@ -13,7 +14,6 @@ use crate::evaluation::Evaluation;
 use crate::evaluation::report::{Summary, wilson};
 use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::config;
-use crate::policy::LearnedPolicy;
 
 /// Seed of the start poses, the same in every validation.
 const SEED: u32 = 0;
@@ -90,7 +90,7 @@ impl Validation {
 
     /// Lets the policy drive. It becomes the best one unless an earlier one arrived more often. Where a run was too slow
     /// for several validations, they become one.
-    pub fn validate(&mut self, policy: LearnedPolicy, env_steps: u64, fraction: f64) -> Result<Validated, Error> {
+    pub fn validate(&mut self, policy: Policy, env_steps: u64, fraction: f64) -> Result<Validated, Error> {
         let bytes = policy.to_bytes();
         let device = Device::processor();
         let evaluation = Evaluation {
@@ -168,7 +168,7 @@ impl Validation {
             lane_distance_mean_arrived: (0 < arrived).then_some(distance),
         };
         let policy: Vec<u8> = stored.column(BEST)?;
-        LearnedPolicy::from_bytes("best policy", &policy).map_err(|message| stored.error(format!("its column `{BEST}` {message}")))?;
+        Policy::from_bytes(&format!("its column `{BEST}`"), &policy).map_err(|error| stored.error(error.to_string()))?;
         self.n_made = n_made;
         self.last = Some(validated(last_steps, last_arrived, last_distance));
         self.best = Some((validated(best_steps, best_arrived, best_distance), policy));

@@ -1,10 +1,10 @@
 use super::*;
 use crate::learner::config::{self, Critics, Entropy};
-use crate::learner::normalisation::Normalisation;
 use crate::learner::replay_buffer::{ReplayBuffer, Rows, Sample};
 use crate::learner::rollout::host;
 use burn::module::Param;
 use offtrack::layout::Ended;
+use offtrack_policy::Normalisation;
 
 const ALPHA: f32 = 0.5;
 /// Observations of two states.

@@ -1,0 +1,39 @@
+//! What can be wrong with a policy.
+
+use std::path::PathBuf;
+
+use offtrack::reader::shortened;
+
+/// Most characters of a message about the contents of a file.
+const LONGEST_MESSAGE: usize = 600;
+
+/// Why there is no policy, or why it cannot drive in a world.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The file cannot be read at all.
+    #[error(transparent)]
+    Unreadable(#[from] offtrack::reader::Error),
+    /// The file is not a policy, is damaged, or holds a policy that cannot drive.
+    #[error("{}: {message}", file.display())]
+    Contents {
+        /// The file, or the policy's name.
+        file: PathBuf,
+        /// What is wrong and what would do.
+        message: String,
+    },
+    /// No policy comes with the program for this benchmark.
+    #[error("policy: {name}; policies come with the program for {}", known.join(", "))]
+    UnknownName {
+        /// The benchmark that was asked for.
+        name: String,
+        /// Those that there are policies for.
+        known: Vec<&'static str>,
+    },
+}
+
+impl Error {
+    /// A long message, which may repeat a part of the file, is shortened.
+    pub(crate) fn contents(name: &str, message: &str) -> Error {
+        Error::Contents { file: name.into(), message: shortened(message, LONGEST_MESSAGE) }
+    }
+}

@@ -1,0 +1,36 @@
+//! Policies for tractor-trailers in roundabouts: the file that holds one, and the network that drives, in plain Rust.
+//!
+//! A [`Policy`] is a multilayer perceptron from an observation to one value an action, with all that is needed to drive
+//! with it. Those that come with the project are part of the library; one trained elsewhere is a [`Policy`] too, once
+//! its weights are in it or in a file as `docs/policies.md` describes it:
+//!
+//! ```
+//! use offtrack::layout::N_VALUES;
+//! use offtrack_policy::{Activation, Layer, Normalisation, Policy};
+//!
+//! # fn main() -> Result<(), offtrack_policy::Error> {
+//! let shipped = Policy::shipped("attard2023")?;
+//! let layer = |inputs, outputs| Layer { weights: vec![0.01; inputs * outputs], biases: vec![0.0; outputs] };
+//! let own = Policy {
+//!     name: "mine".into(),
+//!     layers: vec![layer(N_VALUES, 64), layer(64, 64), layer(64, shipped.actions.len())],
+//!     activation: Activation::Tanh,
+//!     normalisation: Normalisation::none(N_VALUES),
+//!     ..shipped
+//! };
+//! let read = Policy::from_bytes("mine", &own.to_bytes())?; // checks shapes and values
+//! assert_eq!(read.act(&[[0.5; N_VALUES]]), [0]); // all actions are equal here: the first one is taken
+//! # Ok(())
+//! # }
+//! ```
+
+mod error;
+mod file;
+mod network;
+mod normalisation;
+mod policy;
+
+pub use error::Error;
+pub use network::{Activation, Layer};
+pub use normalisation::{LIMIT, Normalisation};
+pub use policy::{Policy, greedy};

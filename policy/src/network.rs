@@ -1,0 +1,139 @@
+//! The network's forward pass: linear layers with an activation between them.
+//!
+//! A sum over inputs is a chain of fused multiply-adds in their order, for each row and output by itself. So a row's
+//! result depends on nothing else, and vector instructions of any width give it to the last bit.
+
+use multiversion::multiversion;
+use offtrack::layout::N_VALUES;
+use rayon::prelude::*;
+
+use crate::normalisation::Normalisation;
+
+/// Rows, and outputs of each, whose sums are made at a time: they fit into the registers.
+const ROWS: usize = 6;
+const OUTPUTS: usize = 16;
+/// Rows that one thread takes through all layers at a time: a slice of the weights serves them from the nearest cache.
+const BLOCK: usize = 8 * ROWS;
+
+/// What stands after each layer but the last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Activation {
+    /// The rectifier, max(x, 0).
+    #[default]
+    Relu,
+    /// The hyperbolic tangent.
+    Tanh,
+}
+
+impl Activation {
+    /// All of them.
+    pub const ALL: [Activation; 2] = [Activation::Relu, Activation::Tanh];
+
+    /// Its name in a policy file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Activation::Relu => "relu",
+            Activation::Tanh => "tanh",
+        }
+    }
+
+    fn apply(self, values: &mut [f32]) {
+        match self {
+            Activation::Relu => values.iter_mut().for_each(|value| *value = if *value < 0.0 { 0.0 } else { *value }),
+            Activation::Tanh => values.iter_mut().for_each(|value| *value = value.tanh()),
+        }
+    }
+}
+
+/// A linear layer: outputs = inputs · weights + biases.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layer {
+    /// `[inputs * outputs]`, inputs varying slowest.
+    pub weights: Vec<f32>,
+    /// `[outputs]`.
+    pub biases: Vec<f32>,
+}
+
+impl Layer {
+    /// Number of its inputs; 0 without outputs.
+    pub fn n_inputs(&self) -> usize {
+        self.weights.len().checked_div(self.biases.len()).unwrap_or_default()
+    }
+
+    /// Number of its outputs.
+    pub fn n_outputs(&self) -> usize {
+        self.biases.len()
+    }
+}
+
+/// The last layer's outputs for each observation, `[rows * outputs]`.
+pub(crate) fn forward(
+    normalisation: &Normalisation,
+    layers: &[Layer],
+    activation: Activation,
+    observations: &[[f32; N_VALUES]],
+) -> Vec<f32> {
+    let n_outputs = layers.last().map_or(0, Layer::n_outputs);
+    let mut logits = vec![0.0; observations.len() * n_outputs];
+    let block = |(observations, logits): (&[[f32; N_VALUES]], &mut [f32])| {
+        let mut values = grouped(&normalisation.apply(observations), N_VALUES);
+        for (index, layer) in layers.iter().enumerate() {
+            let mut outputs = vec![[0.0; ROWS]; values.len() / layer.n_inputs() * layer.n_outputs()];
+            linear(layer, &values, &mut outputs);
+            if index + 1 < layers.len() {
+                activation.apply(outputs.as_flattened_mut());
+            }
+            values = outputs;
+        }
+        for (row, logits) in logits.chunks_exact_mut(n_outputs).enumerate() {
+            let group = &values[row / ROWS * n_outputs..];
+            logits.iter_mut().zip(group).for_each(|(logit, values)| *logit = values[row % ROWS]);
+        }
+    };
+    if BLOCK < observations.len() {
+        observations.par_chunks(BLOCK).zip(logits.par_chunks_mut(BLOCK * n_outputs)).for_each(block);
+    } else {
+        block((observations, &mut logits));
+    }
+    logits
+}
+
+/// Rows of values in groups of [`ROWS`], in each the same value of all rows side by side, `[groups * values]`. The last
+/// group is filled with zeros.
+fn grouped(values: &[f32], n_values: usize) -> Vec<[f32; ROWS]> {
+    let groups = values.chunks(ROWS * n_values);
+    let value = |group: &[f32], index: usize| std::array::from_fn(|row| group.get(row * n_values + index).copied().unwrap_or_default());
+    groups.flat_map(|group| (0..n_values).map(move |index| value(group, index))).collect()
+}
+
+/// A layer's outputs `[groups * outputs]` for its inputs `[groups * inputs]`.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
+fn linear(layer: &Layer, inputs: &[[f32; ROWS]], outputs: &mut [[f32; ROWS]]) {
+    let (n_inputs, n_outputs) = (layer.n_inputs(), layer.n_outputs());
+    for first in (0..n_outputs).step_by(OUTPUTS) {
+        let width = OUTPUTS.min(n_outputs - first);
+        for (inputs, outputs) in inputs.chunks_exact(n_inputs).zip(outputs.chunks_exact_mut(n_outputs)) {
+            // The width is known to the compiler where it matters.
+            let sums = if width == OUTPUTS { sums(layer, inputs, first, OUTPUTS) } else { sums(layer, inputs, first, width) };
+            for (index, (output, bias)) in outputs[first..][..width].iter_mut().zip(&layer.biases[first..]).enumerate() {
+                *output = std::array::from_fn(|row| sums[row][index] + bias);
+            }
+        }
+    }
+}
+
+/// The sums of a group's rows for `width` outputs from the `first` on.
+#[inline(always)]
+fn sums(layer: &Layer, inputs: &[[f32; ROWS]], first: usize, width: usize) -> [[f32; OUTPUTS]; ROWS] {
+    let mut sums = [[0.0; OUTPUTS]; ROWS];
+    for (values, row) in inputs.iter().zip(layer.weights.chunks_exact(layer.n_outputs())) {
+        let mut weights = [0.0; OUTPUTS];
+        weights[..width].copy_from_slice(&row[first..first + width]);
+        for (sums, value) in sums.iter_mut().zip(values) {
+            for (sum, weight) in sums.iter_mut().zip(&weights) {
+                *sum = value.mul_add(*weight, *sum);
+            }
+        }
+    }
+    sums
+}

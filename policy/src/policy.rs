@@ -1,0 +1,135 @@
+//! A policy: a network with all that is needed to drive with it.
+
+use std::path::Path;
+
+use offtrack::layout::{Action, N_VALUES};
+use offtrack::reader;
+use offtrack::world::World;
+
+use crate::error::Error;
+use crate::network::{self, Activation, Layer};
+use crate::normalisation::Normalisation;
+
+/// Largest relative difference of two entries of an action table that count as equal: f32 rounds at 6e-8.
+const SAME_ACTION: f32 = 1e-5;
+/// Most bytes of a policy file: two hundred times the shipped ones.
+const FILE_LIMIT: u64 = 64 << 20;
+
+/// The policies that come with the project, by the benchmark that they learned on.
+const SHIPPED: [(&str, &[u8]); 2] = [
+    ("attard2023", include_bytes!("../../training/policies/attard2023/policy.safetensors")),
+    ("attard2023-as-run", include_bytes!("../../training/policies/attard2023-as-run/policy.safetensors")),
+];
+
+/// A network that can drive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Policy {
+    /// Name for reports and errors: the file, or the benchmark's name and `(shipped)`. Not part of the file.
+    pub name: String,
+    /// The benchmark it learned on.
+    pub benchmark: String,
+    /// The action table that its output refers to.
+    pub actions: Vec<Action>,
+    /// How observations are normalised for it.
+    pub normalisation: Normalisation,
+    /// The layers, from the observation on: the first has [`N_VALUES`] inputs, the last an output an action.
+    pub layers: Vec<Layer>,
+    /// What stands after each layer but the last.
+    pub activation: Activation,
+}
+
+impl Policy {
+    /// Reads a policy file.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read; one that is cut, changed or of another format; and one whose shapes do not fit or
+    /// that has a number that is not finite.
+    pub fn load(file: &Path) -> Result<Policy, Error> {
+        Policy::from_bytes(&file.display().to_string(), &reader::read_bytes(file, FILE_LIMIT)?)
+    }
+
+    /// The policy that comes with the project for this benchmark.
+    ///
+    /// # Errors
+    ///
+    /// For a benchmark without one, its name and those that there are.
+    pub fn shipped(benchmark: &str) -> Result<Policy, Error> {
+        let Some((_, bytes)) = SHIPPED.iter().find(|(name, _)| *name == benchmark) else {
+            return Err(Error::UnknownName { name: benchmark.to_owned(), known: Policy::shipped_names().to_vec() });
+        };
+        Policy::from_bytes(&format!("{benchmark} (shipped)"), bytes)
+    }
+
+    /// The policy that comes with the project for this benchmark or, where there is none, the one for `attard2023`:
+    /// other benchmarks may share its vehicle and actions.
+    ///
+    /// # Errors
+    ///
+    /// None as long as the policies that come with the project can be read.
+    pub fn shipped_or_default(benchmark: &str) -> Result<Policy, Error> {
+        let known = Policy::shipped_names().contains(&benchmark);
+        Policy::shipped(if known { benchmark } else { "attard2023" })
+    }
+
+    /// Names of the benchmarks that a policy comes with the project for.
+    pub fn shipped_names() -> [&'static str; SHIPPED.len()] {
+        SHIPPED.map(|(name, _)| name)
+    }
+
+    /// One value an action for each observation, `[n_envs * n_actions]`. Those of an observation do not depend on the
+    /// others, on its place among them, or on the number of threads, to the last bit.
+    ///
+    /// # Panics
+    ///
+    /// Where the layers do not fit each other; those of a policy that was read do.
+    pub fn logits(&self, observations: &[[f32; N_VALUES]]) -> Vec<f32> {
+        network::forward(&self.normalisation, &self.layers, self.activation, observations)
+    }
+
+    /// The index of the most probable action for each observation, `[n_envs]`.
+    ///
+    /// # Panics
+    ///
+    /// As [`Policy::logits`].
+    pub fn act(&self, observations: &[[f32; N_VALUES]]) -> Vec<u32> {
+        greedy(&self.logits(observations), self.actions.len())
+    }
+
+    /// Whether the policy can drive in `world`.
+    ///
+    /// # Errors
+    ///
+    /// Another action table than the world's.
+    pub fn check(&self, world: &World) -> Result<(), Error> {
+        let near = |a: f32, b: f32| (a - b).abs() <= SAME_ACTION * a.abs().max(1.0);
+        let same = |(a, b): (&Action, &Action)| near(a.steering, b.steering) && near(a.speed, b.speed);
+        if self.actions.len() == world.actions.len() && self.actions.iter().zip(&world.actions).all(same) {
+            return Ok(());
+        }
+        let message = format!(
+            "learned with another action table: {} here, {} in the benchmark; {}",
+            described(&self.actions),
+            described(&world.actions),
+            "a policy that learned with the same actions and the same vehicle lock is needed"
+        );
+        Err(Error::contents(&self.name, &message))
+    }
+}
+
+/// The best action of each row of `logits`, `[rows]`; the first of equals.
+pub fn greedy(logits: &[f32], n_actions: usize) -> Vec<u32> {
+    let best = |row: &[f32]| (1..n_actions).fold(0, |best, action| if row[best] < row[action] { action } else { best });
+    logits.chunks_exact(n_actions).map(|row| best(row) as u32).collect()
+}
+
+/// An action table in a few words.
+fn described(actions: &[Action]) -> String {
+    let range = |value: fn(&Action) -> f32| {
+        let values = actions.iter().map(value);
+        (values.clone().fold(f32::INFINITY, f32::min), values.fold(f32::NEG_INFINITY, f32::max))
+    };
+    let (right, left) = range(|action| action.steering.to_degrees());
+    let (slow, fast) = range(|action| action.speed * 3.6);
+    format!("{} actions, {right:.1}..{left:.1} deg, {slow:.1}..{fast:.1} km/h", actions.len())
+}
