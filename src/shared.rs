@@ -51,6 +51,28 @@ impl<T: Shared, const N: usize> Shared for [T; N] {
     }
 }
 
+/// A shared struct, described.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Struct {
+    /// Its name.
+    pub name: &'static str,
+    /// Its size \[bytes].
+    pub size: usize,
+    /// Its fields, in order and without gaps.
+    pub fields: Vec<Field>,
+}
+
+/// A field of a shared struct.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Field {
+    /// Its name.
+    pub name: &'static str,
+    /// Its offset in the struct \[bytes].
+    pub offset: usize,
+    /// Its type in WGSL: `f32`, `u32`, `vec2<f32>`, another struct or an array.
+    pub wgsl: String,
+}
+
 /// A value that can be written as a WGSL literal.
 pub trait Literal {
     /// Its type in WGSL.
@@ -168,14 +190,18 @@ macro_rules! shared {
             }
         )*
 
-        /// Every shared struct: its name, its size \[bytes], and the name and the offset \[bytes] of each field.
+        /// Every shared struct.
         #[allow(dead_code, reason = "used by tests alone where no other code looks at a layout")]
-        pub fn structs() -> Vec<(&'static str, usize, Vec<(&'static str, usize)>)> {
-            vec![$((
-                stringify!($name),
-                size_of::<$name>(),
-                vec![$((stringify!($field), std::mem::offset_of!($name, $field)),)*],
-            ),)*]
+        pub fn structs() -> Vec<$crate::shared::Struct> {
+            vec![$($crate::shared::Struct {
+                name: stringify!($name),
+                size: size_of::<$name>(),
+                fields: vec![$($crate::shared::Field {
+                    name: stringify!($field),
+                    offset: std::mem::offset_of!($name, $field),
+                    wgsl: <$type as $crate::shared::Shared>::wgsl(),
+                },)*],
+            },)*]
         }
 
         /// The structs in WGSL.

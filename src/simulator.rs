@@ -108,6 +108,16 @@ impl Simulator {
         self.batch.streams()
     }
 
+    /// Makes trucks draw from other streams from their next episode on, `[n_envs]`: as [`Simulator::restore`] needs it
+    /// where [`Simulator::begin`] had given them.
+    pub fn set_streams(&mut self, streams: &[Stream]) -> Result<(), Error> {
+        let n_envs = self.n_envs();
+        if streams.len() != n_envs {
+            return Err(Error::StreamCount { n_streams: streams.len(), n_envs });
+        }
+        self.batch.begin(&self.world, &vec![BeginRow::default(); n_envs], Some(streams))
+    }
+
     /// Sums over all steps since the batch was made.
     pub fn tally(&self) -> Result<Tally, Error> {
         self.batch.tally()

@@ -54,6 +54,14 @@ pub enum Error {
         /// Trucks in the batch.
         n_envs: usize,
     },
+    /// Streams must be one for each truck.
+    #[error("streams: {n_streams} for {n_envs} trucks; one each is needed")]
+    StreamCount {
+        /// Streams given.
+        n_streams: usize,
+        /// Trucks in the batch.
+        n_envs: usize,
+    },
     /// A start beyond the benchmark's largest errors.
     #[error("starts[{env}]: {fraction} of the largest start error; must lie in -1..1")]
     UnknownStart {

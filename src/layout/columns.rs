@@ -70,7 +70,7 @@ macro_rules! column_names {
             }
 
             /// Type of an element in WGSL, where arrays lie flat.
-            pub(super) fn element(self) -> String {
+            pub fn element(self) -> String {
                 match self {
                     $(Column::$variant => <$type>::element(),)*
                 }

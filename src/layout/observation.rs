@@ -3,7 +3,7 @@
 use super::{N_TRACTOR_RAYS, N_TRAILER_RAYS, N_VALUES};
 
 /// Neighbouring values of an observation that measure the same thing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Values {
     /// Name of the group.
     pub name: &'static str,
@@ -11,6 +11,8 @@ pub struct Values {
     pub first: usize,
     /// Number of its values.
     pub n: usize,
+    /// The least that they can be: 0, of angles -1. The largest is 1.
+    pub low: f32,
     /// What each value is, what it is divided by, and where it is limited.
     pub doc: &'static str,
 }
@@ -42,10 +44,10 @@ pub const OBSERVATION: [Values; 13] = [
     values("waypoint_distance", 1, 2, "distance to the next and the following waypoint / 20 m, at most 1"),
     values("crossing_distance", 3, 2, "distance to the crossing lines of these waypoints / 20 m, at most 1"),
     values("lane_distance", 5, 1, "distance to the lane's centre line / 10 m, at most 1"),
-    values("bearing", 6, 5, "angle at the waypoint behind, from a waypoint ahead to the truck / pi"),
-    values("heading", 11, 5, "tractor's heading less the lane's at these waypoints / pi"),
-    values("trailer_heading", 16, 5, "trailer's heading less the lane's at these waypoints / pi"),
-    values("articulation", 21, 1, "tractor's heading less the trailer's / pi"),
+    angles("bearing", 6, 5, "angle at the waypoint behind, from a waypoint ahead to the truck / pi"),
+    angles("heading", 11, 5, "tractor's heading less the lane's at these waypoints / pi"),
+    angles("trailer_heading", 16, 5, "trailer's heading less the lane's at these waypoints / pi"),
+    angles("articulation", 21, 1, "tractor's heading less the trailer's / pi"),
     values("future_curvature", 22, 4, "interior angle of the route ahead / pi, chords of 5, 7, 10, 12 waypoints; 1 is straight"),
     values("current_curvature", 26, 4, "interior angle at the next waypoint / pi, the same chords"),
     values("trailer_range", 30, N_TRAILER_RAYS, "trailer's distance sensors, left and right alternating, front to rear / sensor range"),
@@ -54,7 +56,11 @@ pub const OBSERVATION: [Values; 13] = [
 ];
 
 const fn values(name: &'static str, first: usize, n: usize, doc: &'static str) -> Values {
-    Values { name, first, n, doc }
+    Values { name, first, n, low: 0.0, doc }
+}
+
+const fn angles(name: &'static str, first: usize, n: usize, doc: &'static str) -> Values {
+    Values { low: -1.0, ..values(name, first, n, doc) }
 }
 
 // Every value belongs to one group.

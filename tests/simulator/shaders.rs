@@ -52,6 +52,7 @@ fn every_shader_of_a_stage_has_a_twin_on_the_cpu_and_every_twin_a_shader() {
 mod module {
     use offtrack::layout::structs;
     use offtrack::shared::Named;
+    use offtrack::shared::Struct;
     use offtrack::stages::{Kernel, SHADERS, STAGES};
     use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
     use wgpu::naga::{Module, TypeInner, front::wgsl};
@@ -81,7 +82,8 @@ mod module {
     /// Differences between the layouts of WGSL and of Rust, struct by struct.
     fn differences(module: &Module) -> Vec<String> {
         let mut differences = Vec::new();
-        for (name, size, fields) in structs() {
+        for Struct { name, size, fields } in structs() {
+            let fields: Vec<(&str, usize)> = fields.iter().map(|field| (field.name, field.offset)).collect();
             let found = module.types.iter().find(|(_, kind)| kind.name.as_deref() == Some(name));
             let Some((_, TypeInner::Struct { members, span })) = found.map(|(_, kind)| (name, &kind.inner)) else {
                 differences.push(format!("{name} is missing"));

@@ -1,0 +1,44 @@
+"""Thousands of tractor-trailers drive through roundabouts at once.
+
+- :func:`make_vec` makes a vector environment of Gymnasium: many trucks, stepped together by the simulator.
+- :class:`Roundabout` is one truck, ``gymnasium.make("offtrack_sim:offtrack/Roundabout-v0")``.
+- :class:`Batch` is the simulator itself, without spaces and infos.
+- :class:`Policy` drives: the policy that comes with the package, or a trained one.
+- :mod:`offtrack_sim.sb3`, :mod:`offtrack_sim.puffer`: the same trucks for Stable-Baselines3 and PufferLib.
+- :mod:`offtrack_sim.export` writes a network of PyTorch as a policy file.
+
+An observation is 69 values of float32 in ``[-1, 1]``, see :data:`OBSERVATION`; an action is an index into
+``Batch.action_table``. A step is 0.1 s.
+"""
+
+from __future__ import annotations
+
+import gymnasium
+
+from ._offtrack import ScenarioError, __version__, scenario_names
+from .batch import COLUMNS, OBSERVATION, Batch, Ended, Ends, Values
+from .policy import Policy
+from .single import Roundabout
+from .vector import RoundaboutVector, make_vec
+
+__all__ = [
+    "COLUMNS",
+    "OBSERVATION",
+    "Batch",
+    "Ended",
+    "Ends",
+    "Policy",
+    "Roundabout",
+    "RoundaboutVector",
+    "ScenarioError",
+    "Values",
+    "__version__",
+    "make_vec",
+    "scenario_names",
+]
+
+gymnasium.register(
+    id="offtrack/Roundabout-v0",
+    entry_point="offtrack_sim.single:Roundabout",
+    vector_entry_point="offtrack_sim.vector:make_vec",
+)

@@ -1,0 +1,276 @@
+"""The simulator itself: a batch of trucks, stepped together."""
+
+from __future__ import annotations
+
+import enum
+import operator
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _offtrack
+
+Array = npt.NDArray[Any]
+Floats = npt.NDArray[np.float32]
+Bools = npt.NDArray[np.bool_]
+Ints = npt.NDArray[np.int64]
+
+
+class Ended(enum.IntEnum):
+    """Why an episode ended. Failure wins over arrival, everything wins over the time limit."""
+
+    RUNNING = 0
+    ARRIVED = 1
+    TRACTOR_COLLIDED = 2
+    TRAILER_COLLIDED = 3
+    ROLLED_OVER = 4
+    JACKKNIFED = 5
+    STRAYED = 6
+    TIMED_OUT = 7
+
+
+assert [ended.name.lower() for ended in Ended] == _offtrack.end_codes()
+
+
+class Values(NamedTuple):
+    """Neighbouring values of an observation that measure the same thing."""
+
+    name: str
+    """Name of the group."""
+    first: int
+    """Index of its first value."""
+    n: int
+    """Number of its values."""
+    low: float
+    """The least that they can be: 0, of angles -1. The largest is 1."""
+    doc: str
+    """What each value is, what it is divided by, and where it is limited."""
+
+
+OBSERVATION: tuple[Values, ...] = tuple(Values(*values) for values in _offtrack.observation_groups())
+"""What each of the 69 values of an observation is, group by group."""
+
+N_VALUES: int = sum(values.n for values in OBSERVATION)
+
+
+def _dtype(fields: list[tuple[str, str, int]]) -> np.dtype[Any]:
+    def typed(kind: str, n: int) -> np.dtype[Any]:
+        return np.dtype((kind, (n,))) if n else np.dtype(kind)
+
+    if len(fields) == 1 and not fields[0][0]:
+        return typed(*fields[0][1:])
+    return np.dtype([(name, typed(kind, n)) for name, kind, n in fields])
+
+
+COLUMNS: dict[str, np.dtype[Any]] = {name: _dtype(fields) for name, fields in _offtrack.column_layouts()}
+"""Every column of a batch and the type of a row: a number, an array of numbers, or a record with named fields."""
+
+
+class Ends(NamedTuple):
+    """The episodes that the last step ended, k of them."""
+
+    envs: Ints
+    """Index of each truck, ``[k]``."""
+    codes: Ints
+    """Why, as :class:`Ended`, ``[k]``."""
+    routes: Ints
+    """Index of its route in ``Batch.route_names``, ``[k]``."""
+    observations: Floats
+    """The observation after the last action, ``[k, 69]``."""
+
+
+class Batch(_offtrack.Batch):
+    """Many trucks in one world.
+
+    Args:
+        scenario: Name of a benchmark that comes with the package, see :func:`offtrack_sim.scenario_names`, or the path
+            of a benchmark file.
+        num_envs: Number of trucks.
+        split: Routes that episodes are drawn from: ``"train"``, ``"validation"`` or ``"test"``.
+        routes: Names of routes (``"16m/N-left-3"``) or of roundabouts (``"16m"``) of any split, in place of a split.
+        seed: Seed of routes, starts and random actions, ``0..2**32``. Truck ``i`` draws from the stream ``(seed, i)``.
+        autoreset: What follows the end of an episode: ``"same_step"``, ``"next_step"``, ``"disabled"``, or Gymnasium's
+            ``AutoresetMode``.
+        num_threads: Threads that step the trucks; None for one a core. No result depends on it.
+        device: ``"cpu"``, ``"gpu"`` for the first graphics device, or a part of a graphics device's name.
+
+    The batch begins with the first episode of every truck. One thread at a time may use it; the GIL is released while it
+    steps.
+
+    Raises:
+        ValueError: For an unknown scenario, split, route or mode, and a number out of range; the message names the
+            choices. :class:`ScenarioError` for a file that is refused.
+        MemoryError: Where so many trucks do not fit into memory.
+        RuntimeError: Where there is no such device; the message lists those there are.
+    """
+
+    def __new__(
+        cls,
+        scenario: str | os.PathLike[str] = "attard2023",
+        num_envs: int = 1,
+        *,
+        split: str = "train",
+        routes: Iterable[str] | None = None,
+        seed: int = 0,
+        autoreset: str | enum.Enum = "same_step",
+        num_threads: int | None = None,
+        device: str = "cpu",
+    ) -> Batch:
+        threads = 0 if num_threads is None else _within("num_threads", num_threads, 1, 1025)
+        return super().__new__(
+            cls,
+            os.fspath(scenario),
+            min(operator.index(num_envs), 2**62),
+            split=split,
+            routes=None if routes is None else _names(routes),
+            seed=checked_seed(seed),
+            autoreset=mode_name(autoreset),
+            num_threads=threads,
+            device=device,
+        )
+
+    def step(self, actions: Array) -> tuple[Floats, Floats, Bools, Bools]:
+        """One step of every truck: 0.1 s.
+
+        Args:
+            actions: Index of each truck's action in ``action_table``, integers ``[num_envs]``.
+
+        Returns:
+            Observation ``[num_envs, 69]``, reward, terminated and truncated, ``[num_envs]`` each. Where an episode ended
+            and another began in the same step, the observation is the new one's first: :meth:`ended` has the last one.
+
+        Raises:
+            TypeError: For anything but an array of integers.
+            ValueError: For another length, and for an action outside the table.
+            gymnasium.error.ResetNeeded: Where ``autoreset`` is ``"disabled"`` and an episode has ended.
+            RuntimeError: Where another thread uses the batch.
+        """
+        return super().step(actions)
+
+    def step_into(self, actions: Array, observation: Floats, reward: Floats, terminated: Bools, truncated: Bools) -> None:
+        """The same into arrays of the caller: float32 ``[num_envs, 69]`` and ``[num_envs]``, bool ``[num_envs]`` twice.
+
+        They must be contiguous; a slice ``fragment[t]`` of an array of many steps is.
+        """
+        super().step_into(actions, observation, reward, terminated, truncated)
+
+    def observation(self) -> Floats:
+        """What every truck observes before its next action, ``[num_envs, 69]``."""
+        return super().observation()
+
+    def ended(self) -> Ends | None:
+        """The episodes that the last step ended, None where it ended none."""
+        found = self.last_ended()
+        return None if found is None else Ends(*found)
+
+    def begin(
+        self,
+        envs: Iterable[int] | None = None,
+        *,
+        seeds: Sequence[int | None] | None = None,
+        streams: Sequence[tuple[int, int] | None] | None = None,
+        routes: Sequence[str | None] | None = None,
+        starts: Sequence[tuple[float, float] | None] | None = None,
+    ) -> None:
+        """Begins an episode of some trucks and leaves the others as they are.
+
+        Args:
+            envs: Indices of the trucks, k of them; None for all.
+            seeds: A seed for each: the episode is the first of the stream ``(seed, 0)``, as in a batch of one truck with
+                that seed. None: the next episode of the truck's own stream.
+            streams: The same with the whole stream, ``(seed, index)``.
+            routes: Name of each one's route, of those that the batch drives; None for one as drawn.
+            starts: Lateral offset and heading error of each one's start, as fractions of the benchmark's largest, in
+                ``-1..1``, left and counter-clockwise positive; None for one as drawn.
+        """
+        indices = list(range(self.num_envs)) if envs is None else [operator.index(env) for env in envs]
+        outside = next((env for env in indices if not 0 <= env < self.num_envs), None)
+        if outside is not None:
+            raise ValueError(f"envs: {outside}; the batch has trucks 0..{self.num_envs}")
+        if seeds is not None:
+            if streams is not None:
+                raise ValueError("seeds, streams: give one of them")
+            streams = [None if seed is None else (seed, 0) for seed in seeds]
+        checked: list[tuple[int, int] | None] | None = None
+        if streams is not None:
+            checked = [stream and (checked_seed(stream[0]), _within("streams", stream[1], 0, 2**32)) for stream in streams]
+        self.begin_episodes(indices, checked, None if routes is None else list(routes), None if starts is None else list(starts))
+
+    def columns(self, *names: str) -> dict[str, Array]:
+        """Copies of columns, all of them where none is named: arrays of ``num_envs`` rows, see :data:`COLUMNS`.
+
+        ``batch.columns("truck")["truck"]["speed"]`` is every truck's speed [m/s]. From a graphics device only the named
+        ones are read.
+        """
+        wanted = list(names) or list(COLUMNS)
+        rows = self.column_bytes(wanted)
+        return {name: row.view(COLUMNS[name].base).reshape(self.num_envs, *COLUMNS[name].shape) for name, row in zip(wanted, rows)}
+
+    def state(self) -> dict[str, Array]:
+        """Everything that :meth:`restore` needs: all columns, and ``"stream"``, uint32 ``[num_envs, 2]``."""
+        return {**self.columns(), "stream": np.array(self.streams(), dtype=np.uint32).reshape(self.num_envs, 2)}
+
+    def restore(self, state: Mapping[str, Array]) -> None:
+        """Goes on from a state: with the same scenario and routes every later step is the same, bit for bit.
+
+        Raises:
+            ValueError: For a state of another batch or with values that cannot be; the batch is left as it was.
+        """
+        missing = [name for name in (*COLUMNS, "stream") if name not in state]
+        if missing:
+            raise ValueError(f"state: {missing[0]} is missing; Batch.state() gives all of {', '.join([*COLUMNS, 'stream'])}")
+        columns = []
+        for name, dtype in COLUMNS.items():
+            column = np.asarray(state[name])
+            if column.dtype != dtype.base or column.shape != (self.num_envs, *dtype.shape):
+                needed = f"{dtype.base} of shape {(self.num_envs, *dtype.shape)}"
+                raise ValueError(f"{name}: {column.dtype} of shape {column.shape}; {needed} is needed")
+            columns.append((name, np.ascontiguousarray(column).reshape(-1).view(np.uint8)))
+        stream = np.asarray(state["stream"])
+        if stream.shape != (self.num_envs, 2):
+            raise ValueError(f"stream: shape {stream.shape}; {(self.num_envs, 2)} is needed")
+        self.restore_bytes(columns, [(int(seed), int(env)) for seed, env in stream])
+
+    def render(self, env: int = 0, size: int = 480) -> npt.NDArray[np.uint8]:
+        """A picture of a truck on its roundabout from above, RGB ``[size, size, 3]``; size in 64..4096 pixels."""
+        return self.picture(_within("env", env, 0, self.num_envs), _within("size", size, 64, 4097))
+
+    def tally(self) -> dict[str, float]:
+        """Sums since the batch was made: ``env_steps``, ``episodes``, ``reward``, and episodes by why they ended."""
+        return super().tally()
+
+    def __repr__(self) -> str:
+        return f"Batch({self.scenario!r}, num_envs={self.num_envs}, autoreset={self.autoreset!r}, device={self.device!r})"
+
+
+def mode_name(mode: str | enum.Enum) -> str:
+    """``"next_step"`` for ``AutoresetMode.NEXT_STEP``, and so on."""
+    return mode.name.lower() if isinstance(mode, enum.Enum) else mode
+
+
+def checked_seed(seed: int) -> int:
+    """The seed, if it lies in ``0..2**32``."""
+    return _within("seed", seed, 0, 2**32)
+
+
+def _within(name: str, value: int, low: int, high: int) -> int:
+    try:
+        index = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: {value!r}; an integer is needed") from None
+    if not low <= index < high:
+        raise ValueError(f"{name}: {index}; must lie in {low}..{high}")
+    return index
+
+
+def _names(routes: Iterable[str]) -> list[str]:
+    if isinstance(routes, str):
+        return [routes]
+    names = list(routes)
+    wrong = next((name for name in names if not isinstance(name, str)), None)
+    if wrong is not None:
+        raise TypeError(f"routes: {wrong!r}; names of routes or roundabouts are needed")
+    return names

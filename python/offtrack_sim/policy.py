@@ -1,0 +1,68 @@
+"""Policies that drive: the one that comes with the package, and trained ones."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _offtrack
+
+
+class Policy:
+    """A network that chooses an action for an observation; :meth:`shipped` and :meth:`load` make one.
+
+    Policy files are written by ``offtrack train`` and by :mod:`offtrack_sim.export`.
+    """
+
+    def __init__(self, network: _offtrack.Network) -> None:
+        self._network = network
+
+    @staticmethod
+    def shipped(benchmark: str = "attard2023") -> Policy:
+        """The policy that comes with the package for a benchmark.
+
+        Raises:
+            ValueError: Where there is none; the message names those there are.
+        """
+        return Policy(_offtrack.Network.shipped(benchmark))
+
+    @staticmethod
+    def load(file: str | os.PathLike[str]) -> Policy:
+        """The policy of a file.
+
+        Raises:
+            ValueError: For a file that cannot be read, is damaged or has another shape; the message names file and fault.
+        """
+        return Policy(_offtrack.Network.load(os.fspath(file)))
+
+    @property
+    def name(self) -> str:
+        """Its file, or the benchmark's name and ``(shipped)``."""
+        return self._network.name
+
+    @property
+    def benchmark(self) -> str:
+        """The benchmark that it was trained on."""
+        return self._network.benchmark
+
+    @property
+    def action_table(self) -> npt.NDArray[np.float32]:
+        """Steer angle [rad] and speed [m/s] of each action, ``[n, 2]``: a batch must have the same table."""
+        return self._network.action_table
+
+    def act(self, observations: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+        """The most probable action for each observation: ``[n, 69]`` gives ``[n]``, ``[69]`` a single number."""
+        rows = np.ascontiguousarray(observations, dtype=np.float32)
+        if rows.ndim == 1:
+            return self._network.act(rows[None])[0]  # type: ignore[no-any-return]
+        return self._network.act(rows)
+
+    def logits(self, observations: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+        """The network's output for each observation, ``[n, 69]`` to ``[n, n_actions]``: softmax gives probabilities."""
+        return self._network.logits(np.ascontiguousarray(observations, dtype=np.float32))
+
+    def __repr__(self) -> str:
+        return f"Policy({self.name!r})"

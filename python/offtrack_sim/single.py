@@ -1,0 +1,130 @@
+"""One truck as an environment of Gymnasium."""
+
+from __future__ import annotations
+
+import operator
+import os
+from collections.abc import Iterable
+from typing import Any
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+
+from .batch import N_VALUES, OBSERVATION, Batch, Ended, checked_seed
+
+
+def observation_space() -> gymnasium.spaces.Box:
+    """69 values of float32: angles in -1..1, all others in 0..1."""
+    low = np.concatenate([np.full(values.n, values.low, np.float32) for values in OBSERVATION])
+    return gymnasium.spaces.Box(low, np.ones(N_VALUES, np.float32), dtype=np.float32)
+
+
+class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
+    """A tractor-trailer on a route through a roundabout; a step is 0.1 s.
+
+    ``gymnasium.make("offtrack_sim:offtrack/Roundabout-v0", scenario=..., split=...)`` makes one.
+
+    - Observation: :func:`observation_space`, see ``offtrack_sim.OBSERVATION``.
+    - Action: index into ``env.unwrapped.batch.action_table``, pairs of steer angle [rad] and speed [m/s].
+    - Reward: the benchmark's weighted sum; for attard2023 +100 a waypoint, up to -1.5 a step for the distance to the
+      lane's centre, -500 for a failure. Wrap it in ``gymnasium.wrappers.NormalizeReward`` where a learner wants less.
+    - Info after a reset: ``route``. After the step that ends an episode: ``ended`` (:class:`offtrack_sim.Ended`),
+      ``is_success`` and ``route``. Otherwise empty.
+
+    Args:
+        scenario: Name of a benchmark or path of a file, as for :class:`offtrack_sim.Batch`.
+        split: Routes that episodes are drawn from.
+        routes: Names of routes or roundabouts in place of a split.
+        render_mode: None, or ``"rgb_array"`` for pictures of ``render_size`` pixels a side.
+        device: ``"cpu"``, ``"gpu"`` or part of an adapter's name.
+
+    ``reset(seed=s)`` begins the first episode of the stream ``(s, 0)``, and each later ``reset()`` the next one.
+    ``reset(options={"route": name, "start": (offset, heading)})`` states the route or the start, or both: offset and
+    heading error are fractions, -1..1, of the benchmark's largest start errors.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
+
+    def __init__(
+        self,
+        scenario: str | os.PathLike[str] = "attard2023",
+        *,
+        split: str = "train",
+        routes: Iterable[str] | None = None,
+        render_mode: str | None = None,
+        render_size: int = 480,
+        device: str = "cpu",
+    ) -> None:
+        check_render_mode(render_mode)
+        self.batch = Batch(scenario, 1, split=split, routes=routes, autoreset="disabled", num_threads=1, device=device)
+        self.observation_space = observation_space()
+        self.action_space = gymnasium.spaces.Discrete(len(self.batch.action_table))
+        self.metadata = {**self.metadata, "render_fps": frames_per_second(self.batch)}
+        self.render_mode = render_mode
+        self.render_size = render_size
+        self._has_stream = False
+        self._needs_reset = True
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
+        if seed is not None:
+            seed = checked_seed(seed)
+        options = checked_options(options, "route", "start")
+        super().reset(seed=seed)
+        if seed is None and not self._has_stream:
+            seed = int(self.np_random.integers(2**32))
+        self.batch.begin(
+            [0],
+            seeds=None if seed is None else [seed],
+            routes=None if options.get("route") is None else [options["route"]],
+            starts=None if options.get("start") is None else [options["start"]],
+        )
+        self._has_stream = True
+        self._needs_reset = False
+        return self.batch.observation()[0], {"route": self._route(self.batch.routes()[0])}
+
+    def step(self, action: np.int64) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        if self._needs_reset:
+            raise gymnasium.error.ResetNeeded("call reset() before the first step and after the end of an episode")
+        try:
+            index = operator.index(action)
+        except TypeError:
+            raise TypeError(f"action: {action!r}; an integer is needed") from None
+        if not 0 <= index < self.action_space.n:
+            raise ValueError(f"action: {index}; must lie in 0..{self.action_space.n}")
+        observation, reward, terminated, truncated = self.batch.step(np.array([index]))
+        info: dict[str, Any] = {}
+        ended = self.batch.ended()
+        if ended is not None:
+            self._needs_reset = True
+            code = Ended(int(ended.codes[0]))
+            info = {"ended": int(code), "is_success": code == Ended.ARRIVED, "route": self._route(ended.routes[0])}
+        return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
+
+    def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override]
+        """A picture from above, uint8 ``[render_size, render_size, 3]``; None without a render mode."""
+        return None if self.render_mode is None else self.batch.render(0, self.render_size)
+
+    def _route(self, index: np.int64) -> str:
+        return self.batch.route_names[index]
+
+
+def check_render_mode(render_mode: str | None) -> None:
+    """An error for a mode that no environment of this package has."""
+    if render_mode not in (None, "rgb_array"):
+        raise ValueError(f'render_mode: {render_mode!r}; must be None or "rgb_array" (for a window: HumanRendering of gymnasium)')
+
+
+def frames_per_second(batch: Batch) -> int:
+    """Of a film in real time."""
+    return max(1, round(1 / batch.step_seconds))
+
+
+def checked_options(options: dict[str, Any] | None, *known: str) -> dict[str, Any]:
+    """The options of a reset, if all are known."""
+    unknown = [name for name in options or {} if name not in known]
+    if unknown:
+        raise ValueError(f"options: {unknown[0]!r}; must be one of {', '.join(known)}")
+    return dict(options or {})

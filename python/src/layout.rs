@@ -1,0 +1,46 @@
+//! The layout of columns and observations, so that Python declares nothing twice.
+
+use offtrack::layout::{Column, Ended, OBSERVATION, structs};
+use offtrack::shared::Named;
+use pyo3::prelude::*;
+
+/// A field of a row: name, type of numpy, number of values (0 for one that is no array).
+type Field = (&'static str, &'static str, usize);
+
+/// Every column with the fields of a row: a single unnamed field where a row is an array of numbers.
+#[pyfunction]
+pub fn column_layouts() -> Vec<(&'static str, Vec<Field>)> {
+    let structs = structs();
+    let fields = |column: &Column| {
+        let element = column.element();
+        match structs.iter().find(|found| found.name == element) {
+            Some(found) => found.fields.iter().map(|field| of_field(field.name, &field.wgsl)).collect(),
+            None => {
+                let (_, kind, _) = of_field("", &element);
+                let n = column.width() / size_of::<f32>();
+                vec![("", kind, if n == 1 { 0 } else { n })]
+            }
+        }
+    };
+    Column::ALL.iter().map(|column| (Named::name(*column), fields(column))).collect()
+}
+
+fn of_field(name: &'static str, wgsl: &str) -> Field {
+    match wgsl {
+        "u32" => (name, "<u4", 0),
+        "vec2<f32>" => (name, "<f4", 2),
+        _ => (name, "<f4", 0),
+    }
+}
+
+/// Groups of an observation's values: name, index of the first, number, least value, what each is.
+#[pyfunction]
+pub fn observation_groups() -> Vec<(&'static str, usize, usize, f32, &'static str)> {
+    OBSERVATION.iter().map(|values| (values.name, values.first, values.n, values.low, values.doc)).collect()
+}
+
+/// The codes of `ended` in their order, by name.
+#[pyfunction]
+pub fn end_codes() -> Vec<&'static str> {
+    Ended::ALL.iter().map(|ended| ended.name()).collect()
+}
