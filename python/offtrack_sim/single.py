@@ -58,8 +58,9 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
     ) -> None:
         check_render_mode(render_mode)
         self.batch = Batch(scenario, 1, split=split, routes=routes, autoreset="disabled", num_threads=1, device=device)
-        self.observation_space = observation_space()
-        self.action_space = gymnasium.spaces.Discrete(len(self.batch.action_table))
+        self.observation_space = observation_space()  # type: ignore[assignment]
+        self._n_actions = len(self.batch.action_table)
+        self.action_space = gymnasium.spaces.Discrete(self._n_actions)
         self.metadata = {**self.metadata, "render_fps": frames_per_second(self.batch)}
         self.render_mode = render_mode
         self.render_size = render_size
@@ -92,8 +93,8 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
             index = operator.index(action)
         except TypeError:
             raise TypeError(f"action: {action!r}; an integer is needed") from None
-        if not 0 <= index < self.action_space.n:
-            raise ValueError(f"action: {index}; must lie in 0..{self.action_space.n}")
+        if not 0 <= index < self._n_actions:
+            raise ValueError(f"action: {index}; must lie in 0..{self._n_actions}")
         observation, reward, terminated, truncated = self.batch.step(np.array([index]))
         info: dict[str, Any] = {}
         ended = self.batch.ended()
@@ -103,7 +104,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
             info = {"ended": int(code), "is_success": code == Ended.ARRIVED, "route": self._route(ended.routes[0])}
         return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
 
-    def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> npt.NDArray[np.uint8] | None:
         """A picture from above, uint8 ``[render_size, render_size, 3]``; None without a render mode."""
         return None if self.render_mode is None else self.batch.render(0, self.render_size)
 
