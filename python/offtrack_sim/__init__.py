@@ -3,7 +3,7 @@
 - :func:`make_vec` makes a vector environment of Gymnasium: many trucks, stepped together by the simulator.
 - :class:`Roundabout` is one truck, ``gymnasium.make("offtrack_sim:offtrack/Roundabout-v0")``.
 - :class:`Batch` is the simulator itself, without spaces and infos.
-- :class:`Policy` drives: the policy that comes with the package, or a trained one.
+- :class:`Policy` drives: the policy that comes with the package, or a trained one. :func:`evaluate` counts its success.
 - :mod:`offtrack_sim.sb3`, :mod:`offtrack_sim.puffer`: the same trucks for Stable-Baselines3 and PufferLib.
 - :mod:`offtrack_sim.export` writes a network of PyTorch as a policy file.
 
@@ -17,6 +17,7 @@ import gymnasium
 
 from ._offtrack import ScenarioError, __version__, scenario_names
 from .batch import COLUMNS, OBSERVATION, Batch, Ended, Ends, Values
+from .evaluation import Evaluation, evaluate
 from .policy import Policy
 from .single import Roundabout
 from .vector import RoundaboutVector, make_vec
@@ -27,12 +28,14 @@ __all__ = [
     "Batch",
     "Ended",
     "Ends",
+    "Evaluation",
     "Policy",
     "Roundabout",
     "RoundaboutVector",
     "ScenarioError",
     "Values",
     "__version__",
+    "evaluate",
     "make_vec",
     "scenario_names",
 ]

@@ -1,13 +1,27 @@
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 import numpy.typing as npt
-from typing_extensions import Self
+from typing_extensions import Self, disjoint_base
+
+__all__ = [
+    "__version__",
+    "ScenarioError",
+    "Batch",
+    "Network",
+    "policy_names",
+    "write_policy",
+    "column_layouts",
+    "observation_groups",
+    "end_codes",
+    "scenario_names",
+]
 
 __version__: str
 
 class ScenarioError(ValueError): ...
 
+@disjoint_base
 class Batch:
     @property
     def num_envs(self) -> int: ...
@@ -21,6 +35,8 @@ class Batch:
     def step_seconds(self) -> float: ...
     @property
     def route_names(self) -> list[str]: ...
+    @property
+    def split_routes(self) -> list[str]: ...
     @property
     def action_table(self) -> npt.NDArray[np.float32]: ...
     def __new__(
@@ -46,6 +62,7 @@ class Batch:
         terminated: npt.NDArray[np.bool_],
         truncated: npt.NDArray[np.bool_],
     ) -> None: ...
+    def step_at_random(self) -> None: ...
     def observation(self) -> npt.NDArray[np.float32]: ...
     def routes(self) -> npt.NDArray[np.int64]: ...
     def last_ended(
@@ -64,6 +81,7 @@ class Batch:
     def tally(self) -> dict[str, float]: ...
     def picture(self, env: int, size: int) -> npt.NDArray[np.uint8]: ...
 
+@final
 class Network:
     @property
     def name(self) -> str: ...

@@ -157,6 +157,10 @@ class Batch(_offtrack.Batch):
         """
         super().step_into(actions, observation, reward, terminated, truncated)
 
+    def step_at_random(self) -> None:
+        """One step of every truck with actions that are drawn from its stream, for measuring; nothing is returned."""
+        super().step_at_random()
+
     def observation(self) -> Floats:
         """What every truck observes before its next action, ``[num_envs, 69]``."""
         return super().observation()

@@ -128,6 +128,12 @@ impl Batch {
         self.place.world.route_names.clone()
     }
 
+    /// Names of the routes that episodes are drawn from, in the benchmark's order.
+    #[getter]
+    fn split_routes(&self) -> Vec<&str> {
+        self.place.routes.iter().map(|&route| self.place.world.route_names[route as usize].as_str()).collect()
+    }
+
     #[getter]
     fn action_table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let table: Vec<f32> = self.place.world.actions.iter().flat_map(|action| [action.steering, action.speed]).collect();
@@ -189,6 +195,18 @@ impl Batch {
             *truncated = holds(code, Ended::truncated);
         }
         Ok(())
+    }
+
+    fn step_at_random(&self, py: Python) -> PyResult<()> {
+        let mut state = self.state()?;
+        state.check_process(&self.device)?;
+        let State { simulator, pool, .. } = &mut *state;
+        pool.run(py, || {
+            simulator.step_at_random();
+            simulator.wait()
+        })?
+        .map_err(|error| errors::of_simulator(&error))?;
+        state.look()
     }
 
     fn last_ended<'py>(&self, py: Python<'py>) -> PyResult<Option<Ends<'py>>> {

@@ -23,7 +23,9 @@ pub fn of_reader(error: &reader::Error) -> PyErr {
 
 /// An exception for a batch that was refused or a device that failed.
 pub fn of_simulator(error: &Error) -> PyErr {
+    // Gymnasium's name for it.
     let message = error.to_string();
+    let message = message.strip_prefix("n_envs:").map_or(message.clone(), |rest| format!("num_envs:{rest}"));
     match error {
         Error::BatchTooLarge { .. } => PyMemoryError::new_err(message),
         #[cfg(feature = "gpu")]

@@ -5,7 +5,10 @@
 
 use std::sync::Arc;
 
+use offtrack::layout::Column;
+use offtrack::scenario::Split;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
+use offtrack::world::World;
 
 use crate::{batch_on, benchmark, engines};
 
@@ -71,6 +74,28 @@ fn hash(bytes: &[u8]) -> u64 {
 /// each truck, and the waypoints passed.
 const PINNED_INTEGERS: [(&str, u64); 3] =
     [("attard2023", 0x48c8_cba1_098f_6d5b), ("attard2023-full", 0xea12_cc9f_5053_302c), ("attard2023-as-run", 0x4aa0_1029_58ab_16e9)];
+
+/// Hashes that python/tests/test_pinned.py has too: what a step gives on the training routes of attard2023, to 512 trucks
+/// after 300 random steps with seed 7, on the CPU.
+const PINNED_IN_PYTHON: [(Column, u64); 4] = [
+    (Column::Observation, 0x7ff7_f3a1_8924_9b08),
+    (Column::Reward, 0x389f_a7d6_00c4_78be),
+    (Column::Ended, 0x09a0_a2a2_4afe_7f83),
+    (Column::Truck, 0x4872_ed0c_ab20_f30a),
+];
+
+#[test]
+fn python_sees_these_bytes() {
+    let (mut scenario, _) = benchmark("attard2023");
+    scenario.keep(&[Split::Train]);
+    let world = Arc::new(World::bake(&scenario).unwrap());
+    let routes = scenario.split(Split::Train).to_vec();
+    let mut simulator = batch_on(&Engine::Cpu, &world, 512, 7, RouteChoice::Drawn(routes));
+    (0..300).for_each(|_| simulator.step_at_random());
+    let batch = simulator.batch();
+    let found = PINNED_IN_PYTHON.map(|(column, _)| (column, hash(batch.column(column))));
+    assert!(found == PINNED_IN_PYTHON, "{found:#x?}");
+}
 
 fn after_300_steps(engine: &Engine, name: &str) -> Simulator {
     let world = Arc::new(benchmark(name).1);

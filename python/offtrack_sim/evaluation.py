@@ -1,0 +1,104 @@
+"""Evaluates a policy: a number of episodes on every route of a split, every one counted."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .batch import Batch, Ended
+from .policy import Policy
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What an evaluation found."""
+
+    scenario: str
+    """Name of the benchmark."""
+    split: str
+    """Routes of the benchmark."""
+    seed: int
+    """Seed of the starts."""
+    routes: list[str]
+    """Names of the routes, n of them."""
+    ended: npt.NDArray[np.int64]
+    """Why each episode ended, as :class:`offtrack_sim.Ended`, ``[n, episodes]``."""
+
+    @property
+    def success(self) -> float:
+        """Fraction of the episodes that arrived."""
+        return float((self.ended == Ended.ARRIVED).mean())
+
+    @property
+    def success_by_route(self) -> dict[str, float]:
+        """The same for each route."""
+        arrived = (self.ended == Ended.ARRIVED).mean(axis=1)
+        return {name: float(fraction) for name, fraction in zip(self.routes, arrived)}
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Episodes by why they ended."""
+        counted = Counter(int(code) for code in self.ended.ravel())
+        return {ended.name.lower(): counted[ended] for ended in Ended if counted[ended]}
+
+    def __str__(self) -> str:
+        arrived = int((self.ended == Ended.ARRIVED).sum())
+        counts = ", ".join(f"{name} {count}" for name, count in self.counts.items())
+        return f"{self.scenario} {self.split}: {self.success:.1%} ({arrived}/{self.ended.size}); {counts}"
+
+
+def evaluate(
+    policy: Policy | Callable[[npt.NDArray[np.float32]], Any],
+    scenario: str | os.PathLike[str] = "attard2023",
+    *,
+    split: str = "test",
+    routes: Iterable[str] | None = None,
+    episodes: int = 30,
+    seed: int = 0,
+    device: str = "cpu",
+) -> Evaluation:
+    """Drives every route of a split ``episodes`` times and counts how the episodes ended.
+
+    The starts are those of ``offtrack evaluate`` with the same seed and number of episodes.
+
+    Args:
+        policy: A :class:`offtrack_sim.Policy`, or any function from observations ``[n, 69]`` to actions ``[n]``.
+        scenario, split, routes, device: As for :class:`offtrack_sim.Batch`.
+        episodes: Episodes on each route.
+        seed: Seed of the starts.
+
+    Raises:
+        ValueError: As :class:`offtrack_sim.Batch` says, and for a policy with another action table than the benchmark's.
+    """
+    if episodes < 1:
+        raise ValueError(f"episodes: {episodes}; must be at least 1")
+    names = Batch(scenario, 1, split=split, routes=routes).split_routes
+    batch = Batch(scenario, len(names) * episodes, split=split, routes=routes, autoreset="same_step", device=device)
+    if isinstance(policy, Policy):
+        act: Callable[[npt.NDArray[np.float32]], Any] = policy.act
+        if policy.action_table.shape != batch.action_table.shape or not np.allclose(policy.action_table, batch.action_table, atol=1e-5):
+            raise ValueError(f"{policy.name}: has another action table than {batch.scenario}; see action_table of both")
+    else:
+        act = policy
+    batch.begin(
+        streams=[(seed, env) for env in range(batch.num_envs)],
+        routes=[name for name in names for _ in range(episodes)],
+    )
+    ended = np.zeros(batch.num_envs, dtype=np.int64)
+    observation = batch.observation()
+    while (running := ended == Ended.RUNNING).any():
+        actions = np.zeros(batch.num_envs, dtype=np.int64)
+        # Trucks whose episode has ended drive on, and nobody looks at them.
+        actions[running] = np.asarray(act(observation[running]))
+        observation = batch.step(actions)[0]
+        ends = batch.ended()
+        if ends is not None:
+            first = running[ends.envs]
+            ended[ends.envs[first]] = ends.codes[first]
+    return Evaluation(batch.scenario, split, seed, names, ended.reshape(len(names), episodes))

@@ -1,0 +1,40 @@
+"""A graphics device, real or in software, against the processor."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import offtrack_sim
+
+
+@pytest.fixture(scope="module")
+def device() -> str:
+    """The first device there is: tests need one, as those of the simulator with the feature gpu do."""
+    return offtrack_sim.Batch(num_envs=1, device="gpu").device
+
+
+def test_a_device_and_the_processor_drive_the_same_episodes(device: str) -> None:
+    name = device.split(" (")[0]
+    for mode in ("same_step", "next_step"):
+        here = offtrack_sim.make_vec(num_envs=96, autoreset_mode=mode)
+        there = offtrack_sim.make_vec(num_envs=96, autoreset_mode=mode, device=name[: len(name) // 2])
+        assert there.batch.device == device
+        one, other = here.reset(seed=3), there.reset(seed=3)
+        assert np.allclose(one[0], other[0], atol=1e-4)
+        rng = np.random.default_rng(1)
+        for step in range(150):
+            actions = rng.integers(0, 9, 96)
+            one_step, other_step = here.step(actions), there.step(actions)
+            # Sensors of 20 m that meet a kerb at a small angle differ by centimetres.
+            assert np.allclose(one_step[0], other_step[0], atol=2e-3), step
+            assert (one_step[2] == other_step[2]).all() and (one_step[3] == other_step[3]).all()
+            assert np.allclose(one_step[1], other_step[1], atol=1e-2)
+            assert one_step[4].keys() == other_step[4].keys()
+        assert here.batch.tally()["episodes"] == there.batch.tally()["episodes"] > 100
+
+
+def test_an_unknown_device_is_refused_with_those_there_are(device: str) -> None:
+    with pytest.raises(RuntimeError) as caught:
+        offtrack_sim.Batch(device="no such card")
+    assert "no such card" in str(caught.value) and device.split(" (")[0] in str(caught.value)

@@ -1,0 +1,81 @@
+"""Policies, evaluations, and episodes that the command line recorded."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from offtrack_sim import Batch, Policy, evaluate
+
+DATA = Path(__file__).parent / "data"
+
+
+def test_the_shipped_policy_arrives_on_roundabouts_it_has_never_seen() -> None:
+    found = evaluate(Policy.shipped(), split="test", episodes=10)
+    assert found.success == 1.0 and found.ended.shape == (23, 10)
+    assert found.routes[0] == "20m/E-left-2" and set(found.success_by_route.values()) == {1.0}
+    assert str(found) == "attard2023 test: 100.0% (230/230); arrived 230"
+
+
+def test_an_evaluation_counts_what_the_command_line_counts() -> None:
+    reported = json.loads((DATA / "train.json").read_text())
+    found = evaluate(Policy.shipped(), split="train", episodes=reported["episodes_per_route"], seed=reported["seed"])
+    assert found.counts == reported["ended"]
+
+
+def test_any_function_is_evaluated() -> None:
+    found = evaluate(lambda observations: np.full(len(observations), 4), routes=["16m"], episodes=2)
+    assert found.success == 0.0 and sum(found.counts.values()) == found.ended.size == 38
+    with pytest.raises(ValueError, match="episodes: 0; must be at least 1"):
+        evaluate(Policy.shipped(), episodes=0)
+    with pytest.raises(ValueError, match="has another action table than attard2023-as-run"):
+        evaluate(Policy.shipped(), "attard2023-as-run")
+
+
+def test_logits_agree_with_actions_whatever_the_number_of_rows() -> None:
+    policy = Policy.shipped()
+    assert policy.benchmark and policy.action_table.shape == (9, 2)
+    batch = Batch(num_envs=300, seed=1)
+    for _ in range(50):
+        batch.step_at_random()
+    observations = batch.observation()
+    actions, logits = policy.act(observations), policy.logits(observations)
+    assert (logits.argmax(axis=1) == actions).all() and 1 < len(set(actions.tolist()))
+    assert all(policy.act(observations[env]) == actions[env] for env in range(300))
+    assert (policy.logits(observations[7:8]) == logits[7:8]).all()
+
+
+def test_files_that_are_no_policies_are_refused_by_name(tmp_path: Path) -> None:
+    file = tmp_path / "policy.safetensors"
+    with pytest.raises(ValueError, match="policy.safetensors: cannot be read"):
+        Policy.load(file)
+    file.write_bytes(b"not a policy")
+    with pytest.raises(ValueError, match="policy.safetensors: is not a policy file"):
+        Policy.load(file)
+    with pytest.raises(ValueError, match="policy: 50m; policies come with the program for attard2023"):
+        Policy.shipped("50m")
+    with pytest.raises((TypeError, ValueError), match="observations"):
+        Policy.shipped().act(np.zeros((3, 68)))
+
+
+def test_a_recorded_episode_is_driven_again() -> None:
+    recording = json.loads((DATA / "episode.json").read_text())
+    split = Batch(recording["benchmark"], 1, split="test").split_routes
+    batch = Batch(recording["benchmark"], 1, split="test", autoreset="disabled")
+    # The index of the episode's truck in the evaluation that counts it.
+    index = split.index(recording["route"]) * recording["episodes"] + recording["episode"]
+    batch.begin(streams=[(recording["seed"], index)], routes=[recording["route"]])
+    for frame in recording["frames"]:
+        if frame["action"] is not None:
+            batch.step(np.array([frame["action"]]))
+        columns = batch.columns("truck", "ranges", "reward")
+        # The recording has millimetres and tenths of a milliradian.
+        assert np.allclose(columns["truck"]["position"][0], frame["position"], atol=6e-4)
+        assert np.allclose(columns["truck"]["heading"][0], frame["heading"], atol=6e-5)
+        assert np.allclose(columns["ranges"][0], frame["ranges"], atol=6e-4)
+        assert np.allclose(columns["reward"][0], frame["reward"], atol=6e-4)
+    ends = batch.ended()
+    assert ends is not None and recording["ended"] == "arrived" and ends.codes[0] == 1
