@@ -170,13 +170,13 @@ def test_films_are_recorded_of_one_truck_and_of_many(tmp_path: Path) -> None:
     for _ in range(200):
         if any(env.step(np.int64(0))[2:4]):
             break
-    env.close()
+    env.close()  # type: ignore[no-untyped-call]
     vector = offtrack_sim.make_vec(num_envs=4, render_mode="rgb_array", render_size=64)
     films = of_vectors.RecordVideo(vector, str(tmp_path / "many"), step_trigger=lambda step: step == 0, video_length=20)
     films.reset(seed=1)
     for _ in range(25):
         films.step(np.zeros(4, int))
-    films.close()  # type: ignore[no-untyped-call]
+    films.close()
     for folder in ("one", "many"):
         found = list((tmp_path / folder).glob("*.mp4"))
         assert len(found) == 1 and 1000 < found[0].stat().st_size

@@ -7,7 +7,7 @@ use super::benchmark_keys::Written;
 use super::roads::{MOST_ROADS, Procedural};
 use crate::loading::Loading;
 use crate::reader::{Error, Reader};
-use crate::shipped::Source;
+use crate::shipped::{Kind, Source};
 use crate::vehicle::Vehicle;
 
 impl Scenario {
@@ -15,7 +15,7 @@ impl Scenario {
     pub(super) fn from_source(source: &Source, loading: &Loading) -> Result<Scenario, Error> {
         let file = source.shown();
         let (reader, written) = Reader::parse::<Written>(&file, &source.text()?)?;
-        let vehicle = referred(&reader, "vehicle", source, &written.vehicle, Vehicle::from_source)?;
+        let vehicle = referred(&reader, "vehicle", source, Kind::Vehicle, &written.vehicle, Vehicle::from_source)?;
         if !vehicle.loads.contains_key(&written.load) {
             let loads: Vec<&str> = vehicle.loads.keys().map(String::as_str).collect();
             return Err(reader.invalid("load", format_args!("{:?}", written.load), format!("the vehicle has {}", loads.join(", "))));
@@ -77,16 +77,20 @@ fn without_routes(reader: &Reader, name: String, vehicle: Vehicle, written: &Wri
     })
 }
 
-/// Reads the file at `path` that `source` refers to under `key`. If there is no such file, the error names the key too.
+/// Reads the file that `source` refers to under `key`: by a path that ends in .toml, or the shipped file of this kind by
+/// its name. If there is no such file, the error names the key too.
 pub(super) fn referred<T>(
     reader: &Reader,
     key: &str,
     source: &Source,
+    kind: Kind,
     path: &Path,
     read: impl Fn(&Source) -> Result<T, Error>,
 ) -> Result<T, Error> {
-    read(&source.relative(path)).map_err(|error| match error {
-        Error::Unreadable { .. } | Error::NotAFile { .. } | Error::TooLarge { .. } => {
+    let is_path = path.extension().is_some_and(|extension| extension == "toml");
+    let found = if is_path { Ok(source.relative(path)) } else { Source::named(kind, &path.to_string_lossy()) };
+    found.and_then(|source| read(&source)).map_err(|error| match error {
+        Error::Unreadable { .. } | Error::NotAFile { .. } | Error::TooLarge { .. } | Error::UnknownName { .. } => {
             reader.invalid(key, format_args!("{:?}", path.display().to_string()), error.to_string())
         }
         error => error,

@@ -10,7 +10,7 @@ use crate::procedural::Distribution;
 use crate::reader::{Error, Reader, shown};
 use crate::roundabout::Roundabout;
 use crate::route::Route;
-use crate::shipped::Source;
+use crate::shipped::{Kind, Source};
 
 /// Maximum number of roundabouts that are read, listed or drawn. One takes about 0.1 MB before it is baked.
 pub(super) const MOST_ROADS: usize = 100_000;
@@ -29,7 +29,8 @@ impl Procedural {
     /// Reads the distribution and checks the ranges. No road is drawn.
     pub(super) fn checked(reader: &Reader, source: &Source, written: &WrittenProcedural) -> Result<Procedural, Error> {
         let WrittenProcedural { distribution, seed, count, train, validation, test } = written;
-        let distribution = referred(reader, "procedural.distribution", source, distribution, Distribution::from_source)?;
+        let distribution =
+            referred(reader, "procedural.distribution", source, Kind::Distribution, distribution, Distribution::from_source)?;
         reader.count("procedural.count", *count, 1..=MOST_INDICES)?;
         let mut ranges: [Range<u32>; 3] = Default::default();
         let given = [train, validation, test].map(Option::as_ref);
@@ -63,7 +64,7 @@ impl Procedural {
 impl Scenario {
     /// Adds a roundabout of the file, written under `key`, and its routes.
     pub(super) fn add_file(&mut self, reader: &Reader, key: &str, source: &Source, written: &WrittenRoundabout) -> Result<(), Error> {
-        let roundabout = referred(reader, &format!("{key}.file"), source, &written.file, Roundabout::from_source)?;
+        let roundabout = referred(reader, &format!("{key}.file"), source, Kind::Roundabout, &written.file, Roundabout::from_source)?;
         if self.places.iter().any(|other| other.roundabout.name == roundabout.name) {
             return Err(reader.invalid(format!("{key}.file"), written.file.display(), "each roundabout may be listed once"));
         }
