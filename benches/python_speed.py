@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Times the vector environment of Python against the native program, in turns on the same machine.
 
-A round is one run of `offtrack scale` and one of each loop in Python; a ratio is Python's speed over the native one of the
-same round, and the median of the rounds is reported: load from other programs changes more slowly than the rounds. A
+A round is one run of `offtrack scale` and one of each loop in Python; a ratio is Python's speed over the native one of
+the same round, and the median of the rounds is reported: load from other programs changes more slowly than the rounds. A
 step is 0.1 s of every truck: two physics sub-steps, 29 rays, 69 values, reward, another episode in the same step where
 one ended; actions are drawn uniformly at random, for Python beforehand. Needs the package offtrack_sim.
 
@@ -20,6 +20,7 @@ from pathlib import Path
 
 import gymnasium
 import numpy
+
 import offtrack_sim
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -38,22 +39,36 @@ def main():
 
     sizes = []
     for n_envs in map(int, args.envs.split(",")):
-        loops = {"vector": vector(n_envs), "vector_without_copies": vector(n_envs, copy=False), "batch_step_into": batch(n_envs)}
+        loops = {
+            "vector": vector(n_envs),
+            "vector_without_copies": vector(n_envs, copy=False),
+            "batch_step_into": batch(n_envs),
+        }
         rounds = []
         for number in range(args.rounds):
             machine, native = scaled(args, n_envs)
-            rounds.append({"native": native, **{name: timed(loop, n_envs, args.seconds) for name, loop in loops.items()}})
+            rounds.append(
+                {"native": native, **{name: timed(loop, n_envs, args.seconds) for name, loop in loops.items()}}
+            )
             print(f"{n_envs} trucks, round {number + 1} of {args.rounds}", file=sys.stderr)
         medians = {name: statistics.median(found[name] for found in rounds) for name in rounds[0]}
         ratios = {name: statistics.median(found[name] / found["native"] for found in rounds) for name in loops}
         sizes.append({"n_envs": n_envs, "env_steps_per_second": medians, "ratio": ratios, "rounds": rounds})
-        print(f"{n_envs} trucks: native {medians['native'] / 1e3:.0f} k env steps/s; " + ", ".join(f"{name} {ratio:.1%}" for name, ratio in ratios.items()))
+        print(
+            f"{n_envs} trucks: native {medians['native'] / 1e3:.0f} k env steps/s; "
+            + ", ".join(f"{name} {ratio:.1%}" for name, ratio in ratios.items())
+        )
     if args.json:
         result = {
             **machine,
-            "versions": {"python": sys.version.split()[0], "gymnasium": gymnasium.__version__, "numpy": numpy.__version__, "offtrack_sim": offtrack_sim.__version__},
+            "versions": {
+                "python": sys.version.split()[0],
+                "gymnasium": gymnasium.__version__,
+                "numpy": numpy.__version__,
+                "offtrack_sim": offtrack_sim.__version__,
+            },
             "rounds": args.rounds,
-            "ratio": "Python's env steps a second over those of `offtrack scale` in the same round, the median of the rounds",
+            "ratio": "Python's env steps a second over those of `offtrack scale` in the same round, median of the rounds",
             "sizes": sizes,
         }
         args.json.parent.mkdir(parents=True, exist_ok=True)
@@ -67,7 +82,9 @@ def scaled(args, n_envs):
         command = [args.offtrack, "scale", "--envs", str(n_envs), "--seconds", str(args.seconds), "--json", file]
         subprocess.run(command, check=True, capture_output=True)
         found = json.loads(file.read_text())
-    return {key: found[key] for key in ("machine", "threads", "commit", "date", "benchmark", "step")}, found["runs"][0]["env_steps_per_second"]
+    return {key: found[key] for key in ("machine", "threads", "commit", "date", "benchmark", "step")}, found["runs"][0][
+        "env_steps_per_second"
+    ]
 
 
 def actions(n_envs):
@@ -84,7 +101,12 @@ def vector(n_envs, **arguments):
 def batch(n_envs):
     trucks = offtrack_sim.Batch(num_envs=n_envs)
     drawn = actions(n_envs)
-    room = (numpy.zeros((n_envs, 69), "f4"), numpy.zeros(n_envs, "f4"), numpy.zeros(n_envs, bool), numpy.zeros(n_envs, bool))
+    room = (
+        numpy.zeros((n_envs, 69), "f4"),
+        numpy.zeros(n_envs, "f4"),
+        numpy.zeros(n_envs, bool),
+        numpy.zeros(n_envs, bool),
+    )
     return lambda step: trucks.step_into(drawn[step % 64], *room)
 
 

@@ -97,8 +97,8 @@ class Batch(_offtrack.Batch):
         num_threads: Threads that step the trucks; None for one a core. No result depends on it.
         device: ``"cpu"``, ``"gpu"`` for the first graphics device, or a part of a graphics device's name.
 
-    The batch begins with the first episode of every truck. One thread at a time may use it; the GIL is released while it
-    steps.
+    The batch begins with the first episode of every truck. One thread at a time may use it; the GIL is released while
+    it steps.
 
     Raises:
         ValueError: For an unknown scenario, split, route or mode, and a number out of range; the message names the
@@ -139,8 +139,8 @@ class Batch(_offtrack.Batch):
             actions: Index of each truck's action in ``action_table``, integers ``[num_envs]``.
 
         Returns:
-            Observation ``[num_envs, 69]``, reward, terminated and truncated, ``[num_envs]`` each. Where an episode ended
-            and another began in the same step, the observation is the new one's first: :meth:`ended` has the last one.
+            Observation ``[num_envs, 69]``, reward, terminated and truncated, ``[num_envs]`` each. Where an episode
+            ended and another began in the same step, the observation is the new one's first: :meth:`ended` has the last one.
 
         Raises:
             TypeError: For anything but an array of integers.
@@ -150,7 +150,9 @@ class Batch(_offtrack.Batch):
         """
         return super().step(actions)
 
-    def step_into(self, actions: Array, observation: Floats, reward: Floats, terminated: Bools, truncated: Bools) -> None:
+    def step_into(
+        self, actions: Array, observation: Floats, reward: Floats, terminated: Bools, truncated: Bools
+    ) -> None:
         """The same into arrays of the caller: float32 ``[num_envs, 69]`` and ``[num_envs]``, bool ``[num_envs]`` twice.
 
         They must be contiguous; a slice ``fragment[t]`` of an array of many steps is.
@@ -183,8 +185,8 @@ class Batch(_offtrack.Batch):
 
         Args:
             envs: Indices of the trucks, k of them; None for all.
-            seeds: A seed for each: the episode is the first of the stream ``(seed, 0)``, as in a batch of one truck with
-                that seed. None: the next episode of the truck's own stream.
+            seeds: A seed for each: the episode is the first of the stream ``(seed, 0)``, as in a batch of one truck
+                with that seed. None: the next episode of the truck's own stream.
             streams: The same with the whole stream, ``(seed, index)``.
             routes: Name of each one's route, of those that the batch drives; None for one as drawn.
             starts: Lateral offset and heading error of each one's start, as fractions of the benchmark's largest, in
@@ -200,8 +202,12 @@ class Batch(_offtrack.Batch):
             streams = [None if seed is None else (seed, 0) for seed in seeds]
         checked: list[tuple[int, int] | None] | None = None
         if streams is not None:
-            checked = [stream and (checked_seed(stream[0]), _within("streams", stream[1], 0, 2**32)) for stream in streams]
-        self.begin_episodes(indices, checked, None if routes is None else list(routes), None if starts is None else list(starts))
+            checked = [
+                stream and (checked_seed(stream[0]), _within("streams", stream[1], 0, 2**32)) for stream in streams
+            ]
+        self.begin_episodes(
+            indices, checked, None if routes is None else list(routes), None if starts is None else list(starts)
+        )
 
     def columns(self, *names: str) -> dict[str, Array]:
         """Copies of columns, all of them where none is named: arrays of ``num_envs`` rows, see :data:`COLUMNS`.
@@ -211,7 +217,10 @@ class Batch(_offtrack.Batch):
         """
         wanted = list(names) or list(COLUMNS)
         rows = self.column_bytes(wanted)
-        return {name: row.view(COLUMNS[name].base).reshape(self.num_envs, *COLUMNS[name].shape) for name, row in zip(wanted, rows)}
+        return {
+            name: row.view(COLUMNS[name].base).reshape(self.num_envs, *COLUMNS[name].shape)
+            for name, row in zip(wanted, rows)
+        }
 
     def state(self) -> dict[str, Array]:
         """Everything that :meth:`restore` needs: all columns, and ``"stream"``, uint32 ``[num_envs, 2]``."""
@@ -225,7 +234,9 @@ class Batch(_offtrack.Batch):
         """
         missing = [name for name in (*COLUMNS, "stream") if name not in state]
         if missing:
-            raise ValueError(f"state: {missing[0]} is missing; Batch.state() gives all of {', '.join([*COLUMNS, 'stream'])}")
+            raise ValueError(
+                f"state: {missing[0]} is missing; Batch.state() gives all of {', '.join([*COLUMNS, 'stream'])}"
+            )
         columns = []
         for name, dtype in COLUMNS.items():
             column = np.asarray(state[name])
@@ -247,7 +258,9 @@ class Batch(_offtrack.Batch):
         return super().tally()
 
     def __repr__(self) -> str:
-        return f"Batch({self.scenario!r}, num_envs={self.num_envs}, autoreset={self.autoreset!r}, device={self.device!r})"
+        return (
+            f"Batch({self.scenario!r}, num_envs={self.num_envs}, autoreset={self.autoreset!r}, device={self.device!r})"
+        )
 
 
 def mode_name(mode: str | enum.Enum) -> str:

@@ -74,7 +74,8 @@ def evaluate(
         seed: Seed of the starts.
 
     Raises:
-        ValueError: As :class:`offtrack_sim.Batch` says, and for a policy with another action table than the benchmark's.
+        ValueError: As :class:`offtrack_sim.Batch` says, and for a policy with another action table than the
+            benchmark's.
     """
     if episodes < 1:
         raise ValueError(f"episodes: {episodes}; must be at least 1")
@@ -82,7 +83,9 @@ def evaluate(
     batch = Batch(scenario, len(names) * episodes, split=split, routes=routes, autoreset="same_step", device=device)
     if isinstance(policy, Policy):
         act: Callable[[npt.NDArray[np.float32]], Any] = policy.act
-        if policy.action_table.shape != batch.action_table.shape or not np.allclose(policy.action_table, batch.action_table, atol=1e-5):
+        if policy.action_table.shape != batch.action_table.shape or not np.allclose(
+            policy.action_table, batch.action_table, atol=1e-5
+        ):
             raise ValueError(f"{policy.name}: has another action table than {batch.scenario}; see action_table of both")
     else:
         act = policy

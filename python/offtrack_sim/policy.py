@@ -34,7 +34,8 @@ class Policy:
         """The policy of a file.
 
         Raises:
-            ValueError: For a file that cannot be read, is damaged or has another shape; the message names file and fault.
+            ValueError: For a file that cannot be read, is damaged or has another shape; the message names file and
+                fault.
         """
         return Policy(_offtrack.Network.load(os.fspath(file)))
 

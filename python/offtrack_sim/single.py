@@ -115,7 +115,9 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
 def check_render_mode(render_mode: str | None) -> None:
     """An error for a mode that no environment of this package has."""
     if render_mode not in (None, "rgb_array"):
-        raise ValueError(f'render_mode: {render_mode!r}; must be None or "rgb_array" (for a window: HumanRendering of gymnasium)')
+        raise ValueError(
+            f'render_mode: {render_mode!r}; must be None or "rgb_array" (for a window: HumanRendering of gymnasium)'
+        )
 
 
 def frames_per_second(batch: Batch) -> int:

@@ -60,7 +60,9 @@ class RoundaboutVector(Base):
         render_size: int = 480,
     ) -> None:
         if not HAS_MODES:
-            message = f"gymnasium {gymnasium.__version__}: vector environments need 1.1 or later; Roundabout and Batch do not"
+            message = (
+                f"gymnasium {gymnasium.__version__}: vector environments need 1.1 or later; Roundabout and Batch do not"
+            )
             raise ImportError(message)
         check_render_mode(render_mode)
         mode = "next_step" if autoreset_mode is None else mode_name(autoreset_mode)
@@ -106,8 +108,8 @@ class RoundaboutVector(Base):
             seed: An int gives truck ``i`` the stream ``(seed, i)``; a list gives it ``(seed[i], 0)``, which is what an
                 environment of one truck has with that seed, and None in it leaves the truck its stream. None: every
                 truck goes on with its next episode.
-            options: ``reset_mask``, bool ``[num_envs]``: the trucks to begin, the others go on. ``routes`` and ``starts``:
-                sequences of ``num_envs``, as for :meth:`offtrack_sim.Batch.begin`.
+            options: ``reset_mask``, bool ``[num_envs]``: the trucks to begin, the others go on. ``routes`` and
+                ``starts``: sequences of ``num_envs``, as for :meth:`offtrack_sim.Batch.begin`.
 
         Returns:
             Observations and infos; trucks outside the mask have the observation they had.

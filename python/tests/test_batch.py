@@ -50,7 +50,9 @@ def test_columns_have_their_declared_rows_and_agree_with_the_step() -> None:
     speed = next(values for values in OBSERVATION if values.name == "speed")
     assert np.allclose(truck["speed"] / 27.8, observation[:, speed.first])
     assert truck["position"].shape == (6, 2) and (truck["steps"] == 1).all()
-    assert [batch.route_names[route] for route in truck["route"]] == [batch.route_names[route] for route in batch.routes()]
+    assert [batch.route_names[route] for route in truck["route"]] == [
+        batch.route_names[route] for route in batch.routes()
+    ]
     assert not terminated.any() and not truncated.any()
     assert set(batch.columns("reward")) == {"reward"}
 
@@ -70,7 +72,12 @@ def test_observations_stay_in_their_bounds() -> None:
 
 def test_a_step_into_arrays_gives_what_a_step_returns() -> None:
     one, other = Batch(num_envs=5, seed=2), Batch(num_envs=5, seed=2)
-    fragment = np.zeros((40, 5, 69), np.float32), np.zeros((40, 5), np.float32), np.zeros((40, 5), bool), np.zeros((40, 5), bool)
+    fragment = (
+        np.zeros((40, 5, 69), np.float32),
+        np.zeros((40, 5), np.float32),
+        np.zeros((40, 5), bool),
+        np.zeros((40, 5), bool),
+    )
     for step in range(40):
         actions = np.full(5, step % 9)
         one.step_into(actions, *(array[step] for array in fragment))
@@ -115,7 +122,10 @@ def test_a_state_is_restored_bit_for_bit_with_its_streams() -> None:
     assert all(mine[name].tobytes() == its[name].tobytes() for name in mine)
     before = other.state()
     for wrong, message in [
-        ({**state, "reward": state["reward"][:3]}, r"reward: float32 of shape \(3,\); float32 of shape \(12,\) is needed"),
+        (
+            {**state, "reward": state["reward"][:3]},
+            r"reward: float32 of shape \(3,\); float32 of shape \(12,\) is needed",
+        ),
         ({name: column for name, column in state.items() if name != "stream"}, "state: stream is missing"),
         ({**state, "action": np.full(12, 77, np.uint32)}, r"action\[0\]: 77; the world has actions 0..9"),
     ]:
@@ -167,7 +177,11 @@ def test_a_bad_file_is_refused_with_its_key(tmp_path: Path, short_benchmark: str
         (np.array([0, 0, 9, 0]), ValueError, r"actions\[2\]: 9; must lie in 0..9"),
         (np.array([0, 0, 2**40, 0]), ValueError, r"actions\[2\]: 1099511627776; must lie in 0..9"),
         (np.array([0, 0, 0]), ValueError, "actions: 3 of them; 4 are needed"),
-        (np.zeros(4), TypeError, r"actions: ndarray of float64 and shape \(4,\); a numpy array of integers of shape \(4,\)"),
+        (
+            np.zeros(4),
+            TypeError,
+            r"actions: ndarray of float64 and shape \(4,\); a numpy array of integers of shape \(4,\)",
+        ),
         (np.zeros((4, 1), int), TypeError, r"actions: ndarray of int64 and shape \(4, 1\)"),
         (np.zeros(4, bool), TypeError, "actions: ndarray of bool"),
         ([0, 0, 0, 0], TypeError, "actions: list; a numpy array of integers"),
@@ -192,7 +206,12 @@ def test_actions_of_any_integer_type_and_layout_are_taken() -> None:
 def test_wrong_outputs_and_requests_are_refused() -> None:
     batch = Batch(num_envs=3)
     good: list[Any] = [np.zeros((3, 69), np.float32), np.zeros(3, np.float32), np.zeros(3, bool), np.zeros(3, bool)]
-    for index, wrong in [(0, np.zeros((3, 69))), (0, np.zeros((4, 69), np.float32)), (1, np.zeros(2, np.float32)), (2, np.zeros(3))]:
+    for index, wrong in [
+        (0, np.zeros((3, 69))),
+        (0, np.zeros((4, 69), np.float32)),
+        (1, np.zeros(2, np.float32)),
+        (2, np.zeros(3)),
+    ]:
         with pytest.raises(TypeError, match="must be a writable, contiguous numpy array"):
             batch.step_into(np.zeros(3, int), *[*good[:index], wrong, *good[index + 1 :]])
     frozen = np.zeros(3, np.float32)
@@ -274,5 +293,7 @@ def test_a_tally_counts_every_step() -> None:
     for _ in range(100):
         total += float(batch.step(np.full(10, 4))[1].sum())
     tally = batch.tally()
-    assert tally["env_steps"] == 1000 and tally["episodes"] == sum(tally[ended.name.lower()] for ended in Ended if ended)
+    assert tally["env_steps"] == 1000 and tally["episodes"] == sum(
+        tally[ended.name.lower()] for ended in Ended if ended
+    )
     assert tally["reward"] == pytest.approx(total, abs=1000 / 512)

@@ -22,7 +22,9 @@ def snippets(document: str) -> list[str]:
 
 
 @pytest.mark.parametrize(("document", "n"), [("README.md", 4), ("TUTORIAL.md", 5)])
-def test_the_snippets_run(document: str, n: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_snippets_run(
+    document: str, n: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     found = snippets(document)
     assert len(found) == n

@@ -99,7 +99,7 @@ def test_wrappers_of_gymnasium_work_around_both() -> None:
     assert observation.shape == (3, 69)
     truncated = False
     for _ in range(20):
-        observation, _, terminated, truncated, info = env.step(np.int64(4))
+        observation, _, terminated, truncated, _ = env.step(np.int64(4))
     assert truncated or terminated
 
     vector = of_vectors.NormalizeReward(of_vectors.RecordEpisodeStatistics(offtrack_sim.make_vec(num_envs=8)))

@@ -44,7 +44,10 @@ def drive_both(ours: Any, theirs: Any, mode: AutoresetMode, steps: int, action: 
         done = one[2] | one[3]
         ended += int(done.sum())
         if mode is AutoresetMode.DISABLED and done.any():
-            again, reference = ours.reset(options={"reset_mask": done}), theirs.reset(options={"reset_mask": done.copy()})
+            again, reference = (
+                ours.reset(options={"reset_mask": done}),
+                theirs.reset(options={"reset_mask": done.copy()}),
+            )
             assert (again[0] == reference[0]).all()
             assert_same(again[1], reference[1])
     return ended
