@@ -1,9 +1,9 @@
 """Env steps per second of driving environments through one Python loop, in turns on the same machine.
 
 The loop is `envs.step(actions)` of a vector environment with actions drawn beforehand, uniformly at random. A round
-times every peer once; medians over the rounds are reported, and each peer's ratio to offtrack in the same round. What a step
-is differs: the result says it of each, see README.md beside this file. A peer that cannot be made is reported with the
-reason.
+times every peer once; medians over the rounds are reported, and each peer's ratio to offtrack in the same round. What
+a step is differs: the result says it of each, see README.md beside this file. A peer that cannot be made is reported
+with the reason.
 """
 
 import argparse

@@ -140,7 +140,8 @@ class Batch(_offtrack.Batch):
 
         Returns:
             Observation ``[num_envs, 69]``, reward, terminated and truncated, ``[num_envs]`` each. Where an episode
-            ended and another began in the same step, the observation is the new one's first: :meth:`ended` has the last one.
+            ended and another began in the same step, the observation is the new one's first: :meth:`ended` has the
+            last one.
 
         Raises:
             TypeError: For anything but an array of integers.
