@@ -3,8 +3,8 @@
 
 A round is one run of `offtrack scale` and one of each loop in Python; a ratio is Python's speed over the native one of
 the same round, and the median of the rounds is reported: load from other programs changes more slowly than the rounds.
-A step is 0.1 s of every truck: two physics sub-steps, 29 rays, 69 values, reward, another episode in the same step where
-one ended; actions are drawn uniformly at random, for Python beforehand. Needs the package offtrack_sim.
+A step is 0.1 s of every truck: two physics sub-steps, 29 rays, 69 values, reward, another episode in the same step
+where one ended; actions are drawn uniformly at random, for Python beforehand. Needs the package offtrack_sim.
 
     python3 benches/python_speed.py --offtrack target/release/offtrack --json docs/benchmarks/python/speed.json
 """
