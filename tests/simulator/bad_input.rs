@@ -85,13 +85,19 @@ fn copy() -> tempfile::TempDir {
 /// Reads the broken text instead of `file`. An error must name a file of the folder.
 fn broken(folder: &Path, file: &Path, text: &[u8]) -> Result<(), String> {
     let path = folder.join(file);
-    std::fs::write(&path, text).unwrap();
+    put(&path, text);
     let outcome = read(&path).map_err(|error| error.to_string());
     if let Err(message) = &outcome {
         assert!(message.contains(folder.to_str().unwrap()), "{message}");
     }
-    std::fs::write(&path, text_of(file)).unwrap();
+    put(&path, text_of(file).as_bytes());
     outcome
+}
+
+/// Replaces a file by a new one: ext4 waits for the disk where a file is written over.
+fn put(path: &Path, text: &[u8]) {
+    std::fs::remove_file(path).unwrap();
+    std::fs::write(path, text).unwrap();
 }
 
 /// Byte ranges of the values in a TOML text: what follows `=`, `[` or `,` up to the next of `,]}#` or the line's end.
@@ -126,8 +132,15 @@ fn no_wrong_value_of_any_key_makes_a_reader_panic() {
     let (mut tried, mut refused) = (0, 0);
     for file in files() {
         let text = text_of(&file);
-        let found = values(&text);
+        let mut found = values(&text);
         assert!(10 < found.len(), "{}: {} values found", file.display(), found.len());
+        // Names of routes are read alike, and a benchmark has dozens: two of them stand for all.
+        let is_route = |&(from, to): &(usize, usize)| ["-left-", "-right-"].iter().any(|lane| text[from..to].contains(lane));
+        let mut n_routes = 0;
+        found.retain(|range| {
+            n_routes += usize::from(is_route(range));
+            !is_route(range) || n_routes <= 2
+        });
         for (from, to) in found {
             for value in nasty {
                 tried += 1;
