@@ -22,15 +22,24 @@ FAIR = 3.0
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--offtrack", type=Path, default=REPOSITORY / "target/release/offtrack", help="the program, built with --features gpu")
+    parser.add_argument(
+        "--offtrack",
+        type=Path,
+        default=REPOSITORY / "target/release/offtrack",
+        help="the program, built with --features gpu",
+    )
     parser.add_argument("--adapter", help="part of an adapter's name, see `offtrack devices`")
     parser.add_argument("--envs", default="1024,16384", help="numbers of trucks, separated by commas")
     parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--seconds", type=float, default=2.0, help="time for each number of trucks, engine and round [s]")
+    parser.add_argument(
+        "--seconds", type=float, default=2.0, help="time for each number of trucks, engine and round [s]"
+    )
     parser.add_argument("--json", type=Path, help="write the result to this file")
     args = parser.parse_args()
     if not args.offtrack.is_file():
-        sys.exit(f"--offtrack: {args.offtrack}; no such file: build it with `cargo build --release --features gpu` or name another")
+        sys.exit(
+            f"--offtrack: {args.offtrack}; no such file: build it with `cargo build --release --features gpu` or name another"
+        )
 
     rounds = []
     for number in range(args.rounds):
@@ -61,7 +70,18 @@ def scaled(args, engine):
     """The result of `offtrack scale` on an engine."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scale.json"
-        command = [args.offtrack, "scale", "--device", engine, "--envs", args.envs, "--seconds", str(args.seconds), "--json", file]
+        command = [
+            args.offtrack,
+            "scale",
+            "--device",
+            engine,
+            "--envs",
+            args.envs,
+            "--seconds",
+            str(args.seconds),
+            "--json",
+            file,
+        ]
         if engine == "gpu" and args.adapter:
             command += ["--adapter", args.adapter]
         done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=REPOSITORY)
@@ -103,7 +123,9 @@ def show(size):
     print(f"{size['envs']} trucks{'CPU':>16}{'device':>12}{'ratio':>8}{'fastest':>9}   lowest to highest")
     for name, row in [("whole step", size["step"]), *size["stages"].items()]:
         mark = " *" if name in size["beyond_three_times"] else ""
-        print(f"  {name:12}{row['cpu']:12.1f} ns{row['gpu']:9.1f} ns{row['ratio']:8.2f}{row['ratio_of_fastest']:9.2f}   {row['lowest']:.2f} to {row['highest']:.2f}{mark}")
+        print(
+            f"  {name:12}{row['cpu']:12.1f} ns{row['gpu']:9.1f} ns{row['ratio']:8.2f}{row['ratio_of_fastest']:9.2f}   {row['lowest']:.2f} to {row['highest']:.2f}{mark}"
+        )
 
 
 if __name__ == "__main__":

@@ -28,7 +28,9 @@ def main():
     parser.add_argument("--other", type=Path, help="another build of it: five roundabouts are stepped in turns by both")
     parser.add_argument("--device", default="cpu", choices=["cpu", "gpu"])
     parser.add_argument("--distribution", default="wide")
-    parser.add_argument("--ready", type=int, default=1000, help="roads that are made ready, without a cache and from it; 0 for none")
+    parser.add_argument(
+        "--ready", type=int, default=1000, help="roads that are made ready, without a cache and from it; 0 for none"
+    )
     parser.add_argument("--roads", type=int, default=256, help="roads that are stepped; 0 for none")
     parser.add_argument("--envs", default="1024", help="number of trucks")
     parser.add_argument("--rounds", type=int, default=11)
@@ -70,7 +72,9 @@ def written(args, folder, count):
     text = text.replace('vehicle = "', f'vehicle = "{scenarios}/')
     distribution = scenarios / "distributions" / f"{args.distribution}.toml"
     file = folder / f"random-{count}.toml"
-    file.write_text(f'{text}[procedural]\ndistribution = "{distribution}"\nseed = 2026\ncount = {count}\ntrain = [0, {count}]\n')
+    file.write_text(
+        f'{text}[procedural]\ndistribution = "{distribution}"\nseed = 2026\ncount = {count}\ntrain = [0, {count}]\n'
+    )
     return file
 
 
@@ -91,9 +95,17 @@ def ready(args, folder):
     found = {}
     for name in ("first_time", "from_cache"):
         scale = scaled(args, folder, args.offtrack, benchmark, seconds=0.1)
-        found[name] = {"seconds_to_read": round(scale["seconds_to_read"], 2), "seconds_to_bake": round(scale["seconds_to_bake"], 2)}
+        found[name] = {
+            "seconds_to_read": round(scale["seconds_to_read"], 2),
+            "seconds_to_bake": round(scale["seconds_to_bake"], 2),
+        }
     cache = sum(file.stat().st_size for file in (folder / "cache").iterdir())
-    return found | {"roads": args.ready, "routes": scale["routes"], "world_bytes": scale["world_bytes"], "cache_bytes": cache}
+    return found | {
+        "roads": args.ready,
+        "routes": scale["routes"],
+        "world_bytes": scale["world_bytes"],
+        "cache_bytes": cache,
+    }
 
 
 def compared(runs):

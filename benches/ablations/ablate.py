@@ -88,7 +88,11 @@ CHOICES = [
     ),
     ("chosen: noise 0.1", CHOSEN + ["learning.observation_noise=0.1"], 3_000_000),
     ("chosen: level replay", CHOSEN + REPLAY, 3_000_000),
-    ("chosen: learning rates 6e-4", CHOSEN + ["learning.actor_learning_rate=6e-4", "learning.critic_learning_rate=6e-4"], 3_000_000),
+    (
+        "chosen: learning rates 6e-4",
+        CHOSEN + ["learning.actor_learning_rate=6e-4", "learning.critic_learning_rate=6e-4"],
+        3_000_000,
+    ),
     ("chosen: no mirror augmentation", CHOSEN + ["learning.mirror_augmentation=false"], 3_000_000),
     ("chosen: three layers of 256", CHOSEN + ["learning.hidden=[256, 256, 256]"], 2_100_000),
     ("chosen: two layers of 512", CHOSEN + ["learning.hidden=[512, 512]"], 1_100_000),
@@ -193,7 +197,11 @@ def main():
 
     with ThreadPoolExecutor(len(available)) as pool:
         # One seed of every choice before the next seed: an interrupted series has as many of each.
-        jobs = {(choice[0], seed): pool.submit(job, *choice, seed) for seed in map(int, args.seeds.split(",")) for choice in wanted}
+        jobs = {
+            (choice[0], seed): pool.submit(job, *choice, seed)
+            for seed in map(int, args.seeds.split(","))
+            for choice in wanted
+        }
         rows = {name: {"choice": name, "settings": settings, "runs": []} for name, settings, _ in wanted}
         for (name, seed), running in jobs.items():
             result = running.result()

@@ -22,7 +22,9 @@ import highway_env
 import numpy as np
 
 gymnasium.register_envs(highway_env)
-gymnasium.logger.min_level = gymnasium.logger.ERROR  # it recommends roundabout-v1, which differs in which cars see each other
+gymnasium.logger.min_level = (
+    gymnasium.logger.ERROR
+)  # it recommends roundabout-v1, which differs in which cars see each other
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 WINDOW = 0.5  # s; other programs disturb some windows, not most
@@ -38,7 +40,9 @@ VARIANTS = [
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seconds", type=float, default=10.0, help="time for each peer's run [s]")
-    parser.add_argument("--offtrack", type=Path, default=REPOSITORY / "target/release/offtrack", help="the program to compare with")
+    parser.add_argument(
+        "--offtrack", type=Path, default=REPOSITORY / "target/release/offtrack", help="the program to compare with"
+    )
     parser.add_argument("--envs", type=int, default=1024, help="trucks in the program's batch")
     parser.add_argument("--offtrack-seconds", type=float, default=5.0, help="time for the program's run [s]")
     parser.add_argument("--json", type=Path, help="write the result to this file")
@@ -53,7 +57,9 @@ def main():
         runs.append(measured(name, config, Vector(config, os.cpu_count()), args.seconds))
     for run in runs:
         run["offtrack_is_faster"] = round(ours["env_steps_per_second"] / run["env_steps_per_second"])
-        run["offtrack_simulates_faster"] = round(ours["simulated_seconds_per_second"] / run["simulated_seconds_per_second"])
+        run["offtrack_simulates_faster"] = round(
+            ours["simulated_seconds_per_second"] / run["simulated_seconds_per_second"]
+        )
 
     result = {
         "machine": machine(),
@@ -76,7 +82,16 @@ def offtrack(args):
     """One run of `offtrack scale`, and what its step is."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scale.json"
-        command = [args.offtrack, "scale", "--envs", str(args.envs), "--seconds", str(args.offtrack_seconds), "--json", file]
+        command = [
+            args.offtrack,
+            "scale",
+            "--envs",
+            str(args.envs),
+            "--seconds",
+            str(args.offtrack_seconds),
+            "--json",
+            file,
+        ]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=REPOSITORY)
         scale = json.loads(file.read_text())
     run, step = scale["runs"][0], scale["step"]
@@ -167,7 +182,9 @@ def machine():
 def show(result):
     ours = result["offtrack"]
     print(result["machine"])
-    print(f"offtrack, {ours['envs']} trucks, {ours['threads']} threads: {ours['env_steps_per_second']:,.0f} env steps/s")
+    print(
+        f"offtrack, {ours['envs']} trucks, {ours['threads']} threads: {ours['env_steps_per_second']:,.0f} env steps/s"
+    )
     print(f"  a step is {ours['step']}")
     print("highway-env roundabout-v0")
     print(f"  a step is {result['peer_step']}")

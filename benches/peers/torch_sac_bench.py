@@ -30,7 +30,9 @@ def main():
     parser.add_argument("--rounds", type=int, default=5, help="rounds of each size, in turns")
     parser.add_argument("--seconds", type=float, default=3.0, help="time for a round [s]")
     parser.add_argument("--threads", type=int, default=2, help="PyTorch's threads")
-    parser.add_argument("--offtrack", type=Path, default=REPOSITORY / "target/release/offtrack", help="the program to compare with")
+    parser.add_argument(
+        "--offtrack", type=Path, default=REPOSITORY / "target/release/offtrack", help="the program to compare with"
+    )
     parser.add_argument("--json", type=Path, help="write the result to this file")
     args = parser.parse_args()
     if not args.offtrack.is_file():
@@ -41,14 +43,18 @@ def main():
     torch.manual_seed(0)
 
     print(f"{machine()}; PyTorch {version('torch')}, {args.threads} threads; medians of {args.rounds} rounds")
-    print(f"{'hidden':>16}{'batch':>7}{'offtrack':>13}{'PyTorch':>13}{'ratio':>8}{'fastest':>13}{'PyTorch':>13}{'ratio':>8}   of each round")
+    print(
+        f"{'hidden':>16}{'batch':>7}{'offtrack':>13}{'PyTorch':>13}{'ratio':>8}{'fastest':>13}{'PyTorch':>13}{'ratio':>8}   of each round"
+    )
     cells = []
     for hidden, batch in CELLS:
         cells.append(compared(hidden, batch, args))
         cell = cells[-1]
         ratios = " ".join(f"{ratio:.2f}" for ratio in cell["ratios"])
         times = f"{cell['offtrack']:10.2f} ms{cell['pytorch']:10.2f} ms"
-        fastest = f"{cell['offtrack_fastest']:10.2f} ms{cell['pytorch_fastest']:10.2f} ms{cell['ratio_of_fastest']:8.2f}"
+        fastest = (
+            f"{cell['offtrack_fastest']:10.2f} ms{cell['pytorch_fastest']:10.2f} ms{cell['ratio_of_fastest']:8.2f}"
+        )
         print(f"{'-'.join(map(str, hidden)):>16}{batch:7}{times}{cell['ratio']:8.2f}{fastest}   {ratios}", flush=True)
     result = {
         "machine": machine(),
