@@ -97,6 +97,17 @@ class Batch(_offtrack.Batch):
         num_threads: Threads that step the trucks; None for one a core. No result depends on it.
         device: ``"cpu"``, ``"gpu"`` for the first graphics device, or a part of a graphics device's name.
 
+    Attributes:
+        num_envs: Number of trucks.
+        scenario: Name of the benchmark.
+        device: ``"cpu"``, or the graphics device with its interface and driver.
+        autoreset: ``"same_step"``, ``"next_step"`` or ``"disabled"``.
+        step_seconds: Time of a step [s].
+        action_table: Steer angle [rad] and target speed [m/s] of each action, float32 ``[n_actions, 2]``.
+        route_names: Names of the routes, in the order of the indices that columns have.
+        split_routes: The same names in the benchmark's order. Episode ``e`` of ``episodes`` on its n-th route has the
+            stream ``(seed, n * episodes + e)`` in an evaluation.
+
     The batch begins with the first episode of every truck. One thread at a time may use it; the GIL is released while
     it steps.
 
