@@ -133,8 +133,8 @@ class Batch(_offtrack.Batch):
         threads = 0 if num_threads is None else _within("num_threads", num_threads, 1, 1025)
         return super().__new__(
             cls,
-            os.fspath(scenario),
-            min(operator.index(num_envs), 2**62),
+            scenario_name(scenario),
+            min(_integer("num_envs", num_envs), 2**62),
             split=split,
             routes=None if routes is None else _names(routes),
             seed=checked_seed(seed),
@@ -285,11 +285,23 @@ def checked_seed(seed: int) -> int:
     return _within("seed", seed, 0, 2**32)
 
 
-def _within(name: str, value: int, low: int, high: int) -> int:
+def scenario_name(scenario: str | os.PathLike[str]) -> str:
+    """A benchmark's name or path as text."""
     try:
-        index = operator.index(value)
+        return os.fspath(scenario)
+    except TypeError:
+        raise TypeError(f"scenario: {scenario!r}; the name of a benchmark or the path of its file is needed") from None
+
+
+def _integer(name: str, value: int) -> int:
+    try:
+        return operator.index(value)
     except TypeError:
         raise TypeError(f"{name}: {value!r}; an integer is needed") from None
+
+
+def _within(name: str, value: int, low: int, high: int) -> int:
+    index = _integer(name, value)
     if not low <= index < high:
         raise ValueError(f"{name}: {index}; must lie in {low}..{high}")
     return index
