@@ -172,7 +172,7 @@ class Progress:
             print("  ".join(f"{name} {value:,}" for name, value in row.items()), flush=True)
             self._successes, self._last = [], (now, self.env_steps)
 
-    def finish(self, agent: Agent, kind: str, *packages: str) -> None:
+    def finish(self, agent: Agent, kind: str, *packages: str, extra: dict[str, object] | None = None) -> None:
         """Writes the policy file, evaluates the policy once, and writes the results."""
         args = self.args
         seconds = time.perf_counter() - self.start
@@ -186,6 +186,7 @@ class Progress:
             "seconds": round(seconds, 1),
             "env_steps_per_second": round(self.env_steps / seconds),
             "env_steps_per_second_median": float(np.median([row["env_steps_per_second"] for row in self.curve] or [0])),
+            **(extra or {}),
             "evaluation": evaluate(offtrack_sim.Policy.load(file).act, args.benchmark, args.split),
             "curve": self.curve,
         }
