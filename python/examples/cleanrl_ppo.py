@@ -3,16 +3,16 @@
     python cleanrl_ppo.py --out ppo
 
 Needs ``offtrack-sim``, ``gymnasium >= 1.1`` and ``torch``. Writes ``ppo.safetensors``, which
-``offtrack evaluate --policy ppo.safetensors`` drives, and ``ppo.json`` with the curve and the success on the test routes.
-Ctrl-C ends the training early; what was learned is kept.
+``offtrack evaluate --policy ppo.safetensors`` drives, and ``ppo.json`` with the curve and the success on the test
+routes. Ctrl-C ends the training early; what was learned is kept.
 
 CleanRL's own ppo.py works with one line changed, ``envs = gym.vector.SyncVectorEnv(...)`` to
 
     envs = gym.wrappers.vector.RecordEpisodeStatistics(
         offtrack_sim.make_vec(num_envs=args.num_envs, seed=args.seed, autoreset_mode="same_step"))
 
-Rewards are multiplied by ``--reward-scale``: the benchmark's are -500 to +100, and a value function learns small numbers
-sooner. Settings were chosen by the success on training routes alone.
+Rewards are multiplied by ``--reward-scale``: the benchmark's are -500 to +100, and a value function learns small
+numbers sooner. Settings were chosen by the success on training routes alone.
 """
 
 from __future__ import annotations
@@ -95,12 +95,16 @@ def advantages(agent: Agent, fragment: Fragment, gamma: float, lam: float) -> tu
     return advantage, advantage + values[:-1]
 
 
-def update(agent: Agent, optimizer: torch.optim.Optimizer, fragments: list[Fragment], args: argparse.Namespace) -> float:
+def update(
+    agent: Agent, optimizer: torch.optim.Optimizer, fragments: list[Fragment], args: argparse.Namespace
+) -> float:
     """Some epochs of clipped policy gradients over the fragments; returns the mean entropy [nat]."""
     estimates = [advantages(agent, fragment, args.gamma, args.gae_lambda) for fragment in fragments]
     advantage = torch.cat([estimate[0].flatten() for estimate in estimates])  # [B]
     target = torch.cat([estimate[1].flatten() for estimate in estimates])  # [B]
-    observation = torch.cat([torch.from_numpy(fragment.observation[:-1]).flatten(0, 1) for fragment in fragments])  # [B, 69]
+    observation = torch.cat(
+        [torch.from_numpy(fragment.observation[:-1]).flatten(0, 1) for fragment in fragments]
+    )  # [B, 69]
     action = torch.cat([torch.from_numpy(fragment.action).flatten() for fragment in fragments])  # [B]
     log_prob = torch.cat([torch.from_numpy(fragment.log_prob).flatten() for fragment in fragments])  # [B]
     entropies = []
@@ -123,8 +127,12 @@ def update(agent: Agent, optimizer: torch.optim.Optimizer, fragments: list[Fragm
 
 def arguments(description: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.ArgumentDefaultsHelpFormatter)
-    parser.add_argument("--scenario", default="attard2023", help="benchmark to train on; its actions are those of --benchmark")
-    parser.add_argument("--benchmark", default="attard2023", help="benchmark whose test routes the policy is evaluated on")
+    parser.add_argument(
+        "--scenario", default="attard2023", help="benchmark to train on; its actions are those of --benchmark"
+    )
+    parser.add_argument(
+        "--benchmark", default="attard2023", help="benchmark whose test routes the policy is evaluated on"
+    )
     parser.add_argument("--steps", type=int, default=3_000_000, help="env steps of all trucks together")
     parser.add_argument("--minutes", type=float, default=1e9, help="time after which training ends earlier [min]")
     parser.add_argument("--envs", type=int, default=256, help="number of trucks")
@@ -139,7 +147,9 @@ def arguments(description: str) -> argparse.ArgumentParser:
     parser.add_argument("--minibatch", type=int, default=2048)
     parser.add_argument("--reward-scale", type=float, default=0.01)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--split", default="test", help="routes of the evaluation at the end: test, or train while choosing settings")
+    parser.add_argument(
+        "--split", default="test", help="routes of the evaluation at the end: test, or train while choosing settings"
+    )
     parser.add_argument("--out", type=Path, default=Path("ppo"), help="files to write, without their endings")
     return parser
 
@@ -166,8 +176,15 @@ class Progress:
         now = time.perf_counter()
         if len(self._successes) >= 500 or self.left() == 0:
             speed = (self.env_steps - self._last[1]) / (now - self._last[0])
-            row = {"env_steps": self.env_steps, "seconds": round(now - self.start, 2), "env_steps_per_second": round(speed)}
-            row |= {"success": round(float(np.mean(self._successes)), 4) if self._successes else 0.0, "entropy": round(entropy, 3)}
+            row = {
+                "env_steps": self.env_steps,
+                "seconds": round(now - self.start, 2),
+                "env_steps_per_second": round(speed),
+            }
+            row |= {
+                "success": round(float(np.mean(self._successes)), 4) if self._successes else 0.0,
+                "entropy": round(entropy, 3),
+            }
             self.curve.append(row)
             print("  ".join(f"{name} {value:,}" for name, value in row.items()), flush=True)
             self._successes, self._last = [], (now, self.env_steps)
@@ -221,7 +238,9 @@ def main() -> None:
                 if "final_info" in infos:
                     ended = infos["_final_info"]
                     successes += infos["final_info"]["is_success"][ended].astype(float).tolist()
-                    fragment.limits += [(step, env, infos["final_obs"][env]) for env in np.flatnonzero(truncated & ~terminated)]
+                    fragment.limits += [
+                        (step, env, infos["final_obs"][env]) for env in np.flatnonzero(truncated & ~terminated)
+                    ]
             fragment.observation[-1] = observation
             entropy = update(agent, optimizer, [fragment], args)
             progress.add(fragment.action.size, successes, entropy)

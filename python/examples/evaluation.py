@@ -22,7 +22,9 @@ Act = Callable[[np.ndarray], np.ndarray]
 """Observations, float32 ``[n, 69]``, to indices of actions, integers ``[n]``."""
 
 
-def evaluate(act: Act, scenario: str = "attard2023", split: str = "test", episodes: int = 30, seed: int = 0) -> dict[str, Any]:
+def evaluate(
+    act: Act, scenario: str = "attard2023", split: str = "test", episodes: int = 30, seed: int = 0
+) -> dict[str, Any]:
     """Drives every route of a split, from the start poses that ``offtrack evaluate`` draws with the same seed.
 
     Each truck drives a single episode; those that have ended are left to themselves.
@@ -75,7 +77,11 @@ def about(*packages: str) -> dict[str, Any]:
 def processor() -> str:
     """Its name, as Linux gives it."""
     cpuinfo = Path("/proc/cpuinfo")
-    names = [line.split(":")[1] for line in cpuinfo.read_text().splitlines() if line.startswith("model name")] if cpuinfo.exists() else []
+    names = (
+        [line.split(":")[1] for line in cpuinfo.read_text().splitlines() if line.startswith("model name")]
+        if cpuinfo.exists()
+        else []
+    )
     return names[0].strip() if names else platform.processor()
 
 

@@ -2,16 +2,20 @@
 
     python ray_actors.py --out ray
 
-Needs ``offtrack-sim``, ``ray`` and ``torch`` on every machine, in the same versions. Over several machines, start Ray on
-each and then this program on one of them:
+Needs ``offtrack-sim``, ``ray`` and ``torch`` on every machine, in the same versions. Over several machines, start Ray
+on each and then this program on one of them:
 
+    export RAY_AUTH_MODE=token                                         # on all of them
+    ray get-auth-token --generate                                      # on the first; copy ~/.ray/auth_token to each
     ray start --head --port 6380                                       # on the first
     ray start --address FIRST:6380                                     # on each other
     python ray_actors.py --address FIRST:6380 --actors 16 --out ray    # on the first
 
+Two ``ray start`` on one machine, the second with ``--address 127.0.0.1:6380``, make two nodes too.
+
 Each actor steps its trucks with one thread and hands back fragments of 64 steps, which the simulator writes straight
-into the arrays that Ray moves. The learner, here on the driver, waits for the fragments of all actors, so each is one of
-the present policy; an actor whose machine fails is started anew. Writes ``ray.safetensors``, which
+into the arrays that Ray moves. The learner, here on the driver, waits for the fragments of all actors, so each is one
+of the present policy; an actor whose machine fails is started anew. Writes ``ray.safetensors``, which
 ``offtrack evaluate --policy ray.safetensors`` drives, and ``ray.json`` with the curve and the success on the test
 routes. Ctrl-C ends the training early; what was learned is kept.
 
@@ -83,7 +87,9 @@ class Actor:
             if (ends := self.batch.ended()) is not None:
                 successes += (ends.codes == Ended.ARRIVED).astype(float).tolist()
                 limits = ends.codes == Ended.TIMED_OUT
-                fragment.limits += [(step, int(env), last) for env, last in zip(ends.envs[limits], ends.observations[limits])]
+                fragment.limits += [
+                    (step, int(env), last) for env, last in zip(ends.envs[limits], ends.observations[limits])
+                ]
         fragment.reward *= self.reward_scale
         self.observation = fragment.observation[-1].copy()
         return Driven(fragment, successes, stepping, time.perf_counter() - start)
@@ -92,14 +98,18 @@ class Actor:
 def main() -> None:
     parser = arguments("PPO with actors of Ray, each with a batch of trucks")
     parser.set_defaults(out=Path("ray"), envs=128)
-    parser.add_argument("--actors", type=int, default=2, help="number of actors; --envs is the number of trucks of each")
+    parser.add_argument(
+        "--actors", type=int, default=2, help="number of actors; --envs is the number of trucks of each"
+    )
     parser.add_argument("--address", help="of a running Ray, HOST:PORT or auto; without it one is started for this run")
     args = parser.parse_args()
     torch.manual_seed(args.seed)
     # Arrays that Ray hands over are read-only, and are only read here.
     warnings.filterwarnings("ignore", message="The given NumPy array is not writable")
     # Workers import this file's neighbours wherever they run.
-    ray.init(address=args.address, runtime_env={"working_dir": str(Path(__file__).resolve().parent)}, log_to_driver=False)
+    ray.init(
+        address=args.address, runtime_env={"working_dir": str(Path(__file__).resolve().parent)}, log_to_driver=False
+    )
     made = Actor.options(scheduling_strategy="SPREAD")
     # Each actor's trucks draw from streams of their own: another seed each.
     seeds = [args.seed + 1000 * index for index in range(args.actors)]
@@ -131,9 +141,18 @@ def main() -> None:
     n_steps = args.actors * args.envs * args.fragment
     medians = {name: float(np.median(values)) for name, values in times.items() if values}
     # What the actors would give a learner that takes no time.
-    speeds = {f"env_steps_per_second_{name}": round(n_steps / medians[name]) for name in ("stepping", "driving", "waiting") if name in medians}
+    speeds = {
+        f"env_steps_per_second_{name}": round(n_steps / medians[name])
+        for name in ("stepping", "driving", "waiting")
+        if name in medians
+    }
     ray.shutdown()
-    progress.finish(agent, "ray_actors", "ray", extra={"actors": args.actors, "nodes": len(set(nodes)), "round_seconds": medians, **speeds})
+    progress.finish(
+        agent,
+        "ray_actors",
+        "ray",
+        extra={"actors": args.actors, "nodes": len(set(nodes)), "round_seconds": medians, **speeds},
+    )
 
 
 if __name__ == "__main__":

@@ -49,7 +49,9 @@ class Scaled(VectorWrapper):
 
 def make(context: Any) -> Scaled:
     """The trucks of an env runner, with one thread; RLlib gives them a seed of their own when it resets them."""
-    return Scaled(offtrack_sim.make_vec(context["scenario"], context["num_envs"], num_threads=1), context["reward_scale"])
+    return Scaled(
+        offtrack_sim.make_vec(context["scenario"], context["num_envs"], num_threads=1), context["reward_scale"]
+    )
 
 
 def counted(runner: Any) -> tuple[int, int]:
@@ -68,13 +70,19 @@ def linear_layers(module: Any) -> torch.nn.Sequential:
     """The actor's layers, in order: those of the encoder and of the policy head."""
     encoder = module.encoder.actor_encoder if hasattr(module.encoder, "actor_encoder") else module.encoder.encoder
     layers = [layer for part in (encoder, module.pi) for layer in part.modules()]
-    return torch.nn.Sequential(*[layer for layer in layers if isinstance(layer, (torch.nn.Linear, torch.nn.Tanh, torch.nn.ReLU))])
+    return torch.nn.Sequential(
+        *[layer for layer in layers if isinstance(layer, (torch.nn.Linear, torch.nn.Tanh, torch.nn.ReLU))]
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="PPO of RLlib", formatter_class=argparse.ArgumentDefaultsHelpFormatter)
-    parser.add_argument("--scenario", default="attard2023", help="benchmark to train on; its actions are those of --benchmark")
-    parser.add_argument("--benchmark", default="attard2023", help="benchmark whose test routes the policy is evaluated on")
+    parser.add_argument(
+        "--scenario", default="attard2023", help="benchmark to train on; its actions are those of --benchmark"
+    )
+    parser.add_argument(
+        "--benchmark", default="attard2023", help="benchmark whose test routes the policy is evaluated on"
+    )
     parser.add_argument("--steps", type=int, default=500_000, help="env steps of all trucks together")
     parser.add_argument("--minutes", type=float, default=1e9, help="time after which training ends earlier [min]")
     parser.add_argument("--runners", type=int, default=2, help="number of env runners; 0: the driver steps the trucks")
@@ -82,7 +90,9 @@ def main() -> None:
     parser.add_argument("--reward-scale", type=float, default=0.01)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--address", help="of a running Ray, HOST:PORT or auto; without it one is started for this run")
-    parser.add_argument("--split", default="test", help="routes of the evaluation at the end: test, or train while choosing settings")
+    parser.add_argument(
+        "--split", default="test", help="routes of the evaluation at the end: test, or train while choosing settings"
+    )
     parser.add_argument("--out", type=Path, default=Path("rllib"), help="files to write, without their endings")
     args = parser.parse_args()
 
@@ -113,7 +123,9 @@ def main() -> None:
             vf_clip_param=1e6,
             grad_clip=0.5,
         )
-        .rl_module(model_config=DefaultModelConfig(fcnet_hiddens=[128, 128], fcnet_activation="tanh", vf_share_layers=False))
+        .rl_module(
+            model_config=DefaultModelConfig(fcnet_hiddens=[128, 128], fcnet_activation="tanh", vf_share_layers=False)
+        )
         .debugging(seed=args.seed)
     )
     algorithm = config.build_algo()

@@ -3,11 +3,11 @@
     python sb3_ppo.py --out sb3
 
 Needs ``offtrack-sim`` and ``stable-baselines3`` (which brings torch). Writes ``sb3.zip``, which ``PPO.load`` reads;
-``sb3.safetensors``, which ``offtrack evaluate --policy sb3.safetensors`` drives; and ``sb3.json`` with the curve and the
-success on the test routes. Ctrl-C ends the training early; what was learned is kept.
+``sb3.safetensors``, which ``offtrack evaluate --policy sb3.safetensors`` drives; and ``sb3.json`` with the curve and
+the success on the test routes. Ctrl-C ends the training early; what was learned is kept.
 
-``VecNormalize`` scales the rewards, which are -500 to +100; observations lie in -1..1 already. With its ``norm_obs`` the
-policy file would take over its statistics.
+``VecNormalize`` scales the rewards, which are -500 to +100; observations lie in -1..1 already. With its ``norm_obs``
+the policy file would take over its statistics.
 """
 
 from __future__ import annotations
@@ -57,14 +57,22 @@ class Curve(BaseCallback):
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="PPO of Stable-Baselines3", formatter_class=argparse.ArgumentDefaultsHelpFormatter)
-    parser.add_argument("--scenario", default="attard2023", help="benchmark to train on; its actions are those of --benchmark")
-    parser.add_argument("--benchmark", default="attard2023", help="benchmark whose test routes the policy is evaluated on")
+    parser = argparse.ArgumentParser(
+        description="PPO of Stable-Baselines3", formatter_class=argparse.ArgumentDefaultsHelpFormatter
+    )
+    parser.add_argument(
+        "--scenario", default="attard2023", help="benchmark to train on; its actions are those of --benchmark"
+    )
+    parser.add_argument(
+        "--benchmark", default="attard2023", help="benchmark whose test routes the policy is evaluated on"
+    )
     parser.add_argument("--steps", type=int, default=3_000_000, help="env steps of all trucks together")
     parser.add_argument("--minutes", type=float, default=1e9, help="time after which training ends earlier [min]")
     parser.add_argument("--envs", type=int, default=256, help="number of trucks")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--split", default="test", help="routes of the evaluation at the end: test, or train while choosing settings")
+    parser.add_argument(
+        "--split", default="test", help="routes of the evaluation at the end: test, or train while choosing settings"
+    )
     parser.add_argument("--out", type=Path, default=Path("sb3"), help="files to write, without their endings")
     args = parser.parse_args()
 
@@ -94,7 +102,8 @@ def main() -> None:
     result = {
         "example": "sb3_ppo",
         **about("numpy", "torch", "gymnasium", "stable-baselines3"),
-        "settings": {name: str(value) if isinstance(value, Path) else value for name, value in vars(args).items()} | settings,
+        "settings": {name: str(value) if isinstance(value, Path) else value for name, value in vars(args).items()}
+        | settings,
         "env_steps": model.num_timesteps,
         "seconds": round(seconds, 1),
         "env_steps_per_second": round(model.num_timesteps / seconds),

@@ -1,4 +1,4 @@
-"""Writes a network that was trained elsewhere as a policy file, which ``offtrack evaluate --policy`` and ``Policy`` drive.
+"""Writes a network that was trained elsewhere as a policy file, for ``offtrack evaluate --policy`` and ``Policy``.
 
 Nothing of PyTorch or of a learning library is imported: their objects are known by the names of their classes.
 """
@@ -32,8 +32,8 @@ def save(
 ) -> None:
     """Writes a policy file: the greedy policy of a network.
 
-    The file's policy takes the action with the largest output, which is what ``predict(observation, deterministic=True)``
-    of Stable-Baselines3 does. Where two outputs differ by less than the rounding of 32-bit floats, it may take the other.
+    The file's policy takes the action with the largest output, as ``predict(observation, deterministic=True)`` of
+    Stable-Baselines3 does. Where two outputs differ by less than the rounding of 32-bit floats, it may take the other.
 
     Args:
         file: Where to; an existing file is replaced, whole or not at all.
@@ -41,7 +41,7 @@ def save(
 
             - PPO or A2C of Stable-Baselines3 with ``MlpPolicy``: the layers up to ``action_net``;
             - DQN of Stable-Baselines3 with ``MlpPolicy``: ``q_net``;
-            - a ``torch.nn.Sequential`` of ``Linear`` with all ``ReLU`` or all ``Tanh`` between, and none behind the last:
+            - a ``torch.nn.Sequential`` of ``Linear`` with all ``ReLU`` or all ``Tanh`` between, none behind the last:
               CleanRL's ``agent.actor`` of PPO and ``q_network.network`` of DQN;
             - a list of ``(weights, biases)``, arrays ``[inputs, outputs]`` and ``[outputs]``, with ``ReLU`` between.
         scenario: The benchmark it was trained on, a name or a file: the file keeps its table of actions.
@@ -98,14 +98,18 @@ def _layers(model: Any) -> tuple[Layers, str]:
         if not _is("MlpExtractor", policy.mlp_extractor):
             raise TypeError(f"policy.mlp_extractor: {_kind(policy.mlp_extractor)}; MlpExtractor is needed")
         if not _is("CategoricalDistribution", policy.action_dist):
-            raise TypeError(f"policy.action_dist: {_kind(policy.action_dist)}; CategoricalDistribution is needed: discrete actions")
+            raise TypeError(
+                f"policy.action_dist: {_kind(policy.action_dist)}; CategoricalDistribution is needed: discrete actions"
+            )
         return _of_modules([*_flat(policy.mlp_extractor.policy_net), policy.action_net])
     raise TypeError(f"model: {_kind(model)}; of Stable-Baselines3 only PPO, A2C and DQN can be written")
 
 
 def _check_extractor(extractor: Any) -> None:
     if not _is("FlattenExtractor", extractor):
-        raise TypeError(f"policy.features_extractor: {_kind(extractor)}; FlattenExtractor is needed, which MlpPolicy has")
+        raise TypeError(
+            f"policy.features_extractor: {_kind(extractor)}; FlattenExtractor is needed, which MlpPolicy has"
+        )
 
 
 def _flat(module: Any) -> Iterator[Any]:

@@ -20,16 +20,18 @@ Buffers = tuple[Floats, Floats, Bools, Bools, list[dict[str, list[float]]]]
 class RoundaboutPuffer(pufferlib.PufferEnv):
     """Trucks that are stepped together, with the interface of ``pufferlib.PufferEnv`` of PufferLib 3.
 
-    - Observations ``[num_envs, 69]`` float32, actions ``[num_envs]`` integers; a truck whose episode ends begins the next
-      one in the same step.
+    - Observations ``[num_envs, 69]`` float32, actions ``[num_envs]`` integers; a truck whose episode ends begins the
+      next one in the same step.
     - Rewards ``[num_envs]`` float32 are the benchmark's times ``reward_scale``: PufferLib's trainer clamps rewards to
       -1..1, and the benchmark's are -500 to +100.
+    - PufferLib 3.0's trainer cuts the future at ``terminals`` alone: an episode that the time limit ends runs on, for
+      it, into the next one.
     - Infos are a list with one dict where episodes ended: ``is_success``, ``episode_return`` (unscaled) and
       ``episode_length`` (steps of 0.1 s), each a list with one value an episode. It is empty where none ended.
     - ``batch`` is the simulator, with all its columns.
 
-    ``pufferlib.vector.make(RoundaboutPuffer, env_kwargs={"num_envs": 1024}, num_envs=2, backend=...)`` runs two of them in
-    processes of their own, 1,024 trucks each.
+    ``pufferlib.vector.make(RoundaboutPuffer, env_kwargs={"num_envs": 1024}, num_envs=2, backend=...)`` runs two of them
+    in processes of their own, 1,024 trucks each.
 
     Args:
         scenario: Name of a benchmark or path of a file, as for :class:`offtrack_sim.Batch`.
@@ -57,7 +59,9 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
         seed: int = 0,
     ) -> None:
         threads = num_threads
-        self.batch = Batch(scenario, num_envs, split=split, routes=routes, seed=seed, num_threads=threads, device=device)
+        self.batch = Batch(
+            scenario, num_envs, split=split, routes=routes, seed=seed, num_threads=threads, device=device
+        )
         self.single_observation_space = observation_space()
         self.single_action_space = gymnasium.spaces.Discrete(len(self.batch.action_table))
         self.num_agents = num_envs
@@ -70,7 +74,7 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
         super().__init__(buf)
 
     def reset(self, seed: int | None = None) -> tuple[Floats, list[dict[str, list[float]]]]:
-        """Begins an episode of every truck; truck ``i`` draws from the stream ``(seed, i)``, or goes on with its own."""
+        """Begins an episode of every truck; truck ``i`` draws from ``(seed, i)``, or goes on with its own stream."""
         if seed is None and not self._has_begun:
             seed = self._seed
         streams = None if seed is None else [(checked_seed(seed), env) for env in range(self.num_agents)]

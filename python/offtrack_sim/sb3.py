@@ -23,8 +23,8 @@ class RoundaboutVecEnv(VecEnv):
 
     - Observations ``[num_envs, 69]`` float32, actions ``[num_envs]`` integers, rewards ``[num_envs]`` float32.
     - A truck whose episode ends begins the next one in the same step. Its info then has ``terminal_observation``,
-      ``TimeLimit.truncated``, ``is_success``, ``ended`` (:class:`offtrack_sim.Ended`) and ``route``; every other info is
-      empty.
+      ``TimeLimit.truncated``, ``is_success``, ``ended`` (:class:`offtrack_sim.Ended`) and ``route``; all others
+      are empty.
     - ``batch`` is the simulator, with all its columns.
 
     With the same seeds every value is that of ``DummyVecEnv`` with as many :class:`offtrack_sim.Roundabout`. Wrap it in
@@ -59,7 +59,9 @@ class RoundaboutVecEnv(VecEnv):
         if seed is None:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
         threads = num_threads
-        self.batch = Batch(scenario, num_envs, split=split, routes=routes, seed=seed, num_threads=threads, device=device)
+        self.batch = Batch(
+            scenario, num_envs, split=split, routes=routes, seed=seed, num_threads=threads, device=device
+        )
         self.render_mode = render_mode
         self.render_size = render_size
         self._names = self.batch.route_names
@@ -125,14 +127,23 @@ class RoundaboutVecEnv(VecEnv):
     def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
         """Sets an attribute of this environment, for all trucks: none has attributes of its own."""
         if len(self._chosen(indices)) != self.num_envs:
-            raise ValueError(f"{attr_name}: trucks of one batch have no attributes of their own; set it for all, without indices")
+            raise ValueError(
+                f"{attr_name}: trucks of one batch have no attributes of their own; set it for all, without indices"
+            )
         setattr(self, attr_name, value)
 
-    def env_method(self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any) -> list[Any]:
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
+    ) -> list[Any]:
         """Calls a method of the batch that takes a truck's index first, ``render`` alone, for each of the trucks."""
         if method_name != "render":
-            raise AttributeError(f"{method_name}: trucks of one batch have no methods of their own but render; see `batch`")
-        return [self.batch.render(env, *(method_args or (self.render_size,)), **method_kwargs) for env in self._chosen(indices)]
+            raise AttributeError(
+                f"{method_name}: trucks of one batch have no methods of their own but render; see `batch`"
+            )
+        return [
+            self.batch.render(env, *(method_args or (self.render_size,)), **method_kwargs)
+            for env in self._chosen(indices)
+        ]
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:
         """No truck is wrapped on its own."""

@@ -97,7 +97,9 @@ def observations() -> np.ndarray:
 
 @pytest.mark.parametrize("algorithm", [PPO, A2C, DQN])
 @pytest.mark.parametrize("normalised", [False, True])
-def test_a_policy_file_acts_as_the_model_that_it_was_written_from(algorithm: type, normalised: bool, tmp_path: Path) -> None:
+def test_a_policy_file_acts_as_the_model_that_it_was_written_from(
+    algorithm: type, normalised: bool, tmp_path: Path
+) -> None:
     env = VecMonitor(RoundaboutVecEnv(num_envs=8, seed=1))
     if normalised:
         env = VecNormalize(env)
