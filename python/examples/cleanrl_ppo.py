@@ -8,8 +8,7 @@ routes. Ctrl-C ends the training early; what was learned is kept.
 
 CleanRL's own ppo.py works with one line changed, ``envs = gym.vector.SyncVectorEnv(...)`` to
 
-    envs = gym.wrappers.vector.RecordEpisodeStatistics(
-        offtrack_sim.make_vec(num_envs=args.num_envs, seed=args.seed, autoreset_mode="same_step"))
+    envs = offtrack_sim.make_vec(num_envs=args.num_envs, seed=args.seed, autoreset_mode="same_step")
 
 Rewards are multiplied by ``--reward-scale``: the benchmark's are -500 to +100, and a value function learns small
 numbers sooner. Settings were chosen by the success on training routes alone.
@@ -215,6 +214,8 @@ class Progress:
 
 def main() -> None:
     args = arguments("PPO in one file, all trucks stepped together").parse_args()
+    # Networks this small gain little from more threads, and wait for them on a busy machine.
+    torch.set_num_threads(1)
     torch.manual_seed(args.seed)
     envs = offtrack_sim.make_vec(args.scenario, args.envs, seed=args.seed, autoreset_mode="same_step", copy=False)
     n_values = envs.single_observation_space.shape[0]

@@ -4,8 +4,8 @@
 
 Needs ``offtrack-sim`` and ``pufferlib == 3.0.0``, with numpy below 2 and gymnasium 0.29.1; tests/consumers/run.py shows
 an installation without PufferLib's own environments, which its setup would download. Writes ``puffer.safetensors``,
-which ``offtrack evaluate --policy puffer.safetensors`` drives, and ``puffer.json`` with the curve and the success on the test
-routes. Ctrl-C ends the training early; what was learned is kept.
+which ``offtrack evaluate --policy puffer.safetensors`` drives, and ``puffer.json`` with the curve and the success on
+the test routes. Ctrl-C ends the training early; what was learned is kept.
 
 The trainer clamps rewards to -1..1: ``RoundaboutPuffer`` multiplies them by ``--reward-scale``, 0.002, which makes a
 failure -1. The trainer of 3.0.0 lets the value run on over the end of an episode that the time limit ended.
@@ -83,6 +83,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("puffer"), help="files to write, without their endings")
     args = parser.parse_args()
 
+    # Networks this small gain little from more threads, and wait for them on a busy machine.
+    torch.set_num_threads(1)
     torch.manual_seed(args.seed)
     warnings.filterwarnings("ignore", message=".*CUDA.*")
     kwargs = {"scenario": args.scenario, "num_envs": args.envs, "num_threads": None, "reward_scale": args.reward_scale}

@@ -17,6 +17,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
@@ -76,6 +77,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("sb3"), help="files to write, without their endings")
     args = parser.parse_args()
 
+    # Networks this small gain little from more threads, and wait for them on a busy machine.
+    torch.set_num_threads(1)
     settings = {
         "n_steps": 64,
         "batch_size": 2048,
