@@ -1,0 +1,156 @@
+"""Trucks as a vector environment of Stable-Baselines3, which takes no vector environment of Gymnasium."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+from stable_baselines3.common.vec_env import VecEnv
+
+from .batch import Batch, Bools, Ended, Floats, checked_seed
+from .single import check_render_mode, checked_options, observation_space
+
+Indices = int | Iterable[int] | None
+
+
+class RoundaboutVecEnv(VecEnv):
+    """Trucks that are stepped together, with the interface of ``stable_baselines3.common.vec_env.VecEnv``.
+
+    - Observations ``[num_envs, 69]`` float32, actions ``[num_envs]`` integers, rewards ``[num_envs]`` float32.
+    - A truck whose episode ends begins the next one in the same step. Its info then has ``terminal_observation``,
+      ``TimeLimit.truncated``, ``is_success``, ``ended`` (:class:`offtrack_sim.Ended`) and ``route``; all others
+      are empty.
+    - ``batch`` is the simulator, with all its columns.
+
+    With the same seeds every value is that of ``DummyVecEnv`` with as many :class:`offtrack_sim.Roundabout`. Wrap it in
+    ``VecMonitor`` for returns and lengths of episodes, and in ``VecNormalize`` for rewards that a learner can fit: the
+    benchmark's are -500 to +100.
+
+    Args:
+        scenario: Name of a benchmark or path of a file, as for :class:`offtrack_sim.Batch`.
+        num_envs: Number of trucks.
+        split: Routes that episodes are drawn from.
+        routes: Names of routes or roundabouts in place of a split.
+        seed: Seed where :meth:`reset` is called without :meth:`seed`; None: another one each time.
+        num_threads: Threads that step the trucks; None for one a core.
+        device: ``"cpu"``, ``"gpu"`` or part of an adapter's name.
+        render_mode: None, or ``"rgb_array"`` for pictures of ``render_size`` pixels a side.
+    """
+
+    def __init__(
+        self,
+        scenario: str | os.PathLike[str] = "attard2023",
+        num_envs: int = 1,
+        *,
+        split: str = "train",
+        routes: Iterable[str] | None = None,
+        seed: int | None = None,
+        num_threads: int | None = None,
+        device: str = "cpu",
+        render_mode: str | None = None,
+        render_size: int = 480,
+    ) -> None:
+        check_render_mode(render_mode)
+        if seed is None:
+            seed = int(np.random.SeedSequence().generate_state(1)[0])
+        threads = num_threads
+        self.batch = Batch(
+            scenario, num_envs, split=split, routes=routes, seed=seed, num_threads=threads, device=device
+        )
+        self.render_mode = render_mode
+        self.render_size = render_size
+        self._names = self.batch.route_names
+        self._streams: list[tuple[int, int] | None] = [(seed, env) for env in range(num_envs)]
+        super().__init__(num_envs, observation_space(), gymnasium.spaces.Discrete(len(self.batch.action_table)))
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Gives truck ``i`` the seed ``seed + i`` at the next reset, as an environment of one truck has with it."""
+        first = int(np.random.randint(2**32, dtype=np.uint32)) if seed is None else checked_seed(seed)
+        self._seeds: list[int | None] = [(first + env) % 2**32 for env in range(self.num_envs)]
+        return self._seeds
+
+    def reset(self) -> Floats:
+        """Begins an episode of every truck; ``set_options`` states the ``route`` and ``start`` of some or all."""
+        options = [checked_options(own, "route", "start") for own in self._options]
+        streams = [later if seed is None else (seed, 0) for seed, later in zip(self._seeds, self._streams)]
+        routes, starts = ([own.get(key) for own in options] for key in ("route", "start"))
+        self.batch.begin(streams=streams, routes=routes, starts=starts)
+        # From now on each truck goes on in its stream.
+        self._streams = [None] * self.num_envs
+        self.reset_infos = [{"route": self._names[route]} for route in self.batch.routes()]
+        self._reset_seeds()
+        self._reset_options()
+        return self.batch.observation()
+
+    def step_async(self, actions: npt.NDArray[Any]) -> None:
+        """Keeps the actions; :meth:`step_wait` steps."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[Floats, Floats, Bools, list[dict[str, Any]]]:
+        """One step of every truck, 0.1 s."""
+        observation, reward, terminated, truncated = self.batch.step(self._actions)
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        ends = self.batch.ended()
+        if ends is not None:
+            begun = self.batch.routes()
+            for env, code, route, last in zip(*ends):
+                infos[env] = {
+                    "terminal_observation": last,
+                    "TimeLimit.truncated": bool(truncated[env] and not terminated[env]),
+                    "is_success": bool(code == Ended.ARRIVED),
+                    "ended": int(code),
+                    "route": self._names[route],
+                }
+                self.reset_infos[env] = {"route": self._names[begun[env]]}
+        return observation, reward, terminated | truncated, infos
+
+    def close(self) -> None:
+        """Nothing is left open."""
+
+    def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
+        """A picture of every truck, uint8 ``[render_size, render_size, 3]``; None each without a render mode."""
+        if self.render_mode is None:
+            warnings.warn('render_mode is None; "rgb_array" is needed for pictures', stacklevel=2)
+            return [None] * self.num_envs
+        return [self.batch.render(env, self.render_size) for env in range(self.num_envs)]
+
+    def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
+        """An attribute of the batch or of this environment, once for each of the trucks: it is the same for all."""
+        owner = self if hasattr(self, attr_name) else self.batch
+        return [getattr(owner, attr_name) for _ in self._chosen(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
+        """Sets an attribute of this environment, for all trucks: none has attributes of its own."""
+        if len(self._chosen(indices)) != self.num_envs:
+            raise ValueError(
+                f"{attr_name}: trucks of one batch have no attributes of their own; set it for all, without indices"
+            )
+        setattr(self, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Calls a method of the batch that takes a truck's index first, ``render`` alone, for each of the trucks."""
+        if method_name != "render":
+            raise AttributeError(
+                f"{method_name}: trucks of one batch have no methods of their own but render; see `batch`"
+            )
+        return [
+            self.batch.render(env, *(method_args or (self.render_size,)), **method_kwargs)
+            for env in self._chosen(indices)
+        ]
+
+    def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:
+        """No truck is wrapped on its own."""
+        return [False for _ in self._chosen(indices)]
+
+    def _chosen(self, indices: Indices) -> list[int]:
+        """The trucks meant."""
+        if indices is None:
+            return list(range(self.num_envs))
+        return [int(indices)] if isinstance(indices, (int, np.integer)) else [int(env) for env in indices]
