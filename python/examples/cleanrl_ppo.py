@@ -22,10 +22,10 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from results import about, write_json
 from torch import nn
 
 import offtrack_sim
-from evaluation import about, evaluate, write_json
 from offtrack_sim import export
 
 
@@ -194,6 +194,7 @@ class Progress:
         seconds = time.perf_counter() - self.start
         file = args.out.with_suffix(".safetensors")
         export.save(file, agent.actor, scenario=args.scenario)
+        policy = offtrack_sim.Policy.load(file)
         result = {
             "example": kind,
             **about("numpy", "torch", *packages),
@@ -203,7 +204,7 @@ class Progress:
             "env_steps_per_second": round(self.env_steps / seconds),
             "env_steps_per_second_median": float(np.median([row["env_steps_per_second"] for row in self.curve] or [0])),
             **(extra or {}),
-            "evaluation": evaluate(offtrack_sim.Policy.load(file).act, args.benchmark, args.split),
+            "evaluation": offtrack_sim.evaluate(policy, args.benchmark, split=args.split).as_dict(),
             "curve": self.curve,
         }
         write_json(args.out.with_suffix(".json"), result)

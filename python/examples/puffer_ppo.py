@@ -23,10 +23,10 @@ import numpy as np
 import pufferlib.pufferl
 import pufferlib.vector
 import torch
+from results import about, write_json
 from torch import nn
 
 import offtrack_sim
-from evaluation import about, evaluate, write_json
 from offtrack_sim import export
 from offtrack_sim.puffer import RoundaboutPuffer
 
@@ -143,7 +143,7 @@ def main() -> None:
         "seconds": round(seconds, 1),
         "env_steps_per_second": round(trainer.global_step / seconds),
         "env_steps_per_second_median": float(np.median([row["env_steps_per_second"] for row in curve] or [0])),
-        "evaluation": evaluate(offtrack_sim.Policy.load(file).act, args.benchmark, args.split),
+        "evaluation": offtrack_sim.evaluate(offtrack_sim.Policy.load(file), args.benchmark, split=args.split).as_dict(),
         "curve": curve,
     }
     write_json(args.out.with_suffix(".json"), result)

@@ -32,8 +32,8 @@ from typing import NamedTuple
 import numpy as np
 import ray
 import torch
-
 from cleanrl_ppo import Agent, Fragment, Progress, arguments, update
+
 from offtrack_sim import Batch, Ended
 
 

@@ -25,9 +25,9 @@ from gymnasium.vector import VectorWrapper
 from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig
 from ray.tune.registry import register_env
+from results import about, write_json
 
 import offtrack_sim
-from evaluation import about, evaluate, write_json
 from offtrack_sim import Ended, export
 
 
@@ -161,7 +161,7 @@ def main() -> None:
         "seconds": round(seconds, 1),
         "env_steps_per_second": round(env_steps / seconds),
         "env_steps_per_second_median": float(np.median([row["env_steps_per_second"] for row in curve] or [0])),
-        "evaluation": evaluate(offtrack_sim.Policy.load(file).act, args.benchmark, args.split),
+        "evaluation": offtrack_sim.evaluate(offtrack_sim.Policy.load(file), args.benchmark, split=args.split).as_dict(),
         "curve": curve,
     }
     write_json(args.out.with_suffix(".json"), result)

@@ -18,12 +18,12 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from results import about, write_json
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
 import offtrack_sim
-from evaluation import about, evaluate, write_json
 from offtrack_sim import export
 from offtrack_sim.sb3 import RoundaboutVecEnv
 
@@ -111,7 +111,7 @@ def main() -> None:
         "seconds": round(seconds, 1),
         "env_steps_per_second": round(model.num_timesteps / seconds),
         "env_steps_per_second_median": float(np.median([row["env_steps_per_second"] for row in curve.rows] or [0])),
-        "evaluation": evaluate(offtrack_sim.Policy.load(file).act, args.benchmark, args.split),
+        "evaluation": offtrack_sim.evaluate(offtrack_sim.Policy.load(file), args.benchmark, split=args.split).as_dict(),
         "curve": curve.rows,
     }
     write_json(args.out.with_suffix(".json"), result)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -36,6 +37,13 @@ class Evaluation:
         return float((self.ended == Ended.ARRIVED).mean())
 
     @property
+    def success_interval(self) -> tuple[float, float]:
+        """Wilson's 95 % interval of that fraction."""
+        n, fraction, z = self.ended.size, self.success, 1.959964
+        middle, half = fraction + z * z / (2 * n), z * math.sqrt(fraction * (1 - fraction) / n + z * z / (4 * n * n))
+        return (middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n)
+
+    @property
     def success_by_route(self) -> dict[str, float]:
         """The same for each route."""
         arrived = (self.ended == Ended.ARRIVED).mean(axis=1)
@@ -46,6 +54,22 @@ class Evaluation:
         """Episodes by why they ended."""
         counted = Counter(int(code) for code in self.ended.ravel())
         return {ended.name.lower(): counted[ended] for ended in Ended if counted[ended]}
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same for a JSON file, with the keys of ``offtrack evaluate --json``."""
+        low, high = self.success_interval
+        return {
+            "benchmark": self.scenario,
+            "split": self.split,
+            "seed": self.seed,
+            "episodes": self.ended.size,
+            "arrived": self.counts.get("arrived", 0),
+            "success": self.success,
+            "success_low": low,
+            "success_high": high,
+            "ends": {ended.name.lower(): self.counts.get(ended.name.lower(), 0) for ended in Ended if ended},
+            "routes": self.success_by_route,
+        }
 
     def __str__(self) -> str:
         arrived = int((self.ended == Ended.ARRIVED).sum())

@@ -8,6 +8,9 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 
+# Run by tests/consumers/run.py, where the learning libraries are installed.
+collect_ignore = ["consumers"]
+
 
 @pytest.fixture
 def short_benchmark(tmp_path: Path) -> str:

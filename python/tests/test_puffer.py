@@ -19,6 +19,10 @@ N = 16
 class StandIn:
     """What ``pufferlib.PufferEnv`` of 3.0 demands and makes: spaces of one agent before, buffers after."""
 
+    num_agents: int
+    single_observation_space: Any
+    single_action_space: Any
+
     def __init__(self, buf: Any = None) -> None:
         assert self.num_agents >= 1 and self.single_observation_space.shape == (69,) and self.single_action_space.n > 1
         assert not hasattr(self, "observation_space") and not hasattr(self, "action_space")
@@ -80,7 +84,10 @@ def test_the_first_reset_is_that_of_its_seed_and_later_ones_go_on(puffer: types.
 
 
 def test_results_go_into_the_buffers_that_were_given(puffer: types.ModuleType) -> None:
-    buffers = {"observations": np.zeros((2 * N, 69), np.float32)[N:], "rewards": np.zeros(2 * N, np.float32)[N:]}
+    buffers: dict[str, Any] = {
+        "observations": np.zeros((2 * N, 69), np.float32)[N:],
+        "rewards": np.zeros(2 * N, np.float32)[N:],
+    }
     buffers |= {name: np.zeros(2 * N, bool)[N:] for name in ("terminals", "truncations", "masks")}
     buffers |= {"actions": np.zeros(2 * N, np.int32)[N:]}
     env = puffer.RoundaboutPuffer(num_envs=N, buf=buffers)

@@ -22,7 +22,8 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-PYTHON = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent
+PYTHON = HERE.parents[1]
 
 
 class Consumer(NamedTuple):
@@ -42,7 +43,7 @@ CONSUMERS = [
     Consumer("rllib_ppo", "ray", 128, ["--runners", "2", "--envs", "64", "--steps", "3000000"]),
 ]
 PACKAGES = {
-    "sb3": ["stable-baselines3", "matplotlib"],
+    "sb3": ["stable-baselines3", "matplotlib", "moviepy", "pytest"],
     "ray": ["ray[rllib]", "gymnasium==1.2.2"],
     # All that PufferLib 3.0.0 names, besides torch.
     "puffer": [
@@ -98,7 +99,7 @@ def make(cache: Path, name: str) -> Path:
     if name != "sb3":
         make(cache, "sb3")
         (site / "zz_torch.pth").write_text(str(cache / "sb3" / "lib" / version / "site-packages") + "\n")
-    install = [python, "-m", "pip", "install", "--quiet"]
+    install: list[str | Path] = [python, "-m", "pip", "install", "--quiet"]
     # Without this what the .pth file shows would count as installed.
     own = ["--ignore-installed"] if name == "puffer" else []
     if name == "puffer":
@@ -117,7 +118,7 @@ def make(cache: Path, name: str) -> Path:
 
 def native(python: Path, n_envs: int, seconds: float) -> int:
     """Env steps a second of the simulator alone, with random actions drawn before and all arrays reused."""
-    command = [python, "-c", NATIVE, str(n_envs), str(seconds)]
+    command: list[str | Path] = [python, "-c", NATIVE, str(n_envs), str(seconds)]
     return int(subprocess.run(command, check=True, capture_output=True, text=True, env=with_package()).stdout)
 
 
@@ -130,7 +131,7 @@ def run(consumer: Consumer, args: argparse.Namespace, folder: Path) -> dict[str,
     python = make(args.cache, consumer.environment)
     out = folder / consumer.name
     before = native(python, consumer.n_envs, 3.0)
-    command = [
+    command: list[str | Path] = [
         python,
         PYTHON / "examples" / f"{consumer.name}.py",
         "--minutes",
@@ -184,6 +185,18 @@ def main() -> None:
         "success": "in the curve, of training episodes with actions drawn at random; in the evaluation, greedy",
         "consumers": [],
     }
+    # The tests that need a learning library: the adapter of Stable-Baselines3, exports, and the whole tutorial.
+    tests: list[str | Path] = [
+        make(args.cache, "sb3"),
+        "-m",
+        "pytest",
+        "-q",
+        "--noconftest",
+        "-p",
+        "no:cacheprovider",
+        HERE,
+    ]
+    subprocess.run(tests, check=True, env=with_package(), cwd=HERE)
     with tempfile.TemporaryDirectory() as folder:
         for consumer in CONSUMERS:
             if args.only is not None and consumer.name not in args.only:

@@ -1,4 +1,4 @@
-"""Trucks for Stable-Baselines3, and networks that it trained as policy files. Skipped where it is not installed."""
+"""Trucks for Stable-Baselines3, and networks that it trained as policy files: run by run.py."""
 
 from __future__ import annotations
 
@@ -6,17 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
+from stable_baselines3 import A2C, DQN, PPO
+from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
 
 import offtrack_sim
 from offtrack_sim import export
-
-pytest.importorskip("stable_baselines3")
-torch = pytest.importorskip("torch")
-
-from stable_baselines3 import A2C, DQN, PPO  # noqa: E402
-from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize  # noqa: E402
-
-from offtrack_sim.sb3 import RoundaboutVecEnv  # noqa: E402
+from offtrack_sim.sb3 import RoundaboutVecEnv
 
 N = 12
 
