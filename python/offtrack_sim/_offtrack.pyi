@@ -68,6 +68,7 @@ class Batch:
     def last_ended(
         self,
     ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.float32]] | None: ...
+    def end_infos(self) -> dict[str, Any] | None: ...
     def begin_episodes(
         self,
         envs: list[int],

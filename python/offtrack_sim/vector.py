@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from .batch import N_VALUES, Batch, Ended, Ends, checked_seed, mode_name
+from .batch import N_VALUES, Batch, checked_seed, mode_name
 from .single import check_render_mode, checked_options, frames_per_second, observation_space
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class RoundaboutVector(Base):
         self._names = np.array(self.batch.route_names, dtype=object)
         self._outputs = None if copy else _outputs(num_envs)
         self._seed = seed
-        self._is_next_step = mode == "next_step"
+        self._is_next_step, self._is_same_step = mode == "next_step", mode == "same_step"
         self._has_begun = False
         # Trucks that wait for their next episode.
         self._has_ended = np.zeros(num_envs, dtype=np.bool_)
@@ -135,7 +135,9 @@ class RoundaboutVector(Base):
         self._has_begun = True
         self._has_ended[envs] = False
         infos: dict[str, Any] = {}
-        self._put(infos, "route", np.array(envs), self._names[self.batch.routes()[envs]])
+        begun = np.zeros(self.num_envs, dtype=np.bool_)
+        begun[envs] = True
+        self._put_routes(infos, begun)
         return self._observation(), infos
 
     def step(
@@ -154,26 +156,12 @@ class RoundaboutVector(Base):
         else:
             observation, reward, terminated, truncated = self._outputs
             self.batch.step_into(actions, observation, reward, terminated, truncated)
-        infos: dict[str, Any] = {}
+        infos = self.batch.end_infos() or {}
         if self._is_next_step and self._has_ended.any():
             # These have begun another episode in this step.
-            envs = np.flatnonzero(self._has_ended)
-            self._put(infos, "route", envs, self._names[self.batch.routes()[envs]])
-            self._has_ended[:] = False
-        ends = self.batch.ended()
-        if ends is not None:
-            if self.autoreset_mode == AutoresetMode.SAME_STEP:
-                final: dict[str, Any] = {}
-                self._put_ends(final, ends)
-                last = np.full(self.num_envs, None, dtype=object)
-                for env, values in zip(ends.envs, ends.observations):
-                    last[env] = values
-                mask = self._mask(ends.envs)
-                infos = {"final_obs": last, "_final_obs": mask, "final_info": final, "_final_info": mask.copy()}
-                self._put(infos, "route", ends.envs, self._names[self.batch.routes()[ends.envs]])
-            else:
-                self._put_ends(infos, ends)
-                self._has_ended[ends.envs] = True
+            self._put_routes(infos, self._has_ended)
+        if not self._is_same_step:
+            self._has_ended = terminated | truncated
         return observation, reward, terminated, truncated, infos
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
@@ -192,23 +180,14 @@ class RoundaboutVector(Base):
         self._outputs[0][...] = found
         return self._outputs[0]
 
-    def _mask(self, envs: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-        mask = np.zeros(self.num_envs, dtype=np.bool_)
-        mask[envs] = True
-        return mask
-
-    def _put(self, infos: dict[str, Any], key: str, envs: npt.NDArray[np.int64], values: npt.NDArray[Any]) -> None:
-        """Adds values of some trucks to what infos has of others."""
-        if key not in infos:
-            infos[key] = np.full(self.num_envs, None if values.dtype == object else 0, dtype=values.dtype)
-            infos["_" + key] = np.zeros(self.num_envs, dtype=np.bool_)
-        infos[key][envs] = values
-        infos["_" + key][envs] = True
-
-    def _put_ends(self, infos: dict[str, Any], ends: Ends) -> None:
-        self._put(infos, "ended", ends.envs, ends.codes)
-        self._put(infos, "is_success", ends.envs, ends.codes == Ended.ARRIVED)
-        self._put(infos, "route", ends.envs, self._names[ends.routes])
+    def _put_routes(self, infos: dict[str, Any], begun: npt.NDArray[np.bool_]) -> None:
+        """Adds the routes of trucks that have begun to what infos has of others."""
+        routes = infos.get("route")
+        if routes is None:
+            # An empty array of objects holds None.
+            routes = infos["route"] = np.empty(self.num_envs, dtype=object)
+        routes[begun] = self._names[self.batch.routes()[begun]]
+        infos["_route"] = begun | infos.get("_route", False)
 
 
 def make_vec(

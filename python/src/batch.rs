@@ -10,8 +10,9 @@ use offtrack::shared::Named;
 use offtrack::simulator::{Autoreset, Begin, Engine, RouteChoice, Simulator};
 use offtrack_drawing::camera::{Camera, Shown};
 use pyo3::exceptions::{PyIndexError, PyMemoryError, PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyString};
 
 use crate::pool::Pool;
 use crate::worlds::Place;
@@ -33,6 +34,8 @@ type Ends<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'p
 #[pyclass(subclass, frozen, module = "offtrack_sim._offtrack")]
 pub struct Batch {
     place: Place,
+    /// Names of the world's routes.
+    names: Vec<Py<PyString>>,
     n_envs: usize,
     device: String,
     autoreset: Autoreset,
@@ -95,7 +98,8 @@ impl Batch {
         simulator.set_autoreset(autoreset);
         let mut state = State { simulator, pool, camera: None, routes: Vec::new(), held: Vec::new(), ends: Vec::new() };
         state.look()?;
-        Ok(Batch { place, n_envs, device, autoreset, state: Mutex::new(state) })
+        let names = place.world.route_names.iter().map(|name| PyString::new(py, name).unbind()).collect();
+        Ok(Batch { place, names, n_envs, device, autoreset, state: Mutex::new(state) })
     }
 
     #[getter]
@@ -222,6 +226,56 @@ impl Batch {
             of(|end| end.route.into()),
             PyArray1::from_vec(py, observations).reshape([state.ends.len(), N_VALUES])?,
         )))
+    }
+
+    /// The episodes that the last step ended as Gymnasium's infos, None where it ended none: an array `key` and a mask
+    /// `_key` of all trucks. With `autoreset` in the same step those of the end are in `final_info`.
+    fn end_infos<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let state = self.state()?;
+        if state.ends.is_empty() {
+            return Ok(None);
+        }
+        let none = || -> Vec<Py<PyAny>> { (0..self.n_envs).map(|_| py.None()).collect() };
+        let name = |route: u32| self.names[route as usize].clone_ref(py).into_any();
+        let mut mask = vec![false; self.n_envs];
+        let mut codes = vec![0i64; self.n_envs];
+        let mut successes = vec![false; self.n_envs];
+        let (mut routes, mut begun, mut last) = (none(), Vec::new(), Vec::new());
+        for End { env, code, route, .. } in &state.ends {
+            mask[*env] = true;
+            codes[*env] = i64::from(*code);
+            successes[*env] = *code == Ended::Arrived as u32;
+            routes[*env] = name(*route);
+        }
+        let mask = PyArray1::from_vec(py, mask);
+        let infos = PyDict::new(py);
+        for (key, masked, values) in [
+            (intern!(py, "ended"), intern!(py, "_ended"), PyArray1::from_vec(py, codes).into_any()),
+            (intern!(py, "is_success"), intern!(py, "_is_success"), PyArray1::from_vec(py, successes).into_any()),
+            (intern!(py, "route"), intern!(py, "_route"), PyArray1::from_vec(py, routes).into_any()),
+        ] {
+            infos.set_item(key, values)?;
+            infos.set_item(masked, &mask)?;
+        }
+        if self.autoreset != Autoreset::SameStep {
+            return Ok(Some(infos));
+        }
+        begun.extend(none());
+        last.extend(none());
+        for End { env, observation, .. } in &state.ends {
+            begun[*env] = name(state.routes[*env]);
+            last[*env] = PyArray1::from_slice(py, observation).into_any().unbind();
+        }
+        let with_final = PyDict::new(py);
+        for (key, masked, values) in [
+            (intern!(py, "final_obs"), intern!(py, "_final_obs"), PyArray1::from_vec(py, last).into_any()),
+            (intern!(py, "final_info"), intern!(py, "_final_info"), infos.into_any()),
+            (intern!(py, "route"), intern!(py, "_route"), PyArray1::from_vec(py, begun).into_any()),
+        ] {
+            with_final.set_item(key, values)?;
+            with_final.set_item(masked, &mask)?;
+        }
+        Ok(Some(with_final))
     }
 
     fn begin_episodes(
