@@ -13,11 +13,14 @@ use pyo3::exceptions::{PyIndexError, PyMemoryError, PyRuntimeError, PyTypeError,
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
+use rayon::prelude::*;
 
 use crate::pool::Pool;
 use crate::worlds::Place;
 use crate::{actions, errors};
 
+/// Rows of observations that a thread copies at least.
+const ROWS_MIN: usize = 64;
 /// The device that is none.
 const CPU: &str = "cpu";
 /// What is read after a step, the last of them only where observations were replaced in the step.
@@ -160,11 +163,14 @@ impl Batch {
     fn step<'py>(&self, py: Python<'py>, actions: &Bound<'py, PyAny>) -> PyResult<Step<'py>> {
         let actions = actions::of_array(actions, self.n_envs, &self.place.world.actions)?;
         let mut state = self.state()?;
-        let read = state.step(py, self, &actions)?;
-        let codes = values::<u32>(&read[2]);
-        let flags = |is: fn(Ended) -> bool| PyArray1::from_iter(py, codes.iter().map(move |&code| holds(code, is)));
-        let reward = PyArray1::from_slice(py, &values::<f32>(&read[1]));
-        Ok((self.rows(py, &read[0])?, reward, flags(Ended::terminated), flags(Ended::truncated)))
+        let (observation, reward, terminated, truncated) = state.step(py, self, &actions, |observation, reward, codes| {
+            let observation: Vec<[f32; N_VALUES]> = observation.par_iter().with_min_len(ROWS_MIN).copied().collect();
+            let flags = |is: fn(Ended) -> bool| -> Vec<bool> { codes.iter().map(|&code| holds(code, is)).collect() };
+            (observation.into_flattened(), reward.to_vec(), flags(Ended::terminated), flags(Ended::truncated))
+        })?;
+        let vector = |flags| PyArray1::from_vec(py, flags);
+        let observation = PyArray1::from_vec(py, observation).reshape([self.n_envs, N_VALUES])?;
+        Ok((observation, PyArray1::from_vec(py, reward), vector(terminated), vector(truncated)))
     }
 
     fn step_into(
@@ -188,17 +194,20 @@ impl Batch {
         let mut terminated = writable::<bool>(terminated, "terminated", "bool", n_envs)?;
         let mut truncated = writable::<bool>(truncated, "truncated", "bool", n_envs)?;
         let mut state = self.state()?;
-        let read = state.step(py, self, &actions)?;
-        observation.copy_from_slice(&values::<f32>(&read[0]));
-        let codes = values::<u32>(&read[2]);
         let contiguous = |_| unfit("an output", "contiguous");
-        reward.as_slice_mut().map_err(contiguous)?.copy_from_slice(&values::<f32>(&read[1]));
-        let (terminated, truncated) = (terminated.as_slice_mut().map_err(contiguous)?, truncated.as_slice_mut().map_err(contiguous)?);
-        for ((terminated, truncated), &code) in terminated.iter_mut().zip(truncated).zip(codes.iter()) {
-            *terminated = holds(code, Ended::terminated);
-            *truncated = holds(code, Ended::truncated);
-        }
-        Ok(())
+        let (observation, _) = observation.as_chunks_mut::<N_VALUES>();
+        let reward = reward.as_slice_mut().map_err(contiguous)?;
+        let terminated = terminated.as_slice_mut().map_err(contiguous)?;
+        let truncated = truncated.as_slice_mut().map_err(contiguous)?;
+        state.step(py, self, &actions, |new_observation, new_reward, codes| {
+            let rows = observation.par_iter_mut().with_min_len(ROWS_MIN).zip(new_observation);
+            rows.for_each(|(row, new)| *row = *new);
+            reward.copy_from_slice(new_reward);
+            for ((terminated, truncated), &code) in terminated.iter_mut().zip(truncated).zip(codes) {
+                *terminated = holds(code, Ended::terminated);
+                *truncated = holds(code, Ended::truncated);
+            }
+        })
     }
 
     fn step_at_random(&self, py: Python) -> PyResult<()> {
@@ -411,8 +420,15 @@ impl Batch {
 }
 
 impl State {
-    /// Steps all trucks, and gives observation, reward and end code of each as bytes.
-    fn step(&mut self, py: Python, batch: &Batch, actions: &[u32]) -> PyResult<Vec<Cow<'_, [u8]>>> {
+    /// Steps all trucks, and hands observation, reward and end code of each to `deliver`, on the pool's threads: these
+    /// fall asleep where the caller's own does the work.
+    fn step<T: Send>(
+        &mut self,
+        py: Python,
+        batch: &Batch,
+        actions: &[u32],
+        deliver: impl FnOnce(&[[f32; N_VALUES]], &[f32], &[u32]) -> T + Send,
+    ) -> PyResult<T> {
         self.check_process(&batch.device)?;
         let State { simulator, pool, ends, routes, held, .. } = self;
         if batch.autoreset == Autoreset::Disabled
@@ -420,17 +436,28 @@ impl State {
         {
             return Err(errors::reset_needed(py, &format!("truck {env}: its episode has ended; begin another before the next step")));
         }
-        pool.run(py, || simulator.step(actions))?.map_err(|error| errors::of_simulator(&error))?;
-        let n_read = if batch.autoreset == Autoreset::SameStep { READ.len() } else { READ.len() - 1 };
-        let read = simulator.read(&READ[..n_read]).map_err(|error| errors::of_simulator(&error))?;
-        let (codes, trucks) = (values::<u32>(&read[2]), values::<Truck>(&read[3]));
-        let last = values::<[f32; N_VALUES]>(if n_read == READ.len() { &read[4] } else { &read[0] });
-        ends.clear();
-        for (env, &code) in codes.iter().enumerate().filter(|&(_, &code)| code != Ended::Running as u32) {
-            ends.push(End { env, code, route: routes[env], observation: last[env] });
-        }
-        see(&trucks, routes, held);
-        Ok(read)
+        let same_step = batch.autoreset == Autoreset::SameStep;
+        let stepped = pool.run(py, || {
+            simulator.step(actions)?;
+            let read = simulator.read(if same_step { &READ[..] } else { &READ[..READ.len() - 1] })?;
+            let (observation, codes, trucks) = (values(&read[0]), values::<u32>(&read[2]), values::<Truck>(&read[3]));
+            let last = if same_step { values(&read[4]) } else { Cow::Borrowed(&*observation) };
+            if batch.autoreset == Autoreset::NextStep {
+                // Those that ended in the step before have begun, and no other is on another route.
+                for End { env, .. } in &*ends {
+                    routes[*env] = trucks[*env].route;
+                    held[*env] = false;
+                }
+            }
+            ends.clear();
+            for (env, &code) in codes.iter().enumerate().filter(|&(_, &code)| code != Ended::Running as u32) {
+                ends.push(End { env, code, route: routes[env], observation: last[env] });
+                routes[env] = trucks[env].route;
+                held[env] = trucks[env].held == 1;
+            }
+            Ok(deliver(&observation, &values(&read[1]), &codes))
+        })?;
+        stepped.map_err(|error| errors::of_simulator(&error))
     }
 
     /// Looks at where trucks are after they were put there.

@@ -86,24 +86,29 @@ def test_a_step_into_arrays_gives_what_a_step_returns() -> None:
     assert fragment[0].any() and fragment[1].any()
 
 
-def test_what_ended_is_told_once_with_the_last_observation() -> None:
-    batch = Batch(num_envs=64, seed=4)
-    told = 0
-    for _ in range(200):
-        routes = batch.routes()
-        before = batch.tally()["episodes"]
+@pytest.mark.parametrize("autoreset", ["same_step", "next_step"])
+def test_what_ended_is_told_once_with_the_last_observation(autoreset: str) -> None:
+    # Where trucks start on a kerb, episodes of one step follow each other.
+    routes = ["50m/E-right-1", "50m/NE-right-1", "50m/E-left-3"]
+    batch = Batch("attard2023-as-run", 64, routes=routes, seed=4, autoreset=autoreset)
+    told, of_one_step = 0, 0
+    for _ in range(300):
+        before = batch.columns("truck")["truck"]
+        episodes = batch.tally()["episodes"]
+        assert (batch.routes() == before["route"]).all()
         terminated = batch.step(np.full(64, 0))[2]
         ends = batch.ended()
-        assert (batch.tally()["episodes"] - before) == (0 if ends is None else len(ends.envs))
+        assert (batch.tally()["episodes"] - episodes) == (0 if ends is None else len(ends.envs))
         if ends is None:
             continue
         told += len(ends.envs)
-        assert terminated[ends.envs].all() and (ends.routes == routes[ends.envs]).all()
+        of_one_step += int((before["steps"][ends.envs] == 0).sum())
+        assert terminated[ends.envs].all() and (ends.routes == before["route"][ends.envs]).all()
         assert (ends.observations == batch.columns("next_observation")["next_observation"][ends.envs]).all()
         assert (ends.codes == batch.columns("ended")["ended"][ends.envs]).all() and (ends.codes != Ended.RUNNING).all()
         # Nothing has happened since: it is told again, and a step later no more.
         assert batch.ended() is not None
-    assert 100 < told
+    assert 100 < told and 10 < of_one_step
 
 
 def test_a_state_is_restored_bit_for_bit_with_its_streams() -> None:

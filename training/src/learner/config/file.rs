@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::reader::{Reader, TEXT_LIMIT, read_text};
+use offtrack::reader::{self, Reader, TEXT_LIMIT, read_text};
 use toml::{Table, Value};
 
 use super::set;
@@ -45,7 +45,14 @@ fn with_bases(file: &Path, depth: usize) -> Result<Table, Error> {
         true => PathBuf::from(base.trim_end_matches(".toml")),
         false => beside(file, &base),
     };
-    let mut merged = with_bases(&path, depth + 1)?;
+    let mut merged = with_bases(&path, depth + 1).map_err(|error| match &error {
+        Error::Input(reader::Error::Unreadable { file: missing, .. }) if *missing == path => {
+            let known = SHIPPED.map(|(name, _)| name).join(", ");
+            let expected = format!("{error}; must be a path ending in .toml, relative to this file, or one of {known}");
+            invalid(format!("{base:?}"), expected).into()
+        }
+        _ => error,
+    })?;
     for key in without(file, &mut table)? {
         let removed = set::remove(&mut merged, &key);
         if !removed {

@@ -250,7 +250,8 @@ fn a_file_gives_only_what_differs_from_its_base() {
     for (file, expected) in [
         ("circle.toml", "base: \"circle.toml\"; at most 8 files may follow each other"),
         ("wrong.toml", "base: 3; must be the name or the path"),
-        ("missing.toml", "no.toml: cannot be read"),
+        ("missing.toml", "missing.toml: base: \"no.toml\"; "),
+        ("missing.toml", "must be a path ending in .toml, relative to this file, or one of default, best"),
     ] {
         let message = read(file).unwrap_err();
         assert!(message.contains(expected), "{message}");
