@@ -1,5 +1,7 @@
 //! Arrays of actions: integers of any width, checked as they were given.
 
+use std::fmt::Display;
+
 use numpy::{Element, PyReadonlyArray1};
 use offtrack::layout::Action;
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -12,34 +14,40 @@ use pyo3::prelude::*;
 /// `TypeError` for anything but a one-dimensional numpy array of integers, `ValueError` for another length or an action
 /// outside the table.
 pub fn of_array(actions: &Bound<PyAny>, n_envs: usize, table: &[Action]) -> PyResult<Vec<u32>> {
-    let given = of_type::<i64>(actions)
-        .or_else(|| of_type::<i32>(actions))
-        .or_else(|| of_type::<u32>(actions))
-        .or_else(|| of_type::<u8>(actions))
-        .or_else(|| of_type::<u64>(actions))
-        .or_else(|| of_type::<i16>(actions))
-        .or_else(|| of_type::<u16>(actions))
-        .or_else(|| of_type::<i8>(actions));
+    let limit = table.len() as u32;
+    let given = of_type::<i64>(actions, limit)
+        .or_else(|| of_type::<i32>(actions, limit))
+        .or_else(|| of_type::<u32>(actions, limit))
+        .or_else(|| of_type::<u8>(actions, limit))
+        .or_else(|| of_type::<u64>(actions, limit))
+        .or_else(|| of_type::<i16>(actions, limit))
+        .or_else(|| of_type::<u16>(actions, limit))
+        .or_else(|| of_type::<i8>(actions, limit));
     let Some(given) = given else {
         return Err(PyTypeError::new_err(format!(
             "actions: {}; a numpy array of integers of shape ({n_envs},) is needed",
             described(actions)
         )));
     };
-    if given.len() != n_envs {
-        return Err(PyValueError::new_err(format!("actions: {} of them; {n_envs} are needed, one a truck", given.len())));
+    let known = given?;
+    if known.len() != n_envs {
+        return Err(PyValueError::new_err(format!("actions: {} of them; {n_envs} are needed, one a truck", known.len())));
     }
-    let limit = table.len();
-    let known = |(env, action): (usize, i128)| match usize::try_from(action) {
-        Ok(index) if index < limit => Ok(index as u32),
-        _ => Err(PyValueError::new_err(format!("actions[{env}]: {action}; must lie in 0..{limit}"))),
-    };
-    given.into_iter().enumerate().map(known).collect()
+    Ok(known)
 }
 
-fn of_type<T: Element + Copy + Into<i128>>(actions: &Bound<PyAny>) -> Option<Vec<i128>> {
+/// The actions of an array of this type of numbers, None for any other array.
+fn of_type<T>(actions: &Bound<PyAny>, limit: u32) -> Option<PyResult<Vec<u32>>>
+where
+    T: Element + Copy + Display,
+    u32: TryFrom<T>,
+{
     let array = actions.extract::<PyReadonlyArray1<T>>().ok()?;
-    Some(array.as_array().iter().map(|&action| action.into()).collect())
+    let known = |(env, &action): (usize, &T)| match u32::try_from(action) {
+        Ok(index) if index < limit => Ok(index),
+        _ => Err(PyValueError::new_err(format!("actions[{env}]: {action}; must lie in 0..{limit}"))),
+    };
+    Some(array.as_array().iter().enumerate().map(known).collect())
 }
 
 /// Type of a value, of an array its numbers and shape too.

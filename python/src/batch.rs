@@ -244,24 +244,26 @@ impl Batch {
         if state.ends.is_empty() {
             return Ok(None);
         }
-        let none = || -> Vec<Py<PyAny>> { (0..self.n_envs).map(|_| py.None()).collect() };
-        let name = |route: u32| self.names[route as usize].clone_ref(py).into_any();
+        // An empty array of objects holds None, and is made faster by numpy than filled here.
+        let numpy = py.import(intern!(py, "numpy"))?;
+        let objects = || numpy.call_method1(intern!(py, "empty"), (self.n_envs, intern!(py, "O")));
+        let name = |route: u32| self.names[route as usize].bind(py);
         let mut mask = vec![false; self.n_envs];
         let mut codes = vec![0i64; self.n_envs];
         let mut successes = vec![false; self.n_envs];
-        let (mut routes, mut begun, mut last) = (none(), Vec::new(), Vec::new());
+        let routes = objects()?;
         for End { env, code, route, .. } in &state.ends {
             mask[*env] = true;
             codes[*env] = i64::from(*code);
             successes[*env] = *code == Ended::Arrived as u32;
-            routes[*env] = name(*route);
+            routes.set_item(env, name(*route))?;
         }
         let mask = PyArray1::from_vec(py, mask);
         let infos = PyDict::new(py);
         for (key, masked, values) in [
             (intern!(py, "ended"), intern!(py, "_ended"), PyArray1::from_vec(py, codes).into_any()),
             (intern!(py, "is_success"), intern!(py, "_is_success"), PyArray1::from_vec(py, successes).into_any()),
-            (intern!(py, "route"), intern!(py, "_route"), PyArray1::from_vec(py, routes).into_any()),
+            (intern!(py, "route"), intern!(py, "_route"), routes),
         ] {
             infos.set_item(key, values)?;
             infos.set_item(masked, &mask)?;
@@ -269,17 +271,16 @@ impl Batch {
         if self.autoreset != Autoreset::SameStep {
             return Ok(Some(infos));
         }
-        begun.extend(none());
-        last.extend(none());
+        let (begun, last) = (objects()?, objects()?);
         for End { env, observation, .. } in &state.ends {
-            begun[*env] = name(state.routes[*env]);
-            last[*env] = PyArray1::from_slice(py, observation).into_any().unbind();
+            begun.set_item(env, name(state.routes[*env]))?;
+            last.set_item(env, PyArray1::from_slice(py, observation))?;
         }
         let with_final = PyDict::new(py);
         for (key, masked, values) in [
-            (intern!(py, "final_obs"), intern!(py, "_final_obs"), PyArray1::from_vec(py, last).into_any()),
+            (intern!(py, "final_obs"), intern!(py, "_final_obs"), last),
             (intern!(py, "final_info"), intern!(py, "_final_info"), infos.into_any()),
-            (intern!(py, "route"), intern!(py, "_route"), PyArray1::from_vec(py, begun).into_any()),
+            (intern!(py, "route"), intern!(py, "_route"), begun),
         ] {
             with_final.set_item(key, values)?;
             with_final.set_item(masked, &mask)?;
