@@ -45,6 +45,7 @@ def main():
             "vector": vector(n_envs),
             "vector_without_copies": vector(n_envs, copy=False),
             "batch_step_into": batch(n_envs),
+            "batch_step_at_random": at_random(n_envs),
         }
         rounds = []
         for number in range(args.rounds):
@@ -123,6 +124,12 @@ def batch(n_envs):
         numpy.zeros(n_envs, bool),
     )
     return lambda step: trucks.step_into(drawn[step % 64], *room)
+
+
+def at_random(n_envs):
+    """The native step with native actions, asked for from Python: nothing is handed over."""
+    trucks = offtrack_sim.Batch(num_envs=n_envs)
+    return lambda _: trucks.step_at_random()
 
 
 def timed(loop, n_envs, seconds):
