@@ -10,18 +10,8 @@ use super::check;
 use super::ring::Ring;
 use super::roundabout_keys::Arm;
 use crate::geometry::{Curve, Outline, Piece, rounded, wrapped};
+use crate::ground::Kerb;
 use crate::reader::{Error, Reader};
-
-/// What a kerb belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kerb {
-    /// The outer boundary: from arm to arm, and the arms' ends.
-    Outer,
-    /// The central island.
-    Island,
-    /// The splitter island of the arm with this index.
-    Splitter(usize),
-}
 
 /// The kerbs in the order of the loops that [`kerbs`] makes.
 pub(super) fn order(arms: &[Arm]) -> impl Iterator<Item = Kerb> {

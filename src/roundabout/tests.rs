@@ -34,7 +34,8 @@ fn refusal(from: &str, nth: usize, to: &str) -> String {
 fn the_required_keys_give_a_roundabout_with_lanes_beside_its_kerbs() {
     let roundabout = read(&plain()).unwrap();
     let kerbs = roundabout.kerbs(Gutter::Drivable);
-    let (_, right) = roundabout.lanes.of(0, alignment::Way::Entry).next().unwrap();
+    // After the lanes around the ring come the first arm's entry lanes, the left one first.
+    let right = roundabout.lanes()[roundabout.lane_radii().len() + 1].clone();
     // From the arm's solid end on, the lane's middle keeps half a lane and the gutter from the kerb all the way.
     for step in 12..(right.length() * 4.0) as usize {
         assert!((kerbs.distance(right.point_at(step as f64 / 4.0)) - 2.35).abs() < 1e-9);

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
+use crate::opendrive::Hand;
 use crate::roundabout::Gutter;
 
 /// The file.
@@ -134,6 +135,13 @@ impl Default for WrittenRoutes {
 #[serde(deny_unknown_fields)]
 pub(super) struct WrittenRoundabout {
     pub(super) file: PathBuf,
+    /// For a map: a point near the ring, its hand of traffic, and names.
+    pub(super) ring: Option<[f64; 2]>,
+    #[serde(default)]
+    pub(super) hand: Hand,
+    pub(super) name: Option<String>,
+    #[serde(default)]
+    pub(super) arms: Vec<String>,
     #[serde(default)]
     pub(super) train: WrittenChoice,
     #[serde(default)]
