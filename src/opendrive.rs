@@ -5,6 +5,7 @@
 //! surface with traffic around it. All coordinates are moved to the ring's centre before anything is rounded.
 
 mod records; // what the file says
+mod xml; // elements and attributes
 mod read; // XML -> records
 mod mirror; // left-hand traffic -> right-hand traffic
 mod objects; // traffic islands given as objects

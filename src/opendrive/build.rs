@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec2;
 
 use super::area::{points, signed_area};
-use super::crossings::{ArmLanes, arms, circle};
+use super::crossings::{ArmLanes, Crossing, arms, circle, crossings};
 use super::lanes::{Strip, sampled};
 use super::paths::{Network, within};
 use super::records::Kind;
@@ -32,6 +32,8 @@ const SMALLEST: f64 = 0.02;
 const JUMP: f64 = 0.1;
 /// A centre line that is nearer to a kerb than half a truck's width is warned of \[m].
 const NEAREST: f64 = 1.3;
+/// A way through the ring comes as near to its outer kerb as this, inside or outside \[m].
+const BESIDE_RING: f64 = 6.0;
 /// Ring lanes whose centre lines are nearer to each other than this are one \[m].
 const ONE_LANE: f64 = 1.2;
 
@@ -84,7 +86,15 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
     let coarse = nearby(map, origin, extent + 10.0, super::COARSE);
     let (indices, around): (Vec<usize>, Vec<Strip>) = coarse.into_iter().unzip();
     let circle = circle(&map.records, &around, island_radius);
-    let lanes = arms(&around, &indices, &map.graph, circle);
+    let mut crossings = crossings(&around, &indices, &map.graph, circle);
+    let fine = nearby(map, origin, extent + 10.0, FINEST);
+    let network = Network {
+        graph: &map.graph,
+        strips: fine.iter().filter(|(_, strip)| strip.kind == Kind::Lane).map(|(i, strip)| (*i, strip)).collect(),
+    };
+    let outer_radius = outer_radius(&faces, island_radius);
+    drop_passing_lanes(&mut crossings, &network, outer_radius + BESIDE_RING);
+    let lanes = arms(&crossings, circle);
     let n_arms = lanes.len();
     if lanes.iter().all(|arm| arm.entries.is_empty()) || lanes.iter().all(|arm| arm.exits.is_empty()) {
         let found = format!("{n_arms} arms on a circle of {circle:.1} m");
@@ -96,12 +106,6 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
     let arms = named(&lanes, options, map.is_mirrored()).map_err(|expected| refused("arms", format!("{:?}", options.arms), &expected))?;
 
     // Routes.
-    let fine = nearby(map, origin, extent + 10.0, FINEST);
-    let network = Network {
-        graph: &map.graph,
-        strips: fine.iter().filter(|(_, strip)| strip.kind == Kind::Lane).map(|(i, strip)| (*i, strip)).collect(),
-    };
-    let outer_radius = outer_radius(&faces, island_radius);
     let mut lines = Vec::new();
     for (entry, arm) in lanes.iter().enumerate() {
         if 2 < arm.entries.len() {
@@ -113,7 +117,8 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
         }
         let kept = arm.entries.len().min(2);
         for lane in [Lane::Left, Lane::Right].into_iter().filter(|lane| lane.index() < kept) {
-            let ways = network.ways(&arm.entries[lane.index()], &lanes);
+            let mut ways = network.ways(&arm.entries[lane.index()], &lanes);
+            ways.retain(|(_, way)| network.nearest_to_centre(way) < outer_radius + BESIDE_RING);
             let mut exit = 0;
             for turn in 1..=n_arms {
                 let exit_arm = (entry + turn) % n_arms;
@@ -165,6 +170,25 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
     let lanes = shown(&lines);
     let ground = Ground { island_radius, outer_radius, lane_radii, arms, faces, kerbs, edges: Edges::Own(edges), lanes, lines };
     Ok(Imported { ground, centre: map.outside(origin), warnings })
+}
+
+/// Drops lanes that no way through the ring begins or ends on: those of roads that pass by.
+fn drop_passing_lanes(crossings: &mut Vec<Crossing>, network: &Network, reach: f64) {
+    let alone = |crossing: &Crossing| match crossing.inwards {
+        true => ArmLanes { entries: vec![crossing.clone()], exits: Vec::new() },
+        false => ArmLanes { entries: Vec::new(), exits: vec![crossing.clone()] },
+    };
+    let lanes: Vec<ArmLanes> = crossings.iter().map(alone).collect();
+    let mut used = vec![false; lanes.len()];
+    for (entry, crossing) in crossings.iter().enumerate().filter(|(_, crossing)| crossing.inwards) {
+        for ((exit, _), way) in network.ways(crossing, &lanes) {
+            if network.nearest_to_centre(&way) < reach {
+                (used[entry], used[exit]) = (true, true);
+            }
+        }
+    }
+    let mut used = used.into_iter();
+    crossings.retain(|_| used.next().unwrap_or(false));
 }
 
 fn moved(points: &[DVec2], centre: DVec2) -> Vec<DVec2> {

@@ -13,8 +13,11 @@ use super::rings::NEAR;
 
 /// Crossings of lanes in the same direction that are nearer than this are one lane \[m].
 const ONE_LANE: f64 = 1.2;
-/// Lanes of one road are at most this far from each other on the circle \[m].
-const ONE_ROAD: f64 = 14.0;
+/// Lanes of one road in the same direction are at most this far from each other on the circle \[m].
+const BESIDE: f64 = 7.0;
+/// A lane that leaves and the next that enters are one road if they are at most this far from each other, beside a
+/// splitter island, or at most at this angle seen from the centre \[m], \[rad].
+const ONE_ROAD: (f64, f64) = (21.0, 0.55);
 /// How far beyond its junctions a ring's circle lies \[m].
 const BEYOND: f64 = 0.5;
 /// How far from the island a ring's junctions are followed at most \[m].
@@ -66,8 +69,8 @@ pub(super) fn circle(records: &Records, strips: &[Strip], radius: f64) -> f64 {
     if reach == 0.0 { radius + ALONE } else { reach.max(radius + NEAR) + BEYOND }
 }
 
-/// The arms of a ring around the origin, counter-clockwise from east.
-pub(super) fn arms(strips: &[Strip], indices: &[usize], graph: &Graph, circle: f64) -> Vec<ArmLanes> {
+/// Where lanes cross the circle, counter-clockwise.
+pub(super) fn crossings(strips: &[Strip], indices: &[usize], graph: &Graph, circle: f64) -> Vec<Crossing> {
     let mut crossings: Vec<Crossing> = Vec::new();
     for (strip, &index) in strips.iter().zip(indices) {
         if !strip.is_driven() || (graph.next[index].is_empty() && graph.previous[index].is_empty()) {
@@ -88,12 +91,18 @@ pub(super) fn arms(strips: &[Strip], indices: &[usize], graph: &Graph, circle: f
         }
     }
     crossings.sort_by(|one, other| one.at.to_angle().total_cmp(&other.at.to_angle()));
+    crossings
+}
+
+/// The arms that crossings form, counter-clockwise from east.
+pub(super) fn arms(crossings: &[Crossing], circle: f64) -> Vec<ArmLanes> {
     let n = crossings.len();
     // On the right of the road its lanes leave, on the left they enter: an arm ends where a lane that leaves follows
     // one that enters, or far from the next.
     let ends = |i: usize| {
         let (one, next) = (&crossings[i], &crossings[(i + 1) % n]);
-        (one.inwards && !next.inwards) || ONE_ROAD * if one.inwards == next.inwards { 0.5 } else { 1.5 } < one.at.distance(next.at)
+        let apart = if one.inwards == next.inwards { BESIDE } else { ONE_ROAD.0.max(ONE_ROAD.1 * circle) };
+        (one.inwards && !next.inwards) || apart < one.at.distance(next.at)
     };
     let Some(last) = (0..n).find(|&i| ends(i)) else { return Vec::new() };
     let mut arms: Vec<ArmLanes> = vec![ArmLanes::default()];

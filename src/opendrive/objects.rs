@@ -3,8 +3,9 @@
 use glam::DVec2;
 use roxmltree::Node;
 
-use super::read::{Source, attribute, child, children};
+use super::read::Source;
 use super::records::{Island, Road};
+use super::xml::{attribute, child, children};
 use crate::reader::Error;
 
 /// Largest size of an object \[m].

@@ -98,6 +98,12 @@ impl Network<'_> {
         ways
     }
 
+    /// The least distance of a way from the ring's centre \[m].
+    pub(super) fn nearest_to_centre(&self, way: &[usize]) -> f64 {
+        let strips = way.iter().filter_map(|strip| self.strips.get(strip));
+        strips.flat_map(|strip| &strip.centre).map(|p| p.length()).fold(f64::INFINITY, f64::min)
+    }
+
     /// How much a lane turns from its beginning to its end \[rad].
     fn turn(&self, strip: usize) -> f64 {
         let path = self.path(strip);

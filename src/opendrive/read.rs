@@ -10,6 +10,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 use super::Hand;
 use super::objects::islands;
 use super::records::{Connection, Cubic, Geometry, Height, Kind, Lane, Link, Records, Road, Section, Shape};
+use super::xml::{attribute, child, children, line};
 use crate::reader::{Error, Reader, shortened};
 
 /// Largest file \[bytes].
@@ -112,23 +113,6 @@ fn check_size(document: &Document) -> Result<(), String> {
         0..=MOST_ELEMENTS => Ok(()),
         more => Err(format!("has {more} elements; at most {MOST_ELEMENTS} are read")),
     }
-}
-
-fn line(document: &Document, node: Node) -> u32 {
-    document.text_pos_at(node.range().start).row
-}
-
-pub(super) fn children<'a, 'i>(node: Node<'a, 'i>, name: &'static str) -> impl Iterator<Item = Node<'a, 'i>> {
-    node.children().filter(move |child| child.is_element() && child.tag_name().name() == name)
-}
-
-pub(super) fn child<'a, 'i>(node: Node<'a, 'i>, name: &'static str) -> Option<Node<'a, 'i>> {
-    children(node, name).next()
-}
-
-/// An attribute's text, empty if there is none.
-pub(super) fn attribute<'a>(node: Node<'a, '_>, name: &str) -> &'a str {
-    node.attribute(name).unwrap_or("").trim()
 }
 
 /// A document that is being read.
@@ -332,7 +316,7 @@ impl Source<'_, '_> {
         let end = |name: &'static str| link.and_then(|link| child(link, name)).and_then(|end| attribute(end, "id").parse::<i32>().ok());
         Ok(Lane {
             id,
-            kind: kind(attribute(node, "type")),
+            kind: Kind::named(attribute(node, "type")),
             widths,
             bordered,
             heights,
@@ -402,17 +386,5 @@ fn road_link(node: Node) -> Option<Link> {
         "road" => Some(Link::Road(id, attribute(node, "contactPoint") != "end")),
         "junction" => Some(Link::Junction(id)),
         _ => None,
-    }
-}
-
-/// What a lane of this type is for.
-fn kind(name: &str) -> Kind {
-    match name {
-        "driving" | "bidirectional" | "entry" | "exit" | "onRamp" | "offRamp" | "connectingRamp" | "slipLane" | "bus" | "taxi" | "HOV"
-        | "mwyEntry" | "mwyExit" => Kind::Lane,
-        "shoulder" | "stop" | "parking" | "biking" => Kind::Flat,
-        "curb" => Kind::Kerb,
-        "sidewalk" | "walking" | "median" | "border" | "restricted" => Kind::Solid,
-        _ => Kind::Nothing,
     }
 }

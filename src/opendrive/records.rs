@@ -77,6 +77,20 @@ pub(super) enum Kind {
     Nothing,
 }
 
+impl Kind {
+    /// What a lane of this type is for.
+    pub(super) fn named(name: &str) -> Kind {
+        match name {
+            "driving" | "bidirectional" | "entry" | "exit" | "onRamp" | "offRamp" | "connectingRamp" | "slipLane" | "bus" | "taxi"
+            | "HOV" | "mwyEntry" | "mwyExit" => Kind::Lane,
+            "shoulder" | "stop" | "parking" | "biking" => Kind::Flat,
+            "curb" => Kind::Kerb,
+            "sidewalk" | "walking" | "median" | "border" | "restricted" => Kind::Solid,
+            _ => Kind::Nothing,
+        }
+    }
+}
+
 /// Height of a lane above the road from `start` on, counted from the section's beginning.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Height {
