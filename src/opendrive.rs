@@ -17,7 +17,11 @@ mod surface; // what can be driven on
 mod rings; // where the roundabouts are
 mod crossings; // lanes in and out of a ring, arms
 mod paths; // ways through a ring
+mod names; // names of arms
+mod lines; // ways -> routes
+mod surroundings; // a map around a point
 mod build; // a ring as a `Ground`
+mod junction; // ways through a junction as a `Ground`
 
 use std::path::Path;
 
@@ -26,6 +30,7 @@ use glam::DVec2;
 use crate::reader::{Error, Reader, read_text};
 pub use build::{Imported, Options};
 use graph::Graph;
+pub use junction::{Junction, RoadLane, Way};
 use lanes::Strip;
 use records::Records;
 pub use rings::{Refused, Ring};
@@ -45,6 +50,8 @@ pub enum Hand {
 
 /// Chords of lanes leave their curves by at most this much where rings are looked for \[m].
 const COARSE: f64 = 0.02;
+/// The same for centre lines of routes, before arcs are fitted; headings matter too \[m].
+const FINEST: f64 = 1e-4;
 
 /// A map that was read.
 #[derive(Debug)]

@@ -192,14 +192,15 @@ pub fn roundabout(roundabout: &Roundabout, routes: &[Route], straights: Straight
     let map =
         Group::new().add(road.surface()).add(road.distances()).add(road.lanes()).add(road.kerbs()).add(road.routes()).add(road.arm_names());
     let legend: Vec<Entry> = road.legend().into_iter().chain(road.route_legend()).collect();
-    let title = format!("Roundabout {}: {} arms, {} routes", roundabout.name, roundabout.arms().count(), routes.len());
+    let kind = if roundabout.island_radius() == 0.0 { "Junction" } else { "Roundabout" };
+    let title = format!("{kind} {}: {} arms, {} routes", roundabout.name, roundabout.arms().count(), routes.len());
     let lanes: Vec<String> = roundabout.lane_radii().iter().map(|radius| format!("{radius:.2} m")).collect();
-    let centres = match &lanes[..] {
-        [inner @ .., last] if !inner.is_empty() => format!("centres at {} and {last}", inner.join(", ")),
-        only => format!("centre at {}", only.concat()),
-    };
     let radius = roundabout.outer_radius();
-    let subtitle = format!("Lane {centres}, outer kerb at {radius:.2} m from the centre.");
+    let subtitle = match &lanes[..] {
+        [] => format!("Its arms begin {radius:.2} m from the middle of the junction."),
+        [only] => format!("Lane centre at {only}, outer kerb at {radius:.2} m from the centre."),
+        [inner @ .., last] => format!("Lane centres at {} and {last}, outer kerb at {radius:.2} m from the centre.", inner.join(", ")),
+    };
     Ok(composed(&view, &lettering, &title, &subtitle, Definitions::new(), map, &legend))
 }
 

@@ -129,9 +129,10 @@ impl Ground {
     /// The file and, for a value that makes no sense, its key, the value and what would do.
     pub(crate) fn parse(file: &std::path::Path, text: &str) -> Result<Ground, Error> {
         let (reader, written) = Reader::parse::<Written>(file, text)?;
-        let island_radius = reader.within("island_radius", written.island_radius, 0.5..=500.0, "m")?;
-        let outer_radius = reader.within("outer_radius", written.outer_radius, island_radius..=600.0, "m")?;
-        reader.count("lane_radii", written.lane_radii.len(), 1..=16)?;
+        let island_radius = reader.within("island_radius", written.island_radius, 0.0..=500.0, "m")?;
+        let is_ring = 0.0 < island_radius;
+        let outer_radius = reader.within("outer_radius", written.outer_radius, island_radius.max(0.5)..=600.0, "m")?;
+        reader.count("lane_radii", written.lane_radii.len(), usize::from(is_ring)..=16)?;
         for (i, &radius) in written.lane_radii.iter().enumerate() {
             reader.within(&format!("lane_radii[{i}]"), radius, 0.5..=600.0, "m")?;
         }
@@ -146,8 +147,8 @@ impl Ground {
             let bearing = reader.within(&format!("arm[{i}].bearing_deg"), bearing_deg, -360.0..=360.0, "deg")?.to_radians();
             arms.push(Arm { name, bearing });
         }
-        let (faces, kerbs) = loops(&reader, "face", written.face, &arms)?;
-        let (edges, _) = loops(&reader, "edge", written.edge, &arms)?;
+        let (faces, kerbs) = loops(&reader, "face", written.face, &arms, is_ring)?;
+        let (edges, _) = loops(&reader, "edge", written.edge, &arms, is_ring)?;
         reader.count("route", written.route.len(), 1..=MOST_ROUTES)?;
         let mut lines: Vec<Line> = Vec::new();
         for (i, route) in written.route.into_iter().enumerate() {
@@ -244,8 +245,8 @@ fn arm(reader: &Reader, key: &str, name: &str, arms: &[Arm]) -> Result<usize, Er
 }
 
 /// The loops of an outline, the outer one first in the world: they neither cross nor lie outside it.
-fn loops(reader: &Reader, table: &str, written: Vec<WrittenLoop>, arms: &[Arm]) -> Result<(Outline, Vec<Kerb>), Error> {
-    reader.count(table, written.len(), 2..=MOST_LOOPS)?;
+fn loops(reader: &Reader, table: &str, written: Vec<WrittenLoop>, arms: &[Arm], is_ring: bool) -> Result<(Outline, Vec<Kerb>), Error> {
+    reader.count(table, written.len(), 1 + usize::from(is_ring)..=MOST_LOOPS)?;
     let (mut curves, mut kerbs): (Vec<Curve>, Vec<Kerb>) = (Vec::new(), Vec::new());
     for (i, WrittenLoop { of, path }) in written.into_iter().enumerate() {
         let loop_ = curve(reader, &format!("{table}[{i}].path"), &path, true)?;
@@ -261,7 +262,7 @@ fn loops(reader: &Reader, table: &str, written: Vec<WrittenLoop>, arms: &[Arm]) 
         kerbs.push(kerb);
     }
     let outer = kerbs.iter().filter(|&&kerb| kerb == Kerb::Outer).count();
-    if outer != 1 || !kerbs.contains(&Kerb::Island) {
+    if outer != 1 || is_ring && !kerbs.contains(&Kerb::Island) {
         return Err(reader.invalid(
             format!("{table}[0].of"),
             format!("{outer} outer loops"),

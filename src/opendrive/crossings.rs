@@ -122,3 +122,25 @@ pub(super) fn arms(crossings: &[Crossing], circle: f64) -> Vec<ArmLanes> {
     arms.sort_by(|one, other| around(one).total_cmp(&around(other)));
     arms
 }
+
+/// Arms of which one only leaves and the next only enters are one road that parts farther out, if it leaves the ring
+/// and reaches it beside a splitter island: `gate` is where a lane crosses the circle of this radius next to the ring.
+pub(super) fn joined(mut arms: Vec<ArmLanes>, gate: impl Fn(&Crossing) -> Option<DVec2>, radius: f64) -> Vec<ArmLanes> {
+    let mut i = 0;
+    while i < arms.len() && 1 < arms.len() {
+        let next = (i + 1) % arms.len();
+        let one_road = match (arms[i].entries.as_slice(), arms[i].exits.last(), arms[next].entries.last(), arms[next].exits.as_slice()) {
+            ([], Some(leaves), Some(enters), []) => gate(leaves)
+                .zip(gate(enters))
+                .is_some_and(|(out, into)| out.distance(into) < ONE_ROAD.0.max(ONE_ROAD.1 * radius) && 0.0 < out.perp_dot(into)),
+            _ => false,
+        };
+        if one_road {
+            arms[i].entries = std::mem::take(&mut arms[next].entries);
+            arms.remove(next);
+        } else {
+            i += 1;
+        }
+    }
+    arms
+}

@@ -104,6 +104,25 @@ impl Network<'_> {
         strips.flat_map(|strip| &strip.centre).map(|p| p.length()).fold(f64::INFINITY, f64::min)
     }
 
+    /// Where lanes from or to a crossing pass the circle of a radius around the centre, the nearest such place along them.
+    pub(super) fn gate(&self, crossing: &Crossing, radius: f64) -> Option<DVec2> {
+        let mut seen: HashSet<usize> = crossing.strips.iter().copied().collect();
+        let mut queue: std::collections::VecDeque<usize> = crossing.strips.iter().copied().collect();
+        while let Some(strip) = queue.pop_front() {
+            let mut path = self.path(strip);
+            if !crossing.inwards {
+                path.reverse();
+            }
+            if let Some(pair) = path.windows(2).find(|pair| radius <= pair[0].length() && pair[1].length() < radius) {
+                let (far, near) = (pair[0].length(), pair[1].length());
+                return Some(pair[0].lerp(pair[1], (far - radius) / (far - near)));
+            }
+            let onward = if crossing.inwards { &self.graph.next[strip] } else { &self.graph.previous[strip] };
+            queue.extend(onward.iter().copied().filter(|next| self.strips.contains_key(next) && seen.insert(*next)));
+        }
+        None
+    }
+
     /// How much a lane turns from its beginning to its end \[rad].
     fn turn(&self, strip: usize) -> f64 {
         let path = self.path(strip);

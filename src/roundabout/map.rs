@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec2;
 
 use super::Roundabout;
-use crate::opendrive::{Hand, Imported, Map, Options, Ring};
+use crate::opendrive::{Hand, Imported, Map, Options, Ring, Way};
 use crate::reader::{Error, Reader};
 
 /// Which ring of a map, and how it is imported.
@@ -19,6 +19,8 @@ pub struct Choice {
     pub name: Option<String>,
     /// Names of the arms, counter-clockwise from east; by compass without them.
     pub arms: Vec<String>,
+    /// Ways through a junction in place of a ring.
+    pub ways: Vec<Way>,
 }
 
 /// Whether a file is an OpenDRIVE map by its name.
@@ -45,18 +47,26 @@ impl Choice {
         map.nearest(DVec2::ZERO)
     }
 
-    /// The ring that is meant, with its arms and routes.
+    /// The ring or the ways that are meant, with arms and routes.
     ///
     /// # Errors
     ///
-    /// Those of [`Choice::of`] and [`Map::ground`].
+    /// A ring and ways at once, and those of [`Choice::of`], [`Map::ground`] and [`Map::through`].
     pub fn imported(&self, file: &Path, map: &Map) -> Result<Imported, Error> {
-        map.ground(&self.of(file, map)?, &Options { arms: self.arms.clone() })
+        let options = Options { arms: self.arms.clone() };
+        match (self.ways.as_slice(), self.ring) {
+            ([], _) => map.ground(&self.of(file, map)?, &options),
+            (ways, None) => map.through(ways, &options),
+            (_, Some(p)) => {
+                let expected = "is for a roundabout, and the ways are through a junction; leave one of them out";
+                Err(Reader::of(file).invalid("ring", format_args!("({}, {})", p.x, p.y), expected))
+            }
+        }
     }
 }
 
 impl Roundabout {
-    /// A ring of an OpenDRIVE map.
+    /// A ring of an OpenDRIVE map, or ways through a junction of it.
     ///
     /// # Errors
     ///

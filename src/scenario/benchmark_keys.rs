@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
-use crate::opendrive::Hand;
+use crate::opendrive::{Hand, RoadLane};
 use crate::roundabout::Gutter;
 
 /// The file.
@@ -142,6 +142,9 @@ pub(super) struct WrittenRoundabout {
     pub(super) name: Option<String>,
     #[serde(default)]
     pub(super) arms: Vec<String>,
+    /// For a map: ways through a junction in place of a ring.
+    #[serde(default)]
+    pub(super) way: Vec<WrittenWay>,
     #[serde(default)]
     pub(super) train: WrittenChoice,
     #[serde(default)]
@@ -173,5 +176,39 @@ pub(super) enum WrittenChoice {
 impl Default for WrittenChoice {
     fn default() -> Self {
         WrittenChoice::Names(Vec::new())
+    }
+}
+
+/// A way through a junction of a map.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WrittenWay {
+    pub(super) from: WrittenLane,
+    pub(super) to: WrittenLane,
+}
+
+/// A lane of a road of a map.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WrittenLane {
+    pub(super) road: WrittenId,
+    pub(super) lane: i32,
+}
+
+/// A road's id, a text in OpenDRIVE and mostly a number.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+pub(super) enum WrittenId {
+    Number(u64),
+    Text(String),
+}
+
+impl From<&WrittenLane> for RoadLane {
+    fn from(written: &WrittenLane) -> RoadLane {
+        let road = match &written.road {
+            WrittenId::Number(number) => number.to_string(),
+            WrittenId::Text(text) => text.clone(),
+        };
+        RoadLane { road, lane: written.lane }
     }
 }

@@ -8,6 +8,7 @@ use super::benchmark_keys::{WrittenChoice, WrittenProcedural, WrittenRoundabout}
 use super::read::referred;
 use super::{Place, Scenario, Split};
 use crate::loading::Loading;
+use crate::opendrive::Way;
 use crate::procedural::Distribution;
 use crate::reader::{Error, Reader, shown};
 use crate::roundabout::Roundabout;
@@ -71,12 +72,18 @@ impl Scenario {
             Source::Disk(file) if is_map(file) => {
                 let WrittenRoundabout { hand, name, arms, .. } = written;
                 let ring = written.ring.map(DVec2::from);
-                Roundabout::from_map(file, &Choice { ring, hand: *hand, name: name.clone(), arms: arms.clone() })
+                let ways = written.way.iter().map(|way| Way { from: (&way.from).into(), to: (&way.to).into() }).collect();
+                Roundabout::from_map(file, &Choice { ring, hand: *hand, name: name.clone(), arms: arms.clone(), ways })
             }
             source => Roundabout::from_source(source),
         };
         if !is_map(&written.file) {
-            let given = [("ring", written.ring.is_some()), ("name", written.name.is_some()), ("arms", !written.arms.is_empty())];
+            let given = [
+                ("ring", written.ring.is_some()),
+                ("name", written.name.is_some()),
+                ("arms", !written.arms.is_empty()),
+                ("way", !written.way.is_empty()),
+            ];
             if let Some((name, _)) = given.into_iter().find(|(_, given)| *given) {
                 return Err(reader.invalid(format!("{key}.{name}"), "given", "is for a map, a file that ends in .xodr; leave it out"));
             }

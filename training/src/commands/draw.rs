@@ -18,7 +18,7 @@ use offtrack_drawing::{polygons, rasterised};
 use offtrack_training::error::Error;
 use offtrack_training::files;
 
-use super::import::RingArgs;
+use super::import::PlaceArgs;
 
 /// Draw a roundabout, or a truck's swept path on one of its routes.
 #[derive(Debug, clap::Args)]
@@ -27,7 +27,7 @@ pub struct Args {
     /// of seed 7 of the distribution wide.
     roundabout: String,
     #[command(flatten)]
-    ring: RingArgs,
+    place: PlaceArgs,
     /// The file to write: .svg, .png, or .json for polygons and waypoints.
     ///
     /// JSON: {"solids": [[[x, y], ...], ...], "drivable": [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x,
@@ -88,7 +88,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     length("--approach", args.approach)?;
     length("--departure", args.departure)?;
     let file = Path::new(&args.roundabout);
-    let roundabout = if is_map(file) { Roundabout::from_map(file, &args.ring.choice())? } else { procedural::find(&args.roundabout)? };
+    let roundabout = if is_map(file) { Roundabout::from_map(file, &args.place.choice())? } else { procedural::find(&args.roundabout)? };
     let routes = roundabout.routes(args.approach, args.departure, WAYPOINT_SPACING).map_err(|leaves| {
         let (flag, value) = if leaves.part == "approach" { ("--approach", args.approach) } else { ("--departure", args.departure) };
         Error::Flag { flag, value: format!("{value} m"), expected: leaves.to_string() }
