@@ -24,6 +24,8 @@ const INSCRIBED: f64 = 0.5;
 const INSCRIBED_AMONG_KERBS: f64 = 3.0;
 /// Drivable strips narrower than this are solid \[m].
 const SLIT: f64 = 0.2;
+/// Edges are replaced by longer ones within this where the exact place does not matter \[m].
+const SIMPLE: f64 = 0.003;
 /// Distance between the points of a void's edge that are looked at \[m].
 const CONTACT: f64 = 0.05;
 /// Length of contact with a lane from which a void lies beside it \[m].
@@ -67,15 +69,16 @@ impl Surface {
 
 /// An area without what is connected to it, or hangs on it, by slits that no wheel fits through.
 fn without_slits(area: &Area) -> Area {
-    area.common(&area.grown(-SLIT / 2.0).grown(0.75 * SLIT))
+    // What is grown back covers what was shrunk with a quarter of the slit to spare, corners of 90 deg with 9 mm.
+    area.common(&area.grown(-SLIT / 2.0).simplified(SIMPLE).grown(0.75 * SLIT))
 }
 
 /// The voids between strips that can be driven on.
 fn paved_voids(paved: &Area, solid: &Area, inscribed: f64) -> Area {
     let all = paved.plus(solid);
-    let slivers = all.grown(SLIVER / 2.0).grown(-SLIVER / 2.0).minus(&all);
+    let slivers = all.closed(SLIVER).minus(&all);
     let edge = Edge::new(paved);
-    let small = all.holes().flat_map(|hole| hole.grown(-inscribed).parts.is_empty().then_some(hole.parts)).flatten();
+    let small = all.holes().flat_map(|hole| hole.simplified(SIMPLE).grown(-inscribed).parts.is_empty().then_some(hole.parts)).flatten();
     let small = small.filter(|void| BESIDE < edge.contact(void));
     Area { parts: slivers.parts.into_iter().filter(|void| edge.touches(void)).chain(small).collect() }
 }
