@@ -7,7 +7,7 @@ use glam::DVec2;
 
 use super::build::{Imported, Options, Refusals, check_arms, kerb};
 use super::crossings::{ArmLanes, Crossing, arms, crossings};
-use super::lanes::Strip;
+use super::lanes::{Strip, sampled};
 use super::lines::{Lines, shown};
 use super::names::named;
 use super::paths::{Network, Way as Lanes};
@@ -68,6 +68,21 @@ pub struct Junction {
 }
 
 impl Map {
+    /// The centre line of every lane that is driven on, a section at a time, in its direction of travel and the map's own
+    /// coordinates; chords leave their curves by at most `tolerance` \[m].
+    pub fn lane_centres(&self, tolerance: f64) -> Vec<(RoadLane, Vec<DVec2>)> {
+        let mut centres = Vec::new();
+        for (index, road) in self.records.roads.iter().enumerate() {
+            for section in 0..road.sections.len() {
+                for strip in sampled(road, index, section, tolerance).into_iter().filter(Strip::is_driven) {
+                    let path = strip.path().into_iter().map(|p| self.outside(p)).collect();
+                    centres.push((self.road_lane(&strip), path));
+                }
+            }
+        }
+        centres
+    }
+
     /// The map's junctions that lanes lead through, in the order of their ids, numbers first.
     pub fn junctions(&self) -> Vec<Junction> {
         let network = self.network();
@@ -95,7 +110,12 @@ impl Map {
                 // Through this junction alone.
                 let through = |(_, way): &Lanes| way[1..way.len() - 1].iter().all(|strip| strips.contains(strip));
                 let inner = found.filter(|(_, way)| 2 < way.len()).filter(through);
-                ways.extend(inner.map(|((arm, _), _)| Way { from: self.road_lane(entry), to: self.road_lane(exits[arm]) }));
+                ways.extend(
+                    inner.map(|((arm, _), _)| Way {
+                        from: self.road_lane(&self.strips[entry]),
+                        to: self.road_lane(&self.strips[exits[arm]]),
+                    }),
+                );
             }
             if !ways.is_empty() {
                 let centre = self.outside(middle(strips.iter().flat_map(|&strip| &self.strips[strip].centre)));
@@ -175,8 +195,7 @@ impl Map {
     }
 
     /// A lane by its numbers in the map.
-    fn road_lane(&self, strip: usize) -> RoadLane {
-        let Strip { road, id, .. } = &self.strips[strip];
+    fn road_lane(&self, Strip { road, id, .. }: &Strip) -> RoadLane {
         RoadLane { road: self.records.roads[*road].id.clone(), lane: if self.records.mirrored { -id } else { *id } }
     }
 
@@ -190,7 +209,7 @@ impl Map {
         let id = if self.records.mirrored { lane.wrapping_neg() } else { *lane };
         let found: Vec<usize> = all().filter(|(_, strip)| strip.id == id).map(|(index, _)| index).collect();
         if found.is_empty() {
-            let mut known: Vec<i32> = all().map(|(index, _)| self.road_lane(index).lane).collect();
+            let mut known: Vec<i32> = all().map(|(index, _)| self.road_lane(&self.strips[index]).lane).collect();
             known.sort_unstable();
             known.dedup();
             let expected = format!("road {road} has the lanes {known:?} to drive on");
@@ -208,7 +227,7 @@ impl Map {
         let along = found.map(|(_, along)| along).filter(|along| 1 < along.len());
         along.ok_or_else(|| {
             let onward = entry.strips.iter().flat_map(|&strip| &self.graph.next[strip]).filter(|next| !entry.strips.contains(next));
-            let mut onward: Vec<String> = onward.map(|&next| self.road_lane(next).to_string()).collect();
+            let mut onward: Vec<String> = onward.map(|&next| self.road_lane(&self.strips[next]).to_string()).collect();
             onward.dedup();
             let expected = format!("no links of the map lead there; {} leads on to {}", way.from, onward.join(", "));
             refused.error("to", way.to.to_string(), expected)
