@@ -16,6 +16,7 @@ mod episodes;
 mod field;
 mod fit;
 mod kinds;
+mod map_junctions;
 mod map_lanes;
 mod maps;
 mod modules;
