@@ -5,6 +5,7 @@
 
 mod alignment;
 mod check;
+mod gutter; // widths that differ
 mod kerb;
 mod lane;
 pub mod map; // a ring of a map
@@ -132,12 +133,14 @@ impl Roundabout {
     /// The same; an error says in which stage of the check it was found.
     pub(crate) fn staged(name: String, reader: Reader, written: Written) -> Result<Roundabout, (Stage, Error)> {
         let at = |stage: Stage| move |error: Error| (stage, error);
+        let gutters = written.gutters(&reader).map_err(at(Stage::Values))?;
         let (ring, arms) = written.checked(&reader).map_err(at(Stage::Values))?;
-        let kerbs = kerb::kerbs(&reader, &ring, &arms).map_err(at(Stage::Kerbs))?;
+        let (kerbs, corners) = kerb::kerbs(&reader, &ring, &arms).map_err(at(Stage::Kerbs))?;
         let lanes = Lanes::new(&reader, &ring, &arms).map_err(at(Stage::Lanes))?;
         check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes).map_err(at(Stage::Clear))?;
         check::lanes_beside_each_other(&reader, &arms, &lanes).map_err(at(Stage::Beside))?;
-        Ok(Roundabout { name, ground: ground(&ring, &arms, kerbs, &lanes) })
+        let edges = gutters.map_or(Edges::Beside(ring.gutter), |gutters| Edges::Own(gutters.edges(&ring, &kerbs, &corners)));
+        Ok(Roundabout { name, ground: ground(&ring, &arms, kerbs, edges, &lanes) })
     }
 
     /// A roundabout by what is driven on, from a map.
@@ -268,7 +271,7 @@ impl Roundabout {
 }
 
 /// What is driven on, from checked parameters.
-fn ground(ring: &Ring, arms: &[Arm], kerbs: Outline, lanes: &Lanes) -> Ground {
+fn ground(ring: &Ring, arms: &[Arm], kerbs: Outline, edges: Edges, lanes: &Lanes) -> Ground {
     let lane_radii: Vec<f64> = (0..ring.lanes).rev().map(|from_kerb| ring.lane_radius(from_kerb)).collect();
     let rings = lane_radii.iter().map(|&radius| Curve::circle(DVec2::ZERO, radius));
     let line = |&RouteLine { entry, lane, exit, ref line }: &RouteLine| {
@@ -284,7 +287,7 @@ fn ground(ring: &Ring, arms: &[Arm], kerbs: Outline, lanes: &Lanes) -> Ground {
         arms: arms.iter().map(|arm| ground::Arm { name: arm.name.clone(), bearing: arm.bearing }).collect(),
         faces: kerbs,
         kerbs: kerb::order(arms).collect(),
-        edges: Edges::Beside(ring.gutter),
+        edges,
         lines: lanes.routes().iter().map(line).collect(),
     }
 }

@@ -39,6 +39,8 @@ pub(super) fn drawn(keys: &Keys, draws: &Draws) -> Result<Written, Reason> {
             exit: arm.exit.written(-1.0, &ring),
             corner,
             splitter: arm.splitter(keys, draws, &ring, index),
+            splitter_gutter: None,
+            kerb_gutter: None,
         }
     });
     Ok(Written { ring: written_ring, arm: written.collect() })
@@ -62,7 +64,14 @@ fn ring(keys: &Keys, draws: &Draws) -> (WrittenRing, Ring) {
         None => lane_width,
     };
     let outer = island + 2.0 * gutter + lanes as f64 * ring_lane_width;
-    let written = WrittenRing { island_radius: island, gutter, lane_width: ring_lane_width, lanes: (lanes != 2).then_some(lanes) };
+    let written = WrittenRing {
+        island_radius: island,
+        gutter,
+        lane_width: ring_lane_width,
+        lanes: (lanes != 2).then_some(lanes),
+        island_gutter: None,
+        mouth_gutter: None,
+    };
     (written, Ring { outer, lanes, ring_lane_width, lane_width, gutter })
 }
 

@@ -6,6 +6,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::alignment::{Alignment, Way};
+use super::gutter::{WrittenDirection, WrittenStation};
 use super::ring::Ring;
 use crate::geometry::Bend;
 use crate::reader::{Error, Reader, shown};
@@ -32,6 +33,10 @@ pub(crate) struct WrittenRing {
     pub(crate) lane_width: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) lanes: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) island_gutter: Option<Vec<WrittenDirection>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) mouth_gutter: Option<Vec<WrittenDirection>>,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -48,6 +53,10 @@ pub(crate) struct WrittenArm {
     pub(crate) corner: WrittenCorner,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) splitter: Vec<WrittenPoint>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) splitter_gutter: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) kerb_gutter: Option<Vec<WrittenStation>>,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -76,6 +85,16 @@ pub(crate) struct WrittenCorner {
     pub(crate) kerb_radius: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) lane_radius: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) lane: Option<CornerLane>,
+}
+
+/// Where the right lane to the first exit lies although the kerb beside it passes outside the ring.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum CornerLane {
+    /// On the ring's outermost lane.
+    Ring,
 }
 
 impl WrittenCorner {
@@ -123,6 +142,8 @@ pub(super) struct Arm {
     pub(super) kerb_corner: Option<f64>,
     /// The same for the right lane to the first exit; without it that lane lies beside such a kerb \[m].
     pub(super) lane_corner: Option<f64>,
+    /// Whether that lane follows the ring although the kerb does not.
+    pub(super) lane_on_ring: bool,
     /// Corners of the splitter island's kerb face in the arm's frame; empty if there is no island.
     pub(super) splitter: Vec<Bend>,
 }
@@ -195,7 +216,14 @@ impl WrittenArm {
         if !splitter.is_empty() {
             reader.count(&key("splitter"), splitter.len(), 3..=16)?;
         }
+        let lane_on_ring = self.corner.lane.is_some();
+        if lane_on_ring && (self.corner.kerb_radius.is_none() || self.corner.lane_radius.is_some()) {
+            let expected =
+                "is for a corner with kerb_radius and without lane_radius: leave it out, the lane follows the ring or that radius";
+            return Err(reader.invalid(key("corner.lane"), "\"ring\"", expected));
+        }
         Ok(Arm {
+            lane_on_ring,
             kerb_corner: radius("corner.kerb_radius", self.corner.kerb_radius)?,
             lane_corner: radius("corner.lane_radius", self.corner.lane_radius)?,
             entry: self.entry.checked(reader, &key("entry"), Way::Entry, length, lane_width, ring)?,
