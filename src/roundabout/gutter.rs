@@ -20,8 +20,10 @@ const FINE: f64 = 1e-3;
 const FITTED: f64 = 4e-3;
 /// Gaps between gutters, and strips of road, that are narrower are solid \[m].
 const SLIT: f64 = 0.2;
-/// A width that is not 0 everywhere is applied at points this far apart or nearer \[m].
+/// A width is applied at points at most this far apart, and nearer where it does not change linearly \[m].
 const SPACING: f64 = 0.5;
+/// Least such distance \[m].
+const NEAREST: f64 = 0.01;
 /// Most points of a gutter.
 const MOST_POINTS: usize = 64;
 
@@ -175,18 +177,21 @@ fn strip(curve: &Curve, closed: bool, width: impl Fn(f64, DVec2) -> f64, triangl
             Piece::Arc { radius, .. } => (8.0 * radius * FINE).sqrt().min(SPACING),
         };
         let steps = (length / step).ceil().max(1.0) as usize;
-        let across = |i: usize| {
-            let s = length * i as f64 / steps as f64;
+        let across = |i: f64| {
+            let s = length * i / steps as f64;
             let p = piece.point_at(s);
             let width = width(begin + s, p);
             (p, p + DVec2::from_angle(piece.heading_at(s)).perp() * width, width)
         };
-        let (first, _, at_first) = across(0);
+        let (first, _, at_first) = across(0.0);
         if let Some(before) = before {
             pie(first, at_first, before, wrapped(piece.heading_at(0.0) - before), triangles);
         }
-        for i in 0..steps {
-            let ((a, a_left, from), (b, b_left, to)) = (across(i), across(i + 1));
+        let at = |i: f64| width(begin + length * i / steps as f64, piece.point_at(length * i / steps as f64));
+        let stations: Vec<f64> =
+            (0..steps).flat_map(|i| linear(&at, i as f64, (i + 1) as f64, NEAREST / step)).chain([steps as f64]).collect();
+        for ends in stations.windows(2) {
+            let ((a, a_left, from), (b, b_left, to)) = (across(ends[0]), across(ends[1]));
             if 0.0 < from.max(to) {
                 triangles.extend([vec![a, b, b_left], vec![a, b_left, a_left]]);
             }
@@ -194,6 +199,18 @@ fn strip(curve: &Curve, closed: bool, width: impl Fn(f64, DVec2) -> f64, triangl
         before = Some(piece.heading_at(length));
         begin += length;
     }
+}
+
+/// Beginnings of the parts of an interval in which a width is linear within a millimetre, or which are no longer than
+/// `least`.
+fn linear(width: &impl Fn(f64) -> f64, from: f64, to: f64, least: f64) -> Vec<f64> {
+    let (first, last) = (width(from), width(to));
+    let bent = |i: i32| 1e-3 < (width(from + (to - from) * f64::from(i) / 16.0) - (first + (last - first) * f64::from(i) / 16.0)).abs();
+    if to - from <= least || !(1..16).any(bent) {
+        return vec![from];
+    }
+    let middle = (from + to) / 2.0;
+    [linear(width, from, middle, least), linear(width, middle, to, least)].concat()
 }
 
 /// Adds the sector that opens on the left of a corner that turns right.
