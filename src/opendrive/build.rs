@@ -136,7 +136,7 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
                     continue;
                 }
                 if JUMP < jump {
-                    let route = format!("{}-{}-{exit}", arms[entry].name, lane.name());
+                    let route = format!("{}-{}-{exit}", arms[entry].name, lane.seen(map.is_mirrored()).name());
                     warnings.push(format!("{place}: {route}: its lanes jump by up to {jump:.2} m; the joints were spread"));
                 }
                 let width = |way: &[usize], at: DVec2| width(&network, way, at);
@@ -168,7 +168,18 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
     lane_radii.dedup_by(|after, before| *after - *before < ONE_LANE);
     let kerbs = faces.loops.iter().map(|curve| kerb(curve, &arms)).collect();
     let lanes = shown(&lines);
-    let ground = Ground { island_radius, outer_radius, lane_radii, arms, faces, kerbs, edges: Edges::Own(edges), lanes, lines };
+    let ground = Ground {
+        mirrored: map.is_mirrored(),
+        island_radius,
+        outer_radius,
+        lane_radii,
+        arms,
+        faces,
+        kerbs,
+        edges: Edges::Own(edges),
+        lanes,
+        lines,
+    };
     Ok(Imported { ground, centre: map.outside(origin), warnings })
 }
 

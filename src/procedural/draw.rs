@@ -9,6 +9,7 @@ use super::arm::{Arm, Ring};
 use super::distribution_keys::Keys;
 use super::draws::{Draws, Place, Quantity as Q};
 use super::line::{Line, millimetres};
+use crate::ground::Hand;
 use crate::roundabout::written::{Written, WrittenArm, WrittenCorner, WrittenRing};
 
 /// The names of arms: the nearest of eight directions, from east counter-clockwise.
@@ -43,7 +44,7 @@ pub(super) fn drawn(keys: &Keys, draws: &Draws) -> Result<Written, Reason> {
             kerb_gutter: None,
         }
     });
-    Ok(Written { ring: written_ring, arm: written.collect() })
+    Ok(Written { hand: Hand::Right, ring: written_ring, arm: written.collect() })
 }
 
 /// The ring as a file has it, and what the arms need of it.

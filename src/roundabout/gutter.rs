@@ -145,7 +145,7 @@ fn profile(
 impl Gutters {
     /// The edges of the lanes between `faces`, whose first loop consists of the kerbs from each arm to the next, and
     /// the arms' ends; then come the island and the splitter islands.
-    pub(super) fn edges(&self, ring: &Ring, faces: &Outline, corners: &[Curve]) -> Outline {
+    pub(super) fn edges(&self, reader: &Reader, ring: &Ring, faces: &Outline, corners: &[Curve]) -> Result<Outline, Error> {
         let mut solid = Vec::new();
         for (index, corner) in corners.iter().enumerate() {
             let width = |s: f64, _| self.kerbs[index].as_ref().map_or(self.ring, |profile| profile.at(s));
@@ -162,7 +162,13 @@ impl Gutters {
         if let Some(mouths) = &self.mouths {
             strip(&Curve::circle(DVec2::ZERO, ring.outer()), true, |_, p| at(mouths, p), &mut solid);
         }
-        left(faces, solid)
+        let edges = left(faces, solid);
+        // The outer boundary and the island, apart from each other.
+        if edges.loops.len() < 2 {
+            let value = format_args!("{} m and others", shown(self.ring)).to_string();
+            return Err(reader.invalid("ring.gutter", value, "leave no way around the island: make the gutters narrower"));
+        }
+        Ok(edges)
     }
 }
 

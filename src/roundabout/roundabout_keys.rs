@@ -6,9 +6,11 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::alignment::{Alignment, Way};
+use super::corner::WrittenCorner;
 use super::gutter::{WrittenDirection, WrittenStation};
 use super::ring::Ring;
 use crate::geometry::Bend;
+use crate::ground::Hand;
 use crate::reader::{Error, Reader, shown};
 use crate::route::Lane;
 
@@ -21,6 +23,8 @@ const LANE_WIDTHS: RangeInclusive<f64> = 2.5..=12.0;
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Written {
+    #[serde(default, skip_serializing_if = "is_right")]
+    pub(crate) hand: Hand,
     pub(crate) ring: WrittenRing,
     pub(crate) arm: Vec<WrittenArm>,
 }
@@ -78,31 +82,6 @@ pub(crate) struct WrittenAlignment {
     pub(crate) ring_radius: f64,
 }
 
-#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct WrittenCorner {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) kerb_radius: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) lane_radius: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) lane: Option<CornerLane>,
-}
-
-/// Where the right lane to the first exit lies although the kerb beside it passes outside the ring.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum CornerLane {
-    /// On the ring's outermost lane.
-    Ring,
-}
-
-impl WrittenCorner {
-    fn is_empty(&self) -> bool {
-        *self == WrittenCorner::default()
-    }
-}
-
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct WrittenPoint {
@@ -152,6 +131,11 @@ impl Arm {
     pub(super) fn way(&self, way: Way) -> &Carriageway {
         if way == Way::Entry { &self.entry } else { &self.exit }
     }
+}
+
+/// The hand that is left out of a file.
+fn is_right(hand: &Hand) -> bool {
+    *hand == Hand::Right
 }
 
 impl Written {
@@ -216,12 +200,7 @@ impl WrittenArm {
         if !splitter.is_empty() {
             reader.count(&key("splitter"), splitter.len(), 3..=16)?;
         }
-        let lane_on_ring = self.corner.lane.is_some();
-        if lane_on_ring && (self.corner.kerb_radius.is_none() || self.corner.lane_radius.is_some()) {
-            let expected =
-                "is for a corner with kerb_radius and without lane_radius: leave it out, the lane follows the ring or that radius";
-            return Err(reader.invalid(key("corner.lane"), "\"ring\"", expected));
-        }
+        let lane_on_ring = self.corner.lane_on_ring(reader, &key("corner.lane"))?;
         Ok(Arm {
             lane_on_ring,
             kerb_corner: radius("corner.kerb_radius", self.corner.kerb_radius)?,

@@ -2,13 +2,19 @@
 
 use std::fmt::{self, Display, Formatter, Write};
 
+use crate::ground::Hand;
+
+use super::corner::{CornerLane, WrittenCorner};
 use super::gutter::{WrittenDirection, WrittenStation};
-use super::roundabout_keys::{CornerLane, Written, WrittenAlignment, WrittenArm, WrittenCorner, WrittenPoint, WrittenRing, WrittenWay};
+use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenPoint, WrittenRing, WrittenWay};
 
 /// TOML. Numbers are written so that reading them gives the same bits.
 impl Display for Written {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
-        let Written { ring: WrittenRing { island_radius, gutter, lane_width, lanes, island_gutter, mouth_gutter }, arm } = self;
+        let Written { hand, ring: WrittenRing { island_radius, gutter, lane_width, lanes, island_gutter, mouth_gutter }, arm } = self;
+        if *hand == Hand::Left {
+            writeln!(f, "hand = \"left\"\n")?;
+        }
         writeln!(f, "[ring]\nisland_radius = {island_radius:?}\ngutter = {gutter:?}\nlane_width = {lane_width:?}")?;
         lanes.iter().try_for_each(|lanes| writeln!(f, "lanes = {lanes}"))?;
         for (name, gutter) in [("island_gutter", island_gutter), ("mouth_gutter", mouth_gutter)] {

@@ -16,6 +16,7 @@ mod episodes;
 mod field;
 mod fit;
 mod kinds;
+mod left_hand;
 mod maps;
 mod modules;
 mod observe;

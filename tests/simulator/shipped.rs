@@ -31,7 +31,7 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
     let mut files = BTreeMap::new();
     on_disk(&scenarios(), Path::new(""), &mut files);
     let embedded: BTreeMap<String, String> = FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
-    assert_eq!((files.len(), FILES.len()), (21, 21), "eleven benchmarks, five roundabouts, three vehicles, two distributions");
+    assert_eq!((files.len(), FILES.len()), (29, 29), "fourteen benchmarks, ten roundabouts, three vehicles, two distributions");
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
     assert_eq!(kinds.map(|kind| kind.names().count()), [11, 5, 3, 2]);
