@@ -77,7 +77,7 @@ fn a_recording_read_back_is_the_recording() {
         vehicle: Measures::of(&world),
         actions: world.actions.iter().map(|action| [action.steering, action.speed]).collect(),
         map: Map::of(&scenario.places[roundabout].roundabout, scenario.gutter),
-        centre_line: centre_line(route),
+        centre_line: centre_line(&scenario.places[roundabout].roundabout, route),
         frames: tracks.remove(0).frames,
     };
     let text = serde_json::to_string(&recording).unwrap();
