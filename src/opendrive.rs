@@ -12,7 +12,7 @@ mod objects; // traffic islands given as objects
 mod reference_line; // points and headings along a road
 mod lanes; // lanes as strips
 mod graph; // which lane leads into which
-mod area; // polygons: union, difference, growing
+pub(crate) mod area; // polygons: union, difference, growing
 mod surface; // what can be driven on
 mod rings; // where the roundabouts are
 mod crossings; // lanes in and out of a ring, arms

@@ -1,10 +1,13 @@
 //! A roundabout by its parameters: ring, arms, kerbs, lanes and splitter islands, as arcs and segments.
 //!
-//! Right-hand traffic around an island at the origin. Parameters that describe no roundabout are refused when the file
+//! Traffic around an island at the origin; left-hand traffic is driven as its mirror image. Parameters that describe no roundabout are refused when the file
 //! is read, so the kerbs and lanes of a [`Roundabout`] never fail.
 
 mod alignment;
 mod check;
+mod corner;
+mod gutter; // widths that differ
+mod hand; // left-hand traffic
 mod kerb;
 mod lane;
 pub mod map; // a ring of a map
@@ -16,7 +19,8 @@ mod text;
 
 /// A roundabout as a file has it.
 pub(crate) mod written {
-    pub(crate) use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenCorner, WrittenPoint, WrittenRing, WrittenWay};
+    pub(crate) use super::corner::WrittenCorner;
+    pub(crate) use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenPoint, WrittenRing, WrittenWay};
 }
 
 use std::f64::consts::TAU;
@@ -131,13 +135,24 @@ impl Roundabout {
 
     /// The same; an error says in which stage of the check it was found.
     pub(crate) fn staged(name: String, reader: Reader, written: Written) -> Result<Roundabout, (Stage, Error)> {
+        if written.is_left_hand() {
+            let roundabout = Roundabout::staged(name, reader, written.mirrored());
+            return roundabout
+                .map(|Roundabout { name, ground }| Roundabout { name, ground: Ground { mirrored: true, ..ground } })
+                .map_err(|(stage, error)| (stage, hand::as_written(error)));
+        }
         let at = |stage: Stage| move |error: Error| (stage, error);
+        let gutters = written.gutters(&reader).map_err(at(Stage::Values))?;
         let (ring, arms) = written.checked(&reader).map_err(at(Stage::Values))?;
-        let kerbs = kerb::kerbs(&reader, &ring, &arms).map_err(at(Stage::Kerbs))?;
+        let (kerbs, corners) = kerb::kerbs(&reader, &ring, &arms).map_err(at(Stage::Kerbs))?;
         let lanes = Lanes::new(&reader, &ring, &arms).map_err(at(Stage::Lanes))?;
         check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes).map_err(at(Stage::Clear))?;
         check::lanes_beside_each_other(&reader, &arms, &lanes).map_err(at(Stage::Beside))?;
-        Ok(Roundabout { name, ground: ground(&ring, &arms, kerbs, &lanes) })
+        let edges = match gutters {
+            Some(gutters) => Edges::Own(gutters.edges(&reader, &ring, &kerbs, &corners).map_err(at(Stage::Clear))?),
+            None => Edges::Beside(ring.gutter),
+        };
+        Ok(Roundabout { name, ground: ground(&ring, &arms, kerbs, edges, &lanes) })
     }
 
     /// A roundabout by what is driven on, from a map.
@@ -150,7 +165,7 @@ impl Roundabout {
         &self.ground
     }
 
-    /// The names of the arms, counter-clockwise, in the order of the file.
+    /// The names of the arms in the order of the file: counter-clockwise, clockwise in left-hand traffic.
     pub fn arms(&self) -> impl Iterator<Item = &str> {
         self.ground.arms.iter().map(|arm| arm.name.as_str())
     }
@@ -252,7 +267,7 @@ impl Roundabout {
             }
             let centre_line = line.part(reaches - approach, left + departure);
             routes.push(Route {
-                name: format!("{}/{}-{}-{exit}", self.name, arm.name, lane.name()),
+                name: format!("{}/{}-{}-{exit}", self.name, arm.name, lane.seen(self.is_mirrored()).name()),
                 entry,
                 lane,
                 exit,
@@ -268,7 +283,7 @@ impl Roundabout {
 }
 
 /// What is driven on, from checked parameters.
-fn ground(ring: &Ring, arms: &[Arm], kerbs: Outline, lanes: &Lanes) -> Ground {
+fn ground(ring: &Ring, arms: &[Arm], kerbs: Outline, edges: Edges, lanes: &Lanes) -> Ground {
     let lane_radii: Vec<f64> = (0..ring.lanes).rev().map(|from_kerb| ring.lane_radius(from_kerb)).collect();
     let rings = lane_radii.iter().map(|&radius| Curve::circle(DVec2::ZERO, radius));
     let line = |&RouteLine { entry, lane, exit, ref line }: &RouteLine| {
@@ -277,6 +292,7 @@ fn ground(ring: &Ring, arms: &[Arm], kerbs: Outline, lanes: &Lanes) -> Ground {
         Line { entry, lane, exit, exit_arm, line: line.clone(), crossing: ring.crossing(lane), widths }
     };
     Ground {
+        mirrored: false,
         island_radius: ring.island_radius,
         outer_radius: ring.outer(),
         lanes: rings.chain(lanes.curves().cloned()).collect(),
@@ -284,7 +300,7 @@ fn ground(ring: &Ring, arms: &[Arm], kerbs: Outline, lanes: &Lanes) -> Ground {
         arms: arms.iter().map(|arm| ground::Arm { name: arm.name.clone(), bearing: arm.bearing }).collect(),
         faces: kerbs,
         kerbs: kerb::order(arms).collect(),
-        edges: Edges::Beside(ring.gutter),
+        edges,
         lines: lanes.routes().iter().map(line).collect(),
     }
 }

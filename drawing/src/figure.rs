@@ -70,6 +70,8 @@ pub(crate) struct View {
     pub scale: f64,
     /// Upper left corner of the map on the page \[px].
     corner: DVec2,
+    /// Whether points are those of the mirror image in the x axis, which low and high are not.
+    mirrored: bool,
 }
 
 /// Position and size of a map on its page.
@@ -101,7 +103,13 @@ impl View {
         let centre = (low + high) / 2.0;
         let extent = high - low;
         let extent = extent.max(DVec2::new(extent.y * layout.ratio, extent.x * 0.5));
-        View { low: centre - extent / 2.0, high: centre + extent / 2.0, scale: layout.width / extent.x, corner: layout.corner }
+        View {
+            low: centre - extent / 2.0,
+            high: centre + extent / 2.0,
+            scale: layout.width / extent.x,
+            corner: layout.corner,
+            mirrored: false,
+        }
     }
 
     /// All of the given points with `margin` around them \[m], in the middle of a map that fills a picture of `size`
@@ -110,12 +118,18 @@ impl View {
         let (low, high) = points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
         let scale = (size / (high - low + 2.0 * margin)).min_element();
         let (centre, half) = ((low + high) / 2.0, size / scale / 2.0);
-        View { low: centre - half, high: centre + half, scale, corner: DVec2::ZERO }
+        View { low: centre - half, high: centre + half, scale, corner: DVec2::ZERO, mirrored: false }
     }
 
     /// Where `p` lies on the page \[px].
     pub fn point(&self, p: DVec2) -> DVec2 {
-        self.corner + DVec2::new(p.x - self.low.x, self.high.y - p.y) * self.scale
+        let y = if self.mirrored { -p.y } else { p.y };
+        self.corner + DVec2::new(p.x - self.low.x, self.high.y - y) * self.scale
+    }
+
+    /// The same view for points of the mirror image in the x axis.
+    pub fn for_mirrored(&self) -> View {
+        View { mirrored: true, ..*self }
     }
 
     /// Whether the map shows `p`, at least `margin` metres from its edge.

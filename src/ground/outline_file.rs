@@ -8,7 +8,7 @@ use std::fmt::Write;
 use glam::DVec2;
 use serde::Deserialize;
 
-use super::{Arm, Edges, Ground, Kerb, Line};
+use super::{Arm, Edges, Ground, Hand, Kerb, Line};
 use crate::geometry::{Curve, Outline, Piece, arc_of_height};
 use crate::reader::{Error, Reader};
 use crate::route::Lane;
@@ -26,6 +26,8 @@ const MOST_ROUTES: usize = 128;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
+    #[serde(default)]
+    hand: Hand,
     island_radius: f64,
     outer_radius: f64,
     lane_radii: Vec<f64>,
@@ -77,6 +79,9 @@ impl Ground {
         // Writing to a string cannot fail.
         for line in origin {
             let _ = writeln!(text, "# {line}");
+        }
+        if self.mirrored {
+            let _ = writeln!(text, "\nhand = \"left\"");
         }
         let list = |values: &[f64]| values.iter().map(|value| number(*value, 4)).collect::<Vec<_>>().join(", ");
         let (island, outer) = (number(self.island_radius, 5), number(self.outer_radius, 5));
@@ -173,7 +178,8 @@ impl Ground {
         let lanes = written.lane.iter().enumerate().map(|(i, lane)| curve(&reader, &format!("lane[{i}].path"), &lane.path, false));
         let lanes = lanes.collect::<Result<_, _>>()?;
         let edges = Edges::Own(edges);
-        Ok(Ground { island_radius, outer_radius, lane_radii: written.lane_radii, arms, faces, kerbs, edges, lanes, lines })
+        let mirrored = written.hand == Hand::Left;
+        Ok(Ground { mirrored, island_radius, outer_radius, lane_radii: written.lane_radii, arms, faces, kerbs, edges, lanes, lines })
     }
 }
 

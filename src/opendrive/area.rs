@@ -22,24 +22,24 @@ type Part = Vec<Vec<[f64; 2]>>;
 
 /// An area of any number of parts.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Area {
-    pub(super) parts: Vec<Part>,
+pub(crate) struct Area {
+    pub(crate) parts: Vec<Part>,
 }
 
 /// The points of a contour.
-pub(super) fn points(contour: &[[f64; 2]]) -> Vec<DVec2> {
+pub(crate) fn points(contour: &[[f64; 2]]) -> Vec<DVec2> {
     contour.iter().map(|&p| DVec2::from(p)).collect()
 }
 
 /// The area enclosed by a contour, positive counter-clockwise \[m²].
-pub(super) fn signed_area(contour: &[[f64; 2]]) -> f64 {
+pub(crate) fn signed_area(contour: &[[f64; 2]]) -> f64 {
     let n = contour.len();
     (0..n).map(|i| DVec2::from(contour[i]).perp_dot(contour[(i + 1) % n].into())).sum::<f64>() / 2.0
 }
 
 impl Area {
     /// The union of counter-clockwise contours.
-    pub(super) fn union(contours: impl Iterator<Item = Vec<DVec2>>) -> Area {
+    pub(crate) fn union(contours: impl Iterator<Item = Vec<DVec2>>) -> Area {
         let contours: Vec<Vec<[f64; 2]>> = contours.map(|contour| contour.into_iter().map(DVec2::into).collect()).collect();
         Area { parts: overlaid(&contours, &Vec::new(), OverlayRule::Subject) }
     }
@@ -48,20 +48,20 @@ impl Area {
         Area { parts: overlaid(&self.parts, &other.parts, rule) }
     }
 
-    pub(super) fn plus(&self, other: &Area) -> Area {
+    pub(crate) fn plus(&self, other: &Area) -> Area {
         self.with(other, OverlayRule::Union)
     }
 
-    pub(super) fn minus(&self, other: &Area) -> Area {
+    pub(crate) fn minus(&self, other: &Area) -> Area {
         self.with(other, OverlayRule::Difference)
     }
 
-    pub(super) fn common(&self, other: &Area) -> Area {
+    pub(crate) fn common(&self, other: &Area) -> Area {
         self.with(other, OverlayRule::Intersect)
     }
 
     /// The area grown by `distance` on every side, or shrunk by it if negative \[m].
-    pub(super) fn grown(&self, distance: f64) -> Area {
+    pub(crate) fn grown(&self, distance: f64) -> Area {
         if self.parts.is_empty() {
             return Area::default();
         }
@@ -84,18 +84,18 @@ impl Area {
     }
 
     /// The areas that the parts enclose without being a part of them, each with the contour reversed.
-    pub(super) fn holes(&self) -> impl Iterator<Item = Area> + '_ {
+    pub(crate) fn holes(&self) -> impl Iterator<Item = Area> + '_ {
         let holes = self.parts.iter().flat_map(|part| part.iter().skip(1));
         holes.map(|hole| Area { parts: vec![vec![hole.iter().rev().copied().collect()]] })
     }
 
     /// Its size \[m²].
-    pub(super) fn size(&self) -> f64 {
+    pub(crate) fn size(&self) -> f64 {
         self.parts.iter().flatten().map(|contour| signed_area(contour)).sum()
     }
 
     /// Corners of the smallest upright rectangle around it \[m].
-    pub(super) fn bounds(&self) -> (DVec2, DVec2) {
+    pub(crate) fn bounds(&self) -> (DVec2, DVec2) {
         let points = self.parts.iter().flatten().flatten().map(|&p| DVec2::from(p));
         points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
     }

@@ -79,8 +79,9 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
     let arms =
         named(&lanes, options, map.is_mirrored()).map_err(|expected| refused.error("arms", format!("{:?}", options.arms), expected))?;
 
+    let mirrored = map.is_mirrored();
     let mut routes =
-        Lines { network: &network, arms: &arms, place: &refused.place, extent, circle, lines: Vec::new(), warnings: Vec::new() };
+        Lines { network: &network, mirrored, arms: &arms, place: &refused.place, extent, circle, lines: Vec::new(), warnings: Vec::new() };
     add_routes(&mut routes, &lanes, radius, outer_radius);
     if routes.lines.is_empty() {
         let found = format!("none between {} arms", lanes.len());
@@ -93,7 +94,7 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
     lane_radii.dedup_by(|after, before| *after - *before < ONE_LANE);
     let kerbs = faces.loops.iter().map(|curve| kerb(curve, &arms)).collect();
     let (lanes, edges) = (shown(&lines), Edges::Own(edges));
-    let ground = Ground { island_radius: radius, outer_radius, lane_radii, arms, faces, kerbs, edges, lanes, lines };
+    let ground = Ground { mirrored, island_radius: radius, outer_radius, lane_radii, arms, faces, kerbs, edges, lanes, lines };
     Ok(Imported { ground, centre: map.outside(origin), warnings })
 }
 

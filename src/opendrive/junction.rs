@@ -162,15 +162,24 @@ impl Map {
         check_arms(&refused, &lanes, circle)?;
         let arms = named(&lanes, options, self.is_mirrored())
             .map_err(|expected| refused.error("arms", format!("{:?}", options.arms), expected))?;
-        let mut routes =
-            Lines { network: &network, arms: &arms, place: &refused.place, extent, circle, lines: Vec::new(), warnings: Vec::new() };
+        let mirrored = self.is_mirrored();
+        let mut routes = Lines {
+            network: &network,
+            mirrored,
+            arms: &arms,
+            place: &refused.place,
+            extent,
+            circle,
+            lines: Vec::new(),
+            warnings: Vec::new(),
+        };
         for (way, strips) in &found {
             let route = route(&network.continued(strips, extent), strips, &lanes).ok_or_else(|| {
                 refused.error("way", way.to_string(), format!("must cross the circle of {circle:.1} m around the junction on a lane"))
             })?;
             let (entry, lane, exit, _) = route;
             if routes.lines.iter().any(|line| (line.entry, line.lane, line.exit) == (entry, lane, exit)) {
-                let same = format!("{}-{}-{exit}", arms[entry].name, lane.name());
+                let same = routes.name(entry, lane, exit);
                 return Err(refused.error("way", way.to_string(), format!("is {same}, as an earlier one is; leave one of them out")));
             }
             routes.add(route, &((0, 0), strips.clone()), |_, width| (CROSSING * width, CROSSING * width));
@@ -180,7 +189,8 @@ impl Map {
         lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
         let kerbs = faces.loops.iter().map(|curve| kerb(curve, &arms)).collect();
         let (lanes, edges) = (shown(&lines), Edges::Own(edges));
-        let ground = Ground { island_radius: 0.0, outer_radius: circle, lane_radii: Vec::new(), arms, faces, kerbs, edges, lanes, lines };
+        let ground =
+            Ground { mirrored, island_radius: 0.0, outer_radius: circle, lane_radii: Vec::new(), arms, faces, kerbs, edges, lanes, lines };
         Ok(Imported { ground, centre: self.outside(origin), warnings })
     }
 

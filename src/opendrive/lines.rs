@@ -19,6 +19,8 @@ pub(super) struct Lines<'a> {
     pub(super) arms: &'a [Arm],
     /// What the place is called in messages.
     pub(super) place: &'a str,
+    /// Whether the map has left-hand traffic, so that lanes change their names.
+    pub(super) mirrored: bool,
     /// How far from the origin lines reach \[m].
     pub(super) extent: f64,
     /// Radius of the circle where arms begin \[m].
@@ -66,8 +68,9 @@ impl Lines<'_> {
         }
     }
 
-    fn name(&self, entry: usize, lane: Lane, exit: u32) -> String {
-        format!("{}-{}-{exit}", self.arms[entry].name, lane.name())
+    /// What a route is called, without the roundabout.
+    pub(super) fn name(&self, entry: usize, lane: Lane, exit: u32) -> String {
+        format!("{}-{}-{exit}", self.arms[entry].name, lane.seen(self.mirrored).name())
     }
 }
 

@@ -1,5 +1,6 @@
 //! Which roundabout files are accepted, and how the others are refused.
 
+mod gutters;
 mod kinds;
 
 use proptest::prelude::*;

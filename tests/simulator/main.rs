@@ -16,6 +16,8 @@ mod episodes;
 mod field;
 mod fit;
 mod kinds;
+
+mod left_hand;
 mod map_junctions;
 mod map_lanes;
 mod maps;

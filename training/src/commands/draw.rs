@@ -89,6 +89,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     length("--departure", args.departure)?;
     let file = Path::new(&args.roundabout);
     let roundabout = if is_map(file) { Roundabout::from_map(file, &args.place.choice())? } else { procedural::find(&args.roundabout)? };
+    let roundabout = roundabout.seen();
     let routes = roundabout.routes(args.approach, args.departure, WAYPOINT_SPACING).map_err(|leaves| {
         let (flag, value) = if leaves.part == "approach" { ("--approach", args.approach) } else { ("--departure", args.departure) };
         Error::Flag { flag, value: format!("{value} m"), expected: leaves.to_string() }
