@@ -123,7 +123,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             std::fs::write(&kept, &text)?;
             return Err(format!("attempt {i} panicked; its map is {}", kept.display()).into());
         }
-        longest = longest.max(begun.elapsed().as_secs_f64());
+        let seconds = begun.elapsed().as_secs_f64();
+        if longest.max(1.0) < seconds {
+            let kept = std::env::temp_dir().join("slow.xodr");
+            std::fs::write(&kept, &text)?;
+            println!("attempt {i} took {seconds:.1} s; its map is {}", kept.display());
+        }
+        longest = longest.max(seconds);
         if i % 10_000 == 0 || i == count {
             println!("{i}: {counts:?}; longest {longest:.2} s");
         }

@@ -87,9 +87,11 @@ pub(super) fn densified(contour: &[DVec2], step: f64) -> Vec<DVec2> {
 pub(super) fn rings(strips: &[Strip], graph: &Graph) -> (Vec<Ring>, Vec<Refused>) {
     let drivable = of(strips.iter(), Kind::Lane).plus(&of(strips.iter(), Kind::Flat));
     let paved = drivable.closed(GAP).minus(&of(strips.iter(), Kind::Kerb));
-    let traffic = Traffic::new(strips, graph);
+    let holes: Vec<Area> = paved.holes().collect();
+    let around: Vec<(DVec2, DVec2)> = holes.iter().map(Area::bounds).map(|(low, high)| (low - NEAR, high + NEAR)).collect();
+    let traffic = Traffic::new(strips, graph, &around);
     let (mut rings, mut refused) = (Vec::new(), Vec::new());
-    for hole in paved.holes() {
+    for hole in &holes {
         let outline = densified(&points(&hole.parts[0][0]), 0.25);
         let Some((centre, radius, residual)) = fitted_circle(&outline) else { continue };
         // A sliver between two lanes is no island, whatever surrounds it.
@@ -98,7 +100,7 @@ pub(super) fn rings(strips: &[Strip], graph: &Graph) -> (Vec<Ring>, Vec<Refused>
         if size < 0.6 * RADII[0] || RADII[1] < radius || 4.0 * RADII[1] < (high - low).max_element() {
             continue;
         }
-        let (covered, against) = traffic.around(&hole, &outline, centre);
+        let (covered, against) = traffic.around(hole, &outline, centre);
         let reason = if against.max(covered) < COVERED {
             format!("lanes circulate at {:.0} % of the angles", 100.0 * covered.max(against))
         } else if covered < COVERED {
@@ -127,13 +129,16 @@ struct Traffic {
 const CELL: f64 = 10.0;
 
 impl Traffic {
-    fn new(strips: &[Strip], graph: &Graph) -> Traffic {
+    /// Lanes in rectangles, each given by its corners.
+    fn new(strips: &[Strip], graph: &Graph, around: &[(DVec2, DVec2)]) -> Traffic {
+        let near = |low: DVec2, high: DVec2| around.iter().any(|(from, to)| low.cmple(*to).all() && from.cmple(high).all());
         let mut cells: std::collections::HashMap<(i64, i64), Vec<(DVec2, DVec2)>> = std::collections::HashMap::new();
         for (index, strip) in strips.iter().enumerate() {
-            if !strip.is_driven() || (graph.next[index].is_empty() && graph.previous[index].is_empty()) {
+            let (low, high) = strip.bounds();
+            if !strip.is_driven() || (graph.next[index].is_empty() && graph.previous[index].is_empty()) || !near(low, high) {
                 continue;
             }
-            for pair in strip.path().windows(2) {
+            for pair in strip.path().windows(2).filter(|pair| near(pair[0].min(pair[1]), pair[0].max(pair[1]))) {
                 let Some(ahead) = (pair[1] - pair[0]).try_normalize() else { continue };
                 let parts = (pair[0].distance(pair[1]) / 0.5).ceil().clamp(1.0, 1e5);
                 for part in 0..parts as usize {
