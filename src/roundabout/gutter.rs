@@ -19,7 +19,7 @@ const FINE: f64 = 1e-3;
 /// What arcs and segments may add to that \[m].
 const FITTED: f64 = 4e-3;
 /// Gaps between gutters that are narrower are solid \[m].
-const SLIT: f64 = 0.2;
+const SLIT: f64 = 0.1;
 /// Tips of gutters that are narrower are road \[m].
 const TIP: f64 = 0.1;
 /// A width is applied at points at most this far apart, and nearer where it does not change linearly \[m].
