@@ -20,8 +20,6 @@ const FINE: f64 = 1e-3;
 const FITTED: f64 = 4e-3;
 /// Gaps between gutters that are narrower are solid \[m].
 const SLIT: f64 = 0.1;
-/// Tips of gutters that are narrower are road \[m].
-const TIP: f64 = 0.1;
 /// A width is applied at points at most this far apart, and nearer where it does not change linearly \[m].
 const SPACING: f64 = 0.5;
 /// Least such distance \[m].
@@ -243,7 +241,7 @@ fn left(faces: &Outline, triangles: Vec<Vec<DVec2>>) -> Outline {
     let polygon = |curve: &Curve| counter_clockwise(curve.polyline(FINE));
     let road = Area::union(faces.loops.iter().take(1).map(polygon)).minus(&Area::union(faces.loops.iter().skip(1).map(polygon)));
     let lanes = road.minus(&Area::union(triangles.into_iter().map(counter_clockwise)));
-    let lanes = lanes.common(&lanes.grown(-SLIT / 2.0).grown(0.75 * SLIT)).closed(TIP).common(&road);
+    let lanes = lanes.common(&lanes.grown(-SLIT / 2.0).grown(0.75 * SLIT));
     let size = |part: &[Vec<[f64; 2]>]| part.iter().map(|contour| signed_area(contour)).sum::<f64>();
     let largest = lanes.parts.iter().max_by(|one, other| size(one).total_cmp(&size(other)));
     let loops = largest.into_iter().flatten().map(|contour| fitted_outline(&points(contour), FITTED));
