@@ -18,7 +18,7 @@ use crate::reader::{Error, Reader, shown};
 const FINE: f64 = 1e-3;
 /// What arcs and segments may add to that \[m].
 const FITTED: f64 = 4e-3;
-/// Gaps between gutters, and strips of road, that are narrower are solid \[m].
+/// Gaps between gutters that are narrower are solid \[m].
 const SLIT: f64 = 0.1;
 /// A width is applied at points at most this far apart, and nearer where it does not change linearly \[m].
 const SPACING: f64 = 0.5;

@@ -69,7 +69,7 @@ fn gutters_that_make_no_sense_are_refused_with_their_keys() {
     refused("", falling, "arm[0].kerb_gutter[1].station: 20 m; must be more than 20 m");
     refused("", "splitter_gutter = 0.0\n", "arm[0].splitter_gutter: given; this arm has no splitter island");
     let wide = "kerb_gutter = [{ station = 0.0, width = 3.0 }]\n";
-    let narrow = with("island_gutter = [{ bearing_deg = 0.0, width = 3.0 }]\n", wide).replace("lane_width = 3.7", "lane_width = 2.5");
+    let narrow = with("island_gutter = [{ bearing_deg = 0.0, width = 3.0 }]\n", wide).replace("lane_width = 3.7", "lane_width = 2.6");
     let message = read(&narrow.replace("gutter = 0.5\n", "gutter = 0.1\n")).unwrap_err().to_string();
     assert!(message.contains("leave no way around the island"), "{message}");
     refused("", "corner = { lane = \"ring\" }\n", "arm[0].corner.lane: \"ring\"; is for a corner with kerb_radius");
@@ -78,7 +78,7 @@ fn gutters_that_make_no_sense_are_refused_with_their_keys() {
 #[test]
 fn a_lane_can_follow_the_ring_beside_a_kerb_that_does_not() {
     let route = |corner: &str| read(&with("", corner)).unwrap().line("E", Lane::Right, 1).unwrap();
-    let (follows, beside) = (route(""), route("corner = { kerb_radius = 20.0 }\n"));
-    assert_eq!(route("corner = { kerb_radius = 20.0, lane = \"ring\" }\n"), follows);
+    let (follows, beside) = (route(""), route("corner = { kerb_radius = 14.0 }\n"));
+    assert_eq!(route("corner = { kerb_radius = 14.0, lane = \"ring\" }\n"), follows);
     assert_ne!(beside, follows);
 }
