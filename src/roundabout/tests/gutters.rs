@@ -78,7 +78,7 @@ fn gutters_that_make_no_sense_are_refused_with_their_keys() {
 #[test]
 fn a_lane_can_follow_the_ring_beside_a_kerb_that_does_not() {
     let route = |corner: &str| read(&with("", corner)).unwrap().line("E", Lane::Right, 1).unwrap();
-    let (follows, beside) = (route(""), route("corner = { kerb_radius = 14.0 }\n"));
-    assert_eq!(route("corner = { kerb_radius = 14.0, lane = \"ring\" }\n"), follows);
+    let (follows, beside) = (route(""), route("corner = { kerb_radius = 40.0 }\n"));
+    assert_eq!(route("corner = { kerb_radius = 40.0, lane = \"ring\" }\n"), follows);
     assert_ne!(beside, follows);
 }
