@@ -26,6 +26,8 @@ const LIKE_OTHERS: [&str; 11] = [
     "random2026-10000.toml",
     "random2026-as-run.toml",
     "random2026-as-run-training.toml",
+    "maps2026.toml",
+    "maps2026-crossing.toml",
     "attard2023-maps.toml",
     "attard2023-maps-as-run.toml",
     "attard2023-maps-full.toml",
