@@ -23,7 +23,7 @@ fn next(state: &mut u64) -> usize {
 /// The text with a few faults: in its bytes, or every second time in its values alone.
 fn broken(text: &str, state: &mut u64) -> String {
     let mut bytes = text.as_bytes().to_vec();
-    let in_values = next(state) % 2 == 0;
+    let in_values = next(state).is_multiple_of(2);
     for _ in 0..1 + next(state) % 4 {
         let at = next(state) % bytes.len();
         match if in_values { 3 } else { next(state) % 4 } {
@@ -130,7 +130,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             println!("attempt {i} took {seconds:.1} s; its map is {}", kept.display());
         }
         longest = longest.max(seconds);
-        if i % 10_000 == 0 || i == count {
+        if i.is_multiple_of(10_000) || i == count {
             println!("{i}: {counts:?}; longest {longest:.2} s");
         }
     }

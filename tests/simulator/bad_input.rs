@@ -21,7 +21,7 @@ fn scenarios() -> PathBuf {
 }
 
 /// Benchmarks and roundabouts that have no key but those of another one.
-const LIKE_OTHERS: [&str; 11] = [
+const LIKE_OTHERS: [&str; 13] = [
     "random2026-1000.toml",
     "random2026-10000.toml",
     "random2026-as-run.toml",
