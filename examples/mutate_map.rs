@@ -107,29 +107,36 @@ fn attempt(file: &Path, text: &str, counts: &mut Counts) {
     }
 }
 
+/// Seconds that this thread has computed where the system tells, else seconds that have passed.
+fn seconds(start: Instant) -> f64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let nanoseconds = told.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
+    nanoseconds.map_or_else(|| start.elapsed().as_secs_f64(), |nanoseconds| nanoseconds / 1e9)
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [file, count, rest @ ..] = arguments.as_slice() else { return Err("MAP.xodr COUNT [SEED]".into()) };
     let text = std::fs::read_to_string(file)?;
     let mut state = rest.first().map_or(Ok(1), |seed| seed.parse::<u64>())?.max(1);
     let (mut counts, mut longest) = (Counts::default(), 0.0f64);
-    let count = count.parse::<usize>()?;
+    let (count, start) = (count.parse::<usize>()?, Instant::now());
     for i in 1..=count {
         let text = broken(&text, &mut state);
-        let begun = Instant::now();
+        let begun = seconds(start);
         let attempt = std::panic::AssertUnwindSafe(|| attempt(Path::new(file), &text, &mut counts));
         if std::panic::catch_unwind(attempt).is_err() {
             let kept = std::env::temp_dir().join("broken.xodr");
             std::fs::write(&kept, &text)?;
             return Err(format!("attempt {i} panicked; its map is {}", kept.display()).into());
         }
-        let seconds = begun.elapsed().as_secs_f64();
-        if longest.max(1.0) < seconds {
+        let took = seconds(start) - begun;
+        if longest.max(1.0) < took {
             let kept = std::env::temp_dir().join("slow.xodr");
             std::fs::write(&kept, &text)?;
-            println!("attempt {i} took {seconds:.1} s; its map is {}", kept.display());
+            println!("attempt {i} took {took:.1} s; its map is {}", kept.display());
         }
-        longest = longest.max(seconds);
+        longest = longest.max(took);
         if i.is_multiple_of(10_000) || i == count {
             println!("{i}: {counts:?}; longest {longest:.2} s");
         }
