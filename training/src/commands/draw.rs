@@ -88,7 +88,12 @@ pub fn run(args: &Args) -> Result<(), Error> {
     length("--approach", args.approach)?;
     length("--departure", args.departure)?;
     let file = Path::new(&args.roundabout);
-    let roundabout = if is_map(file) { Roundabout::from_map(file, &args.place.choice())? } else { procedural::find(&args.roundabout)? };
+    let roundabout = if is_map(file) {
+        Roundabout::from_map(file, &args.place.choice())?
+    } else {
+        args.place.check_absent()?;
+        procedural::find(&args.roundabout)?
+    };
     let roundabout = roundabout.seen();
     let routes = roundabout.routes(args.approach, args.departure, WAYPOINT_SPACING).map_err(|leaves| {
         let (flag, value) = if leaves.part == "approach" { ("--approach", args.approach) } else { ("--departure", args.departure) };

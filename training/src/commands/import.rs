@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec2;
 use offtrack::opendrive::{Hand, Imported, Map, Options, RoadLane, Way};
 use offtrack::reader::{Error as InputError, Reader};
@@ -18,10 +19,10 @@ pub struct Args {
     /// The map: a .xodr file.
     map: PathBuf,
     /// Print the roundabouts found, and how many islands and blocks are none.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["ring", "ways", "arms"])]
     list: bool,
     /// Print the ways through every junction, as --way takes them.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["ring", "ways", "arms"])]
     junctions: bool,
     /// Print everything that is odd in the map and in its roundabouts, and why every other island or block is none.
     #[arg(long)]
@@ -47,19 +48,33 @@ pub struct PlaceArgs {
     #[arg(long = "way", value_name = "ROAD:LANE,ROAD:LANE", value_parser = way, conflicts_with = "ring")]
     pub ways: Vec<Way>,
     /// The map's hand of traffic: what the map says, right or left.
-    #[arg(long, default_value = "map", value_parser = clap::builder::PossibleValuesParser::new(["map", "right", "left"]))]
-    pub hand: String,
+    #[arg(long, default_value = "map", value_parser = PossibleValuesParser::new(["map", "right", "left"]).map(hand))]
+    pub hand: Hand,
 }
 
 impl PlaceArgs {
     /// The ring or the ways that the flags choose.
     pub fn choice(&self) -> Choice {
-        let hand = match self.hand.as_str() {
-            "left" => Hand::Left,
-            "right" => Hand::Right,
-            _ => Hand::Map,
-        };
-        Choice { ring: self.ring, hand, ways: self.ways.clone(), ..Choice::default() }
+        Choice { ring: self.ring, hand: self.hand, ways: self.ways.clone(), ..Choice::default() }
+    }
+
+    /// An error if one of the flags is given for a roundabout that is no map.
+    pub fn check_absent(&self) -> Result<(), Error> {
+        let given = [
+            ("--ring", self.ring.map(|p| format!("{},{}", p.x, p.y))),
+            ("--way", self.ways.first().map(|way| format!("{},{}", way.from, way.to))),
+            ("--hand", (self.hand != Hand::Map).then(|| format!("{:?}", self.hand).to_lowercase())),
+        ];
+        let Some((flag, Some(value))) = given.into_iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
+        Err(Error::Flag { flag, value, expected: "is for an OpenDRIVE map, a file that ends in .xodr; leave it out".into() })
+    }
+}
+
+fn hand(word: String) -> Hand {
+    match word.as_str() {
+        "left" => Hand::Left,
+        "right" => Hand::Right,
+        _ => Hand::Map,
     }
 }
 
@@ -90,7 +105,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return junctions(&args.map, &map);
     }
     if args.check {
-        return check(&map, &choice);
+        return check(&args.map, &map, &choice);
     }
     let Some(output) = &args.output else { return Ok(()) };
     if !output.to_string_lossy().ends_with(".outline.toml") {
@@ -177,18 +192,20 @@ fn junctions(file: &Path, map: &Map) -> Result<(), Error> {
     Ok(())
 }
 
-/// Prints all warnings.
-fn check(map: &Map, choice: &Choice) -> Result<(), Error> {
+/// Prints all warnings: about the map, and about the place that is chosen or else all its roundabouts.
+fn check(file: &Path, map: &Map, choice: &Choice) -> Result<(), Error> {
     let mut text = String::new();
     for warning in map.warnings() {
         let _ = writeln!(text, "{warning}");
     }
-    let rings = match choice.ring {
-        Some(p) => vec![map.nearest(p)?],
-        None => map.rings(),
+    let is_chosen = choice.ring.is_some() || !choice.ways.is_empty();
+    let places: Vec<Result<Imported, InputError>> = if is_chosen {
+        vec![choice.imported(file, map)]
+    } else {
+        map.rings().iter().map(|ring| map.ground(ring, &Options { arms: choice.arms.clone() })).collect()
     };
-    for ring in &rings {
-        match map.ground(ring, &Options { arms: choice.arms.clone() }) {
+    for place in &places {
+        match place {
             Ok(Imported { warnings, .. }) => warnings.iter().for_each(|warning| {
                 let _ = writeln!(text, "{warning}");
             }),
@@ -198,10 +215,10 @@ fn check(map: &Map, choice: &Choice) -> Result<(), Error> {
         }
     }
     let warnings = text.lines().count();
-    for refused in map.refused().iter().filter(|_| choice.ring.is_none()) {
+    for refused in map.refused().iter().filter(|_| !is_chosen) {
         let (x, y) = (refused.centre.x, refused.centre.y);
         let _ = writeln!(text, "no ring at {x:.1},{y:.1}, {:.1} m: {}", refused.radius, refused.reason);
     }
-    let _ = writeln!(text, "{warnings} warnings, {} rings", rings.len());
+    let _ = writeln!(text, "{warnings} warnings, {} roundabouts or junctions", places.len());
     files::print(&text)
 }

@@ -41,3 +41,20 @@ fn a_map_without_a_roundabout_is_wrong_input() {
     assert_eq!(offtrack(&["import", "missing.xodr", "--list"]).status.code(), Some(2));
     assert_eq!(offtrack(&["import", map("sumo_ring22.xodr").to_str().unwrap(), "-o", "ring.toml"]).status.code(), Some(2));
 }
+
+#[test]
+fn flags_that_would_do_nothing_are_refused() {
+    let (sumo, folder) = (map("sumo_ring22.xodr"), tempfile::tempdir().unwrap());
+    let (sumo, svg) = (sumo.to_str().unwrap(), folder.path().join("ring.svg"));
+    let refused = |arguments: &[&str], flag: &str| {
+        let output = offtrack(arguments);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && error.contains(flag), "{arguments:?}: {error}");
+    };
+    refused(&["import", sumo, "--list", "--ring", "140,140"], "--ring");
+    refused(&["import", sumo, "--junctions", "--arms", "E,N,W,S"], "--arms");
+    let svg = svg.to_str().unwrap();
+    refused(&["draw", "16m", "--ring", "1,2", "-o", svg], "--ring: 1,2");
+    refused(&["draw", "16m", "--hand", "left", "-o", svg], "--hand: left");
+    refused(&["draw", "16m", "--way", "1:-1,2:-1", "-o", svg], "--way: 1:-1,2:-1");
+}
