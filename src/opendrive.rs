@@ -12,6 +12,7 @@ mod objects; // traffic islands given as objects
 mod reference_line; // points and headings along a road
 mod lanes; // lanes as strips
 mod graph; // which lane leads into which
+mod cells; // things near a point
 pub(crate) mod area; // polygons: union, difference, growing
 mod surface; // what can be driven on
 mod rings; // where the roundabouts are
@@ -69,8 +70,8 @@ impl Map {
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or is no OpenDRIVE map, or a value that makes no sense, with road, lane and line. What
-    /// is only odd is a warning.
+    /// A file that cannot be read or is no OpenDRIVE map, or a value that makes no sense, with road, lane and line.
+    /// What is only odd is a warning.
     pub fn read(file: &Path, hand: Hand) -> Result<Map, Error> {
         Map::parse(file, &read_text(file, read::FILE_LIMIT)?, hand)
     }

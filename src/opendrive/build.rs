@@ -23,7 +23,7 @@ const BESIDE_RING: f64 = 6.0;
 /// Ring lanes whose centre lines are nearer to each other than this are one \[m].
 const ONE_LANE: f64 = 1.2;
 /// Most arms of a place.
-pub(super) const MOST_ARMS: usize = 8;
+const MOST_ARMS: usize = 8;
 
 /// How a ring is imported.
 #[derive(Debug, Clone, Default)]
@@ -75,27 +75,62 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
     let fine = surroundings::lanes(map, origin, extent, FINEST);
     let network = Network { graph: &map.graph, strips: fine.iter().map(|(index, strip)| (*index, strip)).collect() };
     let (circle, lanes) = ring_arms(map, origin, radius, &network, outer_radius + BESIDE_RING);
-    check_arms(&refused, &lanes, circle)?;
-    let arms =
-        named(&lanes, options, map.is_mirrored()).map_err(|expected| refused.error("arms", format!("{:?}", options.arms), expected))?;
-
-    let mirrored = map.is_mirrored();
-    let mut routes =
-        Lines { network: &network, mirrored, arms: &arms, place: &refused.place, extent, circle, lines: Vec::new(), warnings: Vec::new() };
-    add_routes(&mut routes, &lanes, radius, outer_radius);
-    if routes.lines.is_empty() {
-        let found = format!("none between {} arms", lanes.len());
-        return Err(refused.error("routes", found, "the map's links must lead from a lane in to a lane out"));
-    }
-    routes.check(&faces);
-    let Lines { lines, warnings, .. } = routes;
+    let site = Site { map, refused: &refused, network: &network, origin, extent, circle, faces, edges };
+    let mut imported = site.imported(&lanes, options, |routes| {
+        add_routes(routes, &lanes, radius, outer_radius);
+        Ok(())
+    })?;
+    let lines = &imported.ground.lines;
     let mut lane_radii: Vec<f64> = lines.iter().map(|line| ring_radius(&line.line.polyline(0.01), radius, outer_radius)).collect();
     lane_radii.sort_by(f64::total_cmp);
     lane_radii.dedup_by(|after, before| *after - *before < ONE_LANE);
-    let kerbs = faces.loops.iter().map(|curve| kerb(curve, &arms)).collect();
-    let (lanes, edges) = (shown(&lines), Edges::Own(edges));
-    let ground = Ground { mirrored, island_radius: radius, outer_radius, lane_radii, arms, faces, kerbs, edges, lanes, lines };
-    Ok(Imported { ground, centre: map.outside(origin), warnings })
+    imported.ground = Ground { island_radius: radius, outer_radius, lane_radii, ..imported.ground };
+    Ok(imported)
+}
+
+/// A place of a map, a ring or a junction, whose routes are still to be found.
+pub(super) struct Site<'a> {
+    pub(super) map: &'a Map,
+    pub(super) refused: &'a Refusals<'a>,
+    pub(super) network: &'a Network<'a>,
+    /// What is the origin of the rest, in the map's records \[m].
+    pub(super) origin: DVec2,
+    /// How far the world reaches \[m].
+    pub(super) extent: f64,
+    /// Radius of the circle where arms begin \[m].
+    pub(super) circle: f64,
+    pub(super) faces: Outline,
+    pub(super) edges: Outline,
+}
+
+impl Site<'_> {
+    /// The place with these arms and the routes that `add` finds; without an island and lanes around it.
+    pub(super) fn imported(
+        self,
+        lanes: &[ArmLanes],
+        options: &Options,
+        add: impl FnOnce(&mut Lines) -> Result<(), Error>,
+    ) -> Result<Imported, Error> {
+        let Site { map, refused, network, origin, extent, circle, faces, edges } = self;
+        check_arms(refused, lanes, circle)?;
+        let mirrored = map.is_mirrored();
+        let arms = named(lanes, options, mirrored).map_err(|expected| refused.error("arms", format!("{:?}", options.arms), expected))?;
+        let mut routes =
+            Lines { network, mirrored, arms: &arms, place: &refused.place, extent, circle, lines: Vec::new(), warnings: Vec::new() };
+        add(&mut routes)?;
+        if routes.lines.is_empty() {
+            let found = format!("none between {} arms", lanes.len());
+            return Err(refused.error("routes", found, "the map's links must lead from a lane in to a lane out"));
+        }
+        routes.check(&faces);
+        let Lines { mut lines, warnings, .. } = routes;
+        lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
+        let kerbs = faces.loops.iter().map(|curve| kerb(curve, &arms)).collect();
+        let (lanes, edges) = (shown(&lines), Edges::Own(edges));
+        let (island_radius, lane_radii) = (0.0, Vec::new());
+        let ground = Ground { mirrored, island_radius, outer_radius: circle, lane_radii, arms, faces, kerbs, edges, lanes, lines };
+        Ok(Imported { ground, centre: map.outside(origin), warnings })
+    }
 }
 
 /// The surface around a first centre, whose island then gives the centre itself.
@@ -121,7 +156,7 @@ fn ring_arms(map: &Map, origin: DVec2, radius: f64, network: &Network, reach: f6
 }
 
 /// An error if the arms of a place are none, or too many.
-pub(super) fn check_arms(refused: &Refusals, lanes: &[ArmLanes], circle: f64) -> Result<(), Error> {
+fn check_arms(refused: &Refusals, lanes: &[ArmLanes], circle: f64) -> Result<(), Error> {
     let found = format!("{} on a circle of {circle:.1} m", lanes.len());
     if lanes.iter().all(|arm| arm.entries.is_empty()) || lanes.iter().all(|arm| arm.exits.is_empty()) {
         return Err(refused.error("arms", found, "a lane must lead in and another out, by the links of the map"));
@@ -209,7 +244,7 @@ fn ring_radius(line: &[DVec2], island_radius: f64, outer_radius: f64) -> f64 {
 }
 
 /// What a loop of the kerb faces belongs to.
-pub(super) fn kerb(curve: &Curve, arms: &[Arm]) -> Kerb {
+fn kerb(curve: &Curve, arms: &[Arm]) -> Kerb {
     let contour: Vec<[f64; 2]> = curve.polyline(0.01).into_iter().map(DVec2::into).collect();
     if 0.0 < signed_area(&contour) {
         return Kerb::Outer;

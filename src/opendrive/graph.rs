@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use glam::DVec2;
 
+use super::cells::Cells;
 use super::lanes::Strip;
 use super::records::{Kind, Link, Records};
 
@@ -60,7 +61,7 @@ impl Graph {
             strips.iter().map(|strip| if strip.kind == Kind::Lane { End::both(&strip.path()) } else { None }).collect();
         let place: HashMap<(usize, usize, i32), usize> =
             strips.iter().enumerate().map(|(index, strip)| ((strip.road, strip.section, strip.id), index)).collect();
-        let starts = Starts::new(&ends);
+        let starts = starts(&ends);
         let mut graph = Graph { next: vec![Vec::new(); strips.len()], previous: vec![Vec::new(); strips.len()], warnings: Vec::new() };
         for (index, strip) in strips.iter().enumerate() {
             let Some([_, end]) = ends[index] else { continue };
@@ -77,7 +78,7 @@ impl Graph {
             }
             let name = |index: usize| format!("road {} lane {}", records.roads[strips[index].road].id, strips[index].id);
             let jump = wrong.iter().filter_map(|&next| Some(end.to(&ends[next]?[0]).0)).fold(0.0, f64::max);
-            let instead = match starts.nearest(&end, &ends).filter(|&next| next != index) {
+            let instead = match nearest(&starts, &end, &ends).filter(|&next| next != index) {
                 Some(next) if graph.next[index].contains(&next) => "it is left out".into(),
                 Some(next) => {
                     graph.next[index].push(next);
@@ -143,36 +144,23 @@ fn linked(records: &Records, strip: &Strip, follow: bool) -> Vec<(usize, usize, 
     }
 }
 
-/// The beginnings of lanes in square cells, to find those near a point.
-struct Starts {
-    cells: HashMap<(i64, i64), Vec<usize>>,
+/// The beginnings of lanes in cells of [`SEARCH`].
+fn starts(ends: &[Option<[End; 2]>]) -> Cells<usize> {
+    let mut starts = Cells::new(SEARCH);
+    for (index, end) in ends.iter().enumerate() {
+        if let Some([start, _]) = end {
+            starts.insert(start.at, index);
+        }
+    }
+    starts
 }
 
-impl Starts {
-    fn cell(p: DVec2) -> (i64, i64) {
-        ((p.x / SEARCH).floor() as i64, (p.y / SEARCH).floor() as i64)
-    }
-
-    fn new(ends: &[Option<[End; 2]>]) -> Starts {
-        let mut cells: HashMap<(i64, i64), Vec<usize>> = HashMap::new();
-        for (index, end) in ends.iter().enumerate() {
-            if let Some([start, _]) = end {
-                cells.entry(Starts::cell(start.at)).or_default().push(index);
-            }
-        }
-        Starts { cells }
-    }
-
-    /// The lane that begins nearest in place and heading to where another ends.
-    fn nearest(&self, end: &End, ends: &[Option<[End; 2]>]) -> Option<usize> {
-        let (column, row) = Starts::cell(end.at);
-        let around = (-1..=1).flat_map(|x| (-1..=1).map(move |y| (column.wrapping_add(x), row.wrapping_add(y))));
-        let near = around.filter_map(|cell| self.cells.get(&cell)).flatten();
-        let fits = near.filter_map(|&index| {
-            let start = ends[index]?[0];
-            let (jump, turn) = end.to(&start);
-            (jump <= SEARCH && turn <= TURN).then_some((jump + turn, index))
-        });
-        fits.min_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1))).map(|(_, index)| index)
-    }
+/// The lane that begins nearest in place and heading to where another ends.
+fn nearest(starts: &Cells<usize>, end: &End, ends: &[Option<[End; 2]>]) -> Option<usize> {
+    let fits = starts.around(end.at).filter_map(|&index| {
+        let start = ends[index]?[0];
+        let (jump, turn) = end.to(&start);
+        (jump <= SEARCH && turn <= TURN).then_some((jump + turn, index))
+    });
+    fits.min_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1))).map(|(_, index)| index)
 }

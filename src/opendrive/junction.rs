@@ -1,19 +1,17 @@
-//! Ways through the junctions of a map, chosen by road and lane, as a [`Ground`]: a crossing instead of a ring.
+//! Ways through the junctions of a map, chosen by road and lane, as a [`Ground`](crate::ground::Ground): a crossing
+//! instead of a ring.
 
 use std::collections::HashMap;
 use std::fmt;
 
 use glam::DVec2;
 
-use super::build::{Imported, Options, Refusals, check_arms, kerb};
+use super::build::{Imported, Options, Refusals, Site};
 use super::crossings::{ArmLanes, Crossing, arms, crossings};
 use super::lanes::{Strip, sampled};
-use super::lines::{Lines, shown};
-use super::names::named;
 use super::paths::{Network, Way as Lanes};
 use super::surroundings::{self, Part, REACH, clipped, encloses, outline};
 use super::{COARSE, FINEST, Map};
-use crate::ground::{Edges, Ground};
 use crate::reader::{Error, Reader};
 use crate::route::Lane;
 
@@ -68,8 +66,8 @@ pub struct Junction {
 }
 
 impl Map {
-    /// The centre line of every lane that is driven on, a section at a time, in its direction of travel and the map's own
-    /// coordinates; chords leave their curves by at most `tolerance` \[m].
+    /// The centre line of every lane that is driven on, a section at a time, in its direction of travel and the map's
+    /// own coordinates; chords leave their curves by at most `tolerance` \[m].
     pub fn lane_centres(&self, tolerance: f64) -> Vec<(RoadLane, Vec<DVec2>)> {
         let mut centres = Vec::new();
         for (index, road) in self.records.roads.iter().enumerate() {
@@ -126,10 +124,10 @@ impl Map {
         junctions
     }
 
-    /// Ways through the map as a [`Ground`] around the junctions that they lead through.
+    /// Ways through the map as a [`Ground`](crate::ground::Ground) around the junctions that they lead through.
     ///
-    /// Arms are named as a ring's are and exits counted as there, over all roads of these junctions. The circle around the
-    /// junctions takes the place of the ring's outer kerb, and there is no island.
+    /// Arms are named as a ring's are and exits counted as there, over all roads of these junctions. The circle around
+    /// the junctions takes the place of the ring's outer kerb, and there is no island.
     ///
     /// # Errors
     ///
@@ -159,39 +157,21 @@ impl Map {
         let network = Network { graph: &self.graph, strips: fine.iter().map(|(index, strip)| (*index, strip)).collect() };
         let (indices, coarse): (Vec<usize>, Vec<Strip>) = surroundings::nearby(self, origin, extent, COARSE).into_iter().unzip();
         let lanes = arms(&crossings(&coarse, &indices, &self.graph, circle), circle);
-        check_arms(&refused, &lanes, circle)?;
-        let arms = named(&lanes, options, self.is_mirrored())
-            .map_err(|expected| refused.error("arms", format!("{:?}", options.arms), expected))?;
-        let mirrored = self.is_mirrored();
-        let mut routes = Lines {
-            network: &network,
-            mirrored,
-            arms: &arms,
-            place: &refused.place,
-            extent,
-            circle,
-            lines: Vec::new(),
-            warnings: Vec::new(),
-        };
-        for (way, strips) in &found {
-            let route = route(&network.continued(strips, extent), strips, &lanes).ok_or_else(|| {
-                refused.error("way", way.to_string(), format!("must cross the circle of {circle:.1} m around the junction on a lane"))
-            })?;
-            let (entry, lane, exit, _) = route;
-            if routes.lines.iter().any(|line| (line.entry, line.lane, line.exit) == (entry, lane, exit)) {
-                let same = routes.name(entry, lane, exit);
-                return Err(refused.error("way", way.to_string(), format!("is {same}, as an earlier one is; leave one of them out")));
+        let site = Site { map: self, refused: &refused, network: &network, origin, extent, circle, faces, edges };
+        site.imported(&lanes, options, |routes| {
+            for (way, strips) in &found {
+                let crosses = format!("must cross the circle of {circle:.1} m around the junction on a lane");
+                let route = route(&network.continued(strips, extent), strips, &lanes);
+                let route = route.ok_or_else(|| refused.error("way", way.to_string(), crosses))?;
+                let (entry, lane, exit, _) = route;
+                if routes.lines.iter().any(|line| (line.entry, line.lane, line.exit) == (entry, lane, exit)) {
+                    let same = routes.name(entry, lane, exit);
+                    return Err(refused.error("way", way.to_string(), format!("is {same}, as an earlier one is; leave one of them out")));
+                }
+                routes.add(route, &((0, 0), strips.clone()), |_, width| (CROSSING * width, CROSSING * width));
             }
-            routes.add(route, &((0, 0), strips.clone()), |_, width| (CROSSING * width, CROSSING * width));
-        }
-        routes.check(&faces);
-        let Lines { mut lines, warnings, .. } = routes;
-        lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
-        let kerbs = faces.loops.iter().map(|curve| kerb(curve, &arms)).collect();
-        let (lanes, edges) = (shown(&lines), Edges::Own(edges));
-        let ground =
-            Ground { mirrored, island_radius: 0.0, outer_radius: circle, lane_radii: Vec::new(), arms, faces, kerbs, edges, lanes, lines };
-        Ok(Imported { ground, centre: self.outside(origin), warnings })
+            Ok(())
+        })
     }
 
     /// All lanes of the map.

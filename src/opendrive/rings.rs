@@ -7,10 +7,11 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 
 use super::area::{Area, points};
+use super::cells::Cells;
 use super::graph::Graph;
 use super::lanes::Strip;
 use super::records::Kind;
-use super::surface::of;
+use super::surface::{GAP, of};
 
 /// Smallest and largest radius of an island \[m].
 const RADII: [f64; 2] = [1.5, 200.0];
@@ -22,8 +23,6 @@ const COVERED: f64 = 0.85;
 const RESIDUAL: f64 = 0.3;
 /// Angles that are looked at.
 const BINS: usize = 72;
-/// Gaps between strips that are closed first \[m].
-const GAP: f64 = 0.02;
 
 /// A roundabout in a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,7 +88,7 @@ pub(super) fn rings(strips: &[Strip], graph: &Graph) -> (Vec<Ring>, Vec<Refused>
     let paved = drivable.closed(GAP).minus(&of(strips.iter(), Kind::Kerb));
     let holes: Vec<Area> = paved.holes().collect();
     let around: Vec<(DVec2, DVec2)> = holes.iter().map(Area::bounds).map(|(low, high)| (low - NEAR, high + NEAR)).collect();
-    let traffic = Traffic::new(strips, graph, &around);
+    let traffic = traffic(strips, graph, &around);
     let (mut rings, mut refused) = (Vec::new(), Vec::new());
     for hole in &holes {
         let outline = densified(&points(&hole.parts[0][0]), 0.25);
@@ -100,7 +99,7 @@ pub(super) fn rings(strips: &[Strip], graph: &Graph) -> (Vec<Ring>, Vec<Refused>
         if size < 0.6 * RADII[0] || RADII[1] < radius || 4.0 * RADII[1] < (high - low).max_element() {
             continue;
         }
-        let (covered, against) = traffic.around(hole, &outline, centre);
+        let (covered, against) = circulating(&traffic, hole, &outline, centre);
         let reason = if against.max(covered) < COVERED {
             format!("lanes circulate at {:.0} % of the angles", 100.0 * covered.max(against))
         } else if covered < COVERED {
@@ -120,85 +119,51 @@ pub(super) fn rings(strips: &[Strip], graph: &Graph) -> (Vec<Ring>, Vec<Refused>
     (rings, refused)
 }
 
-/// Lanes as points with directions, in square cells.
-struct Traffic {
-    cells: std::collections::HashMap<(i64, i64), Vec<(DVec2, DVec2)>>,
-}
-
-/// Width of the cells \[m].
+/// Width of the cells that lanes are found by \[m].
 const CELL: f64 = 10.0;
 
-impl Traffic {
-    /// Lanes in rectangles, each given by its corners.
-    fn new(strips: &[Strip], graph: &Graph, around: &[(DVec2, DVec2)]) -> Traffic {
-        let near = |low: DVec2, high: DVec2| around.iter().any(|(from, to)| low.cmple(*to).all() && from.cmple(high).all());
-        let mut cells: std::collections::HashMap<(i64, i64), Vec<(DVec2, DVec2)>> = std::collections::HashMap::new();
-        for (index, strip) in strips.iter().enumerate() {
-            let (low, high) = strip.bounds();
-            if !strip.is_driven() || (graph.next[index].is_empty() && graph.previous[index].is_empty()) || !near(low, high) {
-                continue;
-            }
-            for pair in strip.path().windows(2).filter(|pair| near(pair[0].min(pair[1]), pair[0].max(pair[1]))) {
-                let Some(ahead) = (pair[1] - pair[0]).try_normalize() else { continue };
-                let parts = (pair[0].distance(pair[1]) / 0.5).ceil().clamp(1.0, 1e5);
-                for part in 0..parts as usize {
-                    let p = pair[0].lerp(pair[1], part as f64 / parts);
-                    cells.entry(((p.x / CELL).floor() as i64, (p.y / CELL).floor() as i64)).or_default().push((p, ahead));
-                }
+/// Lanes in rectangles, each given by its corners, as points with directions of travel.
+fn traffic(strips: &[Strip], graph: &Graph, around: &[(DVec2, DVec2)]) -> Cells<(DVec2, DVec2)> {
+    let near = |low: DVec2, high: DVec2| around.iter().any(|(from, to)| low.cmple(*to).all() && from.cmple(high).all());
+    let mut cells = Cells::new(CELL);
+    for (index, strip) in strips.iter().enumerate() {
+        let (low, high) = strip.bounds();
+        if !strip.is_driven() || (graph.next[index].is_empty() && graph.previous[index].is_empty()) || !near(low, high) {
+            continue;
+        }
+        for pair in strip.path().windows(2).filter(|pair| near(pair[0].min(pair[1]), pair[0].max(pair[1]))) {
+            let Some(ahead) = (pair[1] - pair[0]).try_normalize() else { continue };
+            let parts = (pair[0].distance(pair[1]) / 0.5).ceil().clamp(1.0, 1e5);
+            for part in 0..parts as usize {
+                let p = pair[0].lerp(pair[1], part as f64 / parts);
+                cells.insert(p, (p, ahead));
             }
         }
-        Traffic { cells }
     }
-
-    /// Parts of the angles around `centre` at which the lane nearest to the island circulates counter-clockwise, and
-    /// clockwise.
-    fn around(&self, hole: &Area, outline: &[DVec2], centre: DVec2) -> (f64, f64) {
-        let (low, high) = hole.bounds();
-        let [low, high] = [low - NEAR, high + NEAR].map(|p| (p / CELL).floor().as_i64vec2());
-        let mut nearest: [Option<(f64, f64)>; BINS] = [None; BINS];
-        let near = Near::new(outline);
-        for column in low.x..=high.x {
-            for row in low.y..=high.y {
-                for &(p, ahead) in self.cells.get(&(column, row)).into_iter().flatten() {
-                    let out = p - centre;
-                    let turning = out.normalize_or_zero().perp_dot(ahead);
-                    if turning.abs() < 0.5 {
-                        continue;
-                    }
-                    let bin = ((out.to_angle().rem_euclid(TAU) / TAU * BINS as f64) as usize).min(BINS - 1);
-                    let distance = near.distance(p);
-                    if distance <= NEAR && nearest[bin].is_none_or(|(other, _)| distance < other) {
-                        nearest[bin] = Some((distance, turning));
-                    }
-                }
-            }
-        }
-        let part = |way: f64| nearest.iter().flatten().filter(|(_, turning)| 0.0 < way * turning).count() as f64 / BINS as f64;
-        (part(1.0), part(-1.0))
-    }
+    cells
 }
 
-/// Points of an outline in square cells of [`NEAR`], for distances up to that.
-struct Near {
-    cells: std::collections::HashMap<(i64, i64), Vec<DVec2>>,
-}
-
-impl Near {
-    fn new(outline: &[DVec2]) -> Near {
-        let mut cells: std::collections::HashMap<(i64, i64), Vec<DVec2>> = std::collections::HashMap::new();
-        for &p in outline {
-            cells.entry(((p.x / NEAR).floor() as i64, (p.y / NEAR).floor() as i64)).or_default().push(p);
+/// Parts of the angles around `centre` at which the lane nearest to a hole circulates counter-clockwise, and clockwise.
+fn circulating(traffic: &Cells<(DVec2, DVec2)>, hole: &Area, outline: &[DVec2], centre: DVec2) -> (f64, f64) {
+    let (low, high) = hole.bounds();
+    let mut nearest: [Option<(f64, f64)>; BINS] = [None; BINS];
+    // Distances beyond NEAR do not matter.
+    let mut edge = Cells::new(NEAR);
+    outline.iter().for_each(|&p| edge.insert(p, p));
+    for &(p, ahead) in traffic.within(low - NEAR, high + NEAR) {
+        let out = p - centre;
+        let turning = out.normalize_or_zero().perp_dot(ahead);
+        if turning.abs() < 0.5 {
+            continue;
         }
-        Near { cells }
+        let bin = ((out.to_angle().rem_euclid(TAU) / TAU * BINS as f64) as usize).min(BINS - 1);
+        let distance = edge.around(p).map(|other| other.distance(p)).fold(f64::INFINITY, f64::min);
+        if distance <= NEAR && nearest[bin].is_none_or(|(other, _)| distance < other) {
+            nearest[bin] = Some((distance, turning));
+        }
     }
-
-    /// Distance from `p` to the nearest point, infinite beyond [`NEAR`] \[m].
-    fn distance(&self, p: DVec2) -> f64 {
-        let (column, row) = ((p.x / NEAR).floor() as i64, (p.y / NEAR).floor() as i64);
-        let around = (-1..=1).flat_map(|x| (-1..=1).map(move |y| (column + x, row + y)));
-        let points = around.filter_map(|cell| self.cells.get(&cell)).flatten();
-        points.map(|other| other.distance(p)).fold(f64::INFINITY, f64::min)
-    }
+    let part = |way: f64| nearest.iter().flatten().filter(|(_, turning)| 0.0 < way * turning).count() as f64 / BINS as f64;
+    (part(1.0), part(-1.0))
 }
 
 #[cfg(test)]

@@ -4,18 +4,17 @@
 //! walks and what has no type, because the shoulder of a ring runs across every mouth. What lies between strips is a
 //! void: narrow ones and small ones beside a lane are paved, all others are solid.
 
-use std::collections::HashMap;
-
 use glam::DVec2;
 
-use super::area::{Area, points};
+use super::area::{Area, counter_clockwise, points};
+use super::cells::Cells;
 use super::lanes::Strip;
 use super::records::Kind;
 use super::rings::densified;
 use crate::geometry::Piece;
 
 /// Gaps between strips that are closed first \[m].
-const GAP: f64 = 0.02;
+pub(super) const GAP: f64 = 0.02;
 /// Voids narrower than this are paved where they touch a lane \[m].
 const SLIVER: f64 = 0.6;
 /// A void that holds a circle of this radius is solid where a map has no kerbs \[m].
@@ -49,11 +48,7 @@ impl Surface {
     /// The surface of these strips, around islands that were given as outlines.
     pub(super) fn new(strips: &[Strip], islands: &[Vec<DVec2>]) -> Surface {
         let kind = |kind: Kind| of(strips.iter(), kind);
-        let counter_clockwise = |island: &Vec<DVec2>| {
-            let area: f64 = (0..island.len()).map(|i| island[i].perp_dot(island[(i + 1) % island.len()])).sum();
-            if area < 0.0 { island.iter().rev().copied().collect() } else { island.clone() }
-        };
-        let kerbs = kind(Kind::Kerb).plus(&Area::union(islands.iter().map(counter_clockwise))).closed(GAP);
+        let kerbs = kind(Kind::Kerb).plus(&Area::union(islands.iter().cloned().map(counter_clockwise))).closed(GAP);
         let lanes = kind(Kind::Lane).closed(GAP).minus(&kerbs);
         let solid = kind(Kind::Solid).minus(&lanes);
         let flat = kind(Kind::Flat).minus(&solid);
@@ -62,15 +57,9 @@ impl Surface {
         let voids = paved_voids(&paved, &kerbs.plus(&solid), inscribed);
         let lane_edge = Edge::new(&lanes);
         let beside_lanes = Area { parts: voids.parts.iter().filter(|void| lane_edge.touches(void)).cloned().collect() };
-        let bounded = |area: Area| without_slits(&area.closed(GAP).minus(&kerbs).minus(&solid));
+        let bounded = |area: Area| area.closed(GAP).minus(&kerbs).minus(&solid).without_slits(SLIT, SIMPLE);
         Surface { edges: bounded(lanes.plus(&beside_lanes)), faces: bounded(paved.plus(&voids)) }
     }
-}
-
-/// An area without what is connected to it, or hangs on it, by slits that no wheel fits through.
-fn without_slits(area: &Area) -> Area {
-    // What is grown back covers what was shrunk with a quarter of the slit to spare, corners of 90 deg with 9 mm.
-    area.common(&area.grown(-SLIT / 2.0).simplified(SIMPLE).grown(0.75 * SLIT))
 }
 
 /// The voids between strips that can be driven on.
@@ -83,18 +72,14 @@ fn paved_voids(paved: &Area, solid: &Area, inscribed: f64) -> Area {
     Area { parts: slivers.parts.into_iter().filter(|void| edge.touches(void)).chain(small).collect() }
 }
 
-/// The edge of an area in square cells, to find what touches it.
+/// The edge of an area in cells of a metre, to find what touches it.
 struct Edge {
-    cells: HashMap<(i64, i64), Vec<Piece>>,
+    cells: Cells<Piece>,
 }
 
 impl Edge {
-    fn cell(p: DVec2) -> (i64, i64) {
-        (p.x.floor() as i64, p.y.floor() as i64)
-    }
-
     fn new(area: &Area) -> Edge {
-        let mut cells: HashMap<(i64, i64), Vec<Piece>> = HashMap::new();
+        let mut cells = Cells::new(1.0);
         for contour in area.parts.iter().flatten() {
             let points = points(contour);
             for (i, &from) in points.iter().enumerate() {
@@ -102,10 +87,10 @@ impl Edge {
                 let parts = from.distance(to).ceil().clamp(1.0, 1e6);
                 for part in 0..parts as usize {
                     let [from, to] = [part, part + 1].map(|part| from.lerp(to, part as f64 / parts));
-                    let (low, high) = (Edge::cell(from.min(to) - GAP), Edge::cell(from.max(to) + GAP));
+                    let (low, high) = (cells.cell(from.min(to) - GAP), cells.cell(from.max(to) + GAP));
                     for column in low.0..=high.0.min(low.0 + 2) {
                         for row in low.1..=high.1.min(low.1 + 2) {
-                            cells.entry((column, row)).or_default().push(Piece::Segment { from, to });
+                            cells.insert_at((column, row), Piece::Segment { from, to });
                         }
                     }
                 }
@@ -116,7 +101,7 @@ impl Edge {
 
     /// Length of edge that a part has in common with the area \[m].
     fn contact(&self, part: &[Vec<[f64; 2]>]) -> f64 {
-        let near = |p: &DVec2| self.cells.get(&Edge::cell(*p)).into_iter().flatten().any(|piece| piece.distance(*p) < GAP);
+        let near = |p: &DVec2| self.cells.at(self.cells.cell(*p)).any(|piece| piece.distance(*p) < GAP);
         let outline = densified(&points(&part[0]), CONTACT);
         let length = |i: usize| outline[i].distance(outline[(i + 1) % outline.len()]);
         (0..outline.len()).filter(|&i| near(&outline[i]) && near(&outline[(i + 1) % outline.len()])).map(length).sum()

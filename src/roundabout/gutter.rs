@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::ring::Ring;
 use super::roundabout_keys::Written;
 use crate::geometry::{Curve, Outline, Piece, fitted_outline, wrapped};
-use crate::opendrive::area::{Area, points, signed_area};
+use crate::opendrive::area::{Area, counter_clockwise, points, signed_area};
 use crate::reader::{Error, Reader, shown};
 
 /// Chords of faces and edges leave their curves by at most this much \[m].
@@ -231,17 +231,10 @@ fn pie(corner: DVec2, radius: f64, heading: f64, turn: f64, triangles: &mut Vec<
 
 /// What is left between the faces without the triangles.
 fn left(faces: &Outline, triangles: Vec<Vec<DVec2>>) -> Outline {
-    let counter_clockwise = |mut contour: Vec<DVec2>| {
-        let flat: Vec<[f64; 2]> = contour.iter().map(|&p| p.into()).collect();
-        if signed_area(&flat) < 0.0 {
-            contour.reverse();
-        }
-        contour
-    };
     let polygon = |curve: &Curve| counter_clockwise(curve.polyline(FINE));
     let road = Area::union(faces.loops.iter().take(1).map(polygon)).minus(&Area::union(faces.loops.iter().skip(1).map(polygon)));
     let lanes = road.minus(&Area::union(triangles.into_iter().map(counter_clockwise)));
-    let lanes = lanes.common(&lanes.grown(-SLIT / 2.0).grown(0.75 * SLIT));
+    let lanes = lanes.without_slits(SLIT, 0.0);
     let size = |part: &[Vec<[f64; 2]>]| part.iter().map(|contour| signed_area(contour)).sum::<f64>();
     let largest = lanes.parts.iter().max_by(|one, other| size(one).total_cmp(&size(other)));
     let loops = largest.into_iter().flatten().map(|contour| fitted_outline(&points(contour), FITTED));

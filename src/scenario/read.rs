@@ -7,6 +7,7 @@ use super::benchmark_keys::Written;
 use super::roads::{MOST_ROADS, Procedural};
 use crate::loading::Loading;
 use crate::reader::{Error, Reader};
+use crate::roundabout::map::is_map;
 use crate::shipped::{Kind, Source};
 use crate::vehicle::Vehicle;
 
@@ -77,8 +78,8 @@ fn without_routes(reader: &Reader, name: String, vehicle: Vehicle, written: &Wri
     })
 }
 
-/// Reads the file that `source` refers to under `key`: by a path that ends in .toml or .xodr, or the shipped file of this kind by
-/// its name. If there is no such file, the error names the key too.
+/// Reads the file that `source` refers to under `key`: by a path that ends in .toml or .xodr, or the shipped file of
+/// this kind by its name. If there is no such file, the error names the key too.
 pub(super) fn referred<T>(
     reader: &Reader,
     key: &str,
@@ -87,7 +88,7 @@ pub(super) fn referred<T>(
     path: &Path,
     read: impl Fn(&Source) -> Result<T, Error>,
 ) -> Result<T, Error> {
-    let is_path = path.extension().is_some_and(|extension| extension == "toml" || extension == "xodr");
+    let is_path = is_map(path) || path.extension().is_some_and(|extension| extension == "toml");
     let found = if is_path { Ok(source.relative(path)) } else { Source::named(kind, &path.to_string_lossy()) };
     found.and_then(|source| read(&source)).map_err(|error| match error {
         Error::Unreadable { .. } | Error::NotAFile { .. } | Error::TooLarge { .. } | Error::UnknownName { .. } => {
