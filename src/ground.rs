@@ -75,8 +75,8 @@ pub struct Ground {
     pub mirrored: bool,
     /// Radius of the central island's kerb face; 0 where there is no ring but a junction \[m].
     pub island_radius: f64,
-    /// Radius of the ring's outer kerb face, or of the circle around the junction; approaches and departures are measured
-    /// from this circle \[m].
+    /// Radius of the ring's outer kerb face, or of the circle around the junction; approaches and departures are
+    /// measured from this circle \[m].
     pub outer_radius: f64,
     /// Radii of the centre lines of the ring's lanes, the innermost first; none in a junction \[m].
     pub lane_radii: Vec<f64>,

@@ -1,7 +1,7 @@
 //! A roundabout by its parameters: ring, arms, kerbs, lanes and splitter islands, as arcs and segments.
 //!
-//! Traffic around an island at the origin; left-hand traffic is driven as its mirror image. Parameters that describe no roundabout are refused when the file
-//! is read, so the kerbs and lanes of a [`Roundabout`] never fail.
+//! Traffic around an island at the origin; left-hand traffic is driven as its mirror image. Parameters that describe no
+//! roundabout are refused when the file is read, so the kerbs and lanes of a [`Roundabout`] never fail.
 
 mod alignment;
 mod check;

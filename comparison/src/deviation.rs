@@ -1,8 +1,8 @@
 //! Distances between a roundabout's curves and measured lines: road edges and lane centre lines, in both directions.
 //!
 //! Measured road edges are the lanes' edges, so they are compared with the outline of [`Gutter::Solid`]; measured kerb
-//! faces with that of [`Gutter::Drivable`]. Two kinds of points are left out: those farther than [`WITHIN`] from the centre, and those whose nearest counterpart is the loose
-//! end of a measured line, beyond which nothing was measured.
+//! faces with that of [`Gutter::Drivable`]. Two kinds of points are left out: those farther than [`WITHIN`] from the
+//! centre, and those whose nearest counterpart is the loose end of a measured line, beyond which nothing was measured.
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Piece};
@@ -83,7 +83,8 @@ pub struct Spread {
 /// One row of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Deviation {
-    /// `island`, `ring`, `kerbs`, `splitters`; `faces`, `edges`, all of them where they were measured; or a route as `E-left-2`.
+    /// `island`, `ring`, `kerbs`, `splitters`; `faces`, `edges`, all of them where they were measured; or a route as
+    /// `E-left-2`.
     pub what: String,
     /// Measured points to the parameters' curves.
     pub from_measured: Spread,

@@ -2,8 +2,8 @@
 //!
 //! Frame 0 is the start, before any action; frame n is the state after step n, up to and including the step that ended
 //! the episode. A recording shows the road as it lies in the world: that of a road with left-hand traffic, which is
-//! driven as its mirror image, is mirrored back. Numbers are rounded when they are recorded (lengths to 1 mm, angles to 0.1 mrad), so that a file holds
-//! the recording exactly.
+//! driven as its mirror image, is mirrored back. Numbers are rounded when they are recorded (lengths to 1 mm, angles to
+//! 0.1 mrad), so that a file holds the recording exactly.
 
 use offtrack::angle::wrapped;
 use offtrack::cpu::collide;
@@ -142,8 +142,9 @@ impl Track {
     }
 }
 
-/// Records some trucks of a batch while it is stepped, in the world that is driven; [`Track::seen`] mirrors back. Made for [`offtrack::simulator::RouteChoice::Fixed`], where a
-/// truck is held after its episode: the first episode of each truck is kept.
+/// Records some trucks of a batch while it is stepped, in the world that is driven; [`Track::seen`] mirrors back. Made
+/// for [`offtrack::simulator::RouteChoice::Fixed`], where a truck is held after its episode: the first episode of each
+/// truck is kept.
 #[derive(Debug)]
 pub struct Recorder {
     tracks: Vec<Track>,
@@ -261,8 +262,8 @@ pub struct Map {
 }
 
 impl Map {
-    /// Of a roundabout as it lies in the world; `gutter` says whether gutters are drivable. Points lie within 1 cm of the
-    /// curves.
+    /// Of a roundabout as it lies in the world; `gutter` says whether gutters are drivable. Points lie within 1 cm of
+    /// the curves.
     pub fn of(roundabout: &Roundabout, gutter: Gutter) -> Map {
         let roundabout = roundabout.seen();
         Map { drivable: polygons::drivable(&roundabout.kerbs(gutter)), lanes: roundabout.lanes().iter().map(polygons::line).collect() }

@@ -32,8 +32,8 @@ pub(super) struct Lines<'a> {
 }
 
 impl Lines<'_> {
-    /// Adds the route along a way, unless nothing of it lies in the world; `crossing` gives the reach of its crossing lines
-    /// from the line and the width of its lane.
+    /// Adds the route along a way, unless nothing of it lies in the world; `crossing` gives the reach of its crossing
+    /// lines from the line and the width of its lane.
     pub(super) fn add(
         &mut self,
         (entry, lane, exit, exit_arm): (usize, Lane, u32, usize),

@@ -104,7 +104,8 @@ impl Network<'_> {
         strips.flat_map(|strip| &strip.centre).map(|p| p.length()).fold(f64::INFINITY, f64::min)
     }
 
-    /// Where lanes from or to a crossing pass the circle of a radius around the centre, the nearest such place along them.
+    /// Where lanes from or to a crossing pass the circle of a radius around the centre, the nearest such place along
+    /// them.
     pub(super) fn gate(&self, crossing: &Crossing, radius: f64) -> Option<DVec2> {
         let mut seen: HashSet<usize> = crossing.strips.iter().copied().collect();
         let mut queue: std::collections::VecDeque<usize> = crossing.strips.iter().copied().collect();

@@ -230,8 +230,8 @@ fn lanes_of_the_shipped_roundabouts_fail_once_a_carriageway_is_moved_over_the_ot
             let message = read(&changed).unwrap_err().to_string();
             refused += usize::from(message.contains("must lie at least 2.5 m left of exit.left"));
         }
-        // On other arms the moved lane meets a splitter island or misses the ring, which is found first; so it is on every
-        // arm of 16m with the map's larger islands.
+        // On other arms the moved lane meets a splitter island or misses the ring, which is found first; so it is on
+        // every arm of 16m with the map's larger islands.
         assert!((0 < refused) != path.ends_with("/16m-maps.toml"), "{path}: {refused} of {arms}");
     }
 }

@@ -79,7 +79,8 @@ fn left_lanes_lead_into_an_exit_of_one_lane_or_are_refused_by_name() {
     let one_exit = with_lanes("", "", "lanes = 1");
     let names: Vec<String> = read(&one_exit).unwrap().routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect();
     assert_eq!(names, read(&plain()).unwrap().routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect::<Vec<_>>());
-    // The exit's straight misses the inner ring lane, and its wide arc into the outer one is too narrow for a left turn.
+    // The exit's straight misses the inner ring lane, and its wide arc into the outer one is too narrow for a left
+    // turn.
     let flared = "points = [{ along = 60.0, offset = -8.5, radius = 30.0 }, { along = 0.0, offset = -22.0 }]\nring_radius = 15.0";
     let plain_exit = "points = [{ along = 30.0, offset = -8.5 }]\nring_radius = 15.0";
     let message = refusal_of(&one_exit.replacen(plain_exit, flared, 1).replace("270.0", "260.0"));

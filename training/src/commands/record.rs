@@ -28,8 +28,8 @@ use super::{policies, progress, roads};
 pub struct Args {
     #[command(flatten)]
     policy: policies::Choice,
-    /// One of the benchmark's routes, of any split: 20m/N-left-3; or one of a random road: wide/7/12/N-left-3. A film may
-    /// have several, each with its own --route, one after another.
+    /// One of the benchmark's routes, of any split: 20m/N-left-3; or one of a random road: wide/7/12/N-left-3. A film
+    /// may have several, each with its own --route, one after another.
     #[arg(long, required = true)]
     route: Vec<String>,
     /// The file to write: .gif, .png, .svg, or .json for data.
@@ -137,7 +137,8 @@ pub(super) struct Of<'a, 'b> {
 }
 
 impl Of<'_, '_> {
-    /// The recording of a track, which is as it lies in the world: episode `episode` of the `episodes` that the evaluation has on this route.
+    /// The recording of a track, which is as it lies in the world: episode `episode` of the `episodes` that the
+    /// evaluation has on this route.
     fn recorded(&self, episode: usize, episodes: usize, track: Track) -> Recorded {
         let Of { scenario, world, roundabout, route, policy, seed } = *self;
         let steering = |angle: f32| if roundabout.is_mirrored() { 0.0 - angle } else { angle };

@@ -163,7 +163,8 @@ mod tests {
     use super::*;
     use crate::device::Device;
 
-    /// What `work` finds in an evaluation of two episodes on each of the test routes of 40m, which has splitter islands.
+    /// What `work` finds in an evaluation of two episodes on each of the test routes of 40m, which has splitter
+    /// islands.
     fn on_40m<T>(work: impl FnOnce(&Evaluation) -> T) -> T {
         let mut scenario = Scenario::named("attard2023").unwrap();
         scenario.retain(|_, route| route.name.starts_with("40m/"));
