@@ -76,8 +76,8 @@ const DRAW_ROUTE: u32 = 0u;
 const DRAW_POSE: u32 = 1u;
 // `Draw::Action`.
 const DRAW_ACTION: u32 = 2u;
-// Largest shift of a no-slip point [m]: the linear tyre model is not valid beyond.
-const SLIP_LEVER_MAX: f32 = 1.5f;
+// Lowest speed that the engine's power is divided by [m/s].
+const POWER_SPEED_MIN: f32 = 1.0f;
 // Keeps a quotient finite at a standstill [m^2/s^2].
 const SPEED_SQUARED_MIN: f32 = 0.01f;
 // Samples taken at once.
@@ -178,6 +178,10 @@ struct Control {
     acceleration: f32,
     // Integral of the speed error [m].
     speed_error_integral: f32,
+    // Steer angle asked for in the step before [rad].
+    steering_before: f32,
+    // Steer angle asked for in the step before that [rad].
+    steering_earlier: f32,
 }
 
 // One tractor and its trailer.
@@ -212,6 +216,10 @@ struct Truck {
     steps: u32,
     // Whether the truck's episode has ended and no other has begun, so that no stage changes it (0 or 1).
     held: u32,
+    // Acceleration along the tractor's heading [m/s^2].
+    acceleration: f32,
+    // Curvature that the tractor's path has beyond that of the steer angle, because it turns in late [1/m].
+    curvature_lag: f32,
 }
 
 // Where a truck begins its route: fractions of the largest start errors, each in -1..=1; zeros are the lane
@@ -309,6 +317,14 @@ struct Roll {
     per_roll_rate: f32,
 }
 
+// A first-order lag, discretised for a sub-step in which what is asked for is constant. Zeros are no lag.
+struct Lag {
+    // Fraction of the deviation that is left at the sub-step's end.
+    left: f32,
+    // Mean of that fraction over the sub-step.
+    mean: f32,
+}
+
 // The vehicle as the stages need it.
 struct Rig {
     // Front axle ahead of the drive axle [m].
@@ -345,6 +361,23 @@ struct Rig {
     tractor_roll: Roll,
     // The trailer's roll.
     trailer_roll: Roll,
+    // Largest shift of a no-slip point by tyre slip [m].
+    slip_lever_max: f32,
+    // Time constant, per speed, with which the tractor's yaw follows the steer angle; 0 for at once [s/(m/s)].
+    yaw_lag: f32,
+    // How the acceleration follows what is asked for when that is drive.
+    drive_lag: Lag,
+    // The same when it is braking.
+    brake_lag: Lag,
+    // Engine power over the mass of the whole truck [W/kg].
+    power: f32,
+    // Friction ellipse: the lateral grip is that of free rolling times `sqrt(1 - friction_ellipse acceleration²)`; 0
+    // where drive and braking take no lateral grip [(s^2/m)^2].
+    friction_ellipse: f32,
+    // Lateral acceleration that the road's fall to the right adds to the roll [m/s^2].
+    crossfall: f32,
+    // Sub-steps from a steer command to the first movement of the wheels.
+    steer_delay: u32,
 }
 
 // One entry of the action table.

@@ -20,8 +20,15 @@ fn controlled(rig: Rig, duration: f32, action: Action, speed: f32, before: Contr
     let held = select(0.0, before.speed_error_integral, near);
     let integrated = select(0.0, held + error * duration, near);
     let asked = rig.speed_gain * error + rig.speed_integral_gain * integrated;
-    let reachable = rig.speed_braking <= asked && asked <= rig.acceleration_max;
+    let most = drive_max(rig, speed);
+    let reachable = rig.speed_braking <= asked && asked <= most;
     let speed_error_integral = select(held, integrated, reachable);
     let acceleration = rig.speed_gain * error + rig.speed_integral_gain * speed_error_integral;
-    return Control(action.steering, min(max(acceleration, rig.speed_braking), rig.acceleration_max), speed_error_integral);
+    return Control(
+        action.steering,
+        min(max(acceleration, rig.speed_braking), most),
+        speed_error_integral,
+        before.steering,
+        before.steering_before,
+    );
 }

@@ -49,6 +49,10 @@ crate::shared! {
         pub acceleration: f32,
         /// Integral of the speed error \[m].
         pub speed_error_integral: f32,
+        /// Steer angle asked for in the step before \[rad].
+        pub steering_before: f32,
+        /// Steer angle asked for in the step before that \[rad].
+        pub steering_earlier: f32,
     }
 
     /// One tractor and its trailer.
@@ -83,6 +87,10 @@ crate::shared! {
         pub steps: u32,
         /// Whether the truck's episode has ended and no other has begun, so that no stage changes it (0 or 1).
         pub held: u32,
+        /// Acceleration along the tractor's heading \[m/s^2].
+        pub acceleration: f32,
+        /// Curvature that the tractor's path has beyond that of the steer angle, because it turns in late \[1/m].
+        pub curvature_lag: f32,
     }
 
     /// Where a truck begins its route: fractions of the largest start errors, each in -1..=1; zeros are the lane
@@ -180,6 +188,14 @@ crate::shared! {
         pub per_roll_rate: f32,
     }
 
+    /// A first-order lag, discretised for a sub-step in which what is asked for is constant. Zeros are no lag.
+    pub struct Lag {
+        /// Fraction of the deviation that is left at the sub-step's end.
+        pub left: f32,
+        /// Mean of that fraction over the sub-step.
+        pub mean: f32,
+    }
+
     /// The vehicle as the stages need it.
     pub struct Rig {
         /// Front axle ahead of the drive axle \[m].
@@ -216,6 +232,23 @@ crate::shared! {
         pub tractor_roll: Roll,
         /// The trailer's roll.
         pub trailer_roll: Roll,
+        /// Largest shift of a no-slip point by tyre slip \[m].
+        pub slip_lever_max: f32,
+        /// Time constant, per speed, with which the tractor's yaw follows the steer angle; 0 for at once \[s/(m/s)].
+        pub yaw_lag: f32,
+        /// How the acceleration follows what is asked for when that is drive.
+        pub drive_lag: Lag,
+        /// The same when it is braking.
+        pub brake_lag: Lag,
+        /// Engine power over the mass of the whole truck \[W/kg].
+        pub power: f32,
+        /// Friction ellipse: the lateral grip is that of free rolling times `sqrt(1 - friction_ellipse acceleration²)`; 0
+        /// where drive and braking take no lateral grip \[(s^2/m)^2].
+        pub friction_ellipse: f32,
+        /// Lateral acceleration that the road's fall to the right adds to the roll \[m/s^2].
+        pub crossfall: f32,
+        /// Sub-steps from a steer command to the first movement of the wheels.
+        pub steer_delay: u32,
     }
 
     /// One entry of the action table.

@@ -8,7 +8,7 @@ mod case;
 
 use glam::Vec2;
 use offtrack::angle::wrapped;
-use offtrack::cpu::drive::{Moving, load_transfer_ratio, motion, moved};
+use offtrack::cpu::drive::{Moving, load_transfer_ratio, motion_of, moved};
 use offtrack::layout::{Control, Rig, Truck};
 use serde::Serialize;
 
@@ -150,7 +150,7 @@ impl Run<'_> {
             steering: init.delta as f32,
             ..Truck::default()
         };
-        let motion = motion(&case.vehicle.rig(case.dt), truck.speed, truck.steering, truck.heading - truck.trailer_heading);
+        let motion = motion_of(&case.vehicle.rig(case.dt), &truck);
         Run { case, t: 0.0, grid: 0, moving: Moving { truck, motion }, psi1: init.psi1, psi2: init.psi2 }
     }
 
@@ -159,19 +159,19 @@ impl Run<'_> {
     fn next_instant(&self) -> Option<f64> {
         let later = |&t: &f64| self.t + SAME_INSTANT < t;
         let grid = f64::from(self.grid + 1) * self.case.dt;
-        let command = self.case.commands.iter().map(|command| command.t).find(later);
-        Some(grid.min(command.unwrap_or(grid)).min(self.case.t_end)).filter(later)
+        let delay = self.case.vehicle.delta_delay;
+        let instants = self.case.commands.iter().flat_map(|command| [command.t, command.t + delay]).filter(later);
+        Some(instants.fold(grid, f64::min).min(self.case.t_end)).filter(later)
     }
 
     /// The run at `t`, at most a sub-step from now.
     fn after(&self, t: f64, moved: &mut impl FnMut(&Rig, f32, &Control, &Moving) -> Moving) -> Self {
-        let control = self.case.commands.iter().rfind(|command| command.t <= self.t + SAME_INSTANT);
+        let in_force = |since: f64| self.case.commands.iter().rfind(|command| command.t <= since + SAME_INSTANT);
         // Before the first command the steer angle and the speed stay as they are.
-        let control = control.map_or(Control { steering: self.moving.truck.steering, ..Control::default() }, |command| Control {
-            steering: command.delta_cmd as f32,
-            acceleration: command.a_cmd as f32,
-            speed_error_integral: 0.0,
-        });
+        let steering =
+            in_force(self.t - self.case.vehicle.delta_delay).map_or(self.moving.truck.steering, |command| command.delta_cmd as f32);
+        let acceleration = in_force(self.t).map_or(0.0, |command| command.a_cmd as f32);
+        let control = Control { steering, acceleration, ..Control::default() };
         let duration = t - self.t;
         // A whole sub-step uses the simulator's own `dt`, not a difference of instants, which would round differently.
         let duration = if (duration - self.case.dt).abs() < SAME_INSTANT { self.case.dt } else { duration };

@@ -6,7 +6,7 @@
 use std::fmt::Display;
 
 use super::Scenario;
-use crate::vehicle::{Suspension, Vehicle};
+use crate::vehicle::{Model, Suspension, Vehicle};
 
 /// A value with which no truck could be stepped.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -40,7 +40,8 @@ impl Scenario {
         list("steer_levels", &self.steer_levels, [-1.0, 1.0])?;
         list("speeds", &self.speeds, [0.01, 100.0])?;
         self.check_routes()?;
-        check_vehicle(&self.vehicle)
+        check_vehicle(&self.vehicle)?;
+        within("vehicle.model.steer_delay", self.vehicle.model.steer_delay, [0.0, 2.0 * self.step])
     }
 
     fn check_numbers(&self) -> Result<(), Invalid> {
@@ -97,7 +98,7 @@ impl Scenario {
 }
 
 fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
-    let Vehicle { tractor, trailer, loads, speed_control, sensors } = vehicle;
+    let Vehicle { tractor, trailer, loads, speed_control, sensors, model } = vehicle;
     let positive = [
         ("tractor.wheelbase", tractor.wheelbase),
         ("tractor.width", tractor.width),
@@ -129,6 +130,7 @@ fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
         within(&name, mount.x, FINITE)?;
         within(&name, mount.y, FINITE)?;
     }
+    check_model(&key("model"), model, trailer.wheelbase)?;
     check_suspension(&key("tractor.suspension"), &tractor.suspension)?;
     for (name, load) in loads {
         let key = key(&format!("loads.{name}"));
@@ -139,6 +141,15 @@ fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
         check_suspension(&format!("{key}.suspension"), &load.suspension)?;
     }
     Ok(())
+}
+
+fn check_model(key: &str, model: &Model, trailer_wheelbase: f64) -> Result<(), Invalid> {
+    // The trailer's lever stays positive.
+    within(&format!("{key}.slip_lever"), model.slip_lever, [0.0, trailer_wheelbase - 0.01])?;
+    let times = [("yaw_lag", model.yaw_lag), ("drive_lag", model.drive_lag), ("brake_lag", model.brake_lag)];
+    times.into_iter().try_for_each(|(name, value)| within(&format!("{key}.{name}"), value, [0.0, 1e6]))?;
+    model.power.map_or(Ok(()), |power| within(&format!("{key}.power"), power, POSITIVE))?;
+    within(&format!("{key}.crossfall"), model.crossfall, [-1.0, 1.0])
 }
 
 fn check_suspension(key: &str, suspension: &Suspension) -> Result<(), Invalid> {

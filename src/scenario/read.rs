@@ -21,6 +21,10 @@ impl Scenario {
             return Err(reader.invalid("load", format_args!("{:?}", written.load), format!("the vehicle has {}", loads.join(", "))));
         }
         let mut scenario = without_routes(&reader, source.stem(), vehicle, &written)?;
+        if 2.0 * scenario.step < scenario.vehicle.model.steer_delay {
+            let expected = format!("the vehicle's model.steer_delay is {} s; two steps at most", scenario.vehicle.model.steer_delay);
+            return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
+        }
         // Drawing takes longest: everything else is checked first.
         let procedural = written.procedural.as_ref().map(|written| Procedural::checked(&reader, source, written)).transpose()?;
         if procedural.is_none() {

@@ -3,6 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails as the test itself does")]
 
 mod circulation;
+mod dynamic;
+mod lags;
 mod properties;
 mod speed_control;
 mod vectors;

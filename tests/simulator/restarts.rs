@@ -140,7 +140,7 @@ fn a_restored_batch_goes_on_bit_for_bit_and_wrong_columns_are_refused() {
             assert!(rows(simulator.batch()) == before);
             error.to_string()
         };
-        assert_eq!(wrong(64, Some(Column::Truck), None), "truck: missing; a batch of 64 trucks needs 4096 bytes");
+        assert_eq!(wrong(64, Some(Column::Truck), None), "truck: missing; a batch of 64 trucks needs 4608 bytes");
         assert_eq!(wrong(32, None, None), "action: 256 bytes; a batch of 32 trucks needs 128 bytes");
         // Indices outside every table.
         let action = wrong(64, Some(Column::Action), Some(vec![255; 64 * size_of::<u32>()]));

@@ -2,12 +2,12 @@
 
 use std::ops::RangeInclusive;
 
-use offtrack::layout::Rig;
+use offtrack::layout::{Lag, Rig};
 use offtrack::reader::{shortened, shown};
-use offtrack::vehicle::{GRAVITY, Suspension};
+use offtrack::vehicle::{GRAVITY, SLIP_LEVER, Suspension};
 use serde::Deserialize;
 
-/// Lateral acceleration far beyond any truck's, for cases without friction [m/s^2].
+/// Lateral acceleration [m/s^2] and power [W/kg] far beyond any truck's, for cases without friction or power.
 const UNLIMITED: f32 = 1e6;
 
 /// A case whose values make no sense.
@@ -95,6 +95,29 @@ pub struct CaseVehicle {
     pub fn2: f64,
     /// Roll damping of the trailer.
     pub zeta2: f64,
+    /// Bound of `K v²` \[m].
+    #[serde(default = "slip_lever")]
+    pub lever_max: f64,
+    /// Time constant of the tractor's yaw over `K v`.
+    #[serde(default)]
+    pub yaw_lag: f64,
+    /// Time constant of the drive \[s].
+    #[serde(default)]
+    pub drive_lag: f64,
+    /// Time constant of the brakes \[s].
+    #[serde(default)]
+    pub brake_lag: f64,
+    /// Time from a steer command to the first movement of the wheels \[s].
+    #[serde(default)]
+    pub delta_delay: f64,
+    /// Engine power over the mass of the truck [W/kg]; unlimited where absent.
+    pub power: Option<f64>,
+    /// Whether drive and braking take lateral grip; it needs `mu`.
+    #[serde(default)]
+    pub ellipse: bool,
+    /// Fall of the road to the right, as a tangent.
+    #[serde(default)]
+    pub crossfall: f64,
 }
 
 /// Initial state of a case.
@@ -130,6 +153,10 @@ pub struct Command {
 pub struct Instant {
     /// Time \[s].
     pub t: f64,
+}
+
+fn slip_lever() -> f64 {
+    SLIP_LEVER
 }
 
 fn right_angle() -> f64 {
@@ -175,6 +202,13 @@ impl CaseVehicle {
             lateral_acceleration_max: self.mu.map_or(UNLIMITED, |mu| (mu * GRAVITY) as f32),
             tractor_roll: self.tractor_suspension().roll(substep),
             trailer_roll: self.trailer_suspension().roll(substep),
+            slip_lever_max: self.lever_max as f32,
+            yaw_lag: (self.yaw_lag * self.K) as f32,
+            drive_lag: Lag::of(self.drive_lag, substep),
+            brake_lag: Lag::of(self.brake_lag, substep),
+            power: self.power.map_or(UNLIMITED, |power| power as f32),
+            friction_ellipse: self.mu.filter(|_| self.ellipse).map_or(0.0, |mu| (mu * GRAVITY).powi(-2) as f32),
+            crossfall: (self.crossfall * GRAVITY) as f32,
             ..Rig::default()
         }
     }
@@ -189,8 +223,15 @@ impl Case {
         self.within("t_end", self.t_end, 0.0..=3600.0, "s")?;
         self.within("vehicle.L1", vehicle.L1, 0.5..=30.0, "m")?;
         self.within("vehicle.a", vehicle.a, -10.0..=10.0, "m")?;
-        // Slip shortens this lever by up to 1.5 m: it stays positive.
-        self.within("vehicle.L2", vehicle.L2, 1.6..=50.0, "m")?;
+        self.within("vehicle.lever_max", vehicle.lever_max, 0.0..=10.0, "m")?;
+        // Slip shortens this lever: it stays positive.
+        self.within("vehicle.L2", vehicle.L2, vehicle.lever_max + 0.1..=50.0, "m")?;
+        self.within("vehicle.yaw_lag", vehicle.yaw_lag, 0.0..=5.0, "")?;
+        self.within("vehicle.drive_lag", vehicle.drive_lag, 0.0..=5.0, "s")?;
+        self.within("vehicle.brake_lag", vehicle.brake_lag, 0.0..=5.0, "s")?;
+        self.within("vehicle.delta_delay", vehicle.delta_delay, 0.0..=5.0, "s")?;
+        self.within("vehicle.power", vehicle.power.unwrap_or(1.0), 0.01..=1e5, "W/kg")?;
+        self.within("vehicle.crossfall", vehicle.crossfall, -0.5..=0.5, "")?;
         self.within("vehicle.K", vehicle.K, 0.0..=1.0, "rad/(m/s^2)")?;
         self.within("vehicle.mu", vehicle.mu.unwrap_or(1.0), 0.0..=10.0, "")?;
         self.within("vehicle.delta_max", vehicle.delta_max, 0.0..=1.5, "rad")?;

@@ -3,6 +3,7 @@
 //! The speed control is a PI controller with anti-windup.
 
 use crate::engine::Row;
+use crate::engine::cpu::drive::drive_max;
 use crate::layout::{Action, Control, Rig};
 use crate::world::World;
 
@@ -24,8 +25,15 @@ pub fn controlled(rig: &Rig, step: f32, action: &Action, speed: f32, before: &Co
     let held = if near { before.speed_error_integral } else { 0.0 };
     let integrated = if near { held + error * step } else { 0.0 };
     let asked = rig.speed_gain * error + rig.speed_integral_gain * integrated;
-    let reachable = rig.speed_braking <= asked && asked <= rig.acceleration_max;
+    let most = drive_max(rig, speed);
+    let reachable = rig.speed_braking <= asked && asked <= most;
     let speed_error_integral = if reachable { integrated } else { held };
     let acceleration = rig.speed_gain * error + rig.speed_integral_gain * speed_error_integral;
-    Control { steering: action.steering, acceleration: acceleration.max(rig.speed_braking).min(rig.acceleration_max), speed_error_integral }
+    Control {
+        steering: action.steering,
+        acceleration: acceleration.max(rig.speed_braking).min(most),
+        speed_error_integral,
+        steering_before: before.steering,
+        steering_earlier: before.steering_before,
+    }
 }

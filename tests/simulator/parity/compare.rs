@@ -50,7 +50,13 @@ const fn within(bound: f32) -> Bound {
 pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
     match column {
         Column::Action | Column::Ended => &[("", 1, SAME)],
-        Column::Control => &[("steering", 1, SAME), ("acceleration", 1, MIDDLING), ("speed_error_integral", 1, MIDDLING)],
+        Column::Control => &[
+            ("steering", 1, SAME),
+            ("acceleration", 1, MIDDLING),
+            ("speed_error_integral", 1, MIDDLING),
+            ("steering_before", 1, SAME),
+            ("steering_earlier", 1, SAME),
+        ],
         Column::Truck => &[
             ("position", 2, POSITION),
             ("heading", 1, ANGLE),
@@ -67,6 +73,8 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("episode", 1, SAME),
             ("steps", 1, SAME),
             ("held", 1, SAME),
+            ("acceleration", 1, MIDDLING),
+            ("curvature_lag", 1, SMALL),
         ],
         Column::Clearance => &[("tractor", 1, CLEARANCE), ("trailer", 1, CLEARANCE)],
         Column::Progress => {

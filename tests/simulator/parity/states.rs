@@ -98,12 +98,15 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
         episode: words(SEED, env as u32, 2, 0)[0],
         steps: if kind == 3 { world.routes[route as usize].step_limit } else { picked(env, 3, 200) as u32 },
         held: 0,
+        acceleration: lean * ratio,
+        curvature_lag: 0.0,
     };
     // Up to the last waypoint; one truck in sixteen has a next waypoint that is too far away.
     let far = if kind == 4 { 10 } else { 0 };
     batch.progress[env].waypoint = (near + far).clamp(1, last) as u32;
     let [integral, ..] = drawn(env, 3);
     batch.control[env].speed_error_integral = integral;
+    (batch.control[env].steering_before, batch.control[env].steering_earlier) = (0.4 * speed, 0.4 * lean);
 }
 
 /// Trucks on each roundabout.

@@ -7,8 +7,8 @@ use std::sync::{Arc, OnceLock};
 
 use bytemuck::bytes_of;
 use glam::DVec2;
-use offtrack::cpu::drive::{Moving, motion};
-use offtrack::layout::{Column, Rig};
+use offtrack::cpu::drive::{Moving, motion_of};
+use offtrack::layout::{Column, Rig, Truck};
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::stages::Stage;
 use offtrack::world::World;
@@ -92,7 +92,7 @@ fn traced(engine: &Engine, case: &Case) -> Traced {
         simulator.restore(|column| Some(given(column))).unwrap();
         simulator.run_stage(Stage::Drive);
         let truck = simulator.batch().truck[0];
-        Moving { truck, motion: motion(rig, truck.speed, truck.steering, truck.heading - truck.trailer_heading) }
+        Moving { truck, motion: motion_of(rig, &truck) }
     })
     .unwrap()
 }
@@ -272,7 +272,8 @@ fn explicit_euler_at_the_same_step_fails_the_vectors() {
     let Init { mut x, mut y, mut psi1, mut psi2, v, delta } = case.init;
     let expected = &written["expected"][1];
     for _ in 0..(number(expected, "t") / case.dt).round() as usize {
-        let motion = motion(&rig, v as f32, delta as f32, (psi1 - psi2) as f32);
+        let truck = Truck { speed: v as f32, steering: delta as f32, heading: (psi1 - psi2) as f32, ..Truck::default() };
+        let motion = motion_of(&rig, &truck);
         (x, y) = (x + case.dt * v * psi1.cos(), y + case.dt * v * psi1.sin());
         psi1 += case.dt * f64::from(motion.yaw_rate);
         psi2 += case.dt * f64::from(motion.trailer_yaw_rate);

@@ -32,6 +32,11 @@ impl Mirror {
     pub fn of(world: &World) -> Result<Mirror, Error> {
         let refused = |expected: String| Error::Flag { flag: "learning.mirror_augmentation", value: "true".to_owned(), expected };
         let mut values = std::array::from_fn(|index| (index, if SIGNED.contains(&index) { -1.0 } else { 1.0 }));
+        if world.params.rig.crossfall != 0.0 {
+            return Err(refused(
+                "the vehicle's road falls to one side (model.crossfall): leave learning.mirror_augmentation out".to_owned(),
+            ));
+        }
         for (index, ray) in world.rays.iter().enumerate() {
             // The image of a trailer's sensor is one of the trailer's.
             let unit = if index < N_TRAILER_RAYS { 0..N_TRAILER_RAYS } else { N_TRAILER_RAYS..N_TRAILER_RAYS + N_TRACTOR_RAYS };

@@ -9,10 +9,11 @@ use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write;
 use std::path::Path;
 
-use offtrack::layout::Start;
+use offtrack::layout::{Rig, Start};
 use offtrack::reader::{self, shortened};
 use offtrack::roundabout::Gutter;
 use offtrack::scenario::Scenario;
+use offtrack::vehicle::Model;
 use offtrack::world::World;
 use serde::{Deserialize, Serialize};
 
@@ -196,7 +197,11 @@ impl Certificate {
 fn conditions(scenario: &Scenario, world: &World) -> BTreeMap<String, String> {
     let list = |values: &mut dyn Iterator<Item = f32>| values.map(|value| format!("{value:.4}")).collect::<Vec<_>>().join(" ");
     let params = &world.params;
-    let rig: Vec<String> = bytemuck::cast_slice(&[params.rig]).iter().map(|value: &f32| format!("{value:.4e}")).collect();
+    let mut rig: Vec<String> = bytemuck::cast_slice(&[params.rig]).iter().map(|value: &f32| format!("{value:.4e}")).collect();
+    // What a vehicle without a `model` has in the fields that came with it changes no certificate.
+    if scenario.vehicle.model == Model::default() {
+        rig.truncate(std::mem::offset_of!(Rig, slip_lever_max) / size_of::<f32>());
+    }
     let gutter = match scenario.gutter {
         Gutter::Drivable => "drivable",
         Gutter::Solid => "solid",
