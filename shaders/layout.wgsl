@@ -74,6 +74,8 @@ const UNIT: f32 = 1.1920929e-7f;
 const DRAW_ROUTE: u32 = 0u;
 // `Draw::Pose`.
 const DRAW_POSE: u32 = 1u;
+// `Draw::Vehicle`.
+const DRAW_VEHICLE: u32 = 4294967295u;
 // `Draw::Action`.
 const DRAW_ACTION: u32 = 2u;
 // Lowest speed that the engine's power is divided by [m/s].
@@ -220,15 +222,21 @@ struct Truck {
     acceleration: f32,
     // Curvature that the tractor's path has beyond that of the steer angle, because it turns in late [1/m].
     curvature_lag: f32,
+    // Index of the vehicle in the world.
+    vehicle: u32,
 }
 
-// Where a truck begins its route: fractions of the largest start errors, each in -1..=1; zeros are the lane
-// centre.
+// How a truck begins its route: fractions of the largest start errors and of half the range of speeds, each in
+// -1..=1, and its vehicle. Zeros are the first vehicle on the lane centre at the middle of the speeds.
 struct Start {
     // Fraction of the largest lateral offset, left positive.
     offset: f32,
     // Fraction of the largest heading error, counter-clockwise positive.
     heading: f32,
+    // Fraction of half the range of speeds, from its middle.
+    speed: f32,
+    // Index of the vehicle in the world.
+    vehicle: u32,
 }
 
 // The stream of random numbers that a truck draws routes, starts and random actions from: a truck with the stream
@@ -378,6 +386,14 @@ struct Rig {
     crossfall: f32,
     // Sub-steps from a steer command to the first movement of the wheels.
     steer_delay: u32,
+    // Mass of the trailer with its load [kg].
+    trailer_mass: f32,
+    // Constant lateral acceleration at which the trailer's inner wheels lift, in units of gravity.
+    rollover_threshold: f32,
+    // Index of its distance sensors among those of all vehicles.
+    chassis: u32,
+    // Index of vehicle and load, as reports and the clock group them.
+    class: u32,
 }
 
 // One entry of the action table.
@@ -388,24 +404,26 @@ struct Action {
     speed: f32,
 }
 
-// Vehicle, time and weights, shared by all trucks.
+// Time and weights, shared by all trucks.
 struct Params {
-    // The vehicle.
-    rig: Rig,
     // Time of one sub-step [s].
     substep: f32,
     // Sub-steps in a step.
     n_substeps: u32,
     // Entries of the action table.
     n_actions: u32,
+    // Vehicles that an episode draws from.
+    n_vehicles: u32,
     // Range of a distance sensor [m].
     sensor_range: f32,
     // Largest lateral offset at the start [m].
     start_offset: f32,
     // Largest heading error at the start [rad].
     start_heading: f32,
-    // Speed at the start [m/s].
+    // Middle of the speeds at the start [m/s].
     start_speed: f32,
+    // Half of their range [m/s].
+    start_speed_range: f32,
     // Distance to the next waypoint beyond which it cannot be passed and the truck has strayed [m].
     stray_distance: f32,
     // Articulation beyond which the truck is jackknifed [rad].
@@ -488,53 +506,55 @@ struct BatchFacts {
     autoreset: u32,
 }
 
-// Vehicle, time and weights.
+// Time and weights.
 @group(0) @binding(0) var<storage, read> params: Params;
+// The vehicles.
+@group(0) @binding(1) var<storage, read> rigs: array<Rig>;
 // The action table.
-@group(0) @binding(1) var<storage, read> actions: array<Action>;
-// The distance sensors, trailer's first.
-@group(0) @binding(2) var<storage, read> rays: array<Ray>;
+@group(0) @binding(2) var<storage, read> actions: array<Action>;
+// The distance sensors of each chassis, trailer's first.
+@group(0) @binding(3) var<storage, read> rays: array<Ray>;
 // A field for each roundabout.
-@group(0) @binding(3) var<storage, read> fields: array<FieldRow>;
+@group(0) @binding(4) var<storage, read> fields: array<FieldRow>;
 // Cells of all fields, two words each.
-@group(0) @binding(4) var<storage, read> cells: array<vec2<u32>>;
+@group(0) @binding(5) var<storage, read> cells: array<vec2<u32>>;
 // Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of STORED_UNIT.
-@group(0) @binding(5) var<storage, read> corners: array<u32>;
+@group(0) @binding(6) var<storage, read> corners: array<u32>;
 // Every route's waypoints, one route after the other.
-@group(0) @binding(6) var<storage, read> waypoints: array<WaypointRow>;
+@group(0) @binding(7) var<storage, read> waypoints: array<WaypointRow>;
 // What is observed at each of them.
-@group(0) @binding(7) var<storage, read> previews: array<PreviewRow>;
+@group(0) @binding(8) var<storage, read> previews: array<PreviewRow>;
 // Every route.
-@group(0) @binding(8) var<storage, read> routes: array<RouteRow>;
+@group(0) @binding(9) var<storage, read> routes: array<RouteRow>;
 // Facts that the trucks of a batch share.
-@group(0) @binding(9) var<storage, read> batch: BatchFacts;
+@group(0) @binding(10) var<storage, read> batch: BatchFacts;
 // Routes that episodes run on: to be drawn from, or one for each truck.
-@group(0) @binding(10) var<storage, read> choice: array<u32>;
+@group(0) @binding(11) var<storage, read> choice: array<u32>;
 // The stream of random numbers that each truck draws from, [n_envs].
-@group(0) @binding(11) var<storage, read> streams: array<Stream>;
+@group(0) @binding(12) var<storage, read> streams: array<Stream>;
 // Which trucks begin an episode when the caller says so, and how, [n_envs].
-@group(0) @binding(12) var<storage, read> begins: array<BeginRow>;
+@group(0) @binding(13) var<storage, read> begins: array<BeginRow>;
 //  Index into the action table, [n_envs].
-@group(0) @binding(13) var<storage, read_write> action: array<u32>;
+@group(0) @binding(14) var<storage, read_write> action: array<u32>;
 //  Steer angle and acceleration asked of each truck, [n_envs].
-@group(0) @binding(14) var<storage, read_write> control: array<Control>;
+@group(0) @binding(15) var<storage, read_write> control: array<Control>;
 //  The trucks, [n_envs].
-@group(0) @binding(15) var<storage, read_write> truck: array<Truck>;
+@group(0) @binding(16) var<storage, read_write> truck: array<Truck>;
 //  Distances to the kerbs [m], [n_envs].
-@group(0) @binding(16) var<storage, read_write> clearance: array<Clearance>;
+@group(0) @binding(17) var<storage, read_write> clearance: array<Clearance>;
 //  Progress along the routes, [n_envs].
-@group(0) @binding(17) var<storage, read_write> progress: array<Progress>;
+@group(0) @binding(18) var<storage, read_write> progress: array<Progress>;
 //  Distance sensors [m], [n_envs, 29].
-@group(0) @binding(18) var<storage, read_write> ranges: array<f32>;
+@group(0) @binding(19) var<storage, read_write> ranges: array<f32>;
 //  The observation before the next action, [n_envs, 69].
-@group(0) @binding(19) var<storage, read_write> observation: array<f32>;
+@group(0) @binding(20) var<storage, read_write> observation: array<f32>;
 //  The observation after the last action, another one only where an episode ended, [n_envs, 69].
-@group(0) @binding(20) var<storage, read_write> next_observation: array<f32>;
+@group(0) @binding(21) var<storage, read_write> next_observation: array<f32>;
 //  Codes of [`crate::layout::Ended`] for the last step, [n_envs].
-@group(0) @binding(21) var<storage, read_write> ended: array<u32>;
+@group(0) @binding(22) var<storage, read_write> ended: array<u32>;
 //  Physical amounts that the reward weighs, [n_envs].
-@group(0) @binding(22) var<storage, read_write> terms: array<RewardTerms>;
+@group(0) @binding(23) var<storage, read_write> terms: array<RewardTerms>;
 //  Rewards of the last step, [n_envs].
-@group(0) @binding(23) var<storage, read_write> reward: array<f32>;
+@group(0) @binding(24) var<storage, read_write> reward: array<f32>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(24) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(25) var<storage, read_write> tally: array<atomic<u32>>;

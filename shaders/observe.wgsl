@@ -51,7 +51,7 @@ fn observed(env: u32, after_reset: bool) {
     let route = routes[truck.route];
     let last = route.n_waypoints - 1u;
     let next = min(progress[env].waypoint, last);
-    let point = reference_point(params.rig.wheelbase, truck);
+    let point = reference_point(rigs[truck.vehicle].wheelbase, truck);
     put(env, after_reset, 0u, clamp(truck.speed / SPEED_SCALE, 0.0, 1.0));
     for (var n = 0u; n < 2u; n++) {
         let waypoint = waypoints[route.first + min(next + n, last)];

@@ -7,7 +7,7 @@ fn steer(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
     let duration = f32(params.n_substeps) * params.substep;
-    control[env] = controlled(params.rig, duration, actions[action[env]], truck[env].speed, control[env]);
+    control[env] = controlled(rigs[truck[env].vehicle], duration, actions[action[env]], truck[env].speed, control[env]);
 }
 
 // The control for the next `duration` seconds of a truck at `speed` [m/s] that was controlled by `before`.

@@ -91,15 +91,21 @@ crate::shared! {
         pub acceleration: f32,
         /// Curvature that the tractor's path has beyond that of the steer angle, because it turns in late \[1/m].
         pub curvature_lag: f32,
+        /// Index of the vehicle in the world.
+        pub vehicle: u32,
     }
 
-    /// Where a truck begins its route: fractions of the largest start errors, each in -1..=1; zeros are the lane
-    /// centre.
+    /// How a truck begins its route: fractions of the largest start errors and of half the range of speeds, each in
+    /// -1..=1, and its vehicle. Zeros are the first vehicle on the lane centre at the middle of the speeds.
     pub struct Start {
         /// Fraction of the largest lateral offset, left positive.
         pub offset: f32,
         /// Fraction of the largest heading error, counter-clockwise positive.
         pub heading: f32,
+        /// Fraction of half the range of speeds, from its middle.
+        pub speed: f32,
+        /// Index of the vehicle in the world.
+        pub vehicle: u32,
     }
 
     /// The stream of random numbers that a truck draws routes, starts and random actions from: a truck with the stream
@@ -249,6 +255,14 @@ crate::shared! {
         pub crossfall: f32,
         /// Sub-steps from a steer command to the first movement of the wheels.
         pub steer_delay: u32,
+        /// Mass of the trailer with its load \[kg].
+        pub trailer_mass: f32,
+        /// Constant lateral acceleration at which the trailer's inner wheels lift, in units of gravity.
+        pub rollover_threshold: f32,
+        /// Index of its distance sensors among those of all vehicles.
+        pub chassis: u32,
+        /// Index of vehicle and load, as reports and the clock group them.
+        pub class: u32,
     }
 
     /// One entry of the action table.
@@ -259,24 +273,26 @@ crate::shared! {
         pub speed: f32,
     }
 
-    /// Vehicle, time and weights, shared by all trucks.
+    /// Time and weights, shared by all trucks.
     pub struct Params {
-        /// The vehicle.
-        pub rig: Rig,
         /// Time of one sub-step \[s].
         pub substep: f32,
         /// Sub-steps in a step.
         pub n_substeps: u32,
         /// Entries of the action table.
         pub n_actions: u32,
+        /// Vehicles that an episode draws from.
+        pub n_vehicles: u32,
         /// Range of a distance sensor \[m].
         pub sensor_range: f32,
         /// Largest lateral offset at the start \[m].
         pub start_offset: f32,
         /// Largest heading error at the start \[rad].
         pub start_heading: f32,
-        /// Speed at the start \[m/s].
+        /// Middle of the speeds at the start \[m/s].
         pub start_speed: f32,
+        /// Half of their range \[m/s].
+        pub start_speed_range: f32,
         /// Distance to the next waypoint beyond which it cannot be passed and the truck has strayed \[m].
         pub stray_distance: f32,
         /// Articulation beyond which the truck is jackknifed \[rad].

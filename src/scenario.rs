@@ -8,6 +8,7 @@ mod read; // the file as checked
 mod roads; // its roundabouts and routes
 mod part; // a part of a scenario, or another roundabout in it
 mod check; // a scenario changed in memory
+mod fleet; // vehicles by shares, drawn from ranges
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -20,6 +21,7 @@ use crate::route::Route;
 use crate::shipped::{Kind, Source};
 use crate::vehicle::Vehicle;
 pub use check::Invalid;
+pub use fleet::{Class, Drawn, Entry, Fleet, Member, N_VEHICLES, Ranges};
 
 /// Default length of a route before the ring \[m].
 pub const APPROACH: f64 = 40.0;
@@ -69,10 +71,12 @@ pub struct Place {
 pub struct Scenario {
     /// The file's stem.
     pub name: String,
-    /// The vehicle.
+    /// The vehicle; of several the first as its file has it, for pictures and for the lock that actions are fractions of.
     pub vehicle: Vehicle,
     /// Name of one of the vehicle's loads.
     pub load: String,
+    /// The vehicles that episodes draw from, where there are several.
+    pub fleet: Option<Fleet>,
     /// Lock of the front wheels in place of the vehicle's own \[rad].
     pub steer_max: Option<f64>,
     /// Whether a gutter may be driven on.

@@ -178,6 +178,20 @@ impl Vehicle {
         (turned(0.5 * wheelbase + behind_axle), turned(ahead_of_axle - 0.5 * wheelbase))
     }
 
+    /// Moves the trailer's axle group back by `length` \[m], and its rear end and the sensors there with it.
+    pub(crate) fn lengthen_trailer(&mut self, length: f64) {
+        self.trailer.wheelbase += length;
+        self.trailer.kingpin_to_rear += length;
+        self.sensors.trailer_last += length;
+    }
+
+    /// Moves the tractor's front axle ahead by `length` \[m], and its front end and the sensors there with it.
+    pub(crate) fn lengthen_tractor(&mut self, length: f64) {
+        let middle = 0.5 * self.tractor.wheelbase;
+        self.tractor.wheelbase += length;
+        self.sensors.tractor_mounts.iter_mut().filter(|mount| middle < mount.x).for_each(|mount| mount.x += length);
+    }
+
     /// Mass of tractor, trailer and load \[kg].
     pub fn gross_mass(&self, load: &Load) -> f64 {
         self.tractor.mass + load.mass
@@ -194,7 +208,7 @@ impl Vehicle {
     }
 
     /// The constants that the stages need, for one of the loads and sub-steps of `substep` \[s]. `steer_max` replaces
-    /// the vehicle's own lock \[rad].
+    /// the vehicle's own lock \[rad]. Chassis and class are the first: [`crate::world::World`] numbers them.
     ///
     /// # Panics
     ///
@@ -228,6 +242,10 @@ impl Vehicle {
             friction_ellipse: model.ellipse(grip) as f32,
             crossfall: model.fall() as f32,
             steer_delay: (model.steer_delay / duration).round() as u32,
+            trailer_mass: load.mass as f32,
+            rollover_threshold: load.suspension.rollover_threshold() as f32,
+            chassis: 0,
+            class: 0,
         }
     }
 

@@ -9,10 +9,10 @@ use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 
 use crate::field::Field;
-use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, RouteRow, WaypointRow};
+use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, Rig, RouteRow, Truck, WaypointRow};
 use crate::loading::Loading;
 use crate::route::{Route, Waypoint};
-use crate::scenario::{Invalid, Place, Scenario};
+use crate::scenario::{Class, Entry, Invalid, Place, Scenario};
 
 /// Waypoints to the corner of each observed curvature.
 const CURVATURE_STEPS: [usize; 4] = [5, 7, 10, 12];
@@ -24,12 +24,16 @@ const RADIUS_SCALE: f64 = 100.0;
 /// The shared, unchanging part of a batch.
 #[derive(Debug, Clone)]
 pub struct World {
-    /// Vehicle, time and weights.
+    /// Time and weights.
     pub params: Params,
+    /// The vehicles that episodes draw from, at least one.
+    pub rigs: Vec<Rig>,
+    /// What each `class` of theirs is.
+    pub classes: Vec<Class>,
+    /// The distance sensors of each `chassis` of theirs, trailer's first.
+    pub rays: Vec<[Ray; N_RAYS]>,
     /// The action table.
     pub actions: Vec<Action>,
-    /// The distance sensors, trailer's first.
-    pub rays: [Ray; N_RAYS],
     /// One field a roundabout.
     pub fields: Vec<Field>,
     /// Every route's waypoints, one route after the other.
@@ -58,8 +62,8 @@ impl World {
     pub fn bake_with(scenario: &Scenario, loading: &Loading) -> Result<World, Invalid> {
         scenario.check()?;
         let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
-        let rig = scenario.vehicle.rig(&scenario.load, substep, scenario.steer_max);
-        let actions = scenario.actions(rig.steer_max);
+        let (rigs, rays) = rigs(scenario, substep);
+        let actions = scenario.actions(rigs[0].steer_max);
         let mut waypoints = Vec::new();
         let mut previews = Vec::new();
         let mut routes = Vec::new();
@@ -79,14 +83,15 @@ impl World {
         }
         Ok(World {
             params: Params {
-                rig,
                 substep,
                 n_substeps: scenario.n_substeps,
                 n_actions: actions.len() as u32,
+                n_vehicles: rigs.len() as u32,
                 sensor_range: scenario.sensor_range as f32,
                 start_offset: scenario.start_offset as f32,
                 start_heading: scenario.start_heading as f32,
                 start_speed: scenario.cruising_speed() as f32,
+                start_speed_range: 0.0,
                 stray_distance: scenario.stray_distance as f32,
                 jackknife_angle: scenario.jackknife_angle as f32,
                 rollover_ratio: scenario.rollover_ratio as f32,
@@ -97,8 +102,10 @@ impl World {
                 clearance_weight: scenario.clearance_weight as f32,
                 failure_weight: scenario.failure_weight as f32,
             },
+            rigs,
+            classes: scenario.classes(),
+            rays,
             actions,
-            rays: scenario.vehicle.rays(),
             fields: fields(scenario, loading),
             waypoints,
             previews,
@@ -110,8 +117,21 @@ impl World {
     /// Memory that its tables take, whatever the number of trucks \[bytes].
     pub fn bytes(&self) -> usize {
         let routes = size_of_val(self.waypoints.as_slice()) + size_of_val(self.previews.as_slice()) + size_of_val(self.routes.as_slice());
-        let vehicle = size_of_val(&self.params) + size_of_val(self.actions.as_slice()) + size_of_val(&self.rays);
-        self.fields.iter().map(Field::bytes).sum::<usize>() + routes + vehicle
+        let vehicles = size_of_val(self.rigs.as_slice()) + size_of_val(self.rays.as_slice());
+        let shared = size_of_val(&self.params) + size_of_val(self.actions.as_slice());
+        self.fields.iter().map(Field::bytes).sum::<usize>() + routes + vehicles + shared
+    }
+
+    /// The vehicle of a truck of this world.
+    #[inline]
+    pub fn rig(&self, truck: &Truck) -> &Rig {
+        &self.rigs[truck.vehicle as usize]
+    }
+
+    /// Its distance sensors, trailer's first.
+    #[inline]
+    pub fn rays_of(&self, rig: &Rig) -> &[Ray; N_RAYS] {
+        &self.rays[rig.chassis as usize]
     }
 
     /// The waypoints of a route of this world.
@@ -133,6 +153,23 @@ impl World {
     pub fn route_field(&self, route: u32) -> &Field {
         &self.fields[self.routes[route as usize].roundabout as usize]
     }
+}
+
+/// Every vehicle, and the distance sensors of every chassis among them.
+fn rigs(scenario: &Scenario, substep: f32) -> (Vec<Rig>, Vec<[Ray; N_RAYS]>) {
+    let classes = scenario.classes();
+    let mut rays: Vec<[Ray; N_RAYS]> = Vec::new();
+    let rig = |entry: Entry| {
+        let own = entry.vehicle.rays();
+        // Rows of one chassis stand together.
+        if rays.last() != Some(&own) {
+            rays.push(own);
+        }
+        let (chassis, class) = (rays.len() as u32 - 1, entry.class as u32);
+        Rig { chassis, class, ..entry.vehicle.rig(&classes[entry.class].load, substep, scenario.steer_max) }
+    };
+    let rigs = scenario.vehicles().into_iter().map(rig).collect();
+    (rigs, rays)
 }
 
 /// The field of every roundabout.

@@ -1,6 +1,6 @@
 //! The buffers that the kernels of a step see: one bind group, a binding each, in this order.
 
-use super::{Action, BatchFacts, BeginRow, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, RouteRow, Stream, WaypointRow};
+use super::{Action, BatchFacts, BeginRow, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, Rig, RouteRow, Stream, WaypointRow};
 use crate::shared::{Named, Shared, comment};
 
 /// What shaders may do to a buffer.
@@ -28,8 +28,10 @@ pub enum Buffer {
 crate::named! {
     /// What trucks share: first the world, then what belongs to one batch.
     pub enum Table {
-        /// Vehicle, time and weights.
+        /// Time and weights.
         Params = "params",
+        /// The vehicles.
+        Rigs = "rigs",
         /// The action table.
         Actions = "actions",
         /// The distance sensors.
@@ -111,9 +113,10 @@ impl Table {
             format!("array<{}>", T::element())
         }
         let (doc, kind) = match self {
-            Table::Params => ("Vehicle, time and weights.", Params::wgsl()),
+            Table::Params => ("Time and weights.", Params::wgsl()),
+            Table::Rigs => ("The vehicles.", rows::<Rig>()),
             Table::Actions => ("The action table.", rows::<Action>()),
-            Table::Rays => ("The distance sensors, trailer's first.", rows::<Ray>()),
+            Table::Rays => ("The distance sensors of each chassis, trailer's first.", rows::<Ray>()),
             Table::Fields => ("A field for each roundabout.", rows::<FieldRow>()),
             Table::Cells => ("Cells of all fields, two words each.", "array<vec2<u32>>".to_owned()),
             Table::Corners => (

@@ -1,8 +1,11 @@
 //! A benchmark file as written: keys, types and defaults. Its values are not checked yet.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Deserialize;
+use serde::de::value::SeqAccessDeserializer;
+use serde::de::{Deserializer, SeqAccess, Visitor};
 
 use crate::roundabout::Gutter;
 
@@ -10,8 +13,9 @@ use crate::roundabout::Gutter;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Written {
-    pub(super) vehicle: PathBuf,
-    pub(super) load: String,
+    pub(super) vehicle: WrittenVehicles,
+    pub(super) load: Option<String>,
+    pub(super) draw: Option<WrittenDraw>,
     pub(super) gutter: Gutter,
     #[serde(default)]
     pub(super) steer_max_deg: Option<f64>,
@@ -31,6 +35,70 @@ pub(super) struct Written {
     #[serde(default)]
     pub(super) roundabout: Vec<WrittenRoundabout>,
     pub(super) procedural: Option<WrittenProcedural>,
+}
+
+/// `vehicle = "FILE"`, or tables `[[vehicle]]`.
+pub(super) enum WrittenVehicles {
+    One(PathBuf),
+    Many(Vec<WrittenMember>),
+}
+
+impl<'de> Deserialize<'de> for WrittenVehicles {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        // An untagged enum would not say what is wrong with a table.
+        struct OneOrMany;
+        impl<'de> Visitor<'de> for OneOrMany {
+            type Value = WrittenVehicles;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("a path, or tables [[vehicle]]")
+            }
+
+            fn visit_str<E>(self, path: &str) -> Result<WrittenVehicles, E> {
+                Ok(WrittenVehicles::One(path.into()))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, tables: A) -> Result<WrittenVehicles, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(tables)).map(WrittenVehicles::Many)
+            }
+        }
+        deserializer.deserialize_any(OneOrMany)
+    }
+}
+
+/// One kind of vehicle.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WrittenMember {
+    pub(super) file: PathBuf,
+    pub(super) loads: BTreeMap<String, f64>,
+    #[serde(default = "one")]
+    pub(super) share: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// What is drawn for each vehicle.
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct WrittenDraw {
+    pub(super) n_vehicles: Option<usize>,
+    pub(super) trailer_wheelbase: Option<[f64; 2]>,
+    pub(super) tractor_wheelbase: Option<[f64; 2]>,
+    pub(super) fifth_wheel: Option<[f64; 2]>,
+    pub(super) centre_of_gravity: Option<[f64; 2]>,
+    pub(super) roll_gain: Option<[f64; 2]>,
+    pub(super) roll_frequency: Option<[f64; 2]>,
+    pub(super) roll_damping: Option<[f64; 2]>,
+    pub(super) slip: Option<[f64; 2]>,
+    pub(super) friction: Option<[f64; 2]>,
+    pub(super) steer_rate: Option<[f64; 2]>,
+    pub(super) acceleration_max: Option<[f64; 2]>,
+    pub(super) steer_delay: Option<[f64; 2]>,
+    pub(super) drive_lag: Option<[f64; 2]>,
+    pub(super) brake_lag: Option<[f64; 2]>,
 }
 
 #[derive(Deserialize)]

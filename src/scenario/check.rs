@@ -41,7 +41,20 @@ impl Scenario {
         list("speeds", &self.speeds, [0.01, 100.0])?;
         self.check_routes()?;
         check_vehicle(&self.vehicle)?;
-        within("vehicle.model.steer_delay", self.vehicle.model.steer_delay, [0.0, 2.0 * self.step])
+        if let Some(fleet) = &self.fleet {
+            within("fleet.n_vehicles", fleet.n_vehicles as f64, [1.0, 1e6])?;
+            if fleet.classes().is_empty() {
+                return Err(invalid("fleet.members", "no loads", "at least one vehicle with a load of a positive share is needed"));
+            }
+            fleet.extremes().try_for_each(|(_, vehicle)| check_vehicle(&vehicle))?;
+        }
+        within("vehicle.model.steer_delay", self.longest_steer_delay(), [0.0, 2.0 * self.step])
+    }
+
+    /// The longest steer delay of its vehicles \[s].
+    pub(super) fn longest_steer_delay(&self) -> f64 {
+        let drawn = self.fleet.iter().flat_map(|fleet| fleet.extremes().map(|(_, vehicle)| vehicle.model.steer_delay));
+        drawn.fold(self.vehicle.model.steer_delay, f64::max)
     }
 
     fn check_numbers(&self) -> Result<(), Invalid> {
@@ -97,7 +110,7 @@ impl Scenario {
     }
 }
 
-fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
+pub(super) fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
     let Vehicle { tractor, trailer, loads, speed_control, sensors, model } = vehicle;
     let positive = [
         ("tractor.wheelbase", tractor.wheelbase),

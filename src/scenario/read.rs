@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::Scenario;
 use super::benchmark_keys::Written;
+use super::fleet::{self, Fleet};
 use super::roads::{MOST_ROADS, Procedural};
 use crate::loading::Loading;
 use crate::reader::{Error, Reader};
@@ -15,14 +16,11 @@ impl Scenario {
     pub(super) fn from_source(source: &Source, loading: &Loading) -> Result<Scenario, Error> {
         let file = source.shown();
         let (reader, written) = Reader::parse::<Written>(&file, &source.text()?)?;
-        let vehicle = referred(&reader, "vehicle", source, Kind::Vehicle, &written.vehicle, Vehicle::from_source)?;
-        if !vehicle.loads.contains_key(&written.load) {
-            let loads: Vec<&str> = vehicle.loads.keys().map(String::as_str).collect();
-            return Err(reader.invalid("load", format_args!("{:?}", written.load), format!("the vehicle has {}", loads.join(", "))));
-        }
-        let mut scenario = without_routes(&reader, source.stem(), vehicle, &written)?;
-        if 2.0 * scenario.step < scenario.vehicle.model.steer_delay {
-            let expected = format!("the vehicle's model.steer_delay is {} s; two steps at most", scenario.vehicle.model.steer_delay);
+        let vehicles = fleet::vehicles(&reader, source, &written)?;
+        let mut scenario = without_routes(&reader, source.stem(), vehicles, &written)?;
+        let delay = scenario.longest_steer_delay();
+        if 2.0 * scenario.step < delay {
+            let expected = format!("the vehicle's steer delay is up to {delay} s; two steps at most");
             return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
         }
         // Drawing takes longest: everything else is checked first.
@@ -45,7 +43,12 @@ impl Scenario {
 }
 
 /// Everything but the roundabouts and their routes, checked and in SI units.
-fn without_routes(reader: &Reader, name: String, vehicle: Vehicle, written: &Written) -> Result<Scenario, Error> {
+fn without_routes(
+    reader: &Reader,
+    name: String,
+    (vehicle, load, fleet): (Vehicle, String, Option<Fleet>),
+    written: &Written,
+) -> Result<Scenario, Error> {
     let Written { time, field, actions, sensors, start, ending, reward, routes, .. } = written;
     let steer_max = written.steer_max_deg.map(|lock| reader.within("steer_max_deg", lock, 1.0..=80.0, "deg")).transpose()?;
     let speeds = numbers(reader, "actions.speeds_kmh", &actions.speeds_kmh, 90.0, 1.0, "km/h")?;
@@ -53,7 +56,8 @@ fn without_routes(reader: &Reader, name: String, vehicle: Vehicle, written: &Wri
         name,
         steer_max: steer_max.map(f64::to_radians),
         vehicle,
-        load: written.load.clone(),
+        load,
+        fleet,
         gutter: written.gutter,
         step: reader.within("time.step", time.step, 0.01..=1.0, "s")?,
         n_substeps: reader.count("time.substeps", time.substeps, 1..=100)? as u32,

@@ -298,7 +298,7 @@ fn a_batch_that_cannot_be_is_refused_and_a_wrong_action_changes_nothing() {
         let before = simulator.batch().truck.clone();
         assert_eq!(simulator.step(&[0, 9]).unwrap_err().to_string(), "actions[1]: 9; must lie in 0..9");
         assert_eq!(simulator.step(&[0]).unwrap_err().to_string(), "actions: 1 for 2 trucks; one each is needed");
-        let start = |offset| offtrack::layout::Start { offset, heading: 0.0 };
+        let start = |offset| offtrack::layout::Start { offset, ..Default::default() };
         let refused = |starts: &[_]| batch_on(&engine, &world, 2, 0, RouteChoice::Drawn(vec![0])).reset_from(starts).unwrap_err();
         assert_eq!(refused(&[start(0.0)]).to_string(), "starts: 1 for 2 trucks; one each is needed");
         assert_eq!(refused(&[start(0.0), start(1.5)]).to_string(), "starts[1]: 1.5 of the largest start error; must lie in -1..1");

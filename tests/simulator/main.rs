@@ -15,6 +15,7 @@ mod collide;
 mod episodes;
 mod field;
 mod fit;
+mod fleet;
 mod kinds;
 mod modules;
 mod observe;

@@ -21,6 +21,6 @@ fn vehicle_file(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/vehicles/{name}.toml"))
 }
 
-fn vehicle(name: &str) -> Vehicle {
+pub fn vehicle(name: &str) -> Vehicle {
     Vehicle::read(&vehicle_file(name)).unwrap()
 }

@@ -89,9 +89,8 @@ impl Evaluation<'_> {
     pub fn drive(&self, policy: &mut dyn Policy, progress: &mut dyn FnMut(usize, usize)) -> Result<Driven, Error> {
         let mut simulator = self.simulator()?;
         let (world, n_episodes) = (self.world, simulator.n_envs());
-        let rig = &world.params.rig;
         let lanes: Vec<LaneWidths> = self.routes().iter().map(|(_, place, route)| LaneWidths::of(self.scenario, place, route)).collect();
-        let mut running: Vec<Running> = simulator.batch().truck.iter().map(|truck| Running::new(rig, truck)).collect();
+        let mut running: Vec<Running> = simulator.batch().truck.iter().map(|truck| Running::new(world.rig(truck), truck)).collect();
         let mut sequences = Sequences(vec![Vec::new(); n_episodes]);
         let mut actions = Vec::new();
         let mut finished: Vec<Option<Episode>> = vec![None; n_episodes];
@@ -103,7 +102,7 @@ impl Evaluation<'_> {
             simulator.step(&actions)?;
             let batch = simulator.batch();
             for (env, (running, finished)) in running.iter_mut().zip(&mut finished).enumerate() {
-                if finished.is_none() && running.follow(rig, &lanes[env / self.episodes], batch, env) {
+                if finished.is_none() && running.follow(world.rig(&batch.truck[env]), &lanes[env / self.episodes], batch, env) {
                     *finished = Some(running.finish(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running)));
                     n_finished += 1;
                 }
@@ -194,13 +193,13 @@ impl Evaluation<'_> {
 
     /// The route of an episode as an index of the world, and its start.
     fn start(&self, episode: usize) -> (u32, Start) {
-        (self.scenario.split(self.split)[episode / self.episodes], drawn_start(self.seed, episode as u32, 0))
+        (self.scenario.split(self.split)[episode / self.episodes], drawn_start(self.world.params.n_vehicles, self.seed, episode as u32, 0))
     }
 
     /// Whether the own lane suffices on each route. The kerbs of one roundabout a thread are held.
     fn own_lane_suffices(&self, routes: &[Evaluated]) -> Vec<bool> {
         let Evaluation { scenario, world, .. } = *self;
-        let (rig, speed) = (&world.params.rig, scenario.cruising_speed());
+        let (rig, speed) = (&world.rigs[0], scenario.cruising_speed());
         let of_one_place: Vec<_> = routes.chunk_by(|(a, ..), (b, ..)| a == b).collect();
         let suffices = |routes: &&[Evaluated]| {
             let kerbs = routes[0].1.roundabout.kerbs(scenario.gutter);

@@ -22,7 +22,7 @@ constants! {
 /// One step of the truck: its sub-steps, and the largest load transfer ratio of each unit among them.
 pub fn drive(world: &World, row: &mut Row) {
     let params = &world.params;
-    *row.truck = driven(&params.rig, params.substep, params.n_substeps, row.control, row.truck);
+    *row.truck = driven(world.rig(row.truck), params.substep, params.n_substeps, row.control, row.truck);
 }
 
 /// The truck after `n_substeps` sub-steps of `substep` seconds, for which the rig's roll is discretised.

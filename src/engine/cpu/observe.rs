@@ -7,7 +7,7 @@ use glam::Vec2;
 use crate::angle::{PI, arc_tangent, wrapped};
 use crate::engine::Row;
 use crate::engine::cpu::follow::{distance_to_segment, reference_point};
-use crate::layout::{N_RAYS, N_VALUES, Params, PreviewRow, Progress, RouteRow, Truck, WaypointRow};
+use crate::layout::{N_RAYS, N_VALUES, Progress, Truck};
 use crate::shared::constants;
 use crate::world::World;
 
@@ -53,24 +53,16 @@ pub fn observe(world: &World, row: &mut Row) {
 
 /// The observation of the row's truck.
 pub(super) fn observation_of(world: &World, row: &Row) -> [f32; N_VALUES] {
-    let route = &world.routes[row.truck.route as usize];
-    let (waypoints, previews) = (world.route_waypoints(row.truck.route), world.route_previews(row.truck.route));
-    observed(&world.params, route, waypoints, previews, row.truck, row.progress, row.ranges)
+    observed(world, row.truck, row.progress, row.ranges)
 }
 
 /// The 69 values.
-pub fn observed(
-    params: &Params,
-    route: &RouteRow,
-    waypoints: &[WaypointRow],
-    previews: &[PreviewRow],
-    truck: &Truck,
-    progress: &Progress,
-    ranges: &[f32; N_RAYS],
-) -> [f32; N_VALUES] {
+pub fn observed(world: &World, truck: &Truck, progress: &Progress, ranges: &[f32; N_RAYS]) -> [f32; N_VALUES] {
+    let route = &world.routes[truck.route as usize];
+    let (waypoints, previews) = (world.route_waypoints(truck.route), world.route_previews(truck.route));
     let last = waypoints.len() - 1;
     let next = (progress.waypoint as usize).min(last);
-    let point = reference_point(params.rig.wheelbase, truck);
+    let point = reference_point(world.rig(truck).wheelbase, truck);
     let mut values = [0.0; N_VALUES];
     values[0] = (truck.speed / SPEED_SCALE).clamp(0.0, 1.0);
     for n in 0..2 {
@@ -93,7 +85,7 @@ pub fn observed(
     let preview = &previews[next].values;
     values[CURVATURES_AT..RANGES_AT].copy_from_slice(&preview[..N_CURVATURES]);
     for (value, range) in values[RANGES_AT..RADII_AT].iter_mut().zip(ranges) {
-        *value = range / params.sensor_range;
+        *value = range / world.params.sensor_range;
     }
     values[RADII_AT..].copy_from_slice(&preview[N_CURVATURES..]);
     values

@@ -11,7 +11,7 @@ use crate::world::World;
 pub fn steer(world: &World, row: &mut Row) {
     let params = &world.params;
     let step = params.n_substeps as f32 * params.substep;
-    *row.control = controlled(&params.rig, step, &world.actions[*row.action as usize], row.truck.speed, row.control);
+    *row.control = controlled(world.rig(row.truck), step, &world.actions[*row.action as usize], row.truck.speed, row.control);
 }
 
 /// The control for the next `step` seconds of a truck at `speed` [m/s] that was controlled by `before`.

@@ -45,6 +45,7 @@ impl<'a> Tables<'a> {
     pub(super) fn bytes(&self, table: Table) -> Cow<'_, [u8]> {
         Cow::Borrowed(match table {
             Table::Params => bytes_of(&self.world.params),
+            Table::Rigs => cast_slice(&self.world.rigs),
             Table::Actions => cast_slice(&self.world.actions),
             Table::Rays => cast_slice(&self.world.rays),
             Table::Fields => cast_slice(&self.fields),

@@ -75,6 +75,7 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("held", 1, SAME),
             ("acceleration", 1, MIDDLING),
             ("curvature_lag", 1, SMALL),
+            ("vehicle", 1, SAME),
         ],
         Column::Clearance => &[("tractor", 1, CLEARANCE), ("trailer", 1, CLEARANCE)],
         Column::Progress => {

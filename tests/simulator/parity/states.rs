@@ -29,6 +29,15 @@ pub fn world(gutter: Gutter) -> Arc<World> {
     worlds[usize::from(gutter == Gutter::Solid)].clone()
 }
 
+/// The same routes for trucks of many kinds, with every lag and limit.
+pub fn fleet_world() -> Arc<World> {
+    let mut scenario = benchmark("attard2023-full").0;
+    scenario.fleet = Some(crate::fleet::all_drawn());
+    let world = World { fields: world(Gutter::Drivable).fields.clone(), ..World::bake(&scenario).unwrap() };
+    assert!(world.rigs.len() == 512 && world.rays.len() == 512);
+    Arc::new(world)
+}
+
 /// Makes a simulator's columns those of `batch`.
 pub fn put(simulator: &mut Simulator, batch: &Batch) {
     simulator.restore(|column| Some(batch.column(column))).unwrap();
@@ -79,6 +88,7 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
     let [speed, steering, lean, ratio] = drawn(env, 1);
     let [roll, roll_rate, trailer_roll, trailer_roll_rate] = drawn(env, 2);
     let waypoint = &waypoints[near];
+    let vehicle = picked(env, 4, world.rigs.len());
     let heading = wrapped(previews[near].heading + 0.3 * turned);
     let behind = previews[near.saturating_sub(4)].heading;
     let lean = if lean < -0.8 { 0.3 } else { 0.05 };
@@ -87,7 +97,7 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
         heading,
         trailer_heading: wrapped(behind + if kind == 2 || kind == 5 { 2.5 * bent } else { 0.3 * bent }),
         speed: 8.0 + 8.0 * speed,
-        steering: steering * world.params.rig.steer_max,
+        steering: steering * world.rigs[vehicle].steer_max,
         tractor_roll: lean * roll,
         tractor_roll_rate: lean * roll_rate,
         trailer_roll: lean * trailer_roll,
@@ -99,7 +109,8 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
         steps: if kind == 3 { world.routes[route as usize].step_limit } else { picked(env, 3, 200) as u32 },
         held: 0,
         acceleration: lean * ratio,
-        curvature_lag: 0.0,
+        curvature_lag: if world.rigs[vehicle].yaw_lag == 0.0 { 0.0 } else { 0.02 * bent },
+        vehicle: vehicle as u32,
     };
     // Up to the last waypoint; one truck in sixteen has a next waypoint that is too far away.
     let far = if kind == 4 { 10 } else { 0 };

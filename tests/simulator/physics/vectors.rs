@@ -101,7 +101,7 @@ fn traced(engine: &Engine, case: &Case) -> Traced {
 fn alone(engine: &Engine, rig: &Rig, substep: f32) -> Simulator {
     static WORLD: OnceLock<World> = OnceLock::new();
     let mut world = WORLD.get_or_init(|| benchmark("attard2023").1).clone();
-    (world.params.rig, world.params.substep, world.params.n_substeps) = (*rig, substep, 1);
+    (world.rigs[0], world.params.substep, world.params.n_substeps) = (*rig, substep, 1);
     batch_on(engine, &Arc::new(world), 1, 0, RouteChoice::Drawn(vec![0]))
 }
 

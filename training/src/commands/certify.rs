@@ -22,13 +22,11 @@ use offtrack_training::files;
 use super::{progress, roads};
 
 /// On the lane centre, and the four corners of the largest start errors.
-const STARTS: [Start; 5] = [
-    Start { offset: 0.0, heading: 0.0 },
-    Start { offset: 1.0, heading: 1.0 },
-    Start { offset: 1.0, heading: -1.0 },
-    Start { offset: -1.0, heading: 1.0 },
-    Start { offset: -1.0, heading: -1.0 },
-];
+const STARTS: [Start; 5] = [start(0.0, 0.0), start(1.0, 1.0), start(1.0, -1.0), start(-1.0, 1.0), start(-1.0, -1.0)];
+
+const fn start(offset: f32, heading: f32) -> Start {
+    Start { offset, heading, speed: 0.0, vehicle: 0 }
+}
 
 /// Show which routes of a benchmark can be completed: search for actions that complete each of them.
 #[derive(Debug, clap::Args)]

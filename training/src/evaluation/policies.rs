@@ -102,7 +102,7 @@ impl Policy for PurePursuit {
         actions.clear();
         actions.extend(batch.truck.iter().zip(&batch.progress).map(|(truck, progress)| {
             let waypoints = world.route_waypoints(truck.route);
-            let steering = self.steering(world.params.rig.wheelbase, truck, waypoints, progress.waypoint as usize);
+            let steering = self.steering(world.rig(truck).wheelbase, truck, waypoints, progress.waypoint as usize);
             nearest(&world.actions, steering, world.params.start_speed)
         }));
     }

@@ -3,7 +3,7 @@
 //! A truck and its sensors are symmetric, so the mirror image of a transition is a valid transition of left-hand
 //! traffic. A learner that samples both has seen every bend in both directions.
 
-use offtrack::layout::{Action, N_TRACTOR_RAYS, N_TRAILER_RAYS, N_VALUES, Ray};
+use offtrack::layout::{Action, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, N_VALUES, Ray};
 use offtrack::world::World;
 use rand::Rng;
 
@@ -32,15 +32,17 @@ impl Mirror {
     pub fn of(world: &World) -> Result<Mirror, Error> {
         let refused = |expected: String| Error::Flag { flag: "learning.mirror_augmentation", value: "true".to_owned(), expected };
         let mut values = std::array::from_fn(|index| (index, if SIGNED.contains(&index) { -1.0 } else { 1.0 }));
-        if world.params.rig.crossfall != 0.0 {
+        if world.rigs.iter().any(|rig| rig.crossfall != 0.0) {
             return Err(refused(
                 "the vehicle's road falls to one side (model.crossfall): leave learning.mirror_augmentation out".to_owned(),
             ));
         }
-        for (index, ray) in world.rays.iter().enumerate() {
+        for index in 0..N_RAYS {
             // The image of a trailer's sensor is one of the trailer's.
             let unit = if index < N_TRAILER_RAYS { 0..N_TRAILER_RAYS } else { N_TRAILER_RAYS..N_TRAILER_RAYS + N_TRACTOR_RAYS };
-            let image = unit.into_iter().find(|&other| are_images(ray, &world.rays[other]));
+            // One that is an image on every chassis.
+            let on_all = |other: usize| world.rays.iter().all(|rays| are_images(&rays[index], &rays[other]));
+            let image = unit.into_iter().find(|&other| on_all(other));
             let image = image.ok_or_else(|| {
                 refused(format!("the vehicle's distance sensor {index} has no mirror image: leave learning.mirror_augmentation out"))
             })?;

@@ -8,7 +8,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use offtrack::angle::wrapped;
-use offtrack::layout::{Ended, Start, Truck};
+use offtrack::layout::{Ended, Rig, Start, Truck};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 use offtrack_policy::Policy;
@@ -139,7 +139,7 @@ fn branched(world: &World, batch: &Batch, beam: &[Candidate], straight: u32, hol
             rows.push(row as u32);
             children.push(candidate.clone());
         }
-        for action in distinct(world, batch.truck[row].steering, candidate.held.unwrap_or(straight), hold) {
+        for action in distinct(world, world.rig(&batch.truck[row]), batch.truck[row].steering, candidate.held.unwrap_or(straight), hold) {
             rows.push(row as u32);
             children.push(Candidate { held: Some(action), ..candidate.clone() });
         }
@@ -149,9 +149,9 @@ fn branched(world: &World, batch: &Batch, beam: &[Candidate], straight: u32, hol
 
 /// The actions that differ within `hold` steps: the steer angle changes at a limited rate, so all levels beyond reach
 /// are equal. The `last` action represents those equal to it, so that a sequence changes seldom.
-fn distinct(world: &World, steering: f32, last: u32, hold: usize) -> Vec<u32> {
+fn distinct(world: &World, rig: &Rig, steering: f32, last: u32, hold: usize) -> Vec<u32> {
     let params = &world.params;
-    let reach = params.rig.steer_rate * (hold as u32 * params.n_substeps) as f32 * params.substep;
+    let reach = rig.steer_rate * (hold as u32 * params.n_substeps) as f32 * params.substep;
     let reached = |action: u32| {
         let asked = &world.actions[action as usize];
         (asked.steering.clamp(steering - reach, steering + reach), asked.speed)
@@ -249,12 +249,12 @@ mod tests {
     fn actions_that_the_steer_rate_makes_equal_are_tried_once_and_the_last_one_represents_them() {
         let world = world();
         // 20 deg/s give 2 deg in a step and levels lie 8 deg apart: straight on, or towards either side.
-        assert_eq!(distinct(&world, 0.0, 4, 1), [4, 0, 5]);
-        assert_eq!(distinct(&world, 0.0, 7, 1), [7, 0, 4]);
+        assert_eq!(distinct(&world, &world.rigs[0], 0.0, 4, 1), [4, 0, 5]);
+        assert_eq!(distinct(&world, &world.rigs[0], 0.0, 7, 1), [7, 0, 4]);
         // A level 1 deg away is reached, and the wheels can move beyond it.
-        assert_eq!(distinct(&world, 7.0f32.to_radians(), 8, 1), [8, 0, 5]);
+        assert_eq!(distinct(&world, &world.rigs[0], 7.0f32.to_radians(), 8, 1), [8, 0, 5]);
         // In 40 steps every level is reached.
-        assert_eq!(distinct(&world, 0.0, 4, 40).len(), 9);
+        assert_eq!(distinct(&world, &world.rigs[0], 0.0, 4, 40).len(), 9);
     }
 
     #[test]

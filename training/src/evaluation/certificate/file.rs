@@ -197,7 +197,7 @@ impl Certificate {
 fn conditions(scenario: &Scenario, world: &World) -> BTreeMap<String, String> {
     let list = |values: &mut dyn Iterator<Item = f32>| values.map(|value| format!("{value:.4}")).collect::<Vec<_>>().join(" ");
     let params = &world.params;
-    let mut rig: Vec<String> = bytemuck::cast_slice(&[params.rig]).iter().map(|value: &f32| format!("{value:.4e}")).collect();
+    let mut rig: Vec<String> = bytemuck::cast_slice(&world.rigs).iter().map(|value: &f32| format!("{value:.4e}")).collect();
     // What a vehicle without a `model` has in the fields that came with it changes no certificate.
     if scenario.vehicle.model == Model::default() {
         rig.truncate(std::mem::offset_of!(Rig, slip_lever_max) / size_of::<f32>());

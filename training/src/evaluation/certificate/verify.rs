@@ -58,7 +58,7 @@ pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted
             // Beyond the time limit of its route no action changes the outcome.
             let limit = world.routes[index].step_limit as usize;
             let actions = file::actions(&found.actions, world.params.n_actions, limit).map_err(damaged)?;
-            sequences.push(Sequence { route: index as u32, start: Start { offset, heading }, actions });
+            sequences.push(Sequence { route: index as u32, start: Start { offset, heading, ..Start::default() }, actions });
         }
     }
     let ended = driven(world, &sequences).map_err(|error| match error {
