@@ -114,9 +114,14 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
     let asked = min(max(control.acceleration, rig.acceleration_min), drive_max(rig, truck.speed));
     var response = rig.drive_lag;
     if asked < 0.0 { response = rig.brake_lag; }
-    let acceleration = asked + response.left * (truck.acceleration - asked);
-    let mean_acceleration = asked + response.mean * (truck.acceleration - asked);
-    let speed = truck.speed + mean_acceleration * substep;
+    var acceleration = asked + response.left * (truck.acceleration - asked);
+    var mean_acceleration = asked + response.mean * (truck.acceleration - asked);
+    var speed = truck.speed + mean_acceleration * substep;
+    if control.holds == 1u && truck.speed * speed <= 0.0 {
+        acceleration = 0.0;
+        mean_acceleration = -truck.speed / substep;
+        speed = 0.0;
+    }
 
     let half_step = 0.5 * substep;
     let articulation = truck.heading - truck.trailer_heading;

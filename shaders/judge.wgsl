@@ -7,7 +7,8 @@ fn judge(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
     truck[env].steps += 1u;
-    let code = ending(params, routes[truck[env].route], truck[env], clearance[env], progress[env]);
+    let step_limit = step_limits[truck[env].route * params.n_classes + rigs[truck[env].vehicle].class_index];
+    let code = ending(params, routes[truck[env].route], step_limit, truck[env], clearance[env], progress[env]);
     let weighed_terms = weighed(params, clearance[env], progress[env], code);
     ended[env] = code;
     terms[env] = weighed_terms;
@@ -15,7 +16,7 @@ fn judge(thread: Thread) {
 }
 
 // Why the episode ended, RUNNING when it did not.
-fn ending(params: Params, route: RouteRow, truck: Truck, clearance: Clearance, progress: Progress) -> u32 {
+fn ending(params: Params, route: RouteRow, step_limit: u32, truck: Truck, clearance: Clearance, progress: Progress) -> u32 {
     let articulation = wrapped(truck.heading - truck.trailer_heading);
     let load_transfer_ratio = max(abs(truck.tractor_load_transfer_ratio), abs(truck.trailer_load_transfer_ratio));
     let arrived = route.n_waypoints <= progress.waypoint;
@@ -31,7 +32,7 @@ fn ending(params: Params, route: RouteRow, truck: Truck, clearance: Clearance, p
         return STRAYED;
     } else if arrived {
         return ARRIVED;
-    } else if route.step_limit < truck.steps {
+    } else if step_limit < truck.steps {
         return TIMED_OUT;
     }
     return RUNNING;

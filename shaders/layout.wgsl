@@ -78,6 +78,8 @@ const DRAW_POSE: u32 = 1u;
 const DRAW_VEHICLE: u32 = 4294967295u;
 // `Draw::Action`.
 const DRAW_ACTION: u32 = 2u;
+// Braking at which a truck comes to stand [m/s^2].
+const HOLD_BRAKING: f32 = 0.5f;
 // Lowest speed that the engine's power is divided by [m/s].
 const POWER_SPEED_MIN: f32 = 1.0f;
 // Keeps a quotient finite at a standstill [m^2/s^2].
@@ -184,6 +186,10 @@ struct Control {
     steering_before: f32,
     // Steer angle asked for in the step before that [rad].
     steering_earlier: f32,
+    // Target speed [m/s].
+    target_speed: f32,
+    // Whether the target speed is 0: once the truck stands, the brakes hold it (0 or 1).
+    holds: u32,
 }
 
 // One tractor and its trailer.
@@ -393,14 +399,14 @@ struct Rig {
     // Index of its distance sensors among those of all vehicles.
     chassis: u32,
     // Index of vehicle and load, as reports and the clock group them.
-    class: u32,
+    class_index: u32,
 }
 
 // One entry of the action table.
 struct Action {
     // Steer angle asked for [rad].
     steering: f32,
-    // Speed asked for [m/s].
+    // Speed asked for or, with [`Params::changes_speed`], by how much the target speed changes [m/s].
     speed: f32,
 }
 
@@ -424,6 +430,14 @@ struct Params {
     start_speed: f32,
     // Half of their range [m/s].
     start_speed_range: f32,
+    // Lowest target speed [m/s].
+    target_speed_min: f32,
+    // Highest target speed [m/s].
+    target_speed_max: f32,
+    // Whether an action changes the target speed by its speed, rather than states it (0 or 1).
+    changes_speed: u32,
+    // Classes of vehicles.
+    n_classes: u32,
     // Distance to the next waypoint beyond which it cannot be passed and the truck has strayed [m].
     stray_distance: f32,
     // Articulation beyond which the truck is jackknifed [rad].
@@ -468,8 +482,6 @@ struct RouteRow {
     n_waypoints: u32,
     // Its roundabout.
     roundabout: u32,
-    // Steps after which an episode is timed out.
-    step_limit: u32,
     // Reach of a waypoint's crossing line to the left [m].
     crossing_left: f32,
     // Reach of a waypoint's crossing line to the right [m].
@@ -526,35 +538,37 @@ struct BatchFacts {
 @group(0) @binding(8) var<storage, read> previews: array<PreviewRow>;
 // Every route.
 @group(0) @binding(9) var<storage, read> routes: array<RouteRow>;
+// Steps after which an episode is timed out, [n_routes, n_classes].
+@group(0) @binding(10) var<storage, read> step_limits: array<u32>;
 // Facts that the trucks of a batch share.
-@group(0) @binding(10) var<storage, read> batch: BatchFacts;
+@group(0) @binding(11) var<storage, read> batch: BatchFacts;
 // Routes that episodes run on: to be drawn from, or one for each truck.
-@group(0) @binding(11) var<storage, read> choice: array<u32>;
+@group(0) @binding(12) var<storage, read> choice: array<u32>;
 // The stream of random numbers that each truck draws from, [n_envs].
-@group(0) @binding(12) var<storage, read> streams: array<Stream>;
+@group(0) @binding(13) var<storage, read> streams: array<Stream>;
 // Which trucks begin an episode when the caller says so, and how, [n_envs].
-@group(0) @binding(13) var<storage, read> begins: array<BeginRow>;
+@group(0) @binding(14) var<storage, read> begins: array<BeginRow>;
 //  Index into the action table, [n_envs].
-@group(0) @binding(14) var<storage, read_write> action: array<u32>;
+@group(0) @binding(15) var<storage, read_write> action: array<u32>;
 //  Steer angle and acceleration asked of each truck, [n_envs].
-@group(0) @binding(15) var<storage, read_write> control: array<Control>;
+@group(0) @binding(16) var<storage, read_write> control: array<Control>;
 //  The trucks, [n_envs].
-@group(0) @binding(16) var<storage, read_write> truck: array<Truck>;
+@group(0) @binding(17) var<storage, read_write> truck: array<Truck>;
 //  Distances to the kerbs [m], [n_envs].
-@group(0) @binding(17) var<storage, read_write> clearance: array<Clearance>;
+@group(0) @binding(18) var<storage, read_write> clearance: array<Clearance>;
 //  Progress along the routes, [n_envs].
-@group(0) @binding(18) var<storage, read_write> progress: array<Progress>;
+@group(0) @binding(19) var<storage, read_write> progress: array<Progress>;
 //  Distance sensors [m], [n_envs, 29].
-@group(0) @binding(19) var<storage, read_write> ranges: array<f32>;
+@group(0) @binding(20) var<storage, read_write> ranges: array<f32>;
 //  The observation before the next action, [n_envs, 69].
-@group(0) @binding(20) var<storage, read_write> observation: array<f32>;
+@group(0) @binding(21) var<storage, read_write> observation: array<f32>;
 //  The observation after the last action, another one only where an episode ended, [n_envs, 69].
-@group(0) @binding(21) var<storage, read_write> next_observation: array<f32>;
+@group(0) @binding(22) var<storage, read_write> next_observation: array<f32>;
 //  Codes of [`crate::layout::Ended`] for the last step, [n_envs].
-@group(0) @binding(22) var<storage, read_write> ended: array<u32>;
+@group(0) @binding(23) var<storage, read_write> ended: array<u32>;
 //  Physical amounts that the reward weighs, [n_envs].
-@group(0) @binding(23) var<storage, read_write> terms: array<RewardTerms>;
+@group(0) @binding(24) var<storage, read_write> terms: array<RewardTerms>;
 //  Rewards of the last step, [n_envs].
-@group(0) @binding(24) var<storage, read_write> reward: array<f32>;
+@group(0) @binding(25) var<storage, read_write> reward: array<f32>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(25) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(26) var<storage, read_write> tally: array<atomic<u32>>;

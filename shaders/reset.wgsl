@@ -61,6 +61,7 @@ fn start(env: u32, begin: BeginRow) {
     after.route = route;
     after.episode = episode;
     control[env] = Control();
+    control[env].target_speed = after.speed;
     truck[env] = after;
     progress[env] = followed(routes[route], reference_point(rigs[start.vehicle].wheelbase, after), 1u, params.stray_distance);
     progress[env].passed = 0u;

@@ -7,13 +7,20 @@ fn steer(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
     let duration = f32(params.n_substeps) * params.substep;
-    control[env] = controlled(rigs[truck[env].vehicle], duration, actions[action[env]], truck[env].speed, control[env]);
+    control[env] = controlled(rigs[truck[env].vehicle], duration, targeted(params, actions[action[env]], control[env]), truck[env].speed, control[env]);
+}
+
+// The action with the target speed that it leads to, from that of the control before.
+fn targeted(params: Params, action: Action, before: Control) -> Action {
+    let changed = min(max(before.target_speed + action.speed, params.target_speed_min), params.target_speed_max);
+    return Action(action.steering, select(action.speed, changed, params.changes_speed == 1u));
 }
 
 // The control for the next `duration` seconds of a truck at `speed` [m/s] that was controlled by `before`.
 //
 // PI controller with anti-windup: the integral is reset to 0 while the error is large, and kept while the acceleration
-// asked for is out of reach. Otherwise a long approach to the target speed would overshoot it.
+// asked for is out of reach. Otherwise a long approach to the target speed would overshoot it. A target of 0 is reached
+// with constant braking at last: the controller alone would never stand.
 fn controlled(rig: Rig, duration: f32, action: Action, speed: f32, before: Control) -> Control {
     let error = action.speed - speed;
     let near = abs(error) <= rig.speed_integral_band;
@@ -23,12 +30,16 @@ fn controlled(rig: Rig, duration: f32, action: Action, speed: f32, before: Contr
     let most = drive_max(rig, speed);
     let reachable = rig.speed_braking <= asked && asked <= most;
     let speed_error_integral = select(held, integrated, reachable);
-    let acceleration = rig.speed_gain * error + rig.speed_integral_gain * speed_error_integral;
+    let holds = action.speed == 0.0;
+    let steady = rig.speed_gain * error + rig.speed_integral_gain * speed_error_integral;
+    let acceleration = select(steady, min(steady, -HOLD_BRAKING), holds);
     return Control(
         action.steering,
         min(max(acceleration, rig.speed_braking), most),
-        speed_error_integral,
+        select(speed_error_integral, 0.0, holds),
         before.steering,
         before.steering_before,
+        action.speed,
+        select(0u, 1u, holds),
     );
 }

@@ -53,6 +53,10 @@ crate::shared! {
         pub steering_before: f32,
         /// Steer angle asked for in the step before that \[rad].
         pub steering_earlier: f32,
+        /// Target speed \[m/s].
+        pub target_speed: f32,
+        /// Whether the target speed is 0: once the truck stands, the brakes hold it (0 or 1).
+        pub holds: u32,
     }
 
     /// One tractor and its trailer.
@@ -262,14 +266,14 @@ crate::shared! {
         /// Index of its distance sensors among those of all vehicles.
         pub chassis: u32,
         /// Index of vehicle and load, as reports and the clock group them.
-        pub class: u32,
+        pub class_index: u32,
     }
 
     /// One entry of the action table.
     pub struct Action {
         /// Steer angle asked for \[rad].
         pub steering: f32,
-        /// Speed asked for \[m/s].
+        /// Speed asked for or, with [`Params::changes_speed`], by how much the target speed changes \[m/s].
         pub speed: f32,
     }
 
@@ -293,6 +297,14 @@ crate::shared! {
         pub start_speed: f32,
         /// Half of their range \[m/s].
         pub start_speed_range: f32,
+        /// Lowest target speed \[m/s].
+        pub target_speed_min: f32,
+        /// Highest target speed \[m/s].
+        pub target_speed_max: f32,
+        /// Whether an action changes the target speed by its speed, rather than states it (0 or 1).
+        pub changes_speed: u32,
+        /// Classes of vehicles.
+        pub n_classes: u32,
         /// Distance to the next waypoint beyond which it cannot be passed and the truck has strayed \[m].
         pub stray_distance: f32,
         /// Articulation beyond which the truck is jackknifed \[rad].
@@ -337,8 +349,6 @@ crate::shared! {
         pub n_waypoints: u32,
         /// Its roundabout.
         pub roundabout: u32,
-        /// Steps after which an episode is timed out.
-        pub step_limit: u32,
         /// Reach of a waypoint's crossing line to the left \[m].
         pub crossing_left: f32,
         /// Reach of a waypoint's crossing line to the right \[m].

@@ -245,7 +245,7 @@ impl Vehicle {
             trailer_mass: load.mass as f32,
             rollover_threshold: load.suspension.rollover_threshold() as f32,
             chassis: 0,
-            class: 0,
+            class_index: 0,
         }
     }
 

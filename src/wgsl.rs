@@ -18,6 +18,7 @@ pub fn shared() -> String {
         angle::printed_constants(),
         field::printed_constants(),
         random::printed_constants(),
+        cpu::steer::printed_constants(),
         cpu::drive::printed_constants(),
         cpu::collide::printed_constants(),
         cpu::sense::printed_constants(),

@@ -11,8 +11,9 @@ use rayon::prelude::*;
 use crate::field::Field;
 use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, Rig, RouteRow, Truck, WaypointRow};
 use crate::loading::Loading;
+use crate::profile::Profile;
 use crate::route::{Route, Waypoint};
-use crate::scenario::{Class, Entry, Invalid, Place, Scenario};
+use crate::scenario::{Class, Clock, Entry, Invalid, Place, Scenario};
 
 /// Waypoints to the corner of each observed curvature.
 const CURVATURE_STEPS: [usize; 4] = [5, 7, 10, 12];
@@ -44,6 +45,8 @@ pub struct World {
     pub routes: Vec<RouteRow>,
     /// `20m/N-left-3` and the like.
     pub route_names: Vec<String>,
+    /// Steps after which an episode is timed out, `[n_routes, n_classes]`.
+    pub step_limits: Vec<u32>,
 }
 
 impl World {
@@ -73,7 +76,6 @@ impl World {
                 first: waypoints.len() as u32,
                 n_waypoints: route.waypoints.len() as u32,
                 roundabout: roundabout as u32,
-                step_limit: step_limit(scenario, route),
                 crossing_left: route.crossing.0 as f32,
                 crossing_right: route.crossing.1 as f32,
             });
@@ -81,6 +83,10 @@ impl World {
             waypoints.extend(route.waypoints.iter().map(waypoint_row));
             previews.extend((0..route.waypoints.len()).map(|index| preview_row(&route.waypoints, index)));
         }
+        let classes = scenario.classes();
+        let [slowest, fastest] = scenario.speed_range();
+        let [start_least, start_most] = scenario.start_speed.unwrap_or([scenario.cruising_speed(); 2]);
+        let step_limits = step_limits(scenario, substep, &waypoints, &routes);
         Ok(World {
             params: Params {
                 substep,
@@ -90,8 +96,12 @@ impl World {
                 sensor_range: scenario.sensor_range as f32,
                 start_offset: scenario.start_offset as f32,
                 start_heading: scenario.start_heading as f32,
-                start_speed: scenario.cruising_speed() as f32,
-                start_speed_range: 0.0,
+                start_speed: (0.5 * (start_least + start_most)) as f32,
+                start_speed_range: (0.5 * (start_most - start_least)) as f32,
+                target_speed_min: slowest as f32,
+                target_speed_max: fastest as f32,
+                changes_speed: u32::from(!scenario.speed_changes.is_empty()),
+                n_classes: classes.len() as u32,
                 stray_distance: scenario.stray_distance as f32,
                 jackknife_angle: scenario.jackknife_angle as f32,
                 rollover_ratio: scenario.rollover_ratio as f32,
@@ -103,7 +113,7 @@ impl World {
                 failure_weight: scenario.failure_weight as f32,
             },
             rigs,
-            classes: scenario.classes(),
+            classes,
             rays,
             actions,
             fields: fields(scenario, loading),
@@ -111,12 +121,14 @@ impl World {
             previews,
             routes,
             route_names,
+            step_limits,
         })
     }
 
     /// Memory that its tables take, whatever the number of trucks \[bytes].
     pub fn bytes(&self) -> usize {
         let routes = size_of_val(self.waypoints.as_slice()) + size_of_val(self.previews.as_slice()) + size_of_val(self.routes.as_slice());
+        let routes = routes + size_of_val(self.step_limits.as_slice());
         let vehicles = size_of_val(self.rigs.as_slice()) + size_of_val(self.rays.as_slice());
         let shared = size_of_val(&self.params) + size_of_val(self.actions.as_slice());
         self.fields.iter().map(Field::bytes).sum::<usize>() + routes + vehicles + shared
@@ -126,6 +138,12 @@ impl World {
     #[inline]
     pub fn rig(&self, truck: &Truck) -> &Rig {
         &self.rigs[truck.vehicle as usize]
+    }
+
+    /// Steps after which a truck's episode is timed out.
+    #[inline]
+    pub fn step_limit(&self, truck: &Truck) -> u32 {
+        self.step_limits[(truck.route * self.params.n_classes + self.rig(truck).class_index) as usize]
     }
 
     /// Its distance sensors, trailer's first.
@@ -165,8 +183,8 @@ fn rigs(scenario: &Scenario, substep: f32) -> (Vec<Rig>, Vec<[Ray; N_RAYS]>) {
         if rays.last() != Some(&own) {
             rays.push(own);
         }
-        let (chassis, class) = (rays.len() as u32 - 1, entry.class as u32);
-        Rig { chassis, class, ..entry.vehicle.rig(&classes[entry.class].load, substep, scenario.steer_max) }
+        let (chassis, class_index) = (rays.len() as u32 - 1, entry.class as u32);
+        Rig { chassis, class_index, ..entry.vehicle.rig(&classes[entry.class].load, substep, scenario.steer_max) }
     };
     let rigs = scenario.vehicles().into_iter().map(rig).collect();
     (rigs, rays)
@@ -189,9 +207,28 @@ fn fields(scenario: &Scenario, loading: &Loading) -> Vec<Field> {
     fields
 }
 
-/// Steps after which an episode on this route is timed out.
-fn step_limit(scenario: &Scenario, route: &Route) -> u32 {
-    (scenario.time_limit * route.centre_line.length() / (scenario.cruising_speed() * scenario.step)).ceil() as u32
+/// Steps after which an episode is timed out, `[n_routes, n_classes]`: multiples of the time that a route takes at the
+/// highest target speed, or of that of the feasible profile of the class as its file has it.
+fn step_limits(scenario: &Scenario, substep: f32, waypoints: &[WaypointRow], routes: &[RouteRow]) -> Vec<u32> {
+    let steps = |time: f64| (scenario.time_limit * time / scenario.step).ceil() as u32;
+    match scenario.clock {
+        Clock::HighestSpeed => {
+            let n_classes = scenario.classes().len();
+            let length = |route: &Route| route.centre_line.length();
+            // In this order of operations for as long as there have been benchmarks.
+            let limit = |route| (scenario.time_limit * length(route) / (scenario.cruising_speed() * scenario.step)).ceil() as u32;
+            scenario.routes().flat_map(|(_, route)| std::iter::repeat_n(limit(route), n_classes)).collect()
+        }
+        Clock::Feasible => {
+            let rigs = scenario.typical_rigs(substep);
+            let fastest = scenario.cruising_speed();
+            let of_route = |route: &RouteRow| {
+                let waypoints = &waypoints[route.first as usize..][..route.n_waypoints as usize];
+                rigs.iter().map(|rig| steps(Profile::of(rig, waypoints, fastest).time)).collect::<Vec<u32>>()
+            };
+            routes.par_iter().flat_map_iter(of_route).collect()
+        }
+    }
 }
 
 fn waypoint_row(waypoint: &Waypoint) -> WaypointRow {

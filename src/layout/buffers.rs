@@ -48,6 +48,8 @@ crate::named! {
         Previews = "previews",
         /// Every route.
         Routes = "routes",
+        /// When an episode is timed out.
+        StepLimits = "step_limits",
         /// Facts that the trucks of a batch share.
         Batch = "batch",
         /// Routes that episodes run on.
@@ -126,6 +128,7 @@ impl Table {
             Table::Waypoints => ("Every route's waypoints, one route after the other.", rows::<WaypointRow>()),
             Table::Previews => ("What is observed at each of them.", rows::<PreviewRow>()),
             Table::Routes => ("Every route.", rows::<RouteRow>()),
+            Table::StepLimits => ("Steps after which an episode is timed out, [n_routes, n_classes].", rows::<u32>()),
             Table::Batch => ("Facts that the trucks of a batch share.", BatchFacts::wgsl()),
             Table::Choice => ("Routes that episodes run on: to be drawn from, or one for each truck.", rows::<u32>()),
             Table::Streams => ("The stream of random numbers that each truck draws from, [n_envs].", rows::<Stream>()),

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 
+use super::Clock;
 use crate::roundabout::Gutter;
 
 /// The file.
@@ -131,6 +132,8 @@ impl Default for WrittenField {
 pub(super) struct WrittenActions {
     pub(super) steer_levels: Vec<f64>,
     pub(super) speeds_kmh: Vec<f64>,
+    #[serde(default)]
+    pub(super) speed_changes_kmh: Vec<f64>,
 }
 
 #[derive(Deserialize)]
@@ -144,11 +147,20 @@ pub(super) struct WrittenSensors {
 pub(super) struct WrittenStart {
     pub(super) offset: f64,
     pub(super) heading_deg: f64,
+    pub(super) speed_kmh: Option<WrittenSpeeds>,
+}
+
+/// A speed, or `[least, greatest]`.
+#[derive(Deserialize)]
+#[serde(untagged)]
+pub(super) enum WrittenSpeeds {
+    One(f64),
+    Range([f64; 2]),
 }
 
 impl Default for WrittenStart {
     fn default() -> Self {
-        WrittenStart { offset: 0.3, heading_deg: 2.0 }
+        WrittenStart { offset: 0.3, heading_deg: 2.0, speed_kmh: None }
     }
 }
 
@@ -159,11 +171,12 @@ pub(super) struct WrittenEnding {
     pub(super) jackknife_deg: f64,
     pub(super) rollover_ratio: f64,
     pub(super) time_limit: f64,
+    pub(super) clock: Clock,
 }
 
 impl Default for WrittenEnding {
     fn default() -> Self {
-        WrittenEnding { stray_distance: 10.0, jackknife_deg: 90.0, rollover_ratio: 1.0, time_limit: 3.0 }
+        WrittenEnding { stray_distance: 10.0, jackknife_deg: 90.0, rollover_ratio: 1.0, time_limit: 3.0, clock: Clock::default() }
     }
 }
 

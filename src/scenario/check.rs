@@ -38,7 +38,12 @@ impl Scenario {
         }
         self.check_numbers()?;
         list("steer_levels", &self.steer_levels, [-1.0, 1.0])?;
-        list("speeds", &self.speeds, [0.01, 100.0])?;
+        list("speeds", &self.speeds, [0.0, 100.0])?;
+        within("speeds", self.cruising_speed(), [0.01, 100.0])?;
+        if !self.speed_changes.is_empty() {
+            list("speed_changes", &self.speed_changes, [-100.0, 100.0])?;
+        }
+        self.start_speed.iter().flatten().try_for_each(|&speed| within("start_speed", speed, [0.0, 100.0]))?;
         self.check_routes()?;
         check_vehicle(&self.vehicle)?;
         if let Some(fleet) = &self.fleet {

@@ -9,6 +9,7 @@ mod read;
 use std::collections::BTreeMap;
 
 use super::Scenario;
+use crate::layout::Rig;
 use crate::vehicle::Vehicle;
 pub use draw::{Drawn, Ranges};
 pub(super) use read::vehicles;
@@ -120,6 +121,15 @@ impl Scenario {
     pub fn vehicles(&self) -> Vec<Entry> {
         let one = || Vec::from([Entry { class: 0, vehicle: self.vehicle.clone() }]);
         self.fleet.as_ref().map_or_else(one, Fleet::table)
+    }
+
+    /// Each class as its file has it, in their order.
+    pub fn typical_rigs(&self, substep: f32) -> Vec<Rig> {
+        let rig = |vehicle: &Vehicle, load: &str| vehicle.rig(load, substep, self.steer_max);
+        match &self.fleet {
+            None => Vec::from([rig(&self.vehicle, &self.load)]),
+            Some(fleet) => fleet.shares().into_iter().map(|(member, load, _)| rig(&member.vehicle, load)).collect(),
+        }
     }
 
     /// The furthest reach of its vehicles at the start: see [`Vehicle::reach`] \[m].

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::Scenario;
-use super::benchmark_keys::Written;
+use super::benchmark_keys::{Written, WrittenSpeeds};
 use super::fleet::{self, Fleet};
 use super::roads::{MOST_ROADS, Procedural};
 use crate::loading::Loading;
@@ -51,7 +51,14 @@ fn without_routes(
 ) -> Result<Scenario, Error> {
     let Written { time, field, actions, sensors, start, ending, reward, routes, .. } = written;
     let steer_max = written.steer_max_deg.map(|lock| reader.within("steer_max_deg", lock, 1.0..=80.0, "deg")).transpose()?;
-    let speeds = numbers(reader, "actions.speeds_kmh", &actions.speeds_kmh, 90.0, 1.0, "km/h")?;
+    let speeds = numbers(reader, "actions.speeds_kmh", &actions.speeds_kmh, 90.0, 0.0, "km/h")?;
+    if speeds.iter().all(|&speed| speed < 1.0) {
+        return Err(reader.invalid("actions.speeds_kmh", "no speed of 1 km/h or more", "at least one is needed, or no truck moves"));
+    }
+    let speed_changes = match actions.speed_changes_kmh.as_slice() {
+        [] => Vec::new(),
+        changes => numbers(reader, "actions.speed_changes_kmh", changes, 90.0, -90.0, "km/h")?,
+    };
     Ok(Scenario {
         name,
         steer_max: steer_max.map(f64::to_radians),
@@ -64,13 +71,16 @@ fn without_routes(
         cell: reader.within("field.cell", field.cell, 0.1..=1.0, "m")?,
         steer_levels: numbers(reader, "actions.steer_levels", &actions.steer_levels, 1.0, -1.0, "")?,
         speeds: speeds.into_iter().map(|speed| speed / 3.6).collect(),
+        speed_changes: speed_changes.into_iter().map(|change| change / 3.6).collect(),
         sensor_range: reader.within("sensors.range", sensors.range, 1.0..=50.0, "m")?,
         start_offset: reader.within("start.offset", start.offset, 0.0..=1.0, "m")?,
         start_heading: reader.within("start.heading_deg", start.heading_deg, 0.0..=20.0, "deg")?.to_radians(),
+        start_speed: start.speed_kmh.as_ref().map(|written| start_speed(reader, written)).transpose()?,
         stray_distance: reader.within("ending.stray_distance", ending.stray_distance, 3.0..=50.0, "m")?,
         jackknife_angle: reader.within("ending.jackknife_deg", ending.jackknife_deg, 30.0..=120.0, "deg")?.to_radians(),
         rollover_ratio: reader.within("ending.rollover_ratio", ending.rollover_ratio, 0.1..=2.0, "")?,
         time_limit: reader.within("ending.time_limit", ending.time_limit, 1.0..=20.0, "")?,
+        clock: ending.clock,
         waypoint_weight: weight(reader, "reward.waypoint", reward.waypoint)?,
         lane_distance_weight: weight(reader, "reward.lane_distance", reward.lane_distance)?,
         lane_distance_limit: reader.within("reward.lane_distance_limit", reward.lane_distance_limit, 0.1..=50.0, "m")?,
@@ -83,6 +93,20 @@ fn without_routes(
         places: Vec::new(),
         splits: Default::default(),
     })
+}
+
+/// Least and greatest speed at the start [m/s].
+fn start_speed(reader: &Reader, written: &WrittenSpeeds) -> Result<[f64; 2], Error> {
+    let [least, greatest] = match *written {
+        WrittenSpeeds::One(speed) => [speed; 2],
+        WrittenSpeeds::Range(range) => range,
+    };
+    reader.within("start.speed_kmh", least, 0.0..=90.0, "km/h")?;
+    reader.within("start.speed_kmh", greatest, 0.0..=90.0, "km/h")?;
+    if greatest < least {
+        return Err(reader.invalid("start.speed_kmh", format_args!("[{least}, {greatest}]"), "must be a speed or [least, greatest]"));
+    }
+    Ok([least / 3.6, greatest / 3.6])
 }
 
 /// Reads the file that `source` refers to under `key`: by a path that ends in .toml, or the shipped file of this kind by

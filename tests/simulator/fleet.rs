@@ -62,7 +62,8 @@ fn each_episode_draws_its_vehicle_alike_on_every_engine() {
         let drawn = |env: u32, truck: &Truck| drawn_start(512, 7, env, truck.episode).vehicle;
         assert!((0..).zip(&batch.truck).all(|(env, truck)| truck.vehicle == drawn(env, truck)), "{name}");
         // Two thirds are of the first kind, a quarter has each load; 512 draws deviate by 6 % at most (3 sigma).
-        let part = |keeps: &dyn Fn(u32) -> bool| batch.truck.iter().filter(|truck| keeps(world.rig(truck).class)).count() as f64 / 512.0;
+        let part =
+            |keeps: &dyn Fn(u32) -> bool| batch.truck.iter().filter(|truck| keeps(world.rig(truck).class_index)).count() as f64 / 512.0;
         assert!((part(&|class| class < 4) - 2.0 / 3.0).abs() < 0.063, "{}", part(&|class| class < 4));
         assert!((part(&|class| class % 4 == 0) - 0.25).abs() < 0.058);
         assert!(batch.truck.iter().any(|truck| 0 < truck.episode), "no truck began another episode");

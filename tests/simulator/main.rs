@@ -31,6 +31,7 @@ mod restarts;
 mod sense;
 mod shaders;
 mod shipped;
+mod speeds;
 
 /// A benchmark of the repository, read and baked.
 fn benchmark(name: &str) -> (Scenario, World) {

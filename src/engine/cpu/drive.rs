@@ -142,9 +142,12 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
     let steering = truck.steering + turn;
     let asked = control.acceleration.max(rig.acceleration_min).min(drive_max(rig, truck.speed));
     let lag = if asked < 0.0 { &rig.brake_lag } else { &rig.drive_lag };
-    let acceleration = asked + lag.left * (truck.acceleration - asked);
-    let mean_acceleration = asked + lag.mean * (truck.acceleration - asked);
-    let speed = truck.speed + mean_acceleration * substep;
+    let mut acceleration = asked + lag.left * (truck.acceleration - asked);
+    let mut mean_acceleration = asked + lag.mean * (truck.acceleration - asked);
+    let mut speed = truck.speed + mean_acceleration * substep;
+    if control.holds == 1 && truck.speed * speed <= 0.0 {
+        (acceleration, mean_acceleration, speed) = (0.0, -truck.speed / substep, 0.0);
+    }
 
     let half = 0.5 * substep;
     let articulation = truck.heading - truck.trailer_heading;

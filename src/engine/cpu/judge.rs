@@ -11,14 +11,15 @@ use crate::world::World;
 pub fn judge(world: &World, row: &mut Row) {
     row.truck.steps += 1;
     let route = &world.routes[row.truck.route as usize];
-    let ended = ending(&world.params, route, row.truck, row.clearance, row.progress);
+    let step_limit = world.step_limit(row.truck);
+    let ended = ending(&world.params, route, step_limit, row.truck, row.clearance, row.progress);
     *row.ended = ended as u32;
     *row.terms = weighed(&world.params, row.clearance, row.progress, ended);
     *row.reward = rewarded(&world.params, row.terms);
 }
 
 /// Why the episode ended, [`Ended::Running`] when it did not.
-pub fn ending(params: &Params, route: &RouteRow, truck: &Truck, clearance: &Clearance, progress: &Progress) -> Ended {
+pub fn ending(params: &Params, route: &RouteRow, step_limit: u32, truck: &Truck, clearance: &Clearance, progress: &Progress) -> Ended {
     let articulation = wrapped(truck.heading - truck.trailer_heading);
     let load_transfer_ratio = truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs());
     let arrived = route.n_waypoints <= progress.waypoint;
@@ -34,7 +35,7 @@ pub fn ending(params: &Params, route: &RouteRow, truck: &Truck, clearance: &Clea
         Ended::Strayed
     } else if arrived {
         Ended::Arrived
-    } else if route.step_limit < truck.steps {
+    } else if step_limit < truck.steps {
         Ended::TimedOut
     } else {
         Ended::Running

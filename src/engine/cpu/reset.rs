@@ -57,10 +57,10 @@ fn start(world: &World, row: &mut Row, begin: &BeginRow) {
     let route = if begin.what & HAS_ROUTE == 0 { route_of(row, episode) } else { begin.route };
     let start = if begin.what & HAS_START == 0 { drawn_start(world.params.n_vehicles, seed, env, episode) } else { begin.start };
     let waypoints = world.route_waypoints(route);
-    *row.control = Control::default();
     let rig = &world.rigs[start.vehicle as usize];
     let at_start = started(&world.params, rig, &waypoints[0], world.route_previews(route)[0].heading, &start);
     *row.truck = Truck { route, episode, ..at_start };
+    *row.control = Control { target_speed: at_start.speed, ..Control::default() };
     let point = reference_point(rig.wheelbase, row.truck);
     *row.progress = followed(waypoints, point, 1, world.params.stray_distance);
     row.progress.passed = 0;

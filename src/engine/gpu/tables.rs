@@ -54,6 +54,7 @@ impl<'a> Tables<'a> {
             Table::Waypoints => cast_slice(&self.world.waypoints),
             Table::Previews => cast_slice(&self.world.previews),
             Table::Routes => cast_slice(&self.world.routes),
+            Table::StepLimits => cast_slice(&self.world.step_limits),
             Table::Batch => bytes_of(&self.facts),
             Table::Choice => cast_slice(self.batch.choice().routes()),
             Table::Streams => cast_slice(self.batch.streams()),

@@ -56,6 +56,8 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("speed_error_integral", 1, MIDDLING),
             ("steering_before", 1, SAME),
             ("steering_earlier", 1, SAME),
+            ("target_speed", 1, SMALL),
+            ("holds", 1, SAME),
         ],
         Column::Truck => &[
             ("position", 2, POSITION),

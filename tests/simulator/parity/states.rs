@@ -106,7 +106,11 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
         trailer_load_transfer_ratio: -ratio,
         route,
         episode: words(SEED, env as u32, 2, 0)[0],
-        steps: if kind == 3 { world.routes[route as usize].step_limit } else { picked(env, 3, 200) as u32 },
+        steps: if kind == 3 {
+            world.step_limits[(route * world.params.n_classes + world.rigs[vehicle].class_index) as usize]
+        } else {
+            picked(env, 3, 200) as u32
+        },
         held: 0,
         acceleration: lean * ratio,
         curvature_lag: if world.rigs[vehicle].yaw_lag == 0.0 { 0.0 } else { 0.02 * bent },
@@ -118,6 +122,12 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
     let [integral, ..] = drawn(env, 3);
     batch.control[env].speed_error_integral = integral;
     (batch.control[env].steering_before, batch.control[env].steering_earlier) = (0.4 * speed, 0.4 * lean);
+    batch.control[env].target_speed = 8.0 + 4.0 * speed;
+    batch.control[env].holds = u32::from(kind == 6);
+    if kind == 6 {
+        // About to stand, or standing.
+        batch.truck[env].speed = if steering < 0.0 { 0.0 } else { 0.02 * steering };
+    }
 }
 
 /// Trucks on each roundabout.

@@ -103,7 +103,7 @@ impl Policy for PurePursuit {
         actions.extend(batch.truck.iter().zip(&batch.progress).map(|(truck, progress)| {
             let waypoints = world.route_waypoints(truck.route);
             let steering = self.steering(world.rig(truck).wheelbase, truck, waypoints, progress.waypoint as usize);
-            nearest(&world.actions, steering, world.params.start_speed)
+            nearest(&world.actions, steering, world.params.target_speed_max)
         }));
     }
 }

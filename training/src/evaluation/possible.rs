@@ -4,7 +4,7 @@
 //! An episode that arrived shows it itself. The start of one that did not is searched for actions that complete it; what
 //! no search completes may be possible all the same, and is left out.
 
-use offtrack::layout::Ended;
+use offtrack::layout::{Ended, Truck};
 use serde::Serialize;
 
 use super::Evaluation;
@@ -65,7 +65,7 @@ impl Evaluation<'_> {
         let starts: Vec<_> = searched.iter().map(|&index| self.start(index)).collect();
         let searches = attempts(self.world, &starts, passes, done)?;
         let sequences = searches.iter().zip(&starts).map(|(found, &(route, start))| {
-            let limit = self.world.routes[route as usize].step_limit as usize;
+            let limit = self.world.step_limit(&Truck { route, vehicle: start.vehicle, ..Truck::default() }) as usize;
             let actions = file::actions(&found.actions, self.world.params.n_actions, limit).unwrap_or_default();
             Sequence { route, start, actions }
         });
