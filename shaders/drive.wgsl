@@ -156,6 +156,7 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
     after.trailer_load_transfer_ratio = load_transfer_ratio(rig.trailer_roll, trailer, last.trailer_lateral_acceleration + rig.crossfall);
     after.acceleration = acceleration;
     after.curvature_lag = curvature_lag;
+    after.lateral_acceleration = last.trailer_lateral_acceleration;
     return Moving(after, last);
 }
 

@@ -12,6 +12,8 @@ const N_TRACTOR_RAYS: u32 = 13u;
 const N_RAYS: u32 = 29u;
 // Values of an observation that depend on the waypoint alone: future and current curvature, radius ahead.
 const N_PREVIEW: u32 = 18u;
+// Values that may be observed beside those.
+const N_EXTRAS: u32 = 12u;
 // Bit of [`BeginRow::what`]: the truck begins an episode.
 const BEGINS: u32 = 1u;
 // Bit: the episode is the first of the truck's stream, not the next one.
@@ -151,6 +153,18 @@ const N_CURVATURES: u32 = 8u;
 const RANGES_AT: u32 = 30u;
 // Index of the radii ahead.
 const RADII_AT: u32 = 59u;
+// Acceleration that is observed as 1 [m/s^2].
+const ACCELERATION_SCALE: f32 = 2.5f;
+// Lateral acceleration that is observed as 1 [m/s^2].
+const G: f32 = 9.81f;
+// Wheelbase that is observed as 1 [m].
+const WHEELBASE_SCALE: f32 = 10.0f;
+// Roll that is observed as 1 [rad].
+const ROLL_SCALE: f32 = 0.15f;
+// Roll rate that is observed as 1 [rad/s].
+const ROLL_RATE_SCALE: f32 = 0.3f;
+// Mass that is observed as 1 [kg].
+const MASS_SCALE: f32 = 40000.0f;
 // Sums in a tally: steps by their end code, then the rewards.
 const N_SUMS: u32 = 9u;
 // Index of the sum of the rewards.
@@ -228,6 +242,8 @@ struct Truck {
     acceleration: f32,
     // Curvature that the tractor's path has beyond that of the steer angle, because it turns in late [1/m].
     curvature_lag: f32,
+    // Lateral acceleration of the trailer's axle group, to the left [m/s^2].
+    lateral_acceleration: f32,
     // Index of the vehicle in the world.
     vehicle: u32,
 }
@@ -438,6 +454,8 @@ struct Params {
     changes_speed: u32,
     // Classes of vehicles.
     n_classes: u32,
+    // Extras that are observed, the first ones; the others stay 0.
+    n_extras: u32,
     // Distance to the next waypoint beyond which it cannot be passed and the truck has strayed [m].
     stray_distance: f32,
     // Articulation beyond which the truck is jackknifed [rad].
@@ -570,5 +588,9 @@ struct BatchFacts {
 @group(0) @binding(24) var<storage, read_write> terms: array<RewardTerms>;
 //  Rewards of the last step, [n_envs].
 @group(0) @binding(25) var<storage, read_write> reward: array<f32>;
+//  What is observed beside the observation before the next action; zeros beyond what the benchmark observes, [n_envs, 12].
+@group(0) @binding(26) var<storage, read_write> extras: array<f32>;
+//  The same beside the observation after the last action, [n_envs, 12].
+@group(0) @binding(27) var<storage, read_write> next_extras: array<f32>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(26) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(28) var<storage, read_write> tally: array<atomic<u32>>;

@@ -6,6 +6,7 @@
 pub mod buffers;
 pub(crate) mod columns;
 mod ended;
+mod extras;
 mod observation;
 
 use glam::Vec2;
@@ -15,6 +16,7 @@ use crate::shared::constants;
 pub use columns::{Column, N_COLUMNS};
 pub use ended::Ended;
 pub(crate) use ended::printed_codes;
+pub use extras::{EXTRAS, Extra, Track};
 pub use observation::{OBSERVATION, Values};
 
 constants! {
@@ -30,6 +32,8 @@ constants! {
     pub const N_RAYS: usize = N_TRAILER_RAYS + N_TRACTOR_RAYS;
     /// Values of an observation that depend on the waypoint alone: future and current curvature, radius ahead.
     pub const N_PREVIEW: usize = 18;
+    /// Values that may be observed beside those.
+    pub const N_EXTRAS: usize = 12;
     /// Bit of [`BeginRow::what`]: the truck begins an episode.
     pub const BEGINS: u32 = 1;
     /// Bit: the episode is the first of the truck's stream, not the next one.
@@ -95,6 +99,8 @@ crate::shared! {
         pub acceleration: f32,
         /// Curvature that the tractor's path has beyond that of the steer angle, because it turns in late \[1/m].
         pub curvature_lag: f32,
+        /// Lateral acceleration of the trailer's axle group, to the left \[m/s^2].
+        pub lateral_acceleration: f32,
         /// Index of the vehicle in the world.
         pub vehicle: u32,
     }
@@ -305,6 +311,8 @@ crate::shared! {
         pub changes_speed: u32,
         /// Classes of vehicles.
         pub n_classes: u32,
+        /// Extras that are observed, the first ones; the others stay 0.
+        pub n_extras: u32,
         /// Distance to the next waypoint beyond which it cannot be passed and the truck has strayed \[m].
         pub stray_distance: f32,
         /// Articulation beyond which the truck is jackknifed \[rad].

@@ -13,7 +13,7 @@ mod fleet; // vehicles by shares, drawn from ranges
 use std::collections::HashSet;
 use std::path::Path;
 
-use crate::layout::Action;
+use crate::layout::{Action, Track};
 use crate::loading::Loading;
 use crate::reader::Error;
 use crate::roundabout::{Gutter, Roundabout};
@@ -106,6 +106,8 @@ pub struct Scenario {
     pub speed_changes: Vec<f64>,
     /// Range of the distance sensors \[m].
     pub sensor_range: f64,
+    /// What is observed beside the observation.
+    pub extras: Track,
     /// Largest lateral offset at the start \[m].
     pub start_offset: f64,
     /// Largest heading error at the start \[rad].

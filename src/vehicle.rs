@@ -16,6 +16,7 @@ use glam::{DVec2, Vec2};
 pub use model::{Model, SLIP_LEVER};
 pub use single_track::{SingleTrack, Steady};
 pub use suspension::Suspension;
+pub(crate) use vehicle_keys::{WrittenModel, model as read_model};
 
 use crate::layout::{Body, Lag, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, Ray, Rig};
 use crate::reader::Error;

@@ -102,6 +102,7 @@ impl World {
                 target_speed_max: fastest as f32,
                 changes_speed: u32::from(!scenario.speed_changes.is_empty()),
                 n_classes: classes.len() as u32,
+                n_extras: scenario.extras.n_extras() as u32,
                 stray_distance: scenario.stray_distance as f32,
                 jackknife_angle: scenario.jackknife_angle as f32,
                 rollover_ratio: scenario.rollover_ratio as f32,

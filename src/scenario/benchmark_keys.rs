@@ -8,7 +8,9 @@ use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 
 use super::Clock;
+use crate::layout::Track;
 use crate::roundabout::Gutter;
+use crate::vehicle::WrittenModel;
 
 /// The file.
 #[derive(Deserialize)]
@@ -26,6 +28,8 @@ pub(super) struct Written {
     pub(super) field: WrittenField,
     pub(super) actions: WrittenActions,
     pub(super) sensors: WrittenSensors,
+    #[serde(default)]
+    pub(super) observation: WrittenObservation,
     #[serde(default)]
     pub(super) start: WrittenStart,
     #[serde(default)]
@@ -75,6 +79,7 @@ pub(super) struct WrittenMember {
     pub(super) loads: BTreeMap<String, f64>,
     #[serde(default = "one")]
     pub(super) share: f64,
+    pub(super) model: Option<WrittenModel>,
 }
 
 fn one() -> f64 {
@@ -140,6 +145,12 @@ pub(super) struct WrittenActions {
 #[serde(deny_unknown_fields)]
 pub(super) struct WrittenSensors {
     pub(super) range: f64,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct WrittenObservation {
+    pub(super) extras: Track,
 }
 
 #[derive(Deserialize)]

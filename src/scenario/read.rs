@@ -73,6 +73,7 @@ fn without_routes(
         speeds: speeds.into_iter().map(|speed| speed / 3.6).collect(),
         speed_changes: speed_changes.into_iter().map(|change| change / 3.6).collect(),
         sensor_range: reader.within("sensors.range", sensors.range, 1.0..=50.0, "m")?,
+        extras: written.observation.extras,
         start_offset: reader.within("start.offset", start.offset, 0.0..=1.0, "m")?,
         start_heading: reader.within("start.heading_deg", start.heading_deg, 0.0..=20.0, "deg")?.to_radians(),
         start_speed: start.speed_kmh.as_ref().map(|written| start_speed(reader, written)).transpose()?,

@@ -96,7 +96,7 @@ struct WrittenSensors {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct WrittenModel {
+pub(crate) struct WrittenModel {
     slip_lever: f64,
     yaw_lag: f64,
     drive_lag: f64,
@@ -141,7 +141,7 @@ impl Vehicle {
             loads: loads.collect::<Result<_, Error>>()?,
             speed_control: speed_control(&reader, &written.speed_control)?,
             sensors: sensors(&reader, &written.sensors, &tractor, &trailer)?,
-            model: model(&reader, &written.model, &trailer)?,
+            model: model(&reader, "model", &written.model, &trailer)?,
             tractor,
             trailer,
         })
@@ -207,8 +207,9 @@ fn speed_control(reader: &Reader, written: &WrittenSpeedControl) -> Result<Speed
     })
 }
 
-fn model(reader: &Reader, written: &WrittenModel, trailer: &Trailer) -> Result<Model, Error> {
-    let within = |name: &str, value, range, unit| reader.within(&format!("model.{name}"), value, range, unit);
+/// Checks the keys of a `model` table, of a vehicle or in place of one.
+pub(crate) fn model(reader: &Reader, key: &str, written: &WrittenModel, trailer: &Trailer) -> Result<Model, Error> {
+    let within = |name: &str, value, range, unit| reader.within(&format!("{key}.{name}"), value, range, unit);
     Ok(Model {
         // Slip shortens the trailer's lever by so much: it stays well positive.
         slip_lever: within("slip_lever", written.slip_lever, 0.0..=(trailer.wheelbase - 1.0).min(4.0), "m")?,

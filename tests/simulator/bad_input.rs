@@ -37,7 +37,7 @@ fn files() -> Vec<PathBuf> {
         }
     }
     files.sort();
-    assert_eq!(files.len(), 17, "five roundabouts, three vehicles, seven benchmarks, two distributions");
+    assert_eq!(files.len(), 20, "five roundabouts, three vehicles, ten benchmarks, two distributions");
     files
 }
 

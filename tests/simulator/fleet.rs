@@ -154,6 +154,7 @@ fn what_is_wrong_with_a_fleet_is_named() {
         ("[[vehicle]]\nfile = \"daf_xf\"\nloads = { empty = 0 }".to_owned(), "vehicle[0].loads: none; at least one is needed"),
         ("[[vehicle]]\nfile = \"tank\"\nloads = { empty = 1 }".to_owned(), "vehicle[0].file: \"tank\""),
         ("[[vehicle]]\nfile = \"daf_xf\"\nloads = { empty = 1 }\nshares = 2".to_owned(), "unknown field `shares`"),
+        (format!("{member}model = {{ slip_lever = 9.0 }}"), "vehicle[0].model.slip_lever: 9 m; must lie in 0..4 m"),
         (format!("{member}share = 0"), "vehicle[0].share: 0; must lie in"),
         (format!("{member}[draw]\nslip = [1.1, 0.9]"), "draw.slip: [1.1, 0.9]; must be [least, greatest]"),
         (format!("{member}[draw]\nslip = [0.9, 100]"), "draw.slip[1]: 100; must lie in 0..10"),

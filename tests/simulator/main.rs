@@ -13,6 +13,7 @@ mod autoreset;
 mod bad_input;
 mod collide;
 mod episodes;
+mod extras;
 mod field;
 mod fit;
 mod fleet;

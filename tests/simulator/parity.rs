@@ -33,14 +33,14 @@ fn written(stage: Stage) -> Written {
         Stage::Collide => (&[Column::Clearance], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_body.half_width *= 1.001))),
         Stage::Follow => (&[Column::Progress], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.wheelbase *= 1.001))),
         Stage::Sense => (&[Column::Ranges], Some(|world| world.rays.iter_mut().flatten().for_each(|ray| ray.origin *= 1.001))),
-        Stage::Observe => (&[Column::NextObservation], Some(|world| world.params.sensor_range *= 1.001)),
+        Stage::Observe => (&[Column::NextObservation, Column::NextExtras], Some(|world| world.params.sensor_range *= 1.001)),
         Stage::Judge => {
             (&[Column::Truck, Column::Ended, Column::Terms, Column::Reward], Some(|world| world.params.lane_distance_limit *= 1.001))
         }
         Stage::Count => (&[], None),
-        Stage::CopyObservation => (&[Column::Observation], None),
+        Stage::CopyObservation => (&[Column::Observation, Column::Extras], None),
         Stage::Reset => (
-            &[Column::Truck, Column::Control, Column::Progress, Column::Ranges, Column::Observation],
+            &[Column::Truck, Column::Control, Column::Progress, Column::Ranges, Column::Observation, Column::Extras],
             Some(|world| {
                 world.params.start_offset *= 1.001;
             }),

@@ -121,6 +121,7 @@ fn a_published_benchmark_gives_the_bytes_that_it_has_always_given() {
     for (name, pinned) in PINNED {
         let simulator = after_300_steps(&Engine::Cpu, name);
         let found: Vec<u64> = Column::ALL.iter().map(|&column| hash(&published(simulator.batch(), column))).collect();
+        assert!(simulator.batch().extras.iter().flatten().all(|&value| value == 0.0));
         assert_eq!(found[..pinned.len()], pinned, "{name}: {found:#018x?}");
     }
 }

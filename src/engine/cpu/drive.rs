@@ -184,6 +184,7 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
             trailer_load_transfer_ratio: load_transfer_ratio(&rig.trailer_roll, trailer, tilted(end.trailer_lateral_acceleration)),
             acceleration,
             curvature_lag,
+            lateral_acceleration: end.trailer_lateral_acceleration,
             ..*truck
         },
         motion: end,

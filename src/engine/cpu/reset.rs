@@ -38,6 +38,7 @@ pub fn begin(world: &World, row: &mut Row, begin: &BeginRow) {
     }
     start(world, row, begin);
     *row.next_observation = *row.observation;
+    *row.next_extras = *row.extras;
     *row.ended = Ended::Running as u32;
     *row.terms = RewardTerms::default();
     *row.reward = 0.0;
@@ -66,6 +67,9 @@ fn start(world: &World, row: &mut Row, begin: &BeginRow) {
     row.progress.passed = 0;
     sense::sense(world, row);
     *row.observation = observe::observation_of(world, row);
+    if 0 < world.params.n_extras {
+        *row.extras = observe::extras(world, row.truck, row.control);
+    }
 }
 
 /// The route of an episode as the batch chooses it.

@@ -8,7 +8,7 @@ use crate::scenario::benchmark_keys::{Written, WrittenDraw, WrittenMember, Writt
 use crate::scenario::check::check_vehicle;
 use crate::scenario::read::referred;
 use crate::shipped::{Kind, Source};
-use crate::vehicle::Vehicle;
+use crate::vehicle::{Vehicle, read_model};
 
 /// Maximum number of rows of a table of vehicles: they take about 45 MB with a chassis each.
 const MOST_VEHICLES: usize = 65_536;
@@ -64,7 +64,10 @@ fn check_load(reader: &Reader, key: &str, vehicle: &Vehicle, load: &str) -> Resu
 }
 
 fn member(reader: &Reader, source: &Source, key: &str, written: &WrittenMember) -> Result<Member, Error> {
-    let (name, vehicle) = read_vehicle(reader, source, &format!("{key}.file"), &written.file)?;
+    let (name, mut vehicle) = read_vehicle(reader, source, &format!("{key}.file"), &written.file)?;
+    if let Some(model) = &written.model {
+        vehicle.model = read_model(reader, &format!("{key}.model"), model, &vehicle.trailer)?;
+    }
     for (load, &share) in &written.loads {
         check_load(reader, &format!("{key}.loads"), &vehicle, load)?;
         reader.within(&format!("{key}.loads.{load}"), share, 0.0..=1e6, "")?;

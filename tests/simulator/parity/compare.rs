@@ -3,7 +3,7 @@
 use std::fmt;
 
 use bytemuck::cast_slice;
-use offtrack::layout::{Column, N_RAYS};
+use offtrack::layout::{Column, N_EXTRAS, N_RAYS};
 
 /// Bound of the difference between two engines in a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,6 +77,7 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("held", 1, SAME),
             ("acceleration", 1, MIDDLING),
             ("curvature_lag", 1, SMALL),
+            ("lateral_acceleration", 1, MIDDLING),
             ("vehicle", 1, SAME),
         ],
         Column::Clearance => &[("tractor", 1, CLEARANCE), ("trailer", 1, CLEARANCE)],
@@ -101,6 +102,7 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             &[("waypoints", 1, SAME), ("lane_distance", 1, SCALED_POSITION), ("clearance", 1, CLEARANCE), ("failure", 1, SAME)]
         }
         Column::Reward => &[("", 1, REWARD)],
+        Column::Extras | Column::NextExtras => &[("", N_EXTRAS, SMALL)],
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use offtrack::angle::wrapped;
 use offtrack::field::Field;
-use offtrack::layout::Truck;
+use offtrack::layout::{Track, Truck};
 use offtrack::random::{index_below, signed_unit, words};
 use offtrack::roundabout::Gutter;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
@@ -33,6 +33,7 @@ pub fn world(gutter: Gutter) -> Arc<World> {
 pub fn fleet_world() -> Arc<World> {
     let mut scenario = benchmark("attard2023-full").0;
     scenario.fleet = Some(crate::fleet::all_drawn());
+    scenario.extras = Track::Oracle;
     let world = World { fields: world(Gutter::Drivable).fields.clone(), ..World::bake(&scenario).unwrap() };
     assert!(world.rigs.len() == 512 && world.rays.len() == 512);
     Arc::new(world)
@@ -114,6 +115,7 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
         held: 0,
         acceleration: lean * ratio,
         curvature_lag: if world.rigs[vehicle].yaw_lag == 0.0 { 0.0 } else { 0.02 * bent },
+        lateral_acceleration: lean,
         vehicle: vehicle as u32,
     };
     // Up to the last waypoint; one truck in sixteen has a next waypoint that is too far away.

@@ -180,7 +180,6 @@ fn bytes(format: Format, size: Option<u32>, recorded: &[Recorded]) -> Result<Vec
         let frames = film::frames(of.recording.frames.len(), of.recording.step);
         takes.push(Take { scene: of.scene()?, frames });
     }
-    let limit = world.step_limit(&simulator.batch().truck[env]);
     let bar = progress::Bar::new("drawing", "frames", takes.iter().map(|take| take.frames.len()).sum());
     Ok(film::gif(&takes, size.unwrap_or(720), || bar.advance())?)
 }

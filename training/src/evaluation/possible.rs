@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn impossible_starts_are_not_counted_and_those_lost_in_the_first_step_are_not_searched() {
-        let (episodes, possible) = possible(9.0, &mut PurePursuit { look_ahead: 7.0 }, Pass { width: 1, hold: 1 });
+        let (episodes, possible) = possible(9.0, &mut PurePursuit::new(7.0), Pass { width: 1, hold: 1 });
         let lost = episodes.iter().filter(|episode| episode.lost_at_start()).count();
         let arrived = episodes.iter().filter(|episode| episode.ended == Ended::Arrived).count();
         assert!(0 < lost, "{episodes:?}");
