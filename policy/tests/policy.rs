@@ -33,6 +33,7 @@ fn policy(hidden: &[usize], n_actions: usize) -> Policy {
         actions: (0..n_actions).map(|index| Action { steering: 0.1 * index as f32 - 0.4, speed: 25.0 / 3.0 }).collect(),
         normalisation: Normalisation::of(&observations(20)),
         layers: sizes.windows(2).enumerate().map(layer).collect(),
+        extras: Vec::new(),
         activation: Activation::Relu,
     }
 }

@@ -48,7 +48,7 @@ pub enum Track {
 
 impl Track {
     /// Number of extras: the first ones.
-    pub fn n_extras(self) -> usize {
+    pub const fn n_extras(self) -> usize {
         match self {
             Track::None => 0,
             Track::Blind => 5,

@@ -77,11 +77,13 @@ fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bo
     });
     let error = world.actions[before.action[env] as usize].speed - before.truck[env].speed;
     let asked = rig.speed_gain * error;
+    // Drive and brakes have lags of their own.
+    let asks_for = after.control[env].acceleration;
     at_a_line
         || near(error.abs(), rig.speed_integral_band)
         || near(asked, rig.speed_braking)
         || near(asked, drive_max(rig, before.truck[env].speed))
-        || near(before.control[env].acceleration, 0.0)
+        || (asks_for != 0.0 && near(asks_for, 0.0))
         || near(clearance.tractor, 0.0)
         || near(clearance.trailer, 0.0)
         || near(truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs()), params.rollover_ratio)

@@ -59,9 +59,10 @@ impl Policy for offtrack_policy::Policy {
         // A held truck needs no action, and before the last episode ends most are held.
         let driving: Vec<usize> = (0..batch.truck.len()).filter(|&env| batch.truck[env].held == 0).collect();
         let observations: Vec<_> = driving.iter().map(|&env| batch.observation[env]).collect();
+        let extras: Vec<_> = driving.iter().map(|&env| batch.extras[env]).collect();
         actions.clear();
         actions.resize(batch.truck.len(), 0);
-        for (env, action) in driving.into_iter().zip(self.act(&observations)) {
+        for (env, action) in driving.into_iter().zip(self.act_beside(&observations, &extras)) {
             actions[env] = action;
         }
     }

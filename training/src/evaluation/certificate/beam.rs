@@ -169,7 +169,8 @@ fn distinct(world: &World, rig: &Rig, steering: f32, last: u32, hold: usize) -> 
 
 /// Each child's action for the next step: the held one, or the policy's for its observation.
 fn chosen(policy: Option<&Policy>, batch: &Batch, children: &[Candidate], straight: u32) -> Vec<u32> {
-    let own = |env: usize| policy.and_then(|policy| policy.act(&batch.observation[env..=env]).first().copied());
+    let own =
+        |env: usize| policy.and_then(|policy| policy.act_beside(&batch.observation[env..=env], &batch.extras[env..=env]).first().copied());
     children.iter().enumerate().map(|(env, child)| child.held.or_else(|| own(env)).unwrap_or(straight)).collect()
 }
 
