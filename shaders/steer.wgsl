@@ -7,7 +7,9 @@ fn steer(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
     let duration = f32(params.n_substeps) * params.substep;
-    control[env] = controlled(rigs[truck[env].vehicle], duration, targeted(params, actions[action[env]], control[env]), truck[env].speed, control[env]);
+    let asked = targeted(params, actions[action[env]], control[env]);
+    control[env] = controlled(rigs[truck[env].vehicle], duration, asked, truck[env].speed, control[env]);
+    control[env].acceleration_before = truck[env].acceleration;
 }
 
 // The action with the target speed that it leads to, from that of the control before.
@@ -41,5 +43,6 @@ fn controlled(rig: Rig, duration: f32, action: Action, speed: f32, before: Contr
         before.steering_before,
         action.speed,
         select(0u, 1u, holds),
+        before.acceleration_before,
     );
 }

@@ -146,3 +146,42 @@ fn the_action_table_has_steer_levels_times_speeds_or_changes() {
     let actions = scenario.actions(1.0);
     assert_eq!((actions.len(), actions[26]), (27, Action { steering: 0.8, speed: 1.0 }));
 }
+
+#[test]
+fn each_term_of_how_a_truck_drives_is_weighed_by_its_key() {
+    let world = world(|scenario| {
+        (scenario.time_weight, scenario.load_transfer_weight, scenario.lateral_acceleration_weight) = (-1.0, -10.0, -3.0);
+        (scenario.jerk_weight, scenario.rollover_weight, scenario.load_transfer_margin) = (-2.0, -200.0, 0.5);
+        (scenario.speeds, scenario.waypoint_weight, scenario.lane_distance_weight) = (Vec::from([10.0 * KMH, 50.0 * KMH]), 0.0, 0.0);
+    });
+    for (name, engine) in engines() {
+        let mut simulator = batch_on(&engine, &world, 1, 0, RouteChoice::Fixed(vec![3]));
+        let (mut before, mut rolled) = (0.0, false);
+        for step in 0..40 {
+            // Braking first, then a turn at too high a speed.
+            simulator.step(&[if step < 3 { 4 } else { 17 }]).unwrap();
+            let batch = simulator.batch();
+            let (truck, terms) = (&batch.truck[0], &batch.terms[0]);
+            let ratio = truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs());
+            rolled = batch.ended[0] == offtrack::layout::Ended::RolledOver as u32;
+            let expected = [
+                1.0,
+                ((ratio - 0.5) / 0.5).clamp(0.0, 1.0),
+                (truck.lateral_acceleration.abs() / 9.81).min(1.0),
+                ((truck.acceleration - before).abs() / 0.1 / 10.0).min(1.0),
+                f32::from(u8::from(rolled)),
+            ];
+            let found = [terms.time, terms.load_transfer, terms.lateral_acceleration, terms.jerk, terms.rollover];
+            assert!(found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-4), "{name} {step}: {terms:?}");
+            let weights = [-1.0, -10.0, -3.0, -2.0, -200.0];
+            let sum: f32 = found.iter().zip(weights).map(|(term, weight)| weight * term).sum::<f32>() - 500.0 * terms.failure;
+            assert!((batch.reward[0] - sum).abs() < 1e-3, "{name} {step}: {} {sum}", batch.reward[0]);
+            assert!(step != 0 || terms.jerk == 1.0, "{name}: full braking at once");
+            before = truck.acceleration;
+            if rolled {
+                break;
+            }
+        }
+        assert!(rolled, "{name}: the truck did not roll over");
+    }
+}

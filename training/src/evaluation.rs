@@ -1,6 +1,7 @@
 //! Evaluates a policy: a number of episodes on every route of a split, every one counted.
 
 pub mod certificate; // routes shown to be possible
+pub mod driving; // how trucks drive, by vehicle and load
 pub mod failures; // why episodes did not arrive
 pub mod groups; // routes that have something in common
 pub mod possible; // success over the starts that are shown to be possible
@@ -16,7 +17,7 @@ mod table; // a report as text
 use std::sync::Arc;
 
 use offtrack::cpu::reset::drawn_start;
-use offtrack::layout::{Ended, Start};
+use offtrack::layout::{Control, Ended, Start, Truck};
 use offtrack::route::Route;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
@@ -90,7 +91,12 @@ impl Evaluation<'_> {
         let mut simulator = self.simulator()?;
         let (world, n_episodes) = (self.world, simulator.n_envs());
         let lanes: Vec<LaneWidths> = self.routes().iter().map(|(_, place, route)| LaneWidths::of(self.scenario, place, route)).collect();
-        let mut running: Vec<Running> = simulator.batch().truck.iter().map(|truck| Running::new(world.rig(truck), truck)).collect();
+        let mut running: Vec<Running> = {
+            let batch = simulator.batch();
+            let new =
+                |(truck, control): (&Truck, &Control)| Running::new(world.rig(truck), truck, control.target_speed, self.scenario.step);
+            batch.truck.iter().zip(&batch.control).map(new).collect()
+        };
         let mut sequences = Sequences(vec![Vec::new(); n_episodes]);
         let mut actions = Vec::new();
         let mut finished: Vec<Option<Episode>> = vec![None; n_episodes];
@@ -179,6 +185,7 @@ impl Evaluation<'_> {
             certified: None,
             possible: None,
             failures: self.failures(finished, None),
+            classes: driving::classes(scenario, self.world, finished),
             groups: Groups::of(&routes, finished, scenario.step),
             routes: route_reports.collect(),
         }

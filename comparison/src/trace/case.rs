@@ -33,6 +33,9 @@ pub struct Case {
     pub vehicle: CaseVehicle,
     /// Length of a sub-step \[s].
     pub dt: f64,
+    /// Time between two decisions of the speed control \[s].
+    #[serde(default = "control_step")]
+    pub control_step: f64,
     /// Initial state.
     pub init: Init,
     /// Commands in order of time.
@@ -118,6 +121,18 @@ pub struct CaseVehicle {
     /// Fall of the road to the right, as a tangent.
     #[serde(default)]
     pub crossfall: f64,
+    /// Speed control: acceleration per speed error [1/s].
+    #[serde(default = "speed_gain")]
+    pub kp: f64,
+    /// Speed control: acceleration per integral of the speed error [1/s^2].
+    #[serde(default = "speed_integral_gain")]
+    pub ki: f64,
+    /// Speed control: speed error beyond which the integral is reset to 0 [m/s].
+    #[serde(default = "speed_band")]
+    pub band: f64,
+    /// Speed control: strongest braking, negative [m/s^2].
+    #[serde(default = "speed_braking")]
+    pub brake: f64,
 }
 
 /// Initial state of a case.
@@ -145,7 +160,10 @@ pub struct Command {
     /// Target steer angle \[rad].
     pub delta_cmd: f64,
     /// Target acceleration [m/s^2].
+    #[serde(default)]
     pub a_cmd: f64,
+    /// Target speed, in place of a target acceleration: the speed control asks for one every `control_step` [m/s].
+    pub v_cmd: Option<f64>,
 }
 
 /// An instant to report.
@@ -153,6 +171,26 @@ pub struct Command {
 pub struct Instant {
     /// Time \[s].
     pub t: f64,
+}
+
+fn control_step() -> f64 {
+    0.1
+}
+
+fn speed_gain() -> f64 {
+    0.8
+}
+
+fn speed_integral_gain() -> f64 {
+    0.05
+}
+
+fn speed_band() -> f64 {
+    0.5 / 3.6
+}
+
+fn speed_braking() -> f64 {
+    -2.5
 }
 
 fn slip_lever() -> f64 {
@@ -209,6 +247,10 @@ impl CaseVehicle {
             power: self.power.map_or(UNLIMITED, |power| power as f32),
             friction_ellipse: self.mu.filter(|_| self.ellipse).map_or(0.0, |mu| (mu * GRAVITY).powi(-2) as f32),
             crossfall: (self.crossfall * GRAVITY) as f32,
+            speed_gain: self.kp as f32,
+            speed_integral_gain: self.ki as f32,
+            speed_integral_band: self.band as f32,
+            speed_braking: self.brake as f32,
             ..Rig::default()
         }
     }
@@ -220,6 +262,11 @@ impl Case {
         let vehicle = &self.vehicle;
         let (any, positive, speed) = (-1e5..=1e5, 1e-3..=1e3, -60.0..=60.0);
         self.within("dt", self.dt, 1e-4..=0.2, "s")?;
+        self.within("control_step", self.control_step, self.dt..=10.0, "s")?;
+        self.within("vehicle.kp", vehicle.kp, 0.0..=100.0, "1/s")?;
+        self.within("vehicle.ki", vehicle.ki, 0.0..=100.0, "1/s^2")?;
+        self.within("vehicle.band", vehicle.band, 0.0..=100.0, "m/s")?;
+        self.within("vehicle.brake", vehicle.brake, -100.0..=0.0, "m/s^2")?;
         self.within("t_end", self.t_end, 0.0..=3600.0, "s")?;
         self.within("vehicle.L1", vehicle.L1, 0.5..=30.0, "m")?;
         self.within("vehicle.a", vehicle.a, -10.0..=10.0, "m")?;
@@ -258,6 +305,7 @@ impl Case {
             earliest = self.within(&format!("commands[{index}].t"), command.t, earliest..=f64::MAX, "s")?;
             self.within(&format!("commands[{index}].delta_cmd"), command.delta_cmd, -1e3..=1e3, "rad")?;
             self.within(&format!("commands[{index}].a_cmd"), command.a_cmd, -1e3..=1e3, "m/s^2")?;
+            self.within(&format!("commands[{index}].v_cmd"), command.v_cmd.unwrap_or(0.0), 0.0..=60.0, "m/s")?;
         }
         let (key, times) = match &self.times {
             Some(times) => ("times[", times.clone()),

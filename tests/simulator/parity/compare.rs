@@ -29,6 +29,8 @@ const TURN: Bound = Bound { turn: 2.0, ..ANGLE };
 const SMALL: Bound = within(1e-6);
 /// Eight units of speeds, accelerations, roll rates and other values below 16.
 const MIDDLING: Bound = within(8e-6);
+/// Eight units of lateral accelerations below 64 m/s^2: a truck at 16 m/s that is bent by 140 deg has such.
+const LARGE: Bound = within(3e-5);
 /// A span that only one engine halves may reduce a clearance of up to 2 m by half.
 const CLEARANCE: Bound = Bound { rarely: 1.0, ..POSITION };
 /// A ray along a kerb may end a sample later on one engine; each ends within 2 cm of the kerb.
@@ -58,6 +60,7 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("steering_earlier", 1, SAME),
             ("target_speed", 1, SMALL),
             ("holds", 1, SAME),
+            ("acceleration_before", 1, SAME),
         ],
         Column::Truck => &[
             ("position", 2, POSITION),
@@ -77,7 +80,7 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("held", 1, SAME),
             ("acceleration", 1, MIDDLING),
             ("curvature_lag", 1, SMALL),
-            ("lateral_acceleration", 1, MIDDLING),
+            ("lateral_acceleration", 1, LARGE),
             ("vehicle", 1, SAME),
         ],
         Column::Clearance => &[("tractor", 1, CLEARANCE), ("trailer", 1, CLEARANCE)],
@@ -98,9 +101,17 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("ranges", N_RAYS, SCALED_RANGE),
             ("radii", 10, SAME),
         ],
-        Column::Terms => {
-            &[("waypoints", 1, SAME), ("lane_distance", 1, SCALED_POSITION), ("clearance", 1, CLEARANCE), ("failure", 1, SAME)]
-        }
+        Column::Terms => &[
+            ("waypoints", 1, SAME),
+            ("lane_distance", 1, SCALED_POSITION),
+            ("clearance", 1, CLEARANCE),
+            ("failure", 1, SAME),
+            ("time", 1, SAME),
+            ("load_transfer", 1, MIDDLING),
+            ("lateral_acceleration", 1, SMALL),
+            ("jerk", 1, MIDDLING),
+            ("rollover", 1, SAME),
+        ],
         Column::Reward => &[("", 1, REWARD)],
         Column::Extras | Column::NextExtras => &[("", N_EXTRAS, SMALL)],
     }

@@ -75,11 +75,6 @@ impl Backend {
         match self {
             Backend::Host => host_rollout(config, world, routes, mirror),
             #[cfg(feature = "gpu")]
-            Backend::Device(_) if 0 < world.params.n_extras => {
-                let expected = "the benchmark's observation.extras are learned with `cpu` alone".to_owned();
-                Err(Error::Flag { flag: "device", value: "gpu".to_owned(), expected })
-            }
-            #[cfg(feature = "gpu")]
             Backend::Device(shared) => Ok(Box::new(DeviceRollout::new(shared, config, world, routes, mirror)?)),
         }
     }

@@ -1,14 +1,14 @@
 //! A beam search over action sequences: can this route be completed from this start at all?
 //!
 //! At one speed all candidates of a depth have made the same progress, so they are ranked by a discounted cost of how
-//! safely they drove. Candidates in nearly the same state would fill the beam with copies of one plan: only the best of
+//! safely they drove; with several speeds driving slowly has a cost too. Candidates in nearly the same state would fill the beam with copies of one plan: only the best of
 //! those is kept.
 
 use std::collections::HashSet;
 use std::sync::Arc;
 
 use offtrack::angle::wrapped;
-use offtrack::layout::{Ended, Rig, Start, Truck};
+use offtrack::layout::{Ended, Params, Rig, Start, Truck};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 use offtrack_policy::Policy;
@@ -28,11 +28,16 @@ const HEADING_WEIGHT: f32 = 1.0;
 const AHEAD: usize = 1;
 /// Cost of a load transfer ratio at its limit, to the fourth power: half of the limit costs little.
 const LOAD_TRANSFER_WEIGHT: f32 = 0.3;
+/// Cost of a standing truck where there are several speeds; at the highest it is 0. A load transfer ratio of 0.8 costs as
+/// much as half of the highest speed.
+const SLOWNESS_WEIGHT: f32 = 0.25;
 /// Two candidates are in nearly the same state if these agree after rounding: position \[m], headings \[rad], steer
 /// angle \[rad].
 const POSITION_BIN: f32 = 0.2;
 const HEADING_BIN: f32 = 0.035;
 const STEER_BIN: f32 = 0.07;
+/// Speed, where it is chosen [m/s].
+const SPEED_BIN: f32 = 1.0;
 /// Steer angles that differ by less are equal \[rad].
 const SAME_STEER: f32 = 1e-6;
 /// The parent of the first segment.
@@ -181,7 +186,11 @@ fn cost(world: &World, batch: &Batch, env: usize) -> f32 {
     let lane_heading = previews[(progress.waypoint as usize + AHEAD).min(previews.len() - 1)].heading;
     let shortfall = (1.0 - clearance.tractor.min(clearance.trailer) / MARGIN).max(0.0);
     let load = truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs()) / world.params.rollover_ratio;
+    let Params { target_speed_min, target_speed_max, .. } = world.params;
+    // Where a truck may drive more slowly, safety alone would make it crawl.
+    let slowness = if target_speed_min < target_speed_max { 1.0 - truck.speed / target_speed_max } else { 0.0 };
     shortfall.powi(2)
+        + SLOWNESS_WEIGHT * slowness
         + LANE_WEIGHT * progress.lane_distance.powi(2)
         + HEADING_WEIGHT * wrapped(truck.heading - lane_heading).powi(2)
         + LOAD_TRANSFER_WEIGHT * load.powi(4)
@@ -226,7 +235,7 @@ fn selected(batch: &Batch, children: &[Candidate], width: usize) -> Vec<u32> {
 }
 
 /// The cell of the state space that a truck is in: nearly equal states share one.
-fn bin(truck: &Truck) -> [i32; 5] {
+fn bin(truck: &Truck) -> [i32; 6] {
     let articulation = wrapped(truck.heading - truck.trailer_heading);
     [
         truck.position.x / POSITION_BIN,
@@ -234,6 +243,7 @@ fn bin(truck: &Truck) -> [i32; 5] {
         truck.heading / HEADING_BIN,
         articulation / HEADING_BIN,
         truck.steering / STEER_BIN,
+        truck.speed / SPEED_BIN,
     ]
     .map(|value| value.round() as i32)
 }

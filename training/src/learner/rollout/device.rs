@@ -70,6 +70,10 @@ impl DeviceRollout {
         routes: Vec<u32>,
         mirror: Option<Mirror>,
     ) -> Result<DeviceRollout, Error> {
+        if 0 < world.params.n_extras {
+            let expected = "the benchmark's observation.extras are learned with `cpu` alone".to_owned();
+            return Err(Error::Flag { flag: "device", value: "gpu".to_owned(), expected });
+        }
         DeviceRollout::with_seeds(shared, config, world, routes, mirror, seeds(config.seed, 0))
     }
 
