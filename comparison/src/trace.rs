@@ -232,16 +232,21 @@ impl Run<'_> {
             ltr2_dyn: load_transfer_ratio(
                 &vehicle.trailer_suspension().roll(self.case.dt),
                 trailer_roll,
-                motion.trailer_lateral_acceleration,
+                motion.trailer_lateral_acceleration + self.fall(),
             )
             .into(),
         }
     }
 
+    /// Lateral acceleration that the road's fall adds [m/s^2].
+    fn fall(&self) -> f32 {
+        self.case.vehicle.rig(self.case.dt).crossfall
+    }
+
     fn tractor_ratio(&self) -> f64 {
         let Moving { truck, motion } = &self.moving;
         let roll = self.case.vehicle.tractor_suspension().roll(self.case.dt);
-        load_transfer_ratio(&roll, Vec2::new(truck.tractor_roll, truck.tractor_roll_rate), motion.lateral_acceleration).into()
+        load_transfer_ratio(&roll, Vec2::new(truck.tractor_roll, truck.tractor_roll_rate), motion.lateral_acceleration + self.fall()).into()
     }
 }
 
