@@ -127,6 +127,7 @@ pub fn write_policy(
         name: file.to_owned(),
         benchmark: name,
         actions,
+        extras: Vec::new(),
         normalisation: Normalisation { mean: vector(&mean), factor: vector(&factor) },
         layers: layers.iter().map(layer).collect(),
         activation,
