@@ -4,6 +4,7 @@
 //! and rays are computed on the arcs themselves.
 
 mod alignment;
+mod fit;
 mod meeting;
 mod offset;
 mod outline;
@@ -15,6 +16,8 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec2;
 
 pub use alignment::{Bend, Misfit, rounded, to_circle};
+pub(crate) use fit::arc_of_height;
+pub use fit::{fitted_line, fitted_outline};
 pub use outline::{Nearby, Outline};
 
 /// A straight or a circular piece of a curve.

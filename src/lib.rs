@@ -13,6 +13,8 @@ pub mod random; // numbers from (seed, env, episode, draw)
 pub mod layout; // rows, constants, columns and buffers
 pub mod geometry; // arcs, segments, outlines; exact distances
 pub mod route; // lane centre lines -> waypoints
+pub mod ground; // a ring with its arms: kerb faces, lane edges, routes
+pub mod opendrive; // maps -> rings
 pub mod roundabout; // parameters -> kerbs and lanes
 pub mod procedural; // random roundabouts, by seed and index
 pub mod field; // the signed distance to the kerbs, baked

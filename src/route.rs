@@ -9,6 +9,9 @@ use crate::geometry::Curve;
 use crate::reader::shown;
 
 /// A lane of a carriageway or of the ring, counted from the kerb.
+///
+/// Left and right are those of the world that is driven, where traffic keeps to the right. On a road with left-hand
+/// traffic names of routes have the lane that a driver there would say: the one next to the kerb is `left`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Lane {
@@ -28,6 +31,19 @@ impl Lane {
             Lane::Left => "left",
             Lane::Right => "right",
         }
+    }
+
+    /// The lane's mirror image.
+    pub fn mirrored(self) -> Lane {
+        match self {
+            Lane::Left => Lane::Right,
+            Lane::Right => Lane::Left,
+        }
+    }
+
+    /// The lane as it is called on a road that is driven as its mirror image, or as it is.
+    pub fn seen(self, mirrored: bool) -> Lane {
+        if mirrored { self.mirrored() } else { self }
     }
 
     /// Number of lanes between this one and the kerb: its index in lists of lanes.
@@ -57,7 +73,8 @@ pub struct Route {
     pub entry: usize,
     /// The lane it keeps.
     pub lane: Lane,
-    /// Exit number, counted counter-clockwise from the entry; the number of arms is a U-turn.
+    /// Exit number, counted in driving direction from the entry: counter-clockwise, clockwise in left-hand traffic; the
+    /// number of arms is a U-turn.
     pub exit: u32,
     /// Approach lane, entry curve, ring arc, exit curve, departure lane; tangent-continuous.
     pub centre_line: Curve,
@@ -70,6 +87,21 @@ pub struct Route {
     pub before: f64,
     /// Length of lane between the route's end and the exit arm's end \[m].
     pub after: f64,
+}
+
+impl Route {
+    /// The route's mirror image in the x axis, by the same name.
+    pub fn mirrored(&self) -> Route {
+        let (left, right) = self.crossing;
+        let across = |w: &Waypoint| Waypoint { position: DVec2::new(w.position.x, -w.position.y), heading: -w.heading };
+        Route {
+            lane: self.lane.mirrored(),
+            centre_line: self.centre_line.mirrored(),
+            waypoints: self.waypoints.iter().map(across).collect(),
+            crossing: (right, left),
+            ..self.clone()
+        }
+    }
 }
 
 /// A route that would begin or end beyond the end of its arm.

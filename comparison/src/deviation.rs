@@ -1,7 +1,7 @@
 //! Distances between a roundabout's curves and measured lines: road edges and lane centre lines, in both directions.
 //!
-//! Measured road edges are the lanes' edges, so they are compared with the outline of [`Gutter::Solid`]. Two kinds of
-//! points are left out: those farther than [`WITHIN`] from the centre, and those whose nearest counterpart is the loose
+//! Measured road edges are the lanes' edges, so they are compared with the outline of [`Gutter::Solid`]; measured kerb
+//! faces with that of [`Gutter::Drivable`]. Two kinds of points are left out: those farther than [`WITHIN`] from the centre, and those whose nearest counterpart is the loose
 //! end of a measured line, beyond which nothing was measured.
 
 use glam::DVec2;
@@ -23,6 +23,9 @@ pub const LONGEST: f64 = 20_000.0;
 /// Spacing of the points at which lines are compared \[m].
 const STEP: f64 = 0.5;
 
+/// Distances within which the points of a [`Spread`] are counted \[m].
+pub const NEAR: [f64; 3] = [0.05, 0.1, 0.3];
+
 /// A measured line: points joined by straights \[m].
 pub type Line = Vec<[f64; 2]>;
 
@@ -42,6 +45,12 @@ pub struct Measured {
     pub splitters: Vec<Line>,
     /// Routes, unbroken stretches only.
     pub routes: Vec<MeasuredRoute>,
+    /// All kerb faces, where they were measured too.
+    #[serde(default)]
+    pub faces: Vec<Line>,
+    /// With them all edges of the lanes, the gutters painted across the arms' mouths included.
+    #[serde(default)]
+    pub edges: Vec<Line>,
 }
 
 /// A route through a measured roundabout.
@@ -67,17 +76,30 @@ pub struct Spread {
     pub mean: f64,
     /// Number of points that were compared.
     pub points: usize,
+    /// Number of those that lie within each distance of [`NEAR`].
+    pub near: [usize; 3],
 }
 
 /// One row of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Deviation {
-    /// `island`, `ring`, `kerbs`, `splitters`, or a route as `E-left-2`.
+    /// `island`, `ring`, `kerbs`, `splitters`; `faces`, `edges`, all of them where they were measured; or a route as `E-left-2`.
     pub what: String,
     /// Measured points to the parameters' curves.
     pub from_measured: Spread,
     /// Points of the parameters' curves to the measured lines; no points where only stretches were measured.
     pub from_model: Spread,
+}
+
+impl Deviation {
+    /// The fractions of all points, both ways, that lie within each distance of [`NEAR`]; 1 without points.
+    pub fn near(&self) -> [f64; 3] {
+        let points = self.from_measured.points + self.from_model.points;
+        std::array::from_fn(|i| match points {
+            0 => 1.0,
+            points => (self.from_measured.near[i] + self.from_model.near[i]) as f64 / points as f64,
+        })
+    }
 }
 
 /// Measured lines that cannot be compared.
@@ -113,7 +135,8 @@ impl Measured {
     /// Every line with its key, `kerbs[2]`.
     fn lines(&self) -> impl Iterator<Item = (String, &Line)> {
         let parts = [("island", &self.island), ("ring", &self.ring), ("kerbs", &self.kerbs), ("splitters", &self.splitters)];
-        let parts = parts.into_iter().map(|(key, lines)| (key.to_owned(), lines));
+        let parts = parts.into_iter().chain([("faces", &self.faces), ("edges", &self.edges)]);
+        let parts = parts.map(|(key, lines)| (key.to_owned(), lines));
         let routes = self.routes.iter().enumerate().map(|(index, route)| (format!("routes[{index}].stretches"), &route.stretches));
         let lines = parts.chain(routes);
         lines.flat_map(|(key, lines)| lines.iter().enumerate().map(move |(index, line)| (format!("{key}[{index}]"), line)))
@@ -167,12 +190,19 @@ fn edges(roundabout: &Roundabout, measured: &Measured) -> Vec<Deviation> {
     let face = roundabout.island_radius();
     let island = |p: DVec2| (face - p.length()).max(p.length() - face - roundabout.gutter()).max(0.0);
     let row = |what: &str, from_measured, from_model| Deviation { what: what.into(), from_measured, from_model };
-    vec![
+    let mut rows = vec![
         row("island", spread(points(&measured.island).into_iter().map(island)), Spread::default()),
         row("ring", to_curves(&measured.ring, &boundary), Spread::default()),
         row("kerbs", to_curves(&measured.kerbs, &boundary), to_lines(&boundary, &measured.kerbs)),
         row("splitters", to_curves(&measured.splitters, &splitters), to_lines(&splitters, &measured.splitters)),
-    ]
+    ];
+    for (what, lines, gutter) in [("faces", &measured.faces, Gutter::Drivable), ("edges", &measured.edges, Gutter::Solid)] {
+        if !lines.is_empty() {
+            let all = roundabout.kerbs(gutter).loops;
+            rows.push(row(what, to_curves(lines, &all), to_lines(&all, lines)));
+        }
+    }
+    rows
 }
 
 /// Points every [`STEP`] along measured lines that lie [`WITHIN`] the centre.
@@ -212,8 +242,16 @@ fn closed(line: &Curve) -> bool {
 }
 
 fn spread(distances: impl Iterator<Item = f64>) -> Spread {
-    let (worst, sum, points) = distances.fold((0.0_f64, 0.0, 0), |(worst, sum, points), d| (worst.max(d), sum + d, points + 1));
-    Spread { worst, mean: if points == 0 { 0.0 } else { sum / points as f64 }, points }
+    let (mut spread, mut sum) = (Spread::default(), 0.0);
+    for distance in distances {
+        spread.worst = spread.worst.max(distance);
+        spread.points += 1;
+        sum += distance;
+        for (near, limit) in spread.near.iter_mut().zip(NEAR) {
+            *near += usize::from(distance <= limit);
+        }
+    }
+    Spread { mean: if spread.points == 0 { 0.0 } else { sum / spread.points as f64 }, ..spread }
 }
 
 #[cfg(test)]
@@ -229,6 +267,8 @@ mod tests {
             kerbs: vec![circle(16.0)],
             splitters: vec![],
             routes: vec![],
+            faces: vec![],
+            edges: vec![],
         }
     }
 

@@ -70,6 +70,8 @@ pub(crate) struct View {
     pub scale: f64,
     /// Upper left corner of the map on the page \[px].
     corner: DVec2,
+    /// Whether points are those of the mirror image in the x axis, which low and high are not.
+    mirrored: bool,
 }
 
 /// Position and size of a map on its page.
@@ -101,7 +103,13 @@ impl View {
         let centre = (low + high) / 2.0;
         let extent = high - low;
         let extent = extent.max(DVec2::new(extent.y * layout.ratio, extent.x * 0.5));
-        View { low: centre - extent / 2.0, high: centre + extent / 2.0, scale: layout.width / extent.x, corner: layout.corner }
+        View {
+            low: centre - extent / 2.0,
+            high: centre + extent / 2.0,
+            scale: layout.width / extent.x,
+            corner: layout.corner,
+            mirrored: false,
+        }
     }
 
     /// All of the given points with `margin` around them \[m], in the middle of a map that fills a picture of `size`
@@ -110,12 +118,18 @@ impl View {
         let (low, high) = points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
         let scale = (size / (high - low + 2.0 * margin)).min_element();
         let (centre, half) = ((low + high) / 2.0, size / scale / 2.0);
-        View { low: centre - half, high: centre + half, scale, corner: DVec2::ZERO }
+        View { low: centre - half, high: centre + half, scale, corner: DVec2::ZERO, mirrored: false }
     }
 
     /// Where `p` lies on the page \[px].
     pub fn point(&self, p: DVec2) -> DVec2 {
-        self.corner + DVec2::new(p.x - self.low.x, self.high.y - p.y) * self.scale
+        let y = if self.mirrored { -p.y } else { p.y };
+        self.corner + DVec2::new(p.x - self.low.x, self.high.y - y) * self.scale
+    }
+
+    /// The same view for points of the mirror image in the x axis.
+    pub fn for_mirrored(&self) -> View {
+        View { mirrored: true, ..*self }
     }
 
     /// Whether the map shows `p`, at least `margin` metres from its edge.
@@ -192,14 +206,15 @@ pub fn roundabout(roundabout: &Roundabout, routes: &[Route], straights: Straight
     let map =
         Group::new().add(road.surface()).add(road.distances()).add(road.lanes()).add(road.kerbs()).add(road.routes()).add(road.arm_names());
     let legend: Vec<Entry> = road.legend().into_iter().chain(road.route_legend()).collect();
-    let title = format!("Roundabout {}: {} arms, {} routes", roundabout.name, roundabout.arms().count(), routes.len());
+    let kind = if roundabout.island_radius() == 0.0 { "Junction" } else { "Roundabout" };
+    let title = format!("{kind} {}: {} arms, {} routes", roundabout.name, roundabout.arms().count(), routes.len());
     let lanes: Vec<String> = roundabout.lane_radii().iter().map(|radius| format!("{radius:.2} m")).collect();
-    let centres = match &lanes[..] {
-        [inner @ .., last] if !inner.is_empty() => format!("centres at {} and {last}", inner.join(", ")),
-        only => format!("centre at {}", only.concat()),
-    };
     let radius = roundabout.outer_radius();
-    let subtitle = format!("Lane {centres}, outer kerb at {radius:.2} m from the centre.");
+    let subtitle = match &lanes[..] {
+        [] => format!("Its arms begin {radius:.2} m from the middle of the junction."),
+        [only] => format!("Lane centre at {only}, outer kerb at {radius:.2} m from the centre."),
+        [inner @ .., last] => format!("Lane centres at {} and {last}, outer kerb at {radius:.2} m from the centre.", inner.join(", ")),
+    };
     Ok(composed(&view, &lettering, &title, &subtitle, Definitions::new(), map, &legend))
 }
 

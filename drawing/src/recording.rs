@@ -1,7 +1,8 @@
 //! A recording: the states of one truck through an episode, step by step, independent of any picture of it.
 //!
 //! Frame 0 is the start, before any action; frame n is the state after step n, up to and including the step that ended
-//! the episode. Numbers are rounded when they are recorded (lengths to 1 mm, angles to 0.1 mrad), so that a file holds
+//! the episode. A recording shows the road as it lies in the world: that of a road with left-hand traffic, which is
+//! driven as its mirror image, is mirrored back. Numbers are rounded when they are recorded (lengths to 1 mm, angles to 0.1 mrad), so that a file holds
 //! the recording exactly.
 
 use offtrack::angle::wrapped;
@@ -94,6 +95,31 @@ impl Frame {
     }
 }
 
+impl Frame {
+    /// The frame in the mirror image of its world: left is right. Pairs of rays stay in their order.
+    #[must_use]
+    pub fn mirrored(&self) -> Frame {
+        let across = |[x, y]: [f32; 2]| [x, 0.0 - y];
+        let negated = |value: f32| 0.0 - value;
+        let mut ranges = self.ranges;
+        let (trailer, tractor) = ranges.split_at_mut(N_TRAILER_RAYS);
+        trailer.chunks_exact_mut(2).for_each(|pair| pair.swap(0, 1));
+        tractor.reverse();
+        Frame {
+            position: across(self.position),
+            heading: negated(self.heading),
+            trailer_position: across(self.trailer_position),
+            trailer_heading: negated(self.trailer_heading),
+            articulation: negated(self.articulation),
+            steering: negated(self.steering),
+            tractor_load_transfer_ratio: negated(self.tractor_load_transfer_ratio),
+            trailer_load_transfer_ratio: negated(self.trailer_load_transfer_ratio),
+            ranges,
+            ..*self
+        }
+    }
+}
+
 /// One truck's episode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Track {
@@ -105,7 +131,18 @@ pub struct Track {
     pub frames: Vec<Frame>,
 }
 
-/// Records some trucks of a batch while it is stepped. Made for [`offtrack::simulator::RouteChoice::Fixed`], where a
+impl Track {
+    /// The episode as it lies in the world: mirrored back where the road is driven as its mirror image.
+    #[must_use]
+    pub fn seen(mut self, roundabout: &Roundabout) -> Track {
+        if roundabout.is_mirrored() {
+            self.frames.iter_mut().for_each(|frame| *frame = frame.mirrored());
+        }
+        self
+    }
+}
+
+/// Records some trucks of a batch while it is stepped, in the world that is driven; [`Track::seen`] mirrors back. Made for [`offtrack::simulator::RouteChoice::Fixed`], where a
 /// truck is held after its episode: the first episode of each truck is kept.
 #[derive(Debug)]
 pub struct Recorder {
@@ -198,6 +235,21 @@ impl Measures {
     }
 }
 
+impl Measures {
+    /// Of the truck that is seen on a roundabout: the mirror image of the one that is driven, where that is.
+    #[must_use]
+    pub fn seen(mut self, roundabout: &Roundabout) -> Measures {
+        if roundabout.is_mirrored() {
+            self.trailer_rays.chunks_exact_mut(2).for_each(|pair| pair.swap(0, 1));
+            self.tractor_rays.reverse();
+            for [_, y, _, dy] in self.trailer_rays.iter_mut().chain(&mut self.tractor_rays) {
+                (*y, *dy) = (0.0 - *y, 0.0 - *dy);
+            }
+        }
+        self
+    }
+}
+
 /// A roundabout as lines of points \[m].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Map {
@@ -209,15 +261,17 @@ pub struct Map {
 }
 
 impl Map {
-    /// Of a roundabout; `gutter` says whether gutters are drivable. Points lie within 1 cm of the curves.
+    /// Of a roundabout as it lies in the world; `gutter` says whether gutters are drivable. Points lie within 1 cm of the
+    /// curves.
     pub fn of(roundabout: &Roundabout, gutter: Gutter) -> Map {
+        let roundabout = roundabout.seen();
         Map { drivable: polygons::drivable(&roundabout.kerbs(gutter)), lanes: roundabout.lanes().iter().map(polygons::line).collect() }
     }
 }
 
-/// A route's centre line as points within 1 cm of it \[m].
-pub fn centre_line(route: &Route) -> Polygon {
-    polygons::line(&route.centre_line)
+/// The centre line of a roundabout's route as it lies in the world, as points within 1 cm of it \[m].
+pub fn centre_line(roundabout: &Roundabout, route: &Route) -> Polygon {
+    polygons::line(&roundabout.seen_route(route).centre_line)
 }
 
 /// One episode with all data that a picture of it needs; the JSON of the command `record`.
@@ -241,7 +295,7 @@ pub struct Recording {
     pub ended: String,
     /// The truck.
     pub vehicle: Measures,
-    /// The action table: steer angle \[rad] and speed asked for [m/s].
+    /// The action table: steer angle, left positive \[rad], and speed asked for [m/s].
     pub actions: Vec<[f32; 2]>,
     /// The roundabout.
     pub map: Map,

@@ -139,11 +139,16 @@ impl<'a> Road<'a> {
         let Straights { approach, departure } = self.straights;
         let away = TO_NAME.min(approach).min(departure);
         for (arm, name) in self.roundabout.arms().enumerate() {
-            // The U-turn enters and leaves on its arm's lanes farthest from the kerbs.
-            let last = self.roundabout.arms().count() as u32;
-            let Some(u_turn) = self.routes.iter().find(|route| route.entry == arm && route.exit == last) else { continue };
-            let line = &u_turn.centre_line;
-            let at = (line.point_at(approach - away) + line.point_at(line.length() - departure + away)) / 2.0;
+            // Beside the lanes farthest from the kerbs: those of the U-turn, or of the ways nearest to one.
+            let farthest = |on_arm: &dyn Fn(&Route) -> bool| {
+                let routes = self.routes.iter().filter(|route| on_arm(route));
+                routes.min_by_key(|route| std::cmp::Reverse(route.exit)).map(|route| &route.centre_line)
+            };
+            let enters = farthest(&|route| route.entry == arm).map(|line| line.point_at(approach - away));
+            let leaves = farthest(&|route| self.roundabout.exit_arm(route) == arm);
+            let leaves = leaves.map(|line| line.point_at(line.length() - departure + away));
+            let (Some(from), Some(to)) = (enters.or(leaves), leaves.or(enters)) else { continue };
+            let at = (from + to) / 2.0;
             if self.view.shows(at, 2.0) {
                 let at = self.view.point(at) + DVec2::new(0.0, 7.0);
                 group = group.add(self.lettering.text_on_map(name, at, 20.0, Align::Middle, colour::INK));

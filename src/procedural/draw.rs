@@ -9,6 +9,7 @@ use super::arm::{Arm, Ring};
 use super::distribution_keys::Keys;
 use super::draws::{Draws, Place, Quantity as Q};
 use super::line::{Line, millimetres};
+use crate::ground::Hand;
 use crate::roundabout::written::{Written, WrittenArm, WrittenCorner, WrittenRing};
 
 /// The names of arms: the nearest of eight directions, from east counter-clockwise.
@@ -39,9 +40,11 @@ pub(super) fn drawn(keys: &Keys, draws: &Draws) -> Result<Written, Reason> {
             exit: arm.exit.written(-1.0, &ring),
             corner,
             splitter: arm.splitter(keys, draws, &ring, index),
+            splitter_gutter: None,
+            kerb_gutter: None,
         }
     });
-    Ok(Written { ring: written_ring, arm: written.collect() })
+    Ok(Written { hand: Hand::Right, ring: written_ring, arm: written.collect() })
 }
 
 /// The ring as a file has it, and what the arms need of it.
@@ -62,7 +65,14 @@ fn ring(keys: &Keys, draws: &Draws) -> (WrittenRing, Ring) {
         None => lane_width,
     };
     let outer = island + 2.0 * gutter + lanes as f64 * ring_lane_width;
-    let written = WrittenRing { island_radius: island, gutter, lane_width: ring_lane_width, lanes: (lanes != 2).then_some(lanes) };
+    let written = WrittenRing {
+        island_radius: island,
+        gutter,
+        lane_width: ring_lane_width,
+        lanes: (lanes != 2).then_some(lanes),
+        island_gutter: None,
+        mouth_gutter: None,
+    };
     (written, Ring { outer, lanes, ring_lane_width, lane_width, gutter })
 }
 

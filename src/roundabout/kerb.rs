@@ -10,18 +10,8 @@ use super::check;
 use super::ring::Ring;
 use super::roundabout_keys::Arm;
 use crate::geometry::{Curve, Outline, Piece, rounded, wrapped};
+use crate::ground::Kerb;
 use crate::reader::{Error, Reader};
-
-/// What a kerb belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kerb {
-    /// The outer boundary: from arm to arm, and the arms' ends.
-    Outer,
-    /// The central island.
-    Island,
-    /// The splitter island of the arm with this index.
-    Splitter(usize),
-}
 
 /// The kerbs in the order of the loops that [`kerbs`] makes.
 pub(super) fn order(arms: &[Arm]) -> impl Iterator<Item = Kerb> {
@@ -29,8 +19,8 @@ pub(super) fn order(arms: &[Arm]) -> impl Iterator<Item = Kerb> {
     [Kerb::Outer, Kerb::Island].into_iter().chain(splitters)
 }
 
-/// The kerb faces as an outline. Fails if they cross each other.
-pub(super) fn kerbs(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<Outline, Error> {
+/// The kerb faces as an outline, and the kerbs from each arm to the next. Fails if they cross each other.
+pub(super) fn kerbs(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<(Outline, Vec<Curve>), Error> {
     let corners: Vec<Curve> = (0..arms.len()).map(|arm| corner(reader, ring, arms, arm)).collect::<Result<_, _>>()?;
     check::corners_apart(reader, arms, &corners)?;
     let mut boundary = Curve::default();
@@ -54,7 +44,7 @@ pub(super) fn kerbs(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<Outlin
         check::splitter(reader, ring, index, &island, &loops)?;
         loops.push(island);
     }
-    Ok(Outline::new(loops))
+    Ok((Outline::new(loops), corners))
 }
 
 /// The kerb from the end of an arm inwards, along the ring or across the corner, and out to the end of the next arm.

@@ -170,7 +170,7 @@ fn first_exit(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -> Resul
         let fault = |fault| check::fault(reader, arms, index, Some("corner.lane_radius"), Lane::Right.name(), Way::Entry, fault);
         return around((entry, arm.bearing), (exit, next.bearing), radius).map(Some).map_err(fault);
     }
-    if arm.kerb_corner.is_none() {
+    if arm.kerb_corner.is_none() || arm.lane_on_ring {
         return Ok(None);
     }
     if arm.lane_width != next.lane_width {

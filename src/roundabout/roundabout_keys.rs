@@ -6,8 +6,11 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::alignment::{Alignment, Way};
+use super::corner::WrittenCorner;
+use super::gutter::{WrittenDirection, WrittenStation};
 use super::ring::Ring;
 use crate::geometry::Bend;
+use crate::ground::Hand;
 use crate::reader::{Error, Reader, shown};
 use crate::route::Lane;
 
@@ -20,6 +23,8 @@ const LANE_WIDTHS: RangeInclusive<f64> = 2.5..=12.0;
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Written {
+    #[serde(default, skip_serializing_if = "is_right")]
+    pub(crate) hand: Hand,
     pub(crate) ring: WrittenRing,
     pub(crate) arm: Vec<WrittenArm>,
 }
@@ -32,6 +37,10 @@ pub(crate) struct WrittenRing {
     pub(crate) lane_width: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) lanes: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) island_gutter: Option<Vec<WrittenDirection>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) mouth_gutter: Option<Vec<WrittenDirection>>,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -48,6 +57,10 @@ pub(crate) struct WrittenArm {
     pub(crate) corner: WrittenCorner,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) splitter: Vec<WrittenPoint>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) splitter_gutter: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) kerb_gutter: Option<Vec<WrittenStation>>,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -67,21 +80,6 @@ pub(crate) struct WrittenWay {
 pub(crate) struct WrittenAlignment {
     pub(crate) points: Vec<WrittenPoint>,
     pub(crate) ring_radius: f64,
-}
-
-#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct WrittenCorner {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) kerb_radius: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) lane_radius: Option<f64>,
-}
-
-impl WrittenCorner {
-    fn is_empty(&self) -> bool {
-        *self == WrittenCorner::default()
-    }
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -123,6 +121,8 @@ pub(super) struct Arm {
     pub(super) kerb_corner: Option<f64>,
     /// The same for the right lane to the first exit; without it that lane lies beside such a kerb \[m].
     pub(super) lane_corner: Option<f64>,
+    /// Whether that lane follows the ring although the kerb does not.
+    pub(super) lane_on_ring: bool,
     /// Corners of the splitter island's kerb face in the arm's frame; empty if there is no island.
     pub(super) splitter: Vec<Bend>,
 }
@@ -131,6 +131,11 @@ impl Arm {
     pub(super) fn way(&self, way: Way) -> &Carriageway {
         if way == Way::Entry { &self.entry } else { &self.exit }
     }
+}
+
+/// The hand that is left out of a file.
+fn is_right(hand: &Hand) -> bool {
+    *hand == Hand::Right
 }
 
 impl Written {
@@ -195,7 +200,9 @@ impl WrittenArm {
         if !splitter.is_empty() {
             reader.count(&key("splitter"), splitter.len(), 3..=16)?;
         }
+        let lane_on_ring = self.corner.lane_on_ring(reader, &key("corner.lane"))?;
         Ok(Arm {
+            lane_on_ring,
             kerb_corner: radius("corner.kerb_radius", self.corner.kerb_radius)?,
             lane_corner: radius("corner.lane_radius", self.corner.lane_radius)?,
             entry: self.entry.checked(reader, &key("entry"), Way::Entry, length, lane_width, ring)?,

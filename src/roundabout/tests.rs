@@ -1,5 +1,6 @@
 //! Which roundabout files are accepted, and how the others are refused.
 
+mod gutters;
 mod kinds;
 
 use proptest::prelude::*;
@@ -34,7 +35,8 @@ fn refusal(from: &str, nth: usize, to: &str) -> String {
 fn the_required_keys_give_a_roundabout_with_lanes_beside_its_kerbs() {
     let roundabout = read(&plain()).unwrap();
     let kerbs = roundabout.kerbs(Gutter::Drivable);
-    let (_, right) = roundabout.lanes.of(0, alignment::Way::Entry).next().unwrap();
+    // After the lanes around the ring come the first arm's entry lanes, the left one first.
+    let right = roundabout.lanes()[roundabout.lane_radii().len() + 1].clone();
     // From the arm's solid end on, the lane's middle keeps half a lane and the gutter from the kerb all the way.
     for step in 12..(right.length() * 4.0) as usize {
         assert!((kerbs.distance(right.point_at(step as f64 / 4.0)) - 2.35).abs() < 1e-9);
@@ -228,8 +230,9 @@ fn lanes_of_the_shipped_roundabouts_fail_once_a_carriageway_is_moved_over_the_ot
             let message = read(&changed).unwrap_err().to_string();
             refused += usize::from(message.contains("must lie at least 2.5 m left of exit.left"));
         }
-        // On other arms the moved lane meets a splitter island or misses the ring, which is found first.
-        assert!(0 < refused, "{path}: {refused} of {arms}");
+        // On other arms the moved lane meets a splitter island or misses the ring, which is found first; so it is on every
+        // arm of 16m with the map's larger islands.
+        assert!((0 < refused) != path.ends_with("/16m-maps.toml"), "{path}: {refused} of {arms}");
     }
 }
 

@@ -9,6 +9,7 @@ use serde::de::{Deserializer, SeqAccess, Visitor};
 
 use super::Clock;
 use crate::layout::Track;
+use crate::opendrive::{Hand, RoadLane};
 use crate::roundabout::Gutter;
 use crate::vehicle::WrittenModel;
 
@@ -242,6 +243,16 @@ impl Default for WrittenRoutes {
 #[serde(deny_unknown_fields)]
 pub(super) struct WrittenRoundabout {
     pub(super) file: PathBuf,
+    /// For a map: a point near the ring, its hand of traffic, and names.
+    pub(super) ring: Option<[f64; 2]>,
+    #[serde(default)]
+    pub(super) hand: Hand,
+    pub(super) name: Option<String>,
+    #[serde(default)]
+    pub(super) arms: Vec<String>,
+    /// For a map: ways through a junction in place of a ring.
+    #[serde(default)]
+    pub(super) way: Vec<WrittenWay>,
     #[serde(default)]
     pub(super) train: WrittenChoice,
     #[serde(default)]
@@ -273,5 +284,39 @@ pub(super) enum WrittenChoice {
 impl Default for WrittenChoice {
     fn default() -> Self {
         WrittenChoice::Names(Vec::new())
+    }
+}
+
+/// A way through a junction of a map.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WrittenWay {
+    pub(super) from: WrittenLane,
+    pub(super) to: WrittenLane,
+}
+
+/// A lane of a road of a map.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WrittenLane {
+    pub(super) road: WrittenId,
+    pub(super) lane: i32,
+}
+
+/// A road's id, a text in OpenDRIVE and mostly a number.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+pub(super) enum WrittenId {
+    Number(u64),
+    Text(String),
+}
+
+impl From<&WrittenLane> for RoadLane {
+    fn from(written: &WrittenLane) -> RoadLane {
+        let road = match &written.road {
+            WrittenId::Number(number) => number.to_string(),
+            WrittenId::Text(text) => text.clone(),
+        };
+        RoadLane { road, lane: written.lane }
     }
 }

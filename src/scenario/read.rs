@@ -116,8 +116,8 @@ fn start_speed(reader: &Reader, written: &WrittenSpeeds) -> Result<[f64; 2], Err
     Ok([least / 3.6, greatest / 3.6])
 }
 
-/// Reads the file that `source` refers to under `key`: by a path that ends in .toml, or the shipped file of this kind by
-/// its name. If there is no such file, the error names the key too.
+/// Reads the file that `source` refers to under `key`: by a path that ends in .toml or .xodr, or the shipped file of
+/// this kind by its name. If there is no such file, the error names the key too.
 pub(super) fn referred<T>(
     reader: &Reader,
     key: &str,
@@ -126,7 +126,7 @@ pub(super) fn referred<T>(
     path: &Path,
     read: impl Fn(&Source) -> Result<T, Error>,
 ) -> Result<T, Error> {
-    let is_path = path.extension().is_some_and(|extension| extension == "toml");
+    let is_path = path.extension().is_some_and(|extension| extension == "toml" || extension == "xodr");
     let found = if is_path { Ok(source.relative(path)) } else { Source::named(kind, &path.to_string_lossy()) };
     found.and_then(|source| read(&source)).map_err(|error| match error {
         Error::Unreadable { .. } | Error::NotAFile { .. } | Error::TooLarge { .. } | Error::UnknownName { .. } => {

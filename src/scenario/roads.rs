@@ -2,13 +2,17 @@
 
 use std::ops::Range;
 
+use glam::DVec2;
+
 use super::benchmark_keys::{WrittenChoice, WrittenProcedural, WrittenRoundabout};
 use super::read::referred;
 use super::{Place, Scenario, Split};
 use crate::loading::Loading;
+use crate::opendrive::Way;
 use crate::procedural::Distribution;
 use crate::reader::{Error, Reader, shown};
 use crate::roundabout::Roundabout;
+use crate::roundabout::map::{Choice, is_map};
 use crate::route::Route;
 use crate::shipped::{Kind, Source};
 
@@ -64,7 +68,27 @@ impl Procedural {
 impl Scenario {
     /// Adds a roundabout of the file, written under `key`, and its routes.
     pub(super) fn add_file(&mut self, reader: &Reader, key: &str, source: &Source, written: &WrittenRoundabout) -> Result<(), Error> {
-        let roundabout = referred(reader, &format!("{key}.file"), source, Kind::Roundabout, &written.file, Roundabout::from_source)?;
+        let read = |source: &Source| match source {
+            Source::Disk(file) if is_map(file) => {
+                let WrittenRoundabout { hand, name, arms, .. } = written;
+                let ring = written.ring.map(DVec2::from);
+                let ways = written.way.iter().map(|way| Way { from: (&way.from).into(), to: (&way.to).into() }).collect();
+                Roundabout::from_map(file, &Choice { ring, hand: *hand, name: name.clone(), arms: arms.clone(), ways })
+            }
+            source => Roundabout::from_source(source),
+        };
+        if !is_map(&written.file) {
+            let given = [
+                ("ring", written.ring.is_some()),
+                ("name", written.name.is_some()),
+                ("arms", !written.arms.is_empty()),
+                ("way", !written.way.is_empty()),
+            ];
+            if let Some((name, _)) = given.into_iter().find(|(_, given)| *given) {
+                return Err(reader.invalid(format!("{key}.{name}"), "given", "is for a map, a file that ends in .xodr; leave it out"));
+            }
+        }
+        let roundabout = referred(reader, &format!("{key}.file"), source, Kind::Roundabout, &written.file, read)?;
         if self.places.iter().any(|other| other.roundabout.name == roundabout.name) {
             return Err(reader.invalid(format!("{key}.file"), written.file.display(), "each roundabout may be listed once"));
         }

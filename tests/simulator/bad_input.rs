@@ -20,9 +20,22 @@ fn scenarios() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
 }
 
-/// Benchmarks that have no key but those of another one.
-const LIKE_OTHERS: [&str; 4] =
-    ["random2026-1000.toml", "random2026-10000.toml", "random2026-as-run.toml", "random2026-as-run-training.toml"];
+/// Benchmarks and roundabouts that have no key but those of another one.
+const LIKE_OTHERS: [&str; 13] = [
+    "random2026-1000.toml",
+    "random2026-10000.toml",
+    "random2026-as-run.toml",
+    "random2026-as-run-training.toml",
+    "maps2026.toml",
+    "maps2026-crossing.toml",
+    "attard2023-maps.toml",
+    "attard2023-maps-as-run.toml",
+    "attard2023-maps-full.toml",
+    "16m-maps.toml",
+    "20m-maps.toml",
+    "32m-maps.toml",
+    "40m-maps.toml",
+];
 
 /// Every other scenario file, relative to `scenarios/`.
 fn files() -> Vec<PathBuf> {
@@ -37,7 +50,7 @@ fn files() -> Vec<PathBuf> {
         }
     }
     files.sort();
-    assert_eq!(files.len(), 20, "five roundabouts, three vehicles, ten benchmarks, two distributions");
+    assert_eq!(files.len(), 21, "six roundabouts, three vehicles, ten benchmarks, two distributions");
     files
 }
 

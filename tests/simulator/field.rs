@@ -26,7 +26,7 @@ pub(crate) fn places(gutter: Gutter) -> Vec<(String, Outline, Field)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/roundabouts");
     let mut files: Vec<_> = folder.read_dir().unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
-    assert_eq!(files.len(), 5, "{files:?}");
+    assert_eq!(files.len(), 10, "{files:?}");
     let place = |file: &Path| {
         let roundabout = Roundabout::read(file).unwrap();
         let kerbs = roundabout.kerbs(gutter);

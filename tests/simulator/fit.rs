@@ -1,4 +1,5 @@
-//! The five roundabouts against the measured ones: road edges and lane centre lines, in both directions.
+//! The five roundabouts against the measured ones: road edges and lane centre lines, in both directions. Those with the
+//! maps' kerbs against the kerb faces and the edges of the lanes.
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its file must fail")]
 
 use std::path::{Path, PathBuf};
@@ -24,13 +25,14 @@ fn measured(name: &str) -> Measured {
 }
 
 #[test]
-fn every_roundabout_file_is_one_of_the_five() {
+fn every_roundabout_file_is_one_of_the_five_or_has_the_kerbs_of_its_map() {
     let mut found: Vec<String> = std::fs::read_dir(Path::new(ROOT).join("scenarios/roundabouts"))
         .unwrap()
         .map(|entry| entry.unwrap().path().file_stem().unwrap().to_string_lossy().into_owned())
         .collect();
     found.sort();
-    assert_eq!(found, NAMES);
+    let expected: Vec<String> = NAMES.iter().flat_map(|name| [(*name).to_owned(), format!("{name}-maps")]).collect();
+    assert_eq!(found, expected);
 }
 
 #[test]
@@ -44,6 +46,27 @@ fn kerbs_and_lanes_lie_within_a_metre_of_the_measured_and_ring_kerbs_within_30_c
             assert!(row.from_measured.worst < bound, "{name}: {row:?}");
             assert!(row.from_model.worst < bound, "{name}: {row:?}");
         }
+    }
+}
+
+#[test]
+fn the_maps_kerb_faces_and_lane_edges_lie_within_30_cm_both_ways() {
+    for name in NAMES {
+        let rows = deviations(&roundabout(&format!("{name}-maps")), &measured(&format!("maps/{name}"))).unwrap();
+        for what in ["faces", "edges"] {
+            let row = rows.iter().find(|row| row.what == what).unwrap();
+            assert!(300 < row.from_measured.points && 300 < row.from_model.points, "{name}: {row:?}");
+            assert!(row.from_measured.worst < 0.3 && row.from_model.worst < 0.3, "{name}: {row:?}");
+        }
+    }
+}
+
+#[test]
+fn the_five_with_one_gutter_everywhere_do_not_have_the_maps_kerbs() {
+    for name in NAMES {
+        let rows = deviations(&roundabout(name), &measured(&format!("maps/{name}"))).unwrap();
+        let faces = rows.iter().find(|row| row.what == "faces").unwrap();
+        assert!(0.3 < faces.from_measured.worst, "{name}: {faces:?}");
     }
 }
 

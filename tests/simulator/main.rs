@@ -18,6 +18,11 @@ mod field;
 mod fit;
 mod fleet;
 mod kinds;
+
+mod left_hand;
+mod map_junctions;
+mod map_lanes;
+mod maps;
 mod modules;
 mod observe;
 #[cfg(feature = "gpu")]

@@ -31,10 +31,14 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
     let mut files = BTreeMap::new();
     on_disk(&scenarios(), Path::new(""), &mut files);
     let embedded: BTreeMap<String, String> = FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
-    assert_eq!((files.len(), FILES.len()), (24, 24), "fourteen benchmarks, five roundabouts, three vehicles, two distributions");
+    assert_eq!(
+        (files.len(), FILES.len()),
+        (39, 39),
+        "nineteen benchmarks, ten roundabouts, five outlines, three vehicles, two distributions"
+    );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [14, 5, 3, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [19, 10, 3, 2]);
 }
 
 /// Benchmarks of so many roads that they are not drawn here.
@@ -70,7 +74,7 @@ fn the_large_benchmarks_are_random2026_with_other_test_roads_that_no_split_share
 fn every_name_gives_what_its_file_gives() {
     // The two with thousands of roads take minutes; the next test reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 12);
+    assert_eq!(benchmarks.len(), 17);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();
@@ -94,7 +98,8 @@ fn an_unknown_name_is_refused_with_the_names_there_are() {
     assert!(benchmark.starts_with("benchmark: nowhere; must be a path ending in .toml or one of attard2023, "), "{benchmark}");
     assert_eq!(
         Roundabout::find("17m").unwrap_err().to_string(),
-        "roundabout: 17m; must be a path ending in .toml or one of 16m, 20m, 32m, 40m, 50m"
+        "roundabout: 17m; must be a path ending in .toml or one of 16m, 20m, 32m, 40m, 50m, \
+         16m-maps, 20m-maps, 32m-maps, 40m-maps, 50m-maps"
     );
     assert_eq!(
         Vehicle::named("bus").unwrap_err().to_string(),
@@ -143,7 +148,7 @@ fn a_file_of_the_users_own_refers_to_shipped_ones_by_name() {
     assert_eq!((scenario.places.len(), scenario.places[0].roundabout.name.as_str()), (3, "20m"));
     std::fs::write(&file, text.replace("\"20m\"", "\"21m\"")).unwrap();
     let message = Scenario::read(&file).unwrap_err().to_string();
-    let expected =
-        "own.toml: roundabout[0].file: \"21m\"; roundabout: 21m; must be a path ending in .toml or one of 16m, 20m, 32m, 40m, 50m";
+    let expected = "own.toml: roundabout[0].file: \"21m\"; roundabout: 21m; must be a path ending in .toml or one of 16m, 20m, 32m, 40m, 50m, \
+         16m-maps, 20m-maps, 32m-maps, 40m-maps, 50m-maps";
     assert!(message.ends_with(expected), "{message}");
 }

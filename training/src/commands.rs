@@ -7,6 +7,7 @@ pub mod devices;
 pub mod draw;
 pub mod evaluate;
 pub mod generate;
+pub mod import;
 mod policies; // flags: which policy
 mod progress; // the bar on a terminal
 pub mod record;

@@ -138,7 +138,7 @@ impl Evaluation<'_> {
     }
 
     /// Records the episodes at these indices as they are driven again: the same actions from the same start give the
-    /// same states, to the last bit. `env` of a track is the episode's index.
+    /// same states, to the last bit; tracks are as they lie in the world. `env` of a track is the episode's index.
     pub fn repeated(&self, sequences: &Sequences, indices: &[usize]) -> Result<Vec<Track>, Error> {
         if indices.is_empty() {
             return Ok(Vec::new());
@@ -156,7 +156,9 @@ impl Evaluation<'_> {
             recorder.follow(self.world, simulator.batch());
         }
         simulator.wait()?;
-        Ok(recorder.finish().into_iter().zip(indices).map(|(track, &env)| Track { env, ..track }).collect())
+        let routes = self.routes();
+        let seen = |(track, &env): (Track, &usize)| Track { env, ..track.seen(&routes[env / self.episodes].1.roundabout) };
+        Ok(recorder.finish().into_iter().zip(indices).map(seen).collect())
     }
 
     /// The report of these episodes, which stand as [`Evaluation::drive`] gives them; `policy` is its name.

@@ -9,7 +9,7 @@ use clap::{Parser, Subcommand};
 use offtrack_training::error::Error;
 use offtrack_training::{files, provenance};
 
-use commands::{bench, certify, deviations, devices, draw, evaluate, generate, record, scale, trace, train};
+use commands::{bench, certify, deviations, devices, draw, evaluate, generate, import, record, scale, trace, train};
 
 /// Batches of tensors are allocated thousands of times a second; the system's allocator takes a third of an update's
 /// time.
@@ -50,6 +50,7 @@ enum Command {
     Certify(certify::Args),
     Draw(draw::Args),
     Generate(generate::Args),
+    Import(import::Args),
     Record(record::Args),
     Trace(trace::Args),
     Deviations(deviations::Args),
@@ -74,6 +75,7 @@ fn main() -> ExitCode {
         Command::Certify(args) => certify::run(args),
         Command::Draw(args) => draw::run(args),
         Command::Generate(args) => generate::run(args),
+        Command::Import(args) => import::run(args),
         Command::Record(args) => record::run(args),
         Command::Trace(args) => trace::run(args),
         Command::Deviations(args) => deviations::run(args),

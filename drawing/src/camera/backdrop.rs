@@ -50,7 +50,7 @@ impl Format {
 pub struct Backdrop {
     /// Index of the route in the world.
     pub route: u32,
-    /// Where the map's points lie, in pixels below the caption.
+    /// Where points of the world that is driven lie, in pixels below the caption.
     pub view: View,
     /// RGBA, `[side, side, 4]`, opaque.
     pub pixels: Vec<u8>,
@@ -65,14 +65,17 @@ pub struct Backdrop {
 impl Backdrop {
     /// Of a route of the scenario; bare ground if it has no such route.
     pub fn new(scenario: &Scenario, route: u32, format: Format, lettering: &Lettering) -> Backdrop {
-        let found = scenario.routes().nth(route as usize).map(|(place, line)| (&scenario.places[place].roundabout, line));
+        let found = scenario.routes().nth(route as usize).map(|(place, line)| {
+            let driven = &scenario.places[place].roundabout;
+            (driven.seen(), driven.seen_route(line), driven.is_mirrored())
+        });
         let side = f64::from(format.side);
         let size = DVec2::new(side, f64::from(format.side - format.caption));
-        let view = match found {
-            Some((roundabout, line)) => View::fitted(shown(scenario, roundabout, line), size, MARGIN),
+        let view = match &found {
+            Some((roundabout, line, _)) => View::fitted(shown(scenario, roundabout, line), size, MARGIN),
             None => View::fitted([-NOWHERE, NOWHERE].map(DVec2::splat).into_iter(), size, 0.0),
         };
-        let name = found.map_or("", |(_, line)| line.name.as_str());
+        let name = found.as_ref().map_or("", |(_, line, _)| line.name.as_str());
         let gap = format.text();
         let width = [name, LONGEST[0], LONGEST[1]].map(|words| lettering.width(words, format.text()) + gap).iter().sum::<f64>();
         let text = format.text() * (side / width).min(1.0);
@@ -87,12 +90,13 @@ impl Backdrop {
         }
         if let Some(mut map) = Canvas::on(below, format.side) {
             map.cover(Ink(colour::SOLID, 1.0));
-            if let Some((roundabout, line)) = found {
+            if let Some((roundabout, line, _)) = &found {
                 draw_road(&mut map, &view, format.pen, roundabout);
                 draw_route(&mut map, &view, format.pen, roundabout, line);
                 draw_kerbs(&mut map, &view, format.pen, roundabout, scenario.gutter);
             }
         }
+        let view = if found.as_ref().is_some_and(|&(_, _, mirrored)| mirrored) { view.for_mirrored() } else { view };
         Backdrop { route, view, pixels, text, speed_at, ended_at: DVec2::new(side - 0.5 * text, base) }
     }
 }

@@ -231,3 +231,30 @@ fn no_state_is_too_far_off_to_be_drawn() {
     let truck = Truck { route: u32::MAX, ..there };
     camera.draw(&Shown { truck: &truck, ranges: &[5.0; N_RAYS], ended: Ended::Running });
 }
+
+#[test]
+fn a_left_hand_road_is_drawn_as_it_lies_and_not_as_it_is_driven() {
+    let mut scenario = (*DRIVEN.0).clone();
+    for place in &mut scenario.places {
+        let ground = offtrack::ground::Ground { mirrored: true, ..place.roundabout.ground().clone() };
+        place.roundabout = offtrack::roundabout::Roundabout::on(place.roundabout.name.clone(), ground);
+    }
+    let (mut right, mut left) = (camera(240), Camera::new(Arc::new(scenario), &DRIVEN.1, 240).unwrap());
+    let truck = truck(0, 30.0);
+    let [one, other] = [&mut right, &mut left].map(|camera| drawn(camera, &truck, Ended::Running));
+    // Below the caption the rows of one are those of the other in opposite order, but for the rounding of edges.
+    let (side, caption) = (right.side() as usize, right.format.caption as usize);
+    let row = |picture: &[u8], row: usize| picture[3 * side * row..][..3 * side].to_vec();
+    let difference = |flipped: bool| {
+        let rows = (caption..side).map(|n| (row(&one, n), row(&other, if flipped { side - 1 - (n - caption) } else { n })));
+        let all: Vec<f64> =
+            rows.flat_map(|(a, b)| a.into_iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(b))).collect::<Vec<_>>()).collect();
+        all.iter().sum::<f64>() / all.len() as f64
+    };
+    assert!(difference(true) < 1.0, "{}", difference(true));
+    assert!(5.0 < difference(false), "{}", difference(false));
+    // The truck stands on its lane.
+    for middle in middles(&truck) {
+        assert_eq!(seen(&left, &other, middle), seen(&right, &one, middle));
+    }
+}

@@ -77,9 +77,33 @@ fn a_recording_read_back_is_the_recording() {
         vehicle: Measures::of(&world),
         actions: world.actions.iter().map(|action| [action.steering, action.speed]).collect(),
         map: Map::of(&scenario.places[roundabout].roundabout, scenario.gutter),
-        centre_line: centre_line(route),
+        centre_line: centre_line(&scenario.places[roundabout].roundabout, route),
         frames: tracks.remove(0).frames,
     };
     let text = serde_json::to_string(&recording).unwrap();
     assert_eq!(serde_json::from_str::<Recording>(&text).unwrap(), recording);
+}
+
+#[test]
+fn the_tracks_of_a_left_hand_road_are_the_mirror_image_of_what_was_driven() {
+    let (world, tracks, _) = driven(&scenario());
+    let right = Roundabout::named("16m").unwrap();
+    let left = Roundabout::on("16m".into(), offtrack::ground::Ground { mirrored: true, ..right.ground().clone() });
+    assert_eq!(tracks[0].clone().seen(&right), tracks[0]);
+    let seen = tracks[0].clone().seen(&left);
+    for (frame, driven) in seen.frames.iter().zip(&tracks[0].frames) {
+        assert_eq!(frame.position, [driven.position[0], 0.0 - driven.position[1]]);
+        assert_eq!((frame.heading, frame.articulation), (0.0 - driven.heading, 0.0 - driven.articulation));
+        assert_eq!((frame.steering, frame.speed, frame.action), (0.0 - driven.steering, driven.speed, driven.action));
+        // The foremost trailer ray on the left is that on the right, the tractor's leftmost its rightmost.
+        assert_eq!((frame.ranges[0], frame.ranges[16]), (driven.ranges[1], driven.ranges[28]));
+    }
+    assert!(seen.frames.iter().any(|frame| frame.steering != 0.0));
+    assert_eq!(seen.seen(&left), tracks[0]);
+    // The truck is symmetric: its mirror image has the same sensors.
+    assert_eq!(Measures::of(&world).seen(&left), Measures::of(&world));
+    let (map, mirrored) = (Map::of(&right, Gutter::Drivable), Map::of(&left, Gutter::Drivable));
+    let north = |map: &Map| map.drivable[0].iter().map(|p| p[1]).fold(f64::NEG_INFINITY, f64::max);
+    let south = |map: &Map| map.drivable[0].iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+    assert!((north(&map) + south(&mirrored)).abs() < 0.02 && (south(&map) + north(&mirrored)).abs() < 0.02);
 }

@@ -54,7 +54,8 @@ fn a_left_lane_on_a_carriageway_of_one_lane_is_refused() {
 fn lanes_of_an_arm_may_be_narrower_than_those_of_the_ring() {
     let narrow = plain().replace("length = 100.0", "length = 100.0\nlane_width = 3.0");
     let roundabout = read(&narrow).unwrap();
-    let start = |lane: usize| roundabout.lanes.of(0, alignment::Way::Entry).nth(lane).unwrap().1.point_at(0.0);
+    // After the lanes around the ring come the first arm's entry lanes, the left one first.
+    let start = |lane: usize| roundabout.lanes()[roundabout.lane_radii().len() + 1 - lane].point_at(0.0);
     // East of the centre an entry lies north of the bearing: 8.5 m less gutter and half a lane, and a lane more.
     assert!((start(0).y - 6.5).abs() < 1e-9 && (start(1).y - 3.5).abs() < 1e-9);
     assert_eq!(roundabout.lane_radii(), read(&plain()).unwrap().lane_radii());

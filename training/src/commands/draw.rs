@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use offtrack::procedural;
 use offtrack::reader::shown;
+use offtrack::roundabout::map::is_map;
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::Route;
 use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
@@ -17,12 +18,16 @@ use offtrack_drawing::{polygons, rasterised};
 use offtrack_training::error::Error;
 use offtrack_training::files;
 
+use super::import::PlaceArgs;
+
 /// Draw a roundabout, or a truck's swept path on one of its routes.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A roundabout's name, the path of its file, or a random road: wide/7/12 is road 12 of seed 7 of the distribution
-    /// wide.
+    /// A roundabout's name, the path of its file or of an OpenDRIVE map (.xodr), or a random road: wide/7/12 is road 12
+    /// of seed 7 of the distribution wide.
     roundabout: String,
+    #[command(flatten)]
+    place: PlaceArgs,
     /// The file to write: .svg, .png, or .json for polygons and waypoints.
     ///
     /// JSON: {"solids": [[[x, y], ...], ...], "drivable": [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x,
@@ -82,7 +87,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     length("--approach", args.approach)?;
     length("--departure", args.departure)?;
-    let roundabout = procedural::find(&args.roundabout)?;
+    let file = Path::new(&args.roundabout);
+    let roundabout = if is_map(file) { Roundabout::from_map(file, &args.place.choice())? } else { procedural::find(&args.roundabout)? };
+    let roundabout = roundabout.seen();
     let routes = roundabout.routes(args.approach, args.departure, WAYPOINT_SPACING).map_err(|leaves| {
         let (flag, value) = if leaves.part == "approach" { ("--approach", args.approach) } else { ("--departure", args.departure) };
         Error::Flag { flag, value: format!("{value} m"), expected: leaves.to_string() }

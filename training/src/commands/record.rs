@@ -96,23 +96,24 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let track = driven(args, scenario, &world, chosen, policy.as_mut())?;
         let Chosen { roundabout, route, .. } = *chosen;
         let of = Of { scenario, world: &world, roundabout, route, policy: policy.name(), seed: args.seed };
-        recorded.push(of.recorded(args.episode, args.episodes, track));
+        recorded.push(of.recorded(args.episode, args.episodes, track.seen(roundabout)));
     }
     let bytes = bytes(format, args.size, &recorded);
     files::write_whole(&args.output, &bytes.map_err(unwritten(&args.output))?)
 }
 
 /// A recording and what is drawn around it.
-struct Recorded<'a> {
+struct Recorded {
     recording: Recording,
-    roundabout: &'a Roundabout,
+    /// As it lies in the world.
+    roundabout: Roundabout,
     gutter: Gutter,
-    route: &'a Route,
+    route: Route,
 }
 
-impl Recorded<'_> {
+impl Recorded {
     fn scene(&self) -> Result<Scene<'_>, Failure> {
-        Ok(Scene::new(&self.recording, self.roundabout, self.gutter, self.route)?)
+        Ok(Scene::new(&self.recording, &self.roundabout, self.gutter, &self.route)?)
     }
 }
 
@@ -135,10 +136,11 @@ pub(super) struct Of<'a, 'b> {
     pub(super) seed: u32,
 }
 
-impl<'a> Of<'a, '_> {
-    /// The recording of a track: episode `episode` of the `episodes` that the evaluation has on this route.
-    fn recorded(&self, episode: usize, episodes: usize, track: Track) -> Recorded<'a> {
+impl Of<'_, '_> {
+    /// The recording of a track, which is as it lies in the world: episode `episode` of the `episodes` that the evaluation has on this route.
+    fn recorded(&self, episode: usize, episodes: usize, track: Track) -> Recorded {
         let Of { scenario, world, roundabout, route, policy, seed } = *self;
+        let steering = |angle: f32| if roundabout.is_mirrored() { 0.0 - angle } else { angle };
         let recording = Recording {
             benchmark: scenario.name.clone(),
             route: route.name.clone(),
@@ -148,13 +150,13 @@ impl<'a> Of<'a, '_> {
             episodes,
             step: scenario.step,
             ended: track.ended.name().to_owned(),
-            vehicle: Measures::of(world),
-            actions: world.actions.iter().map(|action| [action.steering, action.speed]).collect(),
+            vehicle: Measures::of(world).seen(roundabout),
+            actions: world.actions.iter().map(|action| [steering(action.steering), action.speed]).collect(),
             map: Map::of(roundabout, scenario.gutter),
-            centre_line: centre_line(route),
+            centre_line: centre_line(roundabout, route),
             frames: track.frames,
         };
-        Recorded { recording, roundabout, gutter: scenario.gutter, route }
+        Recorded { recording, roundabout: roundabout.seen(), gutter: scenario.gutter, route: roundabout.seen_route(route) }
     }
 
     /// Writes a film of a track, in the usual size.

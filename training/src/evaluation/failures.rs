@@ -80,14 +80,18 @@ impl Evaluation<'_> {
 
     fn example(&self, routes: &[Evaluated], finished: &[Episode], index: usize) -> Example {
         let (episode, (_, start)) = (&finished[index], self.start(index));
+        let (_, place, route) = routes[index / self.episodes];
+        // As it lies in the world.
+        let side = if place.roundabout.is_mirrored() { -1.0 } else { 1.0 };
+        let [x, y] = episode.last.position.as_dvec2().to_array();
         Example {
             index,
-            route: routes[index / self.episodes].2.name.clone(),
+            route: route.name.clone(),
             episode: index % self.episodes,
-            start: [start.offset, start.heading].map(f64::from),
+            start: [start.offset, start.heading].map(|fraction| side * f64::from(fraction)),
             ended: episode.ended.name(),
             steps: episode.steps,
-            position: episode.last.position.as_dvec2().to_array(),
+            position: [x, side * y],
         }
     }
 

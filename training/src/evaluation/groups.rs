@@ -73,8 +73,8 @@ pub(super) fn island_radius((_, place, _): &Evaluated) -> (usize, String) {
     (band, BAND_NAMES[band].to_owned())
 }
 
-pub(super) fn lane((_, _, route): &Evaluated) -> (usize, String) {
-    (0, route.lane.name().to_owned())
+pub(super) fn lane((_, place, route): &Evaluated) -> (usize, String) {
+    (0, route.lane.seen(place.roundabout.is_mirrored()).name().to_owned())
 }
 
 fn exit((_, _, route): &Evaluated) -> (usize, String) {

@@ -8,6 +8,7 @@ mod device;
 mod draw;
 mod evaluate;
 mod generate;
+mod import;
 mod input;
 mod interruption;
 mod page;

@@ -79,7 +79,7 @@ impl<'a> Ground<'a> {
                 routes.push(RouteLine {
                     name: &route.name,
                     roundabout: places.len() - 1,
-                    centre_line: line(&recording::centre_line(route)),
+                    centre_line: line(&recording::centre_line(&page.scenario.places[place].roundabout, route)),
                 });
             }
             let (route, number) = (routes.len() - 1, track.env % per_route);

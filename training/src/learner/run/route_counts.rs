@@ -102,7 +102,7 @@ impl RouteCounts {
             let (place, route) = all[world_route as usize];
             let roundabout = &scenario.places[place].roundabout;
             let (before, _) = route.name.rsplit_once('/').unwrap_or((&roundabout.name, ""));
-            let (lane, exit) = (route.lane.name(), route.exit);
+            let (lane, exit) = (route.lane.seen(roundabout.is_mirrored()).name(), route.exit);
             Name { route: route.name.clone(), roundabout: before.to_owned(), island_radius: roundabout.island_radius(), lane, exit }
         };
         let names: Vec<Name> = scenario.split(Split::Train).iter().enumerate().map(name).collect();

@@ -1,0 +1,188 @@
+//! An OpenDRIVE map as records: what a file says of roads, lanes and junctions, in SI units, right-hand traffic.
+//!
+//! A left-hand map is mirrored in the x axis when it is read, so whatever follows knows right-hand traffic alone.
+
+use std::collections::HashMap;
+
+use glam::DVec2;
+
+/// A polynomial `a + b x + c x² + d x³` that holds from `start` on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cubic {
+    /// Where it begins: x is counted from here \[m].
+    pub(super) start: f64,
+    /// a, b, c, d.
+    pub(super) factors: [f64; 4],
+}
+
+impl Cubic {
+    /// Value at station `s` \[m].
+    pub(super) fn at(&self, s: f64) -> f64 {
+        let [a, b, c, d] = self.factors;
+        let x = s - self.start;
+        a + x * (b + x * (c + x * d))
+    }
+}
+
+/// The record that holds at `s` of those sorted by `start`: the last that begins at or before it, or the first.
+pub(super) fn active<T>(records: &[T], s: f64, start: impl Fn(&T) -> f64) -> Option<&T> {
+    let after = records.partition_point(|record| start(record) <= s);
+    records.get(after.saturating_sub(1))
+}
+
+/// Which form a piece of the reference line has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Shape {
+    Line,
+    /// Its curvature, left positive \[1/m].
+    Arc(f64),
+    /// Curvature at its beginning and at its end, linear between \[1/m].
+    Spiral(f64, f64),
+    /// v as a cubic of u, in the frame of its beginning.
+    Poly3([f64; 4]),
+    /// u and v as cubics of a parameter, which runs from 0 to 1 if `normalised`, else to the length.
+    ParamPoly3 {
+        u: [f64; 4],
+        v: [f64; 4],
+        normalised: bool,
+    },
+}
+
+/// A piece of a reference line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Geometry {
+    /// Station of its beginning \[m].
+    pub(super) start: f64,
+    /// Its beginning \[m].
+    pub(super) origin: DVec2,
+    /// Direction there \[rad].
+    pub(super) heading: f64,
+    /// Its length \[m].
+    pub(super) length: f64,
+    pub(super) shape: Shape,
+}
+
+/// What a lane is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Vehicles drive on it.
+    Lane,
+    /// Level with the lanes: shoulders, stops, parking, cycle tracks.
+    Flat,
+    /// A kerb's strip.
+    Kerb,
+    /// Walks, medians, borders: solid unless a lane lies on them.
+    Solid,
+    /// Nothing is known of it.
+    Nothing,
+}
+
+impl Kind {
+    /// What a lane of this type is for.
+    pub(super) fn named(name: &str) -> Kind {
+        match name {
+            "driving" | "bidirectional" | "entry" | "exit" | "onRamp" | "offRamp" | "connectingRamp" | "slipLane" | "bus" | "taxi"
+            | "HOV" | "mwyEntry" | "mwyExit" => Kind::Lane,
+            "shoulder" | "stop" | "parking" | "biking" => Kind::Flat,
+            "curb" => Kind::Kerb,
+            "sidewalk" | "walking" | "median" | "border" | "restricted" => Kind::Solid,
+            _ => Kind::Nothing,
+        }
+    }
+}
+
+/// Height of a lane above the road from `start` on, counted from the section's beginning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Height {
+    pub(super) start: f64,
+    /// The greater of the inner and the outer edge's \[m].
+    pub(super) height: f64,
+}
+
+/// A lane of a section.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Lane {
+    /// Positive left of the reference line, negative right of it; never 0.
+    pub(super) id: i32,
+    pub(super) kind: Kind,
+    /// Widths, or distances of its outer border from the reference line if `bordered`; starts count from the section's.
+    pub(super) widths: Vec<Cubic>,
+    pub(super) bordered: bool,
+    pub(super) heights: Vec<Height>,
+    /// The lane that it continues in the previous section or road.
+    pub(super) predecessor: Option<i32>,
+    /// The lane that continues it in the next section or road.
+    pub(super) successor: Option<i32>,
+}
+
+/// A stretch of a road with the same lanes.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Section {
+    /// Station of its beginning \[m].
+    pub(super) start: f64,
+    /// From left to right, the centre lane left out.
+    pub(super) lanes: Vec<Lane>,
+}
+
+/// What a road's beginning or end leads to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Link {
+    /// A road's beginning (`true`) or end.
+    Road(String, bool),
+    Junction(String),
+}
+
+/// An object's outline that is solid: a traffic island.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Island {
+    /// Its corners in the map \[m].
+    pub(super) corners: Vec<DVec2>,
+}
+
+/// A road.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Road {
+    pub(super) id: String,
+    /// Length of its reference line \[m].
+    pub(super) length: f64,
+    /// The junction that it is a part of.
+    pub(super) junction: Option<String>,
+    pub(super) predecessor: Option<Link>,
+    pub(super) successor: Option<Link>,
+    pub(super) plan: Vec<Geometry>,
+    pub(super) offsets: Vec<Cubic>,
+    pub(super) sections: Vec<Section>,
+    pub(super) islands: Vec<Island>,
+}
+
+impl Road {
+    /// Station where a section ends \[m].
+    pub(super) fn section_end(&self, section: usize) -> f64 {
+        self.sections.get(section + 1).map_or(self.length, |next| next.start)
+    }
+}
+
+/// A way through a junction.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Connection {
+    pub(super) incoming: String,
+    pub(super) connecting: String,
+    /// Whether the connecting road is entered at its beginning.
+    pub(super) at_start: bool,
+    /// Lane of the incoming road, lane of the connecting one.
+    pub(super) lanes: Vec<(i32, i32)>,
+}
+
+/// A map.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Records {
+    pub(super) roads: Vec<Road>,
+    /// Index of a road by its id.
+    pub(super) by_id: HashMap<String, usize>,
+    /// Connections of a junction by its id.
+    pub(super) junctions: HashMap<String, Vec<Connection>>,
+    /// Whether the map has left-hand traffic, so that the records are its mirror image.
+    pub(super) mirrored: bool,
+    /// What is odd in the file, and what was done about it.
+    pub(super) warnings: Vec<String>,
+}

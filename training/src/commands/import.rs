@@ -1,0 +1,207 @@
+//! Lists the roundabouts or junctions of an OpenDRIVE map, checks it, or writes one of them as an outline file.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use glam::DVec2;
+use offtrack::opendrive::{Hand, Imported, Map, Options, RoadLane, Way};
+use offtrack::reader::{Error as InputError, Reader};
+use offtrack::roundabout::map::Choice;
+
+use offtrack_training::error::Error;
+use offtrack_training::files;
+
+/// List the roundabouts or junctions of an OpenDRIVE map, check it, or write one of them as an outline file.
+#[derive(Debug, clap::Args)]
+#[command(group(clap::ArgGroup::new("action").args(["list", "junctions", "check", "output"]).required(true)))]
+pub struct Args {
+    /// The map: a .xodr file.
+    map: PathBuf,
+    /// Print the roundabouts found, and how many islands and blocks are none.
+    #[arg(long)]
+    list: bool,
+    /// Print the ways through every junction, as --way takes them.
+    #[arg(long)]
+    junctions: bool,
+    /// Print everything that is odd in the map and in its roundabouts, and why every other island or block is none.
+    #[arg(long)]
+    check: bool,
+    /// Write one roundabout to this file, NAME.outline.toml: what is driven on, without the map.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    place: PlaceArgs,
+    /// Names of the arms, counter-clockwise from east: E,N,W. Without them they are named by compass.
+    #[arg(long, value_delimiter = ',')]
+    arms: Vec<String>,
+}
+
+/// Which place of a map.
+#[derive(Debug, Clone, clap::Args)]
+pub struct PlaceArgs {
+    /// A point of the map near the roundabout's centre, X,Y [m]; needed where a map has several.
+    #[arg(long, value_name = "X,Y", value_parser = point, allow_hyphen_values = true)]
+    pub ring: Option<DVec2>,
+    /// A way through a junction in place of a roundabout, from a road's lane to another's: 12:-1,30:1. May be given
+    /// several times; `offtrack import MAP --junctions` lists them.
+    #[arg(long = "way", value_name = "ROAD:LANE,ROAD:LANE", value_parser = way, conflicts_with = "ring")]
+    pub ways: Vec<Way>,
+    /// The map's hand of traffic: what the map says, right or left.
+    #[arg(long, default_value = "map", value_parser = clap::builder::PossibleValuesParser::new(["map", "right", "left"]))]
+    pub hand: String,
+}
+
+impl PlaceArgs {
+    /// The ring or the ways that the flags choose.
+    pub fn choice(&self) -> Choice {
+        let hand = match self.hand.as_str() {
+            "left" => Hand::Left,
+            "right" => Hand::Right,
+            _ => Hand::Map,
+        };
+        Choice { ring: self.ring, hand, ways: self.ways.clone(), ..Choice::default() }
+    }
+}
+
+fn point(text: &str) -> Result<DVec2, String> {
+    let expected = || "must be two numbers, X,Y".to_owned();
+    let (x, y) = text.split_once(',').ok_or_else(expected)?;
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(expected);
+    Ok(DVec2::new(number(x)?, number(y)?))
+}
+
+fn way(text: &str) -> Result<Way, String> {
+    let end = |text: &str| {
+        let (road, lane) = text.rsplit_once(':')?;
+        Some(RoadLane { road: road.trim().to_owned(), lane: lane.trim().parse().ok()? })
+    };
+    let ends = text.rsplit_once(',').and_then(|(from, to)| end(from).zip(end(to)));
+    ends.map(|(from, to)| Way { from, to }).ok_or_else(|| "must be two lanes, ROAD:LANE,ROAD:LANE".to_owned())
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Error> {
+    let choice = Choice { arms: args.arms.clone(), ..args.place.choice() };
+    let map = Map::read(&args.map, choice.hand)?;
+    if args.list {
+        return list(&args.map, &map);
+    }
+    if args.junctions {
+        return junctions(&args.map, &map);
+    }
+    if args.check {
+        return check(&map, &choice);
+    }
+    let Some(output) = &args.output else { return Ok(()) };
+    if !output.to_string_lossy().ends_with(".outline.toml") {
+        let value = output.display().to_string();
+        return Err(Error::Flag { flag: "--output", value, expected: "must end in .outline.toml".into() });
+    }
+    let imported = choice.imported(&args.map, &map)?;
+    files::write_whole(output, text(&args.map, &map, &choice, &imported).as_bytes())?;
+    let Imported { ground, warnings, .. } = &imported;
+    let mut summary = String::new();
+    for warning in warnings {
+        let _ = writeln!(summary, "warning: {warning}");
+    }
+    let (arms, routes) = (ground.arms.len(), ground.lines.len());
+    let island = if 0.0 < ground.island_radius { format!(", island {:.2} m", ground.island_radius) } else { String::new() };
+    let _ = writeln!(summary, "written: {}: {arms} arms, {routes} routes{island}", output.display());
+    files::print(&summary)
+}
+
+/// The outline file, with where it is from.
+fn text(file: &Path, map: &Map, choice: &Choice, Imported { ground, centre, .. }: &Imported) -> String {
+    let name = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let (what, flags) = match choice.ways.as_slice() {
+        [] => ("roundabout", format!(" --ring {:.1},{:.1}", centre.x, centre.y)),
+        ways => ("junction", ways.iter().map(|way| format!(" --way {},{}", way.from, way.to)).collect()),
+    };
+    let mut origin = vec![
+        format!("A {what} of the map {name}: its centre, here the origin, lies at ({:.4}, {:.4}) there.", centre.x, centre.y),
+        format!("Made by: offtrack import {name}{flags} -o NAME.outline.toml"),
+    ];
+    if map.is_mirrored() {
+        origin.push("The map has left-hand traffic; this is its mirror image in the x axis.".into());
+    }
+    origin.push("A path is a list of [x, y] and [x, y, bulge]: a straight or an arc ends there. Metres; docs/maps.md.".into());
+    ground.text(&origin)
+}
+
+/// Prints the rings; a map without one is wrong input.
+fn list(file: &Path, map: &Map) -> Result<(), Error> {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    for ring in map.rings() {
+        let (x, y) = (ring.centre.x, ring.centre.y);
+        let _ = write!(text, "ring {x:.1},{y:.1}: island {:.2} m, within {:.2} m of a circle", ring.radius, ring.residual);
+        match map.ground(&ring, &Options::default()) {
+            Ok(Imported { ground, .. }) => {
+                let arms: Vec<&str> = ground.arms.iter().map(|arm| arm.name.as_str()).collect();
+                let _ = writeln!(text, "; arms {}; {} routes", arms.join(" "), ground.lines.len());
+            }
+            Err(error) => {
+                let _ = writeln!(text, "; cannot be driven: {error}");
+            }
+        }
+    }
+    let others = map.refused().len();
+    if 0 < others {
+        let _ = writeln!(text, "{others} other islands and blocks are none; --check says why");
+    }
+    files::print(&text)?;
+    if map.rings().is_empty() {
+        let expected = format!("no roundabout here: {} roads around {others} islands and blocks", map.n_roads());
+        let none: InputError = Reader::of(file).invalid("ring", "none", expected);
+        return Err(none.into());
+    }
+    Ok(())
+}
+
+/// Prints the ways through every junction; a map without one is wrong input.
+fn junctions(file: &Path, map: &Map) -> Result<(), Error> {
+    let mut text = String::new();
+    let junctions = map.junctions();
+    for junction in &junctions {
+        let _ = writeln!(text, "junction {} at {:.1},{:.1}", junction.id, junction.centre.x, junction.centre.y);
+        for way in &junction.ways {
+            let _ = writeln!(text, "  --way {},{}", way.from, way.to);
+        }
+    }
+    files::print(&text)?;
+    if junctions.is_empty() {
+        let none: InputError =
+            Reader::of(file).invalid("junction", "none", format!("no lanes lead through one of its {} roads", map.n_roads()));
+        return Err(none.into());
+    }
+    Ok(())
+}
+
+/// Prints all warnings.
+fn check(map: &Map, choice: &Choice) -> Result<(), Error> {
+    let mut text = String::new();
+    for warning in map.warnings() {
+        let _ = writeln!(text, "{warning}");
+    }
+    let rings = match choice.ring {
+        Some(p) => vec![map.nearest(p)?],
+        None => map.rings(),
+    };
+    for ring in &rings {
+        match map.ground(ring, &Options { arms: choice.arms.clone() }) {
+            Ok(Imported { warnings, .. }) => warnings.iter().for_each(|warning| {
+                let _ = writeln!(text, "{warning}");
+            }),
+            Err(error) => {
+                let _ = writeln!(text, "{error}");
+            }
+        }
+    }
+    let warnings = text.lines().count();
+    for refused in map.refused().iter().filter(|_| choice.ring.is_none()) {
+        let (x, y) = (refused.centre.x, refused.centre.y);
+        let _ = writeln!(text, "no ring at {x:.1},{y:.1}, {:.1} m: {}", refused.radius, refused.reason);
+    }
+    let _ = writeln!(text, "{warnings} warnings, {} rings", rings.len());
+    files::print(&text)
+}

@@ -1,0 +1,43 @@
+//! `offtrack import`: what it finds in maps, and the files that it writes.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn map(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/maps").join(name)
+}
+
+fn offtrack(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_offtrack")).args(arguments).output().unwrap()
+}
+
+#[test]
+fn a_ring_of_a_map_is_listed_written_and_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let sumo = map("sumo_ring22.xodr");
+    let sumo = sumo.to_str().unwrap();
+    let listed = offtrack(&["import", sumo, "--list"]);
+    let text = String::from_utf8(listed.stdout).unwrap();
+    assert!(listed.status.success() && text.starts_with("ring 140.0,140.0: island 22.0"), "{text}");
+    assert!(text.contains("arms E N W S; 16 routes") && text.contains("4 other islands and blocks are none"), "{text}");
+    let outline = folder.path().join("sumo.outline.toml");
+    let (outline, svg) = (outline.to_str().unwrap(), folder.path().join("sumo.svg"));
+    assert!(offtrack(&["import", sumo, "--ring", "140,140", "-o", outline]).status.success());
+    assert!(offtrack(&["draw", outline, "-o", svg.to_str().unwrap()]).status.success());
+    assert!(std::fs::read_to_string(&svg).unwrap().contains("Roundabout sumo: 4 arms, 16 routes"));
+    assert!(offtrack(&["draw", sumo, "--ring", "140,140", "-o", svg.to_str().unwrap()]).status.success());
+    assert!(std::fs::read_to_string(&svg).unwrap().contains("Roundabout sumo_ring22: 4 arms, 16 routes"));
+    let checked = offtrack(&["import", sumo, "--check"]);
+    assert!(checked.status.success() && String::from_utf8(checked.stdout).unwrap().contains(" jumps by 0.74 m or turns; "));
+}
+
+#[test]
+fn a_map_without_a_roundabout_is_wrong_input() {
+    let listed = offtrack(&["import", map("maliput_Roundabout.xodr").to_str().unwrap(), "--list"]);
+    let (text, error) = (String::from_utf8(listed.stdout).unwrap(), String::from_utf8(listed.stderr).unwrap());
+    assert_eq!(listed.status.code(), Some(2));
+    assert!(error.contains("no roundabout here: 1 roads around 1 islands and blocks"), "{error}");
+    assert!(text.contains("1 other islands and blocks are none"), "{text}");
+    assert_eq!(offtrack(&["import", "missing.xodr", "--list"]).status.code(), Some(2));
+    assert_eq!(offtrack(&["import", map("sumo_ring22.xodr").to_str().unwrap(), "-o", "ring.toml"]).status.code(), Some(2));
+}
