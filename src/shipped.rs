@@ -29,6 +29,8 @@ pub const FILES: &[(&str, &str)] = embedded![
     "laden2026.toml",
     "laden2026-50.toml",
     "laden2026-odd.toml",
+    "laden2026-random.toml",
+    "laden2026-training.toml",
     "maps/sumo22.outline.toml",
     "maps/town03-crossing.outline.toml",
     "maps/town03.outline.toml",

@@ -21,7 +21,9 @@ fn scenarios() -> PathBuf {
 }
 
 /// Benchmarks and roundabouts that have no key but those of another one.
-const LIKE_OTHERS: [&str; 13] = [
+const LIKE_OTHERS: [&str; 15] = [
+    "laden2026-random.toml",
+    "laden2026-training.toml",
     "random2026-1000.toml",
     "random2026-10000.toml",
     "random2026-as-run.toml",
