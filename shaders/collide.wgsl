@@ -9,8 +9,8 @@
 fn collide(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
-    let rig = params.rig;
     let truck = truck[env];
+    let rig = rigs[truck.vehicle];
     let field = fields[routes[truck.route].roundabout];
     // The first pass is the tractor's, the second the trailer's: one set of spans serves both.
     var spans: array<Span, N_SPANS>;

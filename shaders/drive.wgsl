@@ -8,16 +8,18 @@
 fn drive(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
-    truck[env] = driven(params.rig, params.substep, params.n_substeps, control[env], truck[env]);
+    truck[env] = driven(rigs[truck[env].vehicle], params.substep, params.n_substeps, control[env], truck[env]);
 }
 
 // The truck after `n_substeps` sub-steps of `substep` seconds, for which the rig's roll is discretised.
 fn driven(rig: Rig, substep: f32, n_substeps: u32, control: Control, truck: Truck) -> Truck {
-    var moving = Moving(truck, motion(rig, truck.speed, truck.steering, truck.heading - truck.trailer_heading));
+    var moving = Moving(truck, motion_of(rig, truck));
     var tractor_ratio = 0.0;
     var trailer_ratio = 0.0;
     for (var n = 0u; n < n_substeps; n++) {
-        moving = moved(rig, substep, control, moving);
+        var asked = control;
+        asked.steering = delayed(rig.steer_delay, n, n_substeps, control);
+        moving = moved(rig, substep, asked, moving);
         tractor_ratio = larger_in_magnitude(tractor_ratio, moving.truck.tractor_load_transfer_ratio);
         trailer_ratio = larger_in_magnitude(trailer_ratio, moving.truck.trailer_load_transfer_ratio);
     }
@@ -35,6 +37,8 @@ struct Moving {
 
 // Motion of both units at one instant.
 struct Motion {
+    // Curvature of the tractor's steer angle, without lag and limit of grip [1/m].
+    steered_curvature: f32,
     // Of the tractor [rad/s].
     yaw_rate: f32,
     // Of the trailer [rad/s].
@@ -47,20 +51,59 @@ struct Motion {
     trailer_lateral_acceleration: f32,
 }
 
-// Motion of a truck with this speed [m/s], steer angle and articulation [rad].
-fn motion(rig: Rig, speed: f32, steering: f32, articulation: f32) -> Motion {
-    // The tyres' grip bounds the curvature.
-    let curvature_max = rig.lateral_acceleration_max / max(speed * speed, SPEED_SQUARED_MIN);
+// The steer angle that was asked for `delay` sub-steps before sub-step `n` of the step, at most two steps ago [rad].
+fn delayed(delay: u32, n: u32, n_substeps: u32, control: Control) -> f32 {
+    if delay <= n {
+        return control.steering;
+    } else if delay <= n + n_substeps {
+        return control.steering_before;
+    }
+    return control.steering_earlier;
+}
+
+// Motion of a truck.
+fn motion_of(rig: Rig, truck: Truck) -> Motion {
+    let curvature = steered_curvature(rig, truck.steering);
+    return motion(rig, truck.speed, curvature, truck.curvature_lag, truck.acceleration, truck.heading - truck.trailer_heading);
+}
+
+// Curvature of the path on which the tractor's wheels roll at a steer angle [rad], without slip [1/m].
+fn steered_curvature(rig: Rig, steering: f32) -> f32 {
     let steered = sin_cos(steering);
-    let curvature = limited(steered.x / (steered.y * rig.wheelbase), curvature_max);
+    return steered.x / (steered.y * rig.wheelbase);
+}
+
+// Strongest drive at a speed [m/s^2].
+fn drive_max(rig: Rig, speed: f32) -> f32 {
+    return min(rig.acceleration_max, rig.power / max(speed, POWER_SPEED_MIN));
+}
+
+// Motion of a truck with this speed [m/s], curvature of the steer angle and deviation from it [1/m], acceleration
+// [m/s^2] and articulation [rad].
+fn motion(rig: Rig, speed: f32, steered_curvature: f32, curvature_lag: f32, acceleration: f32, articulation: f32) -> Motion {
+    // The tyres' grip bounds the curvature.
+    let grip = rig.lateral_acceleration_max * sqrt(max(1.0 - rig.friction_ellipse * acceleration * acceleration, 0.0));
+    let curvature = limited(steered_curvature + curvature_lag, grip / max(speed * speed, SPEED_SQUARED_MIN));
     let yaw_rate = speed * curvature;
-    let side_speed = -limited(rig.slip * speed * abs(speed), SLIP_LEVER_MAX) * yaw_rate;
+    let side_speed = -limited(rig.slip * speed * abs(speed), rig.slip_lever_max) * yaw_rate;
     let hitch_side_speed = side_speed + rig.fifth_wheel * yaw_rate;
     let bent = sin_cos(articulation);
     let trailer_speed = speed * bent.y - hitch_side_speed * bent.x;
-    let lever = rig.trailer_wheelbase - limited(rig.slip * trailer_speed * abs(trailer_speed), SLIP_LEVER_MAX);
+    let lever = rig.trailer_wheelbase - limited(rig.slip * trailer_speed * abs(trailer_speed), rig.slip_lever_max);
     let trailer_yaw_rate = (speed * bent.x + hitch_side_speed * bent.y) / lever;
-    return Motion(yaw_rate, trailer_yaw_rate, side_speed, speed * yaw_rate, trailer_speed * trailer_yaw_rate);
+    return Motion(steered_curvature, yaw_rate, trailer_yaw_rate, side_speed, speed * yaw_rate, trailer_speed * trailer_yaw_rate);
+}
+
+// The deviation of the path's curvature from the steer angle's, `duration` seconds after it was `lag`, where the steer
+// angle's changes by `rise` in that time [1/m].
+//
+// The tractor's yaw follows its front wheels with the time constant `yaw_lag * speed`: tyres build up lateral force only
+// as slip angles grow. The exponential is its Padé approximant, which is stable at any speed.
+fn lagging(rig: Rig, speed: f32, lag: f32, rise: f32, duration: f32) -> f32 {
+    let time = rig.yaw_lag * abs(speed);
+    let left = time * time / (time * time + duration * time + 0.5 * duration * duration);
+    let settled = -rise / duration * time;
+    return settled + (lag - settled) * left;
 }
 
 // The truck one sub-step later, with its load transfer ratios there.
@@ -68,22 +111,37 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
     let truck = start.truck;
     let turn = limited(limited(control.steering, rig.steer_max) - truck.steering, rig.steer_rate * substep);
     let steering = truck.steering + turn;
-    let acceleration = min(max(control.acceleration, rig.acceleration_min), rig.acceleration_max);
-    let speed = truck.speed + acceleration * substep;
+    let asked = min(max(control.acceleration, rig.acceleration_min), drive_max(rig, truck.speed));
+    var response = rig.drive_lag;
+    if asked < 0.0 { response = rig.brake_lag; }
+    var acceleration = asked + response.left * (truck.acceleration - asked);
+    var mean_acceleration = asked + response.mean * (truck.acceleration - asked);
+    var speed = truck.speed + mean_acceleration * substep;
+    if control.holds == 1u && truck.speed * speed <= 0.0 {
+        acceleration = 0.0;
+        mean_acceleration = -truck.speed / substep;
+        speed = 0.0;
+    }
 
     let half_step = 0.5 * substep;
     let articulation = truck.heading - truck.trailer_heading;
-    let middle_speed = truck.speed + acceleration * half_step;
+    let middle_speed = truck.speed + mean_acceleration * half_step;
     let middle_articulation = articulation + half_step * (start.motion.yaw_rate - start.motion.trailer_yaw_rate);
-    let mean = motion(rig, middle_speed, truck.steering + 0.5 * turn, middle_articulation);
+    let middle_curvature = steered_curvature(rig, truck.steering + 0.5 * turn);
+    let rise = middle_curvature - start.motion.steered_curvature;
+    let middle_lag = lagging(rig, middle_speed, truck.curvature_lag, rise, half_step);
+    let mean = motion(rig, middle_speed, middle_curvature, middle_lag, mean_acceleration, middle_articulation);
     let ahead = direction(truck.heading + half_step * start.motion.yaw_rate);
     let velocity = vec2<f32>(middle_speed * ahead.x - mean.side_speed * ahead.y, middle_speed * ahead.y + mean.side_speed * ahead.x);
 
     let heading = wrapped(truck.heading + substep * mean.yaw_rate);
     let trailer_heading = wrapped(truck.trailer_heading + substep * mean.trailer_yaw_rate);
-    let last = motion(rig, speed, steering, heading - trailer_heading);
-    let tractor = rolled(rig.tractor_roll, vec2<f32>(truck.tractor_roll, truck.tractor_roll_rate), mean.lateral_acceleration);
-    let trailer = rolled(rig.trailer_roll, vec2<f32>(truck.trailer_roll, truck.trailer_roll_rate), mean.trailer_lateral_acceleration);
+    let curvature = steered_curvature(rig, steering);
+    let curvature_lag = lagging(rig, middle_speed, truck.curvature_lag, curvature - start.motion.steered_curvature, substep);
+    let last = motion(rig, speed, curvature, curvature_lag, acceleration, heading - trailer_heading);
+    let tractor = rolled(rig.tractor_roll, vec2<f32>(truck.tractor_roll, truck.tractor_roll_rate), mean.lateral_acceleration + rig.crossfall);
+    let trailer =
+        rolled(rig.trailer_roll, vec2<f32>(truck.trailer_roll, truck.trailer_roll_rate), mean.trailer_lateral_acceleration + rig.crossfall);
     var after = truck;
     after.position = truck.position + substep * velocity;
     after.heading = heading;
@@ -94,8 +152,11 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
     after.tractor_roll_rate = tractor.y;
     after.trailer_roll = trailer.x;
     after.trailer_roll_rate = trailer.y;
-    after.tractor_load_transfer_ratio = load_transfer_ratio(rig.tractor_roll, tractor, last.lateral_acceleration);
-    after.trailer_load_transfer_ratio = load_transfer_ratio(rig.trailer_roll, trailer, last.trailer_lateral_acceleration);
+    after.tractor_load_transfer_ratio = load_transfer_ratio(rig.tractor_roll, tractor, last.lateral_acceleration + rig.crossfall);
+    after.trailer_load_transfer_ratio = load_transfer_ratio(rig.trailer_roll, trailer, last.trailer_lateral_acceleration + rig.crossfall);
+    after.acceleration = acceleration;
+    after.curvature_lag = curvature_lag;
+    after.lateral_acceleration = last.trailer_lateral_acceleration;
     return Moving(after, last);
 }
 

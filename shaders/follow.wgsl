@@ -6,7 +6,7 @@
 fn follow(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
-    let point = reference_point(params.rig.wheelbase, truck[env]);
+    let point = reference_point(rigs[truck[env].vehicle].wheelbase, truck[env]);
     progress[env] = followed(routes[truck[env].route], point, progress[env].waypoint, params.stray_distance);
 }
 

@@ -7,15 +7,17 @@ fn judge(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
     truck[env].steps += 1u;
-    let code = ending(params, routes[truck[env].route], truck[env], clearance[env], progress[env]);
-    let weighed_terms = weighed(params, clearance[env], progress[env], code);
+    let step_limit = step_limits[truck[env].route * params.n_classes + rigs[truck[env].vehicle].class_index];
+    let code = ending(params, routes[truck[env].route], step_limit, truck[env], clearance[env], progress[env]);
+    let driving = driving_terms(params, truck[env], control[env], code);
+    let weighed_terms = weighed(params, clearance[env], progress[env], code, driving);
     ended[env] = code;
     terms[env] = weighed_terms;
     reward[env] = rewarded(params, weighed_terms);
 }
 
 // Why the episode ended, RUNNING when it did not.
-fn ending(params: Params, route: RouteRow, truck: Truck, clearance: Clearance, progress: Progress) -> u32 {
+fn ending(params: Params, route: RouteRow, step_limit: u32, truck: Truck, clearance: Clearance, progress: Progress) -> u32 {
     let articulation = wrapped(truck.heading - truck.trailer_heading);
     let load_transfer_ratio = max(abs(truck.tractor_load_transfer_ratio), abs(truck.trailer_load_transfer_ratio));
     let arrived = route.n_waypoints <= progress.waypoint;
@@ -31,21 +33,35 @@ fn ending(params: Params, route: RouteRow, truck: Truck, clearance: Clearance, p
         return STRAYED;
     } else if arrived {
         return ARRIVED;
-    } else if route.step_limit < truck.steps {
+    } else if step_limit < truck.steps {
         return TIMED_OUT;
     }
     return RUNNING;
 }
 
-// The physical amounts that the reward weighs.
-fn weighed(params: Params, clearance: Clearance, progress: Progress, code: u32) -> RewardTerms {
+// How the truck drove: time, load transfer, lateral acceleration, jerk and rollover; the other terms are 0.
+fn driving_terms(params: Params, truck: Truck, control: Control, code: u32) -> RewardTerms {
+    let ratio = max(abs(truck.tractor_load_transfer_ratio), abs(truck.trailer_load_transfer_ratio));
+    let duration = f32(params.n_substeps) * params.substep;
+    let jerk = abs(truck.acceleration - control.acceleration_before) / duration;
+    var terms = RewardTerms();
+    terms.time = 1.0;
+    terms.load_transfer = clamp((ratio - params.load_transfer_margin) / (1.0 - params.load_transfer_margin), 0.0, 1.0);
+    terms.lateral_acceleration = min(abs(truck.lateral_acceleration) / G, 1.0);
+    terms.jerk = min(jerk / JERK_SCALE, 1.0);
+    terms.rollover = select(0.0, 1.0, code == ROLLED_OVER);
+    return terms;
+}
+
+// The physical amounts that the reward weighs; `driving` has those of `driving_terms`.
+fn weighed(params: Params, clearance: Clearance, progress: Progress, code: u32, driving: RewardTerms) -> RewardTerms {
     let failed = code != RUNNING && code != ARRIVED && code != TIMED_OUT;
-    return RewardTerms(
-        f32(progress.passed),
-        min(progress.lane_distance / params.lane_distance_limit, 1.0),
-        clamp(1.0 - min(clearance.tractor, clearance.trailer) / params.clearance_limit, 0.0, 1.0),
-        select(0.0, 1.0, failed),
-    );
+    var terms = driving;
+    terms.waypoints = f32(progress.passed);
+    terms.lane_distance = min(progress.lane_distance / params.lane_distance_limit, 1.0);
+    terms.clearance = clamp(1.0 - min(clearance.tractor, clearance.trailer) / params.clearance_limit, 0.0, 1.0);
+    terms.failure = select(0.0, 1.0, failed);
+    return terms;
 }
 
 // The weighted sum.
@@ -53,5 +69,10 @@ fn rewarded(params: Params, terms: RewardTerms) -> f32 {
     return params.waypoint_weight * terms.waypoints
         + params.lane_distance_weight * terms.lane_distance
         + params.clearance_weight * terms.clearance
-        + params.failure_weight * terms.failure;
+        + params.failure_weight * terms.failure
+        + params.time_weight * terms.time
+        + params.load_transfer_weight * terms.load_transfer
+        + params.lateral_acceleration_weight * terms.lateral_acceleration
+        + params.jerk_weight * terms.jerk
+        + params.rollover_weight * terms.rollover;
 }

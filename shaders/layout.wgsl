@@ -12,6 +12,8 @@ const N_TRACTOR_RAYS: u32 = 13u;
 const N_RAYS: u32 = 29u;
 // Values of an observation that depend on the waypoint alone: future and current curvature, radius ahead.
 const N_PREVIEW: u32 = 18u;
+// Values that may be observed beside those.
+const N_EXTRAS: u32 = 12u;
 // Bit of [`BeginRow::what`]: the truck begins an episode.
 const BEGINS: u32 = 1u;
 // Bit: the episode is the first of the truck's stream, not the next one.
@@ -74,10 +76,14 @@ const UNIT: f32 = 1.1920929e-7f;
 const DRAW_ROUTE: u32 = 0u;
 // `Draw::Pose`.
 const DRAW_POSE: u32 = 1u;
+// `Draw::Vehicle`.
+const DRAW_VEHICLE: u32 = 4294967295u;
 // `Draw::Action`.
 const DRAW_ACTION: u32 = 2u;
-// Largest shift of a no-slip point [m]: the linear tyre model is not valid beyond.
-const SLIP_LEVER_MAX: f32 = 1.5f;
+// Braking at which a truck comes to stand [m/s^2].
+const HOLD_BRAKING: f32 = 0.5f;
+// Lowest speed that the engine's power is divided by [m/s].
+const POWER_SPEED_MIN: f32 = 1.0f;
 // Keeps a quotient finite at a standstill [m^2/s^2].
 const SPEED_SQUARED_MIN: f32 = 0.01f;
 // Samples taken at once.
@@ -147,6 +153,20 @@ const N_CURVATURES: u32 = 8u;
 const RANGES_AT: u32 = 30u;
 // Index of the radii ahead.
 const RADII_AT: u32 = 59u;
+// Acceleration that is observed as 1 [m/s^2].
+const ACCELERATION_SCALE: f32 = 2.5f;
+// Lateral acceleration that is observed as 1 [m/s^2].
+const G: f32 = 9.81f;
+// Wheelbase that is observed as 1 [m].
+const WHEELBASE_SCALE: f32 = 10.0f;
+// Roll that is observed as 1 [rad].
+const ROLL_SCALE: f32 = 0.15f;
+// Roll rate that is observed as 1 [rad/s].
+const ROLL_RATE_SCALE: f32 = 0.3f;
+// Mass that is observed as 1 [kg].
+const MASS_SCALE: f32 = 40000.0f;
+// Change of the acceleration that its term is 1 at [m/s^3].
+const JERK_SCALE: f32 = 10.0f;
 // Sums in a tally: steps by their end code, then the rewards.
 const N_SUMS: u32 = 9u;
 // Index of the sum of the rewards.
@@ -178,6 +198,16 @@ struct Control {
     acceleration: f32,
     // Integral of the speed error [m].
     speed_error_integral: f32,
+    // Steer angle asked for in the step before [rad].
+    steering_before: f32,
+    // Steer angle asked for in the step before that [rad].
+    steering_earlier: f32,
+    // Target speed [m/s].
+    target_speed: f32,
+    // Whether the target speed is 0: once the truck stands, the brakes hold it (0 or 1).
+    holds: u32,
+    // Acceleration before the step [m/s^2].
+    acceleration_before: f32,
 }
 
 // One tractor and its trailer.
@@ -212,15 +242,27 @@ struct Truck {
     steps: u32,
     // Whether the truck's episode has ended and no other has begun, so that no stage changes it (0 or 1).
     held: u32,
+    // Acceleration along the tractor's heading [m/s^2].
+    acceleration: f32,
+    // Curvature that the tractor's path has beyond that of the steer angle, because it turns in late [1/m].
+    curvature_lag: f32,
+    // Lateral acceleration of the trailer's axle group, to the left [m/s^2].
+    lateral_acceleration: f32,
+    // Index of the vehicle in the world.
+    vehicle: u32,
 }
 
-// Where a truck begins its route: fractions of the largest start errors, each in -1..=1; zeros are the lane
-// centre.
+// How a truck begins its route: fractions of the largest start errors and of half the range of speeds, each in
+// -1..=1, and its vehicle. Zeros are the first vehicle on the lane centre at the middle of the speeds.
 struct Start {
     // Fraction of the largest lateral offset, left positive.
     offset: f32,
     // Fraction of the largest heading error, counter-clockwise positive.
     heading: f32,
+    // Fraction of half the range of speeds, from its middle.
+    speed: f32,
+    // Index of the vehicle in the world.
+    vehicle: u32,
 }
 
 // The stream of random numbers that a truck draws routes, starts and random actions from: a truck with the stream
@@ -275,6 +317,16 @@ struct RewardTerms {
     clearance: f32,
     // 1 when the episode failed in this step.
     failure: f32,
+    // 1: the step itself.
+    time: f32,
+    // How far the larger load transfer ratio is beyond its margin, from 0 there to 1 where wheels lift.
+    load_transfer: f32,
+    // Lateral acceleration of the trailer in units of gravity, at most 1.
+    lateral_acceleration: f32,
+    // Change of the acceleration over 10 m/s^3, at most 1.
+    jerk: f32,
+    // 1 when the truck rolled over in this step.
+    rollover: f32,
 }
 
 // One distance sensor, fixed to a unit. A tractor's frame starts at the drive axle, a trailer's at its axle group.
@@ -307,6 +359,14 @@ struct Roll {
     per_roll: f32,
     // Load transfer ratio per rad/s of roll rate.
     per_roll_rate: f32,
+}
+
+// A first-order lag, discretised for a sub-step in which what is asked for is constant. Zeros are no lag.
+struct Lag {
+    // Fraction of the deviation that is left at the sub-step's end.
+    left: f32,
+    // Mean of that fraction over the sub-step.
+    mean: f32,
 }
 
 // The vehicle as the stages need it.
@@ -345,34 +405,71 @@ struct Rig {
     tractor_roll: Roll,
     // The trailer's roll.
     trailer_roll: Roll,
+    // Largest shift of a no-slip point by tyre slip [m].
+    slip_lever_max: f32,
+    // Time constant, per speed, with which the tractor's yaw follows the steer angle; 0 for at once [s/(m/s)].
+    yaw_lag: f32,
+    // How the acceleration follows what is asked for when that is drive.
+    drive_lag: Lag,
+    // The same when it is braking.
+    brake_lag: Lag,
+    // Engine power over the mass of the whole truck [W/kg].
+    power: f32,
+    // Friction ellipse: the lateral grip is that of free rolling times `sqrt(1 - friction_ellipse acceleration²)`; 0
+    // where drive and braking take no lateral grip [(s^2/m)^2].
+    friction_ellipse: f32,
+    // Lateral acceleration that the road's fall to the right adds to the roll [m/s^2].
+    crossfall: f32,
+    // Sub-steps from a steer command to the first movement of the wheels.
+    steer_delay: u32,
+    // Mass of the trailer with its load [kg].
+    trailer_mass: f32,
+    // Constant lateral acceleration at which the trailer's inner wheels lift, in units of gravity.
+    rollover_threshold: f32,
+    // Index of its distance sensors among those of all vehicles.
+    chassis: u32,
+    // Index of vehicle and load, as reports and the clock group them.
+    class_index: u32,
 }
 
 // One entry of the action table.
 struct Action {
     // Steer angle asked for [rad].
     steering: f32,
-    // Speed asked for [m/s].
+    // Speed asked for or, with [`Params::changes_speed`], by how much the target speed changes [m/s].
     speed: f32,
 }
 
-// Vehicle, time and weights, shared by all trucks.
+// Time and weights, shared by all trucks.
 struct Params {
-    // The vehicle.
-    rig: Rig,
     // Time of one sub-step [s].
     substep: f32,
     // Sub-steps in a step.
     n_substeps: u32,
     // Entries of the action table.
     n_actions: u32,
+    // Vehicles that an episode draws from.
+    n_vehicles: u32,
     // Range of a distance sensor [m].
     sensor_range: f32,
     // Largest lateral offset at the start [m].
     start_offset: f32,
     // Largest heading error at the start [rad].
     start_heading: f32,
-    // Speed at the start [m/s].
+    // Middle of the speeds at the start [m/s].
     start_speed: f32,
+    // Half of their range [m/s].
+    start_speed_range: f32,
+    // Lowest target speed [m/s].
+    target_speed_min: f32,
+    // Highest target speed [m/s].
+    target_speed_max: f32,
+    // Whether an action changes the target speed by its speed, rather than states it (0 or 1).
+    changes_speed: u32,
+    // Classes of vehicles.
+    n_classes: u32,
+    // Extras that are observed, the first ones; the others stay 0.
+    n_extras: u32,
     // Distance to the next waypoint beyond which it cannot be passed and the truck has strayed [m].
     stray_distance: f32,
     // Articulation beyond which the truck is jackknifed [rad].
@@ -391,6 +488,18 @@ struct Params {
     clearance_weight: f32,
     // Reward when the episode fails.
     failure_weight: f32,
+    // Reward for each step.
+    time_weight: f32,
+    // Load transfer ratio beyond which its term counts, below 1.
+    load_transfer_margin: f32,
+    // Reward for the load-transfer term, each step.
+    load_transfer_weight: f32,
+    // Reward for the lateral-acceleration term, each step.
+    lateral_acceleration_weight: f32,
+    // Reward for the jerk term, each step.
+    jerk_weight: f32,
+    // Reward when the truck rolls over, beside that for a failure.
+    rollover_weight: f32,
 }
 
 // One waypoint of one route.
@@ -417,8 +526,6 @@ struct RouteRow {
     n_waypoints: u32,
     // Its roundabout.
     roundabout: u32,
-    // Steps after which an episode is timed out.
-    step_limit: u32,
     // Reach of a waypoint's crossing line to the left [m].
     crossing_left: f32,
     // Reach of a waypoint's crossing line to the right [m].
@@ -455,53 +562,61 @@ struct BatchFacts {
     autoreset: u32,
 }
 
-// Vehicle, time and weights.
+// Time and weights.
 @group(0) @binding(0) var<storage, read> params: Params;
+// The vehicles.
+@group(0) @binding(1) var<storage, read> rigs: array<Rig>;
 // The action table.
-@group(0) @binding(1) var<storage, read> actions: array<Action>;
-// The distance sensors, trailer's first.
-@group(0) @binding(2) var<storage, read> rays: array<Ray>;
+@group(0) @binding(2) var<storage, read> actions: array<Action>;
+// The distance sensors of each chassis, trailer's first.
+@group(0) @binding(3) var<storage, read> rays: array<Ray>;
 // A field for each roundabout.
-@group(0) @binding(3) var<storage, read> fields: array<FieldRow>;
+@group(0) @binding(4) var<storage, read> fields: array<FieldRow>;
 // Cells of all fields, two words each.
-@group(0) @binding(4) var<storage, read> cells: array<vec2<u32>>;
+@group(0) @binding(5) var<storage, read> cells: array<vec2<u32>>;
 // Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of STORED_UNIT.
-@group(0) @binding(5) var<storage, read> corners: array<u32>;
+@group(0) @binding(6) var<storage, read> corners: array<u32>;
 // Every route's waypoints, one route after the other.
-@group(0) @binding(6) var<storage, read> waypoints: array<WaypointRow>;
+@group(0) @binding(7) var<storage, read> waypoints: array<WaypointRow>;
 // What is observed at each of them.
-@group(0) @binding(7) var<storage, read> previews: array<PreviewRow>;
+@group(0) @binding(8) var<storage, read> previews: array<PreviewRow>;
 // Every route.
-@group(0) @binding(8) var<storage, read> routes: array<RouteRow>;
+@group(0) @binding(9) var<storage, read> routes: array<RouteRow>;
+// Steps after which an episode is timed out, [n_routes, n_classes].
+@group(0) @binding(10) var<storage, read> step_limits: array<u32>;
 // Facts that the trucks of a batch share.
-@group(0) @binding(9) var<storage, read> batch: BatchFacts;
+@group(0) @binding(11) var<storage, read> batch: BatchFacts;
 // Routes that episodes run on: to be drawn from, or one for each truck.
-@group(0) @binding(10) var<storage, read> choice: array<u32>;
+@group(0) @binding(12) var<storage, read> choice: array<u32>;
 // The stream of random numbers that each truck draws from, [n_envs].
-@group(0) @binding(11) var<storage, read> streams: array<Stream>;
+@group(0) @binding(13) var<storage, read> streams: array<Stream>;
 // Which trucks begin an episode when the caller says so, and how, [n_envs].
-@group(0) @binding(12) var<storage, read> begins: array<BeginRow>;
+@group(0) @binding(14) var<storage, read> begins: array<BeginRow>;
 //  Index into the action table, [n_envs].
-@group(0) @binding(13) var<storage, read_write> action: array<u32>;
+@group(0) @binding(15) var<storage, read_write> action: array<u32>;
 //  Steer angle and acceleration asked of each truck, [n_envs].
-@group(0) @binding(14) var<storage, read_write> control: array<Control>;
+@group(0) @binding(16) var<storage, read_write> control: array<Control>;
 //  The trucks, [n_envs].
-@group(0) @binding(15) var<storage, read_write> truck: array<Truck>;
+@group(0) @binding(17) var<storage, read_write> truck: array<Truck>;
 //  Distances to the kerbs [m], [n_envs].
-@group(0) @binding(16) var<storage, read_write> clearance: array<Clearance>;
+@group(0) @binding(18) var<storage, read_write> clearance: array<Clearance>;
 //  Progress along the routes, [n_envs].
-@group(0) @binding(17) var<storage, read_write> progress: array<Progress>;
+@group(0) @binding(19) var<storage, read_write> progress: array<Progress>;
 //  Distance sensors [m], [n_envs, 29].
-@group(0) @binding(18) var<storage, read_write> ranges: array<f32>;
+@group(0) @binding(20) var<storage, read_write> ranges: array<f32>;
 //  The observation before the next action, [n_envs, 69].
-@group(0) @binding(19) var<storage, read_write> observation: array<f32>;
+@group(0) @binding(21) var<storage, read_write> observation: array<f32>;
 //  The observation after the last action, another one only where an episode ended, [n_envs, 69].
-@group(0) @binding(20) var<storage, read_write> next_observation: array<f32>;
+@group(0) @binding(22) var<storage, read_write> next_observation: array<f32>;
 //  Codes of [`crate::layout::Ended`] for the last step, [n_envs].
-@group(0) @binding(21) var<storage, read_write> ended: array<u32>;
+@group(0) @binding(23) var<storage, read_write> ended: array<u32>;
 //  Physical amounts that the reward weighs, [n_envs].
-@group(0) @binding(22) var<storage, read_write> terms: array<RewardTerms>;
+@group(0) @binding(24) var<storage, read_write> terms: array<RewardTerms>;
 //  Rewards of the last step, [n_envs].
-@group(0) @binding(23) var<storage, read_write> reward: array<f32>;
+@group(0) @binding(25) var<storage, read_write> reward: array<f32>;
+//  What is observed beside the observation before the next action; zeros beyond what the benchmark observes, [n_envs, 12].
+@group(0) @binding(26) var<storage, read_write> extras: array<f32>;
+//  The same beside the observation after the last action, [n_envs, 12].
+@group(0) @binding(27) var<storage, read_write> next_extras: array<f32>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(24) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(28) var<storage, read_write> tally: array<atomic<u32>>;

@@ -33,6 +33,9 @@ fn copy_first(env: u32) {
     for (var n = 0u; n < N_VALUES; n++) {
         next_observation[env * N_VALUES + n] = observation[env * N_VALUES + n];
     }
+    for (var n = 0u; n < N_EXTRAS; n++) {
+        next_extras[env * N_EXTRAS + n] = extras[env * N_EXTRAS + n];
+    }
 }
 
 // Writes a value of a truck's observation: to the one before the next action after a reset, otherwise to the one after
@@ -45,13 +48,44 @@ fn put(env: u32, after_reset: bool, index: u32, value: f32) {
     }
 }
 
-// The 69 values.
+// The values beside the observation, as src/layout/extras.rs defines them: those that the benchmark observes.
+fn observe_extras(env: u32, after_reset: bool) {
+    if params.n_extras == 0u { return; }
+    let truck = truck[env];
+    let rig = rigs[truck.vehicle];
+    let values = array<f32, N_EXTRAS>(
+        truck.steering / rig.steer_max,
+        control[env].target_speed / SPEED_SCALE,
+        truck.acceleration / ACCELERATION_SCALE,
+        truck.lateral_acceleration / G,
+        rig.trailer_wheelbase / WHEELBASE_SCALE,
+        truck.trailer_roll / ROLL_SCALE,
+        truck.trailer_roll_rate / ROLL_RATE_SCALE,
+        rig.trailer_mass / MASS_SCALE,
+        rig.rollover_threshold,
+        rig.lateral_acceleration_max / G,
+        truck.tractor_load_transfer_ratio,
+        truck.trailer_load_transfer_ratio,
+    );
+    var listed = values;
+    for (var n = 0u; n < N_EXTRAS; n++) {
+        let value = select(0.0, clamp(listed[n], -1.0, 1.0), n < params.n_extras);
+        if after_reset {
+            extras[env * N_EXTRAS + n] = value;
+        } else {
+            next_extras[env * N_EXTRAS + n] = value;
+        }
+    }
+}
+
+// The 69 values, and those beside them.
 fn observed(env: u32, after_reset: bool) {
+    observe_extras(env, after_reset);
     let truck = truck[env];
     let route = routes[truck.route];
     let last = route.n_waypoints - 1u;
     let next = min(progress[env].waypoint, last);
-    let point = reference_point(params.rig.wheelbase, truck);
+    let point = reference_point(rigs[truck.vehicle].wheelbase, truck);
     put(env, after_reset, 0u, clamp(truck.speed / SPEED_SCALE, 0.0, 1.0));
     for (var n = 0u; n < 2u; n++) {
         let waypoint = waypoints[route.first + min(next + n, last)];

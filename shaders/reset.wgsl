@@ -53,15 +53,17 @@ fn start(env: u32, begin: BeginRow) {
     var start = begin.start;
     if (begin.what & HAS_START) == 0u {
         let pose = words(stream.seed, stream.env, episode, DRAW_POSE);
-        start = Start(signed_unit(pose.x), signed_unit(pose.y));
+        let kind = words(stream.seed, stream.env, episode, DRAW_VEHICLE);
+        start = Start(signed_unit(pose.x), signed_unit(pose.y), signed_unit(kind.y), index_below(kind.x, params.n_vehicles));
     }
     let first = routes[route].first;
-    var after = started(params, waypoints[first], previews[first].heading, start);
+    var after = started(params, rigs[start.vehicle].wheelbase, waypoints[first], previews[first].heading, start);
     after.route = route;
     after.episode = episode;
     control[env] = Control();
+    control[env].target_speed = after.speed;
     truck[env] = after;
-    progress[env] = followed(routes[route], reference_point(params.rig.wheelbase, after), 1u, params.stray_distance);
+    progress[env] = followed(routes[route], reference_point(rigs[start.vehicle].wheelbase, after), 1u, params.stray_distance);
     progress[env].passed = 0u;
 }
 
@@ -75,13 +77,14 @@ fn route_of(env: u32, episode: u32) -> u32 {
 }
 
 // A truck at `waypoint`, where the lane has this heading [rad]: trailer straight, offset and turned as `start` says.
-fn started(params: Params, waypoint: WaypointRow, lane_heading: f32, start: Start) -> Truck {
+fn started(params: Params, wheelbase: f32, waypoint: WaypointRow, lane_heading: f32, start: Start) -> Truck {
     let heading = wrapped(lane_heading + start.heading * params.start_heading);
     let point = waypoint.position + start.offset * params.start_offset * perpendicular(waypoint.direction);
     var truck = Truck();
-    truck.position = point - 0.5 * params.rig.wheelbase * direction(heading);
+    truck.position = point - 0.5 * wheelbase * direction(heading);
     truck.heading = heading;
     truck.trailer_heading = heading;
-    truck.speed = params.start_speed;
+    truck.speed = params.start_speed + start.speed * params.start_speed_range;
+    truck.vehicle = start.vehicle;
     return truck;
 }

@@ -22,11 +22,11 @@ fn sense_after_reset(thread: Thread) {
 // Distance along a truck's ray to the kerb: the sensors' range where none is met before, 0 from inside one [m].
 fn range_of(env: u32, index: u32) -> f32 {
     let truck = truck[env];
-    let ray = rays[index];
+    let ray = rays[rigs[truck.vehicle].chassis * N_RAYS + index];
     var position = truck.position;
     var heading = direction(truck.heading);
     if index < N_TRAILER_RAYS {
-        position = trailer_position(params.rig, truck);
+        position = trailer_position(rigs[truck.vehicle], truck);
         heading = direction(truck.trailer_heading);
     }
     let field = fields[routes[truck.route].roundabout];

@@ -7,21 +7,42 @@ fn steer(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
     let duration = f32(params.n_substeps) * params.substep;
-    control[env] = controlled(params.rig, duration, actions[action[env]], truck[env].speed, control[env]);
+    let asked = targeted(params, actions[action[env]], control[env]);
+    control[env] = controlled(rigs[truck[env].vehicle], duration, asked, truck[env].speed, control[env]);
+    control[env].acceleration_before = truck[env].acceleration;
+}
+
+// The action with the target speed that it leads to, from that of the control before.
+fn targeted(params: Params, action: Action, before: Control) -> Action {
+    let changed = min(max(before.target_speed + action.speed, params.target_speed_min), params.target_speed_max);
+    return Action(action.steering, select(action.speed, changed, params.changes_speed == 1u));
 }
 
 // The control for the next `duration` seconds of a truck at `speed` [m/s] that was controlled by `before`.
 //
 // PI controller with anti-windup: the integral is reset to 0 while the error is large, and kept while the acceleration
-// asked for is out of reach. Otherwise a long approach to the target speed would overshoot it.
+// asked for is out of reach. Otherwise a long approach to the target speed would overshoot it. A target of 0 is reached
+// with constant braking at last: the controller alone would never stand.
 fn controlled(rig: Rig, duration: f32, action: Action, speed: f32, before: Control) -> Control {
     let error = action.speed - speed;
     let near = abs(error) <= rig.speed_integral_band;
     let held = select(0.0, before.speed_error_integral, near);
     let integrated = select(0.0, held + error * duration, near);
     let asked = rig.speed_gain * error + rig.speed_integral_gain * integrated;
-    let reachable = rig.speed_braking <= asked && asked <= rig.acceleration_max;
+    let most = drive_max(rig, speed);
+    let reachable = rig.speed_braking <= asked && asked <= most;
     let speed_error_integral = select(held, integrated, reachable);
-    let acceleration = rig.speed_gain * error + rig.speed_integral_gain * speed_error_integral;
-    return Control(action.steering, min(max(acceleration, rig.speed_braking), rig.acceleration_max), speed_error_integral);
+    let holds = action.speed == 0.0;
+    let steady = rig.speed_gain * error + rig.speed_integral_gain * speed_error_integral;
+    let acceleration = select(steady, min(steady, -HOLD_BRAKING), holds);
+    return Control(
+        action.steering,
+        min(max(acceleration, rig.speed_braking), most),
+        select(speed_error_integral, 0.0, holds),
+        before.steering,
+        before.steering_before,
+        action.speed,
+        select(0u, 1u, holds),
+        before.acceleration_before,
+    );
 }

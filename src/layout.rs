@@ -6,6 +6,7 @@
 pub mod buffers;
 pub(crate) mod columns;
 mod ended;
+mod extras;
 mod observation;
 
 use glam::Vec2;
@@ -15,6 +16,7 @@ use crate::shared::constants;
 pub use columns::{Column, N_COLUMNS};
 pub use ended::Ended;
 pub(crate) use ended::printed_codes;
+pub use extras::{EXTRAS, Extra, Track};
 pub use observation::{OBSERVATION, Values};
 
 constants! {
@@ -30,6 +32,8 @@ constants! {
     pub const N_RAYS: usize = N_TRAILER_RAYS + N_TRACTOR_RAYS;
     /// Values of an observation that depend on the waypoint alone: future and current curvature, radius ahead.
     pub const N_PREVIEW: usize = 18;
+    /// Values that may be observed beside those.
+    pub const N_EXTRAS: usize = 12;
     /// Bit of [`BeginRow::what`]: the truck begins an episode.
     pub const BEGINS: u32 = 1;
     /// Bit: the episode is the first of the truck's stream, not the next one.
@@ -49,6 +53,16 @@ crate::shared! {
         pub acceleration: f32,
         /// Integral of the speed error \[m].
         pub speed_error_integral: f32,
+        /// Steer angle asked for in the step before \[rad].
+        pub steering_before: f32,
+        /// Steer angle asked for in the step before that \[rad].
+        pub steering_earlier: f32,
+        /// Target speed \[m/s].
+        pub target_speed: f32,
+        /// Whether the target speed is 0: once the truck stands, the brakes hold it (0 or 1).
+        pub holds: u32,
+        /// Acceleration before the step \[m/s^2].
+        pub acceleration_before: f32,
     }
 
     /// One tractor and its trailer.
@@ -83,15 +97,27 @@ crate::shared! {
         pub steps: u32,
         /// Whether the truck's episode has ended and no other has begun, so that no stage changes it (0 or 1).
         pub held: u32,
+        /// Acceleration along the tractor's heading \[m/s^2].
+        pub acceleration: f32,
+        /// Curvature that the tractor's path has beyond that of the steer angle, because it turns in late \[1/m].
+        pub curvature_lag: f32,
+        /// Lateral acceleration of the trailer's axle group, to the left \[m/s^2].
+        pub lateral_acceleration: f32,
+        /// Index of the vehicle in the world.
+        pub vehicle: u32,
     }
 
-    /// Where a truck begins its route: fractions of the largest start errors, each in -1..=1; zeros are the lane
-    /// centre.
+    /// How a truck begins its route: fractions of the largest start errors and of half the range of speeds, each in
+    /// -1..=1, and its vehicle. Zeros are the first vehicle on the lane centre at the middle of the speeds.
     pub struct Start {
         /// Fraction of the largest lateral offset, left positive.
         pub offset: f32,
         /// Fraction of the largest heading error, counter-clockwise positive.
         pub heading: f32,
+        /// Fraction of half the range of speeds, from its middle.
+        pub speed: f32,
+        /// Index of the vehicle in the world.
+        pub vehicle: u32,
     }
 
     /// The stream of random numbers that a truck draws routes, starts and random actions from: a truck with the stream
@@ -146,6 +172,16 @@ crate::shared! {
         pub clearance: f32,
         /// 1 when the episode failed in this step.
         pub failure: f32,
+        /// 1: the step itself.
+        pub time: f32,
+        /// How far the larger load transfer ratio is beyond its margin, from 0 there to 1 where wheels lift.
+        pub load_transfer: f32,
+        /// Lateral acceleration of the trailer in units of gravity, at most 1.
+        pub lateral_acceleration: f32,
+        /// Change of the acceleration over 10 m/s^3, at most 1.
+        pub jerk: f32,
+        /// 1 when the truck rolled over in this step.
+        pub rollover: f32,
     }
 
     /// One distance sensor, fixed to a unit. A tractor's frame starts at the drive axle, a trailer's at its axle group.
@@ -178,6 +214,14 @@ crate::shared! {
         pub per_roll: f32,
         /// Load transfer ratio per rad/s of roll rate.
         pub per_roll_rate: f32,
+    }
+
+    /// A first-order lag, discretised for a sub-step in which what is asked for is constant. Zeros are no lag.
+    pub struct Lag {
+        /// Fraction of the deviation that is left at the sub-step's end.
+        pub left: f32,
+        /// Mean of that fraction over the sub-step.
+        pub mean: f32,
     }
 
     /// The vehicle as the stages need it.
@@ -216,34 +260,71 @@ crate::shared! {
         pub tractor_roll: Roll,
         /// The trailer's roll.
         pub trailer_roll: Roll,
+        /// Largest shift of a no-slip point by tyre slip \[m].
+        pub slip_lever_max: f32,
+        /// Time constant, per speed, with which the tractor's yaw follows the steer angle; 0 for at once \[s/(m/s)].
+        pub yaw_lag: f32,
+        /// How the acceleration follows what is asked for when that is drive.
+        pub drive_lag: Lag,
+        /// The same when it is braking.
+        pub brake_lag: Lag,
+        /// Engine power over the mass of the whole truck \[W/kg].
+        pub power: f32,
+        /// Friction ellipse: the lateral grip is that of free rolling times `sqrt(1 - friction_ellipse acceleration²)`; 0
+        /// where drive and braking take no lateral grip \[(s^2/m)^2].
+        pub friction_ellipse: f32,
+        /// Lateral acceleration that the road's fall to the right adds to the roll \[m/s^2].
+        pub crossfall: f32,
+        /// Sub-steps from a steer command to the first movement of the wheels.
+        pub steer_delay: u32,
+        /// Mass of the trailer with its load \[kg].
+        pub trailer_mass: f32,
+        /// Constant lateral acceleration at which the trailer's inner wheels lift, in units of gravity.
+        pub rollover_threshold: f32,
+        /// Index of its distance sensors among those of all vehicles.
+        pub chassis: u32,
+        /// Index of vehicle and load, as reports and the clock group them.
+        pub class_index: u32,
     }
 
     /// One entry of the action table.
     pub struct Action {
         /// Steer angle asked for \[rad].
         pub steering: f32,
-        /// Speed asked for \[m/s].
+        /// Speed asked for or, with [`Params::changes_speed`], by how much the target speed changes \[m/s].
         pub speed: f32,
     }
 
-    /// Vehicle, time and weights, shared by all trucks.
+    /// Time and weights, shared by all trucks.
     pub struct Params {
-        /// The vehicle.
-        pub rig: Rig,
         /// Time of one sub-step \[s].
         pub substep: f32,
         /// Sub-steps in a step.
         pub n_substeps: u32,
         /// Entries of the action table.
         pub n_actions: u32,
+        /// Vehicles that an episode draws from.
+        pub n_vehicles: u32,
         /// Range of a distance sensor \[m].
         pub sensor_range: f32,
         /// Largest lateral offset at the start \[m].
         pub start_offset: f32,
         /// Largest heading error at the start \[rad].
         pub start_heading: f32,
-        /// Speed at the start \[m/s].
+        /// Middle of the speeds at the start \[m/s].
         pub start_speed: f32,
+        /// Half of their range \[m/s].
+        pub start_speed_range: f32,
+        /// Lowest target speed \[m/s].
+        pub target_speed_min: f32,
+        /// Highest target speed \[m/s].
+        pub target_speed_max: f32,
+        /// Whether an action changes the target speed by its speed, rather than states it (0 or 1).
+        pub changes_speed: u32,
+        /// Classes of vehicles.
+        pub n_classes: u32,
+        /// Extras that are observed, the first ones; the others stay 0.
+        pub n_extras: u32,
         /// Distance to the next waypoint beyond which it cannot be passed and the truck has strayed \[m].
         pub stray_distance: f32,
         /// Articulation beyond which the truck is jackknifed \[rad].
@@ -262,6 +343,18 @@ crate::shared! {
         pub clearance_weight: f32,
         /// Reward when the episode fails.
         pub failure_weight: f32,
+        /// Reward for each step.
+        pub time_weight: f32,
+        /// Load transfer ratio beyond which its term counts, below 1.
+        pub load_transfer_margin: f32,
+        /// Reward for the load-transfer term, each step.
+        pub load_transfer_weight: f32,
+        /// Reward for the lateral-acceleration term, each step.
+        pub lateral_acceleration_weight: f32,
+        /// Reward for the jerk term, each step.
+        pub jerk_weight: f32,
+        /// Reward when the truck rolls over, beside that for a failure.
+        pub rollover_weight: f32,
     }
 
     /// One waypoint of one route.
@@ -288,8 +381,6 @@ crate::shared! {
         pub n_waypoints: u32,
         /// Its roundabout.
         pub roundabout: u32,
-        /// Steps after which an episode is timed out.
-        pub step_limit: u32,
         /// Reach of a waypoint's crossing line to the left \[m].
         pub crossing_left: f32,
         /// Reach of a waypoint's crossing line to the right \[m].

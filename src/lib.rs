@@ -19,6 +19,7 @@ pub mod roundabout; // parameters -> kerbs and lanes
 pub mod procedural; // random roundabouts, by seed and index
 pub mod field; // the signed distance to the kerbs, baked
 pub mod vehicle; // tractor, trailer, load
+pub mod profile; // how fast a vehicle can drive a route
 pub mod scenario; // what to drive
 pub mod world; // what trucks share, baked
 pub mod stages; // one step, in order

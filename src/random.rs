@@ -18,6 +18,8 @@ constants! {
     const DRAW_ROUTE: u32 = Draw::Route as u32;
     /// `Draw::Pose`.
     const DRAW_POSE: u32 = Draw::Pose as u32;
+    /// `Draw::Vehicle`.
+    const DRAW_VEHICLE: u32 = Draw::Vehicle as u32;
     /// `Draw::Action`.
     const DRAW_ACTION: u32 = Draw::Action as u32;
 }
@@ -30,8 +32,10 @@ pub enum Draw {
     Route,
     /// The pose at the start of an episode: lateral offset and heading.
     Pose,
-    /// A random action; the step is added to it, so it stays last.
+    /// A random action; the step is added to it, so that numbers above it are free only at the other end.
     Action,
+    /// The vehicle of an episode, and the speed that it begins at.
+    Vehicle = u32::MAX,
 }
 
 /// Four random words.

@@ -8,11 +8,12 @@ mod read; // the file as checked
 mod roads; // its roundabouts and routes
 mod part; // a part of a scenario, or another roundabout in it
 mod check; // a scenario changed in memory
+mod fleet; // vehicles by shares, drawn from ranges
 
 use std::collections::HashSet;
 use std::path::Path;
 
-use crate::layout::Action;
+use crate::layout::{Action, Track};
 use crate::loading::Loading;
 use crate::reader::Error;
 use crate::roundabout::{Gutter, Roundabout};
@@ -20,6 +21,7 @@ use crate::route::Route;
 use crate::shipped::{Kind, Source};
 use crate::vehicle::Vehicle;
 pub use check::Invalid;
+pub use fleet::{Class, Drawn, Entry, Fleet, Member, N_VEHICLES, Ranges};
 
 /// Default length of a route before the ring \[m].
 pub const APPROACH: f64 = 40.0;
@@ -29,6 +31,17 @@ pub const DEPARTURE: f64 = 35.0;
 pub const WAYPOINT_SPACING: f64 = 2.0;
 /// Default width of the distance field's cells \[m].
 pub const FIELD_CELL: f64 = 1.0;
+
+/// What the time limit is a multiple of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Clock {
+    /// The time that the route takes at the highest target speed.
+    #[default]
+    HighestSpeed,
+    /// The time of the feasible speed profile of the vehicle and load on the route: see [`crate::profile`].
+    Feasible,
+}
 
 /// The three disjoint sets of a benchmark's routes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,10 +82,12 @@ pub struct Place {
 pub struct Scenario {
     /// The file's stem.
     pub name: String,
-    /// The vehicle.
+    /// The vehicle; of several the first as its file has it, for pictures and for the lock that actions are fractions of.
     pub vehicle: Vehicle,
     /// Name of one of the vehicle's loads.
     pub load: String,
+    /// The vehicles that episodes draw from, where there are several.
+    pub fleet: Option<Fleet>,
     /// Lock of the front wheels in place of the vehicle's own \[rad].
     pub steer_max: Option<f64>,
     /// Whether a gutter may be driven on.
@@ -85,22 +100,30 @@ pub struct Scenario {
     pub cell: f64,
     /// Steer levels as fractions of the lock, left positive.
     pub steer_levels: Vec<f64>,
-    /// Target speeds [m/s].
+    /// Target speeds; with `speed_changes` the lowest and highest of them bound the target [m/s].
     pub speeds: Vec<f64>,
+    /// By how much an action may change the target speed; empty where an action states the target itself [m/s].
+    pub speed_changes: Vec<f64>,
     /// Range of the distance sensors \[m].
     pub sensor_range: f64,
+    /// What is observed beside the observation.
+    pub extras: Track,
     /// Largest lateral offset at the start \[m].
     pub start_offset: f64,
     /// Largest heading error at the start \[rad].
     pub start_heading: f64,
+    /// Least and greatest speed at the start; the highest target speed where there is none [m/s].
+    pub start_speed: Option<[f64; 2]>,
     /// Distance to the next waypoint beyond which the truck has strayed \[m].
     pub stray_distance: f64,
     /// Articulation beyond which the truck is jackknifed \[rad].
     pub jackknife_angle: f64,
     /// Load transfer ratio from which the truck has rolled over.
     pub rollover_ratio: f64,
-    /// An episode's time limit, as a multiple of the time that the route takes at the cruising speed.
+    /// An episode's time limit, as a multiple of the time that the clock gives for the route.
     pub time_limit: f64,
+    /// What the time limit is a multiple of.
+    pub clock: Clock,
     /// Reward for each waypoint passed.
     pub waypoint_weight: f64,
     /// Weight of the lane-distance term in the reward of each step.
@@ -113,6 +136,18 @@ pub struct Scenario {
     pub clearance_limit: f64,
     /// Reward for a failure.
     pub failure_weight: f64,
+    /// Reward for each step.
+    pub time_weight: f64,
+    /// Weight of the load-transfer term in the reward of each step.
+    pub load_transfer_weight: f64,
+    /// Load transfer ratio beyond which that term counts.
+    pub load_transfer_margin: f64,
+    /// Weight of the lateral-acceleration term in the reward of each step.
+    pub lateral_acceleration_weight: f64,
+    /// Weight of the jerk term in the reward of each step.
+    pub jerk_weight: f64,
+    /// Reward for a rollover, beside that for a failure.
+    pub rollover_weight: f64,
     /// Length of a route before the ring \[m].
     pub approach: f64,
     /// Length of a route after the ring \[m].
@@ -194,13 +229,21 @@ impl Scenario {
         self.places.iter().enumerate().flat_map(|(index, place)| place.routes.iter().map(move |route| (index, route)))
     }
 
-    /// The action table for a lock \[rad]: (steer angle, target speed) pairs, the speed varying slowest.
+    /// The action table for a lock \[rad]: pairs of a steer angle and a target speed or a change of it, the speed varying
+    /// slowest.
     pub fn actions(&self, lock: f32) -> Vec<Action> {
         let pair = |speed: f64, level: f64| Action { steering: level as f32 * lock, speed: speed as f32 };
-        self.speeds.iter().flat_map(|&speed| self.steer_levels.iter().map(move |&level| pair(speed, level))).collect()
+        let speeds = if self.speed_changes.is_empty() { &self.speeds } else { &self.speed_changes };
+        speeds.iter().flat_map(|&speed| self.steer_levels.iter().map(move |&level| pair(speed, level))).collect()
     }
 
-    /// The highest target speed: trucks start with it, and time limits are computed with it [m/s].
+    /// The lowest and the highest target speed [m/s].
+    pub fn speed_range(&self) -> [f64; 2] {
+        [self.speeds.iter().copied().fold(f64::INFINITY, f64::min), self.cruising_speed()]
+    }
+
+    /// The highest target speed: trucks start with it, and time limits are computed with it, where the benchmark does
+    /// not say otherwise [m/s].
     pub fn cruising_speed(&self) -> f64 {
         self.speeds.iter().copied().fold(0.0, f64::max)
     }

@@ -155,7 +155,7 @@ impl Simulator {
                 return Err(Error::UnknownTruck { position, index: env, n_envs });
             };
             route.map_or(Ok(()), |route| check_known(&self.world, &[route]))?;
-            start.map_or(Ok(()), |start| check_start(env, &start))?;
+            start.map_or(Ok(()), |start| check_start(&self.world, env, &start))?;
             let flag = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
             let what = BEGINS | flag(stream.is_some(), IS_FIRST) | flag(route.is_some(), HAS_ROUTE) | flag(start.is_some(), HAS_START);
             *begin = BeginRow { start: start.unwrap_or_default(), route: route.unwrap_or_default(), what };
@@ -173,7 +173,7 @@ impl Simulator {
             return Err(Error::StartCount { n_starts: starts.len(), n_envs });
         }
         for (env, start) in starts.iter().enumerate() {
-            check_start(env, start)?;
+            check_start(&self.world, env, start)?;
         }
         let what = BEGINS | IS_FIRST | HAS_START;
         let begins: Vec<BeginRow> = starts.iter().map(|&start| BeginRow { start, route: 0, what }).collect();
@@ -274,9 +274,13 @@ fn check_routes(world: &World, n_envs: usize, choice: &RouteChoice) -> Result<()
     Ok(())
 }
 
-/// An error if the start lies beyond the benchmark's largest errors.
-fn check_start(env: usize, start: &Start) -> Result<(), Error> {
-    let outside = [start.offset, start.heading].into_iter().find(|fraction| !(-1.0..=1.0).contains(fraction));
+/// An error if the start lies beyond the benchmark's largest errors, or its vehicle is not in the world.
+fn check_start(world: &World, env: usize, start: &Start) -> Result<(), Error> {
+    let n_vehicles = world.rigs.len();
+    if n_vehicles <= start.vehicle as usize {
+        return Err(Error::UnknownVehicle { vehicle: start.vehicle, n_vehicles });
+    }
+    let outside = [start.offset, start.heading, start.speed].into_iter().find(|fraction| !(-1.0..=1.0).contains(fraction));
     outside.map_or(Ok(()), |fraction| Err(Error::UnknownStart { env, fraction: fraction.to_string() }))
 }
 
@@ -287,7 +291,7 @@ fn check_known(world: &World, routes: &[u32]) -> Result<(), Error> {
     unknown.map_or(Ok(()), |&route| Err(Error::UnknownRoute { route, n_routes }))
 }
 
-/// An error if a truck's route, waypoint or action is not in the world: stages use them as indices without a check.
+/// An error if a truck's route, vehicle, waypoint or action is not in the world: stages use them as indices without a check.
 fn check_indices(world: &World, batch: &Batch) -> Result<(), Error> {
     if let Some((env, &found)) = batch.action.iter().enumerate().find(|&(_, &action)| world.params.n_actions <= action) {
         let limit = format!("actions 0..{}", world.params.n_actions);
@@ -298,6 +302,10 @@ fn check_indices(world: &World, batch: &Batch) -> Result<(), Error> {
             let limit = format!("routes 0..{}", world.routes.len());
             return Err(Error::OutsideWorld { column: Column::Truck.name(), env, found: truck.route, limit });
         };
+        if world.rigs.len() <= truck.vehicle as usize {
+            let limit = format!("vehicles 0..{}", world.rigs.len());
+            return Err(Error::OutsideWorld { column: Column::Truck.name(), env, found: truck.vehicle, limit });
+        }
         if route.n_waypoints < progress.waypoint {
             let limit = format!("{} waypoints on its route", route.n_waypoints);
             return Err(Error::OutsideWorld { column: Column::Progress.name(), env, found: progress.waypoint, limit });

@@ -47,8 +47,8 @@ pub fn corners(body: &Body, origin: DVec2, heading: f64) -> [DVec2; 4] {
 pub fn swept_path(rig: &Rig, centre_line: &Curve, speed: f64, spacing: f64) -> Vec<Pose> {
     let wheelbase = f64::from(rig.wheelbase);
     let (fifth_wheel, trailer_wheelbase) = (f64::from(rig.fifth_wheel), f64::from(rig.trailer_wheelbase));
-    // The same bound as in the simulator's equations keeps both levers positive.
-    let slip = (f64::from(rig.slip) * speed * speed).min(crate::engine::cpu::drive::SLIP_LEVER_MAX.into());
+    // The same bound as in the simulator's equations, and another that keeps the tractor's lever positive.
+    let slip = (f64::from(rig.slip) * speed * speed).min(rig.slip_lever_max.into()).min(0.8 * wheelbase);
     let rates = |line: f64, heading: f64, trailer_heading: f64| {
         let steering = line - heading;
         let along = speed * steering.cos();

@@ -2,6 +2,7 @@
 //!
 //! The trailer's suspension belongs to the load: an empty trailer and a full tank roll differently on the same axles.
 
+mod model;
 mod single_track;
 mod suspension;
 mod vehicle_keys;
@@ -12,10 +13,12 @@ use std::path::Path;
 
 use glam::{DVec2, Vec2};
 
+pub use model::{Model, SLIP_LEVER};
 pub use single_track::{SingleTrack, Steady};
 pub use suspension::Suspension;
+pub(crate) use vehicle_keys::{WrittenModel, model as read_model};
 
-use crate::layout::{Body, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, Ray, Rig};
+use crate::layout::{Body, Lag, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, Ray, Rig};
 use crate::reader::Error;
 use crate::shipped::{Kind, Source};
 
@@ -35,6 +38,8 @@ pub struct Vehicle {
     pub speed_control: SpeedControl,
     /// Positions of the distance sensors.
     pub sensors: Sensors,
+    /// What its motion takes into account.
+    pub model: Model,
 }
 
 /// The towing unit.
@@ -174,6 +179,20 @@ impl Vehicle {
         (turned(0.5 * wheelbase + behind_axle), turned(ahead_of_axle - 0.5 * wheelbase))
     }
 
+    /// Moves the trailer's axle group back by `length` \[m], and its rear end and the sensors there with it.
+    pub(crate) fn lengthen_trailer(&mut self, length: f64) {
+        self.trailer.wheelbase += length;
+        self.trailer.kingpin_to_rear += length;
+        self.sensors.trailer_last += length;
+    }
+
+    /// Moves the tractor's front axle ahead by `length` \[m], and its front end and the sensors there with it.
+    pub(crate) fn lengthen_tractor(&mut self, length: f64) {
+        let middle = 0.5 * self.tractor.wheelbase;
+        self.tractor.wheelbase += length;
+        self.sensors.tractor_mounts.iter_mut().filter(|mount| middle < mount.x).for_each(|mount| mount.x += length);
+    }
+
     /// Mass of tractor, trailer and load \[kg].
     pub fn gross_mass(&self, load: &Load) -> f64 {
         self.tractor.mass + load.mass
@@ -190,13 +209,14 @@ impl Vehicle {
     }
 
     /// The constants that the stages need, for one of the loads and sub-steps of `substep` \[s]. `steer_max` replaces
-    /// the vehicle's own lock \[rad].
+    /// the vehicle's own lock \[rad]. Chassis and class are the first: [`crate::world::World`] numbers them.
     ///
     /// # Panics
     ///
     /// If [`Vehicle::loads`] has no load of this name.
     pub fn rig(&self, load: &str, substep: f32, steer_max: Option<f64>) -> Rig {
         let load = &self.loads[load];
+        let (model, grip, duration) = (&self.model, self.tractor.friction * GRAVITY, f64::from(substep));
         Rig {
             wheelbase: self.tractor.wheelbase as f32,
             fifth_wheel: self.tractor.fifth_wheel as f32,
@@ -206,15 +226,27 @@ impl Vehicle {
             steer_rate: self.tractor.steer_rate as f32,
             acceleration_min: load.acceleration_min as f32,
             acceleration_max: load.acceleration_max as f32,
-            lateral_acceleration_max: (self.tractor.friction * GRAVITY) as f32,
+            lateral_acceleration_max: grip as f32,
             speed_gain: self.speed_control.gain as f32,
             speed_integral_gain: self.speed_control.integral_gain as f32,
             speed_integral_band: self.speed_control.integral_band as f32,
             speed_braking: self.speed_control.braking as f32,
             tractor_body: self.tractor_body(),
             trailer_body: self.trailer_body(),
-            tractor_roll: self.tractor.suspension.roll(substep.into()),
-            trailer_roll: load.suspension.roll(substep.into()),
+            tractor_roll: self.tractor.suspension.roll(duration),
+            trailer_roll: load.suspension.roll(duration),
+            slip_lever_max: model.slip_lever as f32,
+            yaw_lag: (model.yaw_lag * load.slip) as f32,
+            drive_lag: Lag::of(model.drive_lag, duration),
+            brake_lag: Lag::of(model.brake_lag, duration),
+            power: model.specific_power(self.gross_mass(load)) as f32,
+            friction_ellipse: model.ellipse(grip) as f32,
+            crossfall: model.fall() as f32,
+            steer_delay: (model.steer_delay / duration).round() as u32,
+            trailer_mass: load.mass as f32,
+            rollover_threshold: load.suspension.rollover_threshold() as f32,
+            chassis: 0,
+            class_index: 0,
         }
     }
 

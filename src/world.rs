@@ -9,10 +9,11 @@ use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 
 use crate::field::Field;
-use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, RouteRow, WaypointRow};
+use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, Rig, RouteRow, Truck, WaypointRow};
 use crate::loading::Loading;
+use crate::profile::Profile;
 use crate::route::{Route, Waypoint};
-use crate::scenario::{Invalid, Place, Scenario};
+use crate::scenario::{Class, Clock, Entry, Invalid, Place, Scenario};
 
 /// Waypoints to the corner of each observed curvature.
 const CURVATURE_STEPS: [usize; 4] = [5, 7, 10, 12];
@@ -24,12 +25,16 @@ const RADIUS_SCALE: f64 = 100.0;
 /// The shared, unchanging part of a batch.
 #[derive(Debug, Clone)]
 pub struct World {
-    /// Vehicle, time and weights.
+    /// Time and weights.
     pub params: Params,
+    /// The vehicles that episodes draw from, at least one.
+    pub rigs: Vec<Rig>,
+    /// What each `class` of theirs is.
+    pub classes: Vec<Class>,
+    /// The distance sensors of each `chassis` of theirs, trailer's first.
+    pub rays: Vec<[Ray; N_RAYS]>,
     /// The action table.
     pub actions: Vec<Action>,
-    /// The distance sensors, trailer's first.
-    pub rays: [Ray; N_RAYS],
     /// One field a roundabout.
     pub fields: Vec<Field>,
     /// Every route's waypoints, one route after the other.
@@ -40,6 +45,8 @@ pub struct World {
     pub routes: Vec<RouteRow>,
     /// `20m/N-left-3` and the like.
     pub route_names: Vec<String>,
+    /// Steps after which an episode is timed out, `[n_routes, n_classes]`.
+    pub step_limits: Vec<u32>,
 }
 
 impl World {
@@ -58,8 +65,8 @@ impl World {
     pub fn bake_with(scenario: &Scenario, loading: &Loading) -> Result<World, Invalid> {
         scenario.check()?;
         let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
-        let rig = scenario.vehicle.rig(&scenario.load, substep, scenario.steer_max);
-        let actions = scenario.actions(rig.steer_max);
+        let (rigs, rays) = rigs(scenario, substep);
+        let actions = scenario.actions(rigs[0].steer_max);
         let mut waypoints = Vec::new();
         let mut previews = Vec::new();
         let mut routes = Vec::new();
@@ -69,7 +76,6 @@ impl World {
                 first: waypoints.len() as u32,
                 n_waypoints: route.waypoints.len() as u32,
                 roundabout: roundabout as u32,
-                step_limit: step_limit(scenario, route),
                 crossing_left: route.crossing.0 as f32,
                 crossing_right: route.crossing.1 as f32,
             });
@@ -77,16 +83,26 @@ impl World {
             waypoints.extend(route.waypoints.iter().map(waypoint_row));
             previews.extend((0..route.waypoints.len()).map(|index| preview_row(&route.waypoints, index)));
         }
+        let classes = scenario.classes();
+        let [slowest, fastest] = scenario.speed_range();
+        let [start_least, start_most] = scenario.start_speed.unwrap_or([scenario.cruising_speed(); 2]);
+        let step_limits = step_limits(scenario, substep, &waypoints, &routes);
         Ok(World {
             params: Params {
-                rig,
                 substep,
                 n_substeps: scenario.n_substeps,
                 n_actions: actions.len() as u32,
+                n_vehicles: rigs.len() as u32,
                 sensor_range: scenario.sensor_range as f32,
                 start_offset: scenario.start_offset as f32,
                 start_heading: scenario.start_heading as f32,
-                start_speed: scenario.cruising_speed() as f32,
+                start_speed: (0.5 * (start_least + start_most)) as f32,
+                start_speed_range: (0.5 * (start_most - start_least)) as f32,
+                target_speed_min: slowest as f32,
+                target_speed_max: fastest as f32,
+                changes_speed: u32::from(!scenario.speed_changes.is_empty()),
+                n_classes: classes.len() as u32,
+                n_extras: scenario.extras.n_extras() as u32,
                 stray_distance: scenario.stray_distance as f32,
                 jackknife_angle: scenario.jackknife_angle as f32,
                 rollover_ratio: scenario.rollover_ratio as f32,
@@ -96,22 +112,51 @@ impl World {
                 clearance_limit: scenario.clearance_limit as f32,
                 clearance_weight: scenario.clearance_weight as f32,
                 failure_weight: scenario.failure_weight as f32,
+                load_transfer_margin: scenario.load_transfer_margin as f32,
+                time_weight: scenario.time_weight as f32,
+                load_transfer_weight: scenario.load_transfer_weight as f32,
+                lateral_acceleration_weight: scenario.lateral_acceleration_weight as f32,
+                jerk_weight: scenario.jerk_weight as f32,
+                rollover_weight: scenario.rollover_weight as f32,
             },
+            rigs,
+            classes,
+            rays,
             actions,
-            rays: scenario.vehicle.rays(),
             fields: fields(scenario, loading),
             waypoints,
             previews,
             routes,
             route_names,
+            step_limits,
         })
     }
 
     /// Memory that its tables take, whatever the number of trucks \[bytes].
     pub fn bytes(&self) -> usize {
         let routes = size_of_val(self.waypoints.as_slice()) + size_of_val(self.previews.as_slice()) + size_of_val(self.routes.as_slice());
-        let vehicle = size_of_val(&self.params) + size_of_val(self.actions.as_slice()) + size_of_val(&self.rays);
-        self.fields.iter().map(Field::bytes).sum::<usize>() + routes + vehicle
+        let routes = routes + size_of_val(self.step_limits.as_slice());
+        let vehicles = size_of_val(self.rigs.as_slice()) + size_of_val(self.rays.as_slice());
+        let shared = size_of_val(&self.params) + size_of_val(self.actions.as_slice());
+        self.fields.iter().map(Field::bytes).sum::<usize>() + routes + vehicles + shared
+    }
+
+    /// The vehicle of a truck of this world.
+    #[inline]
+    pub fn rig(&self, truck: &Truck) -> &Rig {
+        &self.rigs[truck.vehicle as usize]
+    }
+
+    /// Steps after which a truck's episode is timed out.
+    #[inline]
+    pub fn step_limit(&self, truck: &Truck) -> u32 {
+        self.step_limits[(truck.route * self.params.n_classes + self.rig(truck).class_index) as usize]
+    }
+
+    /// Its distance sensors, trailer's first.
+    #[inline]
+    pub fn rays_of(&self, rig: &Rig) -> &[Ray; N_RAYS] {
+        &self.rays[rig.chassis as usize]
     }
 
     /// The waypoints of a route of this world.
@@ -135,6 +180,23 @@ impl World {
     }
 }
 
+/// Every vehicle, and the distance sensors of every chassis among them.
+fn rigs(scenario: &Scenario, substep: f32) -> (Vec<Rig>, Vec<[Ray; N_RAYS]>) {
+    let classes = scenario.classes();
+    let mut rays: Vec<[Ray; N_RAYS]> = Vec::new();
+    let rig = |entry: Entry| {
+        let own = entry.vehicle.rays();
+        // Rows of one chassis stand together.
+        if rays.last() != Some(&own) {
+            rays.push(own);
+        }
+        let (chassis, class_index) = (rays.len() as u32 - 1, entry.class as u32);
+        Rig { chassis, class_index, ..entry.vehicle.rig(&classes[entry.class].load, substep, scenario.steer_max) }
+    };
+    let rigs = scenario.vehicles().into_iter().map(rig).collect();
+    (rigs, rays)
+}
+
 /// The field of every roundabout.
 fn fields(scenario: &Scenario, loading: &Loading) -> Vec<Field> {
     let done = AtomicU64::new(0);
@@ -152,9 +214,28 @@ fn fields(scenario: &Scenario, loading: &Loading) -> Vec<Field> {
     fields
 }
 
-/// Steps after which an episode on this route is timed out.
-fn step_limit(scenario: &Scenario, route: &Route) -> u32 {
-    (scenario.time_limit * route.centre_line.length() / (scenario.cruising_speed() * scenario.step)).ceil() as u32
+/// Steps after which an episode is timed out, `[n_routes, n_classes]`: multiples of the time that a route takes at the
+/// highest target speed, or of that of the feasible profile of the class as its file has it.
+fn step_limits(scenario: &Scenario, substep: f32, waypoints: &[WaypointRow], routes: &[RouteRow]) -> Vec<u32> {
+    let steps = |time: f64| (scenario.time_limit * time / scenario.step).ceil() as u32;
+    match scenario.clock {
+        Clock::HighestSpeed => {
+            let n_classes = scenario.classes().len();
+            let length = |route: &Route| route.centre_line.length();
+            // In this order of operations for as long as there have been benchmarks.
+            let limit = |route| (scenario.time_limit * length(route) / (scenario.cruising_speed() * scenario.step)).ceil() as u32;
+            scenario.routes().flat_map(|(_, route)| std::iter::repeat_n(limit(route), n_classes)).collect()
+        }
+        Clock::Feasible => {
+            let rigs = scenario.typical_rigs(substep);
+            let fastest = scenario.cruising_speed();
+            let of_route = |route: &RouteRow| {
+                let waypoints = &waypoints[route.first as usize..][..route.n_waypoints as usize];
+                rigs.iter().map(|rig| steps(Profile::of(rig, waypoints, fastest).time)).collect::<Vec<u32>>()
+            };
+            routes.par_iter().flat_map_iter(of_route).collect()
+        }
+    }
 }
 
 fn waypoint_row(waypoint: &Waypoint) -> WaypointRow {

@@ -8,8 +8,9 @@ mod case;
 
 use glam::Vec2;
 use offtrack::angle::wrapped;
-use offtrack::cpu::drive::{Moving, load_transfer_ratio, motion, moved};
-use offtrack::layout::{Control, Rig, Truck};
+use offtrack::cpu::drive::{Moving, load_transfer_ratio, motion_of, moved};
+use offtrack::cpu::steer::controlled;
+use offtrack::layout::{Action, Control, Rig, Truck};
 use serde::Serialize;
 
 pub use case::{Case, CaseVehicle, Command, Error, Init, Instant};
@@ -134,6 +135,9 @@ struct Run<'a> {
     /// Index of the last sub-step of the grid that has begun.
     grid: u32,
     moving: Moving,
+    /// What the speed control asked for last, and when it decides next \[s].
+    asked: Control,
+    decides: f64,
     /// Unwrapped headings, in addition to the truck's wrapped ones \[rad].
     psi1: f64,
     psi2: f64,
@@ -150,8 +154,9 @@ impl Run<'_> {
             steering: init.delta as f32,
             ..Truck::default()
         };
-        let motion = motion(&case.vehicle.rig(case.dt), truck.speed, truck.steering, truck.heading - truck.trailer_heading);
-        Run { case, t: 0.0, grid: 0, moving: Moving { truck, motion }, psi1: init.psi1, psi2: init.psi2 }
+        let motion = motion_of(&case.vehicle.rig(case.dt), &truck);
+        let asked = Control::default();
+        Run { case, t: 0.0, grid: 0, asked, decides: 0.0, moving: Moving { truck, motion }, psi1: init.psi1, psi2: init.psi2 }
     }
 
     /// The end of the next sub-step: the grid's next instant, or a command or the case's end before it. `None` at the
@@ -159,19 +164,32 @@ impl Run<'_> {
     fn next_instant(&self) -> Option<f64> {
         let later = |&t: &f64| self.t + SAME_INSTANT < t;
         let grid = f64::from(self.grid + 1) * self.case.dt;
-        let command = self.case.commands.iter().map(|command| command.t).find(later);
-        Some(grid.min(command.unwrap_or(grid)).min(self.case.t_end)).filter(later)
+        let delay = self.case.vehicle.delta_delay;
+        let of_commands = self.case.commands.iter().flat_map(|command| [command.t, command.t + delay]);
+        let controls = self.case.commands.iter().any(|command| command.v_cmd.is_some());
+        let instants = of_commands.chain(controls.then_some(self.decides)).filter(later);
+        Some(instants.fold(grid, f64::min).min(self.case.t_end)).filter(later)
     }
 
     /// The run at `t`, at most a sub-step from now.
     fn after(&self, t: f64, moved: &mut impl FnMut(&Rig, f32, &Control, &Moving) -> Moving) -> Self {
-        let control = self.case.commands.iter().rfind(|command| command.t <= self.t + SAME_INSTANT);
+        let in_force = |since: f64| self.case.commands.iter().rfind(|command| command.t <= since + SAME_INSTANT);
         // Before the first command the steer angle and the speed stay as they are.
-        let control = control.map_or(Control { steering: self.moving.truck.steering, ..Control::default() }, |command| Control {
-            steering: command.delta_cmd as f32,
-            acceleration: command.a_cmd as f32,
-            speed_error_integral: 0.0,
-        });
+        let steering =
+            in_force(self.t - self.case.vehicle.delta_delay).map_or(self.moving.truck.steering, |command| command.delta_cmd as f32);
+        let command = in_force(self.t);
+        let (mut asked, mut decides) = (self.asked, self.decides);
+        if decides <= self.t + SAME_INSTANT {
+            decides += self.case.control_step;
+            if let Some(speed) = command.and_then(|command| command.v_cmd) {
+                let (action, step) = (Action { steering: 0.0, speed: speed as f32 }, self.case.control_step as f32);
+                asked = controlled(&self.case.vehicle.rig(self.case.dt), step, &action, self.moving.truck.speed, &self.asked);
+            }
+        }
+        let control = match command {
+            Some(Command { v_cmd: Some(_), .. }) => Control { steering, ..asked },
+            command => Control { steering, acceleration: command.map_or(0.0, |command| command.a_cmd as f32), ..Control::default() },
+        };
         let duration = t - self.t;
         // A whole sub-step uses the simulator's own `dt`, not a difference of instants, which would round differently.
         let duration = if (duration - self.case.dt).abs() < SAME_INSTANT { self.case.dt } else { duration };
@@ -183,6 +201,8 @@ impl Run<'_> {
             psi1: self.psi1 + turned(moving.truck.heading, self.moving.truck.heading),
             psi2: self.psi2 + turned(moving.truck.trailer_heading, self.moving.truck.trailer_heading),
             moving,
+            asked,
+            decides,
             ..*self
         }
     }
@@ -212,16 +232,21 @@ impl Run<'_> {
             ltr2_dyn: load_transfer_ratio(
                 &vehicle.trailer_suspension().roll(self.case.dt),
                 trailer_roll,
-                motion.trailer_lateral_acceleration,
+                motion.trailer_lateral_acceleration + self.fall(),
             )
             .into(),
         }
     }
 
+    /// Lateral acceleration that the road's fall adds [m/s^2].
+    fn fall(&self) -> f32 {
+        self.case.vehicle.rig(self.case.dt).crossfall
+    }
+
     fn tractor_ratio(&self) -> f64 {
         let Moving { truck, motion } = &self.moving;
         let roll = self.case.vehicle.tractor_suspension().roll(self.case.dt);
-        load_transfer_ratio(&roll, Vec2::new(truck.tractor_roll, truck.tractor_roll_rate), motion.lateral_acceleration).into()
+        load_transfer_ratio(&roll, Vec2::new(truck.tractor_roll, truck.tractor_roll_rate), motion.lateral_acceleration + self.fall()).into()
     }
 }
 

@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for &route in &chosen {
             let trucks = driven(&scenario, &world, route);
             for (n, truck) in trucks.iter().enumerate() {
-                let ranges = sense::ranges(world.route_field(route), &world.params.rig, &world.rays, truck, world.params.sensor_range);
+                let ranges = sense::ranges(world.route_field(route), &world.rigs[0], &world.rays[0], truck, world.params.sensor_range);
                 let ended = match (n + 1 < trucks.len(), route % 2) {
                     (true, _) => Ended::Running,
                     (false, 0) => Ended::TrailerCollided,
@@ -63,7 +63,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// A truck along a route at the cruising speed, its front axle on the centre line.
 fn driven(scenario: &Scenario, world: &World, route: u32) -> Vec<Truck> {
     let Some((_, line)) = scenario.routes().nth(route as usize) else { return Vec::new() };
-    let path = swept_path(&world.params.rig, &line.centre_line, scenario.cruising_speed(), SPACING);
+    let path = swept_path(&world.rigs[0], &line.centre_line, scenario.cruising_speed(), SPACING);
     let truck = |(n, pose): (usize, offtrack::swept::Pose)| Truck {
         position: pose.position.as_vec2(),
         heading: pose.heading as f32,

@@ -70,7 +70,7 @@ impl Frame {
     /// Truck `env` after a reset. A reset computes no clearance, so it is computed here.
     fn at_start(world: &World, batch: &Batch, env: usize) -> Frame {
         let truck = &batch.truck[env];
-        Frame::new(world, batch, env, collide::clearance(world.route_field(truck.route), &world.params.rig, truck))
+        Frame::new(world, batch, env, collide::clearance(world.route_field(truck.route), world.rig(truck), truck))
     }
 
     fn new(world: &World, batch: &Batch, env: usize, clearance: Clearance) -> Frame {
@@ -78,7 +78,7 @@ impl Frame {
         Frame {
             position: truck.position.to_array().map(|value| to(MILLI, value)),
             heading: to(ANGLE, truck.heading),
-            trailer_position: truck.trailer_position(&world.params.rig).to_array().map(|value| to(MILLI, value)),
+            trailer_position: truck.trailer_position(world.rig(truck)).to_array().map(|value| to(MILLI, value)),
             trailer_heading: to(ANGLE, truck.trailer_heading),
             articulation: to(ANGLE, wrapped(truck.heading - truck.trailer_heading)),
             steering: to(ANGLE, truck.steering),
@@ -218,11 +218,11 @@ pub struct Measures {
 impl Measures {
     /// Of the vehicle of a world.
     pub fn of(world: &World) -> Measures {
-        let rig = &world.params.rig;
+        let rig = &world.rigs[0];
         let body =
             |body: &Body| Rectangle { front: to(MILLI, body.front), rear: to(MILLI, body.rear), half_width: to(MILLI, body.half_width) };
         let ray = |ray: &Ray| [to(MILLI, ray.origin.x), to(MILLI, ray.origin.y), to(1e6, ray.direction.x), to(1e6, ray.direction.y)];
-        let (trailer, tractor) = world.rays.split_at(N_TRAILER_RAYS);
+        let (trailer, tractor) = world.rays[0].split_at(N_TRAILER_RAYS);
         Measures {
             wheelbase: to(MILLI, rig.wheelbase),
             fifth_wheel: to(MILLI, rig.fifth_wheel),

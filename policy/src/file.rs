@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use offtrack::layout::{Action, N_VALUES};
+use offtrack::layout::{Action, EXTRAS, N_VALUES};
 use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 use serde::{Deserialize, Serialize};
@@ -29,6 +29,9 @@ struct Description {
     /// Steer angle \[rad] and speed [m/s] of each action.
     actions: Vec<[f32; 2]>,
     layers: usize,
+    /// Names of the extras observed beside the 69 values; none where it is absent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    extras: Vec<String>,
     /// A rectifier where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     activation: Option<String>,
@@ -50,6 +53,7 @@ impl Policy {
             benchmark: self.benchmark.clone(),
             actions: self.actions.iter().map(|action| [action.steering, action.speed]).collect(),
             layers: self.layers.len(),
+            extras: self.extras.clone(),
             activation: (self.activation != Activation::Relu).then(|| self.activation.name().to_owned()),
             checksum: 0,
         };
@@ -134,13 +138,18 @@ fn checked(name: &str, description: Description, tensors: &[(String, TensorView)
             return Err(format!("is a policy that cannot drive: {name}[{index}] is {value}; every number must be finite; train it again"));
         }
     }
+    if !description.extras.iter().map(String::as_str).eq(EXTRAS.iter().map(|extra| extra.name).take(description.extras.len())) {
+        let known: Vec<&str> = EXTRAS.iter().map(|extra| extra.name).collect();
+        return Err(format!("is a policy with the extras {:?}; must be the first of {}", description.extras, known.join(", ")));
+    }
+    let n_values = N_VALUES + description.extras.len();
     let (statistics, layers) = tensors.split_at(2);
     for (name, tensor) in statistics {
-        if tensor.shape() != [N_VALUES] {
-            return Err(format!("is a policy of another shape: {name} is {:?}; an observation has {N_VALUES} values", tensor.shape()));
+        if tensor.shape() != [n_values] {
+            return Err(format!("is a policy of another shape: {name} is {:?}; an observation has {n_values} values", tensor.shape()));
         }
     }
-    let mut n_inputs = N_VALUES;
+    let mut n_inputs = n_values;
     for pair in layers.chunks_exact(2) {
         let [(weight_name, weight), (bias_name, bias)] = [&pair[0], &pair[1]];
         let &[n_outputs] = bias.shape() else {
@@ -164,6 +173,7 @@ fn checked(name: &str, description: Description, tensors: &[(String, TensorView)
         name: name.to_owned(),
         benchmark: description.benchmark,
         actions: description.actions.iter().map(|&[steering, speed]| Action { steering, speed }).collect(),
+        extras: description.extras,
         normalisation: Normalisation { mean: floats(&statistics[0].1), factor: floats(&statistics[1].1) },
         layers: layers.chunks_exact(2).map(|pair| Layer { weights: floats(&pair[0].1), biases: floats(&pair[1].1) }).collect(),
         activation,

@@ -14,6 +14,7 @@
 //! let own = Policy {
 //!     name: "mine".into(),
 //!     layers: vec![layer(N_VALUES, 64), layer(64, 64), layer(64, shipped.actions.len())],
+//!     extras: Vec::new(),
 //!     activation: Activation::Tanh,
 //!     normalisation: Normalisation::none(N_VALUES),
 //!     ..shipped

@@ -4,7 +4,6 @@
 //! result depends on nothing else, and vector instructions of any width give it to the last bit.
 
 use multiversion::multiversion;
-use offtrack::layout::N_VALUES;
 use rayon::prelude::*;
 
 use crate::normalisation::Normalisation;
@@ -66,17 +65,12 @@ impl Layer {
     }
 }
 
-/// The last layer's outputs for each observation, `[rows * outputs]`.
-pub(crate) fn forward(
-    normalisation: &Normalisation,
-    layers: &[Layer],
-    activation: Activation,
-    observations: &[[f32; N_VALUES]],
-) -> Vec<f32> {
-    let n_outputs = layers.last().map_or(0, Layer::n_outputs);
-    let mut logits = vec![0.0; observations.len() * n_outputs];
-    let block = |(observations, logits): (&[[f32; N_VALUES]], &mut [f32])| {
-        let mut values = grouped(&normalisation.apply(observations), N_VALUES);
+/// The last layer's outputs for each observation of `[rows * values]`, `[rows * outputs]`.
+pub(crate) fn forward(normalisation: &Normalisation, layers: &[Layer], activation: Activation, observations: &[f32]) -> Vec<f32> {
+    let (n_values, n_outputs) = (normalisation.mean.len(), layers.last().map_or(0, Layer::n_outputs));
+    let mut logits = vec![0.0; observations.len() / n_values * n_outputs];
+    let block = |(observations, logits): (&[f32], &mut [f32])| {
+        let mut values = grouped(&normalisation.apply_rows(observations), n_values);
         for (index, layer) in layers.iter().enumerate() {
             let mut outputs = vec![[0.0; ROWS]; values.len() / layer.n_inputs() * layer.n_outputs()];
             linear(layer, &values, &mut outputs);
@@ -90,8 +84,8 @@ pub(crate) fn forward(
             logits.iter_mut().zip(group).for_each(|(logit, values)| *logit = values[row % ROWS]);
         }
     };
-    if BLOCK < observations.len() {
-        observations.par_chunks(BLOCK).zip(logits.par_chunks_mut(BLOCK * n_outputs)).for_each(block);
+    if BLOCK * n_values < observations.len() {
+        observations.par_chunks(BLOCK * n_values).zip(logits.par_chunks_mut(BLOCK * n_outputs)).for_each(block);
     } else {
         block((observations, &mut logits));
     }

@@ -39,9 +39,14 @@ impl Normalisation {
 
     /// The normalised rows, one after the other, `[rows * values]`.
     pub fn apply<const N: usize>(&self, observations: &[[f32; N]]) -> Vec<f32> {
+        self.apply_rows(observations.as_flattened())
+    }
+
+    /// The same of rows that lie one after the other, `[rows * values]`.
+    pub fn apply_rows(&self, observations: &[f32]) -> Vec<f32> {
         let normalised = |((value, mean), factor): ((&f32, &f32), &f32)| ((value - mean) * factor).clamp(-LIMIT, LIMIT);
-        let mut values = Vec::with_capacity(observations.len() * N);
-        for row in observations {
+        let mut values = Vec::with_capacity(observations.len());
+        for row in observations.chunks_exact(self.mean.len()) {
             values.extend(row.iter().zip(&self.mean).zip(&self.factor).map(normalised));
         }
         values

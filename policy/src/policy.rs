@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use offtrack::layout::{Action, N_VALUES};
+use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES};
 use offtrack::reader;
 use offtrack::world::World;
 
@@ -32,7 +32,10 @@ pub struct Policy {
     pub actions: Vec<Action>,
     /// How observations are normalised for it.
     pub normalisation: Normalisation,
-    /// The layers, from the observation on: the first has [`N_VALUES`] inputs, the last an output an action.
+    /// Names of the extras that it observes beside the 69 values, in the order of [`EXTRAS`]: its first ones.
+    pub extras: Vec<String>,
+    /// The layers, from the observation on: the first has an input for each of the [`N_VALUES`] and the extras, the last
+    /// an output an action.
     pub layers: Vec<Layer>,
     /// What stands after each layer but the last.
     pub activation: Activation,
@@ -77,14 +80,28 @@ impl Policy {
         SHIPPED.map(|(name, _)| name)
     }
 
-    /// One value an action for each observation, `[n_envs * n_actions]`. Those of an observation do not depend on the
+    /// One value an action for each observation, `[n_envs * n_actions]`, of a policy without extras. Those of an observation do not depend on the
     /// others, on its place among them, or on the number of threads, to the last bit.
     ///
     /// # Panics
     ///
-    /// Where the layers do not fit each other; those of a policy that was read do.
+    /// Where the layers do not fit each other; those of a policy that was read do. And where it has extras.
     pub fn logits(&self, observations: &[[f32; N_VALUES]]) -> Vec<f32> {
-        network::forward(&self.normalisation, &self.layers, self.activation, observations)
+        assert!(self.extras.is_empty(), "the policy observes extras: they must be given");
+        network::forward(&self.normalisation, &self.layers, self.activation, observations.as_flattened())
+    }
+
+    /// The same with the extras beside each observation, of which it takes the first, `[n_envs]` each.
+    ///
+    /// # Panics
+    ///
+    /// Where the layers do not fit each other; those of a policy that was read do.
+    pub fn logits_beside(&self, observations: &[[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Vec<f32> {
+        if self.extras.is_empty() {
+            return self.logits(observations);
+        }
+        let rows = observations.iter().zip(extras).flat_map(|(values, extras)| values.iter().chain(&extras[..self.extras.len()]));
+        network::forward(&self.normalisation, &self.layers, self.activation, &rows.copied().collect::<Vec<f32>>())
     }
 
     /// The index of the most probable action for each observation, `[n_envs]`.
@@ -96,12 +113,31 @@ impl Policy {
         greedy(&self.logits(observations), self.actions.len())
     }
 
+    /// The index of the most probable action for each observation with the extras beside it, `[n_envs]`.
+    ///
+    /// # Panics
+    ///
+    /// As [`Policy::logits_beside`].
+    pub fn act_beside(&self, observations: &[[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Vec<u32> {
+        greedy(&self.logits_beside(observations, extras), self.actions.len())
+    }
+
     /// Whether the policy can drive in `world`.
     ///
     /// # Errors
     ///
-    /// Another action table than the world's.
+    /// Other extras than the world's, or another action table.
     pub fn check(&self, world: &World) -> Result<(), Error> {
+        let observed = EXTRAS[..world.params.n_extras as usize].iter().map(|extra| extra.name);
+        if !observed.clone().eq(self.extras.iter().map(String::as_str)) {
+            let listed = |names: Vec<&str>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            let message = format!(
+                "learned with other extras beside the observation: {} here, {} in the benchmark; the key observation.extras must be equal",
+                listed(self.extras.iter().map(String::as_str).collect()),
+                listed(observed.collect()),
+            );
+            return Err(Error::contents(&self.name, &message));
+        }
         let near = |a: f32, b: f32| (a - b).abs() <= SAME_ACTION * a.abs().max(1.0);
         let same = |(a, b): (&Action, &Action)| near(a.steering, b.steering) && near(a.speed, b.speed);
         if self.actions.len() == world.actions.len() && self.actions.iter().zip(&world.actions).all(same) {

@@ -309,7 +309,11 @@ impl Batch {
                 env,
                 stream: streams.as_ref().and_then(|streams| streams[index]).map(|(seed, env)| Stream { seed, env }),
                 route: route.map(|name| self.route(name)).transpose()?,
-                start: starts.as_ref().and_then(|starts| starts[index]).map(|(offset, heading)| Start { offset, heading }),
+                start: starts.as_ref().and_then(|starts| starts[index]).map(|(offset, heading)| Start {
+                    offset,
+                    heading,
+                    ..Start::default()
+                }),
             })
         };
         let requests = envs.iter().enumerate().map(request).collect::<PyResult<Vec<Begin>>>()?;

@@ -29,7 +29,13 @@ impl Network {
 
     #[staticmethod]
     fn load(file: &str) -> PyResult<Network> {
-        Policy::load(Path::new(file)).map(Network::new).map_err(refused)
+        let policy = Policy::load(Path::new(file)).map_err(refused)?;
+        if !policy.extras.is_empty() {
+            let extras = policy.extras.join(", ");
+            let message = format!("{file}: observes {extras} beside the observation; Python drives policies without such extras");
+            return Err(PyValueError::new_err(message));
+        }
+        Ok(Network::new(policy))
     }
 
     #[getter]
@@ -121,6 +127,7 @@ pub fn write_policy(
         name: file.to_owned(),
         benchmark: name,
         actions,
+        extras: Vec::new(),
         normalisation: Normalisation { mean: vector(&mean), factor: vector(&factor) },
         layers: layers.iter().map(layer).collect(),
         activation,

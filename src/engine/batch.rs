@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{Autoreset, Error, Tally, memory};
 use crate::layout::columns::{columns, row_bytes};
-use crate::layout::{Clearance, Column, Control, N_COLUMNS, N_RAYS, N_VALUES, Progress, RewardTerms, Stream, Truck};
+use crate::layout::{Clearance, Column, Control, N_COLUMNS, N_EXTRAS, N_RAYS, N_VALUES, Progress, RewardTerms, Stream, Truck};
 
 /// Rows that a thread takes at least: fewer cost more to hand out than to step.
 const ROWS_MIN: usize = 16;
@@ -35,6 +35,18 @@ impl RouteChoice {
             RouteChoice::Fixed(_) => Autoreset::Disabled,
         }
     }
+}
+
+/// The rows of some columns side by side, in pairs of pairs: a tuple of more than twelve would be none of rayon's.
+macro_rules! zipped {
+    ($batch:ident; $last:ident) => { $batch.$last.par_iter_mut() };
+    ($batch:ident; $name:ident $($rest:ident)+) => { $batch.$name.par_iter_mut().zip(zipped!($batch; $($rest)+)) };
+}
+
+/// The names of one such row.
+macro_rules! nested {
+    ($last:ident) => { $last };
+    ($name:ident $($rest:ident)+) => { ($name, nested!($($rest)+)) };
 }
 
 macro_rules! batch {
@@ -106,8 +118,8 @@ macro_rules! batch {
             /// Every row, divided among all cores.
             pub(crate) fn rows(&mut self) -> impl ParallelIterator<Item = Row<'_>> {
                 let (streams, choice, autoreset) = (&self.streams, &self.choice, self.autoreset);
-                let rows = ($(&mut self.$name,)*).into_par_iter().enumerate().with_min_len(ROWS_MIN);
-                rows.map(move |(env, ($($name,)*))| Row {
+                let rows = zipped!(self; $($name)*).enumerate().with_min_len(ROWS_MIN);
+                rows.map(move |(env, nested!($($name)*))| Row {
                     stream: streams[env],
                     env: env as u32,
                     autoreset,

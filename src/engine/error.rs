@@ -22,6 +22,14 @@ pub enum Error {
     /// An episode needs a route to run on.
     #[error("routes: empty; at least 1 route is needed")]
     NoRoutes,
+    /// A vehicle that the world does not have.
+    #[error("vehicles: {vehicle}; the world has vehicles 0..{n_vehicles}")]
+    UnknownVehicle {
+        /// The index.
+        vehicle: u32,
+        /// Vehicles of the world.
+        n_vehicles: usize,
+    },
     /// A route that the world does not have.
     #[error("routes: {route}; the world has routes 0..{n_routes}")]
     UnknownRoute {

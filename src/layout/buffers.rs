@@ -1,6 +1,6 @@
 //! The buffers that the kernels of a step see: one bind group, a binding each, in this order.
 
-use super::{Action, BatchFacts, BeginRow, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, RouteRow, Stream, WaypointRow};
+use super::{Action, BatchFacts, BeginRow, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, Rig, RouteRow, Stream, WaypointRow};
 use crate::shared::{Named, Shared, comment};
 
 /// What shaders may do to a buffer.
@@ -28,8 +28,10 @@ pub enum Buffer {
 crate::named! {
     /// What trucks share: first the world, then what belongs to one batch.
     pub enum Table {
-        /// Vehicle, time and weights.
+        /// Time and weights.
         Params = "params",
+        /// The vehicles.
+        Rigs = "rigs",
         /// The action table.
         Actions = "actions",
         /// The distance sensors.
@@ -46,6 +48,8 @@ crate::named! {
         Previews = "previews",
         /// Every route.
         Routes = "routes",
+        /// When an episode is timed out.
+        StepLimits = "step_limits",
         /// Facts that the trucks of a batch share.
         Batch = "batch",
         /// Routes that episodes run on.
@@ -111,9 +115,10 @@ impl Table {
             format!("array<{}>", T::element())
         }
         let (doc, kind) = match self {
-            Table::Params => ("Vehicle, time and weights.", Params::wgsl()),
+            Table::Params => ("Time and weights.", Params::wgsl()),
+            Table::Rigs => ("The vehicles.", rows::<Rig>()),
             Table::Actions => ("The action table.", rows::<Action>()),
-            Table::Rays => ("The distance sensors, trailer's first.", rows::<Ray>()),
+            Table::Rays => ("The distance sensors of each chassis, trailer's first.", rows::<Ray>()),
             Table::Fields => ("A field for each roundabout.", rows::<FieldRow>()),
             Table::Cells => ("Cells of all fields, two words each.", "array<vec2<u32>>".to_owned()),
             Table::Corners => (
@@ -123,6 +128,7 @@ impl Table {
             Table::Waypoints => ("Every route's waypoints, one route after the other.", rows::<WaypointRow>()),
             Table::Previews => ("What is observed at each of them.", rows::<PreviewRow>()),
             Table::Routes => ("Every route.", rows::<RouteRow>()),
+            Table::StepLimits => ("Steps after which an episode is timed out, [n_routes, n_classes].", rows::<u32>()),
             Table::Batch => ("Facts that the trucks of a batch share.", BatchFacts::wgsl()),
             Table::Choice => ("Routes that episodes run on: to be drawn from, or one for each truck.", rows::<u32>()),
             Table::Streams => ("The stream of random numbers that each truck draws from, [n_envs].", rows::<Stream>()),

@@ -4,7 +4,7 @@
 //! makes a batch and a row of it. The buffers on a device, their WGSL declarations and the tests' tables follow from
 //! [`Column`].
 
-use super::{Clearance, Control, N_RAYS, N_VALUES, Progress, RewardTerms, Truck};
+use super::{Clearance, Control, N_EXTRAS, N_RAYS, N_VALUES, Progress, RewardTerms, Truck};
 use crate::shared::{Named, Shared};
 
 /// Calls `$then` with every column: doc, variant of [`Column`], name, type of a row. The types are those of `layout`.
@@ -33,6 +33,10 @@ macro_rules! columns {
             Terms terms: RewardTerms,
             /// Rewards of the last step
             Reward reward: f32,
+            /// What is observed beside the observation before the next action; zeros beyond what the benchmark observes
+            Extras extras: [f32; N_EXTRAS],
+            /// The same beside the observation after the last action
+            NextExtras next_extras: [f32; N_EXTRAS],
         }
     };
 }

@@ -1,18 +1,25 @@
 //! A benchmark file as written: keys, types and defaults. Its values are not checked yet.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Deserialize;
+use serde::de::value::SeqAccessDeserializer;
+use serde::de::{Deserializer, SeqAccess, Visitor};
 
+use super::Clock;
+use crate::layout::Track;
 use crate::opendrive::{Hand, RoadLane};
 use crate::roundabout::Gutter;
+use crate::vehicle::WrittenModel;
 
 /// The file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Written {
-    pub(super) vehicle: PathBuf,
-    pub(super) load: String,
+    pub(super) vehicle: WrittenVehicles,
+    pub(super) load: Option<String>,
+    pub(super) draw: Option<WrittenDraw>,
     pub(super) gutter: Gutter,
     #[serde(default)]
     pub(super) steer_max_deg: Option<f64>,
@@ -23,6 +30,8 @@ pub(super) struct Written {
     pub(super) actions: WrittenActions,
     pub(super) sensors: WrittenSensors,
     #[serde(default)]
+    pub(super) observation: WrittenObservation,
+    #[serde(default)]
     pub(super) start: WrittenStart,
     #[serde(default)]
     pub(super) ending: WrittenEnding,
@@ -32,6 +41,71 @@ pub(super) struct Written {
     #[serde(default)]
     pub(super) roundabout: Vec<WrittenRoundabout>,
     pub(super) procedural: Option<WrittenProcedural>,
+}
+
+/// `vehicle = "FILE"`, or tables `[[vehicle]]`.
+pub(super) enum WrittenVehicles {
+    One(PathBuf),
+    Many(Vec<WrittenMember>),
+}
+
+impl<'de> Deserialize<'de> for WrittenVehicles {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        // An untagged enum would not say what is wrong with a table.
+        struct OneOrMany;
+        impl<'de> Visitor<'de> for OneOrMany {
+            type Value = WrittenVehicles;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("a path, or tables [[vehicle]]")
+            }
+
+            fn visit_str<E>(self, path: &str) -> Result<WrittenVehicles, E> {
+                Ok(WrittenVehicles::One(path.into()))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, tables: A) -> Result<WrittenVehicles, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(tables)).map(WrittenVehicles::Many)
+            }
+        }
+        deserializer.deserialize_any(OneOrMany)
+    }
+}
+
+/// One kind of vehicle.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WrittenMember {
+    pub(super) file: PathBuf,
+    pub(super) loads: BTreeMap<String, f64>,
+    #[serde(default = "one")]
+    pub(super) share: f64,
+    pub(super) model: Option<WrittenModel>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// What is drawn for each vehicle.
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct WrittenDraw {
+    pub(super) n_vehicles: Option<usize>,
+    pub(super) trailer_wheelbase: Option<[f64; 2]>,
+    pub(super) tractor_wheelbase: Option<[f64; 2]>,
+    pub(super) fifth_wheel: Option<[f64; 2]>,
+    pub(super) centre_of_gravity: Option<[f64; 2]>,
+    pub(super) roll_gain: Option<[f64; 2]>,
+    pub(super) roll_frequency: Option<[f64; 2]>,
+    pub(super) roll_damping: Option<[f64; 2]>,
+    pub(super) slip: Option<[f64; 2]>,
+    pub(super) friction: Option<[f64; 2]>,
+    pub(super) steer_rate: Option<[f64; 2]>,
+    pub(super) acceleration_max: Option<[f64; 2]>,
+    pub(super) steer_delay: Option<[f64; 2]>,
+    pub(super) drive_lag: Option<[f64; 2]>,
+    pub(super) brake_lag: Option<[f64; 2]>,
 }
 
 #[derive(Deserialize)]
@@ -64,6 +138,8 @@ impl Default for WrittenField {
 pub(super) struct WrittenActions {
     pub(super) steer_levels: Vec<f64>,
     pub(super) speeds_kmh: Vec<f64>,
+    #[serde(default)]
+    pub(super) speed_changes_kmh: Vec<f64>,
 }
 
 #[derive(Deserialize)]
@@ -72,16 +148,31 @@ pub(super) struct WrittenSensors {
     pub(super) range: f64,
 }
 
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct WrittenObservation {
+    pub(super) extras: Track,
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct WrittenStart {
     pub(super) offset: f64,
     pub(super) heading_deg: f64,
+    pub(super) speed_kmh: Option<WrittenSpeeds>,
+}
+
+/// A speed, or `[least, greatest]`.
+#[derive(Deserialize)]
+#[serde(untagged)]
+pub(super) enum WrittenSpeeds {
+    One(f64),
+    Range([f64; 2]),
 }
 
 impl Default for WrittenStart {
     fn default() -> Self {
-        WrittenStart { offset: 0.3, heading_deg: 2.0 }
+        WrittenStart { offset: 0.3, heading_deg: 2.0, speed_kmh: None }
     }
 }
 
@@ -92,11 +183,12 @@ pub(super) struct WrittenEnding {
     pub(super) jackknife_deg: f64,
     pub(super) rollover_ratio: f64,
     pub(super) time_limit: f64,
+    pub(super) clock: Clock,
 }
 
 impl Default for WrittenEnding {
     fn default() -> Self {
-        WrittenEnding { stray_distance: 10.0, jackknife_deg: 90.0, rollover_ratio: 1.0, time_limit: 3.0 }
+        WrittenEnding { stray_distance: 10.0, jackknife_deg: 90.0, rollover_ratio: 1.0, time_limit: 3.0, clock: Clock::default() }
     }
 }
 
@@ -111,6 +203,22 @@ pub(super) struct WrittenReward {
     #[serde(default = "half_a_metre")]
     pub(super) clearance_limit: f64,
     pub(super) failure: f64,
+    #[serde(default)]
+    pub(super) time: f64,
+    #[serde(default)]
+    pub(super) load_transfer: f64,
+    #[serde(default)]
+    pub(super) lateral_acceleration: f64,
+    #[serde(default)]
+    pub(super) jerk: f64,
+    #[serde(default)]
+    pub(super) rollover: f64,
+    #[serde(default = "three_fifths")]
+    pub(super) load_transfer_margin: f64,
+}
+
+fn three_fifths() -> f64 {
+    0.6
 }
 
 fn half_a_metre() -> f64 {

@@ -6,7 +6,7 @@
 use std::fmt::Display;
 
 use super::Scenario;
-use crate::vehicle::{Suspension, Vehicle};
+use crate::vehicle::{Model, Suspension, Vehicle};
 
 /// A value with which no truck could be stepped.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -38,9 +38,29 @@ impl Scenario {
         }
         self.check_numbers()?;
         list("steer_levels", &self.steer_levels, [-1.0, 1.0])?;
-        list("speeds", &self.speeds, [0.01, 100.0])?;
+        list("speeds", &self.speeds, [0.0, 100.0])?;
+        within("speeds", self.cruising_speed(), [0.01, 100.0])?;
+        if !self.speed_changes.is_empty() {
+            list("speed_changes", &self.speed_changes, [-100.0, 100.0])?;
+        }
+        within("load_transfer_margin", self.load_transfer_margin, [0.0, 0.999])?;
+        self.start_speed.iter().flatten().try_for_each(|&speed| within("start_speed", speed, [0.0, 100.0]))?;
         self.check_routes()?;
-        check_vehicle(&self.vehicle)
+        check_vehicle(&self.vehicle)?;
+        if let Some(fleet) = &self.fleet {
+            within("fleet.n_vehicles", fleet.n_vehicles as f64, [1.0, 1e6])?;
+            if fleet.classes().is_empty() {
+                return Err(invalid("fleet.members", "no loads", "at least one vehicle with a load of a positive share is needed"));
+            }
+            fleet.extremes().try_for_each(|(_, vehicle)| check_vehicle(&vehicle))?;
+        }
+        within("vehicle.model.steer_delay", self.longest_steer_delay(), [0.0, 2.0 * self.step])
+    }
+
+    /// The longest steer delay of its vehicles \[s].
+    pub(super) fn longest_steer_delay(&self) -> f64 {
+        let drawn = self.fleet.iter().flat_map(|fleet| fleet.extremes().map(|(_, vehicle)| vehicle.model.steer_delay));
+        drawn.fold(self.vehicle.model.steer_delay, f64::max)
     }
 
     fn check_numbers(&self) -> Result<(), Invalid> {
@@ -67,6 +87,11 @@ impl Scenario {
             ("lane_distance_weight", self.lane_distance_weight),
             ("clearance_weight", self.clearance_weight),
             ("failure_weight", self.failure_weight),
+            ("time_weight", self.time_weight),
+            ("load_transfer_weight", self.load_transfer_weight),
+            ("lateral_acceleration_weight", self.lateral_acceleration_weight),
+            ("jerk_weight", self.jerk_weight),
+            ("rollover_weight", self.rollover_weight),
         ];
         positive.into_iter().try_for_each(|(key, value)| within(key, value, POSITIVE))?;
         finite.into_iter().try_for_each(|(key, value)| within(key, value, FINITE))
@@ -96,8 +121,8 @@ impl Scenario {
     }
 }
 
-fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
-    let Vehicle { tractor, trailer, loads, speed_control, sensors } = vehicle;
+pub(super) fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
+    let Vehicle { tractor, trailer, loads, speed_control, sensors, model } = vehicle;
     let positive = [
         ("tractor.wheelbase", tractor.wheelbase),
         ("tractor.width", tractor.width),
@@ -129,6 +154,7 @@ fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
         within(&name, mount.x, FINITE)?;
         within(&name, mount.y, FINITE)?;
     }
+    check_model(&key("model"), model, trailer.wheelbase)?;
     check_suspension(&key("tractor.suspension"), &tractor.suspension)?;
     for (name, load) in loads {
         let key = key(&format!("loads.{name}"));
@@ -139,6 +165,15 @@ fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
         check_suspension(&format!("{key}.suspension"), &load.suspension)?;
     }
     Ok(())
+}
+
+fn check_model(key: &str, model: &Model, trailer_wheelbase: f64) -> Result<(), Invalid> {
+    // The trailer's lever stays positive.
+    within(&format!("{key}.slip_lever"), model.slip_lever, [0.0, trailer_wheelbase - 0.01])?;
+    let times = [("yaw_lag", model.yaw_lag), ("drive_lag", model.drive_lag), ("brake_lag", model.brake_lag)];
+    times.into_iter().try_for_each(|(name, value)| within(&format!("{key}.{name}"), value, [0.0, 1e6]))?;
+    model.power.map_or(Ok(()), |power| within(&format!("{key}.power"), power, POSITIVE))?;
+    within(&format!("{key}.crossfall"), model.crossfall, [-1.0, 1.0])
 }
 
 fn check_suspension(key: &str, suspension: &Suspension) -> Result<(), Invalid> {

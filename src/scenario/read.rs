@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::Scenario;
-use super::benchmark_keys::Written;
+use super::benchmark_keys::{Written, WrittenSpeeds};
+use super::fleet::{self, Fleet};
 use super::roads::{MOST_ROADS, Procedural};
 use crate::loading::Loading;
 use crate::reader::{Error, Reader};
@@ -16,12 +17,13 @@ impl Scenario {
     pub(super) fn from_source(source: &Source, loading: &Loading) -> Result<Scenario, Error> {
         let file = source.shown();
         let (reader, written) = Reader::parse::<Written>(&file, &source.text()?)?;
-        let vehicle = referred(&reader, "vehicle", source, Kind::Vehicle, &written.vehicle, Vehicle::from_source)?;
-        if !vehicle.loads.contains_key(&written.load) {
-            let loads: Vec<&str> = vehicle.loads.keys().map(String::as_str).collect();
-            return Err(reader.invalid("load", format_args!("{:?}", written.load), format!("the vehicle has {}", loads.join(", "))));
+        let vehicles = fleet::vehicles(&reader, source, &written)?;
+        let mut scenario = without_routes(&reader, source.stem(), vehicles, &written)?;
+        let delay = scenario.longest_steer_delay();
+        if 2.0 * scenario.step < delay {
+            let expected = format!("the vehicle's steer delay is up to {delay} s; two steps at most");
+            return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
         }
-        let mut scenario = without_routes(&reader, source.stem(), vehicle, &written)?;
         // Drawing takes longest: everything else is checked first.
         let procedural = written.procedural.as_ref().map(|written| Procedural::checked(&reader, source, written)).transpose()?;
         if procedural.is_none() {
@@ -42,40 +44,77 @@ impl Scenario {
 }
 
 /// Everything but the roundabouts and their routes, checked and in SI units.
-fn without_routes(reader: &Reader, name: String, vehicle: Vehicle, written: &Written) -> Result<Scenario, Error> {
+fn without_routes(
+    reader: &Reader,
+    name: String,
+    (vehicle, load, fleet): (Vehicle, String, Option<Fleet>),
+    written: &Written,
+) -> Result<Scenario, Error> {
     let Written { time, field, actions, sensors, start, ending, reward, routes, .. } = written;
     let steer_max = written.steer_max_deg.map(|lock| reader.within("steer_max_deg", lock, 1.0..=80.0, "deg")).transpose()?;
-    let speeds = numbers(reader, "actions.speeds_kmh", &actions.speeds_kmh, 90.0, 1.0, "km/h")?;
+    let speeds = numbers(reader, "actions.speeds_kmh", &actions.speeds_kmh, 90.0, 0.0, "km/h")?;
+    if speeds.iter().all(|&speed| speed < 1.0) {
+        return Err(reader.invalid("actions.speeds_kmh", "no speed of 1 km/h or more", "at least one is needed, or no truck moves"));
+    }
+    let speed_changes = match actions.speed_changes_kmh.as_slice() {
+        [] => Vec::new(),
+        changes => numbers(reader, "actions.speed_changes_kmh", changes, 90.0, -90.0, "km/h")?,
+    };
     Ok(Scenario {
         name,
         steer_max: steer_max.map(f64::to_radians),
         vehicle,
-        load: written.load.clone(),
+        load,
+        fleet,
         gutter: written.gutter,
         step: reader.within("time.step", time.step, 0.01..=1.0, "s")?,
         n_substeps: reader.count("time.substeps", time.substeps, 1..=100)? as u32,
         cell: reader.within("field.cell", field.cell, 0.1..=1.0, "m")?,
         steer_levels: numbers(reader, "actions.steer_levels", &actions.steer_levels, 1.0, -1.0, "")?,
         speeds: speeds.into_iter().map(|speed| speed / 3.6).collect(),
+        speed_changes: speed_changes.into_iter().map(|change| change / 3.6).collect(),
         sensor_range: reader.within("sensors.range", sensors.range, 1.0..=50.0, "m")?,
+        extras: written.observation.extras,
         start_offset: reader.within("start.offset", start.offset, 0.0..=1.0, "m")?,
         start_heading: reader.within("start.heading_deg", start.heading_deg, 0.0..=20.0, "deg")?.to_radians(),
+        start_speed: start.speed_kmh.as_ref().map(|written| start_speed(reader, written)).transpose()?,
         stray_distance: reader.within("ending.stray_distance", ending.stray_distance, 3.0..=50.0, "m")?,
         jackknife_angle: reader.within("ending.jackknife_deg", ending.jackknife_deg, 30.0..=120.0, "deg")?.to_radians(),
         rollover_ratio: reader.within("ending.rollover_ratio", ending.rollover_ratio, 0.1..=2.0, "")?,
         time_limit: reader.within("ending.time_limit", ending.time_limit, 1.0..=20.0, "")?,
+        clock: ending.clock,
         waypoint_weight: weight(reader, "reward.waypoint", reward.waypoint)?,
         lane_distance_weight: weight(reader, "reward.lane_distance", reward.lane_distance)?,
         lane_distance_limit: reader.within("reward.lane_distance_limit", reward.lane_distance_limit, 0.1..=50.0, "m")?,
         clearance_weight: weight(reader, "reward.clearance", reward.clearance)?,
         clearance_limit: reader.within("reward.clearance_limit", reward.clearance_limit, 0.01..=10.0, "m")?,
         failure_weight: weight(reader, "reward.failure", reward.failure)?,
+        time_weight: small_weight(reader, "reward.time", reward.time)?,
+        load_transfer_weight: small_weight(reader, "reward.load_transfer", reward.load_transfer)?,
+        lateral_acceleration_weight: small_weight(reader, "reward.lateral_acceleration", reward.lateral_acceleration)?,
+        jerk_weight: small_weight(reader, "reward.jerk", reward.jerk)?,
+        rollover_weight: small_weight(reader, "reward.rollover", reward.rollover)?,
+        load_transfer_margin: reader.within("reward.load_transfer_margin", reward.load_transfer_margin, 0.0..=0.99, "")?,
         approach: reader.within("routes.approach", routes.approach, 5.0..=500.0, "m")?,
         departure: reader.within("routes.departure", routes.departure, 5.0..=500.0, "m")?,
         spacing: reader.within("routes.spacing", routes.spacing, 0.5..=5.0, "m")?,
         places: Vec::new(),
         splits: Default::default(),
     })
+}
+
+/// Least and greatest speed at the start [m/s].
+fn start_speed(reader: &Reader, written: &WrittenSpeeds) -> Result<[f64; 2], Error> {
+    let [least, greatest] = match *written {
+        WrittenSpeeds::One(speed) => [speed; 2],
+        WrittenSpeeds::Range(range) => range,
+    };
+    reader.within("start.speed_kmh", least, 0.0..=90.0, "km/h")?;
+    reader.within("start.speed_kmh", greatest, 0.0..=90.0, "km/h")?;
+    if greatest < least {
+        return Err(reader.invalid("start.speed_kmh", format_args!("[{least}, {greatest}]"), "must be a speed or [least, greatest]"));
+    }
+    Ok([least / 3.6, greatest / 3.6])
 }
 
 /// Reads the file that `source` refers to under `key`: by a path that ends in .toml or .xodr, or the shipped file of
@@ -102,6 +141,11 @@ pub(super) fn referred<T>(
 fn numbers(reader: &Reader, key: &str, values: &[f64], most: f64, least: f64, unit: &str) -> Result<Vec<f64>, Error> {
     reader.count(key, values.len(), 1..=64)?;
     values.iter().enumerate().map(|(index, &value)| reader.within(&format!("{key}[{index}]"), value, least..=most, unit)).collect()
+}
+
+/// A weight of a term that may be 1 in every step.
+fn small_weight(reader: &Reader, key: &str, value: f64) -> Result<f64, Error> {
+    reader.within(key, value, -1e4..=1e4, "")
 }
 
 fn weight(reader: &Reader, key: &str, value: f64) -> Result<f64, Error> {

@@ -151,7 +151,7 @@ impl Scenario {
     /// Every route leaves room for the whole truck on its arms: behind the route's beginning at the start pose, and
     /// ahead of its end on arrival.
     fn whole_truck_on_arms(&self, reader: &Reader, routes: &[Route]) -> Result<(), Error> {
-        let (behind, ahead) = self.vehicle.reach(self.start_heading);
+        let (behind, ahead) = self.reach();
         let starts = routes.iter().map(|route| (route.before - behind, route));
         let ends = routes.iter().map(|route| (route.after - ahead, route));
         let nearest = |(a, first), (b, second)| if b < a { (b, second) } else { (a, first) };

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 use serde::Deserialize;
 
-use super::{Load, Sensors, SpeedControl, Suspension, Tractor, Trailer, Vehicle};
+use super::{Load, Model, Sensors, SpeedControl, Suspension, Tractor, Trailer, Vehicle};
 use crate::layout::N_TRACTOR_RAYS;
 use crate::reader::{Error, Reader};
 use crate::shipped::Source;
@@ -21,6 +21,8 @@ struct Written {
     speed_control: WrittenSpeedControl,
     #[serde(default)]
     sensors: WrittenSensors,
+    #[serde(default)]
+    model: WrittenModel,
 }
 
 #[derive(Deserialize)]
@@ -92,6 +94,26 @@ struct WrittenSensors {
     trailer_last: Option<f64>,
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct WrittenModel {
+    slip_lever: f64,
+    yaw_lag: f64,
+    drive_lag: f64,
+    brake_lag: f64,
+    steer_delay: f64,
+    power: Option<f64>,
+    friction_ellipse: bool,
+    crossfall: f64,
+}
+
+impl Default for WrittenModel {
+    fn default() -> Self {
+        let Model { slip_lever, yaw_lag, drive_lag, brake_lag, steer_delay, power, friction_ellipse, crossfall } = Model::default();
+        WrittenModel { slip_lever, yaw_lag, drive_lag, brake_lag, steer_delay, power, friction_ellipse, crossfall }
+    }
+}
+
 /// Friction of truck tyres on dry asphalt.
 fn dry_asphalt() -> f64 {
     0.7
@@ -119,6 +141,7 @@ impl Vehicle {
             loads: loads.collect::<Result<_, Error>>()?,
             speed_control: speed_control(&reader, &written.speed_control)?,
             sensors: sensors(&reader, &written.sensors, &tractor, &trailer)?,
+            model: model(&reader, "model", &written.model, &trailer)?,
             tractor,
             trailer,
         })
@@ -142,7 +165,7 @@ fn tractor(reader: &Reader, written: &WrittenTractor) -> Result<Tractor, Error> 
 
 fn trailer(reader: &Reader, written: &WrittenTrailer) -> Result<Trailer, Error> {
     Ok(Trailer {
-        // Slip shortens this lever by up to 1.5 m: it stays well positive.
+        // Slip shortens this lever by up to `model.slip_lever`: it stays well positive.
         wheelbase: reader.within("trailer.wheelbase", written.wheelbase, 2.5..=20.0, "m")?,
         kingpin_to_front: reader.within("trailer.kingpin_to_front", written.kingpin_to_front, 0.0..=5.0, "m")?,
         kingpin_to_rear: reader.within("trailer.kingpin_to_rear", written.kingpin_to_rear, 1.0..=25.0, "m")?,
@@ -181,6 +204,22 @@ fn speed_control(reader: &Reader, written: &WrittenSpeedControl) -> Result<Speed
         integral_gain: within("integral_gain", written.integral_gain, 0.0..=10.0, "1/s^2")?,
         integral_band: within("integral_band_kmh", written.integral_band_kmh, 0.0..=200.0, "km/h")? / 3.6,
         braking: within("braking", written.braking, -12.0..=-0.1, "m/s^2")?,
+    })
+}
+
+/// Checks the keys of a `model` table, of a vehicle or in place of one.
+pub(crate) fn model(reader: &Reader, key: &str, written: &WrittenModel, trailer: &Trailer) -> Result<Model, Error> {
+    let within = |name: &str, value, range, unit| reader.within(&format!("{key}.{name}"), value, range, unit);
+    Ok(Model {
+        // Slip shortens the trailer's lever by so much: it stays well positive.
+        slip_lever: within("slip_lever", written.slip_lever, 0.0..=(trailer.wheelbase - 1.0).min(4.0), "m")?,
+        yaw_lag: within("yaw_lag", written.yaw_lag, 0.0..=5.0, "")?,
+        drive_lag: within("drive_lag", written.drive_lag, 0.0..=5.0, "s")?,
+        brake_lag: within("brake_lag", written.brake_lag, 0.0..=5.0, "s")?,
+        steer_delay: within("steer_delay", written.steer_delay, 0.0..=1.0, "s")?,
+        power: written.power.map(|power| within("power", power, 1e4..=1e6, "W")).transpose()?,
+        friction_ellipse: written.friction_ellipse,
+        crossfall: within("crossfall", written.crossfall, -0.1..=0.1, "")?,
     })
 }
 

@@ -130,7 +130,7 @@ fn an_episode_begins_on_the_stated_route_at_the_stated_start_and_the_next_one_is
         simulator.set_autoreset(Autoreset::Disabled);
         step(&mut simulator, 0);
         let before = rows(simulator.batch());
-        let start = Start { offset: 0.5, heading: -1.0 };
+        let start = Start { offset: 0.5, heading: -1.0, ..Start::default() };
         simulator.begin(&[Begin { env: 1, route: Some(30), start: Some(start), ..Begin::default() }]).unwrap();
         let batch = simulator.batch();
         assert!(before != rows(batch));
@@ -146,7 +146,7 @@ fn an_episode_begins_on_the_stated_route_at_the_stated_start_and_the_next_one_is
             (Begin { env: 4, ..Begin::default() }, "indices[1]: 4; the batch has trucks 0..4".to_owned()),
             (Begin { route: Some(75), ..Begin::default() }, "routes: 75; the world has routes 0..75".to_owned()),
             (
-                Begin { start: Some(Start { offset: f32::NAN, heading: 0.0 }), ..Begin::default() },
+                Begin { start: Some(Start { offset: f32::NAN, heading: 0.0, ..Start::default() }), ..Begin::default() },
                 "starts[0]: NaN of the largest start error; must lie in -1..1".to_owned(),
             ),
         ] {

@@ -21,7 +21,9 @@ fn scenarios() -> PathBuf {
 }
 
 /// Benchmarks and roundabouts that have no key but those of another one.
-const LIKE_OTHERS: [&str; 13] = [
+const LIKE_OTHERS: [&str; 15] = [
+    "laden2026-random.toml",
+    "laden2026-training.toml",
     "random2026-1000.toml",
     "random2026-10000.toml",
     "random2026-as-run.toml",
@@ -50,7 +52,7 @@ fn files() -> Vec<PathBuf> {
         }
     }
     files.sort();
-    assert_eq!(files.len(), 18, "six roundabouts, three vehicles, seven benchmarks, two distributions");
+    assert_eq!(files.len(), 21, "six roundabouts, three vehicles, ten benchmarks, two distributions");
     files
 }
 
@@ -311,7 +313,7 @@ fn a_batch_that_cannot_be_is_refused_and_a_wrong_action_changes_nothing() {
         let before = simulator.batch().truck.clone();
         assert_eq!(simulator.step(&[0, 9]).unwrap_err().to_string(), "actions[1]: 9; must lie in 0..9");
         assert_eq!(simulator.step(&[0]).unwrap_err().to_string(), "actions: 1 for 2 trucks; one each is needed");
-        let start = |offset| offtrack::layout::Start { offset, heading: 0.0 };
+        let start = |offset| offtrack::layout::Start { offset, ..Default::default() };
         let refused = |starts: &[_]| batch_on(&engine, &world, 2, 0, RouteChoice::Drawn(vec![0])).reset_from(starts).unwrap_err();
         assert_eq!(refused(&[start(0.0)]).to_string(), "starts: 1 for 2 trucks; one each is needed");
         assert_eq!(refused(&[start(0.0), start(1.5)]).to_string(), "starts[1]: 1.5 of the largest start error; must lie in -1..1");

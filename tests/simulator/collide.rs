@@ -51,7 +51,7 @@ fn verdicts(kerbs: &Outline, rig: &Rig, trucks: &[Truck], exact: &[[bool; 2]], f
 #[test]
 fn a_unit_touches_a_kerb_exactly_when_its_rectangle_does_to_two_centimetres() {
     let world = benchmark("attard2023").1;
-    let rig = &world.params.rig;
+    let rig = &world.rigs[0];
     for (gutter, n) in [(Gutter::Drivable, 100_000), (Gutter::Solid, 10_000)] {
         for (name, kerbs, field) in places(gutter) {
             let trucks: Vec<Truck> = (0..n).into_par_iter().map(|index| pose(&kerbs, index, 0.5)).collect();
@@ -74,9 +74,9 @@ fn a_unit_touches_a_kerb_exactly_when_its_rectangle_does_to_two_centimetres() {
 #[test]
 fn a_rectangle_five_centimetres_too_wide_is_noticed() {
     let world = benchmark("attard2023").1;
-    let rig = &world.params.rig;
+    let rig = &world.rigs[0];
     let mut wide = world.clone();
-    wide.params.rig.trailer_body.half_width += 0.05;
+    wide.rigs[0].trailer_body.half_width += 0.05;
     let (_, kerbs, field) = places(Gutter::Drivable).swap_remove(0);
     let trucks: Vec<Truck> = (0..20_000).into_par_iter().map(|index| pose(&kerbs, index, 0.5)).collect();
     for (_, engine) in engines() {
@@ -89,7 +89,7 @@ fn a_rectangle_five_centimetres_too_wide_is_noticed() {
 #[test]
 fn a_clearance_is_the_distance_or_up_to_twice_that() {
     let world = benchmark("attard2023").1;
-    let rig = &world.params.rig;
+    let rig = &world.rigs[0];
     for (name, kerbs, field) in places(Gutter::Drivable) {
         let trucks: Vec<Truck> = (0..2_000).into_par_iter().map(|index| pose(&kerbs, index, 0.0)).collect();
         let found: Vec<Simulator> =
@@ -121,7 +121,7 @@ fn a_solid_wholly_under_a_unit_is_touched() {
     let yard = Curve { pieces: (0..4).map(|i| Piece::Segment { from: corner[i], to: corner[(i + 1) % 4] }).collect() };
     let post = |x: f64| Outline::new(vec![yard.clone(), Curve::circle(DVec2::new(x, 0.3), 0.2)]);
     let truck = Truck::default();
-    let behind = f64::from(truck.trailer_position(&world.params.rig).x);
+    let behind = f64::from(truck.trailer_position(&world.rigs[0]).x);
     // Posts under the trailer behind the tractor, one a metre.
     let under = (0..8).map(|metre| behind - 3.0 + f64::from(metre)).filter(|x| *x < -2.0);
     assert!(under.clone().count() >= 5);

@@ -61,7 +61,8 @@ fn a_trucks_index_in_the_batch_and_its_neighbours_change_nothing() {
         let routes: Vec<usize> = (0..n_routes).chain([3]).chain((0..n_routes).rev()).collect();
         let of_routes = |value: &dyn Fn(usize) -> u32| routes.iter().map(|&route| value(route)).collect::<Vec<u32>>();
         let mut simulator = batch_on(&engine, &world, routes.len(), 8, RouteChoice::Fixed(of_routes(&|route| route as u32)));
-        let starts: Vec<Start> = routes.iter().map(|&route| Start { offset: route as f32 / 100.0, heading: -0.5 }).collect();
+        let starts: Vec<Start> =
+            routes.iter().map(|&route| Start { offset: route as f32 / 100.0, heading: -0.5, ..Start::default() }).collect();
         simulator.reset_from(&starts).unwrap();
         for step in 0..80 {
             simulator.step(&of_routes(&|route| random::words(1, route as u32, step, 0)[0] % 9)).unwrap();
@@ -134,7 +135,7 @@ fn assert_in_range(world: &World, bounds: &[(Vec2, Vec2)], batch: &Batch) {
         assert!(low.cmple(truck.position).all() && truck.position.cmple(high).all(), "{truck:?}");
         let pi = std::f32::consts::PI;
         assert!(truck.heading.abs() <= pi && truck.trailer_heading.abs() <= pi, "{truck:?}");
-        assert!((0.0..30.0).contains(&truck.speed) && truck.steering.abs() <= world.params.rig.steer_max, "{truck:?}");
+        assert!((0.0..30.0).contains(&truck.speed) && truck.steering.abs() <= world.rigs[0].steer_max, "{truck:?}");
         let finite = [truck.tractor_roll, truck.trailer_roll_rate, truck.trailer_load_transfer_ratio, batch.reward[env]];
         assert!(finite.into_iter().all(f32::is_finite), "{truck:?}");
         assert!(batch.clearance[env].tractor.is_finite() && batch.clearance[env].trailer.is_finite());

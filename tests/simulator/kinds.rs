@@ -199,7 +199,7 @@ fn wide_way(radius: f64, exit: u32) -> Curve {
 
 #[test]
 fn a_truck_passes_the_island_of_a_metre_and_a_half_to_every_exit() {
-    let rig = benchmark("attard2023").1.params.rig;
+    let rig = benchmark("attard2023").1.rigs[0];
     let roundabout = roundabout("mini");
     let kerbs = roundabout.kerbs(Gutter::Drivable);
     let suffices = |line: &Curve| own_lane_suffices(&rig, &kerbs, &swept_path(&rig, &line.part(20.0, line.length() - 20.0), 2.0, 0.25));

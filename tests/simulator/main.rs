@@ -13,8 +13,10 @@ mod autoreset;
 mod bad_input;
 mod collide;
 mod episodes;
+mod extras;
 mod field;
 mod fit;
+mod fleet;
 mod kinds;
 
 mod left_hand;
@@ -35,6 +37,7 @@ mod restarts;
 mod sense;
 mod shaders;
 mod shipped;
+mod speeds;
 
 /// A benchmark of the repository, read and baked.
 fn benchmark(name: &str) -> (Scenario, World) {

@@ -109,18 +109,19 @@ fn worst_differences(shift: usize) -> [f64; 69] {
             }
             let heading = offtrack::angle::wrapped(previews[next.min(waypoints.len() - 1)].heading + 1.5 * draws[1]);
             let truck = Truck {
+                route: index as u32,
                 position: near.position + 4.0 * glam::Vec2::new(draws[2], draws[3]),
                 heading,
                 trailer_heading: offtrack::angle::wrapped(heading + 1.5 * draws[4]),
                 speed: 8.0 + 8.0 * draws[5],
                 ..Truck::default()
             };
-            let wheelbase = f64::from(world.params.rig.wheelbase);
+            let wheelbase = f64::from(world.rigs[0].wheelbase);
             let view = View { route, next: next.min(waypoints.len() - 1), truck, wheelbase, ranges, range: scenario.sensor_range };
             let point = truck.position.as_dvec2() + 0.5 * wheelbase * DVec2::from_angle(f64::from(truck.heading));
             let lane_distance = distance_to_segment(point, view.w(view.next as i64 - 1), view.w(view.next as i64)) as f32;
             let progress = Progress { waypoint: next as u32, lane_distance, ..Progress::default() };
-            let values = observed(&world.params, &world.routes[index], waypoints, previews, &truck, &progress, &ranges);
+            let values = observed(&world, &truck, &progress, &ranges);
             for (value, worst) in worst.iter_mut().enumerate() {
                 let difference = (f64::from(values[(value + shift) % 69]) - view.value(value)).abs();
                 // An angle of -180 deg is one of 180 deg: its scaled value may be -1 here and 1 there.

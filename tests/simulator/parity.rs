@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use glam::Vec2;
 use offtrack::angle::wrapped;
+use offtrack::cpu::drive::drive_max;
 use offtrack::cpu::follow::reference_point;
 use offtrack::layout::{Column, Ended, Truck, WaypointRow};
 use offtrack::random::{Draw, index_below, signed_unit, words};
@@ -18,7 +19,7 @@ use offtrack::world::World;
 use crate::on_device::engine;
 use crate::{batch_on, engines};
 use compare::{Agreement, agreements};
-use states::{ENOUGH, N_ENVS, on_each_roundabout, put, varied, world};
+use states::{ENOUGH, N_ENVS, fleet_world, on_each_roundabout, put, varied, world};
 
 /// Columns, and a change of the world.
 type Written = (&'static [Column], Option<fn(&mut World)>);
@@ -27,19 +28,19 @@ type Written = (&'static [Column], Option<fn(&mut World)>);
 /// of the world.
 fn written(stage: Stage) -> Written {
     match stage {
-        Stage::Steer => (&[Column::Control], Some(|world| world.params.rig.speed_gain *= 1.001)),
-        Stage::Drive => (&[Column::Truck], Some(|world| world.params.rig.trailer_wheelbase *= 1.001)),
-        Stage::Collide => (&[Column::Clearance], Some(|world| world.params.rig.trailer_body.half_width *= 1.001)),
-        Stage::Follow => (&[Column::Progress], Some(|world| world.params.rig.wheelbase *= 1.001)),
-        Stage::Sense => (&[Column::Ranges], Some(|world| world.rays.iter_mut().for_each(|ray| ray.origin *= 1.001))),
-        Stage::Observe => (&[Column::NextObservation], Some(|world| world.params.sensor_range *= 1.001)),
+        Stage::Steer => (&[Column::Control], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.speed_gain *= 1.001))),
+        Stage::Drive => (&[Column::Truck], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_wheelbase *= 1.001))),
+        Stage::Collide => (&[Column::Clearance], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_body.half_width *= 1.001))),
+        Stage::Follow => (&[Column::Progress], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.wheelbase *= 1.001))),
+        Stage::Sense => (&[Column::Ranges], Some(|world| world.rays.iter_mut().flatten().for_each(|ray| ray.origin *= 1.001))),
+        Stage::Observe => (&[Column::NextObservation, Column::NextExtras], Some(|world| world.params.sensor_range *= 1.001)),
         Stage::Judge => {
             (&[Column::Truck, Column::Ended, Column::Terms, Column::Reward], Some(|world| world.params.lane_distance_limit *= 1.001))
         }
         Stage::Count => (&[], None),
-        Stage::CopyObservation => (&[Column::Observation], None),
+        Stage::CopyObservation => (&[Column::Observation, Column::Extras], None),
         Stage::Reset => (
-            &[Column::Truck, Column::Control, Column::Progress, Column::Ranges, Column::Observation],
+            &[Column::Truck, Column::Control, Column::Progress, Column::Ranges, Column::Observation, Column::Extras],
             Some(|world| {
                 world.params.start_offset *= 1.001;
             }),
@@ -64,8 +65,9 @@ fn wrong_device(world: &World, choice: &RouteChoice, change: fn(&mut World)) -> 
 /// Whether a decision about a truck was closer than the margin, in the step or stage that led from `before` to `after`.
 fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bool {
     let (params, truck, clearance) = (&world.params, &after.truck[env], &after.clearance[env]);
+    let rig = world.rig(&before.truck[env]);
     let near = |value: f32, limit: f32| (value - limit).abs() < MARGIN;
-    let point = reference_point(params.rig.wheelbase, truck);
+    let point = reference_point(world.rig(truck).wheelbase, truck);
     let waypoints = world.route_waypoints(truck.route);
     // The waypoints that were passed, and the next one.
     let tried = before.progress[env].waypoint as usize..waypoints.len().min(after.progress[env].waypoint as usize + 1);
@@ -74,11 +76,14 @@ fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bo
         near(offset.dot(waypoint.direction), 0.0) || near(offset.length(), params.stray_distance)
     });
     let error = world.actions[before.action[env] as usize].speed - before.truck[env].speed;
-    let asked = params.rig.speed_gain * error;
+    let asked = rig.speed_gain * error;
+    // Drive and brakes have lags of their own.
+    let asks_for = after.control[env].acceleration;
     at_a_line
-        || near(error.abs(), params.rig.speed_integral_band)
-        || near(asked, params.rig.speed_braking)
-        || near(asked, params.rig.acceleration_max)
+        || near(error.abs(), rig.speed_integral_band)
+        || near(asked, rig.speed_braking)
+        || near(asked, drive_max(rig, before.truck[env].speed))
+        || (asks_for != 0.0 && near(asks_for, 0.0))
         || near(clearance.tractor, 0.0)
         || near(clearance.trailer, 0.0)
         || near(truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs()), params.rollover_ratio)
@@ -119,8 +124,8 @@ fn assert_untouched(before: &Batch, after: &Batch, written: &[Column]) {
 
 #[test]
 fn every_stage_does_the_same_to_every_value_and_touches_no_other() {
-    for (gutter, fixed) in [(Gutter::Drivable, false), (Gutter::Solid, true)] {
-        let world = world(gutter);
+    let worlds = [(world(Gutter::Drivable), false), (world(Gutter::Solid), true), (fleet_world(), false)];
+    for (world, fixed) in worlds {
         let (choice, mut before) = varied(&world, fixed);
         let counts = on_each_roundabout(&world, &before);
         assert!(counts.len() == 5 && counts.iter().all(|&count| ENOUGH <= count), "{counts:?}");
@@ -159,7 +164,7 @@ fn a_whole_step_from_any_state_ends_alike_for_every_reason_there_is() {
     let world = world(Gutter::Drivable);
     let (choice, before) = varied(&world, false);
     let [mut cpu, mut device] = simulators(&world, &choice);
-    let mut wrong = wrong_device(&world, &choice, |world| world.params.rig.wheelbase *= 1.001);
+    let mut wrong = wrong_device(&world, &choice, |world| world.rigs[0].wheelbase *= 1.001);
     // Reset overwrites what decided the end: look at it before.
     for simulator in [&mut cpu, &mut device] {
         put(simulator, &before);
@@ -206,7 +211,7 @@ fn the_largest_rewards_that_a_benchmark_may_give_are_summed_alike() {
 fn routes_poses_and_actions_are_drawn_alike_to_the_last_bit() {
     // A world where a pose consists of its drawn numbers alone.
     let mut world = World::clone(&world(Gutter::Drivable));
-    (world.params.start_offset, world.params.start_heading, world.params.rig.wheelbase) = (1.0, 1.0, 0.0);
+    (world.params.start_offset, world.params.start_heading, world.rigs[0].wheelbase) = (1.0, 1.0, 0.0);
     world.waypoints.iter_mut().for_each(|waypoint| *waypoint = WaypointRow { position: Vec2::ZERO, direction: Vec2::X });
     world.previews.iter_mut().for_each(|preview| preview.heading = 0.0);
     let world = Arc::new(world);

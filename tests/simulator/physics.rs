@@ -3,6 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails as the test itself does")]
 
 mod circulation;
+mod dynamic;
+mod lags;
 mod properties;
 mod speed_control;
 mod vectors;
@@ -19,6 +21,6 @@ fn vehicle_file(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/vehicles/{name}.toml"))
 }
 
-fn vehicle(name: &str) -> Vehicle {
+pub fn vehicle(name: &str) -> Vehicle {
     Vehicle::read(&vehicle_file(name)).unwrap()
 }

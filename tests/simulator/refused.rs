@@ -56,7 +56,7 @@ fn a_scenario_changed_in_memory_is_checked_before_it_is_baked() {
     assert!(refused(|scenario| scenario.load = "feathers".to_owned()).starts_with("load: \"feathers\"; the vehicle has "));
     assert_eq!(refused(|scenario| scenario.speeds.clear()), "speeds: empty; at least one value is needed");
     assert_eq!(refused(|scenario| scenario.steer_levels.clear()), "steer_levels: empty; at least one value is needed");
-    assert_eq!(refused(|scenario| scenario.speeds[0] = f64::NAN), "speeds[0]: NaN; must lie in 0.01..100");
+    assert_eq!(refused(|scenario| scenario.speeds[0] = f64::NAN), "speeds[0]: NaN; must lie in 0..100");
     assert!(refused(|scenario| scenario.places.clear()).starts_with("places: no routes; "));
     assert!(refused(|scenario| scenario.places[0].routes[0].waypoints.truncate(1)).contains("1 waypoints; at least 2"));
     assert!(refused(|scenario| scenario.n_substeps = 0).starts_with("n_substeps: 0; "));

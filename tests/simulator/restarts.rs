@@ -14,12 +14,12 @@ fn a_truck_begins_at_the_stated_fractions_of_the_largest_start_errors() {
     let world = Arc::new(benchmark("attard2023-full").1);
     for (_, engine) in engines() {
         let route = 3;
-        let starts = [(0.0, 0.0), (1.0, -1.0), (-0.5, 0.0)].map(|(offset, heading)| Start { offset, heading });
+        let starts = [(0.0, 0.0), (1.0, -1.0), (-0.5, 0.0)].map(|(offset, heading)| Start { offset, heading, ..Start::default() });
         let mut simulator = batch_on(&engine, &world, 3, 0, RouteChoice::Fixed(vec![route; 3]));
         simulator.reset_from(&starts).unwrap();
         let first = &world.route_waypoints(route)[0];
         for (truck, start) in simulator.batch().truck.iter().zip(&starts) {
-            let point = offtrack::cpu::follow::reference_point(world.params.rig.wheelbase, truck) - first.position;
+            let point = offtrack::cpu::follow::reference_point(world.rigs[0].wheelbase, truck) - first.position;
             // The benchmark's largest errors: 0.3 m and 2 deg. Positions of about 50 m are exact to 4 um in f32.
             assert!((point.dot(first.direction.perp()) - 0.3 * start.offset).abs() < 2e-5, "{truck:?}");
             assert!(point.dot(first.direction).abs() < 2e-5, "{truck:?}");
@@ -38,7 +38,7 @@ fn a_stated_start_equal_to_the_drawn_one_is_the_same() {
         let starts: Vec<Start> = (0..64)
             .map(|env| {
                 let [offset, heading, ..] = random::words(3, env, 0, Draw::Pose as u32).map(random::signed_unit);
-                Start { offset, heading }
+                Start { offset, heading, ..Start::default() }
             })
             .collect();
         simulator.step_at_random();
@@ -140,7 +140,10 @@ fn a_restored_batch_goes_on_bit_for_bit_and_wrong_columns_are_refused() {
             assert!(rows(simulator.batch()) == before);
             error.to_string()
         };
-        assert_eq!(wrong(64, Some(Column::Truck), None), "truck: missing; a batch of 64 trucks needs 4096 bytes");
+        assert_eq!(
+            wrong(64, Some(Column::Truck), None),
+            format!("truck: missing; a batch of 64 trucks needs {} bytes", 64 * size_of::<offtrack::layout::Truck>())
+        );
         assert_eq!(wrong(32, None, None), "action: 256 bytes; a batch of 32 trucks needs 128 bytes");
         // Indices outside every table.
         let action = wrong(64, Some(Column::Action), Some(vec![255; 64 * size_of::<u32>()]));

@@ -20,10 +20,10 @@ const TOLERANCE: f64 = 0.02;
 
 /// Origin and unit vector of a truck's ray.
 fn placed(world: &World, truck: &Truck, ray: usize) -> (DVec2, DVec2) {
-    let trailer = (truck.trailer_position(&world.params.rig), truck.trailer_heading);
+    let trailer = (truck.trailer_position(&world.rigs[0]), truck.trailer_heading);
     let (position, heading) = if ray < N_TRAILER_RAYS { trailer } else { (truck.position, truck.heading) };
     let heading = Vec2::from_angle(heading);
-    let ray = world.rays[ray];
+    let ray = world.rays[0][ray];
     ((position + heading.rotate(ray.origin)).as_dvec2(), heading.rotate(ray.direction).as_dvec2().normalize())
 }
 

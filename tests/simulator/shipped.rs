@@ -31,14 +31,10 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
     let mut files = BTreeMap::new();
     on_disk(&scenarios(), Path::new(""), &mut files);
     let embedded: BTreeMap<String, String> = FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
-    assert_eq!(
-        (files.len(), FILES.len()),
-        (36, 36),
-        "sixteen benchmarks, ten roundabouts, five outlines, three vehicles, two distributions"
-    );
+    assert_eq!((files.len(), FILES.len()), (41, 41), "21 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions");
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [16, 10, 3, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [21, 10, 3, 2]);
 }
 
 /// Benchmarks of so many roads that they are not drawn here.
@@ -71,10 +67,28 @@ fn the_large_benchmarks_are_random2026_with_other_test_roads_that_no_split_share
 }
 
 #[test]
+fn the_laden_benchmarks_of_random_roads_differ_from_laden2026_in_roads_and_training_alone() {
+    let table = |name: &str| Source::named(Kind::Benchmark, name).unwrap().text().unwrap().parse::<toml::Table>().unwrap();
+    for (laden, empty) in [("laden2026-random", "random2026"), ("laden2026-training", "random2026-training")] {
+        let (mut laden, empty, mut expected) = (table(laden), table(empty), table("laden2026"));
+        assert_eq!(laden.remove("procedural").as_ref(), Some(&empty["procedural"]));
+        assert_eq!(laden["reward"], empty["reward"]);
+        let start = laden.remove("start").unwrap();
+        assert_eq!(start["speed_kmh"], expected["start"]["speed_kmh"]);
+        assert_eq!(start.get("offset"), empty.get("start").and_then(|start| start.get("offset")));
+        for key in ["reward", "start", "roundabout"] {
+            laden.remove(key);
+            expected.remove(key);
+        }
+        assert_eq!(laden, expected);
+    }
+}
+
+#[test]
 fn every_name_gives_what_its_file_gives() {
     // The two with thousands of roads take minutes; the next test reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 14);
+    assert_eq!(benchmarks.len(), 19);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();

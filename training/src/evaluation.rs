@@ -1,6 +1,7 @@
 //! Evaluates a policy: a number of episodes on every route of a split, every one counted.
 
 pub mod certificate; // routes shown to be possible
+pub mod driving; // how trucks drive, by vehicle and load
 pub mod failures; // why episodes did not arrive
 pub mod groups; // routes that have something in common
 pub mod possible; // success over the starts that are shown to be possible
@@ -16,7 +17,7 @@ mod table; // a report as text
 use std::sync::Arc;
 
 use offtrack::cpu::reset::drawn_start;
-use offtrack::layout::{Ended, Start};
+use offtrack::layout::{Control, Ended, Start, Truck};
 use offtrack::route::Route;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
@@ -89,9 +90,13 @@ impl Evaluation<'_> {
     pub fn drive(&self, policy: &mut dyn Policy, progress: &mut dyn FnMut(usize, usize)) -> Result<Driven, Error> {
         let mut simulator = self.simulator()?;
         let (world, n_episodes) = (self.world, simulator.n_envs());
-        let rig = &world.params.rig;
         let lanes: Vec<LaneWidths> = self.routes().iter().map(|(_, place, route)| LaneWidths::of(self.scenario, place, route)).collect();
-        let mut running: Vec<Running> = simulator.batch().truck.iter().map(|truck| Running::new(rig, truck)).collect();
+        let mut running: Vec<Running> = {
+            let batch = simulator.batch();
+            let new =
+                |(truck, control): (&Truck, &Control)| Running::new(world.rig(truck), truck, control.target_speed, self.scenario.step);
+            batch.truck.iter().zip(&batch.control).map(new).collect()
+        };
         let mut sequences = Sequences(vec![Vec::new(); n_episodes]);
         let mut actions = Vec::new();
         let mut finished: Vec<Option<Episode>> = vec![None; n_episodes];
@@ -103,7 +108,7 @@ impl Evaluation<'_> {
             simulator.step(&actions)?;
             let batch = simulator.batch();
             for (env, (running, finished)) in running.iter_mut().zip(&mut finished).enumerate() {
-                if finished.is_none() && running.follow(rig, &lanes[env / self.episodes], batch, env) {
+                if finished.is_none() && running.follow(world.rig(&batch.truck[env]), &lanes[env / self.episodes], batch, env) {
                     *finished = Some(running.finish(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running)));
                     n_finished += 1;
                 }
@@ -182,6 +187,7 @@ impl Evaluation<'_> {
             certified: None,
             possible: None,
             failures: self.failures(finished, None),
+            classes: driving::classes(scenario, self.world, finished),
             groups: Groups::of(&routes, finished, scenario.step),
             routes: route_reports.collect(),
         }
@@ -196,13 +202,13 @@ impl Evaluation<'_> {
 
     /// The route of an episode as an index of the world, and its start.
     fn start(&self, episode: usize) -> (u32, Start) {
-        (self.scenario.split(self.split)[episode / self.episodes], drawn_start(self.seed, episode as u32, 0))
+        (self.scenario.split(self.split)[episode / self.episodes], drawn_start(self.world.params.n_vehicles, self.seed, episode as u32, 0))
     }
 
     /// Whether the own lane suffices on each route. The kerbs of one roundabout a thread are held.
     fn own_lane_suffices(&self, routes: &[Evaluated]) -> Vec<bool> {
         let Evaluation { scenario, world, .. } = *self;
-        let (rig, speed) = (&world.params.rig, scenario.cruising_speed());
+        let (rig, speed) = (&world.rigs[0], scenario.cruising_speed());
         let of_one_place: Vec<_> = routes.chunk_by(|(a, ..), (b, ..)| a == b).collect();
         let suffices = |routes: &&[Evaluated]| {
             let kerbs = routes[0].1.roundabout.kerbs(scenario.gutter);

@@ -2,12 +2,12 @@
 
 use std::ops::RangeInclusive;
 
-use offtrack::layout::Rig;
+use offtrack::layout::{Lag, Rig};
 use offtrack::reader::{shortened, shown};
-use offtrack::vehicle::{GRAVITY, Suspension};
+use offtrack::vehicle::{GRAVITY, SLIP_LEVER, Suspension};
 use serde::Deserialize;
 
-/// Lateral acceleration far beyond any truck's, for cases without friction [m/s^2].
+/// Lateral acceleration [m/s^2] and power [W/kg] far beyond any truck's, for cases without friction or power.
 const UNLIMITED: f32 = 1e6;
 
 /// A case whose values make no sense.
@@ -33,6 +33,9 @@ pub struct Case {
     pub vehicle: CaseVehicle,
     /// Length of a sub-step \[s].
     pub dt: f64,
+    /// Time between two decisions of the speed control \[s].
+    #[serde(default = "control_step")]
+    pub control_step: f64,
     /// Initial state.
     pub init: Init,
     /// Commands in order of time.
@@ -95,6 +98,41 @@ pub struct CaseVehicle {
     pub fn2: f64,
     /// Roll damping of the trailer.
     pub zeta2: f64,
+    /// Bound of `K v²` \[m].
+    #[serde(default = "slip_lever")]
+    pub lever_max: f64,
+    /// Time constant of the tractor's yaw over `K v`.
+    #[serde(default)]
+    pub yaw_lag: f64,
+    /// Time constant of the drive \[s].
+    #[serde(default)]
+    pub drive_lag: f64,
+    /// Time constant of the brakes \[s].
+    #[serde(default)]
+    pub brake_lag: f64,
+    /// Time from a steer command to the first movement of the wheels \[s].
+    #[serde(default)]
+    pub delta_delay: f64,
+    /// Engine power over the mass of the truck [W/kg]; unlimited where absent.
+    pub power: Option<f64>,
+    /// Whether drive and braking take lateral grip; it needs `mu`.
+    #[serde(default)]
+    pub ellipse: bool,
+    /// Fall of the road to the right, as a tangent.
+    #[serde(default)]
+    pub crossfall: f64,
+    /// Speed control: acceleration per speed error [1/s].
+    #[serde(default = "speed_gain")]
+    pub kp: f64,
+    /// Speed control: acceleration per integral of the speed error [1/s^2].
+    #[serde(default = "speed_integral_gain")]
+    pub ki: f64,
+    /// Speed control: speed error beyond which the integral is reset to 0 [m/s].
+    #[serde(default = "speed_band")]
+    pub band: f64,
+    /// Speed control: strongest braking, negative [m/s^2].
+    #[serde(default = "speed_braking")]
+    pub brake: f64,
 }
 
 /// Initial state of a case.
@@ -122,7 +160,10 @@ pub struct Command {
     /// Target steer angle \[rad].
     pub delta_cmd: f64,
     /// Target acceleration [m/s^2].
+    #[serde(default)]
     pub a_cmd: f64,
+    /// Target speed, in place of a target acceleration: the speed control asks for one every `control_step` [m/s].
+    pub v_cmd: Option<f64>,
 }
 
 /// An instant to report.
@@ -130,6 +171,30 @@ pub struct Command {
 pub struct Instant {
     /// Time \[s].
     pub t: f64,
+}
+
+fn control_step() -> f64 {
+    0.1
+}
+
+fn speed_gain() -> f64 {
+    0.8
+}
+
+fn speed_integral_gain() -> f64 {
+    0.05
+}
+
+fn speed_band() -> f64 {
+    0.5 / 3.6
+}
+
+fn speed_braking() -> f64 {
+    -2.5
+}
+
+fn slip_lever() -> f64 {
+    SLIP_LEVER
 }
 
 fn right_angle() -> f64 {
@@ -175,6 +240,17 @@ impl CaseVehicle {
             lateral_acceleration_max: self.mu.map_or(UNLIMITED, |mu| (mu * GRAVITY) as f32),
             tractor_roll: self.tractor_suspension().roll(substep),
             trailer_roll: self.trailer_suspension().roll(substep),
+            slip_lever_max: self.lever_max as f32,
+            yaw_lag: (self.yaw_lag * self.K) as f32,
+            drive_lag: Lag::of(self.drive_lag, substep),
+            brake_lag: Lag::of(self.brake_lag, substep),
+            power: self.power.map_or(UNLIMITED, |power| power as f32),
+            friction_ellipse: self.mu.filter(|_| self.ellipse).map_or(0.0, |mu| (mu * GRAVITY).powi(-2) as f32),
+            crossfall: (self.crossfall * GRAVITY) as f32,
+            speed_gain: self.kp as f32,
+            speed_integral_gain: self.ki as f32,
+            speed_integral_band: self.band as f32,
+            speed_braking: self.brake as f32,
             ..Rig::default()
         }
     }
@@ -186,11 +262,23 @@ impl Case {
         let vehicle = &self.vehicle;
         let (any, positive, speed) = (-1e5..=1e5, 1e-3..=1e3, -60.0..=60.0);
         self.within("dt", self.dt, 1e-4..=0.2, "s")?;
+        self.within("control_step", self.control_step, self.dt..=10.0, "s")?;
+        self.within("vehicle.kp", vehicle.kp, 0.0..=100.0, "1/s")?;
+        self.within("vehicle.ki", vehicle.ki, 0.0..=100.0, "1/s^2")?;
+        self.within("vehicle.band", vehicle.band, 0.0..=100.0, "m/s")?;
+        self.within("vehicle.brake", vehicle.brake, -100.0..=0.0, "m/s^2")?;
         self.within("t_end", self.t_end, 0.0..=3600.0, "s")?;
         self.within("vehicle.L1", vehicle.L1, 0.5..=30.0, "m")?;
         self.within("vehicle.a", vehicle.a, -10.0..=10.0, "m")?;
-        // Slip shortens this lever by up to 1.5 m: it stays positive.
-        self.within("vehicle.L2", vehicle.L2, 1.6..=50.0, "m")?;
+        self.within("vehicle.lever_max", vehicle.lever_max, 0.0..=10.0, "m")?;
+        // Slip shortens this lever: it stays positive.
+        self.within("vehicle.L2", vehicle.L2, vehicle.lever_max + 0.1..=50.0, "m")?;
+        self.within("vehicle.yaw_lag", vehicle.yaw_lag, 0.0..=5.0, "")?;
+        self.within("vehicle.drive_lag", vehicle.drive_lag, 0.0..=5.0, "s")?;
+        self.within("vehicle.brake_lag", vehicle.brake_lag, 0.0..=5.0, "s")?;
+        self.within("vehicle.delta_delay", vehicle.delta_delay, 0.0..=5.0, "s")?;
+        self.within("vehicle.power", vehicle.power.unwrap_or(1.0), 0.01..=1e5, "W/kg")?;
+        self.within("vehicle.crossfall", vehicle.crossfall, -0.5..=0.5, "")?;
         self.within("vehicle.K", vehicle.K, 0.0..=1.0, "rad/(m/s^2)")?;
         self.within("vehicle.mu", vehicle.mu.unwrap_or(1.0), 0.0..=10.0, "")?;
         self.within("vehicle.delta_max", vehicle.delta_max, 0.0..=1.5, "rad")?;
@@ -217,6 +305,7 @@ impl Case {
             earliest = self.within(&format!("commands[{index}].t"), command.t, earliest..=f64::MAX, "s")?;
             self.within(&format!("commands[{index}].delta_cmd"), command.delta_cmd, -1e3..=1e3, "rad")?;
             self.within(&format!("commands[{index}].a_cmd"), command.a_cmd, -1e3..=1e3, "m/s^2")?;
+            self.within(&format!("commands[{index}].v_cmd"), command.v_cmd.unwrap_or(0.0), 0.0..=60.0, "m/s")?;
         }
         let (key, times) = match &self.times {
             Some(times) => ("times[", times.clone()),

@@ -16,14 +16,15 @@ const SCREEN_REAR: f32 = 0.8;
 
 /// Dimensions of the trucks of a world.
 pub struct Shape {
-    rig: Rig,
-    rays: [Ray; N_RAYS],
+    /// As the world numbers vehicles and chassis.
+    rigs: Vec<Rig>,
+    rays: Vec<[Ray; N_RAYS]>,
     sensor_range: f32,
 }
 
 impl Shape {
     pub fn of(world: &World) -> Shape {
-        Shape { rig: world.params.rig, rays: world.rays, sensor_range: world.params.sensor_range }
+        Shape { rigs: world.rigs.clone(), rays: world.rays.clone(), sensor_range: world.params.sensor_range }
     }
 
     /// A truck on a map. A line of width 1 is `pen` wide \[px].
@@ -34,10 +35,11 @@ impl Shape {
 
     /// The distance sensors, with a dot where one meets a kerb.
     fn rays(&self, map: &mut Canvas, view: &View, pen: f64, Shown { truck, ranges, .. }: &Shown) {
+        let rig = &self.rigs[truck.vehicle as usize];
         let tractor = (point(truck.position), f64::from(truck.heading));
-        let trailer = (point(truck.trailer_position(&self.rig)), f64::from(truck.trailer_heading));
+        let trailer = (point(truck.trailer_position(rig)), f64::from(truck.trailer_heading));
         let (mut met, mut free, mut dots) = (Vec::new(), Vec::new(), Vec::new());
-        for (n, (ray, &range)) in self.rays.iter().zip(*ranges).enumerate() {
+        for (n, (ray, &range)) in self.rays[rig.chassis as usize].iter().zip(*ranges).enumerate() {
             let (position, heading) = if n < N_TRAILER_RAYS { trailer } else { tractor };
             let ahead = DVec2::from_angle(heading);
             let from = position + ahead.rotate(point(ray.origin));
@@ -57,7 +59,7 @@ impl Shape {
 
     /// Both units, the trailer above the tractor, with windscreen, steered front wheels and hitch.
     fn units(&self, map: &mut Canvas, view: &View, pen: f64, Shown { truck, ended, .. }: &Shown) {
-        let rig = &self.rig;
+        let rig = &self.rigs[truck.vehicle as usize];
         let (position, heading) = (point(truck.position), f64::from(truck.heading));
         let ahead = DVec2::from_angle(heading);
         let on_page = |body: &Body, position: DVec2, heading: f64| corners(body, position, heading).map(|p| view.point(p));

@@ -22,14 +22,14 @@ fn camera(side: u32) -> Camera {
 fn truck(route: u32, s: f64) -> Truck {
     let (_, line) = DRIVEN.0.routes().nth(route as usize).unwrap();
     let Pose { position, heading, trailer_heading, .. } =
-        *swept_path(&DRIVEN.1.params.rig, &line.centre_line.part(0.0, s), 8.0, 1.0).last().unwrap();
+        *swept_path(&DRIVEN.1.rigs[0], &line.centre_line.part(0.0, s), 8.0, 1.0).last().unwrap();
     let (position, heading, trailer_heading) = (position.as_vec2(), heading as f32, trailer_heading as f32);
     Truck { position, heading, trailer_heading, speed: 8.0, route, ..Truck::default() }
 }
 
 fn ranges(truck: &Truck) -> [f32; N_RAYS] {
     let world = &DRIVEN.1;
-    sense::ranges(world.route_field(truck.route), &world.params.rig, &world.rays, truck, world.params.sensor_range)
+    sense::ranges(world.route_field(truck.route), &world.rigs[0], &world.rays[0], truck, world.params.sensor_range)
 }
 
 fn drawn(camera: &mut Camera, truck: &Truck, ended: Ended) -> Vec<u8> {
@@ -54,7 +54,7 @@ fn is(colour: &'static str) -> [u8; 3] {
 
 /// Points of a truck that no detail covers: between the front wheels, and in the middle of the trailer.
 fn middles(truck: &Truck) -> [DVec2; 2] {
-    let rig = &DRIVEN.1.params.rig;
+    let rig = &DRIVEN.1.rigs[0];
     let [ahead, trailer_ahead] = [truck.heading, truck.trailer_heading].map(|heading| DVec2::from_angle(heading.into()));
     let body = &rig.trailer_body;
     let front_axle = truck.position.as_dvec2() + f64::from(rig.wheelbase) * ahead;
@@ -115,7 +115,7 @@ fn ground_road_kerbs_route_and_both_units_have_their_colours() {
 #[test]
 fn the_whole_truck_is_in_the_picture_at_the_start_and_at_the_end_of_every_route() {
     let (scenario, world) = &*DRIVEN;
-    let rig = &world.params.rig;
+    let rig = &world.rigs[0];
     let mut camera = camera(64);
     for route in 0..world.routes.len() as u32 {
         let waypoints = world.route_waypoints(route);

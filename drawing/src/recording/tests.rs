@@ -40,7 +40,7 @@ fn frames_are_the_simulators_states_from_the_start_to_the_last_step() {
             let same = |parts: f64, a: f32, b: f32| assert!(f64::from((a - b).abs()) <= 0.51 / parts + 4e-6, "frame {n}: {a} {b}");
             same(MILLI, frame.position[0], truck.position.x);
             same(MILLI, frame.position[1], truck.position.y);
-            same(MILLI, frame.trailer_position[0], truck.trailer_position(&world.params.rig).x);
+            same(MILLI, frame.trailer_position[0], truck.trailer_position(world.rig(truck)).x);
             same(ANGLE, frame.trailer_heading, truck.trailer_heading);
             same(ANGLE, frame.articulation, wrapped(truck.heading - truck.trailer_heading));
             same(ANGLE, frame.steering, truck.steering);

@@ -38,7 +38,7 @@ constants! {
 /// Fills the row's clearance.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 pub fn collide(world: &World, row: &mut Row) {
-    *row.clearance = clearance(world.route_field(row.truck.route), &world.params.rig, row.truck);
+    *row.clearance = clearance(world.route_field(row.truck.route), world.rig(row.truck), row.truck);
 }
 
 /// Clearance of both units: at least the field's least distance on their rectangles, and at most twice that plus 1 cm.

@@ -8,4 +8,5 @@ use crate::world::World;
 /// Copies the row's observation.
 pub fn copy_observation(_: &World, row: &mut Row) {
     *row.observation = *row.next_observation;
+    *row.extras = *row.next_extras;
 }

@@ -13,8 +13,8 @@ use crate::shared::constants;
 use crate::world::World;
 
 constants! {
-    /// Largest shift of a no-slip point \[m]: the linear tyre model is not valid beyond.
-    pub const SLIP_LEVER_MAX: f32 = 1.5;
+    /// Lowest speed that the engine's power is divided by \[m/s].
+    const POWER_SPEED_MIN: f32 = 1.0;
     /// Keeps a quotient finite at a standstill [m^2/s^2].
     const SPEED_SQUARED_MIN: f32 = 0.01;
 }
@@ -22,16 +22,17 @@ constants! {
 /// One step of the truck: its sub-steps, and the largest load transfer ratio of each unit among them.
 pub fn drive(world: &World, row: &mut Row) {
     let params = &world.params;
-    *row.truck = driven(&params.rig, params.substep, params.n_substeps, row.control, row.truck);
+    *row.truck = driven(world.rig(row.truck), params.substep, params.n_substeps, row.control, row.truck);
 }
 
 /// The truck after `n_substeps` sub-steps of `substep` seconds, for which the rig's roll is discretised.
 #[inline]
 pub fn driven(rig: &Rig, substep: f32, n_substeps: u32, control: &Control, truck: &Truck) -> Truck {
-    let mut moving = Moving { truck: *truck, motion: motion(rig, truck.speed, truck.steering, truck.heading - truck.trailer_heading) };
+    let mut moving = Moving { truck: *truck, motion: motion_of(rig, truck) };
     let (mut tractor_ratio, mut trailer_ratio) = (0.0, 0.0);
-    for _ in 0..n_substeps {
-        moving = moved(rig, substep, control, &moving);
+    for n in 0..n_substeps {
+        let control = Control { steering: delayed(rig.steer_delay, n, n_substeps, control), ..*control };
+        moving = moved(rig, substep, &control, &moving);
         tractor_ratio = larger_in_magnitude(tractor_ratio, moving.truck.tractor_load_transfer_ratio);
         trailer_ratio = larger_in_magnitude(trailer_ratio, moving.truck.trailer_load_transfer_ratio);
     }
@@ -50,6 +51,8 @@ pub struct Moving {
 /// Motion of both units at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
+    /// Curvature of the tractor's steer angle, without lag and limit of grip \[1/m].
+    pub steered_curvature: f32,
     /// Of the tractor \[rad/s].
     pub yaw_rate: f32,
     /// Of the trailer \[rad/s].
@@ -62,21 +65,54 @@ pub struct Motion {
     pub trailer_lateral_acceleration: f32,
 }
 
-/// Motion of a truck with this speed \[m/s], steer angle and articulation \[rad].
+/// The steer angle that was asked for `delay` sub-steps before sub-step `n` of the step, at most two steps ago \[rad].
 #[inline]
-pub fn motion(rig: &Rig, speed: f32, steering: f32, articulation: f32) -> Motion {
-    // The tyres' grip bounds the curvature.
-    let curvature_max = rig.lateral_acceleration_max / (speed * speed).max(SPEED_SQUARED_MIN);
+pub fn delayed(delay: u32, n: u32, n_substeps: u32, control: &Control) -> f32 {
+    if delay <= n {
+        control.steering
+    } else if delay <= n + n_substeps {
+        control.steering_before
+    } else {
+        control.steering_earlier
+    }
+}
+
+/// Motion of a truck.
+#[inline]
+pub fn motion_of(rig: &Rig, truck: &Truck) -> Motion {
+    let curvature = steered_curvature(rig, truck.steering);
+    motion(rig, truck.speed, curvature, truck.curvature_lag, truck.acceleration, truck.heading - truck.trailer_heading)
+}
+
+/// Curvature of the path on which the tractor's wheels roll at a steer angle \[rad], without slip \[1/m].
+#[inline]
+pub fn steered_curvature(rig: &Rig, steering: f32) -> f32 {
     let (sin, cos) = sin_cos(steering);
-    let curvature = limited(sin / (cos * rig.wheelbase), curvature_max);
+    sin / (cos * rig.wheelbase)
+}
+
+/// Strongest drive at a speed \[m/s^2].
+#[inline]
+pub fn drive_max(rig: &Rig, speed: f32) -> f32 {
+    rig.acceleration_max.min(rig.power / speed.max(POWER_SPEED_MIN))
+}
+
+/// Motion of a truck with this speed \[m/s], curvature of the steer angle and deviation from it \[1/m], acceleration
+/// [m/s^2] and articulation \[rad].
+#[inline]
+pub fn motion(rig: &Rig, speed: f32, steered_curvature: f32, curvature_lag: f32, acceleration: f32, articulation: f32) -> Motion {
+    // The tyres' grip bounds the curvature.
+    let grip = rig.lateral_acceleration_max * (1.0 - rig.friction_ellipse * acceleration * acceleration).max(0.0).sqrt();
+    let curvature = limited(steered_curvature + curvature_lag, grip / (speed * speed).max(SPEED_SQUARED_MIN));
     let yaw_rate = speed * curvature;
-    let side_speed = -limited(rig.slip * speed * speed.abs(), SLIP_LEVER_MAX) * yaw_rate;
+    let side_speed = -limited(rig.slip * speed * speed.abs(), rig.slip_lever_max) * yaw_rate;
     let hitch_side_speed = side_speed + rig.fifth_wheel * yaw_rate;
     let (sin, cos) = sin_cos(articulation);
     let trailer_speed = speed * cos - hitch_side_speed * sin;
-    let lever = rig.trailer_wheelbase - limited(rig.slip * trailer_speed * trailer_speed.abs(), SLIP_LEVER_MAX);
+    let lever = rig.trailer_wheelbase - limited(rig.slip * trailer_speed * trailer_speed.abs(), rig.slip_lever_max);
     let trailer_yaw_rate = (speed * sin + hitch_side_speed * cos) / lever;
     Motion {
+        steered_curvature,
         yaw_rate,
         trailer_yaw_rate,
         side_speed,
@@ -85,28 +121,54 @@ pub fn motion(rig: &Rig, speed: f32, steering: f32, articulation: f32) -> Motion
     }
 }
 
+/// The deviation of the path's curvature from the steer angle's, `duration` seconds after it was `lag`, where the steer
+/// angle's changes by `rise` in that time \[1/m].
+///
+/// The tractor's yaw follows its front wheels with the time constant `yaw_lag * speed`: tyres build up lateral force only
+/// as slip angles grow. The exponential is its Padé approximant, which is stable at any speed.
+#[inline]
+pub fn lagging(rig: &Rig, speed: f32, lag: f32, rise: f32, duration: f32) -> f32 {
+    let time = rig.yaw_lag * speed.abs();
+    let left = time * time / (time * time + duration * time + 0.5 * duration * duration);
+    let settled = -rise / duration * time;
+    settled + (lag - settled) * left
+}
+
 /// The truck one sub-step later, with its load transfer ratios there.
 #[inline]
 pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Moving {
     let truck = &start.truck;
     let turn = limited(limited(control.steering, rig.steer_max) - truck.steering, rig.steer_rate * substep);
     let steering = truck.steering + turn;
-    let acceleration = control.acceleration.max(rig.acceleration_min).min(rig.acceleration_max);
-    let speed = truck.speed + acceleration * substep;
+    let asked = control.acceleration.max(rig.acceleration_min).min(drive_max(rig, truck.speed));
+    let lag = if asked < 0.0 { &rig.brake_lag } else { &rig.drive_lag };
+    let mut acceleration = asked + lag.left * (truck.acceleration - asked);
+    let mut mean_acceleration = asked + lag.mean * (truck.acceleration - asked);
+    let mut speed = truck.speed + mean_acceleration * substep;
+    if control.holds == 1 && truck.speed * speed <= 0.0 {
+        (acceleration, mean_acceleration, speed) = (0.0, -truck.speed / substep, 0.0);
+    }
 
     let half = 0.5 * substep;
     let articulation = truck.heading - truck.trailer_heading;
-    let middle_speed = truck.speed + acceleration * half;
+    let middle_speed = truck.speed + mean_acceleration * half;
     let middle_articulation = articulation + half * (start.motion.yaw_rate - start.motion.trailer_yaw_rate);
-    let middle = motion(rig, middle_speed, truck.steering + 0.5 * turn, middle_articulation);
+    let middle_curvature = steered_curvature(rig, truck.steering + 0.5 * turn);
+    let rise = middle_curvature - start.motion.steered_curvature;
+    let middle_lag = lagging(rig, middle_speed, truck.curvature_lag, rise, half);
+    let middle = motion(rig, middle_speed, middle_curvature, middle_lag, mean_acceleration, middle_articulation);
     let (sin, cos) = sin_cos(truck.heading + half * start.motion.yaw_rate);
     let velocity = Vec2::new(middle_speed * cos - middle.side_speed * sin, middle_speed * sin + middle.side_speed * cos);
 
     let heading = wrapped(truck.heading + substep * middle.yaw_rate);
     let trailer_heading = wrapped(truck.trailer_heading + substep * middle.trailer_yaw_rate);
-    let end = motion(rig, speed, steering, heading - trailer_heading);
-    let tractor = rolled(&rig.tractor_roll, Vec2::new(truck.tractor_roll, truck.tractor_roll_rate), middle.lateral_acceleration);
-    let trailer = rolled(&rig.trailer_roll, Vec2::new(truck.trailer_roll, truck.trailer_roll_rate), middle.trailer_lateral_acceleration);
+    let curvature = steered_curvature(rig, steering);
+    let curvature_lag = lagging(rig, middle_speed, truck.curvature_lag, curvature - start.motion.steered_curvature, substep);
+    let end = motion(rig, speed, curvature, curvature_lag, acceleration, heading - trailer_heading);
+    let tilted = |lateral_acceleration: f32| lateral_acceleration + rig.crossfall;
+    let tractor = rolled(&rig.tractor_roll, Vec2::new(truck.tractor_roll, truck.tractor_roll_rate), tilted(middle.lateral_acceleration));
+    let trailer =
+        rolled(&rig.trailer_roll, Vec2::new(truck.trailer_roll, truck.trailer_roll_rate), tilted(middle.trailer_lateral_acceleration));
     Moving {
         truck: Truck {
             position: truck.position + substep * velocity,
@@ -118,8 +180,11 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
             tractor_roll_rate: tractor.y,
             trailer_roll: trailer.x,
             trailer_roll_rate: trailer.y,
-            tractor_load_transfer_ratio: load_transfer_ratio(&rig.tractor_roll, tractor, end.lateral_acceleration),
-            trailer_load_transfer_ratio: load_transfer_ratio(&rig.trailer_roll, trailer, end.trailer_lateral_acceleration),
+            tractor_load_transfer_ratio: load_transfer_ratio(&rig.tractor_roll, tractor, tilted(end.lateral_acceleration)),
+            trailer_load_transfer_ratio: load_transfer_ratio(&rig.trailer_roll, trailer, tilted(end.trailer_lateral_acceleration)),
+            acceleration,
+            curvature_lag,
+            lateral_acceleration: end.trailer_lateral_acceleration,
             ..*truck
         },
         motion: end,

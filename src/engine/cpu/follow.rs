@@ -12,7 +12,7 @@ use crate::world::World;
 /// Updates the row's progress.
 pub fn follow(world: &World, row: &mut Row) {
     let waypoints = world.route_waypoints(row.truck.route);
-    let point = reference_point(world.params.rig.wheelbase, row.truck);
+    let point = reference_point(world.rig(row.truck).wheelbase, row.truck);
     *row.progress = followed(waypoints, point, row.progress.waypoint, world.params.stray_distance);
 }
 

@@ -7,7 +7,7 @@ use glam::Vec2;
 use crate::angle::{PI, arc_tangent, wrapped};
 use crate::engine::Row;
 use crate::engine::cpu::follow::{distance_to_segment, reference_point};
-use crate::layout::{N_RAYS, N_VALUES, Params, PreviewRow, Progress, RouteRow, Truck, WaypointRow};
+use crate::layout::{Control, N_EXTRAS, N_RAYS, N_VALUES, Progress, Truck};
 use crate::shared::constants;
 use crate::world::World;
 
@@ -44,33 +44,40 @@ constants! {
     const RANGES_AT: usize = 30;
     /// Index of the radii ahead.
     const RADII_AT: usize = 59;
+    /// Acceleration that is observed as 1 [m/s^2].
+    const ACCELERATION_SCALE: f32 = 2.5;
+    /// Lateral acceleration that is observed as 1 [m/s^2].
+    pub const G: f32 = 9.81;
+    /// Wheelbase that is observed as 1 \[m].
+    const WHEELBASE_SCALE: f32 = 10.0;
+    /// Roll that is observed as 1 \[rad].
+    const ROLL_SCALE: f32 = 0.15;
+    /// Roll rate that is observed as 1 \[rad/s].
+    const ROLL_RATE_SCALE: f32 = 0.3;
+    /// Mass that is observed as 1 \[kg].
+    const MASS_SCALE: f32 = 40000.0;
 }
 
 /// Writes the row's next observation.
 pub fn observe(world: &World, row: &mut Row) {
     *row.next_observation = observation_of(world, row);
+    if 0 < world.params.n_extras {
+        *row.next_extras = extras(world, row.truck, row.control);
+    }
 }
 
 /// The observation of the row's truck.
 pub(super) fn observation_of(world: &World, row: &Row) -> [f32; N_VALUES] {
-    let route = &world.routes[row.truck.route as usize];
-    let (waypoints, previews) = (world.route_waypoints(row.truck.route), world.route_previews(row.truck.route));
-    observed(&world.params, route, waypoints, previews, row.truck, row.progress, row.ranges)
+    observed(world, row.truck, row.progress, row.ranges)
 }
 
 /// The 69 values.
-pub fn observed(
-    params: &Params,
-    route: &RouteRow,
-    waypoints: &[WaypointRow],
-    previews: &[PreviewRow],
-    truck: &Truck,
-    progress: &Progress,
-    ranges: &[f32; N_RAYS],
-) -> [f32; N_VALUES] {
+pub fn observed(world: &World, truck: &Truck, progress: &Progress, ranges: &[f32; N_RAYS]) -> [f32; N_VALUES] {
+    let route = &world.routes[truck.route as usize];
+    let (waypoints, previews) = (world.route_waypoints(truck.route), world.route_previews(truck.route));
     let last = waypoints.len() - 1;
     let next = (progress.waypoint as usize).min(last);
-    let point = reference_point(params.rig.wheelbase, truck);
+    let point = reference_point(world.rig(truck).wheelbase, truck);
     let mut values = [0.0; N_VALUES];
     values[0] = (truck.speed / SPEED_SCALE).clamp(0.0, 1.0);
     for n in 0..2 {
@@ -93,10 +100,35 @@ pub fn observed(
     let preview = &previews[next].values;
     values[CURVATURES_AT..RANGES_AT].copy_from_slice(&preview[..N_CURVATURES]);
     for (value, range) in values[RANGES_AT..RADII_AT].iter_mut().zip(ranges) {
-        *value = range / params.sensor_range;
+        *value = range / world.params.sensor_range;
     }
     values[RADII_AT..].copy_from_slice(&preview[N_CURVATURES..]);
     values
+}
+
+/// The values beside the observation, as [`EXTRAS`](crate::layout::EXTRAS) defines them: those that the benchmark
+/// observes, zeros in place of the others.
+pub fn extras(world: &World, truck: &Truck, control: &Control) -> [f32; N_EXTRAS] {
+    let rig = world.rig(truck);
+    let values = [
+        truck.steering / rig.steer_max,
+        control.target_speed / SPEED_SCALE,
+        truck.acceleration / ACCELERATION_SCALE,
+        truck.lateral_acceleration / G,
+        rig.trailer_wheelbase / WHEELBASE_SCALE,
+        truck.trailer_roll / ROLL_SCALE,
+        truck.trailer_roll_rate / ROLL_RATE_SCALE,
+        rig.trailer_mass / MASS_SCALE,
+        rig.rollover_threshold,
+        rig.lateral_acceleration_max / G,
+        truck.tractor_load_transfer_ratio,
+        truck.trailer_load_transfer_ratio,
+    ];
+    let mut observed = [0.0; N_EXTRAS];
+    for (n, value) in values.into_iter().enumerate().take(world.params.n_extras as usize) {
+        observed[n] = value.clamp(-1.0, 1.0);
+    }
+    observed
 }
 
 /// Signed angle from `from` to `to`, left positive \[rad].

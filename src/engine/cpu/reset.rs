@@ -7,13 +7,13 @@ use crate::engine::cpu::follow::{followed, reference_point};
 use crate::engine::cpu::{observe, sense};
 use crate::engine::{Autoreset, RouteChoice, Row};
 use crate::layout::{
-    BEGINS, BeginRow, Control, Ended, HAS_ROUTE, HAS_START, IS_FIRST, Params, RewardTerms, Start, Stream, Truck, WaypointRow,
+    BEGINS, BeginRow, Control, Ended, HAS_ROUTE, HAS_START, IS_FIRST, Params, RewardTerms, Rig, Start, Stream, Truck, WaypointRow,
 };
 use crate::random::{self, Draw};
 use crate::world::World;
 
 /// The next episode, as drawn.
-const NEXT: BeginRow = BeginRow { start: Start { offset: 0.0, heading: 0.0 }, route: 0, what: BEGINS };
+const NEXT: BeginRow = BeginRow { start: Start { offset: 0.0, heading: 0.0, speed: 0.0, vehicle: 0 }, route: 0, what: BEGINS };
 
 /// Begins and observes another episode where one ended, or holds the truck. A truck that was held when the step began
 /// begins its next episode with [`Autoreset::NextStep`].
@@ -38,15 +38,17 @@ pub fn begin(world: &World, row: &mut Row, begin: &BeginRow) {
     }
     start(world, row, begin);
     *row.next_observation = *row.observation;
+    *row.next_extras = *row.extras;
     *row.ended = Ended::Running as u32;
     *row.terms = RewardTerms::default();
     *row.reward = 0.0;
 }
 
-/// The start that is drawn for an episode of truck `env`.
-pub fn drawn_start(seed: u32, env: u32, episode: u32) -> Start {
+/// The start that is drawn for an episode of truck `env` in a world of so many vehicles.
+pub fn drawn_start(n_vehicles: u32, seed: u32, env: u32, episode: u32) -> Start {
     let [offset, heading, ..] = random::words(seed, env, episode, Draw::Pose as u32).map(random::signed_unit);
-    Start { offset, heading }
+    let [vehicle, speed, ..] = random::words(seed, env, episode, Draw::Vehicle as u32);
+    Start { offset, heading, speed: random::signed_unit(speed), vehicle: random::index_below(vehicle, n_vehicles) }
 }
 
 /// Puts the truck at the start of an episode and observes it there.
@@ -54,15 +56,20 @@ fn start(world: &World, row: &mut Row, begin: &BeginRow) {
     let Stream { seed, env } = row.stream;
     let episode = if begin.what & IS_FIRST == 0 { row.truck.episode + 1 } else { 0 };
     let route = if begin.what & HAS_ROUTE == 0 { route_of(row, episode) } else { begin.route };
-    let start = if begin.what & HAS_START == 0 { drawn_start(seed, env, episode) } else { begin.start };
+    let start = if begin.what & HAS_START == 0 { drawn_start(world.params.n_vehicles, seed, env, episode) } else { begin.start };
     let waypoints = world.route_waypoints(route);
-    *row.control = Control::default();
-    *row.truck = Truck { route, episode, ..started(&world.params, &waypoints[0], world.route_previews(route)[0].heading, &start) };
-    let point = reference_point(world.params.rig.wheelbase, row.truck);
+    let rig = &world.rigs[start.vehicle as usize];
+    let at_start = started(&world.params, rig, &waypoints[0], world.route_previews(route)[0].heading, &start);
+    *row.truck = Truck { route, episode, ..at_start };
+    *row.control = Control { target_speed: at_start.speed, ..Control::default() };
+    let point = reference_point(rig.wheelbase, row.truck);
     *row.progress = followed(waypoints, point, 1, world.params.stray_distance);
     row.progress.passed = 0;
     sense::sense(world, row);
     *row.observation = observe::observation_of(world, row);
+    if 0 < world.params.n_extras {
+        *row.extras = observe::extras(world, row.truck, row.control);
+    }
 }
 
 /// The route of an episode as the batch chooses it.
@@ -78,14 +85,15 @@ fn route_of(row: &Row, episode: u32) -> u32 {
 }
 
 /// A truck at `waypoint`, where the lane has this heading \[rad]: trailer straight, offset and turned as `start` says.
-pub fn started(params: &Params, waypoint: &WaypointRow, lane_heading: f32, start: &Start) -> Truck {
+pub fn started(params: &Params, rig: &Rig, waypoint: &WaypointRow, lane_heading: f32, start: &Start) -> Truck {
     let heading = wrapped(lane_heading + start.heading * params.start_heading);
     let point = waypoint.position + start.offset * params.start_offset * waypoint.direction.perp();
     Truck {
-        position: point - 0.5 * params.rig.wheelbase * direction(heading),
+        position: point - 0.5 * rig.wheelbase * direction(heading),
         heading,
         trailer_heading: heading,
-        speed: params.start_speed,
+        speed: params.start_speed + start.speed * params.start_speed_range,
+        vehicle: start.vehicle,
         ..Truck::default()
     }
 }

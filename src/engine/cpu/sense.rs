@@ -49,7 +49,8 @@ constants! {
 /// Fills the row's ranges.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 pub fn sense(world: &World, row: &mut Row) {
-    *row.ranges = ranges(world.route_field(row.truck.route), &world.params.rig, &world.rays, row.truck, world.params.sensor_range);
+    let rig = world.rig(row.truck);
+    *row.ranges = ranges(world.route_field(row.truck.route), rig, world.rays_of(rig), row.truck, world.params.sensor_range);
 }
 
 /// Distance along each ray to the kerb: `reach` where none is met before, 0 from inside one \[m].

@@ -3,20 +3,37 @@
 //! The speed control is a PI controller with anti-windup.
 
 use crate::engine::Row;
-use crate::layout::{Action, Control, Rig};
+use crate::engine::cpu::drive::drive_max;
+use crate::layout::{Action, Control, Params, Rig};
+use crate::shared::constants;
 use crate::world::World;
+
+constants! {
+    /// Braking at which a truck comes to stand [m/s^2].
+    const HOLD_BRAKING: f32 = 0.5;
+}
 
 /// Writes the row's control.
 pub fn steer(world: &World, row: &mut Row) {
     let params = &world.params;
     let step = params.n_substeps as f32 * params.substep;
-    *row.control = controlled(&params.rig, step, &world.actions[*row.action as usize], row.truck.speed, row.control);
+    let action = targeted(params, &world.actions[*row.action as usize], row.control);
+    let control = controlled(world.rig(row.truck), step, &action, row.truck.speed, row.control);
+    *row.control = Control { acceleration_before: row.truck.acceleration, ..control };
+}
+
+/// The action with the target speed that it leads to, from that of the control before.
+#[inline]
+pub fn targeted(params: &Params, action: &Action, before: &Control) -> Action {
+    let changed = (before.target_speed + action.speed).max(params.target_speed_min).min(params.target_speed_max);
+    Action { speed: if params.changes_speed == 1 { changed } else { action.speed }, ..*action }
 }
 
 /// The control for the next `step` seconds of a truck at `speed` [m/s] that was controlled by `before`.
 ///
 /// PI controller with anti-windup: the integral is reset to 0 while the error is large, and kept while the acceleration
-/// asked for is out of reach. Otherwise a long approach to the target speed would overshoot it.
+/// asked for is out of reach. Otherwise a long approach to the target speed would overshoot it. A target of 0 is
+/// reached with constant braking at last: the controller alone would never stand.
 #[inline]
 pub fn controlled(rig: &Rig, step: f32, action: &Action, speed: f32, before: &Control) -> Control {
     let error = action.speed - speed;
@@ -24,8 +41,20 @@ pub fn controlled(rig: &Rig, step: f32, action: &Action, speed: f32, before: &Co
     let held = if near { before.speed_error_integral } else { 0.0 };
     let integrated = if near { held + error * step } else { 0.0 };
     let asked = rig.speed_gain * error + rig.speed_integral_gain * integrated;
-    let reachable = rig.speed_braking <= asked && asked <= rig.acceleration_max;
+    let most = drive_max(rig, speed);
+    let reachable = rig.speed_braking <= asked && asked <= most;
     let speed_error_integral = if reachable { integrated } else { held };
     let acceleration = rig.speed_gain * error + rig.speed_integral_gain * speed_error_integral;
-    Control { steering: action.steering, acceleration: acceleration.max(rig.speed_braking).min(rig.acceleration_max), speed_error_integral }
+    let holds = action.speed == 0.0;
+    let acceleration = if holds { acceleration.min(-HOLD_BRAKING) } else { acceleration };
+    Control {
+        steering: action.steering,
+        acceleration: acceleration.max(rig.speed_braking).min(most),
+        speed_error_integral: if holds { 0.0 } else { speed_error_integral },
+        steering_before: before.steering,
+        steering_earlier: before.steering_before,
+        target_speed: action.speed,
+        holds: u32::from(holds),
+        acceleration_before: before.acceleration_before,
+    }
 }

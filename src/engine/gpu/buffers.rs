@@ -102,6 +102,9 @@ pub(super) fn check_world(device: &Device, world: &World) -> Result<(), Error> {
         (Table::Waypoints, size_of_val(world.waypoints.as_slice())),
         (Table::Previews, size_of_val(world.previews.as_slice())),
         (Table::Routes, size_of_val(world.routes.as_slice())),
+        (Table::StepLimits, size_of_val(world.step_limits.as_slice())),
+        (Table::Rigs, size_of_val(world.rigs.as_slice())),
+        (Table::Rays, size_of_val(world.rays.as_slice())),
     ];
     let n_roundabouts = world.fields.len();
     match tables.into_iter().map(|(table, n_bytes)| (table, n_bytes as u64)).find(|(_, n_bytes)| limit < *n_bytes) {

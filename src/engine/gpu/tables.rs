@@ -45,6 +45,7 @@ impl<'a> Tables<'a> {
     pub(super) fn bytes(&self, table: Table) -> Cow<'_, [u8]> {
         Cow::Borrowed(match table {
             Table::Params => bytes_of(&self.world.params),
+            Table::Rigs => cast_slice(&self.world.rigs),
             Table::Actions => cast_slice(&self.world.actions),
             Table::Rays => cast_slice(&self.world.rays),
             Table::Fields => cast_slice(&self.fields),
@@ -53,6 +54,7 @@ impl<'a> Tables<'a> {
             Table::Waypoints => cast_slice(&self.world.waypoints),
             Table::Previews => cast_slice(&self.world.previews),
             Table::Routes => cast_slice(&self.world.routes),
+            Table::StepLimits => cast_slice(&self.world.step_limits),
             Table::Batch => bytes_of(&self.facts),
             Table::Choice => cast_slice(self.batch.choice().routes()),
             Table::Streams => cast_slice(self.batch.streams()),

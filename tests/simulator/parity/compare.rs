@@ -3,7 +3,7 @@
 use std::fmt;
 
 use bytemuck::cast_slice;
-use offtrack::layout::{Column, N_RAYS};
+use offtrack::layout::{Column, N_EXTRAS, N_RAYS};
 
 /// Bound of the difference between two engines in a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +29,8 @@ const TURN: Bound = Bound { turn: 2.0, ..ANGLE };
 const SMALL: Bound = within(1e-6);
 /// Eight units of speeds, accelerations, roll rates and other values below 16.
 const MIDDLING: Bound = within(8e-6);
+/// Eight units of lateral accelerations below 64 m/s^2: a truck at 16 m/s that is bent by 140 deg has such.
+const LARGE: Bound = within(3e-5);
 /// A span that only one engine halves may reduce a clearance of up to 2 m by half.
 const CLEARANCE: Bound = Bound { rarely: 1.0, ..POSITION };
 /// A ray along a kerb may end a sample later on one engine; each ends within 2 cm of the kerb.
@@ -50,7 +52,16 @@ const fn within(bound: f32) -> Bound {
 pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
     match column {
         Column::Action | Column::Ended => &[("", 1, SAME)],
-        Column::Control => &[("steering", 1, SAME), ("acceleration", 1, MIDDLING), ("speed_error_integral", 1, MIDDLING)],
+        Column::Control => &[
+            ("steering", 1, SAME),
+            ("acceleration", 1, MIDDLING),
+            ("speed_error_integral", 1, MIDDLING),
+            ("steering_before", 1, SAME),
+            ("steering_earlier", 1, SAME),
+            ("target_speed", 1, SMALL),
+            ("holds", 1, SAME),
+            ("acceleration_before", 1, SAME),
+        ],
         Column::Truck => &[
             ("position", 2, POSITION),
             ("heading", 1, ANGLE),
@@ -67,6 +78,10 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("episode", 1, SAME),
             ("steps", 1, SAME),
             ("held", 1, SAME),
+            ("acceleration", 1, MIDDLING),
+            ("curvature_lag", 1, SMALL),
+            ("lateral_acceleration", 1, LARGE),
+            ("vehicle", 1, SAME),
         ],
         Column::Clearance => &[("tractor", 1, CLEARANCE), ("trailer", 1, CLEARANCE)],
         Column::Progress => {
@@ -86,10 +101,19 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("ranges", N_RAYS, SCALED_RANGE),
             ("radii", 10, SAME),
         ],
-        Column::Terms => {
-            &[("waypoints", 1, SAME), ("lane_distance", 1, SCALED_POSITION), ("clearance", 1, CLEARANCE), ("failure", 1, SAME)]
-        }
+        Column::Terms => &[
+            ("waypoints", 1, SAME),
+            ("lane_distance", 1, SCALED_POSITION),
+            ("clearance", 1, CLEARANCE),
+            ("failure", 1, SAME),
+            ("time", 1, SAME),
+            ("load_transfer", 1, MIDDLING),
+            ("lateral_acceleration", 1, SMALL),
+            ("jerk", 1, MIDDLING),
+            ("rollover", 1, SAME),
+        ],
         Column::Reward => &[("", 1, REWARD)],
+        Column::Extras | Column::NextExtras => &[("", N_EXTRAS, SMALL)],
     }
 }
 

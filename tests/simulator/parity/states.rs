@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use offtrack::angle::wrapped;
 use offtrack::field::Field;
-use offtrack::layout::Truck;
+use offtrack::layout::{Track, Truck};
 use offtrack::random::{index_below, signed_unit, words};
 use offtrack::roundabout::Gutter;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
@@ -27,6 +27,18 @@ pub fn world(gutter: Gutter) -> Arc<World> {
         [drivable, solid].map(Arc::new)
     });
     worlds[usize::from(gutter == Gutter::Solid)].clone()
+}
+
+/// The same routes for trucks of many kinds, with every lag and limit.
+pub fn fleet_world() -> Arc<World> {
+    let mut scenario = benchmark("attard2023-full").0;
+    scenario.fleet = Some(crate::fleet::all_drawn());
+    scenario.extras = Track::Oracle;
+    (scenario.time_weight, scenario.load_transfer_weight, scenario.lateral_acceleration_weight) = (-0.5, -3.0, -2.0);
+    (scenario.jerk_weight, scenario.rollover_weight) = (-1.0, -100.0);
+    let world = World { fields: world(Gutter::Drivable).fields.clone(), ..World::bake(&scenario).unwrap() };
+    assert!(world.rigs.len() == 512 && world.rays.len() == 512);
+    Arc::new(world)
 }
 
 /// Makes a simulator's columns those of `batch`.
@@ -79,6 +91,7 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
     let [speed, steering, lean, ratio] = drawn(env, 1);
     let [roll, roll_rate, trailer_roll, trailer_roll_rate] = drawn(env, 2);
     let waypoint = &waypoints[near];
+    let vehicle = picked(env, 4, world.rigs.len());
     let heading = wrapped(previews[near].heading + 0.3 * turned);
     let behind = previews[near.saturating_sub(4)].heading;
     let lean = if lean < -0.8 { 0.3 } else { 0.05 };
@@ -87,7 +100,7 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
         heading,
         trailer_heading: wrapped(behind + if kind == 2 || kind == 5 { 2.5 * bent } else { 0.3 * bent }),
         speed: 8.0 + 8.0 * speed,
-        steering: steering * world.params.rig.steer_max,
+        steering: steering * world.rigs[vehicle].steer_max,
         tractor_roll: lean * roll,
         tractor_roll_rate: lean * roll_rate,
         trailer_roll: lean * trailer_roll,
@@ -96,14 +109,29 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
         trailer_load_transfer_ratio: -ratio,
         route,
         episode: words(SEED, env as u32, 2, 0)[0],
-        steps: if kind == 3 { world.routes[route as usize].step_limit } else { picked(env, 3, 200) as u32 },
+        steps: if kind == 3 {
+            world.step_limits[(route * world.params.n_classes + world.rigs[vehicle].class_index) as usize]
+        } else {
+            picked(env, 3, 200) as u32
+        },
         held: 0,
+        acceleration: lean * ratio,
+        curvature_lag: if world.rigs[vehicle].yaw_lag == 0.0 { 0.0 } else { 0.02 * bent },
+        lateral_acceleration: lean,
+        vehicle: vehicle as u32,
     };
     // Up to the last waypoint; one truck in sixteen has a next waypoint that is too far away.
     let far = if kind == 4 { 10 } else { 0 };
     batch.progress[env].waypoint = (near + far).clamp(1, last) as u32;
     let [integral, ..] = drawn(env, 3);
     batch.control[env].speed_error_integral = integral;
+    (batch.control[env].steering_before, batch.control[env].steering_earlier) = (0.4 * speed, 0.4 * lean);
+    batch.control[env].target_speed = 8.0 + 4.0 * speed;
+    batch.control[env].holds = u32::from(kind == 6);
+    if kind == 6 {
+        // About to stand, or standing.
+        batch.truck[env].speed = if steering < 0.0 { 0.0 } else { 0.02 * steering };
+    }
 }
 
 /// Trucks on each roundabout.

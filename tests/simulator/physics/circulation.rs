@@ -1,6 +1,6 @@
 //! Steady circulation in a roundabout's lane: off-tracking and load transfer of the trailer.
 
-use offtrack::cpu::drive::{driven, motion};
+use offtrack::cpu::drive::{driven, motion_of};
 use offtrack::layout::{Control, Rig, Truck};
 
 use super::vehicle;
@@ -14,8 +14,7 @@ fn circulating(rig: &Rig, steering: f32) -> (Truck, f32, f32) {
     let truck = driven(rig, SUBSTEP, 1200, &control, &Truck { speed: SPEED, ..Truck::default() });
     // `driven` reports the largest ratio among its sub-steps, which in a long drive is that of its beginning.
     let truck = driven(rig, SUBSTEP, 1, &control, &truck);
-    let articulation = truck.heading - truck.trailer_heading;
-    let turning = motion(rig, truck.speed, truck.steering, articulation);
+    let turning = motion_of(rig, &truck);
     let front_side_speed = turning.side_speed + rig.wheelbase * turning.yaw_rate;
     let trailer_speed = turning.trailer_lateral_acceleration / turning.trailer_yaw_rate;
     let trailer_side_speed = rig.slip * trailer_speed * trailer_speed.abs() * turning.trailer_yaw_rate;

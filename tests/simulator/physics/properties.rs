@@ -35,7 +35,7 @@ fn trucks(speeds: std::ops::Range<f32>, articulation: f32) -> impl Strategy<Valu
 
 fn controls(steering: f32, acceleration: f32, n: usize) -> impl Strategy<Value = Vec<Control>> {
     let control = (-steering..steering, -acceleration..acceleration);
-    let control = control.prop_map(|(steering, acceleration)| Control { steering, acceleration, speed_error_integral: 0.0 });
+    let control = control.prop_map(|(steering, acceleration)| Control { steering, acceleration, ..Control::default() });
     prop::collection::vec(control, n)
 }
 

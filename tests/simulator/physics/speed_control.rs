@@ -40,7 +40,7 @@ fn a_truck_reaches_its_target_speed_without_overshoot() {
             }
         }
     }
-    assert_eq!(checked, 3 * 4 * 7);
+    assert_eq!(checked, 3 * 5 * 7);
 }
 
 #[test]
@@ -67,8 +67,8 @@ fn a_constant_loss_of_drive_is_compensated_by_the_integral() {
 fn the_control_requests_no_more_than_the_truck_can_do() {
     let rig = vehicle("daf_xf").rig("laden", SUBSTEP, None);
     let ask = |speed, target| controlled(&rig, 0.1, &Action { steering: 0.3, speed: target }, speed, &Control::default());
-    assert_eq!(ask(0.0, 8.0), Control { steering: 0.3, acceleration: 0.7, speed_error_integral: 0.0 });
-    assert_eq!(ask(8.0, 0.0), Control { steering: 0.3, acceleration: -2.5, speed_error_integral: 0.0 });
+    assert_eq!(ask(0.0, 8.0), Control { steering: 0.3, acceleration: 0.7, target_speed: 8.0, ..Control::default() });
+    assert_eq!(ask(8.0, 0.0), Control { steering: 0.3, acceleration: -2.5, holds: 1, ..Control::default() });
 }
 
 proptest! {

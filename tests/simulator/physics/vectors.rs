@@ -7,8 +7,8 @@ use std::sync::{Arc, OnceLock};
 
 use bytemuck::bytes_of;
 use glam::DVec2;
-use offtrack::cpu::drive::{Moving, motion};
-use offtrack::layout::{Column, Rig};
+use offtrack::cpu::drive::{Moving, motion_of};
+use offtrack::layout::{Column, Rig, Truck};
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::stages::Stage;
 use offtrack::world::World;
@@ -46,7 +46,11 @@ impl Worst {
 }
 
 fn cases() -> Vec<Value> {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/physics_vectors.json");
+    cases_of("physics_vectors.json")
+}
+
+fn cases_of(file: &str) -> Vec<Value> {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file);
     let file: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     file["cases"].as_array().unwrap().clone()
 }
@@ -92,7 +96,7 @@ fn traced(engine: &Engine, case: &Case) -> Traced {
         simulator.restore(|column| Some(given(column))).unwrap();
         simulator.run_stage(Stage::Drive);
         let truck = simulator.batch().truck[0];
-        Moving { truck, motion: motion(rig, truck.speed, truck.steering, truck.heading - truck.trailer_heading) }
+        Moving { truck, motion: motion_of(rig, &truck) }
     })
     .unwrap()
 }
@@ -101,14 +105,23 @@ fn traced(engine: &Engine, case: &Case) -> Traced {
 fn alone(engine: &Engine, rig: &Rig, substep: f32) -> Simulator {
     static WORLD: OnceLock<World> = OnceLock::new();
     let mut world = WORLD.get_or_init(|| benchmark("attard2023").1).clone();
-    (world.params.rig, world.params.substep, world.params.n_substeps) = (*rig, substep, 1);
+    (world.rigs[0], world.params.substep, world.params.n_substeps) = (*rig, substep, 1);
     batch_on(engine, &Arc::new(world), 1, 0, RouteChoice::Drawn(vec![0]))
 }
 
 /// The state that a truck reaches `t` seconds after `init` under one command.
 fn driven(engine: &Engine, vehicle: CaseVehicle, init: Init, command: Command, t: f64) -> offtrack_comparison::trace::State {
-    let case =
-        Case { id: String::new(), vehicle, dt: 0.05, init, commands: vec![command], t_end: t, times: Some(vec![t]), expected: vec![] };
+    let case = Case {
+        id: String::new(),
+        vehicle,
+        dt: 0.05,
+        control_step: 0.1,
+        init,
+        commands: vec![command],
+        t_end: t,
+        times: Some(vec![t]),
+        expected: vec![],
+    };
     traced(engine, &case).states[0]
 }
 
@@ -163,7 +176,7 @@ fn closed_form(engine: &Engine, written: &Value) -> Worst {
     for row in rows(written) {
         let (delta, v) = (number(row, "delta"), number(row, "v"));
         let init = Init { x: 0.0, y: 0.0, psi1: 0.0, psi2: -number(row, "gamma0"), v, delta };
-        let state = driven(engine, kinematic(row), init, Command { t: 0.0, delta_cmd: delta, a_cmd: 0.0 }, number(row, "t"));
+        let state = driven(engine, kinematic(row), init, Command { t: 0.0, delta_cmd: delta, a_cmd: 0.0, v_cmd: None }, number(row, "t"));
         worst.see("pos", DVec2::new(state.x, state.y).distance(DVec2::new(number(row, "x"), number(row, "y"))), pos);
         worst.see("psi1", state.psi1 - number(row, "psi1"), angle);
         worst.see("gamma", state.gamma - number(row, "gamma"), angle);
@@ -181,7 +194,7 @@ fn cross_check(engine: &Engine, written: &Value) -> Worst {
         let [x, y, delta, v, psi1, alpha] = serde_json::from_value(check["x0_kst"].clone()).unwrap();
         let [steer_rate, a_cmd]: [f64; 2] = serde_json::from_value(check["u"].clone()).unwrap();
         let vehicle = CaseVehicle { delta_rate: steer_rate.abs(), ..kinematic(&row([3.6, 0.0, 8.1])) };
-        let command = Command { t: 0.0, delta_cmd: 1.5_f64.copysign(steer_rate), a_cmd };
+        let command = Command { t: 0.0, delta_cmd: 1.5_f64.copysign(steer_rate), a_cmd, v_cmd: None };
         let state = driven(engine, vehicle, Init { x, y, psi1, psi2: psi1 + alpha, v, delta }, command, number(check, "t"));
         worst.see("pos", DVec2::new(state.x, state.y).distance(DVec2::new(number(check, "x"), number(check, "y"))), pos);
         for (key, value) in [("psi1", state.psi1), ("gamma", state.gamma), ("delta", state.delta), ("v", state.v)] {
@@ -212,6 +225,33 @@ fn every_reference_vector_holds_within_its_own_tolerance() {
             checked += 1;
         }
         assert_eq!(checked, 30);
+    }
+}
+
+#[test]
+fn target_speeds_loads_and_lags_give_the_trajectories_of_an_independent_integrator() {
+    for (name, engine) in engines() {
+        let cases = cases_of("load_vectors.json");
+        assert_eq!(cases.len(), 24);
+        for case in cases {
+            let worst = trajectory(&engine, &case, |_| {});
+            println!("{} on the {name}: {:.4} ({})", case["id"], worst.ratio, worst.what);
+            assert!(worst.ratio <= 1.0, "{} on the {name}: {worst:?}", case["id"]);
+        }
+    }
+    // Each of the model's parts is needed by a case.
+    let changes: [fn(&mut CaseVehicle); 7] = [
+        |vehicle| vehicle.yaw_lag = 0.0,
+        |vehicle| vehicle.drive_lag = 0.0,
+        |vehicle| vehicle.brake_lag = 0.0,
+        |vehicle| vehicle.delta_delay = 0.0,
+        |vehicle| vehicle.crossfall = 0.0,
+        |vehicle| vehicle.kp = 0.75,
+        |vehicle| vehicle.K *= 1.05,
+    ];
+    for (index, change) in changes.into_iter().enumerate() {
+        let fails = |case: &Value| 1.0 < trajectory(&Engine::Cpu, case, |case| change(&mut case.vehicle)).ratio;
+        assert!(cases_of("load_vectors.json").iter().any(fails), "change {index} fails no case");
     }
 }
 
@@ -272,7 +312,8 @@ fn explicit_euler_at_the_same_step_fails_the_vectors() {
     let Init { mut x, mut y, mut psi1, mut psi2, v, delta } = case.init;
     let expected = &written["expected"][1];
     for _ in 0..(number(expected, "t") / case.dt).round() as usize {
-        let motion = motion(&rig, v as f32, delta as f32, (psi1 - psi2) as f32);
+        let truck = Truck { speed: v as f32, steering: delta as f32, heading: (psi1 - psi2) as f32, ..Truck::default() };
+        let motion = motion_of(&rig, &truck);
         (x, y) = (x + case.dt * v * psi1.cos(), y + case.dt * v * psi1.sin());
         psi1 += case.dt * f64::from(motion.yaw_rate);
         psi2 += case.dt * f64::from(motion.trailer_yaw_rate);

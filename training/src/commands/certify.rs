@@ -22,13 +22,11 @@ use offtrack_training::files;
 use super::{progress, roads};
 
 /// On the lane centre, and the four corners of the largest start errors.
-const STARTS: [Start; 5] = [
-    Start { offset: 0.0, heading: 0.0 },
-    Start { offset: 1.0, heading: 1.0 },
-    Start { offset: 1.0, heading: -1.0 },
-    Start { offset: -1.0, heading: 1.0 },
-    Start { offset: -1.0, heading: -1.0 },
-];
+const STARTS: [Start; 5] = [start(0.0, 0.0), start(1.0, 1.0), start(1.0, -1.0), start(-1.0, 1.0), start(-1.0, -1.0)];
+
+const fn start(offset: f32, heading: f32) -> Start {
+    Start { offset, heading, speed: 0.0, vehicle: 0 }
+}
 
 /// Show which routes of a benchmark can be completed: search for actions that complete each of them.
 #[derive(Debug, clap::Args)]
@@ -43,6 +41,9 @@ pub struct Args {
     /// in the benchmark: wide/7/12/N-left-3, or all of wide/7/12.
     #[arg(long)]
     route: Vec<String>,
+    /// Only trucks with this load, where the benchmark has several: the search drives the first of them.
+    #[arg(long)]
+    load: Option<String>,
     /// A policy file, or the name of a shipped policy: its own action sequence is then among the candidates.
     #[arg(long)]
     policy: Option<String>,
@@ -66,15 +67,16 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return Err(Error::Flag { flag: "--hold", value: args.hold.to_string(), expected: "must lie in 1..50".into() });
     }
     match &args.verify {
-        Some(file) => again(file, args.benchmark.as_deref()),
+        Some(file) => again(file, args.benchmark.as_deref(), args.load.as_deref()),
         None => certify(args),
     }
 }
 
 /// Drives a certificate's sequences again.
-fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
+fn again(path: &Path, benchmark: Option<&str>, load: Option<&str>) -> Result<(), Error> {
     let certificate = Certificate::read(path)?;
-    let mut scenario = roads::benchmark(benchmark.unwrap_or(&certificate.benchmark))?;
+    let scenario = roads::benchmark(benchmark.unwrap_or(&certificate.benchmark))?;
+    let mut scenario = roads::with_load(scenario, load)?;
     // Random roads that the benchmark does not have are drawn again.
     let is_random = |name: &String| name.rsplit_once('/').is_some_and(|(road, _)| procedural::address(road).is_some());
     let names: Vec<String> = certificate.routes.iter().map(|route| route.name.clone()).collect();
@@ -90,7 +92,8 @@ fn again(path: &Path, benchmark: Option<&str>) -> Result<(), Error> {
 /// Searches every route from every start.
 fn certify(args: &Args) -> Result<(), Error> {
     let passes = passes(&args.widths, args.hold)?;
-    let mut scenario = roads::benchmark(args.benchmark.as_deref().unwrap_or("attard2023"))?;
+    let scenario = roads::benchmark(args.benchmark.as_deref().unwrap_or("attard2023"))?;
+    let mut scenario = roads::with_load(scenario, args.load.as_deref())?;
     let splits: Vec<Split> = Split::ALL.into_iter().filter(|split| args.split == "all" || args.split == split.name()).collect();
     if !args.route.is_empty() {
         roads::narrow(&mut scenario, &args.route, &splits)?;

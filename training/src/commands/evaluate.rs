@@ -39,6 +39,9 @@ pub struct Args {
     /// in the benchmark: wide/7/12/N-left-3, or all of wide/7/12.
     #[arg(long)]
     route: Vec<String>,
+    /// Only trucks with this load, where the benchmark has several.
+    #[arg(long)]
+    load: Option<String>,
     /// Episodes on each route \[default: 30, and fewer where there are more than 100 routes: about 3,000 in all\].
     #[arg(long)]
     episodes: Option<usize>,
@@ -81,7 +84,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let passes = passes(&args.widths, HOLD)?;
     let device = args.device.open()?;
     let split = Split::ALL.into_iter().find(|split| split.name() == args.split).unwrap_or(Split::Test);
-    let mut scenario = roads::benchmark(&args.benchmark)?;
+    let mut scenario = roads::with_load(roads::benchmark(&args.benchmark)?, args.load.as_deref())?;
     if !args.route.is_empty() {
         roads::narrow(&mut scenario, &args.route, &[split])?;
     }

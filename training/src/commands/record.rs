@@ -241,9 +241,9 @@ fn scenario(args: &Args, route: &str) -> Result<Scenario, Error> {
 fn driven(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chosen, policy: &mut dyn Policy) -> Result<Track, Error> {
     let trucks: Vec<u32> = scenario.split(chosen.split).iter().flat_map(|&route| std::iter::repeat_n(route, args.episodes)).collect();
     let env = chosen.in_split * args.episodes + args.episode;
-    let limit = world.routes[trucks[env] as usize].step_limit;
     let mut simulator = Simulator::new(world.clone(), trucks.len(), args.seed, RouteChoice::Fixed(trucks))?;
     let mut recorder = Recorder::new(world, simulator.batch(), [env]);
+    let limit = world.step_limit(&simulator.batch().truck[env]);
     let bar = progress::Bar::new("driving", "steps", limit as usize);
     let mut actions = Vec::new();
     while recorder.is_running() {

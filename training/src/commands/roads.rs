@@ -122,3 +122,14 @@ pub fn unknown(scenario: &Scenario, name: &str) -> Error {
     };
     Error::Flag { flag: "--route", value: name.to_owned(), expected }
 }
+
+/// The benchmark with the trucks of this load alone; the whole of it where none is named.
+pub fn with_load(scenario: Scenario, load: Option<&str>) -> Result<Scenario, Error> {
+    let Some(load) = load else { return Ok(scenario) };
+    scenario.with_classes(|class| class.load == load).ok_or_else(|| {
+        let mut known: Vec<String> = scenario.classes().into_iter().map(|class| class.load).collect();
+        known.sort();
+        known.dedup();
+        Error::Flag { flag: "--load", value: load.to_owned(), expected: format!("{} has {}", scenario.name, known.join(", ")) }
+    })
+}

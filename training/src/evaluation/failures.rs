@@ -97,7 +97,7 @@ impl Evaluation<'_> {
 
     /// The cause of an episode that did not arrive, in words.
     fn cause(&self, route: &Evaluated, episode: &Episode) -> String {
-        let (rig, truck) = (&self.world.params.rig, &episode.last);
+        let (rig, truck) = (self.world.rig(&episode.last), &episode.last);
         if episode.lost_at_start() {
             return "lost at start".to_owned();
         }

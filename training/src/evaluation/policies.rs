@@ -1,9 +1,11 @@
 //! What chooses the actions: a learned policy, pure pursuit of the centre line, or actions drawn uniformly at random.
 //! The last two are the baselines that a learner must beat.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use offtrack::layout::{Action, Truck, WaypointRow};
+use offtrack::profile::Profile;
 use offtrack::random::{self, Draw};
 use offtrack::simulator::Batch;
 use offtrack::world::World;
@@ -13,6 +15,9 @@ use crate::error::Error;
 /// Pure pursuit's default look-ahead distance: the best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of
 /// attard2023 \[m].
 pub const LOOK_AHEAD: f32 = 7.0;
+
+/// How far ahead pure pursuit looks for a lower speed: the time that the speed control takes to reach it \[s].
+const RESPONSE: f64 = 1.5;
 
 /// Chooses an action for every truck of a batch.
 pub trait Policy {
@@ -28,7 +33,7 @@ pub trait Policy {
 /// there is none, the one for attard2023. `look_ahead` is pure pursuit's \[m], `seed` that of random actions.
 pub fn find(policy: Option<&str>, benchmark: &str, look_ahead: f32, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
     let learned = match policy {
-        Some("pursuit") => return Ok(Box::new(PurePursuit { look_ahead })),
+        Some("pursuit") => return Ok(Box::new(PurePursuit::new(look_ahead))),
         Some("random") => return Ok(Box::new(UniformRandom { seed })),
         Some(name) => learned(name)?,
         None => offtrack_policy::Policy::shipped_or_default(benchmark)?,
@@ -54,9 +59,10 @@ impl Policy for offtrack_policy::Policy {
         // A held truck needs no action, and before the last episode ends most are held.
         let driving: Vec<usize> = (0..batch.truck.len()).filter(|&env| batch.truck[env].held == 0).collect();
         let observations: Vec<_> = driving.iter().map(|&env| batch.observation[env]).collect();
+        let extras: Vec<_> = driving.iter().map(|&env| batch.extras[env]).collect();
         actions.clear();
         actions.resize(batch.truck.len(), 0);
-        for (env, action) in driving.into_iter().zip(self.act(&observations)) {
+        for (env, action) in driving.into_iter().zip(self.act_beside(&observations, &extras)) {
             actions[env] = action;
         }
     }
@@ -84,13 +90,15 @@ impl Policy for UniformRandom {
 }
 
 /// Pure pursuit: steers the drive axle along the arc to a point of the centre line at the look-ahead distance, at the
-/// highest target speed. It follows the line well and ignores the trailer.
+/// speed of the feasible profile of its vehicle. It follows the line well and ignores the room that the trailer needs.
 ///
 /// R. Coulter, "Implementation of the Pure Pursuit Path Tracking Algorithm" (Carnegie Mellon, 1992).
 #[derive(Debug)]
 pub struct PurePursuit {
     /// Look-ahead distance: from the drive axle to the target point \[m].
-    pub look_ahead: f32,
+    look_ahead: f32,
+    /// The feasible speeds of a vehicle on a route, by both indices.
+    profiles: HashMap<(u32, u32), Profile>,
 }
 
 impl Policy for PurePursuit {
@@ -100,15 +108,31 @@ impl Policy for PurePursuit {
 
     fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
         actions.clear();
-        actions.extend(batch.truck.iter().zip(&batch.progress).map(|(truck, progress)| {
-            let waypoints = world.route_waypoints(truck.route);
-            let steering = self.steering(world.params.rig.wheelbase, truck, waypoints, progress.waypoint as usize);
-            nearest(&world.actions, steering, world.params.start_speed)
+        actions.extend(batch.truck.iter().zip(&batch.progress).zip(&batch.control).map(|((truck, progress), control)| {
+            let (waypoints, next) = (world.route_waypoints(truck.route), progress.waypoint as usize);
+            let steering = self.steering(world.rig(truck).wheelbase, truck, waypoints, next);
+            let speed = self.speed(world, truck, next);
+            nearest(world, steering, if world.params.changes_speed == 1 { speed - control.target_speed } else { speed })
         }));
     }
 }
 
 impl PurePursuit {
+    /// With this look-ahead distance \[m].
+    pub fn new(look_ahead: f32) -> PurePursuit {
+        PurePursuit { look_ahead, profiles: HashMap::new() }
+    }
+
+    /// The speed to drive at: the lowest of the profile within the time that the speed control takes to follow [m/s].
+    fn speed(&mut self, world: &World, truck: &Truck, next: usize) -> f32 {
+        let waypoints = world.route_waypoints(truck.route);
+        let fastest = world.params.target_speed_max.into();
+        let profile = self.profiles.entry((truck.route, truck.vehicle));
+        let profile = profile.or_insert_with(|| Profile::of(world.rig(truck), waypoints, fastest));
+        let spacing = waypoints[0].position.distance(waypoints[1].position);
+        profile.lowest_ahead(next.saturating_sub(1), f64::from(truck.speed) * RESPONSE, spacing.into()) as f32
+    }
+
     /// Steer angle of the arc to the target point \[rad].
     fn steering(&self, wheelbase: f32, truck: &Truck, waypoints: &[WaypointRow], next: usize) -> f32 {
         let pair = |index: usize| (waypoints[index - 1].position, waypoints[index].position);
@@ -129,9 +153,16 @@ impl PurePursuit {
     }
 }
 
-/// The action nearest to `speed` and, among those, nearest to `steering`.
-fn nearest(actions: &[Action], steering: f32, speed: f32) -> u32 {
-    let cost = |action: &Action| (action.speed - speed).abs() * 1e3 + (action.steering - steering).abs();
-    let best = actions.iter().enumerate().min_by(|(_, a), (_, b)| cost(a).total_cmp(&cost(b)));
+/// The action with the highest speed or change that is at most `speed`, the lowest if there is none; among those the
+/// nearest to `steering`.
+fn nearest(world: &World, steering: f32, speed: f32) -> u32 {
+    // A target that is above the profile by a hundredth is taken for it.
+    let above = |action: &Action| speed + 0.01 < action.speed;
+    let apart = |action: &Action| [(action.speed - speed).abs(), (action.steering - steering).abs()];
+    let order = |a: &Action, b: &Action| {
+        let [(speed_a, steering_a), (speed_b, steering_b)] = [apart(a).into(), apart(b).into()];
+        above(a).cmp(&above(b)).then(f32::total_cmp(&speed_a, &speed_b)).then(f32::total_cmp(&steering_a, &steering_b))
+    };
+    let best = world.actions.iter().enumerate().min_by(|(_, a), (_, b)| order(a, b));
     best.map_or(0, |(index, _)| index as u32)
 }

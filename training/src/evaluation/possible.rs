@@ -4,7 +4,7 @@
 //! An episode that arrived shows it itself. The start of one that did not is searched for actions that complete it; what
 //! no search completes may be possible all the same, and is left out.
 
-use offtrack::layout::Ended;
+use offtrack::layout::{Ended, Truck};
 use serde::Serialize;
 
 use super::Evaluation;
@@ -65,7 +65,7 @@ impl Evaluation<'_> {
         let starts: Vec<_> = searched.iter().map(|&index| self.start(index)).collect();
         let searches = attempts(self.world, &starts, passes, done)?;
         let sequences = searches.iter().zip(&starts).map(|(found, &(route, start))| {
-            let limit = self.world.routes[route as usize].step_limit as usize;
+            let limit = self.world.step_limit(&Truck { route, vehicle: start.vehicle, ..Truck::default() }) as usize;
             let actions = file::actions(&found.actions, self.world.params.n_actions, limit).unwrap_or_default();
             Sequence { route, start, actions }
         });
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn impossible_starts_are_not_counted_and_those_lost_in_the_first_step_are_not_searched() {
-        let (episodes, possible) = possible(9.0, &mut PurePursuit { look_ahead: 7.0 }, Pass { width: 1, hold: 1 });
+        let (episodes, possible) = possible(9.0, &mut PurePursuit::new(7.0), Pass { width: 1, hold: 1 });
         let lost = episodes.iter().filter(|episode| episode.lost_at_start()).count();
         let arrived = episodes.iter().filter(|episode| episode.ended == Ended::Arrived).count();
         assert!(0 < lost, "{episodes:?}");

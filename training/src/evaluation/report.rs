@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use offtrack::layout::{Ended, Truck};
 use serde::Serialize;
 
+use super::driving::{ClassReport, Driving};
 use super::failures::Cause;
 use super::groups::Groups;
 use super::possible::Possible;
@@ -38,6 +39,8 @@ pub struct Episode {
     pub articulation_peak: f64,
     /// Largest distance of the trailer axle from the path of the front axle \[m].
     pub off_tracking_peak: f64,
+    /// How it drove.
+    pub driving: Driving,
     /// The truck after its last step.
     pub last: Truck,
 }
@@ -188,6 +191,9 @@ pub struct Report {
     pub possible: Option<Possible>,
     /// Why episodes did not arrive, the commonest cause first.
     pub failures: Vec<Cause>,
+    /// How trucks drove, by vehicle and load; empty where the benchmark has one vehicle and one speed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub classes: Vec<ClassReport>,
     /// Sums by island radius, lane, exit and roundabout.
     pub groups: Groups,
     /// Each route.
@@ -226,6 +232,7 @@ pub(super) mod tests {
             load_transfer_ratio_peak: 1.5,
             articulation_peak: 1.9,
             off_tracking_peak: 10.25,
+            driving: Driving::new(&Truck::default(), 0.0),
             last: Truck::default(),
         }
     }

@@ -10,6 +10,7 @@ use offtrack::angle::wrapped;
 use offtrack::layout::{Ended, Rig, Truck};
 use offtrack::simulator::Batch;
 
+use super::driving::Driving;
 use super::part::LaneWidths;
 use super::report::Episode;
 
@@ -21,16 +22,19 @@ pub(super) struct Running {
     /// Its figures so far; the means and the off-tracking follow at its end.
     episode: Episode,
     off_tracking: OffTracking,
+    /// Duration of a step \[s].
+    step: f64,
 }
 
 impl Running {
     /// At its start.
-    pub(super) fn new(rig: &Rig, truck: &Truck) -> Running {
+    pub(super) fn new(rig: &Rig, truck: &Truck, target_speed: f32, step: f64) -> Running {
         let front = front_axle(rig, truck);
         let ahead = Vec2::from_angle(truck.heading);
         Running {
             lane_distance_sum: 0.0,
             outside: 0,
+            step,
             episode: Episode {
                 ended: Ended::Running,
                 steps: 0,
@@ -43,6 +47,7 @@ impl Running {
                 load_transfer_ratio_peak: 0.0,
                 articulation_peak: 0.0,
                 off_tracking_peak: 0.0,
+                driving: Driving::new(truck, target_speed),
                 last: *truck,
             },
             // The path's first point lies far behind the start, so that the trailer's axle is beside it from the first
@@ -66,6 +71,7 @@ impl Running {
         raise(&mut self.episode.load_transfer_ratio_peak, truck.tractor_load_transfer_ratio.abs());
         raise(&mut self.episode.load_transfer_ratio_peak, truck.trailer_load_transfer_ratio.abs());
         raise(&mut self.episode.articulation_peak, wrapped(truck.heading - truck.trailer_heading).abs());
+        self.episode.driving.follow(batch, env, self.step);
         self.episode.last = *truck;
         self.off_tracking.push(front_axle(rig, truck), truck.trailer_position(rig));
         batch.ended[env] != Ended::Running as u32

@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use offtrack::layout::Ended;
 
+use super::driving;
 use super::failures::Cause;
 use super::groups::Group;
 use super::report::{Report, RouteReport, Summary};
@@ -108,6 +109,9 @@ impl Report {
             let own = self.own_lane_suffices.as_ref().and_then(|summary| summary.outside_lane_mean);
             let own = own.map(|own| format!(", where the own lane suffices {:.1} %", 100.0 * own)).unwrap_or_default();
             push_wrapped(&mut text, &format!("Outside its own lane for {:.1} % of an episode that arrived{own}.", 100.0 * outside), width);
+        }
+        for line in driving::lines(&self.classes) {
+            let _ = writeln!(text, "{line}");
         }
         self.push_causes(&mut text, width);
         if let Some(possible) = &self.possible {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use offtrack::layout::{N_VALUES, Track};
 use offtrack::world::World;
 
 use crate::device;
@@ -72,7 +73,7 @@ impl Backend {
         mirror: Option<Mirror>,
     ) -> Result<Box<dyn Rollout>, Error> {
         match self {
-            Backend::Host => Ok(Box::new(HostRollout::new(config, world, routes, mirror)?)),
+            Backend::Host => host_rollout(config, world, routes, mirror),
             #[cfg(feature = "gpu")]
             Backend::Device(shared) => Ok(Box::new(DeviceRollout::new(shared, config, world, routes, mirror)?)),
         }
@@ -90,4 +91,17 @@ impl Backend {
             }),
         }
     }
+}
+
+/// Trucks and a replay buffer on the host, for as many values as the world's benchmark observes.
+fn host_rollout(config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<Box<dyn Rollout>, Error> {
+    const BLIND: usize = N_VALUES + Track::Blind.n_extras();
+    const MASS: usize = N_VALUES + Track::Mass.n_extras();
+    const ORACLE: usize = N_VALUES + Track::Oracle.n_extras();
+    Ok(match N_VALUES + world.params.n_extras as usize {
+        BLIND => Box::new(HostRollout::<BLIND>::new(config, world, routes, mirror)?),
+        MASS => Box::new(HostRollout::<MASS>::new(config, world, routes, mirror)?),
+        ORACLE => Box::new(HostRollout::<ORACLE>::new(config, world, routes, mirror)?),
+        _ => Box::new(HostRollout::<N_VALUES>::new(config, world, routes, mirror)?),
+    })
 }

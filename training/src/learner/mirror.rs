@@ -3,7 +3,7 @@
 //! A truck and its sensors are symmetric, so the mirror image of a transition is a valid transition of left-hand
 //! traffic. A learner that samples both has seen every bend in both directions.
 
-use offtrack::layout::{Action, N_TRACTOR_RAYS, N_TRAILER_RAYS, N_VALUES, Ray};
+use offtrack::layout::{Action, EXTRAS, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, N_VALUES, Ray};
 use offtrack::world::World;
 use rand::Rng;
 
@@ -22,7 +22,7 @@ const SAME: f32 = 1e-4;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mirror {
     /// Index of the value that each value is mirrored from, and its factor, `[values]`.
-    values: [(usize, f32); N_VALUES],
+    values: Vec<(usize, f32)>,
     /// Index of each action's mirror image, `[actions]`.
     actions: Vec<u32>,
 }
@@ -31,11 +31,20 @@ impl Mirror {
     /// The mirror of a world. Its action table and its sensors must be symmetric.
     pub fn of(world: &World) -> Result<Mirror, Error> {
         let refused = |expected: String| Error::Flag { flag: "learning.mirror_augmentation", value: "true".to_owned(), expected };
-        let mut values = std::array::from_fn(|index| (index, if SIGNED.contains(&index) { -1.0 } else { 1.0 }));
-        for (index, ray) in world.rays.iter().enumerate() {
+        let mut values: Vec<(usize, f32)> = (0..N_VALUES).map(|index| (index, if SIGNED.contains(&index) { -1.0 } else { 1.0 })).collect();
+        let extras = &EXTRAS[..world.params.n_extras as usize];
+        values.extend((N_VALUES..).zip(extras).map(|(index, extra)| (index, extra.mirror)));
+        if world.rigs.iter().any(|rig| rig.crossfall != 0.0) {
+            return Err(refused(
+                "the vehicle's road falls to one side (model.crossfall): leave learning.mirror_augmentation out".to_owned(),
+            ));
+        }
+        for index in 0..N_RAYS {
             // The image of a trailer's sensor is one of the trailer's.
             let unit = if index < N_TRAILER_RAYS { 0..N_TRAILER_RAYS } else { N_TRAILER_RAYS..N_TRAILER_RAYS + N_TRACTOR_RAYS };
-            let image = unit.into_iter().find(|&other| are_images(ray, &world.rays[other]));
+            // One that is an image on every chassis.
+            let on_all = |other: usize| world.rays.iter().all(|rays| are_images(&rays[index], &rays[other]));
+            let image = unit.into_iter().find(|&other| on_all(other));
             let image = image.ok_or_else(|| {
                 refused(format!("the vehicle's distance sensor {index} has no mirror image: leave learning.mirror_augmentation out"))
             })?;
@@ -55,17 +64,20 @@ impl Mirror {
 
     /// Index of the value that each value is mirrored from, and its factor, `[values]`; and each action's mirror image,
     /// `[actions]`.
-    pub fn images(&self) -> ([(usize, f32); N_VALUES], Vec<u32>) {
-        (self.values, self.actions.clone())
+    pub fn images(&self) -> (Vec<(usize, f32)>, Vec<u32>) {
+        (self.values.clone(), self.actions.clone())
     }
 
-    /// The mirror image of an observation.
-    pub fn observation(&self, seen: &[f32; N_VALUES]) -> [f32; N_VALUES] {
-        self.values.map(|(index, factor)| factor * seen[index])
+    /// The mirror image of an observation with the extras behind it.
+    pub fn observation<const N: usize>(&self, seen: &[f32; N]) -> [f32; N] {
+        std::array::from_fn(|value| {
+            let (index, factor) = self.values[value];
+            factor * seen[index]
+        })
     }
 
     /// Mirrors each transition with probability 0.5.
-    pub fn mirror_half(&self, sample: &mut Sample<N_VALUES>, rng: &mut impl Rng) {
+    pub fn mirror_half<const N: usize>(&self, sample: &mut Sample<N>, rng: &mut impl Rng) {
         let rows = sample.observation.iter_mut().zip(&mut sample.next_observation).zip(&mut sample.action);
         for ((observation, next_observation), action) in rows {
             if rng.random() {

@@ -8,12 +8,13 @@ pub mod device;
 pub mod host;
 
 use burn::tensor::Tensor;
-use offtrack::layout::{Ended, N_VALUES};
+use offtrack::layout::Ended;
 use offtrack::simulator::Simulator;
 use offtrack_policy::Normalisation;
 
 use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
+use crate::learner::mirror::Mirror;
 use crate::learner::network::Mlp;
 use crate::learner::sac::Transitions;
 
@@ -48,8 +49,8 @@ pub trait Rollout {
     /// Whether any held transition can be sampled: one that enough steps follow.
     fn can_sample(&self) -> bool;
 
-    /// The observations held, in no particular order. Waits for a device.
-    fn observations(&self) -> Result<Vec<[f32; N_VALUES]>, Error>;
+    /// The normalisation of the observations held and, where there is a mirror, of their images. Waits for a device.
+    fn found_normalisation(&self, mirror: Option<&Mirror>) -> Result<Normalisation, Error>;
 
     /// Normalises observations this way from here on, for acting and for samples.
     fn set_normalisation(&mut self, normalisation: &Normalisation);
@@ -91,4 +92,13 @@ pub trait Rollout {
     /// Continues after `n_updates` from what [`Rollout::save`] added; on a device with an empty replay buffer and new
     /// episodes.
     fn restore(&mut self, stored: &Stored, n_updates: u64) -> Result<(), Error>;
+}
+
+/// The normalisation of these observations: what is learned from with a mirror is symmetric.
+fn normalisation_of<const N: usize>(mut observations: Vec<[f32; N]>, mirror: Option<&Mirror>) -> Normalisation {
+    if let Some(mirror) = mirror {
+        let images: Vec<_> = observations.iter().map(|observation| mirror.observation(observation)).collect();
+        observations.extend(images);
+    }
+    Normalisation::of(&observations)
 }

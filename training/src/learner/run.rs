@@ -257,6 +257,7 @@ fn fingerprint(world: &World) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(bytes_of(&world.params));
     hasher.update(cast_slice(&world.actions));
+    hasher.update(cast_slice(&world.rigs));
     hasher.update(cast_slice(&world.rays));
     hasher.update(cast_slice(&world.waypoints));
     hasher.update(cast_slice(&world.previews));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use burn::tensor::Device;
-use offtrack::layout::N_VALUES;
+use offtrack::layout::{EXTRAS, N_VALUES};
 use offtrack::world::World;
 use offtrack_policy::{Activation, Layer, Normalisation, Policy};
 
@@ -36,7 +36,7 @@ impl Training {
         let mirror = config.learning.mirror_augmentation.then(|| Mirror::of(&world)).transpose()?;
         Ok(Training {
             rollout: backend.rollout(config, &world, routes, mirror.clone())?,
-            sac: Sac::new(&config.learning, N_VALUES, world.actions.len(), u64::from(config.seed), backend.placement())?,
+            sac: Sac::new(&config.learning, n_values(&world), world.actions.len(), u64::from(config.seed), backend.placement())?,
             normalisation: None,
             config: config.clone(),
             mirror,
@@ -132,18 +132,17 @@ impl Training {
         self.rollout.set_td_errors(errors);
     }
 
+    /// Values that the networks observe.
+    fn n_values(&self) -> usize {
+        n_values(&self.world)
+    }
+
     /// The normalisation of the observations held.
     fn found_normalisation(&self) -> Result<Normalisation, Error> {
         if !self.config.learning.normalise_observations || self.rollout.n_transitions() == 0 {
-            return Ok(Normalisation::none(N_VALUES));
+            return Ok(Normalisation::none(self.n_values()));
         }
-        let mut observations = self.rollout.observations()?;
-        // What is learned from is symmetric.
-        if let Some(mirror) = &self.mirror {
-            let images: Vec<_> = observations.iter().map(|observation| mirror.observation(observation)).collect();
-            observations.extend(images);
-        }
-        Ok(Normalisation::of(&observations))
+        self.rollout.found_normalisation(self.mirror.as_ref())
     }
 
     /// The policy: the EMA of the actor. Waits for a device.
@@ -154,6 +153,7 @@ impl Training {
             actions: self.world.actions.clone(),
             normalisation: self.normalisation.clone().map_or_else(|| self.found_normalisation(), Ok)?,
             layers: self.sac.actor_ema().plain_layers(),
+            extras: EXTRAS[..self.world.params.n_extras as usize].iter().map(|extra| extra.name.to_owned()).collect(),
             activation: Activation::Relu,
         })
     }
@@ -173,9 +173,14 @@ impl Training {
         self.rollout.restore(stored, n_updates)?;
         self.sac.restore(stored)?;
         if stored.bytes("normalisation, mean").is_some() {
-            let values = |name: &str| stored.exactly(name, N_VALUES);
+            let values = |name: &str| stored.exactly(name, self.n_values());
             self.set_normalisation(Normalisation { mean: values("normalisation, mean")?, factor: values("normalisation, factor")? });
         }
         Ok(())
     }
+}
+
+/// Values that networks observe in a world: those of an observation, and the extras that its benchmark observes.
+fn n_values(world: &World) -> usize {
+    N_VALUES + world.params.n_extras as usize
 }

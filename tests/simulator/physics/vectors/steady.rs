@@ -3,9 +3,9 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec2;
-use offtrack::cpu::drive::motion;
+use offtrack::cpu::drive::motion_of;
 use offtrack::geometry::{Curve, Piece};
-use offtrack::layout::Rig;
+use offtrack::layout::{Rig, Truck};
 use offtrack::swept::swept_path;
 use offtrack::vehicle::{SingleTrack, Suspension};
 use serde_json::Value;
@@ -33,7 +33,8 @@ pub(super) fn steady_state(written: &Value) -> Worst {
             worst.see("R1", steady.tractor_radius - number(row, "R1"), length);
             worst.see("RH", steady.fifth_wheel_radius - number(row, "RH"), length);
             // In a steady turn of the simulator's own both units turn at one rate.
-            let turning = motion(&kinematic(row).rig(0.05), 5.0, steady.steering as f32, steady.articulation as f32);
+            let (steering, heading) = (steady.steering as f32, steady.articulation as f32);
+            let turning = motion_of(&kinematic(row).rig(0.05), &Truck { speed: 5.0, steering, heading, ..Truck::default() });
             worst.see("rates", f64::from(turning.yaw_rate - turning.trailer_yaw_rate), 1e-5);
         }
     }

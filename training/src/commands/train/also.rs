@@ -52,6 +52,9 @@ impl Also {
             if scenario.actions(lock) != actions {
                 return Err(wrong(format!("its actions and vehicle lock must be those of {}, which is trained on", training.name)));
             }
+            if scenario.extras != training.extras {
+                return Err(wrong(format!("its observation.extras must be those of {}, which is trained on", training.name)));
+            }
             Ok(Also { scenario, split: named.split, trained_on })
         };
         config.also_evaluated().into_iter().map(read).collect()

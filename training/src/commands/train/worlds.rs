@@ -48,6 +48,10 @@ impl Worlds {
             let name = &benchmark.name;
             return Err(wrong(format!("its actions and vehicle lock must be those of {name}, on which the policy is evaluated")));
         }
+        if training.extras != benchmark.extras {
+            let name = &benchmark.name;
+            return Err(wrong(format!("its observation.extras must be those of {name}, on which the policy is evaluated")));
+        }
         let also = Also::read(config, &training, &training_world.actions)?;
         let validation = config.validation.as_ref().map(|settings| validation(&settings.benchmark)).transpose()?;
         Ok(Worlds { benchmark, benchmark_world, training, training_world, validation, also })

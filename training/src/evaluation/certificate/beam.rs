@@ -1,14 +1,14 @@
 //! A beam search over action sequences: can this route be completed from this start at all?
 //!
 //! At one speed all candidates of a depth have made the same progress, so they are ranked by a discounted cost of how
-//! safely they drove. Candidates in nearly the same state would fill the beam with copies of one plan: only the best of
+//! safely they drove; with several speeds driving slowly has a cost too. Candidates in nearly the same state would fill the beam with copies of one plan: only the best of
 //! those is kept.
 
 use std::collections::HashSet;
 use std::sync::Arc;
 
 use offtrack::angle::wrapped;
-use offtrack::layout::{Ended, Start, Truck};
+use offtrack::layout::{Ended, Params, Rig, Start, Truck};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 use offtrack_policy::Policy;
@@ -28,11 +28,16 @@ const HEADING_WEIGHT: f32 = 1.0;
 const AHEAD: usize = 1;
 /// Cost of a load transfer ratio at its limit, to the fourth power: half of the limit costs little.
 const LOAD_TRANSFER_WEIGHT: f32 = 0.3;
+/// Cost of a standing truck where there are several speeds; at the highest it is 0. A load transfer ratio of 0.8 costs as
+/// much as half of the highest speed.
+const SLOWNESS_WEIGHT: f32 = 0.25;
 /// Two candidates are in nearly the same state if these agree after rounding: position \[m], headings \[rad], steer
 /// angle \[rad].
 const POSITION_BIN: f32 = 0.2;
 const HEADING_BIN: f32 = 0.035;
 const STEER_BIN: f32 = 0.07;
+/// Speed, where it is chosen [m/s].
+const SPEED_BIN: f32 = 1.0;
 /// Steer angles that differ by less are equal \[rad].
 const SAME_STEER: f32 = 1e-6;
 /// The parent of the first segment.
@@ -139,7 +144,7 @@ fn branched(world: &World, batch: &Batch, beam: &[Candidate], straight: u32, hol
             rows.push(row as u32);
             children.push(candidate.clone());
         }
-        for action in distinct(world, batch.truck[row].steering, candidate.held.unwrap_or(straight), hold) {
+        for action in distinct(world, world.rig(&batch.truck[row]), batch.truck[row].steering, candidate.held.unwrap_or(straight), hold) {
             rows.push(row as u32);
             children.push(Candidate { held: Some(action), ..candidate.clone() });
         }
@@ -149,9 +154,9 @@ fn branched(world: &World, batch: &Batch, beam: &[Candidate], straight: u32, hol
 
 /// The actions that differ within `hold` steps: the steer angle changes at a limited rate, so all levels beyond reach
 /// are equal. The `last` action represents those equal to it, so that a sequence changes seldom.
-fn distinct(world: &World, steering: f32, last: u32, hold: usize) -> Vec<u32> {
+fn distinct(world: &World, rig: &Rig, steering: f32, last: u32, hold: usize) -> Vec<u32> {
     let params = &world.params;
-    let reach = params.rig.steer_rate * (hold as u32 * params.n_substeps) as f32 * params.substep;
+    let reach = rig.steer_rate * (hold as u32 * params.n_substeps) as f32 * params.substep;
     let reached = |action: u32| {
         let asked = &world.actions[action as usize];
         (asked.steering.clamp(steering - reach, steering + reach), asked.speed)
@@ -169,7 +174,8 @@ fn distinct(world: &World, steering: f32, last: u32, hold: usize) -> Vec<u32> {
 
 /// Each child's action for the next step: the held one, or the policy's for its observation.
 fn chosen(policy: Option<&Policy>, batch: &Batch, children: &[Candidate], straight: u32) -> Vec<u32> {
-    let own = |env: usize| policy.and_then(|policy| policy.act(&batch.observation[env..=env]).first().copied());
+    let own =
+        |env: usize| policy.and_then(|policy| policy.act_beside(&batch.observation[env..=env], &batch.extras[env..=env]).first().copied());
     children.iter().enumerate().map(|(env, child)| child.held.or_else(|| own(env)).unwrap_or(straight)).collect()
 }
 
@@ -180,7 +186,11 @@ fn cost(world: &World, batch: &Batch, env: usize) -> f32 {
     let lane_heading = previews[(progress.waypoint as usize + AHEAD).min(previews.len() - 1)].heading;
     let shortfall = (1.0 - clearance.tractor.min(clearance.trailer) / MARGIN).max(0.0);
     let load = truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs()) / world.params.rollover_ratio;
+    let Params { target_speed_min, target_speed_max, .. } = world.params;
+    // Where a truck may drive more slowly, safety alone would make it crawl.
+    let slowness = if target_speed_min < target_speed_max { 1.0 - truck.speed / target_speed_max } else { 0.0 };
     shortfall.powi(2)
+        + SLOWNESS_WEIGHT * slowness
         + LANE_WEIGHT * progress.lane_distance.powi(2)
         + HEADING_WEIGHT * wrapped(truck.heading - lane_heading).powi(2)
         + LOAD_TRANSFER_WEIGHT * load.powi(4)
@@ -225,7 +235,7 @@ fn selected(batch: &Batch, children: &[Candidate], width: usize) -> Vec<u32> {
 }
 
 /// The cell of the state space that a truck is in: nearly equal states share one.
-fn bin(truck: &Truck) -> [i32; 5] {
+fn bin(truck: &Truck) -> [i32; 6] {
     let articulation = wrapped(truck.heading - truck.trailer_heading);
     [
         truck.position.x / POSITION_BIN,
@@ -233,6 +243,7 @@ fn bin(truck: &Truck) -> [i32; 5] {
         truck.heading / HEADING_BIN,
         articulation / HEADING_BIN,
         truck.steering / STEER_BIN,
+        truck.speed / SPEED_BIN,
     ]
     .map(|value| value.round() as i32)
 }
@@ -249,12 +260,12 @@ mod tests {
     fn actions_that_the_steer_rate_makes_equal_are_tried_once_and_the_last_one_represents_them() {
         let world = world();
         // 20 deg/s give 2 deg in a step and levels lie 8 deg apart: straight on, or towards either side.
-        assert_eq!(distinct(&world, 0.0, 4, 1), [4, 0, 5]);
-        assert_eq!(distinct(&world, 0.0, 7, 1), [7, 0, 4]);
+        assert_eq!(distinct(&world, &world.rigs[0], 0.0, 4, 1), [4, 0, 5]);
+        assert_eq!(distinct(&world, &world.rigs[0], 0.0, 7, 1), [7, 0, 4]);
         // A level 1 deg away is reached, and the wheels can move beyond it.
-        assert_eq!(distinct(&world, 7.0f32.to_radians(), 8, 1), [8, 0, 5]);
+        assert_eq!(distinct(&world, &world.rigs[0], 7.0f32.to_radians(), 8, 1), [8, 0, 5]);
         // In 40 steps every level is reached.
-        assert_eq!(distinct(&world, 0.0, 4, 40).len(), 9);
+        assert_eq!(distinct(&world, &world.rigs[0], 0.0, 4, 40).len(), 9);
     }
 
     #[test]

@@ -9,10 +9,11 @@ use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write;
 use std::path::Path;
 
-use offtrack::layout::Start;
+use offtrack::layout::{Rig, Start};
 use offtrack::reader::{self, shortened};
 use offtrack::roundabout::Gutter;
-use offtrack::scenario::Scenario;
+use offtrack::scenario::{Clock, Scenario};
+use offtrack::vehicle::Model;
 use offtrack::world::World;
 use serde::{Deserialize, Serialize};
 
@@ -196,7 +197,11 @@ impl Certificate {
 fn conditions(scenario: &Scenario, world: &World) -> BTreeMap<String, String> {
     let list = |values: &mut dyn Iterator<Item = f32>| values.map(|value| format!("{value:.4}")).collect::<Vec<_>>().join(" ");
     let params = &world.params;
-    let rig: Vec<String> = bytemuck::cast_slice(&[params.rig]).iter().map(|value: &f32| format!("{value:.4e}")).collect();
+    let mut rig: Vec<String> = bytemuck::cast_slice(&world.rigs).iter().map(|value: &f32| format!("{value:.4e}")).collect();
+    // What a vehicle without a `model` has in the fields that came with it changes no certificate.
+    if scenario.fleet.is_none() && scenario.vehicle.model == Model::default() {
+        rig.truncate(std::mem::offset_of!(Rig, slip_lever_max) / size_of::<f32>());
+    }
     let gutter = match scenario.gutter {
         Gutter::Drivable => "drivable",
         Gutter::Solid => "solid",
@@ -212,7 +217,15 @@ fn conditions(scenario: &Scenario, world: &World) -> BTreeMap<String, String> {
             list(&mut [params.stray_distance, params.jackknife_angle, params.rollover_ratio, scenario.time_limit as f32].into_iter()),
         ),
     ];
-    entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+    // A search drives the first vehicle; a benchmark of one vehicle and one speed has had none of these entries.
+    let first = &world.classes[world.rigs[0].class_index as usize];
+    let fleet = scenario.fleet.is_some().then(|| ("load", format!("{} {}", first.vehicle, first.load)));
+    let clock = (scenario.clock != Clock::default()).then(|| ("clock", "feasible".to_owned()));
+    let start = scenario.start_speed.map(|[least, greatest]| ("start speed", format!("{least:.4} to {greatest:.4} m/s")));
+    let changes = (!scenario.speed_changes.is_empty())
+        .then(|| ("target speeds", list(&mut [params.target_speed_min, params.target_speed_max].into_iter())));
+    let later = [fleet, clock, start, changes].into_iter().flatten();
+    entries.into_iter().chain(later).map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
 /// Run-length encodes actions.

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use offtrack::layout::{Ended, Start};
+use offtrack::layout::{Ended, Start, Truck};
 use offtrack::simulator::{self, RouteChoice, Simulator};
 use offtrack::world::World;
 
@@ -56,9 +56,9 @@ pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted
         for (found, &[offset, heading]) in route.found.iter().zip(&certificate.starts).filter(|(found, _)| found.arrived()) {
             let damaged = |message| wrong(format!("is a damaged certificate: {}: {message}", route.name));
             // Beyond the time limit of its route no action changes the outcome.
-            let limit = world.routes[index].step_limit as usize;
+            let limit = world.step_limit(&Truck { route: index as u32, ..Truck::default() }) as usize;
             let actions = file::actions(&found.actions, world.params.n_actions, limit).map_err(damaged)?;
-            sequences.push(Sequence { route: index as u32, start: Start { offset, heading }, actions });
+            sequences.push(Sequence { route: index as u32, start: Start { offset, heading, ..Start::default() }, actions });
         }
     }
     let ended = driven(world, &sequences).map_err(|error| match error {

@@ -92,7 +92,7 @@ impl<'a> Ground<'a> {
         Ground {
             step: page.scenario.step,
             vehicle: Measures::of(page.world),
-            n_rays: page.world.rays.len(),
+            n_rays: page.world.rays[0].len(),
             maps: places.iter().map(map).collect(),
             routes,
             columns: columns.iter().map(|column| (column.name.as_str(), column.unit)).collect(),

@@ -51,6 +51,7 @@ fn report() -> Report {
             lane: Vec::new(),
         }),
         failures: (0..CAUSES + 2).map(cause).collect(),
+        classes: Vec::new(),
         groups: Groups { island_radius: group("22 m and more"), lane: group("right"), exit: group("1"), roundabout: group("40m") },
         routes: vec![route(true), route(false)],
     }

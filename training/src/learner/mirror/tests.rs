@@ -48,7 +48,8 @@ fn a_mirrored_truck_in_a_mirrored_world_has_mirrored_observations_and_the_same_r
     let begin = |world: World, side: f32| {
         let choice = RouteChoice::Fixed(routes.clone());
         let mut simulator = Simulator::new(Arc::new(world), routes.len(), 0, choice).unwrap();
-        let start = |env: usize| Start { offset: side * (env as f32 * 0.37).sin(), heading: side * (env as f32 * 0.73).sin() };
+        let start =
+            |env: usize| Start { offset: side * (env as f32 * 0.37).sin(), heading: side * (env as f32 * 0.73).sin(), ..Start::default() };
         simulator.reset_from(&(0..routes.len()).map(start).collect::<Vec<_>>()).unwrap();
         simulator
     };
@@ -114,7 +115,7 @@ fn an_action_table_or_sensors_without_an_image_are_refused() {
         "{message}"
     );
     let mut world = World::bake(&scenario()).unwrap();
-    world.rays[3].origin.x += 0.5;
+    world.rays[0][3].origin.x += 0.5;
     let message = Mirror::of(&world).unwrap_err().to_string();
     assert!(message.contains("distance sensor 2 has no mirror image"), "{message}");
 }

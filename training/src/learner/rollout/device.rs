@@ -70,6 +70,10 @@ impl DeviceRollout {
         routes: Vec<u32>,
         mirror: Option<Mirror>,
     ) -> Result<DeviceRollout, Error> {
+        if 0 < world.params.n_extras {
+            let expected = "the benchmark's observation.extras are learned with `cpu` alone".to_owned();
+            return Err(Error::Flag { flag: "device", value: "gpu".to_owned(), expected });
+        }
         DeviceRollout::with_seeds(shared, config, world, routes, mirror, seeds(config.seed, 0))
     }
 
@@ -144,9 +148,10 @@ impl DeviceRollout {
         let empty = |size: usize| gpu.empty("replay buffer", size as u64);
         let (values, actions) = match &self.mirror {
             Some(mirror) => mirror.images(),
-            None => (std::array::from_fn(|index| (index, 1.0)), (0..self.facts.n_actions).collect()),
+            None => ((0..N_VALUES).map(|index| (index, 1.0)).collect(), (0..self.facts.n_actions).collect()),
         };
-        let images = values.map(|(index, factor)| Image { index: index as u32, factor });
+        let image = |(index, factor)| Image { index: index as u32, factor };
+        let images: Vec<Image> = values.into_iter().map(image).collect();
         let (observation, action) = (floats(&self.sample.observation)?, integers(&self.sample.action)?);
         let (reward, discount, next) =
             (floats(&self.sample.reward)?, floats(&self.sample.discount)?, floats(&self.sample.next_observation)?);
@@ -251,12 +256,13 @@ impl Rollout for DeviceRollout {
         self.facts.n_steps < self.slots_held()
     }
 
-    fn observations(&self) -> Result<Vec<[f32; N_VALUES]>, Error> {
+    fn found_normalisation(&self, mirror: Option<&Mirror>) -> Result<Normalisation, Error> {
         let held = self.buffers.slice(Binding::held_observation);
         let size = (self.n_transitions() * N_VALUES * size_of::<f32>()) as u64;
         let bytes = self.shared.gpu.read(&[Slice { size, ..held.clone() }]).map_err(offtrack::simulator::Error::from)?;
         // Bytes need not be aligned as floats are.
-        Ok(bytes[0].chunks_exact(N_VALUES * 4).map(bytemuck::pod_read_unaligned).collect())
+        let rows: Vec<[f32; N_VALUES]> = bytes[0].chunks_exact(N_VALUES * 4).map(bytemuck::pod_read_unaligned).collect();
+        Ok(super::normalisation_of(rows, mirror))
     }
 
     fn set_normalisation(&mut self, normalisation: &Normalisation) {

@@ -1,7 +1,9 @@
 //! Trucks and replay buffer on the host.
 
+use std::borrow::Cow;
+
 use burn::tensor::{Device, Tensor, TensorData};
-use offtrack::layout::{Column, Ended, N_VALUES};
+use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES};
 use offtrack::random;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
@@ -20,13 +22,24 @@ use crate::learner::network::{Mlp, sampled};
 use crate::learner::replay_buffer::{ReplayBuffer, Rows, Sample};
 use crate::learner::sac::{N_SHARDS, Transitions};
 
-/// See the module.
-pub struct HostRollout {
+/// Each truck's `N` values: those of its observation, and its first extras, `[n_envs]`. Without extras nothing is copied.
+fn observed<'a, const N: usize>(observation: &'a [[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Cow<'a, [[f32; N]]> {
+    if N == N_VALUES {
+        return Cow::Borrowed(bytemuck::cast_slice(observation));
+    }
+    let joined = |(values, extras): (&[f32; N_VALUES], &[f32; N_EXTRAS])| {
+        std::array::from_fn(|index| if index < N_VALUES { values[index] } else { extras[index - N_VALUES] })
+    };
+    Cow::Owned(observation.iter().zip(extras).map(joined).collect())
+}
+
+/// Trucks and a replay buffer whose networks observe `N` values. See the module.
+pub struct HostRollout<const N: usize> {
     config: Config,
     simulator: Simulator,
     /// None where routes are drawn uniformly.
     level_replay: Option<LevelReplay>,
-    replay_buffer: ReplayBuffer<N_VALUES>,
+    replay_buffer: ReplayBuffer<N>,
     /// Random numbers of actions and of samples.
     acting: Generator,
     sampling: Generator,
@@ -34,7 +47,7 @@ pub struct HostRollout {
     mirror: Option<Mirror>,
     normalisation: Normalisation,
     /// Observations before the step in hand.
-    observation: Vec<[f32; N_VALUES]>,
+    observation: Vec<[f32; N]>,
     /// Routes of the step in hand; after it, trucks whose episodes ended are on others.
     routes: Vec<u32>,
     /// Rows of the latest sample.
@@ -45,10 +58,10 @@ pub struct HostRollout {
     route_ends: Vec<RouteEnd>,
 }
 
-impl HostRollout {
+impl<const N: usize> HostRollout<N> {
     /// Trucks at the start of their first episodes, and an empty replay buffer. A mirror that the world does not have
     /// is an error.
-    pub fn new(config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<HostRollout, Error> {
+    pub fn new(config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<HostRollout<N>, Error> {
         let stream = |purpose: u32| Generator::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
         let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
         let choice = RouteChoice::Drawn(level_replay.as_ref().map_or(routes, |replay| replay.list().to_vec()));
@@ -59,7 +72,7 @@ impl HostRollout {
             acting: stream(1),
             sampling: stream(2),
             mirror,
-            normalisation: Normalisation::none(N_VALUES),
+            normalisation: Normalisation::none(N),
             observation: Vec::new(),
             routes: Vec::new(),
             sampled_rows: Vec::new(),
@@ -71,7 +84,8 @@ impl HostRollout {
     }
 
     fn choose(&mut self, actor: &Mlp) -> Vec<u32> {
-        let logits = logits(actor, &self.normalisation, &self.simulator.batch().observation);
+        let batch = self.simulator.batch();
+        let logits = logits::<N>(actor, &self.normalisation, &observed(&batch.observation, &batch.extras));
         sampled(&logits, self.n_actions(), &mut self.acting)
     }
 
@@ -82,7 +96,8 @@ impl HostRollout {
     /// Keeps what the step in hand replaces.
     fn begin_step(&mut self) {
         let batch = self.simulator.batch();
-        self.observation.clone_from(&batch.observation);
+        self.observation.clear();
+        self.observation.extend_from_slice(&observed(&batch.observation, &batch.extras));
         self.routes.clear();
         self.routes.extend(batch.truck.iter().map(|truck| truck.route));
     }
@@ -95,7 +110,7 @@ impl HostRollout {
             action: &batch.action,
             reward: &batch.reward,
             ended: &batch.ended,
-            next_observation: &batch.next_observation,
+            next_observation: &observed(&batch.next_observation, &batch.next_extras),
         });
         let codes = batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running));
         for (((sum, &reward), ended), &route) in self.episode_rewards.iter_mut().zip(&batch.reward).zip(codes).zip(&self.routes) {
@@ -117,7 +132,7 @@ impl HostRollout {
     }
 }
 
-impl Rollout for HostRollout {
+impl<const N: usize> Rollout for HostRollout<N> {
     fn simulator(&self) -> &Simulator {
         &self.simulator
     }
@@ -130,8 +145,8 @@ impl Rollout for HostRollout {
         self.replay_buffer.can_sample()
     }
 
-    fn observations(&self) -> Result<Vec<[f32; N_VALUES]>, Error> {
-        Ok(self.replay_buffer.observations().to_vec())
+    fn found_normalisation(&self, mirror: Option<&Mirror>) -> Result<Normalisation, Error> {
+        Ok(super::normalisation_of(self.replay_buffer.observations().to_vec(), mirror))
     }
 
     fn set_normalisation(&mut self, normalisation: &Normalisation) {

@@ -1,0 +1,121 @@
+//! Reads `[[vehicle]]` and `[draw]` of a benchmark file, and checks every value.
+
+use std::path::Path;
+
+use super::{Fleet, Member, N_VEHICLES, Ranges};
+use crate::reader::{Error, Reader};
+use crate::scenario::benchmark_keys::{Written, WrittenDraw, WrittenMember, WrittenVehicles};
+use crate::scenario::check::check_vehicle;
+use crate::scenario::read::referred;
+use crate::shipped::{Kind, Source};
+use crate::vehicle::{Vehicle, read_model};
+
+/// Maximum number of rows of a table of vehicles: they take about 45 MB with a chassis each.
+const MOST_VEHICLES: usize = 65_536;
+/// Maximum number of kinds of vehicle.
+const MOST_MEMBERS: usize = 64;
+
+/// The vehicle and load of a benchmark and, where it has several or draws them, all of them; of these the first stands
+/// for the others.
+pub(in crate::scenario) fn vehicles(
+    reader: &Reader,
+    source: &Source,
+    written: &Written,
+) -> Result<(Vehicle, String, Option<Fleet>), Error> {
+    let members = match &written.vehicle {
+        WrittenVehicles::One(file) => {
+            let (name, vehicle) = read_vehicle(reader, source, "vehicle", file)?;
+            let Some(load) = &written.load else {
+                return Err(reader.invalid("load", "missing", format!("the vehicle has {}", known(&vehicle))));
+            };
+            check_load(reader, "load", &vehicle, load)?;
+            let Some(_) = &written.draw else { return Ok((vehicle, load.clone(), None)) };
+            Vec::from([Member { name, vehicle, share: 1.0, loads: [(load.clone(), 1.0)].into() }])
+        }
+        WrittenVehicles::Many(tables) => {
+            if let Some(load) = &written.load {
+                return Err(reader.invalid("load", format_args!("{load:?}"), "each [[vehicle]] has its own `loads`: leave it out"));
+            }
+            reader.count("vehicle", tables.len(), 1..=MOST_MEMBERS)?;
+            let read = |(index, table)| member(reader, source, &format!("vehicle[{index}]"), table);
+            tables.iter().enumerate().map(read).collect::<Result<Vec<Member>, Error>>()?
+        }
+    };
+    let fleet = drawn(reader, members, written.draw.as_ref().unwrap_or(&WrittenDraw::default()))?;
+    let first = &fleet.members[0];
+    let load = first.loads.iter().find(|(_, share)| 0.0 < **share).map(|(load, _)| load.clone()).unwrap_or_default();
+    Ok((first.vehicle.clone(), load, Some(fleet)))
+}
+
+fn read_vehicle(reader: &Reader, source: &Source, key: &str, file: &Path) -> Result<(String, Vehicle), Error> {
+    let read = |source: &Source| Ok((source.stem(), Vehicle::from_source(source)?));
+    referred(reader, key, source, Kind::Vehicle, file, read)
+}
+
+fn known(vehicle: &Vehicle) -> String {
+    vehicle.loads.keys().map(String::as_str).collect::<Vec<&str>>().join(", ")
+}
+
+fn check_load(reader: &Reader, key: &str, vehicle: &Vehicle, load: &str) -> Result<(), Error> {
+    if vehicle.loads.contains_key(load) {
+        return Ok(());
+    }
+    Err(reader.invalid(key, format_args!("{load:?}"), format!("the vehicle has {}", known(vehicle))))
+}
+
+fn member(reader: &Reader, source: &Source, key: &str, written: &WrittenMember) -> Result<Member, Error> {
+    let (name, mut vehicle) = read_vehicle(reader, source, &format!("{key}.file"), &written.file)?;
+    if let Some(model) = &written.model {
+        vehicle.model = read_model(reader, &format!("{key}.model"), model, &vehicle.trailer)?;
+    }
+    for (load, &share) in &written.loads {
+        check_load(reader, &format!("{key}.loads"), &vehicle, load)?;
+        reader.within(&format!("{key}.loads.{load}"), share, 0.0..=1e6, "")?;
+    }
+    if written.loads.values().all(|&share| share == 0.0) {
+        return Err(reader.invalid(format!("{key}.loads"), "none", format!("at least one is needed; the vehicle has {}", known(&vehicle))));
+    }
+    let share = reader.within(&format!("{key}.share"), written.share, 1e-6..=1e6, "")?;
+    Ok(Member { name, vehicle, share, loads: written.loads.clone() })
+}
+
+/// The fleet, whose vehicles make sense whatever is drawn.
+fn drawn(reader: &Reader, members: Vec<Member>, written: &WrittenDraw) -> Result<Fleet, Error> {
+    let n_vehicles = reader.count("draw.n_vehicles", written.n_vehicles.unwrap_or(N_VEHICLES), 1..=MOST_VEHICLES)?;
+    let range = |key: &str, range: Option<[f64; 2]>, [least, greatest]: [f64; 2], unit: &str| {
+        let Some(range) = range else { return Ok(None) };
+        for (index, end) in range.into_iter().enumerate() {
+            reader.within(&format!("draw.{key}[{index}]"), end, least..=greatest, unit)?;
+        }
+        let [from, to] = range;
+        if to < from {
+            return Err(reader.invalid(format!("draw.{key}"), format_args!("[{from}, {to}]"), "must be [least, greatest]"));
+        }
+        Ok(Some(range))
+    };
+    let (length, factor, time) = ([-3.0, 3.0], [0.1, 10.0], [0.0, 5.0]);
+    let draw = Ranges {
+        trailer_wheelbase: range("trailer_wheelbase", written.trailer_wheelbase, length, "m")?,
+        tractor_wheelbase: range("tractor_wheelbase", written.tractor_wheelbase, length, "m")?,
+        fifth_wheel: range("fifth_wheel", written.fifth_wheel, length, "m")?,
+        centre_of_gravity: range("centre_of_gravity", written.centre_of_gravity, [-1.0, 1.0], "m")?,
+        roll_gain: range("roll_gain", written.roll_gain, factor, "")?,
+        roll_frequency: range("roll_frequency", written.roll_frequency, factor, "")?,
+        roll_damping: range("roll_damping", written.roll_damping, factor, "")?,
+        slip: range("slip", written.slip, [0.0, 10.0], "")?,
+        friction: range("friction", written.friction, factor, "")?,
+        steer_rate: range("steer_rate", written.steer_rate, factor, "")?,
+        acceleration_max: range("acceleration_max", written.acceleration_max, factor, "")?,
+        steer_delay: range("steer_delay", written.steer_delay, [0.0, 1.0], "s")?,
+        drive_lag: range("drive_lag", written.drive_lag, time, "s")?,
+        brake_lag: range("brake_lag", written.brake_lag, time, "s")?,
+    };
+    let fleet = Fleet { members, draw, n_vehicles };
+    for (member, vehicle) in fleet.extremes() {
+        check_vehicle(&vehicle).map_err(|wrong| {
+            let expected = format!("of {} with all ranges at their ends: {}", member.name, wrong.expected);
+            reader.invalid("draw", format_args!("{}: {}", wrong.key, wrong.value), expected)
+        })?;
+    }
+    Ok(fleet)
+}
