@@ -184,7 +184,7 @@ def main():
     available = [int(core) for core in args.cores.split(",")] if args.cores else sorted(os.sched_getaffinity(0))
     for core in available:
         cores.put(core)
-    args.runs = args.runs.resolve()
+    args.offtrack, args.runs = args.offtrack.resolve(), args.runs.resolve()
     write_prices(args.runs / "scenarios")
     wanted = [choice for choice in CHOICES if args.choice is None or choice[0] in args.choice]
 
