@@ -80,7 +80,12 @@ def run(core, args, choice, changes, seed):
             subprocess.run(["rm", "-r", str(folder)], check=True)
         command = [str(args.offtrack), "train", "best", "--name", folder.name, "--out", str(args.runs)]
         command += ["--seed", str(seed), "--steps", str(STEPS)]
-        for key, value in [("benchmark", training), ("training_benchmark", training), ("also_evaluate", ""), ("validation", "")]:
+        for key, value in [
+            ("benchmark", training),
+            ("training_benchmark", training),
+            ("also_evaluate", ""),
+            ("validation", ""),
+        ]:
             command += ["--set", f"{key}={value}"]
         if failure := finished(command, core):
             return {"seed": seed, "failed": failure}
@@ -88,7 +93,14 @@ def run(core, args, choice, changes, seed):
     (folder / "checkpoint.safetensors").unlink(missing_ok=True)
     if not evaluation.is_file():
         command = [str(args.offtrack), "evaluate", "--benchmark", str(examined), "--split", "validation"]
-        command += ["--policy", str(folder / "policy.safetensors"), "--episodes", str(EPISODES), "--json", str(evaluation)]
+        command += [
+            "--policy",
+            str(folder / "policy.safetensors"),
+            "--episodes",
+            str(EPISODES),
+            "--json",
+            str(evaluation),
+        ]
         if failure := finished(command, core):
             return {"seed": seed, "failed": failure}
     trained, found = json.loads(report.read_text()), json.loads(evaluation.read_text())
@@ -119,7 +131,16 @@ def run(core, args, choice, changes, seed):
 
 def table(rows):
     """The rows as a Markdown table."""
-    heads = ["choice", "arrived, each seed", "mean", "rolled over", "of laden_high: arrived", "LTR p99", "time", "lateral p95 [g]"]
+    heads = [
+        "choice",
+        "arrived, each seed",
+        "mean",
+        "rolled over",
+        "of laden_high: arrived",
+        "LTR p99",
+        "time",
+        "lateral p95 [g]",
+    ]
     lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
     for row in rows:
         good = [one for one in row["runs"] if "failed" not in one]
