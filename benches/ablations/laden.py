@@ -23,8 +23,8 @@ STEPS = 1_600_000
 EPISODES = 4
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
-# Name, and what is changed in the benchmarks: TABLE.KEY and its value. Rewards are those that it trains with; reports
-# do not depend on them.
+# Name, and what is changed in the benchmarks: TABLE.KEY and its value. Rewards and endings are those that it trains with;
+# it is examined with those of laden2026.
 CHOICES = [
     ("as laden2026-training", {}),
     ("time -5", {"reward.time": -5.0}),
@@ -33,6 +33,8 @@ CHOICES = [
     ("lateral acceleration -20", {"reward.lateral_acceleration": -20.0}),
     ("jerk -10", {"reward.jerk": -10.0}),
     ("rollover -500", {"reward.rollover": -500.0}),
+    ("rolled over from 0.85 on", {"ending.rollover_ratio": 0.85}),
+    ("rolled over from 0.9 on", {"ending.rollover_ratio": 0.9}),
     ("blind", {"observation.extras": '"blind"'}),
     ("oracle", {"observation.extras": '"oracle"'}),
     ("no extras", {"observation.extras": '"none"'}),
@@ -55,7 +57,11 @@ def write_benchmarks(folder, name, changes):
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for base in ["training", "random"]:
-        own = {path: value for path, value in changes.items() if base == "training" or not path.startswith("reward.")}
+        own = {
+            path: value
+            for path, value in changes.items()
+            if base == "training" or not path.startswith(("reward.", "ending."))
+        }
         file = folder / f"{name}-{base}.toml"
         file.write_text(changed((SCENARIOS / f"laden2026-{base}.toml").read_text(), own))
         files.append(file)

@@ -64,15 +64,25 @@ impl Policy {
         Policy::from_bytes(&format!("{benchmark} (shipped)"), bytes)
     }
 
-    /// The policy that comes with the project for this benchmark or, where there is none, the one for `attard2023`:
-    /// other benchmarks may share its vehicle and actions.
+    /// The policy that comes with the project for this benchmark, whose world is `world`. Where there is none it is the
+    /// first one that can drive there: other benchmarks may share actions and extras.
     ///
     /// # Errors
     ///
-    /// None as long as the policies that come with the project can be read.
-    pub fn shipped_or_default(benchmark: &str) -> Result<Policy, Error> {
-        let known = Policy::shipped_names().contains(&benchmark);
-        Policy::shipped(if known { benchmark } else { "attard2023" })
+    /// Where none can drive there: what the one for `attard2023` lacks.
+    pub fn shipped_for(benchmark: &str, world: &World) -> Result<Policy, Error> {
+        if Policy::shipped_names().contains(&benchmark) {
+            return Policy::shipped(benchmark);
+        }
+        for name in Policy::shipped_names() {
+            let policy = Policy::shipped(name)?;
+            if policy.check(world).is_ok() {
+                return Ok(policy);
+            }
+        }
+        let policy = Policy::shipped("attard2023")?;
+        policy.check(world)?;
+        Ok(policy)
     }
 
     /// Names of the benchmarks that a policy comes with the project for.

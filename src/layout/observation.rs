@@ -13,6 +13,9 @@ pub struct Values {
     pub n: usize,
     /// The least that they can be: 0, of angles -1. The largest is 1.
     pub low: f32,
+    /// Factor of its values in a mirror: -1 where left and right change places, as of angles. Pairs of sensors change
+    /// places themselves.
+    pub mirror: f32,
     /// What each value is, what it is divided by, and where it is limited.
     pub doc: &'static str,
 }
@@ -56,11 +59,11 @@ pub const OBSERVATION: [Values; 13] = [
 ];
 
 const fn values(name: &'static str, first: usize, n: usize, doc: &'static str) -> Values {
-    Values { name, first, n, low: 0.0, doc }
+    Values { name, first, n, low: 0.0, mirror: 1.0, doc }
 }
 
 const fn angles(name: &'static str, first: usize, n: usize, doc: &'static str) -> Values {
-    Values { low: -1.0, ..values(name, first, n, doc) }
+    Values { low: -1.0, mirror: -1.0, ..values(name, first, n, doc) }
 }
 
 // Every value belongs to one group.

@@ -76,6 +76,8 @@ fn the_laden_benchmarks_of_random_roads_differ_from_laden2026_in_roads_and_train
         let start = laden.remove("start").unwrap();
         assert_eq!(start["speed_kmh"], expected["start"]["speed_kmh"]);
         assert_eq!(start.get("offset"), empty.get("start").and_then(|start| start.get("offset")));
+        let ending = laden["ending"].as_table_mut().unwrap();
+        assert_eq!(ending.remove("rollover_ratio").is_some(), empty["reward"].get("clearance").is_some());
         for key in ["reward", "start", "roundabout"] {
             laden.remove(key);
             expected.remove(key);

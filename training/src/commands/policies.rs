@@ -14,7 +14,8 @@ use offtrack_training::evaluation::policies::{self, LOOK_AHEAD, Policy};
 #[group(skip)]
 pub struct Choice {
     /// A policy file, `pursuit` (pure pursuit of the lane's centre), `random`, or the name of a shipped policy. Without
-    /// it the policy shipped for the benchmark or, where there is none, the one for attard2023.
+    /// it the policy shipped for the benchmark or, where there is none, the first shipped one with its actions and
+    /// extras.
     #[arg(long)]
     policy: Option<String>,
     /// With `pursuit`: look-ahead distance [m].
@@ -29,13 +30,15 @@ impl Choice {
             let value = format!("{} m", shown(self.look_ahead));
             return Err(Error::Flag { flag: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
         }
+        let policy = policies::find(self.policy.as_deref(), &scenario.name, self.look_ahead as f32, seed, world)?;
         if self.policy.is_none() && !offtrack_policy::Policy::shipped_names().contains(&scenario.name.as_str()) {
             let _ = writeln!(
                 std::io::stderr(),
-                "offtrack: no policy comes with the program for {}; the one for attard2023 drives; --policy chooses another",
-                scenario.name
+                "offtrack: no policy comes with the program for {}; {} drives; --policy chooses another",
+                scenario.name,
+                policy.name()
             );
         }
-        policies::find(self.policy.as_deref(), &scenario.name, self.look_ahead as f32, seed, world)
+        Ok(policy)
     }
 }

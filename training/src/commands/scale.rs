@@ -171,7 +171,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
             dt: scenario.step,
             substeps: scenario.n_substeps,
             rays: N_RAYS,
-            values: N_VALUES,
+            values: N_VALUES + world.params.n_extras as usize,
             holds: "physics, collision, progress, rays, observation, reward, and a new episode where one ended",
             rays_counted: "those of every step, and once more those after each reset",
             speeds: "medians over windows, nothing read back within one; stages are timed apart, each over the whole batch",
@@ -270,13 +270,13 @@ fn failed(file: &Path) -> impl FnOnce(offtrack_drawing::Error) -> Error {
 }
 
 fn heading(scale: &Scale, device: &offtrack_training::device::Device) -> String {
-    let Step { dt, substeps, holds, .. } = &scale.step;
+    let Step { dt, substeps, values, holds, .. } = &scale.step;
     let threads = if scale.engine == "cpu" { format!(", {} threads", scale.threads) } else { String::new() };
     let names: String = measure::STAGE_NAMES.iter().map(|name| format!(" {name:>7}")).collect();
     let Scale { roundabouts, routes, world_bytes, seconds_to_read, seconds_to_bake, .. } = scale;
     let megabytes = *world_bytes as f64 / 1e6;
     format!(
-        "{}{threads}; a step is {dt} s in {substeps} sub-steps, {N_RAYS} rays, {N_VALUES} values: {holds}\n\
+        "{}{threads}; a step is {dt} s in {substeps} sub-steps, {N_RAYS} rays, {values} values: {holds}\n\
          {roundabouts} roundabouts, {routes} routes, {megabytes:.1} MB; read in {seconds_to_read:.1} s, baked in {seconds_to_bake:.1} s\n\
          {:>8} {:>9} {:>14} {:>14}   ns a truck, a stage at a time:{names}\n",
         device.title(),

@@ -30,13 +30,13 @@ pub trait Policy {
 
 /// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its
 /// benchmark. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where
-/// there is none, the one for attard2023. `look_ahead` is pure pursuit's \[m], `seed` that of random actions.
+/// there is none, the first that can drive there. `look_ahead` is pure pursuit's \[m], `seed` that of random actions.
 pub fn find(policy: Option<&str>, benchmark: &str, look_ahead: f32, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
     let learned = match policy {
         Some("pursuit") => return Ok(Box::new(PurePursuit::new(look_ahead))),
         Some("random") => return Ok(Box::new(UniformRandom { seed })),
         Some(name) => learned(name)?,
-        None => offtrack_policy::Policy::shipped_or_default(benchmark)?,
+        None => offtrack_policy::Policy::shipped_for(benchmark, world)?,
     };
     learned.check(world)?;
     Ok(Box::new(learned))

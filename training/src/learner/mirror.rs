@@ -3,17 +3,13 @@
 //! A truck and its sensors are symmetric, so the mirror image of a transition is a valid transition of left-hand
 //! traffic. A learner that samples both has seen every bend in both directions.
 
-use offtrack::layout::{Action, EXTRAS, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, N_VALUES, Ray};
+use offtrack::layout::{Action, EXTRAS, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, OBSERVATION, Ray};
 use offtrack::world::World;
 use rand::Rng;
 
 use crate::error::Error;
 use crate::learner::replay_buffer::Sample;
 
-/// Signed values of an observation, left positive: angles to waypoints, headings, articulation.
-const SIGNED: std::ops::Range<usize> = 6..22;
-/// Index of the first distance sensor in an observation.
-const RANGES: usize = 30;
 /// Tolerance of two sensors' mounts or two steer angles that are mirror images [m, rad]: f32 rounds at 1e-6 of a few
 /// metres.
 const SAME: f32 = 1e-4;
@@ -31,14 +27,15 @@ impl Mirror {
     /// The mirror of a world. Its action table and its sensors must be symmetric.
     pub fn of(world: &World) -> Result<Mirror, Error> {
         let refused = |expected: String| Error::Flag { flag: "learning.mirror_augmentation", value: "true".to_owned(), expected };
-        let mut values: Vec<(usize, f32)> = (0..N_VALUES).map(|index| (index, if SIGNED.contains(&index) { -1.0 } else { 1.0 })).collect();
-        let extras = &EXTRAS[..world.params.n_extras as usize];
-        values.extend((N_VALUES..).zip(extras).map(|(index, extra)| (index, extra.mirror)));
+        let factors = OBSERVATION.iter().flat_map(|values| std::iter::repeat_n(values.mirror, values.n));
+        let extras = EXTRAS[..world.params.n_extras as usize].iter().map(|extra| extra.mirror);
+        let mut values: Vec<(usize, f32)> = factors.chain(extras).enumerate().collect();
         if world.rigs.iter().any(|rig| rig.crossfall != 0.0) {
             return Err(refused(
                 "the vehicle's road falls to one side (model.crossfall): leave learning.mirror_augmentation out".to_owned(),
             ));
         }
+        let first_ray = OBSERVATION.iter().find(|values| values.name == "trailer_range").expect("observations have ranges").first;
         for index in 0..N_RAYS {
             // The image of a trailer's sensor is one of the trailer's.
             let unit = if index < N_TRAILER_RAYS { 0..N_TRAILER_RAYS } else { N_TRAILER_RAYS..N_TRAILER_RAYS + N_TRACTOR_RAYS };
@@ -48,7 +45,7 @@ impl Mirror {
             let image = image.ok_or_else(|| {
                 refused(format!("the vehicle's distance sensor {index} has no mirror image: leave learning.mirror_augmentation out"))
             })?;
-            values[RANGES + index].0 = RANGES + image;
+            values[first_ray + index].0 = first_ray + image;
         }
         let image = |action: &Action| {
             let same = |other: &Action| (action.steering + other.steering).abs() <= SAME && (action.speed - other.speed).abs() <= SAME;

@@ -223,11 +223,15 @@ fn the_shipped_policy_and_benchmark_are_found_wherever_the_program_runs_and_by_n
 }
 
 #[test]
-fn a_benchmark_without_a_policy_of_its_own_is_driven_by_the_one_for_attard2023_and_says_so() {
-    let output = offtrack(&["evaluate", "--benchmark", "attard2023-full", "--episodes", "1"]);
-    let said = refusal(&output, 0);
-    assert!(said.contains("no policy comes with the program for attard2023-full; the one for attard2023 drives"), "{said}");
-    assert!(String::from_utf8_lossy(&output.stdout).starts_with("policy attard2023 (shipped); benchmark attard2023-full"));
+fn a_benchmark_without_a_policy_of_its_own_is_driven_by_a_shipped_one_that_can_and_says_so() {
+    for (benchmark, policy) in [("attard2023-full", "attard2023"), ("attard2023-maps-as-run", "attard2023-as-run")] {
+        let output = offtrack(&["evaluate", "--benchmark", benchmark, "--episodes", "1"]);
+        let said = refusal(&output, 0);
+        assert!(said.contains(&format!("no policy comes with the program for {benchmark}; {policy} (shipped) drives")), "{said}");
+        assert!(String::from_utf8_lossy(&output.stdout).starts_with(&format!("policy {policy} (shipped); benchmark {benchmark}")));
+    }
+    let said = refusal(&offtrack(&["evaluate", "--benchmark", "laden2026-50", "--episodes", "1"]), 2);
+    assert!(said.contains("attard2023 (shipped): learned with other extras beside the observation"), "{said}");
 }
 
 #[test]

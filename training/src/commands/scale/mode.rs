@@ -48,7 +48,7 @@ pub(super) struct Learner {
 impl Learner {
     /// The policy that comes with the program for `benchmark`, and a training file.
     pub(super) fn read(benchmark: &str, config: &Path, world: &World) -> Result<Learner, Error> {
-        let policy = Policy::shipped_or_default(benchmark)?;
+        let policy = Policy::shipped_for(benchmark, world)?;
         policy.check(world)?;
         Ok(Learner { policy, config: Config::read(config)? })
     }
@@ -62,7 +62,7 @@ impl Learner {
     fn actor(&self, mode: Mode) -> Mlp {
         match mode {
             Mode::LargePolicy => {
-                let sizes = [&[N_VALUES], &LARGE[..], &[self.policy.actions.len()]].concat();
+                let sizes = [&[N_VALUES + self.policy.extras.len()], &LARGE[..], &[self.policy.actions.len()]].concat();
                 Mlp::new(&sizes, 1.0, &mut SmallRng::seed_from_u64(0), &burn::tensor::Device::flex())
             }
             _ => Mlp::of(&self.policy.layers, &burn::tensor::Device::flex()),

@@ -9,12 +9,13 @@ use super::set;
 use crate::error::Error;
 
 /// The training files that come with the program.
-const SHIPPED: [(&str, &str); 6] = [
+const SHIPPED: [(&str, &str); 7] = [
     ("default", include_str!("../../../configs/default.toml")),
     ("best", include_str!("../../../configs/best.toml")),
     ("attard", include_str!("../../../configs/attard.toml")),
     ("gpu", include_str!("../../../configs/gpu.toml")),
     ("as-run", include_str!("../../../configs/as-run.toml")),
+    ("laden", include_str!("../../../configs/laden.toml")),
     ("paper", include_str!("../../../configs/paper.toml")),
 ];
 /// Bases of bases: more than anyone needs, fewer than a circle.

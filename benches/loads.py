@@ -1,0 +1,177 @@
+#!/usr/bin/env python3
+"""Examines policies by load on the benchmarks with loads, and prints how they drive as Markdown tables.
+
+Each policy drives every load on its own: the routes of laden2026 (30 episodes each) and of laden2026-random (one each),
+none of which a policy of training/configs/laden.toml has seen. The baselines are pure pursuit by the feasible speed
+profile, and the policy that is shipped for attard2023, which knows neither loads nor speeds, at 30 and at 20 km/h. What
+the JSON file already has is not evaluated again, so an interrupted series can go on. Standard library only.
+
+    python3 benches/loads.py --policies runs/laden --json docs/benchmarks/laden.json
+"""
+
+import argparse
+import json
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+import zlib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LOADS = ["empty", "half", "laden", "laden_high"]
+# Benchmark, split, and what the table calls it.
+PLACES = [
+    ("laden2026", "test", "23 unseen routes"),
+    ("laden2026", "train", "52 training routes of the study"),
+    ("laden2026-random", "test", "100 random roads"),
+]
+# Look-ahead distance of pure pursuit [m]: the best of 7, 9, 12 and 15 m on the training roads of laden2026-random.
+LOOK_AHEAD = "12"
+
+
+def evaluated(offtrack, benchmark, split, load, policy, more=()):
+    """The report of a policy with a load, without its lists of routes."""
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.json"
+        command = [str(offtrack), "evaluate", "--benchmark", str(benchmark), "--split", split, "--load", load]
+        command += ["--policy", str(policy), "--json", str(report), *more]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode != 0:
+            sys.exit(f"{' '.join(command)}: {done.stderr.strip().splitlines()[-1]}")
+        return condensed(json.loads(report.read_text()))
+
+
+def condensed(report):
+    keys = [
+        "policy",
+        "benchmark",
+        "split",
+        "seed",
+        "episodes",
+        "arrived",
+        "lane_distance_mean",
+        "machine",
+        "commit",
+        "classes",
+    ]
+    return {key: report[key] for key in keys if key in report}
+
+
+def at_one_speed(folder, base, kmh):
+    """A benchmark with loads for trucks of one target speed, without extras: what the shipped policy for attard2023 knows."""
+    text = (ROOT / "scenarios" / f"{base}.toml").read_text()
+    text = re.sub(r"^speeds_kmh = .*$", f"speeds_kmh = [{kmh}.0]", text, flags=re.MULTILINE)
+    text = re.sub(r"^speed_kmh = .*$", f"speed_kmh = {kmh}.0", text, flags=re.MULTILINE)
+    text = text.replace('extras = "mass"', 'extras = "none"')
+    text = re.sub(r'^(file|distribution) = "(.*)"$', rf'\1 = "{ROOT}/scenarios/\2"', text, flags=re.MULTILINE)
+    file = Path(folder) / f"{base}-{kmh}.toml"
+    file.write_text(text)
+    return file
+
+
+def slower(folder, kmh):
+    """The policy shipped for attard2023 with another target speed in its action table."""
+    whole = (ROOT / "training/policies/attard2023/policy.safetensors").read_bytes()
+    (length,) = struct.unpack("<Q", whole[:8])
+    header = json.loads(whole[8 : 8 + length])
+    description = json.loads(header["__metadata__"]["offtrack"])
+    description["actions"] = [[steering, kmh / 3.6] for steering, _ in description["actions"]]
+    # docs/policies.md: a CRC-32 of the description with the checksum 0, then of the tensors in this order.
+    names = ["observation.mean", "observation.factor"]
+    names += [f"actor.{layer}.{part}" for layer in range(description["layers"]) for part in ["weight", "bias"]]
+    description["checksum"] = 0
+    checksum = zlib.crc32(json.dumps(description).encode())
+    for name in names:
+        first, end = header[name]["data_offsets"]
+        checksum = zlib.crc32(whole[8 + length + first : 8 + length + end], checksum)
+    description["checksum"] = checksum
+    header["__metadata__"]["offtrack"] = json.dumps(description)
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 8)
+    file = Path(folder) / f"attard2023-{kmh}.safetensors"
+    file.write_bytes(struct.pack("<Q", len(text)) + text + whole[8 + length :])
+    return file
+
+
+def jobs(args, folder):
+    """Name of the driver, name of the place, load, and the evaluation that belongs to them."""
+    for policy in args.policies:
+        for benchmark, split, place in [*PLACES, ("laden2026-odd", "test", "unseen routes, odd vehicles")]:
+            for load in LOADS:
+                yield policy.parent.name, place, load, (benchmark, split, load, policy)
+    if args.baselines:
+        for benchmark, split, place in PLACES:
+            for load in LOADS:
+                yield "pursuit", place, load, (benchmark, split, load, "pursuit", ("--look-ahead", LOOK_AHEAD))
+        for kmh in [30, 20]:
+            policy = slower(folder, kmh)
+            for base, split, place in PLACES:
+                benchmark = at_one_speed(folder, base, kmh)
+                for load in LOADS:
+                    yield f"attard2023 at {kmh} km/h", place, load, (benchmark, split, load, policy)
+
+
+def merged(classes):
+    """The figures of both vehicles with a load: sums, and means weighted by episodes; of LTR p99 the larger one."""
+    n = sum(one["episodes"] for one in classes)
+    mean = lambda key: sum(one[key] * one["episodes"] for one in classes if one[key] is not None) / n
+    return {
+        "episodes": n,
+        "arrived": sum(one["arrived"] for one in classes),
+        "rolled_over": sum(one["rolled_over"] for one in classes),
+        "p99": max(one["load_transfer_ratio_p99"] for one in classes),
+        "time": mean("time_over_feasible_mean"),
+        "speed": mean("speed_mean_kmh"),
+        "lateral": max(one["lateral_acceleration_p95"] for one in classes),
+    }
+
+
+def tables(results):
+    """For each place a table of drivers and loads."""
+    lines = []
+    for place in dict.fromkeys(row["place"] for row in results):
+        lines += [
+            f"**{place}**",
+            "",
+            "| driver | load | arrived | rolled over | LTR p99 | km/h | time | lateral p95 [g] |",
+            "|---" * 8 + "|",
+        ]
+        for row in (row for row in results if row["place"] == place):
+            one = merged(row["report"]["classes"])
+            lines.append(
+                f"| {row['driver']} | {row['load']} | {100 * one['arrived'] / one['episodes']:.1f} % ({one['arrived']:,}/{one['episodes']:,})"
+                f" | {one['rolled_over']} | {one['p99']:.2f} | {one['speed']:.1f} | {one['time']:.2f} | {one['lateral']:.2f} |"
+            )
+        lines.append("")
+    return "\n".join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--offtrack", type=Path, default=Path("target/release/offtrack"))
+    parser.add_argument("--policies", type=Path, help="folder with the runs of several seeds, or of one")
+    parser.add_argument("--baselines", action="store_true", help="the baselines too")
+    parser.add_argument("--json", type=Path, required=True)
+    args = parser.parse_args()
+    args.offtrack = args.offtrack.resolve()
+    args.policies = sorted(args.policies.glob("**/policy.safetensors")) if args.policies else []
+    if not args.policies and not args.baselines:
+        parser.error("nothing to do: --policies names no folder with a policy.safetensors, and there is no --baselines")
+    results = json.loads(args.json.read_text()) if args.json.is_file() else []
+    done = {(row["driver"], row["place"], row["load"]) for row in results}
+    with tempfile.TemporaryDirectory() as folder:
+        for driver, place, load, job in jobs(args, folder):
+            if (driver, place, load) in done:
+                continue
+            results.append({"driver": driver, "place": place, "load": load, "report": evaluated(args.offtrack, *job)})
+            temporary = args.json.with_suffix(".tmp")
+            temporary.write_text(json.dumps(results, indent=1) + "\n")
+            temporary.replace(args.json)
+            print(driver, place, load, file=sys.stderr, flush=True)
+    print(tables(results))
+
+
+if __name__ == "__main__":
+    main()
