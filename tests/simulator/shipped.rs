@@ -31,10 +31,10 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
     let mut files = BTreeMap::new();
     on_disk(&scenarios(), Path::new(""), &mut files);
     let embedded: BTreeMap<String, String> = FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
-    assert_eq!((files.len(), FILES.len()), (41, 41), "21 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions");
+    assert_eq!((files.len(), FILES.len()), (42, 42), "22 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions");
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [21, 10, 3, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [22, 10, 3, 2]);
 }
 
 /// Benchmarks of so many roads that they are not drawn here.
@@ -90,7 +90,7 @@ fn the_laden_benchmarks_of_random_roads_differ_from_laden2026_in_roads_and_train
 fn every_name_gives_what_its_file_gives() {
     // The two with thousands of roads take minutes; the next test reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 19);
+    assert_eq!(benchmarks.len(), 20);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();

@@ -142,7 +142,7 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
-    use offtrack::layout::N_VALUES;
+    use offtrack::layout::{N_VALUES, Track};
     use offtrack::scenario::{Scenario, Split};
     use offtrack::simulator::{RouteChoice, Simulator};
     use offtrack::world::World;
@@ -150,7 +150,7 @@ mod tests {
     use rand::SeedableRng;
     use rand::rngs::SmallRng;
 
-    use crate::learner::rollout::host::logits;
+    use crate::learner::rollout::host::{logits, observed};
 
     fn weights(network: &Mlp) -> Vec<f32> {
         network.layers.iter().flat_map(|layer| layer.weight.val().into_data().try_to_vec::<f32>().unwrap()).collect()
@@ -200,9 +200,11 @@ mod tests {
 
     #[test]
     fn a_policy_drives_as_the_network_that_learned_it() {
+        const LADEN: usize = N_VALUES + Track::Mass.n_extras();
         for name in Policy::shipped_names() {
             let policy = Policy::shipped(name).unwrap();
             let scenario = Scenario::named(name).unwrap();
+            assert!([0, LADEN - N_VALUES].contains(&policy.extras.len()), "{name}: {:?}", policy.extras);
             let routes = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
             let mut simulator = Simulator::new(Arc::new(World::bake(&scenario).unwrap()), 1024, 1, routes).unwrap();
             let network = Mlp::of(&policy.layers, &Device::flex());
@@ -210,14 +212,17 @@ mod tests {
             wrong.layers[1].weights.iter_mut().for_each(|weight| *weight *= 1.001);
             for _ in 0..4 {
                 for _ in 0..20 {
-                    simulator.step(&policy.act(&simulator.batch().observation)).unwrap();
+                    simulator.step(&policy.act_beside(&simulator.batch().observation, &simulator.batch().extras)).unwrap();
                 }
-                let observations: &[[f32; N_VALUES]] = &simulator.batch().observation;
-                let expected = logits(&network, &policy.normalisation, observations);
+                let (observations, extras): (&[[f32; N_VALUES]], &[_]) = (&simulator.batch().observation, &simulator.batch().extras);
+                let expected = match policy.extras.is_empty() {
+                    true => logits(&network, &policy.normalisation, observations),
+                    false => logits::<LADEN>(&network, &policy.normalisation, &observed(observations, extras)),
+                };
                 let n_actions = policy.actions.len();
                 // Sums over 256 values may round in another order or without fused multiply-adds.
-                assert!(difference(&policy.logits(observations), &expected, n_actions) < 1e-5);
-                assert!(1e-5 < difference(&wrong.logits(observations), &expected, n_actions), "a wrong weight must show");
+                assert!(difference(&policy.logits_beside(observations, extras), &expected, n_actions) < 1e-5);
+                assert!(1e-5 < difference(&wrong.logits_beside(observations, extras), &expected, n_actions), "a wrong weight must show");
             }
             assert_eq!(network.plain_layers(), policy.layers);
         }
