@@ -183,7 +183,12 @@ impl<'a> Scene<'a> {
 
     fn title(&self) -> String {
         let time = (self.recording.frames.len() - 1) as f64 * self.recording.step;
-        format!("{}, {}: {} after {time:.1} s", self.recording.route, self.policy(), self.end())
+        format!("{}, {}{}: {} after {time:.1} s", self.recording.route, self.policy(), self.class(), self.end())
+    }
+
+    /// The names of vehicle and load after a comma, where the benchmark has several.
+    fn class(&self) -> String {
+        self.recording.class.as_ref().map(|class| format!(", {class}")).unwrap_or_default()
     }
 
     /// The start pose and the extremes of the episode.

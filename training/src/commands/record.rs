@@ -16,7 +16,7 @@ use offtrack::world::World;
 use offtrack_drawing::episode::Scene;
 use offtrack_drawing::film::{self, Take};
 use offtrack_drawing::rasterised;
-use offtrack_drawing::recording::{Map, Measures, Recorder, Recording, Track, centre_line};
+use offtrack_drawing::recording::{Class, Map, Measures, Recorder, Recording, Track, centre_line};
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::policies::Policy;
 use offtrack_training::files;
@@ -35,10 +35,11 @@ pub struct Args {
     /// The file to write: .gif, .png, .svg, or .json for data.
     ///
     /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed",
-    /// "episode", "episodes", "step" [s], "ended", "vehicle": dimensions and sensors, "actions": [[steer angle, speed],
-    /// ...], "map": {"drivable", "lanes"}, "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state
-    /// after step n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's
-    /// centre at the origin.
+    /// "episode", "episodes", "step" [s], "ended", "class": {"vehicle", "load"}: their names, where the benchmark has
+    /// several, "vehicle": dimensions and sensors of the truck that drove, "actions": [[steer angle, speed], ...],
+    /// "map": {"drivable", "lanes"}, "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state after step
+    /// n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's centre at
+    /// the origin.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// A benchmark's name, or the path of its file.
@@ -150,7 +151,8 @@ impl Of<'_, '_> {
             episodes,
             step: scenario.step,
             ended: track.ended.name().to_owned(),
-            vehicle: Measures::of(world).seen(roundabout),
+            class: Class::of(world, track.vehicle),
+            vehicle: Measures::of(world, track.vehicle).seen(roundabout),
             actions: world.actions.iter().map(|action| [steering(action.steering), action.speed]).collect(),
             map: Map::of(roundabout, scenario.gutter),
             centre_line: centre_line(roundabout, route),

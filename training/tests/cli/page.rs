@@ -207,3 +207,25 @@ fn a_page_has_a_row_for_each_further_evaluation_and_their_routes_are_left_to_the
         "{document}"
     );
 }
+
+#[test]
+fn a_page_of_a_fleet_shows_each_episode_with_its_own_truck_and_names_vehicle_and_load() {
+    let place = Place::new();
+    let (page, route) = (place.file("page.html"), "20m/E-right-1");
+    let flags = ["--route", route, "--episodes", "12", "--policy", "pursuit", "--html", &place.text("page.html")];
+    succeed(&offtrack(&[&["evaluate", "--benchmark", "laden2026"], &flags[..]].concat()));
+    let document = opened(&page);
+    assert!(document.contains("selftest passed") && document.contains("holds: the replay shows the truck that was driven"), "{document}");
+    let (_, line) = document.split_once("id=\"truck\"").unwrap();
+    let (_, words) = line.split_once('>').unwrap();
+    let (words, _) = words.split_once('<').unwrap();
+    let (vehicle, load) = words.split_once(", ").unwrap();
+    assert!(["daf_xf", "eu_4x2_13m6"].contains(&vehicle) && ["empty", "half", "laden", "laden_high"].contains(&load), "{words}");
+    // With the dimensions of another truck, its rays do not end at kerbs.
+    let text = read(&page);
+    let own = "ground.vehicles[episode.vehicle ?? 0]";
+    assert!(text.contains(own));
+    std::fs::write(&page, text.replace(own, "ground.vehicles[((episode.vehicle ?? 0) + 1) % ground.vehicles.length]")).unwrap();
+    let outcome = selftest(&page);
+    assert!(outcome.contains("fails: the replay shows the truck that was driven: rays of episode"), "{outcome}");
+}

@@ -168,3 +168,21 @@ fn a_recording_that_cannot_be_written_is_a_failure() {
         assert!(said.contains(&place.text(name)) && said.contains("cannot be written"), "{said}");
     }
 }
+
+#[test]
+fn a_recording_of_a_fleet_has_the_truck_of_its_episode_by_name_and_dimensions() {
+    let place = Place::new();
+    let recorded = |episode: &str| {
+        let flags = ["--benchmark", "laden2026", "--route", ROUTE, "--policy", "pursuit", "--episode", episode, "--episodes", "6"];
+        succeed(&offtrack(&[&["record", "-o", &place.text("a.json")], &flags[..]].concat()));
+        let recording = place.json("a.json");
+        let class = ["vehicle", "load"].map(|key| recording["class"][key].as_str().unwrap().to_owned());
+        (class, recording["vehicle"]["trailer_wheelbase"].to_string())
+    };
+    let all: Vec<_> = ["0", "1", "2", "3", "4", "5"].map(recorded).into();
+    assert!(all.iter().all(|([vehicle, _], _)| ["daf_xf", "eu_4x2_13m6"].contains(&vehicle.as_str())), "{all:?}");
+    // Loads and lengths are drawn.
+    assert!(all.iter().any(|(class, _)| class[1] != all[0].0[1]) && all.iter().any(|(_, length)| *length != all[0].1), "{all:?}");
+    record(&place, "a.json", &[]);
+    assert!(place.json("a.json").get("class").is_none(), "one vehicle has no name");
+}

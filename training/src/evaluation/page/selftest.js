@@ -28,7 +28,7 @@ const CHECKS = {
     }
     const ranges = Array.from({ length: ground.n_rays }, (_, ray) => columns["range_" + ray].reduce((most, value) => Math.max(most, value), 0));
     // A range is kept to 1/255 of the sensors' reach.
-    holds(ranges.every((range) => 0 < range && range <= ground.vehicle.sensor_range * 1.002), "ranges within reach");
+    holds(ranges.every((range) => 0 < range && range <= ground.vehicles[0].sensor_range * 1.002), "ranges within reach");
   },
   "groups hold every episode once, and a roundabout shows its routes": ({ page }) => {
     const { evaluation, ground } = page, many = ground.route_reports !== undefined;
@@ -100,6 +100,21 @@ const CHECKS = {
     byId("scrub").dispatchEvent(new Event("input"));
     same(replay.frame, replay.episode.n_frames - 1, "the last frame");
   },
+  "the replay shows the truck that was driven": ({ page, replay }) => {
+    const { ground, episodes } = page, used = new Set(episodes.map((episode) => episode.rig));
+    same(used.size, ground.vehicles.length, "vehicles, each of a shown episode");
+    same(new Set(episodes.map(truckOf)).size, ground.classes?.length ?? 1, "vehicles and loads");
+    for (const rig of used) {
+      const episode = episodes.find((episode) => episode.rig === rig);
+      same(sceneOf(page, episode).rig, rig, "the drawn truck");
+      // A range is kept to 4 cm; the rays of a truck with other dimensions end beside the kerbs.
+      const far = Math.max(...[0, 0.5, 0.8].map((part) => beyondKerbs(page, episode, Math.round(part * (episode.n_frames - 1)))));
+      holds(far < 0.2, `rays of episode ${episode.number} end ${decimal(far, 2)} m beside the kerbs, less than 0.2 m`);
+    }
+    const shown = replay.episode;
+    same(byId("truck").hidden, ground.classes === undefined, "a line with vehicle and load");
+    same(byId("truck").textContent, truckOf(shown), "vehicle and load");
+  },
   "failed episodes are listed first": ({ page, replay }) => {
     for (const route of page.ground.routes.keys()) {
       if (!page.episodes.some((episode) => episode.route === route)) continue;
@@ -110,6 +125,28 @@ const CHECKS = {
     }
   },
 };
+
+/** How far the rays of a frame that meet a kerb end from the nearest one, the farthest of them [m]. */
+function beyondKerbs(page, episode, frame) {
+  const { ground } = page, { rig } = episode, now = instant(page, episode, frame);
+  const kerbs = ground.maps[ground.routes[episode.route].roundabout].drivable.map(pointsOf);
+  const units = [[rig.trailer_rays, now.trailerX, now.trailerY, now.trailerHeading], [rig.tractor_rays, now.x, now.y, now.heading]];
+  const rays = units.flatMap(([rays, ...pose]) => rays.map((ray) => [ray, ...pose]));
+  return Math.max(0, ...rays.map(([[ox, oy, dx, dy], x, y, heading], index) => {
+    const range = now.ranges[index], [ahead, left] = [ox + range * dx, oy + range * dy];
+    const end = [x + ahead * Math.cos(heading) - left * Math.sin(heading), y + ahead * Math.sin(heading) + left * Math.cos(heading)];
+    return range < 0.99 * rig.sensor_range ? Math.min(...kerbs.map((kerb) => toLoop(end, kerb))) : 0;
+  }));
+}
+
+/** The distance from a point to a closed line. */
+function toLoop([x, y], points) {
+  return Math.min(...points.map(([ax, ay], index) => {
+    const [bx, by] = points[(index + 1) % points.length], [ex, ey] = [bx - ax, by - ay];
+    const part = Math.min(Math.max(((x - ax) * ex + (y - ay) * ey) / (ex * ex + ey * ey || 1), 0), 1);
+    return Math.hypot(x - ax - part * ex, y - ay - part * ey);
+  }));
+}
 
 /** The episodes of a route that are shown. */
 const shownOn = ({ episodes, ground }, route) => {
