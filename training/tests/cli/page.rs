@@ -185,6 +185,7 @@ fn only_a_page_of_the_studys_benchmark_has_a_column_for_the_study() {
     succeed(&place.evaluate(&["--policy", "random", "--episodes", "1", "--html", &place.text("page.html")]));
     let document = opened(&page);
     assert!(document.contains("selftest passed") && !column(&document));
+    assert!(!document.contains("<tr class=\"class\">"), "one vehicle at one speed has no classes");
     succeed(&offtrack(&["evaluate", "--policy", "random", "--episodes", "1", "--html", &place.text("page.html")]));
     let document = opened(&page);
     assert!(document.contains("selftest passed") && column(&document));
@@ -221,6 +222,7 @@ fn a_page_of_a_fleet_shows_each_episode_with_its_own_truck_and_names_vehicle_and
     let (words, _) = words.split_once('<').unwrap();
     let (vehicle, load) = words.split_once(", ").unwrap();
     assert!(["daf_xf", "eu_4x2_13m6"].contains(&vehicle) && ["empty", "half", "laden", "laden_high"].contains(&load), "{words}");
+    assert!(document.matches("<tr class=\"class\">").count() > 2 && document.contains("the route open in the replay"), "{document}");
     // With the dimensions of another truck, its rays do not end at kerbs.
     let text = read(&page);
     let own = "ground.vehicles[episode.vehicle ?? 0]";

@@ -20,6 +20,9 @@ type Line = Vec<i64>;
 pub(super) struct Ground<'a> {
     /// Time between two frames \[s].
     step: f64,
+    /// Length of a route before its ring, and after it \[m].
+    approach: f64,
+    departure: f64,
     /// Those of the trucks that are shown, each once.
     vehicles: Vec<Measures>,
     /// Names of vehicle and load; empty where the benchmark has one vehicle.
@@ -104,6 +107,8 @@ impl<'a> Ground<'a> {
         };
         Ground {
             step: page.scenario.step,
+            approach: page.scenario.approach,
+            departure: page.scenario.departure,
             vehicles: fleet.vehicles,
             classes: fleet.classes,
             n_rays: page.world.rays[0].len(),

@@ -36,6 +36,8 @@ class Replay {
     this.playing = false;
     /** Calls back for the next picture. */
     this.onFrame = (callback) => requestAnimationFrame(callback);
+    /** Called when another route is open. */
+    this.onRoute = () => {};
     this.canvas = byId("scene");
     this.order = this.routesInOrder();
     this.fillRoutes();
@@ -82,6 +84,7 @@ class Replay {
       onclick: () => this.openEpisode(episode),
     }, (episode.failed ? "×" : "") + episode.number)));
     this.openEpisode(this.listed[0]);
+    this.onRoute();
   }
 
   /** Opens the route of this name and shows it. */

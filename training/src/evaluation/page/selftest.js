@@ -115,6 +115,43 @@ const CHECKS = {
     same(byId("truck").hidden, ground.classes === undefined, "a line with vehicle and load");
     same(byId("truck").textContent, truckOf(shown), "vehicle and load");
   },
+  "vehicles and loads hold every episode once, with the figures of the frames": ({ page }) => {
+    const { evaluation, episodes } = page, { classes = [] } = evaluation;
+    same(byId("classes").hidden, classes.length === 0, "section hidden");
+    if (classes.length === 0) return;
+    same(document.querySelectorAll("#class-table tr.class").length, classes.length, "rows");
+    for (const key of ["episodes", "arrived"]) same(classes.reduce((sum, one) => sum + one[key], 0), evaluation[key], key);
+    if (episodes.length < evaluation.episodes) return;
+    for (const one of classes) {
+      const name = `${one.vehicle} ${one.load}`;
+      const own = episodes.filter((episode) => (episode.vehicle ?? "") === one.vehicle && loadOf(page, episode) === one.load);
+      same(own.length, one.episodes, name);
+      same(own.filter((episode) => episode.ended === "rolled_over").length, one.rolled_over, `${name}: rolled over`);
+      const peaks = own.map((episode) => Math.max(...framesOf(page, episode, "tractor_load_transfer").map(Math.abs), ...framesOf(page, episode, "trailer_load_transfer").map(Math.abs)));
+      for (const [key, fraction] of [["p50", 0.5], ["p90", 0.9], ["p99", 0.99]]) close(quantile(peaks, fraction), one[`load_transfer_ratio_${key}`], 0.006, `${name}: load transfer ratio`);
+      const speeds = own.flatMap((episode) => [...framesOf(page, episode, "speed")]);
+      close((3.6 * speeds.reduce((sum, speed) => sum + speed, 0)) / speeds.length, one.speed_mean_kmh, 0.02, `${name}: speed`);
+    }
+  },
+  "charts along the path have a line for each load and follow the replay": ({ page, replay }) => {
+    if (page.evaluation.classes === undefined) return;
+    const loads = loadsOf(page), count = () => Number(byId("profiles-note").textContent.match(/^[\d,]+/)[0].replace(",", ""));
+    for (const route of new Set([page.episodes[0].route, page.episodes.at(-1).route])) {
+      replay.openRoute(route);
+      same(document.querySelectorAll("#profiles .curve").length, 3 * loads.length, "lines");
+      same(count(), page.episodes.filter((episode) => !episode.failed && episode.route === route).length, "episodes of the route");
+      holds([...document.querySelectorAll("#profiles .curve")].every((curve) => !curve.getAttribute("d").includes("NaN")), "lines without gaps");
+    }
+    byId("profiles-all").click();
+    same(count(), page.shown.arrived, "episodes of all routes");
+    byId("profiles-route").click();
+    for (const episode of page.episodes.filter((episode) => !episode.failed).slice(0, 20)) {
+      const { lengths, ring, ...line } = lineOfRoute(page, episode.route), { from, speeds } = profileOf(page, episode, { lengths, ring, ...line });
+      // It passes the last waypoint and ends there; where it drives beside the lane's centre its way has another length.
+      close(from + ring[0] + speeds.length, lengths.at(-1), 6, `episode ${episode.number}: end of the route`);
+      close(speeds.reduce((time, speed) => time + 3.6 / speed, 0), episode.seconds, 0.1 * episode.seconds, `episode ${episode.number}: time along the route`);
+    }
+  },
   "failed episodes are listed first": ({ page, replay }) => {
     for (const route of page.ground.routes.keys()) {
       if (!page.episodes.some((episode) => episode.route === route)) continue;
@@ -154,10 +191,12 @@ const shownOn = ({ episodes, ground }, route) => {
   return episodes.filter((episode) => episode.route === index);
 };
 
+/** The values of a column after each step of an episode. */
+const framesOf = ({ columns }, episode, name) => columns[name].subarray(episode.first + 1, episode.first + episode.n_frames);
+
 /** Throws where the frames of all of a summary's episodes give other figures. */
 function sameFigures(page, episodes, summary, of = "") {
-  const { columns } = page;
-  const frames = (episode, name) => columns[name].subarray(episode.first + 1, episode.first + episode.n_frames);
+  const frames = (episode, name) => framesOf(page, episode, name);
   const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
   // Lengths are kept to 1 cm, ratios to 0.01 and angles to 1e-4 rad.
   close(mean(episodes.map((episode) => mean(frames(episode, "lane_distance")))), summary.lane_distance_mean, 0.006, of + "distance to the lane centre");
