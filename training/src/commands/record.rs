@@ -13,6 +13,7 @@ use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;
 
+use offtrack_drawing::comparison::Comparison;
 use offtrack_drawing::episode::Scene;
 use offtrack_drawing::film::{self, Take};
 use offtrack_drawing::rasterised;
@@ -32,6 +33,10 @@ pub struct Args {
     /// have several, each with its own --route, one after another.
     #[arg(long, required = true)]
     route: Vec<String>,
+    /// Only trucks with this load, where the benchmark has several. Given several times, a film shows each load in turn, and
+    /// a .png or .svg one beside the other, with speed and load transfer over the distance along the route.
+    #[arg(long)]
+    load: Vec<String>,
     /// The file to write: .gif, .png, .svg, or .json for data.
     ///
     /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed",
@@ -87,9 +92,16 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = "must end in .gif: other files hold one episode, one --route".to_owned();
         return Err(Error::Flag { flag: "--output", value: args.output.display().to_string(), expected });
     }
-    let scenarios = args.route.iter().map(|route| scenario(args, route)).collect::<Result<Vec<Scenario>, Error>>()?;
-    let chosen = |(scenario, route): (_, &String)| Chosen::new(scenario, route);
-    let chosen = scenarios.iter().zip(&args.route).map(chosen).collect::<Result<Vec<Chosen>, Error>>()?;
+    if format == Format::Json && 1 < args.load.len() {
+        let expected = "must end in .gif, .png or .svg: data are of one episode, one --load".to_owned();
+        return Err(Error::Flag { flag: "--output", value: args.output.display().to_string(), expected });
+    }
+    let loads: Vec<Option<&str>> =
+        if args.load.is_empty() { vec![None] } else { args.load.iter().map(|load| Some(load.as_str())).collect() };
+    let each = || args.route.iter().flat_map(|route| loads.iter().map(move |&load| (route, load)));
+    let scenarios = each().map(|(route, load)| scenario(args, route, load)).collect::<Result<Vec<Scenario>, Error>>()?;
+    let chosen = |(scenario, (route, _)): (_, (&String, _))| Chosen::new(scenario, route);
+    let chosen = scenarios.iter().zip(each()).map(chosen).collect::<Result<Vec<Chosen>, Error>>()?;
     let mut recorded = Vec::new();
     for (scenario, chosen) in scenarios.iter().zip(&chosen) {
         let world = roads::world(scenario)?;
@@ -110,6 +122,8 @@ struct Recorded {
     roundabout: Roundabout,
     gutter: Gutter,
     route: Route,
+    /// Distances along the route at which its ring begins and ends \[m].
+    ring: [f64; 2],
 }
 
 impl Recorded {
@@ -158,7 +172,8 @@ impl Of<'_, '_> {
             centre_line: centre_line(roundabout, route),
             frames: track.frames,
         };
-        Recorded { recording, roundabout: roundabout.seen(), gutter: scenario.gutter, route: roundabout.seen_route(route) }
+        let ring = [scenario.approach, route.centre_line.length() - scenario.departure];
+        Recorded { recording, roundabout: roundabout.seen(), gutter: scenario.gutter, route: roundabout.seen_route(route), ring }
     }
 
     /// Writes a film of a track, in the usual size.
@@ -168,7 +183,8 @@ impl Of<'_, '_> {
     }
 }
 
-/// The recordings in the format asked for; the first alone, unless it is a film.
+/// The recordings in the format asked for: a film of all of them, a picture of one or of several on one route, or the first
+/// as data.
 fn bytes(format: Format, size: Option<u32>, recorded: &[Recorded]) -> Result<Vec<u8>, Failure> {
     if format == Format::Json {
         let mut text = serde_json::to_string(&recorded[0].recording)?;
@@ -176,7 +192,12 @@ fn bytes(format: Format, size: Option<u32>, recorded: &[Recorded]) -> Result<Vec
         return Ok(text.into_bytes());
     }
     if format != Format::Gif {
-        let svg = recorded[0].scene()?.still();
+        let svg = match recorded {
+            [one] => one.scene()?.still(),
+            several => {
+                Comparison { scenes: several.iter().map(Recorded::scene).collect::<Result<_, _>>()?, ring: several[0].ring }.drawn()?
+            }
+        };
         return if format == Format::Png { Ok(rasterised(&svg, size.unwrap_or(1000))?) } else { Ok(svg.into_bytes()) };
     }
     let mut takes = Vec::new();
@@ -221,9 +242,9 @@ impl<'a> Chosen<'a> {
 }
 
 /// The benchmark with the split of the route that is recorded or, where it does not have the route, on the road of the
-/// route alone.
-fn scenario(args: &Args, route: &str) -> Result<Scenario, Error> {
-    let mut scenario = roads::benchmark(&args.benchmark)?;
+/// route alone; with the trucks of one load, if it is named.
+fn scenario(args: &Args, route: &str, load: Option<&str>) -> Result<Scenario, Error> {
+    let mut scenario = roads::with_load(roads::benchmark(&args.benchmark)?, load)?;
     let of = |split: &&Split| scenario.split_names(**split).contains(&route);
     if let Some(&split) = Split::ALL.iter().find(of) {
         scenario.keep(&[split]);

@@ -186,3 +186,36 @@ fn a_recording_of_a_fleet_has_the_truck_of_its_episode_by_name_and_dimensions() 
     record(&place, "a.json", &[]);
     assert!(place.json("a.json").get("class").is_none(), "one vehicle has no name");
 }
+
+#[test]
+fn loads_named_are_driven_by_the_same_truck_and_shown_beside_each_other_or_in_turn() {
+    let place = Place::new();
+    let record = |output: &str, loads: &[&str]| {
+        let mut arguments = vec!["record", "--benchmark", "laden2026", "--route", ROUTE, "--policy", "pursuit", "--size", "200"];
+        let output = place.text(output);
+        arguments.extend(loads.iter().flat_map(|load| ["--load", load]).chain(["-o", &output]));
+        offtrack(&arguments)
+    };
+    let data = ["empty", "laden_high"].map(|load| {
+        succeed(&record("a.json", &[load]));
+        place.json("a.json")
+    });
+    let loads = data.each_ref().map(|recording| recording["class"]["load"].as_str().unwrap());
+    assert_eq!((loads, &data[0]["vehicle"]), (["empty", "laden_high"], &data[1]["vehicle"]));
+    assert_eq!(data[0]["frames"][0]["position"], data[1]["frames"][0]["position"]);
+    assert_ne!(data[0]["frames"], data[1]["frames"], "a load changes how it drives");
+
+    succeed(&record("both.svg", &["empty", "laden_high"]));
+    let svg = std::fs::read_to_string(place.file("both.svg")).unwrap();
+    assert!(svg.contains("empty and laden_high") && svg.contains("Speed [km/h]"));
+    let size = |name: &str, loads: &[&str]| {
+        succeed(&record(name, loads));
+        std::fs::metadata(place.file(name)).unwrap().len()
+    };
+    assert!(size("one.gif", &["empty"]) < size("both.gif", &["empty", "laden_high"]));
+
+    let said = refusal(&record("both.json", &["empty", "laden_high"]), 2);
+    assert!(said.contains("data are of one episode, one --load"), "{said}");
+    let said = refusal(&record("a.svg", &["nothing"]), 2);
+    assert!(said.contains("--load: nothing; laden2026 has empty, half, laden, laden_high"), "{said}");
+}
