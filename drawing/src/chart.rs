@@ -1,5 +1,7 @@
 //! A chart: panels side by side, each with lines over two logarithmic axes and its legend below.
 
+mod axis;
+
 use std::fmt::Write;
 
 use glam::DVec2;
@@ -10,6 +12,7 @@ use crate::Error;
 use crate::figure::{colour, number};
 use crate::legend::{self, Entry, Swatch};
 use crate::lettering::{Align, Lettering};
+pub(crate) use axis::{Axis, axes};
 
 /// Upper left corner of the first panel's plot \[px].
 const CORNER: DVec2 = DVec2::new(92.0, 118.0);
@@ -21,10 +24,6 @@ const GAP: f64 = 104.0;
 const AXIS: f64 = 62.0;
 /// Margin to the right of the last plot and below the longest legend \[px].
 const MARGIN: f64 = 24.0;
-/// Margin beside the outermost points, as a factor.
-const ROOM: f64 = 1.35;
-/// Least ratio of the ends of an axis.
-const REACH: f64 = 12.0;
 
 /// Colours for lines that colour-blind readers can distinguish: P. Tol's "muted" scheme and one more.
 pub const LINES: [&str; 10] =
@@ -70,40 +69,10 @@ pub enum Kind {
     /// Measured: a mark at each point, with its least and greatest value where they are known, in the order of the
     /// points.
     Measured(Vec<(f64, f64)>),
+    /// Measured at so many points that they need no marks.
+    Curve,
     /// For comparison: dashed.
     Reference,
-}
-
-/// A logarithmic axis on the page.
-struct Axis {
-    low: f64,
-    high: f64,
-    /// Positions of the ends \[px].
-    from: f64,
-    to: f64,
-}
-
-impl Axis {
-    /// An axis that shows all of the given values.
-    fn over(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Axis {
-        let (low, high) = values.fold((f64::INFINITY, 0.0f64), |(low, high), value| (low.min(value), high.max(value)));
-        let (low, high) = if low <= high { (low / ROOM, high * ROOM) } else { (1.0, REACH) };
-        let widen = (REACH * low / high).max(1.0).sqrt();
-        Axis { low: low / widen, high: high * widen, from, to }
-    }
-
-    fn at(&self, value: f64) -> f64 {
-        self.from + (value / self.low).ln() / (self.high / self.low).ln() * (self.to - self.from)
-    }
-
-    /// Ticks at 1, 2, ... 9 times each power of ten, and whether each has a number.
-    fn ticks(&self) -> Vec<(f64, bool)> {
-        let decades = (self.high / self.low).log10();
-        let first = self.low.log10().floor() as i32;
-        let all = (first..first + 40).flat_map(|power| (1..10).map(move |digit| (f64::from(digit) * 10f64.powi(power), digit)));
-        let shown = all.filter(|(value, _)| self.low <= *value && *value <= self.high);
-        shown.map(|(value, digit)| (value, digit == 1 || decades < 2.5 && (digit == 2 || digit == 5))).collect()
-    }
 }
 
 impl Chart {
@@ -149,10 +118,10 @@ impl Panel {
         let points = || self.lines.iter().flat_map(|line| &line.points);
         let spreads = self.lines.iter().flat_map(|line| match &line.kind {
             Kind::Measured(spread) => spread.as_slice(),
-            Kind::Reference => &[],
+            Kind::Curve | Kind::Reference => &[],
         });
-        let x = Axis::over(points().map(|p| p.x), corner.x, end.x);
-        let y = Axis::over(points().map(|p| p.y).chain(spreads.flat_map(|&(low, high)| [low, high])), end.y, corner.y);
+        let x = Axis::logarithmic(points().map(|p| p.x), corner.x, end.x);
+        let y = Axis::logarithmic(points().map(|p| p.y).chain(spreads.flat_map(|&(low, high)| [low, high])), end.y, corner.y);
         let mut group = Group::new().add(axes(lettering, &x, &y));
         let middle = DVec2::new(corner.x + 0.5 * PLOT.x, end.y + 44.0);
         group = group.add(lettering.text(self.x, middle, 15.0, Align::Middle, colour::INK));
@@ -177,7 +146,7 @@ impl Panel {
 }
 
 impl Line {
-    fn drawn(&self, x: &Axis, y: &Axis) -> Group {
+    pub(crate) fn drawn(&self, x: &Axis, y: &Axis) -> Group {
         let position = |p: &DVec2| (number(x.at(p.x)), number(y.at(p.y)));
         let mut data = String::new();
         for (index, p) in self.points.iter().enumerate() {
@@ -186,8 +155,10 @@ impl Line {
             let _ = write!(data, "{}{across} {down}", if index == 0 { 'M' } else { 'L' });
         }
         let path = Path::new().set("d", data).set("fill", "none").set("stroke", self.colour).set("stroke-linejoin", "round");
-        let Kind::Measured(spread) = &self.kind else {
-            return Group::new().add(path.set("stroke-width", 1.4).set("stroke-dasharray", "6 4"));
+        let spread = match &self.kind {
+            Kind::Measured(spread) => spread,
+            Kind::Curve => return Group::new().add(path.set("stroke-width", 2.4)),
+            Kind::Reference => return Group::new().add(path.set("stroke-width", 1.4).set("stroke-dasharray", "6 4")),
         };
         let mut bars = String::new();
         for (p, &(low, high)) in self.points.iter().zip(spread) {
@@ -204,68 +175,5 @@ impl Line {
             group = group.add(mark.set("stroke", "white").set("stroke-width", 1.0));
         }
         group
-    }
-}
-
-/// The plot's frame, a faint line at each numbered tick, and the numbers.
-fn axes(lettering: &Lettering, x: &Axis, y: &Axis) -> Group {
-    let (mut grid, mut marks) = (String::new(), String::new());
-    let mut group = Group::new();
-    for (value, numbered) in x.ticks() {
-        let at = number(x.at(value));
-        let _ = write!(marks, "M{at} {}v{}", y.from, if numbered { -7 } else { -4 });
-        if numbered {
-            let _ = write!(grid, "M{at} {}V{}", y.from, y.to);
-            group = group.add(lettering.text(&written(value), DVec2::new(at, y.from + 20.0), 14.0, Align::Middle, colour::INK));
-        }
-    }
-    for (value, numbered) in y.ticks() {
-        let at = number(y.at(value));
-        let _ = write!(marks, "M{} {at}h{}", x.from, if numbered { 7 } else { 4 });
-        if numbered {
-            let _ = write!(grid, "M{} {at}H{}", x.from, x.to);
-            group = group.add(lettering.text(&written(value), DVec2::new(x.from - 8.0, at + 5.0), 14.0, Align::Right, colour::INK));
-        }
-    }
-    let line = |data: String, colour: &str, width: f64| {
-        Path::new().set("d", data).set("fill", "none").set("stroke", colour).set("stroke-width", width)
-    };
-    let frame = format!("M{} {}H{}V{}H{}Z", x.from, y.to, x.to, y.from, x.from);
-    Group::new().add(line(grid, "#e1e1e1", 1.0)).add(line(marks, colour::INK, 1.0)).add(line(frame, colour::INK, 1.2)).add(group)
-}
-
-/// A tick's number with a prefix for thousands.
-fn written(value: f64) -> String {
-    let (unit, prefix) = match value {
-        1e9.. => (1e9, " G"),
-        1e6.. => (1e6, " M"),
-        1e3.. => (1e3, " k"),
-        _ => (1.0, ""),
-    };
-    // Powers of ten below one are not exact.
-    format!("{}{prefix}", (value / unit * 1e6).round() / 1e6)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_axis_shows_its_values_and_is_numbered() {
-        for values in [vec![32.0], vec![900.0, 1_100.0], vec![256.0, 1_048_576.0], vec![0.03, 2e8], vec![]] {
-            let axis = Axis::over(values.iter().copied(), 0.0, 100.0);
-            assert!(values.iter().all(|&value| (0.0..=100.0).contains(&axis.at(value))), "{values:?}");
-            let ticks = axis.ticks();
-            assert!(2 <= ticks.iter().filter(|(_, numbered)| *numbered).count(), "{values:?}");
-            assert!(ticks.iter().all(|&(value, _)| (0.0..=100.0).contains(&axis.at(value))), "{values:?}");
-        }
-    }
-
-    #[test]
-    fn a_factor_has_the_same_length_everywhere_and_numbers_have_prefixes() {
-        let axis = Axis::over([1.0, 1e6].into_iter(), 500.0, 0.0);
-        let length = |from: f64| axis.at(10.0 * from) - axis.at(from);
-        assert!((length(1.0) - length(3e4)).abs() < 1e-9 && length(1.0) < 0.0);
-        assert_eq!([0.1, 5.0, 200.0, 1e3, 2e5, 1e6, 5e9].map(written), ["0.1", "5", "200", "1 k", "200 k", "1 M", "5 G"]);
     }
 }

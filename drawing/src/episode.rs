@@ -30,7 +30,7 @@ const DASHES: &str = "7 4";
 
 /// An episode with its roundabout and route.
 pub struct Scene<'a> {
-    recording: &'a Recording,
+    pub(crate) recording: &'a Recording,
     roundabout: &'a Roundabout,
     gutter: Gutter,
     route: &'a Route,
@@ -68,30 +68,40 @@ impl<'a> Scene<'a> {
     /// The whole episode in one picture, as SVG text.
     pub fn still(&self) -> String {
         let view = View::around(self.shown());
-        let road = self.road(&view);
-        let area = |corners: &[[DVec2; 4]], colour: &str| Path::new().set("d", swept_area(&view, corners)).set("fill", colour);
-        let map = Group::new()
+        let (map, entries) = (self.map(&view), self.legend(&view));
+        crate::figure::composed(&view, &self.lettering, &self.title(), &self.summary(), Definitions::new(), map, &entries)
+    }
+
+    /// The whole episode on the map.
+    pub(crate) fn map(&self, view: &View) -> Group {
+        let road = self.road(view);
+        let area = |corners: &[[DVec2; 4]], colour: &str| Path::new().set("d", swept_area(view, corners)).set("fill", colour);
+        Group::new()
             .add(road.surface())
             .add(area(&self.trailer, colour::SWEPT_BY_TRAILER))
             .add(area(&self.tractor, colour::SWEPT_BY_TRACTOR))
             .add(road.lanes())
             .add(road.kerbs())
-            .add(self.route_line(&view))
-            .add(self.trucks_at_intervals(&view))
-            .add(self.axle_paths(&view, self.recording.frames.len() - 1))
-            .add(self.ends(&view))
-            .add(road.arm_names());
+            .add(self.route_line(view))
+            .add(self.trucks_at_intervals(view))
+            .add(self.axle_paths(view, self.recording.frames.len() - 1))
+            .add(self.ends(view))
+            .add(road.arm_names())
+    }
+
+    /// What is on that map.
+    pub(crate) fn legend(&self, view: &View) -> Vec<Entry> {
         let mut entries = vec![
             Entry::new(Swatch::Area(colour::SWEPT_BY_TRACTOR), "swept by the tractor"),
             Entry::new(Swatch::Area(colour::SWEPT_BY_TRAILER), "swept by the trailer alone"),
             Entry::new(Swatch::Line(colour::ROUTE, 2.4, ""), "route"),
         ];
         entries.extend(path_legend());
-        entries.extend(road.surface_legend());
+        entries.extend(self.road(view).surface_legend());
         if self.touched().is_some() {
             entries.push(Entry::new(Swatch::Ring(colour::OVERLAP), "a kerb was touched here"));
         }
-        crate::figure::composed(&view, &self.lettering, &self.title(), &self.summary(), Definitions::new(), map, &entries)
+        entries
     }
 
     fn road<'b>(&'b self, view: &'b View) -> Road<'b> {
@@ -100,7 +110,7 @@ impl<'a> Scene<'a> {
     }
 
     /// The ring, and the points of the path and of the route near it.
-    fn shown(&self) -> impl Iterator<Item = DVec2> {
+    pub(crate) fn shown(&self) -> impl Iterator<Item = DVec2> {
         let radius = self.roundabout.outer_radius();
         let driven = self.recording.frames.iter().flat_map(|frame| [point(frame.position), point(frame.trailer_position)]);
         let planned = self.route.waypoints.iter().map(|waypoint| waypoint.position);
@@ -164,7 +174,10 @@ impl<'a> Scene<'a> {
             let at = view.point(within);
             let dot = Circle::new().set("cx", number(at.x)).set("cy", number(at.y)).set("r", 6).set("fill", colour::INK);
             let dot = dot.set("stroke", "white").set("stroke-width", 1.5);
-            group = group.add(dot).add(self.lettering.text_on_map(words, at + DVec2::new(12.0, 6.0), 18.0, Align::Left, colour::INK));
+            // Words that would leave the map on the right stand on the left.
+            let leaves = view.point(view.high).x < at.x + 12.0 + self.lettering.width(words, 18.0);
+            let (beside, align) = if leaves { (-12.0, Align::Right) } else { (12.0, Align::Left) };
+            group = group.add(dot).add(self.lettering.text_on_map(words, at + DVec2::new(beside, 6.0), 18.0, align, colour::INK));
         }
         if let Some(touched) = self.touched() {
             let at = view.point(touched);
@@ -183,7 +196,12 @@ impl<'a> Scene<'a> {
 
     fn title(&self) -> String {
         let time = (self.recording.frames.len() - 1) as f64 * self.recording.step;
-        format!("{}, {}: {} after {time:.1} s", self.recording.route, self.policy(), self.end())
+        format!("{}, {}{}: {} after {time:.1} s", self.recording.route, self.policy(), self.class(), self.end())
+    }
+
+    /// The names of vehicle and load after a comma, where the benchmark has several.
+    fn class(&self) -> String {
+        self.recording.class.as_ref().map(|class| format!(", {class}")).unwrap_or_default()
     }
 
     /// The start pose and the extremes of the episode.
@@ -202,7 +220,7 @@ impl<'a> Scene<'a> {
         )
     }
 
-    fn policy(&self) -> &'static str {
+    pub(crate) fn policy(&self) -> &'static str {
         match self.recording.policy.as_str() {
             "pursuit" => "pure pursuit",
             "random" => "random actions",
@@ -211,7 +229,7 @@ impl<'a> Scene<'a> {
     }
 
     /// The end code in words.
-    fn end(&self) -> String {
+    pub(crate) fn end(&self) -> String {
         self.recording.ended.replace('_', " ")
     }
 }

@@ -252,6 +252,7 @@ pub(crate) fn composed(
     let paper = Rectangle::new().set("width", WIDTH).set("height", height).set("fill", "white");
     let edge = Path::new().set("d", view.frame()).set("fill", "none").set("stroke", colour::INK).set("stroke-width", 1.2);
     let clip = ClipPath::new().set("id", "map").add(Path::new().set("d", view.frame()));
+    let letters = lettering.fitting(title, 25.0, WIDTH - LEFT - RIGHT);
     let document = Document::new()
         .set("viewBox", (0.0, 0.0, WIDTH, height))
         .set("width", WIDTH)
@@ -259,7 +260,7 @@ pub(crate) fn composed(
         .add(svg::node::element::Title::new(title))
         .add(definitions.add(clip))
         .add(paper)
-        .add(lettering.text(title, DVec2::new(LEFT, 32.0), 25.0, Align::Left, colour::INK))
+        .add(lettering.text(title, DVec2::new(LEFT, 32.0), letters, Align::Left, colour::INK))
         .add(lettering.text(subtitle, DVec2::new(LEFT, 58.0), 16.0, Align::Left, colour::FAINT))
         .add(map.set("clip-path", "url(#map)"))
         .add(edge)

@@ -30,18 +30,18 @@ pub enum Swatch {
 /// One element of the map.
 pub struct Entry {
     swatch: Swatch,
-    words: &'static str,
+    words: String,
 }
 
 impl Entry {
-    pub fn new(swatch: Swatch, words: &'static str) -> Entry {
-        Entry { swatch, words }
+    pub fn new(swatch: Swatch, words: impl Into<String>) -> Entry {
+        Entry { swatch, words: words.into() }
     }
 }
 
 /// The legend with its upper left corner at `corner`, at most `width` wide, and its height \[px].
 pub fn drawn(lettering: &Lettering, entries: &[Entry], corner: DVec2, width: f64) -> (Group, f64) {
-    let widest = entries.iter().map(|entry| lettering.width(entry.words, SIZE)).fold(0.0, f64::max);
+    let widest = entries.iter().map(|entry| lettering.width(&entry.words, SIZE)).fold(0.0, f64::max);
     let columns = ((width / (SAMPLE + widest + 12.0)).floor() as usize).clamp(1, 4);
     let rows = entries.len().div_ceil(columns);
     let mut group = Group::new();
@@ -50,7 +50,7 @@ pub fn drawn(lettering: &Lettering, entries: &[Entry], corner: DVec2, width: f64
         let (column, row) = (index / rows, index % rows);
         let at = corner + DVec2::new(column as f64 * width / columns as f64, (row as f64 + 0.5) * LINE);
         group = group.add(sample(&entry.swatch, at));
-        group = group.add(lettering.text(entry.words, at + DVec2::new(SAMPLE, 5.0), SIZE, Align::Left, colour::INK));
+        group = group.add(lettering.text(&entry.words, at + DVec2::new(SAMPLE, 5.0), SIZE, Align::Left, colour::INK));
     }
     (group, rows as f64 * LINE)
 }

@@ -33,6 +33,11 @@ impl Lettering {
         words.chars().map(|letter| f64::from(advance(letter))).sum::<f64>() * self.scale(size)
     }
 
+    /// The size in which words are at most `width` wide, `largest` at most \[px].
+    pub fn fitting(&self, words: &str, largest: f64, width: f64) -> f64 {
+        largest.min(width / self.width(words, 1.0).max(f64::MIN_POSITIVE))
+    }
+
     /// One line of text with its base line at `at` \[px].
     pub fn text(&self, words: &str, at: DVec2, size: f64, align: Align, colour: &str) -> Path {
         // The typeface is light: a thin stroke keeps it readable in small pictures.

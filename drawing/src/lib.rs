@@ -4,6 +4,7 @@
 //!   them.
 //! - [`recording::Recorder`] records episodes of a batch, [`episode::Scene`] draws one as a still, [`film::gif`] as a
 //!   film.
+//! - [`comparison::Comparison`] draws several on one route, with speed and load transfer along it.
 //! - [`camera::Camera`] draws a truck as it is now, in RGB pixels, while it is stepped.
 //! - [`sheet::drawn`] draws many roundabouts side by side, [`histograms::Histograms`] how their dimensions are
 //!   distributed.
@@ -27,6 +28,7 @@
 
 pub mod camera; // a truck as it is now, in pixels
 pub mod chart; // measurements as lines
+pub mod comparison; // episodes on one route beside each other
 pub mod episode; // a recorded episode, still or moving
 pub mod figure; // a map with axes, title and legend
 pub mod film; // a recorded episode as GIF
@@ -38,6 +40,7 @@ pub mod polygons; // curves as points
 pub mod recording; // the states of an episode
 mod road; // the layers of a map
 pub mod sheet; // many roundabouts side by side
+mod stations; // how far along a route a truck is
 pub mod sweep; // a truck's swept path on a route
 
 use resvg::{tiny_skia, usvg};

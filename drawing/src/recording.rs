@@ -5,9 +5,11 @@
 //! driven as its mirror image, is mirrored back. Numbers are rounded when they are recorded (lengths to 1 mm, angles to
 //! 0.1 mrad), so that a file holds the recording exactly.
 
+mod measures;
+
 use offtrack::angle::wrapped;
 use offtrack::cpu::collide;
-use offtrack::layout::{Body, Clearance, Ended, N_RAYS, N_TRAILER_RAYS, Ray};
+use offtrack::layout::{Clearance, Ended, N_RAYS, N_TRAILER_RAYS};
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::Route;
 use offtrack::simulator::Batch;
@@ -15,6 +17,7 @@ use offtrack::world::World;
 use serde::{Deserialize, Serialize};
 
 use crate::polygons::{self, Polygon};
+pub use measures::{Class, Measures, Rectangle};
 
 /// Resolution of lengths, speeds, rewards and load transfer ratios: parts of a unit.
 const MILLI: f64 = 1e3;
@@ -125,6 +128,8 @@ impl Frame {
 pub struct Track {
     /// The truck's index in its batch.
     pub env: usize,
+    /// Its vehicle in this episode: a row of the world's `rigs`.
+    pub vehicle: u32,
     /// Why the episode ended; `Running` before its end.
     pub ended: Ended,
     /// The start, then one frame a step.
@@ -153,7 +158,10 @@ pub struct Recorder {
 impl Recorder {
     /// Records the start; the batch has just been reset.
     pub fn new(world: &World, batch: &Batch, envs: impl IntoIterator<Item = usize>) -> Recorder {
-        let track = |env| Track { env, ended: Ended::Running, frames: vec![Frame::at_start(world, batch, env)] };
+        let track = |env: usize| {
+            let (vehicle, start) = (batch.truck[env].vehicle, Frame::at_start(world, batch, env));
+            Track { env, vehicle, ended: Ended::Running, frames: vec![start] }
+        };
         Recorder { tracks: envs.into_iter().map(track).collect() }
     }
 
@@ -173,81 +181,6 @@ impl Recorder {
     /// The episodes, in the order of `envs`.
     pub fn finish(self) -> Vec<Track> {
         self.tracks
-    }
-}
-
-/// A rectangle in its unit's frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Rectangle {
-    /// Front end, ahead of the frame's origin \[m].
-    pub front: f32,
-    /// Rear end, ahead of the frame's origin (negative when behind) \[m].
-    pub rear: f32,
-    /// Half of the width \[m].
-    pub half_width: f32,
-}
-
-impl From<Rectangle> for Body {
-    fn from(Rectangle { front, rear, half_width }: Rectangle) -> Body {
-        Body { front, rear, half_width }
-    }
-}
-
-/// Dimensions of the truck for drawing it. The origin of the tractor is the frame's `position`, that of the trailer
-/// `trailer_position`; x forward, y left.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Measures {
-    /// Front axle ahead of the drive axle \[m].
-    pub wheelbase: f32,
-    /// Fifth wheel ahead of the drive axle \[m].
-    pub fifth_wheel: f32,
-    /// Kingpin ahead of the trailer's axle group \[m].
-    pub trailer_wheelbase: f32,
-    /// The tractor's outline.
-    pub tractor_body: Rectangle,
-    /// The trailer's outline.
-    pub trailer_body: Rectangle,
-    /// The trailer's sensors in the order of `ranges`: mount and unit vector, x, y, dx, dy.
-    pub trailer_rays: Vec<[f32; 4]>,
-    /// The tractor's sensors.
-    pub tractor_rays: Vec<[f32; 4]>,
-    /// Reach of a sensor \[m].
-    pub sensor_range: f32,
-}
-
-impl Measures {
-    /// Of the vehicle of a world.
-    pub fn of(world: &World) -> Measures {
-        let rig = &world.rigs[0];
-        let body =
-            |body: &Body| Rectangle { front: to(MILLI, body.front), rear: to(MILLI, body.rear), half_width: to(MILLI, body.half_width) };
-        let ray = |ray: &Ray| [to(MILLI, ray.origin.x), to(MILLI, ray.origin.y), to(1e6, ray.direction.x), to(1e6, ray.direction.y)];
-        let (trailer, tractor) = world.rays[0].split_at(N_TRAILER_RAYS);
-        Measures {
-            wheelbase: to(MILLI, rig.wheelbase),
-            fifth_wheel: to(MILLI, rig.fifth_wheel),
-            trailer_wheelbase: to(MILLI, rig.trailer_wheelbase),
-            tractor_body: body(&rig.tractor_body),
-            trailer_body: body(&rig.trailer_body),
-            trailer_rays: trailer.iter().map(ray).collect(),
-            tractor_rays: tractor.iter().map(ray).collect(),
-            sensor_range: world.params.sensor_range,
-        }
-    }
-}
-
-impl Measures {
-    /// Of the truck that is seen on a roundabout: the mirror image of the one that is driven, where that is.
-    #[must_use]
-    pub fn seen(mut self, roundabout: &Roundabout) -> Measures {
-        if roundabout.is_mirrored() {
-            self.trailer_rays.chunks_exact_mut(2).for_each(|pair| pair.swap(0, 1));
-            self.tractor_rays.reverse();
-            for [_, y, _, dy] in self.trailer_rays.iter_mut().chain(&mut self.tractor_rays) {
-                (*y, *dy) = (0.0 - *y, 0.0 - *dy);
-            }
-        }
-        self
     }
 }
 
@@ -294,6 +227,9 @@ pub struct Recording {
     pub step: f64,
     /// Why the episode ended, by its name in reports.
     pub ended: String,
+    /// The names of vehicle and load; `None` where the benchmark has one vehicle.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub class: Option<Class>,
     /// The truck.
     pub vehicle: Measures,
     /// The action table: steer angle, left positive \[rad], and speed asked for [m/s].

@@ -15,6 +15,8 @@ use crate::recording::Recording;
 const FILMED: Layout = Layout { corner: DVec2::new(16.0, 96.0), width: WIDTH - 32.0, margin: 5.0, ratio: 1.0 };
 /// Text size of a film's legend relative to that of a still: films are shown smaller.
 const LEGEND_SCALE: f64 = 1.3;
+/// Width of the end in words, "tractor collided" \[px].
+const END_ROOM: f64 = 240.0;
 
 impl Scene<'_> {
     /// The background of all pictures of the film, as SVG text.
@@ -33,8 +35,11 @@ impl Scene<'_> {
         let size = DVec2::new(WIDTH, (below + height * LEGEND_SCALE + 8.0).ceil());
         let paper = Rectangle::new().set("width", size.x).set("height", size.y).set("fill", "white");
         let Recording { route, episode, seed, .. } = self.recording;
-        let title = format!("{route}, {}, start {episode} of seed {seed}", self.policy());
-        let title = self.lettering.text(&title, DVec2::new(FILMED.corner.x, 38.0), 30.0, Align::Left, colour::INK);
+        let title = format!("{route}, {}{}, start {episode} of seed {seed}", self.policy(), self.class());
+        // The end of an episode is written to the right of it.
+        let room = if self.recording.class.is_some() { FILMED.width - END_ROOM } else { FILMED.width };
+        let letters = self.lettering.fitting(&title, 30.0, room);
+        let title = self.lettering.text(&title, DVec2::new(FILMED.corner.x, 38.0), letters, Align::Left, colour::INK);
         let map = map.set("clip-path", "url(#map)");
         document(
             size,

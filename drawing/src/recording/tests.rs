@@ -30,7 +30,8 @@ fn frames_are_the_simulators_states_from_the_start_to_the_last_step() {
     let (world, tracks, states) = driven(&scenario());
     assert_eq!(tracks.iter().map(|track| track.env).collect::<Vec<_>>(), [1, 0]);
     assert_ne!(tracks[0].frames.len(), tracks[1].frames.len(), "one truck is held while the other drives on");
-    for Track { env, ended, frames } in tracks {
+    for Track { env, vehicle, ended, frames } in tracks {
+        assert_eq!(vehicle, 0);
         let last = &states[frames.len() - 1];
         assert_eq!((ended as u32, frames.len()), (last.ended[env], last.truck[env].steps as usize + 1));
         assert!(ended.failed(), "{ended:?}");
@@ -74,7 +75,8 @@ fn a_recording_read_back_is_the_recording() {
         episodes: 1,
         step: scenario.step,
         ended: tracks[0].ended.name().to_owned(),
-        vehicle: Measures::of(&world),
+        class: Class::of(&world, 0),
+        vehicle: Measures::of(&world, 0),
         actions: world.actions.iter().map(|action| [action.steering, action.speed]).collect(),
         map: Map::of(&scenario.places[roundabout].roundabout, scenario.gutter),
         centre_line: centre_line(&scenario.places[roundabout].roundabout, route),
@@ -101,9 +103,47 @@ fn the_tracks_of_a_left_hand_road_are_the_mirror_image_of_what_was_driven() {
     assert!(seen.frames.iter().any(|frame| frame.steering != 0.0));
     assert_eq!(seen.seen(&left), tracks[0]);
     // The truck is symmetric: its mirror image has the same sensors.
-    assert_eq!(Measures::of(&world).seen(&left), Measures::of(&world));
+    assert_eq!(Measures::of(&world, 0).seen(&left), Measures::of(&world, 0));
     let (map, mirrored) = (Map::of(&right, Gutter::Drivable), Map::of(&left, Gutter::Drivable));
     let north = |map: &Map| map.drivable[0].iter().map(|p| p[1]).fold(f64::NEG_INFINITY, f64::max);
     let south = |map: &Map| map.drivable[0].iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
     assert!((north(&map) + south(&mirrored)).abs() < 0.02 && (south(&map) + north(&mirrored)).abs() < 0.02);
+}
+
+#[test]
+fn a_truck_of_a_fleet_is_drawn_with_the_dimensions_and_the_sensors_that_it_drove_with() {
+    let mut scenario = Scenario::named("laden2026").unwrap();
+    scenario.keep(&[Split::Test]);
+    let world = Arc::new(World::bake(&scenario).unwrap());
+    let route = scenario.split(Split::Test)[0];
+    let mut simulator = Simulator::new(world.clone(), 40, 3, RouteChoice::Fixed(vec![route; 40])).unwrap();
+    let mut recorder = Recorder::new(&world, simulator.batch(), 0..40);
+    let starts = simulator.batch().truck.clone();
+    for _ in 0..5 {
+        simulator.step(&[22; 40]).unwrap();
+        recorder.follow(&world, simulator.batch());
+    }
+    let (mut lengths, mut classes) = (Vec::new(), Vec::new());
+    for (track, start) in recorder.finish().iter().zip(&starts) {
+        let (rig, measures) = (world.rig(start), Measures::of(&world, track.vehicle));
+        assert_eq!(track.vehicle, start.vehicle);
+        assert_eq!(measures.trailer_wheelbase, to(MILLI, rig.trailer_wheelbase));
+        assert_eq!(measures.tractor_rays[0][0], to(MILLI, world.rays_of(rig)[N_TRAILER_RAYS].origin.x));
+        // The trailer's axles lie where both positions of a frame say: at the drawn wheelbase behind the kingpin.
+        for frame in &track.frames {
+            let kingpin =
+                |position: [f32; 2], heading: f32, ahead: f32| [position[0] + ahead * heading.cos(), position[1] + ahead * heading.sin()];
+            let a = kingpin(frame.position, frame.heading, measures.fifth_wheel);
+            let b = kingpin(frame.trailer_position, frame.trailer_heading, measures.trailer_wheelbase);
+            // Positions are rounded to 1 mm, headings to 0.1 mrad.
+            assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 0.004, "{a:?} {b:?}");
+        }
+        lengths.push(measures.trailer_wheelbase.to_bits());
+        classes.push(Class::of(&world, track.vehicle).unwrap().to_string());
+    }
+    for (mut values, least) in [(lengths.iter().map(u32::to_string).collect::<Vec<_>>(), 20), (classes, 5)] {
+        values.sort();
+        values.dedup();
+        assert!(least <= values.len(), "{values:?}");
+    }
 }

@@ -13,10 +13,11 @@ use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;
 
+use offtrack_drawing::comparison::Comparison;
 use offtrack_drawing::episode::Scene;
 use offtrack_drawing::film::{self, Take};
 use offtrack_drawing::rasterised;
-use offtrack_drawing::recording::{Map, Measures, Recorder, Recording, Track, centre_line};
+use offtrack_drawing::recording::{Class, Map, Measures, Recorder, Recording, Track, centre_line};
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::policies::Policy;
 use offtrack_training::files;
@@ -32,13 +33,18 @@ pub struct Args {
     /// may have several, each with its own --route, one after another.
     #[arg(long, required = true)]
     route: Vec<String>,
+    /// Only trucks with this load, where the benchmark has several. Given several times, a film shows each load in turn, and
+    /// a .png or .svg one beside the other, with speed and load transfer over the distance along the route.
+    #[arg(long)]
+    load: Vec<String>,
     /// The file to write: .gif, .png, .svg, or .json for data.
     ///
     /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed",
-    /// "episode", "episodes", "step" [s], "ended", "vehicle": dimensions and sensors, "actions": [[steer angle, speed],
-    /// ...], "map": {"drivable", "lanes"}, "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state
-    /// after step n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's
-    /// centre at the origin.
+    /// "episode", "episodes", "step" [s], "ended", "class": {"vehicle", "load"}: their names, where the benchmark has
+    /// several, "vehicle": dimensions and sensors of the truck that drove, "actions": [[steer angle, speed], ...],
+    /// "map": {"drivable", "lanes"}, "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state after step
+    /// n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's centre at
+    /// the origin.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// A benchmark's name, or the path of its file.
@@ -86,9 +92,16 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = "must end in .gif: other files hold one episode, one --route".to_owned();
         return Err(Error::Flag { flag: "--output", value: args.output.display().to_string(), expected });
     }
-    let scenarios = args.route.iter().map(|route| scenario(args, route)).collect::<Result<Vec<Scenario>, Error>>()?;
-    let chosen = |(scenario, route): (_, &String)| Chosen::new(scenario, route);
-    let chosen = scenarios.iter().zip(&args.route).map(chosen).collect::<Result<Vec<Chosen>, Error>>()?;
+    if format == Format::Json && 1 < args.load.len() {
+        let expected = "must end in .gif, .png or .svg: data are of one episode, one --load".to_owned();
+        return Err(Error::Flag { flag: "--output", value: args.output.display().to_string(), expected });
+    }
+    let loads: Vec<Option<&str>> =
+        if args.load.is_empty() { vec![None] } else { args.load.iter().map(|load| Some(load.as_str())).collect() };
+    let each = || args.route.iter().flat_map(|route| loads.iter().map(move |&load| (route, load)));
+    let scenarios = each().map(|(route, load)| scenario(args, route, load)).collect::<Result<Vec<Scenario>, Error>>()?;
+    let chosen = |(scenario, (route, _)): (_, (&String, _))| Chosen::new(scenario, route);
+    let chosen = scenarios.iter().zip(each()).map(chosen).collect::<Result<Vec<Chosen>, Error>>()?;
     let mut recorded = Vec::new();
     for (scenario, chosen) in scenarios.iter().zip(&chosen) {
         let world = roads::world(scenario)?;
@@ -109,6 +122,8 @@ struct Recorded {
     roundabout: Roundabout,
     gutter: Gutter,
     route: Route,
+    /// Distances along the route at which its ring begins and ends \[m].
+    ring: [f64; 2],
 }
 
 impl Recorded {
@@ -151,13 +166,15 @@ impl Of<'_, '_> {
             episodes,
             step: scenario.step,
             ended: track.ended.name().to_owned(),
-            vehicle: Measures::of(world).seen(roundabout),
+            class: Class::of(world, track.vehicle),
+            vehicle: Measures::of(world, track.vehicle).seen(roundabout),
             actions: world.actions.iter().map(|action| [steering(action.steering), action.speed]).collect(),
             map: Map::of(roundabout, scenario.gutter),
             centre_line: centre_line(roundabout, route),
             frames: track.frames,
         };
-        Recorded { recording, roundabout: roundabout.seen(), gutter: scenario.gutter, route: roundabout.seen_route(route) }
+        let ring = [scenario.approach, route.centre_line.length() - scenario.departure];
+        Recorded { recording, roundabout: roundabout.seen(), gutter: scenario.gutter, route: roundabout.seen_route(route), ring }
     }
 
     /// Writes a film of a track, in the usual size.
@@ -167,7 +184,8 @@ impl Of<'_, '_> {
     }
 }
 
-/// The recordings in the format asked for; the first alone, unless it is a film.
+/// The recordings in the format asked for: a film of all of them, a picture of one or of several on one route, or the first
+/// as data.
 fn bytes(format: Format, size: Option<u32>, recorded: &[Recorded]) -> Result<Vec<u8>, Failure> {
     if format == Format::Json {
         let mut text = serde_json::to_string(&recorded[0].recording)?;
@@ -175,7 +193,12 @@ fn bytes(format: Format, size: Option<u32>, recorded: &[Recorded]) -> Result<Vec
         return Ok(text.into_bytes());
     }
     if format != Format::Gif {
-        let svg = recorded[0].scene()?.still();
+        let svg = match recorded {
+            [one] => one.scene()?.still(),
+            several => {
+                Comparison { scenes: several.iter().map(Recorded::scene).collect::<Result<_, _>>()?, ring: several[0].ring }.drawn()?
+            }
+        };
         return if format == Format::Png { Ok(rasterised(&svg, size.unwrap_or(1000))?) } else { Ok(svg.into_bytes()) };
     }
     let mut takes = Vec::new();
@@ -220,9 +243,9 @@ impl<'a> Chosen<'a> {
 }
 
 /// The benchmark with the split of the route that is recorded or, where it does not have the route, on the road of the
-/// route alone.
-fn scenario(args: &Args, route: &str) -> Result<Scenario, Error> {
-    let mut scenario = roads::benchmark(&args.benchmark)?;
+/// route alone; with the trucks of one load, if it is named.
+fn scenario(args: &Args, route: &str, load: Option<&str>) -> Result<Scenario, Error> {
+    let mut scenario = roads::with_load(roads::benchmark(&args.benchmark)?, load)?;
     let of = |split: &&Split| scenario.split_names(**split).contains(&route);
     if let Some(&split) = Split::ALL.iter().find(of) {
         scenario.keep(&[split]);

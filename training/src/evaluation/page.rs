@@ -21,16 +21,19 @@ use offtrack_drawing::recording::Track;
 const TEMPLATE: &str = include_str!("page/report.html");
 const STYLE: &str = include_str!("page/style.css");
 /// In the order of the page; the last one starts the others.
-const SCRIPTS: [&str; 11] = [
+const SCRIPTS: [&str; 14] = [
     include_str!("page/elements.js"),
     include_str!("page/data.js"),
     include_str!("page/headline.js"),
     include_str!("page/routes.js"),
     include_str!("page/groups.js"),
+    include_str!("page/chart.js"),
     include_str!("page/curves.js"),
     include_str!("page/training.js"),
     include_str!("page/scene.js"),
     include_str!("page/replay.js"),
+    include_str!("page/profiles.js"),
+    include_str!("page/classes.js"),
     include_str!("page/selftest.js"),
     include_str!("page/main.js"),
 ];

@@ -185,6 +185,7 @@ fn only_a_page_of_the_studys_benchmark_has_a_column_for_the_study() {
     succeed(&place.evaluate(&["--policy", "random", "--episodes", "1", "--html", &place.text("page.html")]));
     let document = opened(&page);
     assert!(document.contains("selftest passed") && !column(&document));
+    assert!(!document.contains("<tr class=\"class\">"), "one vehicle at one speed has no classes");
     succeed(&offtrack(&["evaluate", "--policy", "random", "--episodes", "1", "--html", &place.text("page.html")]));
     let document = opened(&page);
     assert!(document.contains("selftest passed") && column(&document));
@@ -206,4 +207,27 @@ fn a_page_has_a_row_for_each_further_evaluation_and_their_routes_are_left_to_the
         document.contains("Success, short, train routes (1 of them trained on)") && document.contains("selftest passed\n"),
         "{document}"
     );
+}
+
+#[test]
+fn a_page_of_a_fleet_shows_each_episode_with_its_own_truck_and_names_vehicle_and_load() {
+    let place = Place::new();
+    let (page, route) = (place.file("page.html"), "20m/E-right-1");
+    let flags = ["--route", route, "--episodes", "12", "--policy", "pursuit", "--html", &place.text("page.html")];
+    succeed(&offtrack(&[&["evaluate", "--benchmark", "laden2026"], &flags[..]].concat()));
+    let document = opened(&page);
+    assert!(document.contains("selftest passed") && document.contains("holds: the replay shows the truck that was driven"), "{document}");
+    let (_, line) = document.split_once("id=\"truck\"").unwrap();
+    let (_, words) = line.split_once('>').unwrap();
+    let (words, _) = words.split_once('<').unwrap();
+    let (vehicle, load) = words.split_once(", ").unwrap();
+    assert!(["daf_xf", "eu_4x2_13m6"].contains(&vehicle) && ["empty", "half", "laden", "laden_high"].contains(&load), "{words}");
+    assert!(document.matches("<tr class=\"class\">").count() > 2 && document.contains("the route open in the replay"), "{document}");
+    // With the dimensions of another truck, its rays do not end at kerbs.
+    let text = read(&page);
+    let own = "ground.vehicles[episode.vehicle ?? 0]";
+    assert!(text.contains(own));
+    std::fs::write(&page, text.replace(own, "ground.vehicles[((episode.vehicle ?? 0) + 1) % ground.vehicles.length]")).unwrap();
+    let outcome = selftest(&page);
+    assert!(outcome.contains("fails: the replay shows the truck that was driven: rays of episode"), "{outcome}");
 }

@@ -168,3 +168,54 @@ fn a_recording_that_cannot_be_written_is_a_failure() {
         assert!(said.contains(&place.text(name)) && said.contains("cannot be written"), "{said}");
     }
 }
+
+#[test]
+fn a_recording_of_a_fleet_has_the_truck_of_its_episode_by_name_and_dimensions() {
+    let place = Place::new();
+    let recorded = |episode: &str| {
+        let flags = ["--benchmark", "laden2026", "--route", ROUTE, "--policy", "pursuit", "--episode", episode, "--episodes", "6"];
+        succeed(&offtrack(&[&["record", "-o", &place.text("a.json")], &flags[..]].concat()));
+        let recording = place.json("a.json");
+        let class = ["vehicle", "load"].map(|key| recording["class"][key].as_str().unwrap().to_owned());
+        (class, recording["vehicle"]["trailer_wheelbase"].to_string())
+    };
+    let all: Vec<_> = ["0", "1", "2", "3", "4", "5"].map(recorded).into();
+    assert!(all.iter().all(|([vehicle, _], _)| ["daf_xf", "eu_4x2_13m6"].contains(&vehicle.as_str())), "{all:?}");
+    // Loads and lengths are drawn.
+    assert!(all.iter().any(|(class, _)| class[1] != all[0].0[1]) && all.iter().any(|(_, length)| *length != all[0].1), "{all:?}");
+    record(&place, "a.json", &[]);
+    assert!(place.json("a.json").get("class").is_none(), "one vehicle has no name");
+}
+
+#[test]
+fn loads_named_are_driven_by_the_same_truck_and_shown_beside_each_other_or_in_turn() {
+    let place = Place::new();
+    let record = |output: &str, loads: &[&str]| {
+        let mut arguments = vec!["record", "--benchmark", "laden2026", "--route", ROUTE, "--policy", "pursuit", "--size", "200"];
+        let output = place.text(output);
+        arguments.extend(loads.iter().flat_map(|load| ["--load", load]).chain(["-o", &output]));
+        offtrack(&arguments)
+    };
+    let data = ["empty", "laden_high"].map(|load| {
+        succeed(&record("a.json", &[load]));
+        place.json("a.json")
+    });
+    let loads = data.each_ref().map(|recording| recording["class"]["load"].as_str().unwrap());
+    assert_eq!((loads, &data[0]["vehicle"]), (["empty", "laden_high"], &data[1]["vehicle"]));
+    assert_eq!(data[0]["frames"][0]["position"], data[1]["frames"][0]["position"]);
+    assert_ne!(data[0]["frames"], data[1]["frames"], "a load changes how it drives");
+
+    succeed(&record("both.svg", &["empty", "laden_high"]));
+    let svg = std::fs::read_to_string(place.file("both.svg")).unwrap();
+    assert!(svg.contains("empty and laden_high") && svg.contains("Speed [km/h]"));
+    let size = |name: &str, loads: &[&str]| {
+        succeed(&record(name, loads));
+        std::fs::metadata(place.file(name)).unwrap().len()
+    };
+    assert!(size("one.gif", &["empty"]) < size("both.gif", &["empty", "laden_high"]));
+
+    let said = refusal(&record("both.json", &["empty", "laden_high"]), 2);
+    assert!(said.contains("data are of one episode, one --load"), "{said}");
+    let said = refusal(&record("a.svg", &["nothing"]), 2);
+    assert!(said.contains("--load: nothing; laden2026 has empty, half, laden, laden_high"), "{said}");
+}

@@ -84,7 +84,8 @@ async function readPage() {
   const columns = decoded(await inflated(block("tracks")), ground.columns, ground.episodes.map((episode) => episode.n_frames));
   let first = 0;
   const episodes = ground.episodes.map((episode) => {
-    const whole = { ...episode, first, failed: episode.ended !== "arrived", seconds: (episode.n_frames - 1) * ground.step };
+    const rig = ground.vehicles[episode.vehicle ?? 0], { vehicle, load } = ground.classes?.[episode.class] ?? {};
+    const whole = { ...episode, rig, vehicle, load, first, failed: episode.ended !== "arrived", seconds: (episode.n_frames - 1) * ground.step };
     first += episode.n_frames;
     return whole;
   });
@@ -97,7 +98,7 @@ const wrapped = (angle) => Math.atan2(Math.sin(angle), Math.cos(angle));
 
 /** The state of an episode at `frame`: linear interpolation between two frames. */
 function instant(page, episode, frame) {
-  const { columns, ground } = page, rig = ground.vehicle;
+  const { columns, ground } = page, { rig } = episode;
   const last = episode.n_frames - 1;
   const at = Math.min(Math.max(frame, 0), last), lower = Math.min(Math.floor(at), Math.max(last - 1, 0)), part = at - lower;
   const here = episode.first + lower, next = here + Math.min(1, last);

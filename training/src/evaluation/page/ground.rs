@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 
 use offtrack::route::Route;
-use offtrack_drawing::recording::{self, Measures};
+use offtrack::world::World;
+use offtrack_drawing::recording::{self, Class, Measures};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -19,7 +20,14 @@ type Line = Vec<i64>;
 pub(super) struct Ground<'a> {
     /// Time between two frames \[s].
     step: f64,
-    vehicle: Measures,
+    /// Length of a route before its ring, and after it \[m].
+    approach: f64,
+    departure: f64,
+    /// Those of the trucks that are shown, each once.
+    vehicles: Vec<Measures>,
+    /// Names of vehicle and load; empty where the benchmark has one vehicle.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    classes: Vec<Class>,
     n_rays: usize,
     maps: Vec<Map>,
     routes: Vec<RouteLine<'a>>,
@@ -53,6 +61,12 @@ struct Episode {
     route: usize,
     /// Which of the route's episodes, from 0.
     number: usize,
+    /// Index into `vehicles`.
+    #[serde(skip_serializing_if = "is_first")]
+    vehicle: usize,
+    /// Index into `classes`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    class: Option<usize>,
     ended: &'static str,
     /// One for the start and one for each step.
     n_frames: usize,
@@ -68,6 +82,7 @@ impl<'a> Ground<'a> {
         // Places and routes in the order of their first episodes.
         let (mut places, mut shown): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());
         let (mut routes, mut episodes) = (Vec::new(), Vec::new());
+        let mut fleet = Fleet::default();
         for track in page.tracks {
             let index = track.env / per_route;
             let (place, route) = by_name[evaluated[index].name.as_str()];
@@ -83,7 +98,8 @@ impl<'a> Ground<'a> {
                 });
             }
             let (route, number) = (routes.len() - 1, track.env % per_route);
-            episodes.push(Episode { route, number, ended: track.ended.name(), n_frames: track.frames.len() });
+            let (vehicle, class) = fleet.index(page.world, track.vehicle);
+            episodes.push(Episode { route, number, vehicle, class, ended: track.ended.name(), n_frames: track.frames.len() });
         }
         let map = |&place: &usize| {
             let map = recording::Map::of(&page.scenario.places[place].roundabout, page.scenario.gutter);
@@ -91,7 +107,10 @@ impl<'a> Ground<'a> {
         };
         Ground {
             step: page.scenario.step,
-            vehicle: Measures::of(page.world),
+            approach: page.scenario.approach,
+            departure: page.scenario.departure,
+            vehicles: fleet.vehicles,
+            classes: fleet.classes,
             n_rays: page.world.rays[0].len(),
             maps: places.iter().map(map).collect(),
             routes,
@@ -102,6 +121,39 @@ impl<'a> Ground<'a> {
             commit: provenance::commit(),
         }
     }
+}
+
+/// The trucks that are shown.
+#[derive(Default)]
+struct Fleet {
+    vehicles: Vec<Measures>,
+    classes: Vec<Class>,
+    /// Indices of a row of the world's `rigs`, once it was met.
+    met: HashMap<u32, (usize, Option<usize>)>,
+}
+
+impl Fleet {
+    /// Indices of a row of the world's `rigs` into `vehicles` and `classes`. Trucks that differ in their load alone have the
+    /// same dimensions.
+    fn index(&mut self, world: &World, row: u32) -> (usize, Option<usize>) {
+        let Fleet { vehicles, classes, met } = self;
+        *met.entry(row).or_insert_with(|| {
+            let class = Class::of(world, row).map(|class| position(classes, class));
+            (position(vehicles, Measures::of(world, row)), class)
+        })
+    }
+}
+
+/// The index of an item, which is added where it is new.
+fn position<T: PartialEq>(items: &mut Vec<T>, item: T) -> usize {
+    items.iter().position(|known| *known == item).unwrap_or_else(|| {
+        items.push(item);
+        items.len() - 1
+    })
+}
+
+fn is_first(index: &usize) -> bool {
+    *index == 0
 }
 
 fn lines(polygons: &[Vec<[f64; 2]>]) -> Vec<Line> {

@@ -26,6 +26,7 @@ try {
   attempt(() => showHeadline(page));
   const replay = attempt(() => new Replay(page));
   attempt(() => showRoutes(page, (name) => replay?.openName(name)));
+  attempt(() => showClasses(page, replay));
   attempt(() => showTraining(page));
   attempt(() => showTrainingRoutes(page));
   byId("source").addEventListener("toggle", () => { byId("source").querySelector("pre").textContent = JSON.stringify(JSON.parse(block("report")), null, 2); }, { once: true });

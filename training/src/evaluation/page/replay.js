@@ -15,6 +15,9 @@ const READINGS = [
   ["Lane distance", (now) => now.laneDistance, metres],
 ];
 
+/** The names of an episode's vehicle and load; empty where the benchmark has one vehicle. */
+const truckOf = ({ vehicle, load }) => (load === undefined ? "" : `${vehicle}, ${load}`);
+
 /** A value over the episode with a line at the current frame. */
 function sparkline(values) {
   const low = Math.min(...values, 0), high = Math.max(...values, low + 1e-3), last = Math.max(values.length - 1, 1);
@@ -33,6 +36,8 @@ class Replay {
     this.playing = false;
     /** Calls back for the next picture. */
     this.onFrame = (callback) => requestAnimationFrame(callback);
+    /** Called when another route is open. */
+    this.onRoute = () => {};
     this.canvas = byId("scene");
     this.order = this.routesInOrder();
     this.fillRoutes();
@@ -74,10 +79,12 @@ class Replay {
     this.listed = own.toSorted((a, b) => b.failed - a.failed || a.number - b.number);
     byId("episodes").replaceChildren(...this.listed.map((episode) => html("button", {
       type: "button", class: episode.failed ? "failed" : "", style: `--end: ${endColour(episode.ended)}`,
-      "aria-label": `Episode ${episode.number}: ${endWords(episode.ended)}`, title: `${endWords(episode.ended)} after ${decimal(episode.seconds, 1)} s`,
+      "aria-label": `Episode ${episode.number}: ${endWords(episode.ended)}`,
+      title: [truckOf(episode), `${endWords(episode.ended)} after ${decimal(episode.seconds, 1)} s`].filter(Boolean).join(": "),
       onclick: () => this.openEpisode(episode),
     }, (episode.failed ? "×" : "") + episode.number)));
     this.openEpisode(this.listed[0]);
+    this.onRoute();
   }
 
   /** Opens the route of this name and shows it. */
@@ -93,6 +100,8 @@ class Replay {
     press(byId("episodes"), byId("episodes").children[this.listed.indexOf(episode)]);
     byId("ending").textContent = `${episode.failed ? "Failed: " + endWords(episode.ended) : "Arrived"} after ${decimal(episode.seconds, 1)}${GAP}s`;
     byId("ending").style.setProperty("--end", endColour(episode.ended));
+    byId("truck").hidden = episode.load === undefined;
+    byId("truck").textContent = truckOf(episode);
     const moments = Array.from({ length: episode.n_frames }, (_, frame) => instant(this.page, episode, frame));
     byId("readings").replaceChildren(...READINGS.map(([name, value]) =>
       html("div", {}, html("dt", {}, name), html("dd", {}), sparkline(moments.map(value)))));
@@ -119,7 +128,7 @@ class Replay {
 
   show() {
     const { page, episode, frame } = this, now = instant(page, episode, frame);
-    drawScene(this.canvas, page, this.scene, now, frame, { rays: byId("rays").checked, follow: byId("follow").checked });
+    drawScene(this.canvas, this.scene, now, frame, { rays: byId("rays").checked, follow: byId("follow").checked });
     byId("scrub").value = frame;
     byId("scrub").setAttribute("aria-valuetext", `${decimal(now.time, 1)} s`);
     byId("clock").textContent = `${decimal(now.time, 1)} / ${decimal(episode.seconds, 1)}${GAP}s`;

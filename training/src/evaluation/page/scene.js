@@ -29,7 +29,7 @@ function sceneOf(page, episode) {
   const seen = [...centreLine, ...poses.flatMap((pose) => [[pose.x, pose.y], [pose.trailerX, pose.trailerY]])];
   const ends = (axis) => [Math.min(...seen.map((point) => point[axis])), Math.max(...seen.map((point) => point[axis]))];
   return {
-    road, lanes, route: lineOf(centreLine, false), bounds: [ends(0), ends(1)], ended: episode.ended, last: episode.n_frames - 1,
+    road, lanes, route: lineOf(centreLine, false), bounds: [ends(0), ends(1)], rig: episode.rig, ended: episode.ended, last: episode.n_frames - 1,
     tractorPath: poses.map((pose) => [pose.x, pose.y]), trailerPath: poses.map((pose) => [pose.trailerX, pose.trailerY]), columns,
   };
 }
@@ -68,14 +68,14 @@ function wheel(context, x, y, angle, colour) {
   });
 }
 
-function drawTruck(context, rig, scene, now, pixel, colourOf, atEnd) {
+function drawTruck(context, { rig, ended }, now, pixel, colourOf, atEnd) {
   within(context, now.trailerX, now.trailerY, now.trailerHeading, () => {
-    const hit = atEnd && (scene.ended === "trailer_collided" || scene.ended === "rolled_over");
+    const hit = atEnd && (ended === "trailer_collided" || ended === "rolled_over");
     body(context, rig.trailer_body, colourOf("trailer"), hit, pixel, colourOf);
     for (const side of [-1, 1]) wheel(context, 0, side * (rig.trailer_body.half_width - 0.25), 0, colourOf("ink"));
   });
   within(context, now.x, now.y, now.heading, () => {
-    const hit = atEnd && (scene.ended === "tractor_collided" || scene.ended === "rolled_over");
+    const hit = atEnd && (ended === "tractor_collided" || ended === "rolled_over");
     context.globalAlpha = 0.94;
     body(context, rig.tractor_body, colourOf("tractor"), hit, pixel, colourOf);
     context.globalAlpha = 1;
@@ -145,7 +145,7 @@ function drawScale(context, height, scale, colourOf) {
 }
 
 /** Draws `frame` of an episode on the canvas, which takes the size that it has on the screen. */
-function drawScene(canvas, page, scene, now, frame, { rays, follow }) {
+function drawScene(canvas, scene, now, frame, { rays, follow }) {
   const colourOf = colours(), density = window.devicePixelRatio || 1;
   const width = canvas.clientWidth, height = canvas.clientHeight;
   const [across, down] = [Math.round(width * density), Math.round(height * density)];
@@ -173,8 +173,8 @@ function drawScene(canvas, page, scene, now, frame, { rays, follow }) {
   context.lineWidth = 3 * pixel;
   context.stroke(scene.route);
   drawPaths(context, scene, frame, now, pixel, colourOf);
-  if (rays) drawRays(context, page.ground.vehicle, now, pixel, colourOf);
-  drawTruck(context, page.ground.vehicle, scene, now, pixel, colourOf, frame >= scene.last - 1e-6);
+  if (rays) drawRays(context, scene.rig, now, pixel, colourOf);
+  drawTruck(context, scene, now, pixel, colourOf, frame >= scene.last - 1e-6);
   context.restore();
   drawScale(context, height, view.scale, colourOf);
 }

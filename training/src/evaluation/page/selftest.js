@@ -28,7 +28,7 @@ const CHECKS = {
     }
     const ranges = Array.from({ length: ground.n_rays }, (_, ray) => columns["range_" + ray].reduce((most, value) => Math.max(most, value), 0));
     // A range is kept to 1/255 of the sensors' reach.
-    holds(ranges.every((range) => 0 < range && range <= ground.vehicle.sensor_range * 1.002), "ranges within reach");
+    holds(ranges.every((range) => 0 < range && range <= ground.vehicles[0].sensor_range * 1.002), "ranges within reach");
   },
   "groups hold every episode once, and a roundabout shows its routes": ({ page }) => {
     const { evaluation, ground } = page, many = ground.route_reports !== undefined;
@@ -100,6 +100,58 @@ const CHECKS = {
     byId("scrub").dispatchEvent(new Event("input"));
     same(replay.frame, replay.episode.n_frames - 1, "the last frame");
   },
+  "the replay shows the truck that was driven": ({ page, replay }) => {
+    const { ground, episodes } = page, used = new Set(episodes.map((episode) => episode.rig));
+    same(used.size, ground.vehicles.length, "vehicles, each of a shown episode");
+    same(new Set(episodes.map(truckOf)).size, ground.classes?.length ?? 1, "vehicles and loads");
+    for (const rig of used) {
+      const episode = episodes.find((episode) => episode.rig === rig);
+      same(sceneOf(page, episode).rig, rig, "the drawn truck");
+      // A range is kept to 4 cm; the rays of a truck with other dimensions end beside the kerbs.
+      const far = Math.max(...[0, 0.5, 0.8].map((part) => beyondKerbs(page, episode, Math.round(part * (episode.n_frames - 1)))));
+      holds(far < 0.2, `rays of episode ${episode.number} end ${decimal(far, 2)} m beside the kerbs, less than 0.2 m`);
+    }
+    const shown = replay.episode;
+    same(byId("truck").hidden, ground.classes === undefined, "a line with vehicle and load");
+    same(byId("truck").textContent, truckOf(shown), "vehicle and load");
+  },
+  "vehicles and loads hold every episode once, with the figures of the frames": ({ page }) => {
+    const { evaluation, episodes } = page, { classes = [] } = evaluation;
+    same(byId("classes").hidden, classes.length === 0, "section hidden");
+    if (classes.length === 0) return;
+    same(document.querySelectorAll("#class-table tr.class").length, classes.length, "rows");
+    for (const key of ["episodes", "arrived"]) same(classes.reduce((sum, one) => sum + one[key], 0), evaluation[key], key);
+    if (episodes.length < evaluation.episodes) return;
+    for (const one of classes) {
+      const name = `${one.vehicle} ${one.load}`;
+      const own = episodes.filter((episode) => (episode.vehicle ?? "") === one.vehicle && loadOf(page, episode) === one.load);
+      same(own.length, one.episodes, name);
+      same(own.filter((episode) => episode.ended === "rolled_over").length, one.rolled_over, `${name}: rolled over`);
+      const peaks = own.map((episode) => Math.max(...framesOf(page, episode, "tractor_load_transfer").map(Math.abs), ...framesOf(page, episode, "trailer_load_transfer").map(Math.abs)));
+      for (const [key, fraction] of [["p50", 0.5], ["p90", 0.9], ["p99", 0.99]]) close(quantile(peaks, fraction), one[`load_transfer_ratio_${key}`], 0.006, `${name}: load transfer ratio`);
+      const speeds = own.flatMap((episode) => [...framesOf(page, episode, "speed")]);
+      close((3.6 * speeds.reduce((sum, speed) => sum + speed, 0)) / speeds.length, one.speed_mean_kmh, 0.02, `${name}: speed`);
+    }
+  },
+  "charts along the path have a line for each load and follow the replay": ({ page, replay }) => {
+    if (page.evaluation.classes === undefined) return;
+    const loads = loadsOf(page), count = () => Number(byId("profiles-note").textContent.match(/^[\d,]+/)[0].replace(",", ""));
+    for (const route of new Set([page.episodes[0].route, page.episodes.at(-1).route])) {
+      replay.openRoute(route);
+      same(document.querySelectorAll("#profiles .curve").length, 3 * loads.length, "lines");
+      same(count(), page.episodes.filter((episode) => !episode.failed && episode.route === route).length, "episodes of the route");
+      holds([...document.querySelectorAll("#profiles .curve")].every((curve) => !curve.getAttribute("d").includes("NaN")), "lines without gaps");
+    }
+    byId("profiles-all").click();
+    same(count(), page.shown.arrived, "episodes of all routes");
+    byId("profiles-route").click();
+    for (const episode of page.episodes.filter((episode) => !episode.failed).slice(0, 20)) {
+      const { lengths, ring, ...line } = lineOfRoute(page, episode.route), { from, speeds } = profileOf(page, episode, { lengths, ring, ...line });
+      // It passes the last waypoint and ends there; where it drives beside the lane's centre its way has another length.
+      close(from + ring[0] + speeds.length, lengths.at(-1), 6, `episode ${episode.number}: end of the route`);
+      close(speeds.reduce((time, speed) => time + 3.6 / speed, 0), episode.seconds, 0.1 * episode.seconds, `episode ${episode.number}: time along the route`);
+    }
+  },
   "failed episodes are listed first": ({ page, replay }) => {
     for (const route of page.ground.routes.keys()) {
       if (!page.episodes.some((episode) => episode.route === route)) continue;
@@ -111,16 +163,40 @@ const CHECKS = {
   },
 };
 
+/** How far the rays of a frame that meet a kerb end from the nearest one, the farthest of them [m]. */
+function beyondKerbs(page, episode, frame) {
+  const { ground } = page, { rig } = episode, now = instant(page, episode, frame);
+  const kerbs = ground.maps[ground.routes[episode.route].roundabout].drivable.map(pointsOf);
+  const units = [[rig.trailer_rays, now.trailerX, now.trailerY, now.trailerHeading], [rig.tractor_rays, now.x, now.y, now.heading]];
+  const rays = units.flatMap(([rays, ...pose]) => rays.map((ray) => [ray, ...pose]));
+  return Math.max(0, ...rays.map(([[ox, oy, dx, dy], x, y, heading], index) => {
+    const range = now.ranges[index], [ahead, left] = [ox + range * dx, oy + range * dy];
+    const end = [x + ahead * Math.cos(heading) - left * Math.sin(heading), y + ahead * Math.sin(heading) + left * Math.cos(heading)];
+    return range < 0.99 * rig.sensor_range ? Math.min(...kerbs.map((kerb) => toLoop(end, kerb))) : 0;
+  }));
+}
+
+/** The distance from a point to a closed line. */
+function toLoop([x, y], points) {
+  return Math.min(...points.map(([ax, ay], index) => {
+    const [bx, by] = points[(index + 1) % points.length], [ex, ey] = [bx - ax, by - ay];
+    const part = Math.min(Math.max(((x - ax) * ex + (y - ay) * ey) / (ex * ex + ey * ey || 1), 0), 1);
+    return Math.hypot(x - ax - part * ex, y - ay - part * ey);
+  }));
+}
+
 /** The episodes of a route that are shown. */
 const shownOn = ({ episodes, ground }, route) => {
   const index = ground.routes.findIndex(({ name }) => name === route.name);
   return episodes.filter((episode) => episode.route === index);
 };
 
+/** The values of a column after each step of an episode. */
+const framesOf = ({ columns }, episode, name) => columns[name].subarray(episode.first + 1, episode.first + episode.n_frames);
+
 /** Throws where the frames of all of a summary's episodes give other figures. */
 function sameFigures(page, episodes, summary, of = "") {
-  const { columns } = page;
-  const frames = (episode, name) => columns[name].subarray(episode.first + 1, episode.first + episode.n_frames);
+  const frames = (episode, name) => framesOf(page, episode, name);
   const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
   // Lengths are kept to 1 cm, ratios to 0.01 and angles to 1e-4 rad.
   close(mean(episodes.map((episode) => mean(frames(episode, "lane_distance")))), summary.lane_distance_mean, 0.006, of + "distance to the lane centre");
