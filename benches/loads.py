@@ -156,9 +156,13 @@ def main():
     parser.add_argument("--json", type=Path, required=True)
     args = parser.parse_args()
     args.offtrack = args.offtrack.resolve()
-    args.policies = sorted(args.policies.glob("**/policy.safetensors")) if args.policies else []
+    args.policies = (
+        sorted(report.with_name("policy.safetensors") for report in args.policies.glob("**/report.json"))
+        if args.policies
+        else []
+    )
     if not args.policies and not args.baselines:
-        parser.error("nothing to do: --policies names no folder with a policy.safetensors, and there is no --baselines")
+        parser.error("nothing to do: --policies has no finished run, and there is no --baselines")
     results = json.loads(args.json.read_text()) if args.json.is_file() else []
     done = {(row["driver"], row["place"], row["load"]) for row in results}
     with tempfile.TemporaryDirectory() as folder:

@@ -83,7 +83,9 @@ fn the_shipped_policies_are_written_as_they_were_read_byte_for_byte() {
     let message = Policy::shipped("mine").unwrap_err().to_string();
     assert_eq!(message, "policy: mine; policies come with the program for attard2023, attard2023-as-run, laden2026");
     let world = |benchmark: &str| World::bake(&Scenario::named(benchmark).unwrap()).unwrap();
-    for (benchmark, expected) in [("attard2023-full", "attard2023"), ("attard2023-maps-as-run", "attard2023-as-run"), ("laden2026-odd", "laden2026")] {
+    for (benchmark, expected) in
+        [("attard2023-full", "attard2023"), ("attard2023-maps-as-run", "attard2023-as-run"), ("laden2026-odd", "laden2026")]
+    {
         assert_eq!(Policy::shipped_for(benchmark, &world(benchmark)).unwrap().benchmark, expected);
     }
 }

@@ -118,7 +118,10 @@ fn a_budget_too_small_for_any_update_is_refused() {
 fn a_training_file_is_found_by_its_name() {
     let place = Place::new();
     let message = refusal(&offtrack(&["train", "papre", "--out", &place.text("runs")]), 2);
-    assert!(message.contains("papre: is no training file: the program comes with default, best, attard, gpu, as-run, laden, laden-50, paper"), "{message}");
+    assert!(
+        message.contains("papre: is no training file: the program comes with default, best, attard, gpu, as-run, laden, laden-50, paper"),
+        "{message}"
+    );
     let arguments =
         ["train", "paper", "--steps", "12000", "--set", "learning.hidden=[8]", "--set", "device=cpu", "--out", &place.text("runs")];
     let message = refusal(&offtrack(&[&arguments[..], &["--set", "benchmark=nowhere"]].concat()), 2);
