@@ -96,6 +96,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = "must end in .gif, .png or .svg: data are of one episode, one --load".to_owned();
         return Err(Error::Flag { flag: "--output", value: args.output.display().to_string(), expected });
     }
+    if let Some((_, twice)) = args.load.iter().enumerate().find(|(index, load)| args.load[..*index].contains(load)) {
+        return Err(Error::Flag { flag: "--load", value: twice.clone(), expected: "is given twice; each load once".into() });
+    }
     let loads: Vec<Option<&str>> =
         if args.load.is_empty() { vec![None] } else { args.load.iter().map(|load| Some(load.as_str())).collect() };
     let each = || args.route.iter().flat_map(|route| loads.iter().map(move |&load| (route, load)));

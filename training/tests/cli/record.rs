@@ -216,6 +216,8 @@ fn loads_named_are_driven_by_the_same_truck_and_shown_beside_each_other_or_in_tu
 
     let said = refusal(&record("both.json", &["empty", "laden_high"]), 2);
     assert!(said.contains("data are of one episode, one --load"), "{said}");
+    let said = refusal(&record("a.svg", &["empty", "empty"]), 2);
+    assert!(said.contains("--load: empty; is given twice"), "{said}");
     let said = refusal(&record("a.svg", &["nothing"]), 2);
     assert!(said.contains("--load: nothing; laden2026 has empty, half, laden, laden_high"), "{said}");
 }
