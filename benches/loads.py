@@ -116,14 +116,16 @@ def jobs(args, folder):
 def merged(classes):
     """The figures of both vehicles with a load: sums, and means weighted by episodes; of LTR p99 the larger one."""
     n = sum(one["episodes"] for one in classes)
-    mean = lambda key: sum(one[key] * one["episodes"] for one in classes if one[key] is not None) / n
+    mean = lambda key, weight: (
+        sum(one[key] * one[weight] for one in classes if one[weight]) / max(sum(one[weight] for one in classes), 1)
+    )
     return {
         "episodes": n,
         "arrived": sum(one["arrived"] for one in classes),
         "rolled_over": sum(one["rolled_over"] for one in classes),
         "p99": max(one["load_transfer_ratio_p99"] for one in classes),
-        "time": mean("time_over_feasible_mean"),
-        "speed": mean("speed_mean_kmh"),
+        "time": mean("time_over_feasible_mean", "arrived"),
+        "speed": mean("speed_mean_kmh", "episodes"),
         "lateral": max(one["lateral_acceleration_p95"] for one in classes),
     }
 

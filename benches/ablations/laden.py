@@ -113,7 +113,7 @@ def run(core, args, choice, changes, seed):
     classes = found["classes"]
     high = [one for one in classes if one["load"] == "laden_high"]
     total = sum(one["episodes"] for one in high)
-    mean = lambda key: sum(one[key] * one["episodes"] for one in high) / total
+    mean = lambda key: sum((one[key] or 0.0) * one["episodes"] for one in high) / total
     return {
         "seed": seed,
         "env_steps": trained["env_steps"],
