@@ -131,21 +131,32 @@ def merged(classes):
 
 
 def tables(results):
-    """For each place a table of drivers and loads."""
+    """For each place a table with a row a driver: what arrives of each load, and the figures of all loads together."""
     lines = []
+    heads = [
+        "driver",
+        *LOADS,
+        "rolled over",
+        "LTR p99, laden_high",
+        "time, most of a load",
+        "lateral p95, laden loads [g]",
+    ]
     for place in dict.fromkeys(row["place"] for row in results):
-        lines += [
-            f"**{place}**",
-            "",
-            "| driver | load | arrived | rolled over | LTR p99 | km/h | time | lateral p95 [g] |",
-            "|---" * 8 + "|",
-        ]
-        for row in (row for row in results if row["place"] == place):
-            one = merged(row["report"]["classes"])
-            lines.append(
-                f"| {row['driver']} | {row['load']} | {100 * one['arrived'] / one['episodes']:.1f} % ({one['arrived']:,}/{one['episodes']:,})"
-                f" | {one['rolled_over']} | {one['p99']:.2f} | {one['speed']:.1f} | {one['time']:.2f} | {one['lateral']:.2f} |"
-            )
+        lines += [f"**{place}**", "", "| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
+        at_place = [row for row in results if row["place"] == place]
+        for driver in dict.fromkeys(row["driver"] for row in at_place):
+            by_load = {row["load"]: merged(row["report"]["classes"]) for row in at_place if row["driver"] == driver}
+            cells = [driver]
+            for load in LOADS:
+                one = by_load.get(load)
+                cells.append(f"{100 * one['arrived'] / one['episodes']:.1f} %" if one else "")
+            episodes = sum(one["episodes"] for one in by_load.values())
+            cells.append(f"{sum(one['rolled_over'] for one in by_load.values()):,} of {episodes:,}")
+            cells.append(f"{by_load['laden_high']['p99']:.2f}" if "laden_high" in by_load else "")
+            cells.append(f"{max(one['time'] for one in by_load.values()):.2f}")
+            laden = [one["lateral"] for load, one in by_load.items() if load.startswith("laden")]
+            cells.append(f"{max(laden):.2f}" if laden else "")
+            lines.append("| " + " | ".join(cells) + " |")
         lines.append("")
     return "\n".join(lines)
 
