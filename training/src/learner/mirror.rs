@@ -10,6 +10,11 @@ use rand::Rng;
 use crate::error::Error;
 use crate::learner::replay_buffer::Sample;
 
+/// Index of the first distance sensor in an observation.
+fn first_ray() -> usize {
+    OBSERVATION.iter().filter(|values| values.name.ends_with("_range")).map(|values| values.first).min().unwrap_or_default()
+}
+
 /// Tolerance of two sensors' mounts or two steer angles that are mirror images [m, rad]: f32 rounds at 1e-6 of a few
 /// metres.
 const SAME: f32 = 1e-4;
@@ -35,7 +40,7 @@ impl Mirror {
                 "the vehicle's road falls to one side (model.crossfall): leave learning.mirror_augmentation out".to_owned(),
             ));
         }
-        let first_ray = OBSERVATION.iter().find(|values| values.name == "trailer_range").expect("observations have ranges").first;
+        let first_ray = first_ray();
         for index in 0..N_RAYS {
             // The image of a trailer's sensor is one of the trailer's.
             let unit = if index < N_TRAILER_RAYS { 0..N_TRAILER_RAYS } else { N_TRAILER_RAYS..N_TRAILER_RAYS + N_TRACTOR_RAYS };

@@ -3,7 +3,7 @@ use std::sync::Arc;
 
 use offtrack::field::Field;
 use offtrack::geometry::Outline;
-use offtrack::layout::{Clearance, N_RAYS, Start};
+use offtrack::layout::{Clearance, N_RAYS, N_VALUES, Start};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{RouteChoice, Simulator};
 use rand::SeedableRng;
@@ -73,7 +73,7 @@ fn a_mirrored_truck_in_a_mirrored_world_has_mirrored_observations_and_the_same_r
             let expected = mirror.observation(&one.next_observation[env]);
             for (index, (found, expected)) in other.next_observation[env].iter().zip(expected).enumerate() {
                 mirrored = mirrored.max((expected - one.next_observation[env][index]).abs());
-                if (RANGES..RANGES + N_RAYS).contains(&index) {
+                if (first_ray()..first_ray() + N_RAYS).contains(&index) {
                     // A ray is right to 2 cm of the 20 m that it reaches, but for one that grazes a kerb.
                     n_ranges += 1;
                     n_grazing += usize::from(0.003 < (found - expected).abs());
