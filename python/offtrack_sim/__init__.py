@@ -7,8 +7,8 @@
 - :mod:`offtrack_sim.sb3`, :mod:`offtrack_sim.puffer`: the same trucks for Stable-Baselines3 and PufferLib.
 - :mod:`offtrack_sim.export` writes a network of PyTorch as a policy file.
 
-An observation is 69 values of float32 in ``[-1, 1]``, see :data:`OBSERVATION`; an action is an index into
-``Batch.action_table``. A step is 0.1 s.
+An observation is 69 values of float32 in ``[-1, 1]``, see :data:`OBSERVATION`, and behind them the extras that a
+benchmark may observe, see :data:`EXTRAS`; an action is an index into ``Batch.action_table``. A step is 0.1 s.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from __future__ import annotations
 import gymnasium
 
 from ._offtrack import ScenarioError, __version__, scenario_names
-from .batch import COLUMNS, OBSERVATION, Batch, Ended, Ends, Values
+from .batch import COLUMNS, EXTRAS, OBSERVATION, Batch, Ended, Ends, Start, Values
 from .evaluation import Evaluation, evaluate
 from .policy import Policy
 from .single import Roundabout
@@ -24,6 +24,7 @@ from .vector import RoundaboutVector, make_vec
 
 __all__ = [
     "COLUMNS",
+    "EXTRAS",
     "OBSERVATION",
     "Batch",
     "Ended",
@@ -33,6 +34,7 @@ __all__ = [
     "Roundabout",
     "RoundaboutVector",
     "ScenarioError",
+    "Start",
     "Values",
     "__version__",
     "evaluate",
