@@ -16,8 +16,9 @@ from __future__ import annotations
 import gymnasium
 
 from ._offtrack import ScenarioError, __version__, scenario_names
-from .batch import COLUMNS, EXTRAS, OBSERVATION, Batch, Ended, Ends, Start, Values
+from .batch import Batch, Ends, Start
 from .evaluation import Evaluation, evaluate
+from .layout import COLUMNS, EXTRAS, OBSERVATION, Ended, Values
 from .policy import Policy
 from .single import Roundabout
 from .vector import RoundaboutVector, make_vec

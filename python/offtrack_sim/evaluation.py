@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .batch import Batch, Ended
+from .batch import Batch
+from .layout import Ended
 from .policy import Policy
 
 

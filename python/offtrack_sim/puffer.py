@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pufferlib
 
-from .batch import Batch, Bools, Ended, Floats, checked_seed
+from .batch import Batch, Bools, Floats, checked_seed
+from .layout import Ended
 from .single import observation_space
 
 Buffers = tuple[Floats, Floats, Bools, Bools, list[dict[str, list[float]]]]

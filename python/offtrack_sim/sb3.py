@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 from stable_baselines3.common.vec_env import VecEnv
 
-from .batch import Batch, Bools, Ended, Floats, checked_seed
+from .batch import Batch, Bools, Floats, checked_seed
+from .layout import Ended
 from .single import check_render_mode, checked_options, observation_space
 
 Indices = int | Iterable[int] | None

@@ -11,7 +11,8 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from .batch import EXTRAS, OBSERVATION, Batch, Ended, checked_seed
+from .batch import Batch, checked_seed
+from .layout import EXTRAS, OBSERVATION, Ended
 
 
 def observation_space(n_extras: int = 0) -> gymnasium.spaces.Box:

@@ -3,7 +3,9 @@
 use std::borrow::Cow;
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
-use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray1, PyReadwriteArray2};
+use numpy::{
+    Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray1, PyReadwriteArray2, PyUntypedArrayMethods,
+};
 use offtrack::layout::{Column, Ended, N_RAYS, N_VALUES, Start, Stream, Truck};
 use offtrack::shared::Named;
 use offtrack::simulator::{Autoreset, Begin, Engine, RouteChoice, Simulator};
@@ -216,10 +218,10 @@ impl Batch {
         let (n_envs, n_values) = (self.n_envs, self.n_values());
         let shape = format!("float32 of shape ({n_envs}, {n_values})");
         let mut observation: PyReadwriteArray2<f32> = observation.extract().map_err(|_| unfit("observation", &shape))?;
-        let observation = observation.as_slice_mut().map_err(|_| unfit("observation", &shape))?;
-        if observation.len() != n_envs * n_values {
+        if observation.shape() != [n_envs, n_values] {
             return Err(unfit("observation", &shape));
         }
+        let observation = observation.as_slice_mut().map_err(|_| unfit("observation", &shape))?;
         let mut reward = writable::<f32>(reward, "reward", "float32", n_envs)?;
         let mut terminated = writable::<bool>(terminated, "terminated", "bool", n_envs)?;
         let mut truncated = writable::<bool>(truncated, "truncated", "bool", n_envs)?;
@@ -523,7 +525,7 @@ fn engine_of(device: &str) -> PyResult<(Engine, String)> {
 fn writable<'py, T: Element>(array: &Bound<'py, PyAny>, name: &str, kind: &str, n_envs: usize) -> PyResult<PyReadwriteArray1<'py, T>> {
     let shape = format!("{kind} of shape ({n_envs},)");
     let array: PyReadwriteArray1<T> = array.extract().map_err(|_| unfit(name, &shape))?;
-    if array.len().is_ok_and(|len| len == n_envs) { Ok(array) } else { Err(unfit(name, &shape)) }
+    if array.len() == n_envs { Ok(array) } else { Err(unfit(name, &shape)) }
 }
 
 fn unfit(name: &str, needed: &str) -> PyErr {

@@ -69,6 +69,8 @@ def test_every_step_and_every_end_has_the_extras_of_its_columns(autoreset: str) 
         assert (ends.vehicles == vehicles[ends.envs]).all()
         n_ends += len(ends.envs)
         n_replaced += int((ends.observations[:, 69:] != observation[ends.envs, 69:]).any(axis=1).sum())
+    with pytest.raises(TypeError, match=rf"observation: must be .*, float32 of shape \({N}, 77\)"):
+        into.step_into(actions, outputs[0][:, :69].copy(), *outputs[1:])
     assert N < n_ends
     assert n_replaced == (n_ends if autoreset == "same_step" else 0)
 
