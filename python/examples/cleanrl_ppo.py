@@ -103,7 +103,7 @@ def update(
     target = torch.cat([estimate[1].flatten() for estimate in estimates])  # [B]
     observation = torch.cat(
         [torch.from_numpy(fragment.observation[:-1]).flatten(0, 1) for fragment in fragments]
-    )  # [B, 69]
+    )  # [B, n_values]
     action = torch.cat([torch.from_numpy(fragment.action).flatten() for fragment in fragments])  # [B]
     log_prob = torch.cat([torch.from_numpy(fragment.log_prob).flatten() for fragment in fragments])  # [B]
     entropies = []

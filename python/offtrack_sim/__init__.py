@@ -7,8 +7,8 @@
 - :mod:`offtrack_sim.sb3`, :mod:`offtrack_sim.puffer`: the same trucks for Stable-Baselines3 and PufferLib.
 - :mod:`offtrack_sim.export` writes a network of PyTorch as a policy file.
 
-An observation is 69 values of float32 in ``[-1, 1]``, see :data:`OBSERVATION`; an action is an index into
-``Batch.action_table``. A step is 0.1 s.
+An observation is 69 values of float32 in ``[-1, 1]``, see :data:`OBSERVATION`, and behind them the extras that a
+benchmark may observe, see :data:`EXTRAS`; an action is an index into ``Batch.action_table``. A step is 0.1 s.
 """
 
 from __future__ import annotations
@@ -16,14 +16,16 @@ from __future__ import annotations
 import gymnasium
 
 from ._offtrack import ScenarioError, __version__, scenario_names
-from .batch import COLUMNS, OBSERVATION, Batch, Ended, Ends, Values
+from .batch import Batch, Ends, Start
 from .evaluation import Evaluation, evaluate
+from .layout import COLUMNS, EXTRAS, OBSERVATION, Ended, Values
 from .policy import Policy
 from .single import Roundabout
 from .vector import RoundaboutVector, make_vec
 
 __all__ = [
     "COLUMNS",
+    "EXTRAS",
     "OBSERVATION",
     "Batch",
     "Ended",
@@ -33,6 +35,7 @@ __all__ = [
     "Roundabout",
     "RoundaboutVector",
     "ScenarioError",
+    "Start",
     "Values",
     "__version__",
     "evaluate",

@@ -12,61 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
+from .layout import COLUMNS
 
 Array = npt.NDArray[Any]
 Floats = npt.NDArray[np.float32]
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
-
-
-class Ended(enum.IntEnum):
-    """Why an episode ended. Failure wins over arrival, everything wins over the time limit."""
-
-    RUNNING = 0
-    ARRIVED = 1
-    TRACTOR_COLLIDED = 2
-    TRAILER_COLLIDED = 3
-    ROLLED_OVER = 4
-    JACKKNIFED = 5
-    STRAYED = 6
-    TIMED_OUT = 7
-
-
-assert [ended.name.lower() for ended in Ended] == _offtrack.end_codes()
-
-
-class Values(NamedTuple):
-    """Neighbouring values of an observation that measure the same thing."""
-
-    name: str
-    """Name of the group."""
-    first: int
-    """Index of its first value."""
-    n: int
-    """Number of its values."""
-    low: float
-    """The least that they can be: 0, of angles -1. The largest is 1."""
-    doc: str
-    """What each value is, what it is divided by, and where it is limited."""
-
-
-OBSERVATION: tuple[Values, ...] = tuple(Values(*values) for values in _offtrack.observation_groups())
-"""What each of the 69 values of an observation is, group by group."""
-
-N_VALUES: int = sum(values.n for values in OBSERVATION)
-
-
-def _dtype(fields: list[tuple[str, str, int]]) -> np.dtype[Any]:
-    def typed(kind: str, n: int) -> np.dtype[Any]:
-        return np.dtype((kind, (n,))) if n else np.dtype(kind)
-
-    if len(fields) == 1 and not fields[0][0]:
-        return typed(*fields[0][1:])
-    return np.dtype([(name, typed(kind, n)) for name, kind, n in fields])
-
-
-COLUMNS: dict[str, np.dtype[Any]] = {name: _dtype(fields) for name, fields in _offtrack.column_layouts()}
-"""Every column of a batch and the type of a row: a number, an array of numbers, or a record with named fields."""
 
 
 class Ends(NamedTuple):
@@ -79,7 +30,22 @@ class Ends(NamedTuple):
     routes: Ints
     """Index of its route in ``Batch.route_names``, ``[k]``."""
     observations: Floats
-    """The observation after the last action, ``[k, 69]``."""
+    """The observation after the last action, ``[k, n_values]``."""
+    vehicles: Ints
+    """Index of its vehicle in ``Batch.vehicle_classes``, ``[k]``."""
+
+
+class Start(NamedTuple):
+    """How a truck begins its route; the zeros are the first vehicle on the lane's centre line."""
+
+    offset: float = 0.0
+    """Lateral offset as a fraction of the benchmark's largest, in ``-1..1``, left positive."""
+    heading: float = 0.0
+    """Heading error as a fraction of the benchmark's largest, in ``-1..1``, counter-clockwise positive."""
+    speed: float = 0.0
+    """Where in the benchmark's range of speeds at the start: -1 the lowest, 0 the middle, 1 the highest."""
+    vehicle: int | tuple[str, str] = 0
+    """Index of the vehicle in ``Batch.vehicle_classes``, or its class, one of ``Batch.classes``: that class's first."""
 
 
 class Batch(_offtrack.Batch):
@@ -105,6 +71,12 @@ class Batch(_offtrack.Batch):
         step_seconds: Time of a step [s].
         action_table: Steer angle [rad] and target speed [m/s] of each action, float32 ``[n_actions, 2]``.
         route_names: Names of the routes, in the order of the indices that columns have.
+        extras: Names of the extras that stand behind an observation's 69 values, see :data:`offtrack_sim.EXTRAS`.
+        n_values: Number of an observation's values, extras included.
+        classes: Names of vehicle and load of each class that episodes draw from, pairs in the benchmark's order. The
+            vehicle of a benchmark that has one is ``""``.
+        vehicle_classes: Index into ``classes`` of each vehicle that episodes draw from, ``[n_vehicles]``: vehicles of
+            one class differ where the benchmark draws dimensions.
         split_routes: The same names in the benchmark's order. Episode ``e`` of ``episodes`` on its n-th route has the
             stream ``(seed, n * episodes + e)`` in an evaluation.
 
@@ -131,7 +103,7 @@ class Batch(_offtrack.Batch):
         device: str = "cpu",
     ) -> Batch:
         threads = 0 if num_threads is None else _within("num_threads", num_threads, 1, 1025)
-        return super().__new__(
+        batch = super().__new__(
             cls,
             scenario_name(scenario),
             min(_integer("num_envs", num_envs), 2**62),
@@ -142,6 +114,17 @@ class Batch(_offtrack.Batch):
             num_threads=threads,
             device=device,
         )
+        names = {"route": batch.route_names}
+        if len(batch.classes) > 1:
+            names["vehicle"], names["load"] = ([pair[i] for pair in batch.classes] for i in (0, 1))
+        batch._names = {key: np.array(values, dtype=object) for key, values in names.items()}
+        batch._rows = batch.vehicle_classes
+        return batch
+
+    _names: dict[str, Array]
+    """Names by key of an info: of each route, and of vehicle and load of each class where there are several."""
+    _rows: Ints
+    """Index of each vehicle's class."""
 
     def step(self, actions: Array) -> tuple[Floats, Floats, Bools, Bools]:
         """One step of every truck: 0.1 s.
@@ -150,9 +133,9 @@ class Batch(_offtrack.Batch):
             actions: Index of each truck's action in ``action_table``, integers ``[num_envs]``.
 
         Returns:
-            Observation ``[num_envs, 69]``, reward, terminated and truncated, ``[num_envs]`` each. Where an episode
-            ended and another began in the same step, the observation is the new one's first: :meth:`ended` has the
-            last one.
+            Observation ``[num_envs, n_values]``, reward, terminated and truncated, ``[num_envs]`` each. Where an
+            episode ended and another began in the same step, the observation is the new one's first: :meth:`ended` has
+            the last one.
 
         Raises:
             TypeError: For anything but an array of integers.
@@ -165,7 +148,7 @@ class Batch(_offtrack.Batch):
     def step_into(
         self, actions: Array, observation: Floats, reward: Floats, terminated: Bools, truncated: Bools
     ) -> None:
-        """The same into arrays of the caller: float32 ``[num_envs, 69]`` and ``[num_envs]``, bool ``[num_envs]`` twice.
+        """The same into arrays of the caller: float32 ``[num_envs, n_values]`` and ``[num_envs]``, bool twice.
 
         They must be contiguous; a slice ``fragment[t]`` of an array of many steps is.
         """
@@ -176,8 +159,28 @@ class Batch(_offtrack.Batch):
         super().step_at_random()
 
     def observation(self) -> Floats:
-        """What every truck observes before its next action, ``[num_envs, 69]``."""
+        """What every truck observes before its next action, ``[num_envs, n_values]``."""
         return super().observation()
+
+    def routes(self) -> Ints:
+        """Index in ``route_names`` of the route that each truck is on, ``[num_envs]``."""
+        return super().routes()
+
+    def vehicles(self) -> Ints:
+        """Index in ``vehicle_classes`` of the vehicle that each truck is, ``[num_envs]``."""
+        return super().vehicles()
+
+    def named(self, routes: Any, vehicles: Any) -> dict[str, Any]:
+        """Names of routes and vehicles by their indices, as infos have them.
+
+        ``route``, and where the benchmark has several classes ``vehicle`` and ``load``: arrays of names for arrays of
+        indices, names for single ones.
+        """
+        found = {"route": self._names["route"][routes]}
+        if "vehicle" in self._names:
+            classes = self._rows[vehicles]
+            found |= {key: self._names[key][classes] for key in ("vehicle", "load")}
+        return found
 
     def ended(self) -> Ends | None:
         """The episodes that the last step ended, None where it ended none."""
@@ -191,7 +194,7 @@ class Batch(_offtrack.Batch):
         seeds: Sequence[int | None] | None = None,
         streams: Sequence[tuple[int, int] | None] | None = None,
         routes: Sequence[str | None] | None = None,
-        starts: Sequence[tuple[float, float] | None] | None = None,
+        starts: Sequence[Start | tuple[float, float] | None] | None = None,
     ) -> None:
         """Begins an episode of some trucks and leaves the others as they are.
 
@@ -201,8 +204,11 @@ class Batch(_offtrack.Batch):
                 with that seed. None: the next episode of the truck's own stream.
             streams: The same with the whole stream, ``(seed, index)``.
             routes: Name of each one's route, of those that the batch drives; None for one as drawn.
-            starts: Lateral offset and heading error of each one's start, as fractions of the benchmark's largest, in
-                ``-1..1``, left and counter-clockwise positive; None for one as drawn.
+            starts: Each one's :class:`Start`, or a tuple of its first values: ``(offset, heading)`` is that of the
+                first vehicle at the middle of the speeds. None for one as drawn, with a vehicle as drawn.
+
+        Raises:
+            TypeError, ValueError: For what is not as above; the message names it, and no truck has begun.
         """
         indices = list(range(self.num_envs)) if envs is None else [operator.index(env) for env in envs]
         outside = next((env for env in indices if not 0 <= env < self.num_envs), None)
@@ -217,9 +223,31 @@ class Batch(_offtrack.Batch):
             checked = [
                 stream and (checked_seed(stream[0]), _within("streams", stream[1], 0, 2**32)) for stream in streams
             ]
-        self.begin_episodes(
-            indices, checked, None if routes is None else list(routes), None if starts is None else list(starts)
-        )
+        stated = None if starts is None else [self._start(index, start) for index, start in enumerate(starts)]
+        self.begin_episodes(indices, checked, None if routes is None else list(routes), stated)
+
+    def _start(self, index: int, given: Start | tuple[float, ...] | None) -> tuple[float, float, float, int] | None:
+        """A start with the index of its vehicle."""
+        if given is None:
+            return None
+        try:
+            start = Start(*given)
+            offset, heading, speed = (float(fraction) for fraction in start[:3])
+        except (TypeError, ValueError):
+            needed = "a tuple of offset, heading error, speed and vehicle is needed, see offtrack_sim.Start"
+            raise TypeError(f"starts[{index}]: {given!r}; {needed}") from None
+        return offset, heading, speed, self._vehicle(f"starts[{index}].vehicle", start.vehicle)
+
+    def _vehicle(self, name: str, given: int | tuple[str, str]) -> int:
+        """Index of a vehicle, which may be given as a class."""
+        rows = self._rows
+        if not isinstance(given, tuple):
+            return _within(name, given, 0, len(rows))
+        found = [index for index, known in enumerate(self.classes) if known == given and (rows == index).any()]
+        if not found:
+            known = ", ".join(str(self.classes[index]) for index in np.unique(rows))
+            raise ValueError(f"{name}: {given!r}; {self.scenario} has {known}")
+        return int(np.flatnonzero(rows == found[0])[0])
 
     def columns(self, *names: str) -> dict[str, Array]:
         """Copies of columns, all of them where none is named: arrays of ``num_envs`` rows, see :data:`COLUMNS`.

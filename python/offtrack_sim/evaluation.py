@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .batch import Batch, Ended
+from .batch import Batch
+from .layout import Ended
 from .policy import Policy
 
 
@@ -92,14 +93,15 @@ def evaluate(
     The starts are those of ``offtrack evaluate`` with the same seed and number of episodes.
 
     Args:
-        policy: A :class:`offtrack_sim.Policy`, or any function from observations ``[n, 69]`` to actions ``[n]``.
+        policy: A :class:`offtrack_sim.Policy`, or any function from observations ``[n, n_values]`` to actions
+            ``[n]``: 69 values, and behind them the benchmark's extras.
         scenario, split, routes, device: As for :class:`offtrack_sim.Batch`.
         episodes: Episodes on each route.
         seed: Seed of the starts.
 
     Raises:
-        ValueError: As :class:`offtrack_sim.Batch` says, and for a policy with another action table than the
-            benchmark's.
+        ValueError: As :class:`offtrack_sim.Batch` says, and for a policy with another action table or other extras
+            than the benchmark's.
     """
     if episodes < 1:
         raise ValueError(f"episodes: {episodes}; must be at least 1")
@@ -107,6 +109,9 @@ def evaluate(
     batch = Batch(scenario, len(names) * episodes, split=split, routes=routes, autoreset="same_step", device=device)
     if isinstance(policy, Policy):
         act: Callable[[npt.NDArray[np.float32]], Any] = policy.act
+        if policy.extras != batch.extras:
+            its, needed = (", ".join(extras) or "none" for extras in (policy.extras, batch.extras))
+            raise ValueError(f"{policy.name}: observes other extras than {batch.scenario}: {its}; {needed} are needed")
         if policy.action_table.shape != batch.action_table.shape or not np.allclose(
             policy.action_table, batch.action_table, atol=1e-5
         ):

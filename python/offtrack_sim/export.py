@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
-from .batch import N_VALUES, Floats
+from .batch import Floats
 
 #: A normalised observation is clamped to this, see docs/policies.md.
 CLIP = 10.0
@@ -44,11 +44,12 @@ def save(
             - a ``torch.nn.Sequential`` of ``Linear`` with all ``ReLU`` or all ``Tanh`` between, none behind the last:
               CleanRL's ``agent.actor`` of PPO and ``q_network.network`` of DQN;
             - a list of ``(weights, biases)``, arrays ``[inputs, outputs]`` and ``[outputs]``, with ``ReLU`` between.
-        scenario: The benchmark it was trained on, a name or a file: the file keeps its table of actions.
-        mean: Mean of each observation's value, ``[69]``, where the network was trained with normalised ones; a model of
-            Stable-Baselines3 with ``VecNormalize`` brings its own.
-        variance: Their variance, ``[69]``: a value becomes ``(value - mean) / sqrt(variance + epsilon)``, clamped to
-            -10..10.
+        scenario: The benchmark it was trained on, a name or a file: the file keeps its table of actions and the names
+            of the extras that it observes.
+        mean: Mean of each observation's value, ``[n_values]``, extras included, where the network was trained with
+            normalised ones; a model of Stable-Baselines3 with ``VecNormalize`` brings its own.
+        variance: Their variance, ``[n_values]``: a value becomes ``(value - mean) / sqrt(variance + epsilon)``, clamped
+            to -10..10.
         epsilon: Added to the variance.
 
     Raises:
@@ -65,15 +66,13 @@ def save(
         if mean is not None:
             raise ValueError("mean, variance: the model has those of its VecNormalize; leave them out")
         mean, variance, epsilon = found
-    if mean is None or variance is None:
-        offset, factor = np.zeros(N_VALUES, np.float32), np.ones(N_VALUES, np.float32)
-    else:
-        offset = _vector("mean", mean)
+    normalisation = None
+    if mean is not None and variance is not None:
         spread = np.asarray(variance, np.float64) + epsilon
         if not (spread > 0).all():
             raise ValueError("variance: every value plus epsilon must be greater than 0")
-        factor = _vector("variance", 1 / np.sqrt(spread))
-    _offtrack.write_policy(os.fspath(file), os.fspath(scenario), layers, activation, offset, factor)
+        normalisation = _vector("mean", mean), _vector("variance", 1 / np.sqrt(spread))
+    _offtrack.write_policy(os.fspath(file), os.fspath(scenario), layers, activation, normalisation)
 
 
 def _layers(model: Any) -> tuple[Layers, str]:
@@ -165,8 +164,8 @@ def _array(tensor: Any) -> Floats:
 
 def _vector(name: str, values: npt.ArrayLike) -> Floats:
     vector = np.ascontiguousarray(values, np.float32)
-    if vector.shape != (N_VALUES,):
-        raise ValueError(f"{name}: shape {vector.shape}; ({N_VALUES},) is needed")
+    if vector.ndim != 1:
+        raise ValueError(f"{name}: shape {vector.shape}; one dimension is needed, a number for each value")
     return vector
 
 

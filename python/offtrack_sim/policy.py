@@ -50,19 +50,34 @@ class Policy:
         return self._network.benchmark
 
     @property
+    def extras(self) -> list[str]:
+        """Names of the extras that it observes behind an observation's 69 values: a batch must have the same."""
+        return self._network.extras
+
+    @property
     def action_table(self) -> npt.NDArray[np.float32]:
         """Steer angle [rad] and speed [m/s] of each action, ``[n, 2]``: a batch must have the same table."""
         return self._network.action_table
 
     def act(self, observations: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-        """The most probable action for each observation: ``[n, 69]`` gives ``[n]``, ``[69]`` a single number."""
+        """The most probable action for each observation: ``[n, n_values]`` gives ``[n]``, ``[n_values]`` a number.
+
+        Raises:
+            ValueError: For another number of values than 69 and one for each of ``extras``; the message names them.
+        """
         rows = np.ascontiguousarray(observations, dtype=np.float32)
         if rows.ndim == 1:
             return self._network.act(rows[None])[0]  # type: ignore[no-any-return]
         return self._network.act(rows)
 
     def logits(self, observations: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
-        """The network's output for each observation, ``[n, 69]`` to ``[n, n_actions]``: softmax gives probabilities."""
+        """The network's output for each observation, ``[n, n_values]`` to ``[n, n_actions]``.
+
+        Their softmax gives probabilities.
+
+        Raises:
+            ValueError: As for :meth:`act`.
+        """
         return self._network.logits(np.ascontiguousarray(observations, dtype=np.float32))
 
     def __repr__(self) -> str:

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pufferlib
 
-from .batch import Batch, Bools, Ended, Floats, checked_seed
+from .batch import Batch, Bools, Floats, checked_seed
+from .layout import Ended
 from .single import observation_space
 
 Buffers = tuple[Floats, Floats, Bools, Bools, list[dict[str, list[float]]]]
@@ -20,8 +21,8 @@ Buffers = tuple[Floats, Floats, Bools, Bools, list[dict[str, list[float]]]]
 class RoundaboutPuffer(pufferlib.PufferEnv):
     """Trucks that are stepped together, with the interface of ``pufferlib.PufferEnv`` of PufferLib 3.
 
-    - Observations ``[num_envs, 69]`` float32, actions ``[num_envs]`` integers; a truck whose episode ends begins the
-      next one in the same step.
+    - Observations ``[num_envs, n_values]`` float32, 69 and the benchmark's extras; actions ``[num_envs]`` integers; a
+      truck whose episode ends begins the next one in the same step.
     - Rewards ``[num_envs]`` float32 are the benchmark's times ``reward_scale``: PufferLib's trainer clamps rewards to
       -1..1, and the benchmark's are -500 to +100.
     - PufferLib 3.0's trainer cuts the future at ``terminals`` alone: an episode that the time limit ends runs on, for
@@ -62,7 +63,7 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
         self.batch = Batch(
             scenario, num_envs, split=split, routes=routes, seed=seed, num_threads=threads, device=device
         )
-        self.single_observation_space = observation_space()
+        self.single_observation_space = observation_space(len(self.batch.extras))
         self.single_action_space = gymnasium.spaces.Discrete(len(self.batch.action_table))
         self.num_agents = num_envs
         self.render_mode = "rgb_array"

@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 from stable_baselines3.common.vec_env import VecEnv
 
-from .batch import Batch, Bools, Ended, Floats, checked_seed
+from .batch import Batch, Bools, Floats, checked_seed
+from .layout import Ended
 from .single import check_render_mode, checked_options, observation_space
 
 Indices = int | Iterable[int] | None
@@ -21,10 +22,11 @@ Indices = int | Iterable[int] | None
 class RoundaboutVecEnv(VecEnv):
     """Trucks that are stepped together, with the interface of ``stable_baselines3.common.vec_env.VecEnv``.
 
-    - Observations ``[num_envs, 69]`` float32, actions ``[num_envs]`` integers, rewards ``[num_envs]`` float32.
+    - Observations ``[num_envs, n_values]`` float32, 69 and the benchmark's extras; actions ``[num_envs]`` integers,
+      rewards ``[num_envs]`` float32.
     - A truck whose episode ends begins the next one in the same step. Its info then has ``terminal_observation``,
-      ``TimeLimit.truncated``, ``is_success``, ``ended`` (:class:`offtrack_sim.Ended`) and ``route``; all others
-      are empty.
+      ``TimeLimit.truncated``, ``is_success``, ``ended`` (:class:`offtrack_sim.Ended`), ``route``, and ``vehicle`` and
+      ``load`` where the benchmark has several; all others are empty.
     - ``batch`` is the simulator, with all its columns.
 
     With the same seeds every value is that of ``DummyVecEnv`` with as many :class:`offtrack_sim.Roundabout`. Wrap it in
@@ -64,9 +66,9 @@ class RoundaboutVecEnv(VecEnv):
         )
         self.render_mode = render_mode
         self.render_size = render_size
-        self._names = self.batch.route_names
         self._streams: list[tuple[int, int] | None] = [(seed, env) for env in range(num_envs)]
-        super().__init__(num_envs, observation_space(), gymnasium.spaces.Discrete(len(self.batch.action_table)))
+        space = observation_space(len(self.batch.extras))
+        super().__init__(num_envs, space, gymnasium.spaces.Discrete(len(self.batch.action_table)))
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Gives truck ``i`` the seed ``seed + i`` at the next reset, as an environment of one truck has with it."""
@@ -82,7 +84,7 @@ class RoundaboutVecEnv(VecEnv):
         self.batch.begin(streams=streams, routes=routes, starts=starts)
         # From now on each truck goes on in its stream.
         self._streams = [None] * self.num_envs
-        self.reset_infos = [{"route": self._names[route]} for route in self.batch.routes()]
+        self.reset_infos = [self.batch.named(*pair) for pair in zip(self.batch.routes(), self.batch.vehicles())]
         self._reset_seeds()
         self._reset_options()
         return self.batch.observation()
@@ -97,16 +99,16 @@ class RoundaboutVecEnv(VecEnv):
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         ends = self.batch.ended()
         if ends is not None:
-            begun = self.batch.routes()
-            for env, code, route, last in zip(*ends):
+            routes, vehicles = self.batch.routes(), self.batch.vehicles()
+            for env, code, route, last, vehicle in zip(*ends):
                 infos[env] = {
                     "terminal_observation": last,
                     "TimeLimit.truncated": bool(truncated[env] and not terminated[env]),
                     "is_success": bool(code == Ended.ARRIVED),
                     "ended": int(code),
-                    "route": self._names[route],
+                    **self.batch.named(route, vehicle),
                 }
-                self.reset_infos[env] = {"route": self._names[begun[env]]}
+                self.reset_infos[env] = self.batch.named(routes[env], vehicles[env])
         return observation, reward, terminated | truncated, infos
 
     def close(self) -> None:

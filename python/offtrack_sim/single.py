@@ -11,13 +11,15 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from .batch import N_VALUES, OBSERVATION, Batch, Ended, checked_seed
+from .batch import Batch, checked_seed
+from .layout import EXTRAS, OBSERVATION, Ended
 
 
-def observation_space() -> gymnasium.spaces.Box:
-    """69 values of float32: angles in -1..1, all others in 0..1."""
-    low = np.concatenate([np.full(values.n, values.low, np.float32) for values in OBSERVATION])
-    return gymnasium.spaces.Box(low, np.ones(N_VALUES, np.float32), dtype=np.float32)
+def observation_space(n_extras: int = 0) -> gymnasium.spaces.Box:
+    """69 values of float32, angles in -1..1, all others in 0..1; behind them a benchmark's extras, in -1..1."""
+    groups = (*OBSERVATION, *EXTRAS[:n_extras])
+    low = np.concatenate([np.full(values.n, values.low, np.float32) for values in groups])
+    return gymnasium.spaces.Box(low, np.ones_like(low), dtype=np.float32)
 
 
 class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
@@ -25,12 +27,12 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
 
     ``gymnasium.make("offtrack_sim:offtrack/Roundabout-v0", scenario=..., split=...)`` makes one.
 
-    - Observation: :func:`observation_space`, see ``offtrack_sim.OBSERVATION``.
+    - Observation: :func:`observation_space`, see ``offtrack_sim.OBSERVATION`` and ``offtrack_sim.EXTRAS``.
     - Action: index into ``env.unwrapped.batch.action_table``, pairs of steer angle [rad] and speed [m/s].
     - Reward: the benchmark's weighted sum; for attard2023 +100 a waypoint, up to -1.5 a step for the distance to the
       lane's centre, -500 for a failure. Wrap it in ``gymnasium.wrappers.NormalizeReward`` where a learner wants less.
-    - Info after a reset: ``route``. After the step that ends an episode: ``ended`` (:class:`offtrack_sim.Ended`),
-      ``is_success`` and ``route``. Otherwise empty.
+    - Info after a reset: ``route``, and where the benchmark has several ``vehicle`` and ``load``. After the step that
+      ends an episode: these with ``ended`` (:class:`offtrack_sim.Ended`) and ``is_success``. Otherwise empty.
 
     Args:
         scenario: Name of a benchmark or path of a file, as for :class:`offtrack_sim.Batch`.
@@ -40,8 +42,8 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
         device: ``"cpu"``, ``"gpu"`` or part of an adapter's name.
 
     ``reset(seed=s)`` begins the first episode of the stream ``(s, 0)``, and each later ``reset()`` the next one.
-    ``reset(options={"route": name, "start": (offset, heading)})`` states the route or the start, or both: offset and
-    heading error are fractions, -1..1, of the benchmark's largest start errors.
+    ``reset(options={"route": name, "start": Start(...)})`` states the route or the start (:class:`offtrack_sim.Start`)
+    with its vehicle, or both; ``(offset, heading)`` is the start of the first vehicle.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -58,7 +60,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
     ) -> None:
         check_render_mode(render_mode)
         self.batch = Batch(scenario, 1, split=split, routes=routes, autoreset="disabled", num_threads=1, device=device)
-        self.observation_space = observation_space()  # type: ignore[assignment]
+        self.observation_space = observation_space(len(self.batch.extras))  # type: ignore[assignment]
         self._n_actions = len(self.batch.action_table)
         self.action_space = gymnasium.spaces.Discrete(self._n_actions)
         self.metadata = {**self.metadata, "render_fps": frames_per_second(self.batch)}
@@ -84,7 +86,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
         )
         self._has_stream = True
         self._needs_reset = False
-        return self.batch.observation()[0], {"route": self._route(self.batch.routes()[0])}
+        return self.batch.observation()[0], self.batch.named(self.batch.routes()[0], self.batch.vehicles()[0])
 
     def step(self, action: np.int64) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         if self._needs_reset:
@@ -101,15 +103,13 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
         if ended is not None:
             self._needs_reset = True
             code = Ended(int(ended.codes[0]))
-            info = {"ended": int(code), "is_success": code == Ended.ARRIVED, "route": self._route(ended.routes[0])}
+            info = {"ended": int(code), "is_success": code == Ended.ARRIVED}
+            info |= self.batch.named(ended.routes[0], ended.vehicles[0])
         return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """A picture from above, uint8 ``[render_size, render_size, 3]``; None without a render mode."""
         return None if self.render_mode is None else self.batch.render(0, self.render_size)
-
-    def _route(self, index: np.int64) -> str:
-        return self.batch.route_names[index]
 
 
 def check_render_mode(render_mode: str | None) -> None:

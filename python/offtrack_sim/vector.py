@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from .batch import N_VALUES, Batch, checked_seed, mode_name
+from .batch import Batch, checked_seed, mode_name
 from .single import check_render_mode, checked_options, frames_per_second, observation_space
 
 if TYPE_CHECKING:
@@ -33,11 +33,13 @@ else:
 class RoundaboutVector(Base):
     """Trucks that are stepped together, with the interface of ``gymnasium.vector.VectorEnv``; see :func:`make_vec`.
 
-    - Observations ``[num_envs, 69]`` float32, actions ``[num_envs]`` integers, rewards ``[num_envs]`` float32.
+    - Observations ``[num_envs, n_values]`` float32, 69 and the benchmark's extras; actions ``[num_envs]`` integers,
+      rewards ``[num_envs]`` float32.
     - ``batch`` is the simulator, with all its columns.
     - Infos have the form of Gymnasium's ``SyncVectorEnv``: an array ``key`` and a mask ``_key`` for ``route`` where an
       episode began and for ``ended``, ``is_success`` and ``route`` where one ended, and nothing where neither did. With
-      ``SAME_STEP`` those of the end are in ``final_info``, and ``final_obs`` has the last observations.
+      ``SAME_STEP`` those of the end are in ``final_info``, and ``final_obs`` has the last observations. Where the
+      benchmark has several vehicles or loads, ``vehicle`` and ``load`` stand beside ``route``.
 
     With the same seeds every value is that of ``SyncVectorEnv`` with as many :class:`offtrack_sim.Roundabout`.
     """
@@ -79,7 +81,7 @@ class RoundaboutVector(Base):
             device=device,
         )
         self.num_envs = num_envs
-        self.single_observation_space = observation_space()
+        self.single_observation_space = observation_space(len(self.batch.extras))
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.single_action_space = gymnasium.spaces.Discrete(len(self.batch.action_table))
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -88,8 +90,7 @@ class RoundaboutVector(Base):
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode, "render_fps": fps}
         self.render_mode = render_mode
         self.render_size = render_size
-        self._names = np.array(self.batch.route_names, dtype=object)
-        self._outputs = None if copy else _outputs(num_envs)
+        self._outputs = None if copy else _outputs(num_envs, self.batch.n_values)
         self._seed = seed
         self._is_next_step, self._is_same_step = mode == "next_step", mode == "same_step"
         self._has_begun = False
@@ -109,7 +110,7 @@ class RoundaboutVector(Base):
                 environment of one truck has with that seed, and None in it leaves the truck its stream. None: every
                 truck goes on with its next episode.
             options: ``reset_mask``, bool ``[num_envs]``: the trucks to begin, the others go on. ``routes`` and
-                ``starts``: sequences of ``num_envs``, as for :meth:`offtrack_sim.Batch.begin`.
+                ``starts``: sequences of ``num_envs``, as for :meth:`offtrack_sim.Batch.begin`; a start has a vehicle.
 
         Returns:
             Observations and infos; trucks outside the mask have the observation they had.
@@ -137,7 +138,7 @@ class RoundaboutVector(Base):
         infos: dict[str, Any] = {}
         begun = np.zeros(self.num_envs, dtype=np.bool_)
         begun[envs] = True
-        self._put_routes(infos, begun)
+        self._put_begun(infos, begun)
         return self._observation(), infos
 
     def step(
@@ -159,7 +160,7 @@ class RoundaboutVector(Base):
         infos = self.batch.end_infos() or {}
         if self._is_next_step and self._has_ended.any():
             # These have begun another episode in this step.
-            self._put_routes(infos, self._has_ended)
+            self._put_begun(infos, self._has_ended)
         if not self._is_same_step:
             self._has_ended = terminated | truncated
         return observation, reward, terminated, truncated, infos
@@ -180,14 +181,14 @@ class RoundaboutVector(Base):
         self._outputs[0][...] = found
         return self._outputs[0]
 
-    def _put_routes(self, infos: dict[str, Any], begun: npt.NDArray[np.bool_]) -> None:
-        """Adds the routes of trucks that have begun to what infos has of others."""
-        routes = infos.get("route")
-        if routes is None:
-            # An empty array of objects holds None.
-            routes = infos["route"] = np.empty(self.num_envs, dtype=object)
-        routes[begun] = self._names[self.batch.routes()[begun]]
-        infos["_route"] = begun | infos.get("_route", False)
+    def _put_begun(self, infos: dict[str, Any], begun: npt.NDArray[np.bool_]) -> None:
+        """Adds the names of what trucks have begun with to what infos has of others."""
+        for key, names in self.batch.named(self.batch.routes()[begun], self.batch.vehicles()[begun]).items():
+            if key not in infos:
+                # An empty array of objects holds None.
+                infos[key] = np.empty(self.num_envs, dtype=object)
+            infos[key][begun] = names
+            infos[f"_{key}"] = begun | infos.get(f"_{key}", False)
 
 
 def make_vec(
@@ -243,10 +244,10 @@ def make_vec(
 Outputs = tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.bool_], npt.NDArray[np.bool_]]
 
 
-def _outputs(num_envs: int) -> Outputs:
+def _outputs(num_envs: int, n_values: int) -> Outputs:
     """Room for a step."""
     return (
-        np.zeros((num_envs, N_VALUES), np.float32),
+        np.zeros((num_envs, n_values), np.float32),
         np.zeros(num_envs, np.float32),
         np.zeros(num_envs, np.bool_),
         np.zeros(num_envs, np.bool_),

@@ -3,33 +3,34 @@
 use std::borrow::Cow;
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
-use bytemuck::{AnyBitPattern, NoUninit};
-use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray1, PyReadwriteArray2};
+use numpy::{
+    Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray1, PyReadwriteArray2, PyUntypedArrayMethods,
+};
 use offtrack::layout::{Column, Ended, N_RAYS, N_VALUES, Start, Stream, Truck};
 use offtrack::shared::Named;
 use offtrack::simulator::{Autoreset, Begin, Engine, RouteChoice, Simulator};
 use offtrack_drawing::camera::{Camera, Shown};
 use pyo3::exceptions::{PyIndexError, PyMemoryError, PyRuntimeError, PyTypeError, PyValueError};
-use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
-use rayon::prelude::*;
+use pyo3::types::PyDict;
 
+use crate::infos::{self, End, Episode, Names};
+use crate::observed::{self, Observed, Read, rows_of};
 use crate::pool::Pool;
 use crate::worlds::Place;
 use crate::{actions, errors};
 
-/// Rows of observations that a thread copies at least.
-const ROWS_MIN: usize = 64;
 /// The device that is none.
 const CPU: &str = "cpu";
-/// What is read after a step, the last of them only where observations were replaced in the step.
-const READ: [Column; 5] = [Column::Observation, Column::Reward, Column::Ended, Column::Truck, Column::NextObservation];
 
 /// Observation, reward, terminated, truncated of a step.
 type Step<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<bool>>);
-/// Trucks whose episode ended, why, on which route, and their last observations.
-type Ends<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f32>>);
+/// One whole number for each of some trucks.
+type Indices<'py> = Bound<'py, PyArray1<i64>>;
+/// Trucks whose episode ended, why, on which route, their last observations, and which vehicle they were.
+type Ends<'py> = (Indices<'py>, Indices<'py>, Indices<'py>, Bound<'py, PyArray2<f32>>, Indices<'py>);
+/// Offset, heading error and speed of a start as fractions, and the index of its vehicle.
+type GivenStart = (f32, f32, f32, u32);
 
 /// Many trucks in one world, stepped together.
 ///
@@ -37,9 +38,12 @@ type Ends<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'p
 #[pyclass(subclass, frozen, module = "offtrack_sim._offtrack")]
 pub struct Batch {
     place: Place,
-    /// Names of the world's routes.
-    names: Vec<Py<PyString>>,
+    names: Names,
     n_envs: usize,
+    /// Extras that stand behind each observation's values.
+    n_extras: usize,
+    /// What is read after a step.
+    read: Vec<Column>,
     device: String,
     autoreset: Autoreset,
     state: Mutex<State>,
@@ -50,21 +54,12 @@ struct State {
     simulator: Simulator,
     pool: Pool,
     camera: Option<Camera>,
-    /// Index of the route that each truck is on.
-    routes: Vec<u32>,
+    /// What each truck's episode was drawn from.
+    episodes: Vec<Episode>,
     /// Whether its episode has ended and no other has begun.
     held: Vec<bool>,
     /// Episodes that the last step ended.
     ends: Vec<End>,
-}
-
-/// An episode that the last step ended.
-struct End {
-    env: usize,
-    code: u32,
-    route: u32,
-    /// After the last action.
-    observation: [f32; N_VALUES],
 }
 
 #[pymethods]
@@ -99,10 +94,11 @@ impl Batch {
         let made = pool.run(py, || Simulator::on(engine, world, n_envs, seed, choice))?;
         let mut simulator = made.map_err(|error| errors::of_simulator(&error))?;
         simulator.set_autoreset(autoreset);
-        let mut state = State { simulator, pool, camera: None, routes: Vec::new(), held: Vec::new(), ends: Vec::new() };
+        let mut state = State { simulator, pool, camera: None, episodes: Vec::new(), held: Vec::new(), ends: Vec::new() };
         state.look()?;
-        let names = place.world.route_names.iter().map(|name| PyString::new(py, name).unbind()).collect();
-        Ok(Batch { place, names, n_envs, device, autoreset, state: Mutex::new(state) })
+        let n_extras = place.world.params.n_extras as usize;
+        let (names, read) = (Names::new(py, &place.world), observed::columns_of_step(autoreset, n_extras));
+        Ok(Batch { place, names, n_envs, n_extras, read, device, autoreset, state: Mutex::new(state) })
     }
 
     #[getter]
@@ -141,6 +137,30 @@ impl Batch {
         self.place.routes.iter().map(|&route| self.place.world.route_names[route as usize].as_str()).collect()
     }
 
+    /// Names of the extras that stand behind an observation's values.
+    #[getter]
+    fn extras(&self) -> Vec<&'static str> {
+        observed::names(self.n_extras)
+    }
+
+    /// Values of an observation, its extras among them.
+    #[getter]
+    fn n_values(&self) -> usize {
+        N_VALUES + self.n_extras
+    }
+
+    /// Vehicle and load of each class of the vehicles, in the benchmark's order.
+    #[getter]
+    fn classes(&self) -> Vec<(&str, &str)> {
+        self.place.world.classes.iter().map(|class| (class.vehicle.as_str(), class.load.as_str())).collect()
+    }
+
+    /// Index into `classes` of each vehicle that episodes draw from, `[n_vehicles]`.
+    #[getter]
+    fn vehicle_classes<'py>(&self, py: Python<'py>) -> Indices<'py> {
+        PyArray1::from_iter(py, self.place.world.rigs.iter().map(|rig| i64::from(rig.class_index)))
+    }
+
     #[getter]
     fn action_table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let table: Vec<f32> = self.place.world.actions.iter().flat_map(|action| [action.steering, action.speed]).collect();
@@ -148,28 +168,40 @@ impl Batch {
     }
 
     /// Indices into `route_names` of the routes that trucks are on, `[num_envs]`.
-    fn routes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {
+    fn routes<'py>(&self, py: Python<'py>) -> PyResult<Indices<'py>> {
         let state = self.state()?;
-        Ok(PyArray1::from_iter(py, state.routes.iter().map(|&route| i64::from(route))))
+        Ok(PyArray1::from_iter(py, state.episodes.iter().map(|episode| i64::from(episode.route))))
+    }
+
+    /// Indices into `vehicle_classes` of the vehicles that trucks are, `[num_envs]`.
+    fn vehicles<'py>(&self, py: Python<'py>) -> PyResult<Indices<'py>> {
+        let state = self.state()?;
+        Ok(PyArray1::from_iter(py, state.episodes.iter().map(|episode| i64::from(episode.vehicle))))
     }
 
     fn observation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let state = self.state()?;
+        let mut state = self.state()?;
         state.check_process(&self.device)?;
-        let read = state.simulator.read(&[Column::Observation]).map_err(|error| errors::of_simulator(&error))?;
-        self.rows(py, &read[0])
+        let State { simulator, pool, .. } = &mut *state;
+        let columns = observed::columns_of_observation(self.n_extras);
+        let read = Read::of(simulator, columns).map_err(|error| errors::of_simulator(&error))?;
+        let observation = if self.n_extras == 0 {
+            PyArray1::from_slice(py, &read.rows::<f32>(Column::Observation))
+        } else {
+            PyArray1::from_vec(py, pool.run(py, || read.observed(self.n_extras).to_vec())?)
+        };
+        observation.reshape([self.n_envs, self.n_values()])
     }
 
     fn step<'py>(&self, py: Python<'py>, actions: &Bound<'py, PyAny>) -> PyResult<Step<'py>> {
         let actions = actions::of_array(actions, self.n_envs, &self.place.world.actions)?;
         let mut state = self.state()?;
         let (observation, reward, terminated, truncated) = state.step(py, self, &actions, |observation, reward, codes| {
-            let observation: Vec<[f32; N_VALUES]> = observation.par_iter().with_min_len(ROWS_MIN).copied().collect();
             let flags = |is: fn(Ended) -> bool| -> Vec<bool> { codes.iter().map(|&code| holds(code, is)).collect() };
-            (observation.into_flattened(), reward.to_vec(), flags(Ended::terminated), flags(Ended::truncated))
+            (observation.to_vec(), reward.to_vec(), flags(Ended::terminated), flags(Ended::truncated))
         })?;
         let vector = |flags| PyArray1::from_vec(py, flags);
-        let observation = PyArray1::from_vec(py, observation).reshape([self.n_envs, N_VALUES])?;
+        let observation = PyArray1::from_vec(py, observation).reshape([self.n_envs, self.n_values()])?;
         Ok((observation, PyArray1::from_vec(py, reward), vector(terminated), vector(truncated)))
     }
 
@@ -183,25 +215,23 @@ impl Batch {
         truncated: &Bound<PyAny>,
     ) -> PyResult<()> {
         let actions = actions::of_array(actions, self.n_envs, &self.place.world.actions)?;
-        let n_envs = self.n_envs;
-        let shape = format!("float32 of shape ({n_envs}, {N_VALUES})");
+        let (n_envs, n_values) = (self.n_envs, self.n_values());
+        let shape = format!("float32 of shape ({n_envs}, {n_values})");
         let mut observation: PyReadwriteArray2<f32> = observation.extract().map_err(|_| unfit("observation", &shape))?;
-        let observation = observation.as_slice_mut().map_err(|_| unfit("observation", &shape))?;
-        if observation.len() != n_envs * N_VALUES {
+        if observation.shape() != [n_envs, n_values] {
             return Err(unfit("observation", &shape));
         }
+        let observation = observation.as_slice_mut().map_err(|_| unfit("observation", &shape))?;
         let mut reward = writable::<f32>(reward, "reward", "float32", n_envs)?;
         let mut terminated = writable::<bool>(terminated, "terminated", "bool", n_envs)?;
         let mut truncated = writable::<bool>(truncated, "truncated", "bool", n_envs)?;
         let mut state = self.state()?;
         let contiguous = |_| unfit("an output", "contiguous");
-        let (observation, _) = observation.as_chunks_mut::<N_VALUES>();
         let reward = reward.as_slice_mut().map_err(contiguous)?;
         let terminated = terminated.as_slice_mut().map_err(contiguous)?;
         let truncated = truncated.as_slice_mut().map_err(contiguous)?;
         state.step(py, self, &actions, |new_observation, new_reward, codes| {
-            let rows = observation.par_iter_mut().with_min_len(ROWS_MIN).zip(new_observation);
-            rows.for_each(|(row, new)| *row = *new);
+            new_observation.write(observation);
             reward.copy_from_slice(new_reward);
             for ((terminated, truncated), &code) in terminated.iter_mut().zip(truncated).zip(codes) {
                 *terminated = holds(code, Ended::terminated);
@@ -228,64 +258,23 @@ impl Batch {
             return Ok(None);
         }
         let of = |value: fn(&End) -> i64| PyArray1::from_iter(py, state.ends.iter().map(value));
-        let observations: Vec<f32> = state.ends.iter().flat_map(|end| end.observation).collect();
+        let observations: Vec<f32> = state.ends.iter().flat_map(|end| &end.observation[..self.n_values()]).copied().collect();
         Ok(Some((
             of(|end| end.env as i64),
             of(|end| end.code.into()),
-            of(|end| end.route.into()),
-            PyArray1::from_vec(py, observations).reshape([state.ends.len(), N_VALUES])?,
+            of(|end| end.episode.route.into()),
+            PyArray1::from_vec(py, observations).reshape([state.ends.len(), self.n_values()])?,
+            of(|end| end.episode.vehicle.into()),
         )))
     }
 
-    /// The episodes that the last step ended as Gymnasium's infos, None where it ended none: an array `key` and a mask
-    /// `_key` of all trucks. With `autoreset` in the same step those of the end are in `final_info`.
+    /// The episodes that the last step ended as Gymnasium's infos, None where it ended none.
     fn end_infos<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let state = self.state()?;
         if state.ends.is_empty() {
             return Ok(None);
         }
-        // An empty array of objects holds None, and is made faster by numpy than filled here.
-        let numpy = py.import(intern!(py, "numpy"))?;
-        let objects = || numpy.call_method1(intern!(py, "empty"), (self.n_envs, intern!(py, "O")));
-        let name = |route: u32| self.names[route as usize].bind(py);
-        let mut mask = vec![false; self.n_envs];
-        let mut codes = vec![0i64; self.n_envs];
-        let mut successes = vec![false; self.n_envs];
-        let routes = objects()?;
-        for End { env, code, route, .. } in &state.ends {
-            mask[*env] = true;
-            codes[*env] = i64::from(*code);
-            successes[*env] = *code == Ended::Arrived as u32;
-            routes.set_item(env, name(*route))?;
-        }
-        let mask = PyArray1::from_vec(py, mask);
-        let infos = PyDict::new(py);
-        for (key, masked, values) in [
-            (intern!(py, "ended"), intern!(py, "_ended"), PyArray1::from_vec(py, codes).into_any()),
-            (intern!(py, "is_success"), intern!(py, "_is_success"), PyArray1::from_vec(py, successes).into_any()),
-            (intern!(py, "route"), intern!(py, "_route"), routes),
-        ] {
-            infos.set_item(key, values)?;
-            infos.set_item(masked, &mask)?;
-        }
-        if self.autoreset != Autoreset::SameStep {
-            return Ok(Some(infos));
-        }
-        let (begun, last) = (objects()?, objects()?);
-        for End { env, observation, .. } in &state.ends {
-            begun.set_item(env, name(state.routes[*env]))?;
-            last.set_item(env, PyArray1::from_slice(py, observation))?;
-        }
-        let with_final = PyDict::new(py);
-        for (key, masked, values) in [
-            (intern!(py, "final_obs"), intern!(py, "_final_obs"), last),
-            (intern!(py, "final_info"), intern!(py, "_final_info"), infos.into_any()),
-            (intern!(py, "route"), intern!(py, "_route"), begun),
-        ] {
-            with_final.set_item(key, values)?;
-            with_final.set_item(masked, &mask)?;
-        }
-        Ok(Some(with_final))
+        infos::of_ends(py, &self.names, &state.ends, &state.episodes, self.autoreset, self.n_values()).map(Some)
     }
 
     fn begin_episodes(
@@ -294,7 +283,7 @@ impl Batch {
         envs: Vec<usize>,
         streams: Option<Vec<Option<(u32, u32)>>>,
         routes: Option<Vec<Option<String>>>,
-        starts: Option<Vec<Option<(f32, f32)>>>,
+        starts: Option<Vec<Option<GivenStart>>>,
     ) -> PyResult<()> {
         let n = envs.len();
         let lengths = [streams.as_ref().map(Vec::len), routes.as_ref().map(Vec::len), starts.as_ref().map(Vec::len)];
@@ -309,10 +298,11 @@ impl Batch {
                 env,
                 stream: streams.as_ref().and_then(|streams| streams[index]).map(|(seed, env)| Stream { seed, env }),
                 route: route.map(|name| self.route(name)).transpose()?,
-                start: starts.as_ref().and_then(|starts| starts[index]).map(|(offset, heading)| Start {
+                start: starts.as_ref().and_then(|starts| starts[index]).map(|(offset, heading, speed, vehicle)| Start {
                     offset,
                     heading,
-                    ..Start::default()
+                    speed,
+                    vehicle,
                 }),
             })
         };
@@ -386,10 +376,10 @@ impl Batch {
             }
         };
         let read = simulator.read(&[Column::Truck, Column::Ranges, Column::Ended]).map_err(|error| errors::of_simulator(&error))?;
-        let truck = values::<Truck>(&read[0])[env];
-        let ranges = values::<[f32; N_RAYS]>(&read[1])[env];
+        let truck = rows_of::<Truck>(&read[0])[env];
+        let ranges = rows_of::<[f32; N_RAYS]>(&read[1])[env];
         // A truck that goes on in another episode has not ended.
-        let code = if truck.held == 1 { values::<u32>(&read[2])[env] } else { Ended::Running as u32 };
+        let code = if truck.held == 1 { rows_of::<u32>(&read[2])[env] } else { Ended::Running as u32 };
         let shown = Shown { truck: &truck, ranges: &ranges, ended: Ended::from_code(code).unwrap_or(Ended::Running) };
         let picture = camera.draw(&shown);
         PyArray1::from_slice(py, picture).reshape([size as usize, size as usize, 3])
@@ -417,11 +407,6 @@ impl Batch {
             PyValueError::new_err(format!("routes: {name:?}; the batch drives {list}"))
         })
     }
-
-    /// An array of observations.
-    fn rows<'py>(&self, py: Python<'py>, bytes: &[u8]) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        PyArray1::from_slice(py, &values::<f32>(bytes)).reshape([self.n_envs, N_VALUES])
-    }
 }
 
 impl State {
@@ -432,45 +417,44 @@ impl State {
         py: Python,
         batch: &Batch,
         actions: &[u32],
-        deliver: impl FnOnce(&[[f32; N_VALUES]], &[f32], &[u32]) -> T + Send,
+        deliver: impl FnOnce(&Observed, &[f32], &[u32]) -> T + Send,
     ) -> PyResult<T> {
         self.check_process(&batch.device)?;
-        let State { simulator, pool, ends, routes, held, .. } = self;
+        let State { simulator, pool, ends, episodes, held, .. } = self;
         if batch.autoreset == Autoreset::Disabled
             && let Some(env) = held.iter().position(|held| *held)
         {
             return Err(errors::reset_needed(py, &format!("truck {env}: its episode has ended; begin another before the next step")));
         }
-        let same_step = batch.autoreset == Autoreset::SameStep;
         let stepped = pool.run(py, || {
             simulator.step(actions)?;
-            let read = simulator.read(if same_step { &READ[..] } else { &READ[..READ.len() - 1] })?;
-            let (observation, codes, trucks) = (values(&read[0]), values::<u32>(&read[2]), values::<Truck>(&read[3]));
-            let last = if same_step { values(&read[4]) } else { Cow::Borrowed(&*observation) };
+            let read = Read::of(simulator, &batch.read)?;
+            let (codes, trucks) = (read.rows::<u32>(Column::Ended), read.rows::<Truck>(Column::Truck));
+            let last = read.observed_last(batch.n_extras);
             if batch.autoreset == Autoreset::NextStep {
-                // Those that ended in the step before have begun, and no other is on another route.
+                // Those that ended in the step before have begun, and no other is in another episode.
                 for End { env, .. } in &*ends {
-                    routes[*env] = trucks[*env].route;
+                    episodes[*env] = Episode::of(&trucks[*env]);
                     held[*env] = false;
                 }
             }
             ends.clear();
             for (env, &code) in codes.iter().enumerate().filter(|&(_, &code)| code != Ended::Running as u32) {
-                ends.push(End { env, code, route: routes[env], observation: last[env] });
-                routes[env] = trucks[env].route;
+                ends.push(End { env, code, episode: episodes[env], observation: last.row(env) });
+                episodes[env] = Episode::of(&trucks[env]);
                 held[env] = trucks[env].held == 1;
             }
-            Ok(deliver(&observation, &values(&read[1]), &codes))
+            Ok(deliver(&read.observed(batch.n_extras), &read.rows(Column::Reward), &codes))
         })?;
         stepped.map_err(|error| errors::of_simulator(&error))
     }
 
     /// Looks at where trucks are after they were put there.
     fn look(&mut self) -> PyResult<()> {
-        let State { simulator, routes, held, ends, .. } = self;
+        let State { simulator, episodes, held, ends, .. } = self;
         let read = simulator.read(&[Column::Truck]).map_err(|error| errors::of_simulator(&error))?;
         ends.clear();
-        see(&values::<Truck>(&read[0]), routes, held);
+        see(&rows_of::<Truck>(&read[0]), episodes, held);
         Ok(())
     }
 
@@ -484,20 +468,12 @@ impl State {
     }
 }
 
-/// Takes down on which routes trucks are and which are held.
-fn see(trucks: &[Truck], routes: &mut Vec<u32>, held: &mut Vec<bool>) {
-    routes.clear();
-    routes.extend(trucks.iter().map(|truck| truck.route));
+/// Takes down which episodes trucks are in and which are held.
+fn see(trucks: &[Truck], episodes: &mut Vec<Episode>, held: &mut Vec<bool>) {
+    episodes.clear();
+    episodes.extend(trucks.iter().map(Episode::of));
     held.clear();
     held.extend(trucks.iter().map(|truck| truck.held == 1));
-}
-
-/// Bytes as values. Those read from a device need not be aligned.
-fn values<T: AnyBitPattern + NoUninit>(bytes: &[u8]) -> Cow<'_, [T]> {
-    match bytemuck::try_cast_slice(bytes) {
-        Ok(values) => Cow::Borrowed(values),
-        Err(_) => Cow::Owned(bytemuck::pod_collect_to_vec(bytes)),
-    }
 }
 
 fn holds(code: u32, is: fn(Ended) -> bool) -> bool {
@@ -549,7 +525,7 @@ fn engine_of(device: &str) -> PyResult<(Engine, String)> {
 fn writable<'py, T: Element>(array: &Bound<'py, PyAny>, name: &str, kind: &str, n_envs: usize) -> PyResult<PyReadwriteArray1<'py, T>> {
     let shape = format!("{kind} of shape ({n_envs},)");
     let array: PyReadwriteArray1<T> = array.extract().map_err(|_| unfit(name, &shape))?;
-    if array.len().is_ok_and(|len| len == n_envs) { Ok(array) } else { Err(unfit(name, &shape)) }
+    if array.len() == n_envs { Ok(array) } else { Err(unfit(name, &shape)) }
 }
 
 fn unfit(name: &str, needed: &str) -> PyErr {

@@ -1,6 +1,6 @@
 //! The layout of columns and observations, so that Python declares nothing twice.
 
-use offtrack::layout::{Column, Ended, OBSERVATION, structs};
+use offtrack::layout::{Column, EXTRAS, Ended, N_VALUES, OBSERVATION, structs};
 use offtrack::shared::Named;
 use pyo3::prelude::*;
 
@@ -37,6 +37,12 @@ fn of_field(name: &'static str, wgsl: &str) -> Field {
 #[pyfunction]
 pub fn observation_groups() -> Vec<(&'static str, usize, usize, f32, &'static str)> {
     OBSERVATION.iter().map(|values| (values.name, values.first, values.n, values.low, values.doc)).collect()
+}
+
+/// What may stand behind these, in the same form: a benchmark has the first so many. They are limited to -1..=1.
+#[pyfunction]
+pub fn extra_groups() -> Vec<(&'static str, usize, usize, f32, &'static str)> {
+    EXTRAS.iter().enumerate().map(|(index, extra)| (extra.name, N_VALUES + index, 1, -1.0, extra.doc)).collect()
 }
 
 /// The codes of `ended` in their order, by name.

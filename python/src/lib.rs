@@ -5,7 +5,9 @@
 mod actions; // arrays of actions
 mod batch; // the class Batch
 mod errors; // errors of Rust as exceptions of Python
+mod infos; // infos of episodes that ended
 mod layout; // columns as numpy sees them
+mod observed; // observations with the benchmark's extras
 mod policy; // the class Network
 mod pool; // threads that survive a fork
 mod worlds; // scenarios, read and baked once
@@ -22,6 +24,7 @@ fn _offtrack(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(policy::write_policy, module)?)?;
     module.add_function(wrap_pyfunction!(layout::column_layouts, module)?)?;
     module.add_function(wrap_pyfunction!(layout::observation_groups, module)?)?;
+    module.add_function(wrap_pyfunction!(layout::extra_groups, module)?)?;
     module.add_function(wrap_pyfunction!(layout::end_codes, module)?)?;
     module.add_function(wrap_pyfunction!(worlds::scenario_names, module)?)?;
     Ok(())

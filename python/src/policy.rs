@@ -5,13 +5,13 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
-use offtrack::layout::N_VALUES;
+use offtrack::layout::{N_EXTRAS, N_VALUES};
 use offtrack_policy::{Activation, Error, Layer, Normalisation, Policy};
 use pyo3::exceptions::{PyOSError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::pool::Pool;
-use crate::worlds;
+use crate::{observed, worlds};
 
 /// A policy. The class `offtrack_sim.Policy` wraps it and documents it.
 #[pyclass(frozen, module = "offtrack_sim._offtrack")]
@@ -29,13 +29,7 @@ impl Network {
 
     #[staticmethod]
     fn load(file: &str) -> PyResult<Network> {
-        let policy = Policy::load(Path::new(file)).map_err(refused)?;
-        if !policy.extras.is_empty() {
-            let extras = policy.extras.join(", ");
-            let message = format!("{file}: observes {extras} beside the observation; Python drives policies without such extras");
-            return Err(PyValueError::new_err(message));
-        }
-        Ok(Network::new(policy))
+        Policy::load(Path::new(file)).map(Network::new).map_err(refused)
     }
 
     #[getter]
@@ -48,6 +42,12 @@ impl Network {
         &self.policy.benchmark
     }
 
+    /// Names of the extras that it observes behind an observation's values.
+    #[getter]
+    fn extras(&self) -> &[String] {
+        &self.policy.extras
+    }
+
     #[getter]
     fn action_table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let table: Vec<f32> = self.policy.actions.iter().flat_map(|action| [action.steering, action.speed]).collect();
@@ -55,14 +55,14 @@ impl Network {
     }
 
     fn logits<'py>(&self, py: Python<'py>, observations: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let rows = rows(observations)?;
-        let logits = self.run(py, || self.policy.logits(&rows))?;
-        PyArray1::from_vec(py, logits).reshape([rows.len(), self.policy.actions.len()])
+        let (values, extras) = self.split(observations)?;
+        let logits = self.run(py, || self.policy.logits_beside(&values, &extras))?;
+        PyArray1::from_vec(py, logits).reshape([values.len(), self.policy.actions.len()])
     }
 
     fn act<'py>(&self, py: Python<'py>, observations: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<i64>>> {
-        let rows = rows(observations)?;
-        let actions = self.run(py, || self.policy.act(&rows))?;
+        let (values, extras) = self.split(observations)?;
+        let actions = self.run(py, || self.policy.act_beside(&values, &extras))?;
         Ok(PyArray1::from_iter(py, actions.into_iter().map(i64::from)))
     }
 }
@@ -79,18 +79,33 @@ impl Network {
         let mut pool = self.pool.lock_py_attached(py).unwrap_or_else(|poisoned| poisoned.into_inner());
         pool.run(py, work)
     }
+
+    /// An array of observations, `[n, 69 + extras]`: the values and, where the policy observes some, the extras.
+    fn split(&self, observations: &Bound<PyAny>) -> PyResult<Split> {
+        let n_extras = self.policy.extras.len();
+        let n_values = N_VALUES + n_extras;
+        let needed = || PyTypeError::new_err(format!("observations: a numpy array of float32 and shape (n, {n_values}) is needed"));
+        let array: PyReadonlyArray2<f32> = observations.extract().map_err(|_| needed())?;
+        let found = array.shape()[1];
+        if found != n_values {
+            let extras = observed::described(self.policy.extras.iter().map(String::as_str));
+            return Err(PyValueError::new_err(format!("observations: {found} values each; {n_values} are needed{extras}")));
+        }
+        let values = array.as_slice().map_err(|_| needed())?;
+        if n_extras == 0 {
+            return Ok((values.as_chunks().0.to_vec(), Vec::new()));
+        }
+        let split = |row: &[f32]| {
+            let (values, extras) = row.split_at(N_VALUES);
+            let padded = |index: usize| extras.get(index).copied().unwrap_or_default();
+            (std::array::from_fn(|index| values[index]), std::array::from_fn(padded))
+        };
+        Ok(values.chunks_exact(n_values).map(split).unzip())
+    }
 }
 
-/// An array of observations, `[n, 69]`.
-fn rows(observations: &Bound<PyAny>) -> PyResult<Vec<[f32; N_VALUES]>> {
-    let needed = || PyTypeError::new_err(format!("observations: a numpy array of float32 and shape (n, {N_VALUES}) is needed"));
-    let array: PyReadonlyArray2<f32> = observations.extract().map_err(|_| needed())?;
-    if array.shape()[1] != N_VALUES {
-        return Err(PyValueError::new_err(format!("observations: {} values each; {N_VALUES} are needed", array.shape()[1])));
-    }
-    let values = array.as_slice().map_err(|_| needed())?;
-    Ok(values.as_chunks().0.to_vec())
-}
+/// Values of observations, and the extras beside them.
+type Split = (Vec<[f32; N_VALUES]>, Vec<[f32; N_EXTRAS]>);
 
 fn refused(error: Error) -> PyErr {
     PyValueError::new_err(error.to_string())
@@ -102,33 +117,44 @@ pub fn policy_names() -> Vec<&'static str> {
     Policy::shipped_names().to_vec()
 }
 
-/// Writes a network as a policy file for a benchmark's action table: weights `[inputs, outputs]` and biases of each
-/// layer, and the observation's mean and factor.
+/// Writes a network as a policy file for a benchmark's action table and extras: weights `[inputs, outputs]` and biases
+/// of each layer, and the observation's mean and factor, none for a network without normalisation.
 #[pyfunction]
 pub fn write_policy(
     file: &str,
     scenario: &str,
     layers: Vec<(PyReadonlyArray2<f32>, PyReadonlyArray1<f32>)>,
     activation: &str,
-    mean: PyReadonlyArray1<f32>,
-    factor: PyReadonlyArray1<f32>,
+    normalisation: Option<(PyReadonlyArray1<f32>, PyReadonlyArray1<f32>)>,
 ) -> PyResult<()> {
     let Some(activation) = Activation::ALL.into_iter().find(|known| known.name() == activation) else {
         let known = Activation::ALL.map(Activation::name).join(", ");
         return Err(PyValueError::new_err(format!("activation: {activation:?}; must be one of {known}")));
     };
-    let (name, actions) = worlds::action_table(scenario)?;
+    let (name, actions, extras) = worlds::policy_table(scenario)?;
+    let n_values = N_VALUES + extras.len();
     let vector = |array: &PyReadonlyArray1<f32>| array.as_array().to_vec();
     let layer = |(weights, biases): &(PyReadonlyArray2<f32>, PyReadonlyArray1<f32>)| Layer {
         weights: weights.as_array().iter().copied().collect(),
         biases: vector(biases),
     };
+    let normalisation = match normalisation {
+        None => Normalisation::none(n_values),
+        Some((mean, factor)) => Normalisation { mean: vector(&mean), factor: vector(&factor) },
+    };
+    // The factor is that of a variance.
+    for (name, found) in [("mean", normalisation.mean.len()), ("variance", normalisation.factor.len())] {
+        if found != n_values {
+            let extras = observed::described(extras.iter().copied());
+            return Err(PyValueError::new_err(format!("{name}: shape ({found},); ({n_values},) is needed{extras}")));
+        }
+    }
     let policy = Policy {
         name: file.to_owned(),
         benchmark: name,
         actions,
-        extras: Vec::new(),
-        normalisation: Normalisation { mean: vector(&mean), factor: vector(&factor) },
+        extras: extras.into_iter().map(str::to_owned).collect(),
+        normalisation,
         layers: layers.iter().map(layer).collect(),
         activation,
     };

@@ -97,12 +97,12 @@ pub fn scenario_names() -> Vec<&'static str> {
     Kind::Benchmark.names().collect()
 }
 
-/// A benchmark's name, and its action table.
-pub fn action_table(scenario: &str) -> PyResult<(String, Vec<Action>)> {
+/// A benchmark's name, its action table, and the names of the extras that it observes.
+pub fn policy_table(scenario: &str) -> PyResult<(String, Vec<Action>, Vec<&'static str>)> {
     let cache = Cache::of_user();
     let loading = Loading { cache: cache.as_ref(), ..Loading::PLAIN };
     let scenario = Scenario::load(scenario, &loading).map_err(|error| errors::of_reader(&error))?;
     let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
     let rig = scenario.vehicle.rig(&scenario.load, substep, scenario.steer_max);
-    Ok((scenario.name.clone(), scenario.actions(rig.steer_max)))
+    Ok((scenario.name.clone(), scenario.actions(rig.steer_max), scenario.extras.names()))
 }

@@ -220,6 +220,7 @@ def test_wrong_outputs_and_requests_are_refused() -> None:
     for index, wrong in [
         (0, np.zeros((3, 69))),
         (0, np.zeros((4, 69), np.float32)),
+        (0, np.zeros((69, 3), np.float32)),
         (1, np.zeros(2, np.float32)),
         (2, np.zeros(3)),
     ]:

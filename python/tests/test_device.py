@@ -34,6 +34,27 @@ def test_a_device_and_the_processor_drive_the_same_episodes(device: str) -> None
         assert here.batch.tally()["episodes"] == there.batch.tally()["episodes"] > 100
 
 
+def test_a_device_and_the_processor_observe_the_same_extras(device: str) -> None:
+    here = offtrack_sim.Batch("laden2026", 64, seed=5)
+    there = offtrack_sim.Batch("laden2026", 64, seed=5, device="gpu")
+    assert here.extras == there.extras and (here.vehicles() == there.vehicles()).all()
+    assert np.allclose(here.observation()[:, 69:], there.observation()[:, 69:], atol=1e-5)
+    rng = np.random.default_rng(1)
+    n_ends = 0
+    for step in range(60):
+        actions = rng.integers(0, 45, 64)
+        one, other = here.step(actions), there.step(actions)
+        # A software device and the processor differ by 4e-7.
+        assert np.allclose(one[0][:, 69:], other[0][:, 69:], atol=1e-5), step
+        ends, others = here.ended(), there.ended()
+        assert (ends is None) == (others is None), step
+        if ends is not None and others is not None:
+            n_ends += len(ends.envs)
+            assert (ends.vehicles == others.vehicles).all() and ends.observations.shape == (len(ends.envs), 77)
+            assert np.allclose(ends.observations[:, 69:], others.observations[:, 69:], atol=1e-5), step
+    assert 20 < n_ends
+
+
 def test_an_unknown_device_is_refused_with_those_there_are(device: str) -> None:
     with pytest.raises(RuntimeError) as caught:
         offtrack_sim.Batch(device="no such card")

@@ -24,11 +24,11 @@ class StandIn:
     single_action_space: Any
 
     def __init__(self, buf: Any = None) -> None:
-        assert self.num_agents >= 1 and self.single_observation_space.shape == (69,) and self.single_action_space.n > 1
+        assert self.num_agents >= 1 and self.single_observation_space.shape > (1,) and self.single_action_space.n > 1
         assert not hasattr(self, "observation_space") and not hasattr(self, "action_space")
-        n = self.num_agents
+        n, shape = self.num_agents, self.single_observation_space.shape
         if buf is None:
-            buf = {"observations": np.zeros((n, 69), np.float32), "rewards": np.zeros(n, np.float32)}
+            buf = {"observations": np.zeros((n, *shape), np.float32), "rewards": np.zeros(n, np.float32)}
             buf |= {name: np.zeros(n, bool) for name in ("terminals", "truncations")}
             buf |= {"masks": np.ones(n, bool), "actions": np.zeros(n, np.int32)}
         for name, values in buf.items():
@@ -49,9 +49,13 @@ def puffer() -> Iterator[types.ModuleType]:
         del sys.modules["pufferlib"], sys.modules["offtrack_sim.puffer"]
 
 
-def test_results_are_those_of_a_batch_with_rewards_scaled(puffer: types.ModuleType) -> None:
-    env = puffer.RoundaboutPuffer(num_envs=N, reward_scale=0.5, seed=3)
-    batch = offtrack_sim.Batch(num_envs=N, seed=3)
+@pytest.mark.parametrize(("scenario", "n_values"), [("attard2023", 69), ("laden2026", 77)])
+def test_results_are_those_of_a_batch_with_rewards_scaled(
+    puffer: types.ModuleType, scenario: str, n_values: int
+) -> None:
+    env = puffer.RoundaboutPuffer(scenario, num_envs=N, reward_scale=0.5, seed=3)
+    batch = offtrack_sim.Batch(scenario, num_envs=N, seed=3)
+    assert env.single_observation_space.shape == (n_values,)
     observation, infos = env.reset(seed=3)
     assert infos == [] and np.array_equal(observation, batch.observation())
     actions = np.random.default_rng(0)

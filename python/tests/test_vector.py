@@ -54,15 +54,17 @@ def drive_both(ours: Any, theirs: Any, mode: AutoresetMode, steps: int, action: 
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_many_trucks_equal_as_many_single_ones_in_every_value(mode: AutoresetMode) -> None:
-    ours = offtrack_sim.make_vec(num_envs=N, autoreset_mode=mode)
-    theirs = SyncVectorEnv([offtrack_sim.Roundabout for _ in range(N)], autoreset_mode=mode)
+@pytest.mark.parametrize("scenario", ["attard2023", "laden2026"])
+def test_many_trucks_equal_as_many_single_ones_in_every_value(scenario: str, mode: AutoresetMode) -> None:
+    ours = offtrack_sim.make_vec(scenario, num_envs=N, autoreset_mode=mode)
+    theirs = SyncVectorEnv([lambda: offtrack_sim.Roundabout(scenario) for _ in range(N)], autoreset_mode=mode)
+    n_actions = len(ours.batch.action_table)
     seeds: list[int | None] = list(range(100, 100 + N))
     one, other = ours.reset(seed=seeds), theirs.reset(seed=seeds)
     assert (one[0] == other[0]).all()
     assert_same(one[1], other[1])
     rng = np.random.default_rng(3)
-    ended = drive_both(ours, theirs, mode, 400, lambda _: rng.integers(0, 9, N))
+    ended = drive_both(ours, theirs, mode, 400, lambda _: rng.integers(0, n_actions, N))
     assert 200 < ended
     # Another reset goes on with the next episodes.
     one, other = ours.reset(), theirs.reset()

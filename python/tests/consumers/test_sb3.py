@@ -17,9 +17,10 @@ from offtrack_sim.sb3 import RoundaboutVecEnv
 N = 12
 
 
-def test_every_value_is_that_of_dummy_vec_env() -> None:
-    ours = RoundaboutVecEnv(num_envs=N, num_threads=1)
-    theirs = DummyVecEnv([offtrack_sim.Roundabout] * N)
+@pytest.mark.parametrize("scenario", ["attard2023", "laden2026"])
+def test_every_value_is_that_of_dummy_vec_env(scenario: str) -> None:
+    ours = RoundaboutVecEnv(scenario, num_envs=N, num_threads=1)
+    theirs = DummyVecEnv([lambda: offtrack_sim.Roundabout(scenario)] * N)
     assert ours.seed(7) == theirs.seed(7)
     assert np.array_equal(ours.reset(), theirs.reset())
     assert ours.reset_infos == theirs.reset_infos

@@ -1,0 +1,61 @@
+"""What codes, observations and columns are made of, as the simulator declares it."""
+
+from __future__ import annotations
+
+import enum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import _offtrack
+
+
+class Ended(enum.IntEnum):
+    """Why an episode ended. Failure wins over arrival, everything wins over the time limit."""
+
+    RUNNING = 0
+    ARRIVED = 1
+    TRACTOR_COLLIDED = 2
+    TRAILER_COLLIDED = 3
+    ROLLED_OVER = 4
+    JACKKNIFED = 5
+    STRAYED = 6
+    TIMED_OUT = 7
+
+
+assert [ended.name.lower() for ended in Ended] == _offtrack.end_codes()
+
+
+class Values(NamedTuple):
+    """Neighbouring values of an observation that measure the same thing."""
+
+    name: str
+    """Name of the group."""
+    first: int
+    """Index of its first value."""
+    n: int
+    """Number of its values."""
+    low: float
+    """The least that they can be: 0, of angles -1. The largest is 1."""
+    doc: str
+    """What each value is, what it is divided by, and where it is limited."""
+
+
+OBSERVATION: tuple[Values, ...] = tuple(Values(*values) for values in _offtrack.observation_groups())
+"""What each of the 69 values of an observation is, group by group."""
+
+EXTRAS: tuple[Values, ...] = tuple(Values(*values) for values in _offtrack.extra_groups())
+"""What may stand behind these values, a value each: a benchmark with extras has the first so many, ``Batch.extras``."""
+
+
+def _dtype(fields: list[tuple[str, str, int]]) -> np.dtype[Any]:
+    def typed(kind: str, n: int) -> np.dtype[Any]:
+        return np.dtype((kind, (n,))) if n else np.dtype(kind)
+
+    if len(fields) == 1 and not fields[0][0]:
+        return typed(*fields[0][1:])
+    return np.dtype([(name, typed(kind, n)) for name, kind, n in fields])
+
+
+COLUMNS: dict[str, np.dtype[Any]] = {name: _dtype(fields) for name, fields in _offtrack.column_layouts()}
+"""Every column of a batch and the type of a row: a number, an array of numbers, or a record with named fields."""

@@ -1,0 +1,139 @@
+//! Infos of Gymnasium's vector environments: for each key an array of all trucks and a mask `_key`.
+
+use numpy::PyArray1;
+use offtrack::layout::{Ended, Truck};
+use offtrack::simulator::Autoreset;
+use offtrack::world::World;
+use pyo3::intern;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString};
+
+use crate::observed::N_VALUES_MAX;
+
+/// What infos name of an episode: its route, and vehicle and load where the benchmark has several.
+const KEYS: [&str; 3] = ["route", "vehicle", "load"];
+
+/// What an episode is drawn from.
+#[derive(Clone, Copy)]
+pub struct Episode {
+    /// Index of its route in the world.
+    pub route: u32,
+    /// Index of its vehicle in the world.
+    pub vehicle: u32,
+}
+
+impl Episode {
+    /// The one that a truck is in.
+    pub fn of(truck: &Truck) -> Episode {
+        Episode { route: truck.route, vehicle: truck.vehicle }
+    }
+}
+
+/// An episode that the last step ended.
+pub struct End {
+    /// Index of the truck.
+    pub env: usize,
+    /// Why it ended.
+    pub code: u32,
+    /// What it was drawn from.
+    pub episode: Episode,
+    /// After the last action; zeros behind the benchmark's values.
+    pub observation: [f32; N_VALUES_MAX],
+}
+
+/// Names of a world's routes and vehicles.
+pub struct Names {
+    routes: Vec<Py<PyString>>,
+    /// Vehicle and load of each row of the world's table; empty where all rows have the same.
+    vehicles: Vec<[Py<PyString>; 2]>,
+}
+
+impl Names {
+    /// Those of a world.
+    pub fn new(py: Python, world: &World) -> Names {
+        let text = |name: &String| PyString::new(py, name).unbind();
+        let classes: Vec<_> = world.classes.iter().map(|class| [text(&class.vehicle), text(&class.load)]).collect();
+        let pair = |class: u32| classes[class as usize].each_ref().map(|name| name.clone_ref(py));
+        let rows = world.rigs.iter().filter(|_| 1 < classes.len());
+        Names { routes: world.route_names.iter().map(text).collect(), vehicles: rows.map(|rig| pair(rig.class_index)).collect() }
+    }
+
+    /// What an episode's [`KEYS`] are.
+    fn of(&self, episode: Episode) -> impl Iterator<Item = &Py<PyString>> {
+        let vehicle = self.vehicles.get(episode.vehicle as usize);
+        std::iter::once(&self.routes[episode.route as usize]).chain(vehicle.into_iter().flatten())
+    }
+
+    /// Keys that an episode has.
+    fn keys(&self) -> &'static [&'static str] {
+        if self.vehicles.is_empty() { &KEYS[..1] } else { &KEYS }
+    }
+
+    /// An array of each of the keys that names some trucks' episodes; `None` of the others.
+    fn arrays<'py>(
+        &self,
+        py: Python<'py>,
+        n_envs: usize,
+        episodes: impl Iterator<Item = (usize, Episode)>,
+    ) -> PyResult<Vec<(&'static str, Bound<'py, PyAny>)>> {
+        let keyed = |key: &&'static str| Ok((*key, objects(py, n_envs)?));
+        let arrays = self.keys().iter().map(keyed).collect::<PyResult<Vec<_>>>()?;
+        for (env, episode) in episodes {
+            for ((_, array), name) in arrays.iter().zip(self.of(episode)) {
+                array.set_item(env, name)?;
+            }
+        }
+        Ok(arrays)
+    }
+}
+
+/// The infos of the episodes that a step ended. With `autoreset` in the same step those of the end are in `final_info`,
+/// beside the last observations of `n_values` values; `begun` has the episodes that trucks are in after the step.
+pub fn of_ends<'py>(
+    py: Python<'py>,
+    names: &Names,
+    ends: &[End],
+    begun: &[Episode],
+    autoreset: Autoreset,
+    n_values: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let n_envs = begun.len();
+    let mut mask = vec![false; n_envs];
+    let mut codes = vec![0i64; n_envs];
+    let mut successes = vec![false; n_envs];
+    for End { env, code, .. } in ends {
+        mask[*env] = true;
+        codes[*env] = i64::from(*code);
+        successes[*env] = *code == Ended::Arrived as u32;
+    }
+    let mask = PyArray1::from_vec(py, mask);
+    let infos = PyDict::new(py);
+    let put = |infos: &Bound<PyDict>, key: &str, values: Bound<PyAny>| {
+        infos.set_item(key, values)?;
+        infos.set_item(format!("_{key}"), &mask)
+    };
+    put(&infos, "ended", PyArray1::from_vec(py, codes).into_any())?;
+    put(&infos, "is_success", PyArray1::from_vec(py, successes).into_any())?;
+    for (key, array) in names.arrays(py, n_envs, ends.iter().map(|end| (end.env, end.episode)))? {
+        put(&infos, key, array)?;
+    }
+    if autoreset != Autoreset::SameStep {
+        return Ok(infos);
+    }
+    let last = objects(py, n_envs)?;
+    for End { env, observation, .. } in ends {
+        last.set_item(env, PyArray1::from_slice(py, &observation[..n_values]))?;
+    }
+    let with_final = PyDict::new(py);
+    put(&with_final, "final_obs", last)?;
+    put(&with_final, "final_info", infos.into_any())?;
+    for (key, array) in names.arrays(py, n_envs, ends.iter().map(|end| (end.env, begun[end.env])))? {
+        put(&with_final, key, array)?;
+    }
+    Ok(with_final)
+}
+
+/// An array of objects: an empty one holds None, and numpy makes it faster than it could be filled here.
+fn objects(py: Python<'_>, n_envs: usize) -> PyResult<Bound<'_, PyAny>> {
+    py.import(intern!(py, "numpy"))?.call_method1(intern!(py, "empty"), (n_envs, intern!(py, "O")))
+}
