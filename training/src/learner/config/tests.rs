@@ -224,7 +224,10 @@ fn every_training_file_reads_by_path_and_by_name() {
         assert_eq!(Config::read(Path::new(file.file_stem().unwrap())).unwrap(), by_path);
     }
     let message = Config::read(Path::new("papre")).unwrap_err().to_string();
-    assert!(message.contains("papre: is no training file: the program comes with default, best, attard, gpu, as-run, laden, laden-50, paper"), "{message}");
+    assert!(
+        message.contains("papre: is no training file: the program comes with default, best, attard, gpu, as-run, laden, laden-50, paper"),
+        "{message}"
+    );
 }
 
 #[test]
