@@ -25,16 +25,19 @@ SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
 # Name, and what is changed in the benchmarks: TABLE.KEY and its value. Rewards and endings are those that it trains with;
 # it is examined with those of laden2026.
+AT_ONE = {"ending.rollover_ratio": 1.0}
 CHOICES = [
-    ("as laden2026-training", {}),
+    ("as laden2026-training: rolled over from 0.85 on", {}),
+    ("rolled over from 1 on", AT_ONE),
+    (
+        "from 1 on, load transfer above 0.7: -100",
+        {**AT_ONE, "reward.load_transfer": -100.0, "reward.load_transfer_margin": 0.7},
+    ),
+    ("from 1 on, rollover -500", {**AT_ONE, "reward.rollover": -500.0}),
+    ("rolled over from 0.75 on", {"ending.rollover_ratio": 0.75}),
     ("time -5", {"reward.time": -5.0}),
-    ("load transfer above 0.6: -50", {"reward.load_transfer": -50.0}),
-    ("load transfer above 0.7: -100", {"reward.load_transfer": -100.0, "reward.load_transfer_margin": 0.7}),
     ("lateral acceleration -20", {"reward.lateral_acceleration": -20.0}),
     ("jerk -10", {"reward.jerk": -10.0}),
-    ("rollover -500", {"reward.rollover": -500.0}),
-    ("rolled over from 0.85 on", {"ending.rollover_ratio": 0.85}),
-    ("rolled over from 0.9 on", {"ending.rollover_ratio": 0.9}),
     ("blind", {"observation.extras": '"blind"'}),
     ("oracle", {"observation.extras": '"oracle"'}),
     ("no extras", {"observation.extras": '"none"'}),
