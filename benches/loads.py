@@ -19,6 +19,8 @@ import tempfile
 import zlib
 from pathlib import Path
 
+from ablations.series import SCENARIOS, with_paths, write_json
+
 ROOT = Path(__file__).resolve().parents[1]
 LOADS = ["empty", "half", "laden", "laden_high"]
 # Benchmark, split, and what the table calls it.
@@ -61,13 +63,12 @@ def condensed(report):
 
 def at_one_speed(folder, base, kmh):
     """A benchmark with loads for trucks of one target speed, without extras: what the shipped policy for attard2023 knows."""
-    text = (ROOT / "scenarios" / f"{base}.toml").read_text()
+    text = (SCENARIOS / f"{base}.toml").read_text()
     text = re.sub(r"^speeds_kmh = .*$", f"speeds_kmh = [{kmh}.0]", text, flags=re.MULTILINE)
     text = re.sub(r"^speed_kmh = .*$", f"speed_kmh = {kmh}.0", text, flags=re.MULTILINE)
     text = text.replace('extras = "mass"', 'extras = "none"')
-    text = re.sub(r'^(file|distribution) = "(.*)"$', rf'\1 = "{ROOT}/scenarios/\2"', text, flags=re.MULTILINE)
     file = Path(folder) / f"{base}-{kmh}.toml"
-    file.write_text(text)
+    file.write_text(with_paths(text))
     return file
 
 
@@ -183,9 +184,7 @@ def main():
             if (driver, place, load) in done:
                 continue
             results.append({"driver": driver, "place": place, "load": load, "report": evaluated(args.offtrack, *job)})
-            temporary = args.json.with_suffix(".tmp")
-            temporary.write_text(json.dumps(results, indent=1) + "\n")
-            temporary.replace(args.json)
+            write_json(args.json, results)
             print(driver, place, load, file=sys.stderr, flush=True)
     print(tables(results))
 

@@ -8,16 +8,11 @@ report is not repeated, so an interrupted series can go on. Standard library onl
     python3 benches/ablations/ablate.py --offtrack target/release/offtrack --json docs/benchmarks/ablations.json
 """
 
-import argparse
 import json
-import os
 import re
 import statistics
-import subprocess
-import sys
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
-from queue import Queue
+
+import series
 
 # What all choices have in common on top of training/configs/default.toml, so that the table stays what it is when that
 # file changes. The policy is examined once, at the end, with three episodes on each validation route.
@@ -101,45 +96,27 @@ CHOICES = [
 
 def write_prices(folder):
     """The training benchmark with each of PRICES, as `folder`/NAME.toml."""
-    scenarios = Path(__file__).resolve().parents[2] / "scenarios"
     folder.mkdir(parents=True, exist_ok=True)
     for name, prices in PRICES.items():
-        text = (scenarios / "random2026-training.toml").read_text()
+        text = (series.SCENARIOS / "random2026-training.toml").read_text()
         for key, value in prices.items():
             text, found = re.subn(rf"^{key} = .*$", f"{key} = {value}", text, flags=re.MULTILINE)
             assert found == 1, key
-        for key in ["vehicle", "distribution"]:
-            text, found = re.subn(rf'^{key} = "(.*)"$', rf'{key} = "{scenarios}/\1"', text, flags=re.MULTILINE)
-            assert found == 1, key
-        (folder / f"{name}.toml").write_text(text)
+        (folder / f"{name}.toml").write_text(series.with_paths(text))
 
 
 def train(core, args, name, settings, steps, seed):
     """One run, pinned to a core; returns its row of the result."""
     folder = args.runs / f"{name.replace(' ', '-').replace(',', '')}-{seed}"
-    report = folder / "report.json"
-    if not report.is_file():
-        if folder.exists():
-            # It was interrupted before: a new run cannot use its folder.
-            subprocess.run(["rm", "-r", str(folder)], check=True)
-        command = [str(args.offtrack), "train", "default", "--name", folder.name, "--out", str(args.runs)]
-        command += ["--seed", str(seed), "--steps", str(steps)]
-        for setting in COMMON + settings:
-            key, value = setting.split("=", 1)
-            if value in PRICES:
-                value = args.runs / "scenarios" / f"{value}.toml"
-            command += ["--set", f"{key}={value}"]
-        done = subprocess.run(
-            command,
-            capture_output=True,
-            text=True,
-            preexec_fn=lambda: os.sched_setaffinity(0, {core}),
-        )
-        if done.returncode != 0:
-            return {"seed": seed, "failed": done.stderr.strip().splitlines()[-1]}
-    # Nothing resumes this run, and the replay buffer in its checkpoint fills the disk.
-    (folder / "checkpoint.safetensors").unlink(missing_ok=True)
-    finished = json.loads(report.read_text())
+    chosen = []
+    for setting in COMMON + settings:
+        key, value = setting.split("=", 1)
+        if value in PRICES:
+            value = args.runs / "scenarios" / f"{value}.toml"
+        chosen.append(f"{key}={value}")
+    if failure := series.trained(core, args, folder, "default", seed, steps, chosen):
+        return {"seed": seed, "failed": failure}
+    finished = json.loads((folder / "report.json").read_text())
     validation = finished["validation"]
     return {
         "seed": seed,
@@ -172,46 +149,14 @@ def table(rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--offtrack", type=Path, default=Path("target/release/offtrack"))
-    parser.add_argument("--seeds", default="0,1,2", help="seeds of each choice")
-    parser.add_argument("--choice", action="append", help="only this choice; may be given several times")
-    parser.add_argument("--cores", default=None, help="cores to run on, as in 0,1; default: all")
-    parser.add_argument("--runs", type=Path, default=Path("runs/ablations"))
-    parser.add_argument("--json", type=Path, required=True)
-    args = parser.parse_args()
-    cores = Queue()
-    available = [int(core) for core in args.cores.split(",")] if args.cores else sorted(os.sched_getaffinity(0))
-    for core in available:
-        cores.put(core)
-    args.offtrack, args.runs = args.offtrack.resolve(), args.runs.resolve()
+    args = series.arguments(__doc__, "runs/ablations", [choice[0] for choice in CHOICES])
     write_prices(args.runs / "scenarios")
-    wanted = [choice for choice in CHOICES if args.choice is None or choice[0] in args.choice]
-
-    def job(name, settings, steps, seed):
-        core = cores.get()
-        try:
-            return train(core, args, name, settings, steps, seed)
-        finally:
-            cores.put(core)
-
-    with ThreadPoolExecutor(len(available)) as pool:
-        # One seed of every choice before the next seed: an interrupted series has as many of each.
-        jobs = {
-            (choice[0], seed): pool.submit(job, *choice, seed)
-            for seed in map(int, args.seeds.split(","))
-            for choice in wanted
-        }
-        rows = {name: {"choice": name, "settings": settings, "runs": []} for name, settings, _ in wanted}
-        for (name, seed), running in jobs.items():
-            result = running.result()
-            rows[name]["runs"].append(result)
-            print(name, json.dumps(result), file=sys.stderr, flush=True)
-            whole = {"cores_per_run": 1, "common": COMMON, "choices": list(rows.values())}
-            temporary = args.json.with_suffix(".tmp")
-            temporary.write_text(json.dumps(whole, indent=1) + "\n")
-            temporary.replace(args.json)
-    print(table(rows.values()))
+    choices = {
+        name: (settings, steps) for name, settings, steps in CHOICES if args.choice is None or name in args.choice
+    }
+    wanted = {name: {"choice": name, "settings": settings, "runs": []} for name, (settings, _) in choices.items()}
+    run = lambda core, name, seed: train(core, args, name, *choices[name], seed)
+    series.run_all(args, wanted, run, {"common": COMMON}, table)
 
 
 if __name__ == "__main__":

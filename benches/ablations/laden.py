@@ -8,20 +8,14 @@ so an interrupted series can go on. Standard library only.
     python3 benches/ablations/laden.py --offtrack target/release/offtrack --json docs/benchmarks/ablations-laden.json
 """
 
-import argparse
 import json
-import os
 import re
 import statistics
-import subprocess
-import sys
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
-from queue import Queue
+
+import series
 
 STEPS = 1_600_000
 EPISODES = 4
-SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
 # Name, and what is changed in the benchmarks: TABLE.KEY and its value. Rewards and endings are those that it trains with;
 # it is examined with those of laden2026.
@@ -52,7 +46,7 @@ def changed(text, changes):
         head, rest = text.split(f"[{table}]\n", 1)
         rest = re.sub(rf"^{key} = .*\n", "", rest, count=1, flags=re.MULTILINE)
         text = f"{head}[{table}]\n{key} = {value}\n{rest}"
-    return re.sub(r'^(file|distribution) = "(.*)"$', rf'\1 = "{SCENARIOS}/\2"', text, flags=re.MULTILINE)
+    return series.with_paths(text)
 
 
 def write_benchmarks(folder, name, changes):
@@ -66,15 +60,9 @@ def write_benchmarks(folder, name, changes):
             if base == "training" or not path.startswith(("reward.", "ending."))
         }
         file = folder / f"{name}-{base}.toml"
-        file.write_text(changed((SCENARIOS / f"laden2026-{base}.toml").read_text(), own))
+        file.write_text(changed((series.SCENARIOS / f"laden2026-{base}.toml").read_text(), own))
         files.append(file)
     return files
-
-
-def finished(command, core):
-    """Runs a command on a core; the last line of its errors where it fails."""
-    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=lambda: os.sched_setaffinity(0, {core}))
-    return None if done.returncode == 0 else done.stderr.strip().splitlines()[-1]
 
 
 def run(core, args, choice, changes, seed):
@@ -82,24 +70,10 @@ def run(core, args, choice, changes, seed):
     name = re.sub(r"[^a-z0-9.]+", "-", choice)
     training, examined = write_benchmarks(args.runs / "scenarios", name, changes)
     folder = args.runs / f"{name}-{seed}"
-    report, evaluation = folder / "report.json", args.runs / f"{name}-{seed}.json"
-    if not report.is_file():
-        if folder.exists():
-            # It was interrupted before: a new run cannot use its folder.
-            subprocess.run(["rm", "-r", str(folder)], check=True)
-        command = [str(args.offtrack), "train", "best", "--name", folder.name, "--out", str(args.runs)]
-        command += ["--seed", str(seed), "--steps", str(STEPS)]
-        for key, value in [
-            ("benchmark", training),
-            ("training_benchmark", training),
-            ("also_evaluate", ""),
-            ("validation", ""),
-        ]:
-            command += ["--set", f"{key}={value}"]
-        if failure := finished(command, core):
-            return {"seed": seed, "failed": failure}
-    # Nothing resumes this run, and the replay buffer in its checkpoint fills the disk.
-    (folder / "checkpoint.safetensors").unlink(missing_ok=True)
+    evaluation = args.runs / f"{name}-{seed}.json"
+    settings = [f"benchmark={training}", f"training_benchmark={training}", "also_evaluate=", "validation="]
+    if failure := series.trained(core, args, folder, "best", seed, STEPS, settings):
+        return {"seed": seed, "failed": failure}
     if not evaluation.is_file():
         command = [str(args.offtrack), "evaluate", "--benchmark", str(examined), "--split", "validation"]
         command += [
@@ -110,9 +84,9 @@ def run(core, args, choice, changes, seed):
             "--json",
             str(evaluation),
         ]
-        if failure := finished(command, core):
+        if failure := series.finished(command, core):
             return {"seed": seed, "failed": failure}
-    trained, found = json.loads(report.read_text()), json.loads(evaluation.read_text())
+    trained, found = json.loads((folder / "report.json").read_text()), json.loads(evaluation.read_text())
     classes = found["classes"]
     high = [one for one in classes if one["load"] == "laden_high"]
     total = sum(one["episodes"] for one in high)
@@ -174,45 +148,11 @@ def table(rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--offtrack", type=Path, default=Path("target/release/offtrack"))
-    parser.add_argument("--seeds", default="0,1,2", help="seeds of each choice")
-    parser.add_argument("--choice", action="append", help="only this choice; may be given several times")
-    parser.add_argument("--cores", default=None, help="cores to run on, as in 0,1; default: all")
-    parser.add_argument("--runs", type=Path, default=Path("runs/ablations-laden"))
-    parser.add_argument("--json", type=Path, required=True)
-    args = parser.parse_args()
-    names = [name for name, _ in CHOICES]
-    if unknown := [name for name in args.choice or [] if name not in names]:
-        parser.error(f"--choice: {unknown[0]!r}; must be one of {names}")
-    available = [int(core) for core in args.cores.split(",")] if args.cores else sorted(os.sched_getaffinity(0))
-    cores = Queue()
-    for core in available:
-        cores.put(core)
-    args.offtrack, args.runs = args.offtrack.resolve(), args.runs.resolve()
-    wanted = [choice for choice in CHOICES if args.choice is None or choice[0] in args.choice]
-
-    def job(choice, changes, seed):
-        core = cores.get()
-        try:
-            return run(core, args, choice, changes, seed)
-        finally:
-            cores.put(core)
-
-    with ThreadPoolExecutor(len(available)) as pool:
-        # One seed of every choice before the next seed: an interrupted series has as many of each.
-        seeds = [int(seed) for seed in args.seeds.split(",")]
-        jobs = {(name, seed): pool.submit(job, name, changes, seed) for seed in seeds for name, changes in wanted}
-        rows = {name: {"choice": name, "changes": changes, "runs": []} for name, changes in wanted}
-        for (name, seed), running in jobs.items():
-            result = running.result()
-            rows[name]["runs"].append(result)
-            print(name, json.dumps(result), file=sys.stderr, flush=True)
-            whole = {"cores_per_run": 1, "steps": STEPS, "episodes_per_route": EPISODES, "choices": list(rows.values())}
-            temporary = args.json.with_suffix(".tmp")
-            temporary.write_text(json.dumps(whole, indent=1) + "\n")
-            temporary.replace(args.json)
-    print(table(rows.values()))
+    args = series.arguments(__doc__, "runs/ablations-laden", [name for name, _ in CHOICES])
+    choices = {name: changes for name, changes in CHOICES if args.choice is None or name in args.choice}
+    wanted = {name: {"choice": name, "changes": changes, "runs": []} for name, changes in choices.items()}
+    one = lambda core, name, seed: run(core, args, name, choices[name], seed)
+    series.run_all(args, wanted, one, {"steps": STEPS, "episodes_per_route": EPISODES}, table)
 
 
 if __name__ == "__main__":
