@@ -35,8 +35,8 @@ pub struct Policy {
     pub normalisation: Normalisation,
     /// Names of the extras that it observes beside the 69 values, in the order of [`EXTRAS`]: its first ones.
     pub extras: Vec<String>,
-    /// The layers, from the observation on: the first has an input for each of the [`N_VALUES`] and the extras, the last
-    /// an output an action.
+    /// The layers, from the observation on: the first has an input for each of the [`N_VALUES`] and the extras, the
+    /// last an output an action.
     pub layers: Vec<Layer>,
     /// What stands after each layer but the last.
     pub activation: Activation,
@@ -66,24 +66,19 @@ impl Policy {
     }
 
     /// The policy that comes with the project for this benchmark, whose world is `world`. Where there is none it is the
-    /// first one that can drive there: other benchmarks may share actions and extras.
+    /// first one that can drive there: other benchmarks may share actions and extras. Where none can it is the one for
+    /// `attard2023`, and [`Policy::check`] says what that lacks.
     ///
     /// # Errors
     ///
-    /// Where none can drive there: what the one for `attard2023` lacks.
+    /// None as long as the policies that come with the project can be read.
     pub fn shipped_for(benchmark: &str, world: &World) -> Result<Policy, Error> {
         if Policy::shipped_names().contains(&benchmark) {
             return Policy::shipped(benchmark);
         }
-        for name in Policy::shipped_names() {
-            let policy = Policy::shipped(name)?;
-            if policy.check(world).is_ok() {
-                return Ok(policy);
-            }
-        }
-        let policy = Policy::shipped("attard2023")?;
-        policy.check(world)?;
-        Ok(policy)
+        let mut policies = Policy::shipped_names().into_iter().map(Policy::shipped).collect::<Result<Vec<Policy>, Error>>()?;
+        let fits = policies.iter().position(|policy| policy.check(world).is_ok());
+        Ok(policies.swap_remove(fits.unwrap_or_default()))
     }
 
     /// Names of the benchmarks that a policy comes with the project for.
@@ -91,8 +86,8 @@ impl Policy {
         SHIPPED.map(|(name, _)| name)
     }
 
-    /// One value an action for each observation, `[n_envs * n_actions]`, of a policy without extras. Those of an observation do not depend on the
-    /// others, on its place among them, or on the number of threads, to the last bit.
+    /// One value an action for each observation, `[n_envs * n_actions]`, of a policy without extras. Those of an
+    /// observation do not depend on the others, on its place among them, or on the number of threads, to the last bit.
     ///
     /// # Panics
     ///
