@@ -424,4 +424,10 @@ impl Truck {
     pub fn trailer_position(&self, rig: &Rig) -> Vec2 {
         self.position + rig.fifth_wheel * direction(self.heading) - rig.trailer_wheelbase * direction(self.trailer_heading)
     }
+
+    /// The larger load transfer ratio of both units, without its sign.
+    #[inline]
+    pub fn load_transfer_ratio(&self) -> f32 {
+        self.tractor_load_transfer_ratio.abs().max(self.trailer_load_transfer_ratio.abs())
+    }
 }

@@ -52,13 +52,12 @@ struct Quantity {
 
 const QUANTITIES: [Quantity; 2] = [
     Quantity { title: "Speed [km/h]", value: |frame| 3.6 * f64::from(frame.speed), least: None },
-    Quantity { title: "Load transfer ratio: a wheel lifts at 1", value: ratio, least: Some([0.0, 1.0]) },
+    Quantity {
+        title: "Load transfer ratio: a wheel lifts at 1",
+        value: |frame| frame.load_transfer_ratio().into(),
+        least: Some([0.0, 1.0]),
+    },
 ];
-
-/// The larger load transfer ratio of both units.
-fn ratio(frame: &Frame) -> f64 {
-    f64::from(frame.tractor_load_transfer_ratio.abs().max(frame.trailer_load_transfer_ratio.abs()))
-}
 
 impl Comparison<'_> {
     /// The picture as SVG text.
@@ -84,11 +83,12 @@ impl Comparison<'_> {
         let entries = self.scenes.first().map(|scene| scene.legend(&self.view(0))).unwrap_or_default();
         let (map_legend, height) = legend::drawn(&lettering, &entries, DVec2::new(LEFT, bottom + 8.0), width);
         bottom += 8.0 + height;
-        let lines: Vec<Vec<DVec2>> = QUANTITIES.iter().flat_map(|quantity| self.lines(quantity)).collect();
-        let across = spread(lines.iter().flatten().map(|p| p.x));
+        let stations = self.stations();
+        // The start has no load transfer ratio: that is a step's.
+        let across = spread(stations.iter().flat_map(|stations| stations.iter().skip(1).copied()));
         let x = Axis::linear(across[0], across[1], LEFT, WIDTH - RIGHT);
         for quantity in &QUANTITIES {
-            contents = contents.add(self.chart(&lettering, quantity, &x, bottom + CAPTION));
+            contents = contents.add(self.chart(&lettering, quantity, &stations, &x, bottom + CAPTION));
             bottom += PLOT + NUMBERS;
         }
         let loads = self.scenes.iter().zip(LINES.iter().cycle());
@@ -136,7 +136,7 @@ impl Comparison<'_> {
     fn caption(&self, lettering: &Lettering, index: usize, view: &View) -> Group {
         let scene = &self.scenes[index];
         let time = (scene.recording.frames.len() - 1) as f64 * scene.recording.step;
-        let most = scene.recording.frames.iter().map(ratio).fold(0.0, f64::max);
+        let most = scene.recording.frames.iter().map(Frame::load_transfer_ratio).fold(0.0, f32::max);
         let words = format!("{}: {} after {time:.1} s, load transfer ratio up to {most:.2}", load(scene), scene.end());
         let corner = view.point(DVec2::new(view.low.x, view.high.y));
         let (from, to) = (corner + DVec2::new(0.0, -16.0), corner + DVec2::new(22.0, -16.0));
@@ -147,21 +147,27 @@ impl Comparison<'_> {
         Group::new().add(sample).add(lettering.text(&words, to + DVec2::new(8.0, 6.0), letters, Align::Left, colour::INK))
     }
 
-    /// Of each scene the points of a quantity over the distance along the route.
-    fn lines(&self, quantity: &Quantity) -> Vec<Vec<DVec2>> {
-        let line = |scene: &Scene| {
+    /// Of each scene the distance along the route at each frame \[m].
+    fn stations(&self) -> Vec<Vec<f64>> {
+        let of = |scene: &Scene| {
             let Recording { frames, centre_line, .. } = scene.recording;
-            let positions: Vec<[f32; 2]> = frames.iter().map(|frame| frame.position).collect();
-            // The ratio is that of a step: the start has none.
-            let points = stations(centre_line, &positions).into_iter().zip(frames).skip(1);
-            points.map(|(station, frame)| DVec2::new(station, (quantity.value)(frame))).collect()
+            stations(centre_line, &frames.iter().map(|frame| frame.position).collect::<Vec<_>>())
         };
-        self.scenes.iter().map(line).collect()
+        self.scenes.iter().map(of).collect()
+    }
+
+    /// Of each scene the points of a quantity over the distance along the route, from the first step on.
+    fn lines(&self, quantity: &Quantity, stations: &[Vec<f64>]) -> Vec<Vec<DVec2>> {
+        let line = |(scene, stations): (&Scene, &Vec<f64>)| {
+            let points = stations.iter().zip(&scene.recording.frames).skip(1);
+            points.map(|(&station, frame)| DVec2::new(station, (quantity.value)(frame))).collect()
+        };
+        self.scenes.iter().zip(stations).map(line).collect()
     }
 
     /// A quantity of every scene, the plot's upper edge at `top`.
-    fn chart(&self, lettering: &Lettering, quantity: &Quantity, x: &Axis, top: f64) -> Group {
-        let lines = self.lines(quantity);
+    fn chart(&self, lettering: &Lettering, quantity: &Quantity, stations: &[Vec<f64>], x: &Axis, top: f64) -> Group {
+        let lines = self.lines(quantity, stations);
         let least = quantity.least.into_iter().flatten();
         let [low, high] = spread(lines.iter().flatten().map(|p| p.y).chain(least));
         let y = Axis::linear_to_ticks(low, high, top + PLOT, top);
@@ -222,7 +228,7 @@ mod tests {
     use offtrack::world::World;
 
     use super::*;
-    use crate::recording::{Class, Map, Measures, Recorder, centre_line};
+    use crate::recording::{Of, Recorder};
 
     /// The first truck of `laden2026` with this load, which steers straight on at its highest speed until it ends.
     fn recording(load: &str) -> (Recording, Scenario) {
@@ -239,22 +245,8 @@ mod tests {
         let track = recorder.finish().remove(0);
         let (place, route) = scenario.routes().next().unwrap();
         let roundabout = &scenario.places[place].roundabout;
-        let recording = Recording {
-            benchmark: scenario.name.clone(),
-            route: route.name.clone(),
-            policy: "pursuit".to_owned(),
-            seed: 3,
-            episode: 0,
-            episodes: 1,
-            step: scenario.step,
-            ended: track.ended.name().to_owned(),
-            class: Class::of(&world, track.vehicle),
-            vehicle: Measures::of(&world, track.vehicle),
-            actions: Vec::new(),
-            map: Map::of(roundabout, scenario.gutter),
-            centre_line: centre_line(roundabout, route),
-            frames: track.frames,
-        };
+        let of = Of { scenario: &scenario, world: &world, roundabout, route, policy: "pursuit", seed: 3 };
+        let recording = of.recording(0, 1, track);
         (recording, scenario)
     }
 
@@ -272,7 +264,7 @@ mod tests {
         }
         assert_eq!(svg.matches("<clipPath").count(), 2);
         for (quantity, unit) in QUANTITIES.iter().zip([30.0, 0.0]) {
-            let lines = comparison.lines(quantity);
+            let lines = comparison.lines(quantity, &comparison.stations());
             for (line, (recording, _)) in lines.iter().zip(&recorded) {
                 assert_eq!(line.len(), recording.frames.len() - 1);
                 // Straight on at 30 km/h on a straight arm: 0.83 m a step, and nearly no load transfer at first.

@@ -209,7 +209,7 @@ impl<'a> Scene<'a> {
         let frames = &self.recording.frames;
         let most = |value: fn(&Frame) -> f32| frames.iter().map(value).fold(f32::NEG_INFINITY, f32::max);
         let least = |value: fn(&Frame) -> f32| signed(frames.iter().map(value).fold(f32::INFINITY, f32::min), 2);
-        let ratio = most(|frame| frame.tractor_load_transfer_ratio.abs().max(frame.trailer_load_transfer_ratio.abs()));
+        let ratio = most(Frame::load_transfer_ratio);
         format!(
             "Start {} of seed {}. Least clearance: tractor {} m, trailer {} m. Articulation up to {:.0}\u{b0}, load transfer ratio up to {ratio:.2}.",
             self.recording.episode,

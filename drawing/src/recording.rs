@@ -12,6 +12,7 @@ use offtrack::cpu::collide;
 use offtrack::layout::{Clearance, Ended, N_RAYS, N_TRAILER_RAYS};
 use offtrack::roundabout::{Gutter, Roundabout};
 use offtrack::route::Route;
+use offtrack::scenario::Scenario;
 use offtrack::simulator::Batch;
 use offtrack::world::World;
 use serde::{Deserialize, Serialize};
@@ -99,6 +100,11 @@ impl Frame {
 }
 
 impl Frame {
+    /// The larger load transfer ratio of both units, without its sign.
+    pub fn load_transfer_ratio(&self) -> f32 {
+        self.tractor_load_transfer_ratio.abs().max(self.trailer_load_transfer_ratio.abs())
+    }
+
     /// The frame in the mirror image of its world: left is right. Pairs of rays stay in their order.
     #[must_use]
     pub fn mirrored(&self) -> Frame {
@@ -240,6 +246,48 @@ pub struct Recording {
     pub centre_line: Polygon,
     /// The start, then one frame a step.
     pub frames: Vec<Frame>,
+}
+
+/// What an episode that is recorded belongs to.
+#[derive(Debug, Clone, Copy)]
+pub struct Of<'a, 'b> {
+    /// The benchmark.
+    pub scenario: &'a Scenario,
+    /// The benchmark, baked.
+    pub world: &'b World,
+    /// The route's roundabout.
+    pub roundabout: &'a Roundabout,
+    /// The route.
+    pub route: &'a Route,
+    /// The policy's name.
+    pub policy: &'b str,
+    /// Seed of the start pose.
+    pub seed: u32,
+}
+
+impl Of<'_, '_> {
+    /// The recording of a track, which is as it lies in the world: episode `episode` of the `episodes` that the
+    /// evaluation has on this route.
+    pub fn recording(&self, episode: usize, episodes: usize, track: Track) -> Recording {
+        let Of { scenario, world, roundabout, route, policy, seed } = *self;
+        let steering = |angle: f32| if roundabout.is_mirrored() { 0.0 - angle } else { angle };
+        Recording {
+            benchmark: scenario.name.clone(),
+            route: route.name.clone(),
+            policy: policy.to_owned(),
+            seed,
+            episode,
+            episodes,
+            step: scenario.step,
+            ended: track.ended.name().to_owned(),
+            class: Class::of(world, track.vehicle),
+            vehicle: Measures::of(world, track.vehicle).seen(roundabout),
+            actions: world.actions.iter().map(|action| [steering(action.steering), action.speed]).collect(),
+            map: Map::of(roundabout, scenario.gutter),
+            centre_line: centre_line(roundabout, route),
+            frames: track.frames,
+        }
+    }
 }
 
 /// `value` rounded to `parts` of a unit. A zero has no sign.

@@ -84,7 +84,7 @@ impl Scene<'_> {
     /// A line of figures in fixed columns.
     fn caption(&self, index: usize) -> Group {
         let frame = &self.recording.frames[index];
-        let ratio = frame.tractor_load_transfer_ratio.abs().max(frame.trailer_load_transfer_ratio.abs());
+        let ratio = frame.load_transfer_ratio();
         let [tractor, trailer] = [frame.tractor_clearance, frame.trailer_clearance].map(|clearance| signed(clearance, 2));
         let figures = [
             (0.0, format!("{:.1} s", index as f64 * self.recording.step)),

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use offtrack::scenario::{Scenario, Split};
+use offtrack::scenario::Split;
 use offtrack::simulator::{RouteChoice, Simulator};
 
 use super::*;
@@ -66,22 +66,9 @@ fn a_recording_read_back_is_the_recording() {
     let scenario = scenario();
     let (world, mut tracks, _) = driven(&scenario);
     let (roundabout, route) = scenario.routes().nth(scenario.split(Split::Test)[1] as usize).unwrap();
-    let recording = Recording {
-        benchmark: scenario.name.clone(),
-        route: route.name.clone(),
-        policy: "pursuit".to_owned(),
-        seed: 3,
-        episode: 0,
-        episodes: 1,
-        step: scenario.step,
-        ended: tracks[0].ended.name().to_owned(),
-        class: Class::of(&world, 0),
-        vehicle: Measures::of(&world, 0),
-        actions: world.actions.iter().map(|action| [action.steering, action.speed]).collect(),
-        map: Map::of(&scenario.places[roundabout].roundabout, scenario.gutter),
-        centre_line: centre_line(&scenario.places[roundabout].roundabout, route),
-        frames: tracks.remove(0).frames,
-    };
+    let of =
+        Of { scenario: &scenario, world: &world, roundabout: &scenario.places[roundabout].roundabout, route, policy: "pursuit", seed: 3 };
+    let recording = of.recording(0, 1, tracks.remove(0));
     let text = serde_json::to_string(&recording).unwrap();
     assert_eq!(serde_json::from_str::<Recording>(&text).unwrap(), recording);
 }

@@ -29,7 +29,7 @@ pub fn judge(world: &World, row: &mut Row) {
 /// Why the episode ended, [`Ended::Running`] when it did not.
 pub fn ending(params: &Params, route: &RouteRow, step_limit: u32, truck: &Truck, clearance: &Clearance, progress: &Progress) -> Ended {
     let articulation = wrapped(truck.heading - truck.trailer_heading);
-    let load_transfer_ratio = truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs());
+    let load_transfer_ratio = truck.load_transfer_ratio();
     let arrived = route.n_waypoints <= progress.waypoint;
     if clearance.tractor <= 0.0 {
         Ended::TractorCollided
@@ -52,7 +52,7 @@ pub fn ending(params: &Params, route: &RouteRow, step_limit: u32, truck: &Truck,
 
 /// How the truck drove: time, load transfer, lateral acceleration, jerk and rollover; the other terms are 0.
 pub fn driving_terms(params: &Params, truck: &Truck, control: &Control, ended: Ended) -> RewardTerms {
-    let ratio = truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs());
+    let ratio = truck.load_transfer_ratio();
     let duration = params.n_substeps as f32 * params.substep;
     let jerk = (truck.acceleration - control.acceleration_before).abs() / duration;
     RewardTerms {

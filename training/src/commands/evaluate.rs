@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use offtrack::reader;
 use offtrack::scenario::Split;
+use offtrack_drawing::recording::Of;
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::certificate::attempt::{HOLD, passes};
 use offtrack_training::evaluation::certificate::certified;
@@ -138,9 +139,9 @@ fn write_films(folder: &Path, evaluation: &Evaluation, report: &Report, sequence
     for (n, (cause, track)) in causes.iter().zip(evaluation.repeated(sequences, &indices)?).enumerate() {
         let Example { route: name, episode, .. } = &cause.example;
         let (place, route) = scenario.routes().find(|(_, route)| route.name == *name).expect("a report's routes are the scenario's");
-        let of = record::Of { scenario, world, roundabout: &scenario.places[place].roundabout, route, policy: &report.policy, seed };
+        let of = Of { scenario, world, roundabout: &scenario.places[place].roundabout, route, policy: &report.policy, seed };
         let file = folder.join(format!("{}-{}.gif", n + 1, cause.cause.replace(' ', "-")));
-        of.write_film(&file, *episode, evaluation.episodes, track)?;
+        record::write_film(&of, &file, *episode, evaluation.episodes, track)?;
     }
     Ok(())
 }

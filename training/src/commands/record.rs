@@ -17,7 +17,7 @@ use offtrack_drawing::comparison::Comparison;
 use offtrack_drawing::episode::Scene;
 use offtrack_drawing::film::{self, Take};
 use offtrack_drawing::rasterised;
-use offtrack_drawing::recording::{Class, Map, Measures, Recorder, Recording, Track, centre_line};
+use offtrack_drawing::recording::{Of, Recorder, Recording, Track};
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::policies::Policy;
 use offtrack_training::files;
@@ -33,8 +33,8 @@ pub struct Args {
     /// may have several, each with its own --route, one after another.
     #[arg(long, required = true)]
     route: Vec<String>,
-    /// Only trucks with this load, where the benchmark has several. Given several times, a film shows each load in turn, and
-    /// a .png or .svg one beside the other, with speed and load transfer over the distance along the route.
+    /// Only trucks with this load, where the benchmark has several. Given several times, a film shows each load in
+    /// turn, and a .png or .svg one beside the other, with speed and load transfer over the distance along the route.
     #[arg(long)]
     load: Vec<String>,
     /// The file to write: .gif, .png, .svg, or .json for data.
@@ -42,9 +42,9 @@ pub struct Args {
     /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed",
     /// "episode", "episodes", "step" [s], "ended", "class": {"vehicle", "load"}: their names, where the benchmark has
     /// several, "vehicle": dimensions and sensors of the truck that drove, "actions": [[steer angle, speed], ...],
-    /// "map": {"drivable", "lanes"}, "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state after step
-    /// n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's centre at
-    /// the origin.
+    /// "map": {"drivable", "lanes"}, "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state after
+    /// step n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's
+    /// centre at the origin.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// A benchmark's name, or the path of its file.
@@ -105,16 +105,16 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let scenarios = each().map(|(route, load)| scenario(args, route, load)).collect::<Result<Vec<Scenario>, Error>>()?;
     let chosen = |(scenario, (route, _)): (_, (&String, _))| Chosen::new(scenario, route);
     let chosen = scenarios.iter().zip(each()).map(chosen).collect::<Result<Vec<Chosen>, Error>>()?;
-    let mut recorded = Vec::new();
+    let mut takes = Vec::new();
     for (scenario, chosen) in scenarios.iter().zip(&chosen) {
         let world = roads::world(scenario)?;
         let mut policy = args.policy.open(scenario, &world, args.seed)?;
         let track = driven(args, scenario, &world, chosen, policy.as_mut())?;
         let Chosen { roundabout, route, .. } = *chosen;
         let of = Of { scenario, world: &world, roundabout, route, policy: policy.name(), seed: args.seed };
-        recorded.push(of.recorded(args.episode, args.episodes, track.seen(roundabout)));
+        takes.push(recorded(&of, args.episode, args.episodes, track.seen(roundabout)));
     }
-    let bytes = bytes(format, args.size, &recorded);
+    let bytes = bytes(format, args.size, &takes);
     files::write_whole(&args.output, &bytes.map_err(unwritten(&args.output))?)
 }
 
@@ -143,52 +143,22 @@ fn unwritten(file: &Path) -> impl Fn(Failure) -> Error {
     |failure| Error::write(file)(std::io::Error::other(failure))
 }
 
-/// What an episode that is recorded belongs to.
-pub(super) struct Of<'a, 'b> {
-    pub(super) scenario: &'a Scenario,
-    pub(super) world: &'b World,
-    pub(super) roundabout: &'a Roundabout,
-    pub(super) route: &'a Route,
-    /// The policy's name.
-    pub(super) policy: &'b str,
-    pub(super) seed: u32,
+/// The recording of a track, and what is drawn around it; see [`Of::recording`].
+fn recorded(of: &Of, episode: usize, episodes: usize, track: Track) -> Recorded {
+    let Of { scenario, roundabout, route, .. } = *of;
+    let recording = of.recording(episode, episodes, track);
+    let ring = [scenario.approach, route.centre_line.length() - scenario.departure];
+    Recorded { recording, roundabout: roundabout.seen(), gutter: scenario.gutter, route: roundabout.seen_route(route), ring }
 }
 
-impl Of<'_, '_> {
-    /// The recording of a track, which is as it lies in the world: episode `episode` of the `episodes` that the
-    /// evaluation has on this route.
-    fn recorded(&self, episode: usize, episodes: usize, track: Track) -> Recorded {
-        let Of { scenario, world, roundabout, route, policy, seed } = *self;
-        let steering = |angle: f32| if roundabout.is_mirrored() { 0.0 - angle } else { angle };
-        let recording = Recording {
-            benchmark: scenario.name.clone(),
-            route: route.name.clone(),
-            policy: policy.to_owned(),
-            seed,
-            episode,
-            episodes,
-            step: scenario.step,
-            ended: track.ended.name().to_owned(),
-            class: Class::of(world, track.vehicle),
-            vehicle: Measures::of(world, track.vehicle).seen(roundabout),
-            actions: world.actions.iter().map(|action| [steering(action.steering), action.speed]).collect(),
-            map: Map::of(roundabout, scenario.gutter),
-            centre_line: centre_line(roundabout, route),
-            frames: track.frames,
-        };
-        let ring = [scenario.approach, route.centre_line.length() - scenario.departure];
-        Recorded { recording, roundabout: roundabout.seen(), gutter: scenario.gutter, route: roundabout.seen_route(route), ring }
-    }
-
-    /// Writes a film of a track, in the usual size.
-    pub(super) fn write_film(&self, file: &Path, episode: usize, episodes: usize, track: Track) -> Result<(), Error> {
-        let bytes = bytes(Format::Gif, None, &[self.recorded(episode, episodes, track)]).map_err(unwritten(file))?;
-        files::write_whole(file, &bytes)
-    }
+/// Writes a film of a track, in the usual size.
+pub(super) fn write_film(of: &Of, file: &Path, episode: usize, episodes: usize, track: Track) -> Result<(), Error> {
+    let bytes = bytes(Format::Gif, None, &[recorded(of, episode, episodes, track)]).map_err(unwritten(file))?;
+    files::write_whole(file, &bytes)
 }
 
-/// The recordings in the format asked for: a film of all of them, a picture of one or of several on one route, or the first
-/// as data.
+/// The recordings in the format asked for: a film of all of them, a picture of one or of several on one route, or the
+/// first as data.
 fn bytes(format: Format, size: Option<u32>, recorded: &[Recorded]) -> Result<Vec<u8>, Failure> {
     if format == Format::Json {
         let mut text = serde_json::to_string(&recorded[0].recording)?;

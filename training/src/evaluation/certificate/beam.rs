@@ -1,8 +1,8 @@
 //! A beam search over action sequences: can this route be completed from this start at all?
 //!
 //! At one speed all candidates of a depth have made the same progress, so they are ranked by a discounted cost of how
-//! safely they drove; with several speeds driving slowly has a cost too. Candidates in nearly the same state would fill the beam with copies of one plan: only the best of
-//! those is kept.
+//! safely they drove; with several speeds driving slowly has a cost too. Candidates in nearly the same state would fill
+//! the beam with copies of one plan: only the best of those is kept.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -28,8 +28,8 @@ const HEADING_WEIGHT: f32 = 1.0;
 const AHEAD: usize = 1;
 /// Cost of a load transfer ratio at its limit, to the fourth power: half of the limit costs little.
 const LOAD_TRANSFER_WEIGHT: f32 = 0.3;
-/// Cost of a standing truck where there are several speeds; at the highest it is 0. A load transfer ratio of 0.8 costs as
-/// much as half of the highest speed.
+/// Cost of a standing truck where there are several speeds; at the highest it is 0. A load transfer ratio of 0.8 costs
+/// as much as half of the highest speed.
 const SLOWNESS_WEIGHT: f32 = 0.25;
 /// Two candidates are in nearly the same state if these agree after rounding: position \[m], headings \[rad], steer
 /// angle \[rad].
@@ -185,7 +185,7 @@ fn cost(world: &World, batch: &Batch, env: usize) -> f32 {
     let previews = world.route_previews(truck.route);
     let lane_heading = previews[(progress.waypoint as usize + AHEAD).min(previews.len() - 1)].heading;
     let shortfall = (1.0 - clearance.tractor.min(clearance.trailer) / MARGIN).max(0.0);
-    let load = truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs()) / world.params.rollover_ratio;
+    let load = truck.load_transfer_ratio() / world.params.rollover_ratio;
     let Params { target_speed_min, target_speed_max, .. } = world.params;
     // Where a truck may drive more slowly, safety alone would make it crawl.
     let slowness = if target_speed_min < target_speed_max { 1.0 - truck.speed / target_speed_max } else { 0.0 };
