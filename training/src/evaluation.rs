@@ -29,6 +29,7 @@ use rayon::prelude::*;
 
 use crate::device::Device;
 use crate::error::Error;
+use driving::Driving;
 use groups::{Evaluated, Groups};
 use part::LaneWidths;
 use policies::Policy;
@@ -93,8 +94,11 @@ impl Evaluation<'_> {
         let lanes: Vec<LaneWidths> = self.routes().iter().map(|(_, place, route)| LaneWidths::of(self.scenario, place, route)).collect();
         let mut running: Vec<Running> = {
             let batch = simulator.batch();
-            let new =
-                |(truck, control): (&Truck, &Control)| Running::new(world.rig(truck), truck, control.target_speed, self.scenario.step);
+            let has_classes = driving::has_classes(self.scenario);
+            let new = |(truck, control): (&Truck, &Control)| {
+                let driving = has_classes.then(|| Driving::new(truck, control.target_speed));
+                Running::new(world.rig(truck), truck, driving, self.scenario.step)
+            };
             batch.truck.iter().zip(&batch.control).map(new).collect()
         };
         let mut sequences = Sequences(vec![Vec::new(); n_episodes]);

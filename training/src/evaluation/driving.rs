@@ -55,7 +55,7 @@ impl Driving {
     /// Adds the last step of truck `env`; a step takes `step` seconds.
     pub fn follow(&mut self, batch: &Batch, env: usize, step: f64) {
         let (truck, control) = (&batch.truck[env], &batch.control[env]);
-        let ratio = truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs());
+        let ratio = truck.load_transfer_ratio();
         self.speed_sum += f64::from(truck.speed);
         self.steps_at_limit += u32::from(AT_LIMIT <= ratio);
         self.switches += u32::from(SAME_SPEED < (control.target_speed - self.target_speed).abs());
@@ -117,9 +117,14 @@ pub struct ClassReport {
     pub trailer_contact_speed_kmh: Option<f64>,
 }
 
-/// The report of each class of vehicles in these episodes; none where the benchmark has one vehicle and one speed.
+/// Whether classes of vehicles are reported: where the benchmark has several vehicles or speeds.
+pub(super) fn has_classes(scenario: &Scenario) -> bool {
+    scenario.fleet.is_some() || scenario.speeds.len() != 1 || !scenario.speed_changes.is_empty()
+}
+
+/// The report of each class of vehicles in these episodes; none without [`has_classes`].
 pub(super) fn classes(scenario: &Scenario, world: &World, episodes: &[Episode]) -> Vec<ClassReport> {
-    if scenario.fleet.is_none() && scenario.speeds.len() == 1 && scenario.speed_changes.is_empty() {
+    if !has_classes(scenario) {
         return Vec::new();
     }
     let mut profiles: HashMap<(u32, u32), f64> = HashMap::new();
@@ -151,7 +156,7 @@ fn class_report(
     // The nearest rank.
     let peak = |fraction: f64| peaks[((fraction * n as f64).ceil() as usize).clamp(1, n) - 1];
     let steps: f64 = episodes.iter().map(|episode| f64::from(episode.steps)).sum();
-    let sum = |value: fn(&Driving) -> f64| episodes.iter().map(|episode| value(&episode.driving)).sum::<f64>();
+    let sum = |value: fn(&Driving) -> f64| episodes.iter().filter_map(|episode| episode.driving.as_ref()).map(value).sum::<f64>();
     let lateral = |fraction| LATERAL_BIN * percentile(episodes, |driving| &driving.lateral_accelerations, fraction) / GRAVITY;
     let contact = |code| mean(ended(code).map(|episode| f64::from(episode.last.speed) * 3.6));
     ClassReport {
@@ -186,7 +191,8 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 /// The upper end, in bins, of the bin that a fraction of all steps lies in or below.
 fn percentile(episodes: &[&Episode], bins: impl Fn(&Driving) -> &[u16], fraction: f64) -> f64 {
-    let count = |bin: usize| episodes.iter().map(|episode| u64::from(bins(&episode.driving)[bin])).sum::<u64>();
+    let all = || episodes.iter().filter_map(|episode| episode.driving.as_ref());
+    let count = |bin: usize| all().map(|driving| u64::from(bins(driving)[bin])).sum::<u64>();
     let counts: Vec<u64> = (0..N_BINS).map(count).collect();
     let needed = fraction * counts.iter().sum::<u64>() as f64;
     let mut below = 0;
@@ -237,7 +243,8 @@ mod tests {
     #[test]
     fn a_percentile_of_steps_is_the_bin_that_reaches_it() {
         let mut one = episode(Ended::Arrived);
-        (one.driving.jerks[2], one.driving.jerks[10]) = (95, 5);
+        let driving = one.driving.as_mut().unwrap();
+        (driving.jerks[2], driving.jerks[10]) = (95, 5);
         let found = [0.5, 0.95, 0.96].map(|fraction| percentile(&[&one], |driving| &driving.jerks, fraction));
         assert!(found.iter().zip([3.0, 3.0, 11.0]).all(|(found, expected)| (found - expected).abs() < 1e-9), "{found:?}");
     }

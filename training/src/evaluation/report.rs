@@ -39,8 +39,8 @@ pub struct Episode {
     pub articulation_peak: f64,
     /// Largest distance of the trailer axle from the path of the front axle \[m].
     pub off_tracking_peak: f64,
-    /// How it drove.
-    pub driving: Driving,
+    /// How it drove, where classes of vehicles are reported.
+    pub driving: Option<Driving>,
     /// The truck after its last step.
     pub last: Truck,
 }
@@ -232,7 +232,7 @@ pub(super) mod tests {
             load_transfer_ratio_peak: 1.5,
             articulation_peak: 1.9,
             off_tracking_peak: 10.25,
-            driving: Driving::new(&Truck::default(), 0.0),
+            driving: Some(Driving::new(&Truck::default(), 0.0)),
             last: Truck::default(),
         }
     }

@@ -27,8 +27,8 @@ pub(super) struct Running {
 }
 
 impl Running {
-    /// At its start.
-    pub(super) fn new(rig: &Rig, truck: &Truck, target_speed: f32, step: f64) -> Running {
+    /// At its start; `driving` is what is kept for its class, where classes are reported.
+    pub(super) fn new(rig: &Rig, truck: &Truck, driving: Option<Driving>, step: f64) -> Running {
         let front = front_axle(rig, truck);
         let ahead = Vec2::from_angle(truck.heading);
         Running {
@@ -47,7 +47,7 @@ impl Running {
                 load_transfer_ratio_peak: 0.0,
                 articulation_peak: 0.0,
                 off_tracking_peak: 0.0,
-                driving: Driving::new(truck, target_speed),
+                driving,
                 last: *truck,
             },
             // The path's first point lies far behind the start, so that the trailer's axle is beside it from the first
@@ -68,10 +68,11 @@ impl Running {
         raise(&mut self.episode.lane_distance_max, progress.lane_distance);
         lower(&mut self.episode.tractor_clearance_min, clearance.tractor);
         lower(&mut self.episode.trailer_clearance_min, clearance.trailer);
-        raise(&mut self.episode.load_transfer_ratio_peak, truck.tractor_load_transfer_ratio.abs());
-        raise(&mut self.episode.load_transfer_ratio_peak, truck.trailer_load_transfer_ratio.abs());
+        raise(&mut self.episode.load_transfer_ratio_peak, truck.load_transfer_ratio());
         raise(&mut self.episode.articulation_peak, wrapped(truck.heading - truck.trailer_heading).abs());
-        self.episode.driving.follow(batch, env, self.step);
+        if let Some(driving) = &mut self.episode.driving {
+            driving.follow(batch, env, self.step);
+        }
         self.episode.last = *truck;
         self.off_tracking.push(front_axle(rig, truck), truck.trailer_position(rig));
         batch.ended[env] != Ended::Running as u32
