@@ -90,12 +90,12 @@ pub struct Field {
     /// Cells from south to north, a multiple of 2.
     pub rows: u32,
     /// Two words per cell, in tiles of 4 by 2 cells. Most cells are a block of one sub-cell: the western and the
-    /// eastern pair of distances. Where the lower half of the first word is 0x8000, the cell has other blocks in `values`. They
-    /// begin at the pair that the second word says, one after the other, and the first word's upper half says what they
-    /// are: `kind << 6 | ridge_level << 3 | level`. The first block has 2^level sub-cells a side. Of kind 1 (a ridge)
-    /// the first block is for marching: it is coarse and does not exceed the distance. It is followed by two of
-    /// 2^ridge_level sub-cells a side, whose lesser value is the distance. Kinds 2 and 3 have two blocks of one level,
-    /// whose lesser or greater value is the distance.
+    /// eastern pair of distances. Where the lower half of the first word is 0x8000, the cell has other blocks in
+    /// `values`. They begin at the pair that the second word says, one after the other, and the first word's upper half
+    /// says what they are: `kind << 6 | ridge_level << 3 | level`. The first block has 2^level sub-cells a side. Of
+    /// kind 1 (a ridge) the first block is for marching: it is coarse and does not exceed the distance. It is followed
+    /// by two of 2^ridge_level sub-cells a side, whose lesser value is the distance. Kinds 2 and 3 have two blocks of
+    /// one level, whose lesser or greater value is the distance.
     pub cells: Vec<[u32; 2]>,
     /// Blocks of distances at the sub-cells' corners, in units of 1/2048 m, two to a word: the southern one in the
     /// lower 16 bits, signed, the northern one in the upper. A block has one row of pairs per row of sub-cells, from

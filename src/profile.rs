@@ -1,8 +1,9 @@
-//! How fast a vehicle can drive a route: a speed at every waypoint, from the lateral acceleration that its tyres and its
-//! load hold, and from its brakes and its drive.
+//! How fast a vehicle can drive a route: a speed at every waypoint, from the lateral acceleration that its tyres and
+//! its load hold, and from its brakes and its drive.
 //!
 //! Forward and backward passes over a speed limit are the usual profile of minimum time (J. Bobrow et al., 1985). The
-//! tractor follows the lane's centre; its trailer cuts the bend and still turns where the tractor drives straight again.
+//! tractor follows the lane's centre; its trailer cuts the bend and still turns where the tractor drives straight
+//! again.
 
 use std::f64::consts::PI;
 
@@ -44,8 +45,8 @@ impl Profile {
         Profile { speeds, time }
     }
 
-    /// The lowest speed of the waypoints from `from` on, as far as `distance` \[m] reaches, where they are `spacing` \[m]
-    /// apart [m/s].
+    /// The lowest speed of the waypoints from `from` on, as far as `distance` \[m] reaches, where they are `spacing`
+    /// \[m] apart [m/s].
     pub fn lowest_ahead(&self, from: usize, distance: f64, spacing: f64) -> f64 {
         let from = from.min(self.speeds.len() - 1);
         let to = (from + (distance / spacing).ceil() as usize + 1).min(self.speeds.len());
@@ -103,8 +104,8 @@ mod tests {
     #[test]
     fn a_laden_truck_slows_down_for_a_bend_and_accelerates_out_of_it() {
         let Profile { speeds, time } = profile("laden");
-        // The trailer's path has a radius of sqrt(20² - 7.756²) = 18.4 m in a steady turn at 0.7 of 0.41 g. Its own lateral
-        // acceleration is v² sin cos / wheelbase = v² 0.388 0.922 / 7.756.
+        // The trailer's path has a radius of sqrt(20² - 7.756²) = 18.4 m in a steady turn at 0.7 of 0.41 g. Its own
+        // lateral acceleration is v² sin cos / wheelbase = v² 0.388 0.922 / 7.756.
         let slowest = speeds[80];
         let expected = (0.7 * 0.412 * GRAVITY * 7.756 / (0.388 * 0.922)).sqrt();
         assert!((slowest - expected).abs() < 0.15, "{slowest} {expected}");

@@ -82,7 +82,8 @@ pub struct Place {
 pub struct Scenario {
     /// The file's stem.
     pub name: String,
-    /// The vehicle; of several the first as its file has it, for pictures and for the lock that actions are fractions of.
+    /// The vehicle; of several the first as its file has it, for pictures and for the lock that actions are fractions
+    /// of.
     pub vehicle: Vehicle,
     /// Name of one of the vehicle's loads.
     pub load: String,
@@ -229,8 +230,8 @@ impl Scenario {
         self.places.iter().enumerate().flat_map(|(index, place)| place.routes.iter().map(move |route| (index, route)))
     }
 
-    /// The action table for a lock \[rad]: pairs of a steer angle and a target speed or a change of it, the speed varying
-    /// slowest.
+    /// The action table for a lock \[rad]: pairs of a steer angle and a target speed or a change of it, the speed
+    /// varying slowest.
     pub fn actions(&self, lock: f32) -> Vec<Action> {
         let pair = |speed: f64, level: f64| Action { steering: level as f32 * lock, speed: speed as f32 };
         let speeds = if self.speed_changes.is_empty() { &self.speeds } else { &self.speed_changes };

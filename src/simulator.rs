@@ -291,7 +291,8 @@ fn check_known(world: &World, routes: &[u32]) -> Result<(), Error> {
     unknown.map_or(Ok(()), |&route| Err(Error::UnknownRoute { route, n_routes }))
 }
 
-/// An error if a truck's route, vehicle, waypoint or action is not in the world: stages use them as indices without a check.
+/// An error if a truck's route, vehicle, waypoint or action is not in the world: stages use them as indices without a
+/// check.
 fn check_indices(world: &World, batch: &Batch) -> Result<(), Error> {
     if let Some((env, &found)) = batch.action.iter().enumerate().find(|&(_, &action)| world.params.n_actions <= action) {
         let limit = format!("actions 0..{}", world.params.n_actions);

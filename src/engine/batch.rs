@@ -16,8 +16,8 @@ pub enum RouteChoice {
     /// Drawn uniformly at random for every episode. Episodes follow each other in the same step, unless
     /// [`crate::simulator::Simulator::set_autoreset`] says otherwise.
     Drawn(Vec<u32>),
-    /// Truck `env` runs `routes[env]` once, unless `set_autoreset` says otherwise: when its episode has ended it is held
-    /// until the batch is reset.
+    /// Truck `env` runs `routes[env]` once, unless `set_autoreset` says otherwise: when its episode has ended it is
+    /// held until the batch is reset.
     Fixed(Vec<u32>),
 }
 

@@ -1,4 +1,5 @@
-//! Trucks of several kinds in one benchmark: vehicles and loads by shares, and ranges that their dimensions are drawn from.
+//! Trucks of several kinds in one benchmark: vehicles and loads by shares, and ranges that their dimensions are drawn
+//! from.
 //!
 //! A table of vehicles is drawn once, before anything is baked. An episode draws a row of it, so that vehicle and load
 //! belong together.

@@ -87,8 +87,8 @@ fn published(batch: &Batch, column: Column) -> Vec<u8> {
 const PINNED_INTEGERS: [(&str, u64); 3] =
     [("attard2023", 0x48c8_cba1_098f_6d5b), ("attard2023-full", 0xea12_cc9f_5053_302c), ("attard2023-as-run", 0x4aa0_1029_58ab_16e9)];
 
-/// Hashes that python/tests/test_batch.py has too: what a step gives on the training routes of attard2023, to 512 trucks
-/// after 300 random steps with seed 7, on the CPU.
+/// Hashes that python/tests/test_batch.py has too: what a step gives on the training routes of attard2023, to 512
+/// trucks after 300 random steps with seed 7, on the CPU.
 const PINNED_IN_PYTHON: [(Column, u64); 4] = [
     (Column::Observation, 0x7ff7_f3a1_8924_9b08),
     (Column::Reward, 0x389f_a7d6_00c4_78be),

@@ -108,7 +108,8 @@ fn the_clock_counts_against_the_feasible_time_of_the_vehicle_on_the_route() {
     });
     let limit = |world: &World, route: u32, class: u32| world.step_limits[(route * 8 + class) as usize];
     for route in 0..feasible.routes.len() as u32 {
-        // At the highest speed all are equal; a loaded vehicle takes longer than an empty one, and all longer than that.
+        // At the highest speed all are equal; a loaded vehicle takes longer than an empty one, and all longer than
+        // that.
         assert!((0..8).all(|class| limit(&highest, route, class) == limit(&highest, route, 0)));
         assert!(limit(&highest, route, 0) < limit(&feasible, route, 0), "{route}");
         assert!((0..3).all(|class| limit(&feasible, route, class) <= limit(&feasible, route, class + 1)), "{route}");

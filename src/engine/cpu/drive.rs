@@ -124,8 +124,8 @@ pub fn motion(rig: &Rig, speed: f32, steered_curvature: f32, curvature_lag: f32,
 /// The deviation of the path's curvature from the steer angle's, `duration` seconds after it was `lag`, where the steer
 /// angle's changes by `rise` in that time \[1/m].
 ///
-/// The tractor's yaw follows its front wheels with the time constant `yaw_lag * speed`: tyres build up lateral force only
-/// as slip angles grow. The exponential is its Padé approximant, which is stable at any speed.
+/// The tractor's yaw follows its front wheels with the time constant `yaw_lag * speed`: tyres build up lateral force
+/// only as slip angles grow. The exponential is its Padé approximant, which is stable at any speed.
 #[inline]
 pub fn lagging(rig: &Rig, speed: f32, lag: f32, rise: f32, duration: f32) -> f32 {
     let time = rig.yaw_lag * speed.abs();

@@ -1,7 +1,7 @@
 //! The single-track equations with their repairs against a dynamic single track: masses, tyre forces, a hitch force.
 //!
-//! The reference is integrated here and shares no line with the simulator. Linear tyres whose stiffness is a multiple of
-//! their axle's load, as the slip coefficient K = 1 / (g CC) assumes; constant speed of the drive axle.
+//! The reference is integrated here and shares no line with the simulator. Linear tyres whose stiffness is a multiple
+//! of their axle's load, as the slip coefficient K = 1 / (g CC) assumes; constant speed of the drive axle.
 
 mod reference;
 

@@ -1,8 +1,8 @@
 //! Success over the episodes whose own start is shown to be possible: a policy cannot be blamed for a start from which
 //! nobody arrives.
 //!
-//! An episode that arrived shows it itself. The start of one that did not is searched for actions that complete it; what
-//! no search completes may be possible all the same, and is left out.
+//! An episode that arrived shows it itself. The start of one that did not is searched for actions that complete it;
+//! what no search completes may be possible all the same, and is left out.
 
 use offtrack::layout::{Ended, Truck};
 use serde::Serialize;

@@ -1,4 +1,5 @@
-//! What several seeds of one training file came to: each, their mean, the worst, and how well so few determine the mean.
+//! What several seeds of one training file came to: each, their mean, the worst, and how well so few determine the
+//! mean.
 
 use std::fmt::Write;
 

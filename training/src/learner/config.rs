@@ -259,7 +259,8 @@ impl Config {
         *self == Config { minutes, steps, checkpoint_minutes, ..other.clone() }
     }
 
-    /// The first key whose value differs from that of `other`, and the two values, each `nothing` where it is not given.
+    /// The first key whose value differs from that of `other`, and the two values, each `nothing` where it is not
+    /// given.
     pub fn first_difference(&self, other: &Config) -> Option<(String, String, String)> {
         let (own, others) = (self.keys(), other.keys());
         let key = own.keys().chain(others.keys()).filter(|&key| own.get(key) != others.get(key)).min()?;

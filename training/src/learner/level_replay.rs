@@ -72,8 +72,8 @@ impl LevelReplay {
         due
     }
 
-    /// Makes the list anew. Its second part is systematic: a route stands in it as often as its score says, rounded up or
-    /// down.
+    /// Makes the list anew. Its second part is systematic: a route stands in it as often as its score says, rounded up
+    /// or down.
     fn fill(&mut self) {
         let fraction = self.settings.fraction;
         let n_replayed = (self.routes.len() as f64 * fraction / (1.0 - fraction)).round() as usize;

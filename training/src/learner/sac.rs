@@ -205,8 +205,8 @@ impl Sac {
         let [critics, target] = [&mut self.critics, &mut self.target_critics].map(take);
         (self.critics, self.target_critics) =
             self.critic_optimizer.step(critics, target, critic_gradients, critic_learning_rate * rate_factor, tau);
-        // Until the critics know the policy its rates are 0. It is stepped nevertheless: its leaves must be new ones in each
-        // update, or the graph of every update stays in memory.
+        // Until the critics know the policy its rates are 0. It is stepped nevertheless: its leaves must be new ones in
+        // each update, or the graph of every update stays in memory.
         let is_learning = self.learning.actor_delay < self.n_updates;
         let (rate, ema_rate) = if is_learning { (actor_learning_rate * rate_factor, actor_ema_rate) } else { (0.0, 0.0) };
         let [actor, ema] = [&mut self.actor, &mut self.actor_ema].map(take);

@@ -79,8 +79,8 @@ impl Reference {
         let drive = -self.stiffness[1] * side_speed.atan2(speed);
         let axle = -self.stiffness[2] * axle_side.atan2(trailer.x);
         let (sin, cos) = articulation.sin_cos();
-        // Unknown: side acceleration of the drive axle, both yaw accelerations, force of the trailer on the tractor along
-        // and across the tractor.
+        // Unknown: side acceleration of the drive axle, both yaw accelerations, force of the trailer on the tractor
+        // along and across the tractor.
         let ([m1, m2], [i1, i2]) = (self.mass, self.inertia);
         let (c1, h, c2, l2) = (self.centre, self.hitch, self.trailer_centre, self.trailer_wheelbase);
         let front_side = front * steering.cos();

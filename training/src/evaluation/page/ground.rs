@@ -133,8 +133,8 @@ struct Fleet {
 }
 
 impl Fleet {
-    /// Indices of a row of the world's `rigs` into `vehicles` and `classes`. Trucks that differ in their load alone have the
-    /// same dimensions.
+    /// Indices of a row of the world's `rigs` into `vehicles` and `classes`. Trucks that differ in their load alone
+    /// have the same dimensions.
     fn index(&mut self, world: &World, row: u32) -> (usize, Option<usize>) {
         let Fleet { vehicles, classes, met } = self;
         *met.entry(row).or_insert_with(|| {

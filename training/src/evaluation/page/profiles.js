@@ -1,7 +1,7 @@
 // Speed and load transfer along the path, by load: where trucks slowed down, and what it left them.
 //
-// A truck is as far along a route as the nearest point of the lane's centre to its drive axle. Distances count from where
-// the route leaves its entry arm, so that routes can be laid over each other.
+// A truck is as far along a route as the nearest point of the lane's centre to its drive axle. Distances count from
+// where the route leaves its entry arm, so that routes can be laid over each other.
 
 /** How far ahead on its route a truck is looked for from one frame to the next [m]. */
 const AHEAD = 12;

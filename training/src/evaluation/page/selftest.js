@@ -147,7 +147,8 @@ const CHECKS = {
     byId("profiles-route").click();
     for (const episode of page.episodes.filter((episode) => !episode.failed).slice(0, 20)) {
       const { lengths, ring, ...line } = lineOfRoute(page, episode.route), { from, speeds } = profileOf(page, episode, { lengths, ring, ...line });
-      // It passes the last waypoint and ends there; where it drives beside the lane's centre its way has another length.
+      // It passes the last waypoint and ends there; where it drives beside the lane's centre its way has another
+      // length.
       close(from + ring[0] + speeds.length, lengths.at(-1), 6, `episode ${episode.number}: end of the route`);
       close(speeds.reduce((time, speed) => time + 3.6 / speed, 0), episode.seconds, 0.1 * episode.seconds, `episode ${episode.number}: time along the route`);
     }

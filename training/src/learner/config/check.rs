@@ -63,8 +63,8 @@ impl Config {
         Ok(())
     }
 
-    /// An error if a budget of steps ends before the first update: nothing would be learned. `origin` is the file or the
-    /// flag that gives it.
+    /// An error if a budget of steps ends before the first update: nothing would be learned. `origin` is the file or
+    /// the flag that gives it.
     pub fn check_budget(&self, origin: &Path) -> Result<(), Error> {
         let (warmup, n_steps) = (self.replay_buffer.warmup, self.learning.n_steps + 1);
         let before_updates = (warmup as u64).max(n_steps as u64 * self.n_envs as u64);

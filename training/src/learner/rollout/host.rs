@@ -22,7 +22,8 @@ use crate::learner::network::{Mlp, sampled};
 use crate::learner::replay_buffer::{ReplayBuffer, Rows, Sample};
 use crate::learner::sac::{N_SHARDS, Transitions};
 
-/// Each truck's `N` values: those of its observation, and its first extras, `[n_envs]`. Without extras nothing is copied.
+/// Each truck's `N` values: those of its observation, and its first extras, `[n_envs]`. Without extras nothing is
+/// copied.
 pub fn observed<'a, const N: usize>(observation: &'a [[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Cow<'a, [[f32; N]]> {
     if N == N_VALUES {
         return Cow::Borrowed(bytemuck::cast_slice(observation));

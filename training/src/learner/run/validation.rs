@@ -1,5 +1,5 @@
-//! The policy on validation routes while it learns. The best one is kept: a policy is chosen without a look at the routes
-//! that it is reported on.
+//! The policy on validation routes while it learns. The best one is kept: a policy is chosen without a look at the
+//! routes that it is reported on.
 
 use std::sync::Arc;
 
@@ -88,8 +88,8 @@ impl Validation {
         self.n_made < times && self.n_made < (fraction * times as f64 + 1e-9) as u64
     }
 
-    /// Lets the policy drive. It becomes the best one unless an earlier one arrived more often. Where a run was too slow
-    /// for several validations, they become one.
+    /// Lets the policy drive. It becomes the best one unless an earlier one arrived more often. Where a run was too
+    /// slow for several validations, they become one.
     pub fn validate(&mut self, policy: Policy, env_steps: u64, fraction: f64) -> Result<Validated, Error> {
         let bytes = policy.to_bytes();
         let device = Device::processor();
