@@ -35,9 +35,15 @@ def finished(command, core):
     return None if done.returncode == 0 else done.stderr.strip().splitlines()[-1]
 
 
+def is_finished(folder):
+    """Whether a run has a report, and not that of an interruption."""
+    report = folder / "report.json"
+    return report.is_file() and not json.loads(report.read_text())["interrupted"]
+
+
 def trained(core, args, folder, config, seed, steps, settings):
-    """Trains in `folder`, unless it has a report; the last line of the errors where that fails."""
-    if not (folder / "report.json").is_file():
+    """Trains in `folder`, unless a run there has ended; the last line of the errors where that fails."""
+    if not is_finished(folder):
         if folder.exists():
             # It was interrupted before: a new run cannot use its folder.
             subprocess.run(["rm", "-r", str(folder)], check=True)
@@ -46,6 +52,8 @@ def trained(core, args, folder, config, seed, steps, settings):
         command += [part for setting in settings for part in ("--set", setting)]
         if failure := finished(command, core):
             return failure
+        if not is_finished(folder):
+            return "interrupted"
     # Nothing resumes this run, and the replay buffer in its checkpoint fills the disk.
     (folder / "checkpoint.safetensors").unlink(missing_ok=True)
     return None
