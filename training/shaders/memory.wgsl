@@ -33,11 +33,16 @@ fn choose(thread: Thread) {
 @compute @workgroup_size(WORKGROUP)
 fn store_before(thread: Thread) {
     let element = index_of(thread);
-    let env = element / N_VALUES;
+    let env = element / facts.n_values;
+    let value = element % facts.n_values;
     if facts.n_envs <= env { return; }
     let row = now.slot * facts.n_envs + env;
-    held_observation[row * N_VALUES + element % N_VALUES] = observation[element];
-    if element % N_VALUES == 0u {
+    if value < N_VALUES {
+        held_observation[row * facts.n_values + value] = observation[env * N_VALUES + value];
+    } else {
+        held_observation[row * facts.n_values + value] = extras[env * N_EXTRAS + value - N_VALUES];
+    }
+    if value == 0u {
         held_action[row] = action[env];
     }
 }
@@ -46,11 +51,16 @@ fn store_before(thread: Thread) {
 @compute @workgroup_size(WORKGROUP)
 fn store_after(thread: Thread) {
     let element = index_of(thread);
-    let env = element / N_VALUES;
+    let env = element / facts.n_values;
+    let value = element % facts.n_values;
     if facts.n_envs <= env { return; }
     let row = now.slot * facts.n_envs + env;
-    held_next[row * N_VALUES + element % N_VALUES] = next_observation[element];
-    if element % N_VALUES == 0u {
+    if value < N_VALUES {
+        held_next[row * facts.n_values + value] = next_observation[env * N_VALUES + value];
+    } else {
+        held_next[row * facts.n_values + value] = next_extras[env * N_EXTRAS + value - N_VALUES];
+    }
+    if value == 0u {
         held_reward[row] = reward[env];
         held_ended[row] = ended[env];
     }
@@ -62,8 +72,8 @@ fn store_after(thread: Thread) {
 @compute @workgroup_size(WORKGROUP)
 fn sample(thread: Thread) {
     let element = index_of(thread);
-    let index = element / N_VALUES;
-    let value = element % N_VALUES;
+    let index = element / facts.n_values;
+    let value = element % facts.n_values;
     if facts.n_rows <= index { return; }
     let drawn = words(facts.sampling_seed, index, now.sample, 0u);
     let slot = now.oldest + index_below(drawn.x, now.n_ready);
@@ -94,8 +104,8 @@ fn sample(thread: Thread) {
     if is_mirrored { image = images[value]; }
     // The same noise on both, so that their difference stays what it is.
     let noise = normalisation[value].noise * signed_unit(words(facts.sampling_seed, index, now.sample, 1u + value).x);
-    sampled_observation[element] = normalised(image.factor * held_observation[first * N_VALUES + image.index], value) + noise;
-    sampled_next[element] = normalised(image.factor * held_next[last * N_VALUES + image.index], value) + noise;
+    sampled_observation[element] = normalised(image.factor * held_observation[first * facts.n_values + image.index], value) + noise;
+    sampled_next[element] = normalised(image.factor * held_next[last * facts.n_values + image.index], value) + noise;
 }
 
 // A value, normalised and clipped.

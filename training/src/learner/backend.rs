@@ -64,7 +64,7 @@ impl Backend {
         }
     }
 
-    /// Trucks and a replay buffer there.
+    /// Trucks and a replay buffer there, for as many values as the world's benchmark observes.
     pub fn rollout(
         &self,
         config: &Config,
@@ -72,11 +72,30 @@ impl Backend {
         routes: Vec<u32>,
         mirror: Option<Mirror>,
     ) -> Result<Box<dyn Rollout>, Error> {
-        match self {
-            Backend::Host => host_rollout(config, world, routes, mirror),
-            #[cfg(feature = "gpu")]
-            Backend::Device(shared) => Ok(Box::new(DeviceRollout::new(shared, config, world, routes, mirror)?)),
+        const BLIND: usize = N_VALUES + Track::Blind.n_extras();
+        const MASS: usize = N_VALUES + Track::Mass.n_extras();
+        const ORACLE: usize = N_VALUES + Track::Oracle.n_extras();
+        match N_VALUES + world.params.n_extras as usize {
+            BLIND => self.rollout_of::<BLIND>(config, world, routes, mirror),
+            MASS => self.rollout_of::<MASS>(config, world, routes, mirror),
+            ORACLE => self.rollout_of::<ORACLE>(config, world, routes, mirror),
+            _ => self.rollout_of::<N_VALUES>(config, world, routes, mirror),
         }
+    }
+
+    /// The same where the networks observe `N` values.
+    fn rollout_of<const N: usize>(
+        &self,
+        config: &Config,
+        world: &Arc<World>,
+        routes: Vec<u32>,
+        mirror: Option<Mirror>,
+    ) -> Result<Box<dyn Rollout>, Error> {
+        Ok(match self {
+            Backend::Host => Box::new(HostRollout::<N>::new(config, world, routes, mirror)?),
+            #[cfg(feature = "gpu")]
+            Backend::Device(shared) => Box::new(DeviceRollout::<N>::new(shared, config, world, routes, mirror)?),
+        })
     }
 
     /// The result of `work`. On a device a panic becomes an error, for the tensor library panics where a device fails.
@@ -91,17 +110,4 @@ impl Backend {
             }),
         }
     }
-}
-
-/// Trucks and a replay buffer on the host, for as many values as the world's benchmark observes.
-fn host_rollout(config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<Box<dyn Rollout>, Error> {
-    const BLIND: usize = N_VALUES + Track::Blind.n_extras();
-    const MASS: usize = N_VALUES + Track::Mass.n_extras();
-    const ORACLE: usize = N_VALUES + Track::Oracle.n_extras();
-    Ok(match N_VALUES + world.params.n_extras as usize {
-        BLIND => Box::new(HostRollout::<BLIND>::new(config, world, routes, mirror)?),
-        MASS => Box::new(HostRollout::<MASS>::new(config, world, routes, mirror)?),
-        ORACLE => Box::new(HostRollout::<ORACLE>::new(config, world, routes, mirror)?),
-        _ => Box::new(HostRollout::<N_VALUES>::new(config, world, routes, mirror)?),
-    })
 }

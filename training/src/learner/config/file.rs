@@ -9,7 +9,7 @@ use super::set;
 use crate::error::Error;
 
 /// The training files that come with the program.
-const SHIPPED: [(&str, &str); 8] = [
+const SHIPPED: [(&str, &str); 9] = [
     ("default", include_str!("../../../configs/default.toml")),
     ("best", include_str!("../../../configs/best.toml")),
     ("attard", include_str!("../../../configs/attard.toml")),
@@ -17,6 +17,7 @@ const SHIPPED: [(&str, &str); 8] = [
     ("as-run", include_str!("../../../configs/as-run.toml")),
     ("laden", include_str!("../../../configs/laden.toml")),
     ("laden-50", include_str!("../../../configs/laden-50.toml")),
+    ("laden-gpu", include_str!("../../../configs/laden-gpu.toml")),
     ("paper", include_str!("../../../configs/paper.toml")),
 ];
 /// Bases of bases: more than anyone needs, fewer than a circle.

@@ -218,14 +218,16 @@ fn a_key_set_wrongly_is_refused_with_what_would_do() {
 fn every_training_file_reads_by_path_and_by_name() {
     let folder = files::repository().join("training/configs");
     let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    assert_eq!(files.len(), 8);
+    assert_eq!(files.len(), 9);
     for file in files {
         let by_path = Config::read(&file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(Config::read(Path::new(file.file_stem().unwrap())).unwrap(), by_path);
     }
     let message = Config::read(Path::new("papre")).unwrap_err().to_string();
     assert!(
-        message.contains("papre: is no training file: the program comes with default, best, attard, gpu, as-run, laden, laden-50, paper"),
+        message.contains(
+            "papre: is no training file: the program comes with default, best, attard, gpu, as-run, laden, laden-50, laden-gpu, paper"
+        ),
         "{message}"
     );
 }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use burn::tensor::{Tensor, TensorData};
 use bytemuck::{bytes_of, cast_slice};
 use offtrack::gpu::{Kernels, Slice};
-use offtrack::layout::{Column, Ended, N_VALUES};
+use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES};
 use offtrack::random;
 use offtrack::simulator::{Engine, RouteChoice, Simulator, Tally};
 use offtrack::world::World;
@@ -34,8 +34,8 @@ use shared::{Owned, floats, integers};
 /// Maximum number of steps queued ahead of the device. Queued work holds memory.
 const MAX_QUEUED_STEPS: usize = 16;
 
-/// See the module.
-pub struct DeviceRollout {
+/// Trucks and a replay buffer whose networks observe `N` values. See the module.
+pub struct DeviceRollout<const N: usize> {
     config: Config,
     routes: Vec<u32>,
     mirror: Option<Mirror>,
@@ -44,9 +44,11 @@ pub struct DeviceRollout {
     simulator: Simulator,
     facts: Facts,
     buffers: Buffers,
-    /// The simulator's column of observations, `[n_envs, values]`.
+    /// The simulator's column of observations, `[n_envs, N_VALUES]`.
     observation: Tensor<2>,
-    /// Mean and factor of each value, `[1, values]`.
+    /// The simulator's column of extras, `[n_envs, N_EXTRAS]`.
+    extras: Tensor<2>,
+    /// Mean and factor of each value, `[1, N]`.
     normalisation: [Tensor<2>; 2],
     sample: Transitions,
     _owned: Vec<Owned>,
@@ -60,7 +62,7 @@ pub struct DeviceRollout {
     counted: Tally,
 }
 
-impl DeviceRollout {
+impl<const N: usize> DeviceRollout<N> {
     /// Trucks at the start of their first episodes, and an empty replay buffer of `config.replay_buffer.capacity`
     /// transitions.
     pub fn new(
@@ -69,11 +71,7 @@ impl DeviceRollout {
         world: &Arc<World>,
         routes: Vec<u32>,
         mirror: Option<Mirror>,
-    ) -> Result<DeviceRollout, Error> {
-        if 0 < world.params.n_extras {
-            let expected = "the benchmark's observation.extras are learned with `cpu` alone".to_owned();
-            return Err(Error::Flag { flag: "device", value: "gpu".to_owned(), expected });
-        }
+    ) -> Result<DeviceRollout<N>, Error> {
         DeviceRollout::with_seeds(shared, config, world, routes, mirror, seeds(config.seed, 0))
     }
 
@@ -84,29 +82,32 @@ impl DeviceRollout {
         routes: Vec<u32>,
         mirror: Option<Mirror>,
         seeds: [u32; 2],
-    ) -> Result<DeviceRollout, Error> {
+    ) -> Result<DeviceRollout<N>, Error> {
         let (n_envs, n_rows) = (config.n_envs, config.learning.batch);
         let n_slots = config.replay_buffer.capacity.div_ceil(n_envs);
-        check_capacity(shared, config, n_slots * n_envs)?;
+        check_capacity::<N>(shared, config, n_slots * n_envs)?;
         let device = &shared.tensors;
         let zeros = |width: usize| Tensor::<2>::zeros([n_rows, width], device);
         let observation = Tensor::<2>::zeros([n_envs, N_VALUES], device);
+        let extras = Tensor::<2>::zeros([n_envs, N_EXTRAS], device);
         let sample = Transitions {
-            observation: zeros(N_VALUES),
+            observation: zeros(N),
             action: Tensor::from_data(TensorData::new(vec![0i32; n_rows], [n_rows, 1]), device),
             reward: zeros(1),
             discount: zeros(1),
-            next_observation: zeros(N_VALUES),
+            next_observation: zeros(N),
             weight: Tensor::ones([n_rows, 1], device),
         };
         shared.flush()?;
-        let column = floats(&observation)?;
-        let engine = Engine::Gpu { device: shared.gpu.clone(), columns: vec![(Column::Observation, column.slice.clone())] };
+        let (observed, beside) = (floats(&observation)?, floats(&extras)?);
+        let columns = vec![(Column::Observation, observed.slice.clone()), (Column::Extras, beside.slice.clone())];
+        let engine = Engine::Gpu { device: shared.gpu.clone(), columns };
         let simulator = Simulator::on(engine, world.clone(), n_envs, config.seed, RouteChoice::Drawn(routes.clone()))?;
         let facts = Facts {
             n_envs: n_envs as u32,
             n_slots: n_slots as u32,
             n_actions: world.params.n_actions,
+            n_values: N as u32,
             n_rows: n_rows as u32,
             n_steps: config.learning.n_steps as u32,
             acting_seed: seeds[0],
@@ -126,9 +127,10 @@ impl DeviceRollout {
             simulator,
             facts,
             observation,
-            normalisation: [0.0, 1.0].map(|value| Tensor::full([1, N_VALUES], value, device)),
+            extras,
+            normalisation: [0.0, 1.0].map(|value| Tensor::full([1, N], value, device)),
             sample,
-            _owned: vec![column],
+            _owned: vec![observed, beside],
             n_appended: 0,
             n_steps: 0,
             n_samples: 0,
@@ -136,7 +138,7 @@ impl DeviceRollout {
             counted: Tally::default(),
         };
         rollout.buffers = rollout.make_buffers()?;
-        rollout.set_normalisation(&Normalisation::none(N_VALUES));
+        rollout.set_normalisation(&Normalisation::none(N));
         shared.check()?;
         Ok(rollout)
     }
@@ -148,7 +150,7 @@ impl DeviceRollout {
         let empty = |size: usize| gpu.empty("replay buffer", size as u64);
         let (values, actions) = match &self.mirror {
             Some(mirror) => mirror.images(),
-            None => ((0..N_VALUES).map(|index| (index, 1.0)).collect(), (0..self.facts.n_actions).collect()),
+            None => ((0..N).map(|index| (index, 1.0)).collect(), (0..self.facts.n_actions).collect()),
         };
         let image = |(index, factor)| Image { index: index as u32, factor };
         let images: Vec<Image> = values.into_iter().map(image).collect();
@@ -158,16 +160,18 @@ impl DeviceRollout {
         let batch = self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
         let column = |column: Column| batch.column(column).clone();
         let held = (self.facts.n_slots * self.facts.n_envs) as usize;
-        let row_bytes = N_VALUES * size_of::<f32>();
+        let row_bytes = N * size_of::<f32>();
         let buffers = Buffers::new(vec![
             (Binding::facts, filled(bytes_of(&self.facts))),
             (Binding::now, empty(size_of::<Now>())),
-            (Binding::normalisation, empty(N_VALUES * size_of::<Normal>())),
+            (Binding::normalisation, empty(N * size_of::<Normal>())),
             (Binding::images, filled(cast_slice(&images))),
             (Binding::action_images, filled(cast_slice(&actions))),
             (Binding::action, column(Column::Action)),
             (Binding::observation, column(Column::Observation)),
             (Binding::next_observation, column(Column::NextObservation)),
+            (Binding::extras, column(Column::Extras)),
+            (Binding::next_extras, column(Column::NextExtras)),
             (Binding::ended, column(Column::Ended)),
             (Binding::reward, column(Column::Reward)),
             (Binding::held_observation, empty(held * row_bytes)),
@@ -187,10 +191,14 @@ impl DeviceRollout {
         Ok(buffers)
     }
 
-    /// The trucks' observations, normalised, `[n_envs, values]`.
+    /// The trucks' observations with the first extras behind them, normalised, `[n_envs, N]`.
     fn normalised(&self) -> Tensor<2> {
         let [mean, factor] = self.normalisation.clone();
-        ((self.observation.clone() - mean) * factor).clamp(-LIMIT, LIMIT)
+        let observed = match N - N_VALUES {
+            0 => self.observation.clone(),
+            n_extras => Tensor::cat(vec![self.observation.clone(), self.extras.clone().narrow(1, 0, n_extras)], 1),
+        };
+        ((observed - mean) * factor).clamp(-LIMIT, LIMIT)
     }
 
     /// One step of every truck: by the actor's output, or with random actions where there is none.
@@ -243,7 +251,7 @@ impl DeviceRollout {
     }
 }
 
-impl Rollout for DeviceRollout {
+impl<const N: usize> Rollout for DeviceRollout<N> {
     fn simulator(&self) -> &Simulator {
         &self.simulator
     }
@@ -258,10 +266,10 @@ impl Rollout for DeviceRollout {
 
     fn found_normalisation(&self, mirror: Option<&Mirror>) -> Result<Normalisation, Error> {
         let held = self.buffers.slice(Binding::held_observation);
-        let size = (self.n_transitions() * N_VALUES * size_of::<f32>()) as u64;
+        let size = (self.n_transitions() * N * size_of::<f32>()) as u64;
         let bytes = self.shared.gpu.read(&[Slice { size, ..held.clone() }]).map_err(offtrack::simulator::Error::from)?;
         // Bytes need not be aligned as floats are.
-        let rows: Vec<[f32; N_VALUES]> = bytes[0].chunks_exact(N_VALUES * 4).map(bytemuck::pod_read_unaligned).collect();
+        let rows: Vec<[f32; N]> = bytes[0].chunks_exact(N * 4).map(bytemuck::pod_read_unaligned).collect();
         Ok(super::normalisation_of(rows, mirror))
     }
 
@@ -347,8 +355,8 @@ fn seeds(seed: u32, n_updates: u32) -> [u32; 2] {
 }
 
 /// The observations must fit into one buffer of the device.
-fn check_capacity(shared: &Shared, config: &Config, n_transitions: usize) -> Result<(), Error> {
-    let row_bytes = (N_VALUES * size_of::<f32>()) as u64;
+fn check_capacity<const N: usize>(shared: &Shared, config: &Config, n_transitions: usize) -> Result<(), Error> {
+    let row_bytes = (N * size_of::<f32>()) as u64;
     let limit = shared.gpu.device.limits().max_storage_buffer_binding_size.min(u64::from(u32::MAX) * 4);
     let needed = n_transitions as u64 * row_bytes;
     if needed <= limit {

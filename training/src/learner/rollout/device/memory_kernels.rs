@@ -2,7 +2,6 @@
 //! compiled.
 
 use offtrack::gpu::{Kernels, Slice};
-use offtrack::layout::N_VALUES;
 use offtrack::layout::buffers::Access;
 use offtrack::shared::Shared as _;
 use offtrack::stages::SHADERS;
@@ -18,6 +17,8 @@ offtrack::shared! {
         pub n_slots: u32,
         /// Entries of the action table.
         pub n_actions: u32,
+        /// Values that the networks observe: those of an observation, and the extras behind them.
+        pub n_values: u32,
         /// Transitions in a sample.
         pub n_rows: u32,
         /// Steps of the n-step return.
@@ -98,25 +99,27 @@ macro_rules! bindings {
 bindings! {
     facts: Facts::wgsl(), true, "What does not change in a run.";
     now: Now::wgsl(), true, "What changes from one dispatch to the next.";
-    normalisation: Normal::wgsl(), false, "Normalisation and noise of each value, [N_VALUES].";
-    images: Image::wgsl(), false, "Mirror image of each value, [N_VALUES].";
+    normalisation: Normal::wgsl(), false, "Normalisation and noise of each value, [n_values].";
+    images: Image::wgsl(), false, "Mirror image of each value, [n_values].";
     action_images: "u32".to_owned(), false, "Mirror image of each action, [n_actions].";
     action: "u32".to_owned(), false, "The simulator's column of actions, [n_envs].";
     observation: "f32".to_owned(), false, "The simulator's column of observations, [n_envs, N_VALUES].";
     next_observation: "f32".to_owned(), false, "The simulator's column of next observations, [n_envs, N_VALUES].";
+    extras: "f32".to_owned(), false, "The simulator's column of extras, [n_envs, N_EXTRAS].";
+    next_extras: "f32".to_owned(), false, "The simulator's column of next extras, [n_envs, N_EXTRAS].";
     ended: "u32".to_owned(), false, "The simulator's column of end codes, [n_envs].";
     reward: "f32".to_owned(), false, "The simulator's column of rewards, [n_envs].";
-    held_observation: "f32".to_owned(), false, "The ring: observations, [n_slots, n_envs, N_VALUES].";
-    held_next: "f32".to_owned(), false, "The ring: next observations, [n_slots, n_envs, N_VALUES].";
+    held_observation: "f32".to_owned(), false, "The ring: observations, [n_slots, n_envs, n_values].";
+    held_next: "f32".to_owned(), false, "The ring: next observations, [n_slots, n_envs, n_values].";
     held_action: "u32".to_owned(), false, "The ring: actions, [n_slots, n_envs].";
     held_reward: "f32".to_owned(), false, "The ring: rewards, [n_slots, n_envs].";
     held_ended: "u32".to_owned(), false, "The ring: end codes, [n_slots, n_envs].";
     logits: "f32".to_owned(), false, "The actor's output, [n_envs, n_actions].";
-    sampled_observation: "f32".to_owned(), false, "A sample: observations, [n_rows, N_VALUES].";
+    sampled_observation: "f32".to_owned(), false, "A sample: observations, [n_rows, n_values].";
     sampled_action: "i32".to_owned(), false, "A sample: actions, [n_rows].";
     sampled_reward: "f32".to_owned(), false, "A sample: rewards, [n_rows].";
     sampled_discount: "f32".to_owned(), false, "A sample: discounts, [n_rows].";
-    sampled_next: "f32".to_owned(), false, "A sample: next observations, [n_rows, N_VALUES].";
+    sampled_next: "f32".to_owned(), false, "A sample: next observations, [n_rows, n_values].";
 }
 
 /// A buffer for every binding.
@@ -171,7 +174,7 @@ offtrack::named! {
 impl Kernel {
     /// Threads that it needs: one a truck, or one a value.
     fn threads(self, facts: &Facts) -> u64 {
-        let (envs, rows, values) = (u64::from(facts.n_envs), u64::from(facts.n_rows), N_VALUES as u64);
+        let (envs, rows, values) = (u64::from(facts.n_envs), u64::from(facts.n_rows), u64::from(facts.n_values));
         match self {
             Kernel::Choose => envs,
             Kernel::StoreBefore | Kernel::StoreAfter => envs * values,

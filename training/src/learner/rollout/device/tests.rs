@@ -1,11 +1,18 @@
 use super::*;
-use offtrack::layout::Ended;
+use crate::learner::rollout::host::observed;
+use offtrack::layout::{Ended, Track};
 use offtrack::random::{index_below, signed_unit, words};
 use offtrack::scenario::{Scenario, Split};
 use std::path::Path;
 
+const MASS: usize = N_VALUES + Track::Mass.n_extras();
+
 fn training() -> (Arc<World>, Vec<u32>) {
-    let scenario = Scenario::named("attard2023").unwrap();
+    training_of("attard2023")
+}
+
+fn training_of(benchmark: &str) -> (Arc<World>, Vec<u32>) {
+    let scenario = Scenario::named(benchmark).unwrap();
     (Arc::new(World::bake(&scenario).unwrap()), scenario.split(Split::Train).to_vec())
 }
 
@@ -22,12 +29,12 @@ fn mirror_of(config: &Config, mirror: &Mirror) -> Option<Mirror> {
 }
 
 /// One step of one truck.
-struct Step {
-    seen: [f32; N_VALUES],
+struct Step<const N: usize> {
+    seen: [f32; N],
     action: u32,
     reward: f32,
     ended: u32,
-    next: [f32; N_VALUES],
+    next: [f32; N],
 }
 
 fn host<const D: usize>(tensor: &Tensor<D>) -> Vec<f32> {
@@ -36,7 +43,17 @@ fn host<const D: usize>(tensor: &Tensor<D>) -> Vec<f32> {
 
 #[test]
 fn samples_are_the_transitions_that_were_driven_normalised_noisy_and_mirrored_as_asked() {
-    let (world, routes) = training();
+    check_samples::<N_VALUES>("attard2023");
+}
+
+#[test]
+fn samples_have_the_extras_that_a_benchmark_observes() {
+    check_samples::<MASS>("laden2026");
+}
+
+/// Compares samples of a benchmark whose networks observe `N` values with the steps that were made.
+fn check_samples<const N: usize>(benchmark: &str) {
+    let (world, routes) = training_of(benchmark);
     let shared = Shared::open(None).unwrap();
     let mirror = Mirror::of(&world).unwrap();
     for settings in [
@@ -45,13 +62,16 @@ fn samples_are_the_transitions_that_were_driven_normalised_noisy_and_mirrored_as
     ] {
         let config = config(&settings);
         let (n_envs, n_steps, seeds) = (config.n_envs, config.learning.n_steps, [7, 8]);
-        let mut rollout = DeviceRollout::with_seeds(&shared, &config, &world, routes.clone(), mirror_of(&config, &mirror), seeds).unwrap();
-        let mut history: Vec<Vec<Step>> = Vec::new();
+        let mut rollout =
+            DeviceRollout::<N>::with_seeds(&shared, &config, &world, routes.clone(), mirror_of(&config, &mirror), seeds).unwrap();
+        let mut history: Vec<Vec<Step<N>>> = Vec::new();
         // Three times round the ring of 32 steps.
         for _ in 0..100 {
-            let seen = rollout.simulator().batch().observation.clone();
+            let batch = rollout.simulator().batch();
+            let seen = observed::<N>(&batch.observation, &batch.extras).into_owned();
             rollout.step_at_random().unwrap();
             let batch = rollout.simulator().batch();
+            let next = observed::<N>(&batch.next_observation, &batch.next_extras);
             history.push(
                 (0..n_envs)
                     .map(|env| Step {
@@ -59,12 +79,12 @@ fn samples_are_the_transitions_that_were_driven_normalised_noisy_and_mirrored_as
                         action: batch.action[env],
                         reward: batch.reward[env],
                         ended: batch.ended[env],
-                        next: batch.next_observation[env],
+                        next: next[env],
                     })
                     .collect(),
             );
         }
-        let normalisation = Normalisation { mean: vec![0.25; N_VALUES], factor: (0..N_VALUES).map(|index| 1.0 + index as f32).collect() };
+        let normalisation = Normalisation { mean: vec![0.25; N], factor: (0..N).map(|index| 1.0 + index as f32).collect() };
         rollout.set_normalisation(&normalisation);
         let sample = rollout.sample().unwrap().remove(0);
         let (observation, next) = (host(&sample.observation), host(&sample.next_observation));
@@ -92,7 +112,7 @@ fn samples_are_the_transitions_that_were_driven_normalised_noisy_and_mirrored_as
             }
             let is_mirrored = config.learning.mirror_augmentation && drawn[2] & 1 == 1;
             mirrored += usize::from(is_mirrored);
-            let image = |seen: &[f32; N_VALUES]| if is_mirrored { mirror.observation(seen) } else { *seen };
+            let image = |seen: &[f32; N]| if is_mirrored { mirror.observation(seen) } else { *seen };
             let expected_action = history[first][env].action;
             let expected_action = if is_mirrored { mirror.images().1[expected_action as usize] } else { expected_action };
             assert_eq!(action[row], expected_action as i32);
@@ -101,9 +121,9 @@ fn samples_are_the_transitions_that_were_driven_normalised_noisy_and_mirrored_as
             assert!((reward[row] - expected_reward).abs() <= 1e-5 * expected_reward.abs().max(1.0), "{} {expected_reward}", reward[row]);
             for (found, seen) in [(&observation, &history[first][env].seen), (&next, &history[last][env].next)] {
                 let expected = normalisation.apply(&[image(seen)]);
-                for value in 0..N_VALUES {
+                for value in 0..N {
                     let noise = config.learning.observation_noise as f32 * signed_unit(words(seeds[1], row as u32, 0, 1 + value as u32)[0]);
-                    let difference = found[row * N_VALUES + value] - (expected[value] + noise);
+                    let difference = found[row * N + value] - (expected[value] + noise);
                     // Normalised values lie within 10.
                     assert!(difference.abs() < 1e-5, "{value}: {difference}");
                 }
@@ -119,7 +139,7 @@ fn actions_follow_the_actors_distribution() {
     let (world, routes) = training();
     let shared = Shared::open(None).unwrap();
     let config = config(&["n_envs=4096", "replay_buffer.capacity=100000"]);
-    let mut rollout = DeviceRollout::with_seeds(&shared, &config, &world, routes, None, [7, 8]).unwrap();
+    let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(&shared, &config, &world, routes, None, [7, 8]).unwrap();
     // Probabilities of 1/45, 2/45, ... 9/45.
     let logits: Vec<f32> = (0..4096).flat_map(|_| (1..=9).map(|rank| (rank as f32).ln())).collect();
     let logits = Tensor::from_data(TensorData::new(logits, [4096, 9]), &shared.tensors);
@@ -142,7 +162,8 @@ fn rewards(skips_flush: bool) -> Vec<Vec<f32>> {
     let mut shared = Shared::open(None).unwrap();
     shared.skips_flush = skips_flush;
     let mut rollout =
-        DeviceRollout::with_seeds(&shared, &config(&["learning.mirror_augmentation=false"]), &world, routes, None, [7, 8]).unwrap();
+        DeviceRollout::<N_VALUES>::with_seeds(&shared, &config(&["learning.mirror_augmentation=false"]), &world, routes, None, [7, 8])
+            .unwrap();
     for _ in 0..40 {
         rollout.step_at_random().unwrap();
     }
@@ -170,7 +191,8 @@ fn trucks_take_the_actions_of_the_latest_output() {
     let (world, routes) = training();
     let shared = Shared::open(None).unwrap();
     let mut rollout =
-        DeviceRollout::with_seeds(&shared, &config(&["learning.mirror_augmentation=false"]), &world, routes, None, [7, 8]).unwrap();
+        DeviceRollout::<N_VALUES>::with_seeds(&shared, &config(&["learning.mirror_augmentation=false"]), &world, routes, None, [7, 8])
+            .unwrap();
     let output = |step: usize| {
         let row = (0..9).map(|action| if action == step % 9 { 50.0 } else { 0.0 });
         Tensor::<2>::from_data(TensorData::new(row.collect::<Vec<f32>>(), [1, 9]), &shared.tensors).repeat_dim(0, 64)
