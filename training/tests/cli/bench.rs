@@ -1,11 +1,11 @@
 //! The learner's bench, for people and for a program that takes turns with it.
 
 use std::io::Write;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use serde_json::Value;
 
-use crate::place::{Place, offtrack, succeed};
+use crate::place::{Place, offtrack, program, succeed};
 
 /// Small enough to be over in a moment.
 const SMALL: [&str; 7] = ["bench", "--hidden", "4,3", "--batch", "2,6", "--seconds", "0.1"];
@@ -28,7 +28,7 @@ fn the_learners_bench_writes_a_run_for_each_batch() {
 
 #[test]
 fn each_line_read_asks_for_a_round() {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_offtrack"));
+    let mut command = program();
     let mut program = command.args(SMALL).arg("--lines").stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     program.stdin.take().unwrap().write_all(b"\nagain\n").unwrap();
     let output = program.wait_with_output().unwrap();

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use crate::place::{Place, offtrack, refusal, succeed};
+use crate::place::{Place, offtrack, program, refusal, succeed};
 
 /// A certificate of the short benchmark, from the narrowest search that completes it.
 fn certified() -> Place {
@@ -167,7 +167,7 @@ fn a_result_states_the_commit_of_the_build_and_not_that_of_the_sources_when_it_r
     std::fs::write(&fake, "#!/bin/sh\necho 0123456789ab\n").unwrap();
     assert!(Command::new("chmod").args(["+x", fake.to_str().unwrap()]).status().unwrap().success());
     let path = format!("{}:{}", fake.parent().unwrap().display(), std::env::var("PATH").unwrap());
-    let output = Command::new(env!("CARGO_BIN_EXE_offtrack"))
+    let output = program()
         .env("PATH", path)
         .args([
             "certify",
@@ -192,12 +192,7 @@ fn a_result_states_the_commit_of_the_build_and_not_that_of_the_sources_when_it_r
 fn an_interrupted_search_exits_with_130_and_leaves_no_temporary_file() {
     let place = Place::new();
     let arguments = ["certify", "--benchmark", "attard2023", "--json", &place.text("certificate.json")];
-    let search = Command::new(env!("CARGO_BIN_EXE_offtrack"))
-        .args(arguments)
-        .stdout(std::process::Stdio::null())
-        .stderr(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
+    let search = program().args(arguments).stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null()).spawn().unwrap();
     // The first write shows that the search has begun.
     while !place.file("certificate.json").is_file() {
         std::thread::sleep(std::time::Duration::from_millis(10));

@@ -131,9 +131,8 @@ fn a_program_without_the_feature_says_so_and_how_to_build_one_that_has_it() {
 
 #[cfg(feature = "gpu")]
 mod on_a_device {
-    use std::process::Command;
-
     use super::*;
+    use crate::place::program;
 
     #[test]
     fn the_first_device_of_the_list_is_marked_and_is_the_one_a_result_names() {
@@ -172,7 +171,7 @@ mod on_a_device {
     #[test]
     fn without_a_driver_a_failure_says_what_was_looked_for_and_how_to_get_one() {
         for arguments in [&["devices"][..], &["scale", "--device", "gpu"], &["evaluate", "--device", "gpu"]] {
-            let mut command = Command::new(env!("CARGO_BIN_EXE_offtrack"));
+            let mut command = program();
             // The second name is that of older loaders.
             let output = command.args(arguments).env("VK_DRIVER_FILES", "/no.json").env("VK_ICD_FILENAMES", "/no.json").output().unwrap();
             let said = refusal(&output, 1);
@@ -206,8 +205,11 @@ mod on_a_device {
     #[test]
     fn networks_act_and_learn_on_the_device() {
         let place = Place::new();
-        let arguments = ["--device", "gpu", "--envs", "16", "--mode", &NETWORKS.join(","), "--config", &place.text("tiny.toml")];
-        assert_networks_acted(&scaled(&place, &arguments), 16);
+        // In the second one networks observe extras.
+        for benchmark in ["attard2023", "laden2026"] {
+            let arguments = ["--device", "gpu", "--envs", "16", "--mode", &NETWORKS.join(","), "--config", &place.text("tiny.toml")];
+            assert_networks_acted(&scaled(&place, &[&["--benchmark", benchmark], &arguments[..]].concat()), 16);
+        }
     }
 
     #[test]

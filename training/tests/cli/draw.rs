@@ -1,12 +1,14 @@
 //! `offtrack draw`: its files agree with the library's roundabout.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use glam::DVec2;
 use offtrack::geometry::Outline;
 use offtrack::roundabout::{Gutter, Roundabout};
 use serde_json::Value;
+
+use crate::place::program;
 
 type Polygon = Vec<DVec2>;
 
@@ -192,7 +194,7 @@ fn text(path: &Path) -> &str {
 }
 
 fn draw(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_offtrack")).arg("draw").args(arguments).output().expect("the program runs")
+    program().arg("draw").args(arguments).output().expect("the program runs")
 }
 
 fn succeed(arguments: &[&str]) {

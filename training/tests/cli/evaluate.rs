@@ -1,6 +1,6 @@
 //! `offtrack evaluate`: every episode is counted, equal seeds give equal reports, and wrong policy files are refused.
 
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use offtrack::layout::N_VALUES;
 use offtrack::scenario::Scenario;
@@ -8,7 +8,7 @@ use offtrack::world::World;
 use offtrack_policy::{Activation, Layer, Normalisation, Policy};
 use serde_json::Value;
 
-use crate::place::{Place, offtrack, refusal, repository, succeed};
+use crate::place::{Place, offtrack, program, refusal, repository, succeed};
 
 #[test]
 fn every_episode_is_counted_once_by_its_end_and_once_by_its_route() {
@@ -169,7 +169,7 @@ fn a_report_that_cannot_be_written_is_a_failure() {
 #[test]
 fn a_closed_standard_output_costs_the_table_and_not_the_report() {
     let place = Place::new();
-    let mut evaluation = Command::new(env!("CARGO_BIN_EXE_offtrack"))
+    let mut evaluation = program()
         .args(["evaluate", "--benchmark", &place.text("short.toml"), "--policy", "random", "--episodes", "1"])
         .args(["--json", &place.text("report.json")])
         .stdout(Stdio::piped())
@@ -212,7 +212,7 @@ fn without_a_policy_the_shipped_one_drives_as_its_report_says() {
 fn the_shipped_policy_and_benchmark_are_found_wherever_the_program_runs_and_by_name() {
     let elsewhere = tempfile::tempdir().unwrap();
     for arguments in [&["evaluate", "--episodes", "1"][..], &["evaluate", "--episodes", "1", "--policy", "attard2023"]] {
-        let output = Command::new(env!("CARGO_BIN_EXE_offtrack")).current_dir(elsewhere.path()).args(arguments).output().unwrap();
+        let output = program().current_dir(elsewhere.path()).args(arguments).output().unwrap();
         succeed(&output);
         let printed = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(
@@ -248,7 +248,7 @@ fn a_policy_that_is_not_finite_is_refused_by_file_and_tensor() {
 fn the_table_fits_the_terminal() {
     let place = Place::new();
     for (columns, limit) in [(None, 100), (Some("60"), 60), (Some("120"), 120)] {
-        let mut evaluation = Command::new(env!("CARGO_BIN_EXE_offtrack"));
+        let mut evaluation = program();
         evaluation.args(["evaluate", "--benchmark", &place.text("short.toml"), "--policy", "random", "--episodes", "30"]);
         match columns {
             Some(columns) => evaluation.env("COLUMNS", columns),

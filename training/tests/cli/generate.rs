@@ -1,16 +1,16 @@
 //! `offtrack generate`, and random roads by name in other commands.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use offtrack::procedural::{Distribution, find};
 use offtrack::roundabout::Roundabout;
 
-use crate::place::{Place, offtrack, refusal, succeed};
+use crate::place::{Place, offtrack, program, refusal, succeed};
 
-/// The program with a cache of its own, so that tests leave nothing in the user's.
+/// The program with an empty cache, that of the place.
 fn cached(place: &Place, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_offtrack"));
+    let mut command = program();
     command.current_dir(crate::place::repository()).env("OFFTRACK_CACHE", place.file("cache")).args(arguments).output().unwrap()
 }
 

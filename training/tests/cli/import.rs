@@ -1,14 +1,16 @@
 //! `offtrack import`: what it finds in maps, and the files that it writes.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
+
+use crate::place::program;
 
 fn map(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/maps").join(name)
 }
 
 fn offtrack(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_offtrack")).args(arguments).output().unwrap()
+    program().args(arguments).output().unwrap()
 }
 
 #[test]

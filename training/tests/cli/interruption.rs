@@ -4,7 +4,7 @@
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-use crate::place::{Place, succeed};
+use crate::place::{Place, program, succeed};
 
 /// A run far too long to end by itself, once it writes figures.
 fn begun(place: &Place) -> Child {
@@ -63,10 +63,7 @@ fn a_run_killed_in_its_first_seconds_leaves_a_policy_and_a_checkpoint_to_continu
     assert_eq!(ended(run, "-KILL").status.code(), None);
     assert_whole_rows(&place);
     succeed(&place.evaluate(&["--policy", policy.to_str().unwrap(), "--episodes", "1"]));
-    let resumed = Command::new(env!("CARGO_BIN_EXE_offtrack"))
-        .args(["train", "--resume", &place.text("runs/run"), "--steps", "2000"])
-        .output()
-        .unwrap();
+    let resumed = program().args(["train", "--resume", &place.text("runs/run"), "--steps", "2000"]).output().unwrap();
     succeed(&resumed);
     assert_eq!(place.json("runs/run/report.json")["env_steps"], 2000);
 }

@@ -23,6 +23,9 @@ file = "roundabouts/20m.toml"
 test = ["E-right-1", "W-left-3"]
 "#;
 
+/// Where the tests keep baked fields.
+pub const CACHE: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/offtrack-cache");
+
 /// A learner so small that a run takes a second.
 const TRAINING: &str = r#"
 benchmark = "BENCHMARK"
@@ -92,7 +95,7 @@ impl Place {
 
     /// A training command that has not been started.
     pub fn training(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_offtrack"));
+        let mut command = program();
         command.args(["train", &self.text("tiny.toml"), "--out", &self.text("runs")]).args(arguments);
         command
     }
@@ -111,9 +114,16 @@ pub fn repository() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
+/// The program with a cache of the tests' own, so that they neither need nor fill that of the user.
+pub fn program() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_offtrack"));
+    command.env("OFFTRACK_CACHE", CACHE);
+    command
+}
+
 /// The program, run in the repository.
 pub fn offtrack(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_offtrack")).current_dir(repository()).args(arguments).output().unwrap()
+    program().current_dir(repository()).args(arguments).output().unwrap()
 }
 
 pub fn succeed(output: &Output) {

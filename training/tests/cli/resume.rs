@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::place::{Place, offtrack, refusal, succeed};
+use crate::place::{CACHE, Place, offtrack, program, refusal, succeed};
 
 const ENDLESS: [&str; 2] = ["--steps", "1000000000"];
 /// Columns of the metrics that depend on the clock.
@@ -26,7 +26,7 @@ fn place() -> Place {
 }
 
 fn resumed(place: &Place, run: &str, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_offtrack"));
+    let mut command = program();
     command.args(["train", "--resume", &place.text(&format!("runs/{run}"))]).args(arguments);
     command
 }
@@ -347,7 +347,7 @@ fn a_full_disk_fails_a_run_only_at_its_end_after_the_evaluation() {
     let program = env!("CARGO_BIN_EXE_offtrack");
     let (training, runs) = (place.text("tiny.toml"), place.text("runs"));
     let line = format!("trap '' XFSZ; ulimit -f 500; exec {program} train {training} --out {runs} --name run");
-    let output = Command::new("sh").args(["-c", &line]).output().unwrap();
+    let output = Command::new("sh").env("OFFTRACK_CACHE", CACHE).args(["-c", &line]).output().unwrap();
     let message = refusal(&output, 1);
     // So short a run may meet the full disk at its end alone.
     assert!(message.matches("training goes on").count() <= 1, "{message}");
