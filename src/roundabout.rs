@@ -177,7 +177,12 @@ impl Roundabout {
         arms.iter().zip(next).map(|(arm, next)| (next.bearing - arm.bearing).rem_euclid(TAU)).fold(TAU, f64::min)
     }
 
-    /// Radius of the central island's kerb face \[m].
+    /// Whether its lanes go round a central island; a crossing has none.
+    pub fn has_ring(&self) -> bool {
+        0.0 < self.ground.island_radius
+    }
+
+    /// Radius of the central island's kerb face; 0 on a crossing \[m].
     pub fn island_radius(&self) -> f64 {
         self.ground.island_radius
     }

@@ -17,7 +17,7 @@ mod table; // a report as text
 use std::sync::Arc;
 
 use offtrack::cpu::reset::drawn_start;
-use offtrack::layout::{Control, Ended, Start, Truck};
+use offtrack::layout::{Control, Ended, Rig, Start, Truck};
 use offtrack::route::Route;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
@@ -29,7 +29,7 @@ use rayon::prelude::*;
 
 use crate::device::Device;
 use crate::error::Error;
-use driving::Driving;
+use driving::{ClassReport, Driving};
 use groups::{Evaluated, Groups};
 use part::LaneWidths;
 use policies::Policy;
@@ -191,10 +191,16 @@ impl Evaluation<'_> {
             certified: None,
             possible: None,
             failures: self.failures(finished, None),
-            classes: driving::classes(scenario, self.world, finished),
+            classes: self.classes(finished, None),
             groups: Groups::of(&routes, finished, scenario.step),
             routes: route_reports.collect(),
         }
+    }
+
+    /// How trucks drove, by vehicle and load; the episodes stand as [`Evaluation::drive`] gives them. `possible` says of
+    /// each whether its start is shown to be possible.
+    pub fn classes(&self, finished: &[Episode], possible: Option<&[bool]>) -> Vec<ClassReport> {
+        driving::classes(self.scenario, self.world, finished, possible)
     }
 
     /// The routes of the split, in its order.
@@ -209,10 +215,10 @@ impl Evaluation<'_> {
         (self.scenario.split(self.split)[episode / self.episodes], drawn_start(self.world.params.n_vehicles, self.seed, episode as u32, 0))
     }
 
-    /// Whether the own lane suffices on each route. The kerbs of one roundabout a thread are held.
+    /// Whether the own lane suffices on each route, for the truck that needs most room. The kerbs of one roundabout a thread are held.
     fn own_lane_suffices(&self, routes: &[Evaluated]) -> Vec<bool> {
         let Evaluation { scenario, world, .. } = *self;
-        let (rig, speed) = (&world.rigs[0], scenario.cruising_speed());
+        let (rig, speed) = (widest(&world.rigs), scenario.cruising_speed());
         let of_one_place: Vec<_> = routes.chunk_by(|(a, ..), (b, ..)| a == b).collect();
         let suffices = |routes: &&[Evaluated]| {
             let kerbs = routes[0].1.roundabout.kerbs(scenario.gutter);
@@ -221,6 +227,13 @@ impl Evaluation<'_> {
         };
         of_one_place.par_iter().flat_map_iter(suffices).collect()
     }
+}
+
+/// The truck whose trailer's axle cuts a circle of the front axle most: their squared radii differ by the sum of the
+/// squared wheelbases less the square of the fifth wheel's distance from the drive axle.
+fn widest(rigs: &[Rig]) -> &Rig {
+    let cut = |rig: &Rig| rig.wheelbase.powi(2) - rig.fifth_wheel.powi(2) + rig.trailer_wheelbase.powi(2);
+    rigs.iter().max_by(|a, b| cut(a).total_cmp(&cut(b))).expect("a world has a truck")
 }
 
 /// The actions of each episode, `[episodes][steps]`.

@@ -116,6 +116,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let bar = progress::Bar::new("certifying", "starts", n_searches);
         let (possible, is_possible) = evaluation.possible(&finished, &passes, &|| bar.advance())?;
         report.failures = evaluation.failures(&finished, Some(&is_possible));
+        report.classes = evaluation.classes(&finished, Some(&is_possible));
         report.possible = Some(possible);
     }
     if let Some(file) = &args.json {

@@ -82,6 +82,9 @@ pub struct ClassReport {
     pub arrived: usize,
     /// Fraction that arrived.
     pub success: f64,
+    /// Episodes whose own start is shown to be possible; `None` where nobody asked for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub possible: Option<usize>,
     /// Episodes that ended with a rollover.
     pub rolled_over: usize,
     /// Fraction that did.
@@ -122,8 +125,9 @@ pub(super) fn has_classes(scenario: &Scenario) -> bool {
     scenario.fleet.is_some() || scenario.speeds.len() != 1 || !scenario.speed_changes.is_empty()
 }
 
-/// The report of each class of vehicles in these episodes; none without [`has_classes`].
-pub(super) fn classes(scenario: &Scenario, world: &World, episodes: &[Episode]) -> Vec<ClassReport> {
+/// The report of each class of vehicles in these episodes; none without [`has_classes`]. `possible` says of each episode
+/// whether its start is shown to be possible.
+pub(super) fn classes(scenario: &Scenario, world: &World, episodes: &[Episode], possible: Option<&[bool]>) -> Vec<ClassReport> {
     if !has_classes(scenario) {
         return Vec::new();
     }
@@ -133,8 +137,11 @@ pub(super) fn classes(scenario: &Scenario, world: &World, episodes: &[Episode]) 
         *profiles.entry((truck.route, truck.vehicle)).or_insert_with(|| profile().time)
     };
     let class = |index: usize| {
-        let own: Vec<&Episode> = episodes.iter().filter(|episode| world.rig(&episode.last).class_index as usize == index).collect();
-        (!own.is_empty()).then(|| class_report(scenario, world, index, &own, &mut feasible))
+        let is_own = |episode: &Episode| world.rig(&episode.last).class_index as usize == index;
+        let own: Vec<&Episode> = episodes.iter().filter(|episode| is_own(episode)).collect();
+        let shown = |possible: &[bool]| episodes.iter().zip(possible).filter(|&(episode, &possible)| possible && is_own(episode)).count();
+        let shown = possible.map(shown);
+        (!own.is_empty()).then(|| ClassReport { possible: shown, ..class_report(scenario, world, index, &own, &mut feasible) })
     };
     (0..world.classes.len()).filter_map(class).collect()
 }
@@ -165,6 +172,7 @@ fn class_report(
         episodes: n,
         arrived,
         success: arrived as f64 / n as f64,
+        possible: None,
         rolled_over,
         rolled_over_fraction: rolled_over as f64 / n as f64,
         rolled_over_high: wilson(rolled_over, n).1,
@@ -254,13 +262,15 @@ mod tests {
         let mut scenario = Scenario::named("attard2023").unwrap();
         let world = World::bake(&scenario).unwrap();
         let episodes = [episode(Ended::Arrived), episode(Ended::RolledOver), episode(Ended::TrailerCollided), episode(Ended::Arrived)];
-        assert_eq!(classes(&scenario, &world, &episodes), []);
+        assert_eq!(classes(&scenario, &world, &episodes, None), []);
         scenario.speeds.push(5.0);
-        let found = classes(&scenario, &world, &episodes);
+        let found = classes(&scenario, &world, &episodes, None);
         assert_eq!((found.len(), found[0].arrived, found[0].rolled_over, found[0].rolled_over_fraction), (1, 2, 1, 0.25));
         assert_eq!((found[0].load_transfer_ratio_p50, found[0].load.as_str()), (1.5, "empty"));
         // 999 steps on a route that takes some 16 s at 30 km/h.
         assert!((4.0..9.0).contains(&found[0].time_over_feasible_mean.unwrap()), "{found:?}");
+        assert_eq!(found[0].possible, None);
+        assert_eq!(classes(&scenario, &world, &episodes, Some(&[true, false, true, true]))[0].possible, Some(3));
         assert_eq!(lines(&found).len(), 3);
         assert!(lines(&[]).is_empty());
     }

@@ -22,7 +22,8 @@ const SPACING: f32 = 0.1;
 /// Episodes that did not arrive for the same cause.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cause {
-    /// `trailer on the island`, `tractor on the outer kerb of the exit`, `lost at start`, `strayed` and the like.
+    /// `trailer on the island`, `tractor on the outer kerb of the exit`, `lost at start`, `strayed` and the like; on a
+    /// crossing, which has no ring, `trailer on the outer kerb of the junction`.
     pub cause: String,
     /// Their number.
     pub episodes: usize,
@@ -120,7 +121,7 @@ impl Evaluation<'_> {
         let station = route.centre_line.station(p);
         match place.roundabout.nearest_kerb(p) {
             Kerb::Island => "island".to_owned(),
-            Kerb::Outer => format!("outer kerb of the {}", Part::at(self.scenario, route, station).name()),
+            Kerb::Outer => format!("outer kerb of the {}", Part::at(self.scenario, route, station).name(place.roundabout.has_ring())),
             Kerb::Splitter(arm) => {
                 // A U-turn leaves by the arm that it enters by.
                 let first_half = station < 0.5 * route.centre_line.length();
@@ -217,13 +218,30 @@ mod tests {
                 let line = &route.2.centre_line;
                 for station in (0..line.length() as usize).map(|station| station as f64) {
                     let p = line.point_at(station) + 4.5 * DVec2::from_angle(line.heading_at(station)).perp();
-                    found.insert((evaluation.kerb(route, p), Part::at(evaluation.scenario, route.2, station).name()));
+                    found.insert((evaluation.kerb(route, p), Part::at(evaluation.scenario, route.2, station).name(true)));
                 }
             }
             for expected in [("splitter of the entry", "entry"), ("splitter of the exit", "exit")] {
                 assert!(found.iter().any(|(kerb, part)| (kerb.as_str(), *part) == expected), "{found:?}");
             }
         });
+    }
+
+    #[test]
+    fn a_crossing_has_a_junction_and_no_ring() {
+        let scenario = Scenario::named("maps2026-crossing").unwrap();
+        let (world, device) = (Arc::new(World::bake(&scenario).unwrap()), Device::processor());
+        let split = Split::Test;
+        let evaluation = Evaluation { scenario: &scenario, world: &world, split, episodes: 1, seed: 0, record: false, device: &device };
+        let mut found = std::collections::BTreeSet::new();
+        for route in &evaluation.routes() {
+            let line = &route.2.centre_line;
+            found.extend((0..line.length() as usize).map(|station| evaluation.kerb(route, line.point_at(station as f64))));
+        }
+        assert!(found.contains("outer kerb of the junction") && found.contains("outer kerb of the entry"), "{found:?}");
+        assert!(!found.iter().any(|kerb| kerb.contains("ring")), "{found:?}");
+        let routes = evaluation.routes();
+        assert!(routes.iter().all(|route| super::super::groups::island_radius(route).1 == "none"));
     }
 
     #[test]

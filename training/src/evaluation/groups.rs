@@ -10,8 +10,8 @@ use super::report::{Episode, Summary};
 
 /// Island radii from which on a route is in the next band \[m].
 const BANDS: [f64; 4] = [9.0, 12.0, 16.0, 22.0];
-/// Their names.
-const BAND_NAMES: [&str; BANDS.len() + 1] = ["below 9 m", "9 to 12 m", "12 to 16 m", "16 to 22 m", "22 m and more"];
+/// Their names, and behind them that of the routes of a crossing, which has no island.
+const BAND_NAMES: [&str; BANDS.len() + 2] = ["below 9 m", "9 to 12 m", "12 to 16 m", "16 to 22 m", "22 m and more", "none"];
 
 /// A route that is evaluated: the index of its place in the benchmark, the place, the route.
 pub type Evaluated<'a> = (usize, &'a Place, &'a Route);
@@ -31,7 +31,7 @@ pub struct Group {
 /// Every episode once in each of four partitions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Groups {
-    /// By band of the island's radius, smallest first.
+    /// By band of the island's radius, smallest first; `none` for the routes of crossings.
     pub island_radius: Vec<Group>,
     /// By the lane of approach.
     pub lane: Vec<Group>,
@@ -69,7 +69,7 @@ pub(super) fn by(routes: &[Evaluated], episodes: &[Vec<&Episode>], key: Key, ste
 }
 
 pub(super) fn island_radius((_, place, _): &Evaluated) -> (usize, String) {
-    let band = band(place.roundabout.island_radius());
+    let band = if place.roundabout.has_ring() { band(place.roundabout.island_radius()) } else { BAND_NAMES.len() - 1 };
     (band, BAND_NAMES[band].to_owned())
 }
 

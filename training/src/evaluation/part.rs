@@ -27,11 +27,12 @@ impl Part {
         }
     }
 
-    /// Its name in reports.
-    pub(super) fn name(self) -> &'static str {
+    /// Its name in reports. What lies between the arms of a crossing is no ring.
+    pub(super) fn name(self, has_ring: bool) -> &'static str {
         match self {
             Part::Entry => "entry",
-            Part::Ring => "ring",
+            Part::Ring if has_ring => "ring",
+            Part::Ring => "junction",
             Part::Exit => "exit",
         }
     }
