@@ -1,27 +1,26 @@
 //! A batch of trucks: the simulator as Python sees it.
 
+mod arguments;
+mod state;
+
 use std::borrow::Cow;
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
-use numpy::{
-    Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray1, PyReadwriteArray2, PyUntypedArrayMethods,
-};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray2, PyUntypedArrayMethods};
 use offtrack::layout::{Column, Ended, N_RAYS, N_VALUES, Start, Stream, Truck};
-use offtrack::shared::Named;
-use offtrack::simulator::{Autoreset, Begin, Engine, RouteChoice, Simulator};
+use offtrack::simulator::{Autoreset, Begin, RouteChoice, Simulator};
 use offtrack_drawing::camera::{Camera, Shown};
-use pyo3::exceptions::{PyIndexError, PyMemoryError, PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::infos::{self, End, Episode, Names};
-use crate::observed::{self, Observed, Read, rows_of};
+use crate::infos::{self, End, Names};
+use crate::observed::{self, Read, rows_of};
 use crate::pool::Pool;
 use crate::worlds::Place;
 use crate::{actions, errors};
-
-/// The device that is none.
-const CPU: &str = "cpu";
+use arguments::{autoreset_of, column_of, engine_of, name_of, unfit, writable};
+use state::State;
 
 /// Observation, reward, terminated, truncated of a step.
 type Step<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<bool>>);
@@ -47,19 +46,6 @@ pub struct Batch {
     device: String,
     autoreset: Autoreset,
     state: Mutex<State>,
-}
-
-/// What a step changes.
-struct State {
-    simulator: Simulator,
-    pool: Pool,
-    camera: Option<Camera>,
-    /// What each truck's episode was drawn from.
-    episodes: Vec<Episode>,
-    /// Whether its episode has ended and no other has begun.
-    held: Vec<bool>,
-    /// Episodes that the last step ended.
-    ends: Vec<End>,
 }
 
 #[pymethods]
@@ -409,125 +395,6 @@ impl Batch {
     }
 }
 
-impl State {
-    /// Steps all trucks, and hands observation, reward and end code of each to `deliver`, on the pool's threads: these
-    /// fall asleep where the caller's own does the work.
-    fn step<T: Send>(
-        &mut self,
-        py: Python,
-        batch: &Batch,
-        actions: &[u32],
-        deliver: impl FnOnce(&Observed, &[f32], &[u32]) -> T + Send,
-    ) -> PyResult<T> {
-        self.check_process(&batch.device)?;
-        let State { simulator, pool, ends, episodes, held, .. } = self;
-        if batch.autoreset == Autoreset::Disabled
-            && let Some(env) = held.iter().position(|held| *held)
-        {
-            return Err(errors::reset_needed(py, &format!("truck {env}: its episode has ended; begin another before the next step")));
-        }
-        let stepped = pool.run(py, || {
-            simulator.step(actions)?;
-            let read = Read::of(simulator, &batch.read)?;
-            let (codes, trucks) = (read.rows::<u32>(Column::Ended), read.rows::<Truck>(Column::Truck));
-            let last = read.observed_last(batch.n_extras);
-            if batch.autoreset == Autoreset::NextStep {
-                // Those that ended in the step before have begun, and no other is in another episode.
-                for End { env, .. } in &*ends {
-                    episodes[*env] = Episode::of(&trucks[*env]);
-                    held[*env] = false;
-                }
-            }
-            ends.clear();
-            for (env, &code) in codes.iter().enumerate().filter(|&(_, &code)| code != Ended::Running as u32) {
-                ends.push(End { env, code, episode: episodes[env], observation: last.row(env) });
-                episodes[env] = Episode::of(&trucks[env]);
-                held[env] = trucks[env].held == 1;
-            }
-            Ok(deliver(&read.observed(batch.n_extras), &read.rows(Column::Reward), &codes))
-        })?;
-        stepped.map_err(|error| errors::of_simulator(&error))
-    }
-
-    /// Looks at where trucks are after they were put there.
-    fn look(&mut self) -> PyResult<()> {
-        let State { simulator, episodes, held, ends, .. } = self;
-        let read = simulator.read(&[Column::Truck]).map_err(|error| errors::of_simulator(&error))?;
-        ends.clear();
-        see(&rows_of::<Truck>(&read[0]), episodes, held);
-        Ok(())
-    }
-
-    /// An error in a forked child whose batch is on a device: the device is its parent's.
-    fn check_process(&self, device: &str) -> PyResult<()> {
-        if device != CPU && self.pool.is_forked() {
-            let message = format!("this batch is on {device}, which a forked process cannot use; make the batch in the child");
-            return Err(PyRuntimeError::new_err(message));
-        }
-        Ok(())
-    }
-}
-
-/// Takes down which episodes trucks are in and which are held.
-fn see(trucks: &[Truck], episodes: &mut Vec<Episode>, held: &mut Vec<bool>) {
-    episodes.clear();
-    episodes.extend(trucks.iter().map(Episode::of));
-    held.clear();
-    held.extend(trucks.iter().map(|truck| truck.held == 1));
-}
-
 fn holds(code: u32, is: fn(Ended) -> bool) -> bool {
     Ended::from_code(code).is_some_and(is)
-}
-
-fn column_of(name: &str) -> PyResult<Column> {
-    let found = Column::ALL.iter().find(|column| column.name() == name);
-    found.copied().ok_or_else(|| {
-        let known: Vec<&str> = Column::ALL.iter().map(|column| column.name()).collect();
-        PyValueError::new_err(format!("column: {name:?}; must be one of {}", known.join(", ")))
-    })
-}
-
-/// The names of `gymnasium.vector.AutoresetMode`, in lower case.
-const MODES: [(&str, Autoreset); 3] =
-    [("next_step", Autoreset::NextStep), ("same_step", Autoreset::SameStep), ("disabled", Autoreset::Disabled)];
-
-fn autoreset_of(name: &str) -> PyResult<Autoreset> {
-    let found = MODES.iter().find(|(known, _)| *known == name);
-    found
-        .map(|(_, mode)| *mode)
-        .ok_or_else(|| PyValueError::new_err(format!("autoreset: {name:?}; must be one of {}", MODES.map(|(name, _)| name).join(", "))))
-}
-
-fn name_of(autoreset: Autoreset) -> &'static str {
-    MODES.iter().find(|(_, mode)| *mode == autoreset).map_or("", |(name, _)| name)
-}
-
-/// The engine that `device` names, and the name that it goes by.
-fn engine_of(device: &str) -> PyResult<(Engine, String)> {
-    if device == CPU {
-        return Ok((Engine::Cpu, CPU.to_owned()));
-    }
-    #[cfg(feature = "gpu")]
-    {
-        use offtrack::gpu;
-
-        let adapter = (device != "gpu").then_some(device);
-        let opened = gpu::Device::open(adapter).map_err(|error| PyRuntimeError::new_err(format!("device: {error}")))?;
-        let name = opened.name();
-        Ok((Engine::Gpu { device: opened, columns: gpu::Columns::new() }, name))
-    }
-    #[cfg(not(feature = "gpu"))]
-    Err(PyRuntimeError::new_err(format!("device: {device:?}; this build has only \"cpu\": it was made without the feature gpu")))
-}
-
-/// An output array of the caller.
-fn writable<'py, T: Element>(array: &Bound<'py, PyAny>, name: &str, kind: &str, n_envs: usize) -> PyResult<PyReadwriteArray1<'py, T>> {
-    let shape = format!("{kind} of shape ({n_envs},)");
-    let array: PyReadwriteArray1<T> = array.extract().map_err(|_| unfit(name, &shape))?;
-    if array.len() == n_envs { Ok(array) } else { Err(unfit(name, &shape)) }
-}
-
-fn unfit(name: &str, needed: &str) -> PyErr {
-    PyTypeError::new_err(format!("{name}: must be a writable, contiguous numpy array, {needed}"))
 }

@@ -1,0 +1,94 @@
+//! What a step of a batch changes, and the step.
+
+use offtrack::layout::{Column, Ended, Truck};
+use offtrack::simulator::{Autoreset, Simulator};
+use offtrack_drawing::camera::Camera;
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+use super::Batch;
+use super::arguments::CPU;
+use crate::errors;
+use crate::infos::{End, Episode};
+use crate::observed::{Observed, Read, rows_of};
+use crate::pool::Pool;
+
+/// What a step changes.
+pub(super) struct State {
+    pub(super) simulator: Simulator,
+    pub(super) pool: Pool,
+    pub(super) camera: Option<Camera>,
+    /// What each truck's episode was drawn from.
+    pub(super) episodes: Vec<Episode>,
+    /// Whether its episode has ended and no other has begun.
+    pub(super) held: Vec<bool>,
+    /// Episodes that the last step ended.
+    pub(super) ends: Vec<End>,
+}
+
+impl State {
+    /// Steps all trucks, and hands observation, reward and end code of each to `deliver`, on the pool's threads: these
+    /// fall asleep where the caller's own does the work.
+    pub(super) fn step<T: Send>(
+        &mut self,
+        py: Python,
+        batch: &Batch,
+        actions: &[u32],
+        deliver: impl FnOnce(&Observed, &[f32], &[u32]) -> T + Send,
+    ) -> PyResult<T> {
+        self.check_process(&batch.device)?;
+        let State { simulator, pool, ends, episodes, held, .. } = self;
+        if batch.autoreset == Autoreset::Disabled
+            && let Some(env) = held.iter().position(|held| *held)
+        {
+            return Err(errors::reset_needed(py, &format!("truck {env}: its episode has ended; begin another before the next step")));
+        }
+        let stepped = pool.run(py, || {
+            simulator.step(actions)?;
+            let read = Read::of(simulator, &batch.read)?;
+            let (codes, trucks) = (read.rows::<u32>(Column::Ended), read.rows::<Truck>(Column::Truck));
+            let last = read.observed_last(batch.n_extras);
+            if batch.autoreset == Autoreset::NextStep {
+                // Those that ended in the step before have begun, and no other is in another episode.
+                for End { env, .. } in &*ends {
+                    episodes[*env] = Episode::of(&trucks[*env]);
+                    held[*env] = false;
+                }
+            }
+            ends.clear();
+            for (env, &code) in codes.iter().enumerate().filter(|&(_, &code)| code != Ended::Running as u32) {
+                ends.push(End { env, code, episode: episodes[env], observation: last.row(env) });
+                episodes[env] = Episode::of(&trucks[env]);
+                held[env] = trucks[env].held == 1;
+            }
+            Ok(deliver(&read.observed(batch.n_extras), &read.rows(Column::Reward), &codes))
+        })?;
+        stepped.map_err(|error| errors::of_simulator(&error))
+    }
+
+    /// Looks at where trucks are after they were put there.
+    pub(super) fn look(&mut self) -> PyResult<()> {
+        let State { simulator, episodes, held, ends, .. } = self;
+        let read = simulator.read(&[Column::Truck]).map_err(|error| errors::of_simulator(&error))?;
+        ends.clear();
+        see(&rows_of::<Truck>(&read[0]), episodes, held);
+        Ok(())
+    }
+
+    /// An error in a forked child whose batch is on a device: the device is its parent's.
+    pub(super) fn check_process(&self, device: &str) -> PyResult<()> {
+        if device != CPU && self.pool.is_forked() {
+            let message = format!("this batch is on {device}, which a forked process cannot use; make the batch in the child");
+            return Err(PyRuntimeError::new_err(message));
+        }
+        Ok(())
+    }
+}
+
+/// Takes down which episodes trucks are in and which are held.
+fn see(trucks: &[Truck], episodes: &mut Vec<Episode>, held: &mut Vec<bool>) {
+    episodes.clear();
+    episodes.extend(trucks.iter().map(Episode::of));
+    held.clear();
+    held.extend(trucks.iter().map(|truck| truck.held == 1));
+}
