@@ -9,8 +9,7 @@ fn judge(thread: Thread) {
     truck[env].steps += 1u;
     let step_limit = step_limits[truck[env].route * params.n_classes + rigs[truck[env].vehicle].class_index];
     let code = ending(params, routes[truck[env].route], step_limit, truck[env], clearance[env], progress[env]);
-    let driving = driving_terms(params, truck[env], control[env], code);
-    let weighed_terms = weighed(params, clearance[env], progress[env], code, driving);
+    let weighed_terms = weighed(params, clearance[env], progress[env], code);
     ended[env] = code;
     terms[env] = weighed_terms;
     reward[env] = rewarded(params, weighed_terms);
@@ -39,29 +38,15 @@ fn ending(params: Params, route: RouteRow, step_limit: u32, truck: Truck, cleara
     return RUNNING;
 }
 
-// How the truck drove: time, load transfer, lateral acceleration, jerk and rollover; the other terms are 0.
-fn driving_terms(params: Params, truck: Truck, control: Control, code: u32) -> RewardTerms {
-    let ratio = max(abs(truck.tractor_load_transfer_ratio), abs(truck.trailer_load_transfer_ratio));
-    let duration = f32(params.n_substeps) * params.substep;
-    let jerk = abs(truck.acceleration - control.acceleration_before) / duration;
-    var terms = RewardTerms();
-    terms.time = 1.0;
-    terms.load_transfer = clamp((ratio - params.load_transfer_margin) / (1.0 - params.load_transfer_margin), 0.0, 1.0);
-    terms.lateral_acceleration = min(abs(truck.lateral_acceleration) / G, 1.0);
-    terms.jerk = min(jerk / JERK_SCALE, 1.0);
-    terms.rollover = select(0.0, 1.0, code == ROLLED_OVER);
-    return terms;
-}
-
-// The physical amounts that the reward weighs; `driving` has those of `driving_terms`.
-fn weighed(params: Params, clearance: Clearance, progress: Progress, code: u32, driving: RewardTerms) -> RewardTerms {
+// The physical amounts that the reward weighs.
+fn weighed(params: Params, clearance: Clearance, progress: Progress, code: u32) -> RewardTerms {
     let failed = code != RUNNING && code != ARRIVED && code != TIMED_OUT;
-    var terms = driving;
-    terms.waypoints = f32(progress.passed);
-    terms.lane_distance = min(progress.lane_distance / params.lane_distance_limit, 1.0);
-    terms.clearance = clamp(1.0 - min(clearance.tractor, clearance.trailer) / params.clearance_limit, 0.0, 1.0);
-    terms.failure = select(0.0, 1.0, failed);
-    return terms;
+    return RewardTerms(
+        f32(progress.passed),
+        min(progress.lane_distance / params.lane_distance_limit, 1.0),
+        clamp(1.0 - min(clearance.tractor, clearance.trailer) / params.clearance_limit, 0.0, 1.0),
+        select(0.0, 1.0, failed),
+    );
 }
 
 // The weighted sum.
@@ -69,10 +54,5 @@ fn rewarded(params: Params, terms: RewardTerms) -> f32 {
     return params.waypoint_weight * terms.waypoints
         + params.lane_distance_weight * terms.lane_distance
         + params.clearance_weight * terms.clearance
-        + params.failure_weight * terms.failure
-        + params.time_weight * terms.time
-        + params.load_transfer_weight * terms.load_transfer
-        + params.lateral_acceleration_weight * terms.lateral_acceleration
-        + params.jerk_weight * terms.jerk
-        + params.rollover_weight * terms.rollover;
+        + params.failure_weight * terms.failure;
 }

@@ -165,8 +165,6 @@ const ROLL_SCALE: f32 = 0.15f;
 const ROLL_RATE_SCALE: f32 = 0.3f;
 // Mass that is observed as 1 [kg].
 const MASS_SCALE: f32 = 40000.0f;
-// Change of the acceleration that its term is 1 at [m/s^3].
-const JERK_SCALE: f32 = 10.0f;
 // Sums in a tally: steps by their end code, then the rewards.
 const N_SUMS: u32 = 9u;
 // Index of the sum of the rewards.
@@ -206,8 +204,6 @@ struct Control {
     target_speed: f32,
     // Whether the target speed is 0: once the truck stands, the brakes hold it (0 or 1).
     holds: u32,
-    // Acceleration before the step [m/s^2].
-    acceleration_before: f32,
 }
 
 // One tractor and its trailer.
@@ -317,16 +313,6 @@ struct RewardTerms {
     clearance: f32,
     // 1 when the episode failed in this step.
     failure: f32,
-    // 1: the step itself.
-    time: f32,
-    // How far the larger load transfer ratio is beyond its margin, from 0 there to 1 where wheels lift.
-    load_transfer: f32,
-    // Lateral acceleration of the trailer in units of gravity, at most 1.
-    lateral_acceleration: f32,
-    // Change of the acceleration over 10 m/s^3, at most 1.
-    jerk: f32,
-    // 1 when the truck rolled over in this step.
-    rollover: f32,
 }
 
 // One distance sensor, fixed to a unit. A tractor's frame starts at the drive axle, a trailer's at its axle group.
@@ -488,18 +474,6 @@ struct Params {
     clearance_weight: f32,
     // Reward when the episode fails.
     failure_weight: f32,
-    // Reward for each step.
-    time_weight: f32,
-    // Load transfer ratio beyond which its term counts, below 1.
-    load_transfer_margin: f32,
-    // Reward for the load-transfer term, each step.
-    load_transfer_weight: f32,
-    // Reward for the lateral-acceleration term, each step.
-    lateral_acceleration_weight: f32,
-    // Reward for the jerk term, each step.
-    jerk_weight: f32,
-    // Reward when the truck rolls over, beside that for a failure.
-    rollover_weight: f32,
 }
 
 // One waypoint of one route.

@@ -9,7 +9,6 @@ fn steer(thread: Thread) {
     let duration = f32(params.n_substeps) * params.substep;
     let asked = targeted(params, actions[action[env]], control[env]);
     control[env] = controlled(rigs[truck[env].vehicle], duration, asked, truck[env].speed, control[env]);
-    control[env].acceleration_before = truck[env].acceleration;
 }
 
 // The action with the target speed that it leads to, from that of the control before.
@@ -43,6 +42,5 @@ fn controlled(rig: Rig, duration: f32, action: Action, speed: f32, before: Contr
         before.steering_before,
         action.speed,
         select(0u, 1u, holds),
-        before.acceleration_before,
     );
 }

@@ -61,8 +61,6 @@ crate::shared! {
         pub target_speed: f32,
         /// Whether the target speed is 0: once the truck stands, the brakes hold it (0 or 1).
         pub holds: u32,
-        /// Acceleration before the step \[m/s^2].
-        pub acceleration_before: f32,
     }
 
     /// One tractor and its trailer.
@@ -172,16 +170,6 @@ crate::shared! {
         pub clearance: f32,
         /// 1 when the episode failed in this step.
         pub failure: f32,
-        /// 1: the step itself.
-        pub time: f32,
-        /// How far the larger load transfer ratio is beyond its margin, from 0 there to 1 where wheels lift.
-        pub load_transfer: f32,
-        /// Lateral acceleration of the trailer in units of gravity, at most 1.
-        pub lateral_acceleration: f32,
-        /// Change of the acceleration over 10 m/s^3, at most 1.
-        pub jerk: f32,
-        /// 1 when the truck rolled over in this step.
-        pub rollover: f32,
     }
 
     /// One distance sensor, fixed to a unit. A tractor's frame starts at the drive axle, a trailer's at its axle group.
@@ -343,18 +331,6 @@ crate::shared! {
         pub clearance_weight: f32,
         /// Reward when the episode fails.
         pub failure_weight: f32,
-        /// Reward for each step.
-        pub time_weight: f32,
-        /// Load transfer ratio beyond which its term counts, below 1.
-        pub load_transfer_margin: f32,
-        /// Reward for the load-transfer term, each step.
-        pub load_transfer_weight: f32,
-        /// Reward for the lateral-acceleration term, each step.
-        pub lateral_acceleration_weight: f32,
-        /// Reward for the jerk term, each step.
-        pub jerk_weight: f32,
-        /// Reward when the truck rolls over, beside that for a failure.
-        pub rollover_weight: f32,
     }
 
     /// One waypoint of one route.

@@ -137,18 +137,6 @@ pub struct Scenario {
     pub clearance_limit: f64,
     /// Reward for a failure.
     pub failure_weight: f64,
-    /// Reward for each step.
-    pub time_weight: f64,
-    /// Weight of the load-transfer term in the reward of each step.
-    pub load_transfer_weight: f64,
-    /// Load transfer ratio beyond which that term counts.
-    pub load_transfer_margin: f64,
-    /// Weight of the lateral-acceleration term in the reward of each step.
-    pub lateral_acceleration_weight: f64,
-    /// Weight of the jerk term in the reward of each step.
-    pub jerk_weight: f64,
-    /// Reward for a rollover, beside that for a failure.
-    pub rollover_weight: f64,
     /// Length of a route before the ring \[m].
     pub approach: f64,
     /// Length of a route after the ring \[m].

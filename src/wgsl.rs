@@ -23,7 +23,6 @@ pub fn shared() -> String {
         cpu::collide::printed_constants(),
         cpu::sense::printed_constants(),
         cpu::observe::printed_constants(),
-        cpu::judge::printed_constants(),
         tally::printed_constants(),
         autoreset::printed_constants(),
         "\n".to_owned(),

@@ -203,22 +203,6 @@ pub(super) struct WrittenReward {
     #[serde(default = "half_a_metre")]
     pub(super) clearance_limit: f64,
     pub(super) failure: f64,
-    #[serde(default)]
-    pub(super) time: f64,
-    #[serde(default)]
-    pub(super) load_transfer: f64,
-    #[serde(default)]
-    pub(super) lateral_acceleration: f64,
-    #[serde(default)]
-    pub(super) jerk: f64,
-    #[serde(default)]
-    pub(super) rollover: f64,
-    #[serde(default = "three_fifths")]
-    pub(super) load_transfer_margin: f64,
-}
-
-fn three_fifths() -> f64 {
-    0.6
 }
 
 fn half_a_metre() -> f64 {

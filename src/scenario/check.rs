@@ -43,7 +43,6 @@ impl Scenario {
         if !self.speed_changes.is_empty() {
             list("speed_changes", &self.speed_changes, [-100.0, 100.0])?;
         }
-        within("load_transfer_margin", self.load_transfer_margin, [0.0, 0.999])?;
         self.start_speed.iter().flatten().try_for_each(|&speed| within("start_speed", speed, [0.0, 100.0]))?;
         self.check_routes()?;
         check_vehicle(&self.vehicle)?;
@@ -87,11 +86,6 @@ impl Scenario {
             ("lane_distance_weight", self.lane_distance_weight),
             ("clearance_weight", self.clearance_weight),
             ("failure_weight", self.failure_weight),
-            ("time_weight", self.time_weight),
-            ("load_transfer_weight", self.load_transfer_weight),
-            ("lateral_acceleration_weight", self.lateral_acceleration_weight),
-            ("jerk_weight", self.jerk_weight),
-            ("rollover_weight", self.rollover_weight),
         ];
         positive.into_iter().try_for_each(|(key, value)| within(key, value, POSITIVE))?;
         finite.into_iter().try_for_each(|(key, value)| within(key, value, FINITE))

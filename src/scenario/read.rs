@@ -89,12 +89,6 @@ fn without_routes(
         clearance_weight: weight(reader, "reward.clearance", reward.clearance)?,
         clearance_limit: reader.within("reward.clearance_limit", reward.clearance_limit, 0.01..=10.0, "m")?,
         failure_weight: weight(reader, "reward.failure", reward.failure)?,
-        time_weight: small_weight(reader, "reward.time", reward.time)?,
-        load_transfer_weight: small_weight(reader, "reward.load_transfer", reward.load_transfer)?,
-        lateral_acceleration_weight: small_weight(reader, "reward.lateral_acceleration", reward.lateral_acceleration)?,
-        jerk_weight: small_weight(reader, "reward.jerk", reward.jerk)?,
-        rollover_weight: small_weight(reader, "reward.rollover", reward.rollover)?,
-        load_transfer_margin: reader.within("reward.load_transfer_margin", reward.load_transfer_margin, 0.0..=0.99, "")?,
         approach: reader.within("routes.approach", routes.approach, 5.0..=500.0, "m")?,
         departure: reader.within("routes.departure", routes.departure, 5.0..=500.0, "m")?,
         spacing: reader.within("routes.spacing", routes.spacing, 0.5..=5.0, "m")?,
@@ -141,11 +135,6 @@ pub(super) fn referred<T>(
 fn numbers(reader: &Reader, key: &str, values: &[f64], most: f64, least: f64, unit: &str) -> Result<Vec<f64>, Error> {
     reader.count(key, values.len(), 1..=64)?;
     values.iter().enumerate().map(|(index, &value)| reader.within(&format!("{key}[{index}]"), value, least..=most, unit)).collect()
-}
-
-/// A weight of a term that may be 1 in every step.
-fn small_weight(reader: &Reader, key: &str, value: f64) -> Result<f64, Error> {
-    reader.within(key, value, -1e4..=1e4, "")
 }
 
 fn weight(reader: &Reader, key: &str, value: f64) -> Result<f64, Error> {

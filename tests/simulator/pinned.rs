@@ -76,7 +76,6 @@ fn published(batch: &Batch, column: Column) -> Vec<u8> {
     let width = match column {
         Column::Control => 12,
         Column::Truck => 64,
-        Column::Terms => 16,
         _ => column.width(),
     };
     batch.column(column).chunks_exact(column.width()).flat_map(|row| &row[..width]).copied().collect()

@@ -4,15 +4,8 @@
 
 use crate::angle::wrapped;
 use crate::engine::Row;
-use crate::engine::cpu::observe::G;
-use crate::layout::{Clearance, Control, Ended, Params, Progress, RewardTerms, RouteRow, Truck};
-use crate::shared::constants;
+use crate::layout::{Clearance, Ended, Params, Progress, RewardTerms, RouteRow, Truck};
 use crate::world::World;
-
-constants! {
-    /// Change of the acceleration that its term is 1 at [m/s^3].
-    const JERK_SCALE: f32 = 10.0;
-}
 
 /// Advances the truck's number of steps and writes the end code, the reward's terms and the reward.
 pub fn judge(world: &World, row: &mut Row) {
@@ -21,8 +14,7 @@ pub fn judge(world: &World, row: &mut Row) {
     let step_limit = world.step_limit(row.truck);
     let ended = ending(&world.params, route, step_limit, row.truck, row.clearance, row.progress);
     *row.ended = ended as u32;
-    let driving = driving_terms(&world.params, row.truck, row.control, ended);
-    *row.terms = weighed(&world.params, row.clearance, row.progress, ended, &driving);
+    *row.terms = weighed(&world.params, row.clearance, row.progress, ended);
     *row.reward = rewarded(&world.params, row.terms);
 }
 
@@ -50,29 +42,13 @@ pub fn ending(params: &Params, route: &RouteRow, step_limit: u32, truck: &Truck,
     }
 }
 
-/// How the truck drove: time, load transfer, lateral acceleration, jerk and rollover; the other terms are 0.
-pub fn driving_terms(params: &Params, truck: &Truck, control: &Control, ended: Ended) -> RewardTerms {
-    let ratio = truck.load_transfer_ratio();
-    let duration = params.n_substeps as f32 * params.substep;
-    let jerk = (truck.acceleration - control.acceleration_before).abs() / duration;
-    RewardTerms {
-        time: 1.0,
-        load_transfer: ((ratio - params.load_transfer_margin) / (1.0 - params.load_transfer_margin)).clamp(0.0, 1.0),
-        lateral_acceleration: (truck.lateral_acceleration.abs() / G).min(1.0),
-        jerk: (jerk / JERK_SCALE).min(1.0),
-        rollover: if ended == Ended::RolledOver { 1.0 } else { 0.0 },
-        ..RewardTerms::default()
-    }
-}
-
-/// The physical amounts that the reward weighs; `driving` has those of [`driving_terms`].
-pub fn weighed(params: &Params, clearance: &Clearance, progress: &Progress, ended: Ended, driving: &RewardTerms) -> RewardTerms {
+/// The physical amounts that the reward weighs.
+pub fn weighed(params: &Params, clearance: &Clearance, progress: &Progress, ended: Ended) -> RewardTerms {
     RewardTerms {
         waypoints: progress.passed as f32,
         lane_distance: (progress.lane_distance / params.lane_distance_limit).min(1.0),
         clearance: (1.0 - clearance.tractor.min(clearance.trailer) / params.clearance_limit).clamp(0.0, 1.0),
         failure: if ended.failed() { 1.0 } else { 0.0 },
-        ..*driving
     }
 }
 
@@ -82,9 +58,4 @@ pub fn rewarded(params: &Params, terms: &RewardTerms) -> f32 {
         + params.lane_distance_weight * terms.lane_distance
         + params.clearance_weight * terms.clearance
         + params.failure_weight * terms.failure
-        + params.time_weight * terms.time
-        + params.load_transfer_weight * terms.load_transfer
-        + params.lateral_acceleration_weight * terms.lateral_acceleration
-        + params.jerk_weight * terms.jerk
-        + params.rollover_weight * terms.rollover
 }

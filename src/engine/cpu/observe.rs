@@ -47,7 +47,7 @@ constants! {
     /// Acceleration that is observed as 1 [m/s^2].
     const ACCELERATION_SCALE: f32 = 2.5;
     /// Lateral acceleration that is observed as 1 [m/s^2].
-    pub const G: f32 = 9.81;
+    const G: f32 = 9.81;
     /// Wheelbase that is observed as 1 \[m].
     const WHEELBASE_SCALE: f32 = 10.0;
     /// Roll that is observed as 1 \[rad].

@@ -18,8 +18,7 @@ pub fn steer(world: &World, row: &mut Row) {
     let params = &world.params;
     let step = params.n_substeps as f32 * params.substep;
     let action = targeted(params, &world.actions[*row.action as usize], row.control);
-    let control = controlled(world.rig(row.truck), step, &action, row.truck.speed, row.control);
-    *row.control = Control { acceleration_before: row.truck.acceleration, ..control };
+    *row.control = controlled(world.rig(row.truck), step, &action, row.truck.speed, row.control);
 }
 
 /// The action with the target speed that it leads to, from that of the control before.
@@ -55,6 +54,5 @@ pub fn controlled(rig: &Rig, step: f32, action: &Action, speed: f32, before: &Co
         steering_earlier: before.steering_before,
         target_speed: action.speed,
         holds: u32::from(holds),
-        acceleration_before: before.acceleration_before,
     }
 }

@@ -60,7 +60,6 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("steering_earlier", 1, SAME),
             ("target_speed", 1, SMALL),
             ("holds", 1, SAME),
-            ("acceleration_before", 1, SAME),
         ],
         Column::Truck => &[
             ("position", 2, POSITION),
@@ -101,17 +100,9 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("ranges", N_RAYS, SCALED_RANGE),
             ("radii", 10, SAME),
         ],
-        Column::Terms => &[
-            ("waypoints", 1, SAME),
-            ("lane_distance", 1, SCALED_POSITION),
-            ("clearance", 1, CLEARANCE),
-            ("failure", 1, SAME),
-            ("time", 1, SAME),
-            ("load_transfer", 1, MIDDLING),
-            ("lateral_acceleration", 1, SMALL),
-            ("jerk", 1, MIDDLING),
-            ("rollover", 1, SAME),
-        ],
+        Column::Terms => {
+            &[("waypoints", 1, SAME), ("lane_distance", 1, SCALED_POSITION), ("clearance", 1, CLEARANCE), ("failure", 1, SAME)]
+        }
         Column::Reward => &[("", 1, REWARD)],
         Column::Extras | Column::NextExtras => &[("", N_EXTRAS, SMALL)],
     }

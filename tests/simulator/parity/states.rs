@@ -34,8 +34,6 @@ pub fn fleet_world() -> Arc<World> {
     let mut scenario = benchmark("attard2023-full").0;
     scenario.fleet = Some(crate::fleet::all_drawn());
     scenario.extras = Track::Oracle;
-    (scenario.time_weight, scenario.load_transfer_weight, scenario.lateral_acceleration_weight) = (-0.5, -3.0, -2.0);
-    (scenario.jerk_weight, scenario.rollover_weight) = (-1.0, -100.0);
     let world = World { fields: world(Gutter::Drivable).fields.clone(), ..World::bake(&scenario).unwrap() };
     assert!(world.rigs.len() == 512 && world.rays.len() == 512);
     Arc::new(world)
