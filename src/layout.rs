@@ -8,10 +8,10 @@ pub(crate) mod columns;
 mod ended;
 mod extras;
 mod observation;
+mod truck;
 
 use glam::Vec2;
 
-use crate::angle::direction;
 use crate::shared::constants;
 pub use columns::{Column, N_COLUMNS};
 pub use ended::Ended;
@@ -391,19 +391,5 @@ crate::shared! {
         pub fixed: u32,
         /// What follows the end of an episode: SAME_STEP, NEXT_STEP or DISABLED.
         pub autoreset: u32,
-    }
-}
-
-impl Truck {
-    /// Middle of the trailer's axle group \[m].
-    #[inline]
-    pub fn trailer_position(&self, rig: &Rig) -> Vec2 {
-        self.position + rig.fifth_wheel * direction(self.heading) - rig.trailer_wheelbase * direction(self.trailer_heading)
-    }
-
-    /// The larger load transfer ratio of both units, without its sign.
-    #[inline]
-    pub fn load_transfer_ratio(&self) -> f32 {
-        self.tractor_load_transfer_ratio.abs().max(self.trailer_load_transfer_ratio.abs())
     }
 }
