@@ -17,21 +17,12 @@ import series
 STEPS = 1_600_000
 EPISODES = 4
 
-# Name, and what is changed in the benchmarks: TABLE.KEY and its value. Rewards and endings are those that it trains with;
-# it is examined with those of laden2026.
-AT_ONE = {"ending.rollover_ratio": 1.0}
+# Name, and what is changed in the benchmarks: TABLE.KEY and its value. Endings are those that it trains with; it is
+# examined with those of laden2026.
 CHOICES = [
-    ("as laden2026-training: rolled over from 0.85 on", {}),
-    ("rolled over from 1 on", AT_ONE),
-    (
-        "from 1 on, load transfer above 0.7: -100",
-        {**AT_ONE, "reward.load_transfer": -100.0, "reward.load_transfer_margin": 0.7},
-    ),
-    ("from 1 on, rollover -500", {**AT_ONE, "reward.rollover": -500.0}),
-    ("rolled over from 0.75 on", {"ending.rollover_ratio": 0.75}),
-    ("time -5", {"reward.time": -5.0}),
-    ("lateral acceleration -20", {"reward.lateral_acceleration": -20.0}),
-    ("jerk -10", {"reward.jerk": -10.0}),
+    ("as laden2026-training: rolled over from 0.75 on", {}),
+    ("rolled over from 0.85 on", {"ending.rollover_ratio": 0.85}),
+    ("rolled over from 1 on", {"ending.rollover_ratio": 1.0}),
     ("blind", {"observation.extras": '"blind"'}),
     ("oracle", {"observation.extras": '"oracle"'}),
     ("no extras", {"observation.extras": '"none"'}),
@@ -54,11 +45,7 @@ def write_benchmarks(folder, name, changes):
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for base in ["training", "random"]:
-        own = {
-            path: value
-            for path, value in changes.items()
-            if base == "training" or not path.startswith(("reward.", "ending."))
-        }
+        own = {path: value for path, value in changes.items() if base == "training" or not path.startswith("ending.")}
         file = folder / f"{name}-{base}.toml"
         file.write_text(changed((series.SCENARIOS / f"laden2026-{base}.toml").read_text(), own))
         files.append(file)
