@@ -182,6 +182,11 @@ impl Roundabout {
         0.0 < self.ground.island_radius
     }
 
+    /// What a reader is told lies between its arms: a ring, or on a crossing a junction.
+    pub fn between_arms(&self) -> &'static str {
+        if self.has_ring() { "ring" } else { "junction" }
+    }
+
     /// Radius of the central island's kerb face; 0 on a crossing \[m].
     pub fn island_radius(&self) -> f64 {
         self.ground.island_radius

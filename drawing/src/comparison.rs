@@ -175,7 +175,8 @@ impl Comparison<'_> {
         let [from, to] = self.ring.map(|station| x.at(station));
         let band = Rectangle::new().set("x", number(from)).set("width", number(to - from)).set("y", top).set("height", PLOT);
         group = group.add(band.set("fill", "#eeeeee"));
-        group = group.add(lettering.text("ring", DVec2::new(from + 6.0, top + 17.0), 14.0, Align::Left, colour::FAINT));
+        let between = self.scenes.first().map_or("", |scene| scene.roundabout.between_arms());
+        group = group.add(lettering.text(between, DVec2::new(from + 6.0, top + 17.0), 14.0, Align::Left, colour::FAINT));
         group = group.add(axes(lettering, x, &y));
         for (points, &colour) in lines.into_iter().zip(LINES.iter().cycle()) {
             group = group.add(Line { name: None, colour, kind: Kind::Curve, points }.drawn(x, &y));

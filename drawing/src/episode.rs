@@ -31,7 +31,7 @@ const DASHES: &str = "7 4";
 /// An episode with its roundabout and route.
 pub struct Scene<'a> {
     pub(crate) recording: &'a Recording,
-    roundabout: &'a Roundabout,
+    pub(crate) roundabout: &'a Roundabout,
     gutter: Gutter,
     route: &'a Route,
     /// All routes of the roundabout: they say where the names of the arms stand.

@@ -29,10 +29,11 @@ use rayon::prelude::*;
 
 use crate::device::Device;
 use crate::error::Error;
-use driving::{ClassReport, Driving};
+use driving::Driving;
 use groups::{Evaluated, Groups};
 use part::LaneWidths;
 use policies::Policy;
+use possible::Possible;
 use report::{Episode, Report, RouteReport, Summary};
 use running::Running;
 use shown::shown;
@@ -80,7 +81,7 @@ impl Evaluation<'_> {
     /// The policy's report and, if recorded, the episodes that a page shows. `progress` is as in [`Evaluation::drive`].
     pub fn report(&self, policy: &mut dyn Policy, progress: &mut dyn FnMut(usize, usize)) -> Result<(Report, Vec<Track>), Error> {
         let driven = self.drive(policy, progress)?;
-        Ok((self.summarised(policy.name(), &driven.episodes), driven.tracks))
+        Ok((self.summarised(policy.name(), &driven.episodes, None), driven.tracks))
     }
 
     /// Drives every episode. `progress` is called with the number of finished episodes and the number of all, after
@@ -165,8 +166,9 @@ impl Evaluation<'_> {
         Ok(recorder.finish().into_iter().zip(indices).map(seen).collect())
     }
 
-    /// The report of these episodes, which stand as [`Evaluation::drive`] gives them; `policy` is its name.
-    pub fn summarised(&self, policy: &str, finished: &[Episode]) -> Report {
+    /// The report of these episodes, which stand as [`Evaluation::drive`] gives them; `policy` is its name, `searched` what
+    /// [`Evaluation::possible`] found, if anybody asked for it.
+    pub fn summarised(&self, policy: &str, finished: &[Episode], searched: Option<(Possible, Vec<bool>)>) -> Report {
         let Evaluation { scenario, split, episodes, seed, device, .. } = *self;
         let routes = self.routes();
         let own_lane = self.own_lane_suffices(&routes);
@@ -179,6 +181,8 @@ impl Evaluation<'_> {
             let summary = Summary::of(chunk.iter(), scenario.step)?;
             Some(RouteReport { name: route.name.clone(), own_lane_suffices, island_radius: place.roundabout.island_radius(), summary })
         });
+        let (possible, is_possible) = searched.unzip();
+        let is_possible = is_possible.as_deref();
         Report {
             benchmark: scenario.name.clone(),
             split: split.name(),
@@ -189,18 +193,12 @@ impl Evaluation<'_> {
             own_lane_suffices: of_routes(true),
             needs_deviation: of_routes(false),
             certified: None,
-            possible: None,
-            failures: self.failures(finished, None),
-            classes: self.classes(finished, None),
+            possible,
+            failures: self.failures(finished, is_possible),
+            classes: driving::classes(scenario, self.world, finished, is_possible),
             groups: Groups::of(&routes, finished, scenario.step),
             routes: route_reports.collect(),
         }
-    }
-
-    /// How trucks drove, by vehicle and load; the episodes stand as [`Evaluation::drive`] gives them. `possible` says of
-    /// each whether its start is shown to be possible.
-    pub fn classes(&self, finished: &[Episode], possible: Option<&[bool]>) -> Vec<ClassReport> {
-        driving::classes(self.scenario, self.world, finished, possible)
     }
 
     /// The routes of the split, in its order.

@@ -105,20 +105,19 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let bar = progress::Bar::new("evaluating", "episodes", episodes * n_routes);
         evaluation.drive(policy.as_mut(), &mut |done, all| bar.set(done, all))?
     };
-    let mut report = evaluation.summarised(policy.name(), &finished);
+    let searched = if args.certify {
+        let n_searches = to_search(&finished).count();
+        let bar = progress::Bar::new("certifying", "starts", n_searches);
+        Some(evaluation.possible(&finished, &passes, &|| bar.advance())?)
+    } else {
+        None
+    };
+    let mut report = evaluation.summarised(policy.name(), &finished, searched);
     report.certified = possible.and_then(|possible| {
         let chunks = scenario.split(split).iter().zip(finished.chunks(episodes));
         let kept: Vec<&Episode> = chunks.filter(|(route, _)| possible.contains(route)).flat_map(|(_, chunk)| chunk).collect();
         Summary::of(kept.into_iter(), scenario.step)
     });
-    if args.certify {
-        let n_searches = to_search(&finished).count();
-        let bar = progress::Bar::new("certifying", "starts", n_searches);
-        let (possible, is_possible) = evaluation.possible(&finished, &passes, &|| bar.advance())?;
-        report.failures = evaluation.failures(&finished, Some(&is_possible));
-        report.classes = evaluation.classes(&finished, Some(&is_possible));
-        report.possible = Some(possible);
-    }
     if let Some(file) = &args.json {
         files::write_json(file, &report)?;
     }

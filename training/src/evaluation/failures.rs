@@ -121,7 +121,7 @@ impl Evaluation<'_> {
         let station = route.centre_line.station(p);
         match place.roundabout.nearest_kerb(p) {
             Kerb::Island => "island".to_owned(),
-            Kerb::Outer => format!("outer kerb of the {}", Part::at(self.scenario, route, station).name(place.roundabout.has_ring())),
+            Kerb::Outer => format!("outer kerb of the {}", Part::at(self.scenario, route, station).name(&place.roundabout)),
             Kerb::Splitter(arm) => {
                 // A U-turn leaves by the arm that it enters by.
                 let first_half = station < 0.5 * route.centre_line.length();
@@ -218,7 +218,7 @@ mod tests {
                 let line = &route.2.centre_line;
                 for station in (0..line.length() as usize).map(|station| station as f64) {
                     let p = line.point_at(station) + 4.5 * DVec2::from_angle(line.heading_at(station)).perp();
-                    found.insert((evaluation.kerb(route, p), Part::at(evaluation.scenario, route.2, station).name(true)));
+                    found.insert((evaluation.kerb(route, p), Part::at(evaluation.scenario, route.2, station).name(&route.1.roundabout)));
                 }
             }
             for expected in [("splitter of the entry", "entry"), ("splitter of the exit", "exit")] {

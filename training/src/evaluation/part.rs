@@ -1,5 +1,6 @@
 //! The parts of a route: entry arm, ring, exit arm; and how wide its lane is on each.
 
+use offtrack::roundabout::Roundabout;
 use offtrack::route::Route;
 use offtrack::scenario::{Place, Scenario};
 
@@ -27,12 +28,11 @@ impl Part {
         }
     }
 
-    /// Its name in reports. What lies between the arms of a crossing is no ring.
-    pub(super) fn name(self, has_ring: bool) -> &'static str {
+    /// Its name in reports.
+    pub(super) fn name(self, roundabout: &Roundabout) -> &'static str {
         match self {
             Part::Entry => "entry",
-            Part::Ring if has_ring => "ring",
-            Part::Ring => "junction",
+            Part::Ring => roundabout.between_arms(),
             Part::Exit => "exit",
         }
     }

@@ -43,6 +43,8 @@ pub(super) struct Ground<'a> {
 
 #[derive(Serialize)]
 struct Map {
+    /// What lies between the arms: "ring" or "junction".
+    between_arms: &'static str,
     drivable: Vec<Line>,
     lanes: Vec<Line>,
 }
@@ -102,8 +104,9 @@ impl<'a> Ground<'a> {
             episodes.push(Episode { route, number, vehicle, class, ended: track.ended.name(), n_frames: track.frames.len() });
         }
         let map = |&place: &usize| {
-            let map = recording::Map::of(&page.scenario.places[place].roundabout, page.scenario.gutter);
-            Map { drivable: lines(&map.drivable), lanes: lines(&map.lanes) }
+            let roundabout = &page.scenario.places[place].roundabout;
+            let map = recording::Map::of(roundabout, page.scenario.gutter);
+            Map { between_arms: roundabout.between_arms(), drivable: lines(&map.drivable), lanes: lines(&map.lanes) }
         };
         Ground {
             step: page.scenario.step,

@@ -6,12 +6,14 @@
 /** How far ahead on its route a truck is looked for from one frame to the next [m]. */
 const AHEAD = 12;
 
-/** A route's lane centre, the distance of each of its points from the first [m], and where its ring begins and ends [m]. */
+/** A route's lane centre, the distance of each of its points from the first [m], and where its ring begins and ends [m];
+    on a crossing what lies between the arms. */
 function lineOfRoute({ ground }, route) {
   const points = pointsOf(ground.routes[route].centre_line), lengths = [0];
   for (let index = 1; index < points.length; index++)
     lengths.push(lengths[index - 1] + Math.hypot(points[index][0] - points[index - 1][0], points[index][1] - points[index - 1][1]));
-  return { points, lengths, ring: [ground.approach, lengths.at(-1) - ground.departure] };
+  const between = ground.maps[ground.routes[route].roundabout].between_arms;
+  return { points, lengths, between, ring: [ground.approach, lengths.at(-1) - ground.departure] };
 }
 
 /** The distance along a route of each frame of an episode, which does not go back [m]. */
@@ -91,8 +93,9 @@ function showProfiles(page, replay) {
   let all = false, loads = [];
   const draw = () => {
     const [xs, speeds] = [0, 1].map((axis) => loads.flatMap(({ speed }) => speed.points.map((point) => point[axis])));
-    const across = { from: Math.min(0, ...xs), to: Math.max(1, ...xs), tick: (value) => decimal(value, 0), label: "m from the ring's entry" };
-    const [begin, end] = lines[replay.episode.route].ring, bands = [all ? { from: 0, to: 0, words: "entry" } : { from: 0, to: end - begin, words: "ring" }];
+    const across = { from: Math.min(0, ...xs), to: Math.max(1, ...xs), tick: (value) => decimal(value, 0), label: "m from the end of the entry arm" };
+    const { ring: [begin, end], between } = lines[replay.episode.route];
+    const bands = [all ? { from: 0, to: 0, words: "entry" } : { from: 0, to: end - begin, words: between }];
     // Whole steps of 5 km/h, so that a route's chart has numbers.
     const range = speeds.length === 0 ? undefined : [5 * Math.floor(Math.min(...speeds) / 5), 5 * Math.ceil(Math.max(...speeds) / 5)];
     const most = Math.max(1, ...loads.flatMap(({ high }) => high.points.map(([, y]) => y)));
