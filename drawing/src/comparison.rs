@@ -260,7 +260,7 @@ mod tests {
         let scenes = recorded.iter().map(|(recording, scenario)| Scene::new(recording, roundabout, scenario.gutter, route).unwrap());
         let comparison = Comparison { scenes: scenes.collect(), ring: [40.0, 60.0] };
         let svg = comparison.drawn().unwrap();
-        for words in ["pure pursuit: empty and laden_high", "Speed [km/h]", "distance along the route [m]"] {
+        for words in ["pure pursuit: empty and laden_high", "\"ring\"", "Speed [km/h]", "distance along the route [m]"] {
             assert!(svg.contains(words), "{words}");
         }
         assert_eq!(svg.matches("<clipPath").count(), 2);
