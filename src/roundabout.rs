@@ -182,7 +182,7 @@ impl Roundabout {
         0.0 < self.ground.island_radius
     }
 
-    /// What a reader is told lies between its arms: a ring, or on a crossing a junction.
+    /// Name of what lies between its arms: "ring", or "junction" on a crossing.
     pub fn between_arms(&self) -> &'static str {
         if self.has_ring() { "ring" } else { "junction" }
     }

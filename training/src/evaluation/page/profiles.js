@@ -6,8 +6,8 @@
 /** How far ahead on its route a truck is looked for from one frame to the next [m]. */
 const AHEAD = 12;
 
-/** A route's lane centre, the distance of each of its points from the first [m], and where its ring begins and ends [m];
-    on a crossing what lies between the arms. */
+/** A route's lane centre, the distance of each of its points from the first [m], the name of what lies between the arms,
+    and where that begins and ends [m]. */
 function lineOfRoute({ ground }, route) {
   const points = pointsOf(ground.routes[route].centre_line), lengths = [0];
   for (let index = 1; index < points.length; index++)
