@@ -166,8 +166,8 @@ impl Evaluation<'_> {
         Ok(recorder.finish().into_iter().zip(indices).map(seen).collect())
     }
 
-    /// The report of these episodes, which stand as [`Evaluation::drive`] gives them. `policy` is its name; `searched` is
-    /// what [`Evaluation::possible`] found, `None` without a search.
+    /// The report of these episodes, which stand as [`Evaluation::drive`] gives them. `policy` is its name, and
+    /// `searched` is what [`Evaluation::possible`] found, `None` without a search.
     pub fn summarised(&self, policy: &str, finished: &[Episode], searched: Option<(Possible, Vec<bool>)>) -> Report {
         let Evaluation { scenario, split, episodes, seed, device, .. } = *self;
         let routes = self.routes();
@@ -213,8 +213,8 @@ impl Evaluation<'_> {
         (self.scenario.split(self.split)[episode / self.episodes], drawn_start(self.world.params.n_vehicles, self.seed, episode as u32, 0))
     }
 
-    /// Whether the own lane suffices on each route, for the truck that needs most room. Each thread holds the kerbs of one
-    /// roundabout.
+    /// Whether the own lane suffices on each route, for the truck that needs most room. Each thread holds the kerbs of
+    /// one roundabout.
     fn own_lane_suffices(&self, routes: &[Evaluated]) -> Vec<bool> {
         let Evaluation { scenario, world, .. } = *self;
         let (rig, speed) = (widest(&world.rigs), scenario.cruising_speed());

@@ -50,7 +50,8 @@ const METRICS_LIMIT: u64 = 64 << 20;
 #[derive(Debug, Default, clap::Args)]
 pub struct Args {
     /// A training file: its path, or one of `default`, `best`, `attard`, `as-run`, `laden`, `laden-50`, `gpu`,
-    /// `laden-gpu` and `paper`, which come with the program. Without it `default`, in a program built for graphics devices `gpu`.
+    /// `laden-gpu` and `paper`, which come with the program. Without it `default`, in a program built for graphics
+    /// devices `gpu`.
     config: Option<PathBuf>,
     /// Name of the run's folder; must be new. Without it the training file's name, numbered.
     #[arg(long)]

@@ -125,8 +125,8 @@ pub(super) fn has_classes(scenario: &Scenario) -> bool {
     scenario.fleet.is_some() || scenario.speeds.len() != 1 || !scenario.speed_changes.is_empty()
 }
 
-/// The report of each class of vehicles in these episodes; none without [`has_classes`]. `possible` says of each episode
-/// whether its start is shown to be possible.
+/// The report of each class of vehicles in these episodes; none without [`has_classes`]. `possible` says of each
+/// episode whether its start is shown to be possible.
 pub(super) fn classes(scenario: &Scenario, world: &World, episodes: &[Episode], possible: Option<&[bool]>) -> Vec<ClassReport> {
     if !has_classes(scenario) {
         return Vec::new();
