@@ -401,8 +401,8 @@ struct Rig {
     brake_lag: Lag,
     // Engine power over the mass of the whole truck [W/kg].
     power: f32,
-    // Friction ellipse: the lateral grip is that of free rolling times `sqrt(1 - friction_ellipse acceleration²)`; 0
-    // where drive and braking take no lateral grip [(s^2/m)^2].
+    // Friction ellipse: the lateral grip is that of free rolling times `sqrt(1 - friction_ellipse acceleration²)`;
+    // 0 where drive and braking take no lateral grip [(s^2/m)^2].
     friction_ellipse: f32,
     // Lateral acceleration that the road's fall to the right adds to the roll [m/s^2].
     crossfall: f32,

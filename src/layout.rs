@@ -258,8 +258,8 @@ crate::shared! {
         pub brake_lag: Lag,
         /// Engine power over the mass of the whole truck \[W/kg].
         pub power: f32,
-        /// Friction ellipse: the lateral grip is that of free rolling times `sqrt(1 - friction_ellipse acceleration²)`; 0
-        /// where drive and braking take no lateral grip \[(s^2/m)^2].
+        /// Friction ellipse: the lateral grip is that of free rolling times `sqrt(1 - friction_ellipse acceleration²)`;
+        /// 0 where drive and braking take no lateral grip \[(s^2/m)^2].
         pub friction_ellipse: f32,
         /// Lateral acceleration that the road's fall to the right adds to the roll \[m/s^2].
         pub crossfall: f32,

@@ -35,7 +35,7 @@ pub struct Values {
 /// | 11-15 | `heading` | tractor's heading less the lane's at these waypoints / pi |
 /// | 16-20 | `trailer_heading` | trailer's heading less the lane's at these waypoints / pi |
 /// | 21 | `articulation` | tractor's heading less the trailer's / pi |
-/// | 22-25 | `future_curvature` | interior angle of the route ahead / pi, chords of 5, 7, 10, 12 waypoints; 1 is straight |
+/// | 22-25 | `future_curvature` | interior angle of the route ahead / pi, chords of 5, 7, 10, 12 waypoints; straight: 1 |
 /// | 26-29 | `current_curvature` | interior angle at the next waypoint / pi, the same chords |
 /// | 30-45 | `trailer_range` | trailer's distance sensors, left and right alternating, front to rear / sensor range |
 /// | 46-58 | `tractor_range` | tractor's distance sensors, from left 90 deg to right 90 deg / sensor range |
