@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Trains on random roads with one choice changed at a time and prints the success on the validation roads.
 
-No test route and no measured roundabout is looked at. Each choice gets the env steps that take about the same time of one
-core, so load from other programs does not change a result. One run at a time is pinned to each core. A run that has a
-report is not repeated, so an interrupted series can go on. Standard library only.
+No test route and no measured roundabout is looked at. Each choice gets the env steps that take about the same time of
+one core, so load from other programs does not change a result. One run at a time is pinned to each core. A run that has
+a report is not repeated, so an interrupted series can go on. Standard library only.
 
     python3 benches/ablations/ablate.py --offtrack target/release/offtrack --json docs/benchmarks/ablations.json
 """
@@ -25,6 +25,8 @@ COMMON = [
     "learning.gamma=0.97",
     "learning.entropy.coefficient=0.05",
     "learning.observation_noise=0.2",
+    "learning.actor_ema_rate=0.005",
+    "learning.final_learning_rate_fraction=0.1",
     "replay_buffer.priority=",
     "level_replay=",
 ]
@@ -38,6 +40,7 @@ SLOW = ["replay_buffer.capacity=2000000", "learning.actor_ema_rate=0.001"]
 # Other prices of the training benchmark, by the name of the file that is written with them.
 PRICES = {
     "clearance-0.5": {"clearance_limit": 0.5},
+    "lane-2": {"lane_distance": -2.0},
     "lane-30": {"lane_distance": -30.0, "clearance_limit": 0.5},
     "lane-60": {"lane_distance": -60.0, "clearance_limit": 0.5},
     "lane-60-clearance-1": {"lane_distance": -60.0},
@@ -81,7 +84,14 @@ CHOICES = [
         CHOSEN + ["learning.observation_noise=0.05", "learning.entropy.target_fraction=0.04"],
         4_800_000,
     ),
-    ("chosen: noise 0.1", CHOSEN + ["learning.observation_noise=0.1"], 3_000_000),
+    ("chosen: lane distance -2", CHOSEN + ["training_benchmark=lane-2"], 3_000_000),
+    ("chosen: no noise", CHOSEN + ["learning.observation_noise=0"], 3_000_000),
+    (
+        "chosen: EMA rate 0.0005, learning rates to 0",
+        CHOSEN + ["learning.actor_ema_rate=0.0005", "learning.final_learning_rate_fraction=0"],
+        3_000_000,
+    ),
+    ("chosen: layer normalisation", CHOSEN + ["learning.layer_norm=true"], 2_500_000),
     ("chosen: level replay", CHOSEN + REPLAY, 3_000_000),
     (
         "chosen: learning rates 6e-4",
@@ -107,7 +117,7 @@ def write_prices(folder):
 
 def train(core, args, name, settings, steps, seed):
     """One run, pinned to a core; returns its row of the result."""
-    folder = args.runs / f"{name.replace(' ', '-').replace(',', '')}-{seed}"
+    folder = args.runs / f"{series.folder_name(name)}-{seed}"
     chosen = []
     for setting in COMMON + settings:
         key, value = setting.split("=", 1)

@@ -2,20 +2,23 @@
 """Trains on random roads with loads, one choice changed at a time, and prints how it drives on the validation roads.
 
 No test route and no measured roundabout is looked at. Each run gets the same env steps and is pinned to one core; its
-policy is examined once, at the end, with four episodes on each validation route. A run that has a report is not repeated,
-so an interrupted series can go on. Standard library only.
+policy is examined once, at the end, with four episodes on each validation route. With --full a run is as long as those
+of training/configs/laden.toml, keeps the best policy in its validations as they do, and is examined with 20 episodes. A
+run that has a report is not repeated, so an interrupted series can go on. Standard library only.
 
     python3 benches/ablations/laden.py --offtrack target/release/offtrack --json docs/benchmarks/ablations-laden.json
 """
 
+import argparse
 import json
 import re
 import statistics
 
 import series
 
-STEPS = 1_600_000
-EPISODES = 4
+# Env steps of a run, and episodes on each validation route, without --full and with it.
+STEPS, FULL_STEPS = 1_600_000, 12_800_000
+EPISODES, FULL_EPISODES = 4, 20
 
 # Name, and what is changed in the benchmarks: TABLE.KEY and its value. Endings are those that it trains with; it is
 # examined with those of laden2026.
@@ -54,12 +57,13 @@ def write_benchmarks(folder, name, changes):
 
 def run(core, args, choice, changes, seed):
     """One run and its examination; returns its row of the result."""
-    name = re.sub(r"[^a-z0-9.]+", "-", choice)
+    name = series.folder_name(choice)
     training, examined = write_benchmarks(args.runs / "scenarios", name, changes)
     folder = args.runs / f"{name}-{seed}"
     evaluation = args.runs / f"{name}-{seed}.json"
-    settings = [f"benchmark={training}", f"training_benchmark={training}", "also_evaluate=", "validation="]
-    if failure := series.trained(core, args, folder, "best", seed, STEPS, settings):
+    settings = [f"benchmark={training}", f"training_benchmark={training}", "also_evaluate="]
+    settings.append(f"validation.benchmark={examined}" if args.full else "validation=")
+    if failure := series.trained(core, args, folder, "best", seed, args.steps, settings):
         return {"seed": seed, "failed": failure}
     if not evaluation.is_file():
         command = [str(args.offtrack), "evaluate", "--benchmark", str(examined), "--split", "validation"]
@@ -67,7 +71,7 @@ def run(core, args, choice, changes, seed):
             "--policy",
             str(folder / "policy.safetensors"),
             "--episodes",
-            str(EPISODES),
+            str(args.episodes),
             "--json",
             str(evaluation),
         ]
@@ -135,11 +139,14 @@ def table(rows):
 
 
 def main():
-    args = series.arguments(__doc__, "runs/ablations-laden", [name for name, _ in CHOICES])
+    full = argparse.ArgumentParser(add_help=False)
+    full.add_argument("--full", action="store_true", help="runs as long as those of laden.toml")
+    args = series.arguments(__doc__, "runs/ablations-laden", [name for name, _ in CHOICES], full)
+    args.steps, args.episodes = (FULL_STEPS, FULL_EPISODES) if args.full else (STEPS, EPISODES)
     choices = {name: changes for name, changes in CHOICES if args.choice is None or name in args.choice}
     wanted = {name: {"choice": name, "changes": changes, "runs": []} for name, changes in choices.items()}
     one = lambda core, name, seed: run(core, args, name, choices[name], seed)
-    series.run_all(args, wanted, one, {"steps": STEPS, "episodes_per_route": EPISODES}, table)
+    series.run_all(args, wanted, one, {"steps": args.steps, "episodes_per_route": args.episodes}, table)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What the scripts beside it share: runs of several choices and seeds, one at a time on each core, and their results."""
+"""Shared by the scripts beside it: runs of several choices and seeds, one at a time on each core, and their results."""
 
 import argparse
 import json
@@ -13,9 +13,10 @@ from queue import Queue
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
 
-def arguments(doc, runs, names):
-    """The command line of a script whose choices have these names."""
-    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+def arguments(doc, runs, names, *own):
+    """The command line of a script whose choices have these names; `own`: parsers with flags of its own."""
+    formatter = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=doc, formatter_class=formatter, parents=own)
     parser.add_argument("--offtrack", type=Path, default=Path("target/release/offtrack"))
     parser.add_argument("--seeds", default="0,1,2", help="seeds of each choice")
     parser.add_argument("--choice", action="append", help="only this choice; may be given several times")
@@ -27,6 +28,11 @@ def arguments(doc, runs, names):
         parser.error(f"--choice: {unknown[0]!r}; must be one of {names}")
     args.offtrack, args.runs = args.offtrack.resolve(), args.runs.resolve()
     return args
+
+
+def folder_name(choice):
+    """The name of a choice as `offtrack train --name` accepts it."""
+    return re.sub(r"[^A-Za-z0-9.]+", "-", choice)
 
 
 def finished(command, core):
