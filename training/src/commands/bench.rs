@@ -138,7 +138,8 @@ impl Learner {
         let mut config = Config::read(Path::new("default"))?;
         config.n_envs = N_ENVS;
         config.replay_buffer = config::ReplayBuffer { capacity: N_ENVS * N_SLOTS, warmup: N_ENVS * N_SLOTS, priority: None };
-        config.learning = Learning { hidden: hidden.to_vec(), batch, ..config.learning };
+        // Plain networks, as benches/peers/torch_sac_bench.py has them.
+        config.learning = Learning { hidden: hidden.to_vec(), batch, layer_norm: false, ..config.learning };
         let scenario = Scenario::named(BENCHMARK)?;
         let routes = scenario.split(Split::Train).to_vec();
         let mut training = Training::new(&Backend::Host, &config, Arc::new(World::bake(&scenario)?), routes)?;

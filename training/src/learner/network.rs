@@ -6,6 +6,9 @@ use burn::tensor::activation::{log_softmax, relu};
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;
 
+/// Keeps a layer normalisation from dividing by 0.
+pub const NORM_EPSILON: f64 = 1e-5;
+
 /// Linear layers, a rectifier after each but the last.
 #[derive(Module, Debug, Default)]
 pub struct Mlp {
@@ -48,7 +51,8 @@ impl Mlp {
     /// The same layers with layer normalisation before each rectifier.
     pub fn with_layer_norm(self) -> Mlp {
         let hidden = self.layers.len() - 1;
-        let norm = |layer: &Linear| LayerNormConfig::new(layer.weight.dims()[1]).init(&layer.weight.device());
+        let config = |layer: &Linear| LayerNormConfig::new(layer.weight.dims()[1]).with_epsilon(NORM_EPSILON);
+        let norm = |layer: &Linear| config(layer).init(&layer.weight.device());
         Mlp { norms: self.layers[..hidden].iter().map(norm).collect(), layers: self.layers }
     }
 

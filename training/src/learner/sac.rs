@@ -2,13 +2,14 @@
 //! Action Settings" (2019).
 //!
 //! One learner for the processor and for a graphics device. Only three parts differ: on the processor a batch is
-//! learned in shards, one thread each, Adam is one fused pass, and single numbers are plain; on a device Adam is tensor
-//! operations and an update waits for nothing. The number of shards does not depend on the machine, so neither does the
-//! result.
+//! learned in shards, one thread each, with gradients by the chain rule written out, Adam is one fused pass, and single
+//! numbers are plain; on a device gradients and Adam are tensor operations, and an update waits for nothing. The number
+//! of shards does not depend on the machine, so neither does the result.
 
 mod adam;
 mod critics;
 mod entropy;
+mod gradients;
 mod scalar;
 mod shards;
 mod state;
@@ -16,14 +17,13 @@ mod state;
 use std::mem::take;
 
 use burn::module::Module;
-use burn::optim::GradientsParams;
 use burn::tensor::{Device, Int, Tensor};
 use rand::SeedableRng;
 use rand::rngs::SmallRng;
 use rayon::ThreadPoolBuildError;
 
 use crate::learner::config::Learning;
-use crate::learner::network::{Mlp, distribution};
+use crate::learner::network::Mlp;
 use adam::Adam;
 use critics::Twins;
 use entropy::EntropyCoefficient;
@@ -220,55 +220,6 @@ impl Sac {
         td_errors
     }
 
-    /// Losses of one shard and their gradients. They count for `fraction` of the batch.
-    fn gradients(&self, shard: Transitions, fraction: f32) -> ShardGradients {
-        let (actor, critics) = match self.placement {
-            // Leaves of its own for every thread: two backward passes over shared ones deadlock.
-            Placement::Host => (self.actor.clone().fork(&self.placement.learning()), self.critics.clone().fork(&self.placement.learning())),
-            Placement::Device(_) => (self.actor.clone(), self.critics.clone()),
-        };
-        let alpha = self.entropy_coefficient.value();
-        let combined = |values| self.learning.critics.combined(values);
-
-        // TD target: the soft value of the next observation is an expectation over the policy's actions.
-        let (next_probs, next_log_probs) = distribution(actor.valid().forward(shard.next_observation.clone())); // [B, A] each
-        let next_q = combined(self.target_critics.forward(shard.next_observation)); // [B, A]
-        let next_value = (next_probs.clone() * next_q).sum_dim(1); // [B, 1]
-        let next_value = match self.learning.entropy.in_target {
-            true => next_value + -alpha.scale((next_probs * next_log_probs).sum_dim(1)),
-            false => next_value,
-        };
-        let target = shard.reward + shard.discount * next_value; // [B, 1]
-
-        // Critics: squared TD error of the action taken.
-        let q = critics.forward(shard.observation.clone().autodiff()); // [B, A] twice
-        let [first, second] = q.clone().map(|q| q.gather(1, shard.action.clone().autodiff())); // [B, 1] each
-        let [first_loss, second_loss] = [&first, &second].map(|taken| (taken.clone() - target.clone().autodiff()).square());
-        let critic_loss = ((first_loss + second_loss) * shard.weight.autodiff()).mean();
-        let value = (first.inner() + second.inner()).mul_scalar(0.5); // [B, 1]
-        let td_errors = (value.clone() - target).abs(); // [B, 1]
-
-        // Actor: the critics' values and some entropy. The values are constants here.
-        let q = combined(q.map(Tensor::inner)).autodiff(); // [B, A]
-        let (probs, log_probs) = distribution(actor.forward(shard.observation.autodiff())); // [B, A] each
-        let entropy = -(probs.clone() * log_probs.clone()).inner().sum_dim(1).mean();
-        let actor_loss = (probs * (alpha.scale_learning(log_probs) - q)).sum_dim(1).mean();
-
-        let (critic_loss, actor_loss) = (critic_loss.mul_scalar(fraction), actor_loss.mul_scalar(fraction));
-        let scalar = |tensor: Tensor<1>| Scalar::from_tensor(tensor, self.placement.on_host());
-        ShardGradients {
-            figures: [
-                scalar(critic_loss.clone().inner()),
-                scalar(actor_loss.clone().inner()),
-                scalar(entropy).times_number(fraction),
-                scalar(value.mean()).times_number(fraction),
-            ],
-            td_errors,
-            critics: GradientsParams::from_grads(critic_loss.backward(), &critics),
-            actor: GradientsParams::from_grads(actor_loss.backward(), &actor),
-        }
-    }
-
     /// Figures of the updates since this was last called, summed, and the number of those updates. Waits for a device.
     pub fn take_sums(&mut self) -> (Update, u64) {
         let zeros = [0.0; 4].map(|zero| self.placement.scalar(zero));
@@ -287,14 +238,6 @@ impl Sac {
 pub fn not_finite(update: &Update) -> Option<(&'static str, f32)> {
     let figures = [("critic loss", update.critic_loss), ("actor loss", update.actor_loss), ("entropy", update.entropy)];
     figures.into_iter().find(|(_, value)| !value.is_finite())
-}
-
-/// One shard's part of an update.
-struct ShardGradients {
-    figures: Figures,
-    td_errors: Tensor<2>,
-    critics: GradientsParams,
-    actor: GradientsParams,
 }
 
 fn added(sums: &Figures, figures: &Figures) -> Figures {

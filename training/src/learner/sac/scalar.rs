@@ -13,11 +13,6 @@ pub(super) enum Scalar {
 }
 
 impl Scalar {
-    /// A tensor's one number; on the host it is read.
-    pub(super) fn from_tensor(tensor: Tensor<1>, on_host: bool) -> Scalar {
-        if on_host { Scalar::Host(tensor.into_scalar()) } else { Scalar::Device(Box::new(tensor.reshape([1, 1]))) }
-    }
-
     /// The number where it is at hand.
     pub(super) fn known(&self) -> Option<f32> {
         match self {

@@ -3,6 +3,7 @@ use crate::learner::config::{self, Critics, Entropy};
 use crate::learner::replay_buffer::{ReplayBuffer, Rows, Sample};
 use crate::learner::rollout::host;
 use burn::module::Param;
+use burn::optim::GradientsParams;
 use offtrack::layout::Ended;
 use offtrack_policy::Normalisation;
 
