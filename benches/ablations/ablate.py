@@ -25,6 +25,7 @@ COMMON = [
     "learning.gamma=0.97",
     "learning.entropy.coefficient=0.05",
     "learning.observation_noise=0.2",
+    "learning.layer_norm=false",
     "learning.actor_ema_rate=0.005",
     "learning.final_learning_rate_fraction=0.1",
     "replay_buffer.priority=",
