@@ -20,10 +20,6 @@ import series
 STEPS, FULL_STEPS = 1_600_000, 12_800_000
 EPISODES, FULL_EPISODES = 4, 20
 
-# What all choices have in common on top of training/configs/best.toml, so that the table stays what it is when that file
-# changes.
-COMMON = ["learning.layer_norm=false", "level_replay="]
-
 # Name, and what is changed in the benchmarks: TABLE.KEY and its value. Endings are those that it trains with; it is
 # examined with those of laden2026.
 CHOICES = [
@@ -65,9 +61,9 @@ def run(core, args, choice, changes, seed):
     training, examined = write_benchmarks(args.runs / "scenarios", name, changes)
     folder = args.runs / f"{name}-{seed}"
     evaluation = args.runs / f"{name}-{seed}.json"
-    settings = [*COMMON, f"benchmark={training}", f"training_benchmark={training}", "also_evaluate="]
-    settings += [f"validation.benchmark={examined}", "validation.episodes=1"] if args.full else ["validation="]
-    if failure := series.trained(core, args, folder, "best", seed, args.steps, settings):
+    settings = [f"benchmark={training}", f"training_benchmark={training}", "also_evaluate="]
+    settings.append(f"validation.benchmark={examined}" if args.full else "validation=")
+    if failure := series.trained(core, args, folder, "laden", seed, args.steps, settings):
         return {"seed": seed, "failed": failure}
     if not evaluation.is_file():
         command = [str(args.offtrack), "evaluate", "--benchmark", str(examined), "--split", "validation"]
