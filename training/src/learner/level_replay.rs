@@ -1,8 +1,8 @@
 //! Level replay: routes on which the policy fails are drawn more often.
 //!
 //! After M. Jiang and others, "Prioritized Level Replay" (2021). A route is a level. Its score is the fraction of its
-//! latest episodes that failed. So a route that has not been driven for long is drawn again as one that failed then, and
-//! one on which a policy always fails most often of all. Few of the random roads' routes cannot be completed.
+//! latest episodes that failed. So a route that has not been driven for long is drawn again as one that failed then,
+//! and one on which a policy always fails most often of all. Few of the random roads' routes cannot be completed.
 
 use offtrack::layout::Ended;
 

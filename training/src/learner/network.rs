@@ -42,8 +42,8 @@ impl Mlp {
     /// The layers as a policy has them; waits for the device that they are on.
     pub fn plain_layers(&self) -> Vec<offtrack_policy::Layer> {
         let plain = |layer: &Linear| offtrack_policy::Layer {
-            weights: values(&layer.weight),
-            biases: layer.bias.as_ref().map(values).unwrap_or_default(),
+            weights: values_of(&layer.weight),
+            biases: layer.bias.as_ref().map(values_of).unwrap_or_default(),
         };
         self.layers.iter().map(plain).collect()
     }
@@ -74,12 +74,12 @@ impl Mlp {
     /// Every parameter with its name, in the order in which a module shows them.
     pub fn parameters(&self) -> Vec<(String, Vec<f32>)> {
         let layers = self.layers.iter().zip(1..).flat_map(|(layer, number)| {
-            let biases = layer.bias.as_ref().map(|bias| (format!("layer {number}, bias"), values(bias)));
-            [Some((format!("layer {number}, weight"), values(&layer.weight))), biases].into_iter().flatten()
+            let biases = layer.bias.as_ref().map(|bias| (format!("layer {number}, bias"), values_of(bias)));
+            [Some((format!("layer {number}, weight"), values_of(&layer.weight))), biases].into_iter().flatten()
         });
         let norms = self.norms.iter().zip(1..).flat_map(|(norm, number)| {
-            let shift = norm.beta.as_ref().map(|beta| (format!("normalisation {number}, shift"), values(beta)));
-            [Some((format!("normalisation {number}, scale"), values(&norm.gamma))), shift].into_iter().flatten()
+            let shift = norm.beta.as_ref().map(|beta| (format!("normalisation {number}, shift"), values_of(beta)));
+            [Some((format!("normalisation {number}, scale"), values_of(&norm.gamma))), shift].into_iter().flatten()
         });
         layers.chain(norms).collect()
     }
@@ -104,7 +104,8 @@ impl Mlp {
     }
 }
 
-fn values<const D: usize>(parameter: &Param<Tensor<D>>) -> Vec<f32> {
+/// A parameter's values; waits for the device that they are on.
+pub fn values_of<const D: usize>(parameter: &Param<Tensor<D>>) -> Vec<f32> {
     parameter.val().into_data().try_to_vec().expect("parameters are made of f32 values")
 }
 

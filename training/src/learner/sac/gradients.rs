@@ -11,7 +11,7 @@ use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
 
 use super::scalar::Scalar;
-use super::{Figures, Placement, Sac, Transitions};
+use super::{Figures, Sac, Transitions};
 
 /// One shard's part of an update.
 pub(super) struct ShardGradients {
@@ -25,9 +25,9 @@ pub(super) struct ShardGradients {
 impl Sac {
     /// Losses of one shard and their gradients. They count for `fraction` of the batch.
     pub(super) fn gradients(&self, shard: Transitions, fraction: f32) -> ShardGradients {
-        match (&self.placement, self.entropy_coefficient.value()) {
-            (Placement::Host, Scalar::Host(alpha)) => self.gradients_by_hand(shard, fraction, alpha),
-            (_, alpha) => self.differentiated(shard, fraction, &alpha),
+        match self.entropy_coefficient.value() {
+            Scalar::Host(alpha) => self.gradients_by_hand(shard, fraction, alpha),
+            Scalar::Device(alpha) => self.differentiated(shard, fraction, &alpha),
         }
     }
 }

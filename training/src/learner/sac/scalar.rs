@@ -72,22 +72,6 @@ impl Scalar {
         self.map(f32::sqrt, Tensor::sqrt)
     }
 
-    /// The number times a tensor without gradients.
-    pub(super) fn scale(&self, tensor: Tensor<2>) -> Tensor<2> {
-        match self {
-            Scalar::Host(value) => tensor.mul_scalar(*value),
-            Scalar::Device(value) => tensor * Tensor::clone(value),
-        }
-    }
-
-    /// The number times a tensor with gradients; the number gets none.
-    pub(super) fn scale_learning(&self, tensor: Tensor<2>) -> Tensor<2> {
-        match self {
-            Scalar::Host(value) => tensor.mul_scalar(*value),
-            Scalar::Device(value) => tensor * Tensor::clone(value).autodiff(),
-        }
-    }
-
     fn map(&self, host: impl FnOnce(f32) -> f32, device: impl FnOnce(Tensor<2>) -> Tensor<2>) -> Scalar {
         match self {
             Scalar::Host(value) => Scalar::Host(host(*value)),

@@ -3,7 +3,7 @@
 //! Only products are tensors; what lies between them is one pass over the rows. Sums along a row are made in as many
 //! parts as [`LANES`], so that they do not depend on the width of the processor's vectors.
 
-use burn::module::{Module, Param};
+use burn::module::Module;
 use burn::nn::LayerNorm;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
@@ -11,7 +11,7 @@ use multiversion::multiversion;
 
 use super::ShardGradients;
 use crate::learner::config::Critics;
-use crate::learner::network::{Mlp, NORM_EPSILON};
+use crate::learner::network::{Mlp, NORM_EPSILON, values_of};
 use crate::learner::sac::scalar::Scalar;
 use crate::learner::sac::{Sac, Transitions};
 
@@ -34,7 +34,6 @@ impl Sac {
                 Critics::Minimum => both.map(|(first, second)| first.min(*second)).collect(),
             }
         };
-        let rows = |values: &[f32], row: usize| values[row * n_actions..][..n_actions].to_vec();
 
         // TD target: the soft value of the next observation is an expectation over the policy's actions.
         let next = [&actor, &self.target_critics.first, &self.target_critics.second]
@@ -42,9 +41,9 @@ impl Sac {
         let next_q = combined([&next[1], &next[2]]);
         let target: Vec<f32> = (0..n_rows)
             .map(|row| {
-                let (probs, log_probs) = softmax(&rows(&next[0], row));
+                let (probs, log_probs) = softmax(row_of(&next[0], row, n_actions));
                 let alpha = if self.learning.entropy.in_target { alpha } else { 0.0 };
-                let actions = probs.iter().zip(log_probs).zip(rows(&next_q, row));
+                let actions = probs.iter().zip(log_probs).zip(row_of(&next_q, row, n_actions));
                 let value: f32 = actions.map(|((prob, log_prob), q)| prob * (q - alpha * log_prob)).sum();
                 reward[row] + discount[row] * value
             })
@@ -74,8 +73,8 @@ impl Sac {
         let (mut actor_loss, mut entropy) = (0.0, 0.0);
         let mut by_output = Vec::with_capacity(pass.output.len());
         for row in 0..n_rows {
-            let (probs, log_probs) = softmax(&rows(&pass.output, row));
-            let cost: Vec<f32> = log_probs.iter().zip(rows(&q, row)).map(|(log_prob, q)| alpha * log_prob - q).collect();
+            let (probs, log_probs) = softmax(row_of(&pass.output, row, n_actions));
+            let cost: Vec<f32> = log_probs.iter().zip(row_of(&q, row, n_actions)).map(|(log_prob, q)| alpha * log_prob - q).collect();
             let mean: f32 = probs.iter().zip(&cost).map(|(prob, cost)| prob * cost).sum();
             actor_loss += scale * mean;
             entropy -= scale * probs.iter().zip(&log_probs).map(|(prob, log_prob)| prob * log_prob).sum::<f32>();
@@ -120,7 +119,7 @@ impl Pass {
         for (index, layer) in network.layers.iter().enumerate() {
             let weights = layer.weight.val();
             let width = weights.dims()[1];
-            let biases = layer.bias.as_ref().map(vector).unwrap_or_else(|| vec![0.0; width]);
+            let biases = layer.bias.as_ref().map(values_of).unwrap_or_else(|| vec![0.0; width]);
             let mut values = pass.inputs[index].clone().matmul(weights).into_data();
             if index + 1 == network.layers.len() {
                 add_to_rows(elements_mut(&mut values), &biases);
@@ -185,8 +184,8 @@ struct Norm {
 
 impl Norm {
     fn of(norm: &LayerNorm) -> Norm {
-        let scale = vector(&norm.gamma);
-        Norm { shift: norm.beta.as_ref().map(vector).unwrap_or_else(|| vec![0.0; scale.len()]), scale }
+        let scale = values_of(&norm.gamma);
+        Norm { shift: norm.beta.as_ref().map(values_of).unwrap_or_else(|| vec![0.0; scale.len()]), scale }
     }
 }
 
@@ -300,6 +299,10 @@ fn product(a: &[f32], b: &[f32]) -> f32 {
     sums.iter().sum::<f32>() + rest
 }
 
+fn row_of(values: &[f32], row: usize, width: usize) -> &[f32] {
+    &values[row * width..][..width]
+}
+
 /// Probabilities and their logarithms.
 fn softmax(logits: &[f32]) -> (Vec<f32>, Vec<f32>) {
     let most = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -319,10 +322,6 @@ fn row(values: Vec<f32>) -> Tensor<1> {
 
 fn numbers(tensor: Tensor<2>) -> Vec<f32> {
     tensor.into_data().try_into_vec().expect("transitions are made of f32 values")
-}
-
-fn vector(parameter: &Param<Tensor<1>>) -> Vec<f32> {
-    parameter.val().into_data().try_into_vec().expect("parameters are made of f32 values")
 }
 
 fn elements(values: &TensorData) -> &[f32] {

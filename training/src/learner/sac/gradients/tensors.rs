@@ -10,8 +10,8 @@ use crate::learner::sac::scalar::Scalar;
 use crate::learner::sac::{Sac, Transitions};
 
 impl Sac {
-    /// See [`Sac::gradients`].
-    pub(super) fn differentiated(&self, shard: Transitions, fraction: f32, alpha: &Scalar) -> ShardGradients {
+    /// See [`Sac::gradients`]. `alpha` is the entropy coefficient, `[1, 1]`.
+    pub(super) fn differentiated(&self, shard: Transitions, fraction: f32, alpha: &Tensor<2>) -> ShardGradients {
         let (actor, critics) = (&self.actor, &self.critics);
         let combined = |values| self.learning.critics.combined(values);
 
@@ -20,7 +20,7 @@ impl Sac {
         let next_q = combined(self.target_critics.forward(shard.next_observation)); // [B, A]
         let next_value = (next_probs.clone() * next_q).sum_dim(1); // [B, 1]
         let next_value = match self.learning.entropy.in_target {
-            true => next_value + -alpha.scale((next_probs * next_log_probs).sum_dim(1)),
+            true => next_value + -((next_probs * next_log_probs).sum_dim(1) * alpha.clone()),
             false => next_value,
         };
         let target = shard.reward + shard.discount * next_value; // [B, 1]
@@ -37,7 +37,7 @@ impl Sac {
         let q = combined(q.map(Tensor::inner)).autodiff(); // [B, A]
         let (probs, log_probs) = distribution(actor.forward(shard.observation.autodiff())); // [B, A] each
         let entropy = -(probs.clone() * log_probs.clone()).inner().sum_dim(1).mean();
-        let actor_loss = (probs * (alpha.scale_learning(log_probs) - q)).sum_dim(1).mean();
+        let actor_loss = (probs * (log_probs * alpha.clone().autodiff() - q)).sum_dim(1).mean();
 
         let (critic_loss, actor_loss) = (critic_loss.mul_scalar(fraction), actor_loss.mul_scalar(fraction));
         let scalar = |tensor: Tensor<1>| Scalar::Device(Box::new(tensor.reshape([1, 1])));
