@@ -9,6 +9,7 @@ mod roads; // its roundabouts and routes
 mod part; // a part of a scenario, or another roundabout in it
 mod check; // a scenario changed in memory
 mod fleet; // vehicles by shares, drawn from ranges
+mod reward; // the weights of its reward
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -22,6 +23,7 @@ use crate::shipped::{Kind, Source};
 use crate::vehicle::Vehicle;
 pub use check::Invalid;
 pub use fleet::{Class, Drawn, Entry, Fleet, Member, N_VEHICLES, Ranges};
+pub use reward::RewardChanges;
 
 /// Default length of a route before the ring \[m].
 pub const APPROACH: f64 = 40.0;

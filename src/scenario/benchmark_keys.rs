@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 
-use super::Clock;
+use super::{Clock, RewardChanges};
 use crate::layout::Track;
 use crate::opendrive::{Hand, RoadLane};
 use crate::roundabout::Gutter;
@@ -203,6 +203,20 @@ pub(super) struct WrittenReward {
     #[serde(default = "half_a_metre")]
     pub(super) clearance_limit: f64,
     pub(super) failure: f64,
+}
+
+impl WrittenReward {
+    /// All of its keys.
+    pub(super) fn as_changes(&self) -> RewardChanges {
+        RewardChanges {
+            waypoint: Some(self.waypoint),
+            lane_distance: Some(self.lane_distance),
+            lane_distance_limit: Some(self.lane_distance_limit),
+            clearance: Some(self.clearance),
+            clearance_limit: Some(self.clearance_limit),
+            failure: Some(self.failure),
+        }
+    }
 }
 
 fn half_a_metre() -> f64 {

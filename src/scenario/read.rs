@@ -60,6 +60,7 @@ fn without_routes(
         [] => Vec::new(),
         changes => numbers(reader, "actions.speed_changes_kmh", changes, 90.0, -90.0, "km/h")?,
     };
+    written.reward.as_changes().check(reader)?;
     Ok(Scenario {
         name,
         steer_max: steer_max.map(f64::to_radians),
@@ -83,12 +84,12 @@ fn without_routes(
         rollover_ratio: reader.within("ending.rollover_ratio", ending.rollover_ratio, 0.1..=2.0, "")?,
         time_limit: reader.within("ending.time_limit", ending.time_limit, 1.0..=20.0, "")?,
         clock: ending.clock,
-        waypoint_weight: weight(reader, "reward.waypoint", reward.waypoint)?,
-        lane_distance_weight: weight(reader, "reward.lane_distance", reward.lane_distance)?,
-        lane_distance_limit: reader.within("reward.lane_distance_limit", reward.lane_distance_limit, 0.1..=50.0, "m")?,
-        clearance_weight: weight(reader, "reward.clearance", reward.clearance)?,
-        clearance_limit: reader.within("reward.clearance_limit", reward.clearance_limit, 0.01..=10.0, "m")?,
-        failure_weight: weight(reader, "reward.failure", reward.failure)?,
+        waypoint_weight: reward.waypoint,
+        lane_distance_weight: reward.lane_distance,
+        lane_distance_limit: reward.lane_distance_limit,
+        clearance_weight: reward.clearance,
+        clearance_limit: reward.clearance_limit,
+        failure_weight: reward.failure,
         approach: reader.within("routes.approach", routes.approach, 5.0..=500.0, "m")?,
         departure: reader.within("routes.departure", routes.departure, 5.0..=500.0, "m")?,
         spacing: reader.within("routes.spacing", routes.spacing, 0.5..=5.0, "m")?,
@@ -135,8 +136,4 @@ pub(super) fn referred<T>(
 fn numbers(reader: &Reader, key: &str, values: &[f64], most: f64, least: f64, unit: &str) -> Result<Vec<f64>, Error> {
     reader.count(key, values.len(), 1..=64)?;
     values.iter().enumerate().map(|(index, &value)| reader.within(&format!("{key}[{index}]"), value, least..=most, unit)).collect()
-}
-
-fn weight(reader: &Reader, key: &str, value: f64) -> Result<f64, Error> {
-    reader.within(key, value, -1e6..=1e6, "")
 }

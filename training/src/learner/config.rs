@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use offtrack::reader::Reader;
+use offtrack::scenario::RewardChanges;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
@@ -51,6 +52,9 @@ pub struct Config {
     /// Time between two checkpoints \[min].
     #[serde(default = "checkpoint_minutes")]
     pub checkpoint_minutes: f64,
+    /// Other weights than the training benchmark's in its reward.
+    #[serde(default, skip_serializing_if = "RewardChanges::is_empty")]
+    pub reward: RewardChanges,
     /// Random actions among the policy's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exploration: Option<Exploration>,

@@ -32,6 +32,7 @@ impl Worlds {
         let mut benchmark = roads::benchmark(&config.benchmark)?;
         let mut training = roads::benchmark(config.training_benchmark.as_ref().unwrap_or(&config.benchmark))?;
         training.keep(&[Split::Train]);
+        config.reward.apply(&mut training);
         let wrong = |expected: String| Error::Flag { flag: "training_benchmark", value: training.name.clone(), expected };
         // The policy is evaluated on the test routes alone; without any it is not evaluated.
         if !benchmark.split(Split::Test).is_empty() {

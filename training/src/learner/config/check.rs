@@ -12,6 +12,7 @@ impl Config {
     pub(super) fn check(&self, reader: &Reader) -> Result<(), Error> {
         let Config { replay_buffer, learning, .. } = self;
         self.check_also_evaluate(reader)?;
+        self.reward.check(reader)?;
         reader.count("n_envs", self.n_envs, 1..=1 << 20)?;
         if let Some(minutes) = self.minutes {
             reader.within("minutes", minutes, 0.01..=100_000.0, "min")?;

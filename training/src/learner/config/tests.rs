@@ -1,3 +1,5 @@
+use offtrack::scenario::Scenario;
+
 use super::*;
 use crate::files;
 
@@ -196,6 +198,29 @@ fn single_keys_can_be_set_added_and_taken_out() {
         (words.learning.critics, words.training_benchmark.as_deref(), words.learning.hidden),
         (Critics::Minimum, Some("elsewhere"), vec![8, 8])
     );
+}
+
+#[test]
+fn weights_of_the_reward_can_be_changed_within_the_ranges_of_a_benchmark() {
+    let mut scenario = Scenario::named("attard2023-training").unwrap();
+    let before = scenario.clone();
+    with_set(&[]).unwrap().reward.apply(&mut scenario);
+    assert_eq!(scenario.clearance_weight, before.clearance_weight);
+    let changed = with_set(&["reward.clearance=-70", "reward.failure=-3"]).unwrap();
+    assert_eq!(read(&changed.to_toml()).as_ref(), Ok(&changed));
+    changed.reward.apply(&mut scenario);
+    assert_eq!((scenario.clearance_weight, scenario.failure_weight), (-70.0, -3.0));
+    let others = |of: &Scenario| (of.waypoint_weight, of.lane_distance_weight, of.lane_distance_limit, of.clearance_limit);
+    assert_eq!(others(&scenario), others(&before));
+    for (setting, expected) in [
+        ("reward.clearance_limit=0", "reward.clearance_limit: 0 m; must lie in 0.01..10 m"),
+        ("reward.lane_distance_limit=51", "reward.lane_distance_limit: 51 m; must lie in 0.1..50 m"),
+        ("reward.waypoint=nan", "reward.waypoint: NaN; must lie in"),
+        ("reward.kerb=-1", "unknown field `kerb`"),
+    ] {
+        let message = with_set(&[setting]).unwrap_err();
+        assert!(message.contains(expected), "{setting}: {message}");
+    }
 }
 
 #[test]
