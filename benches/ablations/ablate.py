@@ -9,7 +9,6 @@ a report is not repeated, so an interrupted series can go on. Standard library o
 """
 
 import json
-import re
 import statistics
 
 import series
@@ -38,14 +37,7 @@ GAMMA = ["learning.gamma=0.99"]
 CHOSEN = SMALL + GAMMA + PRIORITY + ["learning.entropy.coefficient=0.2"]
 REPLAY = ["level_replay.fraction=0.5", "level_replay.rate=0.2"]
 SLOW = ["replay_buffer.capacity=2000000", "learning.actor_ema_rate=0.001"]
-# Other prices of the training benchmark, by the name of the file that is written with them.
-PRICES = {
-    "clearance-0.5": {"clearance_limit": 0.5},
-    "lane-2": {"lane_distance": -2.0},
-    "lane-30": {"lane_distance": -30.0, "clearance_limit": 0.5},
-    "lane-60": {"lane_distance": -60.0, "clearance_limit": 0.5},
-    "lane-60-clearance-1": {"lane_distance": -60.0},
-}
+NEAR = ["reward.clearance_limit=0.5"]
 
 # Name, settings, env steps.
 CHOICES = [
@@ -64,20 +56,20 @@ CHOICES = [
     ("256: gamma 0.99, prioritised replay", SMALL + GAMMA + PRIORITY, 3_000_000),
     ("256: gamma 0.98, prioritised replay", SMALL + ["learning.gamma=0.98"] + PRIORITY, 3_000_000),
     ("chosen: 256, gamma 0.99, prioritised replay, more entropy", CHOSEN, 3_000_000),
-    ("chosen: lane distance -30, clearance within 0.5 m", CHOSEN + ["training_benchmark=lane-30"], 3_000_000),
-    ("chosen: lane distance -60, clearance within 0.5 m", CHOSEN + ["training_benchmark=lane-60"], 3_000_000),
-    ("chosen: clearance within 0.5 m", CHOSEN + ["training_benchmark=clearance-0.5"], 4_800_000),
+    ("chosen: lane distance -30, clearance within 0.5 m", CHOSEN + NEAR + ["reward.lane_distance=-30"], 3_000_000),
+    ("chosen: lane distance -60, clearance within 0.5 m", CHOSEN + NEAR + ["reward.lane_distance=-60"], 3_000_000),
+    ("chosen: clearance within 0.5 m", CHOSEN + NEAR, 4_800_000),
     ("chosen: 2,000,000 transitions held, EMA rate 0.001", CHOSEN + SLOW, 4_800_000),
     (
         "chosen: 2,000,000 transitions held, EMA rate 0.001, lane distance -60",
-        CHOSEN + SLOW + ["training_benchmark=lane-60-clearance-1"],
+        CHOSEN + SLOW + ["reward.lane_distance=-60"],
         4_800_000,
     ),
     (
         "chosen: 2,048 trucks, lane distance -60",
         CHOSEN
         + ["n_envs=2048", "replay_buffer.capacity=2400000", "replay_buffer.warmup=80000"]
-        + ["training_benchmark=lane-60-clearance-1"],
+        + ["reward.lane_distance=-60"],
         17_200_000,
     ),
     (
@@ -85,7 +77,7 @@ CHOICES = [
         CHOSEN + ["learning.observation_noise=0.05", "learning.entropy.target_fraction=0.04"],
         4_800_000,
     ),
-    ("chosen: lane distance -2", CHOSEN + ["training_benchmark=lane-2"], 3_000_000),
+    ("chosen: lane distance -2", CHOSEN + ["reward.lane_distance=-2"], 3_000_000),
     ("chosen: no noise", CHOSEN + ["learning.observation_noise=0"], 3_000_000),
     (
         "chosen: EMA rate 0.0005, learning rates to 0",
@@ -105,27 +97,10 @@ CHOICES = [
 ]
 
 
-def write_prices(folder):
-    """The training benchmark with each of PRICES, as `folder`/NAME.toml."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, prices in PRICES.items():
-        text = (series.SCENARIOS / "random2026-training.toml").read_text()
-        for key, value in prices.items():
-            text, found = re.subn(rf"^{key} = .*$", f"{key} = {value}", text, flags=re.MULTILINE)
-            assert found == 1, key
-        (folder / f"{name}.toml").write_text(series.with_paths(text))
-
-
 def train(core, args, name, settings, steps, seed):
     """One run, pinned to a core; returns its row of the result."""
     folder = args.runs / f"{series.folder_name(name)}-{seed}"
-    chosen = []
-    for setting in COMMON + settings:
-        key, value = setting.split("=", 1)
-        if value in PRICES:
-            value = args.runs / "scenarios" / f"{value}.toml"
-        chosen.append(f"{key}={value}")
-    if failure := series.trained(core, args, folder, "default", seed, steps, chosen):
+    if failure := series.trained(core, args, folder, "default", seed, steps, COMMON + settings):
         return {"seed": seed, "failed": failure}
     finished = json.loads((folder / "report.json").read_text())
     validation = finished["validation"]
@@ -161,7 +136,6 @@ def table(rows):
 
 def main():
     args = series.arguments(__doc__, "runs/ablations", [choice[0] for choice in CHOICES])
-    write_prices(args.runs / "scenarios")
     choices = {
         name: (settings, steps) for name, settings, steps in CHOICES if args.choice is None or name in args.choice
     }
