@@ -21,8 +21,9 @@ def test_the_shipped_policy_arrives_on_roundabouts_it_has_never_seen() -> None:
 
 
 def test_an_evaluation_counts_what_the_command_line_counts() -> None:
-    reported = json.loads((DATA / "train.json").read_text())
-    found = evaluate(Policy.shipped(), split="train", episodes=reported["episodes_per_route"], seed=reported["seed"])
+    reported = json.loads((DATA / "maps2026.json").read_text())
+    episodes, seed = reported["episodes_per_route"], reported["seed"]
+    found = evaluate(Policy.shipped(), "maps2026", split="test", episodes=episodes, seed=seed)
     assert found.counts == reported["ended"]
 
 
