@@ -205,7 +205,7 @@ fn single_keys_can_be_set_added_and_taken_out() {
 fn weights_of_the_reward_can_be_changed_within_the_ranges_of_a_benchmark() {
     let mut scenario = Scenario::named("attard2023-training").unwrap();
     let before = scenario.clone();
-    with_set(&[]).unwrap().reward.apply(&mut scenario);
+    with_set(&["reward="]).unwrap().reward.apply(&mut scenario);
     assert_eq!(scenario.clearance_weight, before.clearance_weight);
     let changed = with_set(&["reward.clearance=-70", "reward.failure=-3"]).unwrap();
     assert_eq!(read(&changed.to_toml()).as_ref(), Ok(&changed));
