@@ -118,7 +118,8 @@ fn the_command_line_replaces_keys_and_a_budget_there_replaces_both() {
 #[test]
 fn a_key_that_works_on_the_processor_alone_is_refused_for_a_device() {
     // The default file has two of them.
-    let own = ["[replay_buffer.priority]\n", "\nexponent = 0.6", "\ncorrection = 0.4", "[level_replay]\n", "\nfraction = 0.5", "\nrate = 0.2"];
+    let own =
+        ["[replay_buffer.priority]\n", "\nexponent = 0.6", "\ncorrection = 0.4", "[level_replay]\n", "\nfraction = 0.5", "\nrate = 0.2"];
     let plain = own.iter().fold(default_file(), |text, part| text.replace(part, ""));
     let on_device = format!("device = \"gpu\"\n{plain}");
     assert_eq!(read(&on_device).unwrap().device, Device::Gpu);
