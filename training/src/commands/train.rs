@@ -218,7 +218,9 @@ fn train(config: &Config, worlds: &Worlds, prepared: Prepared, opened: Opened, m
     }
     // Training goes on when nobody reads its lines.
     let (path, n_routes) = (folder.path().display(), worlds.training.split(Split::Train).len());
-    let on = format!("{n_routes} training routes of {}, {}", worlds.training.name, run.device());
+    let rewards = config.changed_rewards();
+    let with = if rewards.is_empty() { String::new() } else { format!(" with {rewards}") };
+    let on = format!("{n_routes} training routes of {}{with}, {}", worlds.training.name, run.device());
     let _ = files::print(&format!("{label}{path}: {doing} on {on}\n"));
     run.learn(|| 0 < stop.load(Ordering::Relaxed))?;
     let finished = finished(config, &run);

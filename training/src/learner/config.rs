@@ -272,6 +272,12 @@ impl Config {
         Some((key.clone(), value(&own), value(&others)))
     }
 
+    /// What differs from the training benchmark's reward, `reward.clearance = -100.0`; empty where nothing does.
+    pub fn changed_rewards(&self) -> String {
+        let changed = self.keys().into_iter().filter(|(key, _)| key.starts_with("reward."));
+        changed.map(|(key, value)| format!("{key} = {value}")).collect::<Vec<_>>().join(", ")
+    }
+
     /// Every key with its tables' names before it, and its value as TOML.
     fn keys(&self) -> BTreeMap<String, String> {
         let mut keys = BTreeMap::new();

@@ -206,10 +206,13 @@ fn single_keys_can_be_set_added_and_taken_out() {
 fn weights_of_the_reward_can_be_changed_within_the_ranges_of_a_benchmark() {
     let mut scenario = Scenario::named("attard2023-training").unwrap();
     let before = scenario.clone();
-    with_set(&["reward="]).unwrap().reward.apply(&mut scenario);
+    let unchanged = with_set(&["reward="]).unwrap();
+    assert_eq!(unchanged.changed_rewards(), "");
+    unchanged.reward.apply(&mut scenario);
     assert_eq!(scenario.clearance_weight, before.clearance_weight);
     let changed = with_set(&["reward.clearance=-70", "reward.failure=-3"]).unwrap();
     assert_eq!(read(&changed.to_toml()).as_ref(), Ok(&changed));
+    assert_eq!(changed.changed_rewards(), "reward.clearance = -70.0, reward.failure = -3.0");
     changed.reward.apply(&mut scenario);
     assert_eq!((scenario.clearance_weight, scenario.failure_weight), (-70.0, -3.0));
     let others = |of: &Scenario| (of.waypoint_weight, of.lane_distance_weight, of.lane_distance_limit, of.clearance_limit);
