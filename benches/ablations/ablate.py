@@ -29,6 +29,7 @@ COMMON = [
     "learning.final_learning_rate_fraction=0.1",
     "replay_buffer.priority=",
     "level_replay=",
+    "reward=",
 ]
 SMALL = ["learning.batch=256", "learning.updates_per_step=4"]
 LARGE = ["learning.batch=512", "learning.updates_per_step=2"]
