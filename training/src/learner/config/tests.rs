@@ -203,7 +203,7 @@ fn single_keys_can_be_set_added_and_taken_out() {
 }
 
 #[test]
-fn weights_of_the_reward_can_be_changed_within_the_ranges_of_a_benchmark() {
+fn weights_of_the_reward_can_be_changed_one_by_one() {
     let mut scenario = Scenario::named("attard2023-training").unwrap();
     let before = scenario.clone();
     let unchanged = with_set(&["reward="]).unwrap();
@@ -217,15 +217,6 @@ fn weights_of_the_reward_can_be_changed_within_the_ranges_of_a_benchmark() {
     assert_eq!((scenario.clearance_weight, scenario.failure_weight), (-70.0, -3.0));
     let others = |of: &Scenario| (of.waypoint_weight, of.lane_distance_weight, of.lane_distance_limit, of.clearance_limit);
     assert_eq!(others(&scenario), others(&before));
-    for (setting, expected) in [
-        ("reward.clearance_limit=0", "reward.clearance_limit: 0 m; must lie in 0.01..10 m"),
-        ("reward.lane_distance_limit=51", "reward.lane_distance_limit: 51 m; must lie in 0.1..50 m"),
-        ("reward.waypoint=nan", "reward.waypoint: NaN; must lie in"),
-        ("reward.kerb=-1", "unknown field `kerb`"),
-    ] {
-        let message = with_set(&[setting]).unwrap_err();
-        assert!(message.contains(expected), "{setting}: {message}");
-    }
 }
 
 #[test]
@@ -238,6 +229,10 @@ fn a_key_set_wrongly_is_refused_with_what_would_do() {
         ("learning.n_steps=0", "--set learning.n_steps=0: learning.n_steps: 0; must lie in 1..100"),
         ("learning.n_step=1", "unknown field `n_step`"),
         ("learning.hidden=wide", "--set learning.hidden=wide: invalid type: string"),
+        ("reward.clearance_limit=0", "reward.clearance_limit: 0 m; must lie in 0.01..10 m"),
+        ("reward.lane_distance_limit=51", "reward.lane_distance_limit: 51 m; must lie in 0.1..50 m"),
+        ("reward.waypoint=nan", "reward.waypoint: NaN; must lie in"),
+        ("reward.kerb=-1", "unknown field `kerb`"),
     ] {
         let message = with_set(&[setting]).unwrap_err();
         assert!(message.contains(expected), "{setting}: {message}");
