@@ -15,8 +15,8 @@ use crate::recording::Recording;
 const FILMED: Layout = Layout { corner: DVec2::new(16.0, 96.0), width: WIDTH - 32.0, margin: 5.0, ratio: 1.0 };
 /// Text size of a film's legend relative to that of a still: films are shown smaller.
 const LEGEND_SCALE: f64 = 1.3;
-/// Width of the end in words, "tractor collided" \[px].
-const END_ROOM: f64 = 240.0;
+/// Text size of a film's title and of the end of its episode in words, on the same line \[px].
+const TITLE: f64 = 30.0;
 
 impl Scene<'_> {
     /// The background of all pictures of the film, as SVG text.
@@ -36,9 +36,8 @@ impl Scene<'_> {
         let paper = Rectangle::new().set("width", size.x).set("height", size.y).set("fill", "white");
         let Recording { route, episode, seed, .. } = self.recording;
         let title = format!("{route}, {}{}, start {episode} of seed {seed}", self.policy(), self.class());
-        // The end of an episode is written to the right of it.
-        let room = if self.recording.class.is_some() { FILMED.width - END_ROOM } else { FILMED.width };
-        let letters = self.lettering.fitting(&title, 30.0, room);
+        let room = FILMED.width - self.lettering.width(&self.end(), TITLE) - TITLE;
+        let letters = self.lettering.fitting(&title, TITLE, room);
         let title = self.lettering.text(&title, DVec2::new(FILMED.corner.x, 38.0), letters, Align::Left, colour::INK);
         let map = map.set("clip-path", "url(#map)");
         document(
@@ -100,7 +99,7 @@ impl Scene<'_> {
             return group;
         }
         let right = DVec2::new(WIDTH - FILMED.corner.x, 38.0);
-        group.add(self.lettering.text(&self.end(), right, 30.0, Align::Right, self.end_colour()))
+        group.add(self.lettering.text(&self.end(), right, TITLE, Align::Right, self.end_colour()))
     }
 
     fn end_colour(&self) -> &'static str {
@@ -115,4 +114,49 @@ fn clip(view: &View) -> Definitions {
 fn document(size: DVec2, definitions: Definitions, contents: Group) -> String {
     let document = Document::new().set("viewBox", (0.0, 0.0, size.x, size.y)).set("width", size.x).set("height", size.y);
     format!("{}\n", document.add(definitions).add(contents))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use offtrack::scenario::{Scenario, Split};
+    use offtrack::simulator::{RouteChoice, Simulator};
+    use offtrack::world::World;
+    use resvg::usvg;
+
+    use super::*;
+    use crate::painted;
+    use crate::recording::{Of, Recorder};
+
+    /// First and last column of these pixels with ink in the line of the title.
+    fn inked(svg: &str) -> (u32, u32) {
+        let pixels = painted(&usvg::Tree::from_str(svg, &usvg::Options::default()).unwrap(), WIDTH as u32, None).unwrap();
+        let ink = |x: &u32| {
+            (14..48).any(|y| {
+                let pixel = pixels.pixel(*x, y).unwrap();
+                pixel.alpha() != 0 && pixel.red() < 200
+            })
+        };
+        ((0..pixels.width()).find(ink).unwrap(), (0..pixels.width()).rev().find(ink).unwrap())
+    }
+
+    #[test]
+    fn the_end_of_an_episode_is_written_beside_the_title_however_long_the_routes_name_is() {
+        let scenario = Scenario::named("attard2023").unwrap();
+        let world = Arc::new(World::bake(&scenario).unwrap());
+        let (roundabout, route) = scenario.routes().nth(scenario.split(Split::Test)[0] as usize).unwrap();
+        let simulator = Simulator::new(world.clone(), 1, 3, RouteChoice::Fixed(vec![scenario.split(Split::Test)[0]])).unwrap();
+        let track = Recorder::new(&world, simulator.batch(), [0]).finish().remove(0);
+        let roundabout = &scenario.places[roundabout].roundabout;
+        let of = Of { scenario: &scenario, world: &world, roundabout, route, policy: "pursuit", seed: 3 };
+        let mut recording = of.recording(0, 1, track);
+        for (name, ended) in [("20m/E-left-2", "arrived"), ("an-imported-map-with-a-long-name/12345/SW-right-11", "tractor_collided")] {
+            (recording.route, recording.ended) = (name.into(), ended.into());
+            let scene = Scene::new(&recording, roundabout, scenario.gutter, route).unwrap();
+            let (title, end) = (inked(&scene.film_background()), inked(&scene.film_picture(0)));
+            assert!(title.0 < 20 && title.1 + 10 < end.0, "{name}: {title:?}, {end:?}");
+            assert!(WIDTH - 20.0 < f64::from(end.1), "{end:?}");
+        }
+    }
 }
