@@ -2,9 +2,9 @@
 """Trains on random roads with loads, one choice changed at a time, and prints how it drives on the validation roads.
 
 No test route and no measured roundabout is looked at. Each run gets the same env steps and is pinned to one core; its
-policy is examined once, at the end, with four episodes on each validation route. With --full a run is as long as those
-of training/configs/laden.toml, keeps the best policy in its validations as they do, and is examined with 20 episodes. A
-run that has a report is not repeated, so an interrupted series can go on. Standard library only.
+policy is examined once, at the end, with four episodes on each validation route. With --full it is a run of
+training/configs/laden.toml as that file is, which keeps the best policy in its validations, and it is examined with 20
+episodes. A run that has a report is not repeated, so an interrupted series can go on. Standard library only.
 
     python3 benches/ablations/laden.py --offtrack target/release/offtrack --json docs/benchmarks/ablations-laden.json
 """
@@ -20,6 +20,15 @@ import series
 STEPS, FULL_STEPS = 1_600_000, 12_800_000
 EPISODES, FULL_EPISODES = 4, 20
 
+# What all choices have in common on top of training/configs/laden.toml without --full, so that the table stays what it
+# is when that file changes.
+COMMON = [
+    "reward=",
+    "level_replay=",
+    "learning.layer_norm=false",
+    "learning.actor_ema_rate=0.005",
+    "learning.final_learning_rate_fraction=0.1",
+]
 # Name, and what is changed in the benchmarks: TABLE.KEY and its value. Endings are those that it trains with; it is
 # examined with those of laden2026.
 CHOICES = [
@@ -62,7 +71,7 @@ def run(core, args, choice, changes, seed):
     folder = args.runs / f"{name}-{seed}"
     evaluation = args.runs / f"{name}-{seed}.json"
     settings = [f"benchmark={training}", f"training_benchmark={training}", "also_evaluate="]
-    settings.append(f"validation.benchmark={examined}" if args.full else "validation=")
+    settings += [f"validation.benchmark={examined}"] if args.full else ["validation=", *COMMON]
     if failure := series.trained(core, args, folder, "laden", seed, args.steps, settings):
         return {"seed": seed, "failed": failure}
     if not evaluation.is_file():
@@ -140,7 +149,7 @@ def table(rows):
 
 def main():
     full = argparse.ArgumentParser(add_help=False)
-    full.add_argument("--full", action="store_true", help="runs as long as those of laden.toml")
+    full.add_argument("--full", action="store_true", help="runs of laden.toml as it is")
     args = series.arguments(__doc__, "runs/ablations-laden", [name for name, _ in CHOICES], full)
     args.steps, args.episodes = (FULL_STEPS, FULL_EPISODES) if args.full else (STEPS, EPISODES)
     choices = {name: changes for name, changes in CHOICES if args.choice is None or name in args.choice}
