@@ -28,6 +28,7 @@ pub const FILES: &[(&str, &str)] = embedded![
     "distributions/wide.toml",
     "laden2026.toml",
     "laden2026-50.toml",
+    "laden2026-50-random.toml",
     "laden2026-50-training.toml",
     "laden2026-odd.toml",
     "laden2026-random.toml",

@@ -21,7 +21,8 @@ fn scenarios() -> PathBuf {
 }
 
 /// Benchmarks and roundabouts that have no key but those of another one.
-const LIKE_OTHERS: [&str; 16] = [
+const LIKE_OTHERS: [&str; 17] = [
+    "laden2026-50-random.toml",
     "laden2026-50-training.toml",
     "laden2026-random.toml",
     "laden2026-training.toml",

@@ -31,7 +31,7 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
     let mut files = BTreeMap::new();
     on_disk(&scenarios(), Path::new(""), &mut files);
     let embedded: BTreeMap<String, String> = FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
-    assert_eq!((files.len(), FILES.len()), (42, 42), "22 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions");
+    assert_eq!((files.len(), FILES.len()), (43, 43), "23 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions");
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
     assert_eq!(kinds.map(|kind| kind.names().count()), [22, 10, 3, 2]);
@@ -87,10 +87,21 @@ fn the_laden_benchmarks_of_random_roads_differ_from_laden2026_in_roads_and_train
 }
 
 #[test]
+fn the_random_roads_of_laden2026_50_differ_from_it_in_roads_and_the_room_before_them_alone() {
+    let table = |name: &str| Source::named(Kind::Benchmark, name).unwrap().text().unwrap().parse::<toml::Table>().unwrap();
+    let (mut random, mut expected) = (table("laden2026-50-random"), table("laden2026-50"));
+    assert_eq!(random.remove("procedural").as_ref(), Some(&table("random2026")["procedural"]));
+    for (table, keys) in [(&mut random, &["routes"][..]), (&mut expected, &["routes", "roundabout"])] {
+        assert!(keys.iter().all(|&key| table.remove(key).is_some()), "{table}");
+    }
+    assert_eq!(random, expected);
+}
+
+#[test]
 fn every_name_gives_what_its_file_gives() {
     // The two with thousands of roads take minutes; the next test reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 20);
+    assert_eq!(benchmarks.len(), 21);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();
