@@ -223,6 +223,7 @@ impl<'a> Scene<'a> {
     pub(crate) fn policy(&self) -> &'static str {
         match self.recording.policy.as_str() {
             "pursuit" => "pure pursuit",
+            planned if planned.starts_with("pursuit of ") => "pure pursuit of a planned line",
             "random" => "random actions",
             _ => "learned policy",
         }

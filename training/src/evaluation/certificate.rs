@@ -4,6 +4,7 @@
 pub mod attempt; // searches from one start until one arrives, and from many at once
 pub mod beam; // a search
 pub mod file; // what it found
+pub mod line; // the paths that it drove, as lines to follow
 pub mod verify; // driving it again
 
 use std::path::Path;

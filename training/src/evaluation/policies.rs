@@ -11,6 +11,7 @@ use offtrack::simulator::Batch;
 use offtrack::world::World;
 
 use crate::error::Error;
+use crate::evaluation::certificate::line::Lines;
 
 /// Pure pursuit's default look-ahead distance: the best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of
 /// attard2023 \[m].
@@ -30,10 +31,10 @@ pub trait Policy {
 
 /// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its
 /// benchmark. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where
-/// there is none, the first that can drive there. `look_ahead` is pure pursuit's \[m], `seed` that of random actions.
-pub fn find(policy: Option<&str>, benchmark: &str, look_ahead: f32, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
+/// there is none, the first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random actions.
+pub fn find(policy: Option<&str>, benchmark: &str, pursuit: PurePursuit, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
     let learned = match policy {
-        Some("pursuit") => return Ok(Box::new(PurePursuit::new(look_ahead))),
+        Some("pursuit") => return Ok(Box::new(pursuit)),
         Some("random") => return Ok(Box::new(UniformRandom { seed })),
         Some(name) => learned(name)?,
         None => offtrack_policy::Policy::shipped_for(benchmark, world)?,
@@ -90,7 +91,8 @@ impl Policy for UniformRandom {
 }
 
 /// Pure pursuit: steers the drive axle along the arc to a point of the centre line at the look-ahead distance, at the
-/// speed of the feasible profile of its vehicle. It follows the line well and ignores the room that the trailer needs.
+/// speed of the feasible profile of its vehicle. It follows the line well and ignores the room that the trailer needs;
+/// [planned](PurePursuit::planned) lines have it.
 ///
 /// R. Coulter, "Implementation of the Pure Pursuit Path Tracking Algorithm" (Carnegie Mellon, 1992).
 #[derive(Debug)]
@@ -99,17 +101,20 @@ pub struct PurePursuit {
     look_ahead: f32,
     /// The feasible speeds of a vehicle on a route, by both indices.
     profiles: HashMap<(u32, u32), Profile>,
+    /// Lines to follow in place of the lane's centre.
+    lines: Lines,
+    name: String,
 }
 
 impl Policy for PurePursuit {
     fn name(&self) -> &str {
-        "pursuit"
+        &self.name
     }
 
     fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
         actions.clear();
         actions.extend(batch.truck.iter().zip(&batch.progress).zip(&batch.control).map(|((truck, progress), control)| {
-            let (waypoints, next) = (world.route_waypoints(truck.route), progress.waypoint as usize);
+            let (waypoints, next) = (line(&self.lines, world, truck.route), progress.waypoint as usize);
             let steering = self.steering(world.rig(truck).wheelbase, truck, waypoints, next);
             let speed = self.speed(world, truck, next);
             nearest(world, steering, if world.params.changes_speed == 1 { speed - control.target_speed } else { speed })
@@ -120,12 +125,18 @@ impl Policy for PurePursuit {
 impl PurePursuit {
     /// With this look-ahead distance \[m].
     pub fn new(look_ahead: f32) -> PurePursuit {
-        PurePursuit { look_ahead, profiles: HashMap::new() }
+        PurePursuit { look_ahead, profiles: HashMap::new(), lines: Lines::new(), name: "pursuit".to_owned() }
+    }
+
+    /// Follows these lines, and the lane's centre on routes that have none; `origin` tells where they are from in its
+    /// name.
+    pub fn planned(self, lines: Lines, origin: &str) -> PurePursuit {
+        PurePursuit { lines, name: format!("pursuit of {origin}"), ..self }
     }
 
     /// The speed to drive at: the lowest of the profile within the time that the speed control takes to follow [m/s].
     fn speed(&mut self, world: &World, truck: &Truck, next: usize) -> f32 {
-        let waypoints = world.route_waypoints(truck.route);
+        let waypoints = line(&self.lines, world, truck.route);
         let fastest = world.params.target_speed_max.into();
         let profile = self.profiles.entry((truck.route, truck.vehicle));
         let profile = profile.or_insert_with(|| Profile::of(world.rig(truck), waypoints, fastest));
@@ -151,6 +162,11 @@ impl PurePursuit {
         let bearing = glam::Vec2::from_angle(-truck.heading).rotate(ahead);
         (2.0 * wheelbase * bearing.y / ahead.length_squared().max(1.0)).atan()
     }
+}
+
+/// The line that pure pursuit follows on a route: a row for each waypoint.
+fn line<'a>(lines: &'a Lines, world: &'a World, route: u32) -> &'a [WaypointRow] {
+    lines.get(&route).map_or_else(|| world.route_waypoints(route), Vec::as_slice)
 }
 
 /// The action with the highest speed or change that is at most `speed`, the lowest if there is none; among those the

@@ -133,6 +133,38 @@ fn an_evaluation_reports_the_success_on_certified_routes() {
 }
 
 #[test]
+fn pursuit_follows_the_paths_of_a_certificate_and_the_lanes_centre_where_it_has_none() {
+    let place = Place::new();
+    let (certificate, report) = (place.text("certificate.json"), place.text("report.json"));
+    let routes = ["--benchmark", "attard2023", "--route", "20m/E-right-1", "--route", "40m/E-left-2"];
+    succeed(&offtrack(&[&["certify"], &routes[..], &["--widths", "64", "--json", &certificate]].concat()));
+    let drive = |flags: &[&str]| offtrack(&[&["evaluate"], &routes[..], &["--episodes", "4", "--json", &report], flags].concat());
+    let evaluate = || drive(&["--policy", "pursuit", "--line", &certificate]);
+    succeed(&drive(&["--policy", "pursuit"]));
+    let centre = place.json("report.json");
+    succeed(&evaluate());
+    let planned = place.json("report.json");
+    assert_eq!((&centre["policy"], &planned["policy"]), (&Value::from("pursuit"), &Value::from(format!("pursuit of {certificate}"))));
+    // Along the lane's centre the trailer does not come round the first of them.
+    assert_eq!((&centre["arrived"], &planned["arrived"]), (&Value::from(4), &Value::from(8)));
+    // Without a sequence a route is followed along its lane's centre.
+    change(&place, |certificate| {
+        for found in certificate["routes"].as_array_mut().unwrap().iter_mut().flat_map(|route| route["found"].as_array_mut().unwrap()) {
+            found["ended"] = "strayed".into();
+        }
+    });
+    let output = evaluate();
+    succeed(&output);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("completes 0 of 2 routes; on the others pursuit follows the lane's centre"), "{said}");
+    assert_eq!(place.json("report.json")["routes"], centre["routes"]);
+    change(&place, |certificate| drop(certificate["routes"].as_array_mut().unwrap().remove(1)));
+    assert!(refusal(&evaluate(), 2).contains("has no route 40m/E-left-2"));
+    let said = refusal(&drive(&["--policy", "random", "--line", &certificate]), 2);
+    assert!(said.contains(&format!("--line: {certificate}; is for pure pursuit: give --policy pursuit, too")), "{said}");
+}
+
+#[test]
 fn a_policy_may_be_among_the_candidates_and_must_fit_the_benchmark() {
     let place = Place::new();
     succeed(&place.train(&["--name", "run", "--steps", "600"]));

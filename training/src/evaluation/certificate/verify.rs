@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::layout::{Ended, Start, Truck};
-use offtrack::simulator::{self, RouteChoice, Simulator};
+use offtrack::simulator::{self, Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 
 use super::file::{self, Certificate};
@@ -24,30 +24,40 @@ pub struct Sequence {
 
 /// Drives sequences in one batch and gives the end code of each at its last step.
 pub fn driven(world: &Arc<World>, sequences: &[Sequence]) -> Result<Vec<Ended>, simulator::Error> {
+    // A truck drives on after its sequence, so its end code is taken at the sequence's last step.
+    let mut ended = vec![Ended::Running; sequences.len()];
+    follow(world, sequences, |index, batch| ended[index] = Ended::from_code(batch.ended[index]).unwrap_or(Ended::Running))?;
+    Ok(ended)
+}
+
+/// Drives sequences in one batch. `seen` is called with the index of a sequence and the batch, whose truck of that index
+/// drives it: at its start and after each of its steps.
+pub fn follow(world: &Arc<World>, sequences: &[Sequence], mut seen: impl FnMut(usize, &Batch)) -> Result<(), simulator::Error> {
     if sequences.is_empty() {
-        return Ok(Vec::new());
+        return Ok(());
     }
     let routes: Vec<u32> = sequences.iter().map(|sequence| sequence.route).collect();
     let starts: Vec<Start> = sequences.iter().map(|sequence| sequence.start).collect();
     let mut simulator = Simulator::new(world.clone(), routes.len(), 0, RouteChoice::Fixed(routes))?;
     simulator.reset_from(&starts)?;
-    // A truck drives on after its sequence, so its end code is taken at the sequence's last step.
-    let mut ended = vec![Ended::Running; sequences.len()];
+    for index in 0..sequences.len() {
+        seen(index, simulator.batch());
+    }
     for step in 0..sequences.iter().map(|sequence| sequence.actions.len()).max().unwrap_or(0) {
         let actions: Vec<u32> = sequences.iter().map(|sequence| sequence.actions.get(step).copied().unwrap_or(0)).collect();
         simulator.step(&actions)?;
-        for ((ended, sequence), &code) in ended.iter_mut().zip(sequences).zip(&simulator.batch().ended) {
+        for (index, sequence) in sequences.iter().enumerate() {
             if step < sequence.actions.len() {
-                *ended = Ended::from_code(code).unwrap_or(Ended::Running);
+                seen(index, simulator.batch());
             }
         }
     }
-    Ok(ended)
+    Ok(())
 }
 
-/// Drives the sequences of the routes that `wanted` accepts and gives their number, or the first that does not arrive.
-/// Every such route must be one of the world's.
-pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted: impl Fn(&str) -> bool) -> Result<usize, Error> {
+/// Drives the sequences of the routes that `wanted` accepts and gives them, or the first that does not arrive as an error.
+/// Every such route must be one of the world's. They come in the order of the file: routes, and starts of each.
+pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted: impl Fn(&str) -> bool) -> Result<Vec<Sequence>, Error> {
     let wrong = |message: String| Error::contents(path, message);
     let mut sequences = Vec::new();
     for route in certificate.routes.iter().filter(|route| wanted(&route.name)) {
@@ -75,5 +85,5 @@ pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted
             });
         }
     }
-    Ok(sequences.len())
+    Ok(sequences)
 }
