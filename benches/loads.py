@@ -3,8 +3,9 @@
 
 Each policy drives every load on its own: the routes of laden2026 (30 episodes each) and of laden2026-random (one each),
 none of which a policy of training/configs/laden.toml has seen. The baselines are pure pursuit by the feasible speed
-profile, and the policy that is shipped for attard2023, which knows neither loads nor speeds, at 30 and at 20 km/h. What
-the JSON file already has is not evaluated again, so an interrupted series can go on. Standard library only.
+profile, of the lane's centre and of paths that a search found, and the policy that is shipped for attard2023, which
+knows neither loads nor speeds, at 30 and at 20 km/h. What the JSON file already has is not evaluated again, so an
+interrupted series can go on. Standard library only.
 
     python3 benches/loads.py --policies runs/laden --json docs/benchmarks/laden.json
 """
@@ -31,6 +32,10 @@ PLACES = [
 ]
 # Look-ahead distance of pure pursuit [m]: the best of 7, 9, 12 and 15 m on the training roads of laden2026-random.
 LOOK_AHEAD = "12"
+# The same for the paths that a search found, as wide as this: the best of 7, 8, 9, 10 and 12 m on five of those roads.
+PLANNED_LOOK_AHEAD = "9"
+PLANNED_WIDTHS = "64,512"
+PLANNED = "pursuit of a planned line"
 
 
 def evaluated(offtrack, benchmark, split, load, policy, more=()):
@@ -59,6 +64,16 @@ def condensed(report):
         "classes",
     ]
     return {key: report[key] for key in keys if key in report}
+
+
+def line(offtrack, folder, benchmark, split, load):
+    """A certificate with the paths that a search finds with a load, each from the lane's centre and from four corners."""
+    file = Path(folder) / f"{benchmark}-{split}-{load}.json"
+    command = [str(offtrack), "certify", "--benchmark", benchmark, "--split", split, "--load", load]
+    done = subprocess.run([*command, "--widths", PLANNED_WIDTHS, "--json", str(file)], capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(command)}: {done.stderr.strip().splitlines()[-1]}")
+    return file
 
 
 def at_one_speed(folder, base, kmh):
@@ -106,6 +121,10 @@ def jobs(args, folder):
         for benchmark, split, place in PLACES:
             for load in LOADS:
                 yield "pursuit", place, load, (benchmark, split, load, "pursuit", ("--look-ahead", LOOK_AHEAD))
+        # The paths of every random road would take a search of hours.
+        for benchmark, split, place in [one for one in PLACES if one[0] == "laden2026"]:
+            for load in LOADS:
+                yield PLANNED, place, load, (benchmark, split, load, "pursuit")
         for kmh in [30, 20]:
             policy = slower(folder, kmh)
             for base, split, place in PLACES:
@@ -183,6 +202,9 @@ def main():
         for driver, place, load, job in jobs(args, folder):
             if (driver, place, load) in done:
                 continue
+            if driver == PLANNED:
+                path = line(args.offtrack, folder, *job[:3])
+                job = (*job, ("--look-ahead", PLANNED_LOOK_AHEAD, "--line", str(path)))
             results.append({"driver": driver, "place": place, "load": load, "report": evaluated(args.offtrack, *job)})
             write_json(args.json, results)
             print(driver, place, load, file=sys.stderr, flush=True)
