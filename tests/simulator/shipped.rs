@@ -34,7 +34,7 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
     assert_eq!((files.len(), FILES.len()), (43, 43), "23 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions");
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [22, 10, 3, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [23, 10, 3, 2]);
 }
 
 /// Benchmarks of so many roads that they are not drawn here.
