@@ -16,10 +16,11 @@ const SAME_ACTION: f32 = 1e-5;
 const FILE_LIMIT: u64 = 64 << 20;
 
 /// The policies that come with the project, by the benchmark that they learned on.
-const SHIPPED: [(&str, &[u8]); 3] = [
+const SHIPPED: [(&str, &[u8]); 4] = [
     ("attard2023", include_bytes!("../../training/policies/attard2023/policy.safetensors")),
     ("attard2023-as-run", include_bytes!("../../training/policies/attard2023-as-run/policy.safetensors")),
     ("laden2026", include_bytes!("../../training/policies/laden2026/policy.safetensors")),
+    ("laden2026-50", include_bytes!("../../training/policies/laden2026-50/policy.safetensors")),
 ];
 
 /// A network that can drive.

@@ -81,11 +81,15 @@ fn the_shipped_policies_are_written_as_they_were_read_byte_for_byte() {
         assert!(policy.to_bytes() == std::fs::read(folder.join(name).join("policy.safetensors")).unwrap(), "{name}");
     }
     let message = Policy::shipped("mine").unwrap_err().to_string();
-    assert_eq!(message, "policy: mine; policies come with the program for attard2023, attard2023-as-run, laden2026");
+    let names = "attard2023, attard2023-as-run, laden2026, laden2026-50";
+    assert_eq!(message, format!("policy: mine; policies come with the program for {names}"));
     let world = |benchmark: &str| World::bake(&Scenario::named(benchmark).unwrap()).unwrap();
-    for (benchmark, expected) in
-        [("attard2023-full", "attard2023"), ("attard2023-maps-as-run", "attard2023-as-run"), ("laden2026-odd", "laden2026")]
-    {
+    for (benchmark, expected) in [
+        ("attard2023-full", "attard2023"),
+        ("attard2023-maps-as-run", "attard2023-as-run"),
+        ("laden2026-odd", "laden2026"),
+        ("laden2026-50", "laden2026-50"),
+    ] {
         assert_eq!(Policy::shipped_for(benchmark, &world(benchmark)).unwrap().benchmark, expected);
     }
 }
