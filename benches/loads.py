@@ -38,15 +38,20 @@ PLANNED_WIDTHS = "64,512"
 PLANNED = "pursuit of a planned line"
 
 
+def finish(command):
+    """Runs a command; where it fails, ends with what it said last."""
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(command)}: {done.stderr.strip().splitlines()[-1]}")
+
+
 def evaluated(offtrack, benchmark, split, load, policy, more=()):
     """The report of a policy with a load, without its lists of routes."""
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
         command = [str(offtrack), "evaluate", "--benchmark", str(benchmark), "--split", split, "--load", load]
         command += ["--policy", str(policy), "--json", str(report), *more]
-        done = subprocess.run(command, capture_output=True, text=True)
-        if done.returncode != 0:
-            sys.exit(f"{' '.join(command)}: {done.stderr.strip().splitlines()[-1]}")
+        finish(command)
         return condensed(json.loads(report.read_text()))
 
 
@@ -67,17 +72,15 @@ def condensed(report):
 
 
 def line(offtrack, folder, benchmark, split, load):
-    """A certificate with the paths that a search finds with a load, each from the lane's centre and from four corners."""
+    """A certificate with the paths that a search finds with a load: from the lane's centre and from four corners."""
     file = Path(folder) / f"{benchmark}-{split}-{load}.json"
     command = [str(offtrack), "certify", "--benchmark", benchmark, "--split", split, "--load", load]
-    done = subprocess.run([*command, "--widths", PLANNED_WIDTHS, "--json", str(file)], capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(command)}: {done.stderr.strip().splitlines()[-1]}")
+    finish([*command, "--widths", PLANNED_WIDTHS, "--json", str(file)])
     return file
 
 
 def at_one_speed(folder, base, kmh):
-    """A benchmark with loads for trucks of one target speed, without extras: what the shipped policy for attard2023 knows."""
+    """A benchmark with loads for trucks of one target speed, without extras: all that the policy for attard2023 knows."""
     text = (SCENARIOS / f"{base}.toml").read_text()
     text = re.sub(r"^speeds_kmh = .*$", f"speeds_kmh = [{kmh}.0]", text, flags=re.MULTILINE)
     text = re.sub(r"^speed_kmh = .*$", f"speed_kmh = {kmh}.0", text, flags=re.MULTILINE)
@@ -122,8 +125,8 @@ def jobs(args, folder):
             for load in LOADS:
                 yield "pursuit", place, load, (benchmark, split, load, "pursuit", ("--look-ahead", LOOK_AHEAD))
         # With so many actions a search takes minutes for these routes and would take hours for the others.
+        benchmark, split, place = PLACES[0]
         for load in LOADS:
-            benchmark, split, place = PLACES[0]
             yield PLANNED, place, load, (benchmark, split, load, "pursuit")
         for kmh in [30, 20]:
             policy = slower(folder, kmh)

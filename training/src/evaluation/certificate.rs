@@ -7,6 +7,7 @@ pub mod file; // what it found
 pub mod line; // the paths that it drove, as lines to follow
 pub mod verify; // driving it again
 
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -15,21 +16,29 @@ use offtrack::world::World;
 
 use crate::error::Error;
 use file::Certificate;
+use verify::Sequence;
 
 /// The certified ones among `routes`, as indices of the world: those completed from every start. Their sequences are
 /// driven again first.
 pub fn certified(path: &Path, scenario: &Scenario, world: &Arc<World>, routes: &[u32]) -> Result<Vec<u32>, Error> {
+    let (certificate, _) = verified(path, scenario, world, routes)?;
+    let names: HashSet<&str> =
+        certificate.routes.iter().filter(|searched| searched.certified()).map(|searched| searched.name.as_str()).collect();
+    Ok(routes.iter().copied().filter(|&route| names.contains(world.route_names[route as usize].as_str())).collect())
+}
+
+/// A certificate that was made for these conditions and has all of `routes`, and the sequences that completed them,
+/// driven again.
+fn verified(path: &Path, scenario: &Scenario, world: &Arc<World>, routes: &[u32]) -> Result<(Certificate, Vec<Sequence>), Error> {
     let certificate = Certificate::read(path)?;
     certificate.check(scenario, world, path)?;
-    let names: Vec<&str> = routes.iter().map(|&route| world.route_names[route as usize].as_str()).collect();
-    verify::verify(&certificate, world, path, |name| names.contains(&name))?;
-    let mut certified = Vec::new();
-    for (&route, name) in routes.iter().zip(names) {
-        let searched = certificate.routes.iter().find(|searched| searched.name == name);
-        let message = || format!("has no route {name}; make one with `offtrack certify --benchmark {} --json FILE`", scenario.name);
-        if searched.ok_or_else(|| Error::Contents { file: path.to_owned(), message: message() })?.certified() {
-            certified.push(route);
-        }
+    let names: HashSet<&str> = routes.iter().map(|&route| world.route_names[route as usize].as_str()).collect();
+    let sequences = verify::verify(&certificate, world, path, |name| names.contains(name))?;
+    let searched: HashSet<&str> = certificate.routes.iter().map(|route| route.name.as_str()).collect();
+    if let Some(&route) = routes.iter().find(|&&route| !searched.contains(world.route_names[route as usize].as_str())) {
+        let (name, benchmark) = (&world.route_names[route as usize], &scenario.name);
+        let message = format!("has no route {name}; make one with `offtrack certify --benchmark {benchmark} --json FILE`");
+        return Err(Error::contents(path, message));
     }
-    Ok(certified)
+    Ok((certificate, sequences))
 }

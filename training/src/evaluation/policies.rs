@@ -31,7 +31,8 @@ pub trait Policy {
 
 /// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its
 /// benchmark. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where
-/// there is none, the first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random actions.
+/// there is none, the first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random
+/// actions.
 pub fn find(policy: Option<&str>, benchmark: &str, pursuit: PurePursuit, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
     let learned = match policy {
         Some("pursuit") => return Ok(Box::new(pursuit)),

@@ -1,5 +1,5 @@
-//! The paths of a certificate as lines to follow: where the drive axle of the truck that completed a route was beside each
-//! waypoint.
+//! The paths of a certificate as lines to follow: where the drive axle of the truck that completed a route was beside
+//! each waypoint.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -10,8 +10,7 @@ use offtrack::layout::{Ended, WaypointRow};
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
 
-use super::file::Certificate;
-use super::verify;
+use super::verify::{self, Sequence};
 use crate::error::Error;
 
 /// Lines by the index of their route in the world: a row for each of the route's waypoints.
@@ -20,14 +19,8 @@ pub type Lines = HashMap<u32, Vec<WaypointRow>>;
 /// The lines of the world's routes that the certificate completes: of each, the path from the first start that it
 /// completed. The sequences are driven again first. Each of the world's routes must be in the file.
 pub fn lines(path: &Path, scenario: &Scenario, world: &Arc<World>) -> Result<Lines, Error> {
-    let certificate = Certificate::read(path)?;
-    certificate.check(scenario, world, path)?;
-    if let Some(name) = world.route_names.iter().find(|name| certificate.routes.iter().all(|route| route.name != **name)) {
-        let benchmark = &scenario.name;
-        let message = format!("has no route {name}; make one with `offtrack certify --benchmark {benchmark} --json FILE`");
-        return Err(Error::contents(path, message));
-    }
-    let mut sequences = verify::verify(&certificate, world, path, |name| world.route_names.iter().any(|own| own == name))?;
+    let routes: Vec<u32> = (0..world.route_names.len() as u32).collect();
+    let (_, mut sequences) = super::verified(path, scenario, world, &routes)?;
     sequences.dedup_by_key(|sequence| sequence.route);
     let mut driven = vec![Vec::new(); sequences.len()];
     verify::follow(world, &sequences, |index, batch| {
@@ -35,13 +28,12 @@ pub fn lines(path: &Path, scenario: &Scenario, world: &Arc<World>) -> Result<Lin
             driven[index].push(batch.truck[index].position);
         }
     })?;
-    let line =
-        |(sequence, driven): (&verify::Sequence, &Vec<Vec2>)| (sequence.route, beside(world.route_waypoints(sequence.route), driven));
+    let line = |(sequence, driven): (&Sequence, &Vec<Vec2>)| (sequence.route, beside(world.route_waypoints(sequence.route), driven));
     Ok(sequences.iter().zip(&driven).map(line).collect())
 }
 
-/// The point of a driven path beside each waypoint, and the direction there. Where the path is not beside one, before its
-/// start and after its end, the line is the lane's centre.
+/// The point of a driven path beside each waypoint, and the direction there. Where the path is not beside one, before
+/// its start and after its end, the line is the lane's centre.
 fn beside(waypoints: &[WaypointRow], driven: &[Vec2]) -> Vec<WaypointRow> {
     let point = |waypoint: &WaypointRow| {
         let along = |p: Vec2| (p - waypoint.position).dot(waypoint.direction);

@@ -30,8 +30,8 @@ pub fn driven(world: &Arc<World>, sequences: &[Sequence]) -> Result<Vec<Ended>, 
     Ok(ended)
 }
 
-/// Drives sequences in one batch. `seen` is called with the index of a sequence and the batch, whose truck of that index
-/// drives it: at its start and after each of its steps.
+/// Drives sequences in one batch. `seen` is called with the index of a sequence and the batch, whose truck of that
+/// index drives it: at its start and after each of its steps.
 pub fn follow(world: &Arc<World>, sequences: &[Sequence], mut seen: impl FnMut(usize, &Batch)) -> Result<(), simulator::Error> {
     if sequences.is_empty() {
         return Ok(());
@@ -55,8 +55,8 @@ pub fn follow(world: &Arc<World>, sequences: &[Sequence], mut seen: impl FnMut(u
     Ok(())
 }
 
-/// Drives the sequences of the routes that `wanted` accepts and gives them, or the first that does not arrive as an error.
-/// Every such route must be one of the world's. They come in the order of the file: routes, and starts of each.
+/// Drives the sequences of the routes that `wanted` accepts and gives them, or the first that does not arrive as an
+/// error. Every such route must be one of the world's. They come in the order of the file: routes, and starts of each.
 pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted: impl Fn(&str) -> bool) -> Result<Vec<Sequence>, Error> {
     let wrong = |message: String| Error::contents(path, message);
     let mut sequences = Vec::new();
