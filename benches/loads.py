@@ -80,7 +80,7 @@ def line(offtrack, folder, benchmark, split, load):
 
 
 def at_one_speed(folder, base, kmh):
-    """A benchmark with loads for trucks of one target speed, without extras: all that the policy for attard2023 knows."""
+    """A benchmark with loads for one target speed, without extras: all that the policy shipped for attard2023 knows."""
     text = (SCENARIOS / f"{base}.toml").read_text()
     text = re.sub(r"^speeds_kmh = .*$", f"speeds_kmh = [{kmh}.0]", text, flags=re.MULTILINE)
     text = re.sub(r"^speed_kmh = .*$", f"speed_kmh = {kmh}.0", text, flags=re.MULTILINE)
