@@ -31,6 +31,7 @@ pub const FILES: &[(&str, &str)] = embedded![
     "laden2026-50-random.toml",
     "laden2026-50-training.toml",
     "laden2026-odd.toml",
+    "laden2026-odd-random.toml",
     "laden2026-random.toml",
     "laden2026-training.toml",
     "maps/sumo22.outline.toml",

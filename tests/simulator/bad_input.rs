@@ -21,9 +21,10 @@ fn scenarios() -> PathBuf {
 }
 
 /// Benchmarks and roundabouts that have no key but those of another one.
-const LIKE_OTHERS: [&str; 17] = [
+const LIKE_OTHERS: [&str; 18] = [
     "laden2026-50-random.toml",
     "laden2026-50-training.toml",
+    "laden2026-odd-random.toml",
     "laden2026-random.toml",
     "laden2026-training.toml",
     "random2026-1000.toml",

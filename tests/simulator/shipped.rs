@@ -31,10 +31,10 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
     let mut files = BTreeMap::new();
     on_disk(&scenarios(), Path::new(""), &mut files);
     let embedded: BTreeMap<String, String> = FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
-    assert_eq!((files.len(), FILES.len()), (43, 43), "23 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions");
+    assert_eq!((files.len(), FILES.len()), (44, 44), "24 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions");
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [23, 10, 3, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [24, 10, 3, 2]);
 }
 
 /// Benchmarks of so many roads that they are not drawn here.
@@ -98,10 +98,19 @@ fn the_random_roads_of_laden2026_50_differ_from_it_in_roads_and_the_room_before_
 }
 
 #[test]
+fn the_random_roads_of_laden2026_odd_differ_from_those_of_laden2026_in_its_vehicles_alone() {
+    let table = |name: &str| Source::named(Kind::Benchmark, name).unwrap().text().unwrap().parse::<toml::Table>().unwrap();
+    let (mut odd_random, mut random, odd) = (table("laden2026-odd-random"), table("laden2026-random"), table("laden2026-odd"));
+    assert_eq!(odd_random.remove("draw").as_ref(), Some(&odd["draw"]));
+    assert_ne!(random.remove("draw").as_ref(), Some(&odd["draw"]));
+    assert_eq!(odd_random, random);
+}
+
+#[test]
 fn every_name_gives_what_its_file_gives() {
     // The two with thousands of roads take minutes; the next test reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 21);
+    assert_eq!(benchmarks.len(), 22);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();
