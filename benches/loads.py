@@ -57,7 +57,6 @@ def evaluated(offtrack, benchmark, split, load, policy, more=()):
 
 def condensed(report):
     keys = [
-        "policy",
         "benchmark",
         "split",
         "seed",
@@ -65,6 +64,7 @@ def condensed(report):
         "arrived",
         "lane_distance_mean",
         "machine",
+        "device",
         "commit",
         "classes",
     ]

@@ -13,7 +13,8 @@ use offtrack_training::evaluation::page::Page;
 use offtrack_training::evaluation::possible::to_search;
 use offtrack_training::evaluation::report::{Episode, Report, Summary};
 use offtrack_training::evaluation::{Driven, Evaluation, Sequences, legend, usual_episodes};
-use offtrack_training::files;
+use offtrack_training::{files, provenance};
+use serde::Serialize;
 use serde_json::Value;
 
 use super::{devices, policies, progress, record, roads, terminal};
@@ -77,6 +78,19 @@ pub struct Args {
     device: devices::Choice,
 }
 
+/// What `--json` writes: the report, and where it comes from.
+#[derive(Serialize)]
+struct Written<'a> {
+    #[serde(flatten)]
+    report: &'a Report,
+    /// The processor's name and number of cores.
+    machine: String,
+    /// What stepped the trucks: `cpu`, or the graphics adapter's name.
+    device: &'a str,
+    /// The commit that the program was built from.
+    commit: String,
+}
+
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     if let Some(episodes) = args.episodes.filter(|episodes| !(1..=100_000).contains(episodes)) {
@@ -119,7 +133,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         Summary::of(kept.into_iter(), scenario.step)
     });
     if let Some(file) = &args.json {
-        files::write_json(file, &report)?;
+        let (machine, commit) = (provenance::machine(), provenance::commit());
+        files::write_json(file, &Written { report: &report, machine, device: &device.name, commit })?;
     }
     if let Some(file) = &args.html {
         Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run, metrics }.write(file)?;

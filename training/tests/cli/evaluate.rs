@@ -20,6 +20,8 @@ fn every_episode_is_counted_once_by_its_end_and_once_by_its_route() {
             (&report["benchmark"], &report["split"], &report["policy"], &report["seed"]),
             (&Value::from("short"), &Value::from("test"), &Value::from(policy), &Value::from(0))
         );
+        assert_eq!((report["engine"].as_str(), report["device"].as_str()), (Some("cpu"), Some("cpu")));
+        assert!(["machine", "commit"].iter().all(|key| report[key].as_str().is_some_and(|text| !text.is_empty())), "{report}");
         let count = |value: &Value| value.as_u64().unwrap();
         let ends = |value: &Value| value["ends"].as_object().unwrap().values().map(count).sum::<u64>();
         let routes = report["routes"].as_array().unwrap();
