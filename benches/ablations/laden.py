@@ -29,12 +29,10 @@ COMMON = [
     "learning.actor_ema_rate=0.005",
     "learning.final_learning_rate_fraction=0.1",
 ]
-# The same of the training benchmark's keys.
-COMMON_KEYS = {"ending.rollover_ratio": 0.75, "draw.friction": "[0.6, 1.1]"}
 # Name, and what is changed in the benchmarks: TABLE.KEY and its value. Endings are those that it trains with; it is
 # examined with those of laden2026.
 CHOICES = [
-    ("rolled over from 0.75 on", {}),
+    ("as laden2026-training: rolled over from 0.75 on", {}),
     ("rolled over from 0.85 on", {"ending.rollover_ratio": 0.85}),
     ("rolled over from 1 on", {"ending.rollover_ratio": 1.0}),
     ("blind", {"observation.extras": '"blind"'}),
@@ -54,15 +52,12 @@ def changed(text, changes):
     return series.with_paths(text)
 
 
-def write_benchmarks(folder, name, changes, common):
-    """The two benchmarks of a choice: to train on, with what all choices have in common, and to be examined on."""
+def write_benchmarks(folder, name, changes):
+    """The two benchmarks of a choice: to train on, and to be examined on."""
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for base in ["training", "random"]:
-        if base == "training":
-            own = common | changes
-        else:
-            own = {path: value for path, value in changes.items() if not path.startswith("ending.")}
+        own = {path: value for path, value in changes.items() if base == "training" or not path.startswith("ending.")}
         file = folder / f"{name}-{base}.toml"
         file.write_text(changed((series.SCENARIOS / f"laden2026-{base}.toml").read_text(), own))
         files.append(file)
@@ -72,7 +67,7 @@ def write_benchmarks(folder, name, changes, common):
 def run(core, args, choice, changes, seed):
     """One run and its examination; returns its row of the result."""
     name = series.folder_name(choice)
-    training, examined = write_benchmarks(args.runs / "scenarios", name, changes, {} if args.full else COMMON_KEYS)
+    training, examined = write_benchmarks(args.runs / "scenarios", name, changes)
     folder = args.runs / f"{name}-{seed}"
     evaluation = args.runs / f"{name}-{seed}.json"
     settings = [f"benchmark={training}", f"training_benchmark={training}", "also_evaluate="]

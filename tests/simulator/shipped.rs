@@ -76,16 +76,8 @@ fn the_laden_benchmarks_of_random_roads_differ_from_laden2026_in_roads_and_train
         let start = laden.remove("start").unwrap();
         assert_eq!(start["speed_kmh"], expected["start"]["speed_kmh"]);
         assert_eq!(start.get("offset"), empty.get("start").and_then(|start| start.get("offset")));
-        // In training a truck has less grip, and rolls over sooner.
-        let is_training = empty["reward"].get("clearance").is_some();
-        let friction = |table: &toml::Table| -> Vec<f64> {
-            table["draw"]["friction"].as_array().unwrap().iter().map(|end| end.as_float().unwrap()).collect()
-        };
-        let (drawn, examined) = (friction(&laden), friction(&expected));
-        assert!(drawn[0] == examined[0] && (drawn[1] < examined[1]) == is_training, "{drawn:?} {examined:?}");
-        laden["draw"]["friction"] = expected["draw"]["friction"].clone();
         let ending = laden["ending"].as_table_mut().unwrap();
-        assert_eq!(ending.remove("rollover_ratio").is_some(), is_training);
+        assert_eq!(ending.remove("rollover_ratio").is_some(), empty["reward"].get("clearance").is_some());
         for key in ["reward", "start", "roundabout"] {
             laden.remove(key);
             expected.remove(key);
