@@ -37,12 +37,16 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
     assert_eq!(kinds.map(|kind| kind.names().count()), [24, 10, 3, 2]);
 }
 
+/// A shipped benchmark's file as it is read as TOML.
+fn table(name: &str) -> toml::Table {
+    Source::named(Kind::Benchmark, name).unwrap().text().unwrap().parse().unwrap()
+}
+
 /// Benchmarks of so many roads that they are not drawn here.
 const LARGE: [&str; 2] = ["random2026-1000", "random2026-10000"];
 
 #[test]
 fn the_large_benchmarks_are_random2026_with_other_test_roads_that_no_split_shares() {
-    let table = |name: &str| Source::named(Kind::Benchmark, name).unwrap().text().unwrap().parse::<toml::Table>().unwrap();
     let range = |table: &toml::Table, split: &str| -> Option<(i64, i64)> {
         let range = table["procedural"].get(split)?.as_array()?;
         Some((range[0].as_integer()?, range[1].as_integer()?))
@@ -68,7 +72,6 @@ fn the_large_benchmarks_are_random2026_with_other_test_roads_that_no_split_share
 
 #[test]
 fn the_laden_benchmarks_of_random_roads_differ_from_laden2026_in_roads_and_training_alone() {
-    let table = |name: &str| Source::named(Kind::Benchmark, name).unwrap().text().unwrap().parse::<toml::Table>().unwrap();
     for (laden, empty) in [("laden2026-random", "random2026"), ("laden2026-training", "random2026-training")] {
         let (mut laden, empty, mut expected) = (table(laden), table(empty), table("laden2026"));
         assert_eq!(laden.remove("procedural").as_ref(), Some(&empty["procedural"]));
@@ -88,7 +91,6 @@ fn the_laden_benchmarks_of_random_roads_differ_from_laden2026_in_roads_and_train
 
 #[test]
 fn the_random_roads_of_laden2026_50_differ_from_it_in_roads_and_the_room_before_them_alone() {
-    let table = |name: &str| Source::named(Kind::Benchmark, name).unwrap().text().unwrap().parse::<toml::Table>().unwrap();
     let (mut random, mut expected) = (table("laden2026-50-random"), table("laden2026-50"));
     assert_eq!(random.remove("procedural").as_ref(), Some(&table("random2026")["procedural"]));
     for (table, keys) in [(&mut random, &["routes"][..]), (&mut expected, &["routes", "roundabout"])] {
@@ -99,7 +101,6 @@ fn the_random_roads_of_laden2026_50_differ_from_it_in_roads_and_the_room_before_
 
 #[test]
 fn the_random_roads_of_laden2026_odd_differ_from_those_of_laden2026_in_its_vehicles_alone() {
-    let table = |name: &str| Source::named(Kind::Benchmark, name).unwrap().text().unwrap().parse::<toml::Table>().unwrap();
     let (mut odd_random, mut random, odd) = (table("laden2026-odd-random"), table("laden2026-random"), table("laden2026-odd"));
     assert_eq!(odd_random.remove("draw").as_ref(), Some(&odd["draw"]));
     assert_ne!(random.remove("draw").as_ref(), Some(&odd["draw"]));
