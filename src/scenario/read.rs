@@ -60,7 +60,7 @@ fn without_routes(
         [] => Vec::new(),
         changes => numbers(reader, "actions.speed_changes_kmh", changes, 90.0, -90.0, "km/h")?,
     };
-    written.reward.as_changes().check(reader)?;
+    written.reward.as_changes().check(reader, "reward")?;
     Ok(Scenario {
         name,
         steer_max: steer_max.map(f64::to_radians),

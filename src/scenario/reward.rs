@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Scenario;
+use crate::layout::Params;
 use crate::reader::{Error, Reader};
 
 /// Other values for some keys of a benchmark's `[reward]`; what is none stays as the benchmark has it.
@@ -37,19 +38,20 @@ impl RewardChanges {
 
     /// # Errors
     ///
-    /// The first value out of the range that a benchmark file may give, with its key.
-    pub fn check(&self, reader: &Reader) -> Result<(), Error> {
+    /// The first value out of the range that a benchmark file may give, with its key in `table`.
+    pub fn check(&self, reader: &Reader, table: &str) -> Result<(), Error> {
         let weight = -1e6..=1e6;
         let keys = [
-            ("reward.waypoint", self.waypoint, weight.clone(), ""),
-            ("reward.lane_distance", self.lane_distance, weight.clone(), ""),
-            ("reward.lane_distance_limit", self.lane_distance_limit, 0.1..=50.0, "m"),
-            ("reward.clearance", self.clearance, weight.clone(), ""),
-            ("reward.clearance_limit", self.clearance_limit, 0.01..=10.0, "m"),
-            ("reward.failure", self.failure, weight, ""),
+            ("waypoint", self.waypoint, weight.clone(), ""),
+            ("lane_distance", self.lane_distance, weight.clone(), ""),
+            ("lane_distance_limit", self.lane_distance_limit, 0.1..=50.0, "m"),
+            ("clearance", self.clearance, weight.clone(), ""),
+            ("clearance_limit", self.clearance_limit, 0.01..=10.0, "m"),
+            ("failure", self.failure, weight, ""),
         ];
-        keys.into_iter()
-            .try_for_each(|(key, value, range, unit)| value.map_or(Ok(()), |value| reader.within(key, value, range, unit).map(drop)))
+        keys.into_iter().try_for_each(|(key, value, range, unit)| {
+            value.map_or(Ok(()), |value| reader.within(&format!("{table}.{key}"), value, range, unit).map(drop))
+        })
     }
 
     /// Changes the reward of a scenario.
@@ -64,6 +66,21 @@ impl RewardChanges {
         ];
         for (value, weight) in keys {
             *weight = value.unwrap_or(*weight);
+        }
+    }
+
+    /// Changes the reward of a world.
+    pub fn apply_to_params(&self, params: &mut Params) {
+        let keys = [
+            (self.waypoint, &mut params.waypoint_weight),
+            (self.lane_distance, &mut params.lane_distance_weight),
+            (self.lane_distance_limit, &mut params.lane_distance_limit),
+            (self.clearance, &mut params.clearance_weight),
+            (self.clearance_limit, &mut params.clearance_limit),
+            (self.failure, &mut params.failure_weight),
+        ];
+        for (value, weight) in keys {
+            *weight = value.map_or(*weight, |value| value as f32);
         }
     }
 }

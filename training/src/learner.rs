@@ -1,12 +1,16 @@
 //! The learner: discrete soft actor-critic, its replay buffer, and the training loop, on the processor or on a graphics
-//! device.
+//! device; and proximal policy optimisation, which can refine its policy.
 //!
-//! Start with [`training`], the loop, then [`sac`], the algorithm. [`rollout`] is what differs between processor and
+//! Start with [`training`], the loop, then [`sac`] and [`ppo`], the algorithms. [`rollout`] is what differs between processor and
 //! device.
 
 pub mod training; // the loop: act, learn
 pub mod sac; // soft actor-critic
+pub mod ppo; // proximal policy optimisation, which refines its policy
 pub mod network; // multi-layer perceptrons
+pub mod pass; // their gradients on the processor
+pub mod adam; // the optimizer
+pub mod shards; // a batch on several threads
 pub mod rollout; // acting, stepping, remembering, sampling: on the host, on a device
 pub mod replay_buffer; // transitions on the host
 pub mod mirror; // mirror augmentation
@@ -16,4 +20,5 @@ pub mod backend; // the choice of processor or device
 pub mod config; // a training file
 pub mod run; // a training run in its folder
 pub mod checkpoint; // all state in a file
+pub mod columns; // networks and optimizers there
 pub mod generator; // random numbers with a state

@@ -47,9 +47,14 @@ pub fn weighed(params: &Params, clearance: &Clearance, progress: &Progress, ende
     RewardTerms {
         waypoints: progress.passed as f32,
         lane_distance: (progress.lane_distance / params.lane_distance_limit).min(1.0),
-        clearance: (1.0 - clearance.tractor.min(clearance.trailer) / params.clearance_limit).clamp(0.0, 1.0),
+        clearance: closeness(params, clearance),
         failure: if ended.failed() { 1.0 } else { 0.0 },
     }
+}
+
+/// Depth of the nearer unit in the margin kept from kerbs, from 0 outside it to 1 at a kerb.
+pub fn closeness(params: &Params, clearance: &Clearance) -> f32 {
+    (1.0 - clearance.tractor.min(clearance.trailer) / params.clearance_limit).clamp(0.0, 1.0)
 }
 
 /// The weighted sum.

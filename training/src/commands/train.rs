@@ -49,7 +49,7 @@ const METRICS_LIMIT: u64 = 64 << 20;
 /// Train a policy, then evaluate it on the test routes.
 #[derive(Debug, Default, clap::Args)]
 pub struct Args {
-    /// A training file: its path, or one of `default`, `best`, `attard`, `as-run`, `laden`, `laden-50`, `gpu`,
+    /// A training file: its path, or one of `default`, `best`, `lane`, `attard`, `as-run`, `laden`, `laden-50`, `gpu`,
     /// `laden-gpu` and `paper`, which come with the program. Without it `default`, in a program built for graphics
     /// devices `gpu`.
     config: Option<PathBuf>,

@@ -3,6 +3,9 @@
 
 use rand::{RngCore, SeedableRng};
 
+use super::checkpoint::Stored;
+use crate::error::Error;
+
 /// What splitmix64 adds from one number to the next: 2^64 over the golden ratio.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
@@ -11,6 +14,14 @@ const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 pub struct Generator {
     /// Four words, not all 0.
     pub state: [u64; 4],
+}
+
+impl Generator {
+    /// The one whose state is a column of a checkpoint. From all zeros every number would be zero: that is an error.
+    pub fn stored(stored: &Stored, column: &str) -> Result<Generator, Error> {
+        let generator = Generator { state: stored.array(column)? };
+        if generator.state == [0; 4] { Err(stored.error(format!("its column `{column}` is all zeros"))) } else { Ok(generator) }
+    }
 }
 
 impl RngCore for Generator {

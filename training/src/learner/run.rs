@@ -94,6 +94,11 @@ impl Run {
 
     fn learn_until(&mut self, stopped: &impl Fn() -> bool) -> Result<(), Error> {
         while self.progress.fraction() < 1.0 && !stopped() {
+            if self.is_refining() {
+                self.refine()?;
+                self.checkpoint_if_due()?;
+                continue;
+            }
             let is_warm = self.training.is_warm()?;
             self.training.act(self.progress.env_steps())?;
             self.progress.stepped(self.config.n_envs as u64);
@@ -119,18 +124,44 @@ impl Run {
         self.count_episodes(true)
     }
 
+    /// Whether the policy is refined now.
+    fn is_refining(&self) -> bool {
+        let begin = self.config.refinement.as_ref().map(|refinement| refinement.begin);
+        begin.is_some_and(|begin| begin <= self.progress.fraction()) && self.training.is_acting()
+    }
+
+    /// An iteration of the refinement, which begins with the best policy so far.
+    fn refine(&mut self) -> Result<(), Error> {
+        let Some(settings) = self.config.refinement.clone() else { return Ok(()) };
+        if !self.training.is_refining() {
+            self.training.begin_refinement(&self.policy()?)?;
+        }
+        let done = (self.progress.fraction() - settings.begin) / (1.0 - settings.begin);
+        let n_updates = self.training.refine(1.0 - (1.0 - settings.final_learning_rate_fraction) * done)?;
+        self.progress.stepped((self.config.n_envs * settings.n_steps) as u64);
+        self.progress.updated(n_updates);
+        self.count_episodes(false)?;
+        let validated = self.validate_if_due()?;
+        if validated || self.progress.is_row_due() {
+            self.write_row()?;
+        }
+        self.progress.show_if_due();
+        Ok(())
+    }
+
     /// Lets the policy drive on the validation routes when it is time to; true if it did.
     fn validate_if_due(&mut self) -> Result<bool, Error> {
         let fraction = self.progress.fraction();
         let Some(validation) = self.validation.as_mut().filter(|validation| validation.is_due(fraction)) else { return Ok(false) };
-        let validated = validation.validate(self.training.policy()?, self.progress.env_steps(), fraction)?;
+        let validated = validation.validate(self.training.policy()?, self.progress.env_steps(), fraction, self.training.is_refining())?;
         self.progress.validated(validated.success, validation.best().map_or(validated.success, |best| best.success));
         Ok(true)
     }
 
     /// The linear learning-rate schedule.
     fn rate_factor(&self) -> f64 {
-        1.0 - (1.0 - self.config.learning.final_learning_rate_fraction) * self.progress.fraction()
+        let end = self.config.refinement.as_ref().map_or(1.0, |refinement| refinement.begin.max(f64::MIN_POSITIVE));
+        1.0 - (1.0 - self.config.learning.final_learning_rate_fraction) * (self.progress.fraction() / end).min(1.0)
     }
 
     fn count_episodes(&mut self, wait: bool) -> Result<(), Error> {
@@ -146,7 +177,7 @@ impl Run {
     /// Writes a row of metrics, once its figures have been checked.
     fn write_row(&mut self) -> Result<(), Error> {
         self.add_sums()?;
-        let entropy_coefficient = self.training.sac().entropy_coefficient();
+        let entropy_coefficient = self.training.entropy_coefficient();
         self.progress.write_row(entropy_coefficient);
         if self.routes.is_due() {
             let written = self.routes.write();
@@ -159,7 +190,7 @@ impl Run {
     fn add_sums(&mut self) -> Result<(), Error> {
         self.training.rollout().check()?;
         self.count_episodes(true)?;
-        let (sums, n_updates) = self.training.sac_mut().take_sums();
+        let (sums, n_updates) = self.training.take_sums();
         self.progress.add_sums(&sums);
         match not_finite(&sums).filter(|_| 0 < n_updates) {
             Some((what, value)) => Err(self.diverged(what, value)),
@@ -181,7 +212,7 @@ impl Run {
         let written = self.checkpointer.wait();
         // The last row is not in the checkpoint: a run that continues takes it back.
         self.add_sums()?;
-        let row = self.progress.finish(self.training.sac().entropy_coefficient());
+        let row = self.progress.finish(self.training.entropy_coefficient());
         let routes = self.routes.write();
         written.map_or(Ok(()), |Written { checkpoint, policy }| checkpoint.and(policy)).and(row).and(routes)
     }
@@ -231,7 +262,7 @@ impl Run {
     /// Fails where a number of the learner is not finite. A checkpoint holds only finite numbers.
     fn check(&mut self) -> Result<(), Error> {
         self.training.rollout().check()?;
-        match self.training.sac().broken() {
+        match self.training.broken() {
             Some((what, value)) => Err(self.diverged(&what, value)),
             None => Ok(()),
         }
@@ -239,7 +270,7 @@ impl Run {
 
     /// The error of a learner that diverged: where it shows, and what there is to go back to.
     fn diverged(&mut self, what: &str, value: f32) -> Error {
-        let also = self.training.sac().broken().filter(|(name, _)| name != what).map(|(name, _)| format!(", so is {name}"));
+        let also = self.training.broken().filter(|(name, _)| name != what).map(|(name, _)| format!(", so is {name}"));
         let (also, kept) = (also.unwrap_or_default(), self.last_checkpoint());
         Error::Diverged { what: what.to_owned(), value, also, env_steps: self.progress.env_steps(), kept }
     }

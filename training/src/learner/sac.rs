@@ -6,12 +6,10 @@
 //! numbers are plain; on a device gradients and Adam are tensor operations, and an update waits for nothing. The number
 //! of shards does not depend on the machine, so neither does the result.
 
-mod adam;
 mod critics;
 mod entropy;
 mod gradients;
 mod scalar;
-mod shards;
 mod state;
 
 use std::mem::take;
@@ -22,17 +20,13 @@ use rand::SeedableRng;
 use rand::rngs::SmallRng;
 use rayon::ThreadPoolBuildError;
 
+use crate::learner::adam::Adam;
 use crate::learner::config::Learning;
 use crate::learner::network::Mlp;
-use adam::Adam;
+use crate::learner::shards::{N_SHARDS, Shards};
 use critics::Twins;
 use entropy::EntropyCoefficient;
 use scalar::Scalar;
-use shards::Shards;
-
-/// Shards of a batch on the processor: two, for the cores of the smallest machines. Another number would round sums
-/// differently.
-pub const N_SHARDS: usize = 2;
 
 /// Where a learner's tensors are.
 #[derive(Debug, Clone)]
@@ -97,6 +91,18 @@ pub struct Update {
     pub entropy: f32,
     /// Value of the actions taken, the mean of both critics.
     pub value: f32,
+}
+
+impl Update {
+    /// The sums of both.
+    pub fn plus(&self, other: &Update) -> Update {
+        Update {
+            critic_loss: self.critic_loss + other.critic_loss,
+            actor_loss: self.actor_loss + other.actor_loss,
+            entropy: self.entropy + other.entropy,
+            value: self.value + other.value,
+        }
+    }
 }
 
 /// The figures of [`Update`], in its order, where the learner is.

@@ -12,8 +12,9 @@ use super::checkpoint::{Columns, Stored};
 use super::config::Config;
 use super::mirror::Mirror;
 use super::network::Mlp;
-use super::rollout::Rollout;
-use super::sac::{Sac, Transitions};
+use super::ppo::Ppo;
+use super::rollout::{Rollout, StepReward};
+use super::sac::{Sac, Transitions, Update};
 use crate::error::Error;
 use crate::evaluation::policies;
 
@@ -25,6 +26,8 @@ pub struct Training {
     mirror: Option<Mirror>,
     rollout: Box<dyn Rollout>,
     sac: Sac,
+    /// None before the refinement.
+    ppo: Option<Ppo>,
     /// None while actions are random.
     normalisation: Option<Normalisation>,
 }
@@ -37,6 +40,7 @@ impl Training {
         Ok(Training {
             rollout: backend.rollout(config, &world, routes, mirror.clone())?,
             sac: Sac::new(&config.learning, n_values(&world), world.actions.len(), u64::from(config.seed), backend.placement())?,
+            ppo: None,
             normalisation: None,
             config: config.clone(),
             mirror,
@@ -64,6 +68,27 @@ impl Training {
         Ok(())
     }
 
+    /// Begins the refinement, from a policy of this run; without effect once it has begun.
+    pub fn begin_refinement(&mut self, policy: &Policy) -> Result<(), Error> {
+        let Some(settings) = self.config.refinement.as_ref().filter(|_| self.ppo.is_none()) else { return Ok(()) };
+        self.ppo = Some(Ppo::new(settings, &Mlp::of(&policy.layers, &Device::flex()), u64::from(self.config.seed))?);
+        Ok(())
+    }
+
+    /// Whether the refinement has begun.
+    pub fn is_refining(&self) -> bool {
+        self.ppo.is_some()
+    }
+
+    /// Steps of all trucks, and updates from them. Returns the number of updates.
+    pub fn refine(&mut self, rate_factor: f64) -> Result<u64, Error> {
+        let (Some(ppo), Some(settings)) = (&mut self.ppo, &self.config.refinement) else { return Ok(0) };
+        let mut reward = StepReward { params: self.world.params, clearance_power: settings.clearance_power as f32 };
+        settings.reward.apply_to_params(&mut reward.params);
+        let steps = self.rollout.collect(ppo.actor(), settings.n_steps, &reward)?;
+        Ok(ppo.learn(&steps, rate_factor))
+    }
+
     /// Trucks and replay buffer.
     pub fn rollout(&self) -> &dyn Rollout {
         self.rollout.as_ref()
@@ -87,6 +112,28 @@ impl Training {
     /// Whether the policy acts already; until then actions are random.
     pub fn is_acting(&self) -> bool {
         self.normalisation.is_some()
+    }
+
+    /// The entropy coefficient of the learner that learns now. Waits for a device.
+    pub fn entropy_coefficient(&self) -> f32 {
+        match self.config.refinement.as_ref().filter(|_| self.is_refining()) {
+            Some(refinement) => refinement.entropy_coefficient as f32,
+            None => self.sac.entropy_coefficient(),
+        }
+    }
+
+    /// Figures of the updates since this was last called, summed, and the number of those updates. Waits for a device.
+    pub fn take_sums(&mut self) -> (Update, u64) {
+        let (mut sums, mut n_updates) = self.sac.take_sums();
+        if let Some((refined, n_refined)) = self.ppo.as_mut().map(Ppo::take_sums) {
+            (sums, n_updates) = (sums.plus(&refined), n_updates + n_refined);
+        }
+        (sums, n_updates)
+    }
+
+    /// The first of the learners' numbers that is not finite: its name and value. Waits for a device.
+    pub fn broken(&self) -> Option<(String, f32)> {
+        self.sac.broken().or_else(|| self.ppo.as_ref().and_then(Ppo::broken))
     }
 
     /// Uses this normalisation, and the policy from here on.
@@ -145,14 +192,14 @@ impl Training {
         self.rollout.found_normalisation(self.mirror.as_ref())
     }
 
-    /// The policy: the EMA of the actor. Waits for a device.
+    /// The policy: the EMA of the actor that learns now. Waits for a device.
     pub fn policy(&self) -> Result<Policy, Error> {
         Ok(Policy {
             name: "the policy in training".to_owned(),
             benchmark: self.config.benchmark.clone(),
             actions: self.world.actions.clone(),
             normalisation: self.normalisation.clone().map_or_else(|| self.found_normalisation(), Ok)?,
-            layers: self.sac.actor_ema().plain_layers(),
+            layers: self.ppo.as_ref().map_or_else(|| self.sac.actor_ema(), |ppo| ppo.actor_ema().clone()).plain_layers(),
             extras: EXTRAS[..self.world.params.n_extras as usize].iter().map(|extra| extra.name.to_owned()).collect(),
             activation: Activation::Relu,
         })
@@ -165,6 +212,7 @@ impl Training {
             columns.put("normalisation, factor", &factor[..]);
         }
         self.sac.save(columns);
+        self.ppo.iter().for_each(|ppo| ppo.save(columns));
         self.rollout.save(columns);
     }
 
@@ -175,6 +223,10 @@ impl Training {
         if stored.bytes("normalisation, mean").is_some() {
             let values = |name: &str| stored.exactly(name, self.n_values());
             self.set_normalisation(Normalisation { mean: values("normalisation, mean")?, factor: values("normalisation, factor")? });
+        }
+        if Ppo::is_in(stored) {
+            self.begin_refinement(&self.policy()?)?;
+            self.ppo.as_mut().map_or(Ok(()), |ppo| ppo.restore(stored))?;
         }
         Ok(())
     }

@@ -77,6 +77,35 @@ fn wait_until(what: &str, reached: impl Fn() -> bool) {
 }
 
 #[test]
+fn a_refinement_stopped_on_the_way_equals_one_never_stopped_bit_for_bit_and_its_last_policy_is_kept() {
+    let place = place();
+    let refinement = "[refinement]\nbegin = 0.25\nn_steps = 8\nepochs = 2\nbatch = 32\ngamma = 0.97\ngae_lambda = 0.9\nclip = 0.2\n\
+                      advantage_limit = 4.0\nentropy_coefficient = 0.003\nactor_learning_rate = 3e-4\ncritic_learning_rate = 1e-3\n\
+                      final_learning_rate_fraction = 0.1\nactor_ema_rate = 0.1\ncritic_iterations = 4\nclearance_power = 2.0\n\
+                      reward = { waypoint = 0.0, clearance_limit = 0.5 }\n";
+    let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
+    std::fs::write(place.file("tiny.toml"), format!("{training}\n{refinement}")).unwrap();
+    let steps = ["--steps", "60000"];
+    succeed(&place.train(&[&["--name", "whole"], &steps[..]].concat()));
+    let run = begun(place.training(&[&["--name", "parts"], &steps[..]].concat()));
+    let refined = || {
+        let checkpoint = std::fs::read(place.file("runs/parts/checkpoint.safetensors")).unwrap_or_default();
+        checkpoint.windows(13).any(|word| word == b"refined actor")
+    };
+    wait_until("a checkpoint of the refinement", refined);
+    succeed(&interrupted(run));
+    assert_eq!(place.json("runs/parts/report.json")["interrupted"], true, "60000 steps are over too soon for this test");
+    let output = resume(&place, "parts", &[]);
+    succeed(&output);
+    assert!(15_000 < continued_after(&output));
+    assert!(bytes(&place, "runs/parts/policy.safetensors") == bytes(&place, "runs/whole/policy.safetensors"));
+    assert_eq!(metrics(&place, "parts"), metrics(&place, "whole"));
+    let validation = place.json("runs/whole/report.json")["validation"].clone();
+    assert_eq!(validation, place.json("runs/parts/report.json")["validation"]);
+    assert_eq!(validation["best"], validation["last"]);
+}
+
+#[test]
 fn a_run_killed_and_stopped_on_the_way_equals_one_never_stopped_bit_for_bit() {
     let place = place();
     let steps = ["--steps", "40000"];

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use offtrack::reader::Reader;
 
-use super::{Config, Device, Learning};
+use super::{Config, Device, Learning, Refinement};
 use crate::error::Error;
 
 impl Config {
@@ -12,7 +12,7 @@ impl Config {
     pub(super) fn check(&self, reader: &Reader) -> Result<(), Error> {
         let Config { replay_buffer, learning, .. } = self;
         self.check_also_evaluate(reader)?;
-        self.reward.check(reader)?;
+        self.reward.check(reader, "reward")?;
         reader.count("n_envs", self.n_envs, 1..=1 << 20)?;
         if let Some(minutes) = self.minutes {
             reader.within("minutes", minutes, 0.01..=100_000.0, "min")?;
@@ -45,6 +45,9 @@ impl Config {
             reader.count("validation.episodes", validation.episodes, 1..=1_000)?;
         }
         learning.check(reader)?;
+        if let Some(refinement) = &self.refinement {
+            refinement.check(reader)?;
+        }
         // A ring of fewer slots than that would hold no step that enough others follow.
         let slots = replay_buffer.capacity / self.n_envs;
         if slots <= learning.n_steps {
@@ -55,6 +58,7 @@ impl Config {
             let without = [
                 ("exploration", self.exploration.is_some()),
                 ("level_replay", self.level_replay.is_some()),
+                ("refinement", self.refinement.is_some()),
                 ("replay_buffer.priority", replay_buffer.priority.is_some()),
             ];
             if let Some((key, _)) = without.into_iter().find(|(_, given)| *given) {
@@ -102,6 +106,28 @@ impl Learning {
         }
         reader.within("learning.entropy.coefficient", self.entropy.coefficient, 1e-9..=1e3, "")?;
         reader.within("learning.entropy.learning_rate", self.entropy.learning_rate, 1e-8..=1.0, "")?;
+        Ok(())
+    }
+}
+
+impl Refinement {
+    fn check(&self, reader: &Reader) -> Result<(), Error> {
+        reader.within("refinement.begin", self.begin, 0.0..=0.99, "")?;
+        reader.count("refinement.n_steps", self.n_steps, 1..=10_000)?;
+        reader.count("refinement.epochs", self.epochs, 1..=100)?;
+        reader.count("refinement.batch", self.batch, 2..=1 << 20)?;
+        reader.within("refinement.gamma", self.gamma, 0.0..=1.0, "")?;
+        reader.within("refinement.gae_lambda", self.gae_lambda, 0.0..=1.0, "")?;
+        reader.within("refinement.clip", self.clip, 0.001..=10.0, "")?;
+        reader.within("refinement.advantage_limit", self.advantage_limit, 0.1..=1e6, "standard deviations")?;
+        reader.within("refinement.entropy_coefficient", self.entropy_coefficient, 0.0..=1e3, "")?;
+        reader.within("refinement.actor_learning_rate", self.actor_learning_rate, 1e-8..=1.0, "")?;
+        reader.within("refinement.critic_learning_rate", self.critic_learning_rate, 1e-8..=1.0, "")?;
+        reader.within("refinement.final_learning_rate_fraction", self.final_learning_rate_fraction, 0.0..=1.0, "")?;
+        reader.within("refinement.actor_ema_rate", self.actor_ema_rate, 1e-6..=1.0, "")?;
+        reader.within("refinement.critic_iterations", self.critic_iterations as f64, 0.0..=1e9, "iterations")?;
+        reader.within("refinement.clearance_power", self.clearance_power, 0.1..=10.0, "")?;
+        self.reward.check(reader, "refinement.reward")?;
         Ok(())
     }
 }

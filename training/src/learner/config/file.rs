@@ -9,9 +9,10 @@ use super::set;
 use crate::error::Error;
 
 /// The training files that come with the program.
-const SHIPPED: [(&str, &str); 9] = [
+const SHIPPED: [(&str, &str); 10] = [
     ("default", include_str!("../../../configs/default.toml")),
     ("best", include_str!("../../../configs/best.toml")),
+    ("lane", include_str!("../../../configs/lane.toml")),
     ("attard", include_str!("../../../configs/attard.toml")),
     ("gpu", include_str!("../../../configs/gpu.toml")),
     ("as-run", include_str!("../../../configs/as-run.toml")),

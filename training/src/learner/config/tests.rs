@@ -77,6 +77,29 @@ fn every_value_out_of_its_range_is_refused_with_its_key_and_what_would_do() {
 }
 
 #[test]
+fn a_refinements_value_out_of_its_range_is_refused_with_its_key() {
+    for (setting, expected) in [
+        ("refinement.begin=1.0", "refinement.begin: 1; must lie in 0..0.99"),
+        ("refinement.n_steps=0", "refinement.n_steps: 0; must lie in 1.."),
+        ("refinement.epochs=0", "refinement.epochs: 0; must lie in 1.."),
+        ("refinement.batch=1", "refinement.batch: 1; must lie in 2.."),
+        ("refinement.gamma=1.5", "refinement.gamma: 1.5; must lie in 0..1"),
+        ("refinement.gae_lambda=-0.1", "refinement.gae_lambda: -0.1; must lie in 0..1"),
+        ("refinement.clip=0.0", "refinement.clip: 0; must lie in"),
+        ("refinement.advantage_limit=0.0", "refinement.advantage_limit: 0 standard deviations; must lie in"),
+        ("refinement.actor_learning_rate=0.0", "refinement.actor_learning_rate: 0; must lie in"),
+        ("refinement.critic_learning_rate=2.0", "refinement.critic_learning_rate: 2; must lie in"),
+        ("refinement.actor_ema_rate=0.0", "refinement.actor_ema_rate: 0; must lie in"),
+        ("refinement.clearance_power=0.0", "refinement.clearance_power: 0; must lie in"),
+        ("refinement.reward.clearance_limit=0.0", "refinement.reward.clearance_limit: 0 m; must lie in 0.01..10 m"),
+        ("refinement.reward.lane=1.0", "unknown field `lane`"),
+    ] {
+        let message = Config::read_with(Path::new("lane"), &[setting.to_owned()]).unwrap_err().to_string();
+        assert!(message.contains(expected), "{setting}: {message}");
+    }
+}
+
+#[test]
 fn a_key_that_is_unknown_missing_or_of_another_type_is_refused_by_its_name() {
     for (key, line, expected) in [
         ("batch", "bacth = 512", "unknown field `bacth`"),
@@ -126,7 +149,11 @@ fn a_key_that_works_on_the_processor_alone_is_refused_for_a_device() {
     let exploration = "[exploration]\ninitial_fraction = 1.0\nfinal_fraction = 0.1\nsteps = 1000\n";
     let priority = "[replay_buffer.priority]\nexponent = 0.6\ncorrection = 0.4\n";
     let level_replay = "[level_replay]\nfraction = 0.5\nrate = 0.2\n";
-    for (key, table) in [("exploration", exploration), ("level_replay", level_replay), ("replay_buffer.priority", priority)] {
+    let lane = std::fs::read_to_string(files::repository().join("training/configs/lane.toml")).unwrap();
+    let refinement = &lane[lane.find("\n[refinement]").unwrap()..];
+    let tables =
+        [("exploration", exploration), ("level_replay", level_replay), ("replay_buffer.priority", priority), ("refinement", refinement)];
+    for (key, table) in tables {
         assert!(read(&format!("{plain}\n{table}")).is_ok(), "{key}");
         let message = read(&format!("{on_device}\n{table}")).unwrap_err().to_string();
         assert!(message.contains(&format!("{key}: given; works with device = \"cpu\" alone")), "{message}");
@@ -243,7 +270,7 @@ fn a_key_set_wrongly_is_refused_with_what_would_do() {
 fn every_training_file_reads_by_path_and_by_name() {
     let folder = files::repository().join("training/configs");
     let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    assert_eq!(files.len(), 9);
+    assert_eq!(files.len(), 10);
     for file in files {
         let by_path = Config::read(&file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(Config::read(Path::new(file.file_stem().unwrap())).unwrap(), by_path);
@@ -251,7 +278,7 @@ fn every_training_file_reads_by_path_and_by_name() {
     let message = Config::read(Path::new("papre")).unwrap_err().to_string();
     assert!(
         message.contains(
-            "papre: is no training file: the program comes with default, best, attard, gpu, as-run, laden, laden-50, laden-gpu, paper"
+            "papre: is no training file: the program comes with default, best, lane, attard, gpu, as-run, laden, laden-50, laden-gpu, paper"
         ),
         "{message}"
     );

@@ -20,12 +20,13 @@ use offtrack::world::World;
 use offtrack_policy::{LIMIT, Normalisation};
 use wgpu::{PollType, SubmissionIndex};
 
-use super::{Episodes, Rollout};
+use super::{Episodes, Rollout, StepReward};
 use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::config::Config;
 use crate::learner::mirror::Mirror;
 use crate::learner::network::Mlp;
+use crate::learner::ppo::steps::Steps;
 use crate::learner::sac::Transitions;
 use memory_kernels::{Binding, Buffers, Facts, Image, Kernel, Normal, Now};
 pub use shared::Shared;
@@ -289,6 +290,12 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
     fn step(&mut self, actor: &Mlp, _: u64) -> Result<(), Error> {
         let logits = actor.forward(self.normalised());
         self.step_by(Some(&logits), true)
+    }
+
+    /// An error: a refinement is on the processor, and a training file that asks for another is refused.
+    fn collect(&mut self, _: &Mlp, _: usize, _: &StepReward) -> Result<Steps, Error> {
+        let expected = "works with device = \"cpu\" alone: leave one of them out".to_owned();
+        Err(Error::Flag { flag: "refinement", value: "given".to_owned(), expected })
     }
 
     fn drive(&mut self, actor: &Mlp) -> Result<(), Error> {

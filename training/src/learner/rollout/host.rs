@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES};
+use offtrack::cpu::judge;
+use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES, RewardTerms};
 use offtrack::random;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
@@ -11,7 +12,7 @@ use offtrack_policy::Normalisation;
 use rand::{Rng, SeedableRng};
 use std::sync::Arc;
 
-use super::{Episodes, Rollout, RouteEnd};
+use super::{Episodes, Rollout, RouteEnd, StepReward};
 use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::config::{Config, Learning};
@@ -19,8 +20,11 @@ use crate::learner::generator::Generator;
 use crate::learner::level_replay::LevelReplay;
 use crate::learner::mirror::Mirror;
 use crate::learner::network::{Mlp, sampled};
+use crate::learner::pass::softmax;
+use crate::learner::ppo::steps::Steps;
 use crate::learner::replay_buffer::{ReplayBuffer, Rows, Sample};
-use crate::learner::sac::{N_SHARDS, Transitions};
+use crate::learner::sac::Transitions;
+use crate::learner::shards::N_SHARDS;
 
 /// Each truck's `N` values: those of its observation, and its first extras, `[n_envs]`. Without extras nothing is
 /// copied.
@@ -113,6 +117,12 @@ impl<const N: usize> HostRollout<N> {
             ended: &batch.ended,
             next_observation: &observed(&batch.next_observation, &batch.next_extras),
         });
+        self.count()
+    }
+
+    /// Counts the episodes that the step just made ended.
+    fn count(&mut self) -> Result<(), Error> {
+        let batch = self.simulator.batch();
         let codes = batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running));
         for (((sum, &reward), ended), &route) in self.episode_rewards.iter_mut().zip(&batch.reward).zip(codes).zip(&self.routes) {
             *sum += reward;
@@ -170,6 +180,39 @@ impl<const N: usize> Rollout for HostRollout<N> {
         self.remember()
     }
 
+    fn collect(&mut self, actor: &Mlp, n_steps: usize, reward: &StepReward) -> Result<Steps, Error> {
+        let (n_envs, n_actions) = (self.config.n_envs, self.n_actions());
+        let limit = self.simulator.world().params.lane_distance_limit;
+        let mut steps = Steps { n_envs, n_values: N, ..Steps::default() };
+        for step in 0..n_steps {
+            self.begin_step();
+            let logits = logits::<N>(actor, &self.normalisation, &self.observation);
+            let actions = sampled(&logits, n_actions, &mut self.acting);
+            steps.observation.extend(self.normalisation.apply(&self.observation));
+            steps.log_prob.extend(logits.chunks_exact(n_actions).zip(&actions).map(|(row, &action)| softmax(row).1[action as usize]));
+            steps.action.extend_from_slice(&actions);
+            self.simulator.step(&actions)?;
+            let batch = self.simulator.batch();
+            for env in 0..n_envs {
+                let terms = RewardTerms {
+                    lane_distance: (batch.terms[env].lane_distance * limit / reward.params.lane_distance_limit).min(1.0),
+                    clearance: judge::closeness(&reward.params, &batch.clearance[env]).powf(reward.clearance_power),
+                    ..batch.terms[env]
+                };
+                steps.reward.push(judge::rewarded(&reward.params, &terms) * self.config.learning.reward_scale as f32);
+                steps.ended.push(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running));
+            }
+            let next = observed::<N>(&batch.next_observation, &batch.next_extras);
+            for (env, next) in next.iter().enumerate() {
+                if steps.needs_next(step * n_envs + env, n_steps * n_envs) {
+                    steps.next_observation.extend(self.normalisation.apply(std::slice::from_ref(next)));
+                }
+            }
+            self.count()?;
+        }
+        Ok(steps)
+    }
+
     fn drive(&mut self, actor: &Mlp) -> Result<(), Error> {
         let actions = self.choose(actor);
         Ok(self.simulator.step(&actions)?)
@@ -223,12 +266,7 @@ impl<const N: usize> Rollout for HostRollout<N> {
     fn restore(&mut self, stored: &Stored, _: u64) -> Result<(), Error> {
         self.simulator.restore(|column| stored.bytes(&column_name(column))).map_err(|error| stored.error(error.to_string()))?;
         check_finite(self.simulator.batch(), stored)?;
-        let generator = |name: &str| {
-            let generator = Generator { state: stored.array(name)? };
-            // From all zeros every number would be zero.
-            if generator.state == [0; 4] { Err(stored.error(format!("its column `{name}` is all zeros"))) } else { Ok(generator) }
-        };
-        (self.acting, self.sampling) = (generator("rollout, acting")?, generator("rollout, sampling")?);
+        (self.acting, self.sampling) = (Generator::stored(stored, "rollout, acting")?, Generator::stored(stored, "rollout, sampling")?);
         self.episode_rewards = stored.exactly("rollout, episode rewards", self.config.n_envs)?;
         if let Some(replay) = &mut self.level_replay {
             replay.restore(stored)?;

@@ -168,10 +168,7 @@ impl Progress {
 
     /// Adds sums over the updates since the last row.
     pub fn add_sums(&mut self, sums: &Update) {
-        self.sums.critic_loss += sums.critic_loss;
-        self.sums.actor_loss += sums.actor_loss;
-        self.sums.entropy += sums.entropy;
-        self.sums.value += sums.value;
+        self.sums = self.sums.plus(sums);
     }
 
     /// Whether it is time for a row: by the clock, or by steps where they alone end the run.

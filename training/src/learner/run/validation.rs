@@ -47,7 +47,7 @@ pub struct Validations {
     pub episodes: u64,
     /// Validations made.
     pub times: u64,
-    /// The best one, whose policy is kept; of equal ones the last.
+    /// The best one, whose policy is kept; of equal ones the last, and of a refinement the last.
     pub best: Validated,
     /// Lower end of the 95 % Wilson interval of its success.
     pub best_success_low: f64,
@@ -88,9 +88,10 @@ impl Validation {
         self.n_made < times && self.n_made < (fraction * times as f64 + 1e-9) as u64
     }
 
-    /// Lets the policy drive. It becomes the best one unless an earlier one arrived more often. Where a run was too
-    /// slow for several validations, they become one.
-    pub fn validate(&mut self, policy: Policy, env_steps: u64, fraction: f64) -> Result<Validated, Error> {
+    /// Lets the policy drive. It becomes the best one unless an earlier one arrived more often. A refined one
+    /// always becomes it: it learns by other rewards, and its learning rates fall. Where a run was too slow for several
+    /// validations, they become one.
+    pub fn validate(&mut self, policy: Policy, env_steps: u64, fraction: f64, is_refined: bool) -> Result<Validated, Error> {
         let bytes = policy.to_bytes();
         let device = Device::processor();
         let evaluation = Evaluation {
@@ -110,7 +111,7 @@ impl Validation {
         let validated = Validated { env_steps, arrived, success, lane_distance_mean_arrived };
         self.n_made = (fraction * self.settings.times as f64 + 1e-9) as u64;
         self.last = Some(validated);
-        if self.best.as_ref().is_none_or(|(best, _)| best.arrived <= arrived) {
+        if is_refined || self.best.as_ref().is_none_or(|(best, _)| best.arrived <= arrived) {
             self.best = Some((validated, bytes));
         }
         Ok(validated)

@@ -2,12 +2,14 @@
 
 use burn::tensor::Device;
 
-use super::adam::State;
 use super::critics::Twins;
 use super::{Sac, Scalar};
 use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
-use crate::learner::network::Mlp;
+use crate::learner::columns::{Named, moments, named, network, optimizer};
+
+/// Name of the column with the numbers of steps that the optimizers made.
+const STEPS: &str = "learner, steps";
 
 impl Sac {
     /// Adds the learner's columns. Waits for a device.
@@ -17,37 +19,24 @@ impl Sac {
         }
         let [actor, critics] = [&self.actor_optimizer, &self.critic_optimizer].map(|optimizer| optimizer.state().n_steps);
         columns.put("learner, updates", vec![self.n_updates, self.n_summed]);
-        columns.put("learner, steps", [actor, critics, self.entropy_coefficient.n_updates].map(|steps| steps as u32).to_vec());
+        columns.put(STEPS, [actor, critics, self.entropy_coefficient.n_updates].map(|steps| steps as u32).to_vec());
         columns.put("learner, sums", self.sums.iter().map(Scalar::read).collect::<Vec<_>>());
     }
 
     /// Continues from a learner of the same sizes.
     pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
-        let network = |name: &str, like: &Mlp, device: &Device| -> Result<Mlp, Error> {
-            let parameters: Result<_, Error> =
-                like.parameters().iter().map(|(part, values)| stored.exactly(&format!("{name}, {part}"), values.len())).collect();
-            Ok(like.with_parameters(parameters?, device))
-        };
         let (plain, learning) = (self.placement.plain(), self.placement.learning());
         let twins = |names: [&str; 2], like: &Twins, device: &Device| -> Result<Twins, Error> {
-            Ok(Twins { first: network(names[0], &like.first, device)?, second: network(names[1], &like.second, device)? })
+            Ok(Twins { first: network(stored, names[0], &like.first, device)?, second: network(stored, names[1], &like.second, device)? })
         };
-        let actor = network("actor", &self.actor, &learning)?;
-        let actor_ema = network("actor EMA", &self.actor_ema, &plain)?;
+        let actor = network(stored, "actor", &self.actor, &learning)?;
+        let actor_ema = network(stored, "actor EMA", &self.actor_ema, &plain)?;
         let critics = twins(["critic 1", "critic 2"], &self.critics, &learning)?;
         let target_critics = twins(["target 1", "target 2"], &self.target_critics, &plain)?;
 
-        let [actor_steps, critic_steps, entropy_steps] = stored.array::<u32, 3>("learner, steps")?;
-        let optimizer = |n_steps: u32, parameters: Vec<(String, Vec<f32>)>| -> Result<State, Error> {
-            let n_steps = i32::try_from(n_steps).map_err(|_| stored.error(format!("its column `learner, steps` says {n_steps}")))?;
-            let moments = parameters.iter().filter(|_| 0 < n_steps).map(|(name, values)| {
-                let [first, second] = moment_names(name).map(|name| stored.exactly(&name, values.len()));
-                Ok([first?, second?])
-            });
-            Ok(State { n_steps, moments: moments.collect::<Result<_, Error>>()? })
-        };
-        let actor_state = optimizer(actor_steps, named("actor", &actor))?;
-        let critic_state = optimizer(critic_steps, critics_named(&critics))?;
+        let [actor_steps, critic_steps, entropy_steps] = stored.array::<u32, 3>(STEPS)?;
+        let actor_state = optimizer(stored, STEPS, actor_steps, &named("actor", &actor))?;
+        let critic_state = optimizer(stored, STEPS, critic_steps, &critics_named(&critics))?;
         let [log, first, second] = stored.array::<f32, 3>("entropy coefficient")?.map(|value| self.placement.scalar(value));
         let [n_updates, n_summed] = stored.array("learner, updates")?;
         let sums = stored.array::<f32, 4>("learner, sums")?.map(|sum| self.placement.scalar(sum));
@@ -66,14 +55,10 @@ impl Sac {
         self.numbers().into_iter().find_map(|(name, values)| Some((name, values.into_iter().find(|value| !value.is_finite())?)))
     }
 
-    pub(super) fn numbers(&self) -> Vec<(String, Vec<f32>)> {
+    pub(super) fn numbers(&self) -> Named {
         let networks = [named("actor", &self.actor), critics_named(&self.critics)];
         let states = [&self.actor_optimizer, &self.critic_optimizer].map(|optimizer| optimizer.state());
-        let moments = states.into_iter().zip(&networks).flat_map(|(state, parameters)| {
-            let pairs = parameters.iter().zip(state.moments);
-            pairs.flat_map(|((name, _), moments)| moment_names(name).into_iter().zip(moments)).collect::<Vec<_>>()
-        });
-        let moments: Vec<_> = moments.collect();
+        let moments: Vec<_> = states.into_iter().zip(&networks).flat_map(|(state, parameters)| moments(parameters, state)).collect();
         let [first, second] = &self.entropy_coefficient.moments;
         let entropy = [&self.entropy_coefficient.log, first, second].map(Scalar::read).to_vec();
         let followers =
@@ -84,15 +69,6 @@ impl Sac {
     }
 }
 
-/// A network's parameters, in the order in which its optimizer has them.
-fn named(network: &str, parameters: &Mlp) -> Vec<(String, Vec<f32>)> {
-    parameters.parameters().into_iter().map(|(name, values)| (format!("{network}, {name}"), values)).collect()
-}
-
-fn critics_named(critics: &Twins) -> Vec<(String, Vec<f32>)> {
+fn critics_named(critics: &Twins) -> Named {
     [named("critic 1", &critics.first), named("critic 2", &critics.second)].concat()
-}
-
-fn moment_names(parameter: &str) -> [String; 2] {
-    ["first", "second"].map(|which| format!("{parameter}, {which} moment"))
 }

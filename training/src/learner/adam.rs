@@ -19,7 +19,7 @@ const DECAY: [f32; 2] = [0.9, 0.999];
 const EPSILON: f64 = 1e-5;
 
 /// The optimizer of one network.
-pub(super) enum Adam {
+pub enum Adam {
     /// On the processor.
     Fused(Fused),
     /// On a device.
@@ -29,16 +29,17 @@ pub(super) enum Adam {
 /// An optimizer's state in the processor's memory. It is all there is: with these fields restored, steps continue bit
 /// for bit.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct State {
+pub struct State {
     /// Steps made.
-    pub(super) n_steps: i32,
+    pub n_steps: i32,
     /// First and second moment of each parameter, `[elements]` each, in the order in which the network lists its
     /// parameters; none before the first step.
-    pub(super) moments: Vec<[Vec<f32>; 2]>,
+    pub moments: Vec<[Vec<f32>; 2]>,
 }
 
 impl Adam {
-    pub(super) fn new(on_host: bool) -> Adam {
+    /// At its beginning, on the processor or on a device.
+    pub fn new(on_host: bool) -> Adam {
         if on_host { Adam::Fused(Fused::default()) } else { Adam::Tensors(Tensors::default()) }
     }
 
@@ -47,14 +48,7 @@ impl Adam {
     ///
     /// Both are given up and returned so that no copy has to be made; a parameter that is also held elsewhere is
     /// copied.
-    pub(super) fn step<M: Module>(
-        &mut self,
-        network: M,
-        follower: M,
-        gradients: Vec<GradientsParams>,
-        learning_rate: f64,
-        tau: f64,
-    ) -> (M, M) {
+    pub fn step<M: Module>(&mut self, network: M, follower: M, gradients: Vec<GradientsParams>, learning_rate: f64, tau: f64) -> (M, M) {
         match self {
             Adam::Fused(fused) => fused.step(network, follower, gradients, learning_rate, tau),
             Adam::Tensors(tensors) => tensors.step(network, follower, gradients, learning_rate, tau),
@@ -62,7 +56,7 @@ impl Adam {
     }
 
     /// The state; waits for a device.
-    pub(super) fn state(&self) -> State {
+    pub fn state(&self) -> State {
         match self {
             Adam::Fused(Fused(state)) => state.clone(),
             Adam::Tensors(tensors) => tensors.state(),
@@ -70,7 +64,7 @@ impl Adam {
     }
 
     /// Continues from a state; tensors are put on `device`.
-    pub(super) fn restore(&mut self, state: State, device: &burn::tensor::Device) {
+    pub fn restore(&mut self, state: State, device: &burn::tensor::Device) {
         match self {
             Adam::Fused(Fused(own)) => *own = state,
             Adam::Tensors(tensors) => *tensors = Tensors::new(&state, device),

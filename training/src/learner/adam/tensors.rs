@@ -8,7 +8,7 @@ use super::{DECAY, State, Step};
 
 /// Both moments of each parameter, flat, in the order in which the network lists its parameters.
 #[derive(Default)]
-pub(in super::super) struct Tensors {
+pub struct Tensors {
     n_steps: i32,
     moments: Vec<[Tensor<1>; 2]>,
 }

@@ -4,18 +4,22 @@
 
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
+/// Shards of a batch on the processor: two, for the cores of the smallest machines. Another number would round sums
+/// differently.
+pub const N_SHARDS: usize = 2;
+
 /// One thread for each shard; none works on all shards in turn.
-pub(super) struct Shards(Vec<ThreadPool>);
+pub struct Shards(Vec<ThreadPool>);
 
 impl Shards {
     /// Threads for `n` shards.
-    pub(super) fn new(n: usize) -> Result<Shards, ThreadPoolBuildError> {
+    pub fn new(n: usize) -> Result<Shards, ThreadPoolBuildError> {
         let pools: Result<_, _> = (0..n).map(|_| ThreadPoolBuilder::new().num_threads(1).build()).collect();
         Ok(Shards(pools?))
     }
 
     /// The result of `work` for each shard, in their order. There are as many threads as shards, or none.
-    pub(super) fn map<I: Send, O: Send>(&self, shards: Vec<I>, work: impl Fn(I) -> O + Sync) -> Vec<O> {
+    pub fn map<I: Send, O: Send>(&self, shards: Vec<I>, work: impl Fn(I) -> O + Sync) -> Vec<O> {
         if self.0.len() < shards.len() {
             return shards.into_iter().map(work).collect();
         }

@@ -19,7 +19,7 @@ const SUM: usize = 1024;
 
 /// The optimizer: nothing but its state.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(in super::super) struct Fused(pub(super) State);
+pub struct Fused(pub(super) State);
 
 impl Fused {
     /// See [`super::Adam::step`].
