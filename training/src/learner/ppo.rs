@@ -1,10 +1,9 @@
 //! Proximal policy optimisation over a discrete action table, in the order of J. Schulman and others, "Proximal Policy
 //! Optimization Algorithms" (2017): it refines a policy that soft actor-critic found.
 //!
-//! The critics of soft actor-critic learn from every transition that is held, and rank single actions inexactly. Here an
-//! action is judged by the episode that followed it under the same policy, and every step is thrown away after a few
-//! passes: that takes many steps, of which a batched simulator has enough. It is on the processor, wherever the policy
-//! was learned.
+//! The critics of soft actor-critic learn from every transition that is held, and rank single actions inexactly. Here
+//! an action is judged by the episode that followed it under the same policy, and every step is thrown away after a few
+//! passes: that takes many steps, of which a batched simulator has enough. It is on the processor alone.
 
 pub mod steps;
 mod state;
@@ -94,8 +93,8 @@ impl Ppo {
         &self.actor_ema
     }
 
-    /// Updates from these steps, some epochs of them. Learning rates are multiplied by `rate_factor`. Returns the number
-    /// of updates.
+    /// Updates from these steps, some epochs of them. Learning rates are multiplied by `rate_factor`. Returns the
+    /// number of updates.
     pub fn learn(&mut self, steps: &Steps, rate_factor: f64) -> u64 {
         let (values, next_values) = (self.values(&steps.observation), self.values(&steps.next_observation));
         let Refinement { gamma, gae_lambda, batch, epochs, advantage_limit, .. } = self.settings;

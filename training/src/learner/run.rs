@@ -94,7 +94,7 @@ impl Run {
 
     fn learn_until(&mut self, stopped: &impl Fn() -> bool) -> Result<(), Error> {
         while self.progress.fraction() < 1.0 && !stopped() {
-            if self.is_refining() {
+            if self.is_refinement_due() {
                 self.refine()?;
                 self.checkpoint_if_due()?;
                 continue;
@@ -124,8 +124,8 @@ impl Run {
         self.count_episodes(true)
     }
 
-    /// Whether the policy is refined now.
-    fn is_refining(&self) -> bool {
+    /// Whether the run has come to its refinement.
+    fn is_refinement_due(&self) -> bool {
         let begin = self.config.refinement.as_ref().map(|refinement| refinement.begin);
         begin.is_some_and(|begin| begin <= self.progress.fraction()) && self.training.is_acting()
     }

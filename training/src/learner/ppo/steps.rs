@@ -22,8 +22,8 @@ pub struct Steps {
     pub reward: Vec<f32>,
     /// Whether and why the episode ended, `[rows]`.
     pub ended: Vec<Ended>,
-    /// Normalised observations after the steps whose value no later row has: those that ran out of time, and the last of
-    /// each truck, in the order of their rows.
+    /// Normalised observations after the steps whose value no later row has: those that ran out of time, and the last
+    /// of each truck, in the order of their rows.
     pub next_observation: Vec<f32>,
 }
 
@@ -40,8 +40,9 @@ impl Steps {
         matrix(TensorData::new(values, [rows.len(), self.n_values]))
     }
 
-    /// Generalised advantage estimates of the actions, and the returns that their values are learned from, `[rows]` each
-    /// (J. Schulman and others, 2016). `values` are those of the observations, `next_values` of `next_observation`.
+    /// Generalised advantage estimates of the actions, and the returns that their values are learned from, `[rows]`
+    /// each (J. Schulman and others, 2016). `values` are those of the observations, `next_values` of
+    /// `next_observation`.
     pub fn advantages(&self, values: &[f32], next_values: &[f32], gamma: f32, lambda: f32) -> (Vec<f32>, Vec<f32>) {
         let n_rows = self.action.len();
         let mut advantage = vec![0.0; n_rows];
