@@ -117,7 +117,9 @@ impl Ppo {
     fn update(&mut self, Rows { steps, advantage, returned, rows }: Rows, rate_factor: f64) {
         let n_rows = rows.len();
         let part = |index: usize| &rows[n_rows * index / N_SHARDS..n_rows * (index + 1) / N_SHARDS];
-        let parts: Vec<Rows> = (0..N_SHARDS).map(|index| Rows { steps, advantage, returned, rows: part(index) }).collect();
+        // The last rows of an epoch may be fewer than the shards.
+        let parts = (0..N_SHARDS).map(part).filter(|rows| !rows.is_empty());
+        let parts: Vec<Rows> = parts.map(|rows| Rows { steps, advantage, returned, rows }).collect();
         let shards = self.shards.map(parts, |part| self.gradients(&part, 1.0 / n_rows as f32));
         let (mut of_actor, mut of_critic) = (Vec::new(), Vec::new());
         for ShardGradients { figures, actor, critic } in shards {

@@ -175,3 +175,12 @@ fn the_policy_stays_while_the_value_network_alone_learns() {
         assert_eq!(weights(&ppo.actor) == weights(&begun), iteration < 2, "{iteration}");
     }
 }
+
+#[test]
+fn a_single_step_is_learned_from() {
+    let mut ppo = Ppo::new(&settings(), &actor(1, 3), 1).unwrap();
+    let steps = bandit(&ppo.actor, &[0.5], |_, _| 1.0, &mut Generator::seed_from_u64(3));
+    let before = ppo.values(&[0.5])[0];
+    assert_eq!(ppo.learn(&steps, 1.0), 2);
+    assert!(before < ppo.values(&[0.5])[0] && ppo.broken().is_none());
+}
