@@ -46,9 +46,13 @@ impl Placement {
         }
     }
 
-    /// For tensors with gradients.
+    /// For the networks that learn. On a device the tensor library differentiates. On the host it must not record them:
+    /// their gradients are written out, and every update would leave its parameters in a graph that nothing frees.
     fn learning(&self) -> Device {
-        self.plain().autodiff()
+        match self {
+            Placement::Host => self.plain(),
+            Placement::Device(device) => device.clone().autodiff(),
+        }
     }
 
     fn on_host(&self) -> bool {

@@ -129,7 +129,7 @@ impl<'a> From<&'a mut [GradientsParams]> for Take<'a> {
 impl ModuleMapper for Take<'_> {
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
         let (id, tensor, mapper) = param.consume();
-        let empty = Tensor::empty([0; D], &tensor.device()).set_require_grad(false);
+        let empty = Tensor::empty([0; D], &tensor.device()).set_require_grad(tensor.is_require_grad());
         self.gradients.push(self.shards.iter_mut().filter_map(|shard| shard.remove::<D>(id)).map(Tensor::into_data).collect());
         self.values.push(tensor.without_autodiff().into_data());
         Param::from_mapped_value(id, empty, mapper)
@@ -143,8 +143,7 @@ impl ModuleMapper for Put {
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
         let (id, empty, mapper) = param.consume();
         let value = match self.0.next() {
-            // Not tracked: gradients come from elsewhere, and each root would stay in the tensor library's graph for ever.
-            Some(values) => Tensor::from_data(values, &empty.device()).set_require_grad(false),
+            Some(values) => Tensor::from_data(values, &empty.device()).set_require_grad(empty.is_require_grad()),
             None => empty,
         };
         Param::from_mapped_value(id, value, mapper)
@@ -174,16 +173,6 @@ mod tests {
         Mlp::new(&[3, 7, 2], 1.0, &mut SmallRng::seed_from_u64(seed), device).with_layer_norm()
     }
 
-    /// Lets the library differentiate by every parameter again: those of a step are not tracked.
-    struct Tracked;
-
-    impl ModuleMapper for Tracked {
-        fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
-            let (id, tensor, mapper) = param.consume();
-            Param::from_mapped_value(id, tensor.set_require_grad(true), mapper)
-        }
-    }
-
     /// Two shards' gradients of the squared output.
     fn gradients(network: &Mlp, seed: u64) -> Vec<GradientsParams> {
         let mut rng = SmallRng::seed_from_u64(seed);
@@ -191,7 +180,7 @@ mod tests {
         let part = |_| {
             let device = Device::flex().autodiff();
             let values: Vec<f32> = (0..4 * inputs).map(|_| rng.random_range(-1.0..1.0)).collect();
-            let own = network.clone().fork(&device).map(&mut Tracked);
+            let own = network.clone().fork(&device);
             let output = own.forward(Tensor::from_data(TensorData::new(values, [4, inputs]), &device));
             GradientsParams::from_grads(output.square().mean().backward(), &own)
         };

@@ -298,6 +298,17 @@ fn the_target_critics_follow_every_so_many_updates_by_tau() {
 }
 
 #[test]
+fn nothing_on_the_host_is_recorded_for_differentiation() {
+    // Each parameter of each update would stay in the tensor library's graph.
+    let mut sac = learner(&Learning { layer_norm: true, ..learning() }, 3, 9);
+    learn(&mut sac, chain, 2);
+    for network in [&sac.actor, &sac.critics.first, &sac.critics.second] {
+        assert!(network.layers.iter().all(|layer| !layer.weight.val().is_require_grad()));
+        assert!(network.norms.iter().all(|norm| !norm.gamma.val().is_require_grad()));
+    }
+}
+
+#[test]
 fn two_critics_are_combined_by_their_mean_or_minimum() {
     let device = Device::flex();
     let pair = || [Tensor::from_data([[1.0, 4.0]], &device), Tensor::from_data([[3.0, 2.0]], &device)];

@@ -1,6 +1,5 @@
 //! Gradients by the chain rule written out, for a learner on the processor: see [`crate::learner::pass`].
 
-use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Tensor, TensorData};
 
@@ -13,7 +12,7 @@ use crate::learner::sac::{Sac, Transitions};
 impl Sac {
     /// See [`Sac::gradients`]. `alpha` is the entropy coefficient.
     pub(super) fn gradients_by_hand(&self, shard: Transitions, fraction: f32, alpha: f32) -> ShardGradients {
-        let (actor, critics) = (self.actor.valid(), self.critics.valid());
+        let (actor, critics) = (&self.actor, &self.critics);
         let [reward, discount, weight] = [shard.reward, shard.discount, shard.weight].map(numbers);
         let action = shard.action.into_data();
         let action: &[i32] = action.as_slice().expect("actions are made of i32 values");
@@ -28,7 +27,7 @@ impl Sac {
         };
 
         // TD target: the soft value of the next observation is an expectation over the policy's actions.
-        let next = [&actor, &self.target_critics.first, &self.target_critics.second]
+        let next = [actor, &self.target_critics.first, &self.target_critics.second]
             .map(|network| Pass::forward(network, shard.next_observation.clone()).output);
         let next_q = combined([&next[1], &next[2]]);
         let target: Vec<f32> = (0..n_rows)
@@ -61,7 +60,7 @@ impl Sac {
         }
 
         // Actor: the critics' values and some entropy. The values are constants here.
-        let pass = Pass::forward(&actor, shard.observation);
+        let pass = Pass::forward(actor, shard.observation);
         let (mut actor_loss, mut entropy) = (0.0, 0.0);
         let mut by_output = Vec::with_capacity(pass.output.len());
         for row in 0..n_rows {
@@ -74,7 +73,7 @@ impl Sac {
             by_output.extend(probs.iter().zip(&cost).map(|(prob, cost)| scale * prob * (cost - mean)));
         }
         let mut of_actor = GradientsParams::new();
-        pass.backward(&actor, by_output, &mut of_actor);
+        pass.backward(actor, by_output, &mut of_actor);
 
         let value = scale * value.iter().sum::<f32>();
         ShardGradients {
