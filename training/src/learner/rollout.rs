@@ -8,12 +8,13 @@ pub mod device;
 pub mod host;
 
 use burn::tensor::Tensor;
-use offtrack::layout::{Ended, Params};
+use offtrack::layout::Ended;
 use offtrack::simulator::Simulator;
 use offtrack_policy::Normalisation;
 
 use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
+use crate::learner::config::Refinement;
 use crate::learner::mirror::Mirror;
 use crate::learner::network::Mlp;
 use crate::learner::ppo::steps::Steps;
@@ -37,15 +38,6 @@ pub struct RouteEnd {
     pub route: u32,
     /// Why it ended.
     pub ended: Ended,
-}
-
-/// How a refinement weighs the reward's terms.
-#[derive(Debug, Clone, Copy)]
-pub struct StepReward {
-    /// The world's, with other weights and limits of the reward.
-    pub params: Params,
-    /// Power of the clearance term.
-    pub clearance_power: f32,
 }
 
 /// Trucks that are stepped together, and the replay buffer of their transitions.
@@ -72,9 +64,9 @@ pub trait Rollout {
     /// before.
     fn step(&mut self, actor: &Mlp, env_steps: u64) -> Result<(), Error>;
 
-    /// So many steps of every truck with actions sampled from the actor's distribution, for learning from them at once:
-    /// not remembered. The lane distance counts as far as the world's limit.
-    fn collect(&mut self, actor: &Mlp, n_steps: usize, reward: &StepReward) -> Result<Steps, Error>;
+    /// A refinement's steps of every truck with actions sampled from the actor's distribution, for learning from them at
+    /// once: not remembered. The lane distance counts as far as the world's limit.
+    fn collect(&mut self, actor: &Mlp, settings: &Refinement) -> Result<Steps, Error>;
 
     /// One such step, not kept at all.
     fn drive(&mut self, actor: &Mlp) -> Result<(), Error>;

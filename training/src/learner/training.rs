@@ -13,7 +13,7 @@ use super::config::Config;
 use super::mirror::Mirror;
 use super::network::Mlp;
 use super::ppo::Ppo;
-use super::rollout::{Rollout, StepReward};
+use super::rollout::Rollout;
 use super::sac::{Sac, Transitions, Update};
 use crate::error::Error;
 use crate::evaluation::policies;
@@ -83,9 +83,7 @@ impl Training {
     /// Steps of all trucks, and updates from them. Returns the number of updates.
     pub fn refine(&mut self, rate_factor: f64) -> Result<u64, Error> {
         let (Some(ppo), Some(settings)) = (&mut self.ppo, &self.config.refinement) else { return Ok(0) };
-        let mut reward = StepReward { params: self.world.params, clearance_power: settings.clearance_power as f32 };
-        settings.reward.apply_to_params(&mut reward.params);
-        let steps = self.rollout.collect(ppo.actor(), settings.n_steps, &reward)?;
+        let steps = self.rollout.collect(ppo.actor(), settings)?;
         Ok(ppo.learn(&steps, rate_factor))
     }
 

@@ -20,10 +20,10 @@ use offtrack::world::World;
 use offtrack_policy::{LIMIT, Normalisation};
 use wgpu::{PollType, SubmissionIndex};
 
-use super::{Episodes, Rollout, StepReward};
+use super::{Episodes, Rollout};
 use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
-use crate::learner::config::Config;
+use crate::learner::config::{Config, Refinement};
 use crate::learner::mirror::Mirror;
 use crate::learner::network::Mlp;
 use crate::learner::ppo::steps::Steps;
@@ -293,7 +293,7 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
     }
 
     /// An error: a refinement is on the processor, and a training file that asks for another is refused.
-    fn collect(&mut self, _: &Mlp, _: usize, _: &StepReward) -> Result<Steps, Error> {
+    fn collect(&mut self, _: &Mlp, _: &Refinement) -> Result<Steps, Error> {
         let expected = "works with device = \"cpu\" alone: leave one of them out".to_owned();
         Err(Error::Flag { flag: "refinement", value: "given".to_owned(), expected })
     }

@@ -12,10 +12,10 @@ use offtrack_policy::Normalisation;
 use rand::{Rng, SeedableRng};
 use std::sync::Arc;
 
-use super::{Episodes, Rollout, RouteEnd, StepReward};
+use super::{Episodes, Rollout, RouteEnd};
 use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
-use crate::learner::config::{Config, Learning};
+use crate::learner::config::{Config, Learning, Refinement};
 use crate::learner::generator::Generator;
 use crate::learner::level_replay::LevelReplay;
 use crate::learner::mirror::Mirror;
@@ -180,26 +180,29 @@ impl<const N: usize> Rollout for HostRollout<N> {
         self.remember()
     }
 
-    fn collect(&mut self, actor: &Mlp, n_steps: usize, reward: &StepReward) -> Result<Steps, Error> {
-        let (n_envs, n_actions) = (self.config.n_envs, self.n_actions());
+    fn collect(&mut self, actor: &Mlp, settings: &Refinement) -> Result<Steps, Error> {
+        let (n_envs, n_actions, n_steps) = (self.config.n_envs, self.n_actions(), settings.n_steps);
         let limit = self.simulator.world().params.lane_distance_limit;
+        let mut params = self.simulator.world().params;
+        settings.reward.apply_to_params(&mut params);
         let mut steps = Steps { n_envs, n_values: N, ..Steps::default() };
         for step in 0..n_steps {
             self.begin_step();
-            let logits = logits::<N>(actor, &self.normalisation, &self.observation);
+            let normalised = self.normalisation.apply(&self.observation);
+            steps.observation.extend_from_slice(&normalised);
+            let logits = logits_of_normalised(actor, normalised, N);
             let actions = sampled(&logits, n_actions, &mut self.acting);
-            steps.observation.extend(self.normalisation.apply(&self.observation));
             steps.log_prob.extend(logits.chunks_exact(n_actions).zip(&actions).map(|(row, &action)| softmax(row).1[action as usize]));
             steps.action.extend_from_slice(&actions);
             self.simulator.step(&actions)?;
             let batch = self.simulator.batch();
             for env in 0..n_envs {
                 let terms = RewardTerms {
-                    lane_distance: (batch.terms[env].lane_distance * limit / reward.params.lane_distance_limit).min(1.0),
-                    clearance: judge::closeness(&reward.params, &batch.clearance[env]).powf(reward.clearance_power),
+                    lane_distance: (batch.terms[env].lane_distance * limit / params.lane_distance_limit).min(1.0),
+                    clearance: judge::closeness(&params, &batch.clearance[env]).powf(settings.clearance_power as f32),
                     ..batch.terms[env]
                 };
-                steps.reward.push(judge::rewarded(&reward.params, &terms) * self.config.learning.reward_scale as f32);
+                steps.reward.push(judge::rewarded(&params, &terms) * self.config.learning.reward_scale as f32);
                 steps.ended.push(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running));
             }
             let next = observed::<N>(&batch.next_observation, &batch.next_extras);
@@ -338,7 +341,13 @@ pub fn shards<const N: usize>(
 
 /// The network's output for each observation, `[rows * actions]`.
 pub fn logits<const N: usize>(network: &Mlp, normalisation: &Normalisation, observations: &[[f32; N]]) -> Vec<f32> {
-    let data = TensorData::new(normalisation.apply(observations), [observations.len(), N]);
+    logits_of_normalised(network, normalisation.apply(observations), N)
+}
+
+/// The same for normalised observations of `n_values` each, one after the other.
+fn logits_of_normalised(network: &Mlp, observations: Vec<f32>, n_values: usize) -> Vec<f32> {
+    let shape = [observations.len() / n_values, n_values];
+    let data = TensorData::new(observations, shape);
     let output = network.forward(Tensor::from_data(data, &Device::flex())).into_data();
     output.try_to_vec().expect("the layers' weights are f32, and so is their output")
 }
