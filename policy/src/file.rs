@@ -92,33 +92,36 @@ impl Policy {
     }
 }
 
+/// What helps where a file is damaged.
+const AGAIN: &str = "download it or train it again";
+
 /// The error is a sentence without the file's name.
 fn read(name: &str, bytes: &[u8]) -> Result<Policy, String> {
-    let unreadable = |error| format!("is not a policy file, or is damaged: {error}");
+    let unreadable = |error| format!("is not a policy file, or is damaged: {error}; {AGAIN}");
     let (_, header) = SafeTensors::read_metadata(bytes).map_err(unreadable)?;
     let tensors = SafeTensors::deserialize(bytes).map_err(unreadable)?;
     let text = header.metadata().as_ref().and_then(|metadata| metadata.get(KEY));
     let text = text.ok_or_else(|| format!("is not a policy file: its metadata has no entry `{KEY}`; `offtrack train` writes one"))?;
     let description: Description =
-        serde_json::from_str(text).map_err(|error| format!("is not a policy file, or is damaged: its description: {error}"))?;
+        serde_json::from_str(text).map_err(|error| format!("is not a policy file, or is damaged: its description: {error}; {AGAIN}"))?;
     if description.version != VERSION {
         return Err(format!("is a policy file of version {}; this program reads version {VERSION}", description.version));
     }
     if !(1..=MOST_LAYERS).contains(&description.layers) || description.actions.is_empty() {
-        return Err("is a damaged policy file: it has no layers, far too many, or no actions".into());
+        return Err(format!("is a damaged policy file: it has no layers, far too many, or no actions; {AGAIN}"));
     }
     let mut read = Vec::new();
     for name in names(description.layers) {
-        let tensor = tensors.tensor(&name).map_err(|error| format!("is a damaged policy file: {error}"))?;
+        let tensor = tensors.tensor(&name).map_err(|error| format!("is a damaged policy file: {error}; {AGAIN}"))?;
         if tensor.dtype() != Dtype::F32 {
-            return Err(format!("is a damaged policy file: {name} must hold 32-bit floats"));
+            return Err(format!("is a damaged policy file: {name} must hold 32-bit floats; {AGAIN}"));
         }
         read.push((name, tensor));
     }
     let found = description.checksum;
     let expected = checksum(&unsigned(text), read.iter().map(|(_, tensor)| tensor.data()));
     if found != expected {
-        return Err(format!("is damaged: its checksum is {found:08x} and its contents give {expected:08x}; download it or train it again"));
+        return Err(format!("is damaged: its checksum is {found:08x} and its contents give {expected:08x}; {AGAIN}"));
     }
     checked(name, description, &read)
 }
