@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use offtrack::cpu::judge;
-use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES, RewardTerms};
+use offtrack::cpu::{judge, steer};
+use offtrack::layout::{Column, Control, Ended, N_EXTRAS, N_VALUES, RewardTerms};
 use offtrack::random;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
@@ -55,6 +55,8 @@ pub struct HostRollout<const N: usize> {
     observation: Vec<[f32; N]>,
     /// Routes of the step in hand; after it, trucks whose episodes ended are on others.
     routes: Vec<u32>,
+    /// Controls before the step in hand, where a change of the target speed has a reward.
+    control: Vec<Control>,
     /// Rows of the latest sample.
     sampled_rows: Vec<usize>,
     /// Sum of each truck's rewards in its episode so far, `[n_envs]`.
@@ -64,11 +66,17 @@ pub struct HostRollout<const N: usize> {
 }
 
 impl<const N: usize> HostRollout<N> {
-    /// Trucks at the start of their first episodes, and an empty replay buffer. A mirror that the world does not have
-    /// is an error.
+    /// Trucks at the start of their first episodes, and an empty replay buffer. A reward for changes of the target speed
+    /// in a world that has one speed is an error.
     pub fn new(config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<HostRollout<N>, Error> {
         let stream = |purpose: u32| Generator::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
         let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
+        if let Some(value) = config.learning.speed_change
+            && world.params.target_speed_min == world.params.target_speed_max
+        {
+            let expected = "the benchmark has one target speed, which nothing changes: leave learning.speed_change out".to_owned();
+            return Err(Error::Flag { flag: "learning.speed_change", value: value.to_string(), expected });
+        }
         let choice = RouteChoice::Drawn(level_replay.as_ref().map_or(routes, |replay| replay.list().to_vec()));
         Ok(HostRollout {
             simulator: Simulator::new(world.clone(), config.n_envs, config.seed, choice)?,
@@ -80,6 +88,7 @@ impl<const N: usize> HostRollout<N> {
             normalisation: Normalisation::none(N),
             observation: Vec::new(),
             routes: Vec::new(),
+            control: Vec::new(),
             sampled_rows: Vec::new(),
             episode_rewards: vec![0.0; config.n_envs],
             ended: Vec::new(),
@@ -103,6 +112,9 @@ impl<const N: usize> HostRollout<N> {
         let batch = self.simulator.batch();
         self.observation.clear();
         self.observation.extend_from_slice(&observed(&batch.observation, &batch.extras));
+        if self.config.learning.speed_change.is_some() {
+            self.control.clone_from(&batch.control);
+        }
         self.routes.clear();
         self.routes.extend(batch.truck.iter().map(|truck| truck.route));
     }
@@ -110,10 +122,14 @@ impl<const N: usize> HostRollout<N> {
     /// Appends the step just made to the replay buffer, and counts the episodes that it ended.
     fn remember(&mut self) -> Result<(), Error> {
         let batch = self.simulator.batch();
+        let reward = match self.config.learning.speed_change {
+            None => Cow::Borrowed(&batch.reward),
+            Some(of_change) => Cow::Owned(with_speed_changes(self.simulator.world(), batch, &self.control, of_change as f32)),
+        };
         self.replay_buffer.append(Rows {
             observation: &self.observation,
             action: &batch.action,
-            reward: &batch.reward,
+            reward: &reward,
             ended: &batch.ended,
             next_observation: &observed(&batch.next_observation, &batch.next_extras),
         });
@@ -279,6 +295,16 @@ impl<const N: usize> Rollout for HostRollout<N> {
     }
 }
 
+/// Each truck's reward for the step just made, with `of_change` where it changed the target speed that `before` had,
+/// `[n_envs]`.
+fn with_speed_changes(world: &World, batch: &Batch, before: &[Control], of_change: f32) -> Vec<f32> {
+    let rewarded = |((&reward, &action), before): ((&f32, &u32), &Control)| {
+        let target = steer::targeted(&world.params, &world.actions[action as usize], before).speed;
+        if target == before.target_speed { reward } else { reward + of_change }
+    };
+    batch.reward.iter().zip(&batch.action).zip(before).map(rewarded).collect()
+}
+
 /// An error if a truck of a checkpoint has a number that is not finite.
 fn check_finite(batch: &Batch, stored: &Stored) -> Result<(), Error> {
     for (column, bytes) in batch.columns() {
@@ -351,3 +377,6 @@ fn logits_of_normalised(network: &Mlp, observations: Vec<f32>, n_values: usize) 
     let output = network.forward(Tensor::from_data(data, &Device::flex())).into_data();
     output.try_to_vec().expect("the layers' weights are f32, and so is their output")
 }
+
+#[cfg(test)]
+mod tests;
