@@ -122,9 +122,9 @@ impl<const N: usize> HostRollout<N> {
     /// Appends the step just made to the replay buffer, and counts the episodes that it ended.
     fn remember(&mut self) -> Result<(), Error> {
         let batch = self.simulator.batch();
-        let reward = match self.config.learning.speed_change {
+        let reward = match self.speed_changes() {
             None => Cow::Borrowed(&batch.reward),
-            Some(of_change) => Cow::Owned(with_speed_changes(self.simulator.world(), batch, &self.control, of_change as f32)),
+            Some(added) => Cow::Owned(batch.reward.iter().zip(added).map(|(reward, added)| reward + added).collect()),
         };
         self.replay_buffer.append(Rows {
             observation: &self.observation,
@@ -134,6 +134,13 @@ impl<const N: usize> HostRollout<N> {
             next_observation: &observed(&batch.next_observation, &batch.next_extras),
         });
         self.count()
+    }
+
+    /// What changes of the target speed in the step just made add to each truck's reward, `[n_envs]`; none where they add
+    /// nothing.
+    fn speed_changes(&self) -> Option<Vec<f32>> {
+        let of_change = self.config.learning.speed_change? as f32;
+        Some(speed_changes(self.simulator.world(), self.simulator.batch(), &self.control, of_change))
     }
 
     /// Counts the episodes that the step just made ended.
@@ -211,14 +218,15 @@ impl<const N: usize> Rollout for HostRollout<N> {
             steps.log_prob.extend(logits.chunks_exact(n_actions).zip(&actions).map(|(row, &action)| softmax(row).1[action as usize]));
             steps.action.extend_from_slice(&actions);
             self.simulator.step(&actions)?;
-            let batch = self.simulator.batch();
+            let (batch, added) = (self.simulator.batch(), self.speed_changes());
             for env in 0..n_envs {
                 let terms = RewardTerms {
                     lane_distance: (batch.terms[env].lane_distance * limit / params.lane_distance_limit).min(1.0),
                     clearance: judge::closeness(&params, &batch.clearance[env]).powf(settings.clearance_power as f32),
                     ..batch.terms[env]
                 };
-                steps.reward.push(judge::rewarded(&params, &terms) * self.config.learning.reward_scale as f32);
+                let reward = judge::rewarded(&params, &terms) + added.as_ref().map_or(0.0, |added| added[env]);
+                steps.reward.push(reward * self.config.learning.reward_scale as f32);
                 steps.ended.push(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running));
             }
             let next = observed::<N>(&batch.next_observation, &batch.next_extras);
@@ -295,14 +303,14 @@ impl<const N: usize> Rollout for HostRollout<N> {
     }
 }
 
-/// Each truck's reward for the step just made, with `of_change` where it changed the target speed that `before` had,
-/// `[n_envs]`.
-fn with_speed_changes(world: &World, batch: &Batch, before: &[Control], of_change: f32) -> Vec<f32> {
-    let rewarded = |((&reward, &action), before): ((&f32, &u32), &Control)| {
+/// What the step just made adds to each truck's reward, `[n_envs]`: `of_change` where it changed the target speed that
+/// `before` had.
+fn speed_changes(world: &World, batch: &Batch, before: &[Control], of_change: f32) -> Vec<f32> {
+    let added = |(&action, before): (&u32, &Control)| {
         let target = steer::targeted(&world.params, &world.actions[action as usize], before).speed;
-        if target == before.target_speed { reward } else { reward + of_change }
+        if target == before.target_speed { 0.0 } else { of_change }
     };
-    batch.reward.iter().zip(&batch.action).zip(before).map(rewarded).collect()
+    batch.action.iter().zip(before).map(added).collect()
 }
 
 /// An error if a truck of a checkpoint has a number that is not finite.
