@@ -26,7 +26,6 @@ COMMON = [
     "reward=",
     "level_replay=",
     "learning.layer_norm=false",
-    "learning.speed_change=",
     "learning.actor_ema_rate=0.005",
     "learning.final_learning_rate_fraction=0.1",
 ]

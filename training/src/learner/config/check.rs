@@ -57,7 +57,6 @@ impl Config {
         if self.device == Device::Gpu {
             let without = [
                 ("exploration", self.exploration.is_some()),
-                ("learning.speed_change", learning.speed_change.is_some()),
                 ("level_replay", self.level_replay.is_some()),
                 ("refinement", self.refinement.is_some()),
                 ("replay_buffer.priority", replay_buffer.priority.is_some()),
@@ -94,9 +93,6 @@ impl Learning {
         reader.count("learning.n_steps", self.n_steps, 1..=100)?;
         reader.within("learning.gamma", self.gamma, 0.0..=1.0, "")?;
         reader.within("learning.reward_scale", self.reward_scale, 1e-6..=1e6, "")?;
-        if let Some(reward) = self.speed_change {
-            reader.within("learning.speed_change", reward, -1e6..=1e6, "")?;
-        }
         reader.within("learning.observation_noise", self.observation_noise, 0.0..=10.0, "")?;
         reader.within("learning.actor_learning_rate", self.actor_learning_rate, 1e-8..=1.0, "")?;
         reader.within("learning.critic_learning_rate", self.critic_learning_rate, 1e-8..=1.0, "")?;

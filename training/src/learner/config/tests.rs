@@ -158,10 +158,6 @@ fn a_key_that_works_on_the_processor_alone_is_refused_for_a_device() {
         let message = read(&format!("{on_device}\n{table}")).unwrap_err().to_string();
         assert!(message.contains(&format!("{key}: given; works with device = \"cpu\" alone")), "{message}");
     }
-    let priced = |text: &str| read(&text.replace("\nreward_scale = ", "\nspeed_change = -5.0\nreward_scale = "));
-    assert_eq!(priced(&plain).unwrap().learning.speed_change, Some(-5.0));
-    let message = priced(&on_device).unwrap_err().to_string();
-    assert!(message.contains("learning.speed_change: given; works with device = \"cpu\" alone"), "{message}");
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use offtrack::cpu::{judge, steer};
-use offtrack::layout::{Column, Control, Ended, N_EXTRAS, N_VALUES, RewardTerms};
+use offtrack::cpu::judge;
+use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES, RewardTerms};
 use offtrack::random;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
@@ -55,8 +55,6 @@ pub struct HostRollout<const N: usize> {
     observation: Vec<[f32; N]>,
     /// Routes of the step in hand; after it, trucks whose episodes ended are on others.
     routes: Vec<u32>,
-    /// Controls before the step in hand, where a change of the target speed has a reward.
-    control: Vec<Control>,
     /// Rows of the latest sample.
     sampled_rows: Vec<usize>,
     /// Sum of each truck's rewards in its episode so far, `[n_envs]`.
@@ -66,17 +64,11 @@ pub struct HostRollout<const N: usize> {
 }
 
 impl<const N: usize> HostRollout<N> {
-    /// Trucks at the start of their first episodes, and an empty replay buffer. A reward for changes of the target speed
-    /// in a world that has one speed is an error.
+    /// Trucks at the start of their first episodes, and an empty replay buffer. A mirror that the world does not have
+    /// is an error.
     pub fn new(config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<HostRollout<N>, Error> {
         let stream = |purpose: u32| Generator::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
         let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
-        if let Some(value) = config.learning.speed_change
-            && world.params.target_speed_min == world.params.target_speed_max
-        {
-            let expected = "the benchmark has one target speed, which nothing changes: leave learning.speed_change out".to_owned();
-            return Err(Error::Flag { flag: "learning.speed_change", value: value.to_string(), expected });
-        }
         let choice = RouteChoice::Drawn(level_replay.as_ref().map_or(routes, |replay| replay.list().to_vec()));
         Ok(HostRollout {
             simulator: Simulator::new(world.clone(), config.n_envs, config.seed, choice)?,
@@ -88,7 +80,6 @@ impl<const N: usize> HostRollout<N> {
             normalisation: Normalisation::none(N),
             observation: Vec::new(),
             routes: Vec::new(),
-            control: Vec::new(),
             sampled_rows: Vec::new(),
             episode_rewards: vec![0.0; config.n_envs],
             ended: Vec::new(),
@@ -112,9 +103,6 @@ impl<const N: usize> HostRollout<N> {
         let batch = self.simulator.batch();
         self.observation.clear();
         self.observation.extend_from_slice(&observed(&batch.observation, &batch.extras));
-        if self.config.learning.speed_change.is_some() {
-            self.control.clone_from(&batch.control);
-        }
         self.routes.clear();
         self.routes.extend(batch.truck.iter().map(|truck| truck.route));
     }
@@ -122,25 +110,14 @@ impl<const N: usize> HostRollout<N> {
     /// Appends the step just made to the replay buffer, and counts the episodes that it ended.
     fn remember(&mut self) -> Result<(), Error> {
         let batch = self.simulator.batch();
-        let reward = match self.speed_changes() {
-            None => Cow::Borrowed(&batch.reward),
-            Some(added) => Cow::Owned(batch.reward.iter().zip(added).map(|(reward, added)| reward + added).collect()),
-        };
         self.replay_buffer.append(Rows {
             observation: &self.observation,
             action: &batch.action,
-            reward: &reward,
+            reward: &batch.reward,
             ended: &batch.ended,
             next_observation: &observed(&batch.next_observation, &batch.next_extras),
         });
         self.count()
-    }
-
-    /// What changes of the target speed in the step just made add to each truck's reward, `[n_envs]`; none where they add
-    /// nothing.
-    fn speed_changes(&self) -> Option<Vec<f32>> {
-        let of_change = self.config.learning.speed_change? as f32;
-        Some(speed_changes(self.simulator.world(), self.simulator.batch(), &self.control, of_change))
     }
 
     /// Counts the episodes that the step just made ended.
@@ -218,15 +195,14 @@ impl<const N: usize> Rollout for HostRollout<N> {
             steps.log_prob.extend(logits.chunks_exact(n_actions).zip(&actions).map(|(row, &action)| softmax(row).1[action as usize]));
             steps.action.extend_from_slice(&actions);
             self.simulator.step(&actions)?;
-            let (batch, added) = (self.simulator.batch(), self.speed_changes());
+            let batch = self.simulator.batch();
             for env in 0..n_envs {
                 let terms = RewardTerms {
                     lane_distance: (batch.terms[env].lane_distance * limit / params.lane_distance_limit).min(1.0),
                     clearance: judge::closeness(&params, &batch.clearance[env]).powf(settings.clearance_power as f32),
                     ..batch.terms[env]
                 };
-                let reward = judge::rewarded(&params, &terms) + added.as_ref().map_or(0.0, |added| added[env]);
-                steps.reward.push(reward * self.config.learning.reward_scale as f32);
+                steps.reward.push(judge::rewarded(&params, &terms) * self.config.learning.reward_scale as f32);
                 steps.ended.push(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running));
             }
             let next = observed::<N>(&batch.next_observation, &batch.next_extras);
@@ -303,16 +279,6 @@ impl<const N: usize> Rollout for HostRollout<N> {
     }
 }
 
-/// What the step just made adds to each truck's reward, `[n_envs]`: `of_change` where it changed the target speed that
-/// `before` had.
-fn speed_changes(world: &World, batch: &Batch, before: &[Control], of_change: f32) -> Vec<f32> {
-    let added = |(&action, before): (&u32, &Control)| {
-        let target = steer::targeted(&world.params, &world.actions[action as usize], before).speed;
-        if target == before.target_speed { 0.0 } else { of_change }
-    };
-    batch.action.iter().zip(before).map(added).collect()
-}
-
 /// An error if a truck of a checkpoint has a number that is not finite.
 fn check_finite(batch: &Batch, stored: &Stored) -> Result<(), Error> {
     for (column, bytes) in batch.columns() {
@@ -385,6 +351,3 @@ fn logits_of_normalised(network: &Mlp, observations: Vec<f32>, n_values: usize) 
     let output = network.forward(Tensor::from_data(data, &Device::flex())).into_data();
     output.try_to_vec().expect("the layers' weights are f32, and so is their output")
 }
-
-#[cfg(test)]
-mod tests;

@@ -15,7 +15,6 @@ fn learning() -> Learning {
         n_steps: 1,
         gamma: 0.9,
         reward_scale: 1.0,
-        speed_change: None,
         normalise_observations: false,
         observation_noise: 0.0,
         mirror_augmentation: false,
