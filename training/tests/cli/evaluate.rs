@@ -118,6 +118,7 @@ fn a_damaged_policy_file_is_refused_by_its_name() {
     std::fs::write(place.file("cut"), &bytes[..bytes.len() / 2]).unwrap();
     std::fs::write(place.file("changed"), bytes.iter().rev().copied().collect::<Vec<u8>>()).unwrap();
     for (name, expected) in [
+        ("cut", "is not a policy file"),
         ("cut", "; download it or train it again"),
         ("changed", "is not a policy file"),
         ("tiny.toml", "is not a policy file"),
