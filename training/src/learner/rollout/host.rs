@@ -64,8 +64,8 @@ pub struct HostRollout<const N: usize> {
 }
 
 impl<const N: usize> HostRollout<N> {
-    /// Trucks at the start of their first episodes, and an empty replay buffer. A mirror that the world does not have
-    /// is an error.
+    /// Trucks at the start of their first episodes, and an empty replay buffer. A route that the world does not have
+    /// and a batch that does not fit into the memory are errors.
     pub fn new(config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<HostRollout<N>, Error> {
         let stream = |purpose: u32| Generator::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
         let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
