@@ -28,6 +28,7 @@ COMMON = [
     "learning.layer_norm=false",
     "learning.actor_ema_rate=0.005",
     "learning.final_learning_rate_fraction=0.1",
+    "learning.arrival=",
 ]
 # Name, and what is changed in the benchmarks: TABLE.KEY and its value. Endings are those that it trains with; it is
 # examined with those of laden2026.

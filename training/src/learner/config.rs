@@ -167,6 +167,9 @@ pub struct Learning {
     pub gamma: f64,
     /// Factor of the rewards.
     pub reward_scale: f64,
+    /// Added to the reward of a step that arrives; none adds nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub arrival: Option<f64>,
     /// Observations are normalised to mean 0 and standard deviation 1.
     pub normalise_observations: bool,
     /// Uniform noise on the normalised observations of a sample, up to this; 0 for none.

@@ -60,6 +60,7 @@ impl Config {
                 ("level_replay", self.level_replay.is_some()),
                 ("refinement", self.refinement.is_some()),
                 ("replay_buffer.priority", replay_buffer.priority.is_some()),
+                ("learning.arrival", learning.arrival.is_some()),
             ];
             if let Some((key, _)) = without.into_iter().find(|(_, given)| *given) {
                 return Err(reader.invalid(key, "given", "works with device = \"cpu\" alone: leave one of them out").into());
@@ -93,6 +94,9 @@ impl Learning {
         reader.count("learning.n_steps", self.n_steps, 1..=100)?;
         reader.within("learning.gamma", self.gamma, 0.0..=1.0, "")?;
         reader.within("learning.reward_scale", self.reward_scale, 1e-6..=1e6, "")?;
+        if let Some(arrival) = self.arrival {
+            reader.within("learning.arrival", arrival, -1e6..=1e6, "")?;
+        }
         reader.within("learning.observation_noise", self.observation_noise, 0.0..=10.0, "")?;
         reader.within("learning.actor_learning_rate", self.actor_learning_rate, 1e-8..=1.0, "")?;
         reader.within("learning.critic_learning_rate", self.critic_learning_rate, 1e-8..=1.0, "")?;

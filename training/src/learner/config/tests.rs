@@ -61,6 +61,7 @@ fn every_value_out_of_its_range_is_refused_with_its_key_and_what_would_do() {
         ("gamma", "gamma = 1.01", "learning.gamma: 1.01; must lie in 0..1"),
         ("gamma", "gamma = -0.1", "learning.gamma: -0.1; must lie in 0..1"),
         ("reward_scale", "reward_scale = 0.0", "learning.reward_scale: 0; must lie in"),
+        ("reward_scale", "reward_scale = 1.0\narrival = 2e6", "learning.arrival: 2000000; must lie in -1000000..1000000"),
         ("actor_learning_rate", "actor_learning_rate = 0.0", "learning.actor_learning_rate: 0; must lie in"),
         ("critic_learning_rate", "critic_learning_rate = inf", "learning.critic_learning_rate: inf; must lie in"),
         ("tau", "tau = 1.5", "learning.tau: 1.5; must lie in"),
@@ -153,9 +154,11 @@ fn a_key_that_works_on_the_processor_alone_is_refused_for_a_device() {
     let refinement = &lane[lane.find("\n[refinement]").unwrap()..];
     let tables =
         [("exploration", exploration), ("level_replay", level_replay), ("replay_buffer.priority", priority), ("refinement", refinement)];
-    for (key, table) in tables {
-        assert!(read(&format!("{plain}\n{table}")).is_ok(), "{key}");
-        let message = read(&format!("{on_device}\n{table}")).unwrap_err().to_string();
+    let with_tables = tables.map(|(key, table)| (key, format!("{plain}\n{table}")));
+    let with_arrival = ("learning.arrival", plain.replace("\n[learning.entropy]", "arrival = 1500.0\n[learning.entropy]"));
+    for (key, text) in with_tables.into_iter().chain([with_arrival]) {
+        assert!(read(&text).is_ok(), "{key}");
+        let message = read(&format!("device = \"gpu\"\n{text}")).unwrap_err().to_string();
         assert!(message.contains(&format!("{key}: given; works with device = \"cpu\" alone")), "{message}");
     }
 }

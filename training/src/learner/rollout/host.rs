@@ -26,6 +26,9 @@ use crate::learner::replay_buffer::{ReplayBuffer, Rows, Sample};
 use crate::learner::sac::Transitions;
 use crate::learner::shards::N_SHARDS;
 
+#[cfg(test)]
+mod tests;
+
 /// Each truck's `N` values: those of its observation, and its first extras, `[n_envs]`. Without extras nothing is
 /// copied.
 pub fn observed<'a, const N: usize>(observation: &'a [[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Cow<'a, [[f32; N]]> {
@@ -110,10 +113,14 @@ impl<const N: usize> HostRollout<N> {
     /// Appends the step just made to the replay buffer, and counts the episodes that it ended.
     fn remember(&mut self) -> Result<(), Error> {
         let batch = self.simulator.batch();
+        let mut reward = Cow::Borrowed(batch.reward.as_slice());
+        if let Some(arrival) = self.config.learning.arrival {
+            add_arrivals(reward.to_mut(), &batch.ended, arrival as f32);
+        }
         self.replay_buffer.append(Rows {
             observation: &self.observation,
             action: &batch.action,
-            reward: &batch.reward,
+            reward: &reward,
             ended: &batch.ended,
             next_observation: &observed(&batch.next_observation, &batch.next_extras),
         });
@@ -182,6 +189,7 @@ impl<const N: usize> Rollout for HostRollout<N> {
 
     fn collect(&mut self, actor: &Mlp, settings: &Refinement) -> Result<Steps, Error> {
         let (n_envs, n_actions, n_steps) = (self.config.n_envs, self.n_actions(), settings.n_steps);
+        let learning = self.config.learning.clone();
         let limit = self.simulator.world().params.lane_distance_limit;
         let mut params = self.simulator.world().params;
         settings.reward.apply_to_params(&mut params);
@@ -202,9 +210,14 @@ impl<const N: usize> Rollout for HostRollout<N> {
                     clearance: judge::closeness(&params, &batch.clearance[env]).powf(settings.clearance_power as f32),
                     ..batch.terms[env]
                 };
-                steps.reward.push(judge::rewarded(&params, &terms) * self.config.learning.reward_scale as f32);
-                steps.ended.push(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running));
+                steps.reward.push(judge::rewarded(&params, &terms));
             }
+            let reward = &mut steps.reward[step * n_envs..];
+            if let Some(arrival) = learning.arrival {
+                add_arrivals(reward, &batch.ended, arrival as f32);
+            }
+            reward.iter_mut().for_each(|reward| *reward *= learning.reward_scale as f32);
+            steps.ended.extend(batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running)));
             let next = observed::<N>(&batch.next_observation, &batch.next_extras);
             for (env, next) in next.iter().enumerate() {
                 if steps.needs_next(step * n_envs + env, n_steps * n_envs) {
@@ -277,6 +290,12 @@ impl<const N: usize> Rollout for HostRollout<N> {
         }
         self.replay_buffer.restore(stored, self.n_actions() as u32)
     }
+}
+
+/// Adds `arrival` to the rewards of the trucks that arrive, `[n_envs]` each.
+fn add_arrivals(reward: &mut [f32], ended: &[u32], arrival: f32) {
+    let arrived = reward.iter_mut().zip(ended).filter(|(_, code)| **code == Ended::Arrived as u32);
+    arrived.for_each(|(reward, _)| *reward += arrival);
 }
 
 /// An error if a truck of a checkpoint has a number that is not finite.

@@ -23,6 +23,7 @@ fn learning() -> Learning {
         n_steps: 1,
         gamma: 0.5,
         reward_scale: 1.0,
+        arrival: None,
         normalise_observations: false,
         observation_noise: 0.0,
         mirror_augmentation: false,
