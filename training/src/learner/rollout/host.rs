@@ -189,7 +189,7 @@ impl<const N: usize> Rollout for HostRollout<N> {
 
     fn collect(&mut self, actor: &Mlp, settings: &Refinement) -> Result<Steps, Error> {
         let (n_envs, n_actions, n_steps) = (self.config.n_envs, self.n_actions(), settings.n_steps);
-        let learning = self.config.learning.clone();
+        let Learning { arrival, reward_scale, .. } = self.config.learning;
         let limit = self.simulator.world().params.lane_distance_limit;
         let mut params = self.simulator.world().params;
         settings.reward.apply_to_params(&mut params);
@@ -213,10 +213,10 @@ impl<const N: usize> Rollout for HostRollout<N> {
                 steps.reward.push(judge::rewarded(&params, &terms));
             }
             let reward = &mut steps.reward[step * n_envs..];
-            if let Some(arrival) = learning.arrival {
+            if let Some(arrival) = arrival {
                 add_arrivals(reward, &batch.ended, arrival as f32);
             }
-            reward.iter_mut().for_each(|reward| *reward *= learning.reward_scale as f32);
+            reward.iter_mut().for_each(|reward| *reward *= reward_scale as f32);
             steps.ended.extend(batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running)));
             let next = observed::<N>(&batch.next_observation, &batch.next_extras);
             for (env, next) in next.iter().enumerate() {
