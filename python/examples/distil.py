@@ -1,0 +1,220 @@
+"""One policy from several: on each route it imitates the teacher that drives it best.
+
+    python distil.py NEAR.safetensors SAFE.safetensors --out distilled
+
+Needs ``offtrack-sim``, ``torch`` and ``safetensors``. Teachers are policy files, the most wanted first. All of them
+drive every training route of ``--scenario`` a few times, and a route's teacher is the first of those that arrive most
+often. Then a student drives all routes at once, every second truck by chance, and learns from each step what the
+route's teacher would have done there: DAgger (Ross, Gordon and Bagnell, "A reduction of imitation learning and
+structured prediction to no-regret online learning", AISTATS 2011) with probabilities in place of actions. So it sees
+the states that it gets into itself, and every step says which action is right, so that it takes in many more roads than
+a learner by trial and error.
+
+Writes ``distilled.safetensors``, which ``offtrack evaluate --policy`` drives, and ``distilled.json`` with the curve and
+the success on the validation routes. Ctrl-C ends the training early; what was learned is kept.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from results import about, write_json
+from safetensors import safe_open
+from torch import nn
+
+import offtrack_sim
+from offtrack_sim import Batch, Ended, Policy, export
+
+HERE = Path(__file__).resolve().parent
+
+
+class Network(nn.Module):
+    """A policy file as a PyTorch module: ``[n, n_values]`` to logits ``[n, n_actions]``, see docs/policies.md."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__()
+        Policy.load(file)  # Its errors say what is wrong with a file.
+        with safe_open(file, "pt") as tensors:
+            about_it = json.loads(tensors.metadata()["offtrack"])
+            self.mean, self.factor = (tensors.get_tensor(f"observation.{name}") for name in ("mean", "factor"))
+            activation = nn.Tanh if about_it.get("activation") == "tanh" else nn.ReLU
+            layers: list[nn.Module] = []
+            for n in range(about_it["layers"]):
+                weight, bias = (tensors.get_tensor(f"actor.{n}.{name}") for name in ("weight", "bias"))
+                linear = nn.Linear(*weight.shape)
+                linear.load_state_dict({"weight": weight.T, "bias": bias})
+                layers += [linear, activation()]
+        self.actor = nn.Sequential(*layers[:-1])
+
+    def forward(self, observation: torch.Tensor) -> torch.Tensor:
+        return self.actor(((observation - self.mean) * self.factor).clamp(-export.CLIP, export.CLIP))
+
+    def save(self, file: Path, scenario: Path) -> None:
+        variance = 1 / self.factor.double().numpy() ** 2
+        export.save(file, self.actor, scenario=scenario, mean=self.mean.numpy(), variance=variance, epsilon=0.0)
+
+
+@torch.no_grad()
+def arrivals(network: Network, batch: Batch, episodes: int) -> np.ndarray:
+    """How many of ``episodes`` arrive on each route of the batch's split, ``[routes]``."""
+    names = [name for name in batch.split_routes for _ in range(episodes)]
+    arrived = np.zeros(len(names), np.int64)
+    for first in range(0, len(names), batch.num_envs):
+        part = names[first : first + batch.num_envs]
+        ended = np.full(batch.num_envs, -1)
+        ended[: len(part)] = Ended.RUNNING
+        batch.begin(range(len(part)), streams=[(0, first + env) for env in range(len(part))], routes=part)
+        observation = batch.observation()
+        while (running := ended == Ended.RUNNING).any():
+            actions = np.zeros(batch.num_envs, np.int64)
+            actions[running] = network(torch.from_numpy(observation[running])).argmax(-1).numpy()
+            observation = batch.step(actions)[0]
+            if (ends := batch.ended()) is not None:
+                first_end = running[ends.envs]
+                ended[ends.envs[first_end]] = ends.codes[first_end]
+        arrived[first : first + len(part)] = ended[: len(part)] == Ended.ARRIVED
+    return arrived.reshape(-1, episodes).sum(axis=1)
+
+
+def distil(teachers: list[Network], student: Network, of_route: np.ndarray, batch: Batch, args: Any) -> list[Any]:
+    """Lets the student imitate ``teachers[of_route[r]]`` on route r of ``batch.route_names``; returns the curve."""
+    rng = np.random.default_rng(args.seed)
+    rare = [batch.route_names[route] for route in np.flatnonzero(of_route > 0)]
+    optimizer = torch.optim.Adam(student.actor.parameters(), lr=args.learning_rate)
+    average = torch.optim.swa_utils.AveragedModel(
+        student.actor, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(0.99)
+    )
+    capacity = max(1, args.capacity // args.envs) * args.envs
+    # A ring of the latest steps: observations and the teachers' probabilities.
+    observations, targets = torch.zeros(capacity, batch.n_values), torch.zeros(capacity, len(batch.action_table))
+    greedy = torch.arange(args.envs) % 2 == 0
+    observation = batch.observation()
+    curve: list[dict[str, float]] = []
+    ended: list[int] = []
+    divergences: list[float] = []
+    start, env_steps, updates = time.perf_counter(), 0, 0
+    try:
+        while env_steps < args.steps:
+            seen = torch.from_numpy(observation)
+            place = slice(env_steps % capacity, env_steps % capacity + args.envs)
+            observations[place] = seen
+            with torch.no_grad():
+                which = torch.from_numpy(of_route[batch.routes()])
+                for index, teacher in enumerate(teachers):
+                    rows = torch.nonzero(which == index).squeeze(-1)
+                    targets[place.start + rows] = teacher(seen[rows]).softmax(-1)
+                logits = student(seen)
+                drawn = torch.multinomial(logits.softmax(-1), 1).squeeze(-1)
+                action = torch.where(greedy, logits.argmax(-1), drawn)
+            observation = batch.step(action.numpy())[0]
+            env_steps += args.envs
+            if (ends := batch.ended()) is not None:
+                ended += ends.codes.tolist()
+                again = ends.envs[rng.random(len(ends.envs)) < args.rare]
+                if rare and len(again):
+                    batch.begin(again, routes=[rare[n] for n in rng.integers(len(rare), size=len(again))])
+                    observation = batch.observation()
+            left = max(0.0, 1 - env_steps / args.steps)
+            optimizer.param_groups[0]["lr"] = args.learning_rate * left
+            while updates * args.minibatch < args.passes * env_steps:
+                updates += 1
+                rows = torch.randint(min(env_steps, capacity), (args.minibatch,))
+                log_probs = student(observations[rows]).log_softmax(-1)
+                loss = nn.functional.kl_div(log_probs, targets[rows], reduction="batchmean")
+                optimizer.zero_grad()
+                loss.backward()
+                optimizer.step()
+                average.update_parameters(student.actor)
+                divergences.append(float(loss.detach()))
+            if len(divergences) >= 500 or left == 0:
+                row = {
+                    "env_steps": env_steps,
+                    "seconds": round(time.perf_counter() - start, 1),
+                    "divergence": round(float(np.mean(divergences)), 4),
+                    "success": round(float(np.mean(np.array(ended) == Ended.ARRIVED)), 4),
+                }
+                curve.append(row)
+                print("  ".join(f"{name} {value:,}" for name, value in row.items()), flush=True)
+                divergences, ended = [], []
+    except KeyboardInterrupt:
+        print("interrupted: what was learned is kept", flush=True)
+    if updates:
+        student.actor.load_state_dict(average.module.state_dict())
+    return curve
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description="One policy from several, by imitation", formatter_class=argparse.ArgumentDefaultsHelpFormatter
+    )
+    parser.add_argument("teachers", nargs="+", type=Path, help="policy files, the most wanted first")
+    parser.add_argument(
+        "--scenario", type=Path, default=HERE / "distil_roads.toml", help="benchmark on whose training routes"
+    )
+    parser.add_argument("--validation", default="random2026", help="benchmark on whose validation routes it is judged")
+    parser.add_argument("--episodes", type=int, default=4, help="episodes of each teacher on each route")
+    parser.add_argument("--steps", type=int, default=12_000_000, help="env steps of all trucks together")
+    parser.add_argument("--envs", type=int, default=2048, help="number of trucks")
+    parser.add_argument(
+        "--rare", type=float, default=0.1, help="fraction of the episodes on routes that are not the first teacher's"
+    )
+    parser.add_argument("--capacity", type=int, default=1_000_000, help="steps that are held")
+    parser.add_argument("--minibatch", type=int, default=2048)
+    parser.add_argument("--passes", type=float, default=2.0, help="times that a step is learned from, on the mean")
+    parser.add_argument("--learning-rate", type=float, default=1e-3, help="at the beginning; it falls to zero linearly")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, default=Path("distilled"), help="files to write, without their endings")
+    args = parser.parse_args()
+    # Networks this small gain little from more threads, and wait for them on a busy machine.
+    torch.set_num_threads(1)
+    torch.manual_seed(args.seed)
+    start = time.perf_counter()
+    if args.envs < 1 or args.steps < 1 or args.episodes < 1 or args.minibatch < 1:
+        parser.error("--envs, --steps, --episodes, --minibatch: must be at least 1")
+    # The student begins as the first teacher.
+    *teachers, student = (Network(file) for file in [*args.teachers, args.teachers[0]])
+    batch = Batch(args.scenario, args.envs, split="train", seed=args.seed)
+    for file in args.teachers:
+        table = Policy.load(file).action_table
+        if table.shape != batch.action_table.shape or not np.allclose(table, batch.action_table, atol=1e-5):
+            parser.error(f"{file}: has another action table than {batch.scenario}; see action_table of both")
+        if Policy.load(file).extras != batch.extras:
+            parser.error(f"{file}: observes other extras than {batch.scenario}; see extras of both")
+    survey = []
+    for file, teacher in zip(args.teachers, teachers):
+        survey.append(arrivals(teacher, batch, args.episodes))
+        arrived = survey[-1].mean() / args.episodes
+        print(f"{file}: {arrived:.2%} of {survey[-1].size * args.episodes:,} arrived", flush=True)
+    chosen = np.argmax(survey, axis=0)
+    print("routes of each teacher:", np.bincount(chosen, minlength=len(teachers)).tolist(), flush=True)
+    by_name = dict(zip(batch.split_routes, chosen.tolist()))
+    of_route = np.array([by_name.get(name, 0) for name in batch.route_names])
+    batch.begin(streams=[(args.seed, env) for env in range(args.envs)])
+    curve = distil(teachers, student, of_route, batch, args)
+    file = args.out.with_name(args.out.name + ".safetensors")
+    student.save(file, args.scenario)
+    found = offtrack_sim.evaluate(Policy.load(file), args.validation, split="validation", episodes=4)
+    result = {
+        "example": "distil",
+        **about("numpy", "torch"),
+        "settings": {**vars(args), "teachers": [file.name for file in args.teachers], "scenario": args.scenario.name}
+        | {"out": str(args.out)},
+        "seconds": round(time.perf_counter() - start, 1),
+        "arrived_of_each_teacher": [int(arrived.sum()) for arrived in survey],
+        "routes_of_each_teacher": np.bincount(chosen, minlength=len(teachers)).tolist(),
+        "evaluation": found.as_dict(),
+        "curve": curve,
+    }
+    write_json(args.out.with_name(args.out.name + ".json"), result)
+    print(found)
+    print(f"wrote {file} and {args.out.with_name(args.out.name + '.json')}")
+
+
+if __name__ == "__main__":
+    main()
