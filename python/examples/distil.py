@@ -4,8 +4,8 @@
 
 Needs ``offtrack-sim``, ``torch`` and ``safetensors``. Teachers are policy files, the most wanted first. All of them
 drive every training route of ``--scenario`` a few times, and a route's teacher is the first of those that arrive most
-often. Then a student drives all routes at once, every second truck by chance, and learns from each step what the
-route's teacher would have done there: DAgger (Ross, Gordon and Bagnell, "A reduction of imitation learning and
+often. Then a student drives all routes at once, every second truck with sampled actions, and learns from each step what
+the route's teacher would have done there: DAgger (Ross, Gordon and Bagnell, "A reduction of imitation learning and
 structured prediction to no-regret online learning", AISTATS 2011) with probabilities in place of actions. So it sees
 the states that it gets into itself, and every step says which action is right, so that it takes in many more roads than
 a learner by trial and error.
@@ -60,28 +60,6 @@ class Network(nn.Module):
         export.save(file, self.actor, scenario=scenario, mean=self.mean.numpy(), variance=variance, epsilon=0.0)
 
 
-@torch.no_grad()
-def arrivals(network: Network, batch: Batch, episodes: int) -> np.ndarray:
-    """How many of ``episodes`` arrive on each route of the batch's split, ``[routes]``."""
-    names = [name for name in batch.split_routes for _ in range(episodes)]
-    arrived = np.zeros(len(names), np.int64)
-    for first in range(0, len(names), batch.num_envs):
-        part = names[first : first + batch.num_envs]
-        ended = np.full(batch.num_envs, -1)
-        ended[: len(part)] = Ended.RUNNING
-        batch.begin(range(len(part)), streams=[(0, first + env) for env in range(len(part))], routes=part)
-        observation = batch.observation()
-        while (running := ended == Ended.RUNNING).any():
-            actions = np.zeros(batch.num_envs, np.int64)
-            actions[running] = network(torch.from_numpy(observation[running])).argmax(-1).numpy()
-            observation = batch.step(actions)[0]
-            if (ends := batch.ended()) is not None:
-                first_end = running[ends.envs]
-                ended[ends.envs[first_end]] = ends.codes[first_end]
-        arrived[first : first + len(part)] = ended[: len(part)] == Ended.ARRIVED
-    return arrived.reshape(-1, episodes).sum(axis=1)
-
-
 def distil(teachers: list[Network], student: Network, of_route: np.ndarray, batch: Batch, args: Any) -> list[Any]:
     """Lets the student imitate ``teachers[of_route[r]]`` on route r of ``batch.route_names``; returns the curve."""
     rng = np.random.default_rng(args.seed)
@@ -132,12 +110,12 @@ def distil(teachers: list[Network], student: Network, of_route: np.ndarray, batc
                 optimizer.step()
                 average.update_parameters(student.actor)
                 divergences.append(float(loss.detach()))
-            if len(divergences) >= 500 or left == 0:
+            if divergences and (len(divergences) >= 500 or left == 0):
                 row = {
                     "env_steps": env_steps,
                     "seconds": round(time.perf_counter() - start, 1),
                     "divergence": round(float(np.mean(divergences)), 4),
-                    "success": round(float(np.mean(np.array(ended) == Ended.ARRIVED)), 4),
+                    "success": round(float(np.mean(np.array(ended) == Ended.ARRIVED)), 4) if ended else 0.0,
                 }
                 curve.append(row)
                 print("  ".join(f"{name} {value:,}" for name, value in row.items()), flush=True)
@@ -177,27 +155,22 @@ def main() -> None:
     start = time.perf_counter()
     if args.envs < 1 or args.steps < 1 or args.episodes < 1 or args.minibatch < 1:
         parser.error("--envs, --steps, --episodes, --minibatch: must be at least 1")
+    args.out.parent.mkdir(parents=True, exist_ok=True)
     # The student begins as the first teacher.
     *teachers, student = (Network(file) for file in [*args.teachers, args.teachers[0]])
     batch = Batch(args.scenario, args.envs, split="train", seed=args.seed)
-    for file in args.teachers:
-        table = Policy.load(file).action_table
-        if table.shape != batch.action_table.shape or not np.allclose(table, batch.action_table, atol=1e-5):
-            parser.error(f"{file}: has another action table than {batch.scenario}; see action_table of both")
-        if Policy.load(file).extras != batch.extras:
-            parser.error(f"{file}: observes other extras than {batch.scenario}; see extras of both")
     survey = []
-    for file, teacher in zip(args.teachers, teachers):
-        survey.append(arrivals(teacher, batch, args.episodes))
-        arrived = survey[-1].mean() / args.episodes
-        print(f"{file}: {arrived:.2%} of {survey[-1].size * args.episodes:,} arrived", flush=True)
+    for file in args.teachers:
+        found = offtrack_sim.evaluate(Policy.load(file), args.scenario, split="train", episodes=args.episodes)
+        survey.append((found.ended == Ended.ARRIVED).sum(axis=1))
+        print(f"{file}: {found.success:.2%} of {found.ended.size:,} arrived", flush=True)
     chosen = np.argmax(survey, axis=0)
-    print("routes of each teacher:", np.bincount(chosen, minlength=len(teachers)).tolist(), flush=True)
+    routes_of_each = np.bincount(chosen, minlength=len(teachers)).tolist()
+    print("routes of each teacher:", routes_of_each, flush=True)
     by_name = dict(zip(batch.split_routes, chosen.tolist()))
     of_route = np.array([by_name.get(name, 0) for name in batch.route_names])
-    batch.begin(streams=[(args.seed, env) for env in range(args.envs)])
     curve = distil(teachers, student, of_route, batch, args)
-    file = args.out.with_name(args.out.name + ".safetensors")
+    file = Path(f"{args.out}.safetensors")
     student.save(file, args.scenario)
     found = offtrack_sim.evaluate(Policy.load(file), args.validation, split="validation", episodes=4)
     result = {
@@ -207,13 +180,13 @@ def main() -> None:
         | {"out": str(args.out)},
         "seconds": round(time.perf_counter() - start, 1),
         "arrived_of_each_teacher": [int(arrived.sum()) for arrived in survey],
-        "routes_of_each_teacher": np.bincount(chosen, minlength=len(teachers)).tolist(),
+        "routes_of_each_teacher": routes_of_each,
         "evaluation": found.as_dict(),
         "curve": curve,
     }
-    write_json(args.out.with_name(args.out.name + ".json"), result)
+    write_json(f"{args.out}.json", result)
     print(found)
-    print(f"wrote {file} and {args.out.with_name(args.out.name + '.json')}")
+    print(f"wrote {file} and {args.out}.json")
 
 
 if __name__ == "__main__":
