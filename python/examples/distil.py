@@ -2,13 +2,14 @@
 
     python distil.py NEAR.safetensors SAFE.safetensors --out distilled
 
-Needs ``offtrack-sim``, ``torch`` and ``safetensors``. Teachers are policy files, the most wanted first. All of them
-drive every training route of ``--scenario`` a few times, and a route's teacher is the first of those that arrive most
-often. Then a student drives all routes at once, every second truck with sampled actions, and learns from each step what
-the route's teacher would have done there: DAgger (Ross, Gordon and Bagnell, "A reduction of imitation learning and
-structured prediction to no-regret online learning", AISTATS 2011) with probabilities in place of actions. So it sees
-the states that it gets into itself, and every step says which action is right, so that it takes in many more roads than
-a learner by trial and error.
+Needs ``offtrack-sim``, ``torch`` and ``safetensors``. Teachers are policy files, the most wanted first. They drive the
+training routes of ``--scenario`` a few times, and a route's teacher is the one that arrives most often; of equal ones
+the one that keeps ``--margin`` from the kerbs more often, for a student never does quite what its teacher does; of
+equal ones the first. Then a student drives all routes at once, every second truck with sampled actions, and learns from
+each step what the route's teacher would have done there: DAgger (Ross, Gordon and Bagnell, "A reduction of imitation
+learning and structured prediction to no-regret online learning", AISTATS 2011) with probabilities in place of actions.
+So it sees the states that it gets into itself, and every step says which action is right, so that it takes in many more
+roads than a learner by trial and error.
 
 Writes ``distilled.safetensors``, which ``offtrack evaluate --policy`` drives, and ``distilled.json`` with the curve and
 the success on the validation routes. Ctrl-C ends the training early; what was learned is kept.
@@ -58,6 +59,76 @@ class Network(nn.Module):
     def save(self, file: Path, scenario: Path) -> None:
         variance = 1 / self.factor.double().numpy() ** 2
         export.save(file, self.actor, scenario=scenario, mean=self.mean.numpy(), variance=variance, epsilon=0.0)
+
+
+def survey(policy: Policy, batch: Batch, routes: list[str], starts: np.ndarray, margin: float) -> np.ndarray:
+    """Drives ``routes`` from ``starts``, ``[k, episodes, 2]``. Returns of each episode whether it arrived, whether it
+    did so at least ``margin`` from the kerbs, and its mean distance to the lane's centre [m]: ``[k, episodes, 3]``."""
+    n_episodes = starts.shape[1]
+    at_a_time = batch.num_envs // n_episodes
+    parts = []
+    for first in range(0, len(routes), at_a_time):
+        part = [name for name in routes[first : first + at_a_time] for _ in range(n_episodes)]
+        envs = np.arange(len(part))
+        batch.begin(envs, routes=part, starts=[tuple(start) for start in starts[first:][:at_a_time].reshape(-1, 2)])
+        ended = np.zeros(len(part), dtype=np.int64)
+        clearance, distance, n_steps = np.full(len(part), np.inf), np.zeros(len(part)), np.zeros(len(part))
+        while len(running := np.flatnonzero(ended == Ended.RUNNING)):
+            actions = np.zeros(batch.num_envs, dtype=np.int64)
+            actions[running] = policy.act(batch.observation()[running])
+            batch.step(actions)
+            columns = batch.columns("clearance", "progress")
+            least = np.minimum(columns["clearance"]["tractor"], columns["clearance"]["trailer"])[running]
+            clearance[running] = np.minimum(clearance[running], least)
+            distance[running] += columns["progress"]["lane_distance"][running]
+            n_steps[running] += 1
+            if (ends := batch.ended()) is not None:
+                first_ends = np.isin(ends.envs, running)
+                ended[ends.envs[first_ends]] = ends.codes[first_ends]
+        arrived = ended == Ended.ARRIVED
+        found = np.stack([arrived, arrived & (clearance >= margin), distance / n_steps], axis=-1)
+        parts.append(found.reshape(-1, n_episodes, 3))
+        if len(parts) % 4 == 0:
+            print(f"{policy.name} has driven {first + at_a_time:,} of {len(routes):,} routes", flush=True)
+    return np.concatenate(parts)
+
+
+def choose(args: Any) -> tuple[list[str], np.ndarray, list[dict[str, Any]]]:
+    """Lets the teachers drive. Returns the names of the routes, the index of each one's teacher, and what each teacher
+    did; of a later one only on the routes on which no earlier one was without fault."""
+    # In this mode a truck's columns are those after its last step until the next one.
+    batch = Batch(args.scenario, args.envs, split="train", seed=args.seed, autoreset="next_step")
+    policies = [Policy.load(file) for file in args.teachers]
+    for policy in policies:
+        tables = policy.action_table, batch.action_table
+        if policy.extras != batch.extras or tables[0].shape != tables[1].shape or not np.allclose(*tables, atol=1e-5):
+            raise SystemExit(f"{policy.name}: other observations or actions than those of {batch.scenario}")
+    names = batch.split_routes
+    starts = np.random.default_rng(args.seed).uniform(-args.starts, args.starts, (len(names), args.episodes, 2))
+    scores = np.full((len(args.teachers), len(names)), -1)
+    left, surveys = np.arange(len(names)), []
+    for teacher, policy in enumerate(policies):
+        found = survey(policy, batch, [names[route] for route in left], starts[left], args.margin)
+        arrived, kept = found[..., 0].sum(axis=1).astype(int), found[..., 1].sum(axis=1).astype(int)
+        scores[teacher, left] = arrived * (args.episodes + 1) + kept
+        surveys.append(
+            {
+                "teacher": args.teachers[teacher].name,
+                "episodes": found[..., 0].size,
+                "arrived": int(arrived.sum()),
+                "with_margin": int(kept.sum()),
+                "lane_distance_mean_arrived": float(found[..., 2][found[..., 0] > 0].mean()) if arrived.any() else None,
+            }
+        )
+        print("  ".join(f"{name} {value}" for name, value in surveys[-1].items()), flush=True)
+        left = left[kept < args.episodes]
+        if not len(left):
+            break
+    chosen = np.argmax(scores, axis=0)
+    for teacher, row in enumerate(surveys):
+        row["routes_taught"] = int((chosen == teacher).sum())
+    print("routes of each teacher:", [row["routes_taught"] for row in surveys], flush=True)
+    return names, chosen, surveys
 
 
 def distil(teachers: list[Network], student: Network, of_route: np.ndarray, batch: Batch, args: Any) -> list[Any]:
@@ -136,7 +207,11 @@ def main() -> None:
         "--scenario", type=Path, default=HERE / "distil_roads.toml", help="benchmark on whose training routes"
     )
     parser.add_argument("--validation", default="random2026", help="benchmark on whose validation routes it is judged")
-    parser.add_argument("--episodes", type=int, default=4, help="episodes of each teacher on each route")
+    parser.add_argument("--episodes", type=int, default=2, help="episodes of each teacher on a route, to choose by")
+    parser.add_argument(
+        "--starts", type=float, default=0.4, help="largest errors of their starts, as a fraction of the benchmark's"
+    )
+    parser.add_argument("--margin", type=float, default=0.1, help="clearance [m] that a teacher should keep")
     parser.add_argument("--steps", type=int, default=12_000_000, help="env steps of all trucks together")
     parser.add_argument("--envs", type=int, default=2048, help="number of trucks")
     parser.add_argument(
@@ -155,19 +230,16 @@ def main() -> None:
     start = time.perf_counter()
     if args.envs < 1 or args.steps < 1 or args.episodes < 1 or args.minibatch < 1:
         parser.error("--envs, --steps, --episodes, --minibatch: must be at least 1")
+    if args.envs < args.episodes:
+        parser.error("--envs: must be at least --episodes")
+    if not 0 <= args.starts <= 1:
+        parser.error("--starts: must lie in 0..1")
     args.out.parent.mkdir(parents=True, exist_ok=True)
     # The student begins as the first teacher.
     *teachers, student = (Network(file) for file in [*args.teachers, args.teachers[0]])
     batch = Batch(args.scenario, args.envs, split="train", seed=args.seed)
-    survey = []
-    for file in args.teachers:
-        found = offtrack_sim.evaluate(Policy.load(file), args.scenario, split="train", episodes=args.episodes)
-        survey.append((found.ended == Ended.ARRIVED).sum(axis=1))
-        print(f"{file}: {found.success:.2%} of {found.ended.size:,} arrived", flush=True)
-    chosen = np.argmax(survey, axis=0)
-    routes_of_each = np.bincount(chosen, minlength=len(teachers)).tolist()
-    print("routes of each teacher:", routes_of_each, flush=True)
-    by_name = dict(zip(batch.split_routes, chosen.tolist()))
+    names, chosen, surveys = choose(args)
+    by_name = dict(zip(names, chosen.tolist()))
     of_route = np.array([by_name.get(name, 0) for name in batch.route_names])
     curve = distil(teachers, student, of_route, batch, args)
     file = Path(f"{args.out}.safetensors")
@@ -179,8 +251,7 @@ def main() -> None:
         "settings": {**vars(args), "teachers": [file.name for file in args.teachers], "scenario": args.scenario.name}
         | {"out": str(args.out)},
         "seconds": round(time.perf_counter() - start, 1),
-        "arrived_of_each_teacher": [int(arrived.sum()) for arrived in survey],
-        "routes_of_each_teacher": routes_of_each,
+        "survey": surveys,
         "evaluation": found.as_dict(),
         "curve": curve,
     }
