@@ -70,13 +70,15 @@ def survey(policy: Policy, batch: Batch, routes: list[str], starts: np.ndarray, 
     for first in range(0, len(routes), at_a_time):
         part = [name for name in routes[first : first + at_a_time] for _ in range(n_episodes)]
         envs = np.arange(len(part))
-        batch.begin(envs, routes=part, starts=[tuple(start) for start in starts[first:][:at_a_time].reshape(-1, 2)])
+        errors = starts[first : first + at_a_time].reshape(-1, 2)
+        batch.begin(envs, routes=part, starts=[tuple(error) for error in errors])
+        observation = batch.observation()
         ended = np.zeros(len(part), dtype=np.int64)
         clearance, distance, n_steps = np.full(len(part), np.inf), np.zeros(len(part)), np.zeros(len(part))
         while len(running := np.flatnonzero(ended == Ended.RUNNING)):
             actions = np.zeros(batch.num_envs, dtype=np.int64)
-            actions[running] = policy.act(batch.observation()[running])
-            batch.step(actions)
+            actions[running] = policy.act(observation[running])
+            observation = batch.step(actions)[0]
             columns = batch.columns("clearance", "progress")
             least = np.minimum(columns["clearance"]["tractor"], columns["clearance"]["trailer"])[running]
             clearance[running] = np.minimum(clearance[running], least)
