@@ -3,8 +3,8 @@
 
 Each policy drives every load on its own: the routes of laden2026 (30 episodes each) and of laden2026-random (four each),
 none of which a policy of training/configs/laden.toml has seen. The baselines are pure pursuit by the feasible speed
-profile, of the lane's centre and of paths that a search found, and the policy that is shipped for attard2023, which
-knows neither loads nor speeds, at 30 and at 20 km/h. What the JSON file already has is not evaluated again, so an
+profile, of the lane's centre and of paths that a search found, and a policy of attard2023, which knows neither loads
+nor speeds, at 30 and at 20 km/h. What the JSON file already has is not evaluated again, so an
 interrupted series can go on. Standard library only.
 
     python3 benches/loads.py --policies runs/laden --json docs/benchmarks/laden.json
@@ -82,7 +82,7 @@ def line(offtrack, folder, benchmark, split, load):
 
 
 def at_one_speed(folder, base, kmh):
-    """A benchmark with loads for one target speed, without extras: all that the policy shipped for attard2023 knows."""
+    """A benchmark with loads for one target speed, without extras: all that a policy of attard2023 knows."""
     text = (SCENARIOS / f"{base}.toml").read_text()
     text = re.sub(r"^speeds_kmh = .*$", f"speeds_kmh = [{kmh}.0]", text, flags=re.MULTILINE)
     text = re.sub(r"^speed_kmh = .*$", f"speed_kmh = {kmh}.0", text, flags=re.MULTILINE)
@@ -93,8 +93,8 @@ def at_one_speed(folder, base, kmh):
 
 
 def slower(folder, kmh):
-    """The policy shipped for attard2023 with another target speed in its action table."""
-    whole = (ROOT / "training/policies/attard2023/policy.safetensors").read_bytes()
+    """A policy of attard2023, seed 71 of its long run, with another target speed in its action table."""
+    whole = (ROOT / "docs/benchmarks/seeds/best-71.safetensors").read_bytes()
     (length,) = struct.unpack("<Q", whole[:8])
     header = json.loads(whole[8 : 8 + length])
     description = json.loads(header["__metadata__"]["offtrack"])

@@ -22,7 +22,7 @@ pub enum Error {
         message: String,
     },
     /// No policy comes with the program for this benchmark.
-    #[error("policy: {name}; policies come with the program for {}", known.join(", "))]
+    #[error("policy: {name}; the program comes with {}", known.join(", "))]
     UnknownName {
         /// The benchmark that was asked for.
         name: String,

@@ -15,9 +15,11 @@ const SAME_ACTION: f32 = 1e-5;
 /// Most bytes of a policy file: two hundred times the shipped ones.
 const FILE_LIMIT: u64 = 64 << 20;
 
-/// The policies that come with the project, by the benchmark that they learned on.
-const SHIPPED: [(&str, &[u8]); 4] = [
+/// The policies that come with the project. One that is called as a benchmark is what drives there unless another is
+/// named.
+const SHIPPED: [(&str, &[u8]); 5] = [
     ("attard2023", include_bytes!("../../training/policies/attard2023/policy.safetensors")),
+    ("attard2023-lane", include_bytes!("../../training/policies/attard2023-lane/policy.safetensors")),
     ("attard2023-as-run", include_bytes!("../../training/policies/attard2023-as-run/policy.safetensors")),
     ("laden2026", include_bytes!("../../training/policies/laden2026/policy.safetensors")),
     ("laden2026-50", include_bytes!("../../training/policies/laden2026-50/policy.safetensors")),
@@ -26,7 +28,7 @@ const SHIPPED: [(&str, &[u8]); 4] = [
 /// A network that can drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Policy {
-    /// Name for reports and errors: the file, or the benchmark's name and `(shipped)`. Not part of the file.
+    /// Name for reports and errors: the file, or the shipped policy's name and `(shipped)`. Not part of the file.
     pub name: String,
     /// The benchmark it learned on.
     pub benchmark: String,
@@ -54,16 +56,17 @@ impl Policy {
         Policy::from_bytes(&file.display().to_string(), &reader::read_bytes(file, FILE_LIMIT)?)
     }
 
-    /// The policy that comes with the project for this benchmark.
+    /// The policy of this name that comes with the project: a benchmark's, or `attard2023-lane`, which drives nearer to
+    /// its lane's centre on `attard2023`.
     ///
     /// # Errors
     ///
-    /// For a benchmark without one, its name and those that there are.
-    pub fn shipped(benchmark: &str) -> Result<Policy, Error> {
-        let Some((_, bytes)) = SHIPPED.iter().find(|(name, _)| *name == benchmark) else {
-            return Err(Error::UnknownName { name: benchmark.to_owned(), known: Policy::shipped_names().to_vec() });
+    /// Where there is none: the name, and those that there are.
+    pub fn shipped(name: &str) -> Result<Policy, Error> {
+        let Some((_, bytes)) = SHIPPED.iter().find(|(known, _)| *known == name) else {
+            return Err(Error::UnknownName { name: name.to_owned(), known: Policy::shipped_names().to_vec() });
         };
-        Policy::from_bytes(&format!("{benchmark} (shipped)"), bytes)
+        Policy::from_bytes(&format!("{name} (shipped)"), bytes)
     }
 
     /// The policy that comes with the project for this benchmark, whose world is `world`. Where there is none it is the
@@ -82,7 +85,7 @@ impl Policy {
         Ok(policies.swap_remove(fits.unwrap_or_default()))
     }
 
-    /// Names of the benchmarks that a policy comes with the project for.
+    /// Names of the policies that come with the project.
     pub fn shipped_names() -> [&'static str; SHIPPED.len()] {
         SHIPPED.map(|(name, _)| name)
     }

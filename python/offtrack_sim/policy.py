@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
+
+if TYPE_CHECKING:
+    from .batch import Batch
 
 
 class Policy:
@@ -21,13 +24,15 @@ class Policy:
         self._network = network
 
     @staticmethod
-    def shipped(benchmark: str = "attard2023") -> Policy:
-        """The policy that comes with the package for a benchmark.
+    def shipped(name: str = "attard2023") -> Policy:
+        """The policy of this name that comes with the package.
+
+        A benchmark's name, or ``attard2023-lane``, which drives nearer to its lane's centre on ``attard2023``.
 
         Raises:
             ValueError: Where there is none; the message names those there are.
         """
-        return Policy(_offtrack.Network.shipped(benchmark))
+        return Policy(_offtrack.Network.shipped(name))
 
     @staticmethod
     def load(file: str | os.PathLike[str]) -> Policy:
@@ -41,7 +46,7 @@ class Policy:
 
     @property
     def name(self) -> str:
-        """Its file, or the benchmark's name and ``(shipped)``."""
+        """Its file, or the shipped policy's name and ``(shipped)``."""
         return self._network.name
 
     @property
@@ -58,6 +63,19 @@ class Policy:
     def action_table(self) -> npt.NDArray[np.float32]:
         """Steer angle [rad] and speed [m/s] of each action, ``[n, 2]``: a batch must have the same table."""
         return self._network.action_table
+
+    def check(self, batch: Batch) -> None:
+        """Nothing, where it can drive the trucks of this batch.
+
+        Raises:
+            ValueError: Where the batch has other extras or another action table; the message says which.
+        """
+        if self.extras != batch.extras:
+            its, needed = (", ".join(extras) or "none" for extras in (self.extras, batch.extras))
+            raise ValueError(f"{self.name}: observes other extras than {batch.scenario}: {its}; {needed} are needed")
+        tables = self.action_table, batch.action_table
+        if tables[0].shape != tables[1].shape or not np.allclose(*tables, atol=1e-5):
+            raise ValueError(f"{self.name}: has another action table than {batch.scenario}; see action_table of both")
 
     def act(self, observations: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
         """The most probable action for each observation: ``[n, n_values]`` gives ``[n]``, ``[n_values]`` a number.

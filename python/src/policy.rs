@@ -23,8 +23,8 @@ pub struct Network {
 #[pymethods]
 impl Network {
     #[staticmethod]
-    fn shipped(benchmark: &str) -> PyResult<Network> {
-        Policy::shipped(benchmark).map(Network::new).map_err(refused)
+    fn shipped(name: &str) -> PyResult<Network> {
+        Policy::shipped(name).map(Network::new).map_err(refused)
     }
 
     #[staticmethod]

@@ -56,7 +56,7 @@ def test_files_that_are_no_policies_are_refused_by_name(tmp_path: Path) -> None:
     file.write_bytes(b"not a policy")
     with pytest.raises(ValueError, match="policy.safetensors: is not a policy file"):
         Policy.load(file)
-    with pytest.raises(ValueError, match="policy: 50m; policies come with the program for attard2023"):
+    with pytest.raises(ValueError, match="policy: 50m; the program comes with attard2023, "):
         Policy.shipped("50m")
     with pytest.raises((TypeError, ValueError), match="observations"):
         Policy.shipped().act(np.zeros((3, 68)))

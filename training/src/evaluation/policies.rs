@@ -30,7 +30,7 @@ pub trait Policy {
 }
 
 /// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its
-/// benchmark. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where
+/// name. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where
 /// there is none, the first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random
 /// actions.
 pub fn find(policy: Option<&str>, benchmark: &str, pursuit: PurePursuit, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
@@ -44,7 +44,7 @@ pub fn find(policy: Option<&str>, benchmark: &str, pursuit: PurePursuit, seed: u
     Ok(Box::new(learned))
 }
 
-/// A learned policy by the path of its file, or a shipped one by its benchmark. A file comes first.
+/// A learned policy by the path of its file, or a shipped one by its name. A file comes first.
 pub fn learned(name: &str) -> Result<offtrack_policy::Policy, Error> {
     if offtrack_policy::Policy::shipped_names().contains(&name) && !Path::new(name).is_file() {
         return Ok(offtrack_policy::Policy::shipped(name)?);

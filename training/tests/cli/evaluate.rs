@@ -212,6 +212,19 @@ fn without_a_policy_the_shipped_one_drives_as_its_report_says() {
 }
 
 #[test]
+fn the_shipped_policy_near_its_lane_keeps_half_the_distance_and_arrives() {
+    let place = Place::new();
+    let [usual, near] = ["attard2023", "attard2023-lane"].map(|policy| {
+        succeed(&offtrack(&["evaluate", "--policy", policy, "--episodes", "4", "--json", &place.text("report.json")]));
+        let report = place.json("report.json");
+        assert_eq!(report["policy"], format!("{policy} (shipped)"));
+        assert!(report["success"].as_f64().unwrap() > 0.95, "{policy}: {}", report["success"]);
+        report["lane_distance_mean_arrived"].as_f64().unwrap()
+    });
+    assert!(near < 0.65 && near < 0.6 * usual, "{near} {usual}");
+}
+
+#[test]
 fn the_shipped_policy_and_benchmark_are_found_wherever_the_program_runs_and_by_name() {
     let elsewhere = tempfile::tempdir().unwrap();
     for arguments in [&["evaluate", "--episodes", "1"][..], &["evaluate", "--episodes", "1", "--policy", "attard2023"]] {
