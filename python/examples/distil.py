@@ -56,7 +56,7 @@ class Network(nn.Module):
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
         return self.actor(((observation - self.mean) * self.factor).clamp(-export.CLIP, export.CLIP))
 
-    def save(self, file: Path, scenario: Path) -> None:
+    def save(self, file: Path, scenario: str | Path) -> None:
         variance = 1 / self.factor.double().numpy() ** 2
         export.save(file, self.actor, scenario=scenario, mean=self.mean.numpy(), variance=variance, epsilon=0.0)
 
@@ -65,34 +65,44 @@ def survey(policy: Policy, batch: Batch, routes: list[str], starts: np.ndarray, 
     """Drives ``routes`` from ``starts``, ``[k, episodes, 2]``. Returns of each episode whether it arrived, whether it
     did so at least ``margin`` from the kerbs, and its mean distance to the lane's centre [m]: ``[k, episodes, 3]``."""
     n_episodes = starts.shape[1]
-    at_a_time = batch.num_envs // n_episodes
-    parts = []
-    for first in range(0, len(routes), at_a_time):
-        part = [name for name in routes[first : first + at_a_time] for _ in range(n_episodes)]
-        envs = np.arange(len(part))
-        errors = starts[first : first + at_a_time].reshape(-1, 2)
-        batch.begin(envs, routes=part, starts=[tuple(error) for error in errors])
-        observation = batch.observation()
-        ended = np.zeros(len(part), dtype=np.int64)
-        clearance, distance, n_steps = np.full(len(part), np.inf), np.zeros(len(part)), np.zeros(len(part))
-        while len(running := np.flatnonzero(ended == Ended.RUNNING)):
-            actions = np.zeros(batch.num_envs, dtype=np.int64)
-            actions[running] = policy.act(observation[running])
-            observation = batch.step(actions)[0]
-            columns = batch.columns("clearance", "progress")
-            least = np.minimum(columns["clearance"]["tractor"], columns["clearance"]["trailer"])[running]
-            clearance[running] = np.minimum(clearance[running], least)
-            distance[running] += columns["progress"]["lane_distance"][running]
-            n_steps[running] += 1
-            if (ends := batch.ended()) is not None:
-                first_ends = np.isin(ends.envs, running)
-                ended[ends.envs[first_ends]] = ends.codes[first_ends]
-        arrived = ended == Ended.ARRIVED
-        found = np.stack([arrived, arrived & (clearance >= margin), distance / n_steps], axis=-1)
-        parts.append(found.reshape(-1, n_episodes, 3))
-        if len(parts) % 4 == 0:
-            print(f"{policy.name} has driven {first + at_a_time:,} of {len(routes):,} routes", flush=True)
-    return np.concatenate(parts)
+    n = len(routes) * n_episodes
+    # What each episode came to, and which one each truck drives: -1 after the last.
+    ended = np.zeros(n, dtype=np.int64)
+    clearance, distance, n_steps = np.full(n, np.inf), np.zeros(n), np.zeros(n)
+    episode = np.full(batch.num_envs, -1)
+    n_begun, n_shown = 0, 0
+    free = np.arange(batch.num_envs)
+    while True:
+        begun = np.arange(n_begun, min(n_begun + len(free), n))
+        episode[free] = -1
+        episode[free[: len(begun)]] = begun
+        if len(begun):
+            names, errors = [routes[e // n_episodes] for e in begun], starts.reshape(-1, 2)[begun]
+            batch.begin(free[: len(begun)], routes=names, starts=[tuple(error) for error in errors])
+            n_begun += len(begun)
+        driving = np.flatnonzero(episode >= 0)
+        if not len(driving):
+            break
+        actions = np.zeros(batch.num_envs, dtype=np.int64)
+        actions[driving] = policy.act(batch.observation()[driving])
+        batch.step(actions)
+        columns = batch.columns("clearance", "progress")
+        least = np.minimum(columns["clearance"]["tractor"], columns["clearance"]["trailer"])
+        of = episode[driving]
+        clearance[of] = np.minimum(clearance[of], least[driving])
+        distance[of] += columns["progress"]["lane_distance"][driving]
+        n_steps[of] += 1
+        free = np.arange(0)
+        if (ends := batch.ended()) is not None:
+            first_ends = episode[ends.envs] >= 0
+            free = ends.envs[first_ends]
+            ended[episode[free]] = ends.codes[first_ends]
+        if n_begun >= n_shown + 10_000:
+            n_shown = n_begun
+            print(f"{policy.name} has begun {n_begun:,} of {n:,} episodes", flush=True)
+    arrived = ended == Ended.ARRIVED
+    found = np.stack([arrived, arrived & (clearance >= margin), distance / n_steps], axis=-1)
+    return found.reshape(-1, n_episodes, 3)
 
 
 def choose(args: Any) -> tuple[list[str], np.ndarray, list[dict[str, Any]]]:
@@ -102,9 +112,10 @@ def choose(args: Any) -> tuple[list[str], np.ndarray, list[dict[str, Any]]]:
     batch = Batch(args.scenario, args.envs, split="train", seed=args.seed, autoreset="next_step")
     policies = [Policy.load(file) for file in args.teachers]
     for policy in policies:
-        tables = policy.action_table, batch.action_table
-        if policy.extras != batch.extras or tables[0].shape != tables[1].shape or not np.allclose(*tables, atol=1e-5):
-            raise SystemExit(f"{policy.name}: other observations or actions than those of {batch.scenario}")
+        try:
+            policy.check(batch)
+        except ValueError as error:
+            raise SystemExit(str(error)) from None
     names = batch.split_routes
     starts = np.random.default_rng(args.seed).uniform(-args.starts, args.starts, (len(names), args.episodes, 2))
     scores = np.full((len(args.teachers), len(names)), -1)

@@ -108,14 +108,8 @@ def evaluate(
     names = Batch(scenario, 1, split=split, routes=routes).split_routes
     batch = Batch(scenario, len(names) * episodes, split=split, routes=routes, autoreset="same_step", device=device)
     if isinstance(policy, Policy):
+        policy.check(batch)
         act: Callable[[npt.NDArray[np.float32]], Any] = policy.act
-        if policy.extras != batch.extras:
-            its, needed = (", ".join(extras) or "none" for extras in (policy.extras, batch.extras))
-            raise ValueError(f"{policy.name}: observes other extras than {batch.scenario}: {its}; {needed} are needed")
-        if policy.action_table.shape != batch.action_table.shape or not np.allclose(
-            policy.action_table, batch.action_table, atol=1e-5
-        ):
-            raise ValueError(f"{policy.name}: has another action table than {batch.scenario}; see action_table of both")
     else:
         act = policy
     batch.begin(
