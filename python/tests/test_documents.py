@@ -34,7 +34,7 @@ def test_the_snippets_run(
     printed = capsys.readouterr().out
     if document == "TUTORIAL.md":
         assert "15 routes, the first is village/E-left-1" in printed
-        assert "own test: 98.3% (59/60); arrived 59, trailer_collided 1" in printed and "'is_success': True" in printed
+        assert "own test: 100.0% (60/60); arrived 60" in printed and "'is_success': True" in printed
         assert list(tmp_path.glob("films/*.mp4"))
     else:
         assert "attard2023 test: 100.0% (46/46); arrived 46" in printed
