@@ -46,10 +46,14 @@ pub fn find(policy: Option<&str>, benchmark: &str, pursuit: PurePursuit, seed: u
 
 /// A learned policy by the path of its file, or a shipped one by its name. A file comes first.
 pub fn learned(name: &str) -> Result<offtrack_policy::Policy, Error> {
-    if offtrack_policy::Policy::shipped_names().contains(&name) && !Path::new(name).is_file() {
+    let file = Path::new(name);
+    let is_shipped = offtrack_policy::Policy::shipped_names().contains(&name) && !file.is_file();
+    // What is no path of a file, by its looks, is a name that was written wrongly: the error has those that there are.
+    let is_name = !file.exists() && file.extension().is_none() && file.components().count() == 1;
+    if is_shipped || is_name {
         return Ok(offtrack_policy::Policy::shipped(name)?);
     }
-    Ok(offtrack_policy::Policy::load(Path::new(name))?)
+    Ok(offtrack_policy::Policy::load(file)?)
 }
 
 impl Policy for offtrack_policy::Policy {

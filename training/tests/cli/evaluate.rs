@@ -239,6 +239,14 @@ fn the_shipped_policy_and_benchmark_are_found_wherever_the_program_runs_and_by_n
 }
 
 #[test]
+fn a_policys_name_that_is_written_wrongly_is_refused_with_those_that_there_are() {
+    let said = refusal(&offtrack(&["evaluate", "--episodes", "1", "--policy", "attard2023-lan"]), 2);
+    assert!(said.contains("policy: attard2023-lan; the program comes with attard2023, attard2023-lane, "), "{said}");
+    let said = refusal(&offtrack(&["evaluate", "--episodes", "1", "--policy", "attard2023-lan.safetensors"]), 2);
+    assert!(said.contains("attard2023-lan.safetensors: cannot be read"), "{said}");
+}
+
+#[test]
 fn a_benchmark_without_a_policy_of_its_own_is_driven_by_a_shipped_one_that_can_and_says_so() {
     for (benchmark, policy) in [("attard2023-full", "attard2023"), ("attard2023-maps-as-run", "attard2023-as-run")] {
         let output = offtrack(&["evaluate", "--benchmark", benchmark, "--episodes", "1"]);

@@ -141,7 +141,7 @@ fn wrong_input_is_refused_with_exit_code_2_and_leaves_nothing_behind() {
         ("a.png", &["--size", "199"], "--size: 199; must lie in 200..4000 pixels"),
         ("a.json", &["--episode", "30"], "--episode: 30; must lie in 0..29: --episodes says how many there are"),
         ("a.json", &["--episodes", "0"], "--episodes: 0; must lie in 1..100000"),
-        ("a.json", &["--policy", "missing"], "missing: cannot be read"),
+        ("a.json", &["--policy", "missing"], "policy: missing; the program comes with attard2023, "),
     ] {
         let said = refused(output, flags);
         assert!(said.contains(expected), "{said}");
