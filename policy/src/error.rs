@@ -21,12 +21,12 @@ pub enum Error {
         /// What is wrong and what would do.
         message: String,
     },
-    /// No policy comes with the program for this benchmark.
+    /// No policy of this name comes with the program.
     #[error("policy: {name}; the program comes with {}", known.join(", "))]
     UnknownName {
-        /// The benchmark that was asked for.
+        /// The name that was asked for.
         name: String,
-        /// Those that there are policies for.
+        /// The names of those that do.
         known: Vec<&'static str>,
     },
 }

@@ -15,8 +15,8 @@ const SAME_ACTION: f32 = 1e-5;
 /// Most bytes of a policy file: two hundred times the shipped ones.
 const FILE_LIMIT: u64 = 64 << 20;
 
-/// The policies that come with the project. One that is called as a benchmark is what drives there unless another is
-/// named.
+/// The policies that come with the project, by name. One with a benchmark's name drives there unless another is asked
+/// for.
 const SHIPPED: [(&str, &[u8]); 5] = [
     ("attard2023", include_bytes!("../../training/policies/attard2023/policy.safetensors")),
     ("attard2023-lane", include_bytes!("../../training/policies/attard2023-lane/policy.safetensors")),

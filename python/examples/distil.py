@@ -56,7 +56,7 @@ class Network(nn.Module):
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
         return self.actor(((observation - self.mean) * self.factor).clamp(-export.CLIP, export.CLIP))
 
-    def save(self, file: Path, scenario: str | Path) -> None:
+    def save(self, file: Path, scenario: Path) -> None:
         variance = 1 / self.factor.double().numpy() ** 2
         export.save(file, self.actor, scenario=scenario, mean=self.mean.numpy(), variance=variance, epsilon=0.0)
 

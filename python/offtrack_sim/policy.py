@@ -65,7 +65,7 @@ class Policy:
         return self._network.action_table
 
     def check(self, batch: Batch) -> None:
-        """Nothing, where it can drive the trucks of this batch.
+        """Checks that it can drive the trucks of this batch.
 
         Raises:
             ValueError: Where the batch has other extras or another action table; the message says which.

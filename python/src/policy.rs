@@ -111,7 +111,7 @@ fn refused(error: Error) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// Names of the benchmarks for which a policy comes with the package.
+/// Names of the policies that come with the package.
 #[pyfunction]
 pub fn policy_names() -> Vec<&'static str> {
     Policy::shipped_names().to_vec()

@@ -29,10 +29,9 @@ pub trait Policy {
     fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>);
 }
 
-/// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its
-/// name. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where
-/// there is none, the first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random
-/// actions.
+/// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its name. Its
+/// action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where there is none, the
+/// first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random actions.
 pub fn find(policy: Option<&str>, benchmark: &str, pursuit: PurePursuit, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
     let learned = match policy {
         Some("pursuit") => return Ok(Box::new(pursuit)),
@@ -48,7 +47,7 @@ pub fn find(policy: Option<&str>, benchmark: &str, pursuit: PurePursuit, seed: u
 pub fn learned(name: &str) -> Result<offtrack_policy::Policy, Error> {
     let file = Path::new(name);
     let is_shipped = offtrack_policy::Policy::shipped_names().contains(&name) && !file.is_file();
-    // What is no path of a file, by its looks, is a name that was written wrongly: the error has those that there are.
+    // A word without an extension that is no file is taken for a wrong name: the error lists the right ones.
     let is_name = !file.exists() && file.extension().is_none() && file.components().count() == 1;
     if is_shipped || is_name {
         return Ok(offtrack_policy::Policy::shipped(name)?);
