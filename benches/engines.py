@@ -4,7 +4,7 @@
 A round is one run of `offtrack scale` on each engine. A ratio is the device's time over the CPU's in the same round, and
 the median of the rounds is reported: load from other programs changes more slowly than the rounds. Standard library only.
 
-    python3 benches/engines.py --offtrack target/release/offtrack --json docs/benchmarks/engines.json
+    python3 benches/engines.py --offtrack target/release/offtrack --json docs/results/engines.json
 """
 
 import argparse

@@ -7,7 +7,7 @@ profile, of the lane's centre and of paths that a search found, and a policy of 
 nor speeds, at 30 and at 20 km/h. What the JSON file already has is not evaluated again, so an interrupted series can
 go on. Standard library only.
 
-    python3 benches/loads.py --policies runs/laden --json docs/benchmarks/laden.json
+    python3 benches/loads.py --policies runs/laden --json laden.json
 """
 
 import argparse
@@ -94,7 +94,7 @@ def at_one_speed(folder, base, kmh):
 
 def slower(folder, kmh):
     """A policy of attard2023, seed 71 of its long run, with another target speed in its action table."""
-    whole = (ROOT / "docs/benchmarks/seeds/best-71.safetensors").read_bytes()
+    whole = (ROOT / "docs/data/best-71.safetensors").read_bytes()
     (length,) = struct.unpack("<Q", whole[:8])
     header = json.loads(whole[8 : 8 + length])
     description = json.loads(header["__metadata__"]["offtrack"])

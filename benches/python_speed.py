@@ -7,7 +7,7 @@ Beside it stands the ratio of each one's fastest window of a quarter of a second
 step is 0.1 s of every truck: two physics sub-steps, 29 rays, 69 values, reward, another episode in the same step
 where one ended; actions are drawn uniformly at random, for Python beforehand. Needs the package offtrack_sim.
 
-    python3 benches/python_speed.py --offtrack target/release/offtrack --json docs/benchmarks/python/speed.json
+    python3 benches/python_speed.py --offtrack target/release/offtrack --json docs/results/python-speed.json
 """
 
 import argparse

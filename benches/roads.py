@@ -4,8 +4,8 @@
 Each speed is a run of `offtrack scale`. What is compared runs in turns, and the median of the rounds' ratios is
 reported: load from other programs changes more slowly than the rounds. Standard library only.
 
-    python3 benches/roads.py --json docs/benchmarks/roads.json
-    python3 benches/roads.py --other OTHER/offtrack --json docs/benchmarks/roads.json    # and beside another build
+    python3 benches/roads.py --json docs/results/roads.json
+    python3 benches/roads.py --other OTHER/offtrack --json docs/results/roads.json    # and beside another build
 """
 
 import argparse

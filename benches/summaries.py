@@ -50,6 +50,8 @@ def rounded(value):
 def brief(report):
     """What is kept of an evaluation."""
     short = {key: report[key] for key in ["benchmark", "split", "policy", "episodes", "arrived"] if key in report}
+    if "/" in short.get("policy", ""):
+        del short["policy"]  # a path of the machine that it was driven on
     short |= {key: rounded(report[key]) for key in ["success", "success_low", "success_high"] if key in report}
     if "ends" in report:
         short["failures"] = {end: n for end, n in report["ends"].items() if end != "arrived" and n}

@@ -5,7 +5,7 @@ No test route and no measured roundabout is looked at. Each choice gets the env 
 one core, so load from other programs does not change a result. One run at a time is pinned to each core. A run that has
 a report is not repeated, so an interrupted series can go on. Standard library only.
 
-    python3 benches/ablations/ablate.py --offtrack target/release/offtrack --json docs/benchmarks/ablations.json
+    python3 benches/ablations/ablate.py --offtrack target/release/offtrack --json ablations.json
 """
 
 import json

@@ -6,7 +6,7 @@ policy is examined once, at the end, with four episodes on each validation route
 training/configs/laden.toml as that file is, which keeps the best policy in its validations, and it is examined with 20
 episodes. A run that has a report is not repeated, so an interrupted series can go on. Standard library only.
 
-    python3 benches/ablations/laden.py --offtrack target/release/offtrack --json docs/benchmarks/ablations-laden.json
+    python3 benches/ablations/laden.py --offtrack target/release/offtrack --json ablations-laden.json
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """Trains with each learning library for a while, each in an environment of its own, and writes what was measured.
 
-    python tests/consumers/run.py --minutes 2 --json ../docs/benchmarks/python/consumers.json
+    python tests/consumers/run.py --minutes 2 --json ../docs/results/python-consumers.json
 
 Environments are made in ``--cache`` with pip and kept. PyTorch, of 5 GB, is installed once, with Stable-Baselines3: the
 others see it through a .pth file. Needs Python 3.11 or later and, with ``--offtrack``, the command-line program, which

@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn the_interval_of_a_mean_is_students() {
-        // Fractions of the ten seeds of docs/benchmarks/README.md: 92.2 %, 87.0 to 97.4 %.
+        // Fractions of ten seeds: 92.2 %, 87.0 to 97.4 %.
         let arrived = [642, 605, 681, 688, 662, 661, 619, 591, 531, 684].map(|arrived| f64::from(arrived) / 690.0);
         let (low, high) = interval(&arrived).unwrap();
         assert!((mean(&arrived) - 0.9223).abs() < 5e-5 && (low - 0.870).abs() < 5e-4 && (high - 0.974).abs() < 5e-4, "{low} {high}");
