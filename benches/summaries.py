@@ -152,11 +152,12 @@ def long_run():
 
     def further(seed):
         measured = [certified[str(seed)][f"attard2023-full-{split}"] for split in ["test", "train"]]
-        return [*measured, archive[f"best-{seed}-random2026-1000"]]
+        return [*measured, certified[str(seed)]["validation"], archive[f"best-{seed}-random2026-1000"]]
 
     commands = [
         "offtrack train best --seeds 240..244",
         "offtrack evaluate --benchmark attard2023-full --policy FILE --certify, and with --split train",
+        "offtrack evaluate --benchmark random2026 --split validation --policy FILE --episodes 20",
         "offtrack evaluate --benchmark random2026-1000 --policy FILE --episodes 1 --certify",
     ]
     return series(archive, "best-", range(240, 245), commands, further)
