@@ -138,11 +138,11 @@ fn body_clearance(
         }
     }
     // Halves spans until the clearance on none can be much less than the least found. Stops at contact.
+    var undecided: array<Span, LANES>;
+    var at_middle: array<f32, LANES>;
     while 0u < n_spans && 0.0 < least {
         let taken = min(n_spans, LANES);
         n_spans -= taken;
-        var undecided: array<Span, LANES>;
-        var at_middle: array<f32, LANES>;
         for (var n = 0u; n < taken; n++) {
             undecided[n] = (*spans)[n_spans + n];
             let line = line_of(body, n_points, undecided[n].line);

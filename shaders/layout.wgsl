@@ -14,7 +14,7 @@ const N_RAYS: u32 = 29u;
 const N_PREVIEW: u32 = 18u;
 // Values that may be observed beside those.
 const N_EXTRAS: u32 = 12u;
-// Bit of [`BeginRow::what`]: the truck begins an episode.
+// Bit of `BeginRow::what`: the truck begins an episode.
 const BEGINS: u32 = 1u;
 // Bit: the episode is the first of the truck's stream, not the next one.
 const IS_FIRST: u32 = 2u;
@@ -52,11 +52,11 @@ const LEVEL_MASK: u32 = 7u;
 const RIDGE_SHIFT: u32 = 3u;
 // Shift of a cell's kind.
 const KIND_SHIFT: u32 = 6u;
-// [`Kind::Ridge`].
+// `Kind::Ridge`.
 const RIDGE: u32 = 1u;
-// [`Kind::Lesser`].
+// `Kind::Lesser`.
 const LESSER: u32 = 2u;
-// [`Kind::Greater`].
+// `Kind::Greater`.
 const GREATER: u32 = 3u;
 // Cells a side of the tiles that lie together in memory, west to east.
 const TILE_COLUMNS: u32 = 4u;
@@ -91,7 +91,7 @@ const LANES: u32 = 8u;
 // Points of a unit sampled first, at most.
 const N_FIRST: u32 = 16u;
 // Further than any clearance [m].
-const FAR: f32 = 3.4028235e38f;
+const FAR: f32 = 340282346638528859811704183484516925440.0f;
 // Points of a tractor's centre line sampled first: with its corners as many as are sampled at once.
 const N_TRACTOR: u32 = 4u;
 // Points of a trailer's centre line sampled first: with its corners twice as many.
@@ -272,11 +272,11 @@ struct Stream {
 
 // What the caller asks of a truck: whether and how it begins an episode.
 struct BeginRow {
-    // Its start, where [`HAS_START`] is set.
+    // Its start, where `HAS_START` is set.
     start: Start,
-    // Index of its route in the world, where [`HAS_ROUTE`] is set.
+    // Index of its route in the world, where `HAS_ROUTE` is set.
     route: u32,
-    // Bits: [`BEGINS`], [`IS_FIRST`], [`HAS_ROUTE`], [`HAS_START`].
+    // Bits: `BEGINS`, `IS_FIRST`, `HAS_ROUTE`, `HAS_START`.
     what: u32,
 }
 
@@ -422,7 +422,7 @@ struct Rig {
 struct Action {
     // Steer angle asked for [rad].
     steering: f32,
-    // Speed asked for or, with [`Params::changes_speed`], by how much the target speed changes [m/s].
+    // Speed asked for or, with `Params::changes_speed`, by how much the target speed changes [m/s].
     speed: f32,
 }
 
@@ -566,31 +566,31 @@ struct BatchFacts {
 @group(0) @binding(13) var<storage, read> streams: array<Stream>;
 // Which trucks begin an episode when the caller says so, and how, [n_envs].
 @group(0) @binding(14) var<storage, read> begins: array<BeginRow>;
-//  Index into the action table, [n_envs].
+// Index into the action table, [n_envs].
 @group(0) @binding(15) var<storage, read_write> action: array<u32>;
-//  Steer angle and acceleration asked of each truck, [n_envs].
+// Steer angle and acceleration asked of each truck, [n_envs].
 @group(0) @binding(16) var<storage, read_write> control: array<Control>;
-//  The trucks, [n_envs].
+// The trucks, [n_envs].
 @group(0) @binding(17) var<storage, read_write> truck: array<Truck>;
-//  Distances to the kerbs [m], [n_envs].
+// Distances to the kerbs [m], [n_envs].
 @group(0) @binding(18) var<storage, read_write> clearance: array<Clearance>;
-//  Progress along the routes, [n_envs].
+// Progress along the routes, [n_envs].
 @group(0) @binding(19) var<storage, read_write> progress: array<Progress>;
-//  Distance sensors [m], [n_envs, 29].
+// Distance sensors [m], [n_envs, 29].
 @group(0) @binding(20) var<storage, read_write> ranges: array<f32>;
-//  The observation before the next action, [n_envs, 69].
+// The observation before the next action, [n_envs, 69].
 @group(0) @binding(21) var<storage, read_write> observation: array<f32>;
-//  The observation after the last action, another one only where an episode ended, [n_envs, 69].
+// The observation after the last action, another one only where an episode ended, [n_envs, 69].
 @group(0) @binding(22) var<storage, read_write> next_observation: array<f32>;
-//  Codes of [`crate::layout::Ended`] for the last step, [n_envs].
+// Codes of `Ended` for the last step, [n_envs].
 @group(0) @binding(23) var<storage, read_write> ended: array<u32>;
-//  Physical amounts that the reward weighs, [n_envs].
+// Physical amounts that the reward weighs, [n_envs].
 @group(0) @binding(24) var<storage, read_write> terms: array<RewardTerms>;
-//  Rewards of the last step, [n_envs].
+// Rewards of the last step, [n_envs].
 @group(0) @binding(25) var<storage, read_write> reward: array<f32>;
-//  What is observed beside the observation before the next action; zeros beyond what the benchmark observes, [n_envs, 12].
+// What is observed beside the observation before the next action; zeros beyond what the benchmark observes, [n_envs, 12].
 @group(0) @binding(26) var<storage, read_write> extras: array<f32>;
-//  The same beside the observation after the last action, [n_envs, 12].
+// The same beside the observation after the last action, [n_envs, 12].
 @group(0) @binding(27) var<storage, read_write> next_extras: array<f32>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
 @group(0) @binding(28) var<storage, read_write> tally: array<atomic<u32>>;

@@ -86,7 +86,10 @@ impl Literal for f32 {
         f32::wgsl()
     }
     fn literal(&self) -> String {
-        format!("{self:?}f")
+        let shortest = format!("{self:?}");
+        // The shortest decimal that rounds to the largest f32 is above it as a real number: not every compiler reads it.
+        let is_above = shortest.parse().is_ok_and(|real: f64| f64::from(f32::MAX) < real.abs());
+        if is_above { format!("{self:.1}f") } else { format!("{shortest}f") }
     }
 }
 
@@ -120,8 +123,26 @@ impl<T: Literal, const N: usize> Literal for [T; N] {
 
 /// Prints the lines of a doc comment as a WGSL comment, indented by `depth`.
 pub fn comment(depth: &str, lines: &[&str]) -> String {
-    // Brackets are escaped for rustdoc, which takes a unit for a link.
-    lines.iter().map(|line| format!("{depth}//{}\n", line.replace("\\[", "["))).collect()
+    lines.iter().map(|line| format!("{depth}// {}", plain(line.trim())).trim_end().to_owned() + "\n").collect()
+}
+
+/// A line of a doc comment as plain text: a link is its text, a path from `crate` on is its last name, and a unit's
+/// bracket, which is escaped for rustdoc, has no backslash.
+fn plain(line: &str) -> String {
+    let mut plain = String::new();
+    let mut rest = line;
+    while let Some((before, link)) = rest.split_once("[`") {
+        plain += before;
+        let Some((path, after)) = link.split_once("`]") else {
+            plain += "[`";
+            rest = link;
+            continue;
+        };
+        let module = path.rfind("::").filter(|_| path.starts_with("crate::")).map_or(0, |end| end + 2);
+        plain += &format!("`{}`", &path[module..]);
+        rest = after.strip_prefix('(').and_then(|target| target.split_once(')')).map_or(after, |(_, after)| after);
+    }
+    (plain + rest).replace("\\[", "[")
 }
 
 /// One of a closed list of names: an unknown one cannot be written.
@@ -240,3 +261,34 @@ macro_rules! constants {
 }
 
 pub(crate) use constants;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_literal_is_at_most_the_largest_f32_as_a_real_number_and_reads_back_to_the_last_bit() {
+        let largest = f64::from(f32::MAX);
+        for value in [f32::MAX, f32::MIN, f32::MAX.next_down(), f32::MIN_POSITIVE, 0.1, -1e38, 16_777_216.0, 0.0] {
+            let literal = value.literal();
+            let text = literal.strip_suffix('f').unwrap();
+            assert!(text.parse::<f64>().unwrap().abs() <= largest, "{literal}");
+            assert_eq!(text.parse::<f32>().unwrap().to_bits(), value.to_bits(), "{literal}");
+        }
+        // What is written of the largest one is exact, not rounded to an f64.
+        assert_eq!(f32::MAX.literal(), "340282346638528859811704183484516925440.0f");
+        assert_eq!(0.1f32.literal(), "0.1f");
+    }
+
+    #[test]
+    fn a_printed_comment_is_plain_text_with_one_space_before_it() {
+        let printed = |line: &str| comment("    ", &[line]);
+        assert_eq!(printed(" Range \\[m]"), "    // Range [m]\n");
+        assert_eq!(printed("  Rates, [n_envs]."), "    // Rates, [n_envs].\n");
+        assert_eq!(printed(" Bits: [`BEGINS`], [`Row::what`]."), "    // Bits: `BEGINS`, `Row::what`.\n");
+        assert_eq!(printed(" Codes of [`crate::layout::Ended`]."), "    // Codes of `Ended`.\n");
+        assert_eq!(printed(" See [`Field`](crate::field::Field) for it."), "    // See `Field` for it.\n");
+        assert_eq!(printed(""), "    //\n");
+        assert_eq!(printed(" An open [`bracket"), "    // An open [`bracket\n");
+    }
+}

@@ -101,7 +101,7 @@ impl Buffer {
     fn declared(self) -> (String, String) {
         match self {
             Buffer::Table(table) => table.declared(),
-            Buffer::Column(column) => (format!("{}, {}.", column.doc(), column.shape()), format!("array<{}>", column.element())),
+            Buffer::Column(column) => (format!("{}, {}.", column.doc().trim(), column.shape()), format!("array<{}>", column.element())),
             Buffer::Tally => {
                 ("Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].".to_owned(), "array<atomic<u32>>".to_owned())
             }
@@ -144,7 +144,7 @@ pub(crate) fn printed() -> String {
     for (binding, buffer) in BUFFERS.into_iter().enumerate() {
         let (doc, kind) = buffer.declared();
         let mode = if buffer.access() == Access::Read { "read" } else { "read_write" };
-        printed += &comment("", &[&format!(" {doc}")]);
+        printed += &comment("", &[&doc]);
         printed += &format!("@group(0) @binding({binding}) var<storage, {mode}> {}: {kind};\n", buffer.name());
     }
     printed

@@ -1,4 +1,4 @@
-//! The shader files: printed from Rust, complete, and valid.
+//! The shader files: printed from Rust, complete, valid, and free of what one of the compilers of WGSL takes amiss.
 
 use std::fs;
 use std::path::Path;
@@ -46,6 +46,135 @@ fn every_shader_of_a_stage_has_a_twin_on_the_cpu_and_every_twin_a_shader() {
         SHADERS.iter().map(|(name, _)| *name).filter(|name| *name != "layout" && !name.starts_with("common/")).collect();
     known.sort_unstable();
     assert_eq!(found, known);
+}
+
+/// Every shader file of the simulator and of the learner: its path, and its text.
+fn shaders() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut shaders = Vec::new();
+    for folder in ["shaders", "shaders/common", "training/shaders"] {
+        for entry in fs::read_dir(root.join(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|extension| extension == "wgsl") {
+                shaders.push((path.display().to_string(), fs::read_to_string(&path).unwrap()));
+            }
+        }
+    }
+    assert_eq!(shaders.len(), SHADERS.len() + 1);
+    shaders
+}
+
+/// A shader without its comments.
+fn code(text: &str) -> String {
+    text.lines().map(|line| line.split_once("//").map_or(line, |(code, _)| code)).collect::<Vec<_>>().join("\n")
+}
+
+/// The numbers in a shader's code, as they are written.
+fn numbers(code: &str) -> Vec<&str> {
+    let of_name = |letter: char| letter.is_alphanumeric() || letter == '_';
+    let mut numbers = Vec::new();
+    let mut rest = code;
+    while let Some(start) = rest.find(of_name) {
+        let word = &rest[start..];
+        let is_number = word.starts_with(|letter: char| letter.is_ascii_digit());
+        let mut before = ' ';
+        let end = word.find(|letter| {
+            let is_sign_of_exponent = (letter == '-' || letter == '+') && before == 'e' && !word.starts_with("0x");
+            before = letter;
+            !(of_name(letter) || is_number && (letter == '.' || is_sign_of_exponent))
+        });
+        let (word, after) = word.split_at(end.unwrap_or(word.len()));
+        if is_number {
+            numbers.push(word);
+        }
+        rest = after;
+    }
+    numbers
+}
+
+/// Whether a number, read exactly and not rounded first, is within its type's range.
+fn is_in_range(number: &str) -> bool {
+    if let Some(hexadecimal) = number.strip_prefix("0x") {
+        return u32::from_str_radix(hexadecimal.trim_end_matches('u'), 16).is_ok();
+    }
+    match number.strip_suffix('u') {
+        Some(whole) => whole.parse::<u32>().is_ok(),
+        None => number.trim_end_matches('f').parse::<f64>().is_ok_and(|real| real.abs() <= f64::from(f32::MAX)),
+    }
+}
+
+#[test]
+fn no_number_of_a_shader_is_above_the_largest_f32_as_a_real_number() {
+    let mut n_numbers = 0;
+    for (file, text) in shaders() {
+        let code = code(&text);
+        for number in numbers(&code) {
+            assert!(is_in_range(number), "{file}: {number}");
+            n_numbers += 1;
+        }
+    }
+    assert!(400 < n_numbers, "{n_numbers}");
+    // What a decimal that is rounded to the nearest f32 may look like.
+    assert_eq!(numbers("const A1: f32 = 3.4028235e38f; let b = -0.5e-3 + 0xffffu - x.y2;"), ["3.4028235e38f", "0.5e-3", "0xffffu"]);
+    assert!(!is_in_range("3.4028235e38f") && !is_in_range("4294967296u") && is_in_range("0.5e-3") && is_in_range("0xffffu"));
+}
+
+#[test]
+fn no_comment_of_a_shader_has_two_spaces_in_a_row_or_a_link_of_rust() {
+    let mut n_comments = 0;
+    for (file, text) in shaders() {
+        for comment in text.lines().filter_map(|line| line.split_once("//")).map(|(_, comment)| comment) {
+            let is_plain = !["  ", "[`", "](", "\\[", "crate::"].iter().any(|mark| comment.contains(mark));
+            assert!(is_plain, "{file}: {comment}");
+            n_comments += 1;
+        }
+    }
+    assert!(400 < n_comments, "{n_comments}");
+}
+
+/// Declarations of variables without an initial value in the loops of a shader's code.
+fn without_value_in_loops(code: &str) -> Vec<String> {
+    let is_bare = |statement: &str| statement.starts_with("var") && !statement.contains('=');
+    let mut found = Vec::new();
+    // For each open brace whether it is a loop's.
+    let mut loops: Vec<bool> = Vec::new();
+    let (mut statement, mut depth) = (String::new(), 0);
+    for letter in code.chars() {
+        depth += i32::from(letter == '(') - i32::from(letter == ')');
+        let ends = depth == 0 && [';', '{', '}'].contains(&letter);
+        if !ends {
+            statement.push(letter);
+            continue;
+        }
+        let head = statement.trim();
+        let is_loop = letter == '{' && ["for", "while", "loop"].iter().any(|word| head.starts_with(word));
+        // In the head of a loop the first statement is a declaration.
+        let declared = if is_loop { head.split(['(', ';']).nth(1).unwrap_or_default() } else { head };
+        if is_bare(declared.trim()) && (is_loop || loops.contains(&true)) {
+            found.push(declared.to_owned());
+        }
+        match letter {
+            '{' => loops.push(is_loop),
+            '}' => drop(loops.pop()),
+            _ => {}
+        }
+        statement.clear();
+    }
+    assert!(loops.is_empty() && depth == 0, "a brace is not closed");
+    found
+}
+
+#[test]
+fn in_a_loop_every_variable_has_an_initial_value_since_one_compiler_clears_it_only_once() {
+    let mut n_loops = 0;
+    for (file, text) in shaders() {
+        let code = code(&text);
+        n_loops += ["for (", "while ", "loop {"].iter().map(|word| code.matches(word).count()).sum::<usize>();
+        assert_eq!(without_value_in_loops(&code), Vec::<String>::new(), "{file}");
+    }
+    assert!(15 < n_loops, "{n_loops}");
+    let bad = "fn f() { var a: u32; for (var n: u32; n < 2u; n++) { if b { var c: array<u32, 2>; } var d = 0u; } while a { var e: u32; } }";
+    assert_eq!(without_value_in_loops(bad), ["var n: u32", "var c: array<u32, 2>", "var e: u32"]);
 }
 
 #[cfg(feature = "gpu")]
