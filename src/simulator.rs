@@ -1,5 +1,8 @@
 //! Many trucks, many steps, on the engine that the caller chooses: the only module that knows both.
 
+mod check; // what a caller asks of a batch
+mod state; // the rows that a batch goes on from
+
 use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,6 +14,8 @@ pub use crate::engine::{Autoreset, Batch, Error, RouteChoice, Tally};
 use crate::layout::{BEGINS, BeginRow, Column, HAS_ROUTE, HAS_START, IS_FIRST, Start, Stream};
 use crate::stages::{N_STAGES, Stage};
 use crate::world::World;
+use check::{check_known, check_routes, check_start};
+use state::check_state;
 
 /// What steps a batch.
 #[derive(Debug, Clone, Default)]
@@ -208,7 +213,11 @@ impl Simulator {
     }
 
     /// Goes on from the bytes of every column that [`Batch::columns`] gave: with the same world, engine, seed and
-    /// routes every later step is the same bit for bit. Wrong columns leave the batch as it was.
+    /// routes every later step is the same bit for bit.
+    ///
+    /// Fails where a column is missing or of another size, and for the first value that no truck of this world can
+    /// have: an index or a code outside its table, a number outside its range or none, by column, truck and field. The
+    /// batch is then as it was, so what a file holds can be given unchecked.
     pub fn restore<'a>(&mut self, bytes_of: impl Fn(Column) -> Option<&'a [u8]>) -> Result<(), Error> {
         let mut batch = self.batch().blank()?;
         let n_envs = batch.n_envs();
@@ -218,7 +227,7 @@ impl Simulator {
             let error = || Error::ColumnSize { column: column.name(), found: found.map(<[u8]>::len), n_envs, n_bytes: bytes.len() };
             bytes.copy_from_slice(fitting.ok_or_else(error)?);
         }
-        check_indices(&self.world, &batch)?;
+        check_state(&self.world, &batch)?;
         self.batch.replace(batch)
     }
 
@@ -256,61 +265,4 @@ impl Simulator {
     pub fn wait(&self) -> Result<(), Error> {
         self.batch.wait()
     }
-}
-
-/// An error if the routes do not fit the world or the number of trucks.
-fn check_routes(world: &World, n_envs: usize, choice: &RouteChoice) -> Result<(), Error> {
-    let routes = choice.routes();
-    if n_envs == 0 {
-        return Err(Error::EmptyBatch);
-    }
-    if routes.is_empty() {
-        return Err(Error::NoRoutes);
-    }
-    check_known(world, routes)?;
-    if matches!(choice, RouteChoice::Fixed(_)) && routes.len() != n_envs {
-        return Err(Error::RouteCount { n_routes: routes.len(), n_envs });
-    }
-    Ok(())
-}
-
-/// An error if the start lies beyond the benchmark's largest errors, or its vehicle is not in the world.
-fn check_start(world: &World, env: usize, start: &Start) -> Result<(), Error> {
-    let n_vehicles = world.rigs.len();
-    if n_vehicles <= start.vehicle as usize {
-        return Err(Error::UnknownVehicle { vehicle: start.vehicle, n_vehicles });
-    }
-    let outside = [start.offset, start.heading, start.speed].into_iter().find(|fraction| !(-1.0..=1.0).contains(fraction));
-    outside.map_or(Ok(()), |fraction| Err(Error::UnknownStart { env, fraction: fraction.to_string() }))
-}
-
-/// An error if the world does not have one of the routes.
-fn check_known(world: &World, routes: &[u32]) -> Result<(), Error> {
-    let n_routes = world.routes.len();
-    let unknown = routes.iter().find(|&&route| n_routes <= route as usize);
-    unknown.map_or(Ok(()), |&route| Err(Error::UnknownRoute { route, n_routes }))
-}
-
-/// An error if a truck's route, vehicle, waypoint or action is not in the world: stages use them as indices without a
-/// check.
-fn check_indices(world: &World, batch: &Batch) -> Result<(), Error> {
-    if let Some((env, &found)) = batch.action.iter().enumerate().find(|&(_, &action)| world.params.n_actions <= action) {
-        let limit = format!("actions 0..{}", world.params.n_actions);
-        return Err(Error::OutsideWorld { column: Column::Action.name(), env, found, limit });
-    }
-    for (env, (truck, progress)) in batch.truck.iter().zip(&batch.progress).enumerate() {
-        let Some(route) = world.routes.get(truck.route as usize) else {
-            let limit = format!("routes 0..{}", world.routes.len());
-            return Err(Error::OutsideWorld { column: Column::Truck.name(), env, found: truck.route, limit });
-        };
-        if world.rigs.len() <= truck.vehicle as usize {
-            let limit = format!("vehicles 0..{}", world.rigs.len());
-            return Err(Error::OutsideWorld { column: Column::Truck.name(), env, found: truck.vehicle, limit });
-        }
-        if route.n_waypoints < progress.waypoint {
-            let limit = format!("{} waypoints on its route", route.n_waypoints);
-            return Err(Error::OutsideWorld { column: Column::Progress.name(), env, found: progress.waypoint, limit });
-        }
-    }
-    Ok(())
 }

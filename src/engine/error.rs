@@ -130,6 +130,16 @@ pub enum Error {
         /// What the world has.
         limit: String,
     },
+    /// A stored value that no truck of this world can have.
+    #[error("{place}: {found}; must lie in {expected}")]
+    ImpossibleValue {
+        /// Column, truck and field: `truck[3].speed`.
+        place: String,
+        /// The value found there.
+        found: String,
+        /// The range that it must lie in.
+        expected: String,
+    },
     /// The device.
     #[cfg(feature = "gpu")]
     #[error(transparent)]

@@ -38,6 +38,7 @@ mod sense;
 mod shaders;
 mod shipped;
 mod speeds;
+mod states;
 
 /// A benchmark of the repository, read and baked.
 fn benchmark(name: &str) -> (Scenario, World) {

@@ -1,0 +1,150 @@
+//! The rows that a batch goes on from, checked: every number is one that a truck of this world can have, so that whatever
+//! is computed from it is finite.
+
+use std::f32::consts::TAU;
+use std::fmt::Debug;
+use std::ops::RangeInclusive;
+
+use crate::engine::{Batch, Error};
+use crate::layout::{Column, Control, Ended, Params, Progress, RewardTerms, Truck};
+use crate::world::World;
+
+/// Largest magnitude of a rate, an acceleration and the like, where nothing narrower is known: stages compute with it
+/// safely, and no truck comes near it.
+const MOST: f32 = 1e6;
+/// Largest magnitude of a speed [m/s]: a target is at most 100.
+const FASTEST: f32 = 1e3;
+/// Largest distance of a truck from the next waypoint in each direction \[m]. It has strayed long before.
+const FAR: f32 = 1e4;
+/// Largest steer angle that an action may ask for \[rad]: locks are at most 1.5.
+const STEEPEST: f32 = 1.6;
+/// An observed value's largest magnitude: 1, with room for the rounding of either engine.
+const OBSERVED: f32 = 1.001;
+
+/// An error for the first value that no truck of this world can have.
+pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
+    check_indices(world, batch)?;
+    for env in 0..batch.n_envs() {
+        let (truck, progress) = (&batch.truck[env], &batch.progress[env]);
+        let n_waypoints = world.routes[truck.route as usize].n_waypoints;
+        check_control(env, &batch.control[env])?;
+        check_truck(world, env, truck, progress)?;
+        let clearance = &batch.clearance[env];
+        within(Column::Clearance, env, ".tractor", clearance.tractor, -MOST..=MOST)?;
+        within(Column::Clearance, env, ".trailer", clearance.trailer, -MOST..=MOST)?;
+        within(Column::Progress, env, ".lane_distance", progress.lane_distance, 0.0..=MOST)?;
+        within(Column::Progress, env, ".waypoint_distance", progress.waypoint_distance, 0.0..=MOST)?;
+        within(Column::Progress, env, ".passed", progress.passed, 0..=n_waypoints)?;
+        all_within(Column::Ranges, env, &batch.ranges[env], 0.0..=world.params.sensor_range)?;
+        let observed = [
+            (Column::Observation, &batch.observation[env][..]),
+            (Column::NextObservation, &batch.next_observation[env]),
+            (Column::Extras, &batch.extras[env]),
+            (Column::NextExtras, &batch.next_extras[env]),
+        ];
+        observed.into_iter().try_for_each(|(column, values)| all_within(column, env, values, -OBSERVED..=OBSERVED))?;
+        within(Column::Ended, env, "", batch.ended[env], 0..=Ended::ALL.len() as u32 - 1)?;
+        check_terms(env, &batch.terms[env], n_waypoints)?;
+        let most = largest_reward(&world.params, n_waypoints);
+        within(Column::Reward, env, "", batch.reward[env], -most..=most)?;
+    }
+    Ok(())
+}
+
+fn check_control(env: usize, control: &Control) -> Result<(), Error> {
+    let Control { steering, acceleration, speed_error_integral, steering_before, steering_earlier, target_speed, holds } = *control;
+    for (field, value, most) in [
+        (".steering", steering, STEEPEST),
+        (".acceleration", acceleration, MOST),
+        (".speed_error_integral", speed_error_integral, MOST),
+        (".steering_before", steering_before, STEEPEST),
+        (".steering_earlier", steering_earlier, STEEPEST),
+        (".target_speed", target_speed, FASTEST),
+    ] {
+        within(Column::Control, env, field, value, -most..=most)?;
+    }
+    within(Column::Control, env, ".holds", holds, 0..=1)
+}
+
+fn check_truck(world: &World, env: usize, truck: &Truck, progress: &Progress) -> Result<(), Error> {
+    let waypoints = world.route_waypoints(truck.route);
+    let next = waypoints[(progress.waypoint as usize).min(waypoints.len() - 1)].position;
+    // A truck steers up to its lock, but for the rounding of a sum.
+    let lock = world.rig(truck).steer_max * OBSERVED;
+    for (field, value, range) in [
+        (".position[0]", truck.position.x, next.x - FAR..=next.x + FAR),
+        (".position[1]", truck.position.y, next.y - FAR..=next.y + FAR),
+        (".heading", truck.heading, -TAU..=TAU),
+        (".trailer_heading", truck.trailer_heading, -TAU..=TAU),
+        (".speed", truck.speed, -FASTEST..=FASTEST),
+        (".steering", truck.steering, -lock..=lock),
+        (".tractor_roll", truck.tractor_roll, -MOST..=MOST),
+        (".tractor_roll_rate", truck.tractor_roll_rate, -MOST..=MOST),
+        (".trailer_roll", truck.trailer_roll, -MOST..=MOST),
+        (".trailer_roll_rate", truck.trailer_roll_rate, -MOST..=MOST),
+        (".tractor_load_transfer_ratio", truck.tractor_load_transfer_ratio, -MOST..=MOST),
+        (".trailer_load_transfer_ratio", truck.trailer_load_transfer_ratio, -MOST..=MOST),
+        (".acceleration", truck.acceleration, -MOST..=MOST),
+        (".curvature_lag", truck.curvature_lag, -MOST..=MOST),
+        (".lateral_acceleration", truck.lateral_acceleration, -MOST..=MOST),
+    ] {
+        within(Column::Truck, env, field, value, range)?;
+    }
+    // The next ones can be counted.
+    within(Column::Truck, env, ".episode", truck.episode, 0..=u32::MAX - 1)?;
+    within(Column::Truck, env, ".steps", truck.steps, 0..=u32::MAX - 1)?;
+    within(Column::Truck, env, ".held", truck.held, 0..=1)
+}
+
+fn check_terms(env: usize, terms: &RewardTerms, n_waypoints: u32) -> Result<(), Error> {
+    let RewardTerms { waypoints, lane_distance, clearance, failure } = *terms;
+    within(Column::Terms, env, ".waypoints", waypoints, 0.0..=n_waypoints as f32)?;
+    let fractions = [(".lane_distance", lane_distance), (".clearance", clearance), (".failure", failure)];
+    fractions.into_iter().try_for_each(|(field, value)| within(Column::Terms, env, field, value, 0.0..=1.0))
+}
+
+/// Most that a step's reward can be, and its negative the least, on a route with so many waypoints.
+fn largest_reward(params: &Params, n_waypoints: u32) -> f32 {
+    let once = params.lane_distance_weight.abs() + params.clearance_weight.abs() + params.failure_weight.abs();
+    (params.waypoint_weight.abs() * n_waypoints as f32 + once) * OBSERVED
+}
+
+fn all_within(column: Column, env: usize, values: &[f32], range: RangeInclusive<f32>) -> Result<(), Error> {
+    match values.iter().position(|value| !range.contains(value)) {
+        Some(index) => within(column, env, &format!("[{index}]"), values[index], range),
+        None => Ok(()),
+    }
+}
+
+/// NaN lies in no range.
+fn within<T: PartialOrd + Debug>(column: Column, env: usize, field: &str, value: T, range: RangeInclusive<T>) -> Result<(), Error> {
+    if range.contains(&value) {
+        return Ok(());
+    }
+    let expected = format!("{:?}..{:?}", range.start(), range.end());
+    Err(Error::ImpossibleValue { place: format!("{}[{env}]{field}", column.name()), found: format!("{value:?}"), expected })
+}
+
+/// An error if a truck's route, vehicle, waypoint or action is not in the world: stages use them as indices without a
+/// check.
+fn check_indices(world: &World, batch: &Batch) -> Result<(), Error> {
+    if let Some((env, &found)) = batch.action.iter().enumerate().find(|&(_, &action)| world.params.n_actions <= action) {
+        let limit = format!("actions 0..{}", world.params.n_actions);
+        return Err(Error::OutsideWorld { column: Column::Action.name(), env, found, limit });
+    }
+    for (env, (truck, progress)) in batch.truck.iter().zip(&batch.progress).enumerate() {
+        let Some(route) = world.routes.get(truck.route as usize) else {
+            let limit = format!("routes 0..{}", world.routes.len());
+            return Err(Error::OutsideWorld { column: Column::Truck.name(), env, found: truck.route, limit });
+        };
+        if world.rigs.len() <= truck.vehicle as usize {
+            let limit = format!("vehicles 0..{}", world.rigs.len());
+            return Err(Error::OutsideWorld { column: Column::Truck.name(), env, found: truck.vehicle, limit });
+        }
+        if route.n_waypoints < progress.waypoint {
+            let limit = format!("{} waypoints on its route", route.n_waypoints);
+            return Err(Error::OutsideWorld { column: Column::Progress.name(), env, found: progress.waypoint, limit });
+        }
+    }
+    Ok(())
+}
