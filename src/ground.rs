@@ -32,7 +32,7 @@ pub enum Kerb {
 }
 
 /// Where the lanes' edges lie.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Edges {
     /// This far from the kerb faces everywhere \[m].
     Beside(f64),
@@ -69,7 +69,7 @@ pub struct Line {
 }
 
 /// A ring with its arms, ready to be driven on.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Ground {
     /// Whether the road itself has left-hand traffic: all that follows is its mirror image in the x axis.
     pub mirrored: bool,

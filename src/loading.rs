@@ -1,4 +1,4 @@
-//! How work on many roads is done: what is kept of it for the next time, and who is told how far it is.
+//! How work on many roads is done: what is kept of it for the next time, who is told how far it is, and who may stop it.
 //!
 //! A [`Cache`] keeps results by their content: an entry holds the whole input that it was computed from, so a stale or
 //! a damaged one is never used. Without a cache everything is computed anew, with the same result.
@@ -31,11 +31,32 @@ pub struct Loading<'a> {
     pub cache: Option<&'a Cache>,
     /// Who is told of progress.
     pub watcher: &'a Watcher<'a>,
+    /// Set by the caller to stop the work at its next road: it then ends with [`Stopped`].
+    pub stop: &'a AtomicBool,
 }
 
+/// The caller stopped the work on many roads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("stopped before all roads were done")]
+pub struct Stopped;
+
+impl From<Stopped> for crate::reader::Error {
+    fn from(_: Stopped) -> crate::reader::Error {
+        crate::reader::Error::Stopped
+    }
+}
+
+/// Nobody sets it.
+static NEVER: AtomicBool = AtomicBool::new(false);
+
 impl Loading<'_> {
-    /// Nothing is kept and nobody is told.
-    pub const PLAIN: Loading<'static> = Loading { cache: None, watcher: &|_| {} };
+    /// Nothing is kept, nobody is told, and nobody stops the work.
+    pub const PLAIN: Loading<'static> = Loading { cache: None, watcher: &|_| {}, stop: &NEVER };
+
+    /// An error once the caller has stopped the work.
+    pub(crate) fn check(&self) -> Result<(), Stopped> {
+        if self.stop.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }
+    }
 
     /// Counts a road of `total` as done and tells the watcher.
     pub(crate) fn count(&self, what: &'static str, done: &AtomicU64, total: usize) {

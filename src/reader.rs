@@ -73,6 +73,9 @@ pub enum Error {
         /// What would do.
         expected: String,
     },
+    /// The caller stopped the reading of many roads, see [`crate::loading::Loading::stop`].
+    #[error("stopped before all roads were read")]
+    Stopped,
 }
 
 /// Maximum size of a scenario, vehicle or roundabout file: a hundred times the largest shipped one \[bytes].

@@ -65,7 +65,7 @@ pub(crate) enum Stage {
 }
 
 /// A checked roundabout.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Roundabout {
     /// The file's stem, `20m`.
     pub name: String,

@@ -71,7 +71,7 @@ impl Split {
 }
 
 /// A roundabout of a benchmark, with the routes that the benchmark uses.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Place {
     /// The roundabout.
     pub roundabout: Roundabout,
@@ -80,7 +80,9 @@ pub struct Place {
 }
 
 /// A benchmark: roundabouts, routes and their split, vehicle, actions, reward. SI units and radians.
-#[derive(Debug, Clone)]
+///
+/// Equal scenarios give equal worlds.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// The file's stem.
     pub name: String,
@@ -193,7 +195,7 @@ impl Scenario {
     ///
     /// # Errors
     ///
-    /// Those of [`Scenario::find`].
+    /// Those of [`Scenario::find`], and [`Error::Stopped`].
     pub fn load(name_or_path: &str, loading: &Loading) -> Result<Scenario, Error> {
         Scenario::from_source(&Source::find(Kind::Benchmark, name_or_path)?, loading)
     }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::field::Field;
 use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, Rig, RouteRow, Truck, WaypointRow};
-use crate::loading::Loading;
+use crate::loading::{Loading, Stopped};
 use crate::profile::Profile;
 use crate::route::{Route, Waypoint};
 use crate::scenario::{Class, Clock, Entry, Invalid, Place, Scenario};
@@ -49,20 +49,34 @@ pub struct World {
     pub step_limits: Vec<u32>,
 }
 
+/// Why there is no world.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// No truck could be stepped in the scenario.
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
+    /// The caller stopped the baking, see [`Loading::stop`].
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+}
+
 impl World {
     /// Computes everything that does not change while trucks drive.
     ///
     /// Fails on a scenario that was changed after it was read so that no truck could be stepped.
     pub fn bake(scenario: &Scenario) -> Result<World, Invalid> {
-        World::bake_with(scenario, &Loading::PLAIN)
+        World::bake_with(scenario, &Loading::PLAIN).map_err(|error| match error {
+            Error::Invalid(invalid) => invalid,
+            Error::Stopped(_) => unreachable!("nobody stops a plain loading"),
+        })
     }
 
     /// The same, with fields from a cache and a watcher who is told of each roundabout. All cores work at it.
     ///
     /// # Errors
     ///
-    /// Those of [`World::bake`].
-    pub fn bake_with(scenario: &Scenario, loading: &Loading) -> Result<World, Invalid> {
+    /// Those of [`World::bake`], and [`Error::Stopped`].
+    pub fn bake_with(scenario: &Scenario, loading: &Loading) -> Result<World, Error> {
         scenario.check()?;
         let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
         let (rigs, rays) = rigs(scenario, substep);
@@ -86,7 +100,7 @@ impl World {
         let classes = scenario.classes();
         let [slowest, fastest] = scenario.speed_range();
         let [start_least, start_most] = scenario.start_speed.unwrap_or([scenario.cruising_speed(); 2]);
-        let step_limits = step_limits(scenario, substep, &waypoints, &routes);
+        let step_limits = step_limits(scenario, substep, &waypoints, &routes, loading)?;
         Ok(World {
             params: Params {
                 substep,
@@ -117,7 +131,7 @@ impl World {
             classes,
             rays,
             actions,
-            fields: fields(scenario, loading),
+            fields: fields(scenario, loading)?,
             waypoints,
             previews,
             routes,
@@ -192,16 +206,17 @@ fn rigs(scenario: &Scenario, substep: f32) -> (Vec<Rig>, Vec<[Ray; N_RAYS]>) {
 }
 
 /// The field of every roundabout.
-fn fields(scenario: &Scenario, loading: &Loading) -> Vec<Field> {
+fn fields(scenario: &Scenario, loading: &Loading) -> Result<Vec<Field>, Stopped> {
     let done = AtomicU64::new(0);
     let field = |place: &Place| {
+        loading.check()?;
         let kerbs = place.roundabout.kerbs(scenario.gutter);
         let field = match loading.cache {
             Some(cache) => Field::cached(&kerbs, scenario.cell, cache),
             None => Field::bake(&kerbs, scenario.cell),
         };
         loading.count("baking roads", &done, scenario.places.len());
-        field
+        Ok(field)
     };
     let fields = scenario.places.par_iter().map(field).collect();
     loading.cache.inspect(|cache| cache.prune());
@@ -210,7 +225,13 @@ fn fields(scenario: &Scenario, loading: &Loading) -> Vec<Field> {
 
 /// Steps after which an episode is timed out, `[n_routes, n_classes]`: multiples of the time that a route takes at the
 /// highest target speed, or of that of the feasible profile of the class as its file has it.
-fn step_limits(scenario: &Scenario, substep: f32, waypoints: &[WaypointRow], routes: &[RouteRow]) -> Vec<u32> {
+fn step_limits(
+    scenario: &Scenario,
+    substep: f32,
+    waypoints: &[WaypointRow],
+    routes: &[RouteRow],
+    loading: &Loading,
+) -> Result<Vec<u32>, Stopped> {
     let steps = |time: f64| (scenario.time_limit * time / scenario.step).ceil() as u32;
     match scenario.clock {
         Clock::HighestSpeed => {
@@ -218,16 +239,17 @@ fn step_limits(scenario: &Scenario, substep: f32, waypoints: &[WaypointRow], rou
             let length = |route: &Route| route.centre_line.length();
             // In this order of operations for as long as there have been benchmarks.
             let limit = |route| (scenario.time_limit * length(route) / (scenario.cruising_speed() * scenario.step)).ceil() as u32;
-            scenario.routes().flat_map(|(_, route)| std::iter::repeat_n(limit(route), n_classes)).collect()
+            Ok(scenario.routes().flat_map(|(_, route)| std::iter::repeat_n(limit(route), n_classes)).collect())
         }
         Clock::Feasible => {
             let rigs = scenario.typical_rigs(substep);
             let fastest = scenario.cruising_speed();
             let of_route = |route: &RouteRow| {
                 let waypoints = &waypoints[route.first as usize..][..route.n_waypoints as usize];
-                rigs.iter().map(|rig| steps(Profile::of(rig, waypoints, fastest).time)).collect::<Vec<u32>>()
+                loading.check()?;
+                Ok(rigs.iter().map(|rig| steps(Profile::of(rig, waypoints, fastest).time)).collect())
             };
-            routes.par_iter().flat_map_iter(of_route).collect()
+            Ok(routes.par_iter().map(of_route).collect::<Result<Vec<Vec<u32>>, Stopped>>()?.concat())
         }
     }
 }

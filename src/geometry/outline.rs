@@ -11,7 +11,7 @@ use super::offset::grown;
 use super::{Curve, Piece};
 
 /// Closed loops that separate the drivable surface from the solid area.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Outline {
     /// The loops, each with the drivable side on its left.
     pub loops: Vec<Curve>,
@@ -20,7 +20,7 @@ pub struct Outline {
 }
 
 /// A piece with precomputed values for its distance.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Placed {
     piece: Piece,
     start: DVec2,
@@ -61,7 +61,7 @@ impl Placed {
 
 /// A stretch of the outline along which y only rises or only falls. Neighbours have bit-identical ends, so that a
 /// horizontal ray through a vertex is counted once.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Rise {
     from: DVec2,
     to: DVec2,

@@ -24,7 +24,7 @@ impl Distribution {
     ///
     /// # Errors
     ///
-    /// Those of [`Distribution::road`].
+    /// Those of [`Distribution::road`], and [`Error::Stopped`].
     pub fn roads(&self, seed: u32, indices: &[u32], loading: &Loading) -> Result<Vec<Road>, Error> {
         let mut chunks: BTreeMap<u32, Known> = indices.iter().map(|&index| (index / CHUNK, Known::new())).collect();
         if let Some(cache) = loading.cache {
@@ -34,6 +34,7 @@ impl Distribution {
         }
         let done = AtomicU64::new(0);
         let road = |&index: &u32| {
+            loading.check()?;
             let road = match chunks.get(&(index / CHUNK)).and_then(|known| known.get(&index)) {
                 Some(&(attempt, refused)) => self.known(seed, index, attempt, refused).map_or_else(|| self.road(seed, index), Ok),
                 None => self.road(seed, index),

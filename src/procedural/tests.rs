@@ -110,7 +110,7 @@ fn a_cache_gives_the_same_roads_and_an_entry_that_is_wrong_is_not_believed() {
     let told = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
     let telling = told.clone();
     let watcher = move |progress: crate::loading::Progress| telling.lock().unwrap().push((progress.done, progress.total));
-    let loading = Loading { cache: Some(&cache), watcher: &watcher };
+    let loading = Loading { cache: Some(&cache), watcher: &watcher, ..Loading::PLAIN };
     let distribution = Distribution::named("wide").unwrap();
     let texts = |indices: &[u32], loading: &Loading| -> Vec<(String, u32, Refused)> {
         distribution.roads(4, indices, loading).unwrap().into_iter().map(|road| (road.text(), road.attempt, road.refused)).collect()

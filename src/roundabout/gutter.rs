@@ -44,7 +44,7 @@ pub(crate) struct WrittenDirection {
 }
 
 /// A width that changes linearly from point to point.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 struct Profile {
     /// Station or angle, rising, and the width there \[m].
     points: Vec<(f64, f64)>,
@@ -68,7 +68,7 @@ impl Profile {
 }
 
 /// The gutters of a roundabout where one width does not do.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Gutters {
     /// Where nothing else is written \[m].
     ring: f64,

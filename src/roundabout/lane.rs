@@ -17,7 +17,7 @@ use crate::reader::{Error, Reader};
 use crate::route::Lane;
 
 /// One end of a route: from an arm's end to the ring, in the world.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 struct Lead {
     /// In the direction of travel: inwards for an entry, outwards for an exit.
     curve: Curve,
@@ -27,7 +27,7 @@ struct Lead {
 }
 
 /// A route from the end of its entry arm to the end of its exit arm.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct RouteLine {
     /// Index of the entry arm.
     pub(super) entry: usize,
@@ -38,7 +38,7 @@ pub(super) struct RouteLine {
 }
 
 /// Every lane of every arm, and the routes that they form.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Lanes {
     /// By arm, then from the kerb.
     entries: Vec<Vec<Lead>>,

@@ -92,7 +92,7 @@ pub(crate) struct WrittenPoint {
 }
 
 /// The alignments of a carriageway.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Carriageway {
     pub(super) kerb: Alignment,
     /// Centre lines of its lanes from the kerb: the right one and, if there are two, the left one.
@@ -106,7 +106,7 @@ impl Carriageway {
     }
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Arm {
     pub(super) name: String,
     /// Counter-clockwise from east \[rad].

@@ -115,6 +115,7 @@ impl Scenario {
         split_of.sort_unstable_by_key(|&(index, _)| index);
         let indices: Vec<u32> = split_of.iter().map(|&(index, _)| index).collect();
         for (road, (_, split)) in procedural.distribution.roads(procedural.seed, &indices, loading)?.into_iter().zip(split_of) {
+            loading.check()?;
             let routes = self.routes_of(reader, &road.roundabout)?;
             self.place(reader, road.roundabout, routes.into_iter().map(|route| (route, Some(split))))?;
         }

@@ -138,7 +138,7 @@ fn a_scenario_from_the_cache_is_the_same_and_progress_is_told() {
     let telling = told.clone();
     let watcher = move |progress: Progress| telling.lock().unwrap().push(progress);
     for _ in 0..2 {
-        let loading = Loading { cache: Some(&cache), watcher: &watcher };
+        let loading = Loading { cache: Some(&cache), watcher: &watcher, ..Loading::PLAIN };
         assert_eq!(format!("{:?}", Scenario::load(path.to_str().unwrap(), &loading).unwrap()), plain);
     }
     assert_eq!(cache.failure(), None);
@@ -208,4 +208,44 @@ fn the_shipped_random_benchmark_trains_on_200_roads_and_reports_100_others() {
     let training = Scenario::named("random2026-training").unwrap();
     assert_eq!(training.split_names(Split::Train), benchmark.split_names(Split::Train));
     assert_eq!(training.routes().count(), training.split(Split::Train).len());
+}
+
+#[test]
+fn work_on_many_roads_that_is_stopped_ends_at_the_next_road() {
+    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = benchmark(folder.path(), ROADS);
+    let (stop, done) = (AtomicBool::new(false), AtomicUsize::new(0));
+    let watcher = |_| {
+        stop.store(true, Ordering::Relaxed);
+        done.fetch_add(1, Ordering::Relaxed);
+    };
+    let loading = Loading { watcher: &watcher, stop: &stop, ..Loading::PLAIN };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let stopped = pool.install(|| Scenario::load(path.to_str().unwrap(), &loading)).unwrap_err();
+    assert_eq!(stopped.to_string(), "stopped before all roads were read");
+    // Each thread ends with the road that it is at.
+    assert!((1..=2).contains(&done.load(Ordering::Relaxed)));
+    let scenario = Scenario::read(&path).unwrap();
+    stop.store(false, Ordering::Relaxed);
+    done.store(0, Ordering::Relaxed);
+    let stopped = pool.install(|| World::bake_with(&scenario, &loading)).unwrap_err();
+    assert_eq!(stopped.to_string(), "stopped before all roads were done");
+    assert!((1..=2).contains(&done.load(Ordering::Relaxed)) && 2 < scenario.places.len());
+}
+
+#[test]
+fn a_scenario_equals_the_same_file_read_again_and_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = benchmark(folder.path(), ROADS);
+    let read = || Scenario::read(&path).unwrap();
+    let first = read();
+    assert!(first == read());
+    let mut changed = read();
+    changed.time_limit += 1e-9;
+    assert!(first != changed);
+    let mut changed = read();
+    changed.keep(&[Split::Train]);
+    assert!(first != changed);
 }

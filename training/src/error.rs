@@ -22,6 +22,9 @@ pub enum Error {
     /// No truck could be stepped in this scenario.
     #[error(transparent)]
     Scenario(#[from] offtrack::scenario::Invalid),
+    /// No world could be baked.
+    #[error(transparent)]
+    World(#[from] offtrack::world::Error),
     /// A batch cannot be made or stepped.
     #[error(transparent)]
     Simulator(#[from] offtrack::simulator::Error),

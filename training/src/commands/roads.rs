@@ -38,7 +38,7 @@ pub fn loading<T>(action: &str, work: impl FnOnce(&Loading) -> T) -> T {
                 bar.set(progress.done, progress.total);
             }
         };
-        work(&Loading { cache: cache.as_ref(), watcher: &watcher })
+        work(&Loading { cache: cache.as_ref(), watcher: &watcher, ..Loading::PLAIN })
     };
     if let Some(failure) = cache.as_ref().and_then(Cache::failure) {
         eprintln!("note: {failure}; the next command computes them again");
