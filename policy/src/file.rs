@@ -8,6 +8,7 @@ use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
+use crate::bounds::overflowing;
 use crate::error::Error;
 use crate::network::{Activation, Layer};
 use crate::normalisation::Normalisation;
@@ -172,13 +173,19 @@ fn checked(name: &str, description: Description, tensors: &[(String, TensorView)
             description.actions.len()
         ));
     }
+    let layers: Vec<Layer> = layers.chunks_exact(2).map(|pair| Layer { weights: floats(&pair[0].1), biases: floats(&pair[1].1) }).collect();
+    if let Some((index, most)) = overflowing(&layers, activation) {
+        return Err(format!(
+            "is a policy that cannot drive: the outputs of actor.{index} may reach {most:.0e}, beyond 32-bit floats; train it again"
+        ));
+    }
     Ok(Policy {
         name: name.to_owned(),
         benchmark: description.benchmark,
         actions: description.actions.iter().map(|&[steering, speed]| Action { steering, speed }).collect(),
         extras: description.extras,
         normalisation: Normalisation { mean: floats(&statistics[0].1), factor: floats(&statistics[1].1) },
-        layers: layers.chunks_exact(2).map(|pair| Layer { weights: floats(&pair[0].1), biases: floats(&pair[1].1) }).collect(),
+        layers,
         activation,
     })
 }

@@ -25,6 +25,7 @@
 //! # }
 //! ```
 
+mod bounds;
 mod error;
 mod file;
 mod network;

@@ -50,8 +50,8 @@ impl Policy {
     ///
     /// # Errors
     ///
-    /// A file that cannot be read; one that is cut, changed or of another format; and one whose shapes do not fit or
-    /// that has a number that is not finite.
+    /// A file that cannot be read; one that is cut, changed or of another format; and one whose shapes do not fit, that
+    /// has a number that is not finite, or numbers so large that its outputs may not be.
     pub fn load(file: &Path) -> Result<Policy, Error> {
         Policy::from_bytes(&file.display().to_string(), &reader::read_bytes(file, FILE_LIMIT)?)
     }
