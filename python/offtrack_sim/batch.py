@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-import operator
+import itertools
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -12,6 +12,17 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
+from .arguments import (
+    check_length,
+    checked_integer,
+    checked_seed,
+    mode_name,
+    names_of,
+    scenario_name,
+    stream_of,
+    text,
+    within,
+)
 from .layout import COLUMNS
 
 Array = npt.NDArray[Any]
@@ -56,12 +67,14 @@ class Batch(_offtrack.Batch):
             of a benchmark file.
         num_envs: Number of trucks.
         split: Routes that episodes are drawn from: ``"train"``, ``"validation"`` or ``"test"``.
-        routes: Names of routes (``"16m/N-left-3"``) or of roundabouts (``"16m"``) of any split, in place of a split.
+        routes: Names of routes (``"16m/N-left-3"``) or of roundabouts (``"16m"``) of any split, in place of a split;
+            and of random roads, as on the command line (``"wide/7/12"``).
         seed: Seed of routes, starts and random actions, ``0..2**32``. Truck ``i`` draws from the stream ``(seed, i)``.
         autoreset: What follows the end of an episode: ``"same_step"``, ``"next_step"``, ``"disabled"``, or Gymnasium's
             ``AutoresetMode``.
         num_threads: Threads that step the trucks; None for one a core. No result depends on it.
         device: ``"cpu"``, ``"gpu"`` for the first graphics device, or a part of a graphics device's name.
+        max_episode_steps: Steps after which an episode is timed out in any case; None for the benchmark's limit alone.
 
     Attributes:
         num_envs: Number of trucks.
@@ -83,6 +96,9 @@ class Batch(_offtrack.Batch):
     The batch begins with the first episode of every truck. One thread at a time may use it; the GIL is released while
     it steps.
 
+    Copies (``copy.copy``, ``copy.deepcopy``) and pickles go on from the batch's state, independent of it: every later
+    step is the same, bit for bit. A pickle names the benchmark, and is refused where that has changed.
+
     Raises:
         ValueError: For an unknown scenario, split, route or mode, and a number out of range; the message names the
             choices. :class:`ScenarioError` for a file that is refused.
@@ -101,30 +117,67 @@ class Batch(_offtrack.Batch):
         autoreset: str | enum.Enum = "same_step",
         num_threads: int | None = None,
         device: str = "cpu",
+        max_episode_steps: int | None = None,
     ) -> Batch:
-        threads = 0 if num_threads is None else _within("num_threads", num_threads, 1, 1025)
+        threads = 0 if num_threads is None else within("num_threads", num_threads, 1, 1025)
+        # Gymnasium's -1 is no limit.
+        limit = None if max_episode_steps in (None, -1) else within("max_episode_steps", max_episode_steps, 1, 2**32)
+        source, names = scenario_name(scenario), None if routes is None else names_of(routes)
         batch = super().__new__(
             cls,
-            scenario_name(scenario),
-            min(_integer("num_envs", num_envs), 2**62),
-            split=split,
-            routes=None if routes is None else _names(routes),
+            source,
+            min(checked_integer("num_envs", num_envs), 2**62),
+            split=text("split", split),
+            routes=names,
             seed=checked_seed(seed),
             autoreset=mode_name(autoreset),
             num_threads=threads,
-            device=device,
+            device=text("device", device),
+            max_episode_steps=limit,
         )
-        names = {"route": batch.route_names}
+        known = {"route": batch.route_names}
         if len(batch.classes) > 1:
-            names["vehicle"], names["load"] = ([pair[i] for pair in batch.classes] for i in (0, 1))
-        batch._names = {key: np.array(values, dtype=object) for key, values in names.items()}
+            known["vehicle"], known["load"] = ([pair[i] for pair in batch.classes] for i in (0, 1))
+        batch._names = {key: np.array(values, dtype=object) for key, values in known.items()}
         batch._rows = batch.vehicle_classes
+        # A relative path is found from another folder too.
+        is_file = source.endswith(".toml") or os.path.isfile(source)
+        batch._arguments = {
+            "scenario": os.path.abspath(source) if is_file else source,
+            "num_envs": batch.num_envs,
+            "split": split,
+            "routes": names,
+            "autoreset": batch.autoreset,
+            "num_threads": num_threads,
+            "device": device,
+            "max_episode_steps": limit,
+        }
         return batch
+
+    def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]:
+        return (), self._arguments
+
+    def __getstate__(self) -> dict[str, Any]:
+        made = ("_names", "_rows", "_arguments")
+        attributes = {name: value for name, value in vars(self).items() if name not in made}
+        return {
+            "state": self.state(),
+            "ended": self.last_ended(),
+            "progress": self.progress(),
+            "attributes": attributes,
+        }
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        self.restore(kept["state"])
+        self.resume(kept["progress"], kept["ended"])
+        vars(self).update(kept["attributes"])
 
     _names: dict[str, Array]
     """Names by key of an info: of each route, and of vehicle and load of each class where there are several."""
     _rows: Ints
     """Index of each vehicle's class."""
+    _arguments: dict[str, Any]
+    """What makes a batch of the same trucks in the same world."""
 
     def step(self, actions: Array) -> tuple[Floats, Floats, Bools, Bools]:
         """One step of every truck: 0.1 s.
@@ -170,12 +223,14 @@ class Batch(_offtrack.Batch):
         """Index in ``vehicle_classes`` of the vehicle that each truck is, ``[num_envs]``."""
         return super().vehicles()
 
-    def named(self, routes: Any, vehicles: Any) -> dict[str, Any]:
+    def named(self, routes: Any, vehicles: Any, numeric: bool = False) -> dict[str, Any]:
         """Names of routes and vehicles by their indices, as infos have them.
 
         ``route``, and where the benchmark has several classes ``vehicle`` and ``load``: arrays of names for arrays of
-        indices, names for single ones.
+        indices, names for single ones. With ``numeric`` the indices themselves: ``route`` and ``vehicle``.
         """
+        if numeric:
+            return {"route": routes, "vehicle": vehicles}
         found = {"route": self._names["route"][routes]}
         if "vehicle" in self._names:
             classes = self._rows[vehicles]
@@ -210,21 +265,36 @@ class Batch(_offtrack.Batch):
         Raises:
             TypeError, ValueError: For what is not as above; the message names it, and no truck has begun.
         """
-        indices = list(range(self.num_envs)) if envs is None else [operator.index(env) for env in envs]
+        indices = list(range(self.num_envs)) if envs is None else self._indices(envs)
         outside = next((env for env in indices if not 0 <= env < self.num_envs), None)
         if outside is not None:
             raise ValueError(f"envs: {outside}; the batch has trucks 0..{self.num_envs}")
-        if seeds is not None:
-            if streams is not None:
-                raise ValueError("seeds, streams: give one of them")
-            streams = [None if seed is None else (seed, 0) for seed in seeds]
+        if seeds is not None and streams is not None:
+            raise ValueError("seeds, streams: give one of them")
+        for name, given in {"seeds": seeds, "streams": streams, "routes": routes, "starts": starts}.items():
+            check_length(name, given, len(indices))
         checked: list[tuple[int, int] | None] | None = None
-        if streams is not None:
+        if seeds is not None:
             checked = [
-                stream and (checked_seed(stream[0]), _within("streams", stream[1], 0, 2**32)) for stream in streams
+                None if seed is None else (within(f"seeds[{index}]", seed, 0, 2**32), 0)
+                for index, seed in enumerate(seeds)
             ]
+        elif streams is not None:
+            checked = [stream_of(f"streams[{index}]", stream) for index, stream in enumerate(streams)]
+        if routes is not None:
+            routes = [None if name is None else text(f"routes[{index}]", name) for index, name in enumerate(routes)]
         stated = None if starts is None else [self._start(index, start) for index, start in enumerate(starts)]
-        self.begin_episodes(indices, checked, None if routes is None else list(routes), stated)
+        self.begin_episodes(indices, checked, routes, stated)
+
+    def _indices(self, envs: Iterable[int]) -> list[int]:
+        """Trucks that a caller names: no more than there are, however long what was given is."""
+        try:
+            given = list(itertools.islice(envs, self.num_envs + 1))
+        except TypeError:
+            raise TypeError(f"envs: {envs!r}; indices of trucks are needed, or None for all") from None
+        if len(given) > self.num_envs:
+            raise ValueError(f"envs: more than {self.num_envs} of them; the batch has as many trucks")
+        return [checked_integer(f"envs[{index}]", env) for index, env in enumerate(given)]
 
     def _start(self, index: int, given: Start | tuple[float, ...] | None) -> tuple[float, float, float, int] | None:
         """A start with the index of its vehicle."""
@@ -242,7 +312,7 @@ class Batch(_offtrack.Batch):
         """Index of a vehicle, which may be given as a class."""
         rows = self._rows
         if not isinstance(given, tuple):
-            return _within(name, given, 0, len(rows))
+            return within(name, given, 0, len(rows))
         found = [index for index, known in enumerate(self.classes) if known == given and (rows == index).any()]
         if not found:
             known = ", ".join(str(self.classes[index]) for index in np.unique(rows))
@@ -255,7 +325,7 @@ class Batch(_offtrack.Batch):
         ``batch.columns("truck")["truck"]["speed"]`` is every truck's speed [m/s]. From a graphics device only the named
         ones are read.
         """
-        wanted = list(names) or list(COLUMNS)
+        wanted = [text("column", name) for name in names] or list(COLUMNS)
         rows = self.column_bytes(wanted)
         return {
             name: row.view(COLUMNS[name].base).reshape(self.num_envs, *COLUMNS[name].shape)
@@ -270,8 +340,13 @@ class Batch(_offtrack.Batch):
         """Goes on from a state: with the same scenario and routes every later step is the same, bit for bit.
 
         Raises:
-            ValueError: For a state of another batch or with values that cannot be; the batch is left as it was.
+            TypeError: For anything but a mapping of names to arrays.
+            ValueError: For a state of another batch, and for the first value that no truck of this batch can have, by
+                column, truck and field: a steer angle beyond the lock, a number that is not finite. The batch is left
+                as it was.
         """
+        if not isinstance(state, Mapping):
+            raise TypeError(f"state: {type(state).__name__}; what Batch.state() gives is needed")
         missing = [name for name in (*COLUMNS, "stream") if name not in state]
         if missing:
             raise ValueError(
@@ -285,13 +360,17 @@ class Batch(_offtrack.Batch):
                 raise ValueError(f"{name}: {column.dtype} of shape {column.shape}; {needed} is needed")
             columns.append((name, np.ascontiguousarray(column).reshape(-1).view(np.uint8)))
         stream = np.asarray(state["stream"])
-        if stream.shape != (self.num_envs, 2):
-            raise ValueError(f"stream: shape {stream.shape}; {(self.num_envs, 2)} is needed")
-        self.restore_bytes(columns, [(int(seed), int(env)) for seed, env in stream])
+        if stream.shape != (self.num_envs, 2) or stream.dtype.kind not in "iu":
+            needed = f"integers of shape {(self.num_envs, 2)}"
+            raise ValueError(f"stream: {stream.dtype} of shape {stream.shape}; {needed} are needed")
+        outside = stream[(stream < 0) | (stream >= 2**32)] if stream.dtype != np.uint32 else stream[:0]
+        if outside.size:
+            raise ValueError(f"stream: {outside.flat[0]}; must lie in 0..{2**32}")
+        self.restore_bytes(columns, [(seed, env) for seed, env in stream.tolist()])
 
     def render(self, env: int = 0, size: int = 480) -> npt.NDArray[np.uint8]:
         """A picture of a truck on its roundabout from above, RGB ``[size, size, 3]``; size in 64..4096 pixels."""
-        return self.picture(_within("env", env, 0, self.num_envs), _within("size", size, 64, 4097))
+        return self.picture(within("env", env, 0, self.num_envs), within("size", size, 64, 4097))
 
     def tally(self) -> dict[str, float]:
         """Sums since the batch was made: ``env_steps``, ``episodes``, ``reward``, and episodes by why they ended."""
@@ -301,45 +380,3 @@ class Batch(_offtrack.Batch):
         return (
             f"Batch({self.scenario!r}, num_envs={self.num_envs}, autoreset={self.autoreset!r}, device={self.device!r})"
         )
-
-
-def mode_name(mode: str | enum.Enum) -> str:
-    """``"next_step"`` for ``AutoresetMode.NEXT_STEP``, and so on."""
-    return mode.name.lower() if isinstance(mode, enum.Enum) else mode
-
-
-def checked_seed(seed: int) -> int:
-    """The seed, if it lies in ``0..2**32``."""
-    return _within("seed", seed, 0, 2**32)
-
-
-def scenario_name(scenario: str | os.PathLike[str]) -> str:
-    """A benchmark's name or path as text."""
-    try:
-        return os.fspath(scenario)
-    except TypeError:
-        raise TypeError(f"scenario: {scenario!r}; the name of a benchmark or the path of its file is needed") from None
-
-
-def _integer(name: str, value: int) -> int:
-    try:
-        return operator.index(value)
-    except TypeError:
-        raise TypeError(f"{name}: {value!r}; an integer is needed") from None
-
-
-def _within(name: str, value: int, low: int, high: int) -> int:
-    index = _integer(name, value)
-    if not low <= index < high:
-        raise ValueError(f"{name}: {index}; must lie in {low}..{high}")
-    return index
-
-
-def _names(routes: Iterable[str]) -> list[str]:
-    if isinstance(routes, str):
-        return [routes]
-    names = list(routes)
-    wrong = next((name for name in names if not isinstance(name, str)), None)
-    if wrong is not None:
-        raise TypeError(f"routes: {wrong!r}; names of routes or roundabouts are needed")
-    return names

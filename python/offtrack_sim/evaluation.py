@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .arguments import checked_integer, checked_seed
 from .batch import Batch
 from .layout import Ended
 from .policy import Policy
@@ -103,8 +104,11 @@ def evaluate(
         ValueError: As :class:`offtrack_sim.Batch` says, and for a policy with another action table or other extras
             than the benchmark's.
     """
-    if episodes < 1:
+    if not callable(policy) and not isinstance(policy, Policy):
+        raise TypeError(f"policy: {policy!r}; a Policy, or a function from observations to actions, is needed")
+    if checked_integer("episodes", episodes) < 1:
         raise ValueError(f"episodes: {episodes}; must be at least 1")
+    checked_seed(seed)
     names = Batch(scenario, 1, split=split, routes=routes).split_routes
     batch = Batch(scenario, len(names) * episodes, split=split, routes=routes, autoreset="same_step", device=device)
     if isinstance(policy, Policy):

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
+from .arguments import file_name, scenario_name
 from .batch import Floats
 
 #: A normalised observation is clamped to this, see docs/policies.md.
@@ -54,7 +55,8 @@ def save(
 
     Raises:
         TypeError: For a model or layer that a policy file cannot hold; the message names it.
-        ValueError: For sizes that do not fit the benchmark, a mean without a variance, a ``VecNormalize`` that clips
+        ValueError: For sizes that do not fit each other or the benchmark, numbers so large that outputs may not be
+            finite, a mean without a variance, a ``VecNormalize`` that clips
             elsewhere than at 10, and numbers that are not finite.
         OSError: Where the file cannot be written.
     """
@@ -72,13 +74,13 @@ def save(
         if not (spread > 0).all():
             raise ValueError("variance: every value plus epsilon must be greater than 0")
         normalisation = _vector("mean", mean), _vector("variance", 1 / np.sqrt(spread))
-    _offtrack.write_policy(os.fspath(file), os.fspath(scenario), layers, activation, normalisation)
+    _offtrack.write_policy(file_name(file), scenario_name(scenario), layers, activation, normalisation)
 
 
 def _layers(model: Any) -> tuple[Layers, str]:
     """The layers of any model that is known, and the activation between them."""
     if isinstance(model, list):
-        return [(_array(weights), _array(biases)) for weights, biases in model], "relu"
+        return [_given(index, layer) for index, layer in enumerate(model)], "relu"
     if _is("Sequential", model):
         return _of_modules(list(_flat(model)))
     policy = getattr(model, "policy", None)
@@ -102,6 +104,18 @@ def _layers(model: Any) -> tuple[Layers, str]:
             )
         return _of_modules([*_flat(policy.mlp_extractor.policy_net), policy.action_net])
     raise TypeError(f"model: {_kind(model)}; of Stable-Baselines3 only PPO, A2C and DQN can be written")
+
+
+def _given(index: int, layer: Any) -> tuple[Floats, Floats]:
+    """A layer of a list."""
+    try:
+        weights, biases = (_array(part) for part in layer)
+    except (TypeError, ValueError):
+        raise TypeError(f"layers[{index}]: {_kind(layer)}; a pair of arrays, weights and biases, is needed") from None
+    if (weights.ndim, biases.ndim) != (2, 1):
+        needed = "[inputs, outputs] and [outputs] are needed"
+        raise ValueError(f"layers[{index}]: shapes {weights.shape} and {biases.shape}; {needed}")
+    return weights, biases
 
 
 def _check_extractor(extractor: Any) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
+from .arguments import file_name
 
 if TYPE_CHECKING:
     from .batch import Batch
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
 class Policy:
     """A network that chooses an action for an observation; :meth:`shipped` and :meth:`load` make one.
 
-    Policy files are written by ``offtrack train`` and by :mod:`offtrack_sim.export`.
+    Policy files are written by ``offtrack train`` and by :mod:`offtrack_sim.export`. Copies and pickles drive as it
+    does: a task of Ray or another process may take one.
     """
 
     def __init__(self, network: _offtrack.Network) -> None:
@@ -32,6 +34,8 @@ class Policy:
         Raises:
             ValueError: Where there is none; the message names those there are.
         """
+        if not isinstance(name, str):
+            raise TypeError(f"name: {name!r}; the name of a policy is needed")
         return Policy(_offtrack.Network.shipped(name))
 
     @staticmethod
@@ -39,10 +43,10 @@ class Policy:
         """The policy of a file.
 
         Raises:
-            ValueError: For a file that cannot be read, is damaged or has another shape; the message names file and
-                fault.
+            ValueError: For a file that cannot be read, is damaged, has another shape, or has numbers so large that its
+                logits may not be finite; the message names file and fault.
         """
-        return Policy(_offtrack.Network.load(os.fspath(file)))
+        return Policy(_offtrack.Network.load(file_name(file)))
 
     @property
     def name(self) -> str:
@@ -81,9 +85,11 @@ class Policy:
         """The most probable action for each observation: ``[n, n_values]`` gives ``[n]``, ``[n_values]`` a number.
 
         Raises:
-            ValueError: For another number of values than 69 and one for each of ``extras``; the message names them.
+            TypeError: For what is no array of numbers.
+            ValueError: For another number of values than 69 and one for each of ``extras``, and for one that is not
+                finite; the message names them.
         """
-        rows = np.ascontiguousarray(observations, dtype=np.float32)
+        rows = _rows(observations)
         if rows.ndim == 1:
             return self._network.act(rows[None])[0]  # type: ignore[no-any-return]
         return self._network.act(rows)
@@ -96,7 +102,16 @@ class Policy:
         Raises:
             ValueError: As for :meth:`act`.
         """
-        return self._network.logits(np.ascontiguousarray(observations, dtype=np.float32))
+        return self._network.logits(_rows(observations))
 
     def __repr__(self) -> str:
         return f"Policy({self.name!r})"
+
+
+def _rows(observations: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+    """Observations as the network takes them."""
+    try:
+        return np.ascontiguousarray(observations, dtype=np.float32)
+    except (TypeError, ValueError):
+        kind = type(observations).__name__
+        raise TypeError(f"observations: {kind}; an array of numbers, [n, n_values], is needed") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Iterable
 from typing import Any
@@ -11,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 import pufferlib
 
-from .batch import Batch, Bools, Floats, checked_seed
+from .arguments import checked_seed
+from .batch import Batch, Bools, Floats
 from .layout import Ended
 from .single import observation_space
 
@@ -73,6 +75,10 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
         self._returns = np.zeros(num_envs)
         self._lengths = np.zeros(num_envs, np.int64)
         super().__init__(buf)
+
+    def __copy__(self) -> RoundaboutPuffer:
+        # A step of a copy that shared the batch would move this one's trucks.
+        return copy.deepcopy(self)
 
     def reset(self, seed: int | None = None) -> tuple[Floats, list[dict[str, list[float]]]]:
         """Begins an episode of every truck; truck ``i`` draws from ``(seed, i)``, or goes on with its own stream."""

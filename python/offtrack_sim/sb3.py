@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import warnings
 from collections.abc import Iterable, Sequence
@@ -12,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 from stable_baselines3.common.vec_env import VecEnv
 
-from .batch import Batch, Bools, Floats, checked_seed
+from .arguments import checked_seed
+from .batch import Batch, Bools, Floats
 from .layout import Ended
 from .single import check_render_mode, checked_options, observation_space
 
@@ -69,6 +71,10 @@ class RoundaboutVecEnv(VecEnv):
         self._streams: list[tuple[int, int] | None] = [(seed, env) for env in range(num_envs)]
         space = observation_space(len(self.batch.extras))
         super().__init__(num_envs, space, gymnasium.spaces.Discrete(len(self.batch.action_table)))
+
+    def __copy__(self) -> RoundaboutVecEnv:
+        # A step of a copy that shared the batch would move this one's trucks.
+        return copy.deepcopy(self)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Gives truck ``i`` the seed ``seed + i`` at the next reset, as an environment of one truck has with it."""

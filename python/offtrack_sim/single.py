@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import operator
 import os
 from collections.abc import Iterable
@@ -11,7 +12,8 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from .batch import Batch, checked_seed
+from .arguments import checked_seed
+from .batch import Batch
 from .layout import EXTRAS, OBSERVATION, Ended
 
 
@@ -40,6 +42,10 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
         routes: Names of routes or roundabouts in place of a split.
         render_mode: None, or ``"rgb_array"`` for pictures of ``render_size`` pixels a side.
         device: ``"cpu"``, ``"gpu"`` or part of an adapter's name.
+        numeric_infos: Whether infos have indices in place of names, ``route`` in ``batch.route_names`` and ``vehicle``
+            in ``batch.vehicle_classes``, as ``gymnasium.wrappers.NumpyToTorch`` needs them.
+
+    Copies (``copy.copy``, ``copy.deepcopy``) and pickles go on from the environment's state, independent of it.
 
     ``reset(seed=s)`` begins the first episode of the stream ``(s, 0)``, and each later ``reset()`` the next one.
     ``reset(options={"route": name, "start": Start(...)})`` states the route or the start (:class:`offtrack_sim.Start`)
@@ -57,6 +63,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
         render_mode: str | None = None,
         render_size: int = 480,
         device: str = "cpu",
+        numeric_infos: bool = False,
     ) -> None:
         check_render_mode(render_mode)
         self.batch = Batch(scenario, 1, split=split, routes=routes, autoreset="disabled", num_threads=1, device=device)
@@ -66,8 +73,13 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
         self.metadata = {**self.metadata, "render_fps": frames_per_second(self.batch)}
         self.render_mode = render_mode
         self.render_size = render_size
+        self.numeric_infos = numeric_infos
         self._has_stream = False
         self._needs_reset = True
+
+    def __copy__(self) -> Roundabout:
+        # A step of a copy that shared the batch would move this one's truck.
+        return copy.deepcopy(self)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -86,7 +98,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
         )
         self._has_stream = True
         self._needs_reset = False
-        return self.batch.observation()[0], self.batch.named(self.batch.routes()[0], self.batch.vehicles()[0])
+        return self.batch.observation()[0], self._named(self.batch.routes()[0], self.batch.vehicles()[0])
 
     def step(self, action: np.int64) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         if self._needs_reset:
@@ -104,8 +116,13 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
             self._needs_reset = True
             code = Ended(int(ended.codes[0]))
             info = {"ended": int(code), "is_success": code == Ended.ARRIVED}
-            info |= self.batch.named(ended.routes[0], ended.vehicles[0])
+            info |= self._named(ended.routes[0], ended.vehicles[0])
         return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
+
+    def _named(self, route: np.int64, vehicle: np.int64) -> dict[str, Any]:
+        if self.numeric_infos:
+            return self.batch.named(int(route), int(vehicle), numeric=True)
+        return self.batch.named(route, vehicle)
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """A picture from above, uint8 ``[render_size, render_size, 3]``; None without a render mode."""
@@ -127,6 +144,8 @@ def frames_per_second(batch: Batch) -> int:
 
 def checked_options(options: dict[str, Any] | None, *known: str) -> dict[str, Any]:
     """The options of a reset, if all are known."""
+    if not isinstance(options, (dict, type(None))):
+        raise TypeError(f"options: {options!r}; a dict is needed, or None")
     unknown = [name for name in options or {} if name not in known]
     if unknown:
         raise ValueError(f"options: {unknown[0]!r}; must be one of {', '.join(known)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy as copies
 import os
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,8 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from .batch import Batch, checked_seed, mode_name
+from .arguments import checked_seed, mode_name
+from .batch import Batch
 from .single import check_render_mode, checked_options, frames_per_second, observation_space
 
 if TYPE_CHECKING:
@@ -39,7 +41,9 @@ class RoundaboutVector(Base):
     - Infos have the form of Gymnasium's ``SyncVectorEnv``: an array ``key`` and a mask ``_key`` for ``route`` where an
       episode began and for ``ended``, ``is_success`` and ``route`` where one ended, and nothing where neither did. With
       ``SAME_STEP`` those of the end are in ``final_info``, and ``final_obs`` has the last observations. Where the
-      benchmark has several vehicles or loads, ``vehicle`` and ``load`` stand beside ``route``.
+      benchmark has several vehicles or loads, ``vehicle`` and ``load`` stand beside ``route``. With ``numeric_infos``
+      all of them are arrays of numbers.
+    - Copies (``copy.copy``, ``copy.deepcopy``) and pickles go on from the state, independent of this environment.
 
     With the same seeds every value is that of ``SyncVectorEnv`` with as many :class:`offtrack_sim.Roundabout`.
     """
@@ -60,6 +64,8 @@ class RoundaboutVector(Base):
         device: str = "cpu",
         render_mode: str | None = None,
         render_size: int = 480,
+        numeric_infos: bool = False,
+        max_episode_steps: int | None = None,
     ) -> None:
         if not HAS_MODES:
             message = (
@@ -79,8 +85,9 @@ class RoundaboutVector(Base):
             autoreset=mode,
             num_threads=num_threads,
             device=device,
+            max_episode_steps=max_episode_steps,
         )
-        self.num_envs = num_envs
+        self.num_envs = num_envs = self.batch.num_envs
         self.single_observation_space = observation_space(len(self.batch.extras))
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.single_action_space = gymnasium.spaces.Discrete(len(self.batch.action_table))
@@ -90,12 +97,17 @@ class RoundaboutVector(Base):
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode, "render_fps": fps}
         self.render_mode = render_mode
         self.render_size = render_size
+        self.numeric_infos = numeric_infos
         self._outputs = None if copy else _outputs(num_envs, self.batch.n_values)
         self._seed = seed
         self._is_next_step, self._is_same_step = mode == "next_step", mode == "same_step"
         self._has_begun = False
         # Trucks that wait for their next episode.
         self._has_ended = np.zeros(num_envs, dtype=np.bool_)
+
+    def __copy__(self) -> RoundaboutVector:
+        # A step of a copy that shared the batch would move this one's trucks.
+        return copies.deepcopy(self)
 
     def reset(
         self,
@@ -121,9 +133,12 @@ class RoundaboutVector(Base):
         streams: list[tuple[int, int] | None]
         if seed is None:
             streams = [None if self._has_begun else (self._seed, env) for env in envs]
-        elif isinstance(seed, (int, np.integer)):
-            streams = [(checked_seed(int(seed)), env) for env in envs]
+        elif not isinstance(seed, Sequence | np.ndarray):
+            whole = checked_seed(seed)
+            streams = [(whole, env) for env in envs]
         else:
+            if isinstance(seed, str):
+                raise TypeError(f"seed: {seed!r}; an integer is needed, or one a truck")
             if len(seed) != self.num_envs:
                 raise ValueError(f"seed: {len(seed)} seeds for {self.num_envs} trucks; one each is needed")
             streams = [None if (given := seed[env]) is None else (checked_seed(given), 0) for env in envs]
@@ -157,7 +172,7 @@ class RoundaboutVector(Base):
         else:
             observation, reward, terminated, truncated = self._outputs
             self.batch.step_into(actions, observation, reward, terminated, truncated)
-        infos = self.batch.end_infos() or {}
+        infos = self.batch.end_infos(self.numeric_infos) or {}
         if self._is_next_step and self._has_ended.any():
             # These have begun another episode in this step.
             self._put_begun(infos, self._has_ended)
@@ -183,10 +198,11 @@ class RoundaboutVector(Base):
 
     def _put_begun(self, infos: dict[str, Any], begun: npt.NDArray[np.bool_]) -> None:
         """Adds the names of what trucks have begun with to what infos has of others."""
-        for key, names in self.batch.named(self.batch.routes()[begun], self.batch.vehicles()[begun]).items():
+        routes, vehicles = self.batch.routes()[begun], self.batch.vehicles()[begun]
+        for key, names in self.batch.named(routes, vehicles, self.numeric_infos).items():
             if key not in infos:
-                # An empty array of objects holds None.
-                infos[key] = np.empty(self.num_envs, dtype=object)
+                # An array of None where it is one of objects.
+                infos[key] = np.full(self.num_envs, 0 if self.numeric_infos else None, dtype=names.dtype)
             infos[key][begun] = names
             infos[f"_{key}"] = begun | infos.get(f"_{key}", False)
 
@@ -204,6 +220,8 @@ def make_vec(
     device: str = "cpu",
     render_mode: str | None = None,
     render_size: int = 480,
+    numeric_infos: bool = False,
+    max_episode_steps: int | None = None,
 ) -> RoundaboutVector:
     """Many trucks as a vector environment of Gymnasium (1.1 or later).
 
@@ -221,6 +239,10 @@ def make_vec(
         num_threads: Threads that step the trucks; None for one a core. No result depends on it.
         device: ``"cpu"``, ``"gpu"`` for the first graphics device, or a part of a graphics device's name.
         render_mode: None, or ``"rgb_array"`` for a picture of every truck, ``render_size`` pixels a side.
+        numeric_infos: Whether infos hold arrays of numbers alone, as ``gymnasium.wrappers.vector.NumpyToTorch`` needs
+            them: ``route`` is the index in ``batch.route_names``, ``vehicle`` that in ``batch.vehicle_classes``, 0
+            where there is none, and ``final_obs`` is float32 ``[num_envs, n_values]``.
+        max_episode_steps: Steps after which an episode is truncated in any case; None for the benchmark's limit alone.
 
     Raises:
         ValueError, MemoryError, RuntimeError: As :class:`offtrack_sim.Batch` says.
@@ -238,6 +260,8 @@ def make_vec(
         device=device,
         render_mode=render_mode,
         render_size=render_size,
+        numeric_infos=numeric_infos,
+        max_episode_steps=max_episode_steps,
     )
 
 
@@ -270,6 +294,8 @@ def _chosen(name: str, values: Sequence[Any] | None, envs: list[int], num_envs: 
     """The values of these trucks."""
     if values is None:
         return None
+    if not hasattr(values, "__len__"):
+        raise TypeError(f"options[{name!r}]: {values!r}; a sequence is needed, one a truck")
     if isinstance(values, str) or len(values) != num_envs:
         n = 1 if isinstance(values, str) else len(values)
         raise ValueError(f"options[{name!r}]: {n} of them; {num_envs} are needed, one a truck")

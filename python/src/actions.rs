@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use numpy::{Element, PyReadonlyArray1};
+use numpy::{Element, PyReadonlyArray1, PyUntypedArrayMethods};
 use offtrack::layout::Action;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -15,39 +15,47 @@ use pyo3::prelude::*;
 /// outside the table.
 pub fn of_array(actions: &Bound<PyAny>, n_envs: usize, table: &[Action]) -> PyResult<Vec<u32>> {
     let limit = table.len() as u32;
-    let given = of_type::<i64>(actions, limit)
-        .or_else(|| of_type::<i32>(actions, limit))
-        .or_else(|| of_type::<u32>(actions, limit))
-        .or_else(|| of_type::<u8>(actions, limit))
-        .or_else(|| of_type::<u64>(actions, limit))
-        .or_else(|| of_type::<i16>(actions, limit))
-        .or_else(|| of_type::<u16>(actions, limit))
-        .or_else(|| of_type::<i8>(actions, limit));
-    let Some(given) = given else {
-        return Err(PyTypeError::new_err(format!(
-            "actions: {}; a numpy array of integers of shape ({n_envs},) is needed",
-            described(actions)
-        )));
-    };
-    let known = given?;
-    if known.len() != n_envs {
-        return Err(PyValueError::new_err(format!("actions: {} of them; {n_envs} are needed, one a truck", known.len())));
-    }
-    Ok(known)
+    let of = Of { n_envs, limit };
+    let given = of
+        .numbers::<i64>(actions)
+        .or_else(|| of.numbers::<i32>(actions))
+        .or_else(|| of.numbers::<u32>(actions))
+        .or_else(|| of.numbers::<u8>(actions))
+        .or_else(|| of.numbers::<u64>(actions))
+        .or_else(|| of.numbers::<i16>(actions))
+        .or_else(|| of.numbers::<u16>(actions))
+        .or_else(|| of.numbers::<i8>(actions));
+    given.unwrap_or_else(|| {
+        let needed = format!("a numpy array of integers of shape ({n_envs},) is needed");
+        Err(PyTypeError::new_err(format!("actions: {}; {needed}", described(actions))))
+    })
 }
 
-/// The actions of an array of this type of numbers, None for any other array.
-fn of_type<T>(actions: &Bound<PyAny>, limit: u32) -> Option<PyResult<Vec<u32>>>
-where
-    T: Element + Copy + Display,
-    u32: TryFrom<T>,
-{
-    let array = actions.extract::<PyReadonlyArray1<T>>().ok()?;
-    let known = |(env, &action): (usize, &T)| match u32::try_from(action) {
-        Ok(index) if index < limit => Ok(index),
-        _ => Err(PyValueError::new_err(format!("actions[{env}]: {action}; must lie in 0..{limit}"))),
-    };
-    Some(array.as_array().iter().enumerate().map(known).collect())
+/// What actions must be.
+struct Of {
+    n_envs: usize,
+    limit: u32,
+}
+
+impl Of {
+    /// The actions of an array of this type of numbers, None for any other array.
+    fn numbers<T>(&self, actions: &Bound<PyAny>) -> Option<PyResult<Vec<u32>>>
+    where
+        T: Element + Copy + Display,
+        u32: TryFrom<T>,
+    {
+        let &Of { n_envs, limit } = self;
+        let array = actions.extract::<PyReadonlyArray1<T>>().ok()?;
+        // Before anything is copied: a broadcast array may be longer than any memory.
+        if array.len() != n_envs {
+            return Some(Err(PyValueError::new_err(format!("actions: {} of them; {n_envs} are needed, one a truck", array.len()))));
+        }
+        let known = |(env, &action): (usize, &T)| match u32::try_from(action) {
+            Ok(index) if index < limit => Ok(index),
+            _ => Err(PyValueError::new_err(format!("actions[{env}]: {action}; must lie in 0..{limit}"))),
+        };
+        Some(array.as_array().iter().enumerate().map(known).collect())
+    }
 }
 
 /// Type of a value, of an array its numbers and shape too.

@@ -1,26 +1,30 @@
 //! A batch of trucks: the simulator as Python sees it.
 
 mod arguments;
+mod requests;
 mod state;
+mod stored;
 
-use std::borrow::Cow;
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray2, PyUntypedArrayMethods};
-use offtrack::layout::{Column, Ended, N_RAYS, N_VALUES, Start, Stream, Truck};
-use offtrack::simulator::{Autoreset, Begin, RouteChoice, Simulator};
+use offtrack::layout::{Column, Ended, N_RAYS, N_VALUES, Truck};
+use offtrack::simulator::{Autoreset, RouteChoice, Simulator, Tally};
 use offtrack_drawing::camera::{Camera, Shown};
 use pyo3::exceptions::{PyIndexError, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::infos::{self, End, Names};
+use crate::infos::{End, Infos, Names};
 use crate::observed::{self, Read, rows_of};
 use crate::pool::Pool;
-use crate::worlds::Place;
+use crate::worlds::{Asked, Place};
 use crate::{actions, errors};
-use arguments::{autoreset_of, column_of, engine_of, name_of, unfit, writable};
+use arguments::{autoreset_of, engine_of, name_of, unfit, writable};
+use errors::guarded;
+use requests::GivenStart;
 use state::State;
+use stored::GivenEnds;
 
 /// Observation, reward, terminated, truncated of a step.
 type Step<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<bool>>);
@@ -28,8 +32,6 @@ type Step<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<f32>>, Bound<'p
 type Indices<'py> = Bound<'py, PyArray1<i64>>;
 /// Trucks whose episode ended, why, on which route, their last observations, and which vehicle they were.
 type Ends<'py> = (Indices<'py>, Indices<'py>, Indices<'py>, Bound<'py, PyArray2<f32>>, Indices<'py>);
-/// Offset, heading error and speed of a start as fractions, and the index of its vehicle.
-type GivenStart = (f32, f32, f32, u32);
 
 /// Many trucks in one world, stepped together.
 ///
@@ -51,7 +53,7 @@ pub struct Batch {
 #[pymethods]
 impl Batch {
     #[new]
-    #[pyo3(signature = (scenario, num_envs, *, split, routes, seed, autoreset, num_threads, device))]
+    #[pyo3(signature = (scenario, num_envs, *, split, routes, seed, autoreset, num_threads, device, max_episode_steps))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(
         py: Python,
@@ -63,28 +65,10 @@ impl Batch {
         autoreset: &str,
         num_threads: usize,
         device: &str,
+        max_episode_steps: Option<u32>,
     ) -> PyResult<Batch> {
-        let n_envs = match usize::try_from(num_envs) {
-            Ok(n_envs) if 0 < n_envs => n_envs,
-            _ => return Err(PyValueError::new_err(format!("num_envs: {num_envs}; must be at least 1"))),
-        };
-        if u32::try_from(n_envs).is_err() {
-            return Err(PyMemoryError::new_err(format!("num_envs: {num_envs}; a batch holds fewer than 2^32 trucks")));
-        }
-        let autoreset = autoreset_of(autoreset)?;
-        let mut pool = Pool::new(num_threads);
-        let place = pool.run(py, || Place::find(scenario, split, routes.as_deref()))??;
-        let (engine, device) = engine_of(device)?;
-        let choice = RouteChoice::Drawn(place.routes.clone());
-        let world = place.world.clone();
-        let made = pool.run(py, || Simulator::on(engine, world, n_envs, seed, choice))?;
-        let mut simulator = made.map_err(|error| errors::of_simulator(&error))?;
-        simulator.set_autoreset(autoreset);
-        let mut state = State { simulator, pool, camera: None, episodes: Vec::new(), held: Vec::new(), ends: Vec::new() };
-        state.look()?;
-        let n_extras = place.world.params.n_extras as usize;
-        let (names, read) = (Names::new(py, &place.world), observed::columns_of_step(autoreset, n_extras));
-        Ok(Batch { place, names, n_envs, n_extras, read, device, autoreset, state: Mutex::new(state) })
+        let asked = Asked { scenario, split, routes: routes.as_deref(), max_episode_steps };
+        guarded(|| Batch::made(py, &asked, num_envs, seed, autoreset, num_threads, device))
     }
 
     #[getter]
@@ -166,29 +150,33 @@ impl Batch {
     }
 
     fn observation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let mut state = self.state()?;
-        state.check_process(&self.device)?;
-        let State { simulator, pool, .. } = &mut *state;
-        let columns = observed::columns_of_observation(self.n_extras);
-        let read = Read::of(simulator, columns).map_err(|error| errors::of_simulator(&error))?;
-        let observation = if self.n_extras == 0 {
-            PyArray1::from_slice(py, &read.rows::<f32>(Column::Observation))
-        } else {
-            PyArray1::from_vec(py, pool.run(py, || read.observed(self.n_extras).to_vec())?)
-        };
-        observation.reshape([self.n_envs, self.n_values()])
+        guarded(|| {
+            let mut state = self.state()?;
+            state.check_process(&self.device)?;
+            let State { simulator, pool, .. } = &mut *state;
+            let columns = observed::columns_of_observation(self.n_extras);
+            let read = Read::of(simulator, columns).map_err(|error| errors::of_simulator(&error))?;
+            let observation = if self.n_extras == 0 {
+                PyArray1::from_slice(py, &read.rows::<f32>(Column::Observation))
+            } else {
+                PyArray1::from_vec(py, pool.run(py, || read.observed(self.n_extras).to_vec())?)
+            };
+            observation.reshape([self.n_envs, self.n_values()])
+        })
     }
 
     fn step<'py>(&self, py: Python<'py>, actions: &Bound<'py, PyAny>) -> PyResult<Step<'py>> {
-        let actions = actions::of_array(actions, self.n_envs, &self.place.world.actions)?;
-        let mut state = self.state()?;
-        let (observation, reward, terminated, truncated) = state.step(py, self, &actions, |observation, reward, codes| {
-            let flags = |is: fn(Ended) -> bool| -> Vec<bool> { codes.iter().map(|&code| holds(code, is)).collect() };
-            (observation.to_vec(), reward.to_vec(), flags(Ended::terminated), flags(Ended::truncated))
-        })?;
-        let vector = |flags| PyArray1::from_vec(py, flags);
-        let observation = PyArray1::from_vec(py, observation).reshape([self.n_envs, self.n_values()])?;
-        Ok((observation, PyArray1::from_vec(py, reward), vector(terminated), vector(truncated)))
+        guarded(|| {
+            let actions = actions::of_array(actions, self.n_envs, &self.place.world.actions)?;
+            let mut state = self.state()?;
+            let (observation, reward, terminated, truncated) = state.step(py, self, &actions, |observation, reward, codes| {
+                let flags = |is: fn(Ended) -> bool| -> Vec<bool> { codes.iter().map(|&code| holds(code, is)).collect() };
+                (observation.to_vec(), reward.to_vec(), flags(Ended::terminated), flags(Ended::truncated))
+            })?;
+            let vector = |flags| PyArray1::from_vec(py, flags);
+            let observation = PyArray1::from_vec(py, observation).reshape([self.n_envs, self.n_values()])?;
+            Ok((observation, PyArray1::from_vec(py, reward), vector(terminated), vector(truncated)))
+        })
     }
 
     fn step_into(
@@ -200,67 +188,77 @@ impl Batch {
         terminated: &Bound<PyAny>,
         truncated: &Bound<PyAny>,
     ) -> PyResult<()> {
-        let actions = actions::of_array(actions, self.n_envs, &self.place.world.actions)?;
-        let (n_envs, n_values) = (self.n_envs, self.n_values());
-        let shape = format!("float32 of shape ({n_envs}, {n_values})");
-        let mut observation: PyReadwriteArray2<f32> = observation.extract().map_err(|_| unfit("observation", &shape))?;
-        if observation.shape() != [n_envs, n_values] {
-            return Err(unfit("observation", &shape));
-        }
-        let observation = observation.as_slice_mut().map_err(|_| unfit("observation", &shape))?;
-        let mut reward = writable::<f32>(reward, "reward", "float32", n_envs)?;
-        let mut terminated = writable::<bool>(terminated, "terminated", "bool", n_envs)?;
-        let mut truncated = writable::<bool>(truncated, "truncated", "bool", n_envs)?;
-        let mut state = self.state()?;
-        let contiguous = |_| unfit("an output", "contiguous");
-        let reward = reward.as_slice_mut().map_err(contiguous)?;
-        let terminated = terminated.as_slice_mut().map_err(contiguous)?;
-        let truncated = truncated.as_slice_mut().map_err(contiguous)?;
-        state.step(py, self, &actions, |new_observation, new_reward, codes| {
-            new_observation.write(observation);
-            reward.copy_from_slice(new_reward);
-            for ((terminated, truncated), &code) in terminated.iter_mut().zip(truncated).zip(codes) {
-                *terminated = holds(code, Ended::terminated);
-                *truncated = holds(code, Ended::truncated);
+        guarded(|| {
+            let actions = actions::of_array(actions, self.n_envs, &self.place.world.actions)?;
+            let (n_envs, n_values) = (self.n_envs, self.n_values());
+            let shape = format!("float32 of shape ({n_envs}, {n_values})");
+            let mut observation: PyReadwriteArray2<f32> = observation.extract().map_err(|_| unfit("observation", &shape))?;
+            if observation.shape() != [n_envs, n_values] {
+                return Err(unfit("observation", &shape));
             }
+            let observation = observation.as_slice_mut().map_err(|_| unfit("observation", &shape))?;
+            let mut reward = writable::<f32>(reward, "reward", "float32", n_envs)?;
+            let mut terminated = writable::<bool>(terminated, "terminated", "bool", n_envs)?;
+            let mut truncated = writable::<bool>(truncated, "truncated", "bool", n_envs)?;
+            let mut state = self.state()?;
+            let contiguous = |_| unfit("an output", "contiguous");
+            let reward = reward.as_slice_mut().map_err(contiguous)?;
+            let terminated = terminated.as_slice_mut().map_err(contiguous)?;
+            let truncated = truncated.as_slice_mut().map_err(contiguous)?;
+            state.step(py, self, &actions, |new_observation, new_reward, codes| {
+                new_observation.write(observation);
+                reward.copy_from_slice(new_reward);
+                for ((terminated, truncated), &code) in terminated.iter_mut().zip(truncated).zip(codes) {
+                    *terminated = holds(code, Ended::terminated);
+                    *truncated = holds(code, Ended::truncated);
+                }
+            })
         })
     }
 
     fn step_at_random(&self, py: Python) -> PyResult<()> {
-        let mut state = self.state()?;
-        state.check_process(&self.device)?;
-        let State { simulator, pool, .. } = &mut *state;
-        pool.run(py, || {
-            simulator.step_at_random();
-            simulator.wait()
-        })?
-        .map_err(|error| errors::of_simulator(&error))?;
-        state.look()
+        guarded(|| {
+            let mut state = self.state()?;
+            state.check_process(&self.device)?;
+            let State { simulator, pool, .. } = &mut *state;
+            pool.run(py, || {
+                simulator.step_at_random();
+                simulator.wait()
+            })?
+            .map_err(|error| errors::of_simulator(&error))?;
+            state.look()
+        })
     }
 
     fn last_ended<'py>(&self, py: Python<'py>) -> PyResult<Option<Ends<'py>>> {
-        let state = self.state()?;
-        if state.ends.is_empty() {
-            return Ok(None);
-        }
-        let of = |value: fn(&End) -> i64| PyArray1::from_iter(py, state.ends.iter().map(value));
-        let observations: Vec<f32> = state.ends.iter().flat_map(|end| &end.observation[..self.n_values()]).copied().collect();
-        Ok(Some((
-            of(|end| end.env as i64),
-            of(|end| end.code.into()),
-            of(|end| end.episode.route.into()),
-            PyArray1::from_vec(py, observations).reshape([state.ends.len(), self.n_values()])?,
-            of(|end| end.episode.vehicle.into()),
-        )))
+        guarded(|| {
+            let state = self.state()?;
+            if state.ends.is_empty() {
+                return Ok(None);
+            }
+            let of = |value: fn(&End) -> i64| PyArray1::from_iter(py, state.ends.iter().map(value));
+            let observations: Vec<f32> = state.ends.iter().flat_map(|end| &end.observation[..self.n_values()]).copied().collect();
+            Ok(Some((
+                of(|end| end.env as i64),
+                of(|end| end.code.into()),
+                of(|end| end.episode.route.into()),
+                PyArray1::from_vec(py, observations).reshape([state.ends.len(), self.n_values()])?,
+                of(|end| end.episode.vehicle.into()),
+            )))
+        })
     }
 
-    /// The episodes that the last step ended as Gymnasium's infos, None where it ended none.
-    fn end_infos<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let state = self.state()?;
-        if state.ends.is_empty() {
-            return Ok(None);
-        }
-        infos::of_ends(py, &self.names, &state.ends, &state.episodes, self.autoreset, self.n_values()).map(Some)
+    /// The episodes that the last step ended as Gymnasium's infos, None where it ended none; with `numeric` arrays of
+    /// numbers alone.
+    fn end_infos<'py>(&self, py: Python<'py>, numeric: bool) -> PyResult<Option<Bound<'py, PyDict>>> {
+        guarded(|| {
+            let state = self.state()?;
+            if state.ends.is_empty() {
+                return Ok(None);
+            }
+            let infos = Infos { names: (!numeric).then_some(&self.names), is_same_step: self.autoreset == Autoreset::SameStep };
+            infos.of_ends(py, &state.ends, &state.episodes, self.n_values()).map(Some)
+        })
     }
 
     fn begin_episodes(
@@ -271,63 +269,27 @@ impl Batch {
         routes: Option<Vec<Option<String>>>,
         starts: Option<Vec<Option<GivenStart>>>,
     ) -> PyResult<()> {
-        let n = envs.len();
-        let lengths = [streams.as_ref().map(Vec::len), routes.as_ref().map(Vec::len), starts.as_ref().map(Vec::len)];
-        for (name, found) in ["streams", "routes", "starts"].into_iter().zip(lengths) {
-            if found.is_some_and(|found| found != n) {
-                return Err(PyValueError::new_err(format!("{name}: {} of them; {n} are needed, one a truck", found.unwrap_or(0))));
-            }
-        }
-        let request = |(index, &env): (usize, &usize)| {
-            let route = routes.as_ref().and_then(|routes| routes[index].as_deref());
-            Ok(Begin {
-                env,
-                stream: streams.as_ref().and_then(|streams| streams[index]).map(|(seed, env)| Stream { seed, env }),
-                route: route.map(|name| self.route(name)).transpose()?,
-                start: starts.as_ref().and_then(|starts| starts[index]).map(|(offset, heading, speed, vehicle)| Start {
-                    offset,
-                    heading,
-                    speed,
-                    vehicle,
-                }),
-            })
-        };
-        let requests = envs.iter().enumerate().map(request).collect::<PyResult<Vec<Begin>>>()?;
-        let mut state = self.state()?;
-        state.check_process(&self.device)?;
-        let State { simulator, pool, .. } = &mut *state;
-        pool.run(py, || simulator.begin(&requests))?.map_err(|error| errors::of_simulator(&error))?;
-        state.look()
+        guarded(|| self.begin(py, &envs, streams.as_deref(), routes.as_deref(), starts.as_deref()))
     }
 
     /// Columns as bytes, `[num_envs, width]`.
     fn column_bytes<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Vec<Bound<'py, PyArray2<u8>>>> {
-        let columns = names.iter().map(|name| column_of(name)).collect::<PyResult<Vec<Column>>>()?;
-        let state = self.state()?;
-        state.check_process(&self.device)?;
-        let read = state.simulator.read(&columns).map_err(|error| errors::of_simulator(&error))?;
-        let shaped = |bytes: &Cow<[u8]>| PyArray1::from_slice(py, bytes).reshape([self.n_envs, bytes.len() / self.n_envs]);
-        read.iter().map(shaped).collect()
+        guarded(|| self.columns(py, &names))
     }
 
     /// Goes on from the bytes of every column, each `[num_envs * width]`, and from streams, `[num_envs]`.
     fn restore_bytes(&self, py: Python, columns: Vec<(String, PyReadonlyArray1<u8>)>, streams: Vec<(u32, u32)>) -> PyResult<()> {
-        let mut given = Vec::new();
-        for (name, bytes) in &columns {
-            given.push((column_of(name)?, bytes.as_slice().map_err(|_| unfit(name, "contiguous"))?));
-        }
-        let streams: Vec<Stream> = streams.into_iter().map(|(seed, env)| Stream { seed, env }).collect();
-        let mut state = self.state()?;
-        state.check_process(&self.device)?;
-        let State { simulator, pool, .. } = &mut *state;
-        let bytes_of = |column| given.iter().find(|(known, _)| *known == column).map(|(_, bytes)| *bytes);
-        let restored = pool.run(py, || {
-            let before = simulator.streams();
-            simulator.set_streams(&streams)?;
-            simulator.restore(bytes_of).inspect_err(|_| drop(simulator.set_streams(&before)))
-        })?;
-        restored.map_err(|error| errors::of_simulator(&error))?;
-        state.look()
+        guarded(|| self.restore(py, &columns, &streams))
+    }
+
+    /// What `resume` needs beside the columns: a fingerprint of the world, and the sums of the tally.
+    fn progress(&self) -> PyResult<(u32, Vec<i64>)> {
+        guarded(|| Ok((self.place.fingerprint(), self.state()?.tally()?.sums.to_vec())))
+    }
+
+    /// Takes what another batch's `progress` and `last_ended` gave.
+    fn resume(&self, progress: (u32, Vec<i64>), ends: Option<GivenEnds>) -> PyResult<()> {
+        guarded(|| self.take_up(progress, ends))
     }
 
     /// Seed and index that each truck draws from.
@@ -336,7 +298,7 @@ impl Batch {
     }
 
     fn tally<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let tally = self.state()?.simulator.tally().map_err(|error| errors::of_simulator(&error))?;
+        let tally = guarded(|| self.state()?.tally())?;
         let dict = PyDict::new(py);
         dict.set_item("env_steps", tally.env_steps())?;
         dict.set_item("episodes", tally.episodes())?;
@@ -348,31 +310,59 @@ impl Batch {
     }
 
     fn picture<'py>(&self, py: Python<'py>, env: usize, size: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        if self.n_envs <= env {
-            return Err(PyIndexError::new_err(format!("env: {env}; the batch has trucks 0..{}", self.n_envs)));
-        }
-        let mut state = self.state()?;
-        state.check_process(&self.device)?;
-        let State { simulator, camera, .. } = &mut *state;
-        let camera = match camera.take_if(|camera| camera.side() == size) {
-            Some(kept) => camera.insert(kept),
-            None => {
-                let made = Camera::new(self.place.scenario.clone(), &self.place.world, size);
-                camera.insert(made.map_err(|error| PyValueError::new_err(format!("size: {error}")))?)
+        guarded(|| {
+            if self.n_envs <= env {
+                return Err(PyIndexError::new_err(format!("env: {env}; the batch has trucks 0..{}", self.n_envs)));
             }
-        };
-        let read = simulator.read(&[Column::Truck, Column::Ranges, Column::Ended]).map_err(|error| errors::of_simulator(&error))?;
-        let truck = rows_of::<Truck>(&read[0])[env];
-        let ranges = rows_of::<[f32; N_RAYS]>(&read[1])[env];
-        // A truck that goes on in another episode has not ended.
-        let code = if truck.held == 1 { rows_of::<u32>(&read[2])[env] } else { Ended::Running as u32 };
-        let shown = Shown { truck: &truck, ranges: &ranges, ended: Ended::from_code(code).unwrap_or(Ended::Running) };
-        let picture = camera.draw(&shown);
-        PyArray1::from_slice(py, picture).reshape([size as usize, size as usize, 3])
+            let mut state = self.state()?;
+            state.check_process(&self.device)?;
+            let State { simulator, camera, .. } = &mut *state;
+            let camera = match camera.take_if(|camera| camera.side() == size) {
+                Some(kept) => camera.insert(kept),
+                None => {
+                    let made = Camera::new(self.place.scenario.clone(), &self.place.world, size);
+                    camera.insert(made.map_err(|error| PyValueError::new_err(format!("size: {error}")))?)
+                }
+            };
+            let read = simulator.read(&[Column::Truck, Column::Ranges, Column::Ended]).map_err(|error| errors::of_simulator(&error))?;
+            let truck = rows_of::<Truck>(&read[0])[env];
+            let ranges = rows_of::<[f32; N_RAYS]>(&read[1])[env];
+            // A truck that goes on in another episode has not ended.
+            let code = if truck.held == 1 { rows_of::<u32>(&read[2])[env] } else { Ended::Running as u32 };
+            let shown = Shown { truck: &truck, ranges: &ranges, ended: Ended::from_code(code).unwrap_or(Ended::Running) };
+            let picture = camera.draw(&shown);
+            PyArray1::from_slice(py, picture).reshape([size as usize, size as usize, 3])
+        })
     }
 }
 
 impl Batch {
+    /// A batch, with its threads and, where one is named, its device.
+    fn made(py: Python, asked: &Asked, num_envs: i64, seed: u32, autoreset: &str, num_threads: usize, device: &str) -> PyResult<Batch> {
+        let n_envs = match usize::try_from(num_envs) {
+            Ok(n_envs) if 0 < n_envs => n_envs,
+            _ => return Err(PyValueError::new_err(format!("num_envs: {num_envs}; must be at least 1"))),
+        };
+        if u32::try_from(n_envs).is_err() {
+            return Err(PyMemoryError::new_err(format!("num_envs: {num_envs}; a batch holds fewer than 2^32 trucks")));
+        }
+        let autoreset = autoreset_of(autoreset)?;
+        let mut pool = Pool::new(num_threads);
+        let place = pool.run_until_signal(py, |stop| Place::find(asked, stop))??;
+        let (engine, device) = engine_of(device)?;
+        let choice = RouteChoice::Drawn(place.routes.clone());
+        let world = place.world.clone();
+        let made = pool.run(py, || Simulator::on(engine, world, n_envs, seed, choice))?;
+        let mut simulator = made.map_err(|error| errors::of_simulator(&error))?;
+        simulator.set_autoreset(autoreset);
+        let mut state =
+            State { simulator, pool, camera: None, episodes: Vec::new(), held: Vec::new(), ends: Vec::new(), earlier: Tally::default() };
+        state.look()?;
+        let n_extras = place.world.params.n_extras as usize;
+        let (names, read) = (Names::new(py, &place.world), observed::columns_of_step(autoreset, n_extras));
+        Ok(Batch { place, names, n_envs, n_extras, read, device, autoreset, state: Mutex::new(state) })
+    }
+
     /// The state, unless another thread has it.
     fn state(&self) -> PyResult<MutexGuard<'_, State>> {
         match self.state.try_lock() {
@@ -382,16 +372,6 @@ impl Batch {
                 Err(PyRuntimeError::new_err("this batch is in use by another thread; give each thread a batch of its own"))
             }
         }
-    }
-
-    /// Index of a route by its name.
-    fn route(&self, name: &str) -> PyResult<u32> {
-        let names = &self.place.world.route_names;
-        let found = names.iter().position(|known| known == name);
-        found.map(|index| index as u32).ok_or_else(|| {
-            let list = offtrack::reader::shortened(&names.join(", "), 600);
-            PyValueError::new_err(format!("routes: {name:?}; the batch drives {list}"))
-        })
     }
 }
 

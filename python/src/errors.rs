@@ -1,9 +1,11 @@
 //! Errors of Rust as exceptions of Python.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use offtrack::reader;
 use offtrack::simulator::Error;
 use pyo3::create_exception;
-use pyo3::exceptions::{PyMemoryError, PyValueError};
+use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 create_exception!(
@@ -12,6 +14,21 @@ create_exception!(
     PyValueError,
     "A scenario, roundabout or vehicle file that cannot be read or makes no sense: the message names file, key and value."
 );
+
+/// Does `work`. A panic in it is a bug on this side of the border: it becomes a `RuntimeError` with the panic's message,
+/// which a caller's `except Exception` catches, as it does not PyO3's `PanicException`.
+///
+/// Nothing that `work` had changed is looked at afterwards: a batch whose lock it held is poisoned and says so.
+pub fn guarded<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
+        let message = offtrack::reader::shortened(text.unwrap_or("no message"), LONGEST_MESSAGE);
+        Err(PyRuntimeError::new_err(format!("a bug of offtrack_sim: {message}")))
+    })
+}
+
+/// Most characters of a panic's message.
+const LONGEST_MESSAGE: usize = 600;
 
 /// An exception for a file that was refused. A name that is not known is a plain `ValueError`.
 pub fn of_reader(error: &reader::Error) -> PyErr {
@@ -33,7 +50,7 @@ pub fn of_simulator(error: &Error) -> PyErr {
             PyMemoryError::new_err(message)
         }
         #[cfg(feature = "gpu")]
-        Error::Gpu(_) => pyo3::exceptions::PyRuntimeError::new_err(message),
+        Error::Gpu(_) => PyRuntimeError::new_err(message),
         _ => PyValueError::new_err(message),
     }
 }

@@ -1,8 +1,7 @@
 //! Infos of Gymnasium's vector environments: for each key an array of all trucks and a mask `_key`.
 
-use numpy::PyArray1;
+use numpy::{PyArray1, PyArrayMethods};
 use offtrack::layout::{Ended, Truck};
-use offtrack::simulator::Autoreset;
 use offtrack::world::World;
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -87,50 +86,83 @@ impl Names {
     }
 }
 
-/// The infos of the episodes that a step ended. With `autoreset` in the same step those of the end are in `final_info`,
-/// beside the last observations of `n_values` values; `begun` has the episodes that trucks are in after the step.
-pub fn of_ends<'py>(
-    py: Python<'py>,
-    names: &Names,
-    ends: &[End],
-    begun: &[Episode],
-    autoreset: Autoreset,
-    n_values: usize,
-) -> PyResult<Bound<'py, PyDict>> {
-    let n_envs = begun.len();
-    let mut mask = vec![false; n_envs];
-    let mut codes = vec![0i64; n_envs];
-    let mut successes = vec![false; n_envs];
-    for End { env, code, .. } in ends {
-        mask[*env] = true;
-        codes[*env] = i64::from(*code);
-        successes[*env] = *code == Ended::Arrived as u32;
+/// How infos of ended episodes are told.
+pub struct Infos<'a> {
+    /// Names of routes and vehicles; None for their indices, and last observations in one array of numbers.
+    pub names: Option<&'a Names>,
+    /// Whether other episodes have begun in the same step: those of the end are then in `final_info`.
+    pub is_same_step: bool,
+}
+
+impl Infos<'_> {
+    /// The infos of the episodes that a step ended, whose last observations have `n_values` values; `begun` has the
+    /// episodes that trucks are in after the step.
+    pub fn of_ends<'py>(&self, py: Python<'py>, ends: &[End], begun: &[Episode], n_values: usize) -> PyResult<Bound<'py, PyDict>> {
+        let n_envs = begun.len();
+        let mut mask = vec![false; n_envs];
+        let mut codes = vec![0i64; n_envs];
+        let mut successes = vec![false; n_envs];
+        for End { env, code, .. } in ends {
+            mask[*env] = true;
+            codes[*env] = i64::from(*code);
+            successes[*env] = *code == Ended::Arrived as u32;
+        }
+        let mask = PyArray1::from_vec(py, mask);
+        let infos = PyDict::new(py);
+        let put = |infos: &Bound<PyDict>, key: &str, values: Bound<PyAny>| {
+            infos.set_item(key, values)?;
+            infos.set_item(format!("_{key}"), &mask)
+        };
+        put(&infos, "ended", PyArray1::from_vec(py, codes).into_any())?;
+        put(&infos, "is_success", PyArray1::from_vec(py, successes).into_any())?;
+        for (key, array) in self.episodes(py, n_envs, ends.iter().map(|end| (end.env, end.episode)))? {
+            put(&infos, key, array)?;
+        }
+        if !self.is_same_step {
+            return Ok(infos);
+        }
+        let with_final = PyDict::new(py);
+        put(&with_final, "final_obs", self.last_observations(py, n_envs, ends, n_values)?)?;
+        put(&with_final, "final_info", infos.into_any())?;
+        for (key, array) in self.episodes(py, n_envs, ends.iter().map(|end| (end.env, begun[end.env])))? {
+            put(&with_final, key, array)?;
+        }
+        Ok(with_final)
     }
-    let mask = PyArray1::from_vec(py, mask);
-    let infos = PyDict::new(py);
-    let put = |infos: &Bound<PyDict>, key: &str, values: Bound<PyAny>| {
-        infos.set_item(key, values)?;
-        infos.set_item(format!("_{key}"), &mask)
-    };
-    put(&infos, "ended", PyArray1::from_vec(py, codes).into_any())?;
-    put(&infos, "is_success", PyArray1::from_vec(py, successes).into_any())?;
-    for (key, array) in names.arrays(py, n_envs, ends.iter().map(|end| (end.env, end.episode)))? {
-        put(&infos, key, array)?;
+
+    /// What some trucks' episodes were drawn from, of all trucks: names, or indices with 0 for the others.
+    fn episodes<'py>(
+        &self,
+        py: Python<'py>,
+        n_envs: usize,
+        episodes: impl Iterator<Item = (usize, Episode)>,
+    ) -> PyResult<Vec<(&'static str, Bound<'py, PyAny>)>> {
+        if let Some(names) = self.names {
+            return names.arrays(py, n_envs, episodes);
+        }
+        let (mut routes, mut vehicles) = (vec![0i64; n_envs], vec![0i64; n_envs]);
+        for (env, Episode { route, vehicle }) in episodes {
+            (routes[env], vehicles[env]) = (route.into(), vehicle.into());
+        }
+        let array = |values| PyArray1::from_vec(py, values).into_any();
+        Ok(vec![(KEYS[0], array(routes)), (KEYS[1], array(vehicles))])
     }
-    if autoreset != Autoreset::SameStep {
-        return Ok(infos);
+
+    /// The last observations of ended episodes, of all trucks: arrays and None, or rows with zeros for the others.
+    fn last_observations<'py>(&self, py: Python<'py>, n_envs: usize, ends: &[End], n_values: usize) -> PyResult<Bound<'py, PyAny>> {
+        if self.names.is_none() {
+            let mut rows = vec![0.0f32; n_envs * n_values];
+            for End { env, observation, .. } in ends {
+                rows[env * n_values..][..n_values].copy_from_slice(&observation[..n_values]);
+            }
+            return Ok(PyArray1::from_vec(py, rows).reshape([n_envs, n_values])?.into_any());
+        }
+        let last = objects(py, n_envs)?;
+        for End { env, observation, .. } in ends {
+            last.set_item(env, PyArray1::from_slice(py, &observation[..n_values]))?;
+        }
+        Ok(last)
     }
-    let last = objects(py, n_envs)?;
-    for End { env, observation, .. } in ends {
-        last.set_item(env, PyArray1::from_slice(py, &observation[..n_values]))?;
-    }
-    let with_final = PyDict::new(py);
-    put(&with_final, "final_obs", last)?;
-    put(&with_final, "final_info", infos.into_any())?;
-    for (key, array) in names.arrays(py, n_envs, ends.iter().map(|end| (end.env, begun[end.env])))? {
-        put(&with_final, key, array)?;
-    }
-    Ok(with_final)
 }
 
 /// An array of objects: an empty one holds None, and numpy makes it faster than it could be filled here.

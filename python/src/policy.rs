@@ -9,7 +9,9 @@ use offtrack::layout::{N_EXTRAS, N_VALUES};
 use offtrack_policy::{Activation, Error, Layer, Normalisation, Policy};
 use pyo3::exceptions::{PyOSError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
+use crate::errors::guarded;
 use crate::pool::Pool;
 use crate::{observed, worlds};
 
@@ -22,14 +24,25 @@ pub struct Network {
 
 #[pymethods]
 impl Network {
+    /// The policy of a file's bytes, by the name that errors will have.
+    #[new]
+    fn new(name: &str, bytes: &[u8]) -> PyResult<Network> {
+        guarded(|| Policy::from_bytes(name, bytes).map(Network::of).map_err(refused))
+    }
+
+    /// What makes another one, for copies and pickles.
+    fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<(&str, Bound<'py, PyBytes>)> {
+        guarded(|| Ok((self.policy.name.as_str(), PyBytes::new(py, &self.policy.to_bytes()))))
+    }
+
     #[staticmethod]
     fn shipped(name: &str) -> PyResult<Network> {
-        Policy::shipped(name).map(Network::new).map_err(refused)
+        guarded(|| Policy::shipped(name).map(Network::of).map_err(refused))
     }
 
     #[staticmethod]
     fn load(file: &str) -> PyResult<Network> {
-        Policy::load(Path::new(file)).map(Network::new).map_err(refused)
+        guarded(|| Policy::load(Path::new(file)).map(Network::of).map_err(refused))
     }
 
     #[getter]
@@ -55,20 +68,24 @@ impl Network {
     }
 
     fn logits<'py>(&self, py: Python<'py>, observations: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let (values, extras) = self.split(observations)?;
-        let logits = self.run(py, || self.policy.logits_beside(&values, &extras))?;
-        PyArray1::from_vec(py, logits).reshape([values.len(), self.policy.actions.len()])
+        guarded(|| {
+            let (values, extras) = self.split(observations)?;
+            let logits = self.run(py, || self.policy.logits_beside(&values, &extras))?;
+            PyArray1::from_vec(py, logits).reshape([values.len(), self.policy.actions.len()])
+        })
     }
 
     fn act<'py>(&self, py: Python<'py>, observations: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<i64>>> {
-        let (values, extras) = self.split(observations)?;
-        let actions = self.run(py, || self.policy.act_beside(&values, &extras))?;
-        Ok(PyArray1::from_iter(py, actions.into_iter().map(i64::from)))
+        guarded(|| {
+            let (values, extras) = self.split(observations)?;
+            let actions = self.run(py, || self.policy.act_beside(&values, &extras))?;
+            Ok(PyArray1::from_iter(py, actions.into_iter().map(i64::from)))
+        })
     }
 }
 
 impl Network {
-    fn new(policy: Policy) -> Network {
+    fn of(policy: Policy) -> Network {
         Network { policy, pool: Mutex::new(Pool::new(0)) }
     }
 
@@ -92,6 +109,10 @@ impl Network {
             return Err(PyValueError::new_err(format!("observations: {found} values each; {n_values} are needed{extras}")));
         }
         let values = array.as_slice().map_err(|_| needed())?;
+        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+            let (row, column, value) = (at / n_values, at % n_values, values[at]);
+            return Err(PyValueError::new_err(format!("observations[{row}, {column}]: {value}; every value must be finite")));
+        }
         if n_extras == 0 {
             return Ok((values.as_chunks().0.to_vec(), Vec::new()));
         }
@@ -121,51 +142,95 @@ pub fn policy_names() -> Vec<&'static str> {
 /// of each layer, and the observation's mean and factor, none for a network without normalisation.
 #[pyfunction]
 pub fn write_policy(
+    py: Python,
     file: &str,
     scenario: &str,
     layers: Vec<(PyReadonlyArray2<f32>, PyReadonlyArray1<f32>)>,
     activation: &str,
     normalisation: Option<(PyReadonlyArray1<f32>, PyReadonlyArray1<f32>)>,
 ) -> PyResult<()> {
-    let Some(activation) = Activation::ALL.into_iter().find(|known| known.name() == activation) else {
-        let known = Activation::ALL.map(Activation::name).join(", ");
-        return Err(PyValueError::new_err(format!("activation: {activation:?}; must be one of {known}")));
-    };
-    let (name, actions, extras) = worlds::policy_table(scenario)?;
-    let n_values = N_VALUES + extras.len();
-    let vector = |array: &PyReadonlyArray1<f32>| array.as_array().to_vec();
-    let layer = |(weights, biases): &(PyReadonlyArray2<f32>, PyReadonlyArray1<f32>)| Layer {
-        weights: weights.as_array().iter().copied().collect(),
-        biases: vector(biases),
-    };
-    let normalisation = match normalisation {
-        None => Normalisation::none(n_values),
-        Some((mean, factor)) => Normalisation { mean: vector(&mean), factor: vector(&factor) },
-    };
-    // The factor is that of a variance.
-    for (name, found) in [("mean", normalisation.mean.len()), ("variance", normalisation.factor.len())] {
-        if found != n_values {
-            let extras = observed::described(extras.iter().copied());
-            return Err(PyValueError::new_err(format!("{name}: shape ({found},); ({n_values},) is needed{extras}")));
+    guarded(|| {
+        let Some(activation) = Activation::ALL.into_iter().find(|known| known.name() == activation) else {
+            let known = Activation::ALL.map(Activation::name).join(", ");
+            return Err(PyValueError::new_err(format!("activation: {activation:?}; must be one of {known}")));
+        };
+        let (name, actions, extras) = Pool::new(0).run_until_signal(py, |stop| worlds::policy_table(scenario, stop))??;
+        let n_values = N_VALUES + extras.len();
+        check_layers(&layers, n_values)?;
+        let vector = |array: &PyReadonlyArray1<f32>| array.as_array().to_vec();
+        let layer = |(weights, biases): &(PyReadonlyArray2<f32>, PyReadonlyArray1<f32>)| Layer {
+            weights: weights.as_array().iter().copied().collect(),
+            biases: vector(biases),
+        };
+        // The factor is that of a variance.
+        let described = observed::described(extras.iter().copied());
+        for (name, given) in
+            [("mean", normalisation.as_ref().map(|given| &given.0)), ("variance", normalisation.as_ref().map(|given| &given.1))]
+        {
+            if let Some(found) = given.map(|given| given.len()).filter(|&found| found != n_values) {
+                return Err(PyValueError::new_err(format!("{name}: shape ({found},); ({n_values},) is needed{described}")));
+            }
         }
+        let normalisation = match &normalisation {
+            None => Normalisation::none(n_values),
+            Some((mean, factor)) => Normalisation { mean: vector(mean), factor: vector(factor) },
+        };
+        let policy = Policy {
+            name: file.to_owned(),
+            benchmark: name,
+            actions,
+            extras: extras.into_iter().map(str::to_owned).collect(),
+            normalisation,
+            layers: layers.iter().map(layer).collect(),
+            activation,
+        };
+        let bytes = policy.to_bytes();
+        // What is written can be read: sizes that do not fit the benchmark and values that cannot be are found here.
+        Policy::from_bytes(file, &bytes).map_err(refused)?;
+        write(file, &bytes)
+    })
+}
+
+/// An error for layers whose shapes do not fit each other, before any of them is copied.
+fn check_layers(layers: &[(PyReadonlyArray2<f32>, PyReadonlyArray1<f32>)], n_values: usize) -> PyResult<()> {
+    let refused = |message: String| Err(PyValueError::new_err(message));
+    if layers.is_empty() {
+        return refused("layers: none; at least one is needed".to_owned());
     }
-    let policy = Policy {
-        name: file.to_owned(),
-        benchmark: name,
-        actions,
-        extras: extras.into_iter().map(str::to_owned).collect(),
-        normalisation,
-        layers: layers.iter().map(layer).collect(),
-        activation,
-    };
-    let bytes = policy.to_bytes();
-    // What is written can be read: sizes that do not fit each other are found here.
-    Policy::from_bytes(file, &bytes).map_err(refused)?;
+    let (mut n_inputs, mut n_numbers) = (n_values, 0usize);
+    for (index, (weights, biases)) in layers.iter().enumerate() {
+        let (shape, n_outputs) = (weights.shape(), biases.len());
+        if shape[1] != n_outputs {
+            return refused(format!(
+                "layers[{index}]: biases of shape ({n_outputs},) beside weights of shape ({}, {}); ({},) is needed, one an output",
+                shape[0], shape[1], shape[1]
+            ));
+        }
+        if n_outputs == 0 || shape[0] != n_inputs {
+            let last = if index == 0 { "an observation has" } else { "the layer before has" };
+            return refused(format!(
+                "layers[{index}]: weights of shape ({}, {n_outputs}); ({n_inputs}, {n_outputs}) is needed, inputs before outputs: {last} {n_inputs}",
+                shape[0]
+            ));
+        }
+        n_numbers = n_numbers.saturating_add(n_outputs.saturating_mul(n_inputs + 1));
+        if MOST_NUMBERS < n_numbers {
+            return refused(format!("layers: {n_numbers} numbers up to layers[{index}]; a policy file has at most {MOST_NUMBERS}"));
+        }
+        n_inputs = n_outputs;
+    }
+    Ok(())
+}
+
+/// Most weights and biases: those of the largest file that is read.
+const MOST_NUMBERS: usize = (64 << 20) / size_of::<f32>();
+
+/// Writes a file, whole or not at all.
+fn write(file: &str, bytes: &[u8]) -> PyResult<()> {
     let failed = |error: std::io::Error| PyOSError::new_err(format!("{file}: cannot be written: {error}"));
     let folder = Path::new(file).parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    // Whole or not at all.
     let mut part = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
-    part.write_all(&bytes).map_err(failed)?;
+    part.write_all(bytes).map_err(failed)?;
     part.persist(file).map_err(|error| failed(error.error))?;
     Ok(())
 }

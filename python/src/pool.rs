@@ -1,8 +1,16 @@
 //! Threads of a batch. A forked child has none of its parent's: it makes its own.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::RecvTimeoutError;
+use std::sync::{Mutex, PoisonError, mpsc};
+use std::time::Duration;
+
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// How often long work looks whether Ctrl-C was pressed.
+const POLL: Duration = Duration::from_millis(50);
 
 /// A pool of threads, made at its first use in a process.
 #[derive(Debug)]
@@ -24,6 +32,36 @@ impl Pool {
         Ok(py.detach(|| pool.install(work)))
     }
 
+    /// Does `work` that may take long in the same way. Where a signal's handler raises meanwhile, as that of Ctrl-C does,
+    /// `work` finds its argument set and should end soon; then the handler's exception is raised.
+    pub fn run_until_signal<T: Send>(&mut self, py: Python, work: impl FnOnce(&AtomicBool) -> T + Send) -> PyResult<T> {
+        let pool = self.here()?;
+        let stop = AtomicBool::new(false);
+        let (sender, receiver) = mpsc::channel();
+        let receiver = Mutex::new(receiver);
+        let wait = || receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(POLL);
+        pool.in_place_scope(|scope| {
+            let stop = &stop;
+            scope.spawn(move |_| {
+                // The receiver lives as long as the scope.
+                let _ = sender.send(work(stop));
+            });
+            let mut handled = Ok(());
+            loop {
+                match py.detach(wait) {
+                    Ok(done) => return handled.map(|()| done),
+                    Err(RecvTimeoutError::Timeout) if handled.is_err() => {}
+                    Err(RecvTimeoutError::Timeout) => {
+                        handled = py.check_signals();
+                        stop.store(handled.is_err(), Ordering::Relaxed);
+                    }
+                    // `work` has panicked, and so does the scope.
+                    Err(RecvTimeoutError::Disconnected) => return Err(PyRuntimeError::new_err("the work has failed")),
+                }
+            }
+        })
+    }
+
     /// Whether the threads were made by another process, of which this one is a fork.
     pub fn is_forked(&self) -> bool {
         self.made.as_ref().is_some_and(|(process, _)| *process != std::process::id())
@@ -40,10 +78,20 @@ impl Pool {
             Some(made) => self.made.insert(made),
             None => {
                 let pool = ThreadPoolBuilder::new().num_threads(self.n_threads).build();
-                let pool = pool.map_err(|error| PyRuntimeError::new_err(format!("num_threads: {}; {error}", self.n_threads)))?;
+                let pool = pool.map_err(|error| refused(self.n_threads, &error))?;
                 self.made.insert((std::process::id(), pool))
             }
         };
         Ok(pool)
     }
+}
+
+/// The exception where the system does not give so many threads: names what asked for them.
+fn refused(n_threads: usize, error: &rayon::ThreadPoolBuildError) -> PyErr {
+    let asked = match std::env::var("RAYON_NUM_THREADS") {
+        _ if 0 < n_threads => format!("num_threads: {n_threads}"),
+        Ok(number) => format!("RAYON_NUM_THREADS: {}", offtrack::reader::shortened(&number, 100)),
+        Err(_) => "num_threads: None, one a core".to_owned(),
+    };
+    PyRuntimeError::new_err(format!("{asked}; the system does not give so many threads ({error}): ask for fewer"))
 }

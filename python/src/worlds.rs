@@ -1,13 +1,17 @@
 //! Scenarios, read and baked once a process: environments of one scenario share a world.
 
-use std::hash::{DefaultHasher, Hash, Hasher};
-use std::sync::{Arc, Mutex, PoisonError};
+mod routes; // those that are to be driven
 
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
+use std::time::Duration;
+
+use bytemuck::{bytes_of, cast_slice};
 use offtrack::layout::Action;
-use offtrack::loading::{Cache, Loading};
+use offtrack::loading::{Cache, Loading, Stopped};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::shipped::Kind;
-use offtrack::world::World;
+use offtrack::world::{Error, World};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -15,8 +19,8 @@ use crate::errors;
 
 /// Most worlds that are kept for the next batch.
 const KEPT: usize = 8;
-/// Most characters of the list of routes in a message.
-const LONGEST_LIST: usize = 600;
+/// How often a thread looks whether another one has baked its world.
+const POLL: Duration = Duration::from_millis(20);
 
 /// What trucks drive in.
 #[derive(Debug, Clone)]
@@ -27,68 +31,93 @@ pub struct Place {
     pub world: Arc<World>,
     /// Routes to draw from, as indices into the world's.
     pub routes: Vec<u32>,
+    /// Steps after which an episode is timed out in any case, where the caller says so.
+    pub max_episode_steps: Option<u32>,
 }
 
-/// What was baked, by the text and the hash of the scenario.
-static BAKED: Mutex<Vec<((u64, usize), Place)>> = Mutex::new(Vec::new());
+/// What a caller asks for.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked<'a> {
+    /// Name or path of the benchmark.
+    pub scenario: &'a str,
+    /// Name of the split.
+    pub split: &'a str,
+    /// Names of routes, or of roundabouts, in place of a split.
+    pub routes: Option<&'a [String]>,
+    /// Steps after which an episode is timed out if it was not before.
+    pub max_episode_steps: Option<u32>,
+}
+
+/// What was baked last.
+static BAKED: Mutex<Vec<Place>> = Mutex::new(Vec::new());
 
 impl Place {
-    /// A benchmark's split, or the routes of any split that `names` has: each a route, or all routes of a roundabout.
-    pub fn find(scenario: &str, split: &str, names: Option<&[String]>) -> PyResult<Place> {
+    /// The place that is asked for: from those that were baked last, or baked now, unless `stop` is set on the way.
+    pub fn find(asked: &Asked, stop: &AtomicBool) -> PyResult<Place> {
         let cache = Cache::of_user();
-        let loading = Loading { cache: cache.as_ref(), ..Loading::PLAIN };
-        let mut scenario = Scenario::load(scenario, &loading).map_err(|error| errors::of_reader(&error))?;
-        narrow(&mut scenario, split, names)?;
-        let key = key(&scenario);
-        let mut baked = BAKED.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, place)) = baked.iter().find(|(known, _)| *known == key) {
+        let loading = Loading { cache: cache.as_ref(), stop, ..Loading::PLAIN };
+        let mut scenario = Scenario::load(asked.scenario, &loading).map_err(|error| errors::of_reader(&error))?;
+        routes::narrow(&mut scenario, asked.split, asked.routes)?;
+        let limit = asked.max_episode_steps;
+        // Held while a world is baked, so that two threads do not bake the same one.
+        let mut baked = baked(stop).map_err(|stopped| PyValueError::new_err(stopped.to_string()))?;
+        let known = |place: &&Place| place.max_episode_steps == limit && *place.scenario == scenario;
+        if let Some(place) = baked.iter().find(known) {
             return Ok(place.clone());
         }
-        let world = World::bake_with(&scenario, &loading).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let same = |place: &&Place| place.max_episode_steps.is_none() && *place.scenario == scenario;
+        let mut world = match baked.iter().find(same) {
+            Some(place) => (*place.world).clone(),
+            None => World::bake_with(&scenario, &loading).map_err(|error| of_world(&error))?,
+        };
+        if let Some(limit) = limit {
+            // The clock of a world lets so many steps pass, and times out in the next one.
+            world.step_limits.iter_mut().for_each(|steps| *steps = (*steps).min(limit.saturating_sub(1)));
+        }
         let routes = Split::ALL.iter().flat_map(|&split| scenario.split(split)).copied().collect();
-        let place = Place { scenario: Arc::new(scenario), world: Arc::new(world), routes };
+        let place = Place { scenario: Arc::new(scenario), world: Arc::new(world), routes, max_episode_steps: limit };
         if baked.len() == KEPT {
             baked.remove(0);
         }
-        baked.push((key, place.clone()));
+        baked.push(place.clone());
         Ok(place)
     }
-}
 
-/// Leaves the scenario the routes that are to be driven.
-fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) -> PyResult<()> {
-    let Some(names) = names else {
-        let Some(split) = Split::ALL.into_iter().find(|known| known.name() == split) else {
-            let known = Split::ALL.map(Split::name).join(", ");
-            return Err(PyValueError::new_err(format!("split: {split:?}; must be one of {known}")));
-        };
-        if scenario.split(split).is_empty() {
-            let has = Split::ALL.into_iter().filter(|&split| !scenario.split(split).is_empty()).map(Split::name);
-            let has = has.collect::<Vec<_>>().join(", ");
-            return Err(PyValueError::new_err(format!("split: {:?}; {} has no such routes, only {has}", split.name(), scenario.name)));
+    /// CRC-32 of all that trucks drive by: a state goes on in an equal world alone.
+    pub fn fingerprint(&self) -> u32 {
+        let World { params, rigs, classes: _, rays, actions, fields, waypoints, previews, routes, route_names, step_limits } = &*self.world;
+        let mut hasher = crc32fast::Hasher::new();
+        hasher.update(bytes_of(params));
+        hasher.update(cast_slice(rigs));
+        hasher.update(cast_slice(rays));
+        hasher.update(cast_slice(actions));
+        hasher.update(cast_slice(waypoints));
+        hasher.update(cast_slice(previews));
+        hasher.update(cast_slice(routes));
+        hasher.update(cast_slice(step_limits));
+        route_names.iter().for_each(|name| hasher.update(name.as_bytes()));
+        for field in fields {
+            hasher.update(cast_slice(&field.cells));
+            hasher.update(cast_slice(&field.values));
         }
-        scenario.keep(&[split]);
-        return Ok(());
-    };
-    if names.is_empty() {
-        return Err(PyValueError::new_err("routes: empty; name at least one route or roundabout, or give None for a split"));
+        hasher.finalize()
     }
-    let is_of = |route: &str, name: &str| route == name || route.strip_prefix(name).is_some_and(|rest| rest.starts_with('/'));
-    let known: Vec<String> = scenario.routes().map(|(_, route)| route.name.clone()).collect();
-    if let Some(unknown) = names.iter().find(|name| !known.iter().any(|route| is_of(route, name))) {
-        let list = offtrack::reader::shortened(&known.join(", "), LONGEST_LIST);
-        return Err(PyValueError::new_err(format!("routes: {unknown:?}; {} has {list}", scenario.name)));
-    }
-    scenario.retain(|_, route| names.iter().any(|name| is_of(&route.name, name)));
-    Ok(())
 }
 
-/// Equal scenarios have equal keys.
-fn key(scenario: &Scenario) -> (u64, usize) {
-    let text = format!("{scenario:?}");
-    let mut hasher = DefaultHasher::new();
-    text.hash(&mut hasher);
-    (hasher.finish(), text.len())
+/// The places that were baked last, once no other thread bakes.
+fn baked(stop: &AtomicBool) -> Result<MutexGuard<'static, Vec<Place>>, Stopped> {
+    loop {
+        match BAKED.try_lock() {
+            Ok(baked) => return Ok(baked),
+            Err(TryLockError::Poisoned(poisoned)) => return Ok(poisoned.into_inner()),
+            Err(TryLockError::WouldBlock) if stop.load(Ordering::Relaxed) => return Err(Stopped),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(POLL),
+        }
+    }
+}
+
+fn of_world(error: &Error) -> PyErr {
+    PyValueError::new_err(error.to_string())
 }
 
 /// Names of the benchmarks that come with the package.
@@ -98,9 +127,9 @@ pub fn scenario_names() -> Vec<&'static str> {
 }
 
 /// A benchmark's name, its action table, and the names of the extras that it observes.
-pub fn policy_table(scenario: &str) -> PyResult<(String, Vec<Action>, Vec<&'static str>)> {
+pub fn policy_table(scenario: &str, stop: &AtomicBool) -> PyResult<(String, Vec<Action>, Vec<&'static str>)> {
     let cache = Cache::of_user();
-    let loading = Loading { cache: cache.as_ref(), ..Loading::PLAIN };
+    let loading = Loading { cache: cache.as_ref(), stop, ..Loading::PLAIN };
     let scenario = Scenario::load(scenario, &loading).map_err(|error| errors::of_reader(&error))?;
     let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
     let rig = scenario.vehicle.rig(&scenario.load, substep, scenario.steer_max);

@@ -237,7 +237,7 @@ def test_policies_and_benchmarks_of_other_extras_are_told_apart(tmp_path: Path) 
         export.save(file, layers, scenario="laden2026", mean=np.zeros(77), variance=np.ones(69))
     with pytest.raises(ValueError, match=r"mean: shape \(1, 77\); one dimension is needed"):
         export.save(file, layers, scenario="laden2026", mean=np.zeros((1, 77)), variance=np.ones(77))
-    with pytest.raises(ValueError, match=r"actor.0.weight is \[69, 45\]; \[77, 45\] is needed"):
+    with pytest.raises(ValueError, match=r"layers\[0\]: weights of shape \(69, 45\); \(77, 45\) is needed"):
         export.save(file, [(layers[0][0][:69], layers[0][1])], scenario="laden2026")
     assert not file.exists()
     export.save(file, layers, scenario="laden2026")

@@ -1,7 +1,7 @@
 //! What a step of a batch changes, and the step.
 
 use offtrack::layout::{Column, Ended, Truck};
-use offtrack::simulator::{Autoreset, Simulator};
+use offtrack::simulator::{Autoreset, Simulator, Tally};
 use offtrack_drawing::camera::Camera;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -24,6 +24,8 @@ pub(super) struct State {
     pub(super) held: Vec<bool>,
     /// Episodes that the last step ended.
     pub(super) ends: Vec<End>,
+    /// What the batch that this one goes on from had counted.
+    pub(super) earlier: Tally,
 }
 
 impl State {
@@ -49,10 +51,9 @@ impl State {
             let (codes, trucks) = (read.rows::<u32>(Column::Ended), read.rows::<Truck>(Column::Truck));
             let last = read.observed_last(batch.n_extras);
             if batch.autoreset == Autoreset::NextStep {
-                // Those that ended in the step before have begun, and no other is in another episode.
-                for End { env, .. } in &*ends {
-                    episodes[*env] = Episode::of(&trucks[*env]);
-                    held[*env] = false;
+                // Those that were held have begun, and no other is in another episode.
+                for env in (0..trucks.len()).filter(|&env| std::mem::take(&mut held[env])) {
+                    episodes[env] = Episode::of(&trucks[env]);
                 }
             }
             ends.clear();
@@ -64,6 +65,13 @@ impl State {
             Ok(deliver(&read.observed(batch.n_extras), &read.rows(Column::Reward), &codes))
         })?;
         stepped.map_err(|error| errors::of_simulator(&error))
+    }
+
+    /// Sums over all steps, those of the batch that this one goes on from among them.
+    pub(super) fn tally(&self) -> PyResult<Tally> {
+        let mut tally = self.simulator.tally().map_err(|error| errors::of_simulator(&error))?;
+        tally.sums.iter_mut().zip(self.earlier.sums).for_each(|(sum, earlier)| *sum += earlier);
+        Ok(tally)
     }
 
     /// Looks at where trucks are after they were put there.

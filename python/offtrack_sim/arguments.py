@@ -1,0 +1,99 @@
+"""Arguments, checked: each error names the argument, the value and what would do."""
+
+from __future__ import annotations
+
+import enum
+import itertools
+import operator
+import os
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+#: Most names of routes that a batch takes: more than any benchmark has routes.
+MOST_NAMES = 10_000_000
+
+
+def mode_name(mode: str | enum.Enum) -> str:
+    """``"next_step"`` for ``AutoresetMode.NEXT_STEP``, and so on."""
+    return mode.name.lower() if isinstance(mode, enum.Enum) else text("autoreset", mode)
+
+
+def checked_seed(seed: int) -> int:
+    """The seed, if it lies in ``0..2**32``."""
+    return within("seed", seed, 0, 2**32)
+
+
+def file_name(file: str | os.PathLike[str]) -> str:
+    """A file's path as text."""
+    try:
+        return text("file", os.fspath(file))
+    except TypeError:
+        raise TypeError(f"file: {file!r}; the path of a file is needed") from None
+
+
+def scenario_name(scenario: str | os.PathLike[str]) -> str:
+    """A benchmark's name or path as text."""
+    try:
+        return text("scenario", os.fspath(scenario))
+    except TypeError:
+        raise TypeError(f"scenario: {scenario!r}; the name of a benchmark or the path of its file is needed") from None
+
+
+def checked_integer(name: str, value: int) -> int:
+    """The value as an integer, if it is one."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: {value!r}; an integer is needed") from None
+
+
+def within(name: str, value: int, low: int, high: int) -> int:
+    """The value as an integer, if it lies in ``low..high``."""
+    index = checked_integer(name, value)
+    if not low <= index < high:
+        raise ValueError(f"{name}: {index}; must lie in {low}..{high}")
+    return index
+
+
+def names_of(routes: Iterable[str]) -> list[str]:
+    """Names of routes as a list."""
+    if isinstance(routes, str):
+        return [routes]
+    try:
+        names = list(itertools.islice(routes, MOST_NAMES + 1))
+    except TypeError:
+        raise TypeError(f"routes: {routes!r}; names of routes or roundabouts are needed") from None
+    if len(names) > MOST_NAMES:
+        raise ValueError(f"routes: more than {MOST_NAMES} names")
+    wrong = next((name for name in names if not isinstance(name, str)), None)
+    if wrong is not None:
+        raise TypeError(f"routes: {wrong!r}; names of routes or roundabouts are needed")
+    return names
+
+
+def text(name: str, value: object) -> str:
+    """The value, if it is a text."""
+    if not isinstance(value, str):
+        raise TypeError(f"{name}: {value!r}; a text is needed")
+    return value
+
+
+def check_length(name: str, given: Sequence[Any] | None, n: int) -> None:
+    """An error unless there is one for each truck; before any of them is looked at."""
+    if given is None:
+        return
+    if isinstance(given, str) or not hasattr(given, "__len__"):
+        raise TypeError(f"{name}: {given!r}; a sequence is needed, one a truck")
+    if len(given) != n:
+        raise ValueError(f"{name}: {len(given)} of them; {n} are needed, one a truck")
+
+
+def stream_of(name: str, given: tuple[int, int] | None) -> tuple[int, int] | None:
+    """A stream, if it is a pair of seed and index."""
+    if given is None:
+        return None
+    try:
+        seed, env = given
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: {given!r}; a pair of seed and index is needed") from None
+    return within(f"{name}[0]", seed, 0, 2**32), within(f"{name}[1]", env, 0, 2**32)

@@ -1,0 +1,82 @@
+//! The routes that are to be driven: a split, or routes by their names, which are those of the command line.
+
+use offtrack::procedural;
+use offtrack::scenario::{Scenario, Split};
+use offtrack::shipped::Kind;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::errors;
+
+/// Most characters of the list of routes in a message.
+const LONGEST_LIST: usize = 600;
+/// Most characters of a name in a message.
+const LONGEST_NAME: usize = 100;
+
+/// Leaves the scenario the routes of a split, or those of any split that `names` has: each a route, or all routes of a
+/// roundabout. One that the benchmark does not have is added, as `wide/7/12` is.
+pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) -> PyResult<()> {
+    let Some(names) = names else {
+        let Some(split) = Split::ALL.into_iter().find(|known| known.name() == split) else {
+            let known = Split::ALL.map(Split::name).join(", ");
+            return Err(PyValueError::new_err(format!("split: {split:?}; must be one of {known}")));
+        };
+        if scenario.split(split).is_empty() {
+            let has = Split::ALL.into_iter().filter(|&split| !scenario.split(split).is_empty()).map(Split::name);
+            let has = has.collect::<Vec<_>>().join(", ");
+            return Err(PyValueError::new_err(format!("split: {:?}; {} has no such routes, only {has}", split.name(), scenario.name)));
+        }
+        scenario.keep(&[split]);
+        return Ok(());
+    };
+    if names.is_empty() {
+        return Err(PyValueError::new_err("routes: empty; name at least one route or roundabout, or give None for a split"));
+    }
+    let mut wanted = names.to_vec();
+    let of_benchmark = known(scenario);
+    let mut added: Vec<&str> = Vec::new();
+    for name in names {
+        let road = match road_of(name) {
+            Some(road) if !of_benchmark.iter().any(|route| is_of(route, name)) => road,
+            _ => continue,
+        };
+        if added.contains(&road) || scenario.places.iter().any(|place| place.roundabout.name == road) {
+            continue;
+        }
+        let roundabout = procedural::find(road).map_err(|error| errors::of_reader(&error))?;
+        // Routes of a file are named after its stem.
+        let renamed = names.iter().filter_map(|name| name.strip_prefix(road)).map(|rest| format!("{}{rest}", roundabout.name));
+        wanted.extend(renamed);
+        scenario.add(roundabout, Split::Test).map_err(|error| errors::of_reader(&error))?;
+        added.push(road);
+    }
+    let known = known(scenario);
+    let is_known = |name: &str| known.iter().any(|route| is_of(route, name));
+    let is_file = |name: &str| added.iter().any(|road| name.starts_with(road) && road.ends_with(".toml"));
+    if let Some(unknown) = wanted.iter().find(|name| !is_known(name) && !is_file(name)) {
+        let list = offtrack::reader::shortened(&known.join(", "), LONGEST_LIST);
+        let name = offtrack::reader::shortened(unknown, LONGEST_NAME);
+        return Err(PyValueError::new_err(format!(
+            "routes: {name:?}; {} has {list}, and random roads have names as wide/7/12",
+            scenario.name
+        )));
+    }
+    scenario.retain(|_, route| wanted.iter().any(|name| is_of(&route.name, name)));
+    Ok(())
+}
+
+fn known(scenario: &Scenario) -> Vec<String> {
+    scenario.routes().map(|(_, route)| route.name.clone()).collect()
+}
+
+/// Whether `name` is this route or its roundabout.
+fn is_of(route: &str, name: &str) -> bool {
+    route == name || route.strip_prefix(name).is_some_and(|rest| rest.starts_with('/'))
+}
+
+/// The road that a name of it or of one of its routes means apart from any benchmark.
+fn road_of(name: &str) -> Option<&str> {
+    let is_road =
+        |name: &str| procedural::address(name).is_some() || Kind::Roundabout.names().any(|known| known == name) || name.ends_with(".toml");
+    if is_road(name) { Some(name) } else { name.rsplit_once('/').map(|(road, _)| road).filter(|road| is_road(road)) }
+}
