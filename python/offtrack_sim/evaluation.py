@@ -101,6 +101,7 @@ def evaluate(
         seed: Seed of the starts.
 
     Raises:
+        TypeError: For a function that gives anything but integers, one for each observation.
         ValueError: As :class:`offtrack_sim.Batch` says, and for a policy with another action table or other extras
             than the benchmark's.
     """
@@ -125,10 +126,18 @@ def evaluate(
     while (running := ended == Ended.RUNNING).any():
         actions = np.zeros(batch.num_envs, dtype=np.int64)
         # Trucks whose episode has ended drive on, and nobody looks at them.
-        actions[running] = np.asarray(act(observation[running]))
+        actions[running] = _checked(act(observation[running]), int(running.sum()))
         observation = batch.step(actions)[0]
         ends = batch.ended()
         if ends is not None:
             first = running[ends.envs]
             ended[ends.envs[first]] = ends.codes[first]
     return Evaluation(batch.scenario, split, seed, names, ended.reshape(len(names), episodes))
+
+
+def _checked(actions: Any, n: int) -> npt.NDArray[Any]:
+    """What a policy gave for ``n`` observations: numbers with a fraction would lose it where they are stored."""
+    found = np.asarray(actions)
+    if found.dtype.kind not in "iu" or found.shape != (n,):
+        raise TypeError(f"policy: gave {found.dtype} of shape {found.shape}; integers of shape ({n},) are needed")
+    return found

@@ -70,7 +70,7 @@ def save(
         mean, variance, epsilon = found
     normalisation = None
     if mean is not None and variance is not None:
-        spread = np.asarray(variance, np.float64) + epsilon
+        spread = _numbers("variance", variance) + _numbers("epsilon", epsilon)
         if not (spread > 0).all():
             raise ValueError("variance: every value plus epsilon must be greater than 0")
         normalisation = _vector("mean", mean), _vector("variance", 1 / np.sqrt(spread))
@@ -177,10 +177,17 @@ def _array(tensor: Any) -> Floats:
 
 
 def _vector(name: str, values: npt.ArrayLike) -> Floats:
-    vector = np.ascontiguousarray(values, np.float32)
+    vector = np.ascontiguousarray(_numbers(name, values), np.float32)
     if vector.ndim != 1:
         raise ValueError(f"{name}: shape {vector.shape}; one dimension is needed, a number for each value")
     return vector
+
+
+def _numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    try:
+        return np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: {_kind(values)}; numbers are needed") from None
 
 
 def _is(name: str, thing: Any) -> bool:

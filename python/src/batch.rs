@@ -201,10 +201,9 @@ impl Batch {
             let mut terminated = writable::<bool>(terminated, "terminated", "bool", n_envs)?;
             let mut truncated = writable::<bool>(truncated, "truncated", "bool", n_envs)?;
             let mut state = self.state()?;
-            let contiguous = |_| unfit("an output", "contiguous");
-            let reward = reward.as_slice_mut().map_err(contiguous)?;
-            let terminated = terminated.as_slice_mut().map_err(contiguous)?;
-            let truncated = truncated.as_slice_mut().map_err(contiguous)?;
+            let reward = reward.as_slice_mut().map_err(|_| unfit("reward", "without gaps"))?;
+            let terminated = terminated.as_slice_mut().map_err(|_| unfit("terminated", "without gaps"))?;
+            let truncated = truncated.as_slice_mut().map_err(|_| unfit("truncated", "without gaps"))?;
             state.step(py, self, &actions, |new_observation, new_reward, codes| {
                 new_observation.write(observation);
                 reward.copy_from_slice(new_reward);

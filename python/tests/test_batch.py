@@ -223,6 +223,7 @@ def test_wrong_outputs_and_requests_are_refused() -> None:
         (0, np.zeros((69, 3), np.float32)),
         (1, np.zeros(2, np.float32)),
         (2, np.zeros(3)),
+        (3, np.zeros(6, bool)[::2]),
     ]:
         with pytest.raises(TypeError, match="must be a writable, contiguous numpy array"):
             batch.step_into(np.zeros(3, int), *[*good[:index], wrong, *good[index + 1 :]])

@@ -87,6 +87,19 @@ def test_the_first_reset_is_that_of_its_seed_and_later_ones_go_on(puffer: types.
     assert np.array_equal(first, env.reset(seed=5)[0])
 
 
+def test_a_step_of_a_copy_leaves_the_original_where_it_is(puffer: types.ModuleType) -> None:
+    import copy
+
+    env = puffer.RoundaboutPuffer(num_envs=N, seed=5)
+    env.reset()
+    twin = copy.copy(env)
+    before = env.observations.copy(), env.batch.observation()
+    actions = np.full(N, 4, np.int32)
+    stepped = twin.step(actions)[0].copy()
+    assert np.array_equal(env.observations, before[0]) and np.array_equal(env.batch.observation(), before[1])
+    assert np.array_equal(env.step(actions)[0], stepped) and not np.array_equal(stepped, before[0])
+
+
 def test_results_go_into_the_buffers_that_were_given(puffer: types.ModuleType) -> None:
     buffers: dict[str, Any] = {
         "observations": np.zeros((2 * N, 69), np.float32)[N:],

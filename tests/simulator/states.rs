@@ -64,6 +64,9 @@ fn a_state_with_any_number_replaced_is_refused_or_gives_finite_observations_and_
     }
 }
 
+/// A change of a truck, and how the message begins that refuses it.
+type Case = (fn(&mut Truck), String);
+
 #[test]
 fn a_state_that_no_truck_can_have_is_refused_by_column_truck_field_and_value() {
     let world = Arc::new(benchmark("attard2023").1);
@@ -71,7 +74,7 @@ fn a_state_that_no_truck_can_have_is_refused_by_column_truck_field_and_value() {
         let mut simulator = batch_on(&engine, &world, 4, 3, RouteChoice::Drawn(vec![0, 1, 2]));
         let kept = simulator.batch().clone();
         let lock = world.rigs[0].steer_max * 1.001;
-        let cases: [(fn(&mut Truck), String); 4] = [
+        let cases: [Case; 4] = [
             (|truck| truck.position.x = f32::NAN, "truck[2].position[0]: NaN; must lie in ".to_owned()),
             (|truck| truck.speed = f32::INFINITY, "truck[2].speed: inf; must lie in -1000.0..1000.0".to_owned()),
             (|truck| truck.steering = 5.0, format!("truck[2].steering: 5.0; must lie in -{lock:?}..{lock:?}")),
