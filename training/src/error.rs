@@ -77,8 +77,9 @@ pub enum Error {
     /// The graphics device failed, or cannot do what the learner needs of it.
     #[error("the graphics device: {0}")]
     Device(String),
-    /// The learner's threads cannot be started.
-    #[error("threads to learn with cannot be started: {0}")]
+    /// Threads to work with cannot be started: the system does not give as many as the machine has cores, or as
+    /// `RAYON_NUM_THREADS` asks for.
+    #[error("threads cannot be started: {0}; set RAYON_NUM_THREADS to fewer")]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// Training has diverged.
     #[error(

@@ -66,7 +66,7 @@ fn main() -> ExitCode {
             std::process::exit(INTERRUPTED);
         });
     }
-    let done = match &command {
+    let done = start_threads().and_then(|()| match &command {
         Command::Train(args) => train::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Scale(args) => scale::run(args),
@@ -79,7 +79,7 @@ fn main() -> ExitCode {
         Command::Record(args) => record::run(args),
         Command::Trace(args) => trace::run(args),
         Command::Deviations(args) => deviations::run(args),
-    };
+    });
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -92,4 +92,10 @@ fn main() -> ExitCode {
 
 fn exit_code(error: &Error) -> u8 {
     if error.is_wrong_input() { WRONG_INPUT } else { FAILED }
+}
+
+/// Starts the threads that commands share. Left to the first work on all cores, a system that does not give so many
+/// would make it panic.
+fn start_threads() -> Result<(), Error> {
+    Ok(rayon::ThreadPoolBuilder::new().build_global()?)
 }

@@ -17,4 +17,5 @@ mod record;
 mod resume;
 mod seeds;
 mod tensorboard;
+mod threads;
 mod train;
