@@ -188,7 +188,8 @@ def test_no_panic_crosses_into_python(tmp_path: Path) -> None:
 
 def test_threads_that_the_system_does_not_give_are_an_error_that_names_them() -> None:
     code = "import offtrack_sim as sim\ntry: sim.Batch()\nexcept RuntimeError as error: print(error)"
-    command = f"ulimit -v 3000000; RAYON_NUM_THREADS=30000 exec {sys.executable} -c '{code}'"
+    # The address space is for threads of this package: those of numpy's library take some for each core.
+    command = f"ulimit -v 3000000; OPENBLAS_NUM_THREADS=1 RAYON_NUM_THREADS=30000 exec {sys.executable} -c '{code}'"
     found = subprocess.run(["bash", "-c", command], capture_output=True, text=True)
     assert found.stdout.startswith("RAYON_NUM_THREADS: 30000; the system does not give so many threads"), found
 
