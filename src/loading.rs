@@ -21,6 +21,14 @@ pub struct Progress {
     pub total: usize,
 }
 
+/// Threads for work on all cores: one a core, or as many as `RAYON_NUM_THREADS` asks for, up to four a core and never less
+/// than 16. More would be no faster, and their stacks alone may not fit into the address space.
+pub fn n_threads() -> usize {
+    let n_cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
+    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|number| number.parse().ok()).filter(|&number: &usize| 0 < number);
+    asked.map_or(n_cores, |asked| asked.min((4 * n_cores).max(16)))
+}
+
 /// Who is told of progress, from any thread.
 pub type Watcher<'a> = dyn Fn(Progress) + Sync + 'a;
 

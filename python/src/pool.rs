@@ -77,21 +77,12 @@ impl Pool {
         let (_, pool) = match self.made.take() {
             Some(made) => self.made.insert(made),
             None => {
-                let pool = ThreadPoolBuilder::new().num_threads(self.n_threads).build();
-                let pool = pool.map_err(|error| refused(self.n_threads, &error))?;
+                let n_threads = if self.n_threads == 0 { offtrack::loading::n_threads() } else { self.n_threads };
+                let pool = ThreadPoolBuilder::new().num_threads(n_threads).build();
+                let pool = pool.map_err(|error| PyRuntimeError::new_err(format!("num_threads: {n_threads}; {error}; ask for fewer")))?;
                 self.made.insert((std::process::id(), pool))
             }
         };
         Ok(pool)
     }
-}
-
-/// The exception where the system does not give so many threads: names what asked for them.
-fn refused(n_threads: usize, error: &rayon::ThreadPoolBuildError) -> PyErr {
-    let asked = match std::env::var("RAYON_NUM_THREADS") {
-        _ if 0 < n_threads => format!("num_threads: {n_threads}"),
-        Ok(number) => format!("RAYON_NUM_THREADS: {}", offtrack::reader::shortened(&number, 100)),
-        Err(_) => "num_threads: None, one a core".to_owned(),
-    };
-    PyRuntimeError::new_err(format!("{asked}; the system does not give so many threads ({error}): ask for fewer"))
 }
