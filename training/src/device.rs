@@ -1,6 +1,8 @@
 //! What steps trucks: the processor, or a device and its name in results.
 //!
-//! The only file here that asks whether the program was built with the feature `gpu`.
+//! In a program that was built without the feature `gpu` there is no device to open.
+
+mod panics;
 
 #[cfg(feature = "gpu")]
 use offtrack::simulator;
@@ -8,6 +10,7 @@ use offtrack::simulator::Engine;
 
 use crate::error::Error;
 use crate::provenance;
+pub use panics::caught;
 
 /// The error text where a program without the feature is asked for a device.
 #[cfg(not(feature = "gpu"))]
@@ -65,27 +68,6 @@ pub fn open(adapter: Option<&str>) -> Result<Device, Error> {
 #[cfg(not(feature = "gpu"))]
 pub fn open(_: Option<&str>) -> Result<Device, Error> {
     Err(Error::Flag { flag: "--device", value: "gpu".to_owned(), expected: format!("{NOT_BUILT_IN}, or leave --device out") })
-}
-
-/// The outcome of `work`, or an error if it panicked: the tensor library panics when its device fails.
-#[cfg(feature = "gpu")]
-pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
-    use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
-
-    let hook = take_hook();
-    set_hook(Box::new(|_| ()));
-    let outcome = catch_unwind(AssertUnwindSafe(work));
-    set_hook(hook);
-    outcome.unwrap_or_else(|panic| {
-        let message = panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|&message| message.to_owned()));
-        Err(Error::Device(message.unwrap_or_else(|| "it failed".to_owned())))
-    })
-}
-
-/// The outcome of `work`.
-#[cfg(not(feature = "gpu"))]
-pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
-    work()
 }
 
 /// Whether the error is a failure of the device rather than wrong input.

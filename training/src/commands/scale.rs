@@ -197,7 +197,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
             let (engine, adapter) = (&device.engine, device.adapter());
             let setting =
                 Setting { engine, adapter, backend: &mut backend, world: &world, routes: &routes, envs, learner: learner.as_ref() };
-            let outcome = offtrack_training::device::caught(|| measured(&mut mode.driven(setting)?, args.seconds));
+            let work = || measured(&mut mode.driven(setting)?, args.seconds);
+            // The tensor library panics where a device fails.
+            let outcome = if device.kind == "gpu" { offtrack_training::device::caught(work, || None) } else { work() };
             let outcome = match outcome {
                 Ok(measured) => Outcome::Measured(Box::new(measured)),
                 Err(error) => {

@@ -168,7 +168,7 @@ pub struct RouteReport {
 pub struct Report {
     /// The benchmark's name.
     pub benchmark: String,
-    /// `train` or `test`.
+    /// `train`, `validation` or `test`.
     pub split: &'static str,
     /// Name of the policy.
     pub policy: String,

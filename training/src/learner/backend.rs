@@ -98,12 +98,12 @@ impl Backend {
         })
     }
 
-    /// The result of `work`. On a device a panic becomes an error, for the tensor library panics where a device fails.
+    /// The result of `work`. On a device a panic of the tensor library becomes an error: it panics where a device fails.
     pub fn guarded<T>(&self, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
         match self {
             Backend::Host => work(),
             #[cfg(feature = "gpu")]
-            Backend::Device(shared) => device::caught(work).map_err(|error| match error {
+            Backend::Device(shared) => device::caught(work, || shared.check().err()).map_err(|error| match error {
                 // What the driver reported says more than the panic that followed.
                 Error::Device(message) => Error::Device(shared.check().err().map_or(message, |error| error.to_string())),
                 error => error,

@@ -102,11 +102,6 @@ impl Training {
         &self.sac
     }
 
-    /// The same, to be updated.
-    pub fn sac_mut(&mut self) -> &mut Sac {
-        &mut self.sac
-    }
-
     /// Whether the policy acts already; until then actions are random.
     pub fn is_acting(&self) -> bool {
         self.normalisation.is_some()
