@@ -23,6 +23,7 @@ pub use autoreset::Autoreset;
 pub(crate) use batch::Row;
 pub use batch::{Batch, RouteChoice};
 pub use error::Error;
+pub use memory::available as available_memory;
 pub use tally::Tally;
 
 /// A batch on its engine. The caller has checked every index and number of rows; `world` is the one that the batch was

@@ -10,7 +10,7 @@ use std::time::Duration;
 use crate::engine::EngineBatch;
 #[cfg(feature = "gpu")]
 use crate::engine::gpu;
-pub use crate::engine::{Autoreset, Batch, Error, RouteChoice, Tally};
+pub use crate::engine::{Autoreset, Batch, Error, RouteChoice, Tally, available_memory};
 use crate::layout::{BEGINS, BeginRow, Column, HAS_ROUTE, HAS_START, IS_FIRST, Start, Stream};
 use crate::stages::{N_STAGES, Stage};
 use crate::world::World;

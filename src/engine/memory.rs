@@ -4,29 +4,53 @@
 
 use std::fs;
 
-/// Memory that can be used without ending another's work, where the system says so [bytes].
-pub(super) fn available() -> Option<u64> {
+/// Memory of the host that can be used without ending another's work, where the system says so \[bytes].
+pub fn available() -> Option<u64> {
     let free = fs::read_to_string("/proc/meminfo").ok().and_then(|text| mem_available(&text));
     // A container may be granted less than the machine has.
     let granted = fs::read_to_string("/sys/fs/cgroup/memory.max").ok().and_then(|text| text.trim().parse().ok());
-    [free, granted].into_iter().flatten().min()
+    [free, granted, address_space()].into_iter().flatten().min()
+}
+
+/// What a limit of the process's address space leaves, as `ulimit -v` sets one [bytes].
+fn address_space() -> Option<u64> {
+    let limits = fs::read_to_string("/proc/self/limits").ok()?;
+    let taken = fs::read_to_string("/proc/self/status").ok().and_then(|text| kilobytes(&text, "VmSize:"))?;
+    Some(address_limit(&limits)?.saturating_sub(taken))
+}
+
+/// The soft limit of the address space in `/proc/self/limits`; none where there is no limit [bytes].
+fn address_limit(text: &str) -> Option<u64> {
+    text.lines().find_map(|line| line.strip_prefix("Max address space"))?.split_whitespace().next()?.parse().ok()
 }
 
 /// `MemAvailable` of `/proc/meminfo` [bytes].
 fn mem_available(text: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    kilobytes(text, "MemAvailable:")
+}
+
+/// A value in kB of a file in `/proc` [bytes].
+fn kilobytes(text: &str, key: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(key))?;
     let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kilobytes.checked_mul(1024)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::mem_available;
+    use super::{address_limit, mem_available};
 
     #[test]
     fn available_memory_is_read_in_bytes() {
         assert_eq!(mem_available("MemTotal:  2048 kB\nMemFree: 1 kB\nMemAvailable:     1024 kB\n"), Some(1 << 20));
         assert_eq!(mem_available("MemTotal: 2048 kB\n"), None);
         assert_eq!(mem_available("MemAvailable: much\n"), None);
+    }
+    #[test]
+    fn a_limit_of_the_address_space_is_read_in_bytes() {
+        let limits =
+            |soft: &str| format!("Max locked memory  8388608  8388608  bytes\nMax address space         {soft}  unlimited  bytes\n");
+        assert_eq!(address_limit(&limits("4096000000")), Some(4_096_000_000));
+        assert_eq!(address_limit(&limits("unlimited")), None);
     }
 }

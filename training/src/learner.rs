@@ -16,6 +16,7 @@ pub mod replay_buffer; // transitions on the host
 pub mod mirror; // mirror augmentation
 pub mod exploration; // random actions among the policy's
 pub mod level_replay; // routes that fail are drawn more often
+pub mod memory; // what a run takes of it, before it begins
 pub mod backend; // the choice of processor or device
 pub mod config; // a training file
 pub mod run; // a training run in its folder

@@ -8,6 +8,7 @@ use offtrack::world::World;
 use crate::device;
 use crate::error::Error;
 use crate::learner::config::{Config, Device};
+use crate::learner::memory;
 use crate::learner::mirror::Mirror;
 #[cfg(feature = "gpu")]
 use crate::learner::rollout::device::{DeviceRollout, Shared};
@@ -61,6 +62,15 @@ impl Backend {
             Backend::Host => Placement::Host,
             #[cfg(feature = "gpu")]
             Backend::Device(shared) => Placement::Device(shared.tensors.clone()),
+        }
+    }
+
+    /// An error if a run there does not fit into the host's memory. A device says what it has no room for when it is asked.
+    pub fn check_memory(&self, config: &Config, n_values: usize, n_actions: usize) -> Result<(), Error> {
+        match self {
+            Backend::Host => memory::check(config, n_values, n_actions),
+            #[cfg(feature = "gpu")]
+            Backend::Device(_) => Ok(()),
         }
     }
 

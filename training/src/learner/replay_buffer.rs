@@ -6,7 +6,7 @@
 mod priorities;
 mod state;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, TryReserveError};
 
 use offtrack::layout::Ended;
 use rand::Rng;
@@ -93,6 +93,15 @@ impl<const N: usize> ReplayBuffer<N> {
             after: Vec::new(),
             truncated: HashMap::new(),
         }
+    }
+
+    /// Takes memory for `n_rows` transitions in all: while they come it is neither moved nor refused.
+    pub fn reserve(&mut self, n_rows: usize) -> Result<(), TryReserveError> {
+        let more = n_rows.saturating_sub(self.observation.len());
+        self.observation.try_reserve_exact(more)?;
+        self.action.try_reserve_exact(more)?;
+        self.reward.try_reserve_exact(more)?;
+        self.after.try_reserve_exact(more)
     }
 
     /// Transitions held.

@@ -36,6 +36,7 @@ impl Training {
     /// Trucks at the start of their first episodes on `routes`, an empty replay buffer, and a learner with random
     /// weights. All that can be wrong with a config in this world is an error here.
     pub fn new(backend: &Backend, config: &Config, world: Arc<World>, routes: Vec<u32>) -> Result<Training, Error> {
+        backend.check_memory(config, n_values(&world), world.actions.len())?;
         let mirror = config.learning.mirror_augmentation.then(|| Mirror::of(&world)).transpose()?;
         Ok(Training {
             rollout: backend.rollout(config, &world, routes, mirror.clone())?,

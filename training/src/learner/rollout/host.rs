@@ -18,6 +18,7 @@ use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::config::{Config, Learning, Refinement};
 use crate::learner::generator::Generator;
 use crate::learner::level_replay::LevelReplay;
+use crate::learner::memory;
 use crate::learner::mirror::Mirror;
 use crate::learner::network::{Mlp, sampled};
 use crate::learner::pass::softmax;
@@ -73,10 +74,12 @@ impl<const N: usize> HostRollout<N> {
         let stream = |purpose: u32| Generator::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
         let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
         let choice = RouteChoice::Drawn(level_replay.as_ref().map_or(routes, |replay| replay.list().to_vec()));
+        let mut replay_buffer = ReplayBuffer::new(config.n_envs, config.learning.n_steps, &config.replay_buffer);
+        reserve(&mut replay_buffer, config)?;
         Ok(HostRollout {
             simulator: Simulator::new(world.clone(), config.n_envs, config.seed, choice)?,
             level_replay,
-            replay_buffer: ReplayBuffer::new(config.n_envs, config.learning.n_steps, &config.replay_buffer),
+            replay_buffer,
             acting: stream(1),
             sampling: stream(2),
             mirror,
@@ -288,8 +291,17 @@ impl<const N: usize> Rollout for HostRollout<N> {
             replay.restore(stored)?;
             self.simulator.draw_from(replay.list())?;
         }
-        self.replay_buffer.restore(stored, self.n_actions() as u32)
+        self.replay_buffer.restore(stored, self.n_actions() as u32)?;
+        reserve(&mut self.replay_buffer, &self.config)
     }
+}
+
+/// Takes the memory of all transitions that a run will hold, or says that there is not so much.
+fn reserve<const N: usize>(replay_buffer: &mut ReplayBuffer<N>, config: &Config) -> Result<(), Error> {
+    replay_buffer.reserve(memory::transitions(config)).map_err(|error| {
+        let expected = format!("{error}; fewer transitions would do");
+        Error::Flag { flag: "replay_buffer.capacity", value: config.replay_buffer.capacity.to_string(), expected }
+    })
 }
 
 /// Adds `arrival` to the rewards of the trucks that arrive, `[n_envs]` each.
