@@ -5,6 +5,7 @@
 
 pub mod checkpointer;
 pub mod events_file;
+mod fingerprint;
 pub mod folder;
 #[cfg(test)]
 mod lost_device_tests;
@@ -15,7 +16,6 @@ pub mod route_counts;
 pub mod validation;
 mod window;
 
-use bytemuck::{bytes_of, cast_slice};
 use offtrack::world::World;
 use offtrack_policy::Policy;
 
@@ -27,6 +27,7 @@ use crate::learner::config::Config;
 use crate::learner::sac::not_finite;
 use crate::learner::training::Training;
 use checkpointer::{Checkpointer, Written};
+use fingerprint::fingerprint;
 use folder::Folder;
 use progress::Progress;
 use route_counts::RouteCounts;
@@ -245,9 +246,9 @@ impl Run {
     pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
         if stored.world() != self.fingerprint {
             let what = self.config.training_benchmark.as_ref().unwrap_or(&self.config.benchmark);
-            let message = format!("was written when {what} was different: put its scenario, vehicle and roundabout files back");
-            return Err(stored.error(message));
+            return Err(stored.error(changed(what)));
         }
+        self.checkpointer.continue_from();
         self.progress.restore(stored)?;
         self.routes.restore(stored)?;
         if let Some(validation) = &mut self.validation {
@@ -283,19 +284,7 @@ impl Run {
     }
 }
 
-/// CRC-32 of all that trucks drive by.
-fn fingerprint(world: &World) -> u32 {
-    let mut hasher = crc32fast::Hasher::new();
-    hasher.update(bytes_of(&world.params));
-    hasher.update(cast_slice(&world.actions));
-    hasher.update(cast_slice(&world.rigs));
-    hasher.update(cast_slice(&world.rays));
-    hasher.update(cast_slice(&world.waypoints));
-    hasher.update(cast_slice(&world.previews));
-    hasher.update(cast_slice(&world.routes));
-    for field in &world.fields {
-        hasher.update(cast_slice(&field.cells));
-        hasher.update(cast_slice(&field.values));
-    }
-    hasher.finalize()
+/// The error text for a benchmark that is no longer what it was when a checkpoint was written.
+fn changed(benchmark: &str) -> String {
+    format!("was written when {benchmark} was different: put its scenario, vehicle and roundabout files back")
 }

@@ -4,6 +4,7 @@
 
 mod bench;
 mod certify;
+mod checkpoint;
 mod device;
 mod draw;
 mod evaluate;

@@ -4,16 +4,14 @@
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-use serde_json::Value;
-
 use crate::place::{CACHE, Place, offtrack, program, refusal, succeed};
 
-const ENDLESS: [&str; 2] = ["--steps", "1000000000"];
+pub const ENDLESS: [&str; 2] = ["--steps", "1000000000"];
 /// Columns of the metrics that depend on the clock.
 const TIMES: [&str; 3] = ["seconds", "steps_per_second", "updates_per_second"];
 
 /// A place whose runs write a checkpoint every few milliseconds, and use what needs most state.
-fn place() -> Place {
+pub fn place() -> Place {
     let place = Place::new();
     let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
     let state = "exploration = { initial_fraction = 0.5, final_fraction = 0.1, steps = 1200, spread = 1.0 }\n";
@@ -31,7 +29,7 @@ fn resumed(place: &Place, run: &str, arguments: &[&str]) -> Command {
     command
 }
 
-fn resume(place: &Place, run: &str, arguments: &[&str]) -> Output {
+pub fn resume(place: &Place, run: &str, arguments: &[&str]) -> Output {
     resumed(place, run, arguments).output().unwrap()
 }
 
@@ -44,7 +42,7 @@ fn interrupted(run: Child) -> Output {
     run.wait_with_output().unwrap()
 }
 
-fn bytes(place: &Place, file: &str) -> Vec<u8> {
+pub fn bytes(place: &Place, file: &str) -> Vec<u8> {
     std::fs::read(place.file(file)).unwrap()
 }
 
@@ -227,75 +225,14 @@ fn a_run_that_cannot_go_on_is_refused_with_the_file_and_what_would_do() {
     refused("runs/run/metrics.csv", b"seconds,env_steps\n", &["runs/run/metrics.csv", "columns"]);
     let benchmark = String::from_utf8(bytes(&place, "short.toml")).unwrap();
     refused("short.toml", benchmark.replace("waypoint = 100.0", "waypoint = 99.0").as_bytes(), &[checkpoint, "short.toml was different"]);
+    // What only says when an episode ends is a part of what trucks drive by.
+    refused("short.toml", benchmark.replace("sensors", "ending = { time_limit = 2.5 }\nsensors").as_bytes(), &["short.toml was different"]);
+    let validated = String::from_utf8(bytes(&place, "validated.toml")).unwrap();
+    refused("validated.toml", validated.replace("N-right-1", "N-left-2").as_bytes(), &[checkpoint, "validated was different"]);
     let message = refusal(&resume(&place, "elsewhere", &[]), 2);
     assert!(message.contains("--resume") && message.contains("the folder of a run is needed"), "{message}");
     let message = refusal(&offtrack(&["train", "--resume", &place.text("runs/run"), "--seed", "3"]), 2);
     assert!(message.contains("cannot be used with '--seed"), "{message}");
-}
-
-/// A checkpoint with its column `name` changed, and the checksum that goes with it: as a program with a fault would
-/// have written it.
-fn with_column(whole: &[u8], name: &str, change: impl FnOnce(&mut [u8])) -> Vec<u8> {
-    let n = u64::from_le_bytes(whole[..8].try_into().unwrap()) as usize;
-    let mut header: Value = serde_json::from_slice(&whole[8..8 + n]).unwrap();
-    let mut body = whole[8 + n..].to_vec();
-    let range = |header: &Value, name: &str| {
-        let offsets = &header[name]["data_offsets"];
-        offsets[0].as_u64().unwrap() as usize..offsets[1].as_u64().unwrap() as usize
-    };
-    change(&mut body[range(&header, name)]);
-    let mut description: serde_json::Map<String, Value> =
-        serde_json::from_str(header["__metadata__"]["offtrack-checkpoint"].as_str().unwrap()).unwrap();
-    // CRC-32 of the description with a 0 for it, then each column's name and bytes in the order of names.
-    let text = |checksum: u64, description: &serde_json::Map<String, Value>| {
-        let config = serde_json::to_string(&description["config"]).unwrap();
-        format!(r#"{{"version":{},"config":{config},"world":{},"checksum":{checksum}}}"#, description["version"], description["world"])
-    };
-    let mut hasher = crc32fast::Hasher::new();
-    hasher.update(text(0, &description).as_bytes());
-    let mut names: Vec<String> = header.as_object().unwrap().keys().filter(|name| *name != "__metadata__").cloned().collect();
-    names.sort();
-    for name in names {
-        hasher.update(name.as_bytes());
-        hasher.update(&body[range(&header, &name)]);
-    }
-    description["checksum"] = hasher.finalize().into();
-    header["__metadata__"]["offtrack-checkpoint"] = text(description["checksum"].as_u64().unwrap(), &description).into();
-    let mut header = serde_json::to_vec(&header).unwrap();
-    header.resize(header.len().next_multiple_of(8), b' ');
-    [&(header.len() as u64).to_le_bytes()[..], &header, &body].concat()
-}
-
-#[test]
-fn a_checkpoint_with_a_right_checksum_and_wrong_contents_is_refused_by_its_column() {
-    let place = place();
-    succeed(&place.train(&["--name", "run", "--steps", "1200"]));
-    let file = "runs/run/checkpoint.safetensors";
-    let whole = bytes(&place, file);
-    let cases: [(&str, &[u8], &str); 14] = [
-        ("actor, layer 1, weight", &f32::NAN.to_le_bytes(), "`actor, layer 1, weight` has NaN at 0"),
-        ("entropy coefficient", &f32::INFINITY.to_le_bytes(), "`entropy coefficient` has inf at 0"),
-        ("normalisation, mean", &f32::NAN.to_le_bytes(), "`normalisation, mean` has NaN"),
-        ("replay buffer, action", &77u32.to_le_bytes(), "`replay buffer, action` has action 77; the table has 0..5"),
-        ("replay buffer, reward", &f32::NAN.to_le_bytes(), "`replay buffer, reward` has NaN"),
-        ("replay buffer, after", &[9], "`replay buffer, after` has an unknown code"),
-        ("replay buffer, after", &[2], "`replay buffer, truncated rows` does not list the rows"),
-        ("replay buffer, priorities", &f64::NAN.to_le_bytes(), "`replay buffer, priorities` has NaN"),
-        ("replay buffer, priorities", &(-1.0f64).to_le_bytes(), "`replay buffer, priorities` has one that is negative"),
-        ("replay buffer, priorities", &0f64.to_le_bytes(), "`replay buffer, priorities` has one where none may be, or lacks one"),
-        ("rollout, acting", &[0; 32], "`rollout, acting` is all zeros"),
-        ("batch, action", &77u32.to_le_bytes(), "action[0]: 77"),
-        ("batch, truck", &f32::NAN.to_le_bytes(), "`batch, truck` has NaN"),
-        ("batch, reward", &f32::INFINITY.to_le_bytes(), "`batch, reward` has inf"),
-    ];
-    for (column, value, expected) in cases {
-        std::fs::write(place.file(file), with_column(&whole, column, |bytes| bytes[..value.len()].copy_from_slice(value))).unwrap();
-        let message = refusal(&resume(&place, "run", &ENDLESS), 2);
-        assert!(message.contains(file) && message.contains(expected), "{column}: {message}");
-    }
-    // The change itself is sound: with the same bytes the run continues.
-    std::fs::write(place.file(file), with_column(&whole, "rollout, acting", |_| ())).unwrap();
-    succeed(&resume(&place, "run", &["--steps", "1300"]));
 }
 
 #[test]
@@ -389,4 +326,17 @@ fn a_full_disk_fails_a_run_only_at_its_end_after_the_evaluation() {
     }
     succeed(&place.evaluate(&["--policy", &place.text("runs/run/policy.safetensors"), "--episodes", "1"]));
     assert_eq!(place.json("runs/run/report.json")["evaluation"]["split"], "test");
+}
+
+#[test]
+fn a_finished_run_without_its_checkpoint_keeps_its_policy_and_does_not_begin_anew() {
+    let place = place();
+    succeed(&place.train(&["--name", "run", "--steps", "800"]));
+    std::fs::remove_file(place.file("runs/run/checkpoint.safetensors")).unwrap();
+    let policy = bytes(&place, "runs/run/policy.safetensors");
+    for flags in [&[][..], &ENDLESS] {
+        let message = refusal(&resume(&place, "run", flags), 2);
+        assert!(message.contains("it has finished and its checkpoint is gone: train --from "), "{message}");
+    }
+    assert!(bytes(&place, "runs/run/policy.safetensors") == policy);
 }

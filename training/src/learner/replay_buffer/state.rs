@@ -5,6 +5,11 @@ use super::{After, ReplayBuffer};
 use crate::error::Error;
 use crate::learner::checkpoint::{Columns, Stored};
 
+/// Far more than any value of an observation.
+const LARGEST_VALUE: f32 = 1e6;
+/// Far more than any reward.
+const LARGEST_REWARD: f32 = 1e9;
+
 impl<const N: usize> ReplayBuffer<N> {
     /// Adds the ring's columns.
     pub fn save<'a>(&'a self, columns: &mut Columns<'a>) {
@@ -28,12 +33,12 @@ impl<const N: usize> ReplayBuffer<N> {
         let [count] = stored.array::<u64, 1>("replay buffer, count")?;
         self.count = usize::try_from(count).map_err(|_| stored.error(format!("its column `replay buffer, count` says {count}")))?;
         let n_rows = self.slots_held() * self.n_envs;
-        self.observation = stored.exactly::<f32>("replay buffer, observation", n_rows * N)?.as_chunks().0.to_vec();
+        self.observation = bounded(stored, "replay buffer, observation", n_rows * N, LARGEST_VALUE)?.as_chunks().0.to_vec();
         self.action = stored.exactly("replay buffer, action", n_rows)?;
         if let Some(action) = self.action.iter().find(|&&action| n_actions <= action) {
             return Err(stored.error(format!("its column `replay buffer, action` has action {action}; the table has 0..{n_actions}")));
         }
-        self.reward = stored.exactly("replay buffer, reward", n_rows)?;
+        self.reward = bounded(stored, "replay buffer, reward", n_rows, LARGEST_REWARD)?;
         let after = |code: u8| [After::Next, After::Terminated, After::Truncated].into_iter().find(|&after| after as u8 == code);
         let codes: Vec<u8> = stored.exactly("replay buffer, after", n_rows)?;
         let codes: Option<_> = codes.into_iter().map(after).collect();
@@ -70,8 +75,17 @@ impl<const N: usize> ReplayBuffer<N> {
             let message = "its column `replay buffer, truncated rows` does not list the rows that `replay buffer, after` says".to_owned();
             return Err(stored.error(message));
         }
-        let observations: Vec<f32> = stored.exactly("replay buffer, truncated observations", rows.len() * N)?;
+        let observations = bounded(stored, "replay buffer, truncated observations", rows.len() * N, LARGEST_VALUE)?;
         self.truncated = rows.iter().map(|&row| row as usize).zip(observations.as_chunks().0.iter().copied()).collect();
         Ok(())
+    }
+}
+
+/// A column of numbers that are no larger than a run makes them.
+fn bounded(stored: &Stored, name: &str, n: usize, largest: f32) -> Result<Vec<f32>, Error> {
+    let numbers: Vec<f32> = stored.exactly(name, n)?;
+    match numbers.iter().find(|number| largest < number.abs()) {
+        Some(number) => Err(stored.error(format!("its column `{name}` has {number:e}, which no run makes: put a sound copy back"))),
+        None => Ok(numbers),
     }
 }

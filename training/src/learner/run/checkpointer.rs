@@ -38,6 +38,8 @@ pub struct Checkpointer {
     /// The first ones are closer together: a run that is killed early loses little.
     next: Duration,
     since: Option<Instant>,
+    /// The checkpoint that there is was not written by this process, which continued from it.
+    is_continued: bool,
     pending: Option<JoinHandle<Written>>,
 }
 
@@ -52,6 +54,7 @@ impl Checkpointer {
             interval: Duration::from_secs_f64(60.0 * minutes),
             next: FIRST,
             since: None,
+            is_continued: false,
             pending: None,
         }
     }
@@ -61,12 +64,19 @@ impl Checkpointer {
         &self.file
     }
 
-    /// What there is to go back to, in words.
+    /// The run continues from the checkpoint that there is.
+    pub fn continue_from(&mut self) {
+        self.is_continued = true;
+    }
+
+    /// What there is to go back to, in words. That a checkpoint was read does not make it a good one: its numbers may be
+    /// what the run failed by.
     pub fn last_good(&self) -> String {
-        if self.file.is_file() {
-            format!("{} is the last good checkpoint", self.file.display())
-        } else {
-            "there is no checkpoint yet".to_owned()
+        let file = self.file.display();
+        match (self.file.is_file(), self.is_continued) {
+            (false, _) => "there is no checkpoint yet".to_owned(),
+            (true, true) => format!("it continued from {file} and has written none since, so that one may be at fault"),
+            (true, false) => format!("{file} is the last good checkpoint"),
         }
     }
 
@@ -111,6 +121,8 @@ impl Checkpointer {
 
     /// Waits for those begun last.
     pub fn wait(&mut self) -> Option<Written> {
-        self.pending.take().map(|pending| pending.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+        let written: Written = self.pending.take()?.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        self.is_continued &= written.checkpoint.is_err();
+        Some(written)
     }
 }

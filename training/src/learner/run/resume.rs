@@ -33,6 +33,12 @@ impl Resumed {
     pub fn open(path: &Path, minutes: Option<f64>, steps: Option<u64>) -> Result<Resumed, Error> {
         let folder = Folder::of(path)?;
         let mut config = Config::read(&folder.config())?;
+        if !folder.checkpoint().is_file() && is_evaluated(&folder) {
+            let policy = folder.policy();
+            let expected =
+                format!("it has finished and its checkpoint is gone: train --from {} begins a run with its policy", policy.display());
+            return Err(refused(path, expected));
+        }
         let file = folder.metrics();
         let metrics = if file.is_file() { MetricsFile::open(file)? } else { MetricsFile::create(file)? };
         if !folder.checkpoint().is_file() {

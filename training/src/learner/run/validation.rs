@@ -14,12 +14,14 @@ use crate::evaluation::Evaluation;
 use crate::evaluation::report::{Summary, wilson};
 use crate::learner::checkpoint::{Columns, Stored};
 use crate::learner::config;
+use crate::learner::run::{changed, fingerprint::fingerprint};
 
 /// Seed of the start poses, the same in every validation.
 const SEED: u32 = 0;
 
 /// Names of its columns in a checkpoint.
 const COUNTS: &str = "validation, counts";
+const WORLD: &str = "validation, world";
 const DISTANCES: &str = "validation, lane distances";
 const BEST: &str = "validation, best policy";
 
@@ -62,6 +64,8 @@ pub struct Validation {
     settings: config::Validation,
     scenario: Arc<Scenario>,
     world: Arc<World>,
+    /// CRC-32 of the world.
+    fingerprint: u32,
     /// Validations made.
     n_made: u64,
     last: Option<Validated>,
@@ -79,7 +83,7 @@ impl Validation {
         if let Some(route) = scenario.shared_names(Split::Validation, training, Split::Train).first() {
             return Err(wrong(format!("{route} is a training route of {}: validation needs others", training.name)));
         }
-        Ok(Validation { settings, scenario, world, n_made: 0, last: None, best: None })
+        Ok(Validation { fingerprint: fingerprint(&world), settings, scenario, world, n_made: 0, last: None, best: None })
     }
 
     /// Whether it is time for the next one, with this fraction of the budget spent.
@@ -144,6 +148,7 @@ impl Validation {
     /// Adds its columns to a checkpoint, if one was made.
     pub fn save<'a>(&'a self, columns: &mut Columns<'a>) {
         let (Some(last), Some((best, policy))) = (self.last, &self.best) else { return };
+        columns.put(WORLD, vec![self.fingerprint]);
         columns.put(COUNTS, vec![self.n_made, last.env_steps, last.arrived, best.env_steps, best.arrived]);
         let distance = |validated: Validated| validated.lane_distance_mean_arrived.unwrap_or_default();
         columns.put(DISTANCES, vec![distance(last), distance(*best)]);
@@ -154,6 +159,10 @@ impl Validation {
     pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
         if stored.bytes(COUNTS).is_none() {
             return Ok(());
+        }
+        // A best policy of other roads or another vehicle cannot be compared with later ones.
+        if stored.array::<u32, 1>(WORLD)? != [self.fingerprint] {
+            return Err(stored.error(changed(&self.scenario.name)));
         }
         let [n_made, last_steps, last_arrived, best_steps, best_arrived] = stored.array::<u64, 5>(COUNTS)?;
         let episodes = (self.scenario.split(Split::Validation).len() * self.settings.episodes) as u64;
