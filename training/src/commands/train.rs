@@ -4,10 +4,13 @@
 //! checkpoint every few minutes. A stopped run leaves a policy that can be evaluated, and all that it takes to
 //! continue.
 
+mod alike;
 mod also;
+mod beginning;
 mod seeds;
 mod worlds;
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -25,6 +28,7 @@ use offtrack_training::files;
 use offtrack_training::learner::backend::Backend;
 use offtrack_training::learner::checkpoint::Stored;
 use offtrack_training::learner::config::{self, Config};
+use offtrack_training::learner::mirror::Mirror;
 use offtrack_training::learner::run::Run;
 use offtrack_training::learner::run::folder::Folder;
 use offtrack_training::learner::run::metrics_file::MetricsFile;
@@ -53,6 +57,11 @@ pub struct Args {
     /// `laden-gpu` and `paper`, which come with the program. Without it `default`, in a program built for graphics
     /// devices `gpu`.
     config: Option<PathBuf>,
+    /// A benchmark of your own, a path or a name: train on its training routes, with its own reward, and evaluate on its
+    /// test routes. The policy is chosen on its validation routes. Where it has no training or no validation routes,
+    /// its vehicle and actions drive on those of random2026.
+    #[arg(long)]
+    benchmark: Option<String>,
     /// Name of the run's folder; must be new. Without it the training file's name, numbered.
     #[arg(long)]
     name: Option<String>,
@@ -92,7 +101,7 @@ pub struct Args {
     /// --minutes or --steps give another budget, counted from the run's beginning; a finished run continues too. The
     /// learning-rate schedule ends with the budget, so with a larger one the rates are higher from here on. With a
     /// budget of steps alone the result is that of a run never stopped, bit for bit on the same machine and program.
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "name", "out", "seed", "seeds", "from", "envs", "adapter", "settings"])]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "benchmark", "name", "out", "seed", "seeds", "from", "envs", "adapter", "settings"])]
     resume: Option<PathBuf>,
 }
 
@@ -160,7 +169,7 @@ impl Prepared {
         let routes = worlds.training.split(Split::Train).to_vec();
         let mut training = backend.guarded(|| Training::new(&backend, config, worlds.training_world.clone(), routes))?;
         training.begin()?;
-        Ok(Prepared { backend, training, validation: worlds.validation(config)? })
+        Ok(Prepared { backend, training, validation: worlds.validation(config) })
     }
 }
 
@@ -180,8 +189,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return seeds::run(args, &file, seeds);
     }
     let resumed = args.resume.as_ref().map(|folder| Resumed::open(folder, args.minutes, args.steps)).transpose()?;
-    let config = resumed.as_ref().map_or_else(|| config(args, &file), |resumed| Ok(resumed.config.clone()))?;
-    let worlds = Worlds::read(&config)?;
+    let (config, worlds) = match &resumed {
+        Some(Resumed { config, folder, .. }) => (config.clone(), Worlds::read(config, &folder.config())?),
+        None => read(args, &file, 1)?,
+    };
     // All that can be wrong with the input is found before a folder is made.
     let prepared = Prepared::new(&config, &worlds)?;
     let opened = match resumed {
@@ -230,9 +241,23 @@ fn train(config: &Config, worlds: &Worlds, prepared: Prepared, opened: Opened, m
     conclude(&folder, worlds, finished, policy, manner, written)
 }
 
+/// The training file of so many runs with what the command line changes, and its benchmarks. Says at once what the runs
+/// will do.
+fn read(args: &Args, file: &Path, n_runs: usize) -> Result<(Config, Worlds), Error> {
+    let mut config = config(args, file)?;
+    let _ = files::print(&beginning::line(&config, file, n_runs));
+    let worlds = Worlds::read(&config, &Config::origin(file, args.benchmark.as_deref(), &args.settings))?;
+    // A benchmark of one's own may have any actions and sensors.
+    if let (Some(_), true, Err(error)) = (&args.benchmark, config.learning.mirror_augmentation, Mirror::of(&worlds.training_world)) {
+        config.learning.mirror_augmentation = false;
+        let _ = writeln!(std::io::stderr(), "note: trains without mirror augmentation: {error}");
+    }
+    Ok((config, worlds))
+}
+
 /// The training file with what the command line changes.
 fn config(args: &Args, file: &Path) -> Result<Config, Error> {
-    let mut config = Config::read_with(file, &args.settings)?;
+    let mut config = Config::read_for(file, args.benchmark.as_deref(), &args.settings)?;
     config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
     let flag = args.steps.map(|steps| PathBuf::from(format!("--steps {steps}")));
     config.check_budget(flag.as_deref().unwrap_or(file))?;
@@ -282,9 +307,17 @@ fn conclude(
         said += &also::lines(finished.evaluation.as_ref(), &finished.also);
     }
     said += &finished.training_routes.as_ref().map(worst).unwrap_or_default();
-    files::print(&format!("{said}written: {path}\n"))?;
+    files::print(&format!("{said}written: {path}\n{}", checkpoint(folder)))?;
     // The evaluation is not lost where something else could not be written.
     written
+}
+
+/// A line about the checkpoint of a run that has finished.
+fn checkpoint(folder: &Folder) -> String {
+    let file = folder.checkpoint();
+    let Ok(size) = std::fs::metadata(&file).map(|metadata| metadata.len()) else { return String::new() };
+    let megabytes = size.div_ceil(1_000_000);
+    format!("{} ({megabytes} MB) is for train --resume with more --steps or --minutes alone; it may be deleted\n", file.display())
 }
 
 /// The evaluation on `benchmark`, with the episodes that its page shows; none where it has no test routes.

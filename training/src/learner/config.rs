@@ -8,7 +8,7 @@ mod file;
 mod set;
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use offtrack::reader::Reader;
 use offtrack::scenario::RewardChanges;
@@ -120,8 +120,10 @@ pub struct LevelReplay {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Validation {
-    /// The benchmark with the validation routes: a name, or the path of a file.
-    pub benchmark: String,
+    /// The benchmark with the validation routes: a name, or the path of a file. None for those of the run's `benchmark`
+    /// or, where that has none, for random roads that are driven as it says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub benchmark: Option<String>,
     /// Number of validations in a run, at equal parts of its budget.
     pub times: usize,
     /// Episodes on each route.
@@ -274,16 +276,28 @@ impl Config {
 
     /// The same with some of its keys set to other values, each `KEY=VALUE`.
     pub fn read_with(file: &Path, settings: &[String]) -> Result<Config, Error> {
+        Config::read_for(file, None, settings)
+    }
+
+    /// The same for another benchmark alone, if one is given.
+    pub fn read_for(file: &Path, benchmark: Option<&str>, settings: &[String]) -> Result<Config, Error> {
         let mut table = file::resolved(file)?;
+        if let Some(benchmark) = benchmark {
+            set::set_benchmark(&mut table, benchmark);
+        }
         set::set(&mut table, settings)?;
-        let origin = match settings {
-            [] => file.display().to_string(),
-            _ => format!("{} with --set {}", file.display(), settings.join(" --set ")),
-        };
-        let wrong = |error: toml::de::Error| Error::contents(Path::new(&origin), error.to_string().trim());
+        let origin = Config::origin(file, benchmark, settings);
+        let wrong = |error: toml::de::Error| Error::contents(&origin, error.to_string().trim());
         let config: Config = table.try_into().map_err(wrong)?;
-        config.check(&Reader::of(Path::new(&origin)))?;
+        config.check(&Reader::of(&origin))?;
         Ok(config)
+    }
+
+    /// Where the keys of [`Config::read_for`] come from, for errors: `default with --set seed=3`.
+    pub fn origin(file: &Path, benchmark: Option<&str>, settings: &[String]) -> PathBuf {
+        let flags = benchmark.map(|name| format!("--benchmark {name}")).into_iter();
+        let flags: Vec<String> = flags.chain(settings.iter().map(|setting| format!("--set {setting}"))).collect();
+        if flags.is_empty() { file.to_owned() } else { PathBuf::from(format!("{} with {}", file.display(), flags.join(" "))) }
     }
 
     /// Values from the command line replace the file's. `--minutes` or `--steps` replaces the whole budget.

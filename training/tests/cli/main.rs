@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a failure of a test's helper fails the test")]
 
 mod bench;
+mod benchmark;
 mod certify;
 mod checkpoint;
 mod device;

@@ -79,8 +79,10 @@ fn training_on_a_test_route_or_with_other_actions_is_refused_before_a_folder_is_
     let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
     for (from, to, expected) in [
         ("test = ", "train = ", "20m/E-right-1 is a test route of short"),
-        ("-0.8, -0.4,", "-0.8, -0.5,", "its actions and vehicle lock must be those of short"),
-        ("load =", "steer_max_deg = 30.0\nload =", "its actions and vehicle lock must be those of short"),
+        ("-0.8, -0.4,", "-0.8, -0.5,", "short, on which the policy is evaluated, differs in actions and vehicle lock: --benchmark"),
+        ("load =", "steer_max_deg = 30.0\nload =", "differs in actions and vehicle lock"),
+        ("load = \"empty\"", "load = \"half\"", "differs in vehicle and load (empty)"),
+        ("range = 20.0", "range = 19.0", "differs in sensors.range (20 m in place of 19 m)"),
     ] {
         assert!(benchmark.contains(from), "{from}");
         std::fs::write(place.file("training.toml"), benchmark.replacen(from, to, 1)).unwrap();
@@ -258,12 +260,71 @@ fn a_further_evaluation_that_cannot_be_is_refused_before_a_folder_is_made() {
         ("nowhere", "also_evaluate: nowhere/test; benchmark: nowhere; must be"),
         (missing.as_str(), "missing.toml: cannot be read"),
         (&format!("{other}/validation"), "other has no routes under `validation`"),
-        ("attard2023/train", "also_evaluate: attard2023/train; its actions and vehicle lock must be those of short"),
+        (
+            "attard2023/train",
+            "also_evaluate: attard2023/train; it differs from short, which is trained on, in actions and vehicle lock: leave",
+        ),
         (&tested, "16m/E-right-1 is trained on, so no test route may be"),
         (&format!("{other}/all"), "also_evaluate[0]"),
     ] {
         let message = refusal(&place.train(&["--set", &format!("also_evaluate=[\"{named}\"]")]), 2);
         assert!(message.contains("also_evaluate") && message.contains(expected), "{message}");
+        assert!(!place.file("runs").exists());
+    }
+}
+
+#[test]
+fn a_wrong_benchmark_is_refused_with_the_file_and_the_key() {
+    let place = Place::new();
+    place.validate(2, 1);
+    for key in ["benchmark", "training_benchmark", "validation.benchmark"] {
+        for name in ["nowhere".to_owned(), place.text("nowhere.toml")] {
+            let message = refusal(&place.train(&["--set", &format!("{key}={name}")]), 2);
+            let expected = format!("tiny.toml with --set {key}={name}: {key}: ");
+            assert!(message.contains(&expected) && message.contains("nowhere"), "{message}");
+        }
+    }
+    let message = refusal(&place.train(&["--benchmark", "nowhere"]), 2);
+    assert!(message.contains("tiny.toml with --benchmark nowhere: benchmark: nowhere; "), "{message}");
+    let tested = std::fs::read_to_string(place.file("short.toml")).unwrap().replace("train = ", "test = ");
+    std::fs::write(place.file("tested.toml"), tested).unwrap();
+    let message = refusal(&place.train(&["--set", &format!("training_benchmark={}", place.text("tested.toml"))]), 2);
+    assert!(message.contains("training_benchmark: tested; it has no routes under `train`"), "{message}");
+    assert!(!place.file("runs").exists());
+}
+
+#[test]
+fn a_run_says_first_what_it_will_do_and_last_what_its_checkpoint_is_for() {
+    let place = Place::new();
+    let output = place.train(&["--name", "run", "--steps", "800"]);
+    succeed(&output);
+    let said = String::from_utf8(output.stdout).unwrap();
+    let first = said.lines().next().unwrap();
+    assert!(
+        first.contains("tiny.toml: trains for 800 env steps of 8 trucks; while it trains a line says how long is left; then"),
+        "{said}"
+    );
+    let last = said.lines().last().unwrap();
+    assert!(last.contains("checkpoint.safetensors (1 MB) is for train --resume") && last.ends_with("it may be deleted"), "{said}");
+}
+
+/// Linux has the limit; other systems do not say what is free.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_run_that_does_not_fit_into_memory_is_refused_before_a_folder_is_made() {
+    let place = Place::new();
+    for (setting, expected) in [
+        ("replay_buffer.capacity=100000000", "replay_buffer.capacity: 100000000; the run would take about 28"),
+        ("learning.hidden=[8192, 8192, 8192, 8192]", "learning.hidden: [8192, 8192, 8192, 8192]; the run would take about 2"),
+        ("learning.batch=1048576", "learning.batch: 1048576; the run would take about"),
+    ] {
+        let (program, training, runs) = (env!("CARGO_BIN_EXE_offtrack"), place.text("tiny.toml"), place.text("runs"));
+        // Four gigabytes of address space; a batch of so many transitions takes a little less on its own.
+        let hidden = if setting.starts_with("learning.batch") { "--set 'learning.hidden=[256, 256]'" } else { "" };
+        let line = format!("ulimit -v 4000000; exec {program} train {training} --out {runs} --steps 1000000000 {hidden} --set '{setting}'");
+        let output = std::process::Command::new("sh").env("OFFTRACK_CACHE", crate::place::CACHE).args(["-c", &line]).output().unwrap();
+        let message = refusal(&output, 2);
+        assert!(message.contains(expected) && message.contains("GB are free: less would do"), "{message}");
         assert!(!place.file("runs").exists());
     }
 }

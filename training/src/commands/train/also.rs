@@ -3,7 +3,7 @@
 //! Their benchmarks are read and checked before the run begins. Each world is baked when its turn comes, so one at a
 //! time is in memory.
 
-use offtrack::layout::Action;
+use offtrack::reader::Reader;
 use offtrack::scenario::{Scenario, Split};
 use offtrack_policy::Policy;
 use offtrack_training::device::Device;
@@ -13,6 +13,7 @@ use offtrack_training::evaluation::{Evaluation, usual_episodes};
 use offtrack_training::learner::config::{AlsoEvaluate, Config};
 use serde::Serialize;
 
+use super::alike;
 use crate::commands::{progress, roads};
 
 /// A further evaluation, ready to be made.
@@ -34,10 +35,11 @@ pub struct AlsoReport {
 }
 
 impl Also {
-    /// Reads the benchmarks that a training file names. `training` is what the policy is trained on, with `actions`.
-    pub fn read(config: &Config, training: &Scenario, actions: &[Action]) -> Result<Vec<Also>, Error> {
+    /// Reads the benchmarks that a training file names. `training` is what the policy is trained on. They may be for other
+    /// vehicles: how well a policy drives those is something to evaluate.
+    pub fn read(config: &Config, reader: &Reader, training: &Scenario) -> Result<Vec<Also>, Error> {
         let read = |named: AlsoEvaluate| {
-            let wrong = |expected: String| Error::Flag { flag: "also_evaluate", value: named.name(), expected };
+            let wrong = |expected: String| Error::from(reader.invalid("also_evaluate", named.name(), expected));
             let mut scenario = roads::benchmark(&named.benchmark).map_err(|error| wrong(error.to_string()))?;
             scenario.keep(&[named.split]);
             if scenario.split(named.split).is_empty() {
@@ -48,12 +50,9 @@ impl Also {
                 return Err(wrong(format!("{route} is trained on, so no {} route may be: leave it out", named.split.name())));
             }
             let trained_on = both.len();
-            let lock = scenario.steer_max.unwrap_or(scenario.vehicle.tractor.steer_max) as f32;
-            if scenario.actions(lock) != actions {
-                return Err(wrong(format!("its actions and vehicle lock must be those of {}, which is trained on", training.name)));
-            }
-            if scenario.extras != training.extras {
-                return Err(wrong(format!("its observation.extras must be those of {}, which is trained on", training.name)));
+            if let Some(difference) = alike::needed(training, &scenario) {
+                let out = "leave it out, or all of them with --set also_evaluate=";
+                return Err(wrong(format!("it differs from {}, which is trained on, in {difference}: {out}", training.name)));
             }
             Ok(Also { scenario, split: named.split, trained_on })
         };

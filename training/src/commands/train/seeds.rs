@@ -15,7 +15,7 @@ use offtrack_training::learner::run::folder::{self, Folder};
 use offtrack_training::learner::run::resume::Resumed;
 use serde::Deserialize;
 
-use super::{Args, Manner, Opened, Prepared, Worlds, config, stop_flag, train};
+use super::{Args, Manner, Opened, Prepared, read, stop_flag, train};
 
 /// Most seeds of a command.
 const MOST: usize = 1000;
@@ -34,7 +34,7 @@ struct Earlier {
 /// Trains the seeds that `text` names.
 pub fn run(args: &Args, file: &Path, text: &str) -> Result<(), Error> {
     let seeds = parsed(text)?;
-    let config = config(args, file)?;
+    let (config, worlds) = read(args, file, seeds.len())?;
     let of_seed = |seed: u32| Config { seed, ..config.clone() };
     let runs = args.out.clone().unwrap_or_else(|| PathBuf::from("runs"));
     let earlier = args.name.as_ref().map(|name| Group(runs.join(name))).filter(|group| group.file().is_file());
@@ -45,7 +45,6 @@ pub fn run(args: &Args, file: &Path, text: &str) -> Result<(), Error> {
         Some(group) => group.unfinished(&seeds)?,
         None => seeds.first().copied(),
     };
-    let worlds = Worlds::read(&config)?;
     // All that can be wrong with the input is found before a folder is made.
     let mut prepared = next.map(|seed| Prepared::new(&of_seed(seed), &worlds)).transpose()?;
     let group = match earlier {

@@ -54,6 +54,9 @@ impl Config {
             let expected = format!("must hold more than learning.n_steps = {} steps of n_envs = {} trucks", learning.n_steps, self.n_envs);
             return Err(reader.invalid("replay_buffer.capacity", replay_buffer.capacity, expected).into());
         }
+        if self.device == Device::Cpu && self.adapter.is_some() {
+            return Err(reader.invalid("adapter", "given", "works with device = \"gpu\" alone: leave it out").into());
+        }
         if self.device == Device::Gpu {
             let without = [
                 ("exploration", self.exploration.is_some()),

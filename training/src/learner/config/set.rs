@@ -1,8 +1,20 @@
-//! Single keys of a training file set from the command line: `--set learning.n_steps=5`.
+//! Keys of a training file set from the command line: `--benchmark mine.toml`, `--set learning.n_steps=5`.
 
 use toml::{Table, Value};
 
 use crate::error::Error;
+
+/// What a training file says of other benchmarks: no key of it holds for another one.
+const OF_OTHERS: [&str; 4] = ["training_benchmark", "reward", "also_evaluate", "validation.benchmark"];
+
+/// Sets `benchmark` and takes out what the file says of others, so that this one is trained on, validated on and
+/// evaluated.
+pub(super) fn set_benchmark(table: &mut Table, benchmark: &str) {
+    table.insert("benchmark".to_owned(), Value::String(benchmark.to_owned()));
+    for key in OF_OTHERS {
+        remove(table, key);
+    }
+}
 
 /// Sets what each of `settings` says, `KEY=VALUE`, in the file's `table`; nothing after the `=` takes the key out.
 pub(super) fn set(table: &mut Table, settings: &[String]) -> Result<(), Error> {
@@ -17,15 +29,16 @@ fn one(table: &mut Table, setting: &str) -> Result<(), Error> {
     if path.iter().any(|part| part.is_empty()) {
         return Err(wrong("a key is needed before the `=`, its parts joined by single points".into()));
     }
+    if value.trim().is_empty() {
+        remove(table, key.trim());
+        return Ok(());
+    }
     let mut table = table;
     for part in tables {
         let inner = table.entry(*part).or_insert_with(|| Value::Table(Table::new()));
         table = inner.as_table_mut().ok_or_else(|| wrong(format!("{part} is a value and has no keys below it")))?;
     }
-    match value.trim() {
-        "" => table.remove(*last),
-        value => table.insert((*last).to_owned(), parsed(value)),
-    };
+    table.insert((*last).to_owned(), parsed(value.trim()));
     Ok(())
 }
 

@@ -233,6 +233,26 @@ fn single_keys_can_be_set_added_and_taken_out() {
 }
 
 #[test]
+fn a_key_that_is_not_there_can_be_taken_out() {
+    let paper = |settings: &[&str]| {
+        let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+        Config::read_with(Path::new("paper"), &settings).map_err(|error| error.to_string())
+    };
+    assert_eq!(paper(&["validation.benchmark=", "refinement.reward.clearance="]), paper(&[]));
+}
+
+#[test]
+fn a_benchmark_of_ones_own_takes_the_place_of_all_that_a_training_file_says_of_others() {
+    let config = Config::read_for(Path::new("default"), Some("mine.toml"), &["reward.failure=-9".to_owned()]).unwrap();
+    let usual = with_set(&[]).unwrap();
+    assert_eq!((config.benchmark.as_str(), &config.training_benchmark, &config.also_evaluate), ("mine.toml", &None, &Vec::new()));
+    assert_eq!(config.changed_rewards(), "reward.failure = -9.0");
+    assert_eq!(config.validation, Some(Validation { benchmark: None, ..usual.validation.unwrap() }));
+    assert_eq!(config.learning, usual.learning);
+    assert_eq!(read(&config.to_toml()), Ok(config));
+}
+
+#[test]
 fn weights_of_the_reward_can_be_changed_one_by_one() {
     let mut scenario = Scenario::named("attard2023-training").unwrap();
     let before = scenario.clone();
@@ -263,6 +283,7 @@ fn a_key_set_wrongly_is_refused_with_what_would_do() {
         ("reward.lane_distance_limit=51", "reward.lane_distance_limit: 51 m; must lie in 0.1..50 m"),
         ("reward.waypoint=nan", "reward.waypoint: NaN; must lie in"),
         ("reward.kerb=-1", "unknown field `kerb`"),
+        ("adapter=llvmpipe", "adapter: given; works with device = \"gpu\" alone"),
     ] {
         let message = with_set(&[setting]).unwrap_err();
         assert!(message.contains(expected), "{setting}: {message}");
