@@ -8,6 +8,7 @@ pub mod draw;
 pub mod evaluate;
 pub mod generate;
 pub mod import;
+mod outputs; // files to write: each its own
 mod policies; // flags: which policy
 mod progress; // the bar on a terminal
 pub mod record;

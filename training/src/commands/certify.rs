@@ -19,7 +19,7 @@ use offtrack_training::evaluation::certificate::verify;
 use offtrack_training::evaluation::policies;
 use offtrack_training::files;
 
-use super::{progress, roads};
+use super::{outputs, progress, roads};
 
 /// On the lane centre, and the four corners of the largest start errors.
 const STARTS: [Start; 5] = [start(0.0, 0.0), start(1.0, 1.0), start(1.0, -1.0), start(-1.0, 1.0), start(-1.0, -1.0)];
@@ -92,6 +92,8 @@ fn again(path: &Path, benchmark: Option<&str>, load: Option<&str>) -> Result<(),
 /// Searches every route from every start.
 fn certify(args: &Args) -> Result<(), Error> {
     let passes = passes(&args.widths, args.hold)?;
+    let read = [("--policy", args.policy.as_ref().map(Path::new)), ("--benchmark", args.benchmark.as_ref().map(Path::new))];
+    outputs::distinct(&[("--json", args.json.as_deref())], &read)?;
     let scenario = roads::benchmark(args.benchmark.as_deref().unwrap_or("attard2023"))?;
     let mut scenario = roads::with_load(scenario, args.load.as_deref())?;
     let splits: Vec<Split> = Split::ALL.into_iter().filter(|split| args.split == "all" || args.split == split.name()).collect();

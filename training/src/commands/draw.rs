@@ -59,9 +59,9 @@ pub struct Args {
     /// Length of the routes after the ring [m].
     #[arg(long, default_value_t = DEPARTURE)]
     departure: f64,
-    /// Width of a PNG [pixels].
-    #[arg(long, default_value_t = 1000)]
-    size: u32,
+    /// Width of a PNG [pixels] \[default: 1000\].
+    #[arg(long)]
+    size: Option<u32>,
 }
 
 /// The format of the file.
@@ -75,8 +75,9 @@ enum Format {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     let format = format(&args.output)?;
-    if !(200..=8000).contains(&args.size) {
-        return Err(Error::Flag { flag: "--size", value: args.size.to_string(), expected: "must lie in 200..8000 pixels".into() });
+    if let Some(size) = args.size.filter(|size| format != Format::Png || !(200..=8000).contains(size)) {
+        let expected = if format == Format::Png { "must lie in 200..8000 pixels" } else { "is for .png: leave it out" };
+        return Err(Error::Flag { flag: "--size", value: size.to_string(), expected: expected.into() });
     }
     if !(1.0..=90.0).contains(&args.speed_kmh) {
         return Err(Error::Flag {
@@ -115,7 +116,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     };
     let svg = page.map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?;
     let bytes = if format == Format::Png {
-        rasterised(&svg, args.size).map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?
+        rasterised(&svg, args.size.unwrap_or(1000)).map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?
     } else {
         svg.into_bytes()
     };

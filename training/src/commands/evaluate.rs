@@ -17,7 +17,7 @@ use offtrack_training::{files, provenance};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::{devices, policies, progress, record, roads, terminal};
+use super::{devices, outputs, policies, progress, record, roads, terminal};
 
 /// Most bytes of a run's report and of its figures.
 const RUN_LIMIT: u64 = 64 << 20;
@@ -57,7 +57,7 @@ pub struct Args {
     /// those that failed and a sample of the others.
     #[arg(long)]
     html: Option<PathBuf>,
-    /// With --html: the folder of the training run that the policy comes from, to show its curves too.
+    /// With --html: the folder of the training run that has left this policy, to show its curves too.
     #[arg(long, requires = "html")]
     run: Option<PathBuf>,
     /// A certificate of `offtrack certify`: success over the routes that it shows to be possible is reported too.
@@ -97,19 +97,25 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return Err(Error::Flag { flag: "--episodes", value: episodes.to_string(), expected: "must lie in 1..100000".into() });
     }
     let passes = passes(&args.widths, HOLD)?;
+    let read = [("--certified", args.certified.as_deref()), ("--benchmark", Some(Path::new(&args.benchmark)))];
+    outputs::distinct(&[("--json", args.json.as_deref()), ("--html", args.html.as_deref())], &[&args.policy.files()[..], &read].concat())?;
     let device = args.device.open()?;
     let split = Split::ALL.into_iter().find(|split| split.name() == args.split).unwrap_or(Split::Test);
     let mut scenario = roads::with_load(roads::benchmark(&args.benchmark)?, args.load.as_deref())?;
     if !args.route.is_empty() {
         roads::narrow(&mut scenario, &args.route, &[split])?;
     }
-    scenario.keep(&[split]);
+    scenario = roads::of_split(scenario, split)?;
     let world = roads::world(&scenario)?;
     let mut policy = args.policy.open(&scenario, &world, args.seed)?;
     let n_routes = scenario.split(split).len();
     let episodes = args.episodes.unwrap_or_else(|| usual_episodes(n_routes));
     let (run, metrics) = match &args.run {
-        Some(folder) => read_run(folder)?,
+        Some(folder) => {
+            let run = read_run(folder)?;
+            args.policy.check_is_of(folder, &scenario, &world)?;
+            run
+        }
         None => (Value::Null, None),
     };
     let possible = args.certified.as_ref().map(|file| certified(file, &scenario, &world, scenario.split(split))).transpose()?;

@@ -19,16 +19,16 @@ pub struct Args {
     /// The map: a .xodr file.
     map: PathBuf,
     /// Print the roundabouts found, and how many islands and blocks are none.
-    #[arg(long, conflicts_with_all = ["ring", "ways", "arms"])]
+    #[arg(long, conflicts_with_all = ["ring", "ways", "arms", "junctions", "check", "output"])]
     list: bool,
     /// Print the ways through every junction, as --way takes them.
-    #[arg(long, conflicts_with_all = ["ring", "ways", "arms"])]
+    #[arg(long, conflicts_with_all = ["ring", "ways", "arms", "check", "output"])]
     junctions: bool,
     /// Print everything that is odd in the map and in its roundabouts, and why every other island or block is none.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "output")]
     check: bool,
     /// Write one roundabout to this file, NAME.outline.toml: what is driven on, without the map.
-    #[arg(short, long)]
+    #[arg(short, long, required_unless_present_any = ["list", "junctions", "check"])]
     output: Option<PathBuf>,
     #[command(flatten)]
     place: PlaceArgs,

@@ -22,7 +22,7 @@ use offtrack_training::error::Error;
 use offtrack_training::evaluation::policies::Policy;
 use offtrack_training::files;
 
-use super::{policies, progress, roads};
+use super::{outputs, policies, progress, roads};
 
 /// Record an episode: as a film, as a picture with the swept paths of both units, or as data.
 #[derive(Debug, clap::Args)]
@@ -76,6 +76,10 @@ enum Format {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     let format = format(&args.output)?;
+    outputs::distinct(&[("--output", Some(&args.output))], &args.policy.files())?;
+    if let (Some(size), Format::Svg | Format::Json) = (args.size, format) {
+        return Err(Error::Flag { flag: "--size", value: size.to_string(), expected: "is for .gif and .png: leave it out".into() });
+    }
     if let Some(size) = args.size
         && !(200..=4000).contains(&size)
     {

@@ -123,6 +123,17 @@ pub fn unknown(scenario: &Scenario, name: &str) -> Error {
     Error::Flag { flag: "--route", value: name.to_owned(), expected }
 }
 
+/// The benchmark with the routes of the split that `--split` names alone. One without any is an error.
+pub fn of_split(mut scenario: Scenario, split: Split) -> Result<Scenario, Error> {
+    if scenario.split(split).is_empty() {
+        let known: Vec<&str> = Split::ALL.into_iter().filter(|&split| !scenario.split(split).is_empty()).map(Split::name).collect();
+        let expected = format!("{} has no such routes: it has {}", scenario.name, known.join(" and "));
+        return Err(Error::Flag { flag: "--split", value: split.name().to_owned(), expected });
+    }
+    scenario.keep(&[split]);
+    Ok(scenario)
+}
+
 /// The benchmark with the trucks of this load alone; the whole of it where none is named.
 pub fn with_load(scenario: Scenario, load: Option<&str>) -> Result<Scenario, Error> {
     let Some(load) = load else { return Ok(scenario) };

@@ -15,7 +15,7 @@ use offtrack::layout::{N_RAYS, N_VALUES};
 use offtrack::scenario::Split;
 use serde::Serialize;
 
-use super::{devices as device, roads};
+use super::{devices as device, outputs, roads};
 pub(crate) use measure::median;
 use measure::{Measured, measured};
 use mode::{Learner, Mode, Setting};
@@ -149,6 +149,11 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if let Some(file) = &args.plot {
         plot::check(file)?;
     }
+    if let Some(file) = args.config.as_ref().filter(|_| !args.mode.contains(&Mode::Training)) {
+        let expected = "is for --mode training: add that mode, or leave --config out".to_owned();
+        return Err(Error::Flag { flag: "--config", value: file.display().to_string(), expected });
+    }
+    outputs::distinct(&[("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())], &[("--config", args.config.as_deref())])?;
     let mut device = args.device.open()?;
     let start = Instant::now();
     let scenario = roads::benchmark(&args.benchmark)?;

@@ -12,6 +12,8 @@ use serde_json::Value;
 use offtrack_training::error::Error;
 use offtrack_training::files::{print, write_json};
 
+use super::outputs;
+
 /// Drive the trajectory cases of a file of reference vectors and print the truck's state at the times they ask for.
 ///
 /// A case has a vehicle, `dt`, `init`, `commands` and `t_end`; its times are `times` or those of `expected`. A sub-step
@@ -41,6 +43,7 @@ struct Skipped {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
+    outputs::distinct(&[("--output", args.output.as_deref())], &[("CASES", Some(&args.cases))])?;
     let report = report(&args.cases)?;
     for Skipped { id, kind } in &report.skipped {
         eprintln!("offtrack: {}: case {id:?} is skipped: its kind is {kind:?}, not \"trajectory\"", args.cases.display());

@@ -115,12 +115,13 @@ fn the_title_of_a_swept_path_says_whether_the_own_lane_suffices() {
 #[test]
 fn wrong_input_is_refused_with_exit_code_2_and_says_what_would_do() {
     let folder = tempfile::tempdir().expect("a folder");
-    let [svg, gif, bare] = ["a.svg", "a.gif", "a"].map(|name| folder.path().join(name));
+    let [svg, png, gif, bare] = ["a.svg", "a.png", "a.gif", "a"].map(|name| folder.path().join(name));
     let place = place("20m");
     let svg = text(&svg);
     refuse(&[&place, "-o", text(&gif)], 2, "must end in .svg, .png or .json");
     refuse(&[&place, "-o", text(&bare)], 2, "must end in .svg, .png or .json");
-    refuse(&[&place, "-o", svg, "--size", "199"], 2, "--size: 199; must lie in 200..8000 pixels");
+    refuse(&[&place, "-o", text(&png), "--size", "199"], 2, "--size: 199; must lie in 200..8000 pixels");
+    refuse(&[&place, "-o", svg, "--size", "400"], 2, "--size: 400; is for .png");
     refuse(&[&place, "-o", svg, "--route", "N-left-9"], 2, "--route: N-left-9; the roundabout has E-left-2, E-left-3,");
     refuse(&[&place, "-o", svg, "--route", "N-left-3", "--load", "bricks"], 2, "--load: bricks; the vehicle has empty,");
     refuse(

@@ -287,3 +287,26 @@ fn the_table_fits_the_terminal() {
         assert!(table.contains("load transfer ratio"), "{printed}");
     }
 }
+
+#[test]
+fn the_curves_of_another_policys_run_are_refused_and_those_of_a_copys_are_shown() {
+    let place = Place::new();
+    for (run, seed) in [("one", "5"), ("two", "6")] {
+        succeed(&place.train(&["--name", run, "--seed", seed, "--steps", "800"]));
+    }
+    let (page, run) = (place.text("page.html"), place.text("runs/one"));
+    let evaluated = |policy: &str| place.evaluate(&["--policy", policy, "--episodes", "1", "--html", &page, "--run", &run]);
+    for other in [place.text("runs/two/policy.safetensors"), "pursuit".to_owned(), "random".to_owned()] {
+        let said = refusal(&evaluated(&other), 2);
+        assert!(said.contains(&format!("--run: {run}; another policy is evaluated: give the run's own")), "{said}");
+        assert!(!place.file("page.html").exists());
+    }
+    std::fs::copy(place.file("runs/one/policy.safetensors"), place.file("copy.safetensors")).unwrap();
+    succeed(&evaluated(&place.text("copy.safetensors")));
+}
+
+#[test]
+fn a_split_without_routes_is_refused_with_those_that_there_are() {
+    let said = refusal(&offtrack(&["evaluate", "--policy", "random", "--split", "validation"]), 2);
+    assert!(said.contains("--split: validation; attard2023 has no such routes: it has train and test"), "{said}");
+}

@@ -9,6 +9,7 @@ mod checkpoint;
 mod device;
 mod draw;
 mod evaluate;
+mod flags;
 mod generate;
 mod import;
 mod input;

@@ -102,12 +102,13 @@ fn a_page_takes_its_curves_from_the_folder_of_a_run() {
     let place = Place::new();
     succeed(&place.train(&["--name", "run", "--steps", "800"]));
     let page = place.text("page.html");
-    let arguments = ["--policy", "random", "--episodes", "1", "--html", &page, "--run"];
+    let policy = place.text("runs/run/policy.safetensors");
+    let arguments = ["--policy", &policy, "--episodes", "1", "--html", &page, "--run"];
     let with_run = |run: &str| place.evaluate(&[&arguments[..], &[&place.text(run)]].concat());
     succeed(&with_run("runs/run"));
     let text = read(Path::new(&page));
     let report: Value = serde_json::from_str(block(&text, "report")).unwrap();
-    assert_eq!((&report["env_steps"], &report["evaluation"]["policy"]), (&Value::from(800), &Value::from("random")));
+    assert_eq!((&report["env_steps"], &report["evaluation"]["policy"]), (&Value::from(800), &Value::from(policy.as_str())));
     assert_eq!(serde_json::from_str::<Value>(block(&text, "metrics")).unwrap(), read(&place.file("runs/run/metrics.csv")));
 
     let said = refusal(&with_run("runs/none"), 2);

@@ -139,6 +139,8 @@ fn wrong_input_is_refused_with_exit_code_2_and_leaves_nothing_behind() {
         ("a.mp4", &[][..], "--output: "),
         ("a", &[], "must end in .gif, .png, .svg or .json"),
         ("a.png", &["--size", "199"], "--size: 199; must lie in 200..4000 pixels"),
+        ("a.svg", &["--size", "400"], "--size: 400; is for .gif and .png"),
+        ("a.json", &["--size", "400"], "--size: 400; is for .gif and .png"),
         ("a.json", &["--episode", "30"], "--episode: 30; must lie in 0..29: --episodes says how many there are"),
         ("a.json", &["--episodes", "0"], "--episodes: 0; must lie in 1..100000"),
         ("a.json", &["--policy", "missing"], "policy: missing; the program comes with attard2023, "),
@@ -162,8 +164,8 @@ fn wrong_input_is_refused_with_exit_code_2_and_leaves_nothing_behind() {
 #[test]
 fn a_recording_that_cannot_be_written_is_a_failure() {
     let place = Place::new();
-    for name in ["missing/a.json", "missing/a.gif"] {
-        let all = recording(&place, name, &["--size", "200"]);
+    for (name, flags) in [("missing/a.json", &[][..]), ("missing/a.gif", &["--size", "200"])] {
+        let all = recording(&place, name, flags);
         let said = refusal(&offtrack(&all.iter().map(String::as_str).collect::<Vec<_>>()), 1);
         assert!(said.contains(&place.text(name)) && said.contains("cannot be written"), "{said}");
     }
@@ -191,7 +193,10 @@ fn a_recording_of_a_fleet_has_the_truck_of_its_episode_by_name_and_dimensions() 
 fn loads_named_are_driven_by_the_same_truck_and_shown_beside_each_other_or_in_turn() {
     let place = Place::new();
     let record = |output: &str, loads: &[&str]| {
-        let mut arguments = vec!["record", "--benchmark", "laden2026", "--route", ROUTE, "--policy", "pursuit", "--size", "200"];
+        let mut arguments = vec!["record", "--benchmark", "laden2026", "--route", ROUTE, "--policy", "pursuit"];
+        if output.ends_with(".gif") {
+            arguments.extend(["--size", "200"]);
+        }
         let output = place.text(output);
         arguments.extend(loads.iter().flat_map(|load| ["--load", load]).chain(["-o", &output]));
         offtrack(&arguments)

@@ -1,0 +1,45 @@
+//! Flags that would have no effect, or cost a file: refused before any work, on every command.
+
+use crate::place::{Place, offtrack, refusal, repository, succeed};
+
+#[test]
+fn a_flag_without_effect_is_refused() {
+    let place = Place::new();
+    for policy in ["random", "attard2023"] {
+        let said = refusal(&offtrack(&["evaluate", "--policy", policy, "--episodes", "1", "--look-ahead", "9"]), 2);
+        assert!(said.contains("--look-ahead: 9 m; is for pure pursuit: give --policy pursuit"), "{said}");
+    }
+    let said = refusal(&offtrack(&["scale", "--envs", "8", "--seconds", "0.1", "--config", &place.text("tiny.toml")]), 2);
+    assert!(said.contains("tiny.toml; is for --mode training"), "{said}");
+    for both in [&["--list", "--check"][..], &["--junctions", "-o", "a.outline.toml"], &["--check", "-o", "a.outline.toml"]] {
+        let said = refusal(&offtrack(&[&["import", "scenarios/maps/sumo_ring22.xodr"], both].concat()), 2);
+        assert!(said.contains("cannot be used with"), "{said}");
+    }
+    let said = refusal(&offtrack(&["import", "scenarios/maps/sumo_ring22.xodr"]), 2);
+    assert!(said.contains("--output <OUTPUT>"), "{said}");
+}
+
+#[test]
+fn a_file_to_be_written_that_is_another_of_the_commands_files_is_refused_before_any_work() {
+    let place = Place::new();
+    succeed(&place.train(&["--name", "run", "--steps", "800"]));
+    let policy = place.text("runs/run/policy.safetensors");
+    let before = std::fs::read(&policy).unwrap();
+    std::fs::create_dir(place.file("folder")).unwrap();
+    let (one, same) = (place.text("report"), place.text("folder/../report"));
+    for (files, expected) in [
+        (["--html", &one, "--json", &one], "is the file of --json too"),
+        (["--html", &one, "--json", &same], "is the file of --json too"),
+        (["--episodes", "1", "--json", &policy], "is the file of --policy too: name another one"),
+    ] {
+        let said = refusal(&place.evaluate(&[&["--policy", policy.as_str()], &files[..]].concat()), 2);
+        assert!(said.contains(expected), "{said}");
+        assert!(!place.file("report").exists() && std::fs::read(&policy).unwrap() == before);
+    }
+    let said = refusal(&offtrack(&["scale", "--envs", "8", "--json", &place.text("a.svg"), "--plot", &place.text("a.svg")]), 2);
+    assert!(said.contains("--plot: ") && said.contains("is the file of --json too"), "{said}");
+    let vectors = place.text("vectors.json");
+    std::fs::copy(repository().join("tests/data/physics_vectors.json"), &vectors).unwrap();
+    let said = refusal(&offtrack(&["trace", &vectors, "-o", &vectors]), 2);
+    assert!(said.contains("--output: ") && said.contains("is the file of CASES too"), "{said}");
+}
