@@ -6,6 +6,7 @@
 mod alignment;
 mod check;
 mod corner;
+mod ends; // arms prolonged
 mod gutter; // widths that differ
 mod hand; // left-hand traffic
 mod kerb;

@@ -1,11 +1,17 @@
-//! The path that both units sweep when the front axle follows a lane's centre line exactly.
+//! The path that both units sweep when the front axle follows a lane's centre line exactly, and what that asks of the
+//! truck.
 //!
-//! It depends on vehicle, speed and line alone and is computed in f64. Pictures and reports use it.
+//! Both depend on vehicle, speed and line alone and are computed in f64. The path itself knows no limit: it turns as
+//! sharply as the line does. Whether lock, steer rate, tyres and load allow that, [`demands`] says. Pictures and reports
+//! use both.
+
+mod demand;
 
 use glam::DVec2;
 
 use crate::geometry::{Curve, Outline};
 use crate::layout::{Body, Rig};
+pub use demand::{Demand, Limit, demands, steer_angle_max};
 
 /// Pose of both units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,6 +38,52 @@ impl Pose {
     }
 }
 
+/// The lengths that decide how the trailer follows, at one speed.
+#[derive(Debug, Clone, Copy)]
+struct Towing {
+    /// Of the front axle [m/s].
+    speed: f64,
+    wheelbase: f64,
+    fifth_wheel: f64,
+    trailer_wheelbase: f64,
+    /// By which slip moves a unit's turning point ahead \[m].
+    slip: f64,
+}
+
+/// Motion of both units at one instant.
+#[derive(Debug, Clone, Copy)]
+struct Turning {
+    /// Speed of the drive axle along the tractor [m/s].
+    along: f64,
+    /// Of the tractor [rad/s].
+    yaw: f64,
+    /// Speed of the trailer's axle group along the trailer [m/s].
+    trailer_along: f64,
+    /// Of the trailer [rad/s].
+    trailer_yaw: f64,
+}
+
+impl Towing {
+    fn of(rig: &Rig, speed: f64) -> Towing {
+        let wheelbase = f64::from(rig.wheelbase);
+        let (fifth_wheel, trailer_wheelbase) = (f64::from(rig.fifth_wheel), f64::from(rig.trailer_wheelbase));
+        // The same bound as in the simulator's equations, and another that keeps the tractor's lever positive.
+        let slip = (f64::from(rig.slip) * speed * speed).min(rig.slip_lever_max.into()).min(0.8 * wheelbase);
+        Towing { speed, wheelbase, fifth_wheel, trailer_wheelbase, slip }
+    }
+
+    /// Motion where the front axle moves in a direction relative to the tractor, at an articulation \[rad].
+    fn turning(&self, direction: f64, articulation: f64) -> Turning {
+        let Towing { speed, wheelbase, fifth_wheel, trailer_wheelbase, slip } = *self;
+        let along = speed * direction.cos();
+        let yaw = speed * direction.sin() / (wheelbase - slip);
+        let (sin, cos) = articulation.sin_cos();
+        let hitch = (fifth_wheel - slip) * yaw;
+        let trailer_yaw = (along * sin + hitch * cos) / (trailer_wheelbase - slip);
+        Turning { along, yaw, trailer_along: along * cos - hitch * sin, trailer_yaw }
+    }
+}
+
 /// Corners of a body in a frame at `origin` with `heading`, counter-clockwise from front left \[m].
 pub fn corners(body: &Body, origin: DVec2, heading: f64) -> [DVec2; 4] {
     let ahead = DVec2::from_angle(heading);
@@ -45,17 +97,11 @@ pub fn corners(body: &Body, origin: DVec2, heading: f64) -> [DVec2; 4] {
 /// The front axle's velocity points along the line; slip moves the tractor's turning point ahead by `slip * speed^2`,
 /// which shortens the lever of the turn, as in the single-track equations of [`crate::engine::cpu::drive`].
 pub fn swept_path(rig: &Rig, centre_line: &Curve, speed: f64, spacing: f64) -> Vec<Pose> {
-    let wheelbase = f64::from(rig.wheelbase);
-    let (fifth_wheel, trailer_wheelbase) = (f64::from(rig.fifth_wheel), f64::from(rig.trailer_wheelbase));
-    // The same bound as in the simulator's equations, and another that keeps the tractor's lever positive.
-    let slip = (f64::from(rig.slip) * speed * speed).min(rig.slip_lever_max.into()).min(0.8 * wheelbase);
+    let towing = Towing::of(rig, speed);
+    let Towing { wheelbase, fifth_wheel, trailer_wheelbase, .. } = towing;
     let rates = |line: f64, heading: f64, trailer_heading: f64| {
-        let steering = line - heading;
-        let along = speed * steering.cos();
-        let yaw = speed * steering.sin() / (wheelbase - slip);
-        let (sin, cos) = (heading - trailer_heading).sin_cos();
-        let hitch = (fifth_wheel - slip) * yaw;
-        (yaw, (along * sin + hitch * cos) / (trailer_wheelbase - slip))
+        let turning = towing.turning(line - heading, heading - trailer_heading);
+        (turning.yaw, turning.trailer_yaw)
     };
     let pose = |station: f64, heading: f64, trailer_heading: f64| {
         let position = centre_line.point_at(station) - wheelbase * DVec2::from_angle(heading);
@@ -85,7 +131,7 @@ pub fn swept_path(rig: &Rig, centre_line: &Curve, speed: f64, spacing: f64) -> V
     poses
 }
 
-/// Whether no pose of the path touches a solid: then a truck on this route need not leave its lane.
+/// Whether no pose of the path touches a solid: then a truck that can steer it need not leave its lane on this route.
 pub fn own_lane_suffices(rig: &Rig, kerbs: &Outline, path: &[Pose]) -> bool {
     !path
         .iter()

@@ -69,7 +69,7 @@ impl<'a> Scene<'a> {
     pub fn still(&self) -> String {
         let view = View::around(self.shown());
         let (map, entries) = (self.map(&view), self.legend(&view));
-        crate::figure::composed(&view, &self.lettering, &self.title(), &self.summary(), Definitions::new(), map, &entries)
+        crate::figure::composed(&view, &self.lettering, &self.title(), &[&self.summary()], Definitions::new(), map, &entries)
     }
 
     /// The whole episode on the map.

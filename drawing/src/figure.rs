@@ -45,6 +45,9 @@ pub(crate) const WIDTH: f64 = 1000.0;
 const LEFT: f64 = 48.0;
 const RIGHT: f64 = 16.0;
 const TOP: f64 = 72.0;
+/// Base line of the first line below the title, and from one to the next \[px].
+const BELOW_TITLE: f64 = 58.0;
+const LINE: f64 = 21.0;
 /// Height of the numbers below the map \[px].
 const AXIS: f64 = 30.0;
 /// Margin around the routes \[m].
@@ -215,14 +218,19 @@ pub fn roundabout(roundabout: &Roundabout, routes: &[Route], straights: Straight
         [only] => format!("Lane centre at {only}, outer kerb at {radius:.2} m from the centre."),
         [inner @ .., last] => format!("Lane centres at {} and {last}, outer kerb at {radius:.2} m from the centre.", inner.join(", ")),
     };
-    Ok(composed(&view, &lettering, &title, &subtitle, Definitions::new(), map, &legend))
+    Ok(composed(&view, &lettering, &title, &[&subtitle], Definitions::new(), map, &legend))
 }
 
 /// What a truck sweeps on one of the routes, as SVG text.
+///
+/// # Errors
+///
+/// [`Error::Typeface`].
 pub fn swept_path(roundabout: &Roundabout, routes: &[Route], straights: Straights, gutter: Gutter, sweep: &Sweep) -> Result<String, Error> {
     let lettering = Lettering::new()?;
     let line = sweep.route.centre_line.part(straights.approach - SHOWN, sweep.route.centre_line.length() - straights.departure + SHOWN);
-    let view = View::around(line.polyline(0.1).into_iter());
+    let layout = Layout { corner: DVec2::new(LEFT, TOP + LINE), ..PRINTED };
+    let view = View::laid_out(line.polyline(0.1).into_iter(), &layout);
     let road = Road::new(&view, &lettering, roundabout, routes, straights, gutter);
     let solids = Path::new().set("d", view.frame() + &road.kerb_data()).set("clip-rule", "evenodd");
     let definitions = sweep.shapes(&view).add(ClipPath::new().set("id", "solids").add(solids));
@@ -230,18 +238,16 @@ pub fn swept_path(roundabout: &Roundabout, routes: &[Route], straights: Straight
     let map = Group::new().add(road.surface()).add(sweep.areas()).add(road.distances()).add(road.lanes()).add(overlaps);
     let map = map.add(road.kerbs()).add(sweep.marks(&view, &lettering)).add(road.arm_names());
     let legend: Vec<Entry> = sweep.legend().into_iter().chain(road.legend()).collect();
-    let verdict = if sweep.suffices { "its own lane suffices" } else { "its own lane does not suffice" };
-    let title = format!("{}: {verdict}", sweep.route.name);
-    let subtitle = format!("Swept path of {}, front axle on the lane's centre: {}.", sweep.driven, sweep.summary());
-    Ok(composed(&view, &lettering, &title, &subtitle, definitions, map, &legend))
+    let [path, needs] = sweep.lines();
+    Ok(composed(&view, &lettering, &sweep.verdict(), &[&path, &needs], definitions, map, &legend))
 }
 
-/// A whole page as SVG text.
+/// A whole page as SVG text, with lines of words below its title.
 pub(crate) fn composed(
     view: &View,
     lettering: &Lettering,
     title: &str,
-    subtitle: &str,
+    lines: &[&str],
     definitions: Definitions,
     map: Group,
     legend: &[Entry],
@@ -252,7 +258,12 @@ pub(crate) fn composed(
     let paper = Rectangle::new().set("width", WIDTH).set("height", height).set("fill", "white");
     let edge = Path::new().set("d", view.frame()).set("fill", "none").set("stroke", colour::INK).set("stroke-width", 1.2);
     let clip = ClipPath::new().set("id", "map").add(Path::new().set("d", view.frame()));
-    let letters = lettering.fitting(title, 25.0, WIDTH - LEFT - RIGHT);
+    let fitted = |words: &str, base: f64, largest: f64, colour: &str| {
+        let size = lettering.fitting(words, largest, WIDTH - LEFT - RIGHT);
+        lettering.text(words, DVec2::new(LEFT, base), size, Align::Left, colour)
+    };
+    let line = |(index, words): (usize, &&str)| fitted(words, BELOW_TITLE + index as f64 * LINE, 16.0, colour::FAINT);
+    let lines = lines.iter().enumerate().map(line).fold(Group::new(), |group, line| group.add(line));
     let document = Document::new()
         .set("viewBox", (0.0, 0.0, WIDTH, height))
         .set("width", WIDTH)
@@ -260,8 +271,8 @@ pub(crate) fn composed(
         .add(svg::node::element::Title::new(title))
         .add(definitions.add(clip))
         .add(paper)
-        .add(lettering.text(title, DVec2::new(LEFT, 32.0), letters, Align::Left, colour::INK))
-        .add(lettering.text(subtitle, DVec2::new(LEFT, 58.0), 16.0, Align::Left, colour::FAINT))
+        .add(fitted(title, 32.0, 25.0, colour::INK))
+        .add(lines)
         .add(map.set("clip-path", "url(#map)"))
         .add(edge)
         .add(axes(view, lettering))

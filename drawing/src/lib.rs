@@ -36,6 +36,7 @@ pub mod histograms; // how often values are drawn
 mod isolines; // lines of equal distance
 mod legend; // samples and words below a map
 mod lettering; // text as outlines
+pub mod limits; // where a path asks for more than the truck has
 pub mod polygons; // curves as points
 pub mod recording; // the states of an episode
 mod road; // the layers of a map

@@ -5,6 +5,8 @@ use offtrack::geometry::{Curve, Outline};
 use offtrack::route::Route;
 use serde::Serialize;
 
+use crate::sweep::{self, Sweep};
+
 /// Largest distance of a chord to its arc, half of the documented 1 cm \[m].
 const TOLERANCE: f64 = 0.005;
 /// Extent of solid ground beyond the outermost kerb \[m].
@@ -18,6 +20,8 @@ struct Written<'a> {
     solids: Vec<Polygon>,
     drivable: Vec<Polygon>,
     routes: Vec<WrittenRoute<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sweep: Option<sweep::Written<'a>>,
 }
 
 #[derive(Serialize)]
@@ -30,12 +34,13 @@ struct WrittenRoute<'a> {
 /// [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x, y, heading], ...]}]}`.
 ///
 /// `drivable` is the outer boundary, then one hole for each island; `solids` are the islands, then the ground beyond
-/// the boundary as two polygons. Curves are within 1 cm.
+/// the boundary as two polygons. Curves are within 1 cm. With a swept path there is `sweep`, as `offtrack draw --help`
+/// describes it.
 ///
 /// # Errors
 ///
 /// A coordinate that is not finite.
-pub fn json(kerbs: &Outline, routes: &[Route]) -> serde_json::Result<String> {
+pub fn json(kerbs: &Outline, routes: &[Route], sweep: Option<&Sweep>) -> serde_json::Result<String> {
     let (boundary, islands) = corners(kerbs);
     let ground = boundary.first().map(|points| ground(points)).into_iter().flatten();
     let solids = islands.iter().cloned().chain(ground).map(|points| rounded(&points)).collect();
@@ -44,7 +49,8 @@ pub fn json(kerbs: &Outline, routes: &[Route]) -> serde_json::Result<String> {
         name: &route.name,
         waypoints: route.waypoints.iter().map(|w| [to(1e4, w.position.x), to(1e4, w.position.y), to(1e6, w.heading)]).collect(),
     });
-    let mut text = serde_json::to_string(&Written { solids, drivable, routes: routes.collect() })?;
+    let sweep = sweep.map(Sweep::written);
+    let mut text = serde_json::to_string(&Written { solids, drivable, routes: routes.collect(), sweep })?;
     text.push('\n');
     Ok(text)
 }

@@ -1,16 +1,20 @@
-//! The swept path of a truck whose front axle follows a route's centre line, and where it leaves the road.
+//! The swept path of a truck whose front axle follows a route's centre line, where it leaves the road, and where the
+//! truck cannot follow.
 
 use glam::DVec2;
 use offtrack::geometry::Outline;
 use offtrack::layout::Rig;
+use offtrack::reader::shown;
 use offtrack::route::Route;
-use offtrack::swept::{Pose, own_lane_suffices, swept_path};
+use offtrack::swept::{Demand, Limit, Pose, demands, own_lane_suffices, swept_path};
 use offtrack::vehicle::Vehicle;
+use serde::Serialize;
 use svg::node::element::{Circle, Definitions, Group, Path, Use};
 
 use crate::figure::{View, colour, number};
 use crate::legend::{Entry, Swatch};
 use crate::lettering::{Align, Lettering};
+use crate::limits::{self, Need, WrittenNeed};
 
 /// Distance between poses \[m].
 const SPACING: f64 = 0.25;
@@ -23,13 +27,37 @@ const BETWEEN_POINTS: f64 = 0.05;
 pub struct Sweep<'a> {
     /// The route.
     pub route: &'a Route,
-    /// Vehicle, load and speed, for the title.
-    pub driven: String,
+    driven: Driven,
     /// Whether no pose touches solid ground.
-    pub suffices: bool,
+    clears: bool,
+    demands: Vec<Demand>,
+    needs: Vec<Need>,
     poses: Vec<Pose>,
     rig: Rig,
     units: [Unit; 2],
+}
+
+/// What is driven.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Driven {
+    /// Name of the vehicle.
+    pub vehicle: String,
+    /// Name of its load.
+    pub load: String,
+    /// Speed of the front axle [km/h].
+    pub speed_kmh: f64,
+}
+
+/// A swept path as JSON has it.
+#[derive(Serialize)]
+pub(crate) struct Written<'a> {
+    #[serde(flatten)]
+    driven: &'a Driven,
+    own_lane_suffices: bool,
+    tractor_clearance: f64,
+    trailer_clearance: f64,
+    limits: Vec<WrittenNeed>,
+    demands: Vec<[f64; 5]>,
 }
 
 /// The swept path of one unit.
@@ -45,28 +73,81 @@ struct Unit {
 }
 
 impl<'a> Sweep<'a> {
-    /// The path of `vehicle` with this load at `speed` [m/s]. `kerbs` are the roundabout's, `driven` is vehicle, load
-    /// and speed in words.
+    /// The path of `vehicle`, which `driven` names, on a road with these kerbs. Those of
+    /// [`Roundabout::kerbs_beyond_ends`](offtrack::roundabout::Roundabout::kerbs_beyond_ends) do not take the road's end
+    /// for one.
     ///
     /// # Panics
     ///
     /// If the vehicle does not have the load.
-    pub fn new(vehicle: &Vehicle, load: &str, speed: f64, kerbs: &Outline, route: &'a Route, driven: String) -> Sweep<'a> {
-        // Path and outlines depend on neither the sub-step nor the lock.
-        let rig = vehicle.rig(load, 0.05, None);
+    pub fn new(vehicle: &Vehicle, driven: Driven, kerbs: &Outline, route: &'a Route) -> Sweep<'a> {
+        let speed = driven.speed_kmh / 3.6;
+        // A sub-step lasts from one pose to the next.
+        let rig = vehicle.rig(&driven.load, (SPACING / speed) as f32, None);
         let poses = swept_path(&rig, &route.centre_line, speed, SPACING);
+        let demands = demands(&rig, &route.centre_line, &poses, speed, SPACING);
         let tractor = poses.iter().map(|pose| pose.tractor_corners(&rig)).collect();
         let trailer = poses.iter().map(|pose| pose.trailer_corners(&rig)).collect();
         Sweep {
             route,
             driven,
-            suffices: own_lane_suffices(&rig, kerbs, &poses),
+            clears: own_lane_suffices(&rig, kerbs, &poses),
+            needs: Need::of_all(&rig, &demands),
+            demands,
             units: [
                 Unit::new("tractor", colour::TRACTOR, colour::SWEPT_BY_TRACTOR, tractor, kerbs),
                 Unit::new("trailer", colour::TRAILER, colour::SWEPT_BY_TRAILER, trailer, kerbs),
             ],
             poses,
             rig,
+        }
+    }
+
+    /// Whether a truck need not leave its lane: no pose touches solid ground, and the lock allows the path.
+    pub fn own_lane_suffices(&self) -> bool {
+        self.clears && !self.exceeds(|limit| limit == Limit::Lock)
+    }
+
+    /// What the path needs of each limit of the truck.
+    pub fn needs(&self) -> &[Need] {
+        &self.needs
+    }
+
+    fn exceeds(&self, counts: impl Fn(Limit) -> bool) -> bool {
+        self.needs.iter().any(|need| need.is_exceeded() && counts(need.limit))
+    }
+
+    /// Whether the own lane suffices, in words, with the route's name.
+    pub fn verdict(&self) -> String {
+        let speed = shown(self.driven.speed_kmh);
+        let too_fast = self.exceeds(|limit| limit != Limit::Lock);
+        let verdict = match (self.exceeds(|limit| limit == Limit::Lock), self.clears, too_fast) {
+            (true, ..) => "the lock does not suffice for its own lane".to_owned(),
+            (_, true, false) => "its own lane suffices".to_owned(),
+            (_, true, true) => format!("its own lane suffices, but not at {speed} km/h"),
+            (_, false, false) => "its own lane does not suffice".to_owned(),
+            (_, false, true) => format!("its own lane does not suffice, and {speed} km/h is too fast for it"),
+        };
+        format!("{}: {verdict}", self.route.name)
+    }
+
+    /// What is driven and where it sweeps, then what it needs of the truck: two lines of words.
+    pub fn lines(&self) -> [String; 2] {
+        let Driven { vehicle, load, speed_kmh } = &self.driven;
+        let driven = format!("{vehicle}, {load}, {} km/h", shown(*speed_kmh));
+        [format!("Swept path of {driven}, front axle on the lane's centre: {}.", self.summary()), limits::words(&self.needs)]
+    }
+
+    pub(crate) fn written(&self) -> Written<'_> {
+        let [tractor, trailer] = &self.units;
+        let rounded = |unit: &Unit| (unit.clearance * 1e4).round() / 1e4;
+        Written {
+            driven: &self.driven,
+            own_lane_suffices: self.own_lane_suffices(),
+            tractor_clearance: rounded(tractor),
+            trailer_clearance: rounded(trailer),
+            limits: self.needs.iter().map(|need| need.written(&self.demands)).collect(),
+            demands: limits::rows(&self.demands),
         }
     }
 
@@ -120,7 +201,8 @@ impl<'a> Sweep<'a> {
         };
         group = group.add(line(self.poses.iter().map(trailer).collect(), colour::TRAILER_AXLES, ""));
         group = group.add(line(self.poses.iter().map(drive).collect(), colour::DRIVE_AXLE, DASHES));
-        group = group.add(line(self.poses.iter().map(front).collect(), colour::INK, ""));
+        let front: Vec<DVec2> = self.poses.iter().map(front).collect();
+        group = group.add(limits::lines(view, &self.needs, &front)).add(line(front, colour::INK, ""));
         for (unit, below) in self.units.iter().zip([false, true]) {
             for &(deepest, depth) in &unit.overlaps {
                 let at = view.point(deepest);
@@ -143,9 +225,10 @@ impl<'a> Sweep<'a> {
             Entry::new(Swatch::Line(colour::DRIVE_AXLE, 1.6, DASHES), "drive axle"),
             Entry::new(Swatch::Line(colour::TRAILER_AXLES, 1.6, ""), "trailer axles"),
         ];
-        if !self.suffices {
+        if !self.clears {
             entries.push(Entry::new(Swatch::Ring(colour::OVERLAP), "swept beyond a kerb, deepest there"));
         }
+        entries.extend(limits::legend(&self.needs));
         entries
     }
 }

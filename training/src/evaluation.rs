@@ -21,7 +21,7 @@ use offtrack::layout::{Control, Ended, Rig, Start, Truck};
 use offtrack::route::Route;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
-use offtrack::swept::{own_lane_suffices, swept_path};
+use offtrack::swept::{own_lane_suffices, steer_angle_max, swept_path};
 use offtrack::world::World;
 use offtrack_drawing::recording::{Recorder, Track};
 
@@ -213,16 +213,21 @@ impl Evaluation<'_> {
         (self.scenario.split(self.split)[episode / self.episodes], drawn_start(self.world.params.n_vehicles, self.seed, episode as u32, 0))
     }
 
-    /// Whether the own lane suffices on each route, for the truck that needs most room. Each thread holds the kerbs of
-    /// one roundabout.
+    /// Whether the own lane suffices on each route: for the truck that needs most room, and within the lock of the one
+    /// that steers least. Each thread holds the kerbs of one roundabout.
     fn own_lane_suffices(&self, routes: &[Evaluated]) -> Vec<bool> {
+        const SPACING: f64 = 0.25;
         let Evaluation { scenario, world, .. } = *self;
-        let (rig, speed) = (widest(&world.rigs), scenario.cruising_speed());
+        let (rig, stiffest, speed) = (widest(&world.rigs), stiffest(&world.rigs), scenario.cruising_speed());
         let of_one_place: Vec<_> = routes.chunk_by(|(a, ..), (b, ..)| a == b).collect();
         let suffices = |routes: &&[Evaluated]| {
-            let kerbs = routes[0].1.roundabout.kerbs(scenario.gutter);
-            let path = |route: &Route| swept_path(rig, &route.centre_line, speed, 0.25);
-            routes.iter().map(|(_, _, route)| own_lane_suffices(rig, &kerbs, &path(route))).collect::<Vec<bool>>()
+            let kerbs = routes[0].1.roundabout.kerbs_beyond_ends(scenario.gutter);
+            let of_route = |route: &Route| {
+                let path = |rig: &Rig| swept_path(rig, &route.centre_line, speed, SPACING);
+                let steered = || steer_angle_max(stiffest, &route.centre_line, &path(stiffest), speed, SPACING);
+                own_lane_suffices(rig, &kerbs, &path(rig)) && steered() <= stiffest.steer_max.into()
+            };
+            routes.iter().map(|(_, _, route)| of_route(route)).collect::<Vec<bool>>()
         };
         of_one_place.par_iter().flat_map_iter(suffices).collect()
     }
@@ -233,6 +238,12 @@ impl Evaluation<'_> {
 fn widest(rigs: &[Rig]) -> &Rig {
     let cut = |rig: &Rig| rig.wheelbase.powi(2) - rig.fifth_wheel.powi(2) + rig.trailer_wheelbase.powi(2);
     rigs.iter().max_by(|a, b| cut(a).total_cmp(&cut(b))).expect("a world has a truck")
+}
+
+/// The truck with the widest circle at its lock.
+fn stiffest(rigs: &[Rig]) -> &Rig {
+    let radius = |rig: &Rig| rig.wheelbase / rig.steer_max.sin();
+    rigs.iter().max_by(|a, b| radius(a).total_cmp(&radius(b))).expect("a world has a truck")
 }
 
 /// The actions of each episode, `[episodes][steps]`.

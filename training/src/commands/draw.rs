@@ -12,7 +12,7 @@ use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
 use offtrack::shipped::{Kind, Source};
 use offtrack::vehicle::Vehicle;
 use offtrack_drawing::figure::{self, Straights};
-use offtrack_drawing::sweep::Sweep;
+use offtrack_drawing::sweep::{Driven, Sweep};
 use offtrack_drawing::{polygons, rasterised};
 
 use offtrack_training::error::Error;
@@ -36,9 +36,18 @@ pub struct Args {
     /// for each island. `solids` are the islands, then the ground beyond the outer boundary as two polygons, north and
     /// south, up to 5 m past the kerbs. So a point is drivable when an odd number of `drivable` contain it, and solid
     /// when any of `solids` does.
+    ///
+    /// With --route also "sweep": {"vehicle", "load", "speed_kmh", "own_lane_suffices", "tractor_clearance",
+    /// "trailer_clearance", "limits": [{"limit", "unit", "has", "needs", "exceeded", "stretches": [[from, to], ...]},
+    /// ...], "demands": [[station, steer angle, steer rate, lateral acceleration, load transfer ratio], ...]}.
+    /// Clearances are the least, negative beyond a kerb [m]. The limits are lock (deg), steer_rate (deg/s), tyres (g)
+    /// and rollover (ratio); `stretches` are stations of the front axle on the route [m] where one is exceeded.
+    /// `demands` has a row every 0.25 m, in m, deg, deg/s, g and 1, left positive. `own_lane_suffices` is true where
+    /// the path touches no kerb and the lock allows it.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
-    /// Draw the swept path on this route: N-left-3, or 16m/N-left-3. JSON then lists this route alone.
+    /// Draw the swept path on this route: N-left-3, or 16m/N-left-3. JSON then lists this route alone. Lock, steer rate,
+    /// tyres and rollover are compared with what the path needs, and printed.
     #[arg(long)]
     route: Option<String>,
     /// With --route: a vehicle's name, or the path of its file.
@@ -101,26 +110,28 @@ pub fn run(args: &Args) -> Result<(), Error> {
         Error::Flag { flag, value: format!("{value} m"), expected: leaves.to_string() }
     })?;
     let route = args.route.as_deref().map(|name| chosen(&routes, name)).transpose()?;
-    if format == Format::Json {
+    let sweep = route.map(|route| sweep(args, &roundabout, route)).transpose()?;
+    let bytes = if format == Format::Json {
         let shown = route.map_or(routes.as_slice(), std::slice::from_ref);
-        let text = polygons::json(&roundabout.kerbs(args.gutter), shown).map_err(|error| Error::write(&args.output)(error.into()))?;
-        return files::write_whole(&args.output, text.as_bytes());
-    }
-    let straights = Straights { approach: args.approach, departure: args.departure };
-    let page = match route {
-        None => figure::roundabout(&roundabout, &routes, straights, args.gutter),
-        Some(route) => {
-            let sweep = sweep(args, &roundabout, route)?;
-            figure::swept_path(&roundabout, &routes, straights, args.gutter, &sweep)
-        }
-    };
-    let svg = page.map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?;
-    let bytes = if format == Format::Png {
-        rasterised(&svg, args.size.unwrap_or(1000)).map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?
+        let text = polygons::json(&roundabout.kerbs(args.gutter), shown, sweep.as_ref());
+        text.map_err(|error| Error::write(&args.output)(error.into()))?.into_bytes()
     } else {
-        svg.into_bytes()
+        let straights = Straights { approach: args.approach, departure: args.departure };
+        let page = match &sweep {
+            None => figure::roundabout(&roundabout, &routes, straights, args.gutter),
+            Some(sweep) => figure::swept_path(&roundabout, &routes, straights, args.gutter, sweep),
+        };
+        let drawn = page.and_then(|svg| if format == Format::Png { rasterised(&svg, args.size.unwrap_or(1000)) } else { Ok(svg.into_bytes()) });
+        drawn.map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?
     };
-    files::write_whole(&args.output, &bytes)
+    files::write_whole(&args.output, &bytes)?;
+    match sweep {
+        None => Ok(()),
+        Some(sweep) => {
+            let [path, needs] = sweep.lines();
+            files::print(&format!("{}\n{path}\n{needs}\n", sweep.verdict()))
+        }
+    }
 }
 
 fn sweep<'a>(args: &Args, roundabout: &Roundabout, route: &'a Route) -> Result<Sweep<'a>, Error> {
@@ -131,8 +142,8 @@ fn sweep<'a>(args: &Args, roundabout: &Roundabout, route: &'a Route) -> Result<S
         return Err(Error::Flag { flag: "--load", value: args.load.clone(), expected });
     }
     let name = Source::find(Kind::Vehicle, &args.vehicle)?.stem();
-    let driven = format!("{name}, {}, {} km/h", args.load, args.speed_kmh);
-    Ok(Sweep::new(&vehicle, &args.load, args.speed_kmh / 3.6, &roundabout.kerbs(args.gutter), route, driven))
+    let driven = Driven { vehicle: name, load: args.load.clone(), speed_kmh: args.speed_kmh };
+    Ok(Sweep::new(&vehicle, driven, &roundabout.kerbs_beyond_ends(args.gutter), route))
 }
 
 fn format(output: &Path) -> Result<Format, Error> {

@@ -21,7 +21,10 @@ const COLUMNS: [(&str, &str); 10] = [
     ("arrived", "episodes that arrived, of all"),
     ("success", "the same as a percentage"),
     ("95 % interval", "Wilson interval of the success"),
-    ("lane", "own: a truck whose front axle follows the lane's centre touches no kerb; wide: it has to swing out of its lane"),
+    (
+        "lane",
+        "own: a truck whose front axle follows the lane's centre touches no kerb, and its lock allows that; wide: it has to swing out of its lane",
+    ),
     ("lane m", "distance of the tractor's middle, half way between its axles, to the lane's centre: mean and largest"),
     ("tractor m, trailer m", "smallest distance of the unit's outline to a kerb; negative: it overlaps the kerb"),
     ("LTR", "largest load transfer ratio of either unit: 0 on even wheels, 1 when a wheel lifts off"),

@@ -112,6 +112,65 @@ fn the_title_of_a_swept_path_says_whether_the_own_lane_suffices() {
     }
 }
 
+/// What a command printed, and the sweep of its JSON.
+fn swept(roundabout: &str, arguments: &[&str]) -> (String, Value) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("a.json");
+    let output = draw(&[&[roundabout, "-o", text(&file)], arguments].concat());
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    let written: Value = serde_json::from_slice(&std::fs::read(file).expect("written")).expect("JSON");
+    (String::from_utf8(output.stdout).expect("text"), written["sweep"].clone())
+}
+
+#[test]
+fn a_turn_that_the_truck_cannot_steer_is_not_said_to_fit() {
+    let (said, sweep) = swept(&place("16m"), &["--route", "N-left-3", "--vehicle", "us_wb62", "--speed-kmh", "1"]);
+    assert!(said.starts_with("16m/N-left-3: the lock does not suffice for its own lane\n"), "{said}");
+    // At a crawl on the inner lane of 10.2 m the angle nears asin(5.94 / 10.2) = 35.6 deg; the ring ends before.
+    assert!(said.contains("Too much for the truck: steer angle 34.8") && said.contains(" of 28.4 deg"), "{said}");
+    assert_eq!((&sweep["own_lane_suffices"], &sweep["limits"][0]["limit"]), (&Value::from(false), &Value::from("lock")));
+    assert_eq!(sweep["limits"][0]["exceeded"], true);
+    let [from, to] = [0, 1].map(|end| sweep["limits"][0]["stretches"][0][end].as_f64().expect("a station"));
+    let at = |row: &&Value| row[0].as_f64().is_some_and(|station| from <= station && station <= to);
+    let demands = sweep["demands"].as_array().expect("a list");
+    let beyond: Vec<&Value> = demands.iter().filter(at).collect();
+    assert!(10 < beyond.len() && beyond.iter().all(|row| 28.4 < row[1].as_f64().expect("an angle").abs()));
+    // With its own lock the study's truck can, and the picture says neither.
+    let (said, sweep) = swept(&place("16m"), &["--route", "W-right-2", "--speed-kmh", "5"]);
+    assert!(said.starts_with("16m/W-right-2: its own lane suffices\n") && said.contains("Within the truck's limits: "), "{said}");
+    assert_eq!(sweep["own_lane_suffices"], true);
+}
+
+#[test]
+fn a_stiff_truck_at_90_kmh_around_a_small_island_exceeds_every_limit_in_title_words_and_json() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let vehicle = folder.path().join("stiff.toml");
+    let repository: PathBuf = [env!("CARGO_MANIFEST_DIR"), ".."].iter().collect();
+    let own = std::fs::read_to_string(repository.join("scenarios/vehicles/eu_4x2_13m6.toml")).expect("the repository's file");
+    assert!(own.contains("steer_max_deg = 40.0"));
+    std::fs::write(&vehicle, own.replace("steer_max_deg = 40.0", "steer_max_deg = 5.0")).expect("written");
+    let arguments = ["--route", "W-right-2", "--speed-kmh", "90", "--vehicle", text(&vehicle)];
+    let (said, sweep) = swept(&place("16m"), &arguments);
+    assert!(said.contains("the lock does not suffice for its own lane") && !said.contains("within its limits"), "{said}");
+    let limits = sweep["limits"].as_array().expect("a list");
+    assert_eq!(limits.len(), 4);
+    assert!(limits.iter().all(|limit| limit["exceeded"] == true && limit["has"].as_f64() < limit["needs"].as_f64()), "{limits:?}");
+    let svg = folder.path().join("a.svg");
+    succeed(&[&[place("16m").as_str(), "-o", text(&svg)], &arguments[..]].concat());
+    let drawn = std::fs::read_to_string(svg).expect("written");
+    for words in ["the lock does not suffice for its own lane", "beyond the lock", "beyond the steer rate", "grip", "wheels lift"] {
+        assert!(drawn.contains(words), "{words}");
+    }
+}
+
+#[test]
+fn a_speed_that_the_truck_cannot_drive_is_told_apart_from_a_lane_that_is_too_narrow() {
+    let (said, sweep) = swept(&place("50m"), &["--route", "E-right-2", "--load", "laden_high", "--speed-kmh", "60"]);
+    assert!(said.contains("50m/E-right-2: its own lane ") && said.contains("60 km/h"), "{said}");
+    assert!(said.contains("load transfer ratio "), "{said}");
+    assert_eq!(sweep["limits"][3]["exceeded"], true);
+}
+
 #[test]
 fn wrong_input_is_refused_with_exit_code_2_and_says_what_would_do() {
     let folder = tempfile::tempdir().expect("a folder");
