@@ -6,6 +6,7 @@ mod circulation;
 mod dynamic;
 mod lags;
 mod properties;
+mod sources;
 mod speed_control;
 mod vectors;
 mod vehicles;

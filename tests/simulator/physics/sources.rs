@@ -1,0 +1,115 @@
+//! The shipped vehicles against the publications that their lengths are from: the table of scenarios/README.md, computed.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::path::Path;
+
+use glam::DVec2;
+use offtrack::geometry::{Curve, Piece};
+use offtrack::swept::{Pose, swept_path};
+use offtrack::vehicle::Vehicle;
+
+use super::vehicle;
+
+const FOOT: f64 = 0.3048;
+
+/// The swept path without slip, the front axle on a straight, an arc of `radius` to the left by `turn`, and a straight
+/// [m, rad].
+fn turned(vehicle: &Vehicle, radius: f64, turn: f64) -> Vec<Pose> {
+    let mut rig = vehicle.rig("empty", 0.05, None);
+    rig.slip = 0.0;
+    let arc = |from: f64, sweep: f64| Piece::Arc { centre: DVec2::ZERO, radius, from, sweep };
+    let (one, two) = (arc(-FRAC_PI_2, turn / 2.0), arc(-FRAC_PI_2 + turn / 2.0, turn / 2.0));
+    let approach = Piece::Segment { from: one.start() - DVec2::X, to: one.start() };
+    let departure = Piece::Segment { from: two.end(), to: two.end() + 30.0 * DVec2::from_angle(turn) };
+    swept_path(&rig, &Curve { pieces: vec![approach, one, two, departure] }, 1.0, 0.05)
+}
+
+/// Overall length of tractor and trailer in line [m].
+fn length(vehicle: &Vehicle) -> f64 {
+    let (tractor, trailer) = (&vehicle.tractor, &vehicle.trailer);
+    tractor.front_overhang + tractor.wheelbase - tractor.fifth_wheel + trailer.kingpin_to_rear
+}
+
+/// Least distance of the trailer's inner rear wheels from the centre of AASHTO's minimum turn: half a turn, the front
+/// axle on 41 ft [m].
+fn inside_radius(vehicle: &Vehicle) -> f64 {
+    let wheel =
+        |pose: &Pose| (pose.trailer_position + 0.5 * vehicle.trailer.width * DVec2::from_angle(pose.trailer_heading).perp()).length();
+    turned(vehicle, 41.0 * FOOT, PI).iter().map(wheel).fold(f64::INFINITY, f64::min)
+}
+
+/// Off-tracking once it is steady, the front axle on 20 m: by driving on, and by SAE J695 from the sum of squares [m].
+fn off_tracking(vehicle: &Vehicle) -> [f64; 2] {
+    const RADIUS: f64 = 20.0;
+    // Two turns, and no way out of them.
+    let poses = turned(vehicle, RADIUS, 4.0 * PI - 1e-9);
+    let steady = &poses[poses.len() - 1 - (30.5 / 0.05) as usize];
+    let (first, second, third) = (vehicle.tractor.wheelbase, vehicle.tractor.fifth_wheel, vehicle.trailer.wheelbase);
+    [RADIUS - steady.trailer_position.length(), RADIUS - (RADIUS.powi(2) - first.powi(2) + second.powi(2) - third.powi(2)).sqrt()]
+}
+
+fn metres(value: f64) -> String {
+    format!("{value:.2} m")
+}
+
+/// The rows of the table: vehicle, what, published, ours.
+fn rows() -> Vec<[String; 4]> {
+    let [us, eu, daf] = ["us_wb62", "eu_4x2_13m6", "daf_xf"].map(vehicle);
+    let row = |cells: [&str; 3], ours: String| [cells[0].to_owned(), cells[1].to_owned(), cells[2].to_owned(), ours];
+    let feet = |value: f64| format!("{:.1} ft, {value:.2} m", value / FOOT);
+    let circle = |vehicle: &Vehicle| metres(vehicle.turning_circle_inner_radius(12.5).unwrap());
+    let mut rows = vec![
+        row(["`us_wb62`", "overall length", "69.0 ft"], feet(length(&us))),
+        row(["`us_wb62`", "length of the trailer", "48.0 ft"], feet(us.trailer.kingpin_to_front + us.trailer.kingpin_to_rear)),
+        row(["`us_wb62`", "radius of the front axle at the lock", "41.0 ft"], feet(us.tractor.wheelbase / us.tractor.steer_max.sin())),
+        row(["`us_wb62`", "inside radius of half a turn on it", "7.4 ft"], feet(inside_radius(&us))),
+        row(["`eu_4x2_13m6`", "overall length", "at most 16.50 m"], metres(length(&eu))),
+        row(["`eu_4x2_13m6`", "kingpin to the trailer's rear", "at most 12.00 m"], metres(eu.trailer.kingpin_to_rear)),
+        row(
+            ["`eu_4x2_13m6`", "kingpin to the trailer's front corners", "at most 2.04 m"],
+            format!("{:.3} m", eu.trailer.kingpin_to_front.hypot(0.5 * eu.trailer.width)),
+        ),
+        row(["`eu_4x2_13m6`", "wheelbase of the trailer", "at most 8.135 m"], metres(eu.trailer.wheelbase)),
+        row(["`eu_4x2_13m6`", "inner circle, the outer one of 12.50 m", "at least 5.30 m"], circle(&eu)),
+        row(["`daf_xf`", "the same", "at least 5.30 m"], circle(&daf)),
+    ];
+    for (name, vehicle) in [("`us_wb62`", &us), ("`eu_4x2_13m6`", &eu), ("`daf_xf`", &daf)] {
+        let [driven, published] = off_tracking(vehicle).map(metres);
+        rows.push([name.to_owned(), "steady off-tracking, the front axle on 20 m".to_owned(), published, driven]);
+    }
+    rows
+}
+
+#[test]
+fn the_readme_has_the_vehicles_beside_their_sources_as_they_are_computed() {
+    let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/README.md")).unwrap();
+    for cells in rows() {
+        let row = format!("| {} |", cells.join(" | "));
+        assert!(readme.contains(&row), "scenarios/README.md lacks {row}");
+    }
+}
+
+#[test]
+fn a_wb62_is_as_long_as_aashtos_and_not_by_a_whole_trailer_behind_its_kingpin() {
+    let us = vehicle("us_wb62");
+    // Lengths are to the centimetre.
+    assert!((length(&us) - 69.0 * FOOT).abs() < 0.01, "{}", length(&us));
+    assert!((us.trailer.kingpin_to_rear - 45.5 * FOOT).abs() < 0.005);
+    assert!((us.trailer.kingpin_to_front + us.trailer.kingpin_to_rear - 48.0 * FOOT).abs() < 0.01);
+}
+
+#[test]
+fn a_wb62_turns_inside_the_radius_that_aashto_publishes() {
+    let us = vehicle("us_wb62");
+    // AASHTO rounds to a tenth of a foot, the file to a centimetre.
+    assert!((inside_radius(&us) / FOOT - 7.4).abs() < 0.08, "{}", inside_radius(&us) / FOOT);
+    assert!((us.tractor.wheelbase / us.tractor.steer_max.sin() / FOOT - 41.0).abs() < 0.1);
+}
+
+#[test]
+fn off_tracking_in_a_steady_turn_is_that_of_sae_j695() {
+    for name in super::VEHICLES {
+        let [driven, published] = off_tracking(&vehicle(name));
+        assert!((driven - published).abs() < 0.005, "{name}: {driven} {published}");
+    }
+}
