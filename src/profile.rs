@@ -3,7 +3,8 @@
 //!
 //! Forward and backward passes over a speed limit are the usual profile of minimum time (J. Bobrow et al., 1985). The
 //! tractor follows the lane's centre; its trailer cuts the bend and still turns where the tractor drives straight
-//! again.
+//! again. Lock and steer rate are not part of it: [`crate::swept::demands`] says where a line asks for more than they
+//! give.
 
 use std::f64::consts::PI;
 
@@ -16,7 +17,7 @@ const LOAD_TRANSFER_MAX: f64 = 0.7;
 const GRIP_MAX: f64 = 0.8;
 /// Mean braking that the speed control reaches where it asks for more as the error grows [m/s^2].
 const BRAKING: f64 = 1.2;
-/// Lowest speed of a profile \[m/s].
+/// Lowest speed of a profile whose highest is not lower still \[m/s].
 const SLOWEST: f64 = 1.0;
 
 /// Speeds along a route.
@@ -32,7 +33,8 @@ impl Profile {
     /// The fastest of a vehicle on a route, at most `fastest` [m/s]. The route has at least two waypoints.
     pub fn of(rig: &Rig, waypoints: &[WaypointRow], fastest: f64) -> Profile {
         let lengths: Vec<f64> = waypoints.windows(2).map(|pair| f64::from(pair[0].position.distance(pair[1].position))).collect();
-        let mut speeds: Vec<f64> = limits(rig, waypoints, &lengths).into_iter().map(|limit| limit.clamp(SLOWEST, fastest)).collect();
+        let slowest = SLOWEST.min(fastest);
+        let mut speeds: Vec<f64> = limits(rig, waypoints, &lengths).into_iter().map(|limit| limit.clamp(slowest, fastest)).collect();
         let braking = BRAKING.min(-f64::from(rig.speed_braking));
         for index in (0..lengths.len()).rev() {
             speeds[index] = speeds[index].min((speeds[index + 1].powi(2) + 2.0 * braking * lengths[index]).sqrt());
@@ -49,7 +51,8 @@ impl Profile {
     /// \[m] apart [m/s].
     pub fn lowest_ahead(&self, from: usize, distance: f64, spacing: f64) -> f64 {
         let from = from.min(self.speeds.len() - 1);
-        let to = (from + (distance / spacing).ceil() as usize + 1).min(self.speeds.len());
+        // Two waypoints of a planned line may coincide: the quotient is infinite then.
+        let to = from.saturating_add((distance / spacing).ceil() as usize).saturating_add(1).min(self.speeds.len());
         self.speeds[from..to].iter().copied().fold(f64::INFINITY, f64::min)
     }
 }
@@ -123,6 +126,22 @@ mod tests {
     fn an_empty_truck_is_faster_than_a_laden_one_and_that_than_a_high_one() {
         let times = ["empty", "half", "laden", "laden_high", "laden_worst"].map(|load| profile(load).time);
         assert!(times.windows(2).all(|pair| pair[0] < pair[1]), "{times:?}");
+    }
+
+    #[test]
+    fn a_benchmark_slower_than_the_slowest_profile_is_driven_at_its_own_speed() {
+        let rig = Vehicle::named("daf_xf").unwrap().rig("laden", 0.05, None);
+        for fastest in [0.01, 1.0 / 3.6, 3.5 / 3.6] {
+            let Profile { speeds, time } = Profile::of(&rig, &waypoints(), fastest);
+            assert!(speeds.iter().all(|&speed| speed == fastest), "{fastest}");
+            assert!((time * fastest - 292.0).abs() < 1e-3, "{fastest}: {time}");
+        }
+    }
+
+    #[test]
+    fn waypoints_in_one_place_have_every_later_one_within_reach() {
+        let profile = Profile { speeds: vec![9.0, 8.0, 7.0], time: 0.0 };
+        assert_eq!([profile.lowest_ahead(1, 3.0, 0.0), profile.lowest_ahead(0, 0.0, 0.0)], [7.0, 9.0]);
     }
 
     #[test]

@@ -24,6 +24,8 @@ pub struct Invalid {
 const FINITE: [f64; 2] = [-1e9, 1e9];
 /// A length, a time, a mass: not 0.
 const POSITIVE: [f64; 2] = [1e-6, 1e9];
+/// Braking: not 0.
+const NEGATIVE: [f64; 2] = [-1e9, -1e-6];
 /// A steer angle [rad].
 const LOCK: [f64; 2] = [1e-3, 1.5];
 
@@ -94,7 +96,8 @@ impl Scenario {
     /// Every route leads somewhere, and there is one.
     fn check_routes(&self) -> Result<(), Invalid> {
         if self.places.iter().all(|place| place.routes.is_empty()) {
-            return Err(invalid("places", "no routes", "at least one route is needed"));
+            let expected = format!("at least one route is needed: the file of {} must list some in the split that is used", self.name);
+            return Err(invalid("places", "no routes", expected));
         }
         for (index, place) in self.places.iter().enumerate() {
             for (number, route) in place.routes.iter().enumerate() {
@@ -135,7 +138,6 @@ pub(super) fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
         ("speed_control.gain", speed_control.gain),
         ("speed_control.integral_gain", speed_control.integral_gain),
         ("speed_control.integral_band", speed_control.integral_band),
-        ("speed_control.braking", speed_control.braking),
         ("sensors.trailer_first", sensors.trailer_first),
         ("sensors.trailer_last", sensors.trailer_last),
     ];
@@ -148,14 +150,15 @@ pub(super) fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
         within(&name, mount.x, FINITE)?;
         within(&name, mount.y, FINITE)?;
     }
+    within(&key("speed_control.braking"), speed_control.braking, NEGATIVE)?;
     check_model(&key("model"), model, trailer.wheelbase)?;
     check_suspension(&key("tractor.suspension"), &tractor.suspension)?;
     for (name, load) in loads {
         let key = key(&format!("loads.{name}"));
         within(&format!("{key}.mass"), load.mass, POSITIVE)?;
         within(&format!("{key}.slip"), load.slip, FINITE)?;
-        within(&format!("{key}.acceleration_min"), load.acceleration_min, FINITE)?;
-        within(&format!("{key}.acceleration_max"), load.acceleration_max, FINITE)?;
+        within(&format!("{key}.acceleration_min"), load.acceleration_min, NEGATIVE)?;
+        within(&format!("{key}.acceleration_max"), load.acceleration_max, POSITIVE)?;
         check_suspension(&format!("{key}.suspension"), &load.suspension)?;
     }
     Ok(())

@@ -64,6 +64,20 @@ fn a_scenario_changed_in_memory_is_checked_before_it_is_baked() {
 }
 
 #[test]
+fn a_benchmark_without_routes_is_named_in_the_error() {
+    let message = refused(|scenario| scenario.places.clear());
+    assert!(message.contains("the file of attard2023 must list some"), "{message}");
+}
+
+#[test]
+fn brakes_that_drive_and_a_drive_that_brakes_are_refused() {
+    let braking = refused(|scenario| scenario.vehicle.speed_control.braking = 0.5);
+    assert!(braking.starts_with("vehicle.speed_control.braking: 0.5; must lie in "), "{braking}");
+    let drive = refused(|scenario| scenario.vehicle.loads.get_mut("empty").unwrap().acceleration_max = -1.0);
+    assert!(drive.starts_with("vehicle.loads.empty.acceleration_max: -1; must lie in "), "{drive}");
+}
+
+#[test]
 fn a_number_of_a_scenario_that_is_not_one_is_refused_by_its_name() {
     type Field = (&'static str, fn(&mut Scenario) -> &mut f64);
     let fields: [Field; 21] = [

@@ -105,7 +105,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if !args.route.is_empty() {
         roads::narrow(&mut scenario, &args.route, &[split])?;
     }
-    scenario = roads::of_split(scenario, split)?;
+    roads::keep(&mut scenario, split, &args.benchmark)?;
     let world = roads::world(&scenario)?;
     let mut policy = args.policy.open(&scenario, &world, args.seed)?;
     let n_routes = scenario.split(split).len();

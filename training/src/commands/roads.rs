@@ -90,6 +90,20 @@ pub fn narrow(scenario: &mut Scenario, names: &[String], splits: &[Split]) -> Re
     Ok(())
 }
 
+/// Leaves the benchmark, which a command was given as `benchmark`, the routes of one split.
+pub fn keep(scenario: &mut Scenario, split: Split, benchmark: &str) -> Result<(), Error> {
+    if scenario.split(split).is_empty() {
+        let name = split.name();
+        let has = Split::ALL.into_iter().filter(|&other| !scenario.split(other).is_empty()).map(Split::name);
+        let has = shortened(&has.collect::<Vec<_>>().join(", "), LONGEST_LIST);
+        let expected =
+            format!("{} has routes under {has} alone; list some under `{name}`, or ask for another split", shortened(benchmark, 200));
+        return Err(Error::Flag { flag: "--split", value: name.to_owned(), expected });
+    }
+    scenario.keep(&[split]);
+    Ok(())
+}
+
 /// Whether `name` is this route or its roundabout.
 fn is_of(route: &str, name: &str) -> bool {
     route == name || route.rsplit_once('/').is_some_and(|(roundabout, _)| roundabout == name)
@@ -121,17 +135,6 @@ pub fn unknown(scenario: &Scenario, name: &str) -> Error {
         None => format!("a route of the benchmark {from} is needed, such as {list}, or one of a random road, such as wide/7/12"),
     };
     Error::Flag { flag: "--route", value: name.to_owned(), expected }
-}
-
-/// The benchmark with the routes of the split that `--split` names alone. One without any is an error.
-pub fn of_split(mut scenario: Scenario, split: Split) -> Result<Scenario, Error> {
-    if scenario.split(split).is_empty() {
-        let known: Vec<&str> = Split::ALL.into_iter().filter(|&split| !scenario.split(split).is_empty()).map(Split::name).collect();
-        let expected = format!("{} has no such routes: it has {}", scenario.name, known.join(" and "));
-        return Err(Error::Flag { flag: "--split", value: split.name().to_owned(), expected });
-    }
-    scenario.keep(&[split]);
-    Ok(scenario)
 }
 
 /// The benchmark with the trucks of this load alone; the whole of it where none is named.
