@@ -9,6 +9,7 @@ mod error;
 #[cfg(feature = "gpu")]
 pub mod gpu; // the engine of compute shaders
 mod memory;
+mod order;
 pub(crate) mod tally;
 
 use std::any::Any;

@@ -3,12 +3,11 @@
 use bytemuck::{cast_slice, cast_slice_mut};
 use rayon::prelude::*;
 
+use super::order::{Order, Place};
 use super::{Autoreset, Error, Tally, memory};
 use crate::layout::columns::{columns, row_bytes};
 use crate::layout::{Clearance, Column, Control, N_COLUMNS, N_EXTRAS, N_RAYS, N_VALUES, Progress, RewardTerms, Stream, Truck};
-
-/// Rows that a thread takes at least: fewer cost more to hand out than to step.
-const ROWS_MIN: usize = 16;
+use crate::world::World;
 
 /// Which route an episode runs on.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,13 +36,16 @@ impl RouteChoice {
     }
 }
 
-/// The rows of some columns side by side, in pairs of pairs: a tuple of more than twelve would be none of rayon's.
+/// Blocks of the rows of some columns side by side, in pairs of pairs: a tuple of more than twelve would be none of
+/// rayon's.
 macro_rules! zipped {
-    ($batch:ident; $last:ident) => { $batch.$last.par_iter_mut() };
-    ($batch:ident; $name:ident $($rest:ident)+) => { $batch.$name.par_iter_mut().zip(zipped!($batch; $($rest)+)) };
+    ($batch:ident, $n:ident; $last:ident) => { $batch.$last.par_chunks_mut($n) };
+    ($batch:ident, $n:ident; $name:ident $($rest:ident)+) => {
+        $batch.$name.par_chunks_mut($n).zip(zipped!($batch, $n; $($rest)+))
+    };
 }
 
-/// The names of one such row.
+/// The names of one such block.
 macro_rules! nested {
     ($last:ident) => { $last };
     ($name:ident $($rest:ident)+) => { ($name, nested!($($rest)+)) };
@@ -67,6 +69,34 @@ macro_rules! batch {
             $($(#[doc = $doc])* pub $name: &'a mut $type,)*
         }
 
+        /// Neighbouring rows of the columns, for one thread to work on.
+        #[derive(Debug)]
+        pub(crate) struct Block<'a> {
+            /// Index of the first truck.
+            first: usize,
+            /// The order in which the trucks are worked on.
+            pub places: &'a mut [Place],
+            streams: &'a [Stream],
+            choice: &'a RouteChoice,
+            autoreset: Autoreset,
+            $($(#[doc = $doc])* pub $name: &'a mut [$type],)*
+        }
+
+        impl Block<'_> {
+            /// The row of the truck at a place.
+            pub(crate) fn row(&mut self, place: Place) -> Row<'_> {
+                let index = place.index as usize;
+                Row {
+                    stream: self.streams[self.first + index],
+                    env: (self.first + index) as u32,
+                    autoreset: self.autoreset,
+                    choice: self.choice,
+                    tally: Tally::default(),
+                    $($name: &mut self.$name[index],)*
+                }
+            }
+        }
+
         /// The columns of a batch: `n_envs` rows each.
         #[derive(Debug, Clone)]
         pub struct Batch {
@@ -74,6 +104,7 @@ macro_rules! batch {
             choice: RouteChoice,
             autoreset: Autoreset,
             streams: Vec<Stream>,
+            order: Order,
             /// Sums since the batch was made.
             pub(crate) tally: Tally,
             $($(#[doc = $doc])* pub $name: Vec<$type>,)*
@@ -85,7 +116,8 @@ macro_rules! batch {
                 check_size(n_envs)?;
                 let mut streams: Vec<Stream> = zeros(n_envs)?;
                 (0..).zip(&mut streams).for_each(|(env, stream)| *stream = Stream { seed, env });
-                Ok(Batch { seed, autoreset: choice.autoreset(), choice, streams, tally: Tally::default(), $($name: zeros(n_envs)?,)* })
+                let order = Order::new(zeros(n_envs)?);
+                Ok(Batch { seed, autoreset: choice.autoreset(), choice, streams, order, tally: Tally::default(), $($name: zeros(n_envs)?,)* })
             }
 
             /// The rows `indices` of this batch, in that order and as often as they are named: row `i` goes on as row
@@ -115,16 +147,18 @@ macro_rules! batch {
                 [$((Column::$variant, cast_slice_mut(&mut self.$name)),)*]
             }
 
-            /// Every row, divided among all cores.
-            pub(crate) fn rows(&mut self) -> impl ParallelIterator<Item = Row<'_>> {
-                let (streams, choice, autoreset) = (&self.streams, &self.choice, self.autoreset);
-                let rows = zipped!(self; $($name)*).enumerate().with_min_len(ROWS_MIN);
-                rows.map(move |(env, nested!($($name)*))| Row {
-                    stream: streams[env],
-                    env: env as u32,
-                    autoreset,
+            /// Every row, in blocks that are divided among all cores; in each the rows are in the order of the trucks'
+            /// roads.
+            pub(crate) fn blocks(&mut self, world: &World) -> impl ParallelIterator<Item = Block<'_>> {
+                let n = self.order.renewed(world, &self.truck);
+                let (streams, choice, autoreset, order) = (&self.streams, &self.choice, self.autoreset, &mut self.order);
+                let blocks = order.blocks().zip(zipped!(self, n; $($name)*)).enumerate();
+                blocks.map(move |(block, (places, nested!($($name)*)))| Block {
+                    first: block * n,
+                    places,
+                    streams,
                     choice,
-                    tally: Tally::default(),
+                    autoreset,
                     $($name,)*
                 })
             }
@@ -158,6 +192,11 @@ impl Batch {
     /// What each truck draws from, `[n_envs]`.
     pub fn streams(&self) -> &[Stream] {
         &self.streams
+    }
+
+    /// Has the order of the rows renewed: many trucks have other roads.
+    pub(crate) fn outdate_order(&mut self) {
+        self.order.outdate();
     }
 
     pub(crate) fn set_autoreset(&mut self, autoreset: Autoreset) {

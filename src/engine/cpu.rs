@@ -1,7 +1,7 @@
 //! The CPU engine: the columns of a batch, stepped a truck at a time by all cores.
 //!
-//! A truck's step reads and writes its own `Row` and reads the shared [`World`], so the number of threads and the
-//! truck's index in the batch cannot change a result.
+//! A truck's step reads and writes its own `Row` and reads the shared [`World`], so the number of threads, the truck's
+//! index in the batch and the order in which trucks are stepped, that of their roads, cannot change a result.
 
 pub mod collide;
 pub mod copy_observation;
@@ -53,20 +53,32 @@ fn run(world: &World, row: &mut Row, stages: &[Stage]) {
 /// Of them a held truck has the reset alone.
 fn run_all(world: &World, batch: &mut Batch, stages: &[Stage]) {
     let resets = stages.contains(&Stage::Reset);
-    let tallies = batch.rows().map(|mut row| {
+    let tally = on_all(world, batch, |row| {
         if row.truck.held == 0 {
-            run(world, &mut row, stages);
+            run(world, row, stages);
         } else if resets {
-            reset::reset(world, &mut row);
+            reset::reset(world, row);
         }
-        row.tally
     });
-    let tally = tallies.reduce(Tally::default, Tally::plus);
     batch.tally = batch.tally.plus(tally);
 }
 
+/// Works on every row, on all cores; returns what the rows add to the tally.
+fn on_all(world: &World, batch: &mut Batch, work: impl Fn(&mut Row) + Sync) -> Tally {
+    let tallies = batch.blocks(world).map(|mut block| {
+        let mut tally = Tally::default();
+        for n in 0..block.places.len() {
+            let mut row = block.row(block.places[n]);
+            work(&mut row);
+            tally = tally.plus(row.tally);
+        }
+        tally
+    });
+    tallies.reduce(Tally::default, Tally::plus)
+}
+
 fn draw_all(world: &World, batch: &mut Batch) {
-    batch.rows().for_each(|mut row| draw::draw(world, &mut row));
+    on_all(world, batch, |row| draw::draw(world, row));
 }
 
 impl EngineBatch for Batch {
@@ -92,10 +104,8 @@ impl EngineBatch for Batch {
 
     fn begin(&mut self, world: &World, begins: &[BeginRow], streams: Option<&[Stream]>) -> Result<(), Error> {
         streams.into_iter().for_each(|streams| self.set_streams(streams));
-        self.rows().for_each(|mut row| {
-            let begin = &begins[row.env as usize];
-            reset::begin(world, &mut row, begin);
-        });
+        on_all(world, self, |row| reset::begin(world, row, &begins[row.env as usize]));
+        self.outdate_order();
         Ok(())
     }
 

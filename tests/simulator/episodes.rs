@@ -53,6 +53,18 @@ fn the_same_seed_gives_the_same_bytes_whatever_threads_batch_size_and_repetition
 }
 
 #[test]
+fn on_many_roads_the_order_in_which_trucks_are_stepped_changes_nothing() {
+    let world = Arc::new(benchmark("attard2023-full").1);
+    for (name, engine) in engines() {
+        let many = driven(&engine, &world, 500, 150, 6, 2);
+        // Other numbers of trucks and threads make other blocks, each with an order of its own.
+        for (n_envs, threads) in [(1, 1), (40, 3), (500, 1)] {
+            assert!(driven(&engine, &world, n_envs, 150, 6, threads) == many[..n_envs], "{n_envs} trucks, {threads} threads on the {name}");
+        }
+    }
+}
+
+#[test]
 fn a_trucks_index_in_the_batch_and_its_neighbours_change_nothing() {
     let world = Arc::new(benchmark("attard2023-full").1);
     let n_routes = world.routes.len();
