@@ -1,6 +1,7 @@
 //! What all trucks share: the roundabouts baked into fields, the routes as a table of waypoints, vehicle and weights.
 //!
-//! A `World` in hand can always be stepped: everything that can be wrong is found when its scenario is read or baked.
+//! A `World` can be stepped as it was baked: what is wrong with a scenario is found when it is read or baked. The
+//! fields are public, and what is changed in them is not checked again.
 
 use std::f64::consts::PI;
 use std::sync::atomic::AtomicU64;

@@ -100,7 +100,10 @@ proptest! {
     #[test]
     fn a_straight_is_led_into_a_circle_without_a_kink(y in -20.0..20.0, radius in 1.0..60.0, circle in 5.0..20.0) {
         let origin = DVec2::new(-150.0, y);
-        let Some((arc, arrival)) = to_circle(origin, DVec2::X, circle, radius) else { return Ok(()) };
+        let led = to_circle(origin, DVec2::X, circle, radius);
+        // Cases without such an arc are not counted.
+        prop_assume!(led.is_some());
+        let (arc, arrival) = led.unwrap();
         prop_assert!(wrapped(arc.heading_at(0.0)).abs() < 1e-9);
         prop_assert!((arc.start().y - y).abs() < 1e-9);
         prop_assert!(arc.end().distance(DVec2::from_angle(arrival) * circle) < 1e-9 * radius.max(circle));
@@ -111,7 +114,10 @@ proptest! {
     #[test]
     fn corners_are_rounded_tangentially(x in 5.0..30.0, y in -30.0..30.0, radius in 0.1..4.0) {
         let bends = [(-30.0, 0.0), (0.0, 0.0), (x, y), (x + 40.0, y)].map(|(x, y)| Bend { at: DVec2::new(x, y), radius });
-        let Ok(curve) = rounded(&bends, false) else { return Ok(()) };
+        let rounded = rounded(&bends, false);
+        // Cases in which no such arc fits are not counted.
+        prop_assume!(rounded.is_ok());
+        let curve = rounded.unwrap();
         for joint in curve.pieces.windows(2) {
             prop_assert!(joint[0].end().distance(joint[1].start()) < 1e-9);
             prop_assert!(wrapped(joint[0].heading_at(joint[0].length()) - joint[1].heading_at(0.0)).abs() < 1e-6);

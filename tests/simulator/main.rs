@@ -33,6 +33,7 @@ mod physics;
 mod pinned;
 mod procedural;
 mod refused;
+mod repository;
 mod restarts;
 mod sense;
 mod shaders;
