@@ -39,6 +39,23 @@ fn opened(page: &Path) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
+/// How wide the page's contents are where the window has so many pixels. A headless window is never narrower than 500
+/// pixels; a frame is.
+fn widths(page: &Path, window: u32) -> (u32, u32) {
+    let report = "<script>addEventListener('load', () => setTimeout(() => { const page = document.documentElement; \
+                  parent.postMessage(`${page.clientWidth} ${page.scrollWidth}`, '*') }, 1000))</script></body>";
+    let [framed, frame] = ["framed.html", "frame.html"].map(|name| page.with_file_name(name));
+    std::fs::write(&framed, read(page).replace("</body>", report)).unwrap();
+    let outer = format!(
+        "<iframe src=\"framed.html\" style=\"border: 0; width: {window}px; height: 9000px\"></iframe><script>addEventListener('message', \
+         event => document.body.append(Object.assign(document.createElement('pre'), {{ id: 'selftest', textContent: event.data }})))</script>"
+    );
+    std::fs::write(&frame, outer).unwrap();
+    let outcome = selftest(&frame);
+    let (width, contents) = outcome.split_once('<').unwrap().0.split_once(' ').unwrap();
+    (width.parse().unwrap(), contents.parse().unwrap())
+}
+
 /// A data block of the page.
 fn block<'a>(page: &'a str, id: &str) -> &'a str {
     let (_, text) = page.split_once(&format!("id=\"{id}\">")).unwrap();
@@ -236,4 +253,28 @@ fn a_page_of_a_fleet_shows_each_episode_with_its_own_truck_and_names_vehicle_and
     std::fs::write(&page, text.replace(own, "ground.vehicles[((episode.vehicle ?? 0) + 1) % ground.vehicles.length]")).unwrap();
     let outcome = selftest(&page);
     assert!(outcome.contains("fails: the replay shows the truck that was driven: rays of episode"), "{outcome}");
+}
+
+#[test]
+fn a_page_is_as_wide_as_its_window_on_a_telephone_and_on_a_desk() {
+    let place = Place::new();
+    let road = "a-roundabout-with-a-rather-long-name";
+    let scenarios = repository().join("scenarios");
+    std::fs::copy(scenarios.join("roundabouts/16m.toml"), place.file(&format!("{road}.toml"))).unwrap();
+    let benchmark = read(&place.file("short.toml"));
+    let own = format!("{}/roundabouts/16m.toml", scenarios.display());
+    assert!(benchmark.contains(&own));
+    std::fs::write(place.file("short.toml"), benchmark.replace(&own, &format!("{road}.toml"))).unwrap();
+    succeed(&place.train(&["--name", "run"]));
+    let fleet = ["--route", "20m/E-right-1", "--episodes", "4", "--policy", "pursuit", "--html", &place.text("fleet.html")];
+    succeed(&offtrack(&[&["evaluate", "--benchmark", "laden2026"], &fleet[..]].concat()));
+    for page in ["runs/run/report.html", "fleet.html"] {
+        let page = place.file(page);
+        for window in [400, 1200] {
+            let (width, contents) = widths(&page, window);
+            // A bar to scroll with takes a few pixels of the window.
+            assert!(contents <= width && (window - 20..=window).contains(&width), "{}: {contents} of {width}", page.display());
+        }
+    }
+    assert!(opened(&place.file("runs/run/report.html")).contains(&format!("{road}/E-right-1")));
 }
