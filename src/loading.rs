@@ -10,6 +10,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::SystemTime;
 
+use crate::reader::shown_path;
+
 /// How far work is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
@@ -155,7 +157,7 @@ impl Cache {
     /// Why something could not be kept: the folder and the first reason.
     pub fn failure(&self) -> Option<String> {
         let failure = self.failure.lock().ok()?;
-        failure.as_ref().map(|error| format!("{}: cannot keep results: {error}", self.folder.display()))
+        failure.as_ref().map(|error| format!("{}: cannot keep results: {error}", shown_path(&self.folder)))
     }
 
     /// Removes the entries that were written longest ago until the folder has at most 4 GiB. Does nothing where nothing

@@ -1,8 +1,8 @@
 //! Reads files of a limited size and checks their values one key at a time. Every error names the file and, where there
 //! is one, the key.
 //!
-//! Messages stay short whatever the file holds: long lines and values are cut, large numbers are printed with an
-//! exponent.
+//! Messages stay short and harmless whatever the file holds: long lines and values are cut, large numbers are printed
+//! with an exponent, characters that a terminal obeys are escaped. Errors see to it where they are shown.
 
 mod message;
 #[cfg(test)]
@@ -16,13 +16,13 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
-pub use message::{differing, shortened, shown};
+pub use message::{LONGEST_PATH, differing, printable, shortened, shown, shown_path};
 
 /// What can be wrong with a file.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The file is missing, is not text, or may not be read.
-    #[error("{}: cannot be read: {source}", file.display())]
+    #[error("{}: cannot be read: {source}", shown_path(file))]
     Unreadable {
         /// The file that was asked for.
         file: PathBuf,
@@ -30,13 +30,13 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A folder, a device or a pipe. Reading one may never end.
-    #[error("{}: is not a regular file; a file is needed", file.display())]
+    #[error("{}: is not a regular file; a file is needed", shown_path(file))]
     NotAFile {
         /// The path that was asked for.
         file: PathBuf,
     },
     /// The file is larger than any of its kind.
-    #[error("{}: is larger than {} MiB, the most that is read of such a file", file.display(), limit >> 20)]
+    #[error("{}: is larger than {} MiB, the most that is read of such a file", shown_path(file), limit >> 20)]
     TooLarge {
         /// The file that was asked for.
         file: PathBuf,
@@ -54,7 +54,7 @@ pub enum Error {
         known: Vec<&'static str>,
     },
     /// The file is not valid TOML, has an unknown key, lacks one, or has one of a wrong type.
-    #[error("{}: {message}", file.display())]
+    #[error("{}: {}", shown_path(file), shortened(message, LONGEST_FAULT))]
     Malformed {
         /// The file that was read.
         file: PathBuf,
@@ -62,13 +62,19 @@ pub enum Error {
         message: String,
     },
     /// A value that can be read but makes no sense.
-    #[error("{}: {key}: {value}; {expected}", file.display())]
+    #[error(
+        "{}: {}: {}; {}",
+        shown_path(file),
+        shortened(key, LONGEST_VALUE),
+        shortened(value, LONGEST_VALUE),
+        shortened(expected, LONGEST_EXPECTED)
+    )]
     Invalid {
         /// The file that was read.
         file: PathBuf,
         /// The key's full path, `arm[2].entry.offset`.
         key: String,
-        /// The value as written, with its unit; cut where it is long.
+        /// The value as written, with its unit.
         value: String,
         /// What would do.
         expected: String,
@@ -83,6 +89,8 @@ pub const TEXT_LIMIT: u64 = 1 << 20;
 
 /// Maximum length of a key or value in a message \[characters].
 const LONGEST_VALUE: usize = 100;
+/// Maximum length of what is wrong with a file as a whole \[characters].
+const LONGEST_FAULT: usize = 1000;
 /// Maximum length of what a message asks for \[characters].
 const LONGEST_EXPECTED: usize = 600;
 
@@ -151,12 +159,7 @@ impl<'a> Reader<'a> {
 
     /// The error for a value that makes no sense.
     pub fn invalid(&self, key: impl Into<String>, value: impl Display, expected: impl Into<String>) -> Error {
-        Error::Invalid {
-            file: self.file.to_owned(),
-            key: shortened(&key.into(), LONGEST_VALUE),
-            value: shortened(&value.to_string(), LONGEST_VALUE),
-            expected: shortened(&expected.into(), LONGEST_EXPECTED),
-        }
+        Error::Invalid { file: self.file.to_owned(), key: key.into(), value: value.to_string(), expected: expected.into() }
     }
 
     /// A finite number within `range`; `unit` is for the message.

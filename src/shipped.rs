@@ -7,7 +7,7 @@
 use std::fmt;
 use std::path::{Component, Path, PathBuf};
 
-use crate::reader::{Error, TEXT_LIMIT, read_text};
+use crate::reader::{Error, TEXT_LIMIT, printable, read_text};
 
 /// Pairs of a file's path below `scenarios/` and its text.
 macro_rules! embedded {
@@ -160,10 +160,10 @@ impl Source {
         }
     }
 
-    /// The file's name without its extension.
+    /// The file's name without its extension, as results and messages show it.
     pub fn stem(&self) -> String {
         let (Source::Disk(file) | Source::Embedded(file)) = self;
-        file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+        file.file_stem().map(|stem| printable(&stem.to_string_lossy()).into_owned()).unwrap_or_default()
     }
 
     /// The file's text.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use offtrack::reader::shortened;
+use offtrack::reader::{LONGEST_PATH, shortened, shown_path};
 
 /// Most characters of a message about the contents of a file.
 const LONGEST_MESSAGE: usize = 600;
@@ -14,7 +14,7 @@ pub enum Error {
     #[error(transparent)]
     Unreadable(#[from] offtrack::reader::Error),
     /// The file is not a policy, is damaged, or holds a policy that cannot drive.
-    #[error("{}: {message}", file.display())]
+    #[error("{}: {}", shown_path(file), shortened(message, LONGEST_MESSAGE))]
     Contents {
         /// The file, or the policy's name.
         file: PathBuf,
@@ -22,7 +22,7 @@ pub enum Error {
         message: String,
     },
     /// No policy of this name comes with the program.
-    #[error("policy: {name}; the program comes with {}", known.join(", "))]
+    #[error("policy: {}; the program comes with {}", shortened(name, LONGEST_PATH), known.join(", "))]
     UnknownName {
         /// The name that was asked for.
         name: String,
@@ -32,8 +32,8 @@ pub enum Error {
 }
 
 impl Error {
-    /// A long message, which may repeat a part of the file, is shortened.
+    /// A file has wrong contents.
     pub(crate) fn contents(name: &str, message: &str) -> Error {
-        Error::Contents { file: name.into(), message: shortened(message, LONGEST_MESSAGE) }
+        Error::Contents { file: name.into(), message: message.to_owned() }
     }
 }

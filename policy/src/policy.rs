@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES};
-use offtrack::reader;
+use offtrack::reader::{self, shown_path};
 use offtrack::world::World;
 
 use crate::error::Error;
@@ -53,7 +53,7 @@ impl Policy {
     /// A file that cannot be read; one that is cut, changed or of another format; and one whose shapes do not fit, that
     /// has a number that is not finite, or numbers so large that its outputs may not be.
     pub fn load(file: &Path) -> Result<Policy, Error> {
-        Policy::from_bytes(&file.display().to_string(), &reader::read_bytes(file, FILE_LIMIT)?)
+        Policy::from_bytes(&shown_path(file), &reader::read_bytes(file, FILE_LIMIT)?)
     }
 
     /// The policy of this name that comes with the project: a benchmark's, or `attard2023-lane`, which drives nearer to

@@ -1,9 +1,68 @@
-//! Error messages of bounded length: numbers, values and lines of a file in a form that can be read on a terminal.
+//! Error messages of bounded length: numbers, values and lines of a file in a form that can be read on a terminal and
+//! does nothing to it.
+
+use std::borrow::Cow;
+use std::ops::RangeInclusive;
+use std::path::Path;
 
 /// Maximum length of the parser's own words \[characters].
 const LONGEST_MESSAGE: usize = 600;
 /// Maximum length of a line that is repeated \[characters].
 const LONGEST_LINE: usize = 100;
+
+/// Maximum length of a path \[characters].
+pub const LONGEST_PATH: usize = 400;
+
+/// Characters beside the control characters that are not seen, or that move or hide what is beside them: the formats of
+/// Unicode 16 (`Cf`), its separators of lines and paragraphs, and the plane of tags.
+const UNSEEN: [RangeInclusive<char>; 19] = [
+    '\u{ad}'..='\u{ad}',
+    '\u{600}'..='\u{605}',
+    '\u{61c}'..='\u{61c}',
+    '\u{6dd}'..='\u{6dd}',
+    '\u{70f}'..='\u{70f}',
+    '\u{890}'..='\u{891}',
+    '\u{8e2}'..='\u{8e2}',
+    '\u{180e}'..='\u{180e}',
+    '\u{200b}'..='\u{200f}',
+    '\u{2028}'..='\u{202e}',
+    '\u{2060}'..='\u{206f}',
+    '\u{feff}'..='\u{feff}',
+    '\u{fff9}'..='\u{fffb}',
+    '\u{110bd}'..='\u{110bd}',
+    '\u{110cd}'..='\u{110cd}',
+    '\u{13430}'..='\u{1343f}',
+    '\u{1bca0}'..='\u{1bca3}',
+    '\u{1d173}'..='\u{1d17a}',
+    '\u{e0000}'..='\u{e0fff}',
+];
+
+/// Whether a terminal would do something else with a character than show it.
+fn is_unseen(c: char) -> bool {
+    c.is_control() || (!c.is_ascii() && UNSEEN.iter().any(|range| range.contains(&c)))
+}
+
+/// `text` as one line without control characters, marks of direction and others that are not seen: each is written as
+/// Rust would escape it, `\n` or `\u{1b}`.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_unseen) {
+        return text.into();
+    }
+    let mut escaped = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        match c {
+            '\t' | '\n' | '\r' => escaped.extend(c.escape_default()),
+            c if is_unseen(c) => escaped.extend(c.escape_unicode()),
+            c => escaped.push(c),
+        }
+    }
+    escaped.into()
+}
+
+/// A path as messages show it.
+pub fn shown_path(path: &Path) -> String {
+    shortened(&path.display().to_string(), LONGEST_PATH)
+}
 
 /// `value` in at most two dozen characters: with an exponent from 1e7 on and below 1e-4.
 pub fn shown(value: f64) -> String {
@@ -18,11 +77,13 @@ pub fn differing(value: f64, limit: f64) -> String {
     differing.next().unwrap_or_else(|| shown(value))
 }
 
-/// `text` where it has at most `limit` characters, else its beginning and its end around an ellipsis.
+/// `text`, [`printable`], where it then has at most `limit` characters, else its beginning and its end around an
+/// ellipsis.
 pub fn shortened(text: &str, limit: usize) -> String {
+    let text = printable(text);
     let n = text.chars().count();
     if n <= limit {
-        return text.to_owned();
+        return text.into_owned();
     }
     let tail = limit / 3;
     let head: String = text.chars().take(limit - tail - 1).collect();
@@ -32,7 +93,7 @@ pub fn shortened(text: &str, limit: usize) -> String {
 
 /// What the TOML parser says of `text`, with the line, the table and the part of the line around the fault.
 pub(super) fn malformed(text: &str, error: &toml::de::Error) -> String {
-    let message = shortened(error.message().trim_end(), LONGEST_MESSAGE).replace('\n', ", ");
+    let message = shortened(&error.message().trim_end().replace('\n', ", "), LONGEST_MESSAGE);
     let Some(span) = error.span() else { return message };
     let at = (0..=span.start.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
     let table = table_at(text, at);
@@ -50,12 +111,12 @@ pub(super) fn malformed(text: &str, error: &toml::de::Error) -> String {
 fn excerpt(line: &str, column: usize) -> String {
     let n = line.chars().count();
     if n <= LONGEST_LINE {
-        return line.trim().to_owned();
+        return printable(line.trim()).into_owned();
     }
     let from = column.saturating_sub(LONGEST_LINE / 2).min(n - LONGEST_LINE);
     let part: String = line.chars().skip(from).take(LONGEST_LINE).collect();
     let cut = |cut: bool| if cut { "…" } else { "" };
-    format!("{}{part}{}", cut(0 < from), cut(from + LONGEST_LINE < n))
+    format!("{}{}{}", cut(0 < from), printable(&part), cut(from + LONGEST_LINE < n))
 }
 
 /// The table that byte `at` lies in, `arm[1].entry.kerb`; `None` at the top level.

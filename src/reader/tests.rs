@@ -88,6 +88,41 @@ fn a_long_key_or_value_is_cut_and_both_its_ends_are_shown() {
 }
 
 #[test]
+fn characters_that_a_terminal_obeys_are_escaped_in_every_part_of_a_message() {
+    let odd = "\u{1b}[2J\u{7}\u{9b}1m\n\r\u{202e}\u{2066}\u{200b}\u{feff}\u{e0041}x";
+    let shown = "\\u{1b}[2J\\u{7}\\u{9b}1m\\n\\r\\u{202e}\\u{2066}\\u{200b}\\u{feff}\\u{e0041}x";
+    assert_eq!(printable(odd), shown);
+    assert_eq!(printable(shown), shown, "what is escaped stays as it is");
+    assert_eq!(printable("Größe 3 µm², кольцо, דרך"), "Größe 3 µm², кольцо, דרך");
+    let (file, source) = (PathBuf::from(odd), || std::io::Error::from(std::io::ErrorKind::NotFound));
+    let [key, value, expected] = [odd; 3].map(str::to_owned);
+    let errors = [
+        Error::Unreadable { file: file.clone(), source: source() },
+        Error::NotAFile { file: file.clone() },
+        Error::TooLarge { file: file.clone(), limit: 1 << 20 },
+        Error::UnknownName { what: "vehicle", name: odd.to_owned(), known: vec!["daf_xf"] },
+        Error::Malformed { file: file.clone(), message: odd.to_owned() },
+        Error::Invalid { file, key, value, expected },
+    ];
+    for (error, times) in errors.iter().zip([1, 1, 1, 1, 2, 4]) {
+        let text = error.to_string();
+        assert_eq!(printable(&text), text);
+        assert_eq!(text.matches(shown).count(), times, "{text}");
+    }
+    // What the parser repeats of a file.
+    for text in ["[a]\nb = \"\u{1b}[2J\u{202e}\"", "[a]\nb = true # \u{202e}", "\u{202e}", "[\"\\u001b\"]\n\"\\u001b[2J\" = true"] {
+        let text = refusal(text);
+        assert_eq!(printable(&text), text);
+    }
+}
+
+#[test]
+fn a_long_path_is_cut() {
+    let error = Error::NotAFile { file: "x".repeat(5000).into() }.to_string();
+    assert!(error.len() < 600, "{error}");
+}
+
+#[test]
 fn large_and_small_numbers_are_shown_with_an_exponent() {
     let shown: Vec<String> = [0.0, -4.5, 1e6, 1e308, -2.5e-9, f64::INFINITY].into_iter().map(shown).collect();
     assert_eq!(shown, ["0", "-4.5", "1000000", "1e308", "-2.5e-9", "inf"]);

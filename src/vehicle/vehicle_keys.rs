@@ -7,8 +7,11 @@ use serde::Deserialize;
 
 use super::{Load, Model, Sensors, SpeedControl, Suspension, Tractor, Trailer, Vehicle};
 use crate::layout::N_TRACTOR_RAYS;
-use crate::reader::{Error, Reader};
+use crate::reader::{Error, Reader, printable};
 use crate::shipped::Source;
+
+/// Maximum length of a load's name \[characters].
+const LONGEST_NAME: usize = 40;
 
 /// The file as written. Its values are not checked yet.
 #[derive(Deserialize)]
@@ -134,6 +137,10 @@ impl Vehicle {
             return Err(reader.invalid("loads", "empty", "at least one table [loads.NAME] is needed"));
         }
         let loads = written.loads.into_iter().map(|(name, written)| {
+            if name.is_empty() || LONGEST_NAME < name.chars().count() || printable(&name) != name {
+                let expected = format!("a load's name must be 1 to {LONGEST_NAME} characters, all of them visible");
+                return Err(reader.invalid("loads", format_args!("{name:?}"), expected));
+            }
             let load = load(&reader, &format!("loads.{name}"), &written)?;
             Ok((name, load))
         });

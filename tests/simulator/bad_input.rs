@@ -326,3 +326,20 @@ fn a_batch_that_cannot_be_is_refused_and_a_wrong_action_changes_nothing() {
         assert_eq!(simulator.batch().truck, before);
     }
 }
+
+#[test]
+fn a_load_whose_name_a_terminal_would_obey_or_a_table_could_not_hold_is_refused() {
+    let text = std::fs::read_to_string(scenarios().join("vehicles/daf_xf.toml")).unwrap();
+    assert!(text.contains("[loads.empty]"));
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("vehicle.toml");
+    let read = |name: &str| {
+        std::fs::write(&file, text.replace("loads.empty", &format!("loads.\"{name}\""))).unwrap();
+        Vehicle::read(&file).map(|vehicle| vehicle.loads.contains_key(name)).map_err(|error| error.to_string())
+    };
+    assert_eq!(read("à moitié"), Ok(true));
+    for name in ["", "\\u001b[2J", "a\\nb", "\\u202e", &"x".repeat(41)] {
+        let said = read(name).unwrap_err();
+        assert!(said.contains("vehicle.toml: loads: ") && said.contains("1 to 40 characters, all of them visible"), "{said}");
+    }
+}

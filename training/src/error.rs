@@ -1,14 +1,18 @@
 //! What can go wrong while training, evaluating or drawing: one error type for this crate, above those of the
 //! simulator's edges ([`offtrack::reader::Error`] for files, [`offtrack::simulator::Error`] for batches and devices).
+//!
+//! Names and values are bounded and made harmless where they are shown, so that none can be forgotten.
 
 use std::path::{Path, PathBuf};
 
-use offtrack::reader::shortened;
+use offtrack::reader::{LONGEST_PATH, shortened, shown_path};
 
 use crate::device;
 
 /// Most characters of a message about the contents of a file.
 const LONGEST_MESSAGE: usize = 600;
+/// Most characters of what a flag may be.
+const LONGEST_EXPECTED: usize = 1000;
 
 /// Why training, an evaluation or a command stopped. [`Error::is_wrong_input`] tells wrong input from a failure.
 #[derive(Debug, thiserror::Error)]
@@ -29,7 +33,7 @@ pub enum Error {
     #[error(transparent)]
     Simulator(#[from] offtrack::simulator::Error),
     /// A setting is out of range or unknown: a command-line argument, or a key of the same meaning.
-    #[error("{flag}: {value}; {expected}")]
+    #[error("{flag}: {}; {}", shortened(value, LONGEST_PATH), shortened(expected, LONGEST_EXPECTED))]
     Flag {
         /// The argument's name.
         flag: &'static str,
@@ -39,7 +43,7 @@ pub enum Error {
         expected: String,
     },
     /// A file has wrong contents.
-    #[error("{}: {message}", file.display())]
+    #[error("{}: {}", shown_path(file), shortened(message, LONGEST_MESSAGE))]
     Contents {
         /// The file.
         file: PathBuf,
@@ -47,7 +51,7 @@ pub enum Error {
         message: String,
     },
     /// A file of a run cannot be read.
-    #[error("{}: cannot be read: {source}", file.display())]
+    #[error("{}: cannot be read: {source}", shown_path(file))]
     Read {
         /// The file.
         file: PathBuf,
@@ -55,7 +59,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A result cannot be written.
-    #[error("{}: cannot be written: {source}", file.display())]
+    #[error("{}: cannot be written: {source}", shown_path(file))]
     Write {
         /// The file or folder.
         file: PathBuf,
@@ -63,7 +67,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// An action sequence of a certificate does not arrive.
-    #[error("{}: {route} from ({:+}, {:+}) of the largest start errors: the sequence does not arrive: {ended}", file.display(), start[0], start[1])]
+    #[error("{}: {} from ({:+}, {:+}) of the largest start errors: the sequence does not arrive: {ended}", shown_path(file), shortened(route, LONGEST_PATH), start[0], start[1])]
     NotVerified {
         /// The certificate.
         file: PathBuf,
@@ -107,9 +111,9 @@ impl Error {
         !failed && !device::has_failed(self)
     }
 
-    /// A file has wrong contents. A long message, which may repeat a part of the file, is shortened.
-    pub fn contents(file: &Path, message: impl AsRef<str>) -> Error {
-        Error::Contents { file: file.to_owned(), message: shortened(message.as_ref(), LONGEST_MESSAGE) }
+    /// A file has wrong contents.
+    pub fn contents(file: &Path, message: impl Into<String>) -> Error {
+        Error::Contents { file: file.to_owned(), message: message.into() }
     }
 
     /// For `map_err` on a file being written.

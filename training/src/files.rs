@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
+use offtrack::reader::printable;
 use serde::Serialize;
 
 use crate::error::Error;
@@ -14,9 +15,33 @@ pub fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new(".")).to_owned()
 }
 
-/// Prints a command's result. A closed standard output is an error, never a panic.
+/// Prints a command's result: lines, in which names of files may stand. A closed standard output is an error, never a
+/// panic.
 pub fn print(text: &str) -> Result<(), Error> {
-    std::io::stdout().write_all(text.as_bytes()).map_err(Error::write(Path::new("standard output")))
+    std::io::stdout().write_all(harmless(text).as_bytes()).map_err(Error::write(Path::new("standard output")))
+}
+
+/// Prints JSON, which other programs may read: characters that a terminal obeys are escaped as JSON has it.
+pub fn print_json(text: &str) -> Result<(), Error> {
+    let mut shown = String::with_capacity(text.len() + 1);
+    for c in text.chars() {
+        if c == '\n' || printable(c.encode_utf8(&mut [0; 4])).chars().eq([c]) {
+            shown.push(c);
+        } else {
+            shown.extend(c.encode_utf16(&mut [0; 2]).iter().map(|unit| format!("\\u{unit:04x}")));
+        }
+    }
+    print(&(shown + "\n"))
+}
+
+/// Says one line on standard error, after the program's name. Nobody may be reading it: then the work goes on.
+pub fn say(line: &str) {
+    let _ = writeln!(std::io::stderr(), "offtrack: {}", printable(line));
+}
+
+/// `text` with its line ends, and without other characters that a terminal obeys.
+pub fn harmless(text: &str) -> String {
+    text.split('\n').map(printable).collect::<Vec<_>>().join("\n")
 }
 
 /// Writes `value` to `file` as indented JSON, whole or not at all.
@@ -145,5 +170,11 @@ mod tests {
         assert!(writer(temporary.path().file_name().unwrap().to_str().unwrap()) == Some(std::process::id()));
         remove_temporaries();
         assert!(!temporary.path().exists());
+    }
+
+    #[test]
+    fn of_characters_that_a_terminal_obeys_only_line_ends_are_printed() {
+        assert_eq!(harmless("a\n\u{1b}[2Jb\r\n\u{202e}c\n"), "a\n\\u{1b}[2Jb\\r\n\\u{202e}c\n");
+        assert_eq!(harmless("Köln  µm²\n"), "Köln  µm²\n");
     }
 }

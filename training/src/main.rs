@@ -2,10 +2,11 @@
 
 mod commands;
 
-use std::io::Write;
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use offtrack::reader::shortened;
 use offtrack_training::error::Error;
 use offtrack_training::{files, provenance};
 
@@ -58,7 +59,10 @@ enum Command {
 
 fn main() -> ExitCode {
     provenance::set_commit(offtrack_commit::commit!());
-    let command = Cli::parse().command.unwrap_or(Command::Train(train::Args::default()));
+    let command = match parsed(&std::env::args_os().collect::<Vec<_>>()) {
+        Ok(cli) => cli.command.unwrap_or(Command::Train(train::Args::default())),
+        Err(code) => return code,
+    };
     if !matches!(command, Command::Train(_)) {
         // Training has a handler of its own, which stops the run and writes it.
         let _ = ctrlc::set_handler(|| {
@@ -84,10 +88,27 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             // With standard error closed, the exit code is all that is left.
-            let _ = writeln!(std::io::stderr(), "offtrack: {error}");
+            files::say(&error.to_string());
             ExitCode::from(exit_code(&error))
         }
     }
+}
+
+/// Most characters of an argument that a message repeats.
+const LONGEST_ARGUMENT: usize = 200;
+
+/// Reads the arguments. Where that fails, help or what is wrong has been printed.
+fn parsed(arguments: &[OsString]) -> Result<Cli, ExitCode> {
+    Cli::try_parse_from(arguments).map_err(|error| {
+        // Errors repeat arguments: this one is that of the same command with arguments that do nothing to a terminal.
+        let shown = arguments.iter().map(|argument| shortened(&argument.to_string_lossy(), LONGEST_ARGUMENT));
+        if let Err(shown) = Cli::try_parse_from(shown) {
+            shown.exit();
+        }
+        // One is not Unicode.
+        files::say(&error.kind().to_string());
+        ExitCode::from(WRONG_INPUT)
+    })
 }
 
 fn exit_code(error: &Error) -> u8 {

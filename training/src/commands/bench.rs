@@ -121,7 +121,7 @@ fn in_turns(args: &Args) -> Result<(), Error> {
         for learner in &mut learners {
             let run = learner.warm(0.1 * args.seconds)?.round(0.9 * args.seconds)?;
             let text = serde_json::to_string(&run).map_err(|error| Error::write(Path::new("standard output"))(error.into()))?;
-            files::print(&format!("{text}\n"))?;
+            files::print_json(&text)?;
         }
     }
     Ok(())

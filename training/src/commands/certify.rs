@@ -120,7 +120,7 @@ fn certify(args: &Args) -> Result<(), Error> {
         let name = world.route_names[route as usize].clone();
         let mut found = Vec::new();
         for start in &STARTS {
-            bar.say(format!("{failures} not completed, {name}"));
+            bar.say(&format!("{failures} not completed, {name}"));
             let one = attempt(&world, route, start, &passes, policy.as_ref())?;
             failures += usize::from(!one.arrived());
             certificate.env_steps += one.env_steps;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec2;
 use offtrack::opendrive::{Hand, Imported, Map, Options, RoadLane, Way};
-use offtrack::reader::{Error as InputError, Reader};
+use offtrack::reader::{Error as InputError, Reader, shown_path};
 use offtrack::roundabout::map::Choice;
 
 use offtrack_training::error::Error;
@@ -121,7 +121,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let (arms, routes) = (ground.arms.len(), ground.lines.len());
     let island = if 0.0 < ground.island_radius { format!(", island {:.2} m", ground.island_radius) } else { String::new() };
-    let _ = writeln!(summary, "written: {}: {arms} arms, {routes} routes{island}", output.display());
+    let _ = writeln!(summary, "written: {}: {arms} arms, {routes} routes{island}", shown_path(output));
     files::print(&summary)
 }
 

@@ -1,15 +1,15 @@
 //! The flags that choose a policy.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use offtrack::reader::shown;
+use offtrack::reader::{shown, shown_path};
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::certificate::line;
 use offtrack_training::evaluation::policies::{self, LOOK_AHEAD, Policy, PurePursuit};
+use offtrack_training::files;
 
 use super::outputs;
 
@@ -37,12 +37,8 @@ impl Choice {
         let pursuit = self.pursuit(scenario, world)?;
         let policy = policies::find(self.policy.as_deref(), &scenario.name, pursuit, seed, world)?;
         if self.policy.is_none() && !offtrack_policy::Policy::shipped_names().contains(&scenario.name.as_str()) {
-            let _ = writeln!(
-                std::io::stderr(),
-                "offtrack: no policy comes with the program for {}; {} drives; --policy chooses another",
-                scenario.name,
-                policy.name()
-            );
+            let (benchmark, drives) = (&scenario.name, policy.name());
+            files::say(&format!("no policy comes with the program for {benchmark}; {drives} drives; --policy chooses another"));
         }
         Ok(policy)
     }
@@ -85,14 +81,9 @@ impl Choice {
         let lines = line::lines(file, scenario, world)?;
         let without = world.route_names.len() - lines.len();
         if 0 < without {
-            let _ = writeln!(
-                std::io::stderr(),
-                "offtrack: {} completes {} of {} routes; on the others pursuit follows the lane's centre",
-                file.display(),
-                lines.len(),
-                world.route_names.len()
-            );
+            let (n, all) = (lines.len(), world.route_names.len());
+            files::say(&format!("{} completes {n} of {all} routes; on the others pursuit follows the lane's centre", shown_path(file)));
         }
-        Ok(pursuit.planned(lines, &file.display().to_string()))
+        Ok(pursuit.planned(lines, &shown_path(file)))
     }
 }

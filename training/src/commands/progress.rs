@@ -4,6 +4,8 @@ use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use offtrack::reader::printable;
+use offtrack_training::files;
 use offtrack_training::learner::run::progress::Display;
 
 /// A bar over `length` things called `unit`, after what is done with them.
@@ -29,8 +31,8 @@ impl Bar {
     }
 
     /// Words after the numbers.
-    pub fn say(&self, words: String) {
-        self.0.set_message(words);
+    pub fn say(&self, words: &str) {
+        self.0.set_message(printable(words).into_owned());
     }
 }
 
@@ -62,7 +64,7 @@ impl TrainingDisplay {
 
 impl Display for TrainingDisplay {
     fn show(&mut self, fraction: f64, line: String) {
-        let line = format!("{}{line}", self.label);
+        let line = printable(&format!("{}{line}", self.label)).into_owned();
         if std::io::stderr().is_terminal() {
             self.bar.set_position((1000.0 * fraction) as u64);
             self.bar.set_message(line);
@@ -73,7 +75,7 @@ impl Display for TrainingDisplay {
     }
 
     fn warn(&mut self, line: String) {
-        let _ = self.bar.suspend(|| writeln!(std::io::stderr(), "offtrack: {line}"));
+        self.bar.suspend(|| files::say(&line));
     }
 
     fn close(&mut self) {

@@ -10,6 +10,7 @@ use offtrack::scenario::{Place, Scenario, Split};
 use offtrack::shipped::Kind;
 use offtrack::world::World;
 use offtrack_training::error::Error;
+use offtrack_training::files;
 
 use super::progress::Bar;
 
@@ -41,7 +42,7 @@ pub fn loading<T>(action: &str, work: impl FnOnce(&Loading) -> T) -> T {
         work(&Loading { cache: cache.as_ref(), watcher: &watcher, ..Loading::PLAIN })
     };
     if let Some(failure) = cache.as_ref().and_then(Cache::failure) {
-        eprintln!("note: {failure}; the next command computes them again");
+        files::say(&format!("note: {failure}; the next command computes them again"));
     }
     done
 }

@@ -3,14 +3,14 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::reader::{read_text, shortened};
+use offtrack::reader::{read_text, shortened, shown_path};
 use offtrack_comparison::FILE_LIMIT;
 use offtrack_comparison::trace::{Case, Traced, trace};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use offtrack_training::error::Error;
-use offtrack_training::files::{print, write_json};
+use offtrack_training::files;
 
 use super::outputs;
 
@@ -46,14 +46,15 @@ pub fn run(args: &Args) -> Result<(), Error> {
     outputs::distinct(&[("--output", args.output.as_deref())], &[("CASES", Some(&args.cases))])?;
     let report = report(&args.cases)?;
     for Skipped { id, kind } in &report.skipped {
-        eprintln!("offtrack: {}: case {id:?} is skipped: its kind is {kind:?}, not \"trajectory\"", args.cases.display());
+        let [id, kind] = [id, kind].map(|text| shortened(&format!("{text:?}"), 100));
+        files::say(&format!("{}: case {id} is skipped: its kind is {kind}, not \"trajectory\"", shown_path(&args.cases)));
     }
     match &args.output {
-        Some(file) => write_json(file, &report),
+        Some(file) => files::write_json(file, &report),
         None => {
             let standard_output = Path::new("standard output");
             let text = serde_json::to_string_pretty(&report).map_err(|error| Error::write(standard_output)(error.into()))?;
-            print(&format!("{text}\n"))
+            files::print_json(&text)
         }
     }
 }

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use offtrack::reader::read_text;
+use offtrack::reader::{read_text, shown_path};
 use offtrack::scenario::Split;
 use offtrack_drawing::recording::Track;
 use offtrack_policy::Policy;
@@ -228,7 +228,7 @@ fn train(config: &Config, worlds: &Worlds, prepared: Prepared, opened: Opened, m
         run.progress.write_events(folder.path())?;
     }
     // Training goes on when nobody reads its lines.
-    let (path, n_routes) = (folder.path().display(), worlds.training.split(Split::Train).len());
+    let (path, n_routes) = (shown_path(folder.path()), worlds.training.split(Split::Train).len());
     let rewards = config.changed_rewards();
     let with = if rewards.is_empty() { String::new() } else { format!(" with {rewards}") };
     let on = format!("{n_routes} training routes of {}{with}, {}", worlds.training.name, run.device());
@@ -282,13 +282,13 @@ fn conclude(
     manner: &Manner,
     written: Result<(), Error>,
 ) -> Result<(), Error> {
-    let path = folder.path().display();
+    let path = shown_path(folder.path());
     if finished.interrupted {
         files::write_json(&folder.report(), &finished)?;
         written?;
         return files::print(&format!("stopped: policy and metrics are in {path}; not evaluated; train --resume {path} continues\n"));
     }
-    let mut policy = Policy { name: folder.policy().display().to_string(), ..policy };
+    let mut policy = Policy { name: shown_path(&folder.policy()), ..policy };
     let evaluated = evaluate(worlds, &mut policy)?;
     finished.evaluation = evaluated.as_ref().map(|(report, _)| report.clone());
     finished.also = worlds.also.iter().map(|also| also.evaluate(&mut policy)).collect::<Result<_, _>>()?;

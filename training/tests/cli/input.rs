@@ -144,6 +144,108 @@ fn a_long_value_is_not_repeated_whole() {
     assert!(said.contains("unknown field") && said.len() < 1000, "{}", said.len());
 }
 
+/// Escape sequences of a terminal, a bell, a line end, and marks that turn and hide text.
+const ODD: &str = "\u{1b}]0;owned\u{7}\u{1b}[2J\u{9b}31m\u{202e}\u{200b}x\nforged";
+
+/// What a command has said on either stream, which must be short and hold nothing that a terminal obeys but line ends.
+fn harmless(arguments: &[&str], output: &std::process::Output) -> String {
+    assert!([0, 1, 2].contains(&output.status.code().unwrap()), "{arguments:?}");
+    let said = [&output.stdout, &output.stderr].map(|said| String::from_utf8(said.clone()).unwrap()).concat();
+    let obeyed = |c: &char| (c.is_control() && *c != '\n') || ['\u{202e}', '\u{200b}'].contains(c);
+    assert!(!said.contains(|c| obeyed(&c)), "{arguments:?}: {said:?}");
+    assert!(!said.lines().any(|line| line.starts_with("forged")), "{arguments:?}: {said}");
+    assert!(said.lines().all(|line| line.chars().count() < 2500), "{arguments:?}: {said}");
+    said
+}
+
+#[test]
+fn names_in_files_and_arguments_do_nothing_to_a_terminal_and_are_not_repeated_whole() {
+    let place = Place::new();
+    let long = "x".repeat(5000);
+    std::fs::write(place.file("escape.toml"), format!("vehicle = \"{ODD}\"\n").replace("x\nforged", "x")).unwrap();
+    std::fs::write(place.file("table.toml"), "vehicle = \"daf_xf\"\nload = \"\\u001b[2J\\u202e\\nforged\"\n").unwrap();
+    std::fs::write(place.file("key.toml"), "\"\\u001b[2J\\u202e\\nforged\" = 1\n").unwrap();
+    std::fs::write(place.file("text.json"), format!("{{\"{ODD}\": 1}}")).unwrap();
+    std::fs::write(place.file("cases.json"), serde_json::json!({"cases": [{"id": ODD, "kind": ODD}]}).to_string()).unwrap();
+    let [tiny, tables, text, cases, svg] = ["tiny.toml", "table.toml", "text.json", "cases.json", "x.svg"].map(|name| place.text(name));
+    let mut n_commands = 0;
+    for file in [ODD, &long, &place.text("escape.toml"), &tables, &place.text("key.toml"), &text, &cases] {
+        let set = format!("{file}=1");
+        for arguments in [
+            vec!["evaluate", "--policy", "random", "--episodes", "1", "--benchmark", file],
+            vec!["evaluate", "--policy", file],
+            vec!["evaluate", "--policy", "random", "--route", file],
+            vec!["evaluate", "--policy", "random", "--load", file],
+            vec!["evaluate", "--policy", "random", "--certified", file],
+            vec!["evaluate", "--policy", "random", "--html", &svg, "--run", file],
+            vec!["evaluate", "--split", file],
+            vec!["certify", "--verify", file],
+            vec!["certify", "--widths", file],
+            vec!["record", "--route", file, "-o", &svg],
+            vec!["record", "--route", "20m/N-left-3", "-o", file],
+            vec!["draw", file, "-o", &svg],
+            vec!["draw", "16m", "--vehicle", file, "--route", "N-left-3", "-o", &svg],
+            vec!["draw", "16m", "--route", file, "-o", &svg],
+            vec!["generate", "--distribution", file, "-o", &text],
+            vec!["generate", "--plot", file],
+            vec!["import", file, "--list"],
+            vec!["trace", file],
+            vec!["deviations", "16m", file],
+            vec!["deviations", file, file],
+            vec!["scale", "--envs", file],
+            vec!["scale", "--benchmark", file, "--seconds", "0.1", "--envs", "1"],
+            vec!["train", file],
+            vec!["train", "--set", file],
+            vec!["train", "--set", &set],
+            vec!["train", &tiny, "--from", file],
+            vec!["train", &tiny, "--name", file],
+            vec!["train", "--seeds", file],
+            vec!["train", "--resume", file],
+            vec![file],
+            vec!["train", "tiny", file],
+        ] {
+            harmless(&arguments, &offtrack(&arguments));
+            n_commands += 1;
+        }
+    }
+    assert_eq!(n_commands, 7 * 31);
+    let said = harmless(&[], &offtrack(&["evaluate", "--benchmark", &place.text("escape.toml")]));
+    assert!(said.contains("vehicle = \"\\u{1b}]0;owned\\u{7}"), "{said}");
+    let said = harmless(&[], &offtrack(&["train", "--set", &format!("{long}=1")]));
+    assert!(said.len() < 1500, "{}", said.len());
+    let said = harmless(&[], &offtrack(&["fly", &format!("--{ODD}")]));
+    assert!(said.contains("unrecognized subcommand 'fly'"), "{said}");
+    let said = harmless(&[], &offtrack(&["evaluate", ODD]));
+    assert!(said.contains("unexpected argument '\\u{1b}]0;owned\\u{7}") && said.contains("x\\nforged'"), "{said}");
+    let printed = offtrack(&["trace", &cases]).stdout;
+    assert_eq!(serde_json::from_slice::<serde_json::Value>(&printed).unwrap()["skipped"][0]["id"], ODD);
+}
+
+#[test]
+fn a_name_of_a_file_that_a_table_shows_does_nothing_to_a_terminal() {
+    let place = Place::new();
+    // Slashes and zeros alone cannot stand in a name.
+    let name = format!("{ODD}.toml");
+    for file in ["short.toml", "tiny.toml"] {
+        std::fs::copy(place.file(file), place.file(&format!("{file}{name}"))).unwrap();
+    }
+    let road = place.text(&name);
+    std::fs::copy(crate::place::repository().join("scenarios/roundabouts/16m.toml"), &road).unwrap();
+    let benchmark = place.text(&format!("short.toml{name}"));
+    for arguments in [
+        vec!["evaluate", "--policy", "random", "--episodes", "1", "--benchmark", &benchmark],
+        vec!["evaluate", "--policy", "random", "--episodes", "1", "--route", &road],
+        vec!["certify", "--widths", "1", "--hold", "50", "--split", "test", "--benchmark", &benchmark],
+        vec!["deviations", &road, "tests/data/measured/16m.json"],
+        vec!["train", &place.text(&format!("tiny.toml{name}")), "--out", &place.text(&format!("runs{ODD}"))],
+    ] {
+        let output = offtrack(&arguments);
+        succeed(&output);
+        let said = harmless(&arguments, &output);
+        assert!(said.contains("\\u{1b}]0;owned"), "{arguments:?}: {said}");
+    }
+}
+
 #[test]
 fn a_roundabout_is_found_by_its_name_or_its_path() {
     for roundabout in ["16m", "scenarios/roundabouts/16m.toml"] {

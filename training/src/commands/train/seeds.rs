@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use offtrack::reader::read_text;
+use offtrack::reader::{read_text, shown_path};
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::seeds::{SeedReport, Seeds};
 use offtrack_training::files;
@@ -72,7 +72,7 @@ pub fn run(args: &Args, file: &Path, text: &str) -> Result<(), Error> {
     }
     let finished = group.all_finished(&seeds)?;
     let table = if finished.is_empty() { String::new() } else { Seeds::of(&seeds, &finished).table() + "\n" };
-    let (path, n, all) = (group.0.display(), finished.len(), seeds.len());
+    let (path, n, all) = (shown_path(&group.0), finished.len(), seeds.len());
     files::print(&match n == all {
         true => format!("{table}written: {path}\n"),
         false => format!("{table}stopped: {n} of {all} seeds have finished; the same command with --name {} continues\n", group.name()),
