@@ -5,6 +5,7 @@
 
 // In reading order: a module uses only those above it.
 pub mod reader; // files: errors with file, key, value and what would do
+pub mod writer; // files written whole or not at all
 pub mod loading; // results kept for the next time, and progress
 pub mod shipped; // the scenario files that come with the library
 pub mod shared; // macros for what Rust and WGSL share

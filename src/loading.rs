@@ -11,6 +11,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::SystemTime;
 
 use crate::reader::shown_path;
+use crate::writer::Output;
 
 /// How far work is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -138,20 +139,14 @@ impl Cache {
     }
 
     fn try_put(&self, kind: &str, key: &[u8], payload: &[u8]) -> io::Result<()> {
-        static COUNT: AtomicU64 = AtomicU64::new(0);
-        let file = self.file(kind, key);
         self.has_grown.store(true, Ordering::Relaxed);
         fs::create_dir_all(&self.folder)?;
         let mut content = [MAGIC, &(key.len() as u64).to_le_bytes()[..], key, payload].concat();
         content.extend(fnv_1a(&content).to_le_bytes());
-        // Two processes may keep the same entry at once.
-        let unique = format!("{}-{}.part", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
-        let part = self.folder.join(unique);
-        let written = fs::File::create(&part).and_then(|mut part| part.write_all(&content)).and_then(|()| fs::rename(&part, &file));
-        if written.is_err() {
-            let _ = fs::remove_file(&part);
-        }
-        written
+        let mut output = Output::create(&self.file(kind, key))?;
+        output.write_all(&content)?;
+        // A crash of the system may damage it; then it is not used.
+        output.finish_unsynced()
     }
 
     /// Why something could not be kept: the folder and the first reason.
@@ -170,7 +165,7 @@ impl Cache {
 
     fn prune_to(&self, limit: u64) {
         let Ok(entries) = fs::read_dir(&self.folder) else { return };
-        let known = |entry: &fs::DirEntry| entry.path().extension().is_some_and(|extension| extension == "cache" || extension == "part");
+        let known = |entry: &fs::DirEntry| entry.path().extension().is_some_and(|extension| extension == "cache");
         let mut files: Vec<(SystemTime, u64, PathBuf)> = entries
             .flatten()
             .filter(known)

@@ -1,6 +1,5 @@
 //! Policies: networks that drive, read from files or shipped, and written for networks that were trained in Python.
 
-use std::io::Write;
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -228,9 +227,5 @@ const MOST_NUMBERS: usize = (64 << 20) / size_of::<f32>();
 /// Writes a file, whole or not at all.
 fn write(file: &str, bytes: &[u8]) -> PyResult<()> {
     let failed = |error: std::io::Error| PyOSError::new_err(format!("{file}: cannot be written: {error}"));
-    let folder = Path::new(file).parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut part = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
-    part.write_all(bytes).map_err(failed)?;
-    part.persist(file).map_err(|error| failed(error.error))?;
-    Ok(())
+    offtrack::writer::write_whole(Path::new(file), bytes).map_err(failed)
 }

@@ -148,7 +148,8 @@ struct Opened {
 
 impl Opened {
     fn new(folder: Folder) -> Result<Opened, Error> {
-        Ok(Opened { metrics: MetricsFile::create(folder.metrics())?, stored: None, has_new_budget: false, folder })
+        let metrics = MetricsFile::create(folder.metrics()).inspect_err(|_| folder.discard())?;
+        Ok(Opened { metrics, stored: None, has_new_budget: false, folder })
     }
 
     fn resumed(Resumed { folder, metrics, stored, .. }: Resumed, has_new_budget: bool) -> Opened {

@@ -14,6 +14,7 @@ mod generate;
 mod import;
 mod input;
 mod interruption;
+mod output;
 mod page;
 mod place;
 mod record;

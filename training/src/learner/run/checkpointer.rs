@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use offtrack::writer::{followed, keep_access};
+
 use crate::error::Error;
 use crate::files;
 use crate::learner::checkpoint::Columns;
@@ -98,13 +100,17 @@ impl Checkpointer {
             self.next = self.interval.min(self.next.saturating_mul(2));
         }
         let written = columns.write(&self.part, config, world);
+        if let (Ok(file), Ok(last)) = (&written, std::fs::metadata(&self.file)) {
+            // Where the owner cannot be kept, the checkpoint is this user's.
+            let _ = keep_access(&last, file);
+        }
         let (part, whole, policy_file, metrics) = (self.part.clone(), self.file.clone(), self.policy.clone(), self.metrics.clone());
         let finish = move || {
             // The rows of metrics are on the disk before the checkpoint that refers to them.
             let moved = written
                 .and_then(|file| file.sync_all())
                 .and_then(|()| File::open(metrics)?.sync_all())
-                .and_then(|()| std::fs::rename(&part, &whole));
+                .and_then(|()| std::fs::rename(&part, followed(&whole)));
             if moved.is_err() {
                 // A part of a checkpoint would fill the disk for nothing.
                 let _ = std::fs::remove_file(&part);

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use offtrack::writer::followed;
+
 use crate::error::Error;
 use crate::files;
 use crate::learner::config::Config;
@@ -14,8 +16,19 @@ impl Folder {
     /// Makes a folder as [`make`] does and writes the config into it.
     pub fn create(runs: &Path, name: Option<&str>, config_file: &Path, config: &Config) -> Result<Folder, Error> {
         let folder = Folder(make(runs, name, config_file)?);
-        folder.write_config(config)?;
-        Ok(folder)
+        let written = folder.write_config(config);
+        if written.is_err() {
+            folder.discard();
+        }
+        written.map(|()| folder)
+    }
+
+    /// Removes the folder of a run that could not begin, which would be in the way of the next attempt. One with more
+    /// in it than a run begins with stays.
+    pub fn discard(&self) {
+        let _ = std::fs::remove_file(self.config());
+        let _ = std::fs::remove_file(self.metrics());
+        let _ = std::fs::remove_dir(&self.0);
     }
 
     /// The folder of a run that continues. Temporary files of a killed process are removed.
@@ -49,9 +62,9 @@ impl Folder {
         self.0.join("checkpoint.safetensors")
     }
 
-    /// The next checkpoint while it is being written.
+    /// The next checkpoint while it is being written: beside the last one, also where that is kept elsewhere and linked.
     pub fn checkpoint_part(&self) -> PathBuf {
-        self.0.join("checkpoint.part")
+        followed(&self.checkpoint()).with_extension("part")
     }
 
     /// The policy, replaced in one move each time.
