@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use offtrack::procedural::{Distribution, Reason, Refused, Road, lane_clearance};
+use offtrack::reader::{read_bytes, shown_path};
 use offtrack::roundabout::Roundabout;
 use offtrack::shipped::Kind;
 use offtrack_drawing::histograms::{Histograms, Panel};
@@ -45,7 +46,7 @@ pub struct Args {
     /// lie.
     #[arg(long)]
     plot: Option<PathBuf>,
-    /// Write over files that the folder has already.
+    /// Write over files of these names that the folder has already and that hold something else.
     #[arg(long, requires = "output")]
     overwrite: bool,
 }
@@ -66,34 +67,36 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let distribution = Distribution::find(&args.distribution)?;
     let indices: Vec<u32> = (args.first..end).collect();
-    let file = |index: u32| format!("{}-{}-{index}.toml", distribution.name, args.seed);
-    if let Some(folder) = &args.output {
-        free(folder, indices.iter().map(|&index| file(index)), args.overwrite)?;
-    }
     let roads = roads::loading("drawing", |loading| distribution.roads(args.seed, &indices, loading))?;
+    // All that can fail but the writing itself is done before anything is written.
+    let sheets = match &args.output {
+        Some(folder) => sheets(folder, &distribution, args, &roads)?,
+        None => Vec::new(),
+    };
+    let plot = args.plot.as_ref().map(|file| picture(file, &histograms(&distribution, args, &roads)?)).transpose()?;
     if let Some(folder) = &args.output {
-        fs::create_dir_all(folder).map_err(Error::write(folder))?;
-        for road in &roads {
-            files::write_whole(&folder.join(file(road.index)), text(&distribution, road).as_bytes())?;
+        let file =
+            |road: &Road| (format!("{}-{}-{}.toml", distribution.name, args.seed, road.index), text(&distribution, road).into_bytes());
+        let files = || roads.iter().map(file).chain(sheets.iter().cloned()).map(|(name, bytes)| (folder.join(name), bytes));
+        if !args.overwrite {
+            files().try_for_each(|(file, bytes)| free(&file, &bytes))?;
         }
-        write_sheet(folder, &distribution, args, &roads)?;
+        fs::create_dir_all(folder).map_err(Error::write(folder))?;
+        files().try_for_each(|(file, bytes)| files::write_whole(&file, &bytes))?;
     }
-    if let Some(plot) = &args.plot {
-        write_picture(plot, &histograms(&distribution, args, &roads)?)?;
+    if let (Some(file), Some(bytes)) = (&args.plot, &plot) {
+        files::write_whole(file, bytes)?;
     }
     files::print(&summary(&distribution, args, &roads))
 }
 
-/// An error if the folder has one of the files to be written already, unless it may be written over.
-fn free(folder: &Path, mut names: impl Iterator<Item = String>, overwrite: bool) -> Result<(), Error> {
-    let sheets = ["contact-sheet.svg", "contact-sheet.png"].map(str::to_owned);
-    match sheets.into_iter().chain(&mut names).map(|name| folder.join(name)).find(|file| file.exists()) {
-        Some(file) if !overwrite => {
-            let expected = "exists; another folder would do, or --overwrite to write over it".to_owned();
-            Err(Error::Flag { flag: "--output", value: file.display().to_string(), expected })
-        }
-        _ => Ok(()),
+/// An error if there is a file that holds anything else. One with the same bytes is what an earlier attempt has left.
+fn free(file: &Path, bytes: &[u8]) -> Result<(), Error> {
+    if !file.exists() || read_bytes(file, bytes.len() as u64).is_ok_and(|found| found == bytes) {
+        return Ok(());
     }
+    let expected = "exists and holds something else; another folder would do, or --overwrite to write over it".to_owned();
+    Err(Error::Flag { flag: "--output", value: file.display().to_string(), expected })
 }
 
 /// A road's file.
@@ -107,27 +110,26 @@ fn text(distribution: &Distribution, road: &Road) -> String {
     )
 }
 
-fn write_sheet(folder: &Path, distribution: &Distribution, args: &Args, roads: &[Road]) -> Result<(), Error> {
+/// Names and contents of the contact sheets.
+fn sheets(folder: &Path, distribution: &Distribution, args: &Args, roads: &[Road]) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let shown: Vec<&Roundabout> = roads.iter().take(ON_SHEET).map(|road| &road.roundabout).collect();
     let of = if shown.len() < roads.len() {
         format!("The first {} of {} random roads", shown.len(), roads.len())
     } else {
         format!("{} random roads", shown.len())
     };
-    let svg_file = folder.join("contact-sheet.svg");
     let title = format!("{of}: distribution {}, seed {}", distribution.name, args.seed);
-    let svg = sheet::drawn(&title, &shown).map_err(|error| Error::write(&svg_file)(std::io::Error::other(error)))?;
-    write_picture(&folder.join("contact-sheet.png"), &svg)?;
-    write_picture(&svg_file, &svg)
+    let names = ["contact-sheet.svg", "contact-sheet.png"];
+    let svg = sheet::drawn(&title, &shown).map_err(|error| Error::write(&folder.join(names[0]))(std::io::Error::other(error)))?;
+    names.into_iter().map(|name| Ok((name.to_owned(), picture(&folder.join(name), &svg)?))).collect()
 }
 
-/// Writes a picture in the format that the file's name asks for.
-fn write_picture(file: &Path, svg: &str) -> Result<(), Error> {
+/// A picture in the format that the file's name asks for.
+fn picture(file: &Path, svg: &str) -> Result<Vec<u8>, Error> {
     if file.extension().is_some_and(|extension| extension == "png") {
-        let bytes = rasterised(svg, WIDTH).map_err(|error| Error::write(file)(std::io::Error::other(error)))?;
-        return files::write_whole(file, &bytes);
+        return rasterised(svg, WIDTH).map_err(|error| Error::write(file)(std::io::Error::other(error)));
     }
-    files::write_whole(file, svg.as_bytes())
+    Ok(svg.as_bytes().to_vec())
 }
 
 /// Histograms of the roads with the shipped roundabouts marked, as SVG text.
@@ -195,7 +197,7 @@ fn summary(distribution: &Distribution, args: &Args, roads: &[Road]) -> String {
         let _ = writeln!(text, "{count:>7} {:>5.1} %  {}", share(count as usize), reason.words());
     }
     for path in [&args.output, &args.plot].into_iter().flatten() {
-        let _ = writeln!(text, "written: {}", path.display());
+        let _ = writeln!(text, "written: {}", shown_path(path));
     }
     text
 }

@@ -64,11 +64,34 @@ fn files_that_exist_are_not_written_over_unless_asked() {
     std::fs::write(&file, "mine").unwrap();
     std::fs::remove_file(Path::new(&folder).join("wide-0-0.toml")).unwrap();
     let said = refusal(&run(&[]), 2);
-    assert!(said.contains("--output: ") && said.contains("wide-0-1.toml; exists; another folder would do"), "{said}");
+    assert!(
+        said.contains("--output: ") && said.contains("wide-0-1.toml; exists and holds something else; another folder would do"),
+        "{said}"
+    );
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
     assert!(!Path::new(&folder).join("wide-0-0.toml").exists(), "nothing is written");
     succeed(&run(&["--overwrite"]));
     assert!(std::fs::read_to_string(&file).unwrap().contains("[ring]"));
+}
+
+#[test]
+fn a_generation_that_failed_on_the_way_succeeds_when_it_is_tried_again() {
+    let place = Place::new();
+    let folder = place.file("roads");
+    let run = || cached(&place, &["generate", "--count", "2", "-o", &place.text("roads")]);
+    // A folder stands where the last file is to be written.
+    std::fs::create_dir_all(folder.join("contact-sheet.png")).unwrap();
+    refusal(&run(), 2);
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1, "nothing is written");
+    std::fs::remove_dir(folder.join("contact-sheet.png")).unwrap();
+    succeed(&run());
+    // As after a kill or on a full disk: some of the files are there.
+    let [road, sheet] = ["wide-0-1.toml", "contact-sheet.svg"].map(|name| folder.join(name));
+    let before = [&road, &sheet].map(|file| std::fs::read(file).unwrap());
+    std::fs::remove_file(&road).unwrap();
+    std::fs::remove_file(&sheet).unwrap();
+    succeed(&run());
+    assert_eq!([&road, &sheet].map(|file| std::fs::read(file).unwrap()), before);
 }
 
 #[test]
