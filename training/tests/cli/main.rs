@@ -16,6 +16,7 @@ mod input;
 mod interruption;
 mod output;
 mod page;
+mod pictures;
 mod place;
 mod record;
 mod resume;
