@@ -12,6 +12,10 @@ use crate::world::World;
 
 /// Blocks that a thread takes on average: one that is held up leaves some to the others.
 const BLOCKS_A_THREAD: usize = 4;
+/// Trucks on a road in a block from which on most of what a truck reads of the road has been read before it.
+const TRUCKS_A_ROAD: usize = 32;
+/// Trucks on a road in a block at least, if it is to be larger for their sake.
+const TRUCKS_A_ROAD_MIN: usize = 8;
 /// Trucks of a block at least: fewer cost more to hand out than to step.
 const BLOCK_MIN: usize = 16;
 /// Uses until the order is renewed.
@@ -45,8 +49,7 @@ impl Order {
 
     /// Renews the order where it is due; returns the number of trucks of a block.
     pub(super) fn renewed(&mut self, world: &World, trucks: &[Truck]) -> usize {
-        let n_blocks = BLOCKS_A_THREAD * rayon::current_num_threads();
-        let block = self.places.len().div_ceil(n_blocks).max(BLOCK_MIN);
+        let block = block_of(self.places.len(), world.fields.len(), rayon::current_num_threads());
         if self.block == block && self.uses < USES {
             self.uses += 1;
             return block;
@@ -72,10 +75,27 @@ impl Order {
     }
 }
 
+/// Trucks of a block: a part of what a thread has to do, or all of it where so many roads are to be shared.
+fn block_of(n_envs: usize, n_roads: usize, n_threads: usize) -> usize {
+    let (whole, part) = (n_envs.div_ceil(n_threads), n_envs.div_ceil(BLOCKS_A_THREAD * n_threads));
+    let shares = TRUCKS_A_ROAD_MIN * n_roads <= whole;
+    let block = if shares { (TRUCKS_A_ROAD * n_roads).clamp(part, whole) } else { part };
+    block.max(BLOCK_MIN)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scenario::Scenario;
+
+    #[test]
+    fn blocks_are_large_where_many_roads_are_shared_and_small_where_few_are_or_none_can_be() {
+        assert_eq!(block_of(16_384, 256, 2), 8_192);
+        assert_eq!(block_of(65_536, 256, 2), 8_192);
+        assert_eq!(block_of(16_384, 5, 2), 2_048);
+        assert_eq!(block_of(1_024, 256, 2), 128);
+        assert_eq!(block_of(3, 256, 2), BLOCK_MIN);
+    }
 
     /// Trucks on routes that change their roads from one truck to the next.
     fn trucks(world: &World, n: usize, shift: usize) -> Vec<Truck> {
