@@ -33,19 +33,9 @@ fn the_picture_of_the_page_shows_the_result_of_the_shipped_policy() {
 }
 
 #[test]
-fn charts_of_measurements_name_the_measurement_that_they_lie_beside() {
-    for name in ["scale-cpu", "scale-llvmpipe"] {
-        let scale = json(&format!("docs/benchmarks/{name}.json"));
-        let chart = fs::read_to_string(repository().join(format!("docs/benchmarks/{name}.svg"))).unwrap();
-        for key in ["machine", "benchmark", "commit", "date"] {
-            let value = scale[key].as_str().unwrap();
-            // On a device its name stands in the place of the processor's.
-            let value = if key == "machine" && scale["engine"] != "cpu" { scale["device"].as_str().unwrap() } else { value };
-            assert!(chart.contains(value), "{name}.svg has no {key} {value}: offtrack scale --json --plot makes both");
-        }
-    }
-    let consumers = json("docs/benchmarks/python/consumers.json");
-    let chart = fs::read_to_string(repository().join("docs/benchmarks/python/consumers.svg")).unwrap();
+fn the_chart_of_what_learns_from_python_names_each_row_of_its_measurement() {
+    let consumers = json("docs/results/python-consumers.json");
+    let chart = fs::read_to_string(repository().join("docs/results/python-consumers.svg")).unwrap();
     let names: Vec<&str> = consumers["consumers"].as_array().unwrap().iter().map(|consumer| consumer["name"].as_str().unwrap()).collect();
     assert!(names.len() == 5 && names.iter().all(|name| chart.contains(&format!(">{name}<"))), "{names:?}");
 }
