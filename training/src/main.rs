@@ -118,5 +118,5 @@ fn exit_code(error: &Error) -> u8 {
 /// Starts the threads that commands share. Left to the first work on all cores, a system that does not give so many
 /// would make it panic.
 fn start_threads() -> Result<(), Error> {
-    Ok(rayon::ThreadPoolBuilder::new().build_global()?)
+    Ok(rayon::ThreadPoolBuilder::new().num_threads(offtrack::loading::n_threads()).build_global()?)
 }
