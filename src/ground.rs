@@ -66,6 +66,8 @@ pub struct Line {
     pub crossing: (f64, f64),
     /// Widths of its lane: on the entry arm, in the ring, on the exit arm \[m].
     pub widths: [f64; 3],
+    /// Why it begins, and why it ends, before the world does, as the map that it is from has it.
+    pub ends: [Option<String>; 2],
 }
 
 /// A ring with its arms, ready to be driven on.

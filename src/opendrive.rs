@@ -6,11 +6,17 @@
 
 mod records; // what the file says
 mod xml; // elements and attributes
+mod encoding; // bytes -> text
 mod read; // XML -> records
+mod plan; // reference lines
+mod sections; // lane sections
+mod level; // grades and crossfall
+mod whole; // what is seen once all was read
 mod mirror; // left-hand traffic -> right-hand traffic
 mod objects; // traffic islands given as objects
 mod reference_line; // points and headings along a road
 mod lanes; // lanes as strips
+mod links; // what the file says of lanes that follow
 mod graph; // which lane leads into which
 mod cells; // things near a point
 pub(crate) mod area; // polygons: union, difference, growing
@@ -18,6 +24,7 @@ mod surface; // what can be driven on
 mod rings; // where the roundabouts are
 mod crossings; // lanes in and out of a ring, arms
 mod paths; // ways through a ring
+mod bypass; // lanes that pass beside a ring
 mod names; // names of arms
 mod lines; // ways -> routes
 mod surroundings; // a map around a point
@@ -28,7 +35,7 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use crate::reader::{Error, Reader, read_text};
+use crate::reader::{Error, Reader, read_bytes};
 pub use build::{Imported, Options};
 use graph::Graph;
 pub use junction::{Junction, RoadLane, Way};
@@ -73,7 +80,7 @@ impl Map {
     /// A file that cannot be read or is no OpenDRIVE map, or a value that makes no sense, with road, lane and line.
     /// What is only odd is a warning.
     pub fn read(file: &Path, hand: Hand) -> Result<Map, Error> {
-        Map::parse(file, &read_text(file, read::FILE_LIMIT)?, hand)
+        Map::parse(file, &encoding::text(file, read_bytes(file, read::FILE_LIMIT)?)?, hand)
     }
 
     /// The same from the file's text; `file` names it in errors.

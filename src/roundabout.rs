@@ -262,19 +262,19 @@ impl Roundabout {
     /// An arm that is too short, with the longest approach or departure that fits.
     pub fn routes(&self, approach: f64, departure: f64, spacing: f64) -> Result<Vec<Route>, LeavesWorld> {
         let mut routes = Vec::new();
-        for &Line { entry, lane, exit, exit_arm, ref line, crossing, .. } in &self.ground.lines {
+        for &Line { entry, lane, exit, exit_arm, ref line, crossing, ref ends, .. } in &self.ground.lines {
             let (arm, exit_arm) = (&self.ground.arms[entry], &self.ground.arms[exit_arm]);
-            let leaves = |part, asked, longest, arm: &ground::Arm| {
-                let (arm, roundabout) = (arm.name.clone(), self.name.clone());
-                Err(LeavesWorld { part, asked, longest, arm, roundabout })
+            let leaves = |part, asked, longest, arm: &ground::Arm, end: &Option<String>| {
+                let (arm, roundabout, reason) = (arm.name.clone(), self.name.clone(), end.clone());
+                Err(LeavesWorld { part, asked, longest, arm, roundabout, reason })
             };
             let (reaches, left) = lane::ring_stations(line, self.ground.outer_radius);
             let after = line.length() - left;
             if reaches < approach {
-                return leaves("approach", approach, reaches, arm);
+                return leaves("approach", approach, reaches, arm, &ends[0]);
             }
             if after < departure {
-                return leaves("departure", departure, after, exit_arm);
+                return leaves("departure", departure, after, exit_arm, &ends[1]);
             }
             let centre_line = line.part(reaches - approach, left + departure);
             routes.push(Route {
@@ -300,7 +300,7 @@ fn ground(ring: &Ring, arms: &[Arm], kerbs: Outline, edges: Edges, lanes: &Lanes
     let line = |&RouteLine { entry, lane, exit, ref line }: &RouteLine| {
         let exit_arm = (entry + exit as usize) % arms.len();
         let widths = [arms[entry].lane_width, ring.lane_width, arms[exit_arm].lane_width];
-        Line { entry, lane, exit, exit_arm, line: line.clone(), crossing: ring.crossing(lane), widths }
+        Line { entry, lane, exit, exit_arm, line: line.clone(), crossing: ring.crossing(lane), widths, ends: [None, None] }
     };
     Ground {
         mirrored: false,

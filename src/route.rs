@@ -106,7 +106,8 @@ impl Route {
 
 /// A route that would begin or end beyond the end of its arm.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{part} of {} m leaves arm {arm} of {roundabout}; at most {} m fit", shown(*asked), (longest * 100.0).floor() / 100.0)]
+#[error("{part} of {} m leaves arm {arm} of {roundabout}; at most {} m fit{}", shown(*asked), (longest * 100.0).floor() / 100.0,
+    reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default())]
 pub struct LeavesWorld {
     /// `approach` or `departure`.
     pub part: &'static str,
@@ -118,6 +119,8 @@ pub struct LeavesWorld {
     pub arm: String,
     /// The roundabout's name.
     pub roundabout: String,
+    /// Why the arm's lanes end there, on a road from a map.
+    pub reason: Option<String>,
 }
 
 /// Waypoints every `spacing` metres along `centre_line`, from its beginning to its end.

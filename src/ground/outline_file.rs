@@ -10,6 +10,7 @@ use serde::Deserialize;
 
 use super::{Arm, Edges, Ground, Hand, Kerb, Line};
 use crate::geometry::{Curve, Outline, Piece, arc_of_height};
+use crate::opendrive::area::signed_area;
 use crate::reader::{Error, Reader};
 use crate::route::Lane;
 
@@ -90,7 +91,7 @@ impl Ground {
             let _ = writeln!(text, "\n[[arm]]\nname = {name:?}\nbearing_deg = {}", number(bearing.to_degrees(), 3));
         }
         let edges = self.edge_loops();
-        let edge_kerbs: Vec<Kerb> = edges.iter().map(|edge| self.kerb_of(edge)).collect();
+        let edge_kerbs = self.edge_kerbs(&edges);
         for (table, loops, kerbs) in [("face", &self.faces.loops, &self.kerbs), ("edge", &edges, &edge_kerbs)] {
             for (curve, kerb) in loops.iter().zip(kerbs) {
                 let of = match kerb {
@@ -101,7 +102,7 @@ impl Ground {
                 let _ = writeln!(text, "\n[[{table}]]\nof = {of:?}\npath = [{}\n]", path(curve, true));
             }
         }
-        for Line { entry, lane, exit, exit_arm, line, crossing, widths } in &self.lines {
+        for Line { entry, lane, exit, exit_arm, line, crossing, widths, .. } in &self.lines {
             let (entry, to, lane) = (&self.arms[*entry].name, &self.arms[*exit_arm].name, lane.name());
             let (crossing, widths) = (list(&[crossing.0, crossing.1]), list(widths));
             let _ = writeln!(text, "\n[[route]]\nentry = {entry:?}\nlane = {lane:?}\nexit = {exit}\nto = {to:?}");
@@ -113,6 +114,16 @@ impl Ground {
         text
     }
 
+    /// The text of an outline file that was read back; `file` names it in errors.
+    ///
+    /// # Errors
+    ///
+    /// What the reader of outline files refuses, such as a lane of half a metre.
+    pub fn checked_text(&self, file: &std::path::Path, origin: &[String]) -> Result<String, Error> {
+        let text = self.text(origin);
+        Ground::parse(file, &text).map(|_| text)
+    }
+
     fn edge_loops(&self) -> Vec<Curve> {
         match &self.edges {
             Edges::Beside(gutter) => self.faces.offset(*gutter).loops,
@@ -120,11 +131,20 @@ impl Ground {
         }
     }
 
-    /// The kerb whose face is nearest to a loop of the edges.
-    fn kerb_of(&self, edge: &Curve) -> Kerb {
-        let p = edge.point_at(0.0);
-        let all = self.kerbs.iter().zip(&self.faces.loops).map(|(&kerb, face)| (face.distance(p), kerb));
-        all.fold((f64::INFINITY, Kerb::Outer), |best, other| if other.0 < best.0 { other } else { best }).1
+    /// What each loop of the edges belongs to: one that is solid inside, to the island or the splitter island whose
+    /// face is nearest. Lane edges may enclose what the faces do not, such as a shoulder among lanes.
+    fn edge_kerbs(&self, edges: &[Curve]) -> Vec<Kerb> {
+        let outer = (0..edges.len()).max_by(|&one, &other| enclosed(&edges[one]).total_cmp(&enclosed(&edges[other])));
+        let of = |(index, edge): (usize, &Curve)| {
+            if Some(index) == outer {
+                return Kerb::Outer;
+            }
+            let p = edge.point_at(0.0);
+            let all = self.kerbs.iter().zip(&self.faces.loops).filter(|(kerb, _)| **kerb != Kerb::Outer);
+            let nearest = all.min_by(|(_, one), (_, other)| one.distance(p).total_cmp(&other.distance(p)));
+            nearest.map_or(Kerb::Splitter(0), |(&kerb, _)| kerb)
+        };
+        edges.iter().enumerate().map(of).collect()
     }
 
     /// The ring that an outline file describes.
@@ -171,7 +191,7 @@ impl Ground {
                 reader.within(&key("widths"), width, 1.0..=20.0, "m")?;
             }
             let line = curve(&reader, &key("path"), &route.path, false)?;
-            lines.push(Line { entry, lane, exit, exit_arm, line, crossing, widths: route.widths });
+            lines.push(Line { entry, lane, exit, exit_arm, line, crossing, widths: route.widths, ends: [None, None] });
         }
         lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
         reader.count("lane", written.lane.len(), 0..=1000)?;
@@ -189,6 +209,12 @@ fn number(value: f64, decimals: usize) -> String {
     let short = text.trim_end_matches('0');
     let short = if short.ends_with('.') { &text[..=short.len()] } else { short };
     if short == "-0.0" { "0.0".into() } else { short.into() }
+}
+
+/// The area that a closed curve encloses, positive if it lies on its left \[m²].
+fn enclosed(curve: &Curve) -> f64 {
+    let contour: Vec<[f64; 2]> = curve.polyline(0.01).into_iter().map(DVec2::into).collect();
+    signed_area(&contour)
 }
 
 /// A curve's points; a closed one begins where it ends.

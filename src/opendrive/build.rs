@@ -5,13 +5,16 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec2;
 
 use super::area::{points, signed_area};
+use super::bypass::Around;
 use super::crossings::{ArmLanes, Crossing, arms, circle, crossings, joined};
 use super::lanes::Strip;
-use super::lines::{Lines, shown};
+use super::level::{GRADE, Level};
+use super::lines::{CROSSING, Lines, shown};
 use super::names::named;
 use super::paths::Network;
 use super::rings::{densified, fitted_circle};
 use super::surroundings::{self, Part, REACH, clipped, encloses_origin, outline};
+use super::whole::TILTED;
 use super::{FINEST, Map, Ring};
 use crate::geometry::{Curve, Outline, Piece};
 use crate::ground::{Arm, Edges, Ground, Kerb};
@@ -73,15 +76,19 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
     let outer_radius = outer_radius(&faces, radius);
 
     let fine = surroundings::lanes(map, origin, extent, FINEST);
-    let network = Network { graph: &map.graph, strips: fine.iter().map(|(index, strip)| (*index, strip)).collect() };
-    let (circle, lanes) = ring_arms(map, origin, radius, &network, outer_radius + BESIDE_RING);
+    let network = Network { records: &map.records, graph: &map.graph, strips: fine.iter().map(|(index, strip)| (*index, strip)).collect() };
+    let around = Around { network: &network, outer_radius, reach: outer_radius + BESIDE_RING, extent };
+    let (circle, lanes, bypasses) = ring_arms(map, origin, radius, &around);
     let site = Site { map, refused: &refused, network: &network, origin, extent, circle, faces, edges };
     let mut imported = site.imported(&lanes, options, |routes| {
         add_routes(routes, &lanes, radius, outer_radius);
         Ok(())
     })?;
-    let lines = &imported.ground.lines;
-    let mut lane_radii: Vec<f64> = lines.iter().map(|line| ring_radius(&line.line.polyline(0.01), radius, outer_radius)).collect();
+    imported.warnings.splice(..0, bypasses.iter().map(|bypass| format!("{}: {bypass}", refused.place)));
+    let lines: Vec<Vec<DVec2>> = imported.ground.lines.iter().map(|line| line.line.polyline(0.01)).collect();
+    let in_ring: Vec<&Vec<DVec2>> = lines.iter().filter(|line| !passes_outside(line, outer_radius)).collect();
+    let in_ring = if in_ring.is_empty() { lines.iter().collect() } else { in_ring };
+    let mut lane_radii: Vec<f64> = in_ring.into_iter().map(|line| ring_radius(line, radius, outer_radius)).collect();
     lane_radii.sort_by(f64::total_cmp);
     lane_radii.dedup_by(|after, before| *after - *before < ONE_LANE);
     imported.ground = Ground { island_radius: radius, outer_radius, lane_radii, ..imported.ground };
@@ -112,7 +119,7 @@ impl Site<'_> {
         add: impl FnOnce(&mut Lines) -> Result<(), Error>,
     ) -> Result<Imported, Error> {
         let Site { map, refused, network, origin, extent, circle, faces, edges } = self;
-        check_arms(refused, lanes, circle)?;
+        check_arms(map, refused, lanes, circle)?;
         let mirrored = map.is_mirrored();
         let arms = named(lanes, options, mirrored).map_err(|expected| refused.error("arms", format!("{:?}", options.arms), expected))?;
         let mut routes =
@@ -120,9 +127,11 @@ impl Site<'_> {
         add(&mut routes)?;
         if routes.lines.is_empty() {
             let found = format!("none between {} arms", lanes.len());
-            return Err(refused.error("routes", found, "the map's links must lead from a lane in to a lane out"));
+            let expected = format!("the map's links must lead from a lane in to a lane out{}", unknown_lanes(map));
+            return Err(refused.error("routes", found, expected));
         }
         routes.check(&faces);
+        routes.warnings.extend(tilt(map, network).map(|tilt| format!("{}: {tilt}", refused.place)));
         let Lines { mut lines, warnings, .. } = routes;
         lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
         let kerbs = faces.loops.iter().map(|curve| kerb(curve, &arms)).collect();
@@ -144,27 +153,47 @@ fn island(map: &Map, ring: &Ring, extent: f64) -> Option<Island> {
     Some(Island { origin: ring.centre + centre, radius, faces: outline(&faces, centre), edges: outline(&edges, centre) })
 }
 
-/// Radius of the circle around a ring where its arms begin, and the lanes of the arms.
-fn ring_arms(map: &Map, origin: DVec2, radius: f64, network: &Network, reach: f64) -> (f64, Vec<ArmLanes>) {
+/// Radius of the circle around a ring where its arms begin, the lanes of the arms, and what became of bypasses.
+fn ring_arms(map: &Map, origin: DVec2, radius: f64, around_ring: &Around) -> (f64, Vec<ArmLanes>, Vec<String>) {
+    let &Around { network, reach, .. } = around_ring;
     let coarse = surroundings::nearby(map, origin, radius + REACH, super::COARSE);
     let (indices, around): (Vec<usize>, Vec<Strip>) = coarse.into_iter().unzip();
     let circle = circle(&map.records, &around, radius);
     let mut crossings = crossings(&around, &indices, &map.graph, circle);
     drop_passing_lanes(&mut crossings, network, reach);
     let gate = |crossing: &Crossing| network.gate(crossing, reach);
-    (circle, joined(arms(&crossings, circle), gate, reach))
+    let (arms, bypasses) = around_ring.merged(joined(arms(&crossings, circle), gate, reach));
+    (circle, arms, bypasses)
 }
 
 /// An error if the arms of a place are none, or too many.
-fn check_arms(refused: &Refusals, lanes: &[ArmLanes], circle: f64) -> Result<(), Error> {
+fn check_arms(map: &Map, refused: &Refusals, lanes: &[ArmLanes], circle: f64) -> Result<(), Error> {
     let found = format!("{} on a circle of {circle:.1} m", lanes.len());
     if lanes.iter().all(|arm| arm.entries.is_empty()) || lanes.iter().all(|arm| arm.exits.is_empty()) {
-        return Err(refused.error("arms", found, "a lane must lead in and another out, by the links of the map"));
+        let expected = format!("a lane must lead in and another out, by the links of the map{}", unknown_lanes(map));
+        return Err(refused.error("arms", found, expected));
     }
     if MOST_ARMS < lanes.len() {
         return Err(refused.error("arms", found, format!("at most {MOST_ARMS} arms are driven")));
     }
     Ok(())
+}
+
+/// What an error adds where the map has lanes of unknown types, on which nothing is driven.
+fn unknown_lanes(map: &Map) -> String {
+    map.records.unknown_lanes().map(|unknown| format!("; it has {unknown}")).unwrap_or_default()
+}
+
+/// The steepest that the lanes around a place are, where that is worth a warning.
+fn tilt(map: &Map, network: &Network) -> Option<String> {
+    let largest = |of: fn(&Level) -> f64, least: f64, what: &str| {
+        let roads = network.strips.values().map(|strip| &map.records.roads[strip.road]).filter(|road| least < of(&road.level));
+        let steepest = roads.max_by(|one, other| of(&one.level).total_cmp(&of(&other.level)).then(other.id.cmp(&one.id)))?;
+        Some(format!("{what} of up to {:.1} % (road {})", 100.0 * of(&steepest.level), super::xml::shown(&steepest.id)))
+    };
+    let parts = [largest(|level| level.grade, GRADE, "grades"), largest(|level| level.crossfall, TILTED, "crossfall")];
+    let list = parts.into_iter().flatten().collect::<Vec<_>>().join(" and ");
+    (!list.is_empty()).then(|| format!("{list}; the simulated road is level"))
 }
 
 /// Adds the routes through a ring: from each of an arm's two entry lanes next to the kerb to every exit.
@@ -187,12 +216,20 @@ fn add_routes(routes: &mut Lines, lanes: &[ArmLanes], island_radius: f64, outer_
                 let candidates = ways.iter().filter(|((arm, _), _)| *arm == exit_arm);
                 let Some(way) = candidates.min_by_key(|((_, to), _)| (to.abs_diff(kept), *to)) else { continue };
                 routes.add((entry, lane, exit, exit_arm), way, |line, width| {
+                    if passes_outside(line, outer_radius) {
+                        return (CROSSING * width, CROSSING * width);
+                    }
                     let middle = ring_radius(line, island_radius, outer_radius);
                     ((middle - island_radius).max(width / 2.0), (outer_radius - middle).max(width / 2.0))
                 });
             }
         }
     }
+}
+
+/// Whether a line does not enter the ring.
+fn passes_outside(line: &[DVec2], outer_radius: f64) -> bool {
+    line.iter().all(|p| outer_radius < p.length())
 }
 
 /// Drops lanes that no way through the ring begins or ends on: those of roads that pass by.

@@ -14,7 +14,7 @@ use super::rings::NEAR;
 /// Crossings of lanes in the same direction that are nearer than this are one lane \[m].
 const ONE_LANE: f64 = 1.2;
 /// Lanes of one road in the same direction are at most this far from each other on the circle \[m].
-const BESIDE: f64 = 7.0;
+pub(super) const BESIDE: f64 = 7.0;
 /// A lane that leaves and the next that enters are one road if they are at most this far from each other, beside a
 /// splitter island, or at most at this angle seen from the centre \[m], \[rad].
 const ONE_ROAD: (f64, f64) = (21.0, 0.55);

@@ -7,7 +7,10 @@ use glam::DVec2;
 
 use super::cells::Cells;
 use super::lanes::Strip;
-use super::records::{Kind, Link, Records};
+use super::links::{Contact, contacts};
+use super::read::MOST_WARNINGS;
+use super::records::{Kind, Records};
+use super::sections::SHORTEST;
 
 /// A joint that jumps further is not believed \[m].
 const JUMP: f64 = 0.5;
@@ -15,6 +18,9 @@ const JUMP: f64 = 0.5;
 const SEARCH: f64 = 1.5;
 /// A joint that turns more is not believed \[rad].
 const TURN: f64 = 0.6;
+
+/// Most lanes of no length that a link is followed across.
+const MOST_PASSED: usize = 100;
 
 /// The lanes that follow each lane, by index of its strip; empty for strips that are no lanes.
 #[derive(Debug, Clone)]
@@ -37,6 +43,9 @@ impl End {
     fn both(path: &[DVec2]) -> Option<[End; 2]> {
         // Directions over at least a centimetre, if the path is as long.
         let (&first, &last) = (path.first()?, path.last()?);
+        if path.iter().all(|p| p.distance(first) < SHORTEST) {
+            return None;
+        }
         let ahead = path.iter().find(|p| 0.01 < p.distance(first)).unwrap_or(&last);
         let behind = path.iter().rev().find(|p| 0.01 < p.distance(last)).unwrap_or(&first);
         let (from, to) = ((*ahead - first).try_normalize()?, (last - *behind).try_normalize()?);
@@ -54,18 +63,60 @@ impl End {
     }
 }
 
+/// The lanes of a map by road, section and number, to follow its links.
+struct Places<'a> {
+    records: &'a Records,
+    strips: &'a [Strip],
+    ends: Vec<Option<[End; 2]>>,
+    index: HashMap<(usize, usize, i32), usize>,
+}
+
+impl<'a> Places<'a> {
+    fn new(records: &'a Records, strips: &'a [Strip]) -> Places<'a> {
+        let ends = strips.iter().map(|strip| if strip.kind == Kind::Lane { End::both(&strip.path()) } else { None }).collect();
+        let index = strips.iter().enumerate().map(|(index, strip)| ((strip.road, strip.section, strip.id), index)).collect();
+        Places { records, strips, ends, index }
+    }
+
+    /// The lanes that the file says follow one, or precede it; those of no length are passed over.
+    fn linked(&self, strip: usize, follow: bool) -> Vec<usize> {
+        let (mut found, mut seen, mut open) = (Vec::new(), vec![strip], vec![strip]);
+        while let Some(strip) = open.pop() {
+            for Contact { road, section, lane } in contacts(self.records, &self.strips[strip], follow) {
+                let Some(&next) = lane.and_then(|lane| self.index.get(&(road, section, lane))) else { continue };
+                if self.ends[next].is_some() || self.strips[next].kind != Kind::Lane {
+                    found.push(next);
+                } else if !seen.contains(&next) && seen.len() < MOST_PASSED {
+                    seen.push(next);
+                    open.push(next);
+                }
+            }
+        }
+        found
+    }
+
+    /// Sections that the file says a lane leads to, or comes from, without naming a lane of theirs that there is.
+    fn unnamed(&self, strip: usize, follow: bool) -> impl Iterator<Item = Contact> {
+        let names = |contact: &Contact| contact.lane.is_some_and(|lane| self.index.contains_key(&(contact.road, contact.section, lane)));
+        contacts(self.records, &self.strips[strip], follow).into_iter().filter(move |contact| !names(contact))
+    }
+
+    /// What a lane is called.
+    fn name(&self, index: usize) -> String {
+        self.records.lane_name(&self.strips[index])
+    }
+}
+
 impl Graph {
     /// The graph of a map's strips.
     pub(super) fn new(records: &Records, strips: &[Strip]) -> Graph {
-        let ends: Vec<Option<[End; 2]>> =
-            strips.iter().map(|strip| if strip.kind == Kind::Lane { End::both(&strip.path()) } else { None }).collect();
-        let place: HashMap<(usize, usize, i32), usize> =
-            strips.iter().enumerate().map(|(index, strip)| ((strip.road, strip.section, strip.id), index)).collect();
-        let starts = starts(&ends);
+        let places = Places::new(records, strips);
+        let ends = &places.ends;
+        let starts = starts(ends);
         let mut graph = Graph { next: vec![Vec::new(); strips.len()], previous: vec![Vec::new(); strips.len()], warnings: Vec::new() };
-        for (index, strip) in strips.iter().enumerate() {
+        for index in 0..strips.len() {
             let Some([_, end]) = ends[index] else { continue };
-            let mut linked: Vec<usize> = linked(records, strip, true).into_iter().filter_map(|key| place.get(&key).copied()).collect();
+            let mut linked = places.linked(index, true);
             linked.sort_unstable();
             linked.dedup();
             let (fits, wrong): (Vec<usize>, Vec<usize>) = linked
@@ -76,32 +127,32 @@ impl Graph {
             if wrong.is_empty() {
                 continue;
             }
-            let name = |index: usize| format!("road {} lane {}", records.roads[strips[index].road].id, strips[index].id);
-            let jump = wrong.iter().filter_map(|&next| Some(end.to(&ends[next]?[0]).0)).fold(0.0, f64::max);
-            let instead = match nearest(&starts, &end, &ends).filter(|&next| next != index) {
+            let misfit = misfit(&end, wrong.iter().filter_map(|&next| Some(ends[next]?[0])));
+            let instead = match nearest(&starts, &end, ends).filter(|&next| next != index) {
                 Some(next) if graph.next[index].contains(&next) => "it is left out".into(),
                 Some(next) => {
                     graph.next[index].push(next);
                     if wrong.contains(&next) {
                         "no lane begins nearer, so it stays".into()
                     } else {
-                        format!("{}, which begins nearer, is taken instead", name(next))
+                        format!("{}, which begins nearer, is taken instead", places.name(next))
                     }
                 }
                 None => "no lane begins near, so it is left out".to_owned(),
             };
-            graph.warnings.push(format!("{}: its link to {} jumps by {jump:.2} m or turns; {instead}", name(index), name(wrong[0])));
+            graph.warn(format!("{}: its link to {} {misfit}; {instead}", places.name(index), places.name(wrong[0])));
         }
         // Many files say of a junction's lane where it comes from, but not of the lane before it where it leads.
-        for (index, strip) in strips.iter().enumerate() {
-            let Some([start, _]) = ends[index] else { continue };
-            for before in linked(records, strip, false).into_iter().filter_map(|key| place.get(&key).copied()) {
-                let fits = before != index && ends[before].is_some_and(|[_, end]| end.leads_into(&start));
+        for (index, start) in ends.iter().enumerate() {
+            let Some([start, _]) = start else { continue };
+            for before in places.linked(index, false) {
+                let fits = before != index && ends[before].is_some_and(|[_, end]| end.leads_into(start));
                 if fits && !graph.next[before].contains(&index) {
                     graph.next[before].push(index);
                 }
             }
         }
+        graph.join_unnamed(&places);
         for index in 0..strips.len() {
             for next in graph.next[index].clone() {
                 graph.previous[next].push(index);
@@ -109,38 +160,57 @@ impl Graph {
         }
         graph
     }
-}
 
-/// Roads, sections and lanes that the file says follow a lane in its direction of travel, or precede it.
-fn linked(records: &Records, strip: &Strip, follow: bool) -> Vec<(usize, usize, i32)> {
-    let road = &records.roads[strip.road];
-    let Some(lane) = road.sections[strip.section].lanes.iter().find(|lane| lane.id == strip.id) else { return Vec::new() };
-    let forward = (strip.id < 0) == follow;
-    let to = if forward { lane.successor } else { lane.predecessor };
-    if forward && strip.section + 1 < road.sections.len() {
-        return to.map(|id| (strip.road, strip.section + 1, id)).into_iter().collect();
-    }
-    if !forward && 0 < strip.section {
-        return to.map(|id| (strip.road, strip.section - 1, id)).into_iter().collect();
-    }
-    let section = |road: usize, at_start: bool| if at_start { 0 } else { records.roads[road].sections.len().saturating_sub(1) };
-    match if forward { &road.successor } else { &road.predecessor } {
-        None => Vec::new(),
-        Some(Link::Road(id, at_start)) => {
-            let next = records.by_id.get(id).copied();
-            next.zip(to).map(|(next, id)| (next, section(next, *at_start), id)).into_iter().collect()
+    fn warn(&mut self, warning: String) {
+        if self.warnings.len() < MOST_WARNINGS {
+            self.warnings.push(warning);
         }
-        Some(Link::Junction(id)) => {
-            let all = records.junctions.get(id).into_iter().flatten().filter(|connection| connection.incoming == road.id);
-            let mut found = Vec::new();
-            for connection in all {
-                let Some(&next) = records.by_id.get(&connection.connecting) else { continue };
-                for (_, to) in connection.lanes.iter().filter(|(from, _)| *from == strip.id) {
-                    found.push((next, section(next, connection.at_start), *to));
+    }
+
+    /// Joins lanes by place and heading where their roads or sections are linked and the file names no lane.
+    fn join_unnamed(&mut self, places: &Places) {
+        let mut reached = vec![false; self.next.len()];
+        self.next.iter().flatten().for_each(|&next| reached[next] = true);
+        let has_next: Vec<bool> = self.next.iter().map(|next| !next.is_empty()).collect();
+        let mut lanes: HashMap<(usize, usize), Vec<usize>> = HashMap::new();
+        for (index, strip) in places.strips.iter().enumerate().filter(|(index, _)| places.ends[*index].is_some()) {
+            lanes.entry((strip.road, strip.section)).or_default().push(index);
+        }
+        for (index, follow) in (0..places.strips.len()).flat_map(|index| [(index, true), (index, false)]) {
+            let Some([start, end]) = places.ends[index] else { continue };
+            if if follow { has_next[index] } else { reached[index] } {
+                continue;
+            }
+            for Contact { road, section, .. } in places.unnamed(index, follow) {
+                let fits = lanes.get(&(road, section)).into_iter().flatten().filter_map(|&other| {
+                    let [other_start, other_end] = places.ends[other]?;
+                    let (from, to) = if follow { (end, other_start) } else { (other_end, start) };
+                    let free = other != index && !if follow { reached[other] } else { has_next[other] };
+                    (free && from.leads_into(&to)).then_some((from.to(&to).0, other))
+                });
+                let Some((_, other)) = fits.min_by(|one, next| one.0.total_cmp(&next.0)) else { continue };
+                let (from, to) = if follow { (index, other) } else { (other, index) };
+                if !self.next[from].contains(&to) {
+                    self.next[from].push(to);
+                    self.warn(format!(
+                        "{}: has no link to a lane, and is joined to {}, which begins there",
+                        places.name(from),
+                        places.name(to)
+                    ));
                 }
             }
-            found
         }
+    }
+}
+
+/// Why links to lanes that begin there are not believed.
+fn misfit(end: &End, starts: impl Iterator<Item = End>) -> String {
+    let (jump, turn) =
+        starts.map(|start| end.to(&start)).fold((0.0f64, 0.0f64), |(jump, turn), other| (jump.max(other.0), turn.max(other.1)));
+    match (JUMP < jump, TURN < turn) {
+        (true, true) => format!("jumps by {jump:.2} m and turns by {:.0} deg", turn.to_degrees()),
+        (false, true) => format!("turns by {:.0} deg", turn.to_degrees()),
+        _ => format!("jumps by {jump:.2} m"),
     }
 }
 

@@ -9,8 +9,10 @@ use glam::DVec2;
 use super::build::{Imported, Options, Refusals, Site};
 use super::crossings::{ArmLanes, Crossing, arms, crossings};
 use super::lanes::{Strip, sampled};
+use super::lines::CROSSING;
 use super::paths::{Network, Way as Lanes};
 use super::surroundings::{self, Part, REACH, clipped, encloses, outline};
+use super::xml::shown;
 use super::{COARSE, FINEST, Map};
 use crate::reader::{Error, Reader};
 use crate::route::Lane;
@@ -21,8 +23,6 @@ const BEYOND: f64 = 0.5;
 const SMALLEST: f64 = 5.0;
 /// Largest radius of that circle \[m].
 const LARGEST: f64 = 60.0;
-/// Reach of crossing lines to either side, in widths of the lane: over the neighbouring lanes too.
-const CROSSING: f64 = 1.5;
 
 /// A lane of a map.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -135,7 +135,7 @@ impl Map {
     /// other, or ways that would have the same name.
     pub fn through(&self, ways: &[Way], options: &Options) -> Result<Imported, Error> {
         let name = ways.iter().map(Way::to_string).collect::<Vec<_>>().join(", ");
-        let refused = Refusals { reader: Reader::of(&self.file), place: format!("way {name}") };
+        let refused = Refusals { reader: Reader::of(&self.file), place: format!("way {}", shown(&name)) };
         let whole = self.network();
         let mut found: Vec<(&Way, Vec<usize>)> = Vec::new();
         for way in ways {
@@ -154,7 +154,8 @@ impl Map {
         let edges = outline(&part(&surface.edges).ok_or_else(no_surface)?, DVec2::ZERO);
 
         let fine = surroundings::lanes(self, origin, extent, FINEST);
-        let network = Network { graph: &self.graph, strips: fine.iter().map(|(index, strip)| (*index, strip)).collect() };
+        let network =
+            Network { records: &self.records, graph: &self.graph, strips: fine.iter().map(|(index, strip)| (*index, strip)).collect() };
         let (indices, coarse): (Vec<usize>, Vec<Strip>) = surroundings::nearby(self, origin, extent, COARSE).into_iter().unzip();
         let lanes = arms(&crossings(&coarse, &indices, &self.graph, circle), circle);
         let site = Site { map: self, refused: &refused, network: &network, origin, extent, circle, faces, edges };
@@ -162,11 +163,15 @@ impl Map {
             for (way, strips) in &found {
                 let crosses = format!("must cross the circle of {circle:.1} m around the junction on a lane");
                 let route = route(&network.continued(strips, extent), strips, &lanes);
-                let route = route.ok_or_else(|| refused.error("way", way.to_string(), crosses))?;
+                let route = route.ok_or_else(|| refused.error("way", shown(&way.to_string()), crosses))?;
                 let (entry, lane, exit, _) = route;
                 if routes.lines.iter().any(|line| (line.entry, line.lane, line.exit) == (entry, lane, exit)) {
                     let same = routes.name(entry, lane, exit);
-                    return Err(refused.error("way", way.to_string(), format!("is {same}, as an earlier one is; leave one of them out")));
+                    return Err(refused.error(
+                        "way",
+                        shown(&way.to_string()),
+                        format!("is {same}, as an earlier one is; leave one of them out"),
+                    ));
                 }
                 routes.add(route, &((0, 0), strips.clone()), |_, width| (CROSSING * width, CROSSING * width));
             }
@@ -177,7 +182,7 @@ impl Map {
     /// All lanes of the map.
     fn network(&self) -> Network<'_> {
         let driven = self.strips.iter().enumerate().filter(|(_, strip)| strip.is_driven());
-        Network { graph: &self.graph, strips: driven.collect() }
+        Network { records: &self.records, graph: &self.graph, strips: driven.collect() }
     }
 
     fn junction_of(&self, strip: &Strip) -> Option<&str> {
@@ -202,7 +207,7 @@ impl Map {
             let mut known: Vec<i32> = all().map(|(index, _)| self.road_lane(&self.strips[index]).lane).collect();
             known.sort_unstable();
             known.dedup();
-            let expected = format!("road {road} has the lanes {known:?} to drive on");
+            let expected = format!("road {} has the lanes {known:?} to drive on", shown(road));
             return Err(refused.error(&format!("{end}.lane"), lane.to_string(), expected));
         }
         Ok(found)
@@ -217,10 +222,10 @@ impl Map {
         let along = found.map(|(_, along)| along).filter(|along| 1 < along.len());
         along.ok_or_else(|| {
             let onward = entry.strips.iter().flat_map(|&strip| &self.graph.next[strip]).filter(|next| !entry.strips.contains(next));
-            let mut onward: Vec<String> = onward.map(|&next| self.road_lane(&self.strips[next]).to_string()).collect();
+            let mut onward: Vec<String> = onward.map(|&next| shown(&self.road_lane(&self.strips[next]).to_string())).collect();
             onward.dedup();
-            let expected = format!("no links of the map lead there; {} leads on to {}", way.from, onward.join(", "));
-            refused.error("to", way.to.to_string(), expected)
+            let expected = format!("no links of the map lead there; {} leads on to {}", shown(&way.from.to_string()), onward.join(", "));
+            refused.error("to", shown(&way.to.to_string()), expected)
         })
     }
 

@@ -34,6 +34,8 @@ pub(super) struct Strip {
     pub(super) section: usize,
     /// The lane's number.
     pub(super) id: i32,
+    /// Whether it is travelled against the reference line.
+    pub(super) backward: bool,
     /// What it is for; a raised flat lane is a kerb or solid.
     pub(super) kind: Kind,
     pub(super) left: Vec<DVec2>,
@@ -45,10 +47,15 @@ impl Strip {
     /// The centre line in the direction of travel \[m].
     pub(super) fn path(&self) -> Vec<DVec2> {
         let mut path = self.centre.clone();
-        if 0 < self.id {
+        if self.backward {
             path.reverse();
         }
         path
+    }
+
+    /// Length of its centre line \[m].
+    pub(super) fn length(&self) -> f64 {
+        self.centre.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
     }
 
     /// Whether vehicles drive on it: a lane as wide as one somewhere.
@@ -94,7 +101,9 @@ pub(super) fn strips(records: &Records, tolerance: f64) -> Result<Vec<Strip>, To
             let sampled = sampled(road, index, section, tolerance);
             let points: usize = sampled.iter().map(|strip| 3 * strip.centre.len()).sum();
             left = left.checked_sub(points).ok_or(TooDetailed)?;
-            length += (road.section_end(section) - road.sections[section].start) * sampled.len() as f64;
+            // Where the reference line jumps, lanes are longer than their section.
+            let stations = road.section_end(section) - road.sections[section].start;
+            length += sampled.iter().map(|strip| stations.max(strip.length())).sum::<f64>();
             if MOST_LENGTH < length {
                 return Err(TooDetailed);
             }
@@ -150,7 +159,8 @@ pub(super) fn sampled(road: &Road, index: usize, section: usize, tolerance: f64)
         let (inner, outer) = (edge(true), edge(false));
         let centre = inner.iter().zip(&outer).map(|(&one, &other)| (one + other) / 2.0).collect();
         let (left, right) = if 0 < lane.id { (outer, inner) } else { (inner, outer) };
-        Strip { road: index, section, id: lane.id, kind, left, right, centre }
+        let backward = (0 < lane.id) != lane.reversed;
+        Strip { road: index, section, id: lane.id, backward, kind, left, right, centre }
     };
     of.lanes.iter().zip(kinds).enumerate().map(strip).collect()
 }

@@ -13,6 +13,9 @@ const JUMP: f64 = 0.1;
 /// A centre line that is nearer to a kerb than half a truck's width is warned of \[m].
 const NEAREST: f64 = 1.3;
 
+/// Reach of crossing lines to either side of a lane that is in no ring, in widths of the lane: over its neighbours too.
+pub(super) const CROSSING: f64 = 1.5;
+
 /// Makes the routes of one place of a map.
 pub(super) struct Lines<'a> {
     pub(super) network: &'a Network<'a>,
@@ -40,7 +43,9 @@ impl Lines<'_> {
         way: &Way,
         crossing: impl Fn(&[DVec2], f64) -> (f64, f64),
     ) {
-        let (line, jump) = self.network.line(&self.network.continued(&way.1, self.extent));
+        let whole = self.network.continued(&way.1, self.extent);
+        let ends = [false, true].map(|at_end| self.network.ends_early(&whole, self.extent - 0.5, at_end));
+        let (line, jump) = self.network.line(&whole);
         let line = within(&line, self.extent - 0.5);
         if line.len() < 2 {
             return;
@@ -54,7 +59,15 @@ impl Lines<'_> {
         let at_arm = |end: DVec2| self.circle * end.normalize_or_zero();
         let widths = [at_arm(from), middle, at_arm(to)].map(|p| width(self.network, &way.1, p));
         let crossing = crossing(&line, widths[1]);
-        self.lines.push(Line { entry, lane, exit, exit_arm, line: fitted_line(&line, FITTED), crossing, widths });
+        for (arm, what, end, reason) in [(entry, "begins", from, &ends[0]), (exit_arm, "ends", to, &ends[1])] {
+            let Some(reason) = reason else { continue };
+            let (place, name) = (self.place, &self.arms[arm].name);
+            let warning = format!("{place}: arm {name}: a lane {what} {:.1} m from the centre: {reason}", end.length());
+            if !self.warnings.contains(&warning) {
+                self.warnings.push(warning);
+            }
+        }
+        self.lines.push(Line { entry, lane, exit, exit_arm, line: fitted_line(&line, FITTED), crossing, widths, ends });
     }
 
     /// Warns of routes too near to a kerb.

@@ -8,6 +8,8 @@ use glam::DVec2;
 use super::crossings::{ArmLanes, Crossing};
 use super::graph::Graph;
 use super::lanes::Strip;
+use super::links::reason;
+use super::records::Records;
 
 /// A way through the ring: arm and lane from the kerb by which it leaves, and the strips along it.
 pub(super) type Way = ((usize, usize), Vec<usize>);
@@ -40,17 +42,33 @@ impl PartialOrd for Reached {
 
 /// The lanes around a ring, by index of the map's strip, with the ring's centre as origin.
 pub(super) struct Network<'a> {
+    pub(super) records: &'a Records,
     pub(super) graph: &'a Graph,
     pub(super) strips: HashMap<usize, &'a Strip>,
 }
 
 impl Network<'_> {
-    fn path(&self, strip: usize) -> Vec<DVec2> {
+    /// The centre line of a lane in its direction of travel \[m].
+    pub(super) fn path(&self, strip: usize) -> Vec<DVec2> {
         self.strips.get(&strip).map_or(Vec::new(), |strip| strip.path())
     }
 
+    /// What a lane is called in messages.
+    pub(super) fn name(&self, strip: usize) -> String {
+        self.strips.get(&strip).map(|strip| self.records.lane_name(strip)).unwrap_or_default()
+    }
+
+    /// Why the lanes of a way begin or end within the world; `None` if they reach its edge.
+    pub(super) fn ends_early(&self, way: &[usize], extent: f64, at_end: bool) -> Option<String> {
+        let strip = if at_end { way.last() } else { way.first() }?;
+        let path = self.path(*strip);
+        let end = if at_end { path.last() } else { path.first() }?;
+        (end.length() < extent).then_some(())?;
+        self.strips.get(strip).map(|strip| reason(self.records, strip, at_end))
+    }
+
     fn length(&self, strip: usize) -> f64 {
-        self.strips.get(&strip).map_or(0.0, |strip| strip.centre.windows(2).map(|pair| pair[0].distance(pair[1])).sum())
+        self.strips.get(&strip).map_or(0.0, |strip| strip.length())
     }
 
     /// The shortest ways from a lane that enters to every lane that leaves.

@@ -2,9 +2,11 @@
 //!
 //! A left-hand map is mirrored in the x axis when it is read, so whatever follows knows right-hand traffic alone.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec2;
+
+use super::level::Level;
 
 /// A polynomial `a + b x + c x² + d x³` that holds from `start` on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,16 +80,17 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// What a lane of this type is for.
-    pub(super) fn named(name: &str) -> Kind {
-        match name {
+    /// What a lane of this type is for; `None` if the type is not known.
+    pub(super) fn named(name: &str) -> Option<Kind> {
+        Some(match name {
             "driving" | "bidirectional" | "entry" | "exit" | "onRamp" | "offRamp" | "connectingRamp" | "slipLane" | "bus" | "taxi"
             | "HOV" | "mwyEntry" | "mwyExit" => Kind::Lane,
             "shoulder" | "stop" | "parking" | "biking" => Kind::Flat,
             "curb" => Kind::Kerb,
             "sidewalk" | "walking" | "median" | "border" | "restricted" => Kind::Solid,
-            _ => Kind::Nothing,
-        }
+            "none" | "tram" | "rail" | "roadWorks" => Kind::Nothing,
+            _ => return None,
+        })
     }
 }
 
@@ -105,6 +108,8 @@ pub(super) struct Lane {
     /// Positive left of the reference line, negative right of it; never 0.
     pub(super) id: i32,
     pub(super) kind: Kind,
+    /// Whether it is travelled against its side's direction.
+    pub(super) reversed: bool,
     /// Widths, or distances of its outer border from the reference line if `bordered`; starts count from the section's.
     pub(super) widths: Vec<Cubic>,
     pub(super) bordered: bool,
@@ -153,6 +158,8 @@ pub(super) struct Road {
     pub(super) offsets: Vec<Cubic>,
     pub(super) sections: Vec<Section>,
     pub(super) islands: Vec<Island>,
+    /// How far it is from level.
+    pub(super) level: Level,
 }
 
 impl Road {
@@ -163,7 +170,7 @@ impl Road {
 }
 
 /// A way through a junction.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct Connection {
     pub(super) incoming: String,
     pub(super) connecting: String,
@@ -171,6 +178,8 @@ pub(super) struct Connection {
     pub(super) at_start: bool,
     /// Lane of the incoming road, lane of the connecting one.
     pub(super) lanes: Vec<(i32, i32)>,
+    /// Whether the connecting road leads on from the junction, rather than through it.
+    pub(super) direct: bool,
 }
 
 /// A map.
@@ -183,6 +192,8 @@ pub(super) struct Records {
     pub(super) junctions: HashMap<String, Vec<Connection>>,
     /// Whether the map has left-hand traffic, so that the records are its mirror image.
     pub(super) mirrored: bool,
+    /// Lane types that are not known, with their numbers of lanes.
+    pub(super) unknown_types: BTreeMap<String, usize>,
     /// What is odd in the file, and what was done about it.
     pub(super) warnings: Vec<String>,
 }

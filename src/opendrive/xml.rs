@@ -1,6 +1,8 @@
-//! Elements and attributes of an XML document.
+//! Elements and attributes of an XML document, and names in it as messages show them.
 
 use roxmltree::{Document, Node};
+
+use crate::reader::shortened;
 
 /// The line of the text where a node begins.
 pub(super) fn line(document: &Document, node: Node) -> u32 {
@@ -20,4 +22,12 @@ pub(super) fn child<'a, 'i>(node: Node<'a, 'i>, name: &'static str) -> Option<No
 /// An attribute's text, empty if there is none.
 pub(super) fn attribute<'a>(node: Node<'a, '_>, name: &str) -> &'a str {
     node.attribute(name).unwrap_or("").trim()
+}
+
+/// Longest name of a map in a message \[characters].
+const LONGEST_NAME: usize = 40;
+
+/// A name of a map as messages show it: of bounded length, and without characters that a terminal would obey.
+pub(super) fn shown(name: &str) -> String {
+    shortened(&shortened(name, LONGEST_NAME).escape_debug().to_string(), 2 * LONGEST_NAME)
 }

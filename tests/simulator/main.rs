@@ -21,6 +21,7 @@ mod kinds;
 
 mod left_hand;
 mod map_junctions;
+mod map_kinds;
 mod map_lanes;
 mod maps;
 mod modules;

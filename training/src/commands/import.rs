@@ -113,7 +113,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return Err(Error::Flag { flag: "--output", value, expected: "must end in .outline.toml".into() });
     }
     let imported = choice.imported(&args.map, &map)?;
-    files::write_whole(output, text(&args.map, &map, &choice, &imported).as_bytes())?;
+    files::write_whole(output, text(&args.map, output, &map, &choice, &imported)?.as_bytes())?;
     let Imported { ground, warnings, .. } = &imported;
     let mut summary = String::new();
     for warning in warnings {
@@ -125,12 +125,14 @@ pub fn run(args: &Args) -> Result<(), Error> {
     files::print(&summary)
 }
 
-/// The outline file, with where it is from.
-fn text(file: &Path, map: &Map, choice: &Choice, Imported { ground, centre, .. }: &Imported) -> String {
-    let name = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+/// The outline file, with where it is from; an error where its own reader would refuse it.
+fn text(file: &Path, output: &Path, map: &Map, choice: &Choice, imported: &Imported) -> Result<String, Error> {
+    let Imported { ground, centre, .. } = imported;
+    // A name may hold line breaks, which would end the comment.
+    let name = file.file_name().map(|name| name.to_string_lossy().escape_debug().to_string()).unwrap_or_default();
     let (what, flags) = match choice.ways.as_slice() {
         [] => ("roundabout", format!(" --ring {:.1},{:.1}", centre.x, centre.y)),
-        ways => ("junction", ways.iter().map(|way| format!(" --way {},{}", way.from, way.to)).collect()),
+        ways => ("junction", ways.iter().map(|way| format!(" --way {},{}", way.from, way.to).escape_debug().to_string()).collect()),
     };
     let mut origin = vec![
         format!("A {what} of the map {name}: its centre, here the origin, lies at ({:.4}, {:.4}) there.", centre.x, centre.y),
@@ -140,13 +142,14 @@ fn text(file: &Path, map: &Map, choice: &Choice, Imported { ground, centre, .. }
         origin.push("The map has left-hand traffic; this is its mirror image in the x axis.".into());
     }
     origin.push("A path is a list of [x, y] and [x, y, bulge]: a straight or an arc ends there. Metres; docs/maps.md.".into());
-    ground.text(&origin)
+    Ok(ground.checked_text(output, &origin)?)
 }
 
-/// Prints the rings; a map without one is wrong input.
+/// Prints the rings; a map without one that can be driven is wrong input.
 fn list(file: &Path, map: &Map) -> Result<(), Error> {
     let mut text = String::new();
     // Writing to a string cannot fail.
+    let (mut drivable, mut refused) = (0, None);
     for ring in map.rings() {
         let (x, y) = (ring.centre.x, ring.centre.y);
         let _ = write!(text, "ring {x:.1},{y:.1}: island {:.2} m, within {:.2} m of a circle", ring.radius, ring.residual);
@@ -154,9 +157,11 @@ fn list(file: &Path, map: &Map) -> Result<(), Error> {
             Ok(Imported { ground, .. }) => {
                 let arms: Vec<&str> = ground.arms.iter().map(|arm| arm.name.as_str()).collect();
                 let _ = writeln!(text, "; arms {}; {} routes", arms.join(" "), ground.lines.len());
+                drivable += 1;
             }
             Err(error) => {
                 let _ = writeln!(text, "; cannot be driven: {error}");
+                refused.get_or_insert(error);
             }
         }
     }
@@ -170,7 +175,10 @@ fn list(file: &Path, map: &Map) -> Result<(), Error> {
         let none: InputError = Reader::of(file).invalid("ring", "none", expected);
         return Err(none.into());
     }
-    Ok(())
+    match refused.filter(|_| drivable == 0) {
+        Some(error) => Err(error.into()),
+        None => Ok(()),
+    }
 }
 
 /// Prints the ways through every junction; a map without one is wrong input.
@@ -178,9 +186,9 @@ fn junctions(file: &Path, map: &Map) -> Result<(), Error> {
     let mut text = String::new();
     let junctions = map.junctions();
     for junction in &junctions {
-        let _ = writeln!(text, "junction {} at {:.1},{:.1}", junction.id, junction.centre.x, junction.centre.y);
+        let _ = writeln!(text, "junction {} at {:.1},{:.1}", junction.id.escape_debug(), junction.centre.x, junction.centre.y);
         for way in &junction.ways {
-            let _ = writeln!(text, "  --way {},{}", way.from, way.to);
+            let _ = writeln!(text, "  --way {}", format!("{},{}", way.from, way.to).escape_debug());
         }
     }
     files::print(&text)?;

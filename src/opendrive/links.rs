@@ -1,0 +1,79 @@
+//! What a map says of the lanes that follow a lane, and where it says nothing although the roads are linked.
+
+use super::lanes::Strip;
+use super::records::{Link, Records, Road};
+use super::xml::shown;
+
+/// A section of a road that a lane leads to or comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Contact {
+    pub(super) road: usize,
+    pub(super) section: usize,
+    /// The lane there that the map names; `None` where it names none.
+    pub(super) lane: Option<i32>,
+}
+
+/// The section at the beginning or the end of a road.
+fn end_of(road: &Road, at_start: bool) -> usize {
+    if at_start { 0 } else { road.sections.len().saturating_sub(1) }
+}
+
+/// What the map says follows a lane in its direction of travel, or precedes it.
+pub(super) fn contacts(records: &Records, strip: &Strip, follow: bool) -> Vec<Contact> {
+    let road = &records.roads[strip.road];
+    let Some(lane) = road.sections[strip.section].lanes.iter().find(|lane| lane.id == strip.id) else { return Vec::new() };
+    let forward = strip.backward != follow;
+    let to = if forward { lane.successor } else { lane.predecessor };
+    if forward && strip.section + 1 < road.sections.len() {
+        return vec![Contact { road: strip.road, section: strip.section + 1, lane: to }];
+    }
+    if !forward && 0 < strip.section {
+        return vec![Contact { road: strip.road, section: strip.section - 1, lane: to }];
+    }
+    let at = |road: usize, at_start: bool, lane: Option<i32>| Contact { road, section: end_of(&records.roads[road], at_start), lane };
+    match if forward { &road.successor } else { &road.predecessor } {
+        None => Vec::new(),
+        Some(Link::Road(id, at_start)) => records.by_id.get(id).map(|&next| at(next, *at_start, to)).into_iter().collect(),
+        Some(Link::Junction(id)) => {
+            let all = records.junctions.get(id).into_iter().flatten().filter(|connection| connection.incoming == road.id);
+            let mut found = Vec::new();
+            for connection in all {
+                let Some(&next) = records.by_id.get(&connection.connecting) else { continue };
+                if connection.lanes.is_empty() {
+                    found.push(at(next, connection.at_start, None));
+                }
+                for (_, to) in connection.lanes.iter().filter(|(from, _)| *from == strip.id) {
+                    found.push(at(next, connection.at_start, Some(*to)));
+                }
+            }
+            found
+        }
+    }
+}
+
+impl Records {
+    /// What a lane is called in messages, by its number in the map.
+    pub(super) fn lane_name(&self, strip: &Strip) -> String {
+        let id = if self.mirrored { -strip.id } else { strip.id };
+        format!("road {} lane {id}", shown(&self.roads[strip.road].id))
+    }
+}
+
+/// Why no lane follows one in its direction of travel, or none precedes it, as the map has it.
+pub(super) fn reason(records: &Records, strip: &Strip, follow: bool) -> String {
+    let road = &records.roads[strip.road];
+    let lane = records.lane_name(strip);
+    let forward = strip.backward != follow;
+    let (verb, inner) = if forward { ("leads on to", strip.section + 1 < road.sections.len()) } else { ("comes from", 0 < strip.section) };
+    if inner {
+        return format!("{lane} has no link to a lane of the road's next section");
+    }
+    match if forward { &road.successor } else { &road.predecessor } {
+        None => format!("road {} is linked to no road there", shown(&road.id)),
+        Some(Link::Road(id, _)) if !records.by_id.contains_key(id) => {
+            format!("{lane} {verb} road {}, which the map does not have", shown(id))
+        }
+        Some(Link::Road(id, _)) => format!("{lane} has no link that fits to a lane of road {}", shown(id)),
+        Some(Link::Junction(id)) => format!("junction {} has no connection that fits for {lane}", shown(id)),
+    }
+}
