@@ -44,7 +44,7 @@ pub struct Args {
     /// Only trucks with this load, where the benchmark has several.
     #[arg(long)]
     load: Option<String>,
-    /// Episodes on each route \[default: 30, and fewer where there are more than 100 routes: about 3,000 in all\].
+    /// Episodes on each route; without it 30, and fewer where there are more than 100 routes: about 3,000 in all.
     #[arg(long)]
     episodes: Option<usize>,
     /// Seed of the start poses and of random actions.

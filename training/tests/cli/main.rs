@@ -7,6 +7,7 @@ mod benchmark;
 mod certify;
 mod checkpoint;
 mod device;
+mod documented_flags;
 mod draw;
 mod evaluate;
 mod flags;
