@@ -360,4 +360,6 @@ impl Config {
 }
 
 #[cfg(test)]
+mod documented_tests;
+#[cfg(test)]
 mod tests;
