@@ -244,6 +244,17 @@ fn every_key_of_a_vehicle_is_documented_as_it_is_read() {
 }
 
 #[test]
+fn every_benchmark_has_a_row() {
+    let folder = std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(SCENARIOS)).unwrap();
+    let mut files: Vec<String> = folder.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    files.retain(|file| file.ends_with(".toml"));
+    assert!(24 <= files.len(), "{files:?}");
+    let readme = text_of("README.md");
+    files.retain(|file| !readme.contains(&format!("\n| `{file}` | ")));
+    assert!(files.is_empty(), "{SCENARIOS}/README.md: add rows to the table of benchmarks for {files:?}");
+}
+
+#[test]
 fn a_wrong_row_and_a_missing_one_are_found_and_all_at_once() {
     let read: Read = |path| boxed(Vehicle::read(path));
     let kind = Kind { read, ..vehicles() };
