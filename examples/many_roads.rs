@@ -10,7 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use offtrack::loading::{Cache, Loading};
+use offtrack::files::cache::{Cache, Loading};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;

@@ -6,8 +6,8 @@
 use std::path::Path;
 use std::time::Instant;
 
-use offtrack::opendrive::{Hand, Imported, Map, Options};
-use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::map::opendrive::{Hand, Imported, Map, Options};
+use offtrack::map::parametric::{Gutter, Roundabout};
 
 /// Numbers that break things.
 const EXTREMES: [&str; 12] = ["0", "-1", "1e308", "-1e308", "nan", "inf", "1e-300", "99999", "-99999", "", "x", "0.5"];

@@ -2,6 +2,8 @@
 //!
 //! Neither engine knows the other. [`crate::simulator`] chooses one and drives it through `EngineBatch`.
 
+pub mod stages; // one step, in order
+pub mod wgsl; // what shaders share with Rust, printed
 pub(crate) mod autoreset;
 mod batch;
 pub mod cpu; // the CPU engine: all cores, a truck at a time
@@ -18,7 +20,7 @@ use std::fmt::Debug;
 use std::time::Duration;
 
 use crate::layout::{BeginRow, Column, Stream};
-use crate::stages::{N_STAGES, Stage};
+use crate::engine::stages::{N_STAGES, Stage};
 use crate::world::World;
 pub use autoreset::Autoreset;
 pub(crate) use batch::Row;

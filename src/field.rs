@@ -9,7 +9,7 @@ mod kept;
 
 use glam::Vec2;
 
-use crate::shared::constants;
+use crate::layout::shared::constants;
 
 constants! {
     /// Southern half of a cell's western pair where the cell has blocks elsewhere: no stored distance is as small.

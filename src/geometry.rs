@@ -3,6 +3,7 @@
 //! Right-handed frame, x east, y north, metres and radians. Arcs are not approximated by polygons: distances, crossings
 //! and rays are computed on the arcs themselves.
 
+pub(crate) mod area; // polygons with holes
 mod alignment;
 mod fit;
 mod meeting;

@@ -3,6 +3,9 @@
 //! Each struct is plain data without padding (vectors first, then scalars), so that a column of them can be copied to a
 //! device as it is. SI units and radians throughout; headings lie in (-pi, pi].
 
+pub mod shared; // macros for what Rust and WGSL share
+pub mod angle; // angles in plain f32
+pub mod random; // numbers from (seed, env, episode, draw)
 pub mod buffers;
 pub(crate) mod columns;
 mod ended;
@@ -12,7 +15,7 @@ mod truck;
 
 use glam::Vec2;
 
-use crate::shared::constants;
+use crate::layout::shared::constants;
 pub use columns::{Column, N_COLUMNS};
 pub use ended::Ended;
 pub(crate) use ended::printed_codes;

@@ -15,11 +15,11 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use crate::layout::{Action, Track};
-use crate::loading::Loading;
-use crate::reader::Error;
-use crate::roundabout::{Gutter, Roundabout};
-use crate::route::Route;
-use crate::shipped::{Kind, Source};
+use crate::files::cache::Loading;
+use crate::files::reader::Error;
+use crate::map::parametric::{Gutter, Roundabout};
+use crate::map::route::Route;
+use crate::files::shipped::{Kind, Source};
 use crate::vehicle::Vehicle;
 pub use check::Invalid;
 pub use fleet::{Class, Drawn, Entry, Fleet, Member, N_VEHICLES, Ranges};
@@ -41,7 +41,7 @@ pub enum Clock {
     /// The time that the route takes at the highest target speed.
     #[default]
     HighestSpeed,
-    /// The time of the feasible speed profile of the vehicle and load on the route: see [`crate::profile`].
+    /// The time of the feasible speed profile of the vehicle and load on the route: see [`crate::vehicle::profile`].
     Feasible,
 }
 
@@ -171,7 +171,7 @@ impl Scenario {
     /// let scenario = Scenario::named("attard2023")?;
     /// assert_eq!(scenario.split(Split::Train).len(), 52);
     /// assert_eq!(scenario.split(Split::Test).len(), 23);
-    /// # Ok::<(), offtrack::reader::Error>(())
+    /// # Ok::<(), offtrack::files::reader::Error>(())
     /// ```
     ///
     /// # Errors

@@ -12,7 +12,7 @@ use crate::engine::EngineBatch;
 use crate::engine::gpu;
 pub use crate::engine::{Autoreset, Batch, Error, RouteChoice, Tally, available_memory};
 use crate::layout::{BEGINS, BeginRow, Column, HAS_ROUTE, HAS_START, IS_FIRST, Start, Stream};
-use crate::stages::{N_STAGES, Stage};
+use crate::engine::stages::{N_STAGES, Stage};
 use crate::world::World;
 use check::{check_known, check_routes, check_start};
 use state::check_state;

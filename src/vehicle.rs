@@ -2,6 +2,8 @@
 //!
 //! The trailer's suspension belongs to the load: an empty trailer and a full tank roll differently on the same axles.
 
+pub mod profile; // how fast a vehicle can drive a route
+pub mod swept; // the path of a truck that never leaves its line
 mod model;
 mod single_track;
 mod suspension;
@@ -19,8 +21,8 @@ pub use suspension::Suspension;
 pub(crate) use vehicle_keys::{WrittenModel, model as read_model};
 
 use crate::layout::{Body, Lag, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, Ray, Rig};
-use crate::reader::Error;
-use crate::shipped::{Kind, Source};
+use crate::files::reader::Error;
+use crate::files::shipped::{Kind, Source};
 
 /// Acceleration of free fall [m/s^2].
 pub const GRAVITY: f64 = 9.81;

@@ -11,9 +11,9 @@ use rayon::prelude::*;
 
 use crate::field::Field;
 use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, Rig, RouteRow, Truck, WaypointRow};
-use crate::loading::{Loading, Stopped};
-use crate::profile::Profile;
-use crate::route::{Route, Waypoint};
+use crate::files::cache::{Loading, Stopped};
+use crate::vehicle::profile::Profile;
+use crate::map::route::{Route, Waypoint};
 use crate::scenario::{Class, Clock, Entry, Invalid, Place, Scenario};
 
 /// Waypoints to the corner of each observed curvature.

@@ -6,9 +6,9 @@
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Piece};
-use offtrack::reader::{shortened, shown};
-use offtrack::roundabout::{Gutter, Roundabout};
-use offtrack::route::Lane;
+use offtrack::files::reader::{shortened, shown};
+use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::route::Lane;
 use serde::{Deserialize, Serialize};
 
 /// Distance from the ring's centre within which points are compared \[m].

@@ -7,7 +7,7 @@
 mod case;
 
 use glam::Vec2;
-use offtrack::angle::wrapped;
+use offtrack::layout::angle::wrapped;
 use offtrack::cpu::drive::{Moving, load_transfer_ratio, motion_of, moved};
 use offtrack::cpu::steer::controlled;
 use offtrack::layout::{Action, Control, Rig, Truck};

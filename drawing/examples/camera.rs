@@ -13,7 +13,7 @@ use std::time::Instant;
 use offtrack::cpu::sense;
 use offtrack::layout::{Ended, Truck};
 use offtrack::scenario::Scenario;
-use offtrack::swept::swept_path;
+use offtrack::vehicle::swept::swept_path;
 use offtrack::world::World;
 use offtrack_drawing::camera::{Camera, Shown};
 
@@ -64,7 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn driven(scenario: &Scenario, world: &World, route: u32) -> Vec<Truck> {
     let Some((_, line)) = scenario.routes().nth(route as usize) else { return Vec::new() };
     let path = swept_path(&world.rigs[0], &line.centre_line, scenario.cruising_speed(), SPACING);
-    let truck = |(n, pose): (usize, offtrack::swept::Pose)| Truck {
+    let truck = |(n, pose): (usize, offtrack::vehicle::swept::Pose)| Truck {
         position: pose.position.as_vec2(),
         heading: pose.heading as f32,
         trailer_heading: pose.trailer_heading as f32,

@@ -5,10 +5,10 @@ mod moving;
 
 use glam::DVec2;
 use offtrack::layout::Ended;
-use offtrack::roundabout::{Gutter, Roundabout};
-use offtrack::route::Route;
+use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::route::Route;
 use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
-use offtrack::swept::corners;
+use offtrack::vehicle::swept::corners;
 use svg::node::element::{Circle, Definitions, Group, Path};
 
 use crate::Error;

@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Piece};
-use offtrack::roundabout::{Gutter, Roundabout};
-use offtrack::route::Route;
+use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::route::Route;
 use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Group, Path, Rectangle};
 

@@ -13,7 +13,7 @@
 //!   machine.
 //!
 //! ```
-//! use offtrack::roundabout::{Gutter, Roundabout};
+//! use offtrack::map::parametric::{Gutter, Roundabout};
 //! use offtrack_drawing::figure::{self, Straights};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::DVec2;
 use offtrack::layout::Rig;
-use offtrack::swept::{Demand, Limit};
+use offtrack::vehicle::swept::{Demand, Limit};
 use serde::Serialize;
 use svg::node::element::{Circle, Group, Path};
 

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Outline};
-use offtrack::route::Route;
+use offtrack::map::route::Route;
 use serde::Serialize;
 
 use crate::sweep::{self, Sweep};

@@ -7,11 +7,11 @@
 
 mod measures;
 
-use offtrack::angle::wrapped;
+use offtrack::layout::angle::wrapped;
 use offtrack::cpu::collide;
 use offtrack::layout::{Clearance, Ended, N_RAYS, N_TRAILER_RAYS};
-use offtrack::roundabout::{Gutter, Roundabout};
-use offtrack::route::Route;
+use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::route::Route;
 use offtrack::scenario::Scenario;
 use offtrack::simulator::Batch;
 use offtrack::world::World;

@@ -5,8 +5,8 @@ use std::f64::consts::FRAC_PI_4;
 use glam::DVec2;
 use offtrack::field::Field;
 use offtrack::geometry::{Curve, Outline};
-use offtrack::roundabout::{Gutter, Roundabout};
-use offtrack::route::{Lane, Route};
+use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::route::{Lane, Route};
 use offtrack::scenario::FIELD_CELL;
 use svg::node::element::{Group, Path};
 

@@ -1,7 +1,7 @@
 //! A contact sheet: many roundabouts at one scale, in rows, each above its name.
 
 use glam::DVec2;
-use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::map::parametric::{Gutter, Roundabout};
 use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Group, Path, Rectangle, Title};
 

@@ -4,9 +4,9 @@
 use glam::DVec2;
 use offtrack::geometry::Outline;
 use offtrack::layout::Rig;
-use offtrack::reader::shown;
-use offtrack::route::Route;
-use offtrack::swept::{Demand, Limit, Pose, demands, own_lane_suffices, swept_path};
+use offtrack::files::reader::shown;
+use offtrack::map::route::Route;
+use offtrack::vehicle::swept::{Demand, Limit, Pose, demands, own_lane_suffices, swept_path};
 use offtrack::vehicle::Vehicle;
 use serde::Serialize;
 use svg::node::element::{Circle, Definitions, Group, Path, Use};
@@ -74,7 +74,7 @@ struct Unit {
 
 impl<'a> Sweep<'a> {
     /// The path of `vehicle`, which `driven` names, on a road with these kerbs. Those of
-    /// [`Roundabout::kerbs_beyond_ends`](offtrack::roundabout::Roundabout::kerbs_beyond_ends) do not take the road's end
+    /// [`Roundabout::kerbs_beyond_ends`](offtrack::map::parametric::Roundabout::kerbs_beyond_ends) do not take the road's end
     /// for one.
     ///
     /// # Panics

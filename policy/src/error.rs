@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use offtrack::reader::{LONGEST_PATH, shortened, shown_path};
+use offtrack::files::reader::{LONGEST_PATH, shortened, shown_path};
 
 /// Most characters of a message about the contents of a file.
 const LONGEST_MESSAGE: usize = 600;
@@ -12,7 +12,7 @@ const LONGEST_MESSAGE: usize = 600;
 pub enum Error {
     /// The file cannot be read at all.
     #[error(transparent)]
-    Unreadable(#[from] offtrack::reader::Error),
+    Unreadable(#[from] offtrack::files::reader::Error),
     /// The file is not a policy, is damaged, or holds a policy that cannot drive.
     #[error("{}: {}", shown_path(file), shortened(message, LONGEST_MESSAGE))]
     Contents {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES};
-use offtrack::reader::{self, shown_path};
+use offtrack::files::reader::{self, shown_path};
 use offtrack::world::World;
 
 use crate::error::Error;

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES, Track};
-use offtrack::random;
+use offtrack::layout::random;
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
 use offtrack_policy::{Activation, Layer, Normalisation, Policy, greedy};

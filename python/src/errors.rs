@@ -2,7 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use offtrack::reader;
+use offtrack::files::reader;
 use offtrack::simulator::Error;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyValueError};
@@ -22,7 +22,7 @@ create_exception!(
 pub fn guarded<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
-        let message = offtrack::reader::shortened(text.unwrap_or("no message"), LONGEST_MESSAGE);
+        let message = offtrack::files::reader::shortened(text.unwrap_or("no message"), LONGEST_MESSAGE);
         Err(PyRuntimeError::new_err(format!("a bug of offtrack_sim: {message}")))
     })
 }

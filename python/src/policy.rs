@@ -227,5 +227,5 @@ const MOST_NUMBERS: usize = (64 << 20) / size_of::<f32>();
 /// Writes a file, whole or not at all.
 fn write(file: &str, bytes: &[u8]) -> PyResult<()> {
     let failed = |error: std::io::Error| PyOSError::new_err(format!("{file}: cannot be written: {error}"));
-    offtrack::writer::write_whole(Path::new(file), bytes).map_err(failed)
+    offtrack::files::writer::write_whole(Path::new(file), bytes).map_err(failed)
 }

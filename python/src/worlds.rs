@@ -8,9 +8,9 @@ use std::time::Duration;
 
 use bytemuck::{bytes_of, cast_slice};
 use offtrack::layout::Action;
-use offtrack::loading::{Cache, Loading, Stopped};
+use offtrack::files::cache::{Cache, Loading, Stopped};
 use offtrack::scenario::{Scenario, Split};
-use offtrack::shipped::Kind;
+use offtrack::files::shipped::Kind;
 use offtrack::world::{Error, World};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

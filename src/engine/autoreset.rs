@@ -1,6 +1,6 @@
 //! What follows the end of an episode. The names are Gymnasium's.
 
-use crate::shared::constants;
+use crate::layout::shared::constants;
 
 constants! {
     /// `Autoreset::SameStep`.

@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 use super::{Autoreset, Batch, EngineBatch, Error, Row, Tally};
 use crate::layout::{BeginRow, Column, Stream};
-use crate::stages::{N_STAGES, STAGES, Stage};
+use crate::engine::stages::{N_STAGES, STAGES, Stage};
 use crate::world::World;
 
 /// Does a stage to one truck.

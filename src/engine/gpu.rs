@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use wgpu::{BufferDescriptor, BufferUsages, Features, Instance, MapMode, PollType};
 
-use crate::stages::Kernel;
+use crate::engine::stages::Kernel;
 pub use adapter::{Adapter, adapters};
 use adapter::{check_limits, described, found, instance, interfaces};
 pub use batch::Batch;

@@ -3,7 +3,7 @@
 //! Integers alone, so that the order of summation changes nothing on any engine.
 
 use crate::layout::Ended;
-use crate::shared::constants;
+use crate::layout::shared::constants;
 
 constants! {
     /// Sums in a tally: steps by their end code, then the rewards.

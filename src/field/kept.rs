@@ -5,7 +5,7 @@ use glam::Vec2;
 
 use super::Field;
 use crate::geometry::{Outline, Piece};
-use crate::loading::Cache;
+use crate::files::cache::Cache;
 
 /// Counted up whenever the same outline gives another field, so that older entries are not used.
 const FORM: u32 = 1;

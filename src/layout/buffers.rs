@@ -1,7 +1,7 @@
 //! The buffers that the kernels of a step see: one bind group, a binding each, in this order.
 
 use super::{Action, BatchFacts, BeginRow, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, Rig, RouteRow, Stream, WaypointRow};
-use crate::shared::{Named, Shared, comment};
+use crate::layout::shared::{Named, Shared, comment};
 
 /// What shaders may do to a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,7 +5,7 @@
 //! [`Column`].
 
 use super::{Clearance, Control, N_EXTRAS, N_RAYS, N_VALUES, Progress, RewardTerms, Truck};
-use crate::shared::{Named, Shared};
+use crate::layout::shared::{Named, Shared};
 
 /// Calls `$then` with every column: doc, variant of [`Column`], name, type of a row. The types are those of `layout`.
 macro_rules! columns {

@@ -3,7 +3,7 @@
 use glam::Vec2;
 
 use super::{Rig, Truck};
-use crate::angle::direction;
+use crate::layout::angle::direction;
 
 impl Truck {
     /// Middle of the trailer's axle group \[m].

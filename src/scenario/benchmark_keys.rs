@@ -9,8 +9,8 @@ use serde::de::{Deserializer, SeqAccess, Visitor};
 
 use super::{Clock, RewardChanges};
 use crate::layout::Track;
-use crate::opendrive::{Hand, RoadLane};
-use crate::roundabout::Gutter;
+use crate::map::opendrive::{Hand, RoadLane};
+use crate::map::parametric::Gutter;
 use crate::vehicle::WrittenModel;
 
 /// The file.

@@ -4,9 +4,9 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use super::{Place, Scenario, Split};
-use crate::reader::{Error, Reader};
-use crate::roundabout::Roundabout;
-use crate::route::Route;
+use crate::files::reader::{Error, Reader};
+use crate::map::parametric::Roundabout;
+use crate::map::route::Route;
 
 impl Scenario {
     /// Drops the routes of all other splits, and roundabouts of which none is left. Indices of routes change.

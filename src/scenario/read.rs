@@ -6,10 +6,10 @@ use super::Scenario;
 use super::benchmark_keys::{Written, WrittenSpeeds};
 use super::fleet::{self, Fleet};
 use super::roads::{MOST_ROADS, Procedural};
-use crate::loading::Loading;
-use crate::reader::{Error, Reader};
-use crate::roundabout::map::is_map;
-use crate::shipped::{Kind, Source};
+use crate::files::cache::Loading;
+use crate::files::reader::{Error, Reader};
+use crate::map::parametric::map::is_map;
+use crate::files::shipped::{Kind, Source};
 use crate::vehicle::Vehicle;
 
 impl Scenario {

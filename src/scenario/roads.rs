@@ -7,14 +7,14 @@ use glam::DVec2;
 use super::benchmark_keys::{WrittenChoice, WrittenProcedural, WrittenRoundabout};
 use super::read::referred;
 use super::{Place, Scenario, Split};
-use crate::loading::Loading;
-use crate::opendrive::Way;
-use crate::procedural::Distribution;
-use crate::reader::{Error, Reader, shown};
-use crate::roundabout::Roundabout;
-use crate::roundabout::map::{Choice, is_map};
-use crate::route::Route;
-use crate::shipped::{Kind, Source};
+use crate::files::cache::Loading;
+use crate::map::opendrive::Way;
+use crate::map::procedural::Distribution;
+use crate::files::reader::{Error, Reader, shown};
+use crate::map::parametric::Roundabout;
+use crate::map::parametric::map::{Choice, is_map};
+use crate::map::route::Route;
+use crate::files::shipped::{Kind, Source};
 
 /// Maximum number of roundabouts that are read, listed or drawn. One takes about 0.1 MB before it is baked.
 pub(super) const MOST_ROADS: usize = 100_000;

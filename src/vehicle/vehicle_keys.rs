@@ -7,8 +7,8 @@ use serde::Deserialize;
 
 use super::{Load, Model, Sensors, SpeedControl, Suspension, Tractor, Trailer, Vehicle};
 use crate::layout::N_TRACTOR_RAYS;
-use crate::reader::{Error, Reader, printable};
-use crate::shipped::Source;
+use crate::files::reader::{Error, Reader, printable};
+use crate::files::shipped::Source;
 
 /// Maximum length of a load's name \[characters].
 const LONGEST_NAME: usize = 40;

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use offtrack::layout::Ended;
-use offtrack::procedural::Distribution;
-use offtrack::reader::Error;
-use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::map::procedural::Distribution;
+use offtrack::files::reader::Error;
+use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{self, Engine, RouteChoice, Simulator};
 use offtrack::vehicle::Vehicle;

@@ -4,9 +4,9 @@ use glam::{DVec2, Vec2};
 use offtrack::field::Field;
 use offtrack::geometry::{Curve, Outline, Piece};
 use offtrack::layout::{Body, Clearance, Rig, Truck};
-use offtrack::roundabout::Gutter;
+use offtrack::map::parametric::Gutter;
 use offtrack::simulator::Simulator;
-use offtrack::stages::Stage;
+use offtrack::engine::stages::Stage;
 use rayon::prelude::*;
 
 use crate::field::{after_stage, places, pose};

@@ -11,11 +11,11 @@ use glam::{DVec2, Vec2};
 use offtrack::field::Field;
 use offtrack::geometry::Outline;
 use offtrack::layout::{Column, Truck};
-use offtrack::random::{signed_unit, words};
-use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::layout::random::{signed_unit, words};
+use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::scenario::FIELD_CELL;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
-use offtrack::stages::Stage;
+use offtrack::engine::stages::Stage;
 use offtrack::world::World;
 use rayon::prelude::*;
 

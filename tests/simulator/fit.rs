@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use offtrack::geometry::{Piece, wrapped};
-use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack_comparison::deviation::{Measured, deviations};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");

@@ -8,11 +8,11 @@ use glam::DVec2;
 use offtrack::field::Field;
 use offtrack::geometry::{Curve, Piece, to_circle, wrapped};
 use offtrack::layout::{Ended, N_RAYS};
-use offtrack::roundabout::{Gutter, Roundabout};
-use offtrack::route::{Lane, Route};
+use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::route::{Lane, Route};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::RouteChoice;
-use offtrack::swept::{own_lane_suffices, swept_path};
+use offtrack::vehicle::swept::{own_lane_suffices, swept_path};
 use offtrack::world::World;
 
 use crate::field::near_kerbs;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec2;
-use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::RouteChoice;
 use offtrack::world::World;

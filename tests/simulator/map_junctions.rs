@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec2;
 use offtrack::geometry::Outline;
-use offtrack::opendrive::{Hand, Map, Options, RoadLane, Way};
-use offtrack::roundabout::map::Choice;
-use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::map::opendrive::{Hand, Map, Options, RoadLane, Way};
+use offtrack::map::parametric::map::Choice;
+use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
 

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use glam::DVec2;
-use offtrack::opendrive::{Hand, Imported, Map, Options};
-use offtrack::roundabout::Roundabout;
+use offtrack::map::opendrive::{Hand, Imported, Map, Options};
+use offtrack::map::parametric::Roundabout;
 
 fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/maps").join(name)

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::DVec2;
 use offtrack::geometry::Piece;
-use offtrack::opendrive::{Hand, Map};
+use offtrack::map::opendrive::{Hand, Map};
 
 /// Cell of the grid that lines are found by \[m].
 const CELL: f64 = 2.0;

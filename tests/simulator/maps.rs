@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec2;
 use offtrack::geometry::Outline;
-use offtrack::ground::Edges;
-use offtrack::opendrive::{Hand, Map, Options};
-use offtrack::reader::Error;
-use offtrack::roundabout::map::Choice;
-use offtrack::roundabout::{Gutter, Kerb, Roundabout};
+use offtrack::map::ground::Edges;
+use offtrack::map::opendrive::{Hand, Map, Options};
+use offtrack::files::reader::Error;
+use offtrack::map::parametric::map::Choice;
+use offtrack::map::parametric::{Gutter, Kerb, Roundabout};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
 use proptest::prelude::*;

@@ -6,8 +6,8 @@ use std::f64::consts::PI;
 use glam::DVec2;
 use offtrack::cpu::observe::observed;
 use offtrack::layout::{N_RAYS, Progress, Truck};
-use offtrack::random;
-use offtrack::route::{Lane, Route};
+use offtrack::layout::random;
+use offtrack::map::route::{Lane, Route};
 use offtrack::world::World;
 
 use crate::benchmark;
@@ -107,12 +107,12 @@ fn worst_differences(shift: usize) -> [f64; 69] {
             for (ray, range) in ranges.iter_mut().enumerate() {
                 *range = 10.0 + 10.0 * random::signed_unit(random::words(12, index as u32, state, ray as u32)[0]);
             }
-            let heading = offtrack::angle::wrapped(previews[next.min(waypoints.len() - 1)].heading + 1.5 * draws[1]);
+            let heading = offtrack::layout::angle::wrapped(previews[next.min(waypoints.len() - 1)].heading + 1.5 * draws[1]);
             let truck = Truck {
                 route: index as u32,
                 position: near.position + 4.0 * glam::Vec2::new(draws[2], draws[3]),
                 heading,
-                trailer_heading: offtrack::angle::wrapped(heading + 1.5 * draws[4]),
+                trailer_heading: offtrack::layout::angle::wrapped(heading + 1.5 * draws[4]),
                 speed: 8.0 + 8.0 * draws[5],
                 ..Truck::default()
             };

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use offtrack::angle::wrapped;
+use offtrack::layout::angle::wrapped;
 use offtrack::gpu::{Columns, Device, Error, Slice, adapters};
 use offtrack::layout::{Column, Truck};
 use offtrack::simulator::{self, Engine, RouteChoice, Simulator};

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use offtrack::layout::Column;
 use offtrack::scenario::Split;
-use offtrack::shared::Named;
+use offtrack::layout::shared::Named;
 use offtrack::simulator::{Batch, Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use offtrack::layout::Ended;
-use offtrack::loading::{Cache, Loading, Progress};
-use offtrack::procedural::{Distribution, find};
+use offtrack::files::cache::{Cache, Loading, Progress};
+use offtrack::map::procedural::{Distribution, find};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{Engine, RouteChoice};
 use offtrack::world::World;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use offtrack::layout::Column;
 use offtrack::scenario::Scenario;
-use offtrack::shared::Named;
+use offtrack::layout::shared::Named;
 use offtrack::simulator::{Error, RouteChoice, Simulator};
 use offtrack::world::World;
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use offtrack::layout::{Column, Start};
-use offtrack::random::{self, Draw};
+use offtrack::layout::random::{self, Draw};
 use offtrack::simulator::RouteChoice;
 
 use crate::episodes::{all_routes, rows};
@@ -23,7 +23,7 @@ fn a_truck_begins_at_the_stated_fractions_of_the_largest_start_errors() {
             // The benchmark's largest errors: 0.3 m and 2 deg. Positions of about 50 m are exact to 4 um in f32.
             assert!((point.dot(first.direction.perp()) - 0.3 * start.offset).abs() < 2e-5, "{truck:?}");
             assert!(point.dot(first.direction).abs() < 2e-5, "{truck:?}");
-            let heading = offtrack::angle::wrapped(truck.heading - world.route_previews(route)[0].heading).to_degrees();
+            let heading = offtrack::layout::angle::wrapped(truck.heading - world.route_previews(route)[0].heading).to_degrees();
             assert!((heading - 2.0 * start.heading).abs() < 1e-4, "{heading}");
         }
     }

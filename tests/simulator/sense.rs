@@ -4,9 +4,9 @@ use glam::{DVec2, Vec2};
 use offtrack::field::Field;
 use offtrack::geometry::Outline;
 use offtrack::layout::{N_RAYS, N_TRAILER_RAYS, Truck};
-use offtrack::roundabout::Gutter;
+use offtrack::map::parametric::Gutter;
 use offtrack::simulator::Engine;
-use offtrack::stages::Stage;
+use offtrack::engine::stages::Stage;
 use offtrack::world::World;
 use rayon::prelude::*;
 

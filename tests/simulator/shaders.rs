@@ -3,12 +3,12 @@
 use std::fs;
 use std::path::Path;
 
-use offtrack::stages::SHADERS;
+use offtrack::engine::stages::SHADERS;
 
 #[test]
 fn the_printed_layout_is_current() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders/layout.wgsl");
-    let printed = offtrack::wgsl::layout();
+    let printed = offtrack::engine::wgsl::layout();
     if std::env::var_os("PRINT_LAYOUT").is_some() {
         fs::write(&path, &printed).unwrap();
     }
@@ -180,9 +180,9 @@ fn in_a_loop_every_variable_has_an_initial_value_since_one_compiler_clears_it_on
 #[cfg(feature = "gpu")]
 mod module {
     use offtrack::layout::structs;
-    use offtrack::shared::Named;
-    use offtrack::shared::Struct;
-    use offtrack::stages::{Kernel, SHADERS, STAGES};
+    use offtrack::layout::shared::Named;
+    use offtrack::layout::shared::Struct;
+    use offtrack::engine::stages::{Kernel, SHADERS, STAGES};
     use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
     use wgpu::naga::{Module, TypeInner, front::wgsl};
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use offtrack::layout::{Action, Start, Truck};
-use offtrack::profile::Profile;
+use offtrack::vehicle::profile::Profile;
 use offtrack::scenario::{Clock, Scenario};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::vehicle::Model;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use offtrack::layout::{Column, Truck};
-use offtrack::shared::Named;
+use offtrack::layout::shared::Named;
 use offtrack::simulator::{Autoreset, RouteChoice, Simulator};
 use offtrack::world::World;
 

@@ -1,11 +1,11 @@
 //! What can go wrong while training, evaluating or drawing: one error type for this crate, above those of the
-//! simulator's edges ([`offtrack::reader::Error`] for files, [`offtrack::simulator::Error`] for batches and devices).
+//! simulator's edges ([`offtrack::files::reader::Error`] for files, [`offtrack::simulator::Error`] for batches and devices).
 //!
 //! Names and values are bounded and made harmless where they are shown, so that none can be forgotten.
 
 use std::path::{Path, PathBuf};
 
-use offtrack::reader::{LONGEST_PATH, shortened, shown_path};
+use offtrack::files::reader::{LONGEST_PATH, shortened, shown_path};
 
 use crate::device;
 
@@ -19,7 +19,7 @@ const LONGEST_EXPECTED: usize = 1000;
 pub enum Error {
     /// A file cannot be read, or is a wrong scenario, vehicle or roundabout.
     #[error(transparent)]
-    Input(#[from] offtrack::reader::Error),
+    Input(#[from] offtrack::files::reader::Error),
     /// A policy cannot be read, or cannot drive in the world.
     #[error(transparent)]
     Policy(#[from] offtrack_policy::Error),

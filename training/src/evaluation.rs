@@ -18,10 +18,10 @@ use std::sync::Arc;
 
 use offtrack::cpu::reset::drawn_start;
 use offtrack::layout::{Control, Ended, Rig, Start, Truck};
-use offtrack::route::Route;
+use offtrack::map::route::Route;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
-use offtrack::swept::{own_lane_suffices, steer_angle_max, swept_path};
+use offtrack::vehicle::swept::{own_lane_suffices, steer_angle_max, swept_path};
 use offtrack::world::World;
 use offtrack_drawing::recording::{Recorder, Track};
 

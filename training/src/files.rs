@@ -4,8 +4,8 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use offtrack::reader::printable;
-use offtrack::writer;
+use offtrack::files::reader::printable;
+use offtrack::files::writer;
 use serde::Serialize;
 
 use crate::error::Error;

@@ -6,7 +6,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use offtrack::reader::shortened;
+use offtrack::files::reader::shortened;
 use offtrack_training::error::Error;
 use offtrack_training::{files, provenance};
 
@@ -118,5 +118,5 @@ fn exit_code(error: &Error) -> u8 {
 /// Starts the threads that commands share. Left to the first work on all cores, a system that does not give so many
 /// would make it panic.
 fn start_threads() -> Result<(), Error> {
-    Ok(rayon::ThreadPoolBuilder::new().num_threads(offtrack::loading::n_threads()).build_global()?)
+    Ok(rayon::ThreadPoolBuilder::new().num_threads(offtrack::files::cache::n_threads()).build_global()?)
 }

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use offtrack::layout::{Lag, Rig};
-use offtrack::reader::{shortened, shown};
+use offtrack::files::reader::{shortened, shown};
 use offtrack::vehicle::{GRAVITY, SLIP_LEVER, Suspension};
 use serde::Deserialize;
 

@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 use offtrack::geometry::Curve;
-use offtrack::roundabout::{Gutter, Roundabout};
-use offtrack::route::Route;
+use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::route::Route;
 use offtrack::scenario::Scenario;
 
 use super::canvas::{Canvas, Ink};

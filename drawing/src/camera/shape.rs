@@ -2,7 +2,7 @@
 
 use glam::{DVec2, Vec2};
 use offtrack::layout::{Body, Ended, N_RAYS, N_TRAILER_RAYS, Ray, Rig};
-use offtrack::swept::corners;
+use offtrack::vehicle::swept::corners;
 use offtrack::world::World;
 
 use super::Shown;

@@ -2,9 +2,9 @@ use std::sync::LazyLock;
 
 use glam::{DVec2, Vec2};
 use offtrack::cpu::sense;
-use offtrack::roundabout::Gutter;
+use offtrack::map::parametric::Gutter;
 use offtrack::scenario::APPROACH;
-use offtrack::swept::{Pose, corners, swept_path};
+use offtrack::vehicle::swept::{Pose, corners, swept_path};
 
 use super::*;
 
@@ -236,8 +236,8 @@ fn no_state_is_too_far_off_to_be_drawn() {
 fn a_left_hand_road_is_drawn_as_it_lies_and_not_as_it_is_driven() {
     let mut scenario = (*DRIVEN.0).clone();
     for place in &mut scenario.places {
-        let ground = offtrack::ground::Ground { mirrored: true, ..place.roundabout.ground().clone() };
-        place.roundabout = offtrack::roundabout::Roundabout::on(place.roundabout.name.clone(), ground);
+        let ground = offtrack::map::ground::Ground { mirrored: true, ..place.roundabout.ground().clone() };
+        place.roundabout = offtrack::map::parametric::Roundabout::on(place.roundabout.name.clone(), ground);
     }
     let (mut right, mut left) = (camera(240), Camera::new(Arc::new(scenario), &DRIVEN.1, 240).unwrap());
     let truck = truck(0, 30.0);

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use offtrack::layout::{Body, N_TRAILER_RAYS, Ray};
-use offtrack::roundabout::Roundabout;
+use offtrack::map::parametric::Roundabout;
 use offtrack::world::World;
 use serde::{Deserialize, Serialize};
 

@@ -2,7 +2,7 @@
 
 use numpy::{Element, PyReadwriteArray1, PyUntypedArrayMethods};
 use offtrack::layout::Column;
-use offtrack::shared::Named;
+use offtrack::layout::shared::Named;
 use offtrack::simulator::{Autoreset, Engine};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;

@@ -56,7 +56,7 @@ impl Batch {
         let names = &self.place.world.route_names;
         let found = names.iter().position(|known| known == name);
         found.map(|index| index as u32).ok_or_else(|| {
-            let list = offtrack::reader::shortened(&names.join(", "), 600);
+            let list = offtrack::files::reader::shortened(&names.join(", "), 600);
             PyValueError::new_err(format!("routes: {name:?}; the batch drives {list}"))
         })
     }

@@ -1,8 +1,8 @@
 //! The routes that are to be driven: a split, or routes by their names, which are those of the command line.
 
-use offtrack::procedural;
+use offtrack::map::procedural;
 use offtrack::scenario::{Scenario, Split};
-use offtrack::shipped::Kind;
+use offtrack::files::shipped::Kind;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -54,8 +54,8 @@ pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) ->
     let is_known = |name: &str| known.iter().any(|route| is_of(route, name));
     let is_file = |name: &str| added.iter().any(|road| name.starts_with(road) && road.ends_with(".toml"));
     if let Some(unknown) = wanted.iter().find(|name| !is_known(name) && !is_file(name)) {
-        let list = offtrack::reader::shortened(&known.join(", "), LONGEST_LIST);
-        let name = offtrack::reader::shortened(unknown, LONGEST_NAME);
+        let list = offtrack::files::reader::shortened(&known.join(", "), LONGEST_LIST);
+        let name = offtrack::files::reader::shortened(unknown, LONGEST_NAME);
         return Err(PyValueError::new_err(format!(
             "routes: {name:?}; {} has {list}, and random roads have names as wide/7/12",
             scenario.name

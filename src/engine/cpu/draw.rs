@@ -4,7 +4,7 @@
 
 use crate::engine::Row;
 use crate::layout::Stream;
-use crate::random::{Draw, index_below, words};
+use crate::layout::random::{Draw, index_below, words};
 use crate::world::World;
 
 /// Draws the row's action.

@@ -4,7 +4,7 @@
 
 use glam::Vec2;
 
-use crate::angle::{TINY, direction};
+use crate::layout::angle::{TINY, direction};
 use crate::engine::Row;
 use crate::layout::{Progress, Truck, WaypointRow};
 use crate::world::World;

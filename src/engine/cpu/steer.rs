@@ -5,7 +5,7 @@
 use crate::engine::Row;
 use crate::engine::cpu::drive::drive_max;
 use crate::layout::{Action, Control, Params, Rig};
-use crate::shared::constants;
+use crate::layout::shared::constants;
 use crate::world::World;
 
 constants! {

@@ -14,7 +14,7 @@ use super::{Columns, Device, Error, Slice, kernels, stage_times};
 use crate::engine::{self, Autoreset, EngineBatch, RouteChoice, Tally};
 use crate::layout::buffers::Table;
 use crate::layout::{BatchFacts, BeginRow, Column, Stream};
-use crate::stages::{BEGIN, Kernel, N_STAGES, STAGES, Stage};
+use crate::engine::stages::{BEGIN, Kernel, N_STAGES, STAGES, Stage};
 use crate::world::World;
 
 /// A batch of trucks on a device.

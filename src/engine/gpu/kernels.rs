@@ -7,8 +7,8 @@ use wgpu::{
 
 use crate::layout::buffers::{Access, BUFFERS};
 use crate::layout::{N_RAYS, N_VALUES, WORKGROUP};
-use crate::shared::Named;
-use crate::stages::{Kernel, SHADERS, Threads};
+use crate::layout::shared::Named;
+use crate::engine::stages::{Kernel, SHADERS, Threads};
 
 /// Workgroups in a row of a dispatch: the most that every device takes.
 const ROW: u32 = 65_535;

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use wgpu::{BufferDescriptor, BufferUsages, ComputePassTimestampWrites, Features, QuerySetDescriptor, QueryType};
 
 use super::{Batch, Error, Slice};
-use crate::stages::{N_STAGES, STAGES};
+use crate::engine::stages::{N_STAGES, STAGES};
 
 /// Steps a batch a stage at a time.
 pub(super) fn step_by_stage(batch: &mut Batch) -> Result<[Duration; N_STAGES], Error> {

@@ -1,6 +1,6 @@
 //! What is drawn for each vehicle of a fleet: additions to lengths, factors, and lags, each uniformly from its range.
 
-use crate::random;
+use crate::layout::random;
 use crate::vehicle::Vehicle;
 
 /// Seed of all draws: a table is a function of its benchmark alone.

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use std::fs;
 use std::path::Path;
 
-use offtrack::reader::Error;
+use offtrack::files::reader::Error;
 use toml::Value;
 
 use super::places::{Step, at, next, parts, places, tables, with, without, written};

@@ -2,11 +2,11 @@
 
 use std::sync::{Arc, OnceLock};
 
-use offtrack::angle::wrapped;
+use offtrack::layout::angle::wrapped;
 use offtrack::field::Field;
 use offtrack::layout::{Track, Truck};
-use offtrack::random::{index_below, signed_unit, words};
-use offtrack::roundabout::Gutter;
+use offtrack::layout::random::{index_below, signed_unit, words};
+use offtrack::map::parametric::Gutter;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 

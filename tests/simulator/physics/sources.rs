@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Piece};
-use offtrack::swept::{Pose, swept_path};
+use offtrack::vehicle::swept::{Pose, swept_path};
 use offtrack::vehicle::Vehicle;
 
 use super::vehicle;

@@ -10,7 +10,7 @@ use glam::DVec2;
 use offtrack::cpu::drive::{Moving, motion_of};
 use offtrack::layout::{Column, Rig, Truck};
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
-use offtrack::stages::Stage;
+use offtrack::engine::stages::Stage;
 use offtrack::world::World;
 use offtrack_comparison::trace::{Case, CaseVehicle, Command, Init, Traced, trace, trace_by};
 use serde_json::Value;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use offtrack::layout::Start;
-use offtrack::procedural;
+use offtrack::map::procedural;
 use offtrack::scenario::Split;
 
 use offtrack_training::error::Error;

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use offtrack::reader::read_text;
-use offtrack::roundabout::Roundabout;
+use offtrack::files::reader::read_text;
+use offtrack::map::parametric::Roundabout;
 use offtrack_comparison::FILE_LIMIT;
 use offtrack_comparison::deviation::{Measured, NEAR, deviations};
 

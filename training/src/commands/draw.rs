@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use offtrack::procedural;
-use offtrack::reader::shown;
-use offtrack::roundabout::map::is_map;
-use offtrack::roundabout::{Gutter, Roundabout};
-use offtrack::route::Route;
+use offtrack::map::procedural;
+use offtrack::files::reader::shown;
+use offtrack::map::parametric::map::is_map;
+use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::route::Route;
 use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
-use offtrack::shipped::{Kind, Source};
+use offtrack::files::shipped::{Kind, Source};
 use offtrack::vehicle::Vehicle;
 use offtrack_drawing::figure::{self, Straights};
 use offtrack_drawing::sweep::{Driven, Sweep};

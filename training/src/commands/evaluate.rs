@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::reader;
+use offtrack::files::reader;
 use offtrack::scenario::Split;
 use offtrack_drawing::recording::Of;
 use offtrack_training::error::Error;

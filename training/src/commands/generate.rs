@@ -4,10 +4,10 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use offtrack::procedural::{Distribution, Reason, Refused, Road, lane_clearance};
-use offtrack::reader::{read_bytes, shown_path};
-use offtrack::roundabout::Roundabout;
-use offtrack::shipped::Kind;
+use offtrack::map::procedural::{Distribution, Reason, Refused, Road, lane_clearance};
+use offtrack::files::reader::{read_bytes, shown_path};
+use offtrack::map::parametric::Roundabout;
+use offtrack::files::shipped::Kind;
 use offtrack_drawing::histograms::{Histograms, Panel};
 use offtrack_drawing::{rasterised, sheet};
 use offtrack_training::error::Error;
@@ -160,7 +160,7 @@ fn histograms(distribution: &Distribution, args: &Args, roads: &[Road]) -> Resul
             panel("arms", &|roundabout| roundabout.arms().count() as f64),
             panel("least gap between arms [deg]", &|roundabout| roundabout.least_gap().to_degrees()),
             panel("islands beside the central one", &|roundabout| {
-                roundabout.kerbs(offtrack::roundabout::Gutter::Drivable).loops.len() as f64 - 2.0
+                roundabout.kerbs(offtrack::map::parametric::Gutter::Drivable).loops.len() as f64 - 2.0
             }),
             panel("tightest radius of a route's centre line [m]", &|roundabout| {
                 roundabout

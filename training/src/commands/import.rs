@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec2;
-use offtrack::opendrive::{Hand, Imported, Map, Options, RoadLane, Way};
-use offtrack::reader::{Error as InputError, Reader, shown_path};
-use offtrack::roundabout::map::Choice;
+use offtrack::map::opendrive::{Hand, Imported, Map, Options, RoadLane, Way};
+use offtrack::files::reader::{Error as InputError, Reader, shown_path};
+use offtrack::map::parametric::map::Choice;
 
 use offtrack_training::error::Error;
 use offtrack_training::files;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use offtrack::reader::{shown, shown_path};
+use offtrack::files::reader::{shown, shown_path};
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
 use offtrack_training::error::Error;

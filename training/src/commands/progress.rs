@@ -4,7 +4,7 @@ use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use offtrack::reader::printable;
+use offtrack::files::reader::printable;
 use offtrack_training::files;
 use offtrack_training::learner::run::progress::Display;
 

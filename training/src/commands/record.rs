@@ -6,9 +6,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use offtrack::procedural;
-use offtrack::roundabout::{Gutter, Roundabout};
-use offtrack::route::Route;
+use offtrack::map::procedural;
+use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::route::Route;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use offtrack::loading::{Cache, Loading, Progress};
-use offtrack::procedural;
-use offtrack::reader::shortened;
-use offtrack::roundabout::Roundabout;
+use offtrack::files::cache::{Cache, Loading, Progress};
+use offtrack::map::procedural;
+use offtrack::files::reader::shortened;
+use offtrack::map::parametric::Roundabout;
 use offtrack::scenario::{Place, Scenario, Split};
-use offtrack::shipped::Kind;
+use offtrack::files::shipped::Kind;
 use offtrack::world::World;
 use offtrack_training::error::Error;
 use offtrack_training::files;

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::reader::{read_text, shortened, shown_path};
+use offtrack::files::reader::{read_text, shortened, shown_path};
 use offtrack_comparison::FILE_LIMIT;
 use offtrack_comparison::trace::{Case, Traced, trace};
 use serde::{Deserialize, Serialize};

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use offtrack::reader::{read_text, shown_path};
+use offtrack::files::reader::{read_text, shown_path};
 use offtrack::scenario::Split;
 use offtrack_drawing::recording::Track;
 use offtrack_policy::Policy;

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use offtrack::layout::{Ended, Truck};
-use offtrack::profile::Profile;
+use offtrack::vehicle::profile::Profile;
 use offtrack::scenario::Scenario;
 use offtrack::simulator::Batch;
 use offtrack::vehicle::GRAVITY;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use offtrack::route::Route;
+use offtrack::map::route::Route;
 use offtrack::scenario::Place;
 use serde::Serialize;
 

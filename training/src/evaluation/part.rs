@@ -1,7 +1,7 @@
 //! The parts of a route: entry arm, ring, exit arm; and how wide its lane is on each.
 
-use offtrack::roundabout::Roundabout;
-use offtrack::route::Route;
+use offtrack::map::parametric::Roundabout;
+use offtrack::map::route::Route;
 use offtrack::scenario::{Place, Scenario};
 
 /// A part of a route.

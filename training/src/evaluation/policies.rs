@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use offtrack::layout::{Action, Truck, WaypointRow};
-use offtrack::profile::Profile;
-use offtrack::random::{self, Draw};
+use offtrack::vehicle::profile::Profile;
+use offtrack::layout::random::{self, Draw};
 use offtrack::simulator::Batch;
 use offtrack::world::World;
 

@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 
 use glam::Vec2;
-use offtrack::angle::wrapped;
+use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Ended, Rig, Truck};
 use offtrack::simulator::Batch;
 

@@ -2,7 +2,7 @@
 //! the others, so that the page's size is bounded.
 
 use offtrack::layout::Ended;
-use offtrack::random;
+use offtrack::layout::random;
 
 use super::report::Episode;
 

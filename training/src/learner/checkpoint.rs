@@ -15,7 +15,7 @@ use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, Metadata, TensorInfo};
 use serde::{Deserialize, Serialize};
 
-use offtrack::reader::read_bytes;
+use offtrack::files::reader::read_bytes;
 
 use crate::error::Error;
 

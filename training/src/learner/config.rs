@@ -10,7 +10,7 @@ mod set;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use offtrack::reader::Reader;
+use offtrack::files::reader::Reader;
 use offtrack::scenario::RewardChanges;
 use serde::{Deserialize, Serialize};
 

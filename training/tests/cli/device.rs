@@ -1,7 +1,7 @@
 //! Devices from outside: which there are, what is said where one cannot be had, and the speed measured on either
 //! engine.
 
-use offtrack::stages::STAGES;
+use offtrack::engine::stages::STAGES;
 use serde_json::Value;
 
 use crate::place::{Place, offtrack, refusal, succeed};

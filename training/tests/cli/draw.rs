@@ -5,7 +5,7 @@ use std::process::Output;
 
 use glam::DVec2;
 use offtrack::geometry::Outline;
-use offtrack::roundabout::{Gutter, Roundabout};
+use offtrack::map::parametric::{Gutter, Roundabout};
 use serde_json::Value;
 
 use crate::place::program;

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::Output;
 
-use offtrack::procedural::{Distribution, find};
-use offtrack::roundabout::Roundabout;
+use offtrack::map::procedural::{Distribution, find};
+use offtrack::map::parametric::Roundabout;
 
 use crate::place::{Place, offtrack, program, refusal, succeed};
 

@@ -6,7 +6,7 @@ use glam::DVec2;
 use offtrack::cpu::drive::motion_of;
 use offtrack::geometry::{Curve, Piece};
 use offtrack::layout::{Rig, Truck};
-use offtrack::swept::swept_path;
+use offtrack::vehicle::swept::swept_path;
 use offtrack::vehicle::{SingleTrack, Suspension};
 use serde_json::Value;
 

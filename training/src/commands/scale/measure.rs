@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use offtrack::layout::N_RAYS;
 use offtrack::simulator::Tally;
-use offtrack::stages::STAGES;
+use offtrack::engine::stages::STAGES;
 use serde::Serialize;
 
 use offtrack_training::error::Error;

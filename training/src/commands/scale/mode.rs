@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use offtrack::layout::N_VALUES;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
-use offtrack::stages::STAGES;
+use offtrack::engine::stages::STAGES;
 use offtrack::world::World;
 use offtrack_policy::Policy;
 use offtrack_training::error::Error;

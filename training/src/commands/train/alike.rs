@@ -6,8 +6,8 @@
 
 use bytemuck::bytes_of;
 use offtrack::layout::{Action, Rig};
-use offtrack::reader::shown;
-use offtrack::roundabout::Gutter;
+use offtrack::files::reader::shown;
+use offtrack::map::parametric::Gutter;
 use offtrack::scenario::Scenario;
 
 /// The action table of a benchmark.

@@ -3,7 +3,7 @@
 //! Their benchmarks are read and checked before the run begins. Each world is baked when its turn comes, so one at a
 //! time is in memory.
 
-use offtrack::reader::Reader;
+use offtrack::files::reader::Reader;
 use offtrack::scenario::{Scenario, Split};
 use offtrack_policy::Policy;
 use offtrack_training::device::Device;

@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use offtrack::reader::{read_text, shown_path};
+use offtrack::files::reader::{read_text, shown_path};
 use offtrack_training::error::Error;
 use offtrack_training::evaluation::seeds::{SeedReport, Seeds};
 use offtrack_training::files;

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use offtrack::reader::{Error as InputError, Reader};
+use offtrack::files::reader::{Error as InputError, Reader};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
 use offtrack_training::error::Error;

@@ -7,7 +7,7 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use offtrack::angle::wrapped;
+use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Ended, Params, Rig, Start, Truck};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;

@@ -10,8 +10,8 @@ use std::fmt::Write;
 use std::path::Path;
 
 use offtrack::layout::{Rig, Start};
-use offtrack::reader::{self, shortened};
-use offtrack::roundabout::Gutter;
+use offtrack::files::reader::{self, shortened};
+use offtrack::map::parametric::Gutter;
 use offtrack::scenario::{Clock, Scenario};
 use offtrack::vehicle::Model;
 use offtrack::world::World;

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use offtrack::route::Route;
+use offtrack::map::route::Route;
 use offtrack::world::World;
 use offtrack_drawing::recording::{self, Class, Measures};
 use serde::Serialize;

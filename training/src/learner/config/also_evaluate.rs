@@ -1,6 +1,6 @@
 //! Further evaluations at the end of a run, as `also_evaluate` names them: `BENCHMARK` or `BENCHMARK/SPLIT`.
 
-use offtrack::reader::Reader;
+use offtrack::files::reader::Reader;
 use offtrack::scenario::Split;
 
 use super::Config;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use offtrack::reader::Reader;
+use offtrack::files::reader::Reader;
 
 use super::{Config, Device, Learning, Refinement};
 use crate::error::Error;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::reader::{self, Reader, TEXT_LIMIT, read_text};
+use offtrack::files::reader::{self, Reader, TEXT_LIMIT, read_text};
 use toml::{Table, Value};
 
 use super::set;

@@ -14,7 +14,7 @@ use burn::tensor::{Tensor, TensorData};
 use bytemuck::{bytes_of, cast_slice};
 use offtrack::gpu::{Kernels, Slice};
 use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES};
-use offtrack::random;
+use offtrack::layout::random;
 use offtrack::simulator::{Engine, RouteChoice, Simulator, Tally};
 use offtrack::world::World;
 use offtrack_policy::{LIMIT, Normalisation};

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use burn::tensor::{Device, Tensor, TensorData};
 use offtrack::cpu::judge;
 use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES, RewardTerms};
-use offtrack::random;
+use offtrack::layout::random;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 use offtrack_policy::Normalisation;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use offtrack::writer::{followed, keep_access};
+use offtrack::files::writer::{followed, keep_access};
 
 use crate::error::Error;
 use crate::files;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::writer::followed;
+use offtrack::files::writer::followed;
 
 use crate::error::Error;
 use crate::files;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use offtrack::reader::read_bytes;
+use offtrack::files::reader::read_bytes;
 use serde_json::Value;
 
 use super::folder::Folder;

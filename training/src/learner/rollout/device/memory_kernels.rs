@@ -3,9 +3,9 @@
 
 use offtrack::gpu::{Kernels, Slice};
 use offtrack::layout::buffers::Access;
-use offtrack::shared::Shared as _;
-use offtrack::stages::SHADERS;
-use offtrack::wgsl;
+use offtrack::layout::shared::Shared as _;
+use offtrack::engine::stages::SHADERS;
+use offtrack::engine::wgsl;
 use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, BufferBinding, CommandEncoder, ComputePassDescriptor, Device};
 
 offtrack::shared! {

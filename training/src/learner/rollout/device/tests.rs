@@ -1,7 +1,7 @@
 use super::*;
 use crate::learner::rollout::host::observed;
 use offtrack::layout::{Ended, Track};
-use offtrack::random::{index_below, signed_unit, words};
+use offtrack::layout::random::{index_below, signed_unit, words};
 use offtrack::scenario::{Scenario, Split};
 use std::path::Path;
 

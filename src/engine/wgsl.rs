@@ -1,0 +1,35 @@
+//! What shaders share with Rust, printed as WGSL.
+
+use crate::engine::{autoreset, cpu, tally};
+use crate::layout::{self, buffers};
+use crate::field;
+use crate::layout::{angle, random};
+
+/// `shaders/layout.wgsl`: constants, structs and the buffers of a step.
+pub fn layout() -> String {
+    [shared(), buffers::printed()].concat()
+}
+
+/// Constants and structs alone, for shaders with buffers of their own.
+pub fn shared() -> String {
+    [
+        "// What shaders share with Rust. Printed by src/engine/wgsl.rs from the layout and the constants beside each stage: change those.\n\n"
+            .to_owned(),
+        layout::printed_constants(),
+        angle::printed_constants(),
+        field::printed_constants(),
+        random::printed_constants(),
+        cpu::steer::printed_constants(),
+        cpu::drive::printed_constants(),
+        cpu::collide::printed_constants(),
+        cpu::sense::printed_constants(),
+        cpu::observe::printed_constants(),
+        tally::printed_constants(),
+        autoreset::printed_constants(),
+        "\n".to_owned(),
+        layout::printed_codes(),
+        "\n".to_owned(),
+        layout::printed_structs(),
+    ]
+    .concat()
+}

@@ -1,0 +1,104 @@
+//! Random numbers as a pure function of (seed, env, episode, draw): no generator state, the same bits on every engine.
+//!
+//! The mixer is pcg4d of M. Jarzynski and M. Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020): u32
+//! arithmetic alone.
+
+use crate::layout::shared::constants;
+
+constants! {
+    /// Factor of the linear congruential step that each counter goes through first.
+    const FACTOR: u32 = 1_664_525;
+    /// Addend of that step.
+    const ADDEND: u32 = 1_013_904_223;
+    /// Lowest bits of a word that an f32 cannot hold.
+    const SPARE_BITS: u32 = 8;
+    /// Unit of the bits above them.
+    const UNIT: f32 = 1.0 / 8_388_608.0;
+    /// `Draw::Route`.
+    const DRAW_ROUTE: u32 = Draw::Route as u32;
+    /// `Draw::Pose`.
+    const DRAW_POSE: u32 = Draw::Pose as u32;
+    /// `Draw::Vehicle`.
+    const DRAW_VEHICLE: u32 = Draw::Vehicle as u32;
+    /// `Draw::Action`.
+    const DRAW_ACTION: u32 = Draw::Action as u32;
+}
+
+/// What a number is drawn for: each has its own stream.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Draw {
+    /// The route of an episode.
+    Route,
+    /// The pose at the start of an episode: lateral offset and heading.
+    Pose,
+    /// A random action; the step is added to it, so that numbers above it are free only at the other end.
+    Action,
+    /// The vehicle of an episode, and the speed that it begins at.
+    Vehicle = u32::MAX,
+}
+
+/// Four random words.
+pub fn words(seed: u32, env: u32, episode: u32, draw: u32) -> [u32; 4] {
+    let [mut x, mut y, mut z, mut w] = [seed, env, episode, draw].map(|word| word.wrapping_mul(FACTOR).wrapping_add(ADDEND));
+    x = x.wrapping_add(y.wrapping_mul(w));
+    y = y.wrapping_add(z.wrapping_mul(x));
+    z = z.wrapping_add(x.wrapping_mul(y));
+    w = w.wrapping_add(y.wrapping_mul(z));
+    [x, y, z, w] = [x, y, z, w].map(|word| word ^ (word >> 16));
+    x = x.wrapping_add(y.wrapping_mul(w));
+    y = y.wrapping_add(z.wrapping_mul(x));
+    z = z.wrapping_add(x.wrapping_mul(y));
+    w = w.wrapping_add(y.wrapping_mul(z));
+    [x, y, z, w]
+}
+
+/// A word as a number in [-1, 1): its upper 24 bits, exact in f32.
+pub fn signed_unit(word: u32) -> f32 {
+    (word >> SPARE_BITS) as f32 * UNIT - 1.0
+}
+
+/// A word as an index below `n`, uniform to within 2^-32.
+pub fn index_below(word: u32, n: u32) -> u32 {
+    ((u64::from(word) * u64::from(n)) >> 32) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbouring_counters_give_unrelated_numbers_without_bias() {
+        let mut sums = [0.0f64; 4];
+        let mut products = 0.0f64;
+        let n = 40_000;
+        for env in 0..200 {
+            for episode in 0..200 {
+                let here = words(7, env, episode, 0).map(signed_unit);
+                let there = words(7, env + 1, episode, 0).map(signed_unit);
+                for (sum, value) in sums.iter_mut().zip(here) {
+                    *sum += f64::from(value);
+                }
+                products += f64::from(here[0] * there[0]);
+            }
+        }
+        // The mean of n uniform numbers in [-1, 1) has a deviation of 1/sqrt(3 n), a product's of 1/(3 sqrt(n)): five
+        // of each.
+        let limit = 5.0 / (3.0 * n as f64).sqrt();
+        assert!(sums.iter().all(|sum| (sum / n as f64).abs() < limit), "{sums:?}");
+        assert!((products / n as f64).abs() < 5.0 / (3.0 * (n as f64).sqrt()), "{products}");
+    }
+
+    #[test]
+    fn an_index_covers_its_range_and_stays_below_it() {
+        assert_eq!(index_below(0, 52), 0);
+        assert_eq!(index_below(u32::MAX, 52), 51);
+        assert_eq!(index_below(u32::MAX, 1), 0);
+    }
+
+    #[test]
+    fn a_unit_number_is_exact_at_its_ends() {
+        assert_eq!(signed_unit(0), -1.0);
+        assert!(signed_unit(u32::MAX) < 1.0);
+    }
+}

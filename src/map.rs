@@ -1,0 +1,9 @@
+//! Roads: a ring with its arms, kerbs, lanes and routes, from parameters, from a map, or drawn at random.
+//!
+//! Each of the three gives a [`ground::Ground`], and all that follows knows that alone.
+
+pub mod route; // lane centre lines -> waypoints
+pub mod ground; // a ring with its arms: kerb faces, lane edges, routes
+pub mod opendrive; // maps -> rings
+pub mod parametric; // parameters -> kerbs and lanes
+pub mod procedural; // random roundabouts, by seed and index

@@ -1,0 +1,296 @@
+//! A ring of a map as a [`Ground`]: surface, arms and routes around its centre, as arcs and segments.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec2;
+
+use crate::geometry::area::{points, signed_area};
+use super::bypass::Around;
+use super::crossings::{ArmLanes, Crossing, arms, circle, crossings, joined};
+use super::lanes::Strip;
+use super::level::{GRADE, Level};
+use super::lines::{CROSSING, Lines, shown};
+use super::names::named;
+use super::paths::Network;
+use super::rings::{densified, fitted_circle};
+use super::surroundings::{self, Part, REACH, clipped, encloses_origin, outline};
+use super::whole::TILTED;
+use super::{FINEST, Map, Ring};
+use crate::geometry::{Curve, Outline, Piece};
+use crate::map::ground::{Arm, Edges, Ground, Kerb};
+use crate::files::reader::{Error, Reader};
+use crate::map::route::Lane;
+
+/// A way through the ring comes as near to its outer kerb as this, inside or outside \[m].
+const BESIDE_RING: f64 = 6.0;
+/// Ring lanes whose centre lines are nearer to each other than this are one \[m].
+const ONE_LANE: f64 = 1.2;
+/// Most arms of a place.
+const MOST_ARMS: usize = 8;
+
+/// How a ring is imported.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Names of the arms, counter-clockwise from east in the map; without them they are named by compass.
+    pub arms: Vec<String>,
+}
+
+/// A ring that was imported.
+#[derive(Debug, Clone)]
+pub struct Imported {
+    /// What is driven on; its origin is the ring's centre.
+    pub ground: Ground,
+    /// The ring's centre in the map's own coordinates \[m].
+    pub centre: DVec2,
+    /// What is odd about it.
+    pub warnings: Vec<String>,
+}
+
+/// Errors about a place of a map, `ring at (1.0, 2.0): key: value; expected`.
+pub(super) struct Refusals<'a> {
+    pub(super) reader: Reader<'a>,
+    pub(super) place: String,
+}
+
+impl Refusals<'_> {
+    pub(super) fn error(&self, key: &str, value: impl Into<String>, expected: impl Into<String>) -> Error {
+        self.reader.invalid(format!("{}: {key}", self.place), value.into(), expected)
+    }
+}
+
+/// The surface around a ring's island, which gives the centre.
+struct Island {
+    origin: DVec2,
+    radius: f64,
+    faces: Outline,
+    edges: Outline,
+}
+
+/// A ring of a map's records.
+pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Imported, Error> {
+    let outside = map.outside(ring.centre);
+    let refused = Refusals { reader: Reader::of(&map.file), place: format!("ring at ({:.1}, {:.1})", outside.x, outside.y) };
+    let extent = ring.radius + REACH;
+    let expected = "its edge is lost among narrow voids; another ring would do";
+    let Island { origin, radius, faces, edges } = island(map, ring, extent).ok_or_else(|| refused.error("island", "none", expected))?;
+    let outer_radius = outer_radius(&faces, radius);
+
+    let fine = surroundings::lanes(map, origin, extent, FINEST);
+    let network = Network { records: &map.records, graph: &map.graph, strips: fine.iter().map(|(index, strip)| (*index, strip)).collect() };
+    let around = Around { network: &network, outer_radius, reach: outer_radius + BESIDE_RING, extent };
+    let (circle, lanes, bypasses) = ring_arms(map, origin, radius, &around);
+    let site = Site { map, refused: &refused, network: &network, origin, extent, circle, faces, edges };
+    let mut imported = site.imported(&lanes, options, |routes| {
+        add_routes(routes, &lanes, radius, outer_radius);
+        Ok(())
+    })?;
+    imported.warnings.splice(..0, bypasses.iter().map(|bypass| format!("{}: {bypass}", refused.place)));
+    let lines: Vec<Vec<DVec2>> = imported.ground.lines.iter().map(|line| line.line.polyline(0.01)).collect();
+    let in_ring: Vec<&Vec<DVec2>> = lines.iter().filter(|line| !passes_outside(line, outer_radius)).collect();
+    let in_ring = if in_ring.is_empty() { lines.iter().collect() } else { in_ring };
+    let mut lane_radii: Vec<f64> = in_ring.into_iter().map(|line| ring_radius(line, radius, outer_radius)).collect();
+    lane_radii.sort_by(f64::total_cmp);
+    lane_radii.dedup_by(|after, before| *after - *before < ONE_LANE);
+    imported.ground = Ground { island_radius: radius, outer_radius, lane_radii, ..imported.ground };
+    Ok(imported)
+}
+
+/// A place of a map, a ring or a junction, whose routes are still to be found.
+pub(super) struct Site<'a> {
+    pub(super) map: &'a Map,
+    pub(super) refused: &'a Refusals<'a>,
+    pub(super) network: &'a Network<'a>,
+    /// What is the origin of the rest, in the map's records \[m].
+    pub(super) origin: DVec2,
+    /// How far the world reaches \[m].
+    pub(super) extent: f64,
+    /// Radius of the circle where arms begin \[m].
+    pub(super) circle: f64,
+    pub(super) faces: Outline,
+    pub(super) edges: Outline,
+}
+
+impl Site<'_> {
+    /// The place with these arms and the routes that `add` finds; without an island and lanes around it.
+    pub(super) fn imported(
+        self,
+        lanes: &[ArmLanes],
+        options: &Options,
+        add: impl FnOnce(&mut Lines) -> Result<(), Error>,
+    ) -> Result<Imported, Error> {
+        let Site { map, refused, network, origin, extent, circle, faces, edges } = self;
+        check_arms(map, refused, lanes, circle)?;
+        let mirrored = map.is_mirrored();
+        let arms = named(lanes, options, mirrored).map_err(|expected| refused.error("arms", format!("{:?}", options.arms), expected))?;
+        let mut routes =
+            Lines { network, mirrored, arms: &arms, place: &refused.place, extent, circle, lines: Vec::new(), warnings: Vec::new() };
+        add(&mut routes)?;
+        if routes.lines.is_empty() {
+            let found = format!("none between {} arms", lanes.len());
+            let expected = format!("the map's links must lead from a lane in to a lane out{}", unknown_lanes(map));
+            return Err(refused.error("routes", found, expected));
+        }
+        routes.check(&faces);
+        routes.warnings.extend(tilt(map, network).map(|tilt| format!("{}: {tilt}", refused.place)));
+        let Lines { mut lines, warnings, .. } = routes;
+        lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
+        let kerbs = faces.loops.iter().map(|curve| kerb(curve, &arms)).collect();
+        let (lanes, edges) = (shown(&lines), Edges::Own(edges));
+        let (island_radius, lane_radii) = (0.0, Vec::new());
+        let ground = Ground { mirrored, island_radius, outer_radius: circle, lane_radii, arms, faces, kerbs, edges, lanes, lines };
+        Ok(Imported { ground, centre: map.outside(origin), warnings })
+    }
+}
+
+/// The surface around a first centre, whose island then gives the centre itself.
+fn island(map: &Map, ring: &Ring, extent: f64) -> Option<Island> {
+    let surface = surroundings::surface(map, ring.centre, extent);
+    let around = |part: &Part| encloses_origin(&part[0]) && part.iter().skip(1).any(|hole| encloses_origin(hole));
+    let faces = clipped(&surface.faces, extent).into_iter().find(around)?;
+    let edges = clipped(&surface.edges, extent).into_iter().find(around)?;
+    let island = faces.iter().skip(1).find(|hole| encloses_origin(hole))?;
+    let (centre, radius, _) = fitted_circle(&densified(&points(island), 0.1))?;
+    Some(Island { origin: ring.centre + centre, radius, faces: outline(&faces, centre), edges: outline(&edges, centre) })
+}
+
+/// Radius of the circle around a ring where its arms begin, the lanes of the arms, and what became of bypasses.
+fn ring_arms(map: &Map, origin: DVec2, radius: f64, around_ring: &Around) -> (f64, Vec<ArmLanes>, Vec<String>) {
+    let &Around { network, reach, .. } = around_ring;
+    let coarse = surroundings::nearby(map, origin, radius + REACH, super::COARSE);
+    let (indices, around): (Vec<usize>, Vec<Strip>) = coarse.into_iter().unzip();
+    let circle = circle(&map.records, &around, radius);
+    let mut crossings = crossings(&around, &indices, &map.graph, circle);
+    drop_passing_lanes(&mut crossings, network, reach);
+    let gate = |crossing: &Crossing| network.gate(crossing, reach);
+    let (arms, bypasses) = around_ring.merged(joined(arms(&crossings, circle), gate, reach));
+    (circle, arms, bypasses)
+}
+
+/// An error if the arms of a place are none, or too many.
+fn check_arms(map: &Map, refused: &Refusals, lanes: &[ArmLanes], circle: f64) -> Result<(), Error> {
+    let found = format!("{} on a circle of {circle:.1} m", lanes.len());
+    if lanes.iter().all(|arm| arm.entries.is_empty()) || lanes.iter().all(|arm| arm.exits.is_empty()) {
+        let expected = format!("a lane must lead in and another out, by the links of the map{}", unknown_lanes(map));
+        return Err(refused.error("arms", found, expected));
+    }
+    if MOST_ARMS < lanes.len() {
+        return Err(refused.error("arms", found, format!("at most {MOST_ARMS} arms are driven")));
+    }
+    Ok(())
+}
+
+/// What an error adds where the map has lanes of unknown types, on which nothing is driven.
+fn unknown_lanes(map: &Map) -> String {
+    map.records.unknown_lanes().map(|unknown| format!("; it has {unknown}")).unwrap_or_default()
+}
+
+/// The steepest that the lanes around a place are, where that is worth a warning.
+fn tilt(map: &Map, network: &Network) -> Option<String> {
+    let largest = |of: fn(&Level) -> f64, least: f64, what: &str| {
+        let roads = network.strips.values().map(|strip| &map.records.roads[strip.road]).filter(|road| least < of(&road.level));
+        let steepest = roads.max_by(|one, other| of(&one.level).total_cmp(&of(&other.level)).then(other.id.cmp(&one.id)))?;
+        Some(format!("{what} of up to {:.1} % (road {})", 100.0 * of(&steepest.level), super::xml::shown(&steepest.id)))
+    };
+    let parts = [largest(|level| level.grade, GRADE, "grades"), largest(|level| level.crossfall, TILTED, "crossfall")];
+    let list = parts.into_iter().flatten().collect::<Vec<_>>().join(" and ");
+    (!list.is_empty()).then(|| format!("{list}; the simulated road is level"))
+}
+
+/// Adds the routes through a ring: from each of an arm's two entry lanes next to the kerb to every exit.
+fn add_routes(routes: &mut Lines, lanes: &[ArmLanes], island_radius: f64, outer_radius: f64) {
+    let n_arms = lanes.len();
+    for (entry, arm) in lanes.iter().enumerate() {
+        let n = arm.entries.len();
+        if 2 < n {
+            let (place, name) = (routes.place, &routes.arms[entry].name);
+            routes.warnings.push(format!("{place}: arm {name} has {n} entry lanes; the two next to the kerb are driven"));
+        }
+        for lane in [Lane::Left, Lane::Right].into_iter().filter(|lane| lane.index() < n.min(2)) {
+            let mut ways = routes.network.ways(&arm.entries[lane.index()], lanes);
+            ways.retain(|(_, way)| routes.network.nearest_to_centre(way) < outer_radius + BESIDE_RING);
+            let mut exit = 0;
+            for exit_arm in (1..=n_arms).map(|turn| (entry + turn) % n_arms).filter(|&arm| !lanes[arm].exits.is_empty()) {
+                exit += 1;
+                // The lane that keeps its place from the kerb, or the one nearest to it.
+                let kept = lane.index().min(lanes[exit_arm].exits.len() - 1);
+                let candidates = ways.iter().filter(|((arm, _), _)| *arm == exit_arm);
+                let Some(way) = candidates.min_by_key(|((_, to), _)| (to.abs_diff(kept), *to)) else { continue };
+                routes.add((entry, lane, exit, exit_arm), way, |line, width| {
+                    if passes_outside(line, outer_radius) {
+                        return (CROSSING * width, CROSSING * width);
+                    }
+                    let middle = ring_radius(line, island_radius, outer_radius);
+                    ((middle - island_radius).max(width / 2.0), (outer_radius - middle).max(width / 2.0))
+                });
+            }
+        }
+    }
+}
+
+/// Whether a line does not enter the ring.
+fn passes_outside(line: &[DVec2], outer_radius: f64) -> bool {
+    line.iter().all(|p| outer_radius < p.length())
+}
+
+/// Drops lanes that no way through the ring begins or ends on: those of roads that pass by.
+fn drop_passing_lanes(crossings: &mut Vec<Crossing>, network: &Network, reach: f64) {
+    let alone = |crossing: &Crossing| match crossing.inwards {
+        true => ArmLanes { entries: vec![crossing.clone()], exits: Vec::new() },
+        false => ArmLanes { entries: Vec::new(), exits: vec![crossing.clone()] },
+    };
+    let lanes: Vec<ArmLanes> = crossings.iter().map(alone).collect();
+    let mut used = vec![false; lanes.len()];
+    for (entry, crossing) in crossings.iter().enumerate().filter(|(_, crossing)| crossing.inwards) {
+        for ((exit, _), way) in network.ways(crossing, &lanes) {
+            if network.nearest_to_centre(&way) < reach {
+                (used[entry], used[exit]) = (true, true);
+            }
+        }
+    }
+    let mut used = used.into_iter();
+    crossings.retain(|_| used.next().unwrap_or(false));
+}
+
+/// Radius of the ring's outer kerb: the island's and what is free beyond it between the arms.
+fn outer_radius(faces: &Outline, island_radius: f64) -> f64 {
+    let mut free: Vec<f64> = (0..180)
+        .map(|i| {
+            let out = DVec2::from_angle(f64::from(i) * TAU / 180.0);
+            faces.ray(out * (island_radius + 0.5), out, 50.0)
+        })
+        .filter(|&free| 2.0 < free)
+        .collect();
+    free.sort_by(f64::total_cmp);
+    // A quarter of the angles at least lies between the mouths.
+    let between = free.get(free.len() / 8).copied().unwrap_or(4.0);
+    island_radius + 0.5 + between
+}
+
+/// Radius at which a line follows the ring: the middle of its distances from the centre \[m].
+fn ring_radius(line: &[DVec2], island_radius: f64, outer_radius: f64) -> f64 {
+    let mut radii: Vec<f64> = Vec::new();
+    for pair in line.windows(2) {
+        let middle = (pair[0] + pair[1]) / 2.0;
+        let turning = middle.normalize_or_zero().perp_dot((pair[1] - pair[0]).normalize_or_zero());
+        if middle.length() < outer_radius && 0.9 < turning {
+            radii.push(middle.length());
+        }
+    }
+    radii.sort_by(f64::total_cmp);
+    radii.get(radii.len() / 2).copied().unwrap_or((island_radius + outer_radius) / 2.0)
+}
+
+/// What a loop of the kerb faces belongs to.
+fn kerb(curve: &Curve, arms: &[Arm]) -> Kerb {
+    let contour: Vec<[f64; 2]> = curve.polyline(0.01).into_iter().map(DVec2::into).collect();
+    if 0.0 < signed_area(&contour) {
+        return Kerb::Outer;
+    }
+    if encloses_origin(&contour) {
+        return Kerb::Island;
+    }
+    let bearing = curve.pieces.iter().map(Piece::start).sum::<DVec2>().to_angle();
+    let apart = |arm: &Arm| (bearing - arm.bearing + PI).rem_euclid(TAU) - PI;
+    let nearest = (0..arms.len()).min_by(|&one, &other| apart(&arms[one]).abs().total_cmp(&apart(&arms[other]).abs()));
+    Kerb::Splitter(nearest.unwrap_or(0))
+}

@@ -1,0 +1,151 @@
+//! How far a road is from level: its grades and its crossfall, which are not simulated, so that they can be warned of.
+
+use roxmltree::Node;
+
+use super::read::Source;
+use super::records::{Cubic, Road, active};
+use super::xml::{child, children};
+use crate::files::reader::Error;
+
+/// A grade beyond this is warned of.
+pub(super) const GRADE: f64 = 0.03;
+/// A step of the elevation beyond this is warned of \[m].
+const STEP: f64 = 0.05;
+/// Records that are nearer to each other than this say nothing of the grade between them \[m].
+const APART: f64 = 1.0;
+/// Largest factor of an elevation.
+const LARGEST: f64 = 1e9;
+
+/// The steepest that a road is.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Level {
+    /// Largest rise along the road, as a fraction of the length.
+    pub(super) grade: f64,
+    /// Largest rise across the road, by its superelevation and its shape together at most, as a fraction of the width.
+    pub(super) crossfall: f64,
+}
+
+impl Cubic {
+    /// Largest absolute value between two stations.
+    fn largest(&self, from: f64, to: f64) -> f64 {
+        let [_, b, c, d] = self.factors;
+        self.largest_at(from, to, roots([b, 2.0 * c, 3.0 * d]), |s| self.at(s))
+    }
+
+    /// Largest absolute slope between two stations.
+    fn steepest(&self, from: f64, to: f64) -> f64 {
+        let [_, b, c, d] = self.factors;
+        let slope = |s: f64| b + (s - self.start) * (2.0 * c + 3.0 * d * (s - self.start));
+        self.largest_at(from, to, roots([2.0 * c, 6.0 * d, 0.0]), slope)
+    }
+
+    /// Largest absolute value of `f` at both stations and at those of `extremes` between them, counted from the start.
+    fn largest_at(&self, from: f64, to: f64, extremes: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
+        let inside = extremes.into_iter().map(|x| self.start + x).filter(|s| (from..=to).contains(s));
+        [from, to].into_iter().chain(inside).map(|s| f(s).abs()).filter(|value| value.is_finite()).fold(0.0, f64::max)
+    }
+}
+
+/// Where `a + b x + c x²` is 0; NaN where it is nowhere.
+fn roots([a, b, c]: [f64; 3]) -> [f64; 2] {
+    if c == 0.0 {
+        return [-a / b, f64::NAN];
+    }
+    let root = (b * b - 4.0 * a * c).sqrt();
+    [(-b - root) / (2.0 * c), (-b + root) / (2.0 * c)]
+}
+
+/// Every record with the stretch on which it holds, up to `end`.
+fn stretches(records: &[Cubic], end: f64) -> impl Iterator<Item = (&Cubic, f64, f64)> {
+    let until = move |i: usize| records.get(i + 1).map_or(end, |next| next.start);
+    records.iter().enumerate().map(move |(i, record)| (record, record.start, until(i).max(record.start)))
+}
+
+impl Source<'_, '_> {
+    /// How far a road is from level, with a warning where it is steep.
+    pub(super) fn level(&mut self, node: Node, road: &Road) -> Result<Level, Error> {
+        let elevation = self.profile(children(node, "elevationProfile"), "elevation")?;
+        let mut grade = stretches(&elevation, road.length).map(|(record, from, to)| record.steepest(from, to)).fold(0.0, f64::max);
+        for pair in elevation.windows(2) {
+            // Elevations in pieces: heights alone, or one that begins elsewhere than the last one ended.
+            let apart = pair[1].start - pair[0].start;
+            if APART <= apart {
+                grade = grade.max((pair[1].factors[0] - pair[0].factors[0]).abs() / apart);
+            }
+        }
+        let step = |pair: &[Cubic]| ((pair[1].factors[0] - pair[0].at(pair[1].start)).abs(), pair[1].start);
+        let largest = elevation.windows(2).map(step).max_by(|one, other| one.0.total_cmp(&other.0));
+        if let Some((step, s)) = largest.filter(|(step, _)| STEP < *step) {
+            self.warn(node, &format!("its elevation jumps by up to {step:.2} m, at s {s:.2} m; the simulated road is level"));
+        }
+        if GRADE < grade {
+            self.warn(node, &format!("has a grade of {:.1} %; the simulated road is level", 100.0 * grade));
+        }
+        Ok(Level { grade, crossfall: self.crossfall(node, road)? })
+    }
+
+    /// The largest rise across a road.
+    fn crossfall(&mut self, node: Node, road: &Road) -> Result<f64, Error> {
+        let superelevation = self.profile(children(node, "lateralProfile"), "superelevation")?;
+        let angle = stretches(&superelevation, road.length).map(|(record, from, to)| record.largest(from, to)).fold(0.0, f64::max);
+        let Some(profile) = child(node, "lateralProfile") else { return Ok(0.0) };
+        if child(profile, "crossSectionSurface").is_some() {
+            self.warn(node, "its crossSectionSurface is not read; the simulated road is level");
+        }
+        // Shapes of one station follow each other across the road.
+        let mut shapes: Vec<(f64, Cubic)> = Vec::new();
+        for shape in children(profile, "shape") {
+            let t = self.number(shape, "t", None, LARGEST)?;
+            shapes.push((self.length(shape, "s")?, Cubic { start: t, factors: self.factors(shape, ["a", "b", "c", "d"])? }));
+        }
+        shapes.sort_by(|(s, one), (t, other)| s.total_cmp(t).then(one.start.total_cmp(&other.start)));
+        let mut steepest: f64 = 0.0;
+        for station in shapes.chunk_by(|(one, _), (other, _)| one == other) {
+            let across: Vec<Cubic> = station.iter().map(|(_, shape)| *shape).collect();
+            let [right, left] = reach(road, station[0].0);
+            for (shape, from, to) in stretches(&across, left) {
+                let (from, to) = (from.clamp(right, left), to.clamp(right, left));
+                steepest = steepest.max(if from < to { shape.steepest(from, to) } else { 0.0 });
+            }
+        }
+        Ok(angle.min(1.5).tan() + steepest)
+    }
+
+    /// Cubics of an element's children in the order of their beginnings.
+    fn profile<'a, 'i: 'a>(&mut self, of: impl Iterator<Item = Node<'a, 'i>>, name: &'static str) -> Result<Vec<Cubic>, Error> {
+        self.cubics(of.flat_map(|profile| children(profile, name)), "s")
+    }
+}
+
+/// How far a road's lanes reach to its right and to its left at a station, left positive \[m].
+fn reach(road: &Road, s: f64) -> [f64; 2] {
+    let Some(section) = active(&road.sections, s, |section| section.start) else { return [0.0; 2] };
+    let offset = active(&road.offsets, s, |offset| offset.start).map_or(0.0, |offset| offset.at(s));
+    let local = s - section.start;
+    let width = |side: i32| -> f64 {
+        let lanes = section.lanes.iter().filter(|lane| lane.id.signum() == side);
+        let at = lanes.map(|lane| {
+            let value = active(&lane.widths, local, |width| width.start).map_or(0.0, |width| width.at(local).abs());
+            (value, lane.bordered)
+        });
+        at.fold(0.0, |sum, (value, bordered)| if bordered { value.max(sum) } else { sum + value })
+    };
+    let (right, left) = (offset - width(-1), offset + width(1));
+    if right.is_finite() && left.is_finite() { [right.min(left), left.max(right)] } else { [0.0; 2] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// v = 0.006 s² - 0.00005 s³ is steepest at s = 40 m, where it rises by 0.24 a metre.
+    #[test]
+    fn a_cubic_is_steepest_where_its_slope_turns_round() {
+        let hill = Cubic { start: 0.0, factors: [0.0, 0.0, 0.006, -0.000_05] };
+        assert!((hill.steepest(0.0, 70.0) - 0.24).abs() < 1e-12);
+        assert!((hill.steepest(0.0, 10.0) - 0.105).abs() < 1e-12);
+        // Its top lies at s = 80 m, 12.8 m high.
+        assert!((hill.largest(0.0, 100.0) - 12.8).abs() < 1e-12);
+        assert_eq!(Cubic { start: 3.0, factors: [-0.15, 0.0, 0.0, 0.0] }.largest(3.0, 9.0), 0.15);
+    }
+}

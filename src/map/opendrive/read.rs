@@ -1,0 +1,256 @@
+//! OpenDRIVE's XML to records: every number finite and within bounds, every error with road, lane and line.
+//!
+//! A file that contradicts itself is read with a warning; one that cannot be understood is refused.
+
+use std::path::Path;
+
+use roxmltree::{Document, Node, ParsingOptions};
+
+use super::Hand;
+use super::level::Level;
+use super::objects::islands;
+use super::records::{Connection, Cubic, Link, Records, Road};
+use super::xml::{attribute, child, children, line, shown};
+use crate::files::reader::{Error, Reader, shortened};
+
+/// Largest file \[bytes].
+pub(super) const FILE_LIMIT: u64 = 256 << 20;
+/// Most elements of a file that are read.
+const MOST_ELEMENTS: usize = 4_000_000;
+/// Most nodes of a file: elements, comments and the text between them.
+const MOST_NODES: u32 = 8_000_000;
+/// Deepest nesting of elements.
+const DEEPEST: u16 = 64;
+/// Longest road \[m].
+pub(super) const LONGEST: f64 = 100_000.0;
+/// A lane above this is raised \[m].
+pub(super) const RAISED: f64 = 0.02;
+/// A raised lane of at most this width is a kerb \[m].
+pub(super) const KERB_WIDTH: f64 = 1.0;
+/// Most warnings that are kept.
+pub(super) const MOST_WARNINGS: usize = 1000;
+
+/// The records of a file's text.
+pub(super) fn records(file: &Path, text: &str, hand: Hand) -> Result<Records, Error> {
+    // A document type is passed over; one that declares entities could make a large map of a small file.
+    let options = ParsingOptions { nodes_limit: MOST_NODES, allow_dtd: !text.contains("<!ENTITY"), ..ParsingOptions::default() };
+    let malformed = |message: String| Error::Malformed { file: file.to_owned(), message: shortened(&message, 300) };
+    let document = Document::parse_with_options(text, options).map_err(|error| {
+        malformed(match error {
+            roxmltree::Error::DtdDetected => "declares entities (<!ENTITY ...>), which are not read; put their text in their place".into(),
+            error => format!("is no OpenDRIVE map: {}", error.to_string().escape_debug()),
+        })
+    })?;
+    let root = document.root_element();
+    if root.tag_name().name() != "OpenDRIVE" {
+        return Err(malformed(format!("is no OpenDRIVE map: the first element is <{}>, not <OpenDRIVE>", shown(root.tag_name().name()))));
+    }
+    check_size(&document).map_err(malformed)?;
+    let mut source = Source { reader: Reader::of(file), document: &document, records: Records::default(), repeated: 0 };
+    for node in children(root, "road") {
+        let road = source.road(node)?;
+        if source.records.by_id.contains_key(&road.id) {
+            source.warn(node, "has the id of an earlier road; it is left out");
+            continue;
+        }
+        source.records.by_id.insert(road.id.clone(), source.records.roads.len());
+        source.records.roads.push(road);
+    }
+    for node in children(root, "junction") {
+        let connections = source.junction(node)?;
+        source.records.junctions.entry(attribute(node, "id").to_owned()).or_insert(connections);
+    }
+    source.records.mirrored = match hand {
+        Hand::Right => false,
+        Hand::Left => true,
+        Hand::Map => source.left_hand(root),
+    };
+    let signals = root.descendants().filter(|node| node.has_tag_name("signal")).count();
+    if 0 < signals {
+        source.records.warnings.push(format!("{signals} signals are not read"));
+    }
+    let mut records = source.records;
+    if records.mirrored {
+        records.mirror();
+    }
+    records.completed(&Reader::of(file))?;
+    Ok(records)
+}
+
+/// An error if there are too many elements, or elements too deep in each other.
+fn check_size(document: &Document) -> Result<(), String> {
+    let mut depths: Vec<u16> = Vec::new();
+    let mut elements = 0;
+    for node in document.descendants() {
+        let depth = node.parent().map_or(0, |parent| depths[parent.id().get_usize()] + 1);
+        if DEEPEST < depth {
+            return Err(format!("line {}: elements lie more than {DEEPEST} deep in each other", line(document, node)));
+        }
+        depths.push(depth);
+        elements += usize::from(node.is_element());
+    }
+    match elements {
+        0..=MOST_ELEMENTS => Ok(()),
+        more => Err(format!("has {more} elements; at most {MOST_ELEMENTS} are read")),
+    }
+}
+
+/// A document that is being read.
+pub(super) struct Source<'a, 'i> {
+    reader: Reader<'a>,
+    document: &'a Document<'i>,
+    pub(super) records: Records,
+    /// Records of lanes that were repeated so far.
+    pub(super) repeated: usize,
+}
+
+impl Source<'_, '_> {
+    /// Where a node stands, for messages: `road 12, section s 0, lane -1, width`.
+    fn place(&self, node: Node) -> String {
+        let mut parts = Vec::new();
+        for node in node.ancestors() {
+            match node.tag_name().name() {
+                "road" => parts.push(format!("road {}", shown(attribute(node, "id")))),
+                "junction" => parts.push(format!("junction {}", shown(attribute(node, "id")))),
+                "laneSection" => parts.push(format!("section s {}", shown(attribute(node, "s")))),
+                "lane" => parts.push(format!("lane {}", shown(attribute(node, "id")))),
+                "geometry" => parts.push(format!("geometry s {}", shown(attribute(node, "s")))),
+                "planView" | "lanes" | "left" | "right" | "center" | "OpenDRIVE" | "" => {}
+                other => parts.push(shown(other)),
+            }
+        }
+        parts.reverse();
+        parts.join(", ")
+    }
+
+    pub(super) fn warn(&mut self, node: Node, what: &str) {
+        if self.records.warnings.len() < MOST_WARNINGS {
+            self.records.warnings.push(format!("{}: {what}", self.place(node)));
+        }
+    }
+
+    pub(super) fn invalid(&self, node: Node, key: &str, value: &str, expected: impl Into<String>) -> Error {
+        let key = format!("line {}: {}: {key}", line(self.document, node), self.place(node));
+        self.reader.invalid(key, value, expected)
+    }
+
+    /// A number within `-limit..limit`, or `default` where the attribute is missing.
+    pub(super) fn number(&self, node: Node, key: &str, default: Option<f64>, limit: f64) -> Result<f64, Error> {
+        let Some(text) = node.attribute(key) else {
+            return default.ok_or_else(|| self.invalid(node, key, "missing", format!("a number within {limit:e} of 0 is needed")));
+        };
+        match text.trim().parse::<f64>() {
+            Ok(value) if value.abs() <= limit => Ok(value),
+            _ => Err(self.invalid(node, key, &format!("{text:?}"), format!("must be a number within {limit:e} of 0"))),
+        }
+    }
+
+    /// A station or a length.
+    pub(super) fn length(&self, node: Node, key: &str) -> Result<f64, Error> {
+        let value = self.number(node, key, None, LONGEST)?;
+        if value < -1e-6 {
+            return Err(self.invalid(node, key, attribute(node, key), "must not be negative"));
+        }
+        Ok(value.max(0.0))
+    }
+
+    pub(super) fn factors(&self, node: Node, keys: [&str; 4]) -> Result<[f64; 4], Error> {
+        let mut factors = [0.0; 4];
+        for (factor, key) in factors.iter_mut().zip(keys) {
+            *factor = self.number(node, key, Some(0.0), 1e30)?;
+        }
+        Ok(factors)
+    }
+
+    fn cubic(&self, node: Node, start: &str) -> Result<Cubic, Error> {
+        Ok(Cubic { start: self.length(node, start)?, factors: self.factors(node, ["a", "b", "c", "d"])? })
+    }
+
+    /// Cubics in the order of their beginnings.
+    pub(super) fn cubics<'a, 'i: 'a>(&mut self, nodes: impl Iterator<Item = Node<'a, 'i>>, start: &str) -> Result<Vec<Cubic>, Error> {
+        let mut cubics = nodes.map(|node| self.cubic(node, start)).collect::<Result<Vec<_>, _>>()?;
+        cubics.sort_by(|one, other| one.start.total_cmp(&other.start));
+        Ok(cubics)
+    }
+
+    fn road(&mut self, node: Node) -> Result<Road, Error> {
+        let id = attribute(node, "id").to_owned();
+        let mut length = self.length(node, "length")?;
+        let Some(plan_node) = child(node, "planView") else {
+            return Err(self.invalid(node, "planView", "missing", "every road needs one"));
+        };
+        let plan = self.plan(plan_node)?;
+        let measured = plan.last().map_or(0.0, |last| last.start + last.length).min(LONGEST);
+        if 0.01 < (measured - length).abs() {
+            self.warn(node, &format!("has a length of {length:.3} m, but its geometries end at {measured:.3} m; they count"));
+            length = measured;
+        }
+        let link = child(node, "link");
+        let end = |name: &'static str| link.and_then(|link| child(link, name)).and_then(road_link);
+        let lanes = child(node, "lanes");
+        let offsets = match lanes {
+            Some(lanes) => self.cubics(children(lanes, "laneOffset"), "s")?,
+            None => Vec::new(),
+        };
+        let sections = self.sections(node, lanes.into_iter().flat_map(|lanes| children(lanes, "laneSection")), length)?;
+        let junction = Some(attribute(node, "junction")).filter(|id| !id.is_empty() && *id != "-1").map(str::to_owned);
+        let mut road = Road {
+            id,
+            length,
+            junction,
+            predecessor: end("predecessor"),
+            successor: end("successor"),
+            plan,
+            offsets,
+            sections,
+            islands: Vec::new(),
+            level: Level::default(),
+        };
+        road.level = self.level(node, &road)?;
+        road.islands = islands(self, node, &road)?;
+        Ok(road)
+    }
+
+    fn junction(&mut self, node: Node) -> Result<Vec<Connection>, Error> {
+        let mut connections = Vec::new();
+        for connection in children(node, "connection") {
+            let mut lanes = Vec::new();
+            for link in children(connection, "laneLink") {
+                match (attribute(link, "from").parse::<i32>(), attribute(link, "to").parse::<i32>()) {
+                    (Ok(from), Ok(to)) => lanes.push((from, to)),
+                    _ => self.warn(link, "has no lane numbers in `from` and `to`; it is left out"),
+                }
+            }
+            // A direct junction joins roads without one between them.
+            let direct = connection.attribute("connectingRoad").is_none() && connection.attribute("linkedRoad").is_some();
+            connections.push(Connection {
+                incoming: attribute(connection, "incomingRoad").to_owned(),
+                connecting: attribute(connection, if direct { "linkedRoad" } else { "connectingRoad" }).to_owned(),
+                at_start: attribute(connection, "contactPoint") != "end",
+                lanes,
+                direct,
+            });
+        }
+        Ok(connections)
+    }
+
+    /// Whether most of the map's roads have left-hand traffic.
+    fn left_hand(&mut self, root: Node) -> bool {
+        let rules: Vec<bool> = children(root, "road").map(|road| attribute(road, "rule") == "LHT").collect();
+        let left = rules.iter().filter(|&&left| left).count();
+        if 0 < left && left < rules.len() {
+            let both = format!("{left} of {} roads have left-hand traffic, the others right-hand; most count for all", rules.len());
+            self.records.warnings.push(both);
+        }
+        rules.len() < 2 * left
+    }
+}
+
+fn road_link(node: Node) -> Option<Link> {
+    let id = attribute(node, "elementId").to_owned();
+    match attribute(node, "elementType") {
+        "road" => Some(Link::Road(id, attribute(node, "contactPoint") != "end")),
+        "junction" => Some(Link::Junction(id)),
+        _ => None,
+    }
+}

@@ -1,0 +1,82 @@
+//! Left-hand traffic: a file describes the road as it lies in the world, and its mirror image in the x axis is driven.
+//!
+//! In such a file everything goes around clockwise. Bearings and offsets change their signs, and the lane next to the
+//! kerb is `left` instead of `right`.
+
+use super::Roundabout;
+use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenPoint, WrittenWay};
+use crate::map::ground::Hand;
+use crate::files::reader::Error;
+use crate::map::route::Route;
+
+/// Words at the end of a message about a position.
+const MIRRORED: &str = "hand = \"left\": positions in this message are those of the mirror image in the x axis";
+
+impl Roundabout {
+    /// Whether the road has left-hand traffic: it is driven as its mirror image in the x axis.
+    pub fn is_mirrored(&self) -> bool {
+        self.ground.mirrored
+    }
+
+    /// The roundabout as it lies in the world, for pictures and results: mirrored back where it has left-hand traffic.
+    /// Routes have the same names; see [`Ground::seen`].
+    pub fn seen(&self) -> Roundabout {
+        Roundabout { name: self.name.clone(), ground: self.ground.seen() }
+    }
+
+    /// A route of this roundabout as it lies in the world.
+    pub fn seen_route(&self, route: &Route) -> Route {
+        if self.is_mirrored() { route.mirrored() } else { route.clone() }
+    }
+}
+
+impl Written {
+    pub(super) fn is_left_hand(&self) -> bool {
+        self.hand == Hand::Left
+    }
+
+    /// The mirror image, with right-hand traffic.
+    pub(super) fn mirrored(mut self) -> Written {
+        self.hand = Hand::Right;
+        let gutters = [&mut self.ring.island_gutter, &mut self.ring.mouth_gutter];
+        gutters.into_iter().flatten().flatten().for_each(|point| point.bearing_deg = -point.bearing_deg);
+        self.arm.iter_mut().for_each(WrittenArm::mirror);
+        self
+    }
+}
+
+impl WrittenArm {
+    fn mirror(&mut self) {
+        self.bearing_deg = -self.bearing_deg;
+        self.splitter.iter_mut().for_each(WrittenPoint::mirror);
+        for WrittenWay { kerb, left, right, .. } in [&mut self.entry, &mut self.exit] {
+            std::mem::swap(left, right);
+            [Some(kerb), left.as_mut(), right.as_mut()].into_iter().flatten().for_each(WrittenAlignment::mirror);
+        }
+    }
+}
+
+impl WrittenAlignment {
+    fn mirror(&mut self) {
+        self.points.iter_mut().for_each(WrittenPoint::mirror);
+    }
+}
+
+impl WrittenPoint {
+    fn mirror(&mut self) {
+        self.offset = -self.offset;
+    }
+}
+
+/// An error of the mirror image by the keys of the file: lanes have their names there, and the message says that
+/// positions are mirrored.
+pub(super) fn as_written(error: Error) -> Error {
+    let Error::Invalid { file, key, value, expected } = error else { return error };
+    let swapped = |part: &str| match part {
+        "left" => "right".to_owned(),
+        "right" => "left".to_owned(),
+        part => part.to_owned(),
+    };
+    let key = key.split('.').map(swapped).collect::<Vec<_>>().join(".");
+    Error::Invalid { file, key, value, expected: format!("{expected} ({MIRRORED})") }
+}

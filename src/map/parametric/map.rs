@@ -1,0 +1,83 @@
+//! A roundabout from an OpenDRIVE map: which of its rings, and how it is named.
+
+use std::path::Path;
+
+use glam::DVec2;
+
+use super::Roundabout;
+use crate::map::opendrive::{Hand, Imported, Map, Options, Ring, Way};
+use crate::files::reader::{Error, Reader};
+
+/// Which ring of a map, and how it is imported.
+#[derive(Debug, Clone, Default)]
+pub struct Choice {
+    /// A point of the map near the ring; needed where the map has several \[m].
+    pub ring: Option<DVec2>,
+    /// Its hand of traffic.
+    pub hand: Hand,
+    /// The roundabout's name; the file's stem without one.
+    pub name: Option<String>,
+    /// Names of the arms, counter-clockwise from east; by compass without them.
+    pub arms: Vec<String>,
+    /// Ways through a junction in place of a ring.
+    pub ways: Vec<Way>,
+}
+
+/// Whether a file is an OpenDRIVE map by its name.
+pub fn is_map(file: &Path) -> bool {
+    file.extension().is_some_and(|extension| extension == "xodr")
+}
+
+impl Choice {
+    /// The ring that is meant.
+    ///
+    /// # Errors
+    ///
+    /// A map without a ring, or with several where none is chosen.
+    pub fn of(&self, file: &Path, map: &Map) -> Result<Ring, Error> {
+        if let Some(p) = self.ring {
+            return map.nearest(p);
+        }
+        let rings = map.rings();
+        if let [_, _, ..] = rings.as_slice() {
+            let listed: Vec<String> = rings.iter().map(|ring| format!("{:.1},{:.1}", ring.centre.x, ring.centre.y)).collect();
+            let expected = format!("the map has several; one of {}", listed.join("  "));
+            return Err(Reader::of(file).invalid("ring", "missing", expected));
+        }
+        map.nearest(DVec2::ZERO)
+    }
+
+    /// The ring or the ways that are meant, with arms and routes.
+    ///
+    /// # Errors
+    ///
+    /// A ring and ways at once, and those of [`Choice::of`], [`Map::ground`] and [`Map::through`].
+    pub fn imported(&self, file: &Path, map: &Map) -> Result<Imported, Error> {
+        let options = Options { arms: self.arms.clone() };
+        match (self.ways.as_slice(), self.ring) {
+            ([], _) => map.ground(&self.of(file, map)?, &options),
+            (ways, None) => map.through(ways, &options),
+            (_, Some(p)) => {
+                let expected = "is for a roundabout, and the ways are through a junction; leave one of them out";
+                Err(Reader::of(file).invalid("ring", format_args!("({}, {})", p.x, p.y), expected))
+            }
+        }
+    }
+}
+
+impl Roundabout {
+    /// A ring of an OpenDRIVE map, or ways through a junction of it.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Map::read`] and [`Choice::imported`], and a name that no route could have.
+    pub fn from_map(file: &Path, choice: &Choice) -> Result<Roundabout, Error> {
+        let stem = || file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = choice.name.clone().unwrap_or_else(stem);
+        if name.is_empty() || 40 < name.len() || name.contains('/') || name.chars().any(char::is_control) {
+            return Err(Reader::of(file).invalid("name", format!("{name:?}"), "must be 1 to 40 characters without a slash"));
+        }
+        let map = Map::read(file, choice.hand)?;
+        Ok(Roundabout::on(name, choice.imported(file, &map)?.ground))
+    }
+}
