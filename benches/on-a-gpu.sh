@@ -35,7 +35,7 @@ envs=${ENVS:-256..1048576}
 filter=${FILTER:-}
 modes=${MODES:-random,policy,large-policy,training}
 seconds=${SECONDS_EACH:-2}
-training=${TRAINING:-training/configs/gpu.toml}
+training=${TRAINING:-learner/configs/gpu.toml}
 minutes=${MINUTES:-1}
 read -ra options <<<"${TRAINING_OPTIONS:-}"
 adapter=(${ADAPTER:+--adapter "$ADAPTER"})

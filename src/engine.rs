@@ -19,8 +19,8 @@ use std::borrow::Cow;
 use std::fmt::Debug;
 use std::time::Duration;
 
-use crate::layout::{BeginRow, Column, Stream};
 use crate::engine::stages::{N_STAGES, Stage};
+use crate::layout::{BeginRow, Column, Stream};
 use crate::world::World;
 pub use autoreset::Autoreset;
 pub(crate) use batch::Row;

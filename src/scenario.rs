@@ -14,12 +14,12 @@ mod reward; // the weights of its reward
 use std::collections::HashSet;
 use std::path::Path;
 
-use crate::layout::{Action, Track};
 use crate::files::cache::Loading;
 use crate::files::reader::Error;
+use crate::files::shipped::{Kind, Source};
+use crate::layout::{Action, Track};
 use crate::map::parametric::{Gutter, Roundabout};
 use crate::map::route::Route;
-use crate::files::shipped::{Kind, Source};
 use crate::vehicle::Vehicle;
 pub use check::Invalid;
 pub use fleet::{Class, Drawn, Entry, Fleet, Member, N_VEHICLES, Ranges};

@@ -20,9 +20,9 @@ pub use single_track::{SingleTrack, Steady};
 pub use suspension::Suspension;
 pub(crate) use vehicle_keys::{WrittenModel, model as read_model};
 
-use crate::layout::{Body, Lag, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, Ray, Rig};
 use crate::files::reader::Error;
 use crate::files::shipped::{Kind, Source};
+use crate::layout::{Body, Lag, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, Ray, Rig};
 
 /// Acceleration of free fall [m/s^2].
 pub const GRAVITY: f64 = 9.81;

@@ -10,11 +10,11 @@ use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 
 use crate::field::Field;
-use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, Rig, RouteRow, Truck, WaypointRow};
 use crate::files::cache::{Loading, Stopped};
-use crate::vehicle::profile::Profile;
+use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, Rig, RouteRow, Truck, WaypointRow};
 use crate::map::route::{Route, Waypoint};
 use crate::scenario::{Class, Clock, Entry, Invalid, Place, Scenario};
+use crate::vehicle::profile::Profile;
 
 /// Waypoints to the corner of each observed curvature.
 const CURVATURE_STEPS: [usize; 4] = [5, 7, 10, 12];

@@ -3,7 +3,7 @@
 
 No test route and no measured roundabout is looked at. Each run gets the same env steps and is pinned to one core; its
 policy is examined once, at the end, with four episodes on each validation route. With --full it is a run of
-training/configs/laden.toml as that file is, which keeps the best policy in its validations, and it is examined with 20
+learner/configs/laden.toml as that file is, which keeps the best policy in its validations, and it is examined with 20
 episodes. A run that has a report is not repeated, so an interrupted series can go on. Standard library only.
 
     python3 benches/ablations/laden.py --offtrack target/release/offtrack --json ablations-laden.json
@@ -20,7 +20,7 @@ import series
 STEPS, FULL_STEPS = 1_600_000, 12_800_000
 EPISODES, FULL_EPISODES = 4, 20
 
-# What all choices have in common on top of training/configs/laden.toml without --full, so that the table stays what it
+# What all choices have in common on top of learner/configs/laden.toml without --full, so that the table stays what it
 # is when that file changes.
 COMMON = [
     "reward=",

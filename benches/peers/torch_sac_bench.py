@@ -122,7 +122,7 @@ def frozen(module_hidden, module):
 
 
 class Learner:
-    """The update of training/src/learner/sac.rs that `offtrack bench` measures, with the same steps in the same order."""
+    """The update of learner/src/sac.rs that `offtrack bench` measures, with the same steps in the same order."""
 
     def __init__(self, hidden, batch):
         self.batch = batch

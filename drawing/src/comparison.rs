@@ -15,8 +15,8 @@ use crate::episode::Scene;
 use crate::figure::{Layout, View, WIDTH, colour, number, scale_bar};
 use crate::legend::{self, Entry, Swatch};
 use crate::lettering::{Align, Lettering};
-use crate::recording::{Frame, Recording};
 use crate::stations::stations;
+use offtrack_evaluation::recording::{Frame, Recording};
 
 /// Margins of the page \[px].
 const LEFT: f64 = 64.0;
@@ -229,7 +229,7 @@ mod tests {
     use offtrack::world::World;
 
     use super::*;
-    use crate::recording::{Of, Recorder};
+    use offtrack_evaluation::recording::{Of, Recorder};
 
     /// The first truck of `laden2026` with this load, which steers straight on at its highest speed until it ends.
     fn recording(load: &str) -> (Recording, Scenario) {

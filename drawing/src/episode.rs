@@ -15,9 +15,9 @@ use crate::Error;
 use crate::figure::{Straights, View, colour, number};
 use crate::legend::{Entry, Swatch};
 use crate::lettering::{Align, Lettering};
-use crate::recording::{Frame, Recording};
 use crate::road::Road;
 use crate::sweep::{nearest, swept_area};
+use offtrack_evaluation::recording::{Frame, Recording};
 
 /// Length of the route shown before and after the ring: all of it at a benchmark's usual lengths \[m].
 const SHOWN: f64 = 45.0;

@@ -2,7 +2,7 @@
 //!
 //! - [`figure::roundabout`] draws a roundabout with its routes, [`figure::swept_path`] a [`sweep::Sweep`] on one of
 //!   them.
-//! - [`recording::Recorder`] records episodes of a batch, [`episode::Scene`] draws one as a still, [`film::gif`] as a
+//! - [`offtrack_evaluation::recording::Recorder`] records episodes of a batch, [`episode::Scene`] draws one as a still, [`film::gif`] as a
 //!   film.
 //! - [`comparison::Comparison`] draws several on one route, with speed and load transfer along it.
 //! - [`camera::Camera`] draws a truck as it is now, in RGB pixels, while it is stepped.
@@ -33,12 +33,11 @@ pub mod episode; // a recorded episode, still or moving
 pub mod figure; // a map with axes, title and legend
 pub mod film; // a recorded episode as GIF
 pub mod histograms; // how often values are drawn
+pub mod json; // a road for other programs
 mod isolines; // lines of equal distance
 mod legend; // samples and words below a map
 mod lettering; // text as outlines
 pub mod limits; // where a path asks for more than the truck has
-pub mod polygons; // curves as points
-pub mod recording; // the states of an episode
 mod road; // the layers of a map
 pub mod sheet; // many roundabouts side by side
 mod stations; // how far along a route a truck is

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use crate::polygons::Polygon;
+use offtrack_evaluation::polygons::Polygon;
 
 /// How far ahead on its route a truck is looked for from one state to the next \[m].
 const AHEAD: f64 = 12.0;

@@ -2,12 +2,12 @@
 //! truck cannot follow.
 
 use glam::DVec2;
+use offtrack::files::reader::shown;
 use offtrack::geometry::Outline;
 use offtrack::layout::Rig;
-use offtrack::files::reader::shown;
 use offtrack::map::route::Route;
-use offtrack::vehicle::swept::{Demand, Limit, Pose, demands, own_lane_suffices, swept_path};
 use offtrack::vehicle::Vehicle;
+use offtrack::vehicle::swept::{Demand, Limit, Pose, demands, own_lane_suffices, swept_path};
 use serde::Serialize;
 use svg::node::element::{Circle, Definitions, Group, Path, Use};
 

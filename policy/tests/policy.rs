@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
-use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES, Track};
 use offtrack::layout::random;
+use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES, Track};
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
 use offtrack_policy::{Activation, Layer, Normalisation, Policy, greedy};
@@ -72,7 +72,7 @@ fn described(policy: &Policy, change: impl Fn(&str) -> String) -> Vec<u8> {
 
 #[test]
 fn the_shipped_policies_are_written_as_they_were_read_byte_for_byte() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("training/policies");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("policy/shipped");
     assert_eq!(std::fs::read_dir(&folder).unwrap().count(), Policy::shipped_names().len());
     for name in Policy::shipped_names() {
         let policy = Policy::shipped(name).unwrap();

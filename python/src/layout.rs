@@ -1,7 +1,7 @@
 //! The layout of columns and observations, so that Python declares nothing twice.
 
-use offtrack::layout::{Column, EXTRAS, Ended, N_VALUES, OBSERVATION, structs};
 use offtrack::layout::shared::Named;
+use offtrack::layout::{Column, EXTRAS, Ended, N_VALUES, OBSERVATION, structs};
 use pyo3::prelude::*;
 
 /// A field of a row: name, type of numpy, number of values (0 for one that is no array).

@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 use std::time::Duration;
 
 use bytemuck::{bytes_of, cast_slice};
-use offtrack::layout::Action;
 use offtrack::files::cache::{Cache, Loading, Stopped};
-use offtrack::scenario::{Scenario, Split};
 use offtrack::files::shipped::Kind;
+use offtrack::layout::Action;
+use offtrack::scenario::{Scenario, Split};
 use offtrack::world::{Error, World};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

@@ -21,8 +21,8 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use super::{Autoreset, Batch, EngineBatch, Error, Row, Tally};
-use crate::layout::{BeginRow, Column, Stream};
 use crate::engine::stages::{N_STAGES, STAGES, Stage};
+use crate::layout::{BeginRow, Column, Stream};
 use crate::world::World;
 
 /// Does a stage to one truck.

@@ -1,8 +1,8 @@
 //! What shaders share with Rust, printed as WGSL.
 
 use crate::engine::{autoreset, cpu, tally};
-use crate::layout::{self, buffers};
 use crate::field;
+use crate::layout::{self, buffers};
 use crate::layout::{angle, random};
 
 /// `shaders/layout.wgsl`: constants, structs and the buffers of a step.

@@ -4,8 +4,8 @@ use bytemuck::{bytes_of, cast_slice};
 use glam::Vec2;
 
 use super::Field;
-use crate::geometry::{Outline, Piece};
 use crate::files::cache::Cache;
+use crate::geometry::{Outline, Piece};
 
 /// Counted up whenever the same outline gives another field, so that older entries are not used.
 const FORM: u32 = 1;

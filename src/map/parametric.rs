@@ -29,12 +29,12 @@ use std::path::Path;
 
 use glam::DVec2;
 
+use crate::files::reader::{Error, Reader};
+use crate::files::shipped::{Kind, Source};
 use crate::geometry::{Curve, Outline};
 pub use crate::map::ground::Kerb;
 use crate::map::ground::{self, Edges, Ground, Line};
-use crate::files::reader::{Error, Reader};
 use crate::map::route::{Lane, LeavesWorld, Route, waypoints};
-use crate::files::shipped::{Kind, Source};
 use lane::{Lanes, RouteLine};
 use ring::Ring;
 use roundabout_keys::{Arm, Written};

@@ -5,8 +5,8 @@
 
 use glam::DVec2;
 
-use crate::geometry::Curve;
 use crate::files::reader::shown;
+use crate::geometry::Curve;
 
 /// A lane of a carriageway or of the ring, counted from the kerb.
 ///

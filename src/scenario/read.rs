@@ -8,8 +8,8 @@ use super::fleet::{self, Fleet};
 use super::roads::{MOST_ROADS, Procedural};
 use crate::files::cache::Loading;
 use crate::files::reader::{Error, Reader};
-use crate::map::parametric::map::is_map;
 use crate::files::shipped::{Kind, Source};
+use crate::map::parametric::map::is_map;
 use crate::vehicle::Vehicle;
 
 impl Scenario {

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::Scenario;
-use crate::layout::Params;
 use crate::files::reader::{Error, Reader};
+use crate::layout::Params;
 
 /// Other values for some keys of a benchmark's `[reward]`; what is none stays as the benchmark has it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

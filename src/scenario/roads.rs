@@ -8,13 +8,13 @@ use super::benchmark_keys::{WrittenChoice, WrittenProcedural, WrittenRoundabout}
 use super::read::referred;
 use super::{Place, Scenario, Split};
 use crate::files::cache::Loading;
-use crate::map::opendrive::Way;
-use crate::map::procedural::Distribution;
 use crate::files::reader::{Error, Reader, shown};
+use crate::files::shipped::{Kind, Source};
+use crate::map::opendrive::Way;
 use crate::map::parametric::Roundabout;
 use crate::map::parametric::map::{Choice, is_map};
+use crate::map::procedural::Distribution;
 use crate::map::route::Route;
-use crate::files::shipped::{Kind, Source};
 
 /// Maximum number of roundabouts that are read, listed or drawn. One takes about 0.1 MB before it is baked.
 pub(super) const MOST_ROADS: usize = 100_000;

@@ -6,9 +6,9 @@ use glam::DVec2;
 use serde::Deserialize;
 
 use super::{Load, Model, Sensors, SpeedControl, Suspension, Tractor, Trailer, Vehicle};
-use crate::layout::N_TRACTOR_RAYS;
 use crate::files::reader::{Error, Reader, printable};
 use crate::files::shipped::Source;
+use crate::layout::N_TRACTOR_RAYS;
 
 /// Maximum length of a load's name \[characters].
 const LONGEST_NAME: usize = 40;

@@ -4,10 +4,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use offtrack::layout::Ended;
-use offtrack::map::procedural::Distribution;
 use offtrack::files::reader::Error;
+use offtrack::layout::Ended;
 use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::procedural::Distribution;
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{self, Engine, RouteChoice, Simulator};
 use offtrack::vehicle::Vehicle;

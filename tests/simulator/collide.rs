@@ -1,12 +1,12 @@
 //! Verdicts and clearances against the exact outlines, from poses all over every roundabout.
 
 use glam::{DVec2, Vec2};
+use offtrack::engine::stages::Stage;
 use offtrack::field::Field;
 use offtrack::geometry::{Curve, Outline, Piece};
 use offtrack::layout::{Body, Clearance, Rig, Truck};
 use offtrack::map::parametric::Gutter;
 use offtrack::simulator::Simulator;
-use offtrack::engine::stages::Stage;
 use rayon::prelude::*;
 
 use crate::field::{after_stage, places, pose};

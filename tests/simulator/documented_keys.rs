@@ -8,9 +8,9 @@ mod rows;
 use std::fmt::Debug;
 use std::path::Path;
 
-use offtrack::map::procedural::Distribution;
 use offtrack::files::reader::Error;
 use offtrack::map::parametric::Roundabout;
+use offtrack::map::procedural::Distribution;
 use offtrack::scenario::Scenario;
 use offtrack::vehicle::Vehicle;
 use toml::Value;

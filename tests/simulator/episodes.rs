@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use glam::Vec2;
-use offtrack::layout::{Column, Ended, N_RAYS, Start};
+use offtrack::engine::stages::STAGES;
 use offtrack::layout::random;
+use offtrack::layout::{Column, Ended, N_RAYS, Start};
 use offtrack::scenario::Split;
 use offtrack::simulator::{Batch, Engine, RouteChoice, Simulator};
-use offtrack::engine::stages::STAGES;
 use offtrack::world::World;
 
 use crate::{batch_on, benchmark, engines};

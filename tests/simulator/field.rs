@@ -8,14 +8,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DVec2, Vec2};
+use offtrack::engine::stages::Stage;
 use offtrack::field::Field;
 use offtrack::geometry::Outline;
-use offtrack::layout::{Column, Truck};
 use offtrack::layout::random::{signed_unit, words};
+use offtrack::layout::{Column, Truck};
 use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::scenario::FIELD_CELL;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
-use offtrack::engine::stages::Stage;
 use offtrack::world::World;
 use rayon::prelude::*;
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use offtrack::geometry::{Piece, wrapped};
 use offtrack::map::parametric::{Gutter, Roundabout};
-use offtrack_comparison::deviation::{Measured, deviations};
+use offtrack_reference::deviation::{Measured, deviations};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 const NAMES: [&str; 5] = ["16m", "20m", "32m", "40m", "50m"];

@@ -5,10 +5,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use glam::DVec2;
+use offtrack::files::reader::Error;
 use offtrack::geometry::Outline;
 use offtrack::map::ground::Edges;
 use offtrack::map::opendrive::{Hand, Map, Options};
-use offtrack::files::reader::Error;
 use offtrack::map::parametric::map::Choice;
 use offtrack::map::parametric::{Gutter, Kerb, Roundabout};
 use offtrack::scenario::{Scenario, Split};

@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use offtrack::layout::angle::wrapped;
 use offtrack::gpu::{Columns, Device, Error, Slice, adapters};
+use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Column, Truck};
 use offtrack::simulator::{self, Engine, RouteChoice, Simulator};
 use offtrack::world::World;

@@ -6,14 +6,14 @@ mod states;
 use std::sync::Arc;
 
 use glam::Vec2;
-use offtrack::layout::angle::wrapped;
 use offtrack::cpu::drive::drive_max;
 use offtrack::cpu::follow::reference_point;
-use offtrack::layout::{Column, Ended, Truck, WaypointRow};
+use offtrack::engine::stages::{STAGES, Stage};
+use offtrack::layout::angle::wrapped;
 use offtrack::layout::random::{Draw, index_below, signed_unit, words};
+use offtrack::layout::{Column, Ended, Truck, WaypointRow};
 use offtrack::map::parametric::Gutter;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
-use offtrack::engine::stages::{STAGES, Stage};
 use offtrack::world::World;
 
 use crate::on_device::engine;

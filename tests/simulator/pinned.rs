@@ -6,8 +6,8 @@
 use std::sync::Arc;
 
 use offtrack::layout::Column;
-use offtrack::scenario::Split;
 use offtrack::layout::shared::Named;
+use offtrack::scenario::Split;
 use offtrack::simulator::{Batch, Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use offtrack::layout::Ended;
 use offtrack::files::cache::{Cache, Loading, Progress};
+use offtrack::layout::Ended;
 use offtrack::map::procedural::{Distribution, find};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{Engine, RouteChoice};

@@ -5,8 +5,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::layout::Column;
-use offtrack::scenario::Scenario;
 use offtrack::layout::shared::Named;
+use offtrack::scenario::Scenario;
 use offtrack::simulator::{Error, RouteChoice, Simulator};
 use offtrack::world::World;
 

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use offtrack::layout::{Column, Start};
 use offtrack::layout::random::{self, Draw};
+use offtrack::layout::{Column, Start};
 use offtrack::simulator::RouteChoice;
 
 use crate::episodes::{all_routes, rows};

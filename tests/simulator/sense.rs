@@ -1,12 +1,12 @@
 //! Ranges against rays on the exact outlines, from poses all over every roundabout.
 
 use glam::{DVec2, Vec2};
+use offtrack::engine::stages::Stage;
 use offtrack::field::Field;
 use offtrack::geometry::Outline;
 use offtrack::layout::{N_RAYS, N_TRAILER_RAYS, Truck};
 use offtrack::map::parametric::Gutter;
 use offtrack::simulator::Engine;
-use offtrack::engine::stages::Stage;
 use offtrack::world::World;
 use rayon::prelude::*;
 

@@ -179,10 +179,10 @@ fn in_a_loop_every_variable_has_an_initial_value_since_one_compiler_clears_it_on
 
 #[cfg(feature = "gpu")]
 mod module {
-    use offtrack::layout::structs;
+    use offtrack::engine::stages::{Kernel, SHADERS, STAGES};
     use offtrack::layout::shared::Named;
     use offtrack::layout::shared::Struct;
-    use offtrack::engine::stages::{Kernel, SHADERS, STAGES};
+    use offtrack::layout::structs;
     use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
     use wgpu::naga::{Module, TypeInner, front::wgsl};
 

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use offtrack::map::procedural::Distribution;
-use offtrack::map::parametric::{Gutter, Roundabout};
-use offtrack::scenario::Scenario;
 use offtrack::files::shipped::{FILES, Kind, Source};
+use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::procedural::Distribution;
+use offtrack::scenario::Scenario;
 use offtrack::vehicle::Vehicle;
 
 fn scenarios() -> PathBuf {

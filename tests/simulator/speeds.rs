@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use offtrack::layout::{Action, Start, Truck};
-use offtrack::vehicle::profile::Profile;
 use offtrack::scenario::{Clock, Scenario};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::vehicle::Model;
+use offtrack::vehicle::profile::Profile;
 use offtrack::world::World;
 
 use crate::fleet::all_drawn;

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use offtrack::layout::{Column, Truck};
 use offtrack::layout::shared::Named;
+use offtrack::layout::{Column, Truck};
 use offtrack::simulator::{Autoreset, RouteChoice, Simulator};
 use offtrack::world::World;
 

@@ -9,7 +9,7 @@ use super::{Scene, path_legend, point, signed};
 use crate::figure::{self, Layout, View, WIDTH, colour, number};
 use crate::legend::{self, Entry, Swatch};
 use crate::lettering::Align;
-use crate::recording::Recording;
+use offtrack_evaluation::recording::Recording;
 
 /// The map of a film.
 const FILMED: Layout = Layout { corner: DVec2::new(16.0, 96.0), width: WIDTH - 32.0, margin: 5.0, ratio: 1.0 };
@@ -127,7 +127,7 @@ mod tests {
 
     use super::*;
     use crate::painted;
-    use crate::recording::{Of, Recorder};
+    use offtrack_evaluation::recording::{Of, Recorder};
 
     /// First and last column of these pixels with ink in the line of the title.
     fn inked(svg: &str) -> (u32, u32) {

@@ -1,8 +1,8 @@
 //! The routes that are to be driven: a split, or routes by their names, which are those of the command line.
 
+use offtrack::files::shipped::Kind;
 use offtrack::map::procedural;
 use offtrack::scenario::{Scenario, Split};
-use offtrack::files::shipped::Kind;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 

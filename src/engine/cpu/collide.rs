@@ -8,11 +8,11 @@
 use glam::Vec2;
 use multiversion::multiversion;
 
-use crate::layout::angle::direction;
 use crate::engine::Row;
 use crate::field::{Field, Purpose};
-use crate::layout::{Body, Clearance, Rig, Truck};
+use crate::layout::angle::direction;
 use crate::layout::shared::constants;
+use crate::layout::{Body, Clearance, Rig, Truck};
 use crate::world::World;
 
 constants! {

@@ -6,10 +6,10 @@
 
 use glam::Vec2;
 
-use crate::layout::angle::{sin_cos, wrapped};
 use crate::engine::Row;
-use crate::layout::{Control, Rig, Roll, Truck};
+use crate::layout::angle::{sin_cos, wrapped};
 use crate::layout::shared::constants;
+use crate::layout::{Control, Rig, Roll, Truck};
 use crate::world::World;
 
 constants! {

@@ -4,8 +4,8 @@
 
 use glam::Vec2;
 
-use crate::layout::angle::{TINY, direction};
 use crate::engine::Row;
+use crate::layout::angle::{TINY, direction};
 use crate::layout::{Progress, Truck, WaypointRow};
 use crate::world::World;
 

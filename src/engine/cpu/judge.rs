@@ -2,8 +2,8 @@
 //!
 //! Failure wins over arrival, everything wins over the time limit.
 
-use crate::layout::angle::wrapped;
 use crate::engine::Row;
+use crate::layout::angle::wrapped;
 use crate::layout::{Clearance, Ended, Params, Progress, RewardTerms, RouteRow, Truck};
 use crate::world::World;
 

@@ -4,11 +4,11 @@
 
 use glam::Vec2;
 
-use crate::layout::angle::{PI, arc_tangent, wrapped};
 use crate::engine::Row;
 use crate::engine::cpu::follow::{distance_to_segment, reference_point};
-use crate::layout::{Control, N_EXTRAS, N_RAYS, N_VALUES, Progress, Truck};
+use crate::layout::angle::{PI, arc_tangent, wrapped};
 use crate::layout::shared::constants;
+use crate::layout::{Control, N_EXTRAS, N_RAYS, N_VALUES, Progress, Truck};
 use crate::world::World;
 
 constants! {

@@ -2,14 +2,14 @@
 //!
 //! Route and pose are functions of (seed, env, episode) alone, where the caller states none.
 
-use crate::layout::angle::{direction, wrapped};
 use crate::engine::cpu::follow::{followed, reference_point};
 use crate::engine::cpu::{observe, sense};
 use crate::engine::{Autoreset, RouteChoice, Row};
+use crate::layout::angle::{direction, wrapped};
+use crate::layout::random::{self, Draw};
 use crate::layout::{
     BEGINS, BeginRow, Control, Ended, HAS_ROUTE, HAS_START, IS_FIRST, Params, RewardTerms, Rig, Start, Stream, Truck, WaypointRow,
 };
-use crate::layout::random::{self, Draw};
 use crate::world::World;
 
 /// The next episode, as drawn.

@@ -7,11 +7,11 @@
 
 use multiversion::multiversion;
 
-use crate::layout::angle::direction;
 use crate::engine::Row;
 use crate::field::{Field, Purpose, Samples};
-use crate::layout::{N_RAYS, N_TRAILER_RAYS, Ray, Rig, Truck};
+use crate::layout::angle::direction;
 use crate::layout::shared::constants;
+use crate::layout::{N_RAYS, N_TRAILER_RAYS, Ray, Rig, Truck};
 use crate::world::World;
 
 /// Rays that are traced side by side while others wait.

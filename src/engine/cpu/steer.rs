@@ -4,8 +4,8 @@
 
 use crate::engine::Row;
 use crate::engine::cpu::drive::drive_max;
-use crate::layout::{Action, Control, Params, Rig};
 use crate::layout::shared::constants;
+use crate::layout::{Action, Control, Params, Rig};
 use crate::world::World;
 
 constants! {

@@ -11,10 +11,10 @@ use wgpu::{CommandEncoder, ComputePassDescriptor, ComputePassTimestampWrites};
 use super::buffers::{Buffers, check_size, check_world};
 use super::tables::Tables;
 use super::{Columns, Device, Error, Slice, kernels, stage_times};
+use crate::engine::stages::{BEGIN, Kernel, N_STAGES, STAGES, Stage};
 use crate::engine::{self, Autoreset, EngineBatch, RouteChoice, Tally};
 use crate::layout::buffers::Table;
 use crate::layout::{BatchFacts, BeginRow, Column, Stream};
-use crate::engine::stages::{BEGIN, Kernel, N_STAGES, STAGES, Stage};
 use crate::world::World;
 
 /// A batch of trucks on a device.

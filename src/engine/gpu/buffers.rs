@@ -7,8 +7,8 @@ use super::{Device, Error};
 use crate::engine::tally::N_SUMS;
 use crate::field::Field;
 use crate::layout::buffers::{BUFFERS, Buffer as Shared, N_TABLES, Table};
-use crate::layout::{Column, N_COLUMNS};
 use crate::layout::shared::Named;
+use crate::layout::{Column, N_COLUMNS};
 use crate::world::World;
 
 /// Part of a buffer.

@@ -5,10 +5,10 @@ use wgpu::{
     ComputePipelineDescriptor, PipelineLayoutDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
 };
 
-use crate::layout::buffers::{Access, BUFFERS};
-use crate::layout::{N_RAYS, N_VALUES, WORKGROUP};
-use crate::layout::shared::Named;
 use crate::engine::stages::{Kernel, SHADERS, Threads};
+use crate::layout::buffers::{Access, BUFFERS};
+use crate::layout::shared::Named;
+use crate::layout::{N_RAYS, N_VALUES, WORKGROUP};
 
 /// Workgroups in a row of a dispatch: the most that every device takes.
 const ROW: u32 = 65_535;

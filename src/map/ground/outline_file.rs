@@ -9,9 +9,9 @@ use glam::DVec2;
 use serde::Deserialize;
 
 use super::{Arm, Edges, Ground, Hand, Kerb, Line};
-use crate::geometry::{Curve, Outline, Piece, arc_of_height};
-use crate::geometry::area::signed_area;
 use crate::files::reader::{Error, Reader};
+use crate::geometry::area::signed_area;
+use crate::geometry::{Curve, Outline, Piece, arc_of_height};
 use crate::map::route::Lane;
 
 /// Largest coordinate \[m].

@@ -4,7 +4,6 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 
-use crate::geometry::area::{points, signed_area};
 use super::bypass::Around;
 use super::crossings::{ArmLanes, Crossing, arms, circle, crossings, joined};
 use super::lanes::Strip;
@@ -16,9 +15,10 @@ use super::rings::{densified, fitted_circle};
 use super::surroundings::{self, Part, REACH, clipped, encloses_origin, outline};
 use super::whole::TILTED;
 use super::{FINEST, Map, Ring};
+use crate::files::reader::{Error, Reader};
+use crate::geometry::area::{points, signed_area};
 use crate::geometry::{Curve, Outline, Piece};
 use crate::map::ground::{Arm, Edges, Ground, Kerb};
-use crate::files::reader::{Error, Reader};
 use crate::map::route::Lane;
 
 /// A way through the ring comes as near to its outer kerb as this, inside or outside \[m].

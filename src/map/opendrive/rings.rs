@@ -6,12 +6,12 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use crate::geometry::area::{Area, points};
 use super::cells::Cells;
 use super::graph::Graph;
 use super::lanes::Strip;
 use super::records::Kind;
 use super::surface::{GAP, of};
+use crate::geometry::area::{Area, points};
 
 /// Smallest and largest radius of an island \[m].
 const RADII: [f64; 2] = [1.5, 200.0];

@@ -6,10 +6,10 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 
 use super::Map;
-use crate::geometry::area::{Area, points, signed_area};
 use super::lanes::{Strip, sampled};
 use super::records::Kind;
 use super::surface::Surface;
+use crate::geometry::area::{Area, points, signed_area};
 use crate::geometry::{Curve, Outline, fitted_outline};
 
 /// Chords of edges leave their curves by at most this much before arcs are fitted \[m].

@@ -9,8 +9,8 @@ use super::alignment::{Fault, Way};
 use super::lane::Lanes;
 use super::ring::Ring;
 use super::roundabout_keys::Arm;
-use crate::geometry::{Curve, Outline};
 use crate::files::reader::{Error, Reader, differing, shown};
+use crate::geometry::{Curve, Outline};
 use crate::map::route::Lane;
 
 /// Half the width of a truck and 5 cm: a lane whose centre line is nearer to a kerb cannot be driven \[m].

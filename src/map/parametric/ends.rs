@@ -64,8 +64,8 @@ fn prolonged(outline: &Outline, lines: &[Line]) -> Outline {
 mod tests {
     use super::*;
     use crate::files::shipped::Kind;
-    use crate::vehicle::swept::{own_lane_suffices, swept_path};
     use crate::vehicle::Vehicle;
+    use crate::vehicle::swept::{own_lane_suffices, swept_path};
 
     /// A ring of one lane and 17 m with four arms of this length \[m].
     fn one_lane(length: u32) -> Roundabout {

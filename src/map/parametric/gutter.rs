@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use super::ring::Ring;
 use super::roundabout_keys::Written;
-use crate::geometry::{Curve, Outline, Piece, fitted_outline, wrapped};
-use crate::geometry::area::{Area, counter_clockwise, points, signed_area};
 use crate::files::reader::{Error, Reader, shown};
+use crate::geometry::area::{Area, counter_clockwise, points, signed_area};
+use crate::geometry::{Curve, Outline, Piece, fitted_outline, wrapped};
 
 /// Chords of faces and edges leave their curves by at most this much \[m].
 const FINE: f64 = 1e-3;

@@ -5,8 +5,8 @@
 
 use super::Roundabout;
 use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenPoint, WrittenWay};
-use crate::map::ground::Hand;
 use crate::files::reader::Error;
+use crate::map::ground::Hand;
 use crate::map::route::Route;
 
 /// Words at the end of a message about a position.

@@ -9,9 +9,9 @@ use super::alignment::{Way, around, ring_arc};
 use super::check;
 use super::ring::Ring;
 use super::roundabout_keys::Arm;
+use crate::files::reader::{Error, Reader};
 use crate::geometry::{Curve, Outline, Piece, rounded, wrapped};
 use crate::map::ground::Kerb;
-use crate::files::reader::{Error, Reader};
 
 /// The kerbs in the order of the loops that [`kerbs`] makes.
 pub(super) fn order(arms: &[Arm]) -> impl Iterator<Item = Kerb> {

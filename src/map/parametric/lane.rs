@@ -12,8 +12,8 @@ use super::check;
 use super::kerb::corner;
 use super::ring::Ring;
 use super::roundabout_keys::Arm;
-use crate::geometry::{Curve, Piece, wrapped};
 use crate::files::reader::{Error, Reader};
+use crate::geometry::{Curve, Piece, wrapped};
 use crate::map::route::Lane;
 
 /// One end of a route: from an arm's end to the ring, in the world.

@@ -5,8 +5,8 @@ use std::path::Path;
 use glam::DVec2;
 
 use super::Roundabout;
-use crate::map::opendrive::{Hand, Imported, Map, Options, Ring, Way};
 use crate::files::reader::{Error, Reader};
+use crate::map::opendrive::{Hand, Imported, Map, Options, Ring, Way};
 
 /// Which ring of a map, and how it is imported.
 #[derive(Debug, Clone, Default)]

@@ -9,9 +9,9 @@ use super::alignment::{Alignment, Way};
 use super::corner::WrittenCorner;
 use super::gutter::{WrittenDirection, WrittenStation};
 use super::ring::Ring;
+use crate::files::reader::{Error, Reader, shown};
 use crate::geometry::Bend;
 use crate::map::ground::Hand;
-use crate::files::reader::{Error, Reader, shown};
 use crate::map::route::Lane;
 
 /// The smallest radius of a bend in a lane; no vehicle follows a smaller one \[m].

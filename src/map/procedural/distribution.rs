@@ -7,9 +7,9 @@ use super::draw::drawn;
 use super::draws::Draws;
 use super::{Reason, Refused, Road};
 use crate::files::reader::{Error, Reader};
+use crate::files::shipped::{Kind, Source};
 use crate::map::parametric::written::Written;
 use crate::map::parametric::{Roundabout, Stage};
-use crate::files::shipped::{Kind, Source};
 
 /// Attempts at a road before the distribution is said to give none.
 const MOST_ATTEMPTS: u32 = 1000;

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use super::{Fleet, Member, N_VEHICLES, Ranges};
 use crate::files::reader::{Error, Reader};
+use crate::files::shipped::{Kind, Source};
 use crate::scenario::benchmark_keys::{Written, WrittenDraw, WrittenMember, WrittenVehicles};
 use crate::scenario::check::check_vehicle;
 use crate::scenario::read::referred;
-use crate::files::shipped::{Kind, Source};
 use crate::vehicle::{Vehicle, read_model};
 
 /// Maximum number of rows of a table of vehicles: they take about 45 MB with a chassis each.

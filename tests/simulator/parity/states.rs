@@ -2,10 +2,10 @@
 
 use std::sync::{Arc, OnceLock};
 
-use offtrack::layout::angle::wrapped;
 use offtrack::field::Field;
-use offtrack::layout::{Track, Truck};
+use offtrack::layout::angle::wrapped;
 use offtrack::layout::random::{index_below, signed_unit, words};
+use offtrack::layout::{Track, Truck};
 use offtrack::map::parametric::Gutter;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;

@@ -3,8 +3,8 @@
 use std::f32::consts::PI;
 
 use glam::Vec2;
-use offtrack::layout::angle::wrapped;
 use offtrack::cpu::drive::driven;
+use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Control, Rig, Truck};
 use proptest::prelude::*;
 

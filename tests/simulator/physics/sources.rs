@@ -5,8 +5,8 @@ use std::path::Path;
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Piece};
-use offtrack::vehicle::swept::{Pose, swept_path};
 use offtrack::vehicle::Vehicle;
+use offtrack::vehicle::swept::{Pose, swept_path};
 
 use super::vehicle;
 

@@ -8,11 +8,11 @@ use std::sync::{Arc, OnceLock};
 use bytemuck::bytes_of;
 use glam::DVec2;
 use offtrack::cpu::drive::{Moving, motion_of};
+use offtrack::engine::stages::Stage;
 use offtrack::layout::{Column, Rig, Truck};
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
-use offtrack::engine::stages::Stage;
 use offtrack::world::World;
-use offtrack_comparison::trace::{Case, CaseVehicle, Command, Init, Traced, trace, trace_by};
+use offtrack_reference::trace::{Case, CaseVehicle, Command, Init, Traced, trace, trace_by};
 use serde_json::Value;
 
 use steady::{path_follow, rollover_static, single_track, steady_envelope, steady_state, steady_state_limit};
@@ -110,7 +110,7 @@ fn alone(engine: &Engine, rig: &Rig, substep: f32) -> Simulator {
 }
 
 /// The state that a truck reaches `t` seconds after `init` under one command.
-fn driven(engine: &Engine, vehicle: CaseVehicle, init: Init, command: Command, t: f64) -> offtrack_comparison::trace::State {
+fn driven(engine: &Engine, vehicle: CaseVehicle, init: Init, command: Command, t: f64) -> offtrack_reference::trace::State {
     let case = Case {
         id: String::new(),
         vehicle,

@@ -1,0 +1,65 @@
+//! `offtrack devices`, and the flags that choose one.
+
+use offtrack_evaluation::device::{self, Device};
+use offtrack_evaluation::error::Error;
+#[cfg(feature = "gpu")]
+use offtrack_evaluation::files;
+
+/// List the devices that `--device gpu` can run on, best first; the default one is marked.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+/// What steps the trucks of a command.
+#[derive(Debug, clap::Args)]
+pub struct Choice {
+    /// What steps the trucks: `cpu`, all cores of the processor, or `gpu`, compute shaders on a device.
+    #[arg(long, default_value = "cpu", value_parser = ["cpu", "gpu"])]
+    device: String,
+    /// With --device gpu: part of an adapter's name, as `offtrack devices` lists it. Without it the first of that list.
+    #[arg(long)]
+    adapter: Option<String>,
+}
+
+impl Choice {
+    /// Opens the device.
+    pub fn open(&self) -> Result<Device, Error> {
+        match (self.device.as_str(), &self.adapter) {
+            ("gpu", adapter) => device::open(adapter.as_deref()),
+            (_, None) => Ok(Device::processor()),
+            (_, Some(name)) => {
+                let expected = "the processor has no adapter: add --device gpu, or leave --adapter out".to_owned();
+                Err(Error::Flag { flag: "--adapter", value: name.clone(), expected })
+            }
+        }
+    }
+}
+
+/// Runs the command.
+#[cfg(feature = "gpu")]
+pub fn run(_: &Args) -> Result<(), Error> {
+    use offtrack::gpu;
+
+    let adapters = gpu::adapters();
+    if adapters.is_empty() {
+        // The error names what was tried and what to install.
+        device::open(None)?;
+    }
+    let mut rows = vec![["", "adapter", "interface", "driver", "kind", "largest buffer"].map(str::to_owned)];
+    rows.extend(adapters.into_iter().enumerate().map(|(index, adapter)| {
+        let mark = if index == 0 { "*" } else { "" };
+        let largest = format!("{} MiB", adapter.binding_max >> 20);
+        [mark.to_owned(), adapter.name, adapter.interface, adapter.driver, adapter.kind.to_owned(), largest]
+    }));
+    let widths: [usize; 6] = std::array::from_fn(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0));
+    for row in rows {
+        let cells: Vec<String> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:width$}")).collect();
+        files::print(&format!("{}\n", cells.join("  ").trim_end()))?;
+    }
+    files::print("* the default, without --adapter\n")
+}
+
+/// Runs the command.
+#[cfg(not(feature = "gpu"))]
+pub fn run(_: &Args) -> Result<(), Error> {
+    Err(Error::Flag { flag: "devices", value: "none can be listed".to_owned(), expected: device::NOT_BUILT_IN.to_owned() })
+}

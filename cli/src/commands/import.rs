@@ -1,0 +1,232 @@
+//! Lists the roundabouts or junctions of an OpenDRIVE map, checks it, or writes one of them as an outline file.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use glam::DVec2;
+use offtrack::files::reader::{Error as InputError, Reader, shown_path};
+use offtrack::map::opendrive::{Hand, Imported, Map, Options, RoadLane, Way};
+use offtrack::map::parametric::map::Choice;
+
+use offtrack_evaluation::error::Error;
+use offtrack_evaluation::files;
+
+/// List the roundabouts or junctions of an OpenDRIVE map, check it, or write one of them as an outline file.
+#[derive(Debug, clap::Args)]
+#[command(group(clap::ArgGroup::new("action").args(["list", "junctions", "check", "output"]).required(true)))]
+pub struct Args {
+    /// The map: a .xodr file.
+    map: PathBuf,
+    /// Print the roundabouts found, and how many islands and blocks are none.
+    #[arg(long, conflicts_with_all = ["ring", "ways", "arms", "junctions", "check", "output"])]
+    list: bool,
+    /// Print the ways through every junction, as --way takes them.
+    #[arg(long, conflicts_with_all = ["ring", "ways", "arms", "check", "output"])]
+    junctions: bool,
+    /// Print everything that is odd in the map and in its roundabouts, and why every other island or block is none.
+    #[arg(long, conflicts_with = "output")]
+    check: bool,
+    /// Write one roundabout to this file, NAME.outline.toml: what is driven on, without the map.
+    #[arg(short, long, required_unless_present_any = ["list", "junctions", "check"])]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    place: PlaceArgs,
+    /// Names of the arms, counter-clockwise from east: E,N,W. Without them they are named by compass.
+    #[arg(long, value_delimiter = ',')]
+    arms: Vec<String>,
+}
+
+/// Which place of a map.
+#[derive(Debug, Clone, clap::Args)]
+pub struct PlaceArgs {
+    /// A point of the map near the roundabout's centre, X,Y [m]; needed where a map has several.
+    #[arg(long, value_name = "X,Y", value_parser = point, allow_hyphen_values = true)]
+    pub ring: Option<DVec2>,
+    /// A way through a junction in place of a roundabout, from a road's lane to another's: 12:-1,30:1. May be given
+    /// several times; `offtrack import MAP --junctions` lists them.
+    #[arg(long = "way", value_name = "ROAD:LANE,ROAD:LANE", value_parser = way, conflicts_with = "ring")]
+    pub ways: Vec<Way>,
+    /// The map's hand of traffic: what the map says, right or left.
+    #[arg(long, default_value = "map", value_parser = PossibleValuesParser::new(["map", "right", "left"]).map(hand))]
+    pub hand: Hand,
+}
+
+impl PlaceArgs {
+    /// The ring or the ways that the flags choose.
+    pub fn choice(&self) -> Choice {
+        Choice { ring: self.ring, hand: self.hand, ways: self.ways.clone(), ..Choice::default() }
+    }
+
+    /// An error if one of the flags is given for a roundabout that is no map.
+    pub fn check_absent(&self) -> Result<(), Error> {
+        let given = [
+            ("--ring", self.ring.map(|p| format!("{},{}", p.x, p.y))),
+            ("--way", self.ways.first().map(|way| format!("{},{}", way.from, way.to))),
+            ("--hand", (self.hand != Hand::Map).then(|| format!("{:?}", self.hand).to_lowercase())),
+        ];
+        let Some((flag, Some(value))) = given.into_iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
+        Err(Error::Flag { flag, value, expected: "is for an OpenDRIVE map, a file that ends in .xodr; leave it out".into() })
+    }
+}
+
+fn hand(word: String) -> Hand {
+    match word.as_str() {
+        "left" => Hand::Left,
+        "right" => Hand::Right,
+        _ => Hand::Map,
+    }
+}
+
+fn point(text: &str) -> Result<DVec2, String> {
+    let expected = || "must be two numbers, X,Y".to_owned();
+    let (x, y) = text.split_once(',').ok_or_else(expected)?;
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(expected);
+    Ok(DVec2::new(number(x)?, number(y)?))
+}
+
+fn way(text: &str) -> Result<Way, String> {
+    let end = |text: &str| {
+        let (road, lane) = text.rsplit_once(':')?;
+        Some(RoadLane { road: road.trim().to_owned(), lane: lane.trim().parse().ok()? })
+    };
+    let ends = text.rsplit_once(',').and_then(|(from, to)| end(from).zip(end(to)));
+    ends.map(|(from, to)| Way { from, to }).ok_or_else(|| "must be two lanes, ROAD:LANE,ROAD:LANE".to_owned())
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Error> {
+    let choice = Choice { arms: args.arms.clone(), ..args.place.choice() };
+    let map = Map::read(&args.map, choice.hand)?;
+    if args.list {
+        return list(&args.map, &map);
+    }
+    if args.junctions {
+        return junctions(&args.map, &map);
+    }
+    if args.check {
+        return check(&args.map, &map, &choice);
+    }
+    let Some(output) = &args.output else { return Ok(()) };
+    if !output.to_string_lossy().ends_with(".outline.toml") {
+        let value = output.display().to_string();
+        return Err(Error::Flag { flag: "--output", value, expected: "must end in .outline.toml".into() });
+    }
+    let imported = choice.imported(&args.map, &map)?;
+    files::write_whole(output, text(&args.map, output, &map, &choice, &imported)?.as_bytes())?;
+    let Imported { ground, warnings, .. } = &imported;
+    let mut summary = String::new();
+    for warning in warnings {
+        let _ = writeln!(summary, "warning: {warning}");
+    }
+    let (arms, routes) = (ground.arms.len(), ground.lines.len());
+    let island = if 0.0 < ground.island_radius { format!(", island {:.2} m", ground.island_radius) } else { String::new() };
+    let _ = writeln!(summary, "written: {}: {arms} arms, {routes} routes{island}", shown_path(output));
+    files::print(&summary)
+}
+
+/// The outline file, with where it is from; an error where its own reader would refuse it.
+fn text(file: &Path, output: &Path, map: &Map, choice: &Choice, imported: &Imported) -> Result<String, Error> {
+    let Imported { ground, centre, .. } = imported;
+    // A name may hold line breaks, which would end the comment.
+    let name = file.file_name().map(|name| name.to_string_lossy().escape_debug().to_string()).unwrap_or_default();
+    let (what, flags) = match choice.ways.as_slice() {
+        [] => ("roundabout", format!(" --ring {:.1},{:.1}", centre.x, centre.y)),
+        ways => ("junction", ways.iter().map(|way| format!(" --way {},{}", way.from, way.to).escape_debug().to_string()).collect()),
+    };
+    let mut origin = vec![
+        format!("A {what} of the map {name}: its centre, here the origin, lies at ({:.4}, {:.4}) there.", centre.x, centre.y),
+        format!("Made by: offtrack import {name}{flags} -o NAME.outline.toml"),
+    ];
+    if map.is_mirrored() {
+        origin.push("The map has left-hand traffic; this is its mirror image in the x axis.".into());
+    }
+    origin.push("A path is a list of [x, y] and [x, y, bulge]: a straight or an arc ends there. Metres; docs/maps.md.".into());
+    Ok(ground.checked_text(output, &origin)?)
+}
+
+/// Prints the rings; a map without one that can be driven is wrong input.
+fn list(file: &Path, map: &Map) -> Result<(), Error> {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let (mut drivable, mut refused) = (0, None);
+    for ring in map.rings() {
+        let (x, y) = (ring.centre.x, ring.centre.y);
+        let _ = write!(text, "ring {x:.1},{y:.1}: island {:.2} m, within {:.2} m of a circle", ring.radius, ring.residual);
+        match map.ground(&ring, &Options::default()) {
+            Ok(Imported { ground, .. }) => {
+                let arms: Vec<&str> = ground.arms.iter().map(|arm| arm.name.as_str()).collect();
+                let _ = writeln!(text, "; arms {}; {} routes", arms.join(" "), ground.lines.len());
+                drivable += 1;
+            }
+            Err(error) => {
+                let _ = writeln!(text, "; cannot be driven: {error}");
+                refused.get_or_insert(error);
+            }
+        }
+    }
+    let others = map.refused().len();
+    if 0 < others {
+        let _ = writeln!(text, "{others} other islands and blocks are none; --check says why");
+    }
+    files::print(&text)?;
+    if map.rings().is_empty() {
+        let expected = format!("no roundabout here: {} roads around {others} islands and blocks", map.n_roads());
+        let none: InputError = Reader::of(file).invalid("ring", "none", expected);
+        return Err(none.into());
+    }
+    match refused.filter(|_| drivable == 0) {
+        Some(error) => Err(error.into()),
+        None => Ok(()),
+    }
+}
+
+/// Prints the ways through every junction; a map without one is wrong input.
+fn junctions(file: &Path, map: &Map) -> Result<(), Error> {
+    let mut text = String::new();
+    let junctions = map.junctions();
+    for junction in &junctions {
+        let _ = writeln!(text, "junction {} at {:.1},{:.1}", junction.id.escape_debug(), junction.centre.x, junction.centre.y);
+        for way in &junction.ways {
+            let _ = writeln!(text, "  --way {}", format!("{},{}", way.from, way.to).escape_debug());
+        }
+    }
+    files::print(&text)?;
+    if junctions.is_empty() {
+        let none: InputError =
+            Reader::of(file).invalid("junction", "none", format!("no lanes lead through one of its {} roads", map.n_roads()));
+        return Err(none.into());
+    }
+    Ok(())
+}
+
+/// Prints all warnings: about the map, and about the place that is chosen or else all its roundabouts.
+fn check(file: &Path, map: &Map, choice: &Choice) -> Result<(), Error> {
+    let mut text = String::new();
+    for warning in map.warnings() {
+        let _ = writeln!(text, "{warning}");
+    }
+    let is_chosen = choice.ring.is_some() || !choice.ways.is_empty();
+    let places: Vec<Result<Imported, InputError>> = if is_chosen {
+        vec![choice.imported(file, map)]
+    } else {
+        map.rings().iter().map(|ring| map.ground(ring, &Options { arms: choice.arms.clone() })).collect()
+    };
+    for place in &places {
+        match place {
+            Ok(Imported { warnings, .. }) => warnings.iter().for_each(|warning| {
+                let _ = writeln!(text, "{warning}");
+            }),
+            Err(error) => {
+                let _ = writeln!(text, "{error}");
+            }
+        }
+    }
+    let warnings = text.lines().count();
+    for refused in map.refused().iter().filter(|_| !is_chosen) {
+        let (x, y) = (refused.centre.x, refused.centre.y);
+        let _ = writeln!(text, "no ring at {x:.1},{y:.1}, {:.1} m: {}", refused.radius, refused.reason);
+    }
+    let _ = writeln!(text, "{warnings} warnings, {} roundabouts or junctions", places.len());
+    files::print(&text)
+}

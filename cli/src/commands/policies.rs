@@ -1,0 +1,89 @@
+//! The flags that choose a policy.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use offtrack::files::reader::{shown, shown_path};
+use offtrack::scenario::Scenario;
+use offtrack::world::World;
+use offtrack_evaluation::certificate::line;
+use offtrack_evaluation::error::Error;
+use offtrack_evaluation::files;
+use offtrack_evaluation::policies::{self, LOOK_AHEAD, Policy, PurePursuit};
+
+use super::outputs;
+
+/// Which policy drives.
+#[derive(Debug, clap::Args)]
+// A group of flags is named after its type, and a command may not have two of the same name.
+#[group(skip)]
+pub struct Choice {
+    /// A policy file, `pursuit` (pure pursuit of the lane's centre), `random`, or the name of a shipped policy. Without
+    /// it the policy shipped for the benchmark or, where there is none, the first shipped one with its actions and
+    /// extras.
+    #[arg(long)]
+    policy: Option<String>,
+    /// With `pursuit`: look-ahead distance [m] \[default: 7\].
+    #[arg(long, allow_negative_numbers = true)]
+    look_ahead: Option<f64>,
+    /// With `pursuit`: a certificate of `offtrack certify`, whose paths it follows in place of the lane's centre.
+    #[arg(long)]
+    line: Option<PathBuf>,
+}
+
+impl Choice {
+    /// Opens the policy for a benchmark; `seed` is that of random actions.
+    pub fn open(&self, scenario: &Scenario, world: &Arc<World>, seed: u32) -> Result<Box<dyn Policy>, Error> {
+        let pursuit = self.pursuit(scenario, world)?;
+        let policy = policies::find(self.policy.as_deref(), &scenario.name, pursuit, seed, world)?;
+        if self.policy.is_none() && !offtrack_policy::Policy::shipped_names().contains(&scenario.name.as_str()) {
+            let (benchmark, drives) = (&scenario.name, policy.name());
+            files::say(&format!("no policy comes with the program for {benchmark}; {drives} drives; --policy chooses another"));
+        }
+        Ok(policy)
+    }
+
+    /// The files that these flags name, if they are files.
+    pub fn files(&self) -> [outputs::Named<'_>; 2] {
+        [("--policy", self.policy.as_ref().map(Path::new)), ("--line", self.line.as_deref())]
+    }
+
+    /// An error unless the policy is the one that the training run in `folder` has left.
+    pub fn check_is_of(&self, folder: &Path, scenario: &Scenario, world: &World) -> Result<(), Error> {
+        let of_run = folder.join("policy.safetensors");
+        let learned = match self.policy.as_deref() {
+            Some("pursuit" | "random") => None,
+            Some(name) => Some(policies::learned(name)?),
+            None => Some(offtrack_policy::Policy::shipped_for(&scenario.name, world)?),
+        };
+        let expected = offtrack_policy::Policy::load(&of_run)?.to_bytes();
+        if learned.is_some_and(|policy| policy.to_bytes() == expected) {
+            return Ok(());
+        }
+        let expected = format!("another policy is evaluated: give the run's own, --policy {}, or leave --run out", of_run.display());
+        Err(Error::Flag { flag: "--run", value: folder.display().to_string(), expected })
+    }
+
+    /// Pure pursuit of the lane's centre or of a certificate's paths.
+    fn pursuit(&self, scenario: &Scenario, world: &Arc<World>) -> Result<PurePursuit, Error> {
+        let distance = self.look_ahead.unwrap_or(LOOK_AHEAD.into());
+        let given = self.look_ahead.map(|distance| ("--look-ahead", format!("{} m", shown(distance))));
+        let given = given.or_else(|| Some(("--line", self.line.as_ref()?.display().to_string())));
+        if let (Some((flag, value)), true) = (given, self.policy.as_deref() != Some("pursuit")) {
+            return Err(Error::Flag { flag, value, expected: "is for pure pursuit: give --policy pursuit, too".into() });
+        }
+        if !(1.0..=50.0).contains(&distance) {
+            let value = format!("{} m", shown(distance));
+            return Err(Error::Flag { flag: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
+        }
+        let pursuit = PurePursuit::new(distance as f32);
+        let Some(file) = &self.line else { return Ok(pursuit) };
+        let lines = line::lines(file, scenario, world)?;
+        let without = world.route_names.len() - lines.len();
+        if 0 < without {
+            let (n, all) = (lines.len(), world.route_names.len());
+            files::say(&format!("{} completes {n} of {all} routes; on the others pursuit follows the lane's centre", shown_path(file)));
+        }
+        Ok(pursuit.planned(lines, &shown_path(file)))
+    }
+}

@@ -1,0 +1,84 @@
+//! The progress bar of a command, on standard error; nothing is drawn where that is no terminal.
+
+use std::io::{IsTerminal, Write};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use offtrack::files::reader::printable;
+use offtrack_evaluation::files;
+use offtrack_learner::run::progress::Display;
+
+/// A bar over `length` things called `unit`, after what is done with them.
+pub struct Bar(ProgressBar);
+
+impl Bar {
+    /// `evaluating`, `episodes`, and how many.
+    pub fn new(action: &str, unit: &str, length: usize) -> Bar {
+        let template = format!("{action} {{bar:24}} {{pos}}/{{len}} {unit}, {{elapsed}} {{wide_msg}}");
+        let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        Bar(ProgressBar::new(length as u64).with_style(style))
+    }
+
+    /// `done` of `length` things are done.
+    pub fn set(&self, done: usize, length: usize) {
+        self.0.set_length(length as u64);
+        self.0.set_position(done as u64);
+    }
+
+    /// One more thing is done.
+    pub fn advance(&self) {
+        self.0.inc(1);
+    }
+
+    /// Words after the numbers.
+    pub fn say(&self, words: &str) {
+        self.0.set_message(printable(words).into_owned());
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// Time between two lines where there is no terminal for a bar.
+const LINE_EVERY: Duration = Duration::from_secs(30);
+
+/// How far a training run is: a bar on a terminal, a plain line now and then elsewhere. Training goes on when nobody
+/// reads its lines.
+pub struct TrainingDisplay {
+    bar: ProgressBar,
+    since_line: Instant,
+    /// Which of several runs it is; begins each line.
+    label: String,
+}
+
+impl TrainingDisplay {
+    /// A bar at its beginning. `label`, which may be empty, begins each line.
+    pub fn new(label: &str) -> TrainingDisplay {
+        let style = ProgressStyle::with_template("{bar:24} {percent:>3} % {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+        TrainingDisplay { bar: ProgressBar::new(1000).with_style(style), since_line: Instant::now(), label: label.to_owned() }
+    }
+}
+
+impl Display for TrainingDisplay {
+    fn show(&mut self, fraction: f64, line: String) {
+        let line = printable(&format!("{}{line}", self.label)).into_owned();
+        if std::io::stderr().is_terminal() {
+            self.bar.set_position((1000.0 * fraction) as u64);
+            self.bar.set_message(line);
+        } else if LINE_EVERY <= self.since_line.elapsed() || fraction == 1.0 {
+            let _ = writeln!(std::io::stderr(), "{:>3.0} % {line}", 100.0 * fraction);
+            self.since_line = Instant::now();
+        }
+    }
+
+    fn warn(&mut self, line: String) {
+        self.bar.suspend(|| files::say(&line));
+    }
+
+    fn close(&mut self) {
+        self.bar.abandon();
+    }
+}

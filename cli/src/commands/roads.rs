@@ -1,0 +1,150 @@
+//! Benchmarks and roads by name, as commands take them: with a cache, a bar, and single routes in place of a split.
+
+use std::sync::Arc;
+
+use offtrack::files::cache::{Cache, Loading, Progress};
+use offtrack::files::reader::shortened;
+use offtrack::files::shipped::Kind;
+use offtrack::map::parametric::Roundabout;
+use offtrack::map::procedural;
+use offtrack::scenario::{Place, Scenario, Split};
+use offtrack::world::World;
+use offtrack_evaluation::error::Error;
+use offtrack_evaluation::files;
+
+use super::progress::Bar;
+
+/// Roads that take no progress bar.
+const FEW: usize = 20;
+/// Most characters of the list of routes in a message.
+const LONGEST_LIST: usize = 600;
+
+/// A benchmark by its name or path. What is known of random roads is kept in the user's cache.
+pub fn benchmark(name: &str) -> Result<Scenario, Error> {
+    Ok(loading("drawing", |loading| Scenario::load(name, loading))?)
+}
+
+/// The benchmark's world, with the fields of its roundabouts from the user's cache.
+pub fn world(scenario: &Scenario) -> Result<Arc<World>, Error> {
+    Ok(loading("baking", |loading| World::bake_with(scenario, loading))?.into())
+}
+
+/// Does `work` on roads with the user's cache and, where there are many, a bar.
+pub fn loading<T>(action: &str, work: impl FnOnce(&Loading) -> T) -> T {
+    let cache = Cache::of_user();
+    let done = {
+        let bar = Bar::new(action, "roads", 0);
+        let watcher = |progress: Progress| {
+            if FEW < progress.total {
+                bar.set(progress.done, progress.total);
+            }
+        };
+        work(&Loading { cache: cache.as_ref(), watcher: &watcher, ..Loading::PLAIN })
+    };
+    if let Some(failure) = cache.as_ref().and_then(Cache::failure) {
+        files::say(&format!("note: {failure}; the next command computes them again"));
+    }
+    done
+}
+
+/// Leaves the benchmark the routes that `--route` names: each a route, or all routes of a roundabout. Those of the
+/// benchmark must be in one of `splits`. A road that the benchmark does not have is added to the last of them.
+pub fn narrow(scenario: &mut Scenario, names: &[String], splits: &[Split]) -> Result<(), Error> {
+    let mut added: Vec<(String, Roundabout)> = Vec::new();
+    for name in names {
+        let of = |split: Split| scenario.split_names(split).iter().any(|route| is_of(route, name));
+        if splits.iter().any(|&split| of(split)) {
+            continue;
+        }
+        if let Some(split) = Split::ALL.into_iter().find(|&split| of(split)) {
+            let expected = format!("is not in the split asked for: give --split {}", split.name());
+            return Err(Error::Flag { flag: "--route", value: name.clone(), expected });
+        }
+        let (road, route) = road_of(name).ok_or_else(|| unknown(scenario, name))?;
+        if scenario.places.iter().any(|place| place.roundabout.name == road) {
+            return Err(unknown(scenario, name));
+        }
+        let found = match added.iter().position(|(known, _)| known == road) {
+            Some(found) => found,
+            None => {
+                added.push((road.to_owned(), procedural::find(road)?));
+                added.len() - 1
+            }
+        };
+        // The road of a file is named after its stem.
+        if let Some(route) = route {
+            let alone = scenario.on(added[found].1.clone())?;
+            if !alone.routes().any(|(_, other)| short(&other.name) == route) {
+                return Err(unknown(&alone, name));
+            }
+        }
+    }
+    let split = splits.last().copied().unwrap_or(Split::Test);
+    let mut wanted = names.to_vec();
+    for (road, roundabout) in added {
+        // Routes of a file are named after its stem.
+        wanted.extend(names.iter().filter_map(|name| name.strip_prefix(road.as_str())).map(|rest| format!("{}{rest}", roundabout.name)));
+        scenario.add(roundabout, split)?;
+    }
+    scenario.keep(splits);
+    scenario.retain(|_, route| wanted.iter().any(|name| is_of(&route.name, name)));
+    Ok(())
+}
+
+/// Leaves the benchmark, which a command was given as `benchmark`, the routes of one split.
+pub fn keep(scenario: &mut Scenario, split: Split, benchmark: &str) -> Result<(), Error> {
+    if scenario.split(split).is_empty() {
+        let name = split.name();
+        let has = Split::ALL.into_iter().filter(|&other| !scenario.split(other).is_empty()).map(Split::name);
+        let has = shortened(&has.collect::<Vec<_>>().join(", "), LONGEST_LIST);
+        let expected =
+            format!("{} has routes under {has} alone; list some under `{name}`, or ask for another split", shortened(benchmark, 200));
+        return Err(Error::Flag { flag: "--split", value: name.to_owned(), expected });
+    }
+    scenario.keep(&[split]);
+    Ok(())
+}
+
+/// Whether `name` is this route or its roundabout.
+fn is_of(route: &str, name: &str) -> bool {
+    route == name || route.rsplit_once('/').is_some_and(|(roundabout, _)| roundabout == name)
+}
+
+/// A route's name within its roundabout.
+fn short(route: &str) -> &str {
+    route.rsplit('/').next().unwrap_or(route)
+}
+
+/// The road and, if it names one, the route within it that a name means apart from any benchmark.
+fn road_of(name: &str) -> Option<(&str, Option<&str>)> {
+    let is_road =
+        |name: &str| procedural::address(name).is_some() || Kind::Roundabout.names().any(|known| known == name) || name.ends_with(".toml");
+    let split = || name.rsplit_once('/').filter(|(road, _)| is_road(road)).map(|(road, route)| (road, Some(route)));
+    if is_road(name) { Some((name, None)) } else { split() }
+}
+
+/// The error for a name that no route has. It lists the routes of the roundabout that the name begins with, or one of
+/// each roundabout.
+pub fn unknown(scenario: &Scenario, name: &str) -> Error {
+    let of = |place: &Place| place.routes.iter().map(|route| route.name.clone()).collect::<Vec<_>>();
+    let begins = |place: &&Place| name.strip_prefix(&place.roundabout.name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'));
+    let meant = scenario.places.iter().find(begins);
+    let names = meant.map_or_else(|| scenario.places.iter().filter_map(|place| of(place).first().cloned()).collect(), of);
+    let (from, list) = (&scenario.name, shortened(&names.join(", "), LONGEST_LIST));
+    let expected = match meant {
+        Some(place) => format!("of {} the benchmark {from} has {list}", place.roundabout.name),
+        None => format!("a route of the benchmark {from} is needed, such as {list}, or one of a random road, such as wide/7/12"),
+    };
+    Error::Flag { flag: "--route", value: name.to_owned(), expected }
+}
+
+/// The benchmark with the trucks of this load alone; the whole of it where none is named.
+pub fn with_load(scenario: Scenario, load: Option<&str>) -> Result<Scenario, Error> {
+    let Some(load) = load else { return Ok(scenario) };
+    scenario.with_classes(|class| class.load == load).ok_or_else(|| {
+        let mut known: Vec<String> = scenario.classes().into_iter().map(|class| class.load).collect();
+        known.sort();
+        known.dedup();
+        Error::Flag { flag: "--load", value: load.to_owned(), expected: format!("{} has {}", scenario.name, known.join(", ")) }
+    })
+}

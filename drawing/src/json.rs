@@ -1,0 +1,68 @@
+//! A road's kerbs as polygons, its routes as waypoints and a swept path, for other programs.
+
+use glam::DVec2;
+use offtrack::geometry::Outline;
+use offtrack::map::route::Route;
+use offtrack_evaluation::polygons::{Polygon, corners, drivable, rounded, to};
+use serde::Serialize;
+
+use crate::sweep::{self, Sweep};
+
+/// Extent of solid ground beyond the outermost kerb \[m].
+const MARGIN: f64 = 5.0;
+
+#[derive(Serialize)]
+struct Written<'a> {
+    solids: Vec<Polygon>,
+    drivable: Vec<Polygon>,
+    routes: Vec<WrittenRoute<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sweep: Option<sweep::Written<'a>>,
+}
+
+#[derive(Serialize)]
+struct WrittenRoute<'a> {
+    name: &'a str,
+    waypoints: Vec<[f64; 3]>,
+}
+
+/// Polygons and waypoints as one line of JSON, in metres and radians: `{"solids": [[[x, y], ...], ...], "drivable":
+/// [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x, y, heading], ...]}]}`.
+///
+/// `drivable` is the outer boundary, then one hole for each island; `solids` are the islands, then the ground beyond
+/// the boundary as two polygons. Curves are within 1 cm. With a swept path there is `sweep`, as `offtrack draw --help`
+/// describes it.
+///
+/// # Errors
+///
+/// A coordinate that is not finite.
+pub fn written(kerbs: &Outline, routes: &[Route], sweep: Option<&Sweep>) -> serde_json::Result<String> {
+    let (boundary, islands) = corners(kerbs);
+    let ground = boundary.first().map(|points| ground(points)).into_iter().flatten();
+    let solids = islands.iter().cloned().chain(ground).map(|points| rounded(&points)).collect();
+    let drivable = drivable(kerbs);
+    let routes = routes.iter().map(|route| WrittenRoute {
+        name: &route.name,
+        waypoints: route.waypoints.iter().map(|w| [to(1e4, w.position.x), to(1e4, w.position.y), to(1e6, w.heading)]).collect(),
+    });
+    let sweep = sweep.map(Sweep::written);
+    let mut text = serde_json::to_string(&Written { solids, drivable, routes: routes.collect(), sweep })?;
+    text.push('\n');
+    Ok(text)
+}
+
+/// The ground around a counter-clockwise boundary, cut at its westernmost and easternmost points into a northern and a
+/// southern polygon.
+fn ground(boundary: &[DVec2]) -> [Vec<DVec2>; 2] {
+    let n = boundary.len();
+    let furthest = |sign: f64| (0..n).max_by(|&a, &b| (sign * boundary[a].x).total_cmp(&(sign * boundary[b].x))).unwrap_or(0);
+    let (west, east) = (furthest(-1.0), furthest(1.0));
+    // Clockwise along the boundary, so that the ground lies on the left.
+    let back = |from: usize, to: usize| (0..=(from + n - to) % n).map(move |step| boundary[(from + n - step) % n]);
+    let low = boundary.iter().copied().fold(DVec2::INFINITY, DVec2::min) - MARGIN;
+    let high = boundary.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max) + MARGIN;
+    let (west_end, east_end) = (DVec2::new(low.x, boundary[west].y), DVec2::new(high.x, boundary[east].y));
+    let north = [east_end, high, DVec2::new(low.x, high.y), west_end].into_iter().chain(back(west, east)).collect();
+    let south = [west_end, low, DVec2::new(high.x, low.y), east_end].into_iter().chain(back(east, west)).collect();
+    [north, south]
+}

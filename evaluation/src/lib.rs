@@ -1,0 +1,61 @@
+//! Policies for tractor-trailers in roundabouts: learned and evaluated. The crate `offtrack_policy` is their files.
+//!
+//! A policy that comes with the project, one truck on each route that it never saw in training, until every episode has
+//! ended:
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use offtrack::layout::Ended;
+//! use offtrack::scenario::{Scenario, Split};
+//! use offtrack::simulator::{RouteChoice, Simulator};
+//! use offtrack::world::World;
+//! use offtrack_policy::Policy;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scenario = Scenario::named("attard2023")?;
+//! let world = Arc::new(World::bake(&scenario)?);
+//! let policy = Policy::shipped("attard2023")?;
+//! let routes = scenario.split(Split::Test).to_vec();
+//! let mut simulator = Simulator::new(world, routes.len(), 0, RouteChoice::Fixed(routes))?;
+//! while simulator.batch().ended.contains(&(Ended::Running as u32)) {
+//!     simulator.step(&policy.act(&simulator.batch().observation))?;
+//! }
+//! let arrived = simulator.batch().ended.iter().filter(|&&ended| ended == Ended::Arrived as u32).count();
+//! println!("{arrived} of {} trucks arrived", simulator.n_envs());
+//! # assert!(20 <= arrived && simulator.n_envs() == 23, "{arrived}");
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! The command line `offtrack` is the binary of this package; the feature `cli`, on by default, builds it. Without the
+//! feature `gpu` no graphics crate is built.
+
+pub mod device; // what steps the trucks
+pub mod error;
+pub mod files; // results, written whole
+pub mod provenance; // machine and commit of a result
+pub mod polygons; // curves as points
+pub mod recording; // the states of an episode
+mod evaluation; // every route, every start, every episode counted
+pub mod certificate; // routes shown to be possible
+pub mod driving; // how trucks drive, by vehicle and load
+pub mod failures; // why episodes did not arrive
+pub mod groups; // routes that have something in common
+pub mod page; // a report as an HTML page
+mod part; // entry, ring and exit of a route
+pub mod policies; // what chooses the actions: learned, pure pursuit, random
+pub mod possible; // success over the starts that are shown to be possible
+pub mod report; // figures of an evaluation
+mod running; // an episode under way
+pub mod seeds; // figures of several seeds
+pub mod shown; // which episodes a page shows
+mod table; // a report as text
+
+pub use evaluation::*;
+pub use table::legend;
+
+/// The README's examples, compiled and run as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;

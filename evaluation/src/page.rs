@@ -1,0 +1,155 @@
+//! The page of an evaluation and of the training run behind it: one HTML file that loads no other file.
+//!
+//! It holds the whole report, so that every figure can be checked, and the episodes that it shows as gzipped columns of
+//! differences. Roundabouts and routes without such an episode are left out.
+
+mod ground;
+mod tracks;
+
+use std::path::Path;
+
+use offtrack::scenario::Scenario;
+use offtrack::world::World;
+use serde_json::{Value, json};
+
+use crate::error::Error;
+use crate::files;
+use crate::recording::Track;
+use crate::report::Report;
+use ground::Ground;
+
+const TEMPLATE: &str = include_str!("page/report.html");
+const STYLE: &str = include_str!("page/style.css");
+/// In the order of the page; the last one starts the others.
+const SCRIPTS: [&str; 14] = [
+    include_str!("page/elements.js"),
+    include_str!("page/data.js"),
+    include_str!("page/headline.js"),
+    include_str!("page/routes.js"),
+    include_str!("page/groups.js"),
+    include_str!("page/chart.js"),
+    include_str!("page/curves.js"),
+    include_str!("page/training.js"),
+    include_str!("page/scene.js"),
+    include_str!("page/replay.js"),
+    include_str!("page/profiles.js"),
+    include_str!("page/classes.js"),
+    include_str!("page/selftest.js"),
+    include_str!("page/main.js"),
+];
+
+/// The contents of a page.
+#[derive(Debug)]
+pub struct Page<'a> {
+    /// The benchmark.
+    pub scenario: &'a Scenario,
+    /// The benchmark, baked.
+    pub world: &'a World,
+    /// The report of the evaluation.
+    pub evaluation: &'a Report,
+    /// The episodes that it shows, in order. `env` is the index of an episode among all, of which each of the report's
+    /// routes has the same number.
+    pub tracks: &'a [Track],
+    /// The training run as in its `report.json`; `Null` without one.
+    pub run: Value,
+    /// The text of the run's `metrics.csv`.
+    pub metrics: Option<String>,
+}
+
+impl Page<'_> {
+    /// Writes the page to `file`.
+    pub fn write(mut self, file: &Path) -> Result<(), Error> {
+        let columns = tracks::columns(self.world.params.sensor_range);
+        let mut ground = Ground::of(&self, &columns);
+        let mut evaluation = json!(self.evaluation);
+        if self.evaluation.has_many_routes() {
+            // Gzipped with the ground: of thousands of routes this is most of the report.
+            ground.route_reports = Some(rounded(evaluation["routes"].take()));
+        }
+        // A row of the page for each further evaluation; their routes are in the report's own file.
+        for also in self.run.get_mut("also").and_then(Value::as_array_mut).into_iter().flatten().filter_map(Value::as_object_mut) {
+            also.retain(|name, _| name != "routes" && name != "groups");
+        }
+        let ground = json!(ground).to_string();
+        match self.run.as_object_mut() {
+            Some(run) => drop(run.insert("evaluation".to_owned(), evaluation)),
+            None => self.run = json!({ "evaluation": evaluation }),
+        }
+        let [ground, tracks] = [ground.into_bytes(), tracks::differences(self.tracks, &columns)].map(|bytes| tracks::packed(&bytes));
+        let (ground, tracks) = (ground.map_err(Error::write(file))?, tracks.map_err(Error::write(file))?);
+        let summary = &self.evaluation.summary;
+        let (benchmark, split) = (&self.evaluation.benchmark, self.evaluation.split);
+        let title =
+            escaped(&format!("{:.1} % of {} episodes arrived, {benchmark} {split} routes", 100.0 * summary.success, summary.episodes));
+        let page = filled(&[
+            ("title", &title),
+            ("heading", &escaped(&format!("Evaluation on {benchmark}, {split} routes"))),
+            ("style", STYLE),
+            ("report", &script_json(&self.run)),
+            ("ground", &ground),
+            ("metrics", &script_json(&json!(self.metrics))),
+            ("tracks", &tracks),
+            ("script", &SCRIPTS.concat()),
+        ]);
+        files::write_whole(file, page.as_bytes())
+    }
+}
+
+/// The same with at most four decimals.
+fn rounded(value: Value) -> Value {
+    match value {
+        Value::Array(values) => values.into_iter().map(rounded).collect(),
+        Value::Object(values) => values.into_iter().map(|(name, value)| (name, rounded(value))).collect(),
+        Value::Number(number) if number.is_f64() => number.as_f64().map_or(Value::Null, |value| json!((1e4 * value).round() / 1e4)),
+        other => other,
+    }
+}
+
+/// The template with each `{{name}}` replaced by its value. Values are not searched for names.
+fn filled(values: &[(&str, &str)]) -> String {
+    let mut page = String::new();
+    let mut rest = TEMPLATE;
+    while let Some((before, (name, after))) = rest.split_once("{{").and_then(|(before, tail)| Some((before, tail.split_once("}}")?))) {
+        page.push_str(before);
+        page.push_str(values.iter().find(|&&(known, _)| known == name).map_or("", |&(_, value)| value));
+        rest = after;
+    }
+    page + rest
+}
+
+/// JSON that can stand in a script element: no `<`, so that no text in it ends the element.
+fn script_json(value: &Value) -> String {
+    value.to_string().replace('<', "\\u003c")
+}
+
+/// Text that can stand in HTML.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_of_the_template_is_replaced_and_values_stay_as_they_are() {
+        let names = ["title", "heading", "style", "report", "ground", "metrics", "tracks", "script"];
+        let page = filled(&names.map(|name| (name, "{{title}}<kept>")));
+        assert_eq!(page.matches("{{title}}<kept>").count(), names.len());
+        assert_eq!(page.matches("{{").count(), page.matches("<kept>").count());
+    }
+
+    #[test]
+    fn a_name_in_a_report_cannot_end_its_script_element() {
+        let text = script_json(&json!({ "policy": "</script><script>alert(1)" }));
+        assert!(!text.contains('<'), "{text}");
+        assert_eq!(serde_json::from_str::<Value>(&text).unwrap()["policy"], "</script><script>alert(1)");
+    }
+
+    #[test]
+    fn of_a_rounded_report_only_fractions_lose_digits() {
+        let value = json!({ "routes": [{ "mean": 0.123_456_78, "least": -2.000_04, "episodes": 123_456_789, "none": null, "name": "a" }] });
+        let expected = json!({ "routes": [{ "mean": 0.1235, "least": -2.0, "episodes": 123_456_789, "none": null, "name": "a" }] });
+        assert_eq!(rounded(value), expected);
+    }
+}

@@ -1,0 +1,188 @@
+//! What chooses the actions: a learned policy, pure pursuit of the centre line, or actions drawn uniformly at random.
+//! The last two are the baselines that a learner must beat.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use offtrack::layout::random::{self, Draw};
+use offtrack::layout::{Action, Truck, WaypointRow};
+use offtrack::simulator::Batch;
+use offtrack::vehicle::profile::Profile;
+use offtrack::world::World;
+
+use crate::certificate::line::Lines;
+use crate::error::Error;
+
+/// Pure pursuit's default look-ahead distance: the best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of
+/// attard2023 \[m].
+pub const LOOK_AHEAD: f32 = 7.0;
+
+/// How far ahead pure pursuit looks for a lower speed: the time that the speed control takes to reach it \[s].
+const RESPONSE: f64 = 1.5;
+
+/// Chooses an action for every truck of a batch.
+pub trait Policy {
+    /// Name for reports: a policy file, a shipped policy, `pursuit` or `random`.
+    fn name(&self) -> &str;
+
+    /// Writes the index of each truck's action in the world's action table, `[n_envs]`.
+    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>);
+}
+
+/// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its name. Its
+/// action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where there is none, the
+/// first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random actions.
+pub fn find(policy: Option<&str>, benchmark: &str, pursuit: PurePursuit, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
+    let learned = match policy {
+        Some("pursuit") => return Ok(Box::new(pursuit)),
+        Some("random") => return Ok(Box::new(UniformRandom { seed })),
+        Some(name) => learned(name)?,
+        None => offtrack_policy::Policy::shipped_for(benchmark, world)?,
+    };
+    learned.check(world)?;
+    Ok(Box::new(learned))
+}
+
+/// A learned policy by the path of its file, or a shipped one by its name. A file comes first.
+pub fn learned(name: &str) -> Result<offtrack_policy::Policy, Error> {
+    let file = Path::new(name);
+    let is_shipped = offtrack_policy::Policy::shipped_names().contains(&name) && !file.is_file();
+    // A word without an extension that is no file is taken for a wrong name: the error lists the right ones.
+    let is_name = !file.exists() && file.extension().is_none() && file.components().count() == 1;
+    if is_shipped || is_name {
+        return Ok(offtrack_policy::Policy::shipped(name)?);
+    }
+    Ok(offtrack_policy::Policy::load(file)?)
+}
+
+impl Policy for offtrack_policy::Policy {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn choose(&mut self, _: &World, batch: &Batch, actions: &mut Vec<u32>) {
+        // A held truck needs no action, and before the last episode ends most are held.
+        let driving: Vec<usize> = (0..batch.truck.len()).filter(|&env| batch.truck[env].held == 0).collect();
+        let observations: Vec<_> = driving.iter().map(|&env| batch.observation[env]).collect();
+        let extras: Vec<_> = driving.iter().map(|&env| batch.extras[env]).collect();
+        actions.clear();
+        actions.resize(batch.truck.len(), 0);
+        for (env, action) in driving.into_iter().zip(self.act_beside(&observations, &extras)) {
+            actions[env] = action;
+        }
+    }
+}
+
+/// Actions drawn uniformly at random.
+#[derive(Debug)]
+pub struct UniformRandom {
+    /// Seed of the draws.
+    pub seed: u32,
+}
+
+impl Policy for UniformRandom {
+    fn name(&self) -> &str {
+        "random"
+    }
+
+    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
+        actions.clear();
+        actions.extend(batch.truck.iter().enumerate().map(|(env, truck)| {
+            let [word, ..] = random::words(self.seed, env as u32, truck.episode, (Draw::Action as u32).wrapping_add(truck.steps));
+            random::index_below(word, world.params.n_actions)
+        }));
+    }
+}
+
+/// Pure pursuit: steers the drive axle along the arc to a point of the centre line at the look-ahead distance, at the
+/// speed of the feasible profile of its vehicle. It follows the line well and ignores the room that the trailer needs;
+/// [planned](PurePursuit::planned) lines have it.
+///
+/// R. Coulter, "Implementation of the Pure Pursuit Path Tracking Algorithm" (Carnegie Mellon, 1992).
+#[derive(Debug)]
+pub struct PurePursuit {
+    /// Look-ahead distance: from the drive axle to the target point \[m].
+    look_ahead: f32,
+    /// The feasible speeds of a vehicle on a route, by both indices.
+    profiles: HashMap<(u32, u32), Profile>,
+    /// Lines to follow in place of the lane's centre.
+    lines: Lines,
+    name: String,
+}
+
+impl Policy for PurePursuit {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
+        actions.clear();
+        actions.extend(batch.truck.iter().zip(&batch.progress).zip(&batch.control).map(|((truck, progress), control)| {
+            let (waypoints, next) = (line(&self.lines, world, truck.route), progress.waypoint as usize);
+            let steering = self.steering(world.rig(truck).wheelbase, truck, waypoints, next);
+            let speed = self.speed(world, truck, next);
+            nearest(world, steering, if world.params.changes_speed == 1 { speed - control.target_speed } else { speed })
+        }));
+    }
+}
+
+impl PurePursuit {
+    /// With this look-ahead distance \[m].
+    pub fn new(look_ahead: f32) -> PurePursuit {
+        PurePursuit { look_ahead, profiles: HashMap::new(), lines: Lines::new(), name: "pursuit".to_owned() }
+    }
+
+    /// Follows these lines, and the lane's centre on routes that have none; `origin` tells where they are from in its
+    /// name.
+    pub fn planned(self, lines: Lines, origin: &str) -> PurePursuit {
+        PurePursuit { lines, name: format!("pursuit of {origin}"), ..self }
+    }
+
+    /// The speed to drive at: the lowest of the profile within the time that the speed control takes to follow [m/s].
+    fn speed(&mut self, world: &World, truck: &Truck, next: usize) -> f32 {
+        let waypoints = line(&self.lines, world, truck.route);
+        let fastest = world.params.target_speed_max.into();
+        let profile = self.profiles.entry((truck.route, truck.vehicle));
+        let profile = profile.or_insert_with(|| Profile::of(world.rig(truck), waypoints, fastest));
+        let spacing = waypoints[0].position.distance(waypoints[1].position);
+        profile.lowest_ahead(next.saturating_sub(1), f64::from(truck.speed) * RESPONSE, spacing.into()) as f32
+    }
+
+    /// Steer angle of the arc to the target point \[rad].
+    fn steering(&self, wheelbase: f32, truck: &Truck, waypoints: &[WaypointRow], next: usize) -> f32 {
+        let pair = |index: usize| (waypoints[index - 1].position, waypoints[index].position);
+        // The first segment that ends beyond the look-ahead distance; it starts within it.
+        let first = next.clamp(1, waypoints.len() - 1);
+        let beyond = |&index: &usize| self.look_ahead <= truck.position.distance(waypoints[index].position);
+        let index = (first..waypoints.len()).find(beyond).unwrap_or(waypoints.len() - 1);
+        let (from, to) = pair(index);
+        let (mut near, mut far) = (0.0f32, 1.0f32);
+        // Bisection finds the target point to a millimetre on a segment of a few metres.
+        for _ in 0..12 {
+            let middle = 0.5 * (near + far);
+            if truck.position.distance(from.lerp(to, middle)) < self.look_ahead { near = middle } else { far = middle }
+        }
+        let ahead = from.lerp(to, far) - truck.position;
+        let bearing = glam::Vec2::from_angle(-truck.heading).rotate(ahead);
+        (2.0 * wheelbase * bearing.y / ahead.length_squared().max(1.0)).atan()
+    }
+}
+
+/// The line that pure pursuit follows on a route: a row for each waypoint.
+fn line<'a>(lines: &'a Lines, world: &'a World, route: u32) -> &'a [WaypointRow] {
+    lines.get(&route).map_or_else(|| world.route_waypoints(route), Vec::as_slice)
+}
+
+/// The action with the highest speed or change that is at most `speed`, the lowest if there is none; among those the
+/// nearest to `steering`.
+fn nearest(world: &World, steering: f32, speed: f32) -> u32 {
+    // A target that is above the profile by a hundredth is taken for it.
+    let above = |action: &Action| speed + 0.01 < action.speed;
+    let apart = |action: &Action| [(action.speed - speed).abs(), (action.steering - steering).abs()];
+    let order = |a: &Action, b: &Action| {
+        let [(speed_a, steering_a), (speed_b, steering_b)] = [apart(a).into(), apart(b).into()];
+        above(a).cmp(&above(b)).then(f32::total_cmp(&speed_a, &speed_b)).then(f32::total_cmp(&steering_a, &steering_b))
+    };
+    let best = world.actions.iter().enumerate().min_by(|(_, a), (_, b)| order(a, b));
+    best.map_or(0, |(index, _)| index as u32)
+}

@@ -1,0 +1,115 @@
+// The replay buffer on a device: a ring of the latest steps of every truck, filled from the simulator's columns and
+// sampled into the learner's tensors. Its twin on the host is learner/src/replay_buffer.rs. Structs and bindings are
+// printed from learner/src/rollout/device/memory_kernels.rs.
+
+// Samples an action for every truck from the actor's output.
+@compute @workgroup_size(WORKGROUP)
+fn choose(thread: Thread) {
+    let env = index_of(thread);
+    if facts.n_envs <= env { return; }
+    let first = env * facts.n_actions;
+    var most = logits[first];
+    for (var n = 1u; n < facts.n_actions; n++) {
+        most = max(most, logits[first + n]);
+    }
+    var sum = 0.0;
+    for (var n = 0u; n < facts.n_actions; n++) {
+        sum += exp(logits[first + n] - most);
+    }
+    var left = sum * 0.5 * (signed_unit(words(facts.acting_seed, env, now.step, 0u).x) + 1.0);
+    // Rounding can leave a little of the sum after the last action.
+    var chosen = facts.n_actions - 1u;
+    for (var n = 0u; n < facts.n_actions; n++) {
+        left -= exp(logits[first + n] - most);
+        if left < 0.0 {
+            chosen = n;
+            break;
+        }
+    }
+    action[env] = chosen;
+}
+
+// Stores observations and actions before a step; a thread a value.
+@compute @workgroup_size(WORKGROUP)
+fn store_before(thread: Thread) {
+    let element = index_of(thread);
+    let env = element / facts.n_values;
+    let value = element % facts.n_values;
+    if facts.n_envs <= env { return; }
+    let row = now.slot * facts.n_envs + env;
+    if value < N_VALUES {
+        held_observation[row * facts.n_values + value] = observation[env * N_VALUES + value];
+    } else {
+        held_observation[row * facts.n_values + value] = extras[env * N_EXTRAS + value - N_VALUES];
+    }
+    if value == 0u {
+        held_action[row] = action[env];
+    }
+}
+
+// Stores what the step led to; a thread a value.
+@compute @workgroup_size(WORKGROUP)
+fn store_after(thread: Thread) {
+    let element = index_of(thread);
+    let env = element / facts.n_values;
+    let value = element % facts.n_values;
+    if facts.n_envs <= env { return; }
+    let row = now.slot * facts.n_envs + env;
+    if value < N_VALUES {
+        held_next[row * facts.n_values + value] = next_observation[env * N_VALUES + value];
+    } else {
+        held_next[row * facts.n_values + value] = next_extras[env * N_EXTRAS + value - N_VALUES];
+    }
+    if value == 0u {
+        held_reward[row] = reward[env];
+        held_ended[row] = ended[env];
+    }
+}
+
+// Samples transitions over up to `n_steps` steps, uniformly at random; a thread a value.
+//
+// The sum of rewards is R. Sutton's n-step return ("Learning to Predict by the Methods of Temporal Differences", 1988).
+@compute @workgroup_size(WORKGROUP)
+fn sample(thread: Thread) {
+    let element = index_of(thread);
+    let index = element / facts.n_values;
+    let value = element % facts.n_values;
+    if facts.n_rows <= index { return; }
+    let drawn = words(facts.sampling_seed, index, now.sample, 0u);
+    let slot = now.oldest + index_below(drawn.x, now.n_ready);
+    let env = index_below(drawn.y, facts.n_envs);
+    let first = (slot % facts.n_slots) * facts.n_envs + env;
+    var last = first;
+    var sum = 0.0;
+    var weight = 1.0;
+    for (var n = 0u; n < facts.n_steps; n++) {
+        last = ((slot + n) % facts.n_slots) * facts.n_envs + env;
+        sum += weight * held_reward[last];
+        weight *= facts.gamma;
+        if held_ended[last] == TIMED_OUT { break; }
+        if held_ended[last] != RUNNING {
+            weight = 0.0;
+            break;
+        }
+    }
+    let is_mirrored = facts.mirrored == 1u && (drawn.z & 1u) == 1u;
+    if value == 0u {
+        var taken = held_action[first];
+        if is_mirrored { taken = action_images[taken]; }
+        sampled_action[index] = i32(taken);
+        sampled_reward[index] = sum * facts.reward_scale;
+        sampled_discount[index] = weight;
+    }
+    var image = Image(value, 1.0);
+    if is_mirrored { image = images[value]; }
+    // The same noise on both, so that their difference stays what it is.
+    let noise = normalisation[value].noise * signed_unit(words(facts.sampling_seed, index, now.sample, 1u + value).x);
+    sampled_observation[element] = normalised(image.factor * held_observation[first * facts.n_values + image.index], value) + noise;
+    sampled_next[element] = normalised(image.factor * held_next[last * facts.n_values + image.index], value) + noise;
+}
+
+// A value, normalised and clipped.
+fn normalised(value: f32, index: u32) -> f32 {
+    let normal = normalisation[index];
+    return clamp((value - normal.mean) * normal.factor, -facts.clip, facts.clip);
+}

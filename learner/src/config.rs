@@ -1,0 +1,365 @@
+//! A training file: what is trained on, for how long, and how. `learner/configs/default.toml` explains every key.
+//!
+//! A file may name another one as its `base` and give only the keys that differ.
+
+mod also_evaluate;
+mod check;
+mod file;
+mod set;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use offtrack::files::reader::Reader;
+use offtrack::scenario::RewardChanges;
+use serde::{Deserialize, Serialize};
+
+use offtrack_evaluation::error::Error;
+
+pub use also_evaluate::AlsoEvaluate;
+
+/// A training file. Unknown keys are refused; one in hand has been checked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// The benchmark whose test routes the policy is evaluated on: a name, or the path of a file.
+    pub benchmark: String,
+    /// The benchmark whose training routes it is trained on; none for `benchmark` itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub training_benchmark: Option<String>,
+    /// Further evaluations of the policy, each `BENCHMARK` or `BENCHMARK/SPLIT`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub also_evaluate: Vec<String>,
+    /// Where the trucks and the learner are.
+    #[serde(default)]
+    pub device: Device,
+    /// Part of the graphics adapter's name; none for the first that is found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adapter: Option<String>,
+    /// A policy to begin with, a file or a shipped one's name; none begins with random weights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
+    /// Seed of routes, poses, networks, actions and samples.
+    pub seed: u32,
+    /// Number of trucks.
+    pub n_envs: usize,
+    /// Training time \[min].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub minutes: Option<f64>,
+    /// Env steps of all trucks together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steps: Option<u64>,
+    /// Time between two checkpoints \[min].
+    #[serde(default = "checkpoint_minutes")]
+    pub checkpoint_minutes: f64,
+    /// Other weights than the training benchmark's in its reward.
+    #[serde(default, skip_serializing_if = "RewardChanges::is_empty")]
+    pub reward: RewardChanges,
+    /// Random actions among the policy's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exploration: Option<Exploration>,
+    /// Routes that fail are drawn more often; none draws uniformly.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub level_replay: Option<LevelReplay>,
+    /// The policy is tried on validation routes while it learns, and the best one is kept; none keeps the last.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub validation: Option<Validation>,
+    /// The replay buffer.
+    pub replay_buffer: ReplayBuffer,
+    /// The learner.
+    pub learning: Learning,
+    /// The last part of the run refines the policy by proximal policy optimisation; none does without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refinement: Option<Refinement>,
+}
+
+/// Why a config can always be written.
+const WRITABLE: &str = "numbers, words and lists of them can all be written as TOML";
+
+fn checkpoint_minutes() -> f64 {
+    2.0
+}
+
+/// Where the trucks and the learner are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Device {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// A graphics device, both on the same one.
+    Gpu,
+}
+
+/// Random actions in place of some of the policy's: epsilon-greedy exploration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Exploration {
+    /// Fraction of random actions at the beginning.
+    pub initial_fraction: f64,
+    /// The same from `steps` on.
+    pub final_fraction: f64,
+    /// Env steps over which it goes from one to the other.
+    pub steps: u64,
+    /// How differently the trucks explore: the fraction of truck i of n is raised to the power 1 + spread i / (n - 1).
+    #[serde(default)]
+    pub spread: f64,
+}
+
+/// Routes are drawn more often where their episodes sometimes fail.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LevelReplay {
+    /// Fraction of the episodes whose route is drawn by its score; the others' is drawn uniformly.
+    pub fraction: f64,
+    /// Weight of a route's latest episode in its failure rate.
+    pub rate: f64,
+}
+
+/// How the policy is tried while it learns.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Validation {
+    /// The benchmark with the validation routes: a name, or the path of a file. None for those of the run's `benchmark`
+    /// or, where that has none, for random roads that are driven as it says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub benchmark: Option<String>,
+    /// Number of validations in a run, at equal parts of its budget.
+    pub times: usize,
+    /// Episodes on each route.
+    pub episodes: usize,
+}
+
+/// The replay buffer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReplayBuffer {
+    /// Transitions held.
+    pub capacity: usize,
+    /// Transitions before the first update.
+    pub warmup: usize,
+    /// Prioritised sampling; none samples uniformly.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub priority: Option<Priority>,
+}
+
+/// Transitions are sampled in proportion to a power of their TD error.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Priority {
+    /// Power of the TD error.
+    pub exponent: f64,
+    /// Power of the importance-sampling weights: 0 corrects nothing, 1 all of the bias.
+    pub correction: f64,
+}
+
+/// The learner.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Learning {
+    /// Sizes of the hidden layers of the actor and the critics.
+    pub hidden: Vec<usize>,
+    /// Transitions in an update.
+    pub batch: usize,
+    /// Updates after each step of all trucks.
+    pub updates_per_step: usize,
+    /// Steps of the n-step return.
+    pub n_steps: usize,
+    /// Discount factor.
+    pub gamma: f64,
+    /// Factor of the rewards.
+    pub reward_scale: f64,
+    /// Added to the reward of a step that arrives; none adds nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub arrival: Option<f64>,
+    /// Observations are normalised to mean 0 and standard deviation 1.
+    pub normalise_observations: bool,
+    /// Uniform noise on the normalised observations of a sample, up to this; 0 for none.
+    #[serde(default)]
+    pub observation_noise: f64,
+    /// Half of the sampled transitions are mirrored left to right.
+    #[serde(default)]
+    pub mirror_augmentation: bool,
+    /// Adam's learning rate of the actor at the beginning.
+    pub actor_learning_rate: f64,
+    /// Adam's learning rate of the critics at the beginning.
+    pub critic_learning_rate: f64,
+    /// Fraction of the learning rates that is left at the end; the schedule is linear.
+    pub final_learning_rate_fraction: f64,
+    /// Layer normalisation in the critics' hidden layers.
+    pub layer_norm: bool,
+    /// How the two critics' values are combined.
+    pub critics: Critics,
+    /// How far the target critics move toward the critics at a time; 1 copies them.
+    pub tau: f64,
+    /// Updates between two such moves.
+    pub target_interval: usize,
+    /// How far the EMA of the actor, which becomes the policy, moves toward the actor in each update.
+    pub actor_ema_rate: f64,
+    /// Updates of the critics alone at the beginning: a policy that is begun with is kept until they know it.
+    #[serde(default)]
+    pub actor_delay: u64,
+    /// The entropy term.
+    pub entropy: Entropy,
+}
+
+/// The last part of a run: proximal policy optimisation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Refinement {
+    /// Fraction of the budget after which it begins.
+    pub begin: f64,
+    /// Steps of each truck that are learned from at a time.
+    pub n_steps: usize,
+    /// Passes over them.
+    pub epochs: usize,
+    /// Steps in an update.
+    pub batch: usize,
+    /// Discount factor.
+    pub gamma: f64,
+    /// Lambda of the generalised advantage estimates.
+    pub gae_lambda: f64,
+    /// How far the probability of an action may go from what it was, as a fraction, before an update gains nothing.
+    pub clip: f64,
+    /// Coefficient of the entropy beside the standardised advantages.
+    pub entropy_coefficient: f64,
+    /// Adam's learning rate of the actor at the beginning of the refinement.
+    pub actor_learning_rate: f64,
+    /// Adam's learning rate of the value network there.
+    pub critic_learning_rate: f64,
+    /// Fraction of the learning rates that is left at the end; the schedule is linear.
+    pub final_learning_rate_fraction: f64,
+    /// How far the EMA of the actor, which becomes the policy, moves toward the actor in each update.
+    pub actor_ema_rate: f64,
+    /// Most standard deviations that an advantage counts as.
+    pub advantage_limit: f64,
+    /// Iterations in which the value network alone learns.
+    pub critic_iterations: u64,
+    /// Power of the clearance term in the reward.
+    pub clearance_power: f64,
+    /// Other weights than those of the run so far in the reward.
+    #[serde(default, skip_serializing_if = "RewardChanges::is_empty")]
+    pub reward: RewardChanges,
+}
+
+/// How the two critics' values are combined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Critics {
+    /// Their mean.
+    Mean,
+    /// The lower of the two.
+    Minimum,
+}
+
+/// The entropy term.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entropy {
+    /// The TD target includes the entropy of the next state; otherwise the actor's loss alone does.
+    pub in_target: bool,
+    /// Entropy that the coefficient is adapted to, as a fraction of the largest possible; none keeps the coefficient.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target_fraction: Option<f64>,
+    /// The coefficient, at the beginning or throughout.
+    pub coefficient: f64,
+    /// Adam's learning rate of the coefficient's logarithm.
+    pub learning_rate: f64,
+}
+
+impl Config {
+    /// Reads a training file by its path or its name, `default`. Everything that can be wrong with it is found here,
+    /// with its key.
+    pub fn read(file: &Path) -> Result<Config, Error> {
+        Config::read_with(file, &[])
+    }
+
+    /// The same with some of its keys set to other values, each `KEY=VALUE`.
+    pub fn read_with(file: &Path, settings: &[String]) -> Result<Config, Error> {
+        Config::read_for(file, None, settings)
+    }
+
+    /// The same for another benchmark alone, if one is given.
+    pub fn read_for(file: &Path, benchmark: Option<&str>, settings: &[String]) -> Result<Config, Error> {
+        let mut table = file::resolved(file)?;
+        if let Some(benchmark) = benchmark {
+            set::set_benchmark(&mut table, benchmark);
+        }
+        set::set(&mut table, settings)?;
+        let origin = Config::origin(file, benchmark, settings);
+        let wrong = |error: toml::de::Error| Error::contents(&origin, error.to_string().trim());
+        let config: Config = table.try_into().map_err(wrong)?;
+        config.check(&Reader::of(&origin))?;
+        Ok(config)
+    }
+
+    /// Where the keys of [`Config::read_for`] come from, for errors: `default with --set seed=3`.
+    pub fn origin(file: &Path, benchmark: Option<&str>, settings: &[String]) -> PathBuf {
+        let flags = benchmark.map(|name| format!("--benchmark {name}")).into_iter();
+        let flags: Vec<String> = flags.chain(settings.iter().map(|setting| format!("--set {setting}"))).collect();
+        if flags.is_empty() { file.to_owned() } else { PathBuf::from(format!("{} with {}", file.display(), flags.join(" "))) }
+    }
+
+    /// Values from the command line replace the file's. `--minutes` or `--steps` replaces the whole budget.
+    pub fn override_with(&mut self, seed: Option<u32>, minutes: Option<f64>, steps: Option<u64>, envs: Option<usize>) -> Result<(), Error> {
+        self.seed = seed.unwrap_or(self.seed);
+        self.n_envs = envs.unwrap_or(self.n_envs);
+        if minutes.is_some() || steps.is_some() {
+            (self.minutes, self.steps) = (minutes, steps);
+        }
+        // The file has been checked, so an error here comes from these flags.
+        let flags = [
+            minutes.map(|minutes| format!("--minutes {minutes}")),
+            steps.map(|steps| format!("--steps {steps}")),
+            envs.map(|envs| format!("--envs {envs}")),
+        ];
+        self.check(&Reader::of(Path::new(&flags.into_iter().flatten().collect::<Vec<_>>().join(" "))))
+    }
+
+    /// Whether a run with this config can continue one with the other: only budget and checkpoint interval may differ.
+    pub fn is_same_run(&self, other: &Config) -> bool {
+        let Config { minutes, steps, checkpoint_minutes, .. } = *self;
+        *self == Config { minutes, steps, checkpoint_minutes, ..other.clone() }
+    }
+
+    /// The first key whose value differs from that of `other`, and the two values, each `nothing` where it is not
+    /// given.
+    pub fn first_difference(&self, other: &Config) -> Option<(String, String, String)> {
+        let (own, others) = (self.keys(), other.keys());
+        let key = own.keys().chain(others.keys()).filter(|&key| own.get(key) != others.get(key)).min()?;
+        let value = |of: &BTreeMap<String, String>| of.get(key).cloned().unwrap_or_else(|| "nothing".to_owned());
+        Some((key.clone(), value(&own), value(&others)))
+    }
+
+    /// What differs from the training benchmark's reward, `reward.clearance = -100.0`; empty where nothing does.
+    pub fn changed_rewards(&self) -> String {
+        let changed = self.keys().into_iter().filter(|(key, _)| key.starts_with("reward."));
+        changed.map(|(key, value)| format!("{key} = {value}")).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Every key with its tables' names before it, and its value as TOML.
+    fn keys(&self) -> BTreeMap<String, String> {
+        let mut keys = BTreeMap::new();
+        let mut left = vec![(String::new(), toml::Value::try_from(self).expect(WRITABLE))];
+        while let Some((name, value)) = left.pop() {
+            match value {
+                toml::Value::Table(table) => {
+                    let prefix = if name.is_empty() { name } else { name + "." };
+                    left.extend(table.into_iter().map(|(key, value)| (format!("{prefix}{key}"), value)));
+                }
+                value => drop(keys.insert(name, value.to_string())),
+            }
+        }
+        keys
+    }
+
+    /// The training file that this config would be read from, without a `base`.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect(WRITABLE)
+    }
+}
+
+#[cfg(test)]
+mod documented_tests;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,124 @@
+//! The memory that a run on the processor takes, reckoned before it begins. Linux grants memory that it does not have
+//! and ends the process that uses it, and an allocation that is refused ends the process too.
+
+use offtrack::simulator::available_memory;
+
+use super::config::{Config, Refinement};
+use offtrack_evaluation::error::Error;
+
+/// Bytes of an f32.
+const F32: u128 = 4;
+/// Copies of the parameters of the learner's networks: parameters of three networks, target networks and EMA, Adam's
+/// moments, gradients of two shards and their sum, and a checkpoint's copy of each.
+const COPIES: u128 = 33;
+/// The same of the refinement's two networks.
+const REFINED_COPIES: u128 = 24;
+/// Bytes of a truck beside its observations: its row of the batch.
+const TRUCK: u128 = 1_000;
+
+/// A part of the memory, and the key that it grows with.
+struct Part {
+    key: &'static str,
+    value: String,
+    bytes: u128,
+}
+
+/// Transitions that the replay buffer ever holds: no more than there are steps.
+pub fn transitions(config: &Config) -> usize {
+    let slots = config.replay_buffer.capacity.div_ceil(config.n_envs);
+    let stepped = config.steps.map_or(usize::MAX, |steps| usize::try_from(steps.div_ceil(config.n_envs as u64)).unwrap_or(usize::MAX));
+    // A refinement's last steps, and the one under way.
+    slots.min(stepped.saturating_add(1)).saturating_mul(config.n_envs)
+}
+
+/// An error if a run of networks of so many values and actions does not fit into the memory that the machine has free. It
+/// names the key that takes most.
+pub fn check(config: &Config, n_values: usize, n_actions: usize) -> Result<(), Error> {
+    check_within(config, n_values, n_actions, available_memory().map_or(u128::MAX, u128::from))
+}
+
+fn check_within(config: &Config, n_values: usize, n_actions: usize, available: u128) -> Result<(), Error> {
+    let parts = parts(config, n_values as u128, n_actions as u128);
+    let needed: u128 = parts.iter().map(|part| part.bytes).sum();
+    let Some(Part { key, value, bytes }) = parts.into_iter().max_by_key(|part| part.bytes).filter(|_| available < needed) else {
+        return Ok(());
+    };
+    let [needed, bytes, available] = [needed, bytes, available].map(gigabytes);
+    let expected =
+        format!("the run would take about {needed} of memory, {bytes} of them for this, and {available} are free: less would do");
+    Err(Error::Flag { flag: key, value, expected })
+}
+
+fn parts(config: &Config, n_values: u128, n_actions: u128) -> [Part; 6] {
+    let Config { replay_buffer, learning, refinement, .. } = config;
+    let (n_envs, batch) = (config.n_envs as u128, learning.batch as u128);
+    let observation = F32 * n_values;
+    let hidden: Vec<u128> = learning.hidden.iter().map(|&size| size as u128).collect();
+    let sizes = [&[n_values], &hidden[..], &[n_actions]].concat();
+    let weights: u128 = sizes.windows(2).map(|pair| (pair[0] + 1) * pair[1]).sum();
+    let widest = hidden.iter().copied().max().unwrap_or_default();
+    let rows = replay_buffer.capacity.div_ceil(config.n_envs) as u128 * n_envs;
+    // A tree of sums over a power of two.
+    let tree = if replay_buffer.priority.is_some() { 2 * rows.next_power_of_two() * 8 } else { 0 };
+    let copies = COPIES + refinement.as_ref().map_or(0, |_| REFINED_COPIES);
+    // Found from a copy of all of them and, with a mirror, their images.
+    let normalised = if learning.mirror_augmentation { 4 } else { 1 };
+    let refined = refinement.as_ref().map_or(0, |Refinement { n_steps, .. }| *n_steps as u128 * n_envs);
+    let part = |key, value, bytes| Part { key, value, bytes };
+    [
+        part("replay_buffer.capacity", replay_buffer.capacity.to_string(), transitions(config) as u128 * (observation + 9) + tree),
+        part("replay_buffer.warmup", replay_buffer.warmup.to_string(), replay_buffer.warmup as u128 * observation * normalised),
+        part("learning.hidden", format!("{:?}", learning.hidden), copies * weights * F32),
+        // Three networks forward and backward, each layer's output kept.
+        part("learning.batch", learning.batch.to_string(), batch * (6 * observation + 9 * F32 * hidden.iter().sum::<u128>())),
+        part("n_envs", config.n_envs.to_string(), n_envs * (TRUCK + 3 * observation + 2 * F32 * widest)),
+        // Twice while a list of them grows.
+        part("refinement.n_steps", refinement.as_ref().map_or(0, |of| of.n_steps).to_string(), 2 * refined * (observation + 32)),
+    ]
+}
+
+fn gigabytes(bytes: u128) -> String {
+    format!("{:.1} GB", bytes as f64 / 1e9)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use offtrack::layout::N_VALUES;
+
+    use super::*;
+
+    fn checked(file: &str, settings: &[&str], gigabytes: u128) -> Result<(), String> {
+        let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+        let config = Config::read_with(Path::new(file), &settings).unwrap();
+        check_within(&config, N_VALUES, 9, gigabytes * 1_000_000_000).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_run_that_does_not_fit_is_refused_by_the_key_that_takes_most_of_the_memory() {
+        for (file, settings, expected) in [
+            ("default", &["replay_buffer.capacity=100000000", "steps=1000000000000"][..], "replay_buffer.capacity: 100000000; the run"),
+            ("default", &["replay_buffer.capacity=100000000", "replay_buffer.warmup=100000000"], "replay_buffer.warmup: 100000000;"),
+            ("default", &["learning.hidden=[8192, 8192, 8192]"], "learning.hidden: [8192, 8192, 8192];"),
+            ("default", &["learning.batch=1048576"], "learning.batch: 1048576;"),
+            ("default", &["n_envs=1048576", "replay_buffer.capacity=100000000", "learning.hidden=[8192]"], "n_envs: 1048576;"),
+            ("lane", &["refinement.n_steps=10000", "n_envs=20000", "replay_buffer.capacity=1000000"], "refinement.n_steps: 10000;"),
+        ] {
+            let message = checked(file, settings, 4).unwrap_err();
+            assert!(message.starts_with(expected) && message.contains("4.0 GB are free"), "{settings:?}: {message}");
+        }
+    }
+
+    #[test]
+    fn every_shipped_training_file_for_the_processor_fits_into_two_gigabytes() {
+        for file in ["default", "best", "lane", "attard", "as-run", "laden", "laden-50", "paper"] {
+            assert_eq!(checked(file, &[], 2), Ok(()), "{file}");
+        }
+    }
+
+    #[test]
+    fn a_replay_buffer_takes_no_more_than_the_steps_of_the_run() {
+        assert_eq!(checked("paper", &["replay_buffer.capacity=100000000", "replay_buffer.priority=", "steps=100000"], 2), Ok(()));
+    }
+}

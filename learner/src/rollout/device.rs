@@ -1,0 +1,378 @@
+//! Trucks and replay buffer on a graphics device: nothing leaves it.
+//!
+//! The simulator writes observations into a buffer that a tensor owns. Kernels read the simulator's columns in place
+//! and write samples into buffers of other tensors. Both sides submit to one queue. The tensor library queues its work
+//! before it submits it, so it is flushed before every submission of ours, and nothing waits.
+
+mod memory_kernels;
+mod shared;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use burn::tensor::{Tensor, TensorData};
+use bytemuck::{bytes_of, cast_slice};
+use offtrack::gpu::{Kernels, Slice};
+use offtrack::layout::random;
+use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES};
+use offtrack::simulator::{Engine, RouteChoice, Simulator, Tally};
+use offtrack::world::World;
+use offtrack_policy::{LIMIT, Normalisation};
+use wgpu::{PollType, SubmissionIndex};
+
+use super::{Episodes, Rollout};
+use crate::checkpoint::{Columns, Stored};
+use crate::config::{Config, Refinement};
+use crate::mirror::Mirror;
+use crate::network::Mlp;
+use crate::ppo::steps::Steps;
+use crate::sac::Transitions;
+use memory_kernels::{Binding, Buffers, Facts, Image, Kernel, Normal, Now};
+use offtrack_evaluation::error::Error;
+pub use shared::Shared;
+use shared::{Owned, floats, integers};
+
+/// Maximum number of steps queued ahead of the device. Queued work holds memory.
+const MAX_QUEUED_STEPS: usize = 16;
+
+/// Trucks and a replay buffer whose networks observe `N` values. See the module.
+pub struct DeviceRollout<const N: usize> {
+    config: Config,
+    routes: Vec<u32>,
+    mirror: Option<Mirror>,
+    shared: Shared,
+    kernels: Kernels<Kernel>,
+    simulator: Simulator,
+    facts: Facts,
+    buffers: Buffers,
+    /// The simulator's column of observations, `[n_envs, N_VALUES]`.
+    observation: Tensor<2>,
+    /// The simulator's column of extras, `[n_envs, N_EXTRAS]`.
+    extras: Tensor<2>,
+    /// Mean and factor of each value, `[1, N]`.
+    normalisation: [Tensor<2>; 2],
+    sample: Transitions,
+    _owned: Vec<Owned>,
+    /// Steps of all trucks appended, and steps made.
+    n_appended: u64,
+    n_steps: u32,
+    n_samples: u32,
+    /// Steps that the device may not have made yet.
+    queued: VecDeque<SubmissionIndex>,
+    /// The tally when it was last read.
+    counted: Tally,
+}
+
+impl<const N: usize> DeviceRollout<N> {
+    /// Trucks at the start of their first episodes, and an empty replay buffer of `config.replay_buffer.capacity`
+    /// transitions.
+    pub fn new(
+        shared: &Shared,
+        config: &Config,
+        world: &Arc<World>,
+        routes: Vec<u32>,
+        mirror: Option<Mirror>,
+    ) -> Result<DeviceRollout<N>, Error> {
+        DeviceRollout::with_seeds(shared, config, world, routes, mirror, seeds(config.seed, 0))
+    }
+
+    fn with_seeds(
+        shared: &Shared,
+        config: &Config,
+        world: &Arc<World>,
+        routes: Vec<u32>,
+        mirror: Option<Mirror>,
+        seeds: [u32; 2],
+    ) -> Result<DeviceRollout<N>, Error> {
+        let (n_envs, n_rows) = (config.n_envs, config.learning.batch);
+        let n_slots = config.replay_buffer.capacity.div_ceil(n_envs);
+        check_capacity::<N>(shared, config, n_slots * n_envs)?;
+        let device = &shared.tensors;
+        let zeros = |width: usize| Tensor::<2>::zeros([n_rows, width], device);
+        let observation = Tensor::<2>::zeros([n_envs, N_VALUES], device);
+        let extras = Tensor::<2>::zeros([n_envs, N_EXTRAS], device);
+        let sample = Transitions {
+            observation: zeros(N),
+            action: Tensor::from_data(TensorData::new(vec![0i32; n_rows], [n_rows, 1]), device),
+            reward: zeros(1),
+            discount: zeros(1),
+            next_observation: zeros(N),
+            weight: Tensor::ones([n_rows, 1], device),
+        };
+        shared.flush()?;
+        let (observed, beside) = (floats(&observation)?, floats(&extras)?);
+        let columns = vec![(Column::Observation, observed.slice.clone()), (Column::Extras, beside.slice.clone())];
+        let engine = Engine::Gpu { device: shared.gpu.clone(), columns };
+        let simulator = Simulator::on(engine, world.clone(), n_envs, config.seed, RouteChoice::Drawn(routes.clone()))?;
+        let facts = Facts {
+            n_envs: n_envs as u32,
+            n_slots: n_slots as u32,
+            n_actions: world.params.n_actions,
+            n_values: N as u32,
+            n_rows: n_rows as u32,
+            n_steps: config.learning.n_steps as u32,
+            acting_seed: seeds[0],
+            sampling_seed: seeds[1],
+            mirrored: mirror.is_some().into(),
+            gamma: config.learning.gamma as f32,
+            reward_scale: config.learning.reward_scale as f32,
+            clip: LIMIT,
+        };
+        let mut rollout = DeviceRollout {
+            kernels: memory_kernels::compile(&shared.gpu.device),
+            buffers: Buffers::default(),
+            config: config.clone(),
+            routes,
+            mirror,
+            shared: shared.clone(),
+            simulator,
+            facts,
+            observation,
+            extras,
+            normalisation: [0.0, 1.0].map(|value| Tensor::full([1, N], value, device)),
+            sample,
+            _owned: vec![observed, beside],
+            n_appended: 0,
+            n_steps: 0,
+            n_samples: 0,
+            queued: VecDeque::with_capacity(MAX_QUEUED_STEPS),
+            counted: Tally::default(),
+        };
+        rollout.buffers = rollout.make_buffers()?;
+        rollout.set_normalisation(&Normalisation::none(N));
+        shared.check()?;
+        Ok(rollout)
+    }
+
+    /// A buffer for every binding of the kernels.
+    fn make_buffers(&mut self) -> Result<Buffers, Error> {
+        let gpu = self.shared.gpu.clone();
+        let filled = |contents: &[u8]| gpu.filled("replay buffer", contents);
+        let empty = |size: usize| gpu.empty("replay buffer", size as u64);
+        let (values, actions) = match &self.mirror {
+            Some(mirror) => mirror.images(),
+            None => ((0..N).map(|index| (index, 1.0)).collect(), (0..self.facts.n_actions).collect()),
+        };
+        let image = |(index, factor)| Image { index: index as u32, factor };
+        let images: Vec<Image> = values.into_iter().map(image).collect();
+        let (observation, action) = (floats(&self.sample.observation)?, integers(&self.sample.action)?);
+        let (reward, discount, next) =
+            (floats(&self.sample.reward)?, floats(&self.sample.discount)?, floats(&self.sample.next_observation)?);
+        let batch = self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
+        let column = |column: Column| batch.column(column).clone();
+        let held = (self.facts.n_slots * self.facts.n_envs) as usize;
+        let row_bytes = N * size_of::<f32>();
+        let buffers = Buffers::new(vec![
+            (Binding::facts, filled(bytes_of(&self.facts))),
+            (Binding::now, empty(size_of::<Now>())),
+            (Binding::normalisation, empty(N * size_of::<Normal>())),
+            (Binding::images, filled(cast_slice(&images))),
+            (Binding::action_images, filled(cast_slice(&actions))),
+            (Binding::action, column(Column::Action)),
+            (Binding::observation, column(Column::Observation)),
+            (Binding::next_observation, column(Column::NextObservation)),
+            (Binding::extras, column(Column::Extras)),
+            (Binding::next_extras, column(Column::NextExtras)),
+            (Binding::ended, column(Column::Ended)),
+            (Binding::reward, column(Column::Reward)),
+            (Binding::held_observation, empty(held * row_bytes)),
+            (Binding::held_next, empty(held * row_bytes)),
+            (Binding::held_action, empty(held * 4)),
+            (Binding::held_reward, empty(held * 4)),
+            (Binding::held_ended, empty(held * 4)),
+            // The actor's output is another buffer in every step; before the first one any will do.
+            (Binding::logits, empty(4)),
+            (Binding::sampled_observation, observation.slice.clone()),
+            (Binding::sampled_action, action.slice.clone()),
+            (Binding::sampled_reward, reward.slice.clone()),
+            (Binding::sampled_discount, discount.slice.clone()),
+            (Binding::sampled_next, next.slice.clone()),
+        ]);
+        self._owned.extend([observation, action, reward, discount, next]);
+        Ok(buffers)
+    }
+
+    /// The trucks' observations with the first extras behind them, normalised, `[n_envs, N]`.
+    fn normalised(&self) -> Tensor<2> {
+        let [mean, factor] = self.normalisation.clone();
+        let observed = match N - N_VALUES {
+            0 => self.observation.clone(),
+            n_extras => Tensor::cat(vec![self.observation.clone(), self.extras.clone().narrow(1, 0, n_extras)], 1),
+        };
+        ((observed - mean) * factor).clamp(-LIMIT, LIMIT)
+    }
+
+    /// One step of every truck: by the actor's output, or with random actions where there is none.
+    fn step_by(&mut self, logits: Option<&Tensor<2>>, remember: bool) -> Result<(), Error> {
+        self.shared.flush()?;
+        let output = logits.map(floats).transpose()?;
+        let device = &self.shared.gpu.device;
+        let group = self.buffers.group(device, &self.kernels, output.as_ref().map(|output| &output.slice));
+        self.write_now();
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let (kernels, facts) = (&self.kernels, &self.facts);
+        let batch = self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
+        if logits.is_some() {
+            memory_kernels::add(kernels, &mut encoder, &group, Kernel::Choose, facts);
+        } else {
+            batch.add_draw(&mut encoder);
+        }
+        if remember {
+            memory_kernels::add(kernels, &mut encoder, &group, Kernel::StoreBefore, facts);
+        }
+        batch.add_step(&mut encoder);
+        if remember {
+            memory_kernels::add(kernels, &mut encoder, &group, Kernel::StoreAfter, facts);
+            self.n_appended += 1;
+        }
+        batch.stepped();
+        self.n_steps = self.n_steps.wrapping_add(1);
+        if self.queued.len() == MAX_QUEUED_STEPS {
+            let waited = device.poll(PollType::Wait { submission_index: self.queued.pop_front(), timeout: None });
+            waited.map_err(|error| Error::Device(error.to_string()))?;
+        }
+        self.queued.push_back(self.shared.gpu.queue.submit([encoder.finish()]));
+        Ok(())
+    }
+
+    fn slots_held(&self) -> u32 {
+        self.n_appended.min(self.facts.n_slots.into()) as u32
+    }
+
+    fn write_now(&self) {
+        let (held, n_slots) = (self.slots_held(), u64::from(self.facts.n_slots));
+        let now = Now {
+            slot: (self.n_appended % n_slots) as u32,
+            oldest: ((self.n_appended - u64::from(held)) % n_slots) as u32,
+            n_ready: held.saturating_sub(self.facts.n_steps),
+            step: self.n_steps,
+            sample: self.n_samples,
+        };
+        self.shared.gpu.queue.write_buffer(&self.buffers.slice(Binding::now).buffer, 0, bytes_of(&now));
+    }
+}
+
+impl<const N: usize> Rollout for DeviceRollout<N> {
+    fn simulator(&self) -> &Simulator {
+        &self.simulator
+    }
+
+    fn n_transitions(&self) -> usize {
+        self.slots_held() as usize * self.facts.n_envs as usize
+    }
+
+    fn can_sample(&self) -> bool {
+        self.facts.n_steps < self.slots_held()
+    }
+
+    fn found_normalisation(&self, mirror: Option<&Mirror>) -> Result<Normalisation, Error> {
+        let held = self.buffers.slice(Binding::held_observation);
+        let size = (self.n_transitions() * N * size_of::<f32>()) as u64;
+        let bytes = self.shared.gpu.read(&[Slice { size, ..held.clone() }]).map_err(offtrack::simulator::Error::from)?;
+        // Bytes need not be aligned as floats are.
+        let rows: Vec<[f32; N]> = bytes[0].chunks_exact(N * 4).map(bytemuck::pod_read_unaligned).collect();
+        Ok(super::normalisation_of(rows, mirror))
+    }
+
+    fn set_normalisation(&mut self, normalisation: &Normalisation) {
+        let noise = self.config.learning.observation_noise as f32;
+        let rows = normalisation.mean.iter().zip(&normalisation.factor);
+        let rows: Vec<Normal> = rows.map(|(&mean, &factor)| Normal { mean, factor, noise }).collect();
+        self.shared.gpu.queue.write_buffer(&self.buffers.slice(Binding::normalisation).buffer, 0, cast_slice(&rows));
+        let row = |values: &[f32]| Tensor::from_data(TensorData::new(values.to_vec(), [1, values.len()]), &self.shared.tensors);
+        self.normalisation = [row(&normalisation.mean), row(&normalisation.factor)];
+    }
+
+    fn step_at_random(&mut self) -> Result<(), Error> {
+        self.step_by(None, true)
+    }
+
+    fn step(&mut self, actor: &Mlp, _: u64) -> Result<(), Error> {
+        let logits = actor.forward(self.normalised());
+        self.step_by(Some(&logits), true)
+    }
+
+    /// An error: a refinement is on the processor, and a training file that asks for another is refused.
+    fn collect(&mut self, _: &Mlp, _: &Refinement) -> Result<Steps, Error> {
+        let expected = "works with device = \"cpu\" alone: leave one of them out".to_owned();
+        Err(Error::Flag { flag: "refinement", value: "given".to_owned(), expected })
+    }
+
+    fn drive(&mut self, actor: &Mlp) -> Result<(), Error> {
+        let logits = actor.forward(self.normalised());
+        self.step_by(Some(&logits), false)
+    }
+
+    /// The same tensors every time, with other values in them; one shard.
+    fn sample(&mut self) -> Result<Vec<Transitions>, Error> {
+        self.shared.flush()?;
+        let group = self.buffers.group(&self.shared.gpu.device, &self.kernels, None);
+        self.write_now();
+        let mut encoder = self.shared.gpu.device.create_command_encoder(&Default::default());
+        memory_kernels::add(&self.kernels, &mut encoder, &group, Kernel::Sample, &self.facts);
+        self.shared.gpu.queue.submit([encoder.finish()]);
+        self.n_samples = self.n_samples.wrapping_add(1);
+        Ok(vec![Transitions {
+            observation: self.sample.observation.clone(),
+            action: self.sample.action.clone(),
+            reward: self.sample.reward.clone(),
+            discount: self.sample.discount.clone(),
+            next_observation: self.sample.next_observation.clone(),
+            weight: self.sample.weight.clone(),
+        }])
+    }
+
+    fn set_td_errors(&mut self, _: Vec<Tensor<2>>) {
+        // A training file with priorities is refused for a device.
+    }
+
+    fn take_episodes(&mut self, wait: bool) -> Result<Vec<Episodes>, Error> {
+        if !wait {
+            return Ok(Vec::new());
+        }
+        let tally = self.simulator.tally()?;
+        let since = tally.since(&self.counted);
+        self.counted = tally;
+        let episodes = Episodes { count: since.episodes(), arrived: since.ended(Ended::Arrived), reward: since.reward() };
+        Ok(Vec::from_iter((0 < episodes.count).then_some(episodes)))
+    }
+
+    fn wait(&self) -> Result<(), Error> {
+        self.shared.wait()
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        self.shared.check()
+    }
+
+    fn save<'a>(&'a self, _: &mut Columns<'a>) {}
+
+    fn restore(&mut self, _: &Stored, n_updates: u64) -> Result<(), Error> {
+        // Other actions and samples than the first time.
+        let seeds = seeds(self.config.seed, n_updates as u32);
+        let world = self.simulator.world().clone();
+        *self = DeviceRollout::with_seeds(&self.shared, &self.config, &world, self.routes.clone(), self.mirror.clone(), seeds)?;
+        Ok(())
+    }
+}
+
+/// Seeds of actions and samples, after so many updates.
+fn seeds(seed: u32, n_updates: u32) -> [u32; 2] {
+    [1, 2].map(|purpose| random::words(seed, purpose, n_updates, u32::MAX)[0])
+}
+
+/// The observations must fit into one buffer of the device.
+fn check_capacity<const N: usize>(shared: &Shared, config: &Config, n_transitions: usize) -> Result<(), Error> {
+    let row_bytes = (N * size_of::<f32>()) as u64;
+    let limit = shared.gpu.device.limits().max_storage_buffer_binding_size.min(u64::from(u32::MAX) * 4);
+    let needed = n_transitions as u64 * row_bytes;
+    if needed <= limit {
+        return Ok(());
+    }
+    let (name, most) = (shared.gpu.name(), limit / row_bytes);
+    let expected = format!("its observations take {needed} bytes where {name} allows {limit} in a buffer: at most {most}");
+    Err(Error::Flag { flag: "replay_buffer.capacity", value: config.replay_buffer.capacity.to_string(), expected })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,206 @@
+//! The kernels of the replay buffer on a device: structs and bindings declared once, printed for `memory.wgsl`, and
+//! compiled.
+
+use offtrack::engine::stages::SHADERS;
+use offtrack::engine::wgsl;
+use offtrack::gpu::{Kernels, Slice};
+use offtrack::layout::buffers::Access;
+use offtrack::layout::shared::Shared as _;
+use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, BufferBinding, CommandEncoder, ComputePassDescriptor, Device};
+
+offtrack::shared! {
+    /// What does not change in a run.
+    pub struct Facts {
+        /// Trucks.
+        pub n_envs: u32,
+        /// Steps of all trucks that the buffer holds.
+        pub n_slots: u32,
+        /// Entries of the action table.
+        pub n_actions: u32,
+        /// Values that the networks observe: those of an observation, and the extras behind them.
+        pub n_values: u32,
+        /// Transitions in a sample.
+        pub n_rows: u32,
+        /// Steps of the n-step return.
+        pub n_steps: u32,
+        /// Seed of the actions.
+        pub acting_seed: u32,
+        /// Seed of samples, noise and mirroring.
+        pub sampling_seed: u32,
+        /// Half of the transitions are mirrored (0 or 1).
+        pub mirrored: u32,
+        /// Discount factor.
+        pub gamma: f32,
+        /// Factor of the rewards.
+        pub reward_scale: f32,
+        /// Where normalised values are clipped.
+        pub clip: f32,
+    }
+
+    /// What changes from one dispatch to the next.
+    pub struct Now {
+        /// The slot to be written.
+        pub slot: u32,
+        /// The oldest slot.
+        pub oldest: u32,
+        /// Slots that enough others follow, from the oldest on.
+        pub n_ready: u32,
+        /// Steps so far: another one gives other random actions.
+        pub step: u32,
+        /// Samples so far.
+        pub sample: u32,
+    }
+
+    /// Normalisation of a value, and the uniform noise added to it.
+    pub struct Normal {
+        /// Subtracted.
+        pub mean: f32,
+        /// Multiplied by then.
+        pub factor: f32,
+        /// Largest noise added then.
+        pub noise: f32,
+    }
+
+    /// The mirror image of a value.
+    pub struct Image {
+        /// Index of the value that it is mirrored from.
+        pub index: u32,
+        /// Its factor.
+        pub factor: f32,
+    }
+}
+
+/// Declares the bindings in order: name, element in WGSL, one element or an array, and what it holds.
+macro_rules! bindings {
+    ($($name:ident: $element:expr, $single:literal, $doc:literal;)*) => {
+        /// The buffers that the kernels see.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[expect(non_camel_case_types, reason = "the names are those of the shader")]
+        pub(super) enum Binding {
+            $(#[doc = $doc] $name,)*
+        }
+
+        impl Binding {
+            /// Every binding; its index is the shader's.
+            pub(super) const ALL: [Binding; 0 $(+ { let _ = Binding::$name; 1 })*] = [$(Binding::$name),*];
+
+            /// Its declaration in WGSL.
+            fn declaration(self) -> String {
+                let (name, element, single, doc): (_, String, bool, _) = match self {
+                    $(Binding::$name => (stringify!($name), $element, $single, $doc),)*
+                };
+                let kind = if single { element } else { format!("array<{element}>") };
+                format!("// {doc}\n@group(0) @binding({}) var<storage, read_write> {name}: {kind};\n", self as u32)
+            }
+        }
+    };
+}
+
+bindings! {
+    facts: Facts::wgsl(), true, "What does not change in a run.";
+    now: Now::wgsl(), true, "What changes from one dispatch to the next.";
+    normalisation: Normal::wgsl(), false, "Normalisation and noise of each value, [n_values].";
+    images: Image::wgsl(), false, "Mirror image of each value, [n_values].";
+    action_images: "u32".to_owned(), false, "Mirror image of each action, [n_actions].";
+    action: "u32".to_owned(), false, "The simulator's column of actions, [n_envs].";
+    observation: "f32".to_owned(), false, "The simulator's column of observations, [n_envs, N_VALUES].";
+    next_observation: "f32".to_owned(), false, "The simulator's column of next observations, [n_envs, N_VALUES].";
+    extras: "f32".to_owned(), false, "The simulator's column of extras, [n_envs, N_EXTRAS].";
+    next_extras: "f32".to_owned(), false, "The simulator's column of next extras, [n_envs, N_EXTRAS].";
+    ended: "u32".to_owned(), false, "The simulator's column of end codes, [n_envs].";
+    reward: "f32".to_owned(), false, "The simulator's column of rewards, [n_envs].";
+    held_observation: "f32".to_owned(), false, "The ring: observations, [n_slots, n_envs, n_values].";
+    held_next: "f32".to_owned(), false, "The ring: next observations, [n_slots, n_envs, n_values].";
+    held_action: "u32".to_owned(), false, "The ring: actions, [n_slots, n_envs].";
+    held_reward: "f32".to_owned(), false, "The ring: rewards, [n_slots, n_envs].";
+    held_ended: "u32".to_owned(), false, "The ring: end codes, [n_slots, n_envs].";
+    logits: "f32".to_owned(), false, "The actor's output, [n_envs, n_actions].";
+    sampled_observation: "f32".to_owned(), false, "A sample: observations, [n_rows, n_values].";
+    sampled_action: "i32".to_owned(), false, "A sample: actions, [n_rows].";
+    sampled_reward: "f32".to_owned(), false, "A sample: rewards, [n_rows].";
+    sampled_discount: "f32".to_owned(), false, "A sample: discounts, [n_rows].";
+    sampled_next: "f32".to_owned(), false, "A sample: next observations, [n_rows, n_values].";
+}
+
+/// A buffer for every binding.
+#[derive(Debug, Default)]
+pub(super) struct Buffers(Vec<(Binding, Slice)>);
+
+impl Buffers {
+    /// The bindings in any order, each once.
+    pub(super) fn new(mut slices: Vec<(Binding, Slice)>) -> Buffers {
+        slices.sort_by_key(|(binding, _)| *binding as u32);
+        assert!(slices.iter().map(|(binding, _)| *binding).eq(Binding::ALL), "every binding has one buffer");
+        Buffers(slices)
+    }
+
+    /// The buffer of a binding.
+    pub(super) fn slice(&self, binding: Binding) -> &Slice {
+        &self.0[binding as usize].1
+    }
+
+    /// A bind group of all of them, with another buffer of logits where one is given.
+    pub(super) fn group(&self, device: &Device, kernels: &Kernels<Kernel>, logits: Option<&Slice>) -> BindGroup {
+        let entry = |(binding, own): &(Binding, Slice)| {
+            let own = if *binding == Binding::logits { logits.unwrap_or(own).clone() } else { own.clone() };
+            (*binding as u32, own)
+        };
+        let slices: Vec<(u32, Slice)> = self.0.iter().map(entry).collect();
+        let entries: Vec<BindGroupEntry> = slices
+            .iter()
+            .map(|(binding, Slice { buffer, offset, size })| {
+                let resource = BindingResource::Buffer(BufferBinding { buffer, offset: *offset, size: std::num::NonZero::new(*size) });
+                BindGroupEntry { binding: *binding, resource }
+            })
+            .collect();
+        device.create_bind_group(&BindGroupDescriptor { label: Some("replay buffer"), layout: &kernels.layout, entries: &entries })
+    }
+}
+
+offtrack::named! {
+    /// The kernels' entry points.
+    pub enum Kernel {
+        /// Samples an action for every truck from the actor's output.
+        Choose = "choose",
+        /// Stores observations and actions before a step.
+        StoreBefore = "store_before",
+        /// Stores what the step led to.
+        StoreAfter = "store_after",
+        /// Samples transitions.
+        Sample = "sample",
+    }
+}
+
+impl Kernel {
+    /// Threads that it needs: one a truck, or one a value.
+    fn threads(self, facts: &Facts) -> u64 {
+        let (envs, rows, values) = (u64::from(facts.n_envs), u64::from(facts.n_rows), u64::from(facts.n_values));
+        match self {
+            Kernel::Choose => envs,
+            Kernel::StoreBefore | Kernel::StoreAfter => envs * values,
+            Kernel::Sample => rows * values,
+        }
+    }
+}
+
+/// The module's text.
+fn source() -> String {
+    let common = SHADERS.iter().filter(|(name, _)| ["common/thread", "common/random"].contains(name)).map(|(_, text)| *text);
+    let bindings: String = Binding::ALL.map(Binding::declaration).concat();
+    let own = [wgsl::shared(), printed_structs(), bindings];
+    own.iter().map(String::as_str).chain(common).chain([include_str!("../../../shaders/replay_buffer.wgsl")]).collect()
+}
+
+/// Compiles the kernels. A tensor's buffer is a slice of a page that other tensors use too, and a page is bound either
+/// to be read or to be written, so all bindings may be written.
+pub(super) fn compile(device: &Device) -> Kernels<Kernel> {
+    let access = [Access::ReadWrite; Binding::ALL.len()];
+    Kernels::compile(device, "replay buffer", source(), access)
+}
+
+/// Adds a kernel to the commands.
+pub(super) fn add(kernels: &Kernels<Kernel>, encoder: &mut CommandEncoder, group: &BindGroup, kernel: Kernel, facts: &Facts) {
+    let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
+    pass.set_bind_group(0, group, &[]);
+    kernels.dispatch(&mut pass, kernel, kernel.threads(facts));
+}

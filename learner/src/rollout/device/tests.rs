@@ -1,0 +1,206 @@
+use super::*;
+use crate::rollout::host::observed;
+use offtrack::layout::random::{index_below, signed_unit, words};
+use offtrack::layout::{Ended, Track};
+use offtrack::scenario::{Scenario, Split};
+use std::path::Path;
+
+const MASS: usize = N_VALUES + Track::Mass.n_extras();
+
+fn training() -> (Arc<World>, Vec<u32>) {
+    training_of("attard2023")
+}
+
+fn training_of(benchmark: &str) -> (Arc<World>, Vec<u32>) {
+    let scenario = Scenario::named(benchmark).unwrap();
+    (Arc::new(World::bake(&scenario).unwrap()), scenario.split(Split::Train).to_vec())
+}
+
+fn config(settings: &[&str]) -> Config {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/gpu.toml");
+    let common = ["n_envs=64", "replay_buffer.capacity=2000", "replay_buffer.warmup=100", "learning.batch=500"];
+    let settings: Vec<String> = common.iter().chain(settings).map(|setting| (*setting).to_owned()).collect();
+    Config::read_with(&file, &settings).unwrap()
+}
+
+/// The mirror where the training file asks for it.
+fn mirror_of(config: &Config, mirror: &Mirror) -> Option<Mirror> {
+    config.learning.mirror_augmentation.then(|| mirror.clone())
+}
+
+/// One step of one truck.
+struct Step<const N: usize> {
+    seen: [f32; N],
+    action: u32,
+    reward: f32,
+    ended: u32,
+    next: [f32; N],
+}
+
+fn host<const D: usize>(tensor: &Tensor<D>) -> Vec<f32> {
+    tensor.clone().into_data().try_to_vec().unwrap()
+}
+
+#[test]
+fn samples_are_the_transitions_that_were_driven_normalised_noisy_and_mirrored_as_asked() {
+    check_samples::<N_VALUES>("attard2023");
+}
+
+#[test]
+fn samples_have_the_extras_that_a_benchmark_observes() {
+    check_samples::<MASS>("laden2026");
+}
+
+/// Compares samples of a benchmark whose networks observe `N` values with the steps that were made.
+fn check_samples<const N: usize>(benchmark: &str) {
+    let (world, routes) = training_of(benchmark);
+    let shared = Shared::open(None).unwrap();
+    let mirror = Mirror::of(&world).unwrap();
+    for settings in [
+        ["learning.mirror_augmentation=true", "learning.observation_noise=0.2"],
+        ["learning.mirror_augmentation=false", "learning.observation_noise=0"],
+    ] {
+        let config = config(&settings);
+        let (n_envs, n_steps, seeds) = (config.n_envs, config.learning.n_steps, [7, 8]);
+        let mut rollout =
+            DeviceRollout::<N>::with_seeds(&shared, &config, &world, routes.clone(), mirror_of(&config, &mirror), seeds).unwrap();
+        let mut history: Vec<Vec<Step<N>>> = Vec::new();
+        // Three times round the ring of 32 steps.
+        for _ in 0..100 {
+            let batch = rollout.simulator().batch();
+            let seen = observed::<N>(&batch.observation, &batch.extras).into_owned();
+            rollout.step_at_random().unwrap();
+            let batch = rollout.simulator().batch();
+            let next = observed::<N>(&batch.next_observation, &batch.next_extras);
+            history.push(
+                (0..n_envs)
+                    .map(|env| Step {
+                        seen: seen[env],
+                        action: batch.action[env],
+                        reward: batch.reward[env],
+                        ended: batch.ended[env],
+                        next: next[env],
+                    })
+                    .collect(),
+            );
+        }
+        let normalisation = Normalisation { mean: vec![0.25; N], factor: (0..N).map(|index| 1.0 + index as f32).collect() };
+        rollout.set_normalisation(&normalisation);
+        let sample = rollout.sample().unwrap().remove(0);
+        let (observation, next) = (host(&sample.observation), host(&sample.next_observation));
+        let (reward, discount) = (host(&sample.reward), host(&sample.discount));
+        let action: Vec<i32> = sample.action.clone().into_data().try_to_vec().unwrap();
+        let n_slots = config.replay_buffer.capacity.div_ceil(n_envs);
+        let (mut ends, mut mirrored) = (0, 0);
+        for row in 0..config.learning.batch {
+            let drawn = words(seeds[1], row as u32, 0, 0);
+            let first = 100 - n_slots + index_below(drawn[0], (n_slots - n_steps) as u32) as usize;
+            let env = index_below(drawn[1], n_envs as u32) as usize;
+            let (mut sum, mut weight, mut last) = (0.0f32, 1.0f32, first);
+            for (step, trucks) in history.iter().enumerate().skip(first).take(n_steps) {
+                last = step;
+                sum += weight * trucks[env].reward;
+                weight *= config.learning.gamma as f32;
+                let ended = Ended::from_code(trucks[env].ended).unwrap();
+                if ended.terminated() {
+                    weight = 0.0;
+                }
+                if ended != Ended::Running {
+                    ends += 1;
+                    break;
+                }
+            }
+            let is_mirrored = config.learning.mirror_augmentation && drawn[2] & 1 == 1;
+            mirrored += usize::from(is_mirrored);
+            let image = |seen: &[f32; N]| if is_mirrored { mirror.observation(seen) } else { *seen };
+            let expected_action = history[first][env].action;
+            let expected_action = if is_mirrored { mirror.images().1[expected_action as usize] } else { expected_action };
+            assert_eq!(action[row], expected_action as i32);
+            assert_eq!(discount[row], weight);
+            let expected_reward = sum * config.learning.reward_scale as f32;
+            assert!((reward[row] - expected_reward).abs() <= 1e-5 * expected_reward.abs().max(1.0), "{} {expected_reward}", reward[row]);
+            for (found, seen) in [(&observation, &history[first][env].seen), (&next, &history[last][env].next)] {
+                let expected = normalisation.apply(&[image(seen)]);
+                for value in 0..N {
+                    let noise = config.learning.observation_noise as f32 * signed_unit(words(seeds[1], row as u32, 0, 1 + value as u32)[0]);
+                    let difference = found[row * N + value] - (expected[value] + noise);
+                    // Normalised values lie within 10.
+                    assert!(difference.abs() < 1e-5, "{value}: {difference}");
+                }
+            }
+        }
+        assert!(20 < ends, "{ends} episodes ended");
+        assert_eq!(config.learning.mirror_augmentation, 200 < mirrored);
+    }
+}
+
+#[test]
+fn actions_follow_the_actors_distribution() {
+    let (world, routes) = training();
+    let shared = Shared::open(None).unwrap();
+    let config = config(&["n_envs=4096", "replay_buffer.capacity=100000"]);
+    let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(&shared, &config, &world, routes, None, [7, 8]).unwrap();
+    // Probabilities of 1/45, 2/45, ... 9/45.
+    let logits: Vec<f32> = (0..4096).flat_map(|_| (1..=9).map(|rank| (rank as f32).ln())).collect();
+    let logits = Tensor::from_data(TensorData::new(logits, [4096, 9]), &shared.tensors);
+    let mut counts = [0usize; 9];
+    for _ in 0..5 {
+        rollout.step_by(Some(&logits), true).unwrap();
+        rollout.simulator().batch().action.iter().for_each(|&action| counts[action as usize] += 1);
+    }
+    let n = 5.0 * 4096.0;
+    for (rank, count) in counts.into_iter().enumerate() {
+        let fraction = (rank + 1) as f64 / 45.0;
+        // Five standard deviations of a count.
+        assert!((count as f64 - n * fraction).abs() < 5.0 * (n * fraction * (1.0 - fraction)).sqrt(), "{rank}: {count}");
+    }
+}
+
+/// Rewards of 40 samples, each requested before the next sample is drawn and computed when the device gets to it.
+fn rewards(skips_flush: bool) -> Vec<Vec<f32>> {
+    let (world, routes) = training();
+    let mut shared = Shared::open(None).unwrap();
+    shared.skips_flush = skips_flush;
+    let mut rollout =
+        DeviceRollout::<N_VALUES>::with_seeds(&shared, &config(&["learning.mirror_augmentation=false"]), &world, routes, None, [7, 8])
+            .unwrap();
+    for _ in 0..40 {
+        rollout.step_at_random().unwrap();
+    }
+    shared.tensors.sync().unwrap();
+    let mut request = |_| {
+        let requested = rollout.sample().unwrap().remove(0).reward.mul_scalar(1.0);
+        rollout.sample().unwrap();
+        host(&requested)
+    };
+    (0..40).map(&mut request).collect()
+}
+
+#[test]
+fn a_sample_is_read_before_the_next_one_overwrites_it_and_only_because_of_the_flush() {
+    let expected = rewards(false);
+    assert_eq!(expected, rewards(false));
+    let unflushed = rewards(true);
+    let wrong = expected.iter().zip(&unflushed).filter(|(expected, found)| expected != found).count();
+    println!("{wrong} of 40 results are of the wrong sample without the flush");
+    assert!(20 < wrong, "the flush could be left out");
+}
+
+#[test]
+fn trucks_take_the_actions_of_the_latest_output() {
+    let (world, routes) = training();
+    let shared = Shared::open(None).unwrap();
+    let mut rollout =
+        DeviceRollout::<N_VALUES>::with_seeds(&shared, &config(&["learning.mirror_augmentation=false"]), &world, routes, None, [7, 8])
+            .unwrap();
+    let output = |step: usize| {
+        let row = (0..9).map(|action| if action == step % 9 { 50.0 } else { 0.0 });
+        Tensor::<2>::from_data(TensorData::new(row.collect::<Vec<f32>>(), [1, 9]), &shared.tensors).repeat_dim(0, 64)
+    };
+    for step in 0..40 {
+        // An output that has to be computed first.
+        let logits = output(step).mul_scalar(2.0).add_scalar(1.0);
+        rollout.step_by(Some(&logits), true).unwrap();
+        assert!(rollout.simulator().batch().action.iter().all(|&action| action as usize == step % 9), "{step}");
+    }
+}

@@ -1,0 +1,384 @@
+//! Trucks and replay buffer on the host.
+
+use std::borrow::Cow;
+
+use burn::tensor::{Device, Tensor, TensorData};
+use offtrack::cpu::judge;
+use offtrack::layout::random;
+use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES, RewardTerms};
+use offtrack::simulator::{Batch, RouteChoice, Simulator};
+use offtrack::world::World;
+use offtrack_policy::Normalisation;
+use rand::{Rng, SeedableRng};
+use std::sync::Arc;
+
+use super::{Episodes, Rollout, RouteEnd};
+use crate::checkpoint::{Columns, Stored};
+use crate::config::{Config, Learning, Refinement};
+use crate::generator::Generator;
+use crate::level_replay::LevelReplay;
+use crate::memory;
+use crate::mirror::Mirror;
+use crate::network::{Mlp, sampled};
+use crate::pass::softmax;
+use crate::ppo::steps::Steps;
+use crate::replay_buffer::{ReplayBuffer, Rows, Sample};
+use crate::sac::Transitions;
+use crate::shards::N_SHARDS;
+use offtrack_evaluation::error::Error;
+
+#[cfg(test)]
+mod tests;
+
+/// Each truck's `N` values: those of its observation, and its first extras, `[n_envs]`. Without extras nothing is
+/// copied.
+pub fn observed<'a, const N: usize>(observation: &'a [[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Cow<'a, [[f32; N]]> {
+    if N == N_VALUES {
+        return Cow::Borrowed(bytemuck::cast_slice(observation));
+    }
+    let joined = |(values, extras): (&[f32; N_VALUES], &[f32; N_EXTRAS])| {
+        std::array::from_fn(|index| if index < N_VALUES { values[index] } else { extras[index - N_VALUES] })
+    };
+    Cow::Owned(observation.iter().zip(extras).map(joined).collect())
+}
+
+/// Trucks and a replay buffer whose networks observe `N` values. See the module.
+pub struct HostRollout<const N: usize> {
+    config: Config,
+    simulator: Simulator,
+    /// None where routes are drawn uniformly.
+    level_replay: Option<LevelReplay>,
+    replay_buffer: ReplayBuffer<N>,
+    /// Random numbers of actions and of samples.
+    acting: Generator,
+    sampling: Generator,
+    /// None without mirror augmentation.
+    mirror: Option<Mirror>,
+    normalisation: Normalisation,
+    /// Observations before the step in hand.
+    observation: Vec<[f32; N]>,
+    /// Routes of the step in hand; after it, trucks whose episodes ended are on others.
+    routes: Vec<u32>,
+    /// Rows of the latest sample.
+    sampled_rows: Vec<usize>,
+    /// Sum of each truck's rewards in its episode so far, `[n_envs]`.
+    episode_rewards: Vec<f32>,
+    ended: Vec<Episodes>,
+    route_ends: Vec<RouteEnd>,
+}
+
+impl<const N: usize> HostRollout<N> {
+    /// Trucks at the start of their first episodes, and an empty replay buffer. A route that the world does not have
+    /// and a batch that does not fit into the memory are errors.
+    pub fn new(config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<HostRollout<N>, Error> {
+        let stream = |purpose: u32| Generator::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
+        let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
+        let choice = RouteChoice::Drawn(level_replay.as_ref().map_or(routes, |replay| replay.list().to_vec()));
+        let mut replay_buffer = ReplayBuffer::new(config.n_envs, config.learning.n_steps, &config.replay_buffer);
+        reserve(&mut replay_buffer, config)?;
+        Ok(HostRollout {
+            simulator: Simulator::new(world.clone(), config.n_envs, config.seed, choice)?,
+            level_replay,
+            replay_buffer,
+            acting: stream(1),
+            sampling: stream(2),
+            mirror,
+            normalisation: Normalisation::none(N),
+            observation: Vec::new(),
+            routes: Vec::new(),
+            sampled_rows: Vec::new(),
+            episode_rewards: vec![0.0; config.n_envs],
+            ended: Vec::new(),
+            route_ends: Vec::new(),
+            config: config.clone(),
+        })
+    }
+
+    fn choose(&mut self, actor: &Mlp) -> Vec<u32> {
+        let batch = self.simulator.batch();
+        let logits = logits::<N>(actor, &self.normalisation, &observed(&batch.observation, &batch.extras));
+        sampled(&logits, self.n_actions(), &mut self.acting)
+    }
+
+    fn n_actions(&self) -> usize {
+        self.simulator.world().actions.len()
+    }
+
+    /// Keeps what the step in hand replaces.
+    fn begin_step(&mut self) {
+        let batch = self.simulator.batch();
+        self.observation.clear();
+        self.observation.extend_from_slice(&observed(&batch.observation, &batch.extras));
+        self.routes.clear();
+        self.routes.extend(batch.truck.iter().map(|truck| truck.route));
+    }
+
+    /// Appends the step just made to the replay buffer, and counts the episodes that it ended.
+    fn remember(&mut self) -> Result<(), Error> {
+        let batch = self.simulator.batch();
+        let mut reward = Cow::Borrowed(batch.reward.as_slice());
+        if let Some(arrival) = self.config.learning.arrival {
+            add_arrivals(reward.to_mut(), &batch.ended, arrival as f32);
+        }
+        self.replay_buffer.append(Rows {
+            observation: &self.observation,
+            action: &batch.action,
+            reward: &reward,
+            ended: &batch.ended,
+            next_observation: &observed(&batch.next_observation, &batch.next_extras),
+        });
+        self.count()
+    }
+
+    /// Counts the episodes that the step just made ended.
+    fn count(&mut self) -> Result<(), Error> {
+        let batch = self.simulator.batch();
+        let codes = batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running));
+        for (((sum, &reward), ended), &route) in self.episode_rewards.iter_mut().zip(&batch.reward).zip(codes).zip(&self.routes) {
+            *sum += reward;
+            if ended != Ended::Running {
+                let arrived = u64::from(ended == Ended::Arrived);
+                let end = RouteEnd { route, ended };
+                self.level_replay.iter_mut().for_each(|replay| replay.count(end));
+                self.route_ends.push(end);
+                self.ended.push(Episodes { count: 1, arrived, reward: f64::from(std::mem::take(sum)) });
+            }
+        }
+        if let Some(replay) = &mut self.level_replay
+            && replay.stepped()
+        {
+            self.simulator.draw_from(replay.list())?;
+        }
+        Ok(())
+    }
+}
+
+impl<const N: usize> Rollout for HostRollout<N> {
+    fn simulator(&self) -> &Simulator {
+        &self.simulator
+    }
+
+    fn n_transitions(&self) -> usize {
+        self.replay_buffer.n_transitions()
+    }
+
+    fn can_sample(&self) -> bool {
+        self.replay_buffer.can_sample()
+    }
+
+    fn found_normalisation(&self, mirror: Option<&Mirror>) -> Result<Normalisation, Error> {
+        Ok(super::normalisation_of(self.replay_buffer.observations().to_vec(), mirror))
+    }
+
+    fn set_normalisation(&mut self, normalisation: &Normalisation) {
+        self.normalisation = normalisation.clone();
+    }
+
+    fn step_at_random(&mut self) -> Result<(), Error> {
+        self.begin_step();
+        self.simulator.step_at_random();
+        self.remember()
+    }
+
+    fn step(&mut self, actor: &Mlp, env_steps: u64) -> Result<(), Error> {
+        self.begin_step();
+        let (mut actions, n_actions) = (self.choose(actor), self.n_actions());
+        if let Some(exploration) = &self.config.exploration {
+            exploration.explore(env_steps, n_actions, &mut actions, &mut self.acting);
+        }
+        self.simulator.step(&actions)?;
+        self.remember()
+    }
+
+    fn collect(&mut self, actor: &Mlp, settings: &Refinement) -> Result<Steps, Error> {
+        let (n_envs, n_actions, n_steps) = (self.config.n_envs, self.n_actions(), settings.n_steps);
+        let Learning { arrival, reward_scale, .. } = self.config.learning;
+        let limit = self.simulator.world().params.lane_distance_limit;
+        let mut params = self.simulator.world().params;
+        settings.reward.apply_to_params(&mut params);
+        let mut steps = Steps { n_envs, n_values: N, ..Steps::default() };
+        for step in 0..n_steps {
+            self.begin_step();
+            let normalised = self.normalisation.apply(&self.observation);
+            steps.observation.extend_from_slice(&normalised);
+            let logits = logits_of_normalised(actor, normalised, N);
+            let actions = sampled(&logits, n_actions, &mut self.acting);
+            steps.log_prob.extend(logits.chunks_exact(n_actions).zip(&actions).map(|(row, &action)| softmax(row).1[action as usize]));
+            steps.action.extend_from_slice(&actions);
+            self.simulator.step(&actions)?;
+            let batch = self.simulator.batch();
+            for env in 0..n_envs {
+                let terms = RewardTerms {
+                    lane_distance: (batch.terms[env].lane_distance * limit / params.lane_distance_limit).min(1.0),
+                    clearance: judge::closeness(&params, &batch.clearance[env]).powf(settings.clearance_power as f32),
+                    ..batch.terms[env]
+                };
+                steps.reward.push(judge::rewarded(&params, &terms));
+            }
+            let reward = &mut steps.reward[step * n_envs..];
+            if let Some(arrival) = arrival {
+                add_arrivals(reward, &batch.ended, arrival as f32);
+            }
+            reward.iter_mut().for_each(|reward| *reward *= reward_scale as f32);
+            steps.ended.extend(batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running)));
+            let next = observed::<N>(&batch.next_observation, &batch.next_extras);
+            for (env, next) in next.iter().enumerate() {
+                if steps.needs_next(step * n_envs + env, n_steps * n_envs) {
+                    steps.next_observation.extend(self.normalisation.apply(std::slice::from_ref(next)));
+                }
+            }
+            self.count()?;
+        }
+        Ok(steps)
+    }
+
+    fn drive(&mut self, actor: &Mlp) -> Result<(), Error> {
+        let actions = self.choose(actor);
+        Ok(self.simulator.step(&actions)?)
+    }
+
+    fn sample(&mut self) -> Result<Vec<Transitions>, Error> {
+        let learning = &self.config.learning;
+        let mut sample = self.replay_buffer.sample(learning.batch, learning.gamma as f32, &mut self.sampling);
+        if let Some(mirror) = &self.mirror {
+            mirror.mirror_half(&mut sample, &mut self.sampling);
+        }
+        self.sampled_rows.clone_from(&sample.row);
+        Ok(shards(&sample, &self.normalisation, learning, &mut self.sampling))
+    }
+
+    fn set_td_errors(&mut self, errors: Vec<Tensor<2>>) {
+        if self.replay_buffer.has_priorities() {
+            let read = |errors: Tensor<2>| errors.into_data().try_to_vec::<f32>().expect("TD errors of f32 critics are f32");
+            let errors: Vec<f32> = errors.into_iter().flat_map(read).collect();
+            self.replay_buffer.set_td_errors(&self.sampled_rows, &errors);
+        }
+    }
+
+    fn take_episodes(&mut self, _: bool) -> Result<Vec<Episodes>, Error> {
+        Ok(std::mem::take(&mut self.ended))
+    }
+
+    fn take_route_ends(&mut self) -> Vec<RouteEnd> {
+        std::mem::take(&mut self.route_ends)
+    }
+
+    fn wait(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn save<'a>(&'a self, columns: &mut Columns<'a>) {
+        for (column, bytes) in self.simulator.batch().columns() {
+            columns.put(column_name(column), bytes);
+        }
+        columns.put("rollout, acting", &self.acting.state[..]);
+        columns.put("rollout, sampling", &self.sampling.state[..]);
+        columns.put("rollout, episode rewards", &self.episode_rewards[..]);
+        self.level_replay.iter().for_each(|replay| replay.save(columns));
+        self.replay_buffer.save(columns);
+    }
+
+    fn restore(&mut self, stored: &Stored, _: u64) -> Result<(), Error> {
+        self.simulator.restore(|column| stored.bytes(&column_name(column))).map_err(|error| stored.error(error.to_string()))?;
+        check_finite(self.simulator.batch(), stored)?;
+        (self.acting, self.sampling) = (Generator::stored(stored, "rollout, acting")?, Generator::stored(stored, "rollout, sampling")?);
+        self.episode_rewards = stored.exactly("rollout, episode rewards", self.config.n_envs)?;
+        if let Some(replay) = &mut self.level_replay {
+            replay.restore(stored)?;
+            self.simulator.draw_from(replay.list())?;
+        }
+        self.replay_buffer.restore(stored, self.n_actions() as u32)?;
+        reserve(&mut self.replay_buffer, &self.config)
+    }
+}
+
+/// Takes the memory of all transitions that a run will hold, or says that there is not so much.
+fn reserve<const N: usize>(replay_buffer: &mut ReplayBuffer<N>, config: &Config) -> Result<(), Error> {
+    replay_buffer.reserve(memory::transitions(config)).map_err(|error| {
+        let expected = format!("{error}; fewer transitions would do");
+        Error::Flag { flag: "replay_buffer.capacity", value: config.replay_buffer.capacity.to_string(), expected }
+    })
+}
+
+/// Adds `arrival` to the rewards of the trucks that arrive, `[n_envs]` each.
+fn add_arrivals(reward: &mut [f32], ended: &[u32], arrival: f32) {
+    let arrived = reward.iter_mut().zip(ended).filter(|(_, code)| **code == Ended::Arrived as u32);
+    arrived.for_each(|(reward, _)| *reward += arrival);
+}
+
+/// An error if a truck of a checkpoint has a number that is not finite.
+fn check_finite(batch: &Batch, stored: &Stored) -> Result<(), Error> {
+    for (column, bytes) in batch.columns() {
+        let floats: Vec<f32> = match column {
+            // Indices, or floats beside indices.
+            Column::Action | Column::Ended | Column::Progress => continue,
+            Column::Truck => {
+                batch.truck.iter().flat_map(|truck| [truck.position.x, truck.position.y, truck.heading, truck.speed]).collect()
+            }
+            _ => bytes.chunks_exact(size_of::<f32>()).map(bytemuck::pod_read_unaligned).collect(),
+        };
+        if let Some(value) = floats.iter().find(|value| !value.is_finite()) {
+            return Err(stored.error(format!("its column `{}` has {value}: put a sound copy back", column_name(column))));
+        }
+    }
+    Ok(())
+}
+
+fn column_name(column: Column) -> String {
+    format!("batch, {}", column.name())
+}
+
+/// A sample as tensors, in [`N_SHARDS`] shards of nearly the same size. Both observations of a transition get the same
+/// noise, so that their difference stays what it is.
+pub fn shards<const N: usize>(
+    sample: &Sample<N>,
+    normalisation: &Normalisation,
+    learning: &Learning,
+    rng: &mut impl Rng,
+) -> Vec<Transitions> {
+    let device = Device::flex();
+    let n_rows = sample.action.len();
+    let (reward_scale, noise) = (learning.reward_scale as f32, learning.observation_noise as f32);
+    let mut shard = |index: usize| {
+        let rows = n_rows * index / N_SHARDS..n_rows * (index + 1) / N_SHARDS;
+        let shape = [rows.len(), 1];
+        let actions: Vec<i32> = sample.action[rows.clone()].iter().map(|&action| action as i32).collect();
+        let rewards: Vec<f32> = sample.reward[rows.clone()].iter().map(|reward| reward * reward_scale).collect();
+        let mut normalised = [&sample.observation, &sample.next_observation].map(|column| normalisation.apply(&column[rows.clone()]));
+        if 0.0 < noise {
+            let [observation, next] = &mut normalised;
+            for (value, next) in observation.iter_mut().zip(next) {
+                let added = rng.random_range(-noise..noise);
+                *value += added;
+                *next += added;
+            }
+        }
+        let [observation, next_observation] = normalised.map(|values| Tensor::from_data(TensorData::new(values, [rows.len(), N]), &device));
+        Transitions {
+            observation,
+            action: Tensor::from_data(TensorData::new(actions, shape), &device),
+            reward: Tensor::from_data(TensorData::new(rewards, shape), &device),
+            discount: Tensor::from_data(TensorData::new(sample.discount[rows.clone()].to_vec(), shape), &device),
+            next_observation,
+            weight: Tensor::from_data(TensorData::new(sample.weight[rows].to_vec(), shape), &device),
+        }
+    };
+    (0..N_SHARDS).map(&mut shard).collect()
+}
+
+/// The network's output for each observation, `[rows * actions]`.
+pub fn logits<const N: usize>(network: &Mlp, normalisation: &Normalisation, observations: &[[f32; N]]) -> Vec<f32> {
+    logits_of_normalised(network, normalisation.apply(observations), N)
+}
+
+/// The same for normalised observations of `n_values` each, one after the other.
+fn logits_of_normalised(network: &Mlp, observations: Vec<f32>, n_values: usize) -> Vec<f32> {
+    let shape = [observations.len() / n_values, n_values];
+    let data = TensorData::new(observations, shape);
+    let output = network.forward(Tensor::from_data(data, &Device::flex())).into_data();
+    output.try_to_vec().expect("the layers' weights are f32, and so is their output")
+}

@@ -1,0 +1,133 @@
+//! The folder of a run: created for it, and never written by another.
+
+use std::path::{Path, PathBuf};
+
+use offtrack::files::writer::followed;
+
+use crate::config::Config;
+use offtrack_evaluation::error::Error;
+use offtrack_evaluation::files;
+
+/// Where a run writes.
+#[derive(Debug)]
+pub struct Folder(PathBuf);
+
+impl Folder {
+    /// Makes a folder as [`make`] does and writes the config into it.
+    pub fn create(runs: &Path, name: Option<&str>, config_file: &Path, config: &Config) -> Result<Folder, Error> {
+        let folder = Folder(make(runs, name, config_file)?);
+        let written = folder.write_config(config);
+        if written.is_err() {
+            folder.discard();
+        }
+        written.map(|()| folder)
+    }
+
+    /// Removes the folder of a run that could not begin, which would be in the way of the next attempt. One with more
+    /// in it than a run begins with stays.
+    pub fn discard(&self) {
+        let _ = std::fs::remove_file(self.config());
+        let _ = std::fs::remove_file(self.metrics());
+        let _ = std::fs::remove_dir(&self.0);
+    }
+
+    /// The folder of a run that continues. Temporary files of a killed process are removed.
+    pub fn of(path: &Path) -> Result<Folder, Error> {
+        let folder = Folder(path.to_owned());
+        if folder.config().is_file() {
+            let _ = std::fs::remove_file(folder.checkpoint_part());
+            return Ok(folder);
+        }
+        let expected = "the folder of a run is needed, with the config.toml that it left".to_owned();
+        Err(Error::Flag { flag: "--resume", value: path.display().to_string(), expected })
+    }
+
+    /// Writes the training file as used.
+    pub fn write_config(&self, config: &Config) -> Result<(), Error> {
+        files::write_whole(&self.config(), config.to_toml().as_bytes())
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// The training file as used.
+    pub fn config(&self) -> PathBuf {
+        self.0.join("config.toml")
+    }
+
+    /// All that it takes to continue, replaced in one move each time.
+    pub fn checkpoint(&self) -> PathBuf {
+        self.0.join("checkpoint.safetensors")
+    }
+
+    /// The next checkpoint while it is being written: beside the last one, also where that is kept elsewhere and linked.
+    pub fn checkpoint_part(&self) -> PathBuf {
+        followed(&self.checkpoint()).with_extension("part")
+    }
+
+    /// The policy, replaced in one move each time.
+    pub fn policy(&self) -> PathBuf {
+        self.0.join("policy.safetensors")
+    }
+
+    /// A row of metrics every few seconds.
+    pub fn metrics(&self) -> PathBuf {
+        self.0.join("metrics.csv")
+    }
+
+    /// Success on each training route.
+    pub fn routes(&self) -> PathBuf {
+        self.0.join("routes.csv")
+    }
+
+    /// The report.
+    pub fn report(&self) -> PathBuf {
+        self.0.join("report.json")
+    }
+
+    /// The same as a page to look at.
+    pub fn page(&self) -> PathBuf {
+        self.0.join("report.html")
+    }
+}
+
+/// Makes `runs/name`, or `runs/<training file's name>` with the first free number.
+pub fn make(runs: &Path, name: Option<&str>, config_file: &Path) -> Result<PathBuf, Error> {
+    std::fs::create_dir_all(runs).map_err(Error::write(runs))?;
+    match name {
+        Some(name) => named(runs, name),
+        None => numbered(runs, config_file),
+    }
+}
+
+fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
+    let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) && !name.starts_with('.') && !name.is_empty();
+    if !plain {
+        let expected = "a name of letters, digits, `-`, `_` and `.` that begins with none of the last is needed".to_owned();
+        return Err(Error::Flag { flag: "--name", value: format!("{name:?}"), expected });
+    }
+    let path = runs.join(name);
+    match std::fs::create_dir(&path) {
+        Ok(()) => Ok(path),
+        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+            let expected = format!("{} exists and is never overwritten: choose another name", path.display());
+            Err(Error::Flag { flag: "--name", value: name.to_owned(), expected })
+        }
+        Err(error) => Err(Error::write(&path)(error)),
+    }
+}
+
+fn numbered(runs: &Path, config_file: &Path) -> Result<PathBuf, Error> {
+    let stem = config_file.file_stem().map_or_else(|| "run".into(), |stem| stem.to_string_lossy());
+    let mut number = 1u32;
+    loop {
+        let path = runs.join(format!("{stem}-{number}"));
+        match std::fs::create_dir(&path) {
+            Ok(()) => return Ok(path),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
+            Err(error) => return Err(Error::write(&path)(error)),
+        }
+    }
+}

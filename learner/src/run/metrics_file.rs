@@ -1,0 +1,99 @@
+//! `metrics.csv`: whole rows only, even on a full disk, and cut back to where a checkpoint was.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use offtrack_evaluation::error::Error;
+
+/// How long a run waits for the lock of a process that is still ending.
+const LOCK_TIME: Duration = Duration::from_secs(3);
+
+/// Names of the columns.
+pub(super) const HEAD: &str = "seconds,env_steps,episodes,updates,success,reward,critic_loss,actor_loss,entropy,value,entropy_coefficient,steps_per_second,updates_per_second,validation_success\n";
+
+/// The file, held by one run at a time.
+#[derive(Debug)]
+pub struct MetricsFile {
+    path: PathBuf,
+    file: File,
+    /// Bytes of whole rows.
+    length: u64,
+}
+
+impl MetricsFile {
+    /// A new file with the names of its columns.
+    pub fn create(path: PathBuf) -> Result<MetricsFile, Error> {
+        let file = OpenOptions::new().append(true).create_new(true).open(&path).map_err(Error::write(&path))?;
+        let mut metrics_file = MetricsFile { path, file, length: 0 };
+        metrics_file.lock()?;
+        metrics_file.append(HEAD)?;
+        Ok(metrics_file)
+    }
+
+    /// The file of a run that continues; its lock is taken.
+    pub fn open(path: PathBuf) -> Result<MetricsFile, Error> {
+        let read = OpenOptions::new().read(true).append(true).open(&path);
+        let file = read.map_err(Error::read(&path))?;
+        let metrics_file = MetricsFile { length: file.metadata().map_err(Error::read(&path))?.len(), path, file };
+        metrics_file.lock()?;
+        let mut head = String::new();
+        BufReader::new(&metrics_file.file).read_line(&mut head).map_err(Error::read(&metrics_file.path))?;
+        if head != HEAD {
+            let message = "its columns are not those that this program writes: continue with the program that wrote it".to_owned();
+            return Err(Error::Contents { file: metrics_file.path, message });
+        }
+        Ok(metrics_file)
+    }
+
+    /// Locks the file: a second run in the same folder would mix its rows and checkpoints with those of the first.
+    fn lock(&self) -> Result<(), Error> {
+        let begun = Instant::now();
+        loop {
+            match self.file.try_lock() {
+                // A killed process holds its lock until it has ended.
+                Err(TryLockError::WouldBlock) if begun.elapsed() < LOCK_TIME => std::thread::sleep(Duration::from_millis(20)),
+                Err(TryLockError::WouldBlock) => {
+                    let message = "another run is writing it: stop that one first".to_owned();
+                    return Err(Error::Contents { file: self.path.clone(), message });
+                }
+                // Some file systems have no locks; there runs go without.
+                Ok(()) | Err(TryLockError::Error(_)) => return Ok(()),
+            }
+        }
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Bytes of whole rows.
+    pub fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// Adds a row. After an error the file is as it was.
+    pub fn append(&mut self, row: &str) -> Result<(), Error> {
+        let written = self.file.write_all(row.as_bytes());
+        if written.is_err() {
+            // Half a row would spoil the next one.
+            let _ = self.file.set_len(self.length);
+        }
+        written.map_err(Error::write(&self.path))?;
+        self.length += row.len() as u64;
+        Ok(())
+    }
+
+    /// Removes the rows after the first `length` bytes.
+    pub fn cut(&mut self, length: u64) -> Result<(), Error> {
+        if self.length < length {
+            let message = format!("has {} bytes where its checkpoint expects {length}: put the whole file back", self.length);
+            return Err(Error::Contents { file: self.path.clone(), message });
+        }
+        self.file.set_len(length).map_err(Error::write(&self.path))?;
+        self.length = length;
+        Ok(())
+    }
+}

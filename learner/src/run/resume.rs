@@ -1,0 +1,78 @@
+//! What a stopped run continues from: its folder, its training file and its checkpoint; or why it cannot.
+
+use std::path::Path;
+
+use offtrack::files::reader::read_bytes;
+use serde_json::Value;
+
+use super::folder::Folder;
+use super::metrics_file::MetricsFile;
+use super::progress;
+use crate::checkpoint::Stored;
+use crate::config::Config;
+use offtrack_evaluation::error::Error;
+
+/// Most bytes of a report.
+const REPORT_LIMIT: u64 = 64 << 20;
+
+/// A run in its folder.
+#[derive(Debug)]
+pub struct Resumed {
+    /// The folder.
+    pub folder: Folder,
+    /// The run's own training file, with another budget where the command line gives one.
+    pub config: Config,
+    /// Its metrics, locked: no other run can write a checkpoint meanwhile.
+    pub metrics: MetricsFile,
+    /// Its last checkpoint; none where it was killed before the first one, so that it starts from the beginning.
+    pub stored: Option<Stored>,
+}
+
+impl Resumed {
+    /// Reads all of it. Nothing is written but a missing `metrics.csv`.
+    pub fn open(path: &Path, minutes: Option<f64>, steps: Option<u64>) -> Result<Resumed, Error> {
+        let folder = Folder::of(path)?;
+        let mut config = Config::read(&folder.config())?;
+        if !folder.checkpoint().is_file() && is_evaluated(&folder) {
+            let policy = folder.policy();
+            let expected =
+                format!("it has finished and its checkpoint is gone: train --from {} begins a run with its policy", policy.display());
+            return Err(refused(path, expected));
+        }
+        let file = folder.metrics();
+        let metrics = if file.is_file() { MetricsFile::open(file)? } else { MetricsFile::create(file)? };
+        if !folder.checkpoint().is_file() {
+            config.override_with(None, minutes, steps, None)?;
+            return Ok(Resumed { folder, config, metrics, stored: None });
+        }
+        let stored = Stored::read(&folder.checkpoint())?;
+        let written = toml::from_str(stored.config()).map_err(|error| stored.error(format!("its training file: {error}")))?;
+        if !config.is_same_run(&written) {
+            let message =
+                "is not the training file that the checkpoint was written with; only minutes, steps and checkpoint_minutes may differ";
+            return Err(Error::Contents { file: folder.config(), message: message.to_owned() });
+        }
+        config.override_with(None, minutes, steps, None)?;
+        let (seconds, env_steps) = progress::reached(&stored)?;
+        let over = config.minutes.is_some_and(|minutes| 60.0 * minutes <= seconds) || config.steps.is_some_and(|steps| steps <= env_steps);
+        if over && (minutes.is_some() || steps.is_some()) {
+            let expected = format!("it was trained for {:.2} min and {env_steps} env steps: more are needed", seconds / 60.0);
+            return Err(refused(path, expected));
+        }
+        if over && is_evaluated(&folder) {
+            let expected = "it has finished, see its report.json; with more --minutes or --steps than it had it continues".to_owned();
+            return Err(refused(path, expected));
+        }
+        Ok(Resumed { folder, config, metrics, stored: Some(stored) })
+    }
+}
+
+fn refused(path: &Path, expected: String) -> Error {
+    Error::Flag { flag: "--resume", value: path.display().to_string(), expected }
+}
+
+/// The final evaluation has been written.
+fn is_evaluated(folder: &Folder) -> bool {
+    let report = read_bytes(&folder.report(), REPORT_LIMIT).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+    report.is_some_and(|report| report["interrupted"] == false)
+}
