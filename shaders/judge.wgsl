@@ -9,10 +9,10 @@ fn judge(thread: Thread) {
     truck[env].steps += 1u;
     let step_limit = step_limits[truck[env].route * params.n_classes + rigs[truck[env].vehicle].class_index];
     let code = ending(params, routes[truck[env].route], step_limit, truck[env], clearance[env], progress[env]);
-    let weighed_terms = weighed(params, clearance[env], progress[env], code);
+    let amounts = reward_terms(params, clearance[env], progress[env], code);
     ended[env] = code;
-    terms[env] = weighed_terms;
-    reward[env] = rewarded(params, weighed_terms);
+    terms[env] = amounts;
+    reward[env] = rewarded(params, amounts);
 }
 
 // Why the episode ended, RUNNING when it did not.
@@ -39,20 +39,20 @@ fn ending(params: Params, route: RouteRow, step_limit: u32, truck: Truck, cleara
 }
 
 // The physical amounts that the reward weighs.
-fn weighed(params: Params, clearance: Clearance, progress: Progress, code: u32) -> RewardTerms {
+fn reward_terms(params: Params, clearance: Clearance, progress: Progress, code: u32) -> RewardTerms {
     let failed = code != RUNNING && code != ARRIVED && code != TIMED_OUT;
     return RewardTerms(
         f32(progress.passed),
-        min(progress.lane_distance / params.lane_distance_limit, 1.0),
-        clamp(1.0 - min(clearance.tractor, clearance.trailer) / params.clearance_limit, 0.0, 1.0),
+        min(progress.lane_distance / params.reward.lane_distance_limit, 1.0),
+        clamp(1.0 - min(clearance.tractor, clearance.trailer) / params.reward.clearance_limit, 0.0, 1.0),
         select(0.0, 1.0, failed),
     );
 }
 
 // The weighted sum.
 fn rewarded(params: Params, terms: RewardTerms) -> f32 {
-    return params.waypoint_weight * terms.waypoints
-        + params.lane_distance_weight * terms.lane_distance
-        + params.clearance_weight * terms.clearance
-        + params.failure_weight * terms.failure;
+    return params.reward.waypoint * terms.waypoints
+        + params.reward.lane_distance * terms.lane_distance
+        + params.reward.clearance * terms.clearance
+        + params.reward.failure * terms.failure;
 }

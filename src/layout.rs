@@ -286,6 +286,22 @@ crate::shared! {
         pub speed: f32,
     }
 
+    /// The weights of the reward's terms and the limits of two of them, by the keys of a benchmark's `[reward]`.
+    pub struct Reward {
+        /// Reward for each waypoint passed.
+        pub waypoint: f32,
+        /// Reward for the lane-distance term, each step.
+        pub lane_distance: f32,
+        /// Distance to the lane centre at which that term is 1 \[m].
+        pub lane_distance_limit: f32,
+        /// Reward for the clearance term, each step.
+        pub clearance: f32,
+        /// Margin kept from kerbs, within which that term counts \[m].
+        pub clearance_limit: f32,
+        /// Reward when the episode fails.
+        pub failure: f32,
+    }
+
     /// Time and weights, shared by all trucks.
     pub struct Params {
         /// Time of one sub-step \[s].
@@ -322,18 +338,8 @@ crate::shared! {
         pub jackknife_angle: f32,
         /// Load transfer ratio from which the truck has rolled over.
         pub rollover_ratio: f32,
-        /// Distance to the lane centre at which its reward term is 1 \[m].
-        pub lane_distance_limit: f32,
-        /// Reward for each waypoint passed.
-        pub waypoint_weight: f32,
-        /// Reward for the lane-distance term, each step.
-        pub lane_distance_weight: f32,
-        /// Margin kept from kerbs, within which the clearance term counts \[m].
-        pub clearance_limit: f32,
-        /// Reward for the clearance term, each step.
-        pub clearance_weight: f32,
-        /// Reward when the episode fails.
-        pub failure_weight: f32,
+        /// Weights and limits of the reward.
+        pub reward: Reward,
     }
 
     /// One waypoint of one route.

@@ -9,7 +9,7 @@ mod roads; // its roundabouts and routes
 mod part; // a part of a scenario, or another roundabout in it
 mod check; // a scenario changed in memory
 mod fleet; // vehicles by shares, drawn from ranges
-mod reward; // the weights of its reward
+mod reward; // the keys of its reward
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -23,7 +23,7 @@ use crate::map::route::Route;
 use crate::vehicle::Vehicle;
 pub use check::Invalid;
 pub use fleet::{Class, Drawn, Entry, Fleet, Member, N_VEHICLES, Ranges};
-pub use reward::RewardChanges;
+pub use reward::{REWARD_KEYS, Reward, RewardChanges, RewardKey};
 
 /// Default length of a route before the ring \[m].
 pub const APPROACH: f64 = 40.0;
@@ -129,18 +129,8 @@ pub struct Scenario {
     pub time_limit: f64,
     /// What the time limit is a multiple of.
     pub clock: Clock,
-    /// Reward for each waypoint passed.
-    pub waypoint_weight: f64,
-    /// Weight of the lane-distance term in the reward of each step.
-    pub lane_distance_weight: f64,
-    /// Distance to the lane centre at which that term is 1 \[m].
-    pub lane_distance_limit: f64,
-    /// Weight of the clearance term in the reward of each step.
-    pub clearance_weight: f64,
-    /// Clearance to a kerb below which that term counts \[m].
-    pub clearance_limit: f64,
-    /// Reward for a failure.
-    pub failure_weight: f64,
+    /// The weights and limits of its reward.
+    pub reward: Reward,
     /// Length of a route before the ring \[m].
     pub approach: f64,
     /// Length of a route after the ring \[m].

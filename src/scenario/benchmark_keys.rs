@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 
-use super::{Clock, RewardChanges};
+use super::{Clock, Reward};
 use crate::layout::Track;
 use crate::map::opendrive::{Hand, RoadLane};
 use crate::map::parametric::Gutter;
@@ -35,7 +35,7 @@ pub(super) struct Written {
     pub(super) start: WrittenStart,
     #[serde(default)]
     pub(super) ending: WrittenEnding,
-    pub(super) reward: WrittenReward,
+    pub(super) reward: Reward,
     #[serde(default)]
     pub(super) routes: WrittenRoutes,
     #[serde(default)]
@@ -190,37 +190,6 @@ impl Default for WrittenEnding {
     fn default() -> Self {
         WrittenEnding { stray_distance: 10.0, jackknife_deg: 90.0, rollover_ratio: 1.0, time_limit: 3.0, clock: Clock::default() }
     }
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct WrittenReward {
-    pub(super) waypoint: f64,
-    pub(super) lane_distance: f64,
-    pub(super) lane_distance_limit: f64,
-    #[serde(default)]
-    pub(super) clearance: f64,
-    #[serde(default = "half_a_metre")]
-    pub(super) clearance_limit: f64,
-    pub(super) failure: f64,
-}
-
-impl WrittenReward {
-    /// All of its keys.
-    pub(super) fn as_changes(&self) -> RewardChanges {
-        RewardChanges {
-            waypoint: Some(self.waypoint),
-            lane_distance: Some(self.lane_distance),
-            lane_distance_limit: Some(self.lane_distance_limit),
-            clearance: Some(self.clearance),
-            clearance_limit: Some(self.clearance_limit),
-            failure: Some(self.failure),
-        }
-    }
-}
-
-fn half_a_metre() -> f64 {
-    0.5
 }
 
 #[derive(Deserialize)]

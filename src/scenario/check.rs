@@ -5,7 +5,7 @@
 
 use std::fmt::Display;
 
-use super::Scenario;
+use super::{REWARD_KEYS, Scenario};
 use crate::vehicle::{Model, Suspension, Vehicle};
 
 /// A value with which no truck could be stepped.
@@ -78,19 +78,15 @@ impl Scenario {
             ("jackknife_angle", self.jackknife_angle),
             ("rollover_ratio", self.rollover_ratio),
             ("time_limit", self.time_limit),
-            ("lane_distance_limit", self.lane_distance_limit),
-            ("clearance_limit", self.clearance_limit),
         ];
         let finite = [
             ("start_offset", self.start_offset),
             ("start_heading", self.start_heading),
-            ("waypoint_weight", self.waypoint_weight),
-            ("lane_distance_weight", self.lane_distance_weight),
-            ("clearance_weight", self.clearance_weight),
-            ("failure_weight", self.failure_weight),
         ];
         positive.into_iter().try_for_each(|(key, value)| within(key, value, POSITIVE))?;
-        finite.into_iter().try_for_each(|(key, value)| within(key, value, FINITE))
+        finite.into_iter().try_for_each(|(key, value)| within(key, value, FINITE))?;
+        let reward = REWARD_KEYS.iter().zip(self.reward.values());
+        reward.into_iter().try_for_each(|(key, value)| within(&format!("reward.{}", key.name), value, key.range))
     }
 
     /// Every route leads somewhere, and there is one.

@@ -60,7 +60,7 @@ fn without_routes(
         [] => Vec::new(),
         changes => numbers(reader, "actions.speed_changes_kmh", changes, 90.0, -90.0, "km/h")?,
     };
-    written.reward.as_changes().check(reader, "reward")?;
+    written.reward.check(reader)?;
     Ok(Scenario {
         name,
         steer_max: steer_max.map(f64::to_radians),
@@ -84,12 +84,7 @@ fn without_routes(
         rollover_ratio: reader.within("ending.rollover_ratio", ending.rollover_ratio, 0.1..=2.0, "")?,
         time_limit: reader.within("ending.time_limit", ending.time_limit, 1.0..=20.0, "")?,
         clock: ending.clock,
-        waypoint_weight: reward.waypoint,
-        lane_distance_weight: reward.lane_distance,
-        lane_distance_limit: reward.lane_distance_limit,
-        clearance_weight: reward.clearance,
-        clearance_limit: reward.clearance_limit,
-        failure_weight: reward.failure,
+        reward: *reward,
         approach: reader.within("routes.approach", routes.approach, 5.0..=500.0, "m")?,
         departure: reader.within("routes.departure", routes.departure, 5.0..=500.0, "m")?,
         spacing: reader.within("routes.spacing", routes.spacing, 0.5..=5.0, "m")?,

@@ -1,33 +1,105 @@
-//! The weights of a benchmark's reward: their ranges, and other values for some of them.
+//! The reward of a benchmark: its keys with their ranges, and other values for some of them.
+//!
+//! The keys are listed here and, as they are on a device, in [`crate::layout::Reward`].
 
 use serde::{Deserialize, Serialize};
 
-use super::Scenario;
 use crate::files::reader::{Error, Reader};
-use crate::layout::Params;
+use crate::layout;
 
-/// Other values for some keys of a benchmark's `[reward]`; what is none stays as the benchmark has it.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RewardChanges {
+/// Range of a weight.
+const WEIGHT: [f64; 2] = [-1e6, 1e6];
+
+/// A key of `[reward]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RewardKey {
+    /// Its name.
+    pub name: &'static str,
+    /// Least and greatest value that a file may give.
+    pub range: [f64; 2],
+    /// Its unit; empty for a weight.
+    pub unit: &'static str,
+}
+
+macro_rules! reward {
+    ($($(#[doc = $doc:literal])* $(#[serde($($serde:tt)*)])? $key:ident: $range:expr, $unit:literal;)*) => {
+        /// The weights of a reward's terms and the limits of two of them.
+        #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct Reward {
+            $($(#[doc = $doc])* $(#[serde($($serde)*)])? pub $key: f64,)*
+        }
+
+        /// Other values for some keys of a benchmark's `[reward]`; what is none stays as the benchmark has it.
+        #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct RewardChanges {
+            $($(#[doc = $doc])* #[serde(default, skip_serializing_if = "Option::is_none")] pub $key: Option<f64>,)*
+        }
+
+        /// The keys of `[reward]`, in their order.
+        pub const REWARD_KEYS: &[RewardKey] = &[$(RewardKey { name: stringify!($key), range: $range, unit: $unit },)*];
+
+        impl Reward {
+            /// Its values in the order of [`REWARD_KEYS`].
+            pub fn values(&self) -> Vec<f64> {
+                vec![$(self.$key),*]
+            }
+        }
+
+        impl From<&Reward> for layout::Reward {
+            fn from(reward: &Reward) -> layout::Reward {
+                layout::Reward { $($key: reward.$key as f32,)* }
+            }
+        }
+
+        impl RewardChanges {
+            /// Its values in the order of [`REWARD_KEYS`].
+            fn values(&self) -> Vec<Option<f64>> {
+                vec![$(self.$key),*]
+            }
+
+            /// Changes the reward of a scenario.
+            pub fn apply(&self, reward: &mut Reward) {
+                $(reward.$key = self.$key.unwrap_or(reward.$key);)*
+            }
+
+            /// Changes the reward of a world.
+            pub fn apply_to_world(&self, reward: &mut layout::Reward) {
+                $(reward.$key = self.$key.map_or(reward.$key, |value| value as f32);)*
+            }
+        }
+    };
+}
+
+reward! {
     /// Reward for each waypoint passed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub waypoint: Option<f64>,
+    waypoint: WEIGHT, "";
     /// Weight of the lane-distance term in the reward of each step.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lane_distance: Option<f64>,
+    lane_distance: WEIGHT, "";
     /// Distance to the lane centre at which that term is 1 \[m].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lane_distance_limit: Option<f64>,
+    lane_distance_limit: [0.1, 50.0], "m";
     /// Weight of the clearance term in the reward of each step.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub clearance: Option<f64>,
+    #[serde(default)]
+    clearance: WEIGHT, "";
     /// Clearance to a kerb below which that term counts \[m].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub clearance_limit: Option<f64>,
+    #[serde(default = "half_a_metre")]
+    clearance_limit: [0.01, 10.0], "m";
     /// Reward for a failure.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub failure: Option<f64>,
+    failure: WEIGHT, "";
+}
+
+fn half_a_metre() -> f64 {
+    0.5
+}
+
+impl Reward {
+    /// # Errors
+    ///
+    /// The first value out of its range, with its key.
+    pub(super) fn check(&self, reader: &Reader) -> Result<(), Error> {
+        check(reader, "reward", self.values().into_iter().map(Some))
+    }
 }
 
 impl RewardChanges {
@@ -40,47 +112,14 @@ impl RewardChanges {
     ///
     /// The first value out of the range that a benchmark file may give, with its key in `table`.
     pub fn check(&self, reader: &Reader, table: &str) -> Result<(), Error> {
-        let weight = -1e6..=1e6;
-        let keys = [
-            ("waypoint", self.waypoint, weight.clone(), ""),
-            ("lane_distance", self.lane_distance, weight.clone(), ""),
-            ("lane_distance_limit", self.lane_distance_limit, 0.1..=50.0, "m"),
-            ("clearance", self.clearance, weight.clone(), ""),
-            ("clearance_limit", self.clearance_limit, 0.01..=10.0, "m"),
-            ("failure", self.failure, weight, ""),
-        ];
-        keys.into_iter().try_for_each(|(key, value, range, unit)| {
-            value.map_or(Ok(()), |value| reader.within(&format!("{table}.{key}"), value, range, unit).map(drop))
-        })
+        check(reader, table, self.values().into_iter())
     }
+}
 
-    /// Changes the reward of a scenario.
-    pub fn apply(&self, scenario: &mut Scenario) {
-        let keys = [
-            (self.waypoint, &mut scenario.waypoint_weight),
-            (self.lane_distance, &mut scenario.lane_distance_weight),
-            (self.lane_distance_limit, &mut scenario.lane_distance_limit),
-            (self.clearance, &mut scenario.clearance_weight),
-            (self.clearance_limit, &mut scenario.clearance_limit),
-            (self.failure, &mut scenario.failure_weight),
-        ];
-        for (value, weight) in keys {
-            *weight = value.unwrap_or(*weight);
-        }
-    }
-
-    /// Changes the reward of a world.
-    pub fn apply_to_params(&self, params: &mut Params) {
-        let keys = [
-            (self.waypoint, &mut params.waypoint_weight),
-            (self.lane_distance, &mut params.lane_distance_weight),
-            (self.lane_distance_limit, &mut params.lane_distance_limit),
-            (self.clearance, &mut params.clearance_weight),
-            (self.clearance_limit, &mut params.clearance_limit),
-            (self.failure, &mut params.failure_weight),
-        ];
-        for (value, weight) in keys {
-            *weight = value.map_or(*weight, |value| value as f32);
-        }
-    }
+fn check(reader: &Reader, table: &str, values: impl Iterator<Item = Option<f64>>) -> Result<(), Error> {
+    REWARD_KEYS.iter().zip(values).try_for_each(|(key, value)| {
+        let [least, greatest] = key.range;
+        let within = |value| reader.within(&format!("{table}.{}", key.name), value, least..=greatest, key.unit);
+        value.map_or(Ok(()), |value| within(value).map(drop))
+    })
 }

@@ -105,8 +105,8 @@ fn check_terms(env: usize, terms: &RewardTerms, n_waypoints: u32) -> Result<(), 
 
 /// Most that a step's reward can be, and its negative the least, on a route with so many waypoints.
 fn largest_reward(params: &Params, n_waypoints: u32) -> f32 {
-    let once = params.lane_distance_weight.abs() + params.clearance_weight.abs() + params.failure_weight.abs();
-    (params.waypoint_weight.abs() * n_waypoints as f32 + once) * OBSERVED
+    let once = params.reward.lane_distance.abs() + params.reward.clearance.abs() + params.reward.failure.abs();
+    (params.reward.waypoint.abs() * n_waypoints as f32 + once) * OBSERVED
 }
 
 fn all_within(column: Column, env: usize, values: &[f32], range: RangeInclusive<f32>) -> Result<(), Error> {

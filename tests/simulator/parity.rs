@@ -35,7 +35,7 @@ fn written(stage: Stage) -> Written {
         Stage::Sense => (&[Column::Ranges], Some(|world| world.rays.iter_mut().flatten().for_each(|ray| ray.origin *= 1.001))),
         Stage::Observe => (&[Column::NextObservation, Column::NextExtras], Some(|world| world.params.sensor_range *= 1.001)),
         Stage::Judge => {
-            (&[Column::Truck, Column::Ended, Column::Terms, Column::Reward], Some(|world| world.params.lane_distance_limit *= 1.001))
+            (&[Column::Truck, Column::Ended, Column::Terms, Column::Reward], Some(|world| world.params.reward.lane_distance_limit *= 1.001))
         }
         Stage::Count => (&[], None),
         Stage::CopyObservation => (&[Column::Observation, Column::Extras], None),
@@ -196,8 +196,8 @@ fn the_largest_rewards_that_a_benchmark_may_give_are_summed_alike() {
     let (choice, before) = varied(&world.clone().into(), false);
     // Whole numbers, which every engine adds up to the same reward.
     let params = &mut world.params;
-    (params.waypoint_weight, params.failure_weight) = (1e6, -1e6);
-    (params.lane_distance_weight, params.clearance_weight) = (0.0, 0.0);
+    (params.reward.waypoint, params.reward.failure) = (1e6, -1e6);
+    (params.reward.lane_distance, params.reward.clearance) = (0.0, 0.0);
     let [here, there] = simulators(&Arc::new(world), &choice).map(|mut simulator| {
         put(&mut simulator, &before);
         simulator.step(&before.action).unwrap();

@@ -258,14 +258,14 @@ fn weights_of_the_reward_can_be_changed_one_by_one() {
     let before = scenario.clone();
     let unchanged = with_set(&["reward="]).unwrap();
     assert_eq!(unchanged.changed_rewards(), "");
-    unchanged.reward.apply(&mut scenario);
-    assert_eq!(scenario.clearance_weight, before.clearance_weight);
+    unchanged.reward.apply(&mut scenario.reward);
+    assert_eq!(scenario.reward.clearance, before.reward.clearance);
     let changed = with_set(&["reward.clearance=-70", "reward.failure=-3"]).unwrap();
     assert_eq!(read(&changed.to_toml()).as_ref(), Ok(&changed));
     assert_eq!(changed.changed_rewards(), "reward.clearance = -70.0, reward.failure = -3.0");
-    changed.reward.apply(&mut scenario);
-    assert_eq!((scenario.clearance_weight, scenario.failure_weight), (-70.0, -3.0));
-    let others = |of: &Scenario| (of.waypoint_weight, of.lane_distance_weight, of.lane_distance_limit, of.clearance_limit);
+    changed.reward.apply(&mut scenario.reward);
+    assert_eq!((scenario.reward.clearance, scenario.reward.failure), (-70.0, -3.0));
+    let others = |of: &Scenario| (of.reward.waypoint, of.reward.lane_distance, of.reward.lane_distance_limit, of.reward.clearance_limit);
     assert_eq!(others(&scenario), others(&before));
 }
 

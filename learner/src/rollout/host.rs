@@ -193,9 +193,9 @@ impl<const N: usize> Rollout for HostRollout<N> {
     fn collect(&mut self, actor: &Mlp, settings: &Refinement) -> Result<Steps, Error> {
         let (n_envs, n_actions, n_steps) = (self.config.n_envs, self.n_actions(), settings.n_steps);
         let Learning { arrival, reward_scale, .. } = self.config.learning;
-        let limit = self.simulator.world().params.lane_distance_limit;
+        let limit = self.simulator.world().params.reward.lane_distance_limit;
         let mut params = self.simulator.world().params;
-        settings.reward.apply_to_params(&mut params);
+        settings.reward.apply_to_world(&mut params.reward);
         let mut steps = Steps { n_envs, n_values: N, ..Steps::default() };
         for step in 0..n_steps {
             self.begin_step();
@@ -209,7 +209,7 @@ impl<const N: usize> Rollout for HostRollout<N> {
             let batch = self.simulator.batch();
             for env in 0..n_envs {
                 let terms = RewardTerms {
-                    lane_distance: (batch.terms[env].lane_distance * limit / params.lane_distance_limit).min(1.0),
+                    lane_distance: (batch.terms[env].lane_distance * limit / params.reward.lane_distance_limit).min(1.0),
                     clearance: judge::closeness(&params, &batch.clearance[env]).powf(settings.clearance_power as f32),
                     ..batch.terms[env]
                 };

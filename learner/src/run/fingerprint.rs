@@ -50,7 +50,7 @@ mod tests {
         let world = World::bake(&Scenario::named("attard2023").unwrap()).unwrap();
         let before = fingerprint(&world);
         let changes: [Change; 17] = [
-            ("params", |world| world.params.failure_weight -= 1.0),
+            ("params", |world| world.params.reward.failure -= 1.0),
             ("rigs", |world| world.rigs[0].slip += 1e-6),
             ("classes, vehicle", |world| world.classes[0].vehicle += "x"),
             ("classes, load", |world| world.classes[0].load += "x"),

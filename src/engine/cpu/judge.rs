@@ -14,7 +14,7 @@ pub fn judge(world: &World, row: &mut Row) {
     let step_limit = world.step_limit(row.truck);
     let ended = ending(&world.params, route, step_limit, row.truck, row.clearance, row.progress);
     *row.ended = ended as u32;
-    *row.terms = weighed(&world.params, row.clearance, row.progress, ended);
+    *row.terms = reward_terms(&world.params, row.clearance, row.progress, ended);
     *row.reward = rewarded(&world.params, row.terms);
 }
 
@@ -43,10 +43,10 @@ pub fn ending(params: &Params, route: &RouteRow, step_limit: u32, truck: &Truck,
 }
 
 /// The physical amounts that the reward weighs.
-pub fn weighed(params: &Params, clearance: &Clearance, progress: &Progress, ended: Ended) -> RewardTerms {
+pub fn reward_terms(params: &Params, clearance: &Clearance, progress: &Progress, ended: Ended) -> RewardTerms {
     RewardTerms {
         waypoints: progress.passed as f32,
-        lane_distance: (progress.lane_distance / params.lane_distance_limit).min(1.0),
+        lane_distance: (progress.lane_distance / params.reward.lane_distance_limit).min(1.0),
         clearance: closeness(params, clearance),
         failure: if ended.failed() { 1.0 } else { 0.0 },
     }
@@ -54,13 +54,13 @@ pub fn weighed(params: &Params, clearance: &Clearance, progress: &Progress, ende
 
 /// Depth of the nearer unit in the margin kept from kerbs, from 0 outside it to 1 at a kerb.
 pub fn closeness(params: &Params, clearance: &Clearance) -> f32 {
-    (1.0 - clearance.tractor.min(clearance.trailer) / params.clearance_limit).clamp(0.0, 1.0)
+    (1.0 - clearance.tractor.min(clearance.trailer) / params.reward.clearance_limit).clamp(0.0, 1.0)
 }
 
 /// The weighted sum.
 pub fn rewarded(params: &Params, terms: &RewardTerms) -> f32 {
-    params.waypoint_weight * terms.waypoints
-        + params.lane_distance_weight * terms.lane_distance
-        + params.clearance_weight * terms.clearance
-        + params.failure_weight * terms.failure
+    params.reward.waypoint * terms.waypoints
+        + params.reward.lane_distance * terms.lane_distance
+        + params.reward.clearance * terms.clearance
+        + params.reward.failure * terms.failure
 }

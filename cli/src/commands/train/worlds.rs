@@ -95,7 +95,7 @@ fn training(reader: &Reader, config: &Config, own: &Scenario) -> Result<Scenario
         return Err(reader.invalid("training_benchmark", &training.name, "it has no routes under `train`").into());
     }
     training.keep(&[Split::Train]);
-    config.reward.apply(&mut training);
+    config.reward.apply(&mut training.reward);
     Ok(training)
 }
 
