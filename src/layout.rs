@@ -20,6 +20,7 @@ pub use columns::{Column, N_COLUMNS};
 pub use ended::Ended;
 pub(crate) use ended::printed_codes;
 pub use extras::{EXTRAS, Extra, Track};
+pub(crate) use observation::first_of;
 pub use observation::{OBSERVATION, Values};
 
 constants! {

@@ -45,28 +45,15 @@ pub enum Clock {
     Feasible,
 }
 
-/// The three disjoint sets of a benchmark's routes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Split {
-    /// Routes for training.
-    Train,
-    /// Routes for choosing among policies: neither trained on nor reported.
-    Validation,
-    /// Routes for evaluation only.
-    Test,
-}
-
-impl Split {
-    /// All splits, in the order of a benchmark file.
-    pub const ALL: [Split; 3] = [Split::Train, Split::Validation, Split::Test];
-
-    /// The split's key in a benchmark file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Split::Train => "train",
-            Split::Validation => "validation",
-            Split::Test => "test",
-        }
+crate::named! {
+    /// The three disjoint sets of a benchmark's routes, by their keys in a benchmark file.
+    pub enum Split {
+        /// Routes for training.
+        Train = "train",
+        /// Routes for choosing among policies: neither trained on nor reported.
+        Validation = "validation",
+        /// Routes for evaluation only.
+        Test = "test",
     }
 }
 

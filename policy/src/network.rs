@@ -14,28 +14,19 @@ const OUTPUTS: usize = 16;
 /// Rows that one thread takes through all layers at a time: a slice of the weights serves them from the nearest cache.
 const BLOCK: usize = 8 * ROWS;
 
-/// What stands after each layer but the last.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Activation {
-    /// The rectifier, max(x, 0).
-    #[default]
-    Relu,
-    /// The hyperbolic tangent.
-    Tanh,
+offtrack::named! {
+    /// What stands after each layer but the last.
+    #[derive(Default)]
+    pub enum Activation {
+        /// The rectifier, max(x, 0).
+        #[default]
+        Relu = "relu",
+        /// The hyperbolic tangent.
+        Tanh = "tanh",
+    }
 }
 
 impl Activation {
-    /// All of them.
-    pub const ALL: [Activation; 2] = [Activation::Relu, Activation::Tanh];
-
-    /// Its name in a policy file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Activation::Relu => "relu",
-            Activation::Tanh => "tanh",
-        }
-    }
-
     fn apply(self, values: &mut [f32]) {
         match self {
             Activation::Relu => values.iter_mut().for_each(|value| *value = if *value < 0.0 { 0.0 } else { *value }),

@@ -1,8 +1,6 @@
 //! One step, in order. Both engines run these stages: the CPU by the function, the device by the kernels of the same
 //! name.
 
-use crate::layout::shared::Named;
-
 crate::named! {
     /// A stage of a step, in the order of a step.
     pub enum Stage {
@@ -33,15 +31,7 @@ crate::named! {
 pub const N_STAGES: usize = Stage::ALL.len();
 
 /// The stages of a step, first to last.
-pub const STAGES: [Stage; N_STAGES] = {
-    let mut stages = [Stage::Steer; N_STAGES];
-    let mut index = 0;
-    while index < N_STAGES {
-        stages[index] = Stage::ALL[index];
-        index += 1;
-    }
-    stages
-};
+pub const STAGES: [Stage; N_STAGES] = Stage::ALL;
 
 /// The kernels that begin an episode of the trucks that the caller named.
 pub const BEGIN: [Kernel; 3] = [Kernel::Begin, Kernel::SenseAfterReset, Kernel::ObserveBegun];

@@ -7,9 +7,9 @@ use crate::layout::shared::constants;
 
 constants! {
     /// Sums in a tally: steps by their end code, then the rewards.
-    pub const N_SUMS: usize = 9;
+    pub const N_SUMS: usize = Ended::ALL.len() + 1;
     /// Index of the sum of the rewards.
-    pub const REWARD_SUM: usize = 8;
+    pub const REWARD_SUM: usize = N_SUMS - 1;
     /// Units that a reward of 1 is counted in.
     pub const REWARD_UNITS: f32 = 256.0;
 }
@@ -51,7 +51,8 @@ impl Tally {
     /// Adds a step with this end code and reward.
     #[inline]
     pub(crate) fn add_step(&mut self, ended: u32, reward: f32) {
-        self.sums[ended as usize % REWARD_SUM] += 1;
+        // A remainder and no check: the code is one of so many.
+        self.sums[ended as usize % Ended::ALL.len()] += 1;
         self.sums[REWARD_SUM] += (reward * REWARD_UNITS).round_ties_even() as i64;
     }
 

@@ -1,54 +1,30 @@
 //! Why an episode ended.
 
-/// Why an episode ended. Failure wins over arrival, everything wins over the time limit.
-#[repr(u32)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Ended {
-    /// It goes on.
-    Running,
-    /// The last waypoint was passed.
-    Arrived,
-    /// The tractor's outline touched a kerb.
-    TractorCollided,
-    /// The trailer's outline touched a kerb.
-    TrailerCollided,
-    /// A unit's wheels lifted.
-    RolledOver,
-    /// The articulation passed its limit.
-    Jackknifed,
-    /// The next waypoint is too far away.
-    Strayed,
-    /// The time limit was reached.
-    TimedOut,
+crate::named! {
+    /// Why an episode ended, by the number and the name that reports have. Failure wins over arrival, everything wins over
+    /// the time limit.
+    #[repr(u32)]
+    pub enum Ended {
+        /// It goes on.
+        Running = "running",
+        /// The last waypoint was passed.
+        Arrived = "arrived",
+        /// The tractor's outline touched a kerb.
+        TractorCollided = "tractor_collided",
+        /// The trailer's outline touched a kerb.
+        TrailerCollided = "trailer_collided",
+        /// A unit's wheels lifted.
+        RolledOver = "rolled_over",
+        /// The articulation passed its limit.
+        Jackknifed = "jackknifed",
+        /// The next waypoint is too far away.
+        Strayed = "strayed",
+        /// The time limit was reached.
+        TimedOut = "timed_out",
+    }
 }
 
 impl Ended {
-    /// Every code, in the order of its number.
-    pub const ALL: [Ended; 8] = [
-        Ended::Running,
-        Ended::Arrived,
-        Ended::TractorCollided,
-        Ended::TrailerCollided,
-        Ended::RolledOver,
-        Ended::Jackknifed,
-        Ended::Strayed,
-        Ended::TimedOut,
-    ];
-
-    /// The code as reports name it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Ended::Running => "running",
-            Ended::Arrived => "arrived",
-            Ended::TractorCollided => "tractor_collided",
-            Ended::TrailerCollided => "trailer_collided",
-            Ended::RolledOver => "rolled_over",
-            Ended::Jackknifed => "jackknifed",
-            Ended::Strayed => "strayed",
-            Ended::TimedOut => "timed_out",
-        }
-    }
-
     /// The code with this number in an `ended` column.
     pub fn from_code(code: u32) -> Option<Ended> {
         Ended::ALL.get(code as usize).copied()

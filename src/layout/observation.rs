@@ -42,37 +42,56 @@ pub struct Values {
 /// | 59-68 | `radius` | radius of the route over two chords of 5 waypoints, 0 to 9 chords ahead / 100 m, at most 1 |
 ///
 /// Waypoints ahead are the next one and the 2nd, 5th, 7th and 10th after it.
-pub const OBSERVATION: [Values; 13] = [
-    values("speed", 0, 1, "speed of the drive axle / 27.8 m/s, limited to 0..1"),
-    values("waypoint_distance", 1, 2, "distance to the next and the following waypoint / 20 m, at most 1"),
-    values("crossing_distance", 3, 2, "distance to the crossing lines of these waypoints / 20 m, at most 1"),
-    values("lane_distance", 5, 1, "distance to the lane's centre line / 10 m, at most 1"),
-    angles("bearing", 6, 5, "angle at the waypoint behind, from a waypoint ahead to the truck / pi"),
-    angles("heading", 11, 5, "tractor's heading less the lane's at these waypoints / pi"),
-    angles("trailer_heading", 16, 5, "trailer's heading less the lane's at these waypoints / pi"),
-    angles("articulation", 21, 1, "tractor's heading less the trailer's / pi"),
-    values("future_curvature", 22, 4, "interior angle of the route ahead / pi, chords of 5, 7, 10, 12 waypoints; 1 is straight"),
-    values("current_curvature", 26, 4, "interior angle at the next waypoint / pi, the same chords"),
-    values("trailer_range", 30, N_TRAILER_RAYS, "trailer's distance sensors, left and right alternating, front to rear / sensor range"),
-    values("tractor_range", 46, N_TRACTOR_RAYS, "tractor's distance sensors, from left 90 deg to right 90 deg / sensor range"),
-    values("radius", 59, 10, "radius of the route over two chords of 5 waypoints, 0 to 9 chords ahead / 100 m, at most 1"),
-];
+pub const OBSERVATION: [Values; 13] = numbered([
+    values("speed", 1, "speed of the drive axle / 27.8 m/s, limited to 0..1"),
+    values("waypoint_distance", 2, "distance to the next and the following waypoint / 20 m, at most 1"),
+    values("crossing_distance", 2, "distance to the crossing lines of these waypoints / 20 m, at most 1"),
+    values("lane_distance", 1, "distance to the lane's centre line / 10 m, at most 1"),
+    angles("bearing", 5, "angle at the waypoint behind, from a waypoint ahead to the truck / pi"),
+    angles("heading", 5, "tractor's heading less the lane's at these waypoints / pi"),
+    angles("trailer_heading", 5, "trailer's heading less the lane's at these waypoints / pi"),
+    angles("articulation", 1, "tractor's heading less the trailer's / pi"),
+    values("future_curvature", 4, "interior angle of the route ahead / pi, chords of 5, 7, 10, 12 waypoints; 1 is straight"),
+    values("current_curvature", 4, "interior angle at the next waypoint / pi, the same chords"),
+    values("trailer_range", N_TRAILER_RAYS, "trailer's distance sensors, left and right alternating, front to rear / sensor range"),
+    values("tractor_range", N_TRACTOR_RAYS, "tractor's distance sensors, from left 90 deg to right 90 deg / sensor range"),
+    values("radius", 10, "radius of the route over two chords of 5 waypoints, 0 to 9 chords ahead / 100 m, at most 1"),
+]);
 
-const fn values(name: &'static str, first: usize, n: usize, doc: &'static str) -> Values {
-    Values { name, first, n, low: 0.0, mirror: 1.0, doc }
+const fn values(name: &'static str, n: usize, doc: &'static str) -> Values {
+    Values { name, first: 0, n, low: 0.0, mirror: 1.0, doc }
 }
 
-const fn angles(name: &'static str, first: usize, n: usize, doc: &'static str) -> Values {
-    Values { low: -1.0, mirror: -1.0, ..values(name, first, n, doc) }
+const fn angles(name: &'static str, n: usize, doc: &'static str) -> Values {
+    Values { low: -1.0, mirror: -1.0, ..values(name, n, doc) }
 }
 
-// Every value belongs to one group.
-const _: () = {
+/// The groups with the index of each one's first value, which follow each other and are [`N_VALUES`] in all.
+const fn numbered<const N: usize>(mut groups: [Values; N]) -> [Values; N] {
     let (mut group, mut next) = (0, 0);
-    while group < OBSERVATION.len() {
-        assert!(OBSERVATION[group].first == next);
-        next += OBSERVATION[group].n;
+    while group < N {
+        groups[group].first = next;
+        next += groups[group].n;
         group += 1;
     }
     assert!(next == N_VALUES);
-};
+    groups
+}
+
+/// Index of the first value of the group with this name.
+pub(crate) const fn first_of(name: &str) -> usize {
+    let mut group = 0;
+    while !is_same(OBSERVATION[group].name, name) {
+        group += 1;
+    }
+    OBSERVATION[group].first
+}
+
+const fn is_same(one: &str, other: &str) -> bool {
+    let (one, other) = (one.as_bytes(), other.as_bytes());
+    let mut index = 0;
+    while index < one.len() && index < other.len() && one[index] == other[index] {
+        index += 1;
+    }
+    index == one.len() && index == other.len()
+}

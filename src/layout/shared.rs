@@ -160,14 +160,17 @@ pub trait Named: Copy + Eq + std::fmt::Debug + 'static {
 /// An enum that is a closed list of names, see [`Named`](crate::layout::shared::Named).
 #[macro_export]
 macro_rules! named {
-    ($(#[doc = $doc:literal])* pub enum $list:ident { $($(#[doc = $item_doc:literal])* $item:ident = $name:literal,)* }) => {
-        $(#[doc = $doc])*
+    ($(#[$attribute:meta])* pub enum $list:ident { $($(#[$item_attribute:meta])* $item:ident = $name:literal,)* }) => {
+        $(#[$attribute])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub enum $list {
-            $($(#[doc = $item_doc])* $item,)*
+            $($(#[$item_attribute])* $item,)*
         }
 
         impl $list {
+            /// Every one, in order.
+            pub const ALL: [$list; [$($name),*].len()] = [$($list::$item),*];
+
             /// The name.
             pub const fn name(self) -> &'static str {
                 match self {
@@ -177,7 +180,7 @@ macro_rules! named {
         }
 
         impl $crate::layout::shared::Named for $list {
-            const ALL: &'static [$list] = &[$($list::$item,)*];
+            const ALL: &'static [$list] = &$list::ALL;
 
             fn name(self) -> &'static str {
                 $list::name(self)
