@@ -46,18 +46,18 @@ fn traced(field: FieldRow, origin: vec2<f32>, ahead: vec2<f32>, reach: f32) -> f
         let radius = abs(distance);
         let closing = -(ahead.x * sample.slope.x + ahead.y * sample.slope.y);
 
-        let bridged = max(free + radius + GAP, SHORT);
+        let bridged = max(free + radius + RAY_GAP, RAY_SHORT);
         // Deep in a solid the slope may be that of its far side.
-        let accepted = along - base <= bridged && -CLOSE < distance;
-        let near = radius <= max(MET_HEAD_ON * closing * closing, MET);
+        let accepted = along - base <= bridged && -RAY_CLOSE < distance;
+        let near = radius <= max(RAY_MET_HEAD_ON * closing * closing, RAY_MET);
         let met = accepted && near && (0.0 < closing || distance < 0.0);
         let beyond = accepted && reach <= along + distance;
         let inside = along <= 0.0 && distance <= 0.0;
 
         // Distance to a straight kerb; and between two circles that touch each other and the same straight kerb.
-        let to_kerb = max(min(distance / max(closing, GRAZING), SHORT), -SHORT);
+        let to_kerb = max(min(distance / max(closing, RAY_GRAZING), RAY_SHORT), -RAY_SHORT);
         let to_circle = 2.0 * CAUTION * distance / (1.0 + max(closing, 0.0));
-        let step = select(to_circle, to_kerb, met || distance < CLOSE);
+        let step = select(to_circle, to_kerb, met || distance < RAY_CLOSE);
         var next = select(base + free, along + step, accepted);
         next = select(max(min(next, reach), 0.0), reach, beyond);
         next = select(next, 0.0, inside);

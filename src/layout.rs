@@ -19,7 +19,7 @@ use crate::layout::shared::constants;
 pub use columns::{Column, N_COLUMNS};
 pub use ended::Ended;
 pub(crate) use ended::printed_codes;
-pub use extras::{EXTRAS, Extra, Track};
+pub use extras::{EXTRAS, Extra, ObservedExtras};
 pub(crate) use observation::first_of;
 pub use observation::{OBSERVATION, Values};
 

@@ -17,7 +17,7 @@ use std::path::Path;
 use crate::files::cache::Loading;
 use crate::files::reader::Error;
 use crate::files::shipped::{Kind, Source};
-use crate::layout::{Action, Track};
+use crate::layout::{Action, ObservedExtras};
 use crate::map::parametric::{Gutter, Roundabout};
 use crate::map::route::Route;
 use crate::vehicle::Vehicle;
@@ -99,7 +99,7 @@ pub struct Scenario {
     /// Range of the distance sensors \[m].
     pub sensor_range: f64,
     /// What is observed beside the observation.
-    pub extras: Track,
+    pub extras: ObservedExtras,
     /// Largest lateral offset at the start \[m].
     pub start_offset: f64,
     /// Largest heading error at the start \[rad].

@@ -58,7 +58,7 @@ pub fn open(adapter: Option<&str>) -> Result<Device, Error> {
         }
         Err(gpu::Error::UnknownAdapter { name, found }) => {
             let expected = format!("no adapter's name contains this; there is {}", found.join(", "));
-            Err(Error::Flag { flag: "--adapter", value: name, expected })
+            Err(Error::Setting { name: "--adapter", value: name, expected })
         }
         Err(error) => Err(simulator::Error::from(error).into()),
     }
@@ -67,7 +67,7 @@ pub fn open(adapter: Option<&str>) -> Result<Device, Error> {
 /// Opens the first adapter whose name contains `adapter`.
 #[cfg(not(feature = "gpu"))]
 pub fn open(_: Option<&str>) -> Result<Device, Error> {
-    Err(Error::Flag { flag: "--device", value: "gpu".to_owned(), expected: format!("{NOT_BUILT_IN}, or leave --device out") })
+    Err(Error::Setting { name: "--device", value: "gpu".to_owned(), expected: format!("{NOT_BUILT_IN}, or leave --device out") })
 }
 
 /// Whether the error is a failure of the device rather than wrong input.

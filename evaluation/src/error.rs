@@ -33,10 +33,10 @@ pub enum Error {
     #[error(transparent)]
     Simulator(#[from] offtrack::simulator::Error),
     /// A setting is out of range or unknown: a command-line argument, or a key of the same meaning.
-    #[error("{flag}: {}; {}", shortened(value, LONGEST_PATH), shortened(expected, LONGEST_EXPECTED))]
-    Flag {
+    #[error("{name}: {}; {}", shortened(value, LONGEST_PATH), shortened(expected, LONGEST_EXPECTED))]
+    Setting {
         /// The argument's name.
-        flag: &'static str,
+        name: &'static str,
         /// The value given.
         value: String,
         /// What is allowed.

@@ -18,7 +18,7 @@ use crate::driving::{self, Driving};
 use crate::error::Error;
 use crate::groups::{Evaluated, Groups};
 use crate::part::LaneWidths;
-use crate::policies::Policy;
+use crate::policies::Controller;
 use crate::possible::Possible;
 use crate::report::{Episode, Report, RouteReport, Summary};
 use crate::running::Running;
@@ -63,7 +63,7 @@ pub struct Driven {
 
 impl Evaluation<'_> {
     /// The policy's report and, if recorded, the episodes that a page shows. `progress` is as in [`Evaluation::drive`].
-    pub fn report(&self, policy: &mut dyn Policy, progress: &mut dyn FnMut(usize, usize)) -> Result<(Report, Vec<Track>), Error> {
+    pub fn report(&self, policy: &mut dyn Controller, progress: &mut dyn FnMut(usize, usize)) -> Result<(Report, Vec<Track>), Error> {
         let driven = self.drive(policy, progress)?;
         Ok((self.summarised(policy.name(), &driven.episodes, None), driven.tracks))
     }
@@ -73,7 +73,7 @@ impl Evaluation<'_> {
     ///
     /// No states are held while the policy drives, only its actions. The episodes to be shown are chosen once it is
     /// known which failed, and recorded as they are driven again.
-    pub fn drive(&self, policy: &mut dyn Policy, progress: &mut dyn FnMut(usize, usize)) -> Result<Driven, Error> {
+    pub fn drive(&self, policy: &mut dyn Controller, progress: &mut dyn FnMut(usize, usize)) -> Result<Driven, Error> {
         let mut simulator = self.simulator()?;
         let (world, n_episodes) = (self.world, simulator.n_envs());
         let lanes: Vec<LaneWidths> = self.routes().iter().map(|(_, place, route)| LaneWidths::of(self.scenario, place, route)).collect();
@@ -120,7 +120,7 @@ impl Evaluation<'_> {
         let routes = scenario.split(split);
         if routes.is_empty() {
             let value = split.name().to_owned();
-            return Err(Error::Flag { flag: "split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
+            return Err(Error::Setting { name: "split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
         }
         let trucks: Vec<u32> = routes.iter().flat_map(|&route| std::iter::repeat_n(route, episodes)).collect();
         Ok(Simulator::on(device.engine.clone(), world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?)

@@ -21,7 +21,7 @@ pub const LOOK_AHEAD: f32 = 7.0;
 const RESPONSE: f64 = 1.5;
 
 /// Chooses an action for every truck of a batch.
-pub trait Policy {
+pub trait Controller {
     /// Name for reports: a policy file, a shipped policy, `pursuit` or `random`.
     fn name(&self) -> &str;
 
@@ -32,7 +32,7 @@ pub trait Policy {
 /// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its name. Its
 /// action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where there is none, the
 /// first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random actions.
-pub fn find(policy: Option<&str>, benchmark: &str, pursuit: PurePursuit, seed: u32, world: &World) -> Result<Box<dyn Policy>, Error> {
+pub fn find(policy: Option<&str>, benchmark: &str, pursuit: PurePursuit, seed: u32, world: &World) -> Result<Box<dyn Controller>, Error> {
     let learned = match policy {
         Some("pursuit") => return Ok(Box::new(pursuit)),
         Some("random") => return Ok(Box::new(UniformRandom { seed })),
@@ -55,7 +55,7 @@ pub fn learned(name: &str) -> Result<offtrack_policy::Policy, Error> {
     Ok(offtrack_policy::Policy::load(file)?)
 }
 
-impl Policy for offtrack_policy::Policy {
+impl Controller for offtrack_policy::Policy {
     fn name(&self) -> &str {
         &self.name
     }
@@ -80,7 +80,7 @@ pub struct UniformRandom {
     pub seed: u32,
 }
 
-impl Policy for UniformRandom {
+impl Controller for UniformRandom {
     fn name(&self) -> &str {
         "random"
     }
@@ -110,7 +110,7 @@ pub struct PurePursuit {
     name: String,
 }
 
-impl Policy for PurePursuit {
+impl Controller for PurePursuit {
     fn name(&self) -> &str {
         &self.name
     }

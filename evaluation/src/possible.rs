@@ -100,12 +100,12 @@ mod tests {
     use offtrack::world::World;
 
     use super::super::Driven;
-    use super::super::policies::{Policy, PurePursuit, UniformRandom};
+    use super::super::policies::{Controller, PurePursuit, UniformRandom};
     use super::*;
     use crate::device::Device;
 
     /// A route that a narrow search completes, with the largest start offset given \[m], and what is found of `policy`.
-    fn possible(start_offset: f64, policy: &mut dyn Policy, pass: Pass) -> (Vec<Episode>, Possible) {
+    fn possible(start_offset: f64, policy: &mut dyn Controller, pass: Pass) -> (Vec<Episode>, Possible) {
         let mut scenario = Scenario::named("attard2023").unwrap();
         scenario.retain(|_, route| route.name == "20m/E-right-1");
         scenario.start_offset = start_offset;

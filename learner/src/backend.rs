@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use offtrack::layout::{N_VALUES, Track};
+use offtrack::layout::{N_VALUES, ObservedExtras};
 use offtrack::world::World;
 
 use crate::config::{Config, Device};
@@ -44,7 +44,7 @@ impl Backend {
     #[cfg(not(feature = "gpu"))]
     pub fn on_device(_: Option<&str>) -> Result<Backend, Error> {
         let expected = format!("{}; or set device = \"cpu\"", device::NOT_BUILT_IN);
-        Err(Error::Flag { flag: "device", value: "\"gpu\"".to_owned(), expected })
+        Err(Error::Setting { name: "device", value: "\"gpu\"".to_owned(), expected })
     }
 
     /// Its name in results: `cpu`, or the adapter's with its interface and driver.
@@ -82,9 +82,9 @@ impl Backend {
         routes: Vec<u32>,
         mirror: Option<Mirror>,
     ) -> Result<Box<dyn Rollout>, Error> {
-        const BLIND: usize = N_VALUES + Track::Blind.n_extras();
-        const MASS: usize = N_VALUES + Track::Mass.n_extras();
-        const ORACLE: usize = N_VALUES + Track::Oracle.n_extras();
+        const BLIND: usize = N_VALUES + ObservedExtras::Blind.n_extras();
+        const MASS: usize = N_VALUES + ObservedExtras::Mass.n_extras();
+        const ORACLE: usize = N_VALUES + ObservedExtras::Oracle.n_extras();
         match N_VALUES + world.params.n_extras as usize {
             BLIND => self.rollout_of::<BLIND>(config, world, routes, mirror),
             MASS => self.rollout_of::<MASS>(config, world, routes, mirror),

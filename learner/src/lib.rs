@@ -1,10 +1,10 @@
 //! The learner: discrete soft actor-critic, its replay buffer, and the training loop, on the processor or on a graphics
 //! device; and proximal policy optimisation, which can refine its policy.
 //!
-//! Start with [`training`], the loop, then [`sac`] and [`ppo`], the algorithms. [`rollout`] is what differs between processor and
+//! Start with [`session`], the loop, then [`sac`] and [`ppo`], the algorithms. [`rollout`] is what differs between processor and
 //! device.
 
-pub mod training; // the loop: act, learn
+pub mod session; // the loop: act, learn
 pub mod sac; // soft actor-critic
 pub mod ppo; // proximal policy optimisation, which refines its policy
 pub mod network; // multi-layer perceptrons

@@ -46,7 +46,7 @@ fn check_within(config: &Config, n_values: usize, n_actions: usize, available: u
     let [needed, bytes, available] = [needed, bytes, available].map(gigabytes);
     let expected =
         format!("the run would take about {needed} of memory, {bytes} of them for this, and {available} are free: less would do");
-    Err(Error::Flag { flag: key, value, expected })
+    Err(Error::Setting { name: key, value, expected })
 }
 
 fn parts(config: &Config, n_values: u128, n_actions: u128) -> [Part; 6] {

@@ -31,7 +31,7 @@ pub struct Mirror {
 impl Mirror {
     /// The mirror of a world. Its action table and its sensors must be symmetric.
     pub fn of(world: &World) -> Result<Mirror, Error> {
-        let refused = |expected: String| Error::Flag { flag: "learning.mirror_augmentation", value: "true".to_owned(), expected };
+        let refused = |expected: String| Error::Setting { name: "learning.mirror_augmentation", value: "true".to_owned(), expected };
         let factors = OBSERVATION.iter().flat_map(|values| std::iter::repeat_n(values.mirror, values.n));
         let extras = EXTRAS[..world.params.n_extras as usize].iter().map(|extra| extra.mirror);
         let mut values: Vec<(usize, f32)> = factors.chain(extras).enumerate().collect();

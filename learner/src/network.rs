@@ -158,7 +158,7 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
-    use offtrack::layout::{N_VALUES, Track};
+    use offtrack::layout::{N_VALUES, ObservedExtras};
     use offtrack::scenario::{Scenario, Split};
     use offtrack::simulator::{RouteChoice, Simulator};
     use offtrack::world::World;
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn a_policy_drives_as_the_network_that_learned_it() {
-        const LADEN: usize = N_VALUES + Track::Mass.n_extras();
+        const LADEN: usize = N_VALUES + ObservedExtras::Mass.n_extras();
         for name in Policy::shipped_names() {
             let policy = Policy::shipped(name).unwrap();
             let scenario = Scenario::named(name.trim_end_matches("-lane")).unwrap();

@@ -23,7 +23,7 @@ use crate::backend::Backend;
 use crate::checkpoint::{Columns, Stored};
 use crate::config::Config;
 use crate::sac::not_finite;
-use crate::training::Training;
+use crate::session::Session;
 use checkpointer::{Checkpointer, Written};
 use fingerprint::fingerprint;
 use folder::Folder;
@@ -39,7 +39,7 @@ pub struct Run {
     backend: Backend,
     /// CRC-32 of the world.
     fingerprint: u32,
-    training: Training,
+    training: Session,
     /// How far it is.
     pub progress: Progress,
     /// How it does on each training route.
@@ -55,7 +55,7 @@ impl Run {
         backend: Backend,
         config: &Config,
         world: &World,
-        training: Training,
+        training: Session,
         folder: &Folder,
         progress: Progress,
         routes: RouteCounts,

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use offtrack::layout::random;
-use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES, Track};
+use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES, ObservedExtras};
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
 use offtrack_policy::{Activation, Layer, Normalisation, Policy, greedy};
@@ -376,18 +376,18 @@ fn a_policy_with_extras_drives_by_them_and_its_file_names_them() {
 #[test]
 fn a_policy_is_refused_where_a_benchmark_observes_other_extras() {
     let mut scenario = Scenario::named("attard2023").unwrap();
-    let mut check = |track: Track, policy: &Policy| {
+    let mut check = |track: ObservedExtras, policy: &Policy| {
         scenario.extras = track;
         let world = World::bake(&scenario).unwrap();
         let policy = Policy { actions: world.actions.clone(), ..policy.clone() };
         policy.check(&world).map_err(|error| error.to_string())
     };
-    assert_eq!(check(Track::Mass, &with_extras(8)), Ok(()));
-    assert_eq!(check(Track::None, &with_extras(0)), Ok(()));
-    let message = check(Track::Blind, &with_extras(8)).unwrap_err();
+    assert_eq!(check(ObservedExtras::Mass, &with_extras(8)), Ok(()));
+    assert_eq!(check(ObservedExtras::None, &with_extras(0)), Ok(()));
+    let message = check(ObservedExtras::Blind, &with_extras(8)).unwrap_err();
     assert!(message.contains("trailer_mass here") && message.contains("trailer_wheelbase in the benchmark"), "{message}");
-    assert!(check(Track::None, &with_extras(8)).unwrap_err().contains("none in the benchmark"));
-    assert!(check(Track::Oracle, &with_extras(0)).unwrap_err().contains("none here"));
+    assert!(check(ObservedExtras::None, &with_extras(8)).unwrap_err().contains("none in the benchmark"));
+    assert!(check(ObservedExtras::Oracle, &with_extras(0)).unwrap_err().contains("none here"));
     // Extras are the first of their list.
     let wrong = Policy { extras: vec!["trailer_mass".to_owned()], ..with_extras(1) };
     assert!(refusal(&wrong.to_bytes()).contains("is a policy with the extras [\"trailer_mass\"]; must be the first of steering,"));

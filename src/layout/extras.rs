@@ -34,7 +34,7 @@ pub const EXTRAS: [Extra; N_EXTRAS] = [
 /// Which extras a benchmark observes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Track {
+pub enum ObservedExtras {
     /// None.
     #[default]
     None,
@@ -46,14 +46,14 @@ pub enum Track {
     Oracle,
 }
 
-impl Track {
+impl ObservedExtras {
     /// Number of extras: the first ones.
     pub const fn n_extras(self) -> usize {
         match self {
-            Track::None => 0,
-            Track::Blind => 5,
-            Track::Mass => 8,
-            Track::Oracle => N_EXTRAS,
+            ObservedExtras::None => 0,
+            ObservedExtras::Blind => 5,
+            ObservedExtras::Mass => 8,
+            ObservedExtras::Oracle => N_EXTRAS,
         }
     }
 

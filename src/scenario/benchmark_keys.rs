@@ -8,7 +8,7 @@ use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 
 use super::{Clock, Reward};
-use crate::layout::Track;
+use crate::layout::ObservedExtras;
 use crate::map::opendrive::{Hand, RoadLane};
 use crate::map::parametric::Gutter;
 use crate::vehicle::WrittenModel;
@@ -151,7 +151,7 @@ pub(super) struct WrittenSensors {
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct WrittenObservation {
-    pub(super) extras: Track,
+    pub(super) extras: ObservedExtras,
 }
 
 #[derive(Deserialize)]

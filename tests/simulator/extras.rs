@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use offtrack::layout::{EXTRAS, N_EXTRAS, Start, Track};
+use offtrack::layout::{EXTRAS, N_EXTRAS, Start, ObservedExtras};
 use offtrack::simulator::{Autoreset, RouteChoice};
 use offtrack::vehicle::GRAVITY;
 use offtrack::world::World;
@@ -10,7 +10,7 @@ use offtrack::world::World;
 use crate::fleet::all_drawn;
 use crate::{batch_on, benchmark, engines};
 
-fn world(track: Track) -> Arc<World> {
+fn world(track: ObservedExtras) -> Arc<World> {
     let mut scenario = benchmark("attard2023").0;
     (scenario.fleet, scenario.extras) = (Some(all_drawn()), track);
     Arc::new(World::bake(&scenario).unwrap())
@@ -18,7 +18,7 @@ fn world(track: Track) -> Arc<World> {
 
 #[test]
 fn each_extra_is_what_its_definition_says() {
-    let world = world(Track::Oracle);
+    let world = world(ObservedExtras::Oracle);
     for (name, engine) in engines() {
         let mut simulator = batch_on(&engine, &world, 64, 5, RouteChoice::Drawn(vec![1, 3, 5]));
         (0..12).for_each(|_| simulator.step_at_random());
@@ -54,7 +54,7 @@ fn each_extra_is_what_its_definition_says() {
 
 #[test]
 fn a_track_observes_the_first_extras_and_leaves_the_others_0() {
-    for (track, n) in [(Track::None, 0), (Track::Blind, 5), (Track::Mass, 8), (Track::Oracle, N_EXTRAS)] {
+    for (track, n) in [(ObservedExtras::None, 0), (ObservedExtras::Blind, 5), (ObservedExtras::Mass, 8), (ObservedExtras::Oracle, N_EXTRAS)] {
         let world = world(track);
         for (name, engine) in engines() {
             let mut simulator = batch_on(&engine, &world, 32, 5, RouteChoice::Drawn(vec![1, 3, 5]));
@@ -67,13 +67,13 @@ fn a_track_observes_the_first_extras_and_leaves_the_others_0() {
         }
         assert_eq!(track.names().len(), n);
     }
-    assert!(!Track::Blind.names().iter().any(|name| name.contains("mass") || name.contains("roll")));
-    assert!(Track::Mass.names().contains(&"trailer_mass") && !Track::Mass.names().contains(&"rollover_threshold"));
+    assert!(!ObservedExtras::Blind.names().iter().any(|name| name.contains("mass") || name.contains("roll")));
+    assert!(ObservedExtras::Mass.names().contains(&"trailer_mass") && !ObservedExtras::Mass.names().contains(&"rollover_threshold"));
 }
 
 #[test]
 fn extras_differ_before_and_after_an_action_only_where_an_episode_ended() {
-    let world = world(Track::Oracle);
+    let world = world(ObservedExtras::Oracle);
     for (name, engine) in engines() {
         for autoreset in [Autoreset::SameStep, Autoreset::NextStep] {
             let mut simulator = batch_on(&engine, &world, 256, 5, RouteChoice::Drawn((0..75).collect()));
@@ -96,7 +96,7 @@ fn extras_differ_before_and_after_an_action_only_where_an_episode_ended() {
 
 #[test]
 fn a_mirrored_truck_has_the_mirrored_extras() {
-    let mut world = World::clone(&world(Track::Oracle));
+    let mut world = World::clone(&world(ObservedExtras::Oracle));
     world.rigs.iter_mut().for_each(|rig| rig.crossfall = 0.0);
     let world = Arc::new(world);
     for (name, engine) in engines() {

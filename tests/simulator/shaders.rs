@@ -180,7 +180,6 @@ fn in_a_loop_every_variable_has_an_initial_value_since_one_compiler_clears_it_on
 #[cfg(feature = "gpu")]
 mod module {
     use offtrack::engine::stages::{Kernel, SHADERS, STAGES};
-    use offtrack::layout::shared::Named;
     use offtrack::layout::shared::Struct;
     use offtrack::layout::structs;
     use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};

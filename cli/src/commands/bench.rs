@@ -16,7 +16,7 @@ use offtrack_evaluation::files;
 use offtrack_evaluation::provenance;
 use offtrack_learner::backend::Backend;
 use offtrack_learner::config::{self, Config, Learning};
-use offtrack_learner::training::Training;
+use offtrack_learner::session::Session;
 use serde::Serialize;
 
 use super::scale::median;
@@ -78,13 +78,13 @@ struct Run {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     if !(0.1..=3600.0).contains(&args.seconds) {
-        return Err(Error::Flag { flag: "--seconds", value: format!("{} s", args.seconds), expected: "must lie in 0.1..3600 s".into() });
+        return Err(Error::Setting { name: "--seconds", value: format!("{} s", args.seconds), expected: "must lie in 0.1..3600 s".into() });
     }
     if let Some(size) = args.hidden.iter().find(|size| !(1..=8192).contains(*size)) {
-        return Err(Error::Flag { flag: "--hidden", value: size.to_string(), expected: "sizes must lie in 1..8192".into() });
+        return Err(Error::Setting { name: "--hidden", value: size.to_string(), expected: "sizes must lie in 1..8192".into() });
     }
     if let Some(batch) = args.batch.iter().find(|batch| !(2..=1 << 20).contains(*batch)) {
-        return Err(Error::Flag { flag: "--batch", value: batch.to_string(), expected: "must lie in 2..1048576".into() });
+        return Err(Error::Setting { name: "--batch", value: batch.to_string(), expected: "must lie in 2..1048576".into() });
     }
     if args.lines {
         return in_turns(args);
@@ -130,7 +130,7 @@ fn in_turns(args: &Args) -> Result<(), Error> {
 /// The default learner with other sizes, and a full replay buffer of transitions with random actions.
 struct Learner {
     learning: Learning,
-    training: Training,
+    training: Session,
 }
 
 impl Learner {
@@ -142,7 +142,7 @@ impl Learner {
         config.learning = Learning { hidden: hidden.to_vec(), batch, layer_norm: false, ..config.learning };
         let scenario = Scenario::named(BENCHMARK)?;
         let routes = scenario.split(Split::Train).to_vec();
-        let mut training = Training::new(&Backend::Host, &config, Arc::new(World::bake(&scenario)?), routes)?;
+        let mut training = Session::new(&Backend::Host, &config, Arc::new(World::bake(&scenario)?), routes)?;
         while !training.is_warm()? {
             training.act(0)?;
         }

@@ -64,7 +64,7 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     if !(1..=50).contains(&args.hold) {
-        return Err(Error::Flag { flag: "--hold", value: args.hold.to_string(), expected: "must lie in 1..50".into() });
+        return Err(Error::Setting { name: "--hold", value: args.hold.to_string(), expected: "must lie in 1..50".into() });
     }
     match &args.verify {
         Some(file) => again(file, args.benchmark.as_deref(), args.load.as_deref()),
@@ -109,7 +109,7 @@ fn certify(args: &Args) -> Result<(), Error> {
     routes.sort_unstable();
     if routes.is_empty() {
         let expected = format!("the benchmark {} has no such routes", scenario.name);
-        return Err(Error::Flag { flag: "--split", value: args.split.clone(), expected });
+        return Err(Error::Setting { name: "--split", value: args.split.clone(), expected });
     }
     let name = policy.as_ref().map(|policy| policy.name.clone());
     let mut certificate = Certificate::new(&scenario, &world, &args.split, name, passes.clone(), &STARTS);

@@ -28,7 +28,7 @@ impl Choice {
             (_, None) => Ok(Device::processor()),
             (_, Some(name)) => {
                 let expected = "the processor has no adapter: add --device gpu, or leave --adapter out".to_owned();
-                Err(Error::Flag { flag: "--adapter", value: name.clone(), expected })
+                Err(Error::Setting { name: "--adapter", value: name.clone(), expected })
             }
         }
     }
@@ -61,5 +61,5 @@ pub fn run(_: &Args) -> Result<(), Error> {
 /// Runs the command.
 #[cfg(not(feature = "gpu"))]
 pub fn run(_: &Args) -> Result<(), Error> {
-    Err(Error::Flag { flag: "devices", value: "none can be listed".to_owned(), expected: device::NOT_BUILT_IN.to_owned() })
+    Err(Error::Setting { name: "devices", value: "none can be listed".to_owned(), expected: device::NOT_BUILT_IN.to_owned() })
 }

@@ -86,11 +86,11 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let format = format(&args.output)?;
     if let Some(size) = args.size.filter(|size| format != Format::Png || !(200..=8000).contains(size)) {
         let expected = if format == Format::Png { "must lie in 200..8000 pixels" } else { "is for .png: leave it out" };
-        return Err(Error::Flag { flag: "--size", value: size.to_string(), expected: expected.into() });
+        return Err(Error::Setting { name: "--size", value: size.to_string(), expected: expected.into() });
     }
     if !(1.0..=90.0).contains(&args.speed_kmh) {
-        return Err(Error::Flag {
-            flag: "--speed-kmh",
+        return Err(Error::Setting {
+            name: "--speed-kmh",
             value: format!("{} km/h", shown(args.speed_kmh)),
             expected: "must lie in 1..90 km/h".into(),
         });
@@ -107,7 +107,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let roundabout = roundabout.seen();
     let routes = roundabout.routes(args.approach, args.departure, WAYPOINT_SPACING).map_err(|leaves| {
         let (flag, value) = if leaves.part == "approach" { ("--approach", args.approach) } else { ("--departure", args.departure) };
-        Error::Flag { flag, value: format!("{value} m"), expected: leaves.to_string() }
+        Error::Setting { name: flag, value: format!("{value} m"), expected: leaves.to_string() }
     })?;
     let route = args.route.as_deref().map(|name| chosen(&routes, name)).transpose()?;
     let sweep = route.map(|route| sweep(args, &roundabout, route)).transpose()?;
@@ -140,7 +140,7 @@ fn sweep<'a>(args: &Args, roundabout: &Roundabout, route: &'a Route) -> Result<S
     if !vehicle.loads.contains_key(&args.load) {
         let loads: Vec<&str> = vehicle.loads.keys().map(String::as_str).collect();
         let expected = format!("the vehicle has {}", loads.join(", "));
-        return Err(Error::Flag { flag: "--load", value: args.load.clone(), expected });
+        return Err(Error::Setting { name: "--load", value: args.load.clone(), expected });
     }
     let name = Source::find(Kind::Vehicle, &args.vehicle)?.stem();
     let driven = Driven { vehicle: name, load: args.load.clone(), speed_kmh: args.speed_kmh };
@@ -154,7 +154,7 @@ fn format(output: &Path) -> Result<Format, Error> {
         Some("json") => Ok(Format::Json),
         _ => {
             let value = output.display().to_string();
-            Err(Error::Flag { flag: "--output", value, expected: "must end in .svg, .png or .json".into() })
+            Err(Error::Setting { name: "--output", value, expected: "must end in .svg, .png or .json".into() })
         }
     }
 }
@@ -167,7 +167,7 @@ fn length(flag: &'static str, value: f64) -> Result<(), Error> {
     if (5.0..=500.0).contains(&value) {
         return Ok(());
     }
-    Err(Error::Flag { flag, value: format!("{} m", shown(value)), expected: "must lie in 5..500 m".into() })
+    Err(Error::Setting { name: flag, value: format!("{} m", shown(value)), expected: "must lie in 5..500 m".into() })
 }
 
 /// The route with this name; the roundabout's own name before it may be left out.
@@ -175,6 +175,6 @@ fn chosen<'a>(routes: &'a [Route], name: &str) -> Result<&'a Route, Error> {
     let short = |route: &'a Route| route.name.rsplit('/').next().unwrap_or(&route.name);
     routes.iter().find(|route| route.name == name || short(route) == name).ok_or_else(|| {
         let known: Vec<&str> = routes.iter().map(short).collect();
-        Error::Flag { flag: "--route", value: name.to_owned(), expected: format!("the roundabout has {}", known.join(", ")) }
+        Error::Setting { name: "--route", value: name.to_owned(), expected: format!("the roundabout has {}", known.join(", ")) }
     })
 }

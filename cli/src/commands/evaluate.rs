@@ -94,7 +94,7 @@ struct Written<'a> {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     if let Some(episodes) = args.episodes.filter(|episodes| !(1..=100_000).contains(episodes)) {
-        return Err(Error::Flag { flag: "--episodes", value: episodes.to_string(), expected: "must lie in 1..100000".into() });
+        return Err(Error::Setting { name: "--episodes", value: episodes.to_string(), expected: "must lie in 1..100000".into() });
     }
     let passes = passes(&args.widths, HOLD)?;
     let read = [("--certified", args.certified.as_deref()), ("--benchmark", Some(Path::new(&args.benchmark)))];

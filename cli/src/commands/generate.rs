@@ -54,16 +54,16 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     if !(1..=MOST).contains(&args.count) {
-        return Err(Error::Flag { flag: "--count", value: args.count.to_string(), expected: format!("must lie in 1..{MOST}") });
+        return Err(Error::Setting { name: "--count", value: args.count.to_string(), expected: format!("must lie in 1..{MOST}") });
     }
     let Some(end) = args.first.checked_add(args.count) else {
         let expected = format!("must be at most {} for so many roads", u32::MAX - args.count);
-        return Err(Error::Flag { flag: "--first", value: args.first.to_string(), expected });
+        return Err(Error::Setting { name: "--first", value: args.first.to_string(), expected });
     };
     if let Some(plot) = &args.plot
         && !plot.extension().is_some_and(|extension| extension == "svg" || extension == "png")
     {
-        return Err(Error::Flag { flag: "--plot", value: plot.display().to_string(), expected: "must end in .svg or .png".into() });
+        return Err(Error::Setting { name: "--plot", value: plot.display().to_string(), expected: "must end in .svg or .png".into() });
     }
     let distribution = Distribution::find(&args.distribution)?;
     let indices: Vec<u32> = (args.first..end).collect();
@@ -96,7 +96,7 @@ fn free(file: &Path, bytes: &[u8]) -> Result<(), Error> {
         return Ok(());
     }
     let expected = "exists and holds something else; another folder would do, or --overwrite to write over it".to_owned();
-    Err(Error::Flag { flag: "--output", value: file.display().to_string(), expected })
+    Err(Error::Setting { name: "--output", value: file.display().to_string(), expected })
 }
 
 /// A road's file.

@@ -66,7 +66,7 @@ impl PlaceArgs {
             ("--hand", (self.hand != Hand::Map).then(|| format!("{:?}", self.hand).to_lowercase())),
         ];
         let Some((flag, Some(value))) = given.into_iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
-        Err(Error::Flag { flag, value, expected: "is for an OpenDRIVE map, a file that ends in .xodr; leave it out".into() })
+        Err(Error::Setting { name: flag, value, expected: "is for an OpenDRIVE map, a file that ends in .xodr; leave it out".into() })
     }
 }
 
@@ -110,7 +110,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let Some(output) = &args.output else { return Ok(()) };
     if !output.to_string_lossy().ends_with(".outline.toml") {
         let value = output.display().to_string();
-        return Err(Error::Flag { flag: "--output", value, expected: "must end in .outline.toml".into() });
+        return Err(Error::Setting { name: "--output", value, expected: "must end in .outline.toml".into() });
     }
     let imported = choice.imported(&args.map, &map)?;
     files::write_whole(output, text(&args.map, output, &map, &choice, &imported)?.as_bytes())?;

@@ -9,7 +9,7 @@ use offtrack::world::World;
 use offtrack_evaluation::certificate::line;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
-use offtrack_evaluation::policies::{self, LOOK_AHEAD, Policy, PurePursuit};
+use offtrack_evaluation::policies::{self, Controller, LOOK_AHEAD, PurePursuit};
 
 use super::outputs;
 
@@ -33,7 +33,7 @@ pub struct Choice {
 
 impl Choice {
     /// Opens the policy for a benchmark; `seed` is that of random actions.
-    pub fn open(&self, scenario: &Scenario, world: &Arc<World>, seed: u32) -> Result<Box<dyn Policy>, Error> {
+    pub fn open(&self, scenario: &Scenario, world: &Arc<World>, seed: u32) -> Result<Box<dyn Controller>, Error> {
         let pursuit = self.pursuit(scenario, world)?;
         let policy = policies::find(self.policy.as_deref(), &scenario.name, pursuit, seed, world)?;
         if self.policy.is_none() && !offtrack_policy::Policy::shipped_names().contains(&scenario.name.as_str()) {
@@ -61,7 +61,7 @@ impl Choice {
             return Ok(());
         }
         let expected = format!("another policy is evaluated: give the run's own, --policy {}, or leave --run out", of_run.display());
-        Err(Error::Flag { flag: "--run", value: folder.display().to_string(), expected })
+        Err(Error::Setting { name: "--run", value: folder.display().to_string(), expected })
     }
 
     /// Pure pursuit of the lane's centre or of a certificate's paths.
@@ -70,11 +70,11 @@ impl Choice {
         let given = self.look_ahead.map(|distance| ("--look-ahead", format!("{} m", shown(distance))));
         let given = given.or_else(|| Some(("--line", self.line.as_ref()?.display().to_string())));
         if let (Some((flag, value)), true) = (given, self.policy.as_deref() != Some("pursuit")) {
-            return Err(Error::Flag { flag, value, expected: "is for pure pursuit: give --policy pursuit, too".into() });
+            return Err(Error::Setting { name: flag, value, expected: "is for pure pursuit: give --policy pursuit, too".into() });
         }
         if !(1.0..=50.0).contains(&distance) {
             let value = format!("{} m", shown(distance));
-            return Err(Error::Flag { flag: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
+            return Err(Error::Setting { name: "--look-ahead", value, expected: "must lie in 1..50 m".into() });
         }
         let pursuit = PurePursuit::new(distance as f32);
         let Some(file) = &self.line else { return Ok(pursuit) };

@@ -19,7 +19,7 @@ use offtrack_drawing::film::{self, Take};
 use offtrack_drawing::rasterised;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
-use offtrack_evaluation::policies::Policy;
+use offtrack_evaluation::policies::Controller;
 use offtrack_evaluation::recording::{Of, Recorder, Recording, Track};
 
 use super::{outputs, policies, progress, roads};
@@ -78,30 +78,30 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let format = format(&args.output)?;
     outputs::distinct(&[("--output", Some(&args.output))], &args.policy.files())?;
     if let (Some(size), Format::Svg | Format::Json) = (args.size, format) {
-        return Err(Error::Flag { flag: "--size", value: size.to_string(), expected: "is for .gif and .png: leave it out".into() });
+        return Err(Error::Setting { name: "--size", value: size.to_string(), expected: "is for .gif and .png: leave it out".into() });
     }
     if let Some(size) = args.size
         && !(200..=4000).contains(&size)
     {
-        return Err(Error::Flag { flag: "--size", value: size.to_string(), expected: "must lie in 200..4000 pixels".into() });
+        return Err(Error::Setting { name: "--size", value: size.to_string(), expected: "must lie in 200..4000 pixels".into() });
     }
     if !(1..=100_000).contains(&args.episodes) {
-        return Err(Error::Flag { flag: "--episodes", value: args.episodes.to_string(), expected: "must lie in 1..100000".into() });
+        return Err(Error::Setting { name: "--episodes", value: args.episodes.to_string(), expected: "must lie in 1..100000".into() });
     }
     if args.episodes <= args.episode {
         let expected = format!("must lie in 0..{}: --episodes says how many there are", args.episodes - 1);
-        return Err(Error::Flag { flag: "--episode", value: args.episode.to_string(), expected });
+        return Err(Error::Setting { name: "--episode", value: args.episode.to_string(), expected });
     }
     if format != Format::Gif && 1 < args.route.len() {
         let expected = "must end in .gif: other files hold one episode, one --route".to_owned();
-        return Err(Error::Flag { flag: "--output", value: args.output.display().to_string(), expected });
+        return Err(Error::Setting { name: "--output", value: args.output.display().to_string(), expected });
     }
     if format == Format::Json && 1 < args.load.len() {
         let expected = "must end in .gif, .png or .svg: data are of one episode, one --load".to_owned();
-        return Err(Error::Flag { flag: "--output", value: args.output.display().to_string(), expected });
+        return Err(Error::Setting { name: "--output", value: args.output.display().to_string(), expected });
     }
     if let Some((_, twice)) = args.load.iter().enumerate().find(|(index, load)| args.load[..*index].contains(load)) {
-        return Err(Error::Flag { flag: "--load", value: twice.clone(), expected: "is given twice; each load once".into() });
+        return Err(Error::Setting { name: "--load", value: twice.clone(), expected: "is given twice; each load once".into() });
     }
     let loads: Vec<Option<&str>> =
         if args.load.is_empty() { vec![None] } else { args.load.iter().map(|load| Some(load.as_str())).collect() };
@@ -195,7 +195,7 @@ fn format(output: &Path) -> Result<Format, Error> {
         Some("json") => Ok(Format::Json),
         _ => {
             let value = output.display().to_string();
-            Err(Error::Flag { flag: "--output", value, expected: "must end in .gif, .png, .svg or .json".into() })
+            Err(Error::Setting { name: "--output", value, expected: "must end in .gif, .png, .svg or .json".into() })
         }
     }
 }
@@ -238,7 +238,7 @@ fn scenario(args: &Args, route: &str, load: Option<&str>) -> Result<Scenario, Er
 }
 
 /// Drives the batch of the evaluation until the episode has ended.
-fn driven(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chosen, policy: &mut dyn Policy) -> Result<Track, Error> {
+fn driven(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chosen, policy: &mut dyn Controller) -> Result<Track, Error> {
     let trucks: Vec<u32> = scenario.split(chosen.split).iter().flat_map(|&route| std::iter::repeat_n(route, args.episodes)).collect();
     let env = chosen.in_split * args.episodes + args.episode;
     let mut simulator = Simulator::new(world.clone(), trucks.len(), args.seed, RouteChoice::Fixed(trucks))?;

@@ -58,7 +58,7 @@ pub fn narrow(scenario: &mut Scenario, names: &[String], splits: &[Split]) -> Re
         }
         if let Some(split) = Split::ALL.into_iter().find(|&split| of(split)) {
             let expected = format!("is not in the split asked for: give --split {}", split.name());
-            return Err(Error::Flag { flag: "--route", value: name.clone(), expected });
+            return Err(Error::Setting { name: "--route", value: name.clone(), expected });
         }
         let (road, route) = road_of(name).ok_or_else(|| unknown(scenario, name))?;
         if scenario.places.iter().any(|place| place.roundabout.name == road) {
@@ -99,7 +99,7 @@ pub fn keep(scenario: &mut Scenario, split: Split, benchmark: &str) -> Result<()
         let has = shortened(&has.collect::<Vec<_>>().join(", "), LONGEST_LIST);
         let expected =
             format!("{} has routes under {has} alone; list some under `{name}`, or ask for another split", shortened(benchmark, 200));
-        return Err(Error::Flag { flag: "--split", value: name.to_owned(), expected });
+        return Err(Error::Setting { name: "--split", value: name.to_owned(), expected });
     }
     scenario.keep(&[split]);
     Ok(())
@@ -135,7 +135,7 @@ pub fn unknown(scenario: &Scenario, name: &str) -> Error {
         Some(place) => format!("of {} the benchmark {from} has {list}", place.roundabout.name),
         None => format!("a route of the benchmark {from} is needed, such as {list}, or one of a random road, such as wide/7/12"),
     };
-    Error::Flag { flag: "--route", value: name.to_owned(), expected }
+    Error::Setting { name: "--route", value: name.to_owned(), expected }
 }
 
 /// The benchmark with the trucks of this load alone; the whole of it where none is named.
@@ -145,6 +145,6 @@ pub fn with_load(scenario: Scenario, load: Option<&str>) -> Result<Scenario, Err
         let mut known: Vec<String> = scenario.classes().into_iter().map(|class| class.load).collect();
         known.sort();
         known.dedup();
-        Error::Flag { flag: "--load", value: load.to_owned(), expected: format!("{} has {}", scenario.name, known.join(", ")) }
+        Error::Setting { name: "--load", value: load.to_owned(), expected: format!("{} has {}", scenario.name, known.join(", ")) }
     })
 }

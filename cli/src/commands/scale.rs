@@ -144,14 +144,14 @@ impl Run {
 pub fn run(args: &Args) -> Result<(), Error> {
     let envs = sizes(&args.envs)?;
     if !(0.1..=3600.0).contains(&args.seconds) {
-        return Err(Error::Flag { flag: "--seconds", value: format!("{} s", args.seconds), expected: "must lie in 0.1..3600 s".into() });
+        return Err(Error::Setting { name: "--seconds", value: format!("{} s", args.seconds), expected: "must lie in 0.1..3600 s".into() });
     }
     if let Some(file) = &args.plot {
         plot::check(file)?;
     }
     if let Some(file) = args.config.as_ref().filter(|_| !args.mode.contains(&Mode::Training)) {
         let expected = "is for --mode training: add that mode, or leave --config out".to_owned();
-        return Err(Error::Flag { flag: "--config", value: file.display().to_string(), expected });
+        return Err(Error::Setting { name: "--config", value: file.display().to_string(), expected });
     }
     outputs::distinct(&[("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())], &[("--config", args.config.as_deref())])?;
     let mut device = args.device.open()?;
@@ -232,8 +232,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
 
 /// The numbers of trucks that `--envs` names.
 fn sizes(text: &str) -> Result<Vec<usize>, Error> {
-    let wrong = |value: &str| Error::Flag {
-        flag: "--envs",
+    let wrong = |value: &str| Error::Setting {
+        name: "--envs",
         value: value.to_owned(),
         expected: format!("must lie in 1..{MOST_ENVS}, as in 1024,4096 or 256..1048576"),
     };

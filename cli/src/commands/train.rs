@@ -36,7 +36,7 @@ use offtrack_learner::run::progress::Progress;
 use offtrack_learner::run::resume::Resumed;
 use offtrack_learner::run::route_counts::{RouteCounts, WorstRoutes};
 use offtrack_learner::run::validation::{Validation, Validations};
-use offtrack_learner::training::Training;
+use offtrack_learner::session::Session;
 use offtrack_policy::Policy;
 use serde::Serialize;
 use serde_json::json;
@@ -160,7 +160,7 @@ impl Opened {
 /// What a run has before its folder.
 struct Prepared {
     backend: Backend,
-    training: Training,
+    training: Session,
     validation: Option<Validation>,
 }
 
@@ -168,7 +168,7 @@ impl Prepared {
     fn new(config: &Config, worlds: &Worlds) -> Result<Prepared, Error> {
         let backend = Backend::open(config)?;
         let routes = worlds.training.split(Split::Train).to_vec();
-        let mut training = backend.guarded(|| Training::new(&backend, config, worlds.training_world.clone(), routes))?;
+        let mut training = backend.guarded(|| Session::new(&backend, config, worlds.training_world.clone(), routes))?;
         training.begin()?;
         Ok(Prepared { backend, training, validation: worlds.validation(config) })
     }
@@ -266,7 +266,7 @@ fn config(args: &Args, file: &Path) -> Result<Config, Error> {
     if let Some(adapter) = &args.adapter {
         if config.device == config::Device::Cpu {
             let expected = "the training file uses the processor: leave it out, or add --set device=gpu".to_owned();
-            return Err(Error::Flag { flag: "--adapter", value: adapter.clone(), expected });
+            return Err(Error::Setting { name: "--adapter", value: adapter.clone(), expected });
         }
         config.adapter = Some(adapter.clone());
     }

@@ -21,7 +21,7 @@ const WIDEST: usize = 1 << 18;
 /// that is 0 or that no memory holds.
 pub fn passes(widths: &[usize], hold: usize) -> Result<Vec<Pass>, Error> {
     if let Some(width) = widths.iter().find(|width| !(1..=WIDEST).contains(*width)) {
-        return Err(Error::Flag { flag: "--widths", value: width.to_string(), expected: format!("must lie in 1..{WIDEST}") });
+        return Err(Error::Setting { name: "--widths", value: width.to_string(), expected: format!("must lie in 1..{WIDEST}") });
     }
     let mut passes: Vec<Pass> = widths.iter().map(|&width| Pass { width, hold }).collect();
     if let Some(&width) = widths.iter().max()

@@ -22,7 +22,7 @@ pub(super) fn set(table: &mut Table, settings: &[String]) -> Result<(), Error> {
 }
 
 fn one(table: &mut Table, setting: &str) -> Result<(), Error> {
-    let wrong = |expected: String| Error::Flag { flag: "--set", value: setting.to_owned(), expected };
+    let wrong = |expected: String| Error::Setting { name: "--set", value: setting.to_owned(), expected };
     let (key, value) = setting.split_once('=').ok_or_else(|| wrong("KEY=VALUE is needed, as in learning.n_steps=5".into()))?;
     let path: Vec<&str> = key.trim().split('.').collect();
     let [tables @ .., last] = path.as_slice() else { return Err(wrong("a key is needed before the `=`".into())) };

@@ -295,7 +295,7 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
     /// An error: a refinement is on the processor, and a training file that asks for another is refused.
     fn collect(&mut self, _: &Mlp, _: &Refinement) -> Result<Steps, Error> {
         let expected = "works with device = \"cpu\" alone: leave one of them out".to_owned();
-        Err(Error::Flag { flag: "refinement", value: "given".to_owned(), expected })
+        Err(Error::Setting { name: "refinement", value: "given".to_owned(), expected })
     }
 
     fn drive(&mut self, actor: &Mlp) -> Result<(), Error> {
@@ -371,7 +371,7 @@ fn check_capacity<const N: usize>(shared: &Shared, config: &Config, n_transition
     }
     let (name, most) = (shared.gpu.name(), limit / row_bytes);
     let expected = format!("its observations take {needed} bytes where {name} allows {limit} in a buffer: at most {most}");
-    Err(Error::Flag { flag: "replay_buffer.capacity", value: config.replay_buffer.capacity.to_string(), expected })
+    Err(Error::Setting { name: "replay_buffer.capacity", value: config.replay_buffer.capacity.to_string(), expected })
 }
 
 #[cfg(test)]

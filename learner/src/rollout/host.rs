@@ -300,7 +300,7 @@ impl<const N: usize> Rollout for HostRollout<N> {
 fn reserve<const N: usize>(replay_buffer: &mut ReplayBuffer<N>, config: &Config) -> Result<(), Error> {
     replay_buffer.reserve(memory::transitions(config)).map_err(|error| {
         let expected = format!("{error}; fewer transitions would do");
-        Error::Flag { flag: "replay_buffer.capacity", value: config.replay_buffer.capacity.to_string(), expected }
+        Error::Setting { name: "replay_buffer.capacity", value: config.replay_buffer.capacity.to_string(), expected }
     })
 }
 

@@ -39,7 +39,7 @@ impl Folder {
             return Ok(folder);
         }
         let expected = "the folder of a run is needed, with the config.toml that it left".to_owned();
-        Err(Error::Flag { flag: "--resume", value: path.display().to_string(), expected })
+        Err(Error::Setting { name: "--resume", value: path.display().to_string(), expected })
     }
 
     /// Writes the training file as used.
@@ -106,14 +106,14 @@ fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
     let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) && !name.starts_with('.') && !name.is_empty();
     if !plain {
         let expected = "a name of letters, digits, `-`, `_` and `.` that begins with none of the last is needed".to_owned();
-        return Err(Error::Flag { flag: "--name", value: format!("{name:?}"), expected });
+        return Err(Error::Setting { name: "--name", value: format!("{name:?}"), expected });
     }
     let path = runs.join(name);
     match std::fs::create_dir(&path) {
         Ok(()) => Ok(path),
         Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
             let expected = format!("{} exists and is never overwritten: choose another name", path.display());
-            Err(Error::Flag { flag: "--name", value: name.to_owned(), expected })
+            Err(Error::Setting { name: "--name", value: name.to_owned(), expected })
         }
         Err(error) => Err(Error::write(&path)(error)),
     }

@@ -25,7 +25,7 @@ fn run(folder: &Path, settings: &[&str]) -> (Run, Folder, Shared) {
     let progress = Progress::new(&config, MetricsFile::create(folder.metrics()).unwrap(), Box::new(()));
     let shared = Shared::open(None).unwrap();
     let backend = Backend::Device(Box::new(shared.clone()));
-    let training = Training::new(&backend, &config, world.clone(), routes).unwrap();
+    let training = Session::new(&backend, &config, world.clone(), routes).unwrap();
     let routes = RouteCounts::new(&scenario, folder.routes());
     (Run::new(backend, &config, &world, training, &folder, progress, routes), folder, shared)
 }

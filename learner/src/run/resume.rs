@@ -68,7 +68,7 @@ impl Resumed {
 }
 
 fn refused(path: &Path, expected: String) -> Error {
-    Error::Flag { flag: "--resume", value: path.display().to_string(), expected }
+    Error::Setting { name: "--resume", value: path.display().to_string(), expected }
 }
 
 /// The final evaluation has been written.

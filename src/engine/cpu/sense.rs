@@ -28,18 +28,18 @@ const ORDER: [usize; N_RAYS] = [23, 24, 19, 22, 20, 21, 18, 25, 17, 16, 26, 14, 
 constants! {
     /// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide
     /// between them.
-    const GAP: f32 = 0.05;
+    const RAY_GAP: f32 = 0.05;
     /// A step this short is never taken back \[m].
-    const SHORT: f32 = 0.25;
+    const RAY_SHORT: f32 = 0.25;
     /// Closer to a kerb than this, it is taken for straight \[m].
-    const CLOSE: f32 = 0.15;
+    const RAY_CLOSE: f32 = 0.15;
     /// This close to a kerb the ray has met it \[m].
-    const MET: f32 = 0.004;
+    const RAY_MET: f32 = 0.004;
     /// Head-on, a ray has met the kerb from this far off: a straight kerb's position is known to a few millimetres then
     /// \[m].
-    const MET_HEAD_ON: f32 = 0.02;
+    const RAY_MET_HEAD_ON: f32 = 0.02;
     /// Slope of a ray 5 deg from grazing; flatter ones are not followed to the last centimetre.
-    const GRAZING: f32 = 0.087;
+    const RAY_GRAZING: f32 = 0.087;
     /// Fraction of the longest step that is tried, so that the circles overlap where the field is slightly off.
     const CAUTION: f32 = 0.98;
     /// Most samples of a ray. A ray along a kerb at the longest range takes fewer.
@@ -176,18 +176,18 @@ impl<const N: usize> Bundle<N> {
             let radius = distance.abs();
             let closing = -(self.direction_x[n] * east[n] + self.direction_y[n] * north[n]);
 
-            let bridged = larger(self.free[n] + radius + GAP, SHORT);
+            let bridged = larger(self.free[n] + radius + RAY_GAP, RAY_SHORT);
             // Deep in a solid the slope may be that of its far side.
-            let accepted = (along - self.base[n] <= bridged) & (-CLOSE < distance);
-            let near = radius <= larger(MET_HEAD_ON * closing * closing, MET);
+            let accepted = (along - self.base[n] <= bridged) & (-RAY_CLOSE < distance);
+            let near = radius <= larger(RAY_MET_HEAD_ON * closing * closing, RAY_MET);
             let met = accepted & near & ((0.0 < closing) | (distance < 0.0));
             let beyond = accepted & (reach <= along + distance);
             let inside = (along <= 0.0) & (distance <= 0.0);
 
             // Distance to a straight kerb; and between two circles that touch each other and the same straight kerb.
-            let to_kerb = larger(smaller(distance / larger(closing, GRAZING), SHORT), -SHORT);
+            let to_kerb = larger(smaller(distance / larger(closing, RAY_GRAZING), RAY_SHORT), -RAY_SHORT);
             let to_circle = 2.0 * CAUTION * distance / (1.0 + larger(closing, 0.0));
-            let step = if met | (distance < CLOSE) { to_kerb } else { to_circle };
+            let step = if met | (distance < RAY_CLOSE) { to_kerb } else { to_circle };
             let next = if accepted { along + step } else { self.base[n] + self.free[n] };
             let next = if beyond { reach } else { larger(smaller(next, reach), 0.0) };
             let next = if inside { 0.0 } else { next };

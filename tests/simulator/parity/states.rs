@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use offtrack::field::Field;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::random::{index_below, signed_unit, words};
-use offtrack::layout::{Track, Truck};
+use offtrack::layout::{ObservedExtras, Truck};
 use offtrack::map::parametric::Gutter;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
@@ -33,7 +33,7 @@ pub fn world(gutter: Gutter) -> Arc<World> {
 pub fn fleet_world() -> Arc<World> {
     let mut scenario = benchmark("attard2023-full").0;
     scenario.fleet = Some(crate::fleet::all_drawn());
-    scenario.extras = Track::Oracle;
+    scenario.extras = ObservedExtras::Oracle;
     let world = World { fields: world(Gutter::Drivable).fields.clone(), ..World::bake(&scenario).unwrap() };
     assert!(world.rigs.len() == 512 && world.rays.len() == 512);
     Arc::new(world)

@@ -13,7 +13,7 @@ use offtrack_learner::backend::Backend;
 use offtrack_learner::config::Config;
 use offtrack_learner::network::Mlp;
 use offtrack_learner::rollout::Rollout;
-use offtrack_learner::training::Training;
+use offtrack_learner::session::Session;
 use offtrack_policy::Policy;
 use serde::Serialize;
 
@@ -104,7 +104,7 @@ pub(super) enum Driven {
     /// See [`Mode::Policy`] and [`Mode::LargePolicy`].
     Acting { rollout: Box<dyn Rollout>, actor: Mlp },
     /// See [`Mode::Training`].
-    Training(Box<Training>),
+    Training(Box<Session>),
 }
 
 impl Driven {
@@ -178,7 +178,7 @@ impl Mode {
             rollout.set_normalisation(&learner.policy.normalisation);
             return Ok(Driven::Acting { rollout, actor: learner.actor(self).on(&backend.placement().plain()) });
         }
-        let mut training = Training::new(backend, &config, world.clone(), routes.to_vec())?;
+        let mut training = Session::new(backend, &config, world.clone(), routes.to_vec())?;
         while training.rollout().n_transitions() < config.replay_buffer.warmup || !training.rollout().can_sample() {
             training.rollout_mut().step_at_random()?;
         }

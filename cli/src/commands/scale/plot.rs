@@ -16,7 +16,7 @@ pub(super) const PNG_WIDTH: u32 = 1600;
 pub(super) fn check(file: &Path) -> Result<(), Error> {
     match file.extension().and_then(|extension| extension.to_str()) {
         Some("svg" | "png") => Ok(()),
-        _ => Err(Error::Flag { flag: "--plot", value: file.display().to_string(), expected: "must end in .svg or .png".into() }),
+        _ => Err(Error::Setting { name: "--plot", value: file.display().to_string(), expected: "must end in .svg or .png".into() }),
     }
 }
 

@@ -81,7 +81,7 @@ pub fn run(args: &Args, file: &Path, text: &str) -> Result<(), Error> {
 
 /// The seeds that `20..24` (both included) or `3,7,9` names.
 fn parsed(text: &str) -> Result<Vec<u32>, Error> {
-    let wrong = |expected: String| Error::Flag { flag: "--seeds", value: text.to_owned(), expected };
+    let wrong = |expected: String| Error::Setting { name: "--seeds", value: text.to_owned(), expected };
     let form = || wrong("a range as in 20..24, both included, or numbers separated by commas, as in 3,7,9, are needed".to_owned());
     let seed = |word: &str| word.trim().parse::<u32>().map_err(|_| form());
     let many = || wrong(format!("at most {MOST} seeds are trained by one command"));
@@ -129,7 +129,7 @@ impl Group {
             .map_err(|error| Error::contents(&file, format!("{error}; it must be as `train --seeds` has written it")))?;
         if let Some(missing) = earlier.seeds.iter().find(|seed| !seeds.contains(seed)) {
             let expected = format!("{} has seed {missing} too: name it as well, or choose another --name", self.0.display());
-            return Err(Error::Flag { flag: "--seeds", value: text.to_owned(), expected });
+            return Err(Error::Setting { name: "--seeds", value: text.to_owned(), expected });
         }
         for &seed in seeds {
             let file = self.folder(seed).join("config.toml");

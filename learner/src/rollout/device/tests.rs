@@ -1,11 +1,11 @@
 use super::*;
 use crate::rollout::host::observed;
 use offtrack::layout::random::{index_below, signed_unit, words};
-use offtrack::layout::{Ended, Track};
+use offtrack::layout::{Ended, ObservedExtras};
 use offtrack::scenario::{Scenario, Split};
 use std::path::Path;
 
-const MASS: usize = N_VALUES + Track::Mass.n_extras();
+const MASS: usize = N_VALUES + ObservedExtras::Mass.n_extras();
 
 fn training() -> (Arc<World>, Vec<u32>) {
     training_of("attard2023")

@@ -19,7 +19,7 @@ use offtrack_evaluation::error::Error;
 use offtrack_evaluation::policies;
 
 /// Trucks, replay buffer and learner.
-pub struct Training {
+pub struct Session {
     config: Config,
     world: Arc<World>,
     /// None without mirror augmentation.
@@ -32,13 +32,13 @@ pub struct Training {
     normalisation: Option<Normalisation>,
 }
 
-impl Training {
+impl Session {
     /// Trucks at the start of their first episodes on `routes`, an empty replay buffer, and a learner with random
     /// weights. All that can be wrong with a config in this world is an error here.
-    pub fn new(backend: &Backend, config: &Config, world: Arc<World>, routes: Vec<u32>) -> Result<Training, Error> {
+    pub fn new(backend: &Backend, config: &Config, world: Arc<World>, routes: Vec<u32>) -> Result<Session, Error> {
         backend.check_memory(config, n_values(&world), world.actions.len())?;
         let mirror = config.learning.mirror_augmentation.then(|| Mirror::of(&world)).transpose()?;
-        Ok(Training {
+        Ok(Session {
             rollout: backend.rollout(config, &world, routes, mirror.clone())?,
             sac: Sac::new(&config.learning, n_values(&world), world.actions.len(), u64::from(config.seed), backend.placement())?,
             ppo: None,
@@ -57,12 +57,12 @@ impl Training {
         policy.check(&self.world)?;
         if policy.activation != Activation::Relu {
             let expected = format!("has the activation {}: the learner continues with relu alone", policy.activation.name());
-            return Err(Error::Flag { flag: "from", value: from.clone(), expected });
+            return Err(Error::Setting { name: "from", value: from.clone(), expected });
         }
         let hidden: Vec<usize> = policy.layers[..policy.layers.len() - 1].iter().map(Layer::n_outputs).collect();
         if hidden != self.config.learning.hidden {
             let expected = format!("has hidden layers of {hidden:?}: learning.hidden must be equal, not {:?}", self.config.learning.hidden);
-            return Err(Error::Flag { flag: "from", value: from.clone(), expected });
+            return Err(Error::Setting { name: "from", value: from.clone(), expected });
         }
         self.sac.set_actor(&Mlp::of(&policy.layers, &Device::flex()));
         self.set_normalisation(policy.normalisation);
