@@ -15,7 +15,7 @@ use crate::Error;
 use crate::figure::{Straights, View, colour, number};
 use crate::legend::{Entry, Swatch};
 use crate::lettering::{Align, Lettering};
-use crate::road::Road;
+use crate::road::RoadLayers;
 use crate::sweep::{nearest, swept_area};
 use offtrack_evaluation::recording::{Frame, Recording};
 
@@ -104,9 +104,9 @@ impl<'a> Scene<'a> {
         entries
     }
 
-    fn road<'b>(&'b self, view: &'b View) -> Road<'b> {
+    fn road<'b>(&'b self, view: &'b View) -> RoadLayers<'b> {
         let straights = Straights { approach: APPROACH, departure: DEPARTURE };
-        Road::new(view, &self.lettering, self.roundabout, &self.routes, straights, self.gutter)
+        RoadLayers::new(view, &self.lettering, self.roundabout, &self.routes, straights, self.gutter)
     }
 
     /// The ring, and the points of the path and of the route near it.

@@ -12,7 +12,7 @@ use svg::node::element::{ClipPath, Definitions, Group, Path, Rectangle};
 use crate::Error;
 use crate::legend::{self, Entry};
 use crate::lettering::{Align, Lettering};
-use crate::road::Road;
+use crate::road::RoadLayers;
 use crate::sweep::Sweep;
 
 /// Colours that differ for colour-blind readers and in grey: the hues of P. Tol's "vibrant" scheme. Channels of areas
@@ -205,7 +205,7 @@ pub(crate) fn number(value: f64) -> f64 {
 pub fn roundabout(roundabout: &Roundabout, routes: &[Route], straights: Straights, gutter: Gutter) -> Result<String, Error> {
     let lettering = Lettering::new()?;
     let view = View::around(routes.iter().flat_map(|route| &route.waypoints).map(|waypoint| waypoint.position));
-    let road = Road::new(&view, &lettering, roundabout, routes, straights, gutter);
+    let road = RoadLayers::new(&view, &lettering, roundabout, routes, straights, gutter);
     let map =
         Group::new().add(road.surface()).add(road.distances()).add(road.lanes()).add(road.kerbs()).add(road.routes()).add(road.arm_names());
     let legend: Vec<Entry> = road.legend().into_iter().chain(road.route_legend()).collect();
@@ -231,7 +231,7 @@ pub fn swept_path(roundabout: &Roundabout, routes: &[Route], straights: Straight
     let line = sweep.route.centre_line.part(straights.approach - SHOWN, sweep.route.centre_line.length() - straights.departure + SHOWN);
     let layout = Layout { corner: DVec2::new(LEFT, TOP + LINE), ..PRINTED };
     let view = View::laid_out(line.polyline(0.1).into_iter(), &layout);
-    let road = Road::new(&view, &lettering, roundabout, routes, straights, gutter);
+    let road = RoadLayers::new(&view, &lettering, roundabout, routes, straights, gutter);
     let solids = Path::new().set("d", view.frame() + &road.kerb_data()).set("clip-rule", "evenodd");
     let definitions = sweep.shapes(&view).add(ClipPath::new().set("id", "solids").add(solids));
     let overlaps = Group::new().set("clip-path", "url(#solids)").add(sweep.overlaps());

@@ -23,7 +23,7 @@ const TO_NAME: f64 = 23.0;
 const LANE_DASHES: &str = "6 5";
 
 /// A roundabout in a view; each method draws one layer.
-pub(crate) struct Road<'a> {
+pub(crate) struct RoadLayers<'a> {
     view: &'a View,
     lettering: &'a Lettering,
     roundabout: &'a Roundabout,
@@ -33,7 +33,7 @@ pub(crate) struct Road<'a> {
     kerbs: Outline,
 }
 
-impl<'a> Road<'a> {
+impl<'a> RoadLayers<'a> {
     pub(crate) fn new(
         view: &'a View,
         lettering: &'a Lettering,
@@ -41,8 +41,8 @@ impl<'a> Road<'a> {
         routes: &'a [Route],
         straights: Straights,
         gutter: Gutter,
-    ) -> Road<'a> {
-        Road { view, lettering, roundabout, routes, straights, gutter, kerbs: roundabout.kerbs(gutter) }
+    ) -> RoadLayers<'a> {
+        RoadLayers { view, lettering, roundabout, routes, straights, gutter, kerbs: roundabout.kerbs(gutter) }
     }
 
     /// Path data of the edges of the drivable area.

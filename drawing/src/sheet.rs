@@ -8,7 +8,7 @@ use svg::node::element::{ClipPath, Definitions, Group, Path, Rectangle, Title};
 use crate::Error;
 use crate::figure::{Layout, Straights, View, colour, number, scale_bar};
 use crate::lettering::{Align, Lettering};
-use crate::road::Road;
+use crate::road::RoadLayers;
 
 /// Side of a map \[px].
 const MAP: f64 = 190.0;
@@ -44,7 +44,7 @@ pub fn drawn(title: &str, roundabouts: &[&Roundabout]) -> Result<String, Error> 
         let corner = DVec2::new(MARGIN, MARGIN + TITLE) + DVec2::new((index % columns) as f64, (index / columns) as f64) * cell;
         let layout = Layout { corner, width: MAP, margin: 0.0, ratio: 1.0 };
         let view = View::laid_out([DVec2::splat(-reach), DVec2::splat(reach)].into_iter(), &layout);
-        let road = Road::new(&view, &lettering, roundabout, &[], straights, Gutter::Drivable);
+        let road = RoadLayers::new(&view, &lettering, roundabout, &[], straights, Gutter::Drivable);
         let clip = format!("map-{index}");
         definitions = definitions.add(ClipPath::new().set("id", clip.as_str()).add(Path::new().set("d", view.frame())));
         let mut map = Group::new().add(road.surface()).add(road.thin_lanes()).add(road.thin_kerbs());

@@ -22,7 +22,7 @@ pub use distribution::Distribution;
 
 /// A roundabout drawn at random.
 #[derive(Debug, Clone)]
-pub struct Road {
+pub struct RandomRoad {
     /// The roundabout. Its name is the distribution's, the seed and the index: `wide/7/12`.
     pub roundabout: Roundabout,
     /// Seed that it was drawn with.
@@ -36,7 +36,7 @@ pub struct Road {
     written: Written,
 }
 
-impl Road {
+impl RandomRoad {
     /// The text of a roundabout file that describes it: read again it gives the same roundabout, bit for bit.
     pub fn text(&self) -> String {
         self.written.to_string()

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use offtrack::files::reader::{read_bytes, shown_path};
 use offtrack::files::shipped::Kind;
 use offtrack::map::parametric::Roundabout;
-use offtrack::map::procedural::{Distribution, Reason, Refused, Road, lane_clearance};
+use offtrack::map::procedural::{Distribution, Reason, Refused, RandomRoad, lane_clearance};
 use offtrack_drawing::histograms::{Histograms, Panel};
 use offtrack_drawing::{rasterised, sheet};
 use offtrack_evaluation::error::Error;
@@ -76,7 +76,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let plot = args.plot.as_ref().map(|file| picture(file, &histograms(&distribution, args, &roads)?)).transpose()?;
     if let Some(folder) = &args.output {
         let file =
-            |road: &Road| (format!("{}-{}-{}.toml", distribution.name, args.seed, road.index), text(&distribution, road).into_bytes());
+            |road: &RandomRoad| (format!("{}-{}-{}.toml", distribution.name, args.seed, road.index), text(&distribution, road).into_bytes());
         let files = || roads.iter().map(file).chain(sheets.iter().cloned()).map(|(name, bytes)| (folder.join(name), bytes));
         if !args.overwrite {
             files().try_for_each(|(file, bytes)| free(&file, &bytes))?;
@@ -100,8 +100,8 @@ fn free(file: &Path, bytes: &[u8]) -> Result<(), Error> {
 }
 
 /// A road's file.
-fn text(distribution: &Distribution, road: &Road) -> String {
-    let Road { seed, index, attempt, .. } = road;
+fn text(distribution: &Distribution, road: &RandomRoad) -> String {
+    let RandomRoad { seed, index, attempt, .. } = road;
     let name = &distribution.name;
     format!(
         "# A random roundabout: distribution {name}, seed {seed}, index {index}, attempt {attempt}.\n# Made by: offtrack generate \
@@ -111,7 +111,7 @@ fn text(distribution: &Distribution, road: &Road) -> String {
 }
 
 /// Names and contents of the contact sheets.
-fn sheets(folder: &Path, distribution: &Distribution, args: &Args, roads: &[Road]) -> Result<Vec<(String, Vec<u8>)>, Error> {
+fn sheets(folder: &Path, distribution: &Distribution, args: &Args, roads: &[RandomRoad]) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let shown: Vec<&Roundabout> = roads.iter().take(ON_SHEET).map(|road| &road.roundabout).collect();
     let of = if shown.len() < roads.len() {
         format!("The first {} of {} random roads", shown.len(), roads.len())
@@ -133,7 +133,7 @@ fn picture(file: &Path, svg: &str) -> Result<Vec<u8>, Error> {
 }
 
 /// Histograms of the roads with the shipped roundabouts marked, as SVG text.
-fn histograms(distribution: &Distribution, args: &Args, roads: &[Road]) -> Result<String, Error> {
+fn histograms(distribution: &Distribution, args: &Args, roads: &[RandomRoad]) -> Result<String, Error> {
     let (approach, departure) = (distribution.approach, distribution.departure);
     // Those with the maps' kerbs have the same dimensions as the others.
     let marked: Vec<String> = Kind::Roundabout.names().filter(|name| !name.ends_with("-maps")).map(str::to_owned).collect();
@@ -180,7 +180,7 @@ fn histograms(distribution: &Distribution, args: &Args, roads: &[Road]) -> Resul
 }
 
 /// What was drawn, and why draws were refused.
-fn summary(distribution: &Distribution, args: &Args, roads: &[Road]) -> String {
+fn summary(distribution: &Distribution, args: &Args, roads: &[RandomRoad]) -> String {
     let mut refused = Refused::default();
     roads.iter().for_each(|road| refused.add(&road.refused));
     let draws = refused.total() as usize + roads.len();

@@ -6,7 +6,7 @@
 use glam::DVec2;
 
 use super::read::{KERB_WIDTH, RAISED};
-use super::records::{Kind, Lane, Records, Road, Section, active};
+use super::records::{Kind, Lane, Records, RoadRecord, Section, active};
 
 /// Most halvings of the stretch between two records.
 const MOST_HALVINGS: u32 = 9;
@@ -114,7 +114,7 @@ pub(super) fn strips(records: &Records, tolerance: f64) -> Result<Vec<Strip>, To
 }
 
 /// The lanes of one section, from left to right.
-pub(super) fn sampled(road: &Road, index: usize, section: usize, tolerance: f64) -> Vec<Strip> {
+pub(super) fn sampled(road: &RoadRecord, index: usize, section: usize, tolerance: f64) -> Vec<Strip> {
     let of = &road.sections[section];
     if of.lanes.is_empty() {
         return Vec::new();
@@ -189,7 +189,7 @@ struct Sample {
 }
 
 impl Sample {
-    fn new(road: &Road, section: &Section, s: f64) -> Sample {
+    fn new(road: &RoadRecord, section: &Section, s: f64) -> Sample {
         let (p, heading) = road.pose(s);
         let across = DVec2::from_angle(heading).perp();
         let offset = active(&road.offsets, s, |offset| offset.start).filter(|offset| offset.start <= s).map_or(0.0, |offset| offset.at(s));
@@ -227,7 +227,7 @@ impl Sample {
 }
 
 /// Adds the samples after `before` up to `after`.
-fn halved(road: &Road, section: &Section, before: &Sample, after: &Sample, tolerance: f64, depth: u32, samples: &mut Vec<Sample>) {
+fn halved(road: &RoadRecord, section: &Section, before: &Sample, after: &Sample, tolerance: f64, depth: u32, samples: &mut Vec<Sample>) {
     let at = |fraction: f64| Sample::new(road, section, before.s + fraction * (after.s - before.s));
     let middle = at(0.5);
     // A curve that turns both ways may cross the chord's middle.

@@ -3,7 +3,7 @@
 use roxmltree::Node;
 
 use super::read::Source;
-use super::records::{Cubic, Road, active};
+use super::records::{Cubic, RoadRecord, active};
 use super::xml::{child, children};
 use crate::files::reader::Error;
 
@@ -63,7 +63,7 @@ fn stretches(records: &[Cubic], end: f64) -> impl Iterator<Item = (&Cubic, f64, 
 
 impl Source<'_, '_> {
     /// How far a road is from level, with a warning where it is steep.
-    pub(super) fn level(&mut self, node: Node, road: &Road) -> Result<Level, Error> {
+    pub(super) fn level(&mut self, node: Node, road: &RoadRecord) -> Result<Level, Error> {
         let elevation = self.profile(children(node, "elevationProfile"), "elevation")?;
         let mut grade = stretches(&elevation, road.length).map(|(record, from, to)| record.steepest(from, to)).fold(0.0, f64::max);
         for pair in elevation.windows(2) {
@@ -85,7 +85,7 @@ impl Source<'_, '_> {
     }
 
     /// The largest rise across a road.
-    fn crossfall(&mut self, node: Node, road: &Road) -> Result<f64, Error> {
+    fn crossfall(&mut self, node: Node, road: &RoadRecord) -> Result<f64, Error> {
         let superelevation = self.profile(children(node, "lateralProfile"), "superelevation")?;
         let angle = stretches(&superelevation, road.length).map(|(record, from, to)| record.largest(from, to)).fold(0.0, f64::max);
         let Some(profile) = child(node, "lateralProfile") else { return Ok(0.0) };
@@ -118,7 +118,7 @@ impl Source<'_, '_> {
 }
 
 /// How far a road's lanes reach to its right and to its left at a station, left positive \[m].
-fn reach(road: &Road, s: f64) -> [f64; 2] {
+fn reach(road: &RoadRecord, s: f64) -> [f64; 2] {
     let Some(section) = active(&road.sections, s, |section| section.start) else { return [0.0; 2] };
     let offset = active(&road.offsets, s, |offset| offset.start).map_or(0.0, |offset| offset.at(s));
     let local = s - section.start;

@@ -1,7 +1,7 @@
 //! What a map says of the lanes that follow a lane, and where it says nothing although the roads are linked.
 
 use super::lanes::Strip;
-use super::records::{Link, Records, Road};
+use super::records::{Link, Records, RoadRecord};
 use super::xml::shown;
 
 /// A section of a road that a lane leads to or comes from.
@@ -14,7 +14,7 @@ pub(super) struct Contact {
 }
 
 /// The section at the beginning or the end of a road.
-fn end_of(road: &Road, at_start: bool) -> usize {
+fn end_of(road: &RoadRecord, at_start: bool) -> usize {
     if at_start { 0 } else { road.sections.len().saturating_sub(1) }
 }
 
@@ -33,7 +33,7 @@ pub(super) fn contacts(records: &Records, strip: &Strip, follow: bool) -> Vec<Co
     let at = |road: usize, at_start: bool, lane: Option<i32>| Contact { road, section: end_of(&records.roads[road], at_start), lane };
     match if forward { &road.successor } else { &road.predecessor } {
         None => Vec::new(),
-        Some(Link::Road(id, at_start)) => records.by_id.get(id).map(|&next| at(next, *at_start, to)).into_iter().collect(),
+        Some(Link::RoadRecord(id, at_start)) => records.by_id.get(id).map(|&next| at(next, *at_start, to)).into_iter().collect(),
         Some(Link::Junction(id)) => {
             let all = records.junctions.get(id).into_iter().flatten().filter(|connection| connection.incoming == road.id);
             let mut found = Vec::new();
@@ -70,10 +70,10 @@ pub(super) fn reason(records: &Records, strip: &Strip, follow: bool) -> String {
     }
     match if forward { &road.successor } else { &road.predecessor } {
         None => format!("road {} is linked to no road there", shown(&road.id)),
-        Some(Link::Road(id, _)) if !records.by_id.contains_key(id) => {
+        Some(Link::RoadRecord(id, _)) if !records.by_id.contains_key(id) => {
             format!("{lane} {verb} road {}, which the map does not have", shown(id))
         }
-        Some(Link::Road(id, _)) => format!("{lane} has no link that fits to a lane of road {}", shown(id)),
+        Some(Link::RoadRecord(id, _)) => format!("{lane} has no link that fits to a lane of road {}", shown(id)),
         Some(Link::Junction(id)) => format!("junction {} has no connection that fits for {lane}", shown(id)),
     }
 }

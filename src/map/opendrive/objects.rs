@@ -4,7 +4,7 @@ use glam::DVec2;
 use roxmltree::Node;
 
 use super::read::Source;
-use super::records::{Island, Road};
+use super::records::{Island, RoadRecord};
 use super::xml::{attribute, child, children};
 use crate::files::reader::Error;
 
@@ -14,7 +14,7 @@ const LARGEST: f64 = 1000.0;
 const MOST_CORNERS: usize = 1000;
 
 /// The islands among the objects of a road. Other objects are warned of.
-pub(super) fn islands(source: &mut Source, node: Node, road: &Road) -> Result<Vec<Island>, Error> {
+pub(super) fn islands(source: &mut Source, node: Node, road: &RoadRecord) -> Result<Vec<Island>, Error> {
     let (mut islands, mut others) = (Vec::new(), 0);
     for object in children(node, "objects").flat_map(|objects| children(objects, "object")) {
         if !["trafficIsland", "raisedMedian"].contains(&attribute(object, "type")) {

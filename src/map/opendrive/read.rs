@@ -9,7 +9,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 use super::Hand;
 use super::level::Level;
 use super::objects::islands;
-use super::records::{Connection, Cubic, Link, Records, Road};
+use super::records::{Connection, Cubic, Link, Records, RoadRecord};
 use super::xml::{attribute, child, children, line, shown};
 use crate::files::reader::{Error, Reader, shortened};
 
@@ -173,7 +173,7 @@ impl Source<'_, '_> {
         Ok(cubics)
     }
 
-    fn road(&mut self, node: Node) -> Result<Road, Error> {
+    fn road(&mut self, node: Node) -> Result<RoadRecord, Error> {
         let id = attribute(node, "id").to_owned();
         let mut length = self.length(node, "length")?;
         let Some(plan_node) = child(node, "planView") else {
@@ -194,7 +194,7 @@ impl Source<'_, '_> {
         };
         let sections = self.sections(node, lanes.into_iter().flat_map(|lanes| children(lanes, "laneSection")), length)?;
         let junction = Some(attribute(node, "junction")).filter(|id| !id.is_empty() && *id != "-1").map(str::to_owned);
-        let mut road = Road {
+        let mut road = RoadRecord {
             id,
             length,
             junction,
@@ -249,7 +249,7 @@ impl Source<'_, '_> {
 fn road_link(node: Node) -> Option<Link> {
     let id = attribute(node, "elementId").to_owned();
     match attribute(node, "elementType") {
-        "road" => Some(Link::Road(id, attribute(node, "contactPoint") != "end")),
+        "road" => Some(Link::RoadRecord(id, attribute(node, "contactPoint") != "end")),
         "junction" => Some(Link::Junction(id)),
         _ => None,
     }

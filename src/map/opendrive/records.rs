@@ -133,7 +133,7 @@ pub(super) struct Section {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Link {
     /// A road's beginning (`true`) or end.
-    Road(String, bool),
+    RoadRecord(String, bool),
     Junction(String),
 }
 
@@ -146,7 +146,7 @@ pub(super) struct Island {
 
 /// A road.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Road {
+pub(super) struct RoadRecord {
     pub(super) id: String,
     /// Length of its reference line \[m].
     pub(super) length: f64,
@@ -162,7 +162,7 @@ pub(super) struct Road {
     pub(super) level: Level,
 }
 
-impl Road {
+impl RoadRecord {
     /// Station where a section ends \[m].
     pub(super) fn section_end(&self, section: usize) -> f64 {
         self.sections.get(section + 1).map_or(self.length, |next| next.start)
@@ -185,7 +185,7 @@ pub(super) struct Connection {
 /// A map.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Records {
-    pub(super) roads: Vec<Road>,
+    pub(super) roads: Vec<RoadRecord>,
     /// Index of a road by its id.
     pub(super) by_id: HashMap<String, usize>,
     /// Connections of a junction by its id.

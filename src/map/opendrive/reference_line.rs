@@ -5,7 +5,7 @@
 
 use glam::DVec2;
 
-use super::records::{Geometry, Road, Shape, active};
+use super::records::{Geometry, RoadRecord, Shape, active};
 
 /// Abscissae and weights of Gauss-Legendre quadrature of eight points on -1..1, the positive half.
 const GAUSS: [(f64, f64); 4] = [
@@ -98,7 +98,7 @@ impl Geometry {
     }
 }
 
-impl Road {
+impl RoadRecord {
     /// Point and heading of the reference line at station `s` \[m], \[rad].
     pub(super) fn pose(&self, s: f64) -> (DVec2, f64) {
         // A road that was read has at least one geometry. Where the next begins late, the one before goes on straight.

@@ -61,7 +61,7 @@ impl Records {
         for road in &self.roads {
             for link in [&road.predecessor, &road.successor].into_iter().flatten() {
                 match link {
-                    Link::Road(id, _) if !known.contains(id.as_str()) => missing.push((&road.id, "road", id)),
+                    Link::RoadRecord(id, _) if !known.contains(id.as_str()) => missing.push((&road.id, "road", id)),
                     Link::Junction(id) if !self.junctions.contains_key(id) => missing.push((&road.id, "junction", id)),
                     _ => {}
                 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::distribution_keys::Keys;
 use super::draw::drawn;
 use super::draws::Draws;
-use super::{Reason, Refused, Road};
+use super::{Reason, Refused, RandomRoad};
 use crate::files::reader::{Error, Reader};
 use crate::files::shipped::{Kind, Source};
 use crate::map::parametric::written::Written;
@@ -65,16 +65,16 @@ impl Distribution {
         Ok(Distribution { name: source.stem(), approach, departure, text, keys, file })
     }
 
-    /// Road `index` of `seed`.
+    /// RandomRoad `index` of `seed`.
     ///
     /// # Errors
     ///
     /// A distribution of which no draw is a road, with the reasons.
-    pub fn road(&self, seed: u32, index: u32) -> Result<Road, Error> {
+    pub fn road(&self, seed: u32, index: u32) -> Result<RandomRoad, Error> {
         let mut refused = Refused::default();
         for attempt in 0..MOST_ATTEMPTS {
             match self.attempt(seed, index, attempt) {
-                Ok((roundabout, written)) => return Ok(Road { roundabout, seed, index, attempt, refused, written }),
+                Ok((roundabout, written)) => return Ok(RandomRoad { roundabout, seed, index, attempt, refused, written }),
                 Err(reason) => refused.note(reason),
             }
         }

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicU64;
 
 use rayon::prelude::*;
 
-use super::{Distribution, Reason, Refused, Road};
+use super::{Distribution, Reason, Refused, RandomRoad};
 use crate::files::cache::Loading;
 use crate::files::reader::Error;
 
@@ -25,7 +25,7 @@ impl Distribution {
     /// # Errors
     ///
     /// Those of [`Distribution::road`], and [`Error::Stopped`].
-    pub fn roads(&self, seed: u32, indices: &[u32], loading: &Loading) -> Result<Vec<Road>, Error> {
+    pub fn roads(&self, seed: u32, indices: &[u32], loading: &Loading) -> Result<Vec<RandomRoad>, Error> {
         let mut chunks: BTreeMap<u32, Known> = indices.iter().map(|&index| (index / CHUNK, Known::new())).collect();
         if let Some(cache) = loading.cache {
             for (&chunk, known) in &mut chunks {
@@ -42,7 +42,7 @@ impl Distribution {
             loading.count("drawing roads", &done, indices.len());
             road
         };
-        let roads: Vec<Road> = indices.par_iter().map(road).collect::<Result<_, _>>()?;
+        let roads: Vec<RandomRoad> = indices.par_iter().map(road).collect::<Result<_, _>>()?;
         if let Some(cache) = loading.cache {
             let mut changed = BTreeMap::<u32, Known>::new();
             for road in &roads {
@@ -60,9 +60,9 @@ impl Distribution {
     }
 
     /// The road of an attempt that was valid before, if it is.
-    fn known(&self, seed: u32, index: u32, attempt: u32, refused: Refused) -> Option<Road> {
+    fn known(&self, seed: u32, index: u32, attempt: u32, refused: Refused) -> Option<RandomRoad> {
         let (roundabout, written) = (refused.total() == attempt).then(|| self.attempt(seed, index, attempt).ok())??;
-        Some(Road { roundabout, seed, index, attempt, refused, written })
+        Some(RandomRoad { roundabout, seed, index, attempt, refused, written })
     }
 
     /// All that the roads of a chunk depend on.

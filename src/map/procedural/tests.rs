@@ -37,7 +37,7 @@ fn a_road_is_the_same_alone_and_among_others_whatever_the_threads() {
     for distribution in shipped() {
         let texts = |threads: usize, indices: &[u32]| -> Vec<String> {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| distribution.roads(3, indices, &Loading::PLAIN).unwrap()).iter().map(Road::text).collect()
+            pool.install(|| distribution.roads(3, indices, &Loading::PLAIN).unwrap()).iter().map(RandomRoad::text).collect()
         };
         let all: Vec<u32> = (0..20).collect();
         let one = texts(1, &all);
