@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use offtrack::map::opendrive::{Hand, Imported, Map, Options};
-use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::{Gutter, Road};
 
 /// Numbers that break things.
 const EXTREMES: [&str; 12] = ["0", "-1", "1e308", "-1e308", "nan", "inf", "1e-300", "99999", "-99999", "", "x", "0.5"];
@@ -72,7 +72,7 @@ fn changed(value: &str, bytes: &[u8], state: &mut u64) -> String {
 
 /// Panics unless what was imported can be driven on.
 fn check(imported: Imported) {
-    let roundabout = Roundabout::on("broken".to_owned(), imported.ground);
+    let roundabout = Road::on("broken".to_owned(), imported.ground);
     let faces = roundabout.kerbs(Gutter::Drivable);
     let _ = roundabout.kerbs(Gutter::Solid);
     assert!(roundabout.island_radius().is_finite() && roundabout.outer_radius().is_finite());

@@ -6,4 +6,9 @@ pub mod route; // lane centre lines -> waypoints
 pub mod ground; // a ring with its arms: kerb faces, lane edges, routes
 pub mod opendrive; // maps -> rings
 pub mod parametric; // parameters -> kerbs and lanes
+mod road; // a name and its ground
+pub mod chosen; // which ring of a map
 pub mod procedural; // random roundabouts, by seed and index
+
+pub use ground::Kerb;
+pub use road::{Gutter, Road};

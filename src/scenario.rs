@@ -18,8 +18,8 @@ use crate::files::cache::Loading;
 use crate::files::reader::Error;
 use crate::files::shipped::{Kind, Source};
 use crate::layout::{Action, ObservedExtras};
-use crate::map::parametric::{Gutter, Roundabout};
 use crate::map::route::Route;
+use crate::map::{Gutter, Road};
 use crate::vehicle::Vehicle;
 pub use check::Invalid;
 pub use fleet::{Class, Drawn, Entry, Fleet, Member, N_VEHICLES, Ranges};
@@ -61,7 +61,7 @@ crate::named! {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
     /// The roundabout.
-    pub roundabout: Roundabout,
+    pub roundabout: Road,
     /// Routes of all splits, each once, in the roundabout's order.
     pub routes: Vec<Route>,
 }

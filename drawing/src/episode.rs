@@ -5,8 +5,8 @@ mod moving;
 
 use glam::DVec2;
 use offtrack::layout::Ended;
-use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::map::route::Route;
+use offtrack::map::{Gutter, Road};
 use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
 use offtrack::vehicle::swept::corners;
 use svg::node::element::{Circle, Definitions, Group, Path};
@@ -31,7 +31,7 @@ const DASHES: &str = "7 4";
 /// An episode with its roundabout and route.
 pub struct Scene<'a> {
     pub(crate) recording: &'a Recording,
-    pub(crate) roundabout: &'a Roundabout,
+    pub(crate) roundabout: &'a Road,
     gutter: Gutter,
     route: &'a Route,
     /// All routes of the roundabout: they say where the names of the arms stand.
@@ -48,7 +48,7 @@ impl<'a> Scene<'a> {
     /// # Errors
     ///
     /// [`Error::Typeface`].
-    pub fn new(recording: &'a Recording, roundabout: &'a Roundabout, gutter: Gutter, route: &'a Route) -> Result<Scene<'a>, Error> {
+    pub fn new(recording: &'a Recording, roundabout: &'a Road, gutter: Gutter, route: &'a Route) -> Result<Scene<'a>, Error> {
         let vehicle = &recording.vehicle;
         let tractor = |frame: &Frame| corners(&vehicle.tractor_body.into(), point(frame.position), frame.heading.into());
         let trailer = |frame: &Frame| corners(&vehicle.trailer_body.into(), point(frame.trailer_position), frame.trailer_heading.into());

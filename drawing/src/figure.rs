@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Piece};
-use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::map::route::Route;
+use offtrack::map::{Gutter, Road};
 use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Group, Path, Rectangle};
 
@@ -202,7 +202,7 @@ pub(crate) fn number(value: f64) -> f64 {
 /// # Errors
 ///
 /// [`Error::Typeface`].
-pub fn roundabout(roundabout: &Roundabout, routes: &[Route], straights: Straights, gutter: Gutter) -> Result<String, Error> {
+pub fn roundabout(roundabout: &Road, routes: &[Route], straights: Straights, gutter: Gutter) -> Result<String, Error> {
     let lettering = Lettering::new()?;
     let view = View::around(routes.iter().flat_map(|route| &route.waypoints).map(|waypoint| waypoint.position));
     let road = RoadLayers::new(&view, &lettering, roundabout, routes, straights, gutter);
@@ -226,7 +226,7 @@ pub fn roundabout(roundabout: &Roundabout, routes: &[Route], straights: Straight
 /// # Errors
 ///
 /// [`Error::Typeface`].
-pub fn swept_path(roundabout: &Roundabout, routes: &[Route], straights: Straights, gutter: Gutter, sweep: &Sweep) -> Result<String, Error> {
+pub fn swept_path(roundabout: &Road, routes: &[Route], straights: Straights, gutter: Gutter, sweep: &Sweep) -> Result<String, Error> {
     let lettering = Lettering::new()?;
     let line = sweep.route.centre_line.part(straights.approach - SHOWN, sweep.route.centre_line.length() - straights.departure + SHOWN);
     let layout = Layout { corner: DVec2::new(LEFT, TOP + LINE), ..PRINTED };

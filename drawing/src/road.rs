@@ -5,8 +5,8 @@ use std::f64::consts::FRAC_PI_4;
 use glam::DVec2;
 use offtrack::field::Field;
 use offtrack::geometry::{Curve, Outline};
-use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::map::route::{Lane, Route};
+use offtrack::map::{Gutter, Road};
 use offtrack::scenario::FIELD_CELL;
 use svg::node::element::{Group, Path};
 
@@ -26,7 +26,7 @@ const LANE_DASHES: &str = "6 5";
 pub(crate) struct RoadLayers<'a> {
     view: &'a View,
     lettering: &'a Lettering,
-    roundabout: &'a Roundabout,
+    roundabout: &'a Road,
     routes: &'a [Route],
     straights: Straights,
     gutter: Gutter,
@@ -37,7 +37,7 @@ impl<'a> RoadLayers<'a> {
     pub(crate) fn new(
         view: &'a View,
         lettering: &'a Lettering,
-        roundabout: &'a Roundabout,
+        roundabout: &'a Road,
         routes: &'a [Route],
         straights: Straights,
         gutter: Gutter,

@@ -1,7 +1,7 @@
 //! A contact sheet: many roundabouts at one scale, in rows, each above its name.
 
 use glam::DVec2;
-use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::{Gutter, Road};
 use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Group, Path, Rectangle, Title};
 
@@ -30,7 +30,7 @@ const COLUMNS: usize = 8;
 /// # Errors
 ///
 /// [`Error::Typeface`].
-pub fn drawn(title: &str, roundabouts: &[&Roundabout]) -> Result<String, Error> {
+pub fn drawn(title: &str, roundabouts: &[&Road]) -> Result<String, Error> {
     let lettering = Lettering::new()?;
     let columns = roundabouts.len().clamp(1, COLUMNS);
     let rows = roundabouts.len().div_ceil(columns).max(1);
@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn every_roundabout_has_a_map_with_its_name_and_all_have_one_scale() {
-        let roundabouts = ["16m", "50m", "20m"].map(|name| Roundabout::named(name).unwrap());
+        let roundabouts = ["16m", "50m", "20m"].map(|name| Road::named(name).unwrap());
         let svg = drawn("Three", &roundabouts.each_ref()).unwrap();
         for name in ["Three", "16m", "50m", "20m", &format!("4 arms, island {:.1} m", roundabouts[2].island_radius())] {
             assert!(svg.contains(&format!("aria-label=\"{name}\"")), "{name}");

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, Vec2};
 use offtrack::layout::{Body, Ended};
-use offtrack::map::parametric::Kerb;
+use offtrack::map::Kerb;
 use rayon::prelude::*;
 use serde::Serialize;
 

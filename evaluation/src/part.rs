@@ -1,6 +1,6 @@
 //! The parts of a route: entry arm, ring, exit arm; and how wide its lane is on each.
 
-use offtrack::map::parametric::Roundabout;
+use offtrack::map::Road;
 use offtrack::map::route::Route;
 use offtrack::scenario::{Place, Scenario};
 
@@ -29,7 +29,7 @@ impl Part {
     }
 
     /// Its name in reports.
-    pub(super) fn name(self, roundabout: &Roundabout) -> &'static str {
+    pub(super) fn name(self, roundabout: &Road) -> &'static str {
         match self {
             Part::Entry => "entry",
             Part::Ring => roundabout.between_arms(),

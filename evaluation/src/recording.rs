@@ -10,8 +10,8 @@ mod measures;
 use offtrack::cpu::collide;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Clearance, Ended, N_RAYS, N_TRAILER_RAYS};
-use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::map::route::Route;
+use offtrack::map::{Gutter, Road};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::Batch;
 use offtrack::world::World;
@@ -145,7 +145,7 @@ pub struct Track {
 impl Track {
     /// The episode as it lies in the world: mirrored back where the road is driven as its mirror image.
     #[must_use]
-    pub fn seen(mut self, roundabout: &Roundabout) -> Track {
+    pub fn seen(mut self, roundabout: &Road) -> Track {
         if roundabout.is_mirrored() {
             self.frames.iter_mut().for_each(|frame| *frame = frame.mirrored());
         }
@@ -203,14 +203,14 @@ pub struct Map {
 impl Map {
     /// Of a roundabout as it lies in the world; `gutter` says whether gutters are drivable. Points lie within 1 cm of
     /// the curves.
-    pub fn of(roundabout: &Roundabout, gutter: Gutter) -> Map {
+    pub fn of(roundabout: &Road, gutter: Gutter) -> Map {
         let roundabout = roundabout.seen();
         Map { drivable: polygons::drivable(&roundabout.kerbs(gutter)), lanes: roundabout.lanes().iter().map(polygons::line).collect() }
     }
 }
 
 /// The centre line of a roundabout's route as it lies in the world, as points within 1 cm of it \[m].
-pub fn centre_line(roundabout: &Roundabout, route: &Route) -> Polygon {
+pub fn centre_line(roundabout: &Road, route: &Route) -> Polygon {
     polygons::line(&roundabout.seen_route(route).centre_line)
 }
 
@@ -256,7 +256,7 @@ pub struct Of<'a, 'b> {
     /// The benchmark, baked.
     pub world: &'b World,
     /// The route's roundabout.
-    pub roundabout: &'a Roundabout,
+    pub roundabout: &'a Road,
     /// The route.
     pub route: &'a Route,
     /// The policy's name.

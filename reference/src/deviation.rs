@@ -7,8 +7,8 @@
 use glam::DVec2;
 use offtrack::files::reader::{shortened, shown};
 use offtrack::geometry::{Curve, Piece};
-use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::map::route::Lane;
+use offtrack::map::{Gutter, Road};
 use serde::{Deserialize, Serialize};
 
 /// Distance from the ring's centre within which points are compared \[m].
@@ -167,7 +167,7 @@ impl Measured {
 /// # Errors
 ///
 /// Measured lines that are too long or too far away, and a route that the roundabout does not have.
-pub fn deviations(roundabout: &Roundabout, measured: &Measured) -> Result<Vec<Deviation>, Error> {
+pub fn deviations(roundabout: &Road, measured: &Measured) -> Result<Vec<Deviation>, Error> {
     measured.check()?;
     let mut rows = edges(roundabout, measured);
     for (index, route) in measured.routes.iter().enumerate() {
@@ -184,7 +184,7 @@ pub fn deviations(roundabout: &Roundabout, measured: &Measured) -> Result<Vec<De
 }
 
 /// The rows of the road's edges: island, ring, kerbs and splitter islands.
-fn edges(roundabout: &Roundabout, measured: &Measured) -> Vec<Deviation> {
+fn edges(roundabout: &Road, measured: &Measured) -> Vec<Deviation> {
     let solid = roundabout.kerbs(Gutter::Solid);
     let (boundary, holes): (Vec<Curve>, Vec<Curve>) = solid.loops.into_iter().partition(|curve| 0.0 < curve.signed_area());
     let splitters: Vec<Curve> = holes.into_iter().filter(|curve| curve.distance(DVec2::ZERO) > roundabout.outer_radius() - 1.0).collect();
@@ -274,7 +274,7 @@ mod tests {
     }
 
     fn refusal(measured: &Measured) -> String {
-        deviations(&Roundabout::named("16m").unwrap(), measured).unwrap_err().to_string()
+        deviations(&Road::named("16m").unwrap(), measured).unwrap_err().to_string()
     }
 
     #[test]
@@ -293,7 +293,7 @@ mod tests {
         measured.splitters = vec![there_and_back; 11];
         assert!(refusal(&measured).starts_with("splitters[9]: 20"), "{}", refusal(&measured));
         measured.splitters.truncate(9);
-        deviations(&Roundabout::named("16m").unwrap(), &measured).unwrap();
+        deviations(&Road::named("16m").unwrap(), &measured).unwrap();
     }
 
     #[test]
@@ -319,7 +319,7 @@ mod tests {
     fn empty_lines_and_lines_of_one_point_are_compared_as_nothing() {
         let mut measured = measured();
         measured.ring = vec![vec![], vec![[1.0, 2.0]]];
-        let rows = deviations(&Roundabout::named("16m").unwrap(), &measured).unwrap();
+        let rows = deviations(&Road::named("16m").unwrap(), &measured).unwrap();
         assert!(rows[1].from_measured.worst.is_finite());
     }
 }

@@ -16,7 +16,7 @@ mod tests;
 
 use crate::files::reader::Error;
 use crate::map::parametric::written::Written;
-use crate::map::parametric::{Gutter, Roundabout};
+use crate::map::{Gutter, Road};
 
 pub use distribution::Distribution;
 
@@ -24,7 +24,7 @@ pub use distribution::Distribution;
 #[derive(Debug, Clone)]
 pub struct RandomRoad {
     /// The roundabout. Its name is the distribution's, the seed and the index: `wide/7/12`.
-    pub roundabout: Roundabout,
+    pub roundabout: Road,
     /// Seed that it was drawn with.
     pub seed: u32,
     /// Its index among the roads of the seed.
@@ -45,7 +45,7 @@ impl RandomRoad {
 
 /// Least distance of a route's centre line from a kerb, `NaN` where the arms are too short for such routes \[m].
 /// `approach` and `departure` are the lengths of the routes before and after the ring \[m].
-pub fn lane_clearance(roundabout: &Roundabout, approach: f64, departure: f64) -> f64 {
+pub fn lane_clearance(roundabout: &Road, approach: f64, departure: f64) -> f64 {
     let Ok(routes) = roundabout.routes(approach, departure, 5.0) else { return f64::NAN };
     rules::lane_clearance(&roundabout.kerbs(Gutter::Drivable), &routes, 0.0)
 }
@@ -142,16 +142,16 @@ impl Refused {
     }
 }
 
-/// A random road by its name, `wide/7/12`, distribution, seed and index, or else a roundabout as [`Roundabout::find`]
+/// A random road by its name, `wide/7/12`, distribution, seed and index, or else a roundabout as [`Road::find`]
 /// finds it. In place of the distribution's name may stand the path of its file.
 ///
 /// # Errors
 ///
-/// Those of [`Distribution::find`], [`Distribution::road`] and [`Roundabout::find`].
-pub fn find(name_or_path: &str) -> Result<Roundabout, Error> {
+/// Those of [`Distribution::find`], [`Distribution::road`] and [`Road::find`].
+pub fn find(name_or_path: &str) -> Result<Road, Error> {
     match address(name_or_path) {
         Some((distribution, seed, index)) => Ok(Distribution::find(distribution)?.road(seed, index)?.roundabout),
-        None => Roundabout::find(name_or_path),
+        None => Road::find(name_or_path),
     }
 }
 

@@ -9,8 +9,8 @@ use serde::de::{Deserializer, SeqAccess, Visitor};
 
 use super::{Clock, Reward};
 use crate::layout::ObservedExtras;
+use crate::map::Gutter;
 use crate::map::opendrive::{Hand, RoadLane};
-use crate::map::parametric::Gutter;
 use crate::vehicle::WrittenModel;
 
 /// The file.

@@ -79,10 +79,7 @@ impl Scenario {
             ("rollover_ratio", self.rollover_ratio),
             ("time_limit", self.time_limit),
         ];
-        let finite = [
-            ("start_offset", self.start_offset),
-            ("start_heading", self.start_heading),
-        ];
+        let finite = [("start_offset", self.start_offset), ("start_heading", self.start_heading)];
         positive.into_iter().try_for_each(|(key, value)| within(key, value, POSITIVE))?;
         finite.into_iter().try_for_each(|(key, value)| within(key, value, FINITE))?;
         let reward = REWARD_KEYS.iter().zip(self.reward.values());

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::{Place, Scenario, Split};
 use crate::files::reader::{Error, Reader};
-use crate::map::parametric::Roundabout;
+use crate::map::Road;
 use crate::map::route::Route;
 
 impl Scenario {
@@ -40,7 +40,7 @@ impl Scenario {
     /// # Errors
     ///
     /// Those of [`Scenario::add`].
-    pub fn on(&self, roundabout: Roundabout) -> Result<Scenario, Error> {
+    pub fn on(&self, roundabout: Road) -> Result<Scenario, Error> {
         let mut scenario = Scenario { places: Vec::<Place>::new(), splits: Default::default(), ..self.clone() };
         scenario.add(roundabout, Split::Test)?;
         Ok(scenario)
@@ -51,7 +51,7 @@ impl Scenario {
     /// # Errors
     ///
     /// An arm too short for the benchmark's routes and vehicle; the roundabout's name stands for the file.
-    pub fn add(&mut self, roundabout: Roundabout, split: Split) -> Result<(), Error> {
+    pub fn add(&mut self, roundabout: Road, split: Split) -> Result<(), Error> {
         let name = roundabout.name.clone();
         let reader = Reader::of(Path::new(&name));
         let routes = self.routes_of(&reader, &roundabout)?;

@@ -9,7 +9,7 @@ use super::roads::{MOST_ROADS, Procedural};
 use crate::files::cache::Loading;
 use crate::files::reader::{Error, Reader};
 use crate::files::shipped::{Kind, Source};
-use crate::map::parametric::map::is_map;
+use crate::map::chosen::is_map;
 use crate::vehicle::Vehicle;
 
 impl Scenario {

@@ -10,9 +10,9 @@ use super::{Place, Scenario, Split};
 use crate::files::cache::Loading;
 use crate::files::reader::{Error, Reader, shown};
 use crate::files::shipped::{Kind, Source};
+use crate::map::Road;
+use crate::map::chosen::{Choice, is_map};
 use crate::map::opendrive::Way;
-use crate::map::parametric::Roundabout;
-use crate::map::parametric::map::{Choice, is_map};
 use crate::map::procedural::Distribution;
 use crate::map::route::Route;
 
@@ -73,9 +73,9 @@ impl Scenario {
                 let WrittenRoundabout { hand, name, arms, .. } = written;
                 let ring = written.ring.map(DVec2::from);
                 let ways = written.way.iter().map(|way| Way { from: (&way.from).into(), to: (&way.to).into() }).collect();
-                Roundabout::from_map(file, &Choice { ring, hand: *hand, name: name.clone(), arms: arms.clone(), ways })
+                Road::from_map(file, &Choice { ring, hand: *hand, name: name.clone(), arms: arms.clone(), ways })
             }
-            source => Roundabout::from_source(source),
+            source => Road::from_source(source),
         };
         if !is_map(&written.file) {
             let given = [
@@ -123,7 +123,7 @@ impl Scenario {
     }
 
     /// All routes of a roundabout.
-    pub(super) fn routes_of(&self, reader: &Reader, roundabout: &Roundabout) -> Result<Vec<Route>, Error> {
+    pub(super) fn routes_of(&self, reader: &Reader, roundabout: &Road) -> Result<Vec<Route>, Error> {
         roundabout.routes(self.approach, self.departure, self.spacing).map_err(|leaves| {
             reader.invalid(format!("routes.{}", leaves.part), format_args!("{} m", shown(leaves.asked)), leaves.to_string())
         })
@@ -133,7 +133,7 @@ impl Scenario {
     pub(super) fn place(
         &mut self,
         reader: &Reader,
-        roundabout: Roundabout,
+        roundabout: Road,
         routes: impl Iterator<Item = (Route, Option<Split>)>,
     ) -> Result<(), Error> {
         let mut next: u32 = self.splits.iter().map(|split| split.len() as u32).sum();

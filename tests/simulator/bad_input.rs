@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use offtrack::files::reader::Error;
 use offtrack::layout::Ended;
-use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::map::procedural::Distribution;
+use offtrack::map::{Gutter, Road};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{self, Engine, RouteChoice, Simulator};
 use offtrack::vehicle::Vehicle;
@@ -70,7 +70,7 @@ fn text_of(file: &Path) -> String {
 fn read(path: &Path) -> Result<(), Error> {
     match path.parent().and_then(Path::file_name).and_then(|folder| folder.to_str()) {
         Some("roundabouts") => {
-            let roundabout = Roundabout::read(path)?;
+            let roundabout = Road::read(path)?;
             // An accepted roundabout must be usable.
             for gutter in [Gutter::Drivable, Gutter::Solid] {
                 assert!(roundabout.kerbs(gutter).signed_distance(glam::DVec2::new(3.0, -7.0)).is_finite());

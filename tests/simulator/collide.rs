@@ -5,7 +5,7 @@ use offtrack::engine::stages::Stage;
 use offtrack::field::Field;
 use offtrack::geometry::{Curve, Outline, Piece};
 use offtrack::layout::{Body, Clearance, Rig, Truck};
-use offtrack::map::parametric::Gutter;
+use offtrack::map::Gutter;
 use offtrack::simulator::Simulator;
 use rayon::prelude::*;
 

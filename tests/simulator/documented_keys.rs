@@ -9,7 +9,7 @@ use std::fmt::Debug;
 use std::path::Path;
 
 use offtrack::files::reader::Error;
-use offtrack::map::parametric::Roundabout;
+use offtrack::map::Road;
 use offtrack::map::procedural::Distribution;
 use offtrack::scenario::Scenario;
 use offtrack::vehicle::Vehicle;
@@ -173,7 +173,7 @@ fn roundabouts() -> Kind {
     let keys =
         [("hand", "\"right\""), ("ring.lanes", "2"), ("arm[].lane_width", "3.7"), ("arm[].entry.lanes", "2"), ("arm[].exit.lanes", "2")];
     let documents = Vec::from([with_keys(&text_of("roundabouts/16m.toml"), &keys), document(&text_of("roundabouts/40m-maps.toml"))]);
-    Kind { documents, read: |path| boxed(Roundabout::read(path)) }
+    Kind { documents, read: |path| boxed(Road::read(path)) }
 }
 
 /// A distribution keeps its file's text, which differs where a key is left out; its keys come last.

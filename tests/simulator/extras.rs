@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use offtrack::layout::{EXTRAS, N_EXTRAS, Start, ObservedExtras};
+use offtrack::layout::{EXTRAS, N_EXTRAS, ObservedExtras, Start};
 use offtrack::simulator::{Autoreset, RouteChoice};
 use offtrack::vehicle::GRAVITY;
 use offtrack::world::World;
@@ -54,7 +54,8 @@ fn each_extra_is_what_its_definition_says() {
 
 #[test]
 fn a_track_observes_the_first_extras_and_leaves_the_others_0() {
-    for (track, n) in [(ObservedExtras::None, 0), (ObservedExtras::Blind, 5), (ObservedExtras::Mass, 8), (ObservedExtras::Oracle, N_EXTRAS)] {
+    for (track, n) in [(ObservedExtras::None, 0), (ObservedExtras::Blind, 5), (ObservedExtras::Mass, 8), (ObservedExtras::Oracle, N_EXTRAS)]
+    {
         let world = world(track);
         for (name, engine) in engines() {
             let mut simulator = batch_on(&engine, &world, 32, 5, RouteChoice::Drawn(vec![1, 3, 5]));

@@ -13,7 +13,7 @@ use offtrack::field::Field;
 use offtrack::geometry::Outline;
 use offtrack::layout::random::{signed_unit, words};
 use offtrack::layout::{Column, Truck};
-use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::{Gutter, Road};
 use offtrack::scenario::FIELD_CELL;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
@@ -28,7 +28,7 @@ pub(crate) fn places(gutter: Gutter) -> Vec<(String, Outline, Field)> {
     files.sort();
     assert_eq!(files.len(), 10, "{files:?}");
     let place = |file: &Path| {
-        let roundabout = Roundabout::read(file).unwrap();
+        let roundabout = Road::read(file).unwrap();
         let kerbs = roundabout.kerbs(gutter);
         let field = Field::bake(&kerbs, FIELD_CELL);
         (roundabout.name, kerbs, field)

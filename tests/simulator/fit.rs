@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use offtrack::geometry::{Piece, wrapped};
-use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::{Gutter, Road};
 use offtrack_reference::deviation::{Measured, deviations};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -15,8 +15,8 @@ fn file(name: &str) -> PathBuf {
     Path::new(ROOT).join("scenarios/roundabouts").join(name).with_extension("toml")
 }
 
-fn roundabout(name: &str) -> Roundabout {
-    Roundabout::read(&file(name)).unwrap()
+fn roundabout(name: &str) -> Road {
+    Road::read(&file(name)).unwrap()
 }
 
 fn measured(name: &str) -> Measured {
@@ -82,7 +82,7 @@ fn a_roundabout_turned_by_three_degrees_fails_the_comparison() {
         .collect();
     let path = std::env::temp_dir().join(format!("offtrack-turned-{}.toml", std::process::id()));
     std::fs::write(&path, turned).unwrap();
-    let rows = deviations(&Roundabout::read(&path).unwrap(), &measured("40m")).unwrap();
+    let rows = deviations(&Road::read(&path).unwrap(), &measured("40m")).unwrap();
     std::fs::remove_file(&path).unwrap();
     assert!(rows.iter().any(|row| 1.0 < row.from_measured.worst));
 }

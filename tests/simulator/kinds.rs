@@ -8,8 +8,8 @@ use glam::DVec2;
 use offtrack::field::Field;
 use offtrack::geometry::{Curve, Piece, to_circle, wrapped};
 use offtrack::layout::{Ended, N_RAYS};
-use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::map::route::{Lane, Route};
+use offtrack::map::{Gutter, Road};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::RouteChoice;
 use offtrack::vehicle::swept::{own_lane_suffices, swept_path};
@@ -25,8 +25,8 @@ fn file(name: &str) -> PathBuf {
     Path::new(ROOT).join("tests/data/roundabouts").join(name).with_extension("toml")
 }
 
-fn roundabout(name: &str) -> Roundabout {
-    Roundabout::read(&file(name)).unwrap()
+fn roundabout(name: &str) -> Road {
+    Road::read(&file(name)).unwrap()
 }
 
 fn routes(name: &str) -> Vec<Route> {

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec2;
-use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::{Gutter, Road};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::RouteChoice;
 use offtrack::world::World;
@@ -41,8 +41,8 @@ fn left_hand(text: &str) -> String {
     format!("hand = \"left\"\n{}", text.lines().map(line).collect::<String>())
 }
 
-fn pair(name: &str) -> [Roundabout; 2] {
-    [text(name), left_hand(&text(name))].map(|text| Roundabout::from_toml("road", &text).unwrap())
+fn pair(name: &str) -> [Road; 2] {
+    [text(name), left_hand(&text(name))].map(|text| Road::from_toml("road", &text).unwrap())
 }
 
 /// The benchmark of one roundabout, and its world.
@@ -123,8 +123,7 @@ fn a_left_hand_road_has_its_lanes_by_the_names_that_a_driver_there_would_say() {
     let [right, left] = pair("16m");
     // E-right-1 is the lane next to the kerb to the first exit; in left-hand traffic that lane is the left one, and the
     // first exit clockwise is N's mirror image.
-    let names =
-        |roundabout: &Roundabout| roundabout.routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect::<Vec<_>>();
+    let names = |roundabout: &Road| roundabout.routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect::<Vec<_>>();
     let (right, left) = (names(&right), names(&left));
     assert!(right.contains(&"road/E-right-1".to_owned()) && !right.contains(&"road/E-left-1".to_owned()));
     assert!(left.contains(&"road/E-left-1".to_owned()) && !left.contains(&"road/E-right-1".to_owned()));
@@ -141,7 +140,7 @@ fn a_benchmark_names_the_routes_of_a_left_hand_road_as_they_are_there() {
 #[test]
 fn an_error_in_a_left_hand_file_names_its_lane_and_says_that_positions_are_mirrored() {
     let text = left_hand(&text("16m")).replacen("ring_radius = 24.5", "ring_radius = 2400.5", 1);
-    let message = Roundabout::from_toml("road", &text).unwrap_err().to_string();
+    let message = Road::from_toml("road", &text).unwrap_err().to_string();
     assert!(message.starts_with("road: arm[0].entry.left.ring_radius: 2400.5 m; must lie in 0.1..1000 m"), "{message}");
     assert!(message.contains("mirror image"), "{message}");
 }
@@ -150,10 +149,10 @@ fn an_error_in_a_left_hand_file_names_its_lane_and_says_that_positions_are_mirro
 fn an_outline_file_keeps_the_hand_of_traffic() {
     let [right, left] = pair("16m-maps");
     let folder = tempfile::tempdir().unwrap();
-    let read = |roundabout: &Roundabout| {
+    let read = |roundabout: &Road| {
         let file = folder.path().join("road.outline.toml");
         fs::write(&file, roundabout.ground().text(&[])).unwrap();
-        Roundabout::read(&file).unwrap()
+        Road::read(&file).unwrap()
     };
     assert!(read(&left).is_mirrored() && !read(&right).is_mirrored());
     assert_eq!(read(&left).routes(40.0, 35.0, 2.0).unwrap()[0].name, left.routes(40.0, 35.0, 2.0).unwrap()[0].name);

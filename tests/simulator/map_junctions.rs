@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec2;
 use offtrack::geometry::Outline;
+use offtrack::map::chosen::Choice;
 use offtrack::map::opendrive::{Hand, Map, Options, RoadLane, Way};
-use offtrack::map::parametric::map::Choice;
-use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::{Gutter, Road};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
 
@@ -33,7 +33,7 @@ fn a_junction_has_every_way_through_it_and_drives_them() {
     assert!(junction.ways.contains(&way(("90", 1), ("34", -1))));
     let ground = map.through(&junction.ways, &Options::default()).unwrap().ground;
     assert_eq!(ground.arms.iter().map(|arm| arm.name.as_str()).collect::<Vec<_>>(), ["E", "N", "W", "S"]);
-    let crossing = Roundabout::on("crossing".to_owned(), ground);
+    let crossing = Road::on("crossing".to_owned(), ground);
     let faces = crossing.kerbs(Gutter::Drivable);
     let routes = crossing.routes(20.0, 20.0, 2.0).unwrap();
     assert_eq!(routes.len(), 14);
@@ -74,16 +74,16 @@ fn shipped_outlines_are_what_their_maps_give() {
         ("zala8", "zala_full", Some(DVec2::new(6.0, 1702.0)), vec![]),
         ("sumo22", "sumo_ring22", None, vec![]),
     ] {
-        let shipped = Roundabout::read(&folder().join(format!("{outline}.outline.toml"))).unwrap();
+        let shipped = Road::read(&folder().join(format!("{outline}.outline.toml"))).unwrap();
         let choice = Choice { ring, arms: arms.into_iter().map(str::to_owned).collect(), ..Choice::default() };
-        let imported = Roundabout::from_map(&folder().join(format!("{map}.xodr")), &choice).unwrap();
+        let imported = Road::from_map(&folder().join(format!("{map}.xodr")), &choice).unwrap();
         for gutter in [Gutter::Drivable, Gutter::Solid] {
             let (one, other) = (shipped.kerbs(gutter), imported.kerbs(gutter));
             // Curves are fitted within 5 mm, elsewhere perhaps by other pieces.
             assert!(apart(&one, &other).max(apart(&other, &one)) < 0.01, "{outline}");
         }
         assert_eq!(shipped.arms().collect::<Vec<_>>(), imported.arms().collect::<Vec<_>>());
-        let names = |roundabout: &Roundabout| -> Vec<String> {
+        let names = |roundabout: &Road| -> Vec<String> {
             let routes = roundabout.routes(40.0, 35.0, 2.0).unwrap();
             routes.iter().filter_map(|route| route.name.rsplit('/').next().map(str::to_owned)).collect()
         };

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use glam::DVec2;
+use offtrack::map::Road;
 use offtrack::map::opendrive::{Hand, Imported, Map, Options};
-use offtrack::map::parametric::Roundabout;
 
 fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/maps").join(name)
@@ -52,7 +52,7 @@ fn continued(link: &str, back: &str, more: &str) -> String {
 
 /// All sixteen routes, 45 m before and after the ring: longer than what is left of an arm that was cut.
 fn assert_drivable(map: &Map) {
-    let roundabout = Roundabout::on("ring".to_owned(), imported(map).ground);
+    let roundabout = Road::on("ring".to_owned(), imported(map).ground);
     assert_eq!(roundabout.routes(45.0, 45.0, 2.0).unwrap().len(), 16);
 }
 
@@ -123,7 +123,7 @@ fn an_arm_that_ends_early_is_refused_with_what_the_map_says_there() {
         let map = parsed(&continued(link, "", "<junction id=\"950\"/>"));
         let Imported { ground, warnings, .. } = imported(&map);
         assert!(warnings.iter().any(|warning| warning.contains("arm E: a lane begins 48.0 m from the centre: ")), "{warnings:?}");
-        let message = Roundabout::on("ring".to_owned(), ground).routes(45.0, 45.0, 2.0).unwrap_err().to_string();
+        let message = Road::on("ring".to_owned(), ground).routes(45.0, 45.0, 2.0).unwrap_err().to_string();
         assert!(message.contains("m fit: ") && message.contains(expected), "{message}");
     }
 }
@@ -310,7 +310,7 @@ fn a_bypass_far_from_its_arms_is_a_lane_of_the_arms_that_it_joins() {
     let without = imported(&plain);
     assert_eq!(with.ground.lines.len(), without.ground.lines.len() + 1);
     assert!(lane(&with).len() == 1 && (lane(&with)[0] - lane(&without)[0]).abs() < 0.1);
-    let roundabout = Roundabout::on("ring".to_owned(), with.ground);
+    let roundabout = Road::on("ring".to_owned(), with.ground);
     for route in roundabout.routes(40.0, 35.0, 2.0).unwrap() {
         // Exits are counted as without it, and its own route stays outside the ring.
         assert_eq!(roundabout.exit_arm(&route), (route.entry + route.exit as usize) % 4, "{}", route.name);
@@ -344,7 +344,7 @@ fn an_outline_with_a_shoulder_among_its_lanes_is_read_again() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("ring.outline.toml");
     fs::write(&file, ground.checked_text(&file, &[]).unwrap()).unwrap();
-    assert_eq!(Roundabout::read(&file).unwrap().ground().lines.len(), 16);
+    assert_eq!(Road::read(&file).unwrap().ground().lines.len(), 16);
     // What its reader refuses is not written.
     let mut narrow = ground;
     narrow.lines[3].widths[0] = 0.5;

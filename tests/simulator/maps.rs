@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use glam::DVec2;
 use offtrack::files::reader::Error;
 use offtrack::geometry::Outline;
+use offtrack::map::chosen::Choice;
 use offtrack::map::ground::Edges;
 use offtrack::map::opendrive::{Hand, Map, Options};
-use offtrack::map::parametric::map::Choice;
-use offtrack::map::parametric::{Gutter, Kerb, Roundabout};
+use offtrack::map::{Gutter, Kerb, Road};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
 use proptest::prelude::*;
@@ -19,8 +19,8 @@ fn map(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/maps").join(name)
 }
 
-fn ring() -> Roundabout {
-    Roundabout::from_map(&map("sumo_ring22.xodr"), &Choice::default()).unwrap()
+fn ring() -> Road {
+    Road::from_map(&map("sumo_ring22.xodr"), &Choice::default()).unwrap()
 }
 
 fn turn(from: f64, to: f64) -> f64 {
@@ -78,7 +78,7 @@ fn an_outline_file_gives_what_the_map_gave_and_is_written_as_it_was_read() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("ring.outline.toml");
     fs::write(&file, &text).unwrap();
-    let read = Roundabout::read(&file).unwrap();
+    let read = Road::read(&file).unwrap();
     assert_eq!(read.name, "ring");
     let apart = |one: &Outline, other: &Outline| {
         one.loops.iter().flat_map(|curve| curve.polyline(0.01)).map(|p| other.distance(p)).fold(0.0, f64::max)
@@ -106,7 +106,7 @@ fn a_faulty_outline_file_is_refused_with_its_key() {
         let file = folder.path().join("ring.outline.toml");
         assert!(text.contains(from), "{from}");
         fs::write(&file, text.replacen(from, to, 1)).unwrap();
-        Roundabout::read(&file).unwrap_err().to_string()
+        Road::read(&file).unwrap_err().to_string()
     };
     for (from, to, key) in [
         ("island_radius = ", "island_radius = 1000", "island_radius: "),
@@ -123,7 +123,7 @@ fn a_faulty_outline_file_is_refused_with_its_key() {
 
 #[test]
 fn a_map_without_a_roundabout_says_so() {
-    let message = Roundabout::from_map(&map("maliput_Roundabout.xodr"), &Choice::default()).unwrap_err().to_string();
+    let message = Road::from_map(&map("maliput_Roundabout.xodr"), &Choice::default()).unwrap_err().to_string();
     assert!(message.contains("maliput_Roundabout.xodr: ring: ") && message.contains("no roundabout here: 1 roads"), "{message}");
 }
 

@@ -12,7 +12,7 @@ use offtrack::engine::stages::{STAGES, Stage};
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::random::{Draw, index_below, signed_unit, words};
 use offtrack::layout::{Column, Ended, Truck, WaypointRow};
-use offtrack::map::parametric::Gutter;
+use offtrack::map::Gutter;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 

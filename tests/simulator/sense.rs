@@ -5,7 +5,7 @@ use offtrack::engine::stages::Stage;
 use offtrack::field::Field;
 use offtrack::geometry::Outline;
 use offtrack::layout::{N_RAYS, N_TRAILER_RAYS, Truck};
-use offtrack::map::parametric::Gutter;
+use offtrack::map::Gutter;
 use offtrack::simulator::Engine;
 use offtrack::world::World;
 use rayon::prelude::*;

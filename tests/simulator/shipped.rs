@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use offtrack::files::shipped::{FILES, Kind, Source};
-use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::map::procedural::Distribution;
+use offtrack::map::{Gutter, Road};
 use offtrack::scenario::Scenario;
 use offtrack::vehicle::Vehicle;
 
@@ -125,7 +125,7 @@ fn every_name_gives_what_its_file_gives() {
         assert_eq!(named.name, name);
     }
     for name in Kind::Roundabout.names() {
-        assert_eq!(Roundabout::named(name).unwrap().name, name);
+        assert_eq!(Road::named(name).unwrap().name, name);
     }
     for name in Kind::Vehicle.names() {
         Vehicle::named(name).unwrap();
@@ -140,7 +140,7 @@ fn an_unknown_name_is_refused_with_the_names_there_are() {
     let benchmark = Scenario::find("nowhere").unwrap_err().to_string();
     assert!(benchmark.starts_with("benchmark: nowhere; must be a path ending in .toml or one of attard2023, "), "{benchmark}");
     assert_eq!(
-        Roundabout::find("17m").unwrap_err().to_string(),
+        Road::find("17m").unwrap_err().to_string(),
         "roundabout: 17m; must be a path ending in .toml or one of 16m, 20m, 32m, 40m, 50m, \
          16m-maps, 20m-maps, 32m-maps, 40m-maps, 50m-maps"
     );
@@ -170,12 +170,12 @@ fn a_path_is_read_from_disk_whatever_the_embedded_files_are_called() {
 #[test]
 fn a_roundabout_can_be_made_from_text() {
     let text = std::fs::read_to_string(scenarios().join("roundabouts/16m.toml")).unwrap();
-    let made = Roundabout::from_toml("copy", &text).unwrap();
+    let made = Road::from_toml("copy", &text).unwrap();
     assert_eq!(made.name, "copy");
-    let kerbs = |roundabout: &Roundabout| format!("{:?}", roundabout.kerbs(Gutter::Solid));
-    assert_eq!(kerbs(&made), kerbs(&Roundabout::named("16m").unwrap()));
+    let kerbs = |roundabout: &Road| format!("{:?}", roundabout.kerbs(Gutter::Solid));
+    assert_eq!(kerbs(&made), kerbs(&Road::named("16m").unwrap()));
     assert!(made.routes(40.0, 35.0, 2.0).unwrap()[0].name.starts_with("copy/E-left-"));
-    let message = Roundabout::from_toml("random 7", &text.replace("gutter = 0.5", "gutter = -1")).unwrap_err().to_string();
+    let message = Road::from_toml("random 7", &text.replace("gutter = 0.5", "gutter = -1")).unwrap_err().to_string();
     assert_eq!(message, "random 7: ring.gutter: -1 m; must lie in 0..3 m");
 }
 

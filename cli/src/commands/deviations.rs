@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use offtrack::files::reader::read_text;
-use offtrack::map::parametric::Roundabout;
+use offtrack::map::Road;
 use offtrack_reference::FILE_LIMIT;
 use offtrack_reference::deviation::{Measured, NEAR, deviations};
 
@@ -22,7 +22,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
-    let roundabout = Roundabout::find(&args.roundabout)?;
+    let roundabout = Road::find(&args.roundabout)?;
     let text = read_text(&args.measured, FILE_LIMIT)?;
     let wrong = |message: String| Error::contents(&args.measured, message);
     let measured: Measured = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use offtrack::files::reader::shown;
 use offtrack::files::shipped::{Kind, Source};
-use offtrack::map::parametric::map::is_map;
-use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::chosen::is_map;
 use offtrack::map::procedural;
 use offtrack::map::route::Route;
+use offtrack::map::{Gutter, Road};
 use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
 use offtrack::vehicle::Vehicle;
 use offtrack_drawing::figure::{self, Straights};
@@ -99,7 +99,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     length("--departure", args.departure)?;
     let file = Path::new(&args.roundabout);
     let roundabout = if is_map(file) {
-        Roundabout::from_map(file, &args.place.choice())?
+        Road::from_map(file, &args.place.choice())?
     } else {
         args.place.check_absent()?;
         procedural::find(&args.roundabout)?
@@ -135,7 +135,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
 }
 
-fn sweep<'a>(args: &Args, roundabout: &Roundabout, route: &'a Route) -> Result<Sweep<'a>, Error> {
+fn sweep<'a>(args: &Args, roundabout: &Road, route: &'a Route) -> Result<Sweep<'a>, Error> {
     let vehicle = Vehicle::find(&args.vehicle)?;
     if !vehicle.loads.contains_key(&args.load) {
         let loads: Vec<&str> = vehicle.loads.keys().map(String::as_str).collect();

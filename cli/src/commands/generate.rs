@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use offtrack::files::reader::{read_bytes, shown_path};
 use offtrack::files::shipped::Kind;
-use offtrack::map::parametric::Roundabout;
-use offtrack::map::procedural::{Distribution, Reason, Refused, RandomRoad, lane_clearance};
+use offtrack::map::Road;
+use offtrack::map::procedural::{Distribution, RandomRoad, Reason, Refused, lane_clearance};
 use offtrack_drawing::histograms::{Histograms, Panel};
 use offtrack_drawing::{rasterised, sheet};
 use offtrack_evaluation::error::Error;
@@ -75,8 +75,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
     };
     let plot = args.plot.as_ref().map(|file| picture(file, &histograms(&distribution, args, &roads)?)).transpose()?;
     if let Some(folder) = &args.output {
-        let file =
-            |road: &RandomRoad| (format!("{}-{}-{}.toml", distribution.name, args.seed, road.index), text(&distribution, road).into_bytes());
+        let file = |road: &RandomRoad| {
+            (format!("{}-{}-{}.toml", distribution.name, args.seed, road.index), text(&distribution, road).into_bytes())
+        };
         let files = || roads.iter().map(file).chain(sheets.iter().cloned()).map(|(name, bytes)| (folder.join(name), bytes));
         if !args.overwrite {
             files().try_for_each(|(file, bytes)| free(&file, &bytes))?;
@@ -112,7 +113,7 @@ fn text(distribution: &Distribution, road: &RandomRoad) -> String {
 
 /// Names and contents of the contact sheets.
 fn sheets(folder: &Path, distribution: &Distribution, args: &Args, roads: &[RandomRoad]) -> Result<Vec<(String, Vec<u8>)>, Error> {
-    let shown: Vec<&Roundabout> = roads.iter().take(ON_SHEET).map(|road| &road.roundabout).collect();
+    let shown: Vec<&Road> = roads.iter().take(ON_SHEET).map(|road| &road.roundabout).collect();
     let of = if shown.len() < roads.len() {
         format!("The first {} of {} random roads", shown.len(), roads.len())
     } else {
@@ -137,8 +138,8 @@ fn histograms(distribution: &Distribution, args: &Args, roads: &[RandomRoad]) ->
     let (approach, departure) = (distribution.approach, distribution.departure);
     // Those with the maps' kerbs have the same dimensions as the others.
     let marked: Vec<String> = Kind::Roundabout.names().filter(|name| !name.ends_with("-maps")).map(str::to_owned).collect();
-    let known: Vec<Roundabout> = marked.iter().map(|name| Roundabout::named(name)).collect::<Result<_, _>>()?;
-    let panel = |x: &'static str, measure: &dyn Fn(&Roundabout) -> f64| Panel {
+    let known: Vec<Road> = marked.iter().map(|name| Road::named(name)).collect::<Result<_, _>>()?;
+    let panel = |x: &'static str, measure: &dyn Fn(&Road) -> f64| Panel {
         x,
         values: roads.iter().map(|road| measure(&road.roundabout)).collect(),
         marks: known.iter().map(measure).collect(),
@@ -148,8 +149,8 @@ fn histograms(distribution: &Distribution, args: &Args, roads: &[RandomRoad]) ->
         subtitle: format!("Seed {}. Each diamond is a measured roundabout.", args.seed),
         marked,
         panels: vec![
-            panel("island radius [m]", &Roundabout::island_radius),
-            panel("outer radius of the ring [m]", &Roundabout::outer_radius),
+            panel("island radius [m]", &Road::island_radius),
+            panel("outer radius of the ring [m]", &Road::outer_radius),
             panel("width of a ring lane [m]", &|roundabout| {
                 let radii = roundabout.lane_radii();
                 match radii.as_slice() {
@@ -160,7 +161,7 @@ fn histograms(distribution: &Distribution, args: &Args, roads: &[RandomRoad]) ->
             panel("arms", &|roundabout| roundabout.arms().count() as f64),
             panel("least gap between arms [deg]", &|roundabout| roundabout.least_gap().to_degrees()),
             panel("islands beside the central one", &|roundabout| {
-                roundabout.kerbs(offtrack::map::parametric::Gutter::Drivable).loops.len() as f64 - 2.0
+                roundabout.kerbs(offtrack::map::Gutter::Drivable).loops.len() as f64 - 2.0
             }),
             panel("tightest radius of a route's centre line [m]", &|roundabout| {
                 roundabout

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec2;
 use offtrack::files::reader::{Error as InputError, Reader, shown_path};
+use offtrack::map::chosen::Choice;
 use offtrack::map::opendrive::{Hand, Imported, Map, Options, RoadLane, Way};
-use offtrack::map::parametric::map::Choice;
 
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;

@@ -6,9 +6,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::map::procedural;
 use offtrack::map::route::Route;
+use offtrack::map::{Gutter, Road};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;
@@ -126,7 +126,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 struct Recorded {
     recording: Recording,
     /// As it lies in the world.
-    roundabout: Roundabout,
+    roundabout: Road,
     gutter: Gutter,
     route: Route,
     /// Distances along the route at which its ring begins and ends \[m].
@@ -203,7 +203,7 @@ fn format(output: &Path) -> Result<Format, Error> {
 /// A route of a benchmark, its roundabout, and its index in its split.
 struct Chosen<'a> {
     route: &'a Route,
-    roundabout: &'a Roundabout,
+    roundabout: &'a Road,
     split: Split,
     in_split: usize,
 }

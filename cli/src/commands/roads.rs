@@ -5,7 +5,7 @@ use std::sync::Arc;
 use offtrack::files::cache::{Cache, Loading, Progress};
 use offtrack::files::reader::shortened;
 use offtrack::files::shipped::Kind;
-use offtrack::map::parametric::Roundabout;
+use offtrack::map::Road;
 use offtrack::map::procedural;
 use offtrack::scenario::{Place, Scenario, Split};
 use offtrack::world::World;
@@ -50,7 +50,7 @@ pub fn loading<T>(action: &str, work: impl FnOnce(&Loading) -> T) -> T {
 /// Leaves the benchmark the routes that `--route` names: each a route, or all routes of a roundabout. Those of the
 /// benchmark must be in one of `splits`. A road that the benchmark does not have is added to the last of them.
 pub fn narrow(scenario: &mut Scenario, names: &[String], splits: &[Split]) -> Result<(), Error> {
-    let mut added: Vec<(String, Roundabout)> = Vec::new();
+    let mut added: Vec<(String, Road)> = Vec::new();
     for name in names {
         let of = |split: Split| scenario.split_names(split).iter().any(|route| is_of(route, name));
         if splits.iter().any(|&split| of(split)) {

@@ -5,7 +5,7 @@ use std::process::Output;
 
 use glam::DVec2;
 use offtrack::geometry::Outline;
-use offtrack::map::parametric::{Gutter, Roundabout};
+use offtrack::map::{Gutter, Road};
 use serde_json::Value;
 
 use crate::place::program;
@@ -233,8 +233,8 @@ fn polygons(value: &Value) -> Vec<Polygon> {
     value.as_array().expect("a list").iter().map(list).collect()
 }
 
-fn roundabout() -> Roundabout {
-    Roundabout::read(Path::new(&place("16m"))).expect("the repository's file")
+fn roundabout() -> Road {
+    Road::read(Path::new(&place("16m"))).expect("the repository's file")
 }
 
 fn written(arguments: &[&str]) -> Value {

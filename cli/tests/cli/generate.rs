@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Output;
 
-use offtrack::map::parametric::Roundabout;
+use offtrack::map::Road;
 use offtrack::map::procedural::{Distribution, find};
 
 use crate::place::{Place, offtrack, program, refusal, succeed};
@@ -37,7 +37,7 @@ fn generated_files_are_the_roads_of_the_library_and_a_second_run_writes_the_same
             "{text}"
         );
         assert!(text.ends_with(&road.text()));
-        let read = Roundabout::read(&path).unwrap();
+        let read = Road::read(&path).unwrap();
         assert_eq!(read.name, format!("wide-7-{index}"));
         assert_eq!(format!("{:?}", read.lanes()), format!("{:?}", road.roundabout.lanes()));
     }

@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 use offtrack::geometry::Curve;
-use offtrack::map::parametric::{Gutter, Roundabout};
 use offtrack::map::route::Route;
+use offtrack::map::{Gutter, Road};
 use offtrack::scenario::Scenario;
 
 use super::canvas::{Canvas, Ink};
@@ -102,7 +102,7 @@ impl Backdrop {
 }
 
 /// The ring, and the path of a truck that begins and ends the route with both units on it.
-fn shown(scenario: &Scenario, roundabout: &Roundabout, route: &Route) -> impl Iterator<Item = DVec2> {
+fn shown(scenario: &Scenario, roundabout: &Road, route: &Route) -> impl Iterator<Item = DVec2> {
     let radius = roundabout.outer_radius();
     let whole = roundabout.arms().nth(route.entry).and_then(|entry| roundabout.line(entry, route.lane, route.exit));
     let path = whole.map_or_else(
@@ -115,14 +115,14 @@ fn shown(scenario: &Scenario, roundabout: &Roundabout, route: &Route) -> impl It
     path.polyline(1.0).into_iter().chain([DVec2::splat(-radius), DVec2::splat(radius)])
 }
 
-fn draw_road(map: &mut Canvas, view: &View, pen: f64, roundabout: &Roundabout) {
+fn draw_road(map: &mut Canvas, view: &View, pen: f64, roundabout: &Road) {
     for (area, ink) in [(Gutter::Drivable, colour::GUTTER), (Gutter::Solid, colour::ROAD)] {
         map.areas(&lines(view, &roundabout.kerbs(area).loops), Ink(ink, 1.0));
     }
     map.dashes(&lines(view, &roundabout.lanes()), Ink(colour::LANE, 1.0), 0.9 * pen, LANE_DASHES.map(|length| length * pen));
 }
 
-fn draw_route(map: &mut Canvas, view: &View, pen: f64, roundabout: &Roundabout, route: &Route) {
+fn draw_route(map: &mut Canvas, view: &View, pen: f64, roundabout: &Road, route: &Route) {
     let line = lines(view, std::slice::from_ref(&route.centre_line));
     let width = roundabout.lane_widths(route).into_iter().fold(f64::INFINITY, f64::min);
     map.lines(&line, false, Ink(colour::ROUTE, 0.16), width * view.scale);
@@ -137,7 +137,7 @@ fn draw_route(map: &mut Canvas, view: &View, pen: f64, roundabout: &Roundabout, 
     }
 }
 
-fn draw_kerbs(map: &mut Canvas, view: &View, pen: f64, roundabout: &Roundabout, gutter: Gutter) {
+fn draw_kerbs(map: &mut Canvas, view: &View, pen: f64, roundabout: &Road, gutter: Gutter) {
     map.lines(&lines(view, &roundabout.kerbs(gutter).loops), true, Ink(colour::KERB, 1.0), 1.6 * pen);
 }
 

@@ -2,7 +2,7 @@ use std::sync::LazyLock;
 
 use glam::{DVec2, Vec2};
 use offtrack::cpu::sense;
-use offtrack::map::parametric::Gutter;
+use offtrack::map::Gutter;
 use offtrack::scenario::APPROACH;
 use offtrack::vehicle::swept::{Pose, corners, swept_path};
 
@@ -237,7 +237,7 @@ fn a_left_hand_road_is_drawn_as_it_lies_and_not_as_it_is_driven() {
     let mut scenario = (*DRIVEN.0).clone();
     for place in &mut scenario.places {
         let ground = offtrack::map::ground::Ground { mirrored: true, ..place.roundabout.ground().clone() };
-        place.roundabout = offtrack::map::parametric::Roundabout::on(place.roundabout.name.clone(), ground);
+        place.roundabout = offtrack::map::Road::on(place.roundabout.name.clone(), ground);
     }
     let (mut right, mut left) = (camera(240), Camera::new(Arc::new(scenario), &DRIVEN.1, 240).unwrap());
     let truck = truck(0, 30.0);

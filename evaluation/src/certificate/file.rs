@@ -11,7 +11,7 @@ use std::path::Path;
 
 use offtrack::files::reader::{self, shortened};
 use offtrack::layout::{Rig, Start};
-use offtrack::map::parametric::Gutter;
+use offtrack::map::Gutter;
 use offtrack::scenario::{Clock, Scenario};
 use offtrack::vehicle::Model;
 use offtrack::world::World;

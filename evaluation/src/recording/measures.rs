@@ -3,7 +3,7 @@
 use std::fmt;
 
 use offtrack::layout::{Body, N_TRAILER_RAYS, Ray};
-use offtrack::map::parametric::Roundabout;
+use offtrack::map::Road;
 use offtrack::world::World;
 use serde::{Deserialize, Serialize};
 
@@ -70,7 +70,7 @@ impl Measures {
 
     /// Of the truck that is seen on a roundabout: the mirror image of the one that is driven, where that is.
     #[must_use]
-    pub fn seen(mut self, roundabout: &Roundabout) -> Measures {
+    pub fn seen(mut self, roundabout: &Road) -> Measures {
         if roundabout.is_mirrored() {
             self.trailer_rays.chunks_exact_mut(2).for_each(|pair| pair.swap(0, 1));
             self.tractor_rays.reverse();

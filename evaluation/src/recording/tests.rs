@@ -76,8 +76,8 @@ fn a_recording_read_back_is_the_recording() {
 #[test]
 fn the_tracks_of_a_left_hand_road_are_the_mirror_image_of_what_was_driven() {
     let (world, tracks, _) = driven(&scenario());
-    let right = Roundabout::named("16m").unwrap();
-    let left = Roundabout::on("16m".into(), offtrack::map::ground::Ground { mirrored: true, ..right.ground().clone() });
+    let right = Road::named("16m").unwrap();
+    let left = Road::on("16m".into(), offtrack::map::ground::Ground { mirrored: true, ..right.ground().clone() });
     assert_eq!(tracks[0].clone().seen(&right), tracks[0]);
     let seen = tracks[0].clone().seen(&left);
     for (frame, driven) in seen.frames.iter().zip(&tracks[0].frames) {

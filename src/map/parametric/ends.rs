@@ -5,9 +5,9 @@
 
 use glam::DVec2;
 
-use super::{Gutter, Roundabout};
 use crate::geometry::{Curve, Outline, Piece};
 use crate::map::ground::{Edges, Line};
+use crate::map::{Gutter, Road};
 
 /// By how much an arm is prolonged: more than the longest truck \[m].
 const BEYOND: f64 = 60.0;
@@ -15,8 +15,8 @@ const BEYOND: f64 = 60.0;
 /// \[m].
 const NEAR: f64 = 3.0;
 
-impl Roundabout {
-    /// The edge of the drivable surface as [`Roundabout::kerbs`] gives it, but for the ends of the arms: they lie 60 m
+impl Road {
+    /// The edge of the drivable surface as [`Road::kerbs`] gives it, but for the ends of the arms: they lie 60 m
     /// farther out. Trucks are stepped between the kerbs of the file; this is to find out which lane they fit.
     pub fn kerbs_beyond_ends(&self, gutter: Gutter) -> Outline {
         let lines = &self.ground.lines;
@@ -68,7 +68,7 @@ mod tests {
     use crate::vehicle::swept::{own_lane_suffices, swept_path};
 
     /// A ring of one lane and 17 m with four arms of this length \[m].
-    fn one_lane(length: u32) -> Roundabout {
+    fn one_lane(length: u32) -> Road {
         let carriageway =
             |way: &str, offset: f64| format!("[arm.{way}.kerb]\npoints = [{{ along = 30.0, offset = {offset:?} }}]\nring_radius = 15.0\n");
         let arm = |(name, bearing): (&str, f64)| {
@@ -77,20 +77,20 @@ mod tests {
         };
         let arms: String = [("E", 0.0), ("N", 90.0), ("W", 180.0), ("S", 270.0)].map(arm).concat();
         let ring = "[ring]\nisland_radius = 10.0\ngutter = 0.5\nlane_width = 6.0\nlanes = 1\n";
-        Roundabout::from_toml("one", &format!("{ring}{arms}")).unwrap()
+        Road::from_toml("one", &format!("{ring}{arms}")).unwrap()
     }
 
     #[test]
     fn an_arm_too_short_for_the_truck_is_no_kerb_that_it_sweeps() {
         let rig = Vehicle::named("eu_4x2_13m6").unwrap().rig("empty", 0.05, None);
-        let suffices = |length: u32, kerbs: fn(&Roundabout) -> Outline| {
+        let suffices = |length: u32, kerbs: fn(&Road) -> Outline| {
             let roundabout = one_lane(length);
             let routes = roundabout.routes(40.0, 35.0, 2.0).unwrap();
             let path = |line: &Curve| swept_path(&rig, line, 20.0 / 3.6, 0.25);
             let kerbs = kerbs(&roundabout);
             routes.iter().map(|route| own_lane_suffices(&rig, &kerbs, &path(&route.centre_line))).collect::<Vec<bool>>()
         };
-        let beyond = |roundabout: &Roundabout| roundabout.kerbs_beyond_ends(Gutter::Drivable);
+        let beyond = |roundabout: &Road| roundabout.kerbs_beyond_ends(Gutter::Drivable);
         let (short, long) = (suffices(70, beyond), suffices(90, beyond));
         let n_own = long.iter().filter(|&&own| own).count();
         assert!((short == long) && long.len() == 16 && 0 < n_own && n_own < 16, "{short:?} {long:?}");
@@ -102,7 +102,7 @@ mod tests {
     fn every_arm_goes_on_beyond_its_end_and_its_kerbs_stay_where_they_are() {
         let mut seen = 0;
         for name in Kind::Roundabout.names() {
-            let roundabout = Roundabout::named(name).unwrap();
+            let roundabout = Road::named(name).unwrap();
             for gutter in [Gutter::Drivable, Gutter::Solid] {
                 let (kerbs, open) = (roundabout.kerbs(gutter), roundabout.kerbs_beyond_ends(gutter));
                 for Line { line, .. } in &roundabout.ground.lines {

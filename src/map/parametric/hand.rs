@@ -3,32 +3,12 @@
 //! In such a file everything goes around clockwise. Bearings and offsets change their signs, and the lane next to the
 //! kerb is `left` instead of `right`.
 
-use super::Roundabout;
 use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenPoint, WrittenWay};
 use crate::files::reader::Error;
 use crate::map::ground::Hand;
-use crate::map::route::Route;
 
 /// Words at the end of a message about a position.
 const MIRRORED: &str = "hand = \"left\": positions in this message are those of the mirror image in the x axis";
-
-impl Roundabout {
-    /// Whether the road has left-hand traffic: it is driven as its mirror image in the x axis.
-    pub fn is_mirrored(&self) -> bool {
-        self.ground.mirrored
-    }
-
-    /// The roundabout as it lies in the world, for pictures and results: mirrored back where it has left-hand traffic.
-    /// Routes have the same names; see [`Ground::seen`].
-    pub fn seen(&self) -> Roundabout {
-        Roundabout { name: self.name.clone(), ground: self.ground.seen() }
-    }
-
-    /// A route of this roundabout as it lies in the world.
-    pub fn seen_route(&self, route: &Route) -> Route {
-        if self.is_mirrored() { route.mirrored() } else { route.clone() }
-    }
-}
 
 impl Written {
     pub(super) fn is_left_hand(&self) -> bool {

@@ -63,7 +63,7 @@ pub(super) fn exits(n_arms: usize, entry_lanes: usize) -> Vec<(Lane, u32)> {
 
 /// The stations at which a line first reaches and last leaves the circle of radius `outer` around the ring's centre; if
 /// it passes outside, the station nearest to the centre, twice \[m].
-pub(super) fn ring_stations(line: &Curve, outer: f64) -> (f64, f64) {
+pub(in crate::map) fn ring_stations(line: &Curve, outer: f64) -> (f64, f64) {
     let circle = Curve::circle(DVec2::ZERO, outer);
     let mut begin = 0.0;
     let mut stations = Vec::new();

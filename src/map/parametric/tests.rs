@@ -6,6 +6,8 @@ mod kinds;
 use proptest::prelude::*;
 
 use super::*;
+use crate::map::route::Lane;
+use crate::map::{Gutter, Kerb};
 
 /// A roundabout with four straight arms and only the required keys.
 fn plain() -> String {
@@ -19,8 +21,8 @@ fn plain() -> String {
     text
 }
 
-fn read(text: &str) -> Result<Roundabout, Error> {
-    Roundabout::from_toml("plain", text)
+fn read(text: &str) -> Result<Road, Error> {
+    Road::from_toml("plain", text)
 }
 
 /// The message for the plain roundabout with its `nth` occurrence of `from` replaced.

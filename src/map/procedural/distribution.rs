@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use super::distribution_keys::Keys;
 use super::draw::drawn;
 use super::draws::Draws;
-use super::{Reason, Refused, RandomRoad};
+use super::{RandomRoad, Reason, Refused};
 use crate::files::reader::{Error, Reader};
 use crate::files::shipped::{Kind, Source};
+use crate::map::Road;
+use crate::map::parametric::Stage;
 use crate::map::parametric::written::Written;
-use crate::map::parametric::{Roundabout, Stage};
 
 /// Attempts at a road before the distribution is said to give none.
 const MOST_ATTEMPTS: u32 = 1000;
@@ -65,7 +66,7 @@ impl Distribution {
         Ok(Distribution { name: source.stem(), approach, departure, text, keys, file })
     }
 
-    /// RandomRoad `index` of `seed`.
+    /// Road `index` of `seed`.
     ///
     /// # Errors
     ///
@@ -90,10 +91,10 @@ impl Distribution {
     }
 
     /// The road of one attempt.
-    pub(super) fn attempt(&self, seed: u32, index: u32, attempt: u32) -> Result<(Roundabout, Written), Reason> {
+    pub(super) fn attempt(&self, seed: u32, index: u32, attempt: u32) -> Result<(Road, Written), Reason> {
         let written = drawn(&self.keys, &Draws { seed, road: index, attempt })?;
         let name = format!("{}/{seed}/{index}", self.name);
-        let roundabout = Roundabout::staged(name, Reader::of(&self.file), written.clone()).map_err(|(stage, _)| match stage {
+        let roundabout = Road::staged(name, Reader::of(&self.file), written.clone()).map_err(|(stage, _)| match stage {
             Stage::Values => Reason::Values,
             Stage::Kerbs => Reason::Kerbs,
             Stage::Lanes => Reason::Lanes,

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicU64;
 
 use rayon::prelude::*;
 
-use super::{Distribution, Reason, Refused, RandomRoad};
+use super::{Distribution, RandomRoad, Reason, Refused};
 use crate::files::cache::Loading;
 use crate::files::reader::Error;
 

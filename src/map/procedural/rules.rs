@@ -7,12 +7,12 @@ use glam::DVec2;
 use super::Reason;
 use super::distribution_keys::Rules;
 use crate::geometry::{Curve, Outline, Piece};
-use crate::map::parametric::{Gutter, Roundabout};
 use crate::map::route::Route;
+use crate::map::{Gutter, Road};
 
 impl Rules {
     /// Why the roundabout breaks one of the rules, if it does.
-    pub(super) fn keeps(&self, roundabout: &Roundabout) -> Result<(), Reason> {
+    pub(super) fn keeps(&self, roundabout: &Road) -> Result<(), Reason> {
         let routes = roundabout.routes(self.approach, self.departure, 5.0).map_err(|_| Reason::ArmTooShort)?;
         if routes.iter().any(|route| route.before < self.truck_behind || route.after < self.truck_ahead) {
             return Err(Reason::ArmTooShort);

@@ -53,7 +53,7 @@ fn a_road_written_as_a_file_reads_back_bit_for_bit() {
     for distribution in shipped() {
         for index in 0..30 {
             let road = distribution.road(11, index).unwrap();
-            let read = Roundabout::from_toml(&road.roundabout.name, &road.text()).unwrap();
+            let read = Road::from_toml(&road.roundabout.name, &road.text()).unwrap();
             // Debug prints every number so that it reads back to the same bits.
             assert_eq!(format!("{read:?}"), format!("{:?}", road.roundabout), "{index}");
         }
@@ -93,7 +93,7 @@ fn refused_draws_add_up_to_the_attempts_before_the_valid_one() {
             assert_eq!(Reason::ALL.iter().map(|&reason| road.refused.count(reason)).sum::<u32>(), road.attempt);
             all.add(&road.refused);
         }
-        assert_eq!(all.total(), roads.iter().map(|road| road.attempt).sum());
+        assert_eq!(all.total(), roads.iter().map(|road| road.attempt).sum::<u32>());
         assert!(5 <= Reason::ALL.iter().filter(|&&reason| 0 < all.count(reason)).count(), "{all:?}");
         // No file could have passed the checks with any of the attempts before.
         for road in &roads[..10] {

@@ -6,7 +6,7 @@ use offtrack::field::Field;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::random::{index_below, signed_unit, words};
 use offtrack::layout::{ObservedExtras, Truck};
-use offtrack::map::parametric::Gutter;
+use offtrack::map::Gutter;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 

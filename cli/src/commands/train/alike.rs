@@ -7,7 +7,7 @@
 use bytemuck::bytes_of;
 use offtrack::files::reader::shown;
 use offtrack::layout::{Action, Rig};
-use offtrack::map::parametric::Gutter;
+use offtrack::map::Gutter;
 use offtrack::scenario::Scenario;
 
 /// The action table of a benchmark.
@@ -101,7 +101,7 @@ mod tests {
         let changes: [Change; 10] = [
             ("actions and vehicle lock", |of| of.steer_levels[0] = -0.7),
             ("actions and vehicle lock", |of| of.steer_max = Some(0.5)),
-            ("observation.extras", |of| of.extras = offtrack::layout::Track::Mass),
+            ("observation.extras", |of| of.extras = offtrack::layout::ObservedExtras::Mass),
             ("time.step and time.substeps (0.2 s, 2 in place of 0.1 s, 2)", |of| of.step = 0.2),
             ("sensors.range (10 m in place of 20 m)", |of| of.sensor_range = 10.0),
             ("routes.spacing (1 m in place of 2 m)", |of| of.spacing = 1.0),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use super::Roundabout;
+use super::Road;
 use crate::files::reader::{Error, Reader};
 use crate::map::opendrive::{Hand, Imported, Map, Options, Ring, Way};
 
@@ -65,19 +65,19 @@ impl Choice {
     }
 }
 
-impl Roundabout {
+impl Road {
     /// A ring of an OpenDRIVE map, or ways through a junction of it.
     ///
     /// # Errors
     ///
     /// Those of [`Map::read`] and [`Choice::imported`], and a name that no route could have.
-    pub fn from_map(file: &Path, choice: &Choice) -> Result<Roundabout, Error> {
+    pub fn from_map(file: &Path, choice: &Choice) -> Result<Road, Error> {
         let stem = || file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let name = choice.name.clone().unwrap_or_else(stem);
         if name.is_empty() || 40 < name.len() || name.contains('/') || name.chars().any(char::is_control) {
             return Err(Reader::of(file).invalid("name", format!("{name:?}"), "must be 1 to 40 characters without a slash"));
         }
         let map = Map::read(file, choice.hand)?;
-        Ok(Roundabout::on(name, choice.imported(file, &map)?.ground))
+        Ok(Road::on(name, choice.imported(file, &map)?.ground))
     }
 }
