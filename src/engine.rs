@@ -6,7 +6,7 @@ pub mod stages; // one step, in order
 pub mod wgsl; // what shaders share with Rust, printed
 pub(crate) mod autoreset;
 mod batch;
-pub mod cpu; // the CPU engine: all cores, a truck at a time
+pub(crate) mod cpu; // the CPU engine: all cores, a truck at a time
 mod error;
 #[cfg(feature = "gpu")]
 pub mod gpu; // the engine of compute shaders

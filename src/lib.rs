@@ -15,6 +15,17 @@ pub mod world; // what trucks share, baked
 pub mod engine; // one step in order, on the two engines
 pub mod simulator; // many trucks, many steps, on either engine
 
-pub use engine::cpu;
 #[cfg(feature = "gpu")]
 pub use engine::gpu;
+
+/// The formulas of a step, each for one truck, as the CPU engine computes them.
+pub mod physics {
+    pub use crate::engine::cpu::collide::clearance;
+    pub use crate::engine::cpu::drive::{Motion, Moving, drive_max, driven, load_transfer_ratio, motion_of, moved};
+    pub use crate::engine::cpu::follow::{distance_to_segment, reference_point};
+    pub use crate::engine::cpu::judge::{closeness, rewarded};
+    pub use crate::engine::cpu::observe::observed;
+    pub use crate::engine::cpu::reset::drawn_start;
+    pub use crate::engine::cpu::sense::ranges;
+    pub use crate::engine::cpu::steer::controlled;
+}

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use offtrack::cpu::sense;
+use offtrack::physics;
 use offtrack::layout::{Ended, Truck};
 use offtrack::scenario::Scenario;
 use offtrack::vehicle::swept::swept_path;
@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for &route in &chosen {
             let trucks = driven(&scenario, &world, route);
             for (n, truck) in trucks.iter().enumerate() {
-                let ranges = sense::ranges(world.route_field(route), &world.rigs[0], &world.rays[0], truck, world.params.sensor_range);
+                let ranges = physics::ranges(world.route_field(route), &world.rigs[0], &world.rays[0], truck, world.params.sensor_range);
                 let ended = match (n + 1 < trucks.len(), route % 2) {
                     (true, _) => Ended::Running,
                     (false, 0) => Ended::TrailerCollided,

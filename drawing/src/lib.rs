@@ -47,6 +47,7 @@ use resvg::{tiny_skia, usvg};
 
 /// Why a picture cannot be drawn.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The embedded typeface cannot be read.
     #[error("the typeface cannot be read: {0}")]

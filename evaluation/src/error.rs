@@ -16,6 +16,7 @@ const LONGEST_EXPECTED: usize = 1000;
 
 /// Why training, an evaluation or a command stopped. [`Error::is_wrong_input`] tells wrong input from a failure.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A file cannot be read, or is a wrong scenario, vehicle or roundabout.
     #[error(transparent)]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::recording::{Recorder, Track};
-use offtrack::cpu::reset::drawn_start;
+use offtrack::physics::drawn_start;
 use offtrack::layout::{Control, Ended, Rig, Start, Truck};
 use offtrack::map::route::Route;
 use offtrack::scenario::{Scenario, Split};

@@ -7,7 +7,7 @@
 
 mod measures;
 
-use offtrack::cpu::collide;
+use offtrack::physics;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Clearance, Ended, N_RAYS, N_TRAILER_RAYS};
 use offtrack::map::route::Route;
@@ -74,7 +74,7 @@ impl Frame {
     /// Truck `env` after a reset. A reset computes no clearance, so it is computed here.
     fn at_start(world: &World, batch: &Batch, env: usize) -> Frame {
         let truck = &batch.truck[env];
-        Frame::new(world, batch, env, collide::clearance(world.route_field(truck.route), world.rig(truck), truck))
+        Frame::new(world, batch, env, physics::clearance(world.route_field(truck.route), world.rig(truck), truck))
     }
 
     fn new(world: &World, batch: &Batch, env: usize, clearance: Clearance) -> Frame {

@@ -147,7 +147,7 @@ impl OffTracking {
     }
 
     fn distance(&self, point: Vec2, segment: usize) -> f64 {
-        f64::from(offtrack::cpu::follow::distance_to_segment(point, self.front[segment], self.front[segment + 1]))
+        f64::from(offtrack::physics::distance_to_segment(point, self.front[segment], self.front[segment + 1]))
     }
 }
 

@@ -9,6 +9,7 @@ const LONGEST_MESSAGE: usize = 600;
 
 /// Why there is no policy, or why it cannot drive in a world.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The file cannot be read at all.
     #[error(transparent)]

@@ -105,6 +105,7 @@ impl Deviation {
 
 /// Measured lines that cannot be compared.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A measured route that the roundabout does not have.
     #[error("{key}: {route}; the roundabout has no such route")]

@@ -1,4 +1,4 @@
-//! A truck driven open loop by the simulator's own [`drive`](offtrack::cpu::drive), for comparison with reference
+//! A truck driven open loop by the simulator's own [`drive`](offtrack::physics), for comparison with reference
 //! trajectories.
 //!
 //! `tests/data/physics_vectors.json` holds such cases. A state between two instants of the sub-step grid is computed on
@@ -7,8 +7,8 @@
 mod case;
 
 use glam::Vec2;
-use offtrack::cpu::drive::{Moving, load_transfer_ratio, motion_of, moved};
-use offtrack::cpu::steer::controlled;
+use offtrack::physics::{Moving, load_transfer_ratio, motion_of, moved};
+use offtrack::physics::controlled;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Action, Control, Rig, Truck};
 use serde::Serialize;

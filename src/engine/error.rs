@@ -5,6 +5,7 @@ use super::gpu;
 
 /// What a caller can get wrong about a batch, and how a device can fail.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A batch needs a truck.
     #[error("n_envs: 0; a batch needs at least 1 truck")]

@@ -20,6 +20,7 @@ pub use message::{LONGEST_PATH, differing, printable, shortened, shown, shown_pa
 
 /// What can be wrong with a file.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The file is missing, is not text, or may not be read.
     #[error("{}: cannot be read: {source}", shown_path(file))]

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use offtrack::cpu::reset::drawn_start;
+use offtrack::physics::drawn_start;
 use offtrack::layout::{Start, Truck};
 use offtrack::scenario::{Fleet, Member, Ranges, Scenario};
 use offtrack::simulator::{Begin, Engine, Error, RouteChoice, Simulator};

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec2;
-use offtrack::cpu::observe::observed;
+use offtrack::physics::observed;
 use offtrack::layout::random;
 use offtrack::layout::{N_RAYS, Progress, Truck};
 use offtrack::map::route::{Lane, Route};

@@ -6,8 +6,8 @@ mod states;
 use std::sync::Arc;
 
 use glam::Vec2;
-use offtrack::cpu::drive::drive_max;
-use offtrack::cpu::follow::reference_point;
+use offtrack::physics::drive_max;
+use offtrack::physics::reference_point;
 use offtrack::engine::stages::{STAGES, Stage};
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::random::{Draw, index_below, signed_unit, words};

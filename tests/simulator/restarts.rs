@@ -19,7 +19,7 @@ fn a_truck_begins_at_the_stated_fractions_of_the_largest_start_errors() {
         simulator.reset_from(&starts).unwrap();
         let first = &world.route_waypoints(route)[0];
         for (truck, start) in simulator.batch().truck.iter().zip(&starts) {
-            let point = offtrack::cpu::follow::reference_point(world.rigs[0].wheelbase, truck) - first.position;
+            let point = offtrack::physics::reference_point(world.rigs[0].wheelbase, truck) - first.position;
             // The benchmark's largest errors: 0.3 m and 2 deg. Positions of about 50 m are exact to 4 um in f32.
             assert!((point.dot(first.direction.perp()) - 0.3 * start.offset).abs() < 2e-5, "{truck:?}");
             assert!(point.dot(first.direction).abs() < 2e-5, "{truck:?}");

@@ -1,7 +1,7 @@
 use std::sync::LazyLock;
 
 use glam::{DVec2, Vec2};
-use offtrack::cpu::sense;
+use offtrack::physics;
 use offtrack::map::Gutter;
 use offtrack::scenario::APPROACH;
 use offtrack::vehicle::swept::{Pose, corners, swept_path};
@@ -29,7 +29,7 @@ fn truck(route: u32, s: f64) -> Truck {
 
 fn ranges(truck: &Truck) -> [f32; N_RAYS] {
     let world = &DRIVEN.1;
-    sense::ranges(world.route_field(truck.route), &world.rigs[0], &world.rays[0], truck, world.params.sensor_range)
+    physics::ranges(world.route_field(truck.route), &world.rigs[0], &world.rays[0], truck, world.params.sensor_range)
 }
 
 fn drawn(camera: &mut Camera, truck: &Truck, ended: Ended) -> Vec<u8> {

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use offtrack::cpu::judge;
+use offtrack::physics;
 use offtrack::layout::random;
 use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES, RewardTerms};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
@@ -210,10 +210,10 @@ impl<const N: usize> Rollout for HostRollout<N> {
             for env in 0..n_envs {
                 let terms = RewardTerms {
                     lane_distance: (batch.terms[env].lane_distance * limit / params.reward.lane_distance_limit).min(1.0),
-                    clearance: judge::closeness(&params, &batch.clearance[env]).powf(settings.clearance_power as f32),
+                    clearance: physics::closeness(&params, &batch.clearance[env]).powf(settings.clearance_power as f32),
                     ..batch.terms[env]
                 };
-                steps.reward.push(judge::rewarded(&params, &terms));
+                steps.reward.push(physics::rewarded(&params, &terms));
             }
             let reward = &mut steps.reward[step * n_envs..];
             if let Some(arrival) = arrival {

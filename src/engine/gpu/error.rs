@@ -2,6 +2,7 @@
 
 /// What can go wrong with a device.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// No driver offers one.
     #[error(

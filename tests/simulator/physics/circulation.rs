@@ -1,6 +1,6 @@
 //! Steady circulation in a roundabout's lane: off-tracking and load transfer of the trailer.
 
-use offtrack::cpu::drive::{driven, motion_of};
+use offtrack::physics::{driven, motion_of};
 use offtrack::layout::{Control, Rig, Truck};
 
 use super::vehicle;

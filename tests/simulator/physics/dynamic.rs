@@ -6,7 +6,7 @@
 mod reference;
 
 use glam::DVec2;
-use offtrack::cpu::drive::{driven, motion_of};
+use offtrack::physics::{driven, motion_of};
 use offtrack::layout::{Control, Rig, Truck};
 use offtrack::vehicle::{GRAVITY, Model, Suspension, Vehicle};
 

@@ -1,7 +1,7 @@
 //! Lags and limits of a vehicle's model, each by its closed form.
 
-use offtrack::cpu::drive::{drive_max, driven, motion_of};
-use offtrack::cpu::steer::controlled;
+use offtrack::physics::{drive_max, driven, motion_of};
+use offtrack::physics::controlled;
 use offtrack::layout::{Action, Control, Rig, Truck};
 use offtrack::vehicle::{GRAVITY, Model};
 

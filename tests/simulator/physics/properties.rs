@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use glam::Vec2;
-use offtrack::cpu::drive::driven;
+use offtrack::physics::driven;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Control, Rig, Truck};
 use proptest::prelude::*;

@@ -1,7 +1,7 @@
 //! The target speed is reached and held without overshoot.
 
-use offtrack::cpu::drive::driven;
-use offtrack::cpu::steer::controlled;
+use offtrack::physics::driven;
+use offtrack::physics::controlled;
 use offtrack::layout::{Action, Control, Rig, Truck};
 use proptest::prelude::*;
 

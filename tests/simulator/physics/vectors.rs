@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 
 use bytemuck::bytes_of;
 use glam::DVec2;
-use offtrack::cpu::drive::{Moving, motion_of};
+use offtrack::physics::{Moving, motion_of};
 use offtrack::engine::stages::Stage;
 use offtrack::layout::{Column, Rig, Truck};
 use offtrack::simulator::{Engine, RouteChoice, Simulator};

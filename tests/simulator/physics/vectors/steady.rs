@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec2;
-use offtrack::cpu::drive::motion_of;
+use offtrack::physics::motion_of;
 use offtrack::geometry::{Curve, Piece};
 use offtrack::layout::{Rig, Truck};
 use offtrack::vehicle::swept::swept_path;
