@@ -35,7 +35,7 @@ fn collide(thread: Thread) {
 struct Line {
     begin: vec2<f32>,
     end: vec2<f32>,
-    // What is subtracted from distances: the radius of the capsule, or nothing on the outline itself [m].
+    // What is subtracted from distances: the radius of the capsule, or nothing on the outline itself (m).
     radius: f32,
 }
 
@@ -44,7 +44,7 @@ struct Span {
     line: u32,
     // Which part: 1 is all of the line, 2 and 3 are its halves, 4 to 7 its quarters.
     part: u32,
-    // Lower bounds of the distance to the kerb at both ends [m].
+    // Lower bounds of the distance to the kerb at both ends (m).
     at_begin: f32,
     at_end: f32,
 }
@@ -94,7 +94,7 @@ fn middle(line: Line, part: u32) -> vec2<f32> {
     return line.begin + fraction * (line.end - line.begin);
 }
 
-// Lower bound of the clearance on a span, as the distance is 1-Lipschitz [m].
+// Lower bound of the clearance on a span, as the distance is 1-Lipschitz (m).
 fn bound(line: Line, span: Span) -> f32 {
     return 0.5 * (span.at_begin + span.at_end - width(span.part) * distance(line.begin, line.end)) - line.radius;
 }
@@ -167,7 +167,7 @@ fn body_clearance(
     return least;
 }
 
-// Signed distance at a point of a unit's frame [m].
+// Signed distance at a point of a unit's frame (m).
 fn sampled(field: FieldRow, position: vec2<f32>, heading: vec2<f32>, point: vec2<f32>) -> f32 {
     let p = vec2<f32>(position.x + point.x * heading.x - point.y * heading.y, position.y + point.x * heading.y + point.y * heading.x);
     return field_sample(field, true, p).distance;

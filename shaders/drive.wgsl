@@ -37,21 +37,21 @@ struct Moving {
 
 // Motion of both units at one instant.
 struct Motion {
-    // Curvature of the tractor's steer angle, without lag and limit of grip [1/m].
+    // Curvature of the tractor's steer angle, without lag and limit of grip (1/m).
     steered_curvature: f32,
-    // Of the tractor [rad/s].
+    // Of the tractor (rad/s).
     yaw_rate: f32,
-    // Of the trailer [rad/s].
+    // Of the trailer (rad/s).
     trailer_yaw_rate: f32,
-    // Speed of the drive axle to the left [m/s].
+    // Speed of the drive axle to the left (m/s).
     side_speed: f32,
-    // Of the tractor, to the left [m/s^2].
+    // Of the tractor, to the left (m/s^2).
     lateral_acceleration: f32,
-    // Of the trailer's axle group, to the left [m/s^2].
+    // Of the trailer's axle group, to the left (m/s^2).
     trailer_lateral_acceleration: f32,
 }
 
-// The steer angle that was asked for `delay` sub-steps before sub-step `n` of the step, at most two steps ago [rad].
+// The steer angle that was asked for `delay` sub-steps before sub-step `n` of the step, at most two steps ago (rad).
 fn delayed(delay: u32, n: u32, n_substeps: u32, control: Control) -> f32 {
     if delay <= n {
         return control.steering;
@@ -67,19 +67,19 @@ fn motion_of(rig: Rig, truck: Truck) -> Motion {
     return motion(rig, truck.speed, curvature, truck.curvature_lag, truck.acceleration, truck.heading - truck.trailer_heading);
 }
 
-// Curvature of the path on which the tractor's wheels roll at a steer angle [rad], without slip [1/m].
+// Curvature of the path on which the tractor's wheels roll at a steer angle (rad), without slip (1/m).
 fn steered_curvature(rig: Rig, steering: f32) -> f32 {
     let steered = sin_cos(steering);
     return steered.x / (steered.y * rig.wheelbase);
 }
 
-// Strongest drive at a speed [m/s^2].
+// Strongest drive at a speed (m/s^2).
 fn drive_max(rig: Rig, speed: f32) -> f32 {
     return min(rig.acceleration_max, rig.power / max(speed, POWER_SPEED_MIN));
 }
 
-// Motion of a truck with this speed [m/s], curvature of the steer angle and deviation from it [1/m], acceleration
-// [m/s^2] and articulation [rad].
+// Motion of a truck with this speed (m/s), curvature of the steer angle and deviation from it (1/m), acceleration
+// (m/s^2) and articulation (rad).
 fn motion(rig: Rig, speed: f32, steered_curvature: f32, curvature_lag: f32, acceleration: f32, articulation: f32) -> Motion {
     // The tyres' grip bounds the curvature.
     let grip = rig.lateral_acceleration_max * sqrt(max(1.0 - rig.friction_ellipse * acceleration * acceleration, 0.0));
@@ -95,7 +95,7 @@ fn motion(rig: Rig, speed: f32, steered_curvature: f32, curvature_lag: f32, acce
 }
 
 // The deviation of the path's curvature from the steer angle's, `duration` seconds after it was `lag`, where the steer
-// angle's changes by `rise` in that time [1/m].
+// angle's changes by `rise` in that time (1/m).
 //
 // The tractor's yaw follows its front wheels with the time constant `yaw_lag * speed`: tyres build up lateral force
 // only as slip angles grow. The exponential is its Padé approximant, which is stable at any speed.

@@ -10,7 +10,7 @@ fn follow(thread: Thread) {
     progress[env] = followed(routes[truck[env].route], point, progress[env].waypoint, params.stray_distance);
 }
 
-// Middle of the wheelbase [m].
+// Middle of the wheelbase (m).
 fn reference_point(wheelbase: f32, truck: Truck) -> vec2<f32> {
     return truck.position + 0.5 * wheelbase * direction(truck.heading);
 }
@@ -37,7 +37,7 @@ fn is_passed(waypoint: WaypointRow, point: vec2<f32>, reach: f32) -> bool {
     return 0.0 <= dot(offset, waypoint.direction) && dot(offset, offset) <= reach * reach;
 }
 
-// Distance of `point` from the segment `begin`..`end` [m].
+// Distance of `point` from the segment `begin`..`end` (m).
 fn distance_to_segment(point: vec2<f32>, begin: vec2<f32>, end: vec2<f32>) -> f32 {
     let along = end - begin;
     let fraction = dot(point - begin, along) / max(dot(along, along), TINY);

@@ -62,7 +62,7 @@ const GREATER: u32 = 3u;
 const TILE_COLUMNS: u32 = 4u;
 // The same south to north.
 const TILE_ROWS: u32 = 2u;
-// What a stored value of 1 means: 0.5 mm. Exact in f32 [m].
+// What a stored value of 1 means: 0.5 mm. Exact in f32 (m).
 const STORED_UNIT: f32 = 0.00048828125f;
 // Factor of the linear congruential step that each counter goes through first.
 const FACTOR: u32 = 1664525u;
@@ -80,40 +80,40 @@ const DRAW_POSE: u32 = 1u;
 const DRAW_VEHICLE: u32 = 4294967295u;
 // `Draw::Action`.
 const DRAW_ACTION: u32 = 2u;
-// Braking at which a truck comes to stand [m/s^2].
+// Braking at which a truck comes to stand (m/s^2).
 const HOLD_BRAKING: f32 = 0.5f;
-// Lowest speed that the engine's power is divided by [m/s].
+// Lowest speed that the engine's power is divided by (m/s).
 const POWER_SPEED_MIN: f32 = 1.0f;
-// Keeps a quotient finite at a standstill [m^2/s^2].
+// Keeps a quotient finite at a standstill (m^2/s^2).
 const SPEED_SQUARED_MIN: f32 = 0.01f;
 // Samples taken at once.
 const LANES: u32 = 8u;
 // Points of a unit sampled first, at most.
 const N_FIRST: u32 = 16u;
-// Further than any clearance [m].
+// Further than any clearance (m).
 const FAR: f32 = 340282346638528859811704183484516925440.0f;
 // Points of a tractor's centre line sampled first: with its corners as many as are sampled at once.
 const N_TRACTOR: u32 = 4u;
 // Points of a trailer's centre line sampled first: with its corners twice as many.
 const N_TRAILER: u32 = 12u;
-// Error of a clearance that is always tolerated [m].
+// Error of a clearance that is always tolerated (m).
 const TOLERANCE: f32 = 0.01f;
 // Error that is tolerated as a fraction of the clearance: far from a kerb a centimetre does not matter.
 const FRACTION: f32 = 0.5f;
 // Most undecided spans: at first 11 and 8 of a trailer, then at most 8 more for each of the 8 halvings from 2.5 m
 // to 1 cm.
 const N_SPANS: u32 = 96u;
-// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide
+// The circles at both ends of a step may lie this far apart (m): a kerb thinner than this along the ray can hide
 // between them.
 const GAP: f32 = 0.05f;
-// A step this short is never taken back [m].
+// A step this short is never taken back (m).
 const SHORT: f32 = 0.25f;
-// Closer to a kerb than this, it is taken for straight [m].
+// Closer to a kerb than this, it is taken for straight (m).
 const CLOSE: f32 = 0.15f;
-// This close to a kerb the ray has met it [m].
+// This close to a kerb the ray has met it (m).
 const MET: f32 = 0.004f;
 // Head-on, a ray has met the kerb from this far off: a straight kerb's position is known to a few millimetres then
-// [m].
+// (m).
 const MET_HEAD_ON: f32 = 0.02f;
 // Slope of a ray 5 deg from grazing; flatter ones are not followed to the last centimetre.
 const GRAZING: f32 = 0.087f;
@@ -121,11 +121,11 @@ const GRAZING: f32 = 0.087f;
 const CAUTION: f32 = 0.98f;
 // Most samples of a ray. A ray along a kerb at the longest range takes fewer.
 const SAMPLES_MAX: u32 = 128u;
-// Speed that is observed as 1 [m/s].
+// Speed that is observed as 1 (m/s).
 const SPEED_SCALE: f32 = 27.8f;
-// Distance to a waypoint or its crossing line that is observed as 1 [m].
+// Distance to a waypoint or its crossing line that is observed as 1 (m).
 const WAYPOINT_SCALE: f32 = 20.0f;
-// Distance to the lane centre that is observed as 1 [m].
+// Distance to the lane centre that is observed as 1 (m).
 const LANE_SCALE: f32 = 10.0f;
 // Number of waypoints that angles are taken to.
 const N_LOOK_AHEAD: u32 = 5u;
@@ -153,17 +153,17 @@ const N_CURVATURES: u32 = 8u;
 const RANGES_AT: u32 = 30u;
 // Index of the radii ahead.
 const RADII_AT: u32 = 59u;
-// Acceleration that is observed as 1 [m/s^2].
+// Acceleration that is observed as 1 (m/s^2).
 const ACCELERATION_SCALE: f32 = 2.5f;
-// Lateral acceleration that is observed as 1 [m/s^2].
+// Lateral acceleration that is observed as 1 (m/s^2).
 const G: f32 = 9.81f;
-// Wheelbase that is observed as 1 [m].
+// Wheelbase that is observed as 1 (m).
 const WHEELBASE_SCALE: f32 = 10.0f;
-// Roll that is observed as 1 [rad].
+// Roll that is observed as 1 (rad).
 const ROLL_SCALE: f32 = 0.15f;
-// Roll rate that is observed as 1 [rad/s].
+// Roll rate that is observed as 1 (rad/s).
 const ROLL_RATE_SCALE: f32 = 0.3f;
-// Mass that is observed as 1 [kg].
+// Mass that is observed as 1 (kg).
 const MASS_SCALE: f32 = 40000.0f;
 // Sums in a tally: steps by their end code, then the rewards.
 const N_SUMS: u32 = 9u;
@@ -190,17 +190,17 @@ const TIMED_OUT: u32 = 7u;
 
 // What the steer stage asks of a truck for a step: a steer angle and an acceleration.
 struct Control {
-    // Steer angle asked for [rad].
+    // Steer angle asked for (rad).
     steering: f32,
-    // Acceleration asked for [m/s^2].
+    // Acceleration asked for (m/s^2).
     acceleration: f32,
-    // Integral of the speed error [m].
+    // Integral of the speed error (m).
     speed_error_integral: f32,
-    // Steer angle asked for in the step before [rad].
+    // Steer angle asked for in the step before (rad).
     steering_before: f32,
-    // Steer angle asked for in the step before that [rad].
+    // Steer angle asked for in the step before that (rad).
     steering_earlier: f32,
-    // Target speed [m/s].
+    // Target speed (m/s).
     target_speed: f32,
     // Whether the target speed is 0: once the truck stands, the brakes hold it (0 or 1).
     holds: u32,
@@ -208,27 +208,27 @@ struct Control {
 
 // One tractor and its trailer.
 struct Truck {
-    // Middle of the drive axle [m].
+    // Middle of the drive axle (m).
     position: vec2<f32>,
-    // Heading of the tractor, counter-clockwise from +x [rad].
+    // Heading of the tractor, counter-clockwise from +x (rad).
     heading: f32,
-    // Heading of the trailer, counter-clockwise from +x [rad].
+    // Heading of the trailer, counter-clockwise from +x (rad).
     trailer_heading: f32,
-    // Speed of the drive axle along the tractor's heading [m/s].
+    // Speed of the drive axle along the tractor's heading (m/s).
     speed: f32,
-    // Steer angle of the front axle, left positive [rad].
+    // Steer angle of the front axle, left positive (rad).
     steering: f32,
-    // Roll angle of the tractor [rad].
+    // Roll angle of the tractor (rad).
     tractor_roll: f32,
-    // Roll rate of the tractor [rad/s].
+    // Roll rate of the tractor (rad/s).
     tractor_roll_rate: f32,
-    // Roll angle of the trailer [rad].
+    // Roll angle of the trailer (rad).
     trailer_roll: f32,
-    // Roll rate of the trailer [rad/s].
+    // Roll rate of the trailer (rad/s).
     trailer_roll_rate: f32,
-    // Load transfer ratio of the tractor, the largest of the step in magnitude, signed [1].
+    // Load transfer ratio of the tractor, the largest of the step in magnitude, signed (1).
     tractor_load_transfer_ratio: f32,
-    // Load transfer ratio of the trailer, the largest of the step in magnitude, signed [1].
+    // Load transfer ratio of the trailer, the largest of the step in magnitude, signed (1).
     trailer_load_transfer_ratio: f32,
     // Index of the route in the world.
     route: u32,
@@ -238,11 +238,11 @@ struct Truck {
     steps: u32,
     // Whether the truck's episode has ended and no other has begun, so that no stage changes it (0 or 1).
     held: u32,
-    // Acceleration along the tractor's heading [m/s^2].
+    // Acceleration along the tractor's heading (m/s^2).
     acceleration: f32,
-    // Curvature that the tractor's path has beyond that of the steer angle, because it turns in late [1/m].
+    // Curvature that the tractor's path has beyond that of the steer angle, because it turns in late (1/m).
     curvature_lag: f32,
-    // Lateral acceleration of the trailer's axle group, to the left [m/s^2].
+    // Lateral acceleration of the trailer's axle group, to the left (m/s^2).
     lateral_acceleration: f32,
     // Index of the vehicle in the world.
     vehicle: u32,
@@ -280,22 +280,22 @@ struct BeginRow {
     what: u32,
 }
 
-// Distance from a unit's outline to the nearest solid edge, at most 0 where they touch [m].
+// Distance from a unit's outline to the nearest solid edge, at most 0 where they touch (m).
 //
 // Contact is exact to 2 cm. Otherwise the value is at least the true distance less the field's error, and at most
 // twice the true distance plus 2 cm: far from a kerb fewer points are sampled.
 struct Clearance {
-    // Of the tractor [m].
+    // Of the tractor (m).
     tractor: f32,
-    // Of the trailer [m].
+    // Of the trailer (m).
     trailer: f32,
 }
 
 // How far along its route a truck is.
 struct Progress {
-    // Distance from the reference point to the lane centre [m].
+    // Distance from the reference point to the lane centre (m).
     lane_distance: f32,
-    // Distance from the reference point to the next waypoint [m].
+    // Distance from the reference point to the next waypoint (m).
     waypoint_distance: f32,
     // Index of the next waypoint to pass on the route; the route's number of waypoints once all are passed.
     waypoint: u32,
@@ -317,7 +317,7 @@ struct RewardTerms {
 
 // One distance sensor, fixed to a unit. A tractor's frame starts at the drive axle, a trailer's at its axle group.
 struct Ray {
-    // Mount in the unit's frame, x forward, y left [m].
+    // Mount in the unit's frame, x forward, y left (m).
     origin: vec2<f32>,
     // Unit vector in the unit's frame.
     direction: vec2<f32>,
@@ -325,11 +325,11 @@ struct Ray {
 
 // A rectangle fixed to a unit's frame.
 struct Body {
-    // Front end, ahead of the frame's origin [m].
+    // Front end, ahead of the frame's origin (m).
     front: f32,
-    // Rear end, ahead of the frame's origin (negative when behind) [m].
+    // Rear end, ahead of the frame's origin (negative when behind) (m).
     rear: f32,
-    // Half of the width [m].
+    // Half of the width (m).
     half_width: f32,
 }
 
@@ -357,31 +357,31 @@ struct Lag {
 
 // The vehicle as the stages need it.
 struct Rig {
-    // Front axle ahead of the drive axle [m].
+    // Front axle ahead of the drive axle (m).
     wheelbase: f32,
-    // Fifth wheel ahead of the drive axle [m].
+    // Fifth wheel ahead of the drive axle (m).
     fifth_wheel: f32,
-    // Kingpin ahead of the trailer's axle group [m].
+    // Kingpin ahead of the trailer's axle group (m).
     trailer_wheelbase: f32,
     // Slip factor [rad/(m/s^2)].
     slip: f32,
-    // Largest steer angle [rad].
+    // Largest steer angle (rad).
     steer_max: f32,
-    // Fastest change of the steer angle [rad/s].
+    // Fastest change of the steer angle (rad/s).
     steer_rate: f32,
-    // Strongest braking, negative [m/s^2].
+    // Strongest braking, negative (m/s^2).
     acceleration_min: f32,
-    // Strongest drive [m/s^2].
+    // Strongest drive (m/s^2).
     acceleration_max: f32,
-    // Lateral acceleration that the tyres can hold [m/s^2].
+    // Lateral acceleration that the tyres can hold (m/s^2).
     lateral_acceleration_max: f32,
-    // Speed control: acceleration per speed error [1/s].
+    // Speed control: acceleration per speed error (1/s).
     speed_gain: f32,
-    // Speed control: acceleration per integral of the speed error [1/s^2].
+    // Speed control: acceleration per integral of the speed error (1/s^2).
     speed_integral_gain: f32,
-    // Speed control: speed error beyond which the integral is reset to 0 [m/s].
+    // Speed control: speed error beyond which the integral is reset to 0 (m/s).
     speed_integral_band: f32,
-    // Speed control: strongest braking it asks for, negative [m/s^2].
+    // Speed control: strongest braking it asks for, negative (m/s^2).
     speed_braking: f32,
     // The tractor's outline.
     tractor_body: Body,
@@ -391,7 +391,7 @@ struct Rig {
     tractor_roll: Roll,
     // The trailer's roll.
     trailer_roll: Roll,
-    // Largest shift of a no-slip point by tyre slip [m].
+    // Largest shift of a no-slip point by tyre slip (m).
     slip_lever_max: f32,
     // Time constant, per speed, with which the tractor's yaw follows the steer angle; 0 for at once [s/(m/s)].
     yaw_lag: f32,
@@ -399,16 +399,16 @@ struct Rig {
     drive_lag: Lag,
     // The same when it is braking.
     brake_lag: Lag,
-    // Engine power over the mass of the whole truck [W/kg].
+    // Engine power over the mass of the whole truck (W/kg).
     power: f32,
     // Friction ellipse: the lateral grip is that of free rolling times `sqrt(1 - friction_ellipse acceleration²)`;
     // 0 where drive and braking take no lateral grip [(s^2/m)^2].
     friction_ellipse: f32,
-    // Lateral acceleration that the road's fall to the right adds to the roll [m/s^2].
+    // Lateral acceleration that the road's fall to the right adds to the roll (m/s^2).
     crossfall: f32,
     // Sub-steps from a steer command to the first movement of the wheels.
     steer_delay: u32,
-    // Mass of the trailer with its load [kg].
+    // Mass of the trailer with its load (kg).
     trailer_mass: f32,
     // Constant lateral acceleration at which the trailer's inner wheels lift, in units of gravity.
     rollover_threshold: f32,
@@ -420,15 +420,15 @@ struct Rig {
 
 // One entry of the action table.
 struct Action {
-    // Steer angle asked for [rad].
+    // Steer angle asked for (rad).
     steering: f32,
-    // Speed asked for or, with `Params::changes_speed`, by how much the target speed changes [m/s].
+    // Speed asked for or, with `Params::changes_speed`, by how much the target speed changes (m/s).
     speed: f32,
 }
 
 // Time and weights, shared by all trucks.
 struct Params {
-    // Time of one sub-step [s].
+    // Time of one sub-step (s).
     substep: f32,
     // Sub-steps in a step.
     n_substeps: u32,
@@ -436,19 +436,19 @@ struct Params {
     n_actions: u32,
     // Vehicles that an episode draws from.
     n_vehicles: u32,
-    // Range of a distance sensor [m].
+    // Range of a distance sensor (m).
     sensor_range: f32,
-    // Largest lateral offset at the start [m].
+    // Largest lateral offset at the start (m).
     start_offset: f32,
-    // Largest heading error at the start [rad].
+    // Largest heading error at the start (rad).
     start_heading: f32,
-    // Middle of the speeds at the start [m/s].
+    // Middle of the speeds at the start (m/s).
     start_speed: f32,
-    // Half of their range [m/s].
+    // Half of their range (m/s).
     start_speed_range: f32,
-    // Lowest target speed [m/s].
+    // Lowest target speed (m/s).
     target_speed_min: f32,
-    // Highest target speed [m/s].
+    // Highest target speed (m/s).
     target_speed_max: f32,
     // Whether an action changes the target speed by its speed, rather than states it (0 or 1).
     changes_speed: u32,
@@ -456,19 +456,19 @@ struct Params {
     n_classes: u32,
     // Extras that are observed, the first ones; the others stay 0.
     n_extras: u32,
-    // Distance to the next waypoint beyond which it cannot be passed and the truck has strayed [m].
+    // Distance to the next waypoint beyond which it cannot be passed and the truck has strayed (m).
     stray_distance: f32,
-    // Articulation beyond which the truck is jackknifed [rad].
+    // Articulation beyond which the truck is jackknifed (rad).
     jackknife_angle: f32,
     // Load transfer ratio from which the truck has rolled over.
     rollover_ratio: f32,
-    // Distance to the lane centre at which its reward term is 1 [m].
+    // Distance to the lane centre at which its reward term is 1 (m).
     lane_distance_limit: f32,
     // Reward for each waypoint passed.
     waypoint_weight: f32,
     // Reward for the lane-distance term, each step.
     lane_distance_weight: f32,
-    // Margin kept from kerbs, within which the clearance term counts [m].
+    // Margin kept from kerbs, within which the clearance term counts (m).
     clearance_limit: f32,
     // Reward for the clearance term, each step.
     clearance_weight: f32,
@@ -478,7 +478,7 @@ struct Params {
 
 // One waypoint of one route.
 struct WaypointRow {
-    // Position on the lane centre [m].
+    // Position on the lane centre (m).
     position: vec2<f32>,
     // Unit vector along the lane.
     direction: vec2<f32>,
@@ -486,7 +486,7 @@ struct WaypointRow {
 
 // The values of an observation that depend on the next waypoint alone.
 struct PreviewRow {
-    // Heading of the lane [rad].
+    // Heading of the lane (rad).
     heading: f32,
     // Scaled as observed: 4 future curvatures, 4 current ones, 10 radii ahead.
     values: array<f32, 18>,
@@ -500,17 +500,17 @@ struct RouteRow {
     n_waypoints: u32,
     // Its roundabout.
     roundabout: u32,
-    // Reach of a waypoint's crossing line to the left [m].
+    // Reach of a waypoint's crossing line to the left (m).
     crossing_left: f32,
-    // Reach of a waypoint's crossing line to the right [m].
+    // Reach of a waypoint's crossing line to the right (m).
     crossing_right: f32,
 }
 
 // One roundabout's field among the tables of all fields.
 struct FieldRow {
-    // South-west corner of the grid [m].
+    // South-west corner of the grid (m).
     origin: vec2<f32>,
-    // Cells in a metre [1/m].
+    // Cells in a metre (1/m).
     cells_per_metre: f32,
     // Slope of the distance where it rises by one stored unit across a cell.
     slope: f32,
@@ -572,11 +572,11 @@ struct BatchFacts {
 @group(0) @binding(16) var<storage, read_write> control: array<Control>;
 // The trucks, [n_envs].
 @group(0) @binding(17) var<storage, read_write> truck: array<Truck>;
-// Distances to the kerbs [m], [n_envs].
+// Distances to the kerbs (m), [n_envs].
 @group(0) @binding(18) var<storage, read_write> clearance: array<Clearance>;
 // Progress along the routes, [n_envs].
 @group(0) @binding(19) var<storage, read_write> progress: array<Progress>;
-// Distance sensors [m], [n_envs, 29].
+// Distance sensors (m), [n_envs, 29].
 @group(0) @binding(20) var<storage, read_write> ranges: array<f32>;
 // The observation before the next action, [n_envs, 69].
 @group(0) @binding(21) var<storage, read_write> observation: array<f32>;

@@ -117,7 +117,7 @@ fn observed(env: u32, after_reset: bool) {
     }
 }
 
-// Signed angle from `a` to `b`, left positive [rad].
+// Signed angle from `a` to `b`, left positive (rad).
 fn angle_between(a: vec2<f32>, b: vec2<f32>) -> f32 {
     return arc_tangent(a.x * b.y - a.y * b.x, dot(a, b));
 }

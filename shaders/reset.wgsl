@@ -76,7 +76,7 @@ fn route_of(env: u32, episode: u32) -> u32 {
     return choice[index];
 }
 
-// A truck at `waypoint`, where the lane has this heading [rad]: trailer straight, offset and turned as `start` says.
+// A truck at `waypoint`, where the lane has this heading (rad): trailer straight, offset and turned as `start` says.
 fn started(params: Params, wheelbase: f32, waypoint: WaypointRow, lane_heading: f32, start: Start) -> Truck {
     let heading = wrapped(lane_heading + start.heading * params.start_heading);
     let point = waypoint.position + start.offset * params.start_offset * perpendicular(waypoint.direction);

@@ -19,7 +19,7 @@ fn sense_after_reset(thread: Thread) {
     ranges[ray] = range_of(ray / N_RAYS, ray % N_RAYS);
 }
 
-// Distance along a truck's ray to the kerb: the sensors' range where none is met before, 0 from inside one [m].
+// Distance along a truck's ray to the kerb: the sensors' range where none is met before, 0 from inside one (m).
 fn range_of(env: u32, index: u32) -> f32 {
     let truck = truck[env];
     let ray = rays[rigs[truck.vehicle].chassis * N_RAYS + index];
@@ -36,7 +36,7 @@ fn range_of(env: u32, index: u32) -> f32 {
 // Within 2 cm of the exact distance, except for rays that come within 2 cm of a kerb at less than 5 deg to it.
 fn traced(field: FieldRow, origin: vec2<f32>, ahead: vec2<f32>, reach: f32) -> f32 {
     // Distances along the ray of the next sample and of the start of the last accepted step, and the radius of the free
-    // circle there [m].
+    // circle there (m).
     var along = 0.0;
     var base = 0.0;
     var free = 0.0;

@@ -17,7 +17,7 @@ fn targeted(params: Params, action: Action, before: Control) -> Action {
     return Action(action.steering, select(action.speed, changed, params.changes_speed == 1u));
 }
 
-// The control for the next `duration` seconds of a truck at `speed` [m/s] that was controlled by `before`.
+// The control for the next `duration` seconds of a truck at `speed` (m/s) that was controlled by `before`.
 //
 // PI controller with anti-windup: the integral is reset to 0 while the error is large, and kept while the acceleration
 // asked for is out of reach. Otherwise a long approach to the target speed would overshoot it. A target of 0 is reached

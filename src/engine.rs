@@ -35,7 +35,7 @@ pub(crate) trait EngineBatch: Any + Debug + Send + Sync {
     /// Trucks in the batch.
     fn n_envs(&self) -> usize;
 
-    /// Memory of the columns \[bytes].
+    /// Memory of the columns (bytes).
     fn bytes(&self) -> usize;
 
     /// The columns on the host.

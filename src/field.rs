@@ -30,7 +30,7 @@ constants! {
     const TILE_COLUMNS: u32 = 4;
     /// The same south to north.
     const TILE_ROWS: u32 = 2;
-    /// What a stored value of 1 means: 0.5 mm. Exact in f32 \[m].
+    /// What a stored value of 1 means: 0.5 mm. Exact in f32 (m).
     pub(crate) const STORED_UNIT: f32 = 1.0 / 2048.0;
 }
 /// How a cell's blocks make the distance.
@@ -81,9 +81,9 @@ const WHOLE_BITS: u32 = 0x7f_ffff;
 /// Signed distance to the kerbs of one roundabout.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
-    /// South-west corner of the grid \[m].
+    /// South-west corner of the grid (m).
     pub origin: Vec2,
-    /// Cells in a metre [1/m].
+    /// Cells in a metre (1/m).
     pub cells_per_metre: f32,
     /// Cells from west to east, a multiple of 4.
     pub columns: u32,
@@ -107,7 +107,7 @@ pub struct Field {
 /// The field at several points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Samples<const N: usize> {
-    /// Signed distance \[m].
+    /// Signed distance (m).
     pub distance: [f32; N],
     /// Derivative to the east.
     pub east: [f32; N],
@@ -136,7 +136,7 @@ pub(crate) enum Purpose {
 }
 
 impl Field {
-    /// Signed distance at `p`. Outside the grid everything is solid and the value keeps falling \[m].
+    /// Signed distance at `p`. Outside the grid everything is solid and the value keeps falling (m).
     ///
     /// Up to 5 m from a kerb the error is at most 1 cm, or 3 cm within 0.5 m of a kink of the distance; on a smooth
     /// kerb it is at most 1 mm. Beyond 7.5 m inside a solid, and beyond 15.9 m from all kerbs, the value stays.
@@ -227,7 +227,7 @@ impl Field {
         Samples { distance, east, north }
     }
 
-    /// Size of the tables \[bytes].
+    /// Size of the tables (bytes).
     pub fn bytes(&self) -> usize {
         size_of_val(self.cells.as_slice()) + size_of_val(self.values.as_slice())
     }

@@ -26,26 +26,26 @@ pub use outline::{Nearby, Outline};
 pub enum Piece {
     /// A straight piece.
     Segment {
-        /// Where it begins \[m].
+        /// Where it begins (m).
         from: DVec2,
-        /// Where it ends \[m].
+        /// Where it ends (m).
         to: DVec2,
     },
     /// A circular piece.
     Arc {
-        /// Centre of its circle \[m].
+        /// Centre of its circle (m).
         centre: DVec2,
-        /// Radius of its circle, positive \[m].
+        /// Radius of its circle, positive (m).
         radius: f64,
-        /// Direction from the centre to its beginning \[rad].
+        /// Direction from the centre to its beginning (rad).
         from: f64,
-        /// Angle covered, positive counter-clockwise, at most a full turn either way \[rad].
+        /// Angle covered, positive counter-clockwise, at most a full turn either way (rad).
         sweep: f64,
     },
 }
 
 impl Piece {
-    /// Length along the piece \[m].
+    /// Length along the piece (m).
     pub fn length(&self) -> f64 {
         match *self {
             Piece::Segment { from, to } => from.distance(to),
@@ -53,7 +53,7 @@ impl Piece {
         }
     }
 
-    /// First point \[m].
+    /// First point (m).
     pub fn start(&self) -> DVec2 {
         match *self {
             Piece::Segment { from, .. } => from,
@@ -61,7 +61,7 @@ impl Piece {
         }
     }
 
-    /// Last point \[m].
+    /// Last point (m).
     pub fn end(&self) -> DVec2 {
         match *self {
             Piece::Segment { to, .. } => to,
@@ -69,7 +69,7 @@ impl Piece {
         }
     }
 
-    /// The point `s` metres from the beginning, `s` within the piece \[m].
+    /// The point `s` metres from the beginning, `s` within the piece (m).
     pub fn point_at(&self, s: f64) -> DVec2 {
         match *self {
             Piece::Segment { from, to } => from + (to - from).normalize_or_zero() * s,
@@ -77,7 +77,7 @@ impl Piece {
         }
     }
 
-    /// Direction of travel `s` metres from the beginning, in (-pi, pi] \[rad].
+    /// Direction of travel `s` metres from the beginning, in (-pi, pi] (rad).
     pub fn heading_at(&self, s: f64) -> f64 {
         match *self {
             Piece::Segment { from, to } => (to - from).to_angle(),
@@ -85,7 +85,7 @@ impl Piece {
         }
     }
 
-    /// Distance from `p` to the nearest point of the piece \[m].
+    /// Distance from `p` to the nearest point of the piece (m).
     pub fn distance(&self, p: DVec2) -> f64 {
         match *self {
             Piece::Segment { from, to } => {
@@ -108,7 +108,7 @@ impl Piece {
         }
     }
 
-    /// The same piece turned counter-clockwise around the origin by `angle` \[rad].
+    /// The same piece turned counter-clockwise around the origin by `angle` (rad).
     pub fn turned(&self, angle: f64) -> Piece {
         let turn = DVec2::from_angle(angle);
         match *self {
@@ -137,7 +137,7 @@ impl Piece {
     }
 
     /// The piece `distance` to the left of this one, or to the right of it if negative; `None` if an arc would shrink
-    /// to nothing \[m].
+    /// to nothing (m).
     pub fn beside(&self, distance: f64) -> Option<Piece> {
         match *self {
             Piece::Segment { from, to } => {
@@ -162,7 +162,7 @@ impl Piece {
         }
     }
 
-    /// Station of `p`, a point of the piece: its distance from the beginning along the piece \[m].
+    /// Station of `p`, a point of the piece: its distance from the beginning along the piece (m).
     pub(crate) fn station(&self, p: DVec2) -> f64 {
         match *self {
             Piece::Segment { from, to } => (p - from).dot((to - from).normalize_or_zero()).clamp(0.0, self.length()),
@@ -190,22 +190,22 @@ impl Curve {
         Curve { pieces: vec![Piece::Arc { centre, radius, from: 0.0, sweep: TAU }] }
     }
 
-    /// Length along the curve \[m].
+    /// Length along the curve (m).
     pub fn length(&self) -> f64 {
         self.pieces.iter().map(Piece::length).sum()
     }
 
-    /// The point `s` metres from the beginning, `s` clamped to the curve; the origin for a curve without pieces \[m].
+    /// The point `s` metres from the beginning, `s` clamped to the curve; the origin for a curve without pieces (m).
     pub fn point_at(&self, s: f64) -> DVec2 {
         self.piece_at(s).map_or(DVec2::ZERO, |(piece, s)| piece.point_at(s))
     }
 
-    /// Direction of travel `s` metres from the beginning, `s` clamped to the curve, in (-pi, pi] \[rad].
+    /// Direction of travel `s` metres from the beginning, `s` clamped to the curve, in (-pi, pi] (rad).
     pub fn heading_at(&self, s: f64) -> f64 {
         self.piece_at(s).map_or(0.0, |(piece, s)| piece.heading_at(s))
     }
 
-    /// Radius of the tightest arc; infinite for a curve without arcs \[m].
+    /// Radius of the tightest arc; infinite for a curve without arcs (m).
     pub fn least_radius(&self) -> f64 {
         let radius = |piece: &Piece| match *piece {
             Piece::Arc { radius, .. } => radius,
@@ -214,12 +214,12 @@ impl Curve {
         self.pieces.iter().map(radius).fold(f64::INFINITY, f64::min)
     }
 
-    /// Distance from `p` to the nearest point of the curve; infinite for a curve without pieces \[m].
+    /// Distance from `p` to the nearest point of the curve; infinite for a curve without pieces (m).
     pub fn distance(&self, p: DVec2) -> f64 {
         self.pieces.iter().map(|piece| piece.distance(p)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Points on the curve, both ends included, whose chords leave it by at most `tolerance` \[m].
+    /// Points on the curve, both ends included, whose chords leave it by at most `tolerance` (m).
     pub fn polyline(&self, tolerance: f64) -> Vec<DVec2> {
         let mut points: Vec<DVec2> = self.pieces.first().map(Piece::start).into_iter().collect();
         for piece in &self.pieces {
@@ -240,7 +240,7 @@ impl Curve {
         Curve { pieces: self.pieces.iter().rev().map(Piece::reversed).collect() }
     }
 
-    /// The same curve turned counter-clockwise around the origin by `angle` \[rad].
+    /// The same curve turned counter-clockwise around the origin by `angle` (rad).
     pub fn turned(&self, angle: f64) -> Curve {
         Curve { pieces: self.pieces.iter().map(|piece| piece.turned(angle)).collect() }
     }
@@ -265,7 +265,7 @@ impl Curve {
         Curve { pieces }
     }
 
-    /// Station of the curve's point nearest to `p`: its distance from the beginning along the curve \[m].
+    /// Station of the curve's point nearest to `p`: its distance from the beginning along the curve (m).
     pub fn station(&self, p: DVec2) -> f64 {
         let mut begin = 0.0;
         let mut best = (f64::INFINITY, 0.0);
@@ -279,7 +279,7 @@ impl Curve {
         best.1
     }
 
-    /// The area enclosed by a closed curve, positive counter-clockwise \[m²].
+    /// The area enclosed by a closed curve, positive counter-clockwise (m²).
     pub fn signed_area(&self) -> f64 {
         let area = |piece: &Piece| match *piece {
             Piece::Segment { from, to } => from.perp_dot(to) / 2.0,
@@ -304,7 +304,7 @@ impl Curve {
     }
 }
 
-/// `angle` brought into (-pi, pi] \[rad].
+/// `angle` brought into (-pi, pi] (rad).
 pub fn wrapped(angle: f64) -> f64 {
     PI - (PI - angle).rem_euclid(TAU)
 }

@@ -51,17 +51,17 @@ constants! {
 crate::shared! {
     /// What the steer stage asks of a truck for a step: a steer angle and an acceleration.
     pub struct Control {
-        /// Steer angle asked for \[rad].
+        /// Steer angle asked for (rad).
         pub steering: f32,
-        /// Acceleration asked for \[m/s^2].
+        /// Acceleration asked for (m/s^2).
         pub acceleration: f32,
-        /// Integral of the speed error \[m].
+        /// Integral of the speed error (m).
         pub speed_error_integral: f32,
-        /// Steer angle asked for in the step before \[rad].
+        /// Steer angle asked for in the step before (rad).
         pub steering_before: f32,
-        /// Steer angle asked for in the step before that \[rad].
+        /// Steer angle asked for in the step before that (rad).
         pub steering_earlier: f32,
-        /// Target speed \[m/s].
+        /// Target speed (m/s).
         pub target_speed: f32,
         /// Whether the target speed is 0: once the truck stands, the brakes hold it (0 or 1).
         pub holds: u32,
@@ -69,27 +69,27 @@ crate::shared! {
 
     /// One tractor and its trailer.
     pub struct Truck {
-        /// Middle of the drive axle \[m].
+        /// Middle of the drive axle (m).
         pub position: Vec2,
-        /// Heading of the tractor, counter-clockwise from +x \[rad].
+        /// Heading of the tractor, counter-clockwise from +x (rad).
         pub heading: f32,
-        /// Heading of the trailer, counter-clockwise from +x \[rad].
+        /// Heading of the trailer, counter-clockwise from +x (rad).
         pub trailer_heading: f32,
-        /// Speed of the drive axle along the tractor's heading \[m/s].
+        /// Speed of the drive axle along the tractor's heading (m/s).
         pub speed: f32,
-        /// Steer angle of the front axle, left positive \[rad].
+        /// Steer angle of the front axle, left positive (rad).
         pub steering: f32,
-        /// Roll angle of the tractor \[rad].
+        /// Roll angle of the tractor (rad).
         pub tractor_roll: f32,
-        /// Roll rate of the tractor \[rad/s].
+        /// Roll rate of the tractor (rad/s).
         pub tractor_roll_rate: f32,
-        /// Roll angle of the trailer \[rad].
+        /// Roll angle of the trailer (rad).
         pub trailer_roll: f32,
-        /// Roll rate of the trailer \[rad/s].
+        /// Roll rate of the trailer (rad/s).
         pub trailer_roll_rate: f32,
-        /// Load transfer ratio of the tractor, the largest of the step in magnitude, signed \[1].
+        /// Load transfer ratio of the tractor, the largest of the step in magnitude, signed (1).
         pub tractor_load_transfer_ratio: f32,
-        /// Load transfer ratio of the trailer, the largest of the step in magnitude, signed \[1].
+        /// Load transfer ratio of the trailer, the largest of the step in magnitude, signed (1).
         pub trailer_load_transfer_ratio: f32,
         /// Index of the route in the world.
         pub route: u32,
@@ -99,11 +99,11 @@ crate::shared! {
         pub steps: u32,
         /// Whether the truck's episode has ended and no other has begun, so that no stage changes it (0 or 1).
         pub held: u32,
-        /// Acceleration along the tractor's heading \[m/s^2].
+        /// Acceleration along the tractor's heading (m/s^2).
         pub acceleration: f32,
-        /// Curvature that the tractor's path has beyond that of the steer angle, because it turns in late \[1/m].
+        /// Curvature that the tractor's path has beyond that of the steer angle, because it turns in late (1/m).
         pub curvature_lag: f32,
-        /// Lateral acceleration of the trailer's axle group, to the left \[m/s^2].
+        /// Lateral acceleration of the trailer's axle group, to the left (m/s^2).
         pub lateral_acceleration: f32,
         /// Index of the vehicle in the world.
         pub vehicle: u32,
@@ -141,22 +141,22 @@ crate::shared! {
         pub what: u32,
     }
 
-    /// Distance from a unit's outline to the nearest solid edge, at most 0 where they touch \[m].
+    /// Distance from a unit's outline to the nearest solid edge, at most 0 where they touch (m).
     ///
     /// Contact is exact to 2 cm. Otherwise the value is at least the true distance less the field's error, and at most
     /// twice the true distance plus 2 cm: far from a kerb fewer points are sampled.
     pub struct Clearance {
-        /// Of the tractor \[m].
+        /// Of the tractor (m).
         pub tractor: f32,
-        /// Of the trailer \[m].
+        /// Of the trailer (m).
         pub trailer: f32,
     }
 
     /// How far along its route a truck is.
     pub struct Progress {
-        /// Distance from the reference point to the lane centre \[m].
+        /// Distance from the reference point to the lane centre (m).
         pub lane_distance: f32,
-        /// Distance from the reference point to the next waypoint \[m].
+        /// Distance from the reference point to the next waypoint (m).
         pub waypoint_distance: f32,
         /// Index of the next waypoint to pass on the route; the route's number of waypoints once all are passed.
         pub waypoint: u32,
@@ -178,7 +178,7 @@ crate::shared! {
 
     /// One distance sensor, fixed to a unit. A tractor's frame starts at the drive axle, a trailer's at its axle group.
     pub struct Ray {
-        /// Mount in the unit's frame, x forward, y left \[m].
+        /// Mount in the unit's frame, x forward, y left (m).
         pub origin: Vec2,
         /// Unit vector in the unit's frame.
         pub direction: Vec2,
@@ -186,11 +186,11 @@ crate::shared! {
 
     /// A rectangle fixed to a unit's frame.
     pub struct Body {
-        /// Front end, ahead of the frame's origin \[m].
+        /// Front end, ahead of the frame's origin (m).
         pub front: f32,
-        /// Rear end, ahead of the frame's origin (negative when behind) \[m].
+        /// Rear end, ahead of the frame's origin (negative when behind) (m).
         pub rear: f32,
-        /// Half of the width \[m].
+        /// Half of the width (m).
         pub half_width: f32,
     }
 
@@ -218,31 +218,31 @@ crate::shared! {
 
     /// The vehicle as the stages need it.
     pub struct Rig {
-        /// Front axle ahead of the drive axle \[m].
+        /// Front axle ahead of the drive axle (m).
         pub wheelbase: f32,
-        /// Fifth wheel ahead of the drive axle \[m].
+        /// Fifth wheel ahead of the drive axle (m).
         pub fifth_wheel: f32,
-        /// Kingpin ahead of the trailer's axle group \[m].
+        /// Kingpin ahead of the trailer's axle group (m).
         pub trailer_wheelbase: f32,
-        /// Slip factor \[rad/(m/s^2)].
+        /// Slip factor (rad/(m/s^2)).
         pub slip: f32,
-        /// Largest steer angle \[rad].
+        /// Largest steer angle (rad).
         pub steer_max: f32,
-        /// Fastest change of the steer angle \[rad/s].
+        /// Fastest change of the steer angle (rad/s).
         pub steer_rate: f32,
-        /// Strongest braking, negative \[m/s^2].
+        /// Strongest braking, negative (m/s^2).
         pub acceleration_min: f32,
-        /// Strongest drive \[m/s^2].
+        /// Strongest drive (m/s^2).
         pub acceleration_max: f32,
-        /// Lateral acceleration that the tyres can hold \[m/s^2].
+        /// Lateral acceleration that the tyres can hold (m/s^2).
         pub lateral_acceleration_max: f32,
-        /// Speed control: acceleration per speed error \[1/s].
+        /// Speed control: acceleration per speed error (1/s).
         pub speed_gain: f32,
-        /// Speed control: acceleration per integral of the speed error \[1/s^2].
+        /// Speed control: acceleration per integral of the speed error (1/s^2).
         pub speed_integral_gain: f32,
-        /// Speed control: speed error beyond which the integral is reset to 0 \[m/s].
+        /// Speed control: speed error beyond which the integral is reset to 0 (m/s).
         pub speed_integral_band: f32,
-        /// Speed control: strongest braking it asks for, negative \[m/s^2].
+        /// Speed control: strongest braking it asks for, negative (m/s^2).
         pub speed_braking: f32,
         /// The tractor's outline.
         pub tractor_body: Body,
@@ -252,24 +252,24 @@ crate::shared! {
         pub tractor_roll: Roll,
         /// The trailer's roll.
         pub trailer_roll: Roll,
-        /// Largest shift of a no-slip point by tyre slip \[m].
+        /// Largest shift of a no-slip point by tyre slip (m).
         pub slip_lever_max: f32,
-        /// Time constant, per speed, with which the tractor's yaw follows the steer angle; 0 for at once \[s/(m/s)].
+        /// Time constant, per speed, with which the tractor's yaw follows the steer angle; 0 for at once (s/(m/s)).
         pub yaw_lag: f32,
         /// How the acceleration follows what is asked for when that is drive.
         pub drive_lag: Lag,
         /// The same when it is braking.
         pub brake_lag: Lag,
-        /// Engine power over the mass of the whole truck \[W/kg].
+        /// Engine power over the mass of the whole truck (W/kg).
         pub power: f32,
         /// Friction ellipse: the lateral grip is that of free rolling times `sqrt(1 - friction_ellipse acceleration²)`;
-        /// 0 where drive and braking take no lateral grip \[(s^2/m)^2].
+        /// 0 where drive and braking take no lateral grip ((s^2/m)^2).
         pub friction_ellipse: f32,
-        /// Lateral acceleration that the road's fall to the right adds to the roll \[m/s^2].
+        /// Lateral acceleration that the road's fall to the right adds to the roll (m/s^2).
         pub crossfall: f32,
         /// Sub-steps from a steer command to the first movement of the wheels.
         pub steer_delay: u32,
-        /// Mass of the trailer with its load \[kg].
+        /// Mass of the trailer with its load (kg).
         pub trailer_mass: f32,
         /// Constant lateral acceleration at which the trailer's inner wheels lift, in units of gravity.
         pub rollover_threshold: f32,
@@ -281,9 +281,9 @@ crate::shared! {
 
     /// One entry of the action table.
     pub struct Action {
-        /// Steer angle asked for \[rad].
+        /// Steer angle asked for (rad).
         pub steering: f32,
-        /// Speed asked for or, with [`Params::changes_speed`], by how much the target speed changes \[m/s].
+        /// Speed asked for or, with [`Params::changes_speed`], by how much the target speed changes (m/s).
         pub speed: f32,
     }
 
@@ -293,11 +293,11 @@ crate::shared! {
         pub waypoint: f32,
         /// Reward for the lane-distance term, each step.
         pub lane_distance: f32,
-        /// Distance to the lane centre at which that term is 1 \[m].
+        /// Distance to the lane centre at which that term is 1 (m).
         pub lane_distance_limit: f32,
         /// Reward for the clearance term, each step.
         pub clearance: f32,
-        /// Margin kept from kerbs, within which that term counts \[m].
+        /// Margin kept from kerbs, within which that term counts (m).
         pub clearance_limit: f32,
         /// Reward when the episode fails.
         pub failure: f32,
@@ -305,7 +305,7 @@ crate::shared! {
 
     /// Time and weights, shared by all trucks.
     pub struct Params {
-        /// Time of one sub-step \[s].
+        /// Time of one sub-step (s).
         pub substep: f32,
         /// Sub-steps in a step.
         pub n_substeps: u32,
@@ -313,19 +313,19 @@ crate::shared! {
         pub n_actions: u32,
         /// Vehicles that an episode draws from.
         pub n_vehicles: u32,
-        /// Range of a distance sensor \[m].
+        /// Range of a distance sensor (m).
         pub sensor_range: f32,
-        /// Largest lateral offset at the start \[m].
+        /// Largest lateral offset at the start (m).
         pub start_offset: f32,
-        /// Largest heading error at the start \[rad].
+        /// Largest heading error at the start (rad).
         pub start_heading: f32,
-        /// Middle of the speeds at the start \[m/s].
+        /// Middle of the speeds at the start (m/s).
         pub start_speed: f32,
-        /// Half of their range \[m/s].
+        /// Half of their range (m/s).
         pub start_speed_range: f32,
-        /// Lowest target speed \[m/s].
+        /// Lowest target speed (m/s).
         pub target_speed_min: f32,
-        /// Highest target speed \[m/s].
+        /// Highest target speed (m/s).
         pub target_speed_max: f32,
         /// Whether an action changes the target speed by its speed, rather than states it (0 or 1).
         pub changes_speed: u32,
@@ -333,9 +333,9 @@ crate::shared! {
         pub n_classes: u32,
         /// Extras that are observed, the first ones; the others stay 0.
         pub n_extras: u32,
-        /// Distance to the next waypoint beyond which it cannot be passed and the truck has strayed \[m].
+        /// Distance to the next waypoint beyond which it cannot be passed and the truck has strayed (m).
         pub stray_distance: f32,
-        /// Articulation beyond which the truck is jackknifed \[rad].
+        /// Articulation beyond which the truck is jackknifed (rad).
         pub jackknife_angle: f32,
         /// Load transfer ratio from which the truck has rolled over.
         pub rollover_ratio: f32,
@@ -345,7 +345,7 @@ crate::shared! {
 
     /// One waypoint of one route.
     pub struct WaypointRow {
-        /// Position on the lane centre \[m].
+        /// Position on the lane centre (m).
         pub position: Vec2,
         /// Unit vector along the lane.
         pub direction: Vec2,
@@ -353,7 +353,7 @@ crate::shared! {
 
     /// The values of an observation that depend on the next waypoint alone.
     pub struct PreviewRow {
-        /// Heading of the lane \[rad].
+        /// Heading of the lane (rad).
         pub heading: f32,
         /// Scaled as observed: 4 future curvatures, 4 current ones, 10 radii ahead.
         pub values: [f32; N_PREVIEW],
@@ -367,17 +367,17 @@ crate::shared! {
         pub n_waypoints: u32,
         /// Its roundabout.
         pub roundabout: u32,
-        /// Reach of a waypoint's crossing line to the left \[m].
+        /// Reach of a waypoint's crossing line to the left (m).
         pub crossing_left: f32,
-        /// Reach of a waypoint's crossing line to the right \[m].
+        /// Reach of a waypoint's crossing line to the right (m).
         pub crossing_right: f32,
     }
 
     /// One roundabout's field among the tables of all fields.
     pub struct FieldRow {
-        /// South-west corner of the grid \[m].
+        /// South-west corner of the grid (m).
         pub origin: Vec2,
-        /// Cells in a metre \[1/m].
+        /// Cells in a metre (1/m).
         pub cells_per_metre: f32,
         /// Slope of the distance where it rises by one stored unit across a cell.
         pub slope: f32,

@@ -25,13 +25,13 @@ pub use check::Invalid;
 pub use fleet::{Class, Drawn, Entry, Fleet, Member, N_VEHICLES, Ranges};
 pub use reward::{REWARD_KEYS, Reward, RewardChanges, RewardKey};
 
-/// Default length of a route before the ring \[m].
+/// Default length of a route before the ring (m).
 pub const APPROACH: f64 = 40.0;
-/// Default length of a route after the ring \[m].
+/// Default length of a route after the ring (m).
 pub const DEPARTURE: f64 = 35.0;
-/// Default distance between waypoints \[m].
+/// Default distance between waypoints (m).
 pub const WAYPOINT_SPACING: f64 = 2.0;
-/// Default width of the distance field's cells \[m].
+/// Default width of the distance field's cells (m).
 pub const FIELD_CELL: f64 = 1.0;
 
 /// What the time limit is a multiple of.
@@ -80,35 +80,35 @@ pub struct Scenario {
     pub load: String,
     /// The vehicles that episodes draw from, where there are several.
     pub fleet: Option<Fleet>,
-    /// Lock of the front wheels in place of the vehicle's own \[rad].
+    /// Lock of the front wheels in place of the vehicle's own (rad).
     pub steer_max: Option<f64>,
     /// Whether a gutter may be driven on.
     pub gutter: Gutter,
-    /// Duration of a step \[s].
+    /// Duration of a step (s).
     pub step: f64,
     /// Physics sub-steps in a step.
     pub n_substeps: u32,
-    /// Width of the distance field's cells \[m].
+    /// Width of the distance field's cells (m).
     pub cell: f64,
     /// Steer levels as fractions of the lock, left positive.
     pub steer_levels: Vec<f64>,
-    /// Target speeds; with `speed_changes` the lowest and highest of them bound the target [m/s].
+    /// Target speeds; with `speed_changes` the lowest and highest of them bound the target (m/s).
     pub speeds: Vec<f64>,
-    /// By how much an action may change the target speed; empty where an action states the target itself [m/s].
+    /// By how much an action may change the target speed; empty where an action states the target itself (m/s).
     pub speed_changes: Vec<f64>,
-    /// Range of the distance sensors \[m].
+    /// Range of the distance sensors (m).
     pub sensor_range: f64,
     /// What is observed beside the observation.
     pub extras: ObservedExtras,
-    /// Largest lateral offset at the start \[m].
+    /// Largest lateral offset at the start (m).
     pub start_offset: f64,
-    /// Largest heading error at the start \[rad].
+    /// Largest heading error at the start (rad).
     pub start_heading: f64,
-    /// Least and greatest speed at the start; the highest target speed where there is none [m/s].
+    /// Least and greatest speed at the start; the highest target speed where there is none (m/s).
     pub start_speed: Option<[f64; 2]>,
-    /// Distance to the next waypoint beyond which the truck has strayed \[m].
+    /// Distance to the next waypoint beyond which the truck has strayed (m).
     pub stray_distance: f64,
-    /// Articulation beyond which the truck is jackknifed \[rad].
+    /// Articulation beyond which the truck is jackknifed (rad).
     pub jackknife_angle: f64,
     /// Load transfer ratio from which the truck has rolled over.
     pub rollover_ratio: f64,
@@ -118,11 +118,11 @@ pub struct Scenario {
     pub clock: Clock,
     /// The weights and limits of its reward.
     pub reward: Reward,
-    /// Length of a route before the ring \[m].
+    /// Length of a route before the ring (m).
     pub approach: f64,
-    /// Length of a route after the ring \[m].
+    /// Length of a route after the ring (m).
     pub departure: f64,
-    /// Distance between waypoints \[m].
+    /// Distance between waypoints (m).
     pub spacing: f64,
     /// The roundabouts.
     pub places: Vec<Place>,
@@ -199,7 +199,7 @@ impl Scenario {
         self.places.iter().enumerate().flat_map(|(index, place)| place.routes.iter().map(move |route| (index, route)))
     }
 
-    /// The action table for a lock \[rad]: pairs of a steer angle and a target speed or a change of it, the speed
+    /// The action table for a lock (rad): pairs of a steer angle and a target speed or a change of it, the speed
     /// varying slowest.
     pub fn actions(&self, lock: f32) -> Vec<Action> {
         let pair = |speed: f64, level: f64| Action { steering: level as f32 * lock, speed: speed as f32 };
@@ -207,13 +207,13 @@ impl Scenario {
         speeds.iter().flat_map(|&speed| self.steer_levels.iter().map(move |&level| pair(speed, level))).collect()
     }
 
-    /// The lowest and the highest target speed [m/s].
+    /// The lowest and the highest target speed (m/s).
     pub fn speed_range(&self) -> [f64; 2] {
         [self.speeds.iter().copied().fold(f64::INFINITY, f64::min), self.cruising_speed()]
     }
 
     /// The highest target speed: trucks start with it, and time limits are computed with it, where the benchmark does
-    /// not say otherwise [m/s].
+    /// not say otherwise (m/s).
     pub fn cruising_speed(&self) -> f64 {
         self.speeds.iter().copied().fold(0.0, f64::max)
     }

@@ -88,7 +88,7 @@ impl Simulator {
         self.batch.n_envs()
     }
 
-    /// Memory of the columns, without the shared world \[bytes].
+    /// Memory of the columns, without the shared world (bytes).
     pub fn bytes(&self) -> usize {
         self.batch.bytes()
     }

@@ -24,7 +24,7 @@ use crate::files::reader::Error;
 use crate::files::shipped::{Kind, Source};
 use crate::layout::{Body, Lag, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, Ray, Rig};
 
-/// Acceleration of free fall [m/s^2].
+/// Acceleration of free fall (m/s^2).
 pub const GRAVITY: f64 = 9.81;
 
 /// A tractor, its trailer, and every load that the trailer may carry. SI units and radians.
@@ -47,23 +47,23 @@ pub struct Vehicle {
 /// The towing unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tractor {
-    /// Front axle ahead of the drive axle \[m].
+    /// Front axle ahead of the drive axle (m).
     pub wheelbase: f64,
-    /// Fifth wheel ahead of the drive axle, negative when behind \[m].
+    /// Fifth wheel ahead of the drive axle, negative when behind (m).
     pub fifth_wheel: f64,
-    /// Front end ahead of the front axle \[m].
+    /// Front end ahead of the front axle (m).
     pub front_overhang: f64,
-    /// Rear end behind the drive axle \[m].
+    /// Rear end behind the drive axle (m).
     pub rear_overhang: f64,
-    /// Width of the outline \[m].
+    /// Width of the outline (m).
     pub width: f64,
-    /// Largest steer angle \[rad].
+    /// Largest steer angle (rad).
     pub steer_max: f64,
-    /// Fastest change of the steer angle [rad/s].
+    /// Fastest change of the steer angle (rad/s).
     pub steer_rate: f64,
     /// Lateral acceleration that the tyres can hold, in units of gravity.
     pub friction: f64,
-    /// Mass \[kg].
+    /// Mass (kg).
     pub mass: f64,
     /// Its roll.
     pub suspension: Suspension,
@@ -72,26 +72,26 @@ pub struct Tractor {
 /// The towed unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trailer {
-    /// Kingpin ahead of the axle group's centre \[m].
+    /// Kingpin ahead of the axle group's centre (m).
     pub wheelbase: f64,
-    /// Front end ahead of the kingpin \[m].
+    /// Front end ahead of the kingpin (m).
     pub kingpin_to_front: f64,
-    /// Rear end behind the kingpin \[m].
+    /// Rear end behind the kingpin (m).
     pub kingpin_to_rear: f64,
-    /// Width of the outline \[m].
+    /// Width of the outline (m).
     pub width: f64,
 }
 
 /// A load of the trailer, and how the truck moves with it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Load {
-    /// Mass of the trailer with its load \[kg].
+    /// Mass of the trailer with its load (kg).
     pub mass: f64,
     /// Slip angle of an axle per lateral acceleration [rad/(m/s^2)].
     pub slip: f64,
-    /// Strongest braking, negative [m/s^2].
+    /// Strongest braking, negative (m/s^2).
     pub acceleration_min: f64,
-    /// Strongest drive [m/s^2].
+    /// Strongest drive (m/s^2).
     pub acceleration_max: f64,
     /// Roll of the loaded trailer.
     pub suspension: Suspension,
@@ -100,24 +100,24 @@ pub struct Load {
 /// A PI controller of the speed with anti-windup.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpeedControl {
-    /// Acceleration per speed error [1/s].
+    /// Acceleration per speed error (1/s).
     pub gain: f64,
-    /// Acceleration per integral of the speed error [1/s^2].
+    /// Acceleration per integral of the speed error (1/s^2).
     pub integral_gain: f64,
-    /// Speed error beyond which the integral is reset to 0 [m/s].
+    /// Speed error beyond which the integral is reset to 0 (m/s).
     pub integral_band: f64,
-    /// Strongest braking that the controller requests, negative [m/s^2].
+    /// Strongest braking that the controller requests, negative (m/s^2).
     pub braking: f64,
 }
 
 /// Positions of the distance sensors, each in its unit's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensors {
-    /// Tractor sensors, from 90 deg left to 90 deg right: (ahead of the drive axle, left) \[m].
+    /// Tractor sensors, from 90 deg left to 90 deg right: (ahead of the drive axle, left) (m).
     pub tractor_mounts: [DVec2; N_TRACTOR_RAYS],
-    /// Foremost trailer sensor, behind the trailer's front end \[m].
+    /// Foremost trailer sensor, behind the trailer's front end (m).
     pub trailer_first: f64,
-    /// Rearmost trailer sensor, behind the trailer's front end \[m].
+    /// Rearmost trailer sensor, behind the trailer's front end (m).
     pub trailer_last: f64,
 }
 
@@ -167,7 +167,7 @@ impl Vehicle {
     }
 
     /// Reach of the straight truck behind and ahead of the middle of its wheelbase, the point that follows a route,
-    /// when it is turned by up to `heading` \[rad] against the route \[m].
+    /// when it is turned by up to `heading` (rad) against the route (m).
     pub fn reach(&self, heading: f64) -> (f64, f64) {
         let Tractor { wheelbase, fifth_wheel, front_overhang, rear_overhang, width, .. } = self.tractor;
         let behind_axle = (self.trailer.kingpin_to_rear - fifth_wheel).max(rear_overhang);
@@ -181,27 +181,27 @@ impl Vehicle {
         (turned(0.5 * wheelbase + behind_axle), turned(ahead_of_axle - 0.5 * wheelbase))
     }
 
-    /// Moves the trailer's axle group back by `length` \[m], and its rear end and the sensors there with it.
+    /// Moves the trailer's axle group back by `length` (m), and its rear end and the sensors there with it.
     pub(crate) fn lengthen_trailer(&mut self, length: f64) {
         self.trailer.wheelbase += length;
         self.trailer.kingpin_to_rear += length;
         self.sensors.trailer_last += length;
     }
 
-    /// Moves the tractor's front axle ahead by `length` \[m], and its front end and the sensors there with it.
+    /// Moves the tractor's front axle ahead by `length` (m), and its front end and the sensors there with it.
     pub(crate) fn lengthen_tractor(&mut self, length: f64) {
         let middle = 0.5 * self.tractor.wheelbase;
         self.tractor.wheelbase += length;
         self.sensors.tractor_mounts.iter_mut().filter(|mount| middle < mount.x).for_each(|mount| mount.x += length);
     }
 
-    /// Mass of tractor, trailer and load \[kg].
+    /// Mass of tractor, trailer and load (kg).
     pub fn gross_mass(&self, load: &Load) -> f64 {
         self.tractor.mass + load.mass
     }
 
     /// Radius of the circle inside the trailer's axle group when the tractor's outer front corner runs on a circle of
-    /// radius `outer` \[m]; `None` if the combination cannot turn so tightly. Directive 96/53/EC requires 5.30 m at
+    /// radius `outer` (m); `None` if the combination cannot turn so tightly. Directive 96/53/EC requires 5.30 m at
     /// 12.50 m.
     pub fn turning_circle_inner_radius(&self, outer: f64) -> Option<f64> {
         let Tractor { wheelbase, front_overhang, width, .. } = self.tractor;
@@ -210,8 +210,8 @@ impl Vehicle {
         Some(steady.trailer_radius - 0.5 * self.trailer.width)
     }
 
-    /// The constants that the stages need, for one of the loads and sub-steps of `substep` \[s]. `steer_max` replaces
-    /// the vehicle's own lock \[rad]. Chassis and class are the first: [`crate::world::World`] numbers them.
+    /// The constants that the stages need, for one of the loads and sub-steps of `substep` (s). `steer_max` replaces
+    /// the vehicle's own lock (rad). Chassis and class are the first: [`crate::world::World`] numbers them.
     ///
     /// # Panics
     ///

@@ -20,7 +20,7 @@ use crate::vehicle::profile::Profile;
 const CURVATURE_STEPS: [usize; 4] = [5, 7, 10, 12];
 /// Waypoints in each chord of the observed radii.
 const CHORD: usize = 5;
-/// Radius that is observed as 1 \[m].
+/// Radius that is observed as 1 (m).
 const RADIUS_SCALE: f64 = 100.0;
 
 /// The shared, unchanging part of a batch.
@@ -136,7 +136,7 @@ impl World {
         })
     }
 
-    /// Memory that its tables take, whatever the number of trucks \[bytes].
+    /// Memory that its tables take, whatever the number of trucks (bytes).
     pub fn bytes(&self) -> usize {
         let routes = size_of_val(self.waypoints.as_slice()) + size_of_val(self.previews.as_slice()) + size_of_val(self.routes.as_slice());
         let routes = routes + size_of_val(self.step_limits.as_slice());
@@ -270,14 +270,14 @@ fn preview_row(waypoints: &[Waypoint], index: usize) -> PreviewRow {
     PreviewRow { heading: waypoints[index].heading as f32, values }
 }
 
-/// Angle at `corner` between `from` and `to`: pi when the three lie in line, and when two of them coincide \[rad].
+/// Angle at `corner` between `from` and `to`: pi when the three lie in line, and when two of them coincide (rad).
 fn corner(from: DVec2, corner: DVec2, to: DVec2) -> f64 {
     let (back, ahead) = (from - corner, to - corner);
     if back == DVec2::ZERO || ahead == DVec2::ZERO { PI } else { back.angle_to(ahead).abs() }
 }
 
 /// Distance from `middle` to the intersection of the bisectors of the two chords that join there; infinite when they
-/// are parallel \[m].
+/// are parallel (m).
 fn turning_radius(from: DVec2, middle: DVec2, to: DVec2) -> f64 {
     let (first, second) = (middle - from, to - middle);
     // Radius of the circle through three points: the product of the sides over four times the area.

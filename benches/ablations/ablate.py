@@ -14,7 +14,7 @@ import statistics
 import series
 
 # What all choices have in common on top of learner/configs/default.toml, so that the table stays what it is when that
-# file changes. The policy is examined once, at the end, with three episodes on each validation route.
+# file changes. The policy is evaluated once, at the end, with three episodes on each validation route.
 COMMON = [
     "benchmark=random2026-training",
     "also_evaluate=",

@@ -2,8 +2,8 @@
 """Trains on random roads with loads, one choice changed at a time, and prints how it drives on the validation roads.
 
 No test route and no measured roundabout is looked at. Each run gets the same env steps and is pinned to one core; its
-policy is examined once, at the end, with four episodes on each validation route. With --full it is a run of
-learner/configs/laden.toml as that file is, which keeps the best policy in its validations, and it is examined with 20
+policy is evaluated once, at the end, with four episodes on each validation route. With --full it is a run of
+learner/configs/laden.toml as that file is, which keeps the best policy in its validations, and it is evaluated with 20
 episodes. A run that has a report is not repeated, so an interrupted series can go on. Standard library only.
 
     python3 benches/ablations/laden.py --offtrack target/release/offtrack --json ablations-laden.json
@@ -31,7 +31,7 @@ COMMON = [
     "learning.arrival=",
 ]
 # Name, and what is changed in the benchmarks: TABLE.KEY and its value. Endings are those that it trains with; it is
-# examined with those of laden2026.
+# evaluated with those of laden2026.
 CHOICES = [
     ("as laden2026-training: rolled over from 0.75 on", {}),
     ("rolled over from 0.85 on", {"ending.rollover_ratio": 0.85}),
@@ -54,7 +54,7 @@ def changed(text, changes):
 
 
 def write_benchmarks(folder, name, changes):
-    """The two benchmarks of a choice: to train on, and to be examined on."""
+    """The two benchmarks of a choice: to train on, and to be evaluated on."""
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for base in ["training", "random"]:
@@ -66,17 +66,17 @@ def write_benchmarks(folder, name, changes):
 
 
 def run(core, args, choice, changes, seed):
-    """One run and its examination; returns its row of the result."""
+    """One run and its evaluation; returns its row of the result."""
     name = series.folder_name(choice)
-    training, examined = write_benchmarks(args.runs / "scenarios", name, changes)
+    training, evaluated = write_benchmarks(args.runs / "scenarios", name, changes)
     folder = args.runs / f"{name}-{seed}"
     evaluation = args.runs / f"{name}-{seed}.json"
     settings = [f"benchmark={training}", f"training_benchmark={training}", "also_evaluate="]
-    settings += [f"validation.benchmark={examined}"] if args.full else ["validation=", *COMMON]
+    settings += [f"validation.benchmark={evaluated}"] if args.full else ["validation=", *COMMON]
     if failure := series.trained(core, args, folder, "laden", seed, args.steps, settings):
         return {"seed": seed, "failed": failure}
     if not evaluation.is_file():
-        command = [str(args.offtrack), "evaluate", "--benchmark", str(examined), "--split", "validation"]
+        command = [str(args.offtrack), "evaluate", "--benchmark", str(evaluated), "--split", "validation"]
         command += [
             "--policy",
             str(folder / "policy.safetensors"),

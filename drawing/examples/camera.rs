@@ -10,18 +10,18 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use offtrack::physics;
 use offtrack::layout::{Ended, Truck};
+use offtrack::physics;
 use offtrack::scenario::Scenario;
 use offtrack::vehicle::swept::swept_path;
 use offtrack::world::World;
 use offtrack_drawing::camera::{Camera, Shown};
 
-/// Sides of the pictures \[pixels].
+/// Sides of the pictures (pixels).
 const SIDES: [u32; 3] = [240, 480, 960];
 /// Routes that are driven.
 const N_ROUTES: usize = 12;
-/// Distance between two pictures \[m].
+/// Distance between two pictures (m).
 const SPACING: f64 = 1.0;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -23,11 +23,11 @@ use backdrop::{Backdrop, Format};
 use canvas::{Canvas, Ink};
 use shape::Shape;
 
-/// Sides that a picture can have \[pixels].
+/// Sides that a picture can have (pixels).
 pub const SIDES: RangeInclusive<u32> = 64..=4096;
 /// Most backgrounds that are kept.
 const N_KEPT: usize = 64;
-/// Most memory that they take \[bytes]: fewer are kept of large pictures.
+/// Most memory that they take (bytes): fewer are kept of large pictures.
 const KEPT_BYTES: usize = 256 << 20;
 
 /// What a picture shows: a truck, and what its last step was. All of them describe the same state.
@@ -35,7 +35,7 @@ const KEPT_BYTES: usize = 256 << 20;
 pub struct Shown<'a> {
     /// The truck. It chooses the route whose background is drawn.
     pub truck: &'a Truck,
-    /// Distance along each ray to the kerb, the trailer's first \[m].
+    /// Distance along each ray to the kerb, the trailer's first (m).
     pub ranges: &'a [f32; N_RAYS],
     /// Why its episode ended.
     pub ended: Ended,
@@ -80,7 +80,7 @@ impl Camera {
         })
     }
 
-    /// Width and height of a picture \[pixels].
+    /// Width and height of a picture (pixels).
     pub fn side(&self) -> u32 {
         self.format.side
     }
@@ -134,7 +134,7 @@ fn draw_caption(caption: &mut Canvas, backdrop: &Backdrop, lettering: &Lettering
     }
 }
 
-/// Backgrounds that are kept of pictures with this side \[pixels].
+/// Backgrounds that are kept of pictures with this side (pixels).
 fn n_kept(side: u32) -> usize {
     (KEPT_BYTES / (4 * (side * side) as usize)).clamp(1, N_KEPT)
 }

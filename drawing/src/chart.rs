@@ -14,15 +14,15 @@ use crate::legend::{self, Entry, Swatch};
 use crate::lettering::{Align, Lettering};
 pub(crate) use axis::{Axis, axes};
 
-/// Upper left corner of the first panel's plot \[px].
+/// Upper left corner of the first panel's plot (px).
 const CORNER: DVec2 = DVec2::new(92.0, 118.0);
-/// Size of a plot \[px].
+/// Size of a plot (px).
 const PLOT: DVec2 = DVec2::new(440.0, 380.0);
-/// From one plot's right edge to the next one's left \[px].
+/// From one plot's right edge to the next one's left (px).
 const GAP: f64 = 104.0;
-/// From a plot's lower edge to its legend: numbers and axis title \[px].
+/// From a plot's lower edge to its legend: numbers and axis title (px).
 const AXIS: f64 = 62.0;
-/// Margin to the right of the last plot and below the longest legend \[px].
+/// Margin to the right of the last plot and below the longest legend (px).
 const MARGIN: f64 = 24.0;
 
 /// Colours for lines that colour-blind readers can distinguish: P. Tol's "muted" scheme and one more.
@@ -112,7 +112,7 @@ impl Chart {
 }
 
 impl Panel {
-    /// The panel with its plot's upper left corner at `corner`, and how far down it reaches \[px].
+    /// The panel with its plot's upper left corner at `corner`, and how far down it reaches (px).
     fn drawn(&self, lettering: &Lettering, corner: DVec2) -> (Group, f64) {
         let end = corner + PLOT;
         let points = || self.lines.iter().flat_map(|line| &line.points);

@@ -18,19 +18,19 @@ use crate::lettering::{Align, Lettering};
 use crate::stations::stations;
 use offtrack_evaluation::recording::{Frame, Recording};
 
-/// Margins of the page \[px].
+/// Margins of the page (px).
 const LEFT: f64 = 64.0;
 const RIGHT: f64 = 16.0;
-/// From the page's upper edge to the first map \[px].
+/// From the page's upper edge to the first map (px).
 const TOP: f64 = 106.0;
-/// Maps side by side at most, and the gap between two \[px].
+/// Maps side by side at most, and the gap between two (px).
 const COLUMNS: usize = 2;
 const GAP: f64 = 16.0;
-/// From a map's lower edge to the upper edge of the one below it: that one's caption \[px].
+/// From a map's lower edge to the upper edge of the one below it: that one's caption (px).
 const CAPTION: f64 = 40.0;
-/// Margin around the paths on a map \[m].
+/// Margin around the paths on a map (m).
 const MARGIN: f64 = 5.0;
-/// Height of a chart's plot, and of its numbers and its caption \[px].
+/// Height of a chart's plot, and of its numbers and its caption (px).
 const PLOT: f64 = 150.0;
 const NUMBERS: f64 = 64.0;
 
@@ -38,7 +38,7 @@ const NUMBERS: f64 = 64.0;
 pub struct Comparison<'a> {
     /// One for each load, at least one; all on the same route.
     pub scenes: Vec<Scene<'a>>,
-    /// Distances along the route at which its ring begins and ends \[m].
+    /// Distances along the route at which its ring begins and ends (m).
     pub ring: [f64; 2],
 }
 
@@ -147,7 +147,7 @@ impl Comparison<'_> {
         Group::new().add(sample).add(lettering.text(&words, to + DVec2::new(8.0, 6.0), letters, Align::Left, colour::INK))
     }
 
-    /// Of each scene the distance along the route at each frame \[m].
+    /// Of each scene the distance along the route at each frame (m).
     fn stations(&self) -> Vec<Vec<f64>> {
         let of = |scene: &Scene| {
             let Recording { frames, centre_line, .. } = scene.recording;

@@ -19,11 +19,11 @@ use crate::road::RoadLayers;
 use crate::sweep::{nearest, swept_area};
 use offtrack_evaluation::recording::{Frame, Recording};
 
-/// Length of the route shown before and after the ring: all of it at a benchmark's usual lengths \[m].
+/// Length of the route shown before and after the ring: all of it at a benchmark's usual lengths (m).
 const SHOWN: f64 = 45.0;
-/// Approximate distance between the trucks of a still \[m].
+/// Approximate distance between the trucks of a still (m).
 const BETWEEN_TRUCKS: f64 = 20.0;
-/// Length and gauge of the drawn front wheels \[m].
+/// Length and gauge of the drawn front wheels (m).
 pub(crate) const WHEEL: f64 = 1.0;
 pub(crate) const GAUGE: f64 = 2.04;
 const DASHES: &str = "7 4";

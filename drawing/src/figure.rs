@@ -39,39 +39,39 @@ pub(crate) mod colour {
     pub const RAY: &str = "#aa3377";
 }
 
-/// Width of the page \[px].
+/// Width of the page (px).
 pub(crate) const WIDTH: f64 = 1000.0;
-/// Margins from the page's left, right and upper edge to the map \[px].
+/// Margins from the page's left, right and upper edge to the map (px).
 const LEFT: f64 = 48.0;
 const RIGHT: f64 = 16.0;
 const TOP: f64 = 72.0;
-/// Base line of the first line below the title, and from one to the next \[px].
+/// Base line of the first line below the title, and from one to the next (px).
 const BELOW_TITLE: f64 = 58.0;
 const LINE: f64 = 21.0;
-/// Height of the numbers below the map \[px].
+/// Height of the numbers below the map (px).
 const AXIS: f64 = 30.0;
-/// Margin around the routes \[m].
+/// Margin around the routes (m).
 const MARGIN: f64 = 8.0;
-/// With a swept path: length of the route shown before and after the ring \[m].
+/// With a swept path: length of the route shown before and after the ring (m).
 const SHOWN: f64 = 25.0;
 
-/// Lengths of the routes before and after the ring \[m].
+/// Lengths of the routes before and after the ring (m).
 #[derive(Debug, Clone, Copy)]
 pub struct Straights {
-    /// Length before the ring \[m].
+    /// Length before the ring (m).
     pub approach: f64,
-    /// Length after the ring \[m].
+    /// Length after the ring (m).
     pub departure: f64,
 }
 
 /// The transformation from the roundabout (metres, x east, y north) to the page (pixels, x right, y down).
 pub(crate) struct View {
-    /// South-west and north-east corner of the map \[m].
+    /// South-west and north-east corner of the map (m).
     pub low: DVec2,
     pub high: DVec2,
-    /// Pixels in a metre [px/m].
+    /// Pixels in a metre (px/m).
     pub scale: f64,
-    /// Upper left corner of the map on the page \[px].
+    /// Upper left corner of the map on the page (px).
     corner: DVec2,
     /// Whether points are those of the mirror image in the x axis, which low and high are not.
     mirrored: bool,
@@ -79,11 +79,11 @@ pub(crate) struct View {
 
 /// Position and size of a map on its page.
 pub(crate) struct Layout {
-    /// Upper left corner of the map \[px].
+    /// Upper left corner of the map (px).
     pub corner: DVec2,
-    /// Width of the map \[px].
+    /// Width of the map (px).
     pub width: f64,
-    /// Margin around the points that must be shown \[m].
+    /// Margin around the points that must be shown (m).
     pub margin: f64,
     /// Least ratio of the map's width to its height.
     pub ratio: f64,
@@ -115,8 +115,8 @@ impl View {
         }
     }
 
-    /// All of the given points with `margin` around them \[m], in the middle of a map that fills a picture of `size`
-    /// \[px].
+    /// All of the given points with `margin` around them (m), in the middle of a map that fills a picture of `size`
+    /// (px).
     pub fn fitted(points: impl Iterator<Item = DVec2>, size: DVec2, margin: f64) -> View {
         let (low, high) = points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
         let scale = (size / (high - low + 2.0 * margin)).min_element();
@@ -124,7 +124,7 @@ impl View {
         View { low: centre - half, high: centre + half, scale, corner: DVec2::ZERO, mirrored: false }
     }
 
-    /// Where `p` lies on the page \[px].
+    /// Where `p` lies on the page (px).
     pub fn point(&self, p: DVec2) -> DVec2 {
         let y = if self.mirrored { -p.y } else { p.y };
         self.corner + DVec2::new(p.x - self.low.x, self.high.y - y) * self.scale

@@ -9,7 +9,7 @@ use resvg::{tiny_skia::Pixmap, usvg};
 use crate::episode::Scene;
 use crate::{COLOUR_STEP, Error, painted, stepped};
 
-/// Simulated time between two pictures \[s].
+/// Simulated time between two pictures (s).
 const DRIVEN: f64 = 0.2;
 /// Time that a picture is shown, half of that: the film runs at twice the speed [hundredths of a second].
 const SHOWN: u16 = 10;
@@ -21,7 +21,7 @@ const N_LEVELS: usize = 255 / COLOUR_STEP as usize + 1;
 const UNCHANGED: u8 = 255;
 
 /// Indices of the frames of a recording that a film shows: the first, the last, and those between at even distances.
-/// `step` is the time between two frames \[s].
+/// `step` is the time between two frames (s).
 pub fn frames(n_frames: usize, step: f64) -> Vec<usize> {
     let stride = (DRIVEN / step).round().max(1.0) as usize;
     let last = n_frames - 1;

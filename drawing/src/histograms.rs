@@ -11,11 +11,11 @@ use crate::chart::LINES;
 use crate::figure::{colour, number};
 use crate::lettering::{Align, Lettering};
 
-/// Size of a plot \[px].
+/// Size of a plot (px).
 const PLOT: DVec2 = DVec2::new(290.0, 130.0);
-/// Between plots: room for marks, numbers and axis titles \[px].
+/// Between plots: room for marks, numbers and axis titles (px).
 const GAP: DVec2 = DVec2::new(34.0, 96.0);
-/// Upper left corner of the first plot \[px].
+/// Upper left corner of the first plot (px).
 const CORNER: DVec2 = DVec2::new(28.0, 136.0);
 /// Plots in a row.
 const COLUMNS: usize = 3;
@@ -158,7 +158,7 @@ impl Panel {
     }
 }
 
-/// A diamond \[px].
+/// A diamond (px).
 fn mark(at: DVec2, colour: &str) -> Path {
     let data = format!("M{} {}l6.5 6.5l-6.5 6.5l-6.5 -6.5Z", number(at.x), number(at.y - 6.5));
     Path::new().set("d", data).set("fill", colour).set("stroke", "white").set("stroke-width", 1.2)

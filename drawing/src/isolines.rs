@@ -6,9 +6,9 @@ use offtrack::field::Field;
 
 use crate::figure::View;
 
-/// Sampling distance of the field: fine enough for ridges between two lines half a metre apart \[m].
+/// Sampling distance of the field: fine enough for ridges between two lines half a metre apart (m).
 const STEP: f64 = 0.2;
-/// A point nearer than this to the line between its neighbours is left out \[m].
+/// A point nearer than this to the line between its neighbours is left out (m).
 const STRAIGHT: f64 = 0.02;
 
 /// The contour lines at every whole metre within the view.

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::sweep::{self, Sweep};
 
-/// Extent of solid ground beyond the outermost kerb \[m].
+/// Extent of solid ground beyond the outermost kerb (m).
 const MARGIN: f64 = 5.0;
 
 #[derive(Serialize)]

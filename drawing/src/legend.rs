@@ -6,13 +6,13 @@ use svg::node::element::{Circle, Group, Path, Rectangle};
 use crate::figure::{colour, number};
 use crate::lettering::{Align, Lettering};
 
-/// Size of the text \[px].
+/// Size of the text (px).
 const SIZE: f64 = 15.0;
-/// Line spacing \[px].
+/// Line spacing (px).
 const LINE: f64 = 25.0;
-/// Width of a sample and the gap after it \[px].
+/// Width of a sample and the gap after it (px).
 const SAMPLE: f64 = 46.0;
-/// Width of a sample alone \[px].
+/// Width of a sample alone (px).
 const SWATCH: f64 = 36.0;
 
 /// How an element of the map looks.
@@ -39,7 +39,7 @@ impl Entry {
     }
 }
 
-/// The legend with its upper left corner at `corner`, at most `width` wide, and its height \[px].
+/// The legend with its upper left corner at `corner`, at most `width` wide, and its height (px).
 pub fn drawn(lettering: &Lettering, entries: &[Entry], corner: DVec2, width: f64) -> (Group, f64) {
     let widest = entries.iter().map(|entry| lettering.width(&entry.words, SIZE)).fold(0.0, f64::max);
     let columns = ((width / (SAMPLE + widest + 12.0)).floor() as usize).clamp(1, 4);
@@ -55,7 +55,7 @@ pub fn drawn(lettering: &Lettering, entries: &[Entry], corner: DVec2, width: f64
     (group, rows as f64 * LINE)
 }
 
-/// A chevron with its tip at `at`, pointing along `direction` \[px].
+/// A chevron with its tip at `at`, pointing along `direction` (px).
 pub fn chevron(at: DVec2, direction: DVec2, colour: &str) -> Path {
     let [tip, left, notch, right] = chevron_corners(at, 9.0 * direction);
     let n = number;
@@ -64,13 +64,13 @@ pub fn chevron(at: DVec2, direction: DVec2, colour: &str) -> Path {
     Path::new().set("d", data).set("fill", colour).set("stroke", "white").set("stroke-width", 0.6)
 }
 
-/// Corners of a chevron with its tip at `at`, as long as `along` and pointing there \[px].
+/// Corners of a chevron with its tip at `at`, as long as `along` and pointing there (px).
 pub fn chevron_corners(at: DVec2, along: DVec2) -> [DVec2; 4] {
     let side = along.perp() * (4.6 / 9.0);
     [at, at - along + side, at - 0.68 * along, at - along - side]
 }
 
-/// The sample of an entry; `at` is the middle of its left edge \[px].
+/// The sample of an entry; `at` is the middle of its left edge (px).
 fn sample(swatch: &Swatch, at: DVec2) -> Group {
     let line = |colour: &str, width: f64| {
         let path = Path::new().set("d", format!("M{} {}h{SWATCH}", number(at.x), number(at.y))).set("fill", "none");

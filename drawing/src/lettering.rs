@@ -27,18 +27,18 @@ impl Lettering {
         Ok(Lettering { face: Face::parse(epaint_default_fonts::UBUNTU_LIGHT, 0)? })
     }
 
-    /// Width of `words` in text of `size` \[px].
+    /// Width of `words` in text of `size` (px).
     pub fn width(&self, words: &str, size: f64) -> f64 {
         let advance = |letter| self.face.glyph_index(letter).and_then(|glyph| self.face.glyph_hor_advance(glyph)).unwrap_or(0);
         words.chars().map(|letter| f64::from(advance(letter))).sum::<f64>() * self.scale(size)
     }
 
-    /// The size in which words are at most `width` wide, `largest` at most \[px].
+    /// The size in which words are at most `width` wide, `largest` at most (px).
     pub fn fitting(&self, words: &str, largest: f64, width: f64) -> f64 {
         largest.min(width / self.width(words, 1.0).max(f64::MIN_POSITIVE))
     }
 
-    /// One line of text with its base line at `at` \[px].
+    /// One line of text with its base line at `at` (px).
     pub fn text(&self, words: &str, at: DVec2, size: f64, align: Align, colour: &str) -> Path {
         // The typeface is light: a thin stroke keeps it readable in small pictures.
         let weight = number(0.035 * size);
@@ -52,7 +52,7 @@ impl Lettering {
         Group::new().add(rim).add(self.text(words, at, size, align, colour))
     }
 
-    /// The outlines of one line of text with its base line at `at` \[px]; `None` for words without any.
+    /// The outlines of one line of text with its base line at `at` (px); `None` for words without any.
     pub fn path(&self, words: &str, at: DVec2, size: f64, align: Align) -> Option<tiny_skia::Path> {
         let mut brush = Brush { path: tiny_skia::PathBuilder::new(), at, scale: self.scale(size) };
         for (glyph, at) in self.placed(words, at, size, align) {
@@ -72,7 +72,7 @@ impl Lettering {
         Path::new().set("d", pen.data)
     }
 
-    /// The glyphs of one line of text, each with the left end of its base line \[px].
+    /// The glyphs of one line of text, each with the left end of its base line (px).
     fn placed(&self, words: &str, at: DVec2, size: f64, align: Align) -> impl Iterator<Item = (GlyphId, DVec2)> {
         let shift = match align {
             Align::Left => 0.0,

@@ -61,15 +61,15 @@ pub enum Error {
     /// A film cannot be encoded.
     #[error("the GIF cannot be encoded: {0}")]
     Gif(#[from] gif::EncodingError),
-    /// The side of a camera's square pictures \[pixels] is out of range.
+    /// The side of a camera's square pictures (pixels) is out of range.
     #[error("a picture of {0} x {0} pixels cannot be drawn; its side must lie in {low}..={high} pixels", low = camera::SIDES.start(), high = camera::SIDES.end())]
     Side(u32),
     /// The picture has no pixels, or more than its format can hold.
     #[error("a picture of {width} x {height} pixels cannot be drawn")]
     Size {
-        /// Width asked for \[pixels].
+        /// Width asked for (pixels).
         width: u32,
-        /// Height that follows from it \[pixels].
+        /// Height that follows from it (pixels).
         height: u32,
     },
 }

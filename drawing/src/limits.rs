@@ -11,9 +11,9 @@ use svg::node::element::{Circle, Group, Path};
 use crate::figure::{View, number};
 use crate::legend::{Entry, Swatch};
 
-/// Distance between the lines beside a path, and from the path to the first \[px].
+/// Distance between the lines beside a path, and from the path to the first (px).
 const BESIDE: f64 = 5.0;
-/// Width of such a line \[px].
+/// Width of such a line (px).
 const WIDTH: f64 = 3.0;
 
 /// A limit of the truck beside what a path needs of it, in the limit's unit.
@@ -39,7 +39,7 @@ pub(crate) struct WrittenNeed {
     has: f64,
     needs: f64,
     exceeded: bool,
-    /// First and last station of each stretch where it is \[m].
+    /// First and last station of each stretch where it is (m).
     stretches: Vec<[f64; 2]>,
 }
 
@@ -156,7 +156,7 @@ fn rounded(parts: f64, value: f64) -> f64 {
     (value * parts).round() / parts
 }
 
-/// What each pose needs, for JSON: station \[m], steer angle \[deg], steer rate [deg/s], lateral acceleration \[g],
+/// What each pose needs, for JSON: station (m), steer angle (deg), steer rate [deg/s], lateral acceleration (g),
 /// load transfer ratio; left positive.
 pub(crate) fn rows(demands: &[Demand]) -> Vec<[f64; 5]> {
     let row = |demand: &Demand| {

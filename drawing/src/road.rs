@@ -15,9 +15,9 @@ use crate::isolines::isolines;
 use crate::legend::{Entry, Swatch, chevron};
 use crate::lettering::{Align, Lettering};
 
-/// Least distance between arrows of one colour \[m].
+/// Least distance between arrows of one colour (m).
 const APART: f64 = 5.0;
-/// From the ring to the name of an arm \[m].
+/// From the ring to the name of an arm (m).
 const TO_NAME: f64 = 23.0;
 
 const LANE_DASHES: &str = "6 5";
@@ -123,7 +123,7 @@ impl<'a> RoadLayers<'a> {
     }
 
     /// Stations of the arrows of a route: two on its approach, one at every eighth of the ring, two on its departure
-    /// \[m].
+    /// (m).
     fn arrow_stations(&self, line: &Curve) -> Vec<f64> {
         let eighth = |s: f64| (line.point_at(s).to_angle() / FRAC_PI_4).floor();
         let (enters, leaves) = (self.straights.approach, line.length() - self.straights.departure);

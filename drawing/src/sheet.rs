@@ -10,17 +10,17 @@ use crate::figure::{Layout, Straights, View, colour, number, scale_bar};
 use crate::lettering::{Align, Lettering};
 use crate::road::RoadLayers;
 
-/// Side of a map \[px].
+/// Side of a map (px).
 const MAP: f64 = 190.0;
-/// Between maps \[px].
+/// Between maps (px).
 const GAP: f64 = 10.0;
-/// Height of the lines below a map \[px].
+/// Height of the lines below a map (px).
 const CAPTION: f64 = 40.0;
-/// Margin around the sheet \[px].
+/// Margin around the sheet (px).
 const MARGIN: f64 = 20.0;
-/// Height of the title \[px].
+/// Height of the title (px).
 const TITLE: f64 = 52.0;
-/// Length of the arms shown beyond the largest ring \[m].
+/// Length of the arms shown beyond the largest ring (m).
 const ARMS: f64 = 16.0;
 /// Maps in a row at most.
 const COLUMNS: usize = 8;

@@ -4,10 +4,10 @@ use glam::DVec2;
 
 use offtrack_evaluation::polygons::Polygon;
 
-/// How far ahead on its route a truck is looked for from one state to the next \[m].
+/// How far ahead on its route a truck is looked for from one state to the next (m).
 const AHEAD: f64 = 12.0;
 
-/// The distance along a route of each of these positions, which does not go back \[m]: that of the nearest point of the
+/// The distance along a route of each of these positions, which does not go back (m): that of the nearest point of the
 /// route's centre line. Before its beginning and after its end the line goes straight on.
 pub(crate) fn stations(centre_line: &Polygon, positions: &[[f32; 2]]) -> Vec<f64> {
     let points: Vec<DVec2> = centre_line.iter().copied().map(DVec2::from).collect();

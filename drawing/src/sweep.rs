@@ -16,11 +16,11 @@ use crate::legend::{Entry, Swatch};
 use crate::lettering::{Align, Lettering};
 use crate::limits::{self, Need, WrittenNeed};
 
-/// Distance between poses \[m].
+/// Distance between poses (m).
 const SPACING: f64 = 0.25;
-/// Distance between the trucks that are drawn \[m].
+/// Distance between the trucks that are drawn (m).
 const BETWEEN_TRUCKS: f64 = 22.0;
-/// Distance between the points of an outline at which clearance is computed \[m].
+/// Distance between the points of an outline at which clearance is computed (m).
 const BETWEEN_POINTS: f64 = 0.05;
 
 /// A truck's swept path along a route.
@@ -44,7 +44,7 @@ pub struct Driven {
     pub vehicle: String,
     /// Name of its load.
     pub load: String,
-    /// Speed of the front axle [km/h].
+    /// Speed of the front axle (km/h).
     pub speed_kmh: f64,
 }
 
@@ -66,9 +66,9 @@ struct Unit {
     colour: &'static str,
     light: &'static str,
     corners: Vec<[DVec2; 4]>,
-    /// Least signed distance of the outline from the kerbs \[m].
+    /// Least signed distance of the outline from the kerbs (m).
     clearance: f64,
-    /// For each section on which the unit overlaps solid ground: its deepest point, and the depth \[m].
+    /// For each section on which the unit overlaps solid ground: its deepest point, and the depth (m).
     overlaps: Vec<(DVec2, f64)>,
 }
 
@@ -269,7 +269,7 @@ pub(crate) fn swept_area(view: &View, corners: &[[DVec2; 4]]) -> String {
     corners.windows(2).map(|pair| view.polygon(&hull(pair.concat()))).collect()
 }
 
-/// The point of a rectangle's outline with the least signed distance from the kerbs, and that distance \[m].
+/// The point of a rectangle's outline with the least signed distance from the kerbs, and that distance (m).
 pub(crate) fn nearest(corners: &[DVec2; 4], kerbs: &Outline) -> (DVec2, f64) {
     let centre = (corners[0] + corners[2]) / 2.0;
     let nearby = kerbs.near(centre, corners[0].distance(centre));

@@ -14,17 +14,17 @@ use super::report::{Episode, wilson};
 
 /// Load transfer ratio from which a truck is at its limit.
 const AT_LIMIT: f32 = 0.9;
-/// Width of a bin of lateral accelerations [m/s^2] and of jerks [m/s^3], and their number.
+/// Width of a bin of lateral accelerations (m/s^2) and of jerks (m/s^3), and their number.
 const LATERAL_BIN: f64 = 0.1;
 const JERK_BIN: f64 = 0.25;
 const N_BINS: usize = 120;
-/// Target speeds that differ by less are the same [m/s].
+/// Target speeds that differ by less are the same (m/s).
 const SAME_SPEED: f32 = 1e-3;
 
 /// What is kept of one episode, from step to step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Driving {
-    /// Sum of the speeds after each step [m/s].
+    /// Sum of the speeds after each step (m/s).
     speed_sum: f64,
     /// Steps after which the load transfer ratio was at its limit.
     steps_at_limit: u32,
@@ -97,26 +97,26 @@ pub struct ClassReport {
     pub load_transfer_ratio_p90: f64,
     /// The same of 99 in 100.
     pub load_transfer_ratio_p99: f64,
-    /// Mean time of an episode with a load transfer ratio of at least 0.9 \[s].
+    /// Mean time of an episode with a load transfer ratio of at least 0.9 (s).
     pub time_at_limit_mean: f64,
-    /// Mean speed of all steps \[km/h].
+    /// Mean speed of all steps (km/h).
     pub speed_mean_kmh: f64,
     /// Time over that of the feasible speed profile of the episode's vehicle on its route, mean of the episodes that
     /// arrived; `None` if none did.
     pub time_over_feasible_mean: Option<f64>,
-    /// Lateral acceleration of the trailer: half of the steps have at most this \[g].
+    /// Lateral acceleration of the trailer: half of the steps have at most this (g).
     pub lateral_acceleration_p50: f64,
     /// The same of 95 in 100.
     pub lateral_acceleration_p95: f64,
     /// The same of 99 in 100.
     pub lateral_acceleration_p99: f64,
-    /// Change of the acceleration that 95 in 100 steps have at most [m/s^3].
+    /// Change of the acceleration that 95 in 100 steps have at most (m/s^3).
     pub jerk_p95: f64,
     /// Changes of the target speed in a second.
     pub switches_per_second: f64,
-    /// Mean speed at contact of the episodes in which the tractor touched a kerb \[km/h].
+    /// Mean speed at contact of the episodes in which the tractor touched a kerb (km/h).
     pub tractor_contact_speed_kmh: Option<f64>,
-    /// The same of the trailer \[km/h].
+    /// The same of the trailer (km/h).
     pub trailer_contact_speed_kmh: Option<f64>,
 }
 

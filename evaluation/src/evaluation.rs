@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::recording::{Recorder, Track};
-use offtrack::physics::drawn_start;
 use offtrack::layout::{Control, Ended, Rig, Start, Truck};
 use offtrack::map::route::Route;
+use offtrack::physics::drawn_start;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::vehicle::swept::{own_lane_suffices, steer_angle_max, swept_path};

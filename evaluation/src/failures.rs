@@ -16,7 +16,7 @@ use super::groups::Evaluated;
 use super::part::Part;
 use super::report::Episode;
 
-/// Largest distance between two points of a unit that are looked at \[m].
+/// Largest distance between two points of a unit that are looked at (m).
 const SPACING: f32 = 0.1;
 
 /// Episodes that did not arrive for the same cause.
@@ -52,7 +52,7 @@ pub struct Example {
     pub ended: &'static str,
     /// Its number of steps.
     pub steps: u32,
-    /// Middle of the tractor's drive axle at its end, x east, y north \[m].
+    /// Middle of the tractor's drive axle at its end, x east, y north (m).
     pub position: [f64; 2],
 }
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::report::{Episode, Summary};
 
-/// Island radii from which on a route is in the next band \[m].
+/// Island radii from which on a route is in the next band (m).
 const BANDS: [f64; 4] = [9.0, 12.0, 16.0, 22.0];
 /// Their names, and behind them that of the routes of a crossing, which has no island.
 const BAND_NAMES: [&str; BANDS.len() + 2] = ["below 9 m", "9 to 12 m", "12 to 16 m", "16 to 22 m", "22 m and more", "none"];
@@ -85,7 +85,7 @@ fn roundabout(&(index, place, _): &Evaluated) -> (usize, String) {
     (index, place.roundabout.name.clone())
 }
 
-/// Index of an island's band by its radius \[m].
+/// Index of an island's band by its radius (m).
 fn band(island_radius: f64) -> usize {
     BANDS.iter().filter(|&&from| from <= island_radius).count()
 }

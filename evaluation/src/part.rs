@@ -12,7 +12,7 @@ pub(super) enum Part {
     Exit,
 }
 
-/// Stations at which a route's ring and its exit begin \[m].
+/// Stations at which a route's ring and its exit begin (m).
 fn ring_and_exit(scenario: &Scenario, route: &Route) -> [f64; 2] {
     [scenario.approach, route.centre_line.length() - scenario.departure]
 }
@@ -41,11 +41,11 @@ impl Part {
 /// Half of the width of a route's lane, from its centre to its edge.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LaneWidths {
-    /// Distance between waypoints \[m].
+    /// Distance between waypoints (m).
     spacing: f64,
-    /// Stations at which the ring and the exit begin \[m].
+    /// Stations at which the ring and the exit begin (m).
     from: [f64; 2],
-    /// On the entry arm, in the ring, on the exit arm \[m].
+    /// On the entry arm, in the ring, on the exit arm (m).
     half_widths: [f32; 3],
 }
 
@@ -58,7 +58,7 @@ impl LaneWidths {
         }
     }
 
-    /// Where `waypoint` is the next one to pass: on the segment that ends there \[m].
+    /// Where `waypoint` is the next one to pass: on the segment that ends there (m).
     pub(super) fn half_width(&self, waypoint: u32) -> f32 {
         let middle = (f64::from(waypoint) - 0.5) * self.spacing;
         self.half_widths[self.from.iter().filter(|&&from| from <= middle).count()]

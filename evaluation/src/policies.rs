@@ -14,10 +14,10 @@ use crate::certificate::line::Lines;
 use crate::error::Error;
 
 /// Pure pursuit's default look-ahead distance: the best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of
-/// attard2023 \[m].
+/// attard2023 (m).
 pub const LOOK_AHEAD: f32 = 7.0;
 
-/// How far ahead pure pursuit looks for a lower speed: the time that the speed control takes to reach it \[s].
+/// How far ahead pure pursuit looks for a lower speed: the time that the speed control takes to reach it (s).
 const RESPONSE: f64 = 1.5;
 
 /// Chooses an action for every truck of a batch.
@@ -101,7 +101,7 @@ impl Controller for UniformRandom {
 /// R. Coulter, "Implementation of the Pure Pursuit Path Tracking Algorithm" (Carnegie Mellon, 1992).
 #[derive(Debug)]
 pub struct PurePursuit {
-    /// Look-ahead distance: from the drive axle to the target point \[m].
+    /// Look-ahead distance: from the drive axle to the target point (m).
     look_ahead: f32,
     /// The feasible speeds of a vehicle on a route, by both indices.
     profiles: HashMap<(u32, u32), Profile>,
@@ -127,7 +127,7 @@ impl Controller for PurePursuit {
 }
 
 impl PurePursuit {
-    /// With this look-ahead distance \[m].
+    /// With this look-ahead distance (m).
     pub fn new(look_ahead: f32) -> PurePursuit {
         PurePursuit { look_ahead, profiles: HashMap::new(), lines: Lines::new(), name: "pursuit".to_owned() }
     }
@@ -138,7 +138,7 @@ impl PurePursuit {
         PurePursuit { lines, name: format!("pursuit of {origin}"), ..self }
     }
 
-    /// The speed to drive at: the lowest of the profile within the time that the speed control takes to follow [m/s].
+    /// The speed to drive at: the lowest of the profile within the time that the speed control takes to follow (m/s).
     fn speed(&mut self, world: &World, truck: &Truck, next: usize) -> f32 {
         let waypoints = line(&self.lines, world, truck.route);
         let fastest = world.params.target_speed_max.into();
@@ -148,7 +148,7 @@ impl PurePursuit {
         profile.lowest_ahead(next.saturating_sub(1), f64::from(truck.speed) * RESPONSE, spacing.into()) as f32
     }
 
-    /// Steer angle of the arc to the target point \[rad].
+    /// Steer angle of the arc to the target point (rad).
     fn steering(&self, wheelbase: f32, truck: &Truck, waypoints: &[WaypointRow], next: usize) -> f32 {
         let pair = |index: usize| (waypoints[index - 1].position, waypoints[index].position);
         // The first segment that ends beyond the look-ahead distance; it starts within it.

@@ -3,9 +3,9 @@
 use glam::DVec2;
 use offtrack::geometry::{Curve, Outline};
 
-/// Largest distance of a chord to its arc, half of the documented 1 cm \[m].
+/// Largest distance of a chord to its arc, half of the documented 1 cm (m).
 const TOLERANCE: f64 = 0.005;
-/// The points of a line, open or closed \[m]. A closed one does not repeat its first point.
+/// The points of a line, open or closed (m). A closed one does not repeat its first point.
 pub type Polygon = Vec<[f64; 2]>;
 
 /// The edges of the drivable area: the outer boundary counter-clockwise, then the islands clockwise.

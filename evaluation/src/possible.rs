@@ -104,7 +104,7 @@ mod tests {
     use super::*;
     use crate::device::Device;
 
-    /// A route that a narrow search completes, with the largest start offset given \[m], and what is found of `policy`.
+    /// A route that a narrow search completes, with the largest start offset given (m), and what is found of `policy`.
     fn possible(start_offset: f64, policy: &mut dyn Controller, pass: Pass) -> (Vec<Episode>, Possible) {
         let mut scenario = Scenario::named("attard2023").unwrap();
         scenario.retain(|_, route| route.name == "20m/E-right-1");

@@ -7,11 +7,11 @@
 
 mod measures;
 
-use offtrack::physics;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Clearance, Ended, N_RAYS, N_TRAILER_RAYS};
 use offtrack::map::route::Route;
 use offtrack::map::{Gutter, Road};
+use offtrack::physics;
 use offtrack::scenario::Scenario;
 use offtrack::simulator::Batch;
 use offtrack::world::World;
@@ -28,27 +28,27 @@ const ANGLE: f64 = 1e4;
 /// One truck after one step, less than 250 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
-    /// Middle of the drive axle, x east, y north \[m].
+    /// Middle of the drive axle, x east, y north (m).
     pub position: [f32; 2],
-    /// Of the tractor, counter-clockwise from east, in (-pi, pi] \[rad].
+    /// Of the tractor, counter-clockwise from east, in (-pi, pi] (rad).
     pub heading: f32,
-    /// Middle of the trailer's axle group \[m].
+    /// Middle of the trailer's axle group (m).
     pub trailer_position: [f32; 2],
-    /// Of the trailer \[rad].
+    /// Of the trailer (rad).
     pub trailer_heading: f32,
-    /// Tractor's heading minus the trailer's, in (-pi, pi] \[rad].
+    /// Tractor's heading minus the trailer's, in (-pi, pi] (rad).
     pub articulation: f32,
-    /// Of the front axle, left positive \[rad].
+    /// Of the front axle, left positive (rad).
     pub steering: f32,
-    /// Of the drive axle [m/s].
+    /// Of the drive axle (m/s).
     pub speed: f32,
     /// Index of the last action in the action table; `None` at the start.
     pub action: Option<u32>,
-    /// From the reference point to the lane centre \[m].
+    /// From the reference point to the lane centre (m).
     pub lane_distance: f32,
-    /// From the tractor's outline to the nearest kerb, negative where they overlap \[m].
+    /// From the tractor's outline to the nearest kerb, negative where they overlap (m).
     pub tractor_clearance: f32,
-    /// From the trailer's outline to the nearest kerb \[m].
+    /// From the trailer's outline to the nearest kerb (m).
     pub trailer_clearance: f32,
     /// Of the tractor, the largest of the step in magnitude, signed.
     pub tractor_load_transfer_ratio: f32,
@@ -57,7 +57,7 @@ pub struct Frame {
     /// Of the step; 0 at the start.
     pub reward: f32,
     /// Distance along each ray to the kerb, the trailer's 16 first, left and right alternating, front to rear, then the
-    /// tractor's 13 from left to right \[m].
+    /// tractor's 13 from left to right (m).
     pub ranges: [f32; N_RAYS],
 }
 
@@ -190,7 +190,7 @@ impl Recorder {
     }
 }
 
-/// A roundabout as lines of points \[m].
+/// A roundabout as lines of points (m).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Map {
     /// Polygons around the drivable area: the outer boundary counter-clockwise, then each island clockwise, without a
@@ -209,7 +209,7 @@ impl Map {
     }
 }
 
-/// The centre line of a roundabout's route as it lies in the world, as points within 1 cm of it \[m].
+/// The centre line of a roundabout's route as it lies in the world, as points within 1 cm of it (m).
 pub fn centre_line(roundabout: &Road, route: &Route) -> Polygon {
     polygons::line(&roundabout.seen_route(route).centre_line)
 }
@@ -229,7 +229,7 @@ pub struct Recording {
     pub episode: usize,
     /// Episodes on each route in that evaluation: the start pose depends on it.
     pub episodes: usize,
-    /// Time between two frames \[s].
+    /// Time between two frames (s).
     pub step: f64,
     /// Why the episode ended, by its name in reports.
     pub ended: String,
@@ -238,11 +238,11 @@ pub struct Recording {
     pub class: Option<Class>,
     /// The truck.
     pub vehicle: Measures,
-    /// The action table: steer angle, left positive \[rad], and speed asked for [m/s].
+    /// The action table: steer angle, left positive (rad), and speed asked for (m/s).
     pub actions: Vec<[f32; 2]>,
     /// The roundabout.
     pub map: Map,
-    /// The route's centre line \[m].
+    /// The route's centre line (m).
     pub centre_line: Polygon,
     /// The start, then one frame a step.
     pub frames: Vec<Frame>,

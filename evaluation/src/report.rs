@@ -23,21 +23,21 @@ pub struct Episode {
     pub steps: u32,
     /// Sum of the rewards.
     pub reward: f64,
-    /// Mean distance to the lane centre \[m].
+    /// Mean distance to the lane centre (m).
     pub lane_distance_mean: f64,
-    /// Largest distance to the lane centre \[m].
+    /// Largest distance to the lane centre (m).
     pub lane_distance_max: f64,
     /// Fraction of its steps after which the tractor's middle was outside of the route's own lane.
     pub outside_lane: f64,
-    /// Smallest distance of the tractor to a kerb \[m].
+    /// Smallest distance of the tractor to a kerb (m).
     pub tractor_clearance_min: f64,
-    /// Smallest distance of the trailer to a kerb \[m].
+    /// Smallest distance of the trailer to a kerb (m).
     pub trailer_clearance_min: f64,
     /// Largest load transfer ratio of either unit.
     pub load_transfer_ratio_peak: f64,
-    /// Largest articulation \[rad].
+    /// Largest articulation (rad).
     pub articulation_peak: f64,
-    /// Largest distance of the trailer axle from the path of the front axle \[m].
+    /// Largest distance of the trailer axle from the path of the front axle (m).
     pub off_tracking_peak: f64,
     /// How it drove, where classes of vehicles are reported.
     pub driving: Option<Driving>,
@@ -62,27 +62,27 @@ pub struct Summary {
     pub ends: BTreeMap<&'static str, usize>,
     /// Episodes that failed in their first step: the truck starts on or against a kerb, and no action helps.
     pub lost_at_start: usize,
-    /// Mean distance to the lane centre, all episodes \[m].
+    /// Mean distance to the lane centre, all episodes (m).
     pub lane_distance_mean: f64,
-    /// The same of those that arrived, `None` if none did \[m].
+    /// The same of those that arrived, `None` if none did (m).
     pub lane_distance_mean_arrived: Option<f64>,
-    /// Largest distance to the lane centre \[m].
+    /// Largest distance to the lane centre (m).
     pub lane_distance_max: f64,
-    /// The same of those that arrived \[m].
+    /// The same of those that arrived (m).
     pub lane_distance_max_arrived: Option<f64>,
     /// Mean fraction of an episode's steps outside of its own lane, of those that arrived; `None` if none did.
     pub outside_lane_mean: Option<f64>,
-    /// Smallest distance of the tractor to a kerb \[m].
+    /// Smallest distance of the tractor to a kerb (m).
     pub tractor_clearance_min: f64,
-    /// Smallest distance of the trailer to a kerb \[m].
+    /// Smallest distance of the trailer to a kerb (m).
     pub trailer_clearance_min: f64,
     /// Largest load transfer ratio.
     pub load_transfer_ratio_peak: f64,
-    /// Largest articulation \[deg].
+    /// Largest articulation (deg).
     pub articulation_peak_deg: f64,
-    /// Largest off-tracking \[m].
+    /// Largest off-tracking (m).
     pub off_tracking_peak: f64,
-    /// Mean time of an episode \[s].
+    /// Mean time of an episode (s).
     pub time_mean: f64,
     /// Mean sum of rewards.
     pub reward_mean: f64,
@@ -157,7 +157,7 @@ pub struct RouteReport {
     /// A truck whose front axle follows the centre line touches no kerb, and its lock allows that. Steer rate, tyres and
     /// rollover are not asked: they depend on the speed, which is the policy's.
     pub own_lane_suffices: bool,
-    /// Radius of the roundabout's island \[m].
+    /// Radius of the roundabout's island (m).
     pub island_radius: f64,
     /// Figures of its episodes.
     #[serde(flatten)]

@@ -22,7 +22,7 @@ pub(super) struct Running {
     /// Its figures so far; the means and the off-tracking follow at its end.
     episode: Episode,
     off_tracking: OffTracking,
-    /// Duration of a step \[s].
+    /// Duration of a step (s).
     step: f64,
 }
 
@@ -91,12 +91,12 @@ impl Running {
     }
 }
 
-/// Middle of the front axle \[m].
+/// Middle of the front axle (m).
 fn front_axle(rig: &Rig, truck: &Truck) -> Vec2 {
     truck.position + rig.wheelbase * Vec2::from_angle(truck.heading)
 }
 
-/// Largest distance of the trailer's axle from the path of the front axle \[m]. The trailer follows the path in order,
+/// Largest distance of the trailer's axle from the path of the front axle (m). The trailer follows the path in order,
 /// so the search for the nearest segment only moves forwards, and what lies behind it is dropped.
 struct OffTracking {
     /// The path, from the segment nearest to the trailer on.

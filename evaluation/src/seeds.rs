@@ -50,7 +50,7 @@ pub struct Seeds {
 #[derive(Debug, Clone, Serialize)]
 struct SeedRun {
     seed: u32,
-    /// Training time \[s].
+    /// Training time (s).
     seconds: f64,
     env_steps: u64,
     updates: u64,
@@ -73,7 +73,7 @@ struct SeedsEvaluation {
     success_worst: f64,
     /// The first seed with that success.
     worst_seed: u32,
-    /// Mean of the seeds' mean distances to the lane centre in episodes that arrived \[m].
+    /// Mean of the seeds' mean distances to the lane centre in episodes that arrived (m).
     lane_distance_mean_arrived: Option<f64>,
     seeds: Vec<SeedFigures>,
 }
@@ -85,7 +85,7 @@ struct SeedFigures {
     episodes: usize,
     arrived: usize,
     success: f64,
-    /// Mean distance to the lane centre in episodes that arrived; none if none did \[m].
+    /// Mean distance to the lane centre in episodes that arrived; none if none did (m).
     lane_distance_mean_arrived: Option<f64>,
 }
 

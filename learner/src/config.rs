@@ -43,13 +43,13 @@ pub struct Config {
     pub seed: u32,
     /// Number of trucks.
     pub n_envs: usize,
-    /// Training time \[min].
+    /// Training time (min).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minutes: Option<f64>,
     /// Env steps of all trucks together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<u64>,
-    /// Time between two checkpoints \[min].
+    /// Time between two checkpoints (min).
     #[serde(default = "checkpoint_minutes")]
     pub checkpoint_minutes: f64,
     /// Other weights than the training benchmark's in its reward.

@@ -137,7 +137,7 @@ pub fn distribution(logits: Tensor<2>) -> (Tensor<2>, Tensor<2>) {
     (log_probs.clone().exp(), log_probs)
 }
 
-/// An action sampled from the softmax of each row of `logits`, `[rows]`.
+/// An action sampled from the softmax of each row of `logits`, `(rows)`.
 pub fn sampled(logits: &[f32], n_actions: usize, rng: &mut impl Rng) -> Vec<u32> {
     let mut one = |row: &[f32]| {
         let most = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);

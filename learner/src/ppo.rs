@@ -181,7 +181,7 @@ impl Ppo {
         ShardGradients { figures, actor, critic }
     }
 
-    /// The value network's output for each normalised observation of `[rows * values]`, `[rows]`.
+    /// The value network's output for each normalised observation of `[rows * values]`, `(rows)`.
     fn values(&self, observations: &[f32]) -> Vec<f32> {
         let n_values = self.critic.layers[0].weight.dims()[0];
         let blocks: Vec<&[f32]> = observations.chunks(BLOCK * n_values).collect();

@@ -91,7 +91,7 @@ pub struct Update {
     pub critic_loss: f32,
     /// Entropy coefficient times negative entropy, minus value: what the actor minimises.
     pub actor_loss: f32,
-    /// Entropy of the policy \[nat].
+    /// Entropy of the policy (nat).
     pub entropy: f32,
     /// Value of the actions taken, the mean of both critics.
     pub value: f32,

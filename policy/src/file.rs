@@ -27,7 +27,7 @@ const MOST_LAYERS: usize = 64;
 struct Description {
     version: u32,
     benchmark: String,
-    /// Steer angle \[rad] and speed [m/s] of each action.
+    /// Steer angle (rad) and speed (m/s) of each action.
     actions: Vec<[f32; 2]>,
     layers: usize,
     /// Names of the extras observed beside the 69 values; none where it is absent.

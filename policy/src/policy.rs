@@ -163,7 +163,7 @@ impl Policy {
     }
 }
 
-/// The best action of each row of `logits`, `[rows]`; the first of equals.
+/// The best action of each row of `logits`, `(rows)`; the first of equals.
 pub fn greedy(logits: &[f32], n_actions: usize) -> Vec<u32> {
     let best = |row: &[f32]| (1..n_actions).fold(0, |best, action| if row[best] < row[action] { action } else { best });
     logits.chunks_exact(n_actions).map(|row| best(row) as u32).collect()

@@ -11,25 +11,25 @@ use offtrack::map::route::Lane;
 use offtrack::map::{Gutter, Road};
 use serde::{Deserialize, Serialize};
 
-/// Distance from the ring's centre within which points are compared \[m].
+/// Distance from the ring's centre within which points are compared (m).
 pub const WITHIN: f64 = 45.0;
 
-/// Maximum magnitude of a measured coordinate \[m].
+/// Maximum magnitude of a measured coordinate (m).
 pub const FARTHEST: f64 = 1000.0;
 
-/// Maximum length of all measured lines together \[m].
+/// Maximum length of all measured lines together (m).
 pub const LONGEST: f64 = 20_000.0;
 
-/// Spacing of the points at which lines are compared \[m].
+/// Spacing of the points at which lines are compared (m).
 const STEP: f64 = 0.5;
 
-/// Distances within which the points of a [`Spread`] are counted \[m].
+/// Distances within which the points of a [`Spread`] are counted (m).
 pub const NEAR: [f64; 3] = [0.05, 0.1, 0.3];
 
-/// A measured line: points joined by straights \[m].
+/// A measured line: points joined by straights (m).
 pub type Line = Vec<[f64; 2]>;
 
-/// A measured roundabout, its ring's centre at the origin \[m].
+/// A measured roundabout, its ring's centre at the origin (m).
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measured {
@@ -70,9 +70,9 @@ pub struct MeasuredRoute {
 /// Distances of a set of points from the curves they should lie on.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Spread {
-    /// The largest distance \[m].
+    /// The largest distance (m).
     pub worst: f64,
-    /// The mean distance \[m].
+    /// The mean distance (m).
     pub mean: f64,
     /// Number of points that were compared.
     pub points: usize,
@@ -120,7 +120,7 @@ pub enum Error {
     TooFar {
         /// The coordinate's key: line, point, and 0 for x or 1 for y, `kerbs[2][17][0]`.
         key: String,
-        /// The coordinate \[m].
+        /// The coordinate (m).
         value: String,
     },
     /// More line than any roundabout has.
@@ -128,7 +128,7 @@ pub enum Error {
     TooLong {
         /// The key of the line that exceeds the limit.
         key: String,
-        /// Length of all lines up to this one \[m].
+        /// Length of all lines up to this one (m).
         length: String,
     },
 }

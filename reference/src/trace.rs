@@ -7,15 +7,15 @@
 mod case;
 
 use glam::Vec2;
-use offtrack::physics::{Moving, load_transfer_ratio, motion_of, moved};
-use offtrack::physics::controlled;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Action, Control, Rig, Truck};
+use offtrack::physics::controlled;
+use offtrack::physics::{Moving, load_transfer_ratio, motion_of, moved};
 use serde::Serialize;
 
 pub use case::{Case, CaseVehicle, Command, Error, Init, Instant};
 
-/// Instants closer together than this are the same \[s].
+/// Instants closer together than this are the same (s).
 const SAME_INSTANT: f64 = 1e-7;
 
 /// The result of a case.
@@ -27,36 +27,36 @@ pub struct Traced {
     pub states: Vec<State>,
     /// Largest magnitudes over all sub-steps; `None` if the truck jackknifed, because they mean nothing after that.
     pub peak: Option<Peak>,
-    /// Time at which the articulation passed its limit, interpolated within the sub-step \[s].
+    /// Time at which the articulation passed its limit, interpolated within the sub-step (s).
     pub t_jackknife: Option<f64>,
 }
 
 /// The truck at an instant. Headings are unwrapped: they continue from the case's initial headings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct State {
-    /// Time \[s].
+    /// Time (s).
     pub t: f64,
-    /// Middle of the drive axle \[m].
+    /// Middle of the drive axle (m).
     pub x: f64,
-    /// Middle of the drive axle \[m].
+    /// Middle of the drive axle (m).
     pub y: f64,
-    /// Tractor's heading \[rad].
+    /// Tractor's heading (rad).
     pub psi1: f64,
-    /// Trailer's heading \[rad].
+    /// Trailer's heading (rad).
     pub psi2: f64,
-    /// Articulation, `psi1 - psi2` \[rad].
+    /// Articulation, `psi1 - psi2` (rad).
     pub gamma: f64,
-    /// Speed [m/s].
+    /// Speed (m/s).
     pub v: f64,
-    /// Steer angle \[rad].
+    /// Steer angle (rad).
     pub delta: f64,
-    /// Fifth wheel \[m].
+    /// Fifth wheel (m).
     pub hitch: [f64; 2],
-    /// Middle of the trailer's axle group \[m].
+    /// Middle of the trailer's axle group (m).
     pub trailer_axle: [f64; 2],
-    /// Lateral acceleration of the tractor [m/s^2].
+    /// Lateral acceleration of the tractor (m/s^2).
     pub ay1: f64,
-    /// Lateral acceleration of the trailer [m/s^2].
+    /// Lateral acceleration of the trailer (m/s^2).
     pub ay2: f64,
     /// Quasi-static load transfer ratio of the tractor.
     pub ltr1_qs: f64,
@@ -69,9 +69,9 @@ pub struct State {
 /// Largest magnitudes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Peak {
-    /// Lateral acceleration of the tractor [m/s^2].
+    /// Lateral acceleration of the tractor (m/s^2).
     pub ay1: f64,
-    /// Lateral acceleration of the trailer [m/s^2].
+    /// Lateral acceleration of the trailer (m/s^2).
     pub ay2: f64,
     /// Quasi-static load transfer ratio of the tractor.
     pub ltr1_qs: f64,
@@ -81,7 +81,7 @@ pub struct Peak {
     pub ltr1_dyn: f64,
     /// Load transfer ratio of the trailer.
     pub ltr2_dyn: f64,
-    /// Articulation \[rad].
+    /// Articulation (rad).
     pub gamma: f64,
 }
 
@@ -95,7 +95,7 @@ pub fn trace(case: &Case) -> Result<Traced, Error> {
 }
 
 /// Drives a case with the caller's replacement for [`moved`]. Its arguments are the rig, the length of the sub-step
-/// \[s], the control and the truck.
+/// (s), the control and the truck.
 ///
 /// # Errors
 ///
@@ -130,15 +130,15 @@ pub fn trace_by(case: &Case, mut moved: impl FnMut(&Rig, f32, &Control, &Moving)
 #[derive(Clone)]
 struct Run<'a> {
     case: &'a Case,
-    /// Current time \[s].
+    /// Current time (s).
     t: f64,
     /// Index of the last sub-step of the grid that has begun.
     grid: u32,
     moving: Moving,
-    /// What the speed control asked for last, and when it decides next \[s].
+    /// What the speed control asked for last, and when it decides next (s).
     asked: Control,
     decides: f64,
-    /// Unwrapped headings, in addition to the truck's wrapped ones \[rad].
+    /// Unwrapped headings, in addition to the truck's wrapped ones (rad).
     psi1: f64,
     psi2: f64,
 }
@@ -238,7 +238,7 @@ impl Run<'_> {
         }
     }
 
-    /// Lateral acceleration that the road's fall adds [m/s^2].
+    /// Lateral acceleration that the road's fall adds (m/s^2).
     fn fall(&self) -> f32 {
         self.case.vehicle.rig(self.case.dt).crossfall
     }

@@ -4,7 +4,7 @@
 
 // The field at a point.
 struct Sample {
-    // Signed distance [m].
+    // Signed distance (m).
     distance: f32,
     // Its slope to the east and to the north.
     slope: vec2<f32>,

@@ -1,6 +1,6 @@
 // Positions on a truck, and which trucks a kernel works on.
 
-// Middle of the trailer's axle group [m].
+// Middle of the trailer's axle group (m).
 fn trailer_position(rig: Rig, truck: Truck) -> vec2<f32> {
     return truck.position + rig.fifth_wheel * direction(truck.heading) - rig.trailer_wheelbase * direction(truck.trailer_heading);
 }

@@ -4,7 +4,7 @@
 
 use std::fs;
 
-/// Memory of the host that can be used without ending another's work, where the system says so \[bytes].
+/// Memory of the host that can be used without ending another's work, where the system says so (bytes).
 pub fn available() -> Option<u64> {
     let free = fs::read_to_string("/proc/meminfo").ok().and_then(|text| mem_available(&text));
     // A container may be granted less than the machine has.
@@ -12,24 +12,24 @@ pub fn available() -> Option<u64> {
     [free, granted, address_space()].into_iter().flatten().min()
 }
 
-/// What a limit of the process's address space leaves, as `ulimit -v` sets one [bytes].
+/// What a limit of the process's address space leaves, as `ulimit -v` sets one (bytes).
 fn address_space() -> Option<u64> {
     let limits = fs::read_to_string("/proc/self/limits").ok()?;
     let taken = fs::read_to_string("/proc/self/status").ok().and_then(|text| kilobytes(&text, "VmSize:"))?;
     Some(address_limit(&limits)?.saturating_sub(taken))
 }
 
-/// The soft limit of the address space in `/proc/self/limits`; none where there is no limit [bytes].
+/// The soft limit of the address space in `/proc/self/limits`; none where there is no limit (bytes).
 fn address_limit(text: &str) -> Option<u64> {
     text.lines().find_map(|line| line.strip_prefix("Max address space"))?.split_whitespace().next()?.parse().ok()
 }
 
-/// `MemAvailable` of `/proc/meminfo` [bytes].
+/// `MemAvailable` of `/proc/meminfo` (bytes).
 fn mem_available(text: &str) -> Option<u64> {
     kilobytes(text, "MemAvailable:")
 }
 
-/// A value in kB of a file in `/proc` [bytes].
+/// A value in kB of a file in `/proc` (bytes).
 fn kilobytes(text: &str, key: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(key))?;
     let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;

@@ -6,29 +6,29 @@ use rayon::prelude::*;
 use super::{Field, Kind, STORED_UNIT, TILE_COLUMNS, TILE_ROWS, cell_index, elsewhere};
 use crate::geometry::{Nearby, Outline};
 
-/// Solid ground kept around the outline \[m].
+/// Solid ground kept around the outline (m).
 const MARGIN: f64 = 1.0;
-/// Finest sub-cell \[m]. A kink in the middle of one is off by half of it: 1.6 cm.
+/// Finest sub-cell (m). A kink in the middle of one is off by half of it: 1.6 cm.
 const FINEST: f64 = 1.0 / 32.0;
 /// Cells a side of a region that is skipped as a whole where it is deep in a solid.
 const REGION: usize = 16;
-/// Up to this distance from a kerb a ray may end, and a grazing ray multiplies the error by 11 \[m].
+/// Up to this distance from a kerb a ray may end, and a grazing ray multiplies the error by 11 (m).
 const SURFACE: f64 = 0.4;
-/// Largest error there \[m].
+/// Largest error there (m).
 const SURFACE_TOLERANCE: f64 = 6e-4;
-/// Up to this distance from a kerb the stated accuracy holds \[m].
+/// Up to this distance from a kerb the stated accuracy holds (m).
 const PROMISED: f64 = 6.0;
-/// Largest error there except at kinks \[m].
+/// Largest error there except at kinks (m).
 const TOLERANCE: f64 = 8e-3;
-/// Deepest value stored in a solid: cells that are deeper share one block \[m].
+/// Deepest value stored in a solid: cells that are deeper share one block (m).
 const DEEP: f64 = 7.5;
-/// Largest value stored. It is a lower bound of the distance, and longer than any step of a march \[m].
+/// Largest value stored. It is a lower bound of the distance, and longer than any step of a march (m).
 const FAR: f64 = 15.9;
 
 /// In sub-cells up to this width an error above [`TOLERANCE`] is that of a kink: a kerb bend of 0.2 m radius is
-/// interpolated better \[m].
+/// interpolated better (m).
 const KINK: f64 = 0.125;
-/// Largest error there at the sampled points, so that between them it stays below 3 cm \[m].
+/// Largest error there at the sampled points, so that between them it stays below 3 cm (m).
 const KINK_TOLERANCE: f64 = 0.018;
 /// Two kerbs whose gradients have a smaller product than this make a kink.
 const APART: f64 = 0.95;
@@ -214,7 +214,7 @@ fn found(nearby: &Nearby, corner: DVec2, cell: f64) -> Cell {
     Cell::Single(coarsest(simple + 1..finest).unwrap_or_else(|| square.block(finest, exact)))
 }
 
-/// Largest error where the distance is `exact` and sub-cells are `step` wide \[m].
+/// Largest error where the distance is `exact` and sub-cells are `step` wide (m).
 fn tolerance(exact: f64, step: f64) -> f64 {
     if exact.abs() < SURFACE {
         SURFACE_TOLERANCE
@@ -289,7 +289,7 @@ fn sides(nearby: &Nearby, square: &Square) -> Option<[Vec<usize>; 2]> {
     sides.iter().all(|side| !side.is_empty()).then_some(sides)
 }
 
-/// Signed distance from `p` to a group of pieces, extended beyond the group's ends \[m].
+/// Signed distance from `p` to a group of pieces, extended beyond the group's ends (m).
 fn extended(nearby: &Nearby, pieces: &[usize], p: DVec2) -> f64 {
     let nearest = pieces.iter().copied().min_by(|&a, &b| nearby.piece_distance(a, p).total_cmp(&nearby.piece_distance(b, p)));
     nearest.map_or(0.0, |piece| nearby.extended(piece, p).0)
@@ -310,7 +310,7 @@ impl Square {
         Block { level, nodes: (0..lines * lines).map(|index| stored(distance(at(index)))).collect() }
     }
 
-    /// What a block interpolates to at points all over it \[m].
+    /// What a block interpolates to at points all over it (m).
     fn values(&self, block: &Block) -> impl Iterator<Item = f64> {
         points(block.level).map(move |(column, row, u, v)| {
             let lines = (1 << block.level) + 1;
@@ -320,19 +320,19 @@ impl Square {
         })
     }
 
-    /// `distance` there, as far as it is stored \[m].
+    /// `distance` there, as far as it is stored (m).
     fn sampled(&self, level: u32, distance: impl Fn(DVec2) -> f64) -> impl Iterator<Item = f64> {
         let step = self.step(level);
         points(level)
             .map(move |(column, row, u, v)| distance(self.corner + DVec2::new(column as f64 + u, row as f64 + v) * step).clamp(-DEEP, FAR))
     }
 
-    /// The error of a block there, and the exact distance \[m].
+    /// The error of a block there, and the exact distance (m).
     fn errors(&self, block: &Block, exact: impl Fn(DVec2) -> f64) -> impl Iterator<Item = (f64, f64)> {
         self.values(block).zip(self.sampled(block.level, exact)).map(|(value, exact)| (value - exact, exact))
     }
 
-    /// Width of a level's sub-cells \[m].
+    /// Width of a level's sub-cells (m).
     fn step(&self, level: u32) -> f64 {
         self.cell / f64::from(1 << level)
     }

@@ -87,7 +87,7 @@ pub struct Cache {
 
 /// First bytes of an entry: its kind and the version of its form.
 const MAGIC: &[u8; 16] = b"offtrack cache 1";
-/// Size up to which [`Cache::prune`] lets a folder grow \[bytes].
+/// Size up to which [`Cache::prune`] lets a folder grow (bytes).
 const LIMIT: u64 = 4 << 30;
 
 impl Cache {

@@ -85,14 +85,14 @@ pub enum Error {
     Stopped,
 }
 
-/// Maximum size of a scenario, vehicle or roundabout file: a hundred times the largest shipped one \[bytes].
+/// Maximum size of a scenario, vehicle or roundabout file: a hundred times the largest shipped one (bytes).
 pub const TEXT_LIMIT: u64 = 1 << 20;
 
-/// Maximum length of a key or value in a message \[characters].
+/// Maximum length of a key or value in a message (characters).
 const LONGEST_VALUE: usize = 100;
-/// Maximum length of what is wrong with a file as a whole \[characters].
+/// Maximum length of what is wrong with a file as a whole (characters).
 const LONGEST_FAULT: usize = 1000;
-/// Maximum length of what a message asks for \[characters].
+/// Maximum length of what a message asks for (characters).
 const LONGEST_EXPECTED: usize = 600;
 
 /// The bytes of a regular file of at most `limit` bytes.

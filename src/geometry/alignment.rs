@@ -9,9 +9,9 @@ use super::{Curve, Piece};
 /// A corner of an alignment: the intersection of two straights, and the radius of the arc that rounds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bend {
-    /// Intersection of the straights \[m].
+    /// Intersection of the straights (m).
     pub at: DVec2,
-    /// Radius of the arc between them; 0 leaves the corner sharp \[m].
+    /// Radius of the arc between them; 0 leaves the corner sharp (m).
     pub radius: f64,
 }
 
@@ -20,7 +20,7 @@ pub struct Bend {
 pub struct Misfit {
     /// Index of the bend.
     pub bend: usize,
-    /// The largest radius that fits, all others unchanged \[m].
+    /// The largest radius that fits, all others unchanged (m).
     pub largest: f64,
 }
 
@@ -58,7 +58,7 @@ pub fn rounded(bends: &[Bend], closed: bool) -> Result<Curve, Misfit> {
 
 /// The arc of `radius` that leads the straight from `origin` in `direction` (of length 1) into the circle of radius
 /// `circle` around the plane's origin, which is travelled counter-clockwise, and the direction from the plane's origin
-/// to the point of contact \[rad].
+/// to the point of contact (rad).
 ///
 /// A straight that would cut the circle is led in by a right turn from outside; one that would pass it, by a left turn
 /// wider than the circle. `None` if no such arc begins ahead.
@@ -82,7 +82,7 @@ pub fn to_circle(origin: DVec2, direction: DVec2, circle: f64, radius: f64) -> O
 }
 
 struct Rounding {
-    /// From the bend's point to either end of its arc \[m].
+    /// From the bend's point to either end of its arc (m).
     tangent: f64,
     begin: DVec2,
     end: DVec2,

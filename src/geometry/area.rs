@@ -14,7 +14,7 @@ use i_overlay::mesh::float::style::{LineJoin, OutlineStyle};
 use crate::geometry::Piece;
 
 /// Points of a metre on the grid that polygons are computed on: 0.06 mm apart. On a finer grid edges that all but
-/// coincide cross each other without end \[1/m].
+/// coincide cross each other without end (1/m).
 const GRID: f64 = 16384.0;
 
 /// Contours of one connected part: its outer one, then its holes.
@@ -40,7 +40,7 @@ pub(crate) fn counter_clockwise(mut contour: Vec<DVec2>) -> Vec<DVec2> {
     contour
 }
 
-/// The area enclosed by a contour, positive counter-clockwise \[m²].
+/// The area enclosed by a contour, positive counter-clockwise (m²).
 pub(crate) fn signed_area(contour: &[[f64; 2]]) -> f64 {
     let n = contour.len();
     (0..n).map(|i| DVec2::from(contour[i]).perp_dot(contour[(i + 1) % n].into())).sum::<f64>() / 2.0
@@ -69,7 +69,7 @@ impl Area {
         self.with(other, OverlayRule::Intersect)
     }
 
-    /// The area grown by `distance` on every side, or shrunk by it if negative \[m].
+    /// The area grown by `distance` on every side, or shrunk by it if negative (m).
     pub(crate) fn grown(&self, distance: f64) -> Area {
         if self.parts.is_empty() {
             return Area::default();
@@ -78,14 +78,14 @@ impl Area {
         Area { parts: self.parts.outline_fixed_scale(&style, GRID).unwrap_or_else(|_| self.parts.outline(&style)) }
     }
 
-    /// The same area with fewer points: what is left out lies within `tolerance` of the new edges \[m].
+    /// The same area with fewer points: what is left out lies within `tolerance` of the new edges (m).
     pub(crate) fn simplified(&self, tolerance: f64) -> Area {
         let contour = |contour: &Vec<[f64; 2]>| simplified(contour, tolerance);
         let part = |part: &Part| part.iter().map(contour).filter(|contour| 2 < contour.len()).collect();
         Area { parts: self.parts.iter().map(part).filter(|part: &Part| !part.is_empty()).collect() }
     }
 
-    /// The area with every gap closed that is narrower than `width`, a tenth of it uncertain \[m].
+    /// The area with every gap closed that is narrower than `width`, a tenth of it uncertain (m).
     pub(crate) fn closed(&self, width: f64) -> Area {
         // Fewer points make this several times as fast; what they add at most is shrunk away again.
         let tolerance = width / 10.0;
@@ -93,7 +93,7 @@ impl Area {
     }
 
     /// The area without what is connected to it, or hangs on it, by slits narrower than `width`; edges are replaced by
-    /// longer ones within `tolerance` on the way, which is faster \[m].
+    /// longer ones within `tolerance` on the way, which is faster (m).
     ///
     /// What is grown back covers what was shrunk with a quarter of the width to spare; corners of 90 deg keep 0.04 of
     /// it.
@@ -107,12 +107,12 @@ impl Area {
         holes.map(|hole| Area { parts: vec![vec![hole.iter().rev().copied().collect()]] })
     }
 
-    /// Its size \[m²].
+    /// Its size (m²).
     pub(crate) fn size(&self) -> f64 {
         self.parts.iter().flatten().map(|contour| signed_area(contour)).sum()
     }
 
-    /// Corners of the smallest upright rectangle around it \[m].
+    /// Corners of the smallest upright rectangle around it (m).
     pub(crate) fn bounds(&self) -> (DVec2, DVec2) {
         let points = self.parts.iter().flatten().flatten().map(|&p| DVec2::from(p));
         points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))

@@ -9,12 +9,12 @@ use glam::DVec2;
 
 use super::{Curve, Piece, wrapped};
 
-/// Points of a polyline are at most this far apart when a curve is compared with it \[m].
+/// Points of a polyline are at most this far apart when a curve is compared with it (m).
 const STEP: f64 = 0.5;
 /// Most points that one piece replaces.
 const MOST_POINTS: usize = 4000;
 
-/// The closed polyline as a closed curve: every one of its points is within `tolerance` of the curve \[m].
+/// The closed polyline as a closed curve: every one of its points is within `tolerance` of the curve (m).
 ///
 /// The curve goes around as the polyline does. It is empty for fewer than three points.
 pub fn fitted_outline(polyline: &[DVec2], tolerance: f64) -> Curve {
@@ -41,7 +41,7 @@ pub fn fitted_outline(polyline: &[DVec2], tolerance: f64) -> Curve {
 }
 
 /// The polyline as a curve of the same ends whose heading has no step: every one of its points is within `tolerance` of
-/// the curve \[m].
+/// the curve (m).
 pub fn fitted_line(polyline: &[DVec2], tolerance: f64) -> Curve {
     let points = dense(&distinct(polyline));
     if points.len() < 2 {
@@ -67,7 +67,7 @@ pub fn fitted_line(polyline: &[DVec2], tolerance: f64) -> Curve {
     Curve { pieces }
 }
 
-/// Largest distance of points beside a piece from it: from its line or circle \[m].
+/// Largest distance of points beside a piece from it: from its line or circle (m).
 fn farthest(points: &[DVec2], piece: &Piece) -> f64 {
     let farthest = |distance: &dyn Fn(DVec2) -> f64| points.iter().map(|&p| distance(p)).fold(0.0, f64::max);
     match *piece {
@@ -213,7 +213,7 @@ fn arc_through(points: &[DVec2], tolerance: f64) -> Option<Piece> {
 }
 
 /// The arc between two points whose middle is `height` right of the chord; a segment if it is flat, nothing if it is
-/// more than half a circle \[m].
+/// more than half a circle (m).
 pub(crate) fn arc_of_height(from: DVec2, to: DVec2, height: f64) -> Option<Piece> {
     let chord = to - from;
     let half = chord.length() / 2.0;

@@ -5,10 +5,10 @@ use glam::DVec2;
 
 use super::{Curve, Outline, Piece, wrapped};
 
-/// Ends nearer than this are the same point \[m].
+/// Ends nearer than this are the same point (m).
 const SAME: f64 = 1e-6;
 
-/// The loops around the solids of `outline` grown by `distance` \[m].
+/// The loops around the solids of `outline` grown by `distance` (m).
 pub(super) fn grown(outline: &Outline, distance: f64) -> Vec<Curve> {
     let moved: Vec<Piece> = outline.loops.iter().flat_map(|curve| moved(curve, distance)).collect();
     let kept = moved.iter().enumerate().flat_map(|(index, piece)| {

@@ -97,7 +97,7 @@ impl Outline {
         Outline { loops, pieces, rises: rises.concat() }
     }
 
-    /// Unsigned distance from `p` to the outline \[m].
+    /// Unsigned distance from `p` to the outline (m).
     pub fn distance(&self, p: DVec2) -> f64 {
         nearest(&self.pieces, p)
     }
@@ -107,13 +107,13 @@ impl Outline {
         odd(&self.rises, p)
     }
 
-    /// Distance from `p` to the outline, positive on the drivable surface, negative in the solid area \[m].
+    /// Distance from `p` to the outline, positive on the drivable surface, negative in the solid area (m).
     pub fn signed_distance(&self, p: DVec2) -> f64 {
         if self.contains(p) { self.distance(p) } else { -self.distance(p) }
     }
 
     /// Distance along the ray from `origin` in `direction` (of length 1) to the outline; `range` where nothing is met
-    /// before, 0 from inside a solid \[m].
+    /// before, 0 from inside a solid (m).
     pub fn ray(&self, origin: DVec2, direction: DVec2, range: f64) -> f64 {
         if !self.contains(origin) {
             return 0.0;
@@ -135,7 +135,7 @@ impl Outline {
             || self.loops.iter().any(|curve| within(curve.point_at(0.0)))
     }
 
-    /// The corners (west south, east north) of the smallest upright rectangle around the outline \[m].
+    /// The corners (west south, east north) of the smallest upright rectangle around the outline (m).
     pub fn bounds(&self) -> (DVec2, DVec2) {
         let ends = self.rises.iter().flat_map(|rise| {
             let bulge = rise.arc.and_then(|(centre, radius, side)| {
@@ -154,7 +154,7 @@ impl Outline {
     }
 
     /// The outline with the solid area grown by `distance`: every point of the new outline is `distance` from the old
-    /// one \[m].
+    /// one (m).
     pub fn offset(&self, distance: f64) -> Outline {
         Outline::new(grown(self, distance))
     }
@@ -210,13 +210,13 @@ impl Nearby {
         all.fold((f64::INFINITY, 0), |best, other| if other.0 < best.0 { other } else { best }).1
     }
 
-    /// Distance from `p` to a piece \[m].
+    /// Distance from `p` to a piece (m).
     pub fn piece_distance(&self, piece: usize, p: DVec2) -> f64 {
         self.pieces[piece].distance(p)
     }
 
     /// Signed distance from `p` to a piece extended beyond its ends, to a straight line or a whole circle: positive on
-    /// the drivable side, with the gradient there \[m].
+    /// the drivable side, with the gradient there (m).
     pub fn extended(&self, piece: usize, p: DVec2) -> (f64, DVec2) {
         match self.pieces[piece].piece {
             Piece::Segment { from, to } => {
@@ -232,7 +232,7 @@ impl Nearby {
     }
 
     /// Signed distance from `p` to the whole outline, exact for points within the radius given to [`Outline::near`]
-    /// \[m].
+    /// (m).
     pub fn signed_distance(&self, p: DVec2) -> f64 {
         let drivable = match &self.side {
             Side::Same(drivable) => *drivable,

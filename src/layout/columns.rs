@@ -17,11 +17,11 @@ macro_rules! columns {
             Control control: Control,
             /// The trucks
             Truck truck: Truck,
-            /// Distances to the kerbs \[m]
+            /// Distances to the kerbs (m)
             Clearance clearance: Clearance,
             /// Progress along the routes
             Progress progress: Progress,
-            /// Distance sensors \[m]
+            /// Distance sensors (m)
             Ranges ranges: [f32; N_RAYS],
             /// The observation before the next action
             Observation observation: [f32; N_VALUES],

@@ -56,7 +56,7 @@ impl<T: Shared, const N: usize> Shared for [T; N] {
 pub struct Struct {
     /// Its name.
     pub name: &'static str,
-    /// Its size \[bytes].
+    /// Its size (bytes).
     pub size: usize,
     /// Its fields, in order and without gaps.
     pub fields: Vec<Field>,
@@ -67,7 +67,7 @@ pub struct Struct {
 pub struct Field {
     /// Its name.
     pub name: &'static str,
-    /// Its offset in the struct \[bytes].
+    /// Its offset in the struct (bytes).
     pub offset: usize,
     /// Its type in WGSL: `f32`, `u32`, `vec2<f32>`, another struct or an array.
     pub wgsl: String,

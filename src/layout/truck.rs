@@ -6,7 +6,7 @@ use super::{Rig, Truck};
 use crate::layout::angle::direction;
 
 impl Truck {
-    /// Middle of the trailer's axle group \[m].
+    /// Middle of the trailer's axle group (m).
     #[inline]
     pub fn trailer_position(&self, rig: &Rig) -> Vec2 {
         self.position + rig.fifth_wheel * direction(self.heading) - rig.trailer_wheelbase * direction(self.trailer_heading)

@@ -11,7 +11,7 @@ use crate::map::opendrive::{Hand, Imported, Map, Options, Ring, Way};
 /// Which ring of a map, and how it is imported.
 #[derive(Debug, Clone, Default)]
 pub struct Choice {
-    /// A point of the map near the ring; needed where the map has several \[m].
+    /// A point of the map near the ring; needed where the map has several (m).
     pub ring: Option<DVec2>,
     /// Its hand of traffic.
     pub hand: Hand,

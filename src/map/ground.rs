@@ -34,7 +34,7 @@ pub enum Kerb {
 /// Where the lanes' edges lie.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Edges {
-    /// This far from the kerb faces everywhere \[m].
+    /// This far from the kerb faces everywhere (m).
     Beside(f64),
     /// On outlines of their own.
     Own(Outline),
@@ -45,7 +45,7 @@ pub enum Edges {
 pub struct Arm {
     /// Its name, a part of the names of its routes.
     pub name: String,
-    /// Direction in which it leaves the ring, counter-clockwise from east \[rad].
+    /// Direction in which it leaves the ring, counter-clockwise from east (rad).
     pub bearing: f64,
 }
 
@@ -62,9 +62,9 @@ pub struct Line {
     pub exit_arm: usize,
     /// Its centre line.
     pub line: Curve,
-    /// Reach of a crossing line from the centre line to its left and to its right, over all lanes of the ring \[m].
+    /// Reach of a crossing line from the centre line to its left and to its right, over all lanes of the ring (m).
     pub crossing: (f64, f64),
-    /// Widths of its lane: on the entry arm, in the ring, on the exit arm \[m].
+    /// Widths of its lane: on the entry arm, in the ring, on the exit arm (m).
     pub widths: [f64; 3],
     /// Why it begins, and why it ends, before the world does, as the map that it is from has it.
     pub ends: [Option<String>; 2],
@@ -75,12 +75,12 @@ pub struct Line {
 pub struct Ground {
     /// Whether the road itself has left-hand traffic: all that follows is its mirror image in the x axis.
     pub mirrored: bool,
-    /// Radius of the central island's kerb face; 0 where there is no ring but a junction \[m].
+    /// Radius of the central island's kerb face; 0 where there is no ring but a junction (m).
     pub island_radius: f64,
     /// Radius of the ring's outer kerb face, or of the circle around the junction; approaches and departures are
-    /// measured from this circle \[m].
+    /// measured from this circle (m).
     pub outer_radius: f64,
-    /// Radii of the centre lines of the ring's lanes, the innermost first; none in a junction \[m].
+    /// Radii of the centre lines of the ring's lanes, the innermost first; none in a junction (m).
     pub lane_radii: Vec<f64>,
     /// The arms, counter-clockwise.
     pub arms: Vec<Arm>,

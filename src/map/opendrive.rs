@@ -55,9 +55,9 @@ pub enum Hand {
     Left,
 }
 
-/// Chords of lanes leave their curves by at most this much where rings are looked for \[m].
+/// Chords of lanes leave their curves by at most this much where rings are looked for (m).
 const COARSE: f64 = 0.02;
-/// The same for centre lines of routes, before arcs are fitted; headings matter too \[m].
+/// The same for centre lines of routes, before arcs are fitted; headings matter too (m).
 const FINEST: f64 = 1e-4;
 
 /// A map that was read.
@@ -123,7 +123,7 @@ impl Map {
         self.records.roads.len()
     }
 
-    /// The ring whose centre is nearest to a point of the map \[m].
+    /// The ring whose centre is nearest to a point of the map (m).
     ///
     /// # Errors
     ///

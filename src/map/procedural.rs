@@ -43,8 +43,8 @@ impl RandomRoad {
     }
 }
 
-/// Least distance of a route's centre line from a kerb, `NaN` where the arms are too short for such routes \[m].
-/// `approach` and `departure` are the lengths of the routes before and after the ring \[m].
+/// Least distance of a route's centre line from a kerb, `NaN` where the arms are too short for such routes (m).
+/// `approach` and `departure` are the lengths of the routes before and after the ring (m).
 pub fn lane_clearance(roundabout: &Road, approach: f64, departure: f64) -> f64 {
     let Ok(routes) = roundabout.routes(approach, departure, 5.0) else { return f64::NAN };
     rules::lane_clearance(&roundabout.kerbs(Gutter::Drivable), &routes, 0.0)

@@ -44,7 +44,7 @@ impl Road {
         self.ground.arms.iter().map(|arm| arm.name.as_str())
     }
 
-    /// Least angle between the bearings of two neighbouring arms \[rad].
+    /// Least angle between the bearings of two neighbouring arms (rad).
     pub fn least_gap(&self) -> f64 {
         let arms = &self.ground.arms;
         let next = arms.iter().cycle().skip(1);
@@ -61,12 +61,12 @@ impl Road {
         if self.has_ring() { "ring" } else { "junction" }
     }
 
-    /// Radius of the central island's kerb face; 0 on a crossing \[m].
+    /// Radius of the central island's kerb face; 0 on a crossing (m).
     pub fn island_radius(&self) -> f64 {
         self.ground.island_radius
     }
 
-    /// Width of the strip between a kerb's face and the lane beside it; 0 where it is not the same everywhere \[m].
+    /// Width of the strip between a kerb's face and the lane beside it; 0 where it is not the same everywhere (m).
     pub fn gutter(&self) -> f64 {
         match self.ground.edges {
             Edges::Beside(gutter) => gutter,
@@ -74,12 +74,12 @@ impl Road {
         }
     }
 
-    /// Radius of the outer kerb's face; approaches and departures are measured from this circle \[m].
+    /// Radius of the outer kerb's face; approaches and departures are measured from this circle (m).
     pub fn outer_radius(&self) -> f64 {
         self.ground.outer_radius
     }
 
-    /// Radii of the centre lines of the ring's lanes, the innermost first \[m].
+    /// Radii of the centre lines of the ring's lanes, the innermost first (m).
     pub fn lane_radii(&self) -> Vec<f64> {
         self.ground.lane_radii.clone()
     }
@@ -99,7 +99,7 @@ impl Road {
         all.fold((f64::INFINITY, Kerb::Outer), |best, other| if other.0 < best.0 { other } else { best }).1
     }
 
-    /// Widths of a route's lane: on the entry arm, in the ring, on the exit arm \[m].
+    /// Widths of a route's lane: on the entry arm, in the ring, on the exit arm (m).
     pub fn lane_widths(&self, route: &Route) -> [f64; 3] {
         self.line_of(route).map_or([0.0; 3], |line| line.widths)
     }
@@ -128,7 +128,7 @@ impl Road {
     }
 
     /// All routes, ordered by entry arm, lane and exit. They lead from `approach` before the ring to `departure` after
-    /// it, with waypoints every `spacing` \[m].
+    /// it, with waypoints every `spacing` (m).
     ///
     /// # Errors
     ///

@@ -58,9 +58,9 @@ impl Lane {
 /// A point of a route, and the route's direction there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Waypoint {
-    /// On the centre line \[m].
+    /// On the centre line (m).
     pub position: DVec2,
-    /// Heading of the centre line, in (-pi, pi] \[rad].
+    /// Heading of the centre line, in (-pi, pi] (rad).
     pub heading: f64,
 }
 
@@ -81,11 +81,11 @@ pub struct Route {
     /// Points along the centre line at the requested spacing, from its beginning to its end; only the last two may be
     /// nearer to each other.
     pub waypoints: Vec<Waypoint>,
-    /// Reach of a waypoint's crossing line to its left and to its right; it covers all lanes of the ring \[m].
+    /// Reach of a waypoint's crossing line to its left and to its right; it covers all lanes of the ring (m).
     pub crossing: (f64, f64),
-    /// Length of lane between the entry arm's end and the route's beginning \[m].
+    /// Length of lane between the entry arm's end and the route's beginning (m).
     pub before: f64,
-    /// Length of lane between the route's end and the exit arm's end \[m].
+    /// Length of lane between the route's end and the exit arm's end (m).
     pub after: f64,
 }
 
@@ -111,9 +111,9 @@ impl Route {
 pub struct LeavesWorld {
     /// `approach` or `departure`.
     pub part: &'static str,
-    /// The requested length \[m].
+    /// The requested length (m).
     pub asked: f64,
-    /// The largest length that fits on this arm \[m].
+    /// The largest length that fits on this arm (m).
     pub longest: f64,
     /// The arm's name.
     pub arm: String,

@@ -26,7 +26,7 @@ const FINITE: [f64; 2] = [-1e9, 1e9];
 const POSITIVE: [f64; 2] = [1e-6, 1e9];
 /// Braking: not 0.
 const NEGATIVE: [f64; 2] = [-1e9, -1e-6];
-/// A steer angle [rad].
+/// A steer angle (rad).
 const LOCK: [f64; 2] = [1e-3, 1.5];
 
 impl Scenario {
@@ -58,7 +58,7 @@ impl Scenario {
         within("vehicle.model.steer_delay", self.longest_steer_delay(), [0.0, 2.0 * self.step])
     }
 
-    /// The longest steer delay of its vehicles \[s].
+    /// The longest steer delay of its vehicles (s).
     pub(super) fn longest_steer_delay(&self) -> f64 {
         let drawn = self.fleet.iter().flat_map(|fleet| fleet.extremes().map(|(_, vehicle)| vehicle.model.steer_delay));
         drawn.fold(self.vehicle.model.steer_delay, f64::max)

@@ -133,7 +133,7 @@ impl Scenario {
         }
     }
 
-    /// The furthest reach of its vehicles at the start: see [`Vehicle::reach`] \[m].
+    /// The furthest reach of its vehicles at the start: see [`Vehicle::reach`] (m).
     pub fn reach(&self) -> (f64, f64) {
         let drawn = self.fleet.iter().flat_map(Fleet::extremes).map(|(_, vehicle)| vehicle.reach(self.start_heading));
         drawn.fold(self.vehicle.reach(self.start_heading), |(a, b), (c, d)| (a.max(c), b.max(d)))

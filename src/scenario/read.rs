@@ -93,7 +93,7 @@ fn without_routes(
     })
 }
 
-/// Least and greatest speed at the start [m/s].
+/// Least and greatest speed at the start (m/s).
 fn start_speed(reader: &Reader, written: &WrittenSpeeds) -> Result<[f64; 2], Error> {
     let [least, greatest] = match *written {
         WrittenSpeeds::One(speed) => [speed; 2],

@@ -77,12 +77,12 @@ reward! {
     waypoint: WEIGHT, "";
     /// Weight of the lane-distance term in the reward of each step.
     lane_distance: WEIGHT, "";
-    /// Distance to the lane centre at which that term is 1 \[m].
+    /// Distance to the lane centre at which that term is 1 (m).
     lane_distance_limit: [0.1, 50.0], "m";
     /// Weight of the clearance term in the reward of each step.
     #[serde(default)]
     clearance: WEIGHT, "";
-    /// Clearance to a kerb below which that term counts \[m].
+    /// Clearance to a kerb below which that term counts (m).
     #[serde(default = "half_a_metre")]
     clearance_limit: [0.01, 10.0], "m";
     /// Reward for a failure.

@@ -12,11 +12,11 @@ use crate::world::World;
 /// Largest magnitude of a rate, an acceleration and the like, where nothing narrower is known: stages compute with it
 /// safely, and no truck comes near it.
 const MOST: f32 = 1e6;
-/// Largest magnitude of a speed [m/s]: a target is at most 100.
+/// Largest magnitude of a speed (m/s): a target is at most 100.
 const FASTEST: f32 = 1e3;
-/// Largest distance of a truck from the next waypoint in each direction \[m]. It has strayed long before.
+/// Largest distance of a truck from the next waypoint in each direction (m). It has strayed long before.
 const FAR: f32 = 1e4;
-/// Largest steer angle that an action may ask for \[rad]: locks are at most 1.5.
+/// Largest steer angle that an action may ask for (rad): locks are at most 1.5.
 const STEEPEST: f32 = 1.6;
 /// An observed value's largest magnitude: 1, with room for the rounding of either engine.
 const OBSERVED: f32 = 1.001;

@@ -5,25 +5,25 @@
 use super::GRAVITY;
 use crate::layout::Lag;
 
-/// Bound of the slip lever where a file does not say \[m]: below 32 km/h it is never reached.
+/// Bound of the slip lever where a file does not say (m): below 32 km/h it is never reached.
 pub const SLIP_LEVER: f64 = 1.5;
-/// Power over mass of a truck whose file gives no power: far beyond any truck's \[W/kg].
+/// Power over mass of a truck whose file gives no power: far beyond any truck's (W/kg).
 const UNLIMITED: f64 = 1e9;
 
 /// What a vehicle's motion takes into account.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
-    /// Bound of the shift of a no-slip point by tyre slip \[m].
+    /// Bound of the shift of a no-slip point by tyre slip (m).
     pub slip_lever: f64,
     /// Time constant of the tractor's yaw behind its front wheels, as a multiple of slip times speed; 0 is at once.
     pub yaw_lag: f64,
-    /// Time constant of the drive \[s].
+    /// Time constant of the drive (s).
     pub drive_lag: f64,
-    /// Time constant of the brakes \[s].
+    /// Time constant of the brakes (s).
     pub brake_lag: f64,
-    /// Time from a steer command to the first movement of the wheels \[s].
+    /// Time from a steer command to the first movement of the wheels (s).
     pub steer_delay: f64,
-    /// Engine power, where it limits the drive \[W].
+    /// Engine power, where it limits the drive (W).
     pub power: Option<f64>,
     /// Whether drive and braking take lateral grip.
     pub friction_ellipse: bool,
@@ -47,24 +47,24 @@ impl Default for Model {
 }
 
 impl Model {
-    /// Power over the mass of the whole truck [W/kg].
+    /// Power over the mass of the whole truck (W/kg).
     pub(super) fn specific_power(&self, gross_mass: f64) -> f64 {
         self.power.map_or(UNLIMITED, |power| power / gross_mass)
     }
 
-    /// The factor of `1 - factor acceleration²` for tyres that hold so much [m/s^2].
+    /// The factor of `1 - factor acceleration²` for tyres that hold so much (m/s^2).
     pub(super) fn ellipse(&self, grip: f64) -> f64 {
         if self.friction_ellipse { grip.powi(-2) } else { 0.0 }
     }
 
-    /// Lateral acceleration that the road's fall adds to the roll [m/s^2].
+    /// Lateral acceleration that the road's fall adds to the roll (m/s^2).
     pub(super) fn fall(&self) -> f64 {
         GRAVITY * self.crossfall
     }
 }
 
 impl Lag {
-    /// A lag with this time constant, 0 for none, in sub-steps of `substep` \[s].
+    /// A lag with this time constant, 0 for none, in sub-steps of `substep` (s).
     pub fn of(time: f64, substep: f64) -> Lag {
         if time == 0.0 {
             return Lag::default();

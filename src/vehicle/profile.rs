@@ -15,22 +15,22 @@ use crate::vehicle::GRAVITY;
 const LOAD_TRANSFER_MAX: f64 = 0.7;
 /// Fraction of the tyres' grip that a bend may take: what is left is for steering.
 const GRIP_MAX: f64 = 0.8;
-/// Mean braking that the speed control reaches where it asks for more as the error grows [m/s^2].
+/// Mean braking that the speed control reaches where it asks for more as the error grows (m/s^2).
 const BRAKING: f64 = 1.2;
-/// Lowest speed of a profile whose highest is not lower still \[m/s].
+/// Lowest speed of a profile whose highest is not lower still (m/s).
 const SLOWEST: f64 = 1.0;
 
 /// Speeds along a route.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
-    /// At each waypoint [m/s].
+    /// At each waypoint (m/s).
     pub speeds: Vec<f64>,
-    /// From the first waypoint to the last \[s].
+    /// From the first waypoint to the last (s).
     pub time: f64,
 }
 
 impl Profile {
-    /// The fastest of a vehicle on a route, at most `fastest` [m/s]. The route has at least two waypoints.
+    /// The fastest of a vehicle on a route, at most `fastest` (m/s). The route has at least two waypoints.
     pub fn of(rig: &Rig, waypoints: &[WaypointRow], fastest: f64) -> Profile {
         let lengths: Vec<f64> = waypoints.windows(2).map(|pair| f64::from(pair[0].position.distance(pair[1].position))).collect();
         let slowest = SLOWEST.min(fastest);
@@ -47,8 +47,8 @@ impl Profile {
         Profile { speeds, time }
     }
 
-    /// The lowest speed of the waypoints from `from` on, as far as `distance` \[m] reaches, where they are `spacing`
-    /// \[m] apart [m/s].
+    /// The lowest speed of the waypoints from `from` on, as far as `distance` (m) reaches, where they are `spacing`
+    /// (m) apart (m/s).
     pub fn lowest_ahead(&self, from: usize, distance: f64, spacing: f64) -> f64 {
         let from = from.min(self.speeds.len() - 1);
         // Two waypoints of a planned line may coincide: the quotient is infinite then.
@@ -57,7 +57,7 @@ impl Profile {
     }
 }
 
-/// The speed at each waypoint that neither the tractor's grip nor the trailer's load allow to exceed [m/s].
+/// The speed at each waypoint that neither the tractor's grip nor the trailer's load allow to exceed (m/s).
 fn limits(rig: &Rig, waypoints: &[WaypointRow], lengths: &[f64]) -> Vec<f64> {
     let heading = |index: usize| f64::from(waypoints[index].direction.y).atan2(waypoints[index].direction.x.into());
     let turn = |from: f64, to: f64| (to - from + 3.0 * PI).rem_euclid(2.0 * PI) - PI;

@@ -9,15 +9,15 @@ use crate::vehicle::GRAVITY;
 /// Parameters of a unit's roll.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Suspension {
-    /// Height of the centre of gravity \[m].
+    /// Height of the centre of gravity (m).
     pub centre_of_gravity: f64,
-    /// Height of the roll centre \[m].
+    /// Height of the roll centre (m).
     pub roll_centre: f64,
-    /// Distance between the wheels of an axle \[m].
+    /// Distance between the wheels of an axle (m).
     pub track: f64,
-    /// Roll angle per lateral acceleration in units of gravity \[rad].
+    /// Roll angle per lateral acceleration in units of gravity (rad).
     pub roll_gain: f64,
-    /// Undamped natural frequency of the roll \[Hz].
+    /// Undamped natural frequency of the roll (Hz).
     pub roll_frequency: f64,
     /// Damping ratio of the roll, below 1.
     pub roll_damping: f64,
@@ -30,7 +30,7 @@ impl Suspension {
         0.5 * self.track / (self.centre_of_gravity + self.roll_gain * lever)
     }
 
-    /// Load transfer ratio under a constant lateral acceleration [m/s^2].
+    /// Load transfer ratio under a constant lateral acceleration (m/s^2).
     pub fn quasi_static_load_transfer_ratio(&self, lateral_acceleration: f64) -> f64 {
         lateral_acceleration / GRAVITY / self.rollover_threshold()
     }

@@ -16,23 +16,23 @@ pub use demand::{Demand, Limit, demands, steer_angle_max};
 /// Pose of both units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// Middle of the drive axle \[m].
+    /// Middle of the drive axle (m).
     pub position: DVec2,
-    /// Heading of the tractor \[rad].
+    /// Heading of the tractor (rad).
     pub heading: f64,
-    /// Middle of the trailer's axle group \[m].
+    /// Middle of the trailer's axle group (m).
     pub trailer_position: DVec2,
-    /// Heading of the trailer \[rad].
+    /// Heading of the trailer (rad).
     pub trailer_heading: f64,
 }
 
 impl Pose {
-    /// Corners of the tractor's outline, counter-clockwise from front left \[m].
+    /// Corners of the tractor's outline, counter-clockwise from front left (m).
     pub fn tractor_corners(&self, rig: &Rig) -> [DVec2; 4] {
         corners(&rig.tractor_body, self.position, self.heading)
     }
 
-    /// Corners of the trailer's outline, counter-clockwise from front left \[m].
+    /// Corners of the trailer's outline, counter-clockwise from front left (m).
     pub fn trailer_corners(&self, rig: &Rig) -> [DVec2; 4] {
         corners(&rig.trailer_body, self.trailer_position, self.trailer_heading)
     }
@@ -41,25 +41,25 @@ impl Pose {
 /// The lengths that decide how the trailer follows, at one speed.
 #[derive(Debug, Clone, Copy)]
 struct Towing {
-    /// Of the front axle [m/s].
+    /// Of the front axle (m/s).
     speed: f64,
     wheelbase: f64,
     fifth_wheel: f64,
     trailer_wheelbase: f64,
-    /// By which slip moves a unit's turning point ahead \[m].
+    /// By which slip moves a unit's turning point ahead (m).
     slip: f64,
 }
 
 /// Motion of both units at one instant.
 #[derive(Debug, Clone, Copy)]
 struct Turning {
-    /// Speed of the drive axle along the tractor [m/s].
+    /// Speed of the drive axle along the tractor (m/s).
     along: f64,
-    /// Of the tractor [rad/s].
+    /// Of the tractor (rad/s).
     yaw: f64,
-    /// Speed of the trailer's axle group along the trailer [m/s].
+    /// Speed of the trailer's axle group along the trailer (m/s).
     trailer_along: f64,
-    /// Of the trailer [rad/s].
+    /// Of the trailer (rad/s).
     trailer_yaw: f64,
 }
 
@@ -72,7 +72,7 @@ impl Towing {
         Towing { speed, wheelbase, fifth_wheel, trailer_wheelbase, slip }
     }
 
-    /// Motion where the front axle moves in a direction relative to the tractor, at an articulation \[rad].
+    /// Motion where the front axle moves in a direction relative to the tractor, at an articulation (rad).
     fn turning(&self, direction: f64, articulation: f64) -> Turning {
         let Towing { speed, wheelbase, fifth_wheel, trailer_wheelbase, slip } = *self;
         let along = speed * direction.cos();
@@ -84,7 +84,7 @@ impl Towing {
     }
 }
 
-/// Corners of a body in a frame at `origin` with `heading`, counter-clockwise from front left \[m].
+/// Corners of a body in a frame at `origin` with `heading`, counter-clockwise from front left (m).
 pub fn corners(body: &Body, origin: DVec2, heading: f64) -> [DVec2; 4] {
     let ahead = DVec2::from_angle(heading);
     let (front, rear, side) = (f64::from(body.front), f64::from(body.rear), f64::from(body.half_width) * ahead.perp());

@@ -10,7 +10,7 @@ use crate::files::reader::{Error, Reader, printable};
 use crate::files::shipped::Source;
 use crate::layout::N_TRACTOR_RAYS;
 
-/// Maximum length of a load's name \[characters].
+/// Maximum length of a load's name (characters).
 const LONGEST_NAME: usize = 40;
 
 /// The file as written. Its values are not checked yet.

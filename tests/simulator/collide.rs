@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::field::{after_stage, places, pose};
 use crate::{benchmark, engines};
 
-/// Corners of a unit's rectangle grown by `margin` on all sides [m].
+/// Corners of a unit's rectangle grown by `margin` on all sides (m).
 fn corners(body: &Body, position: Vec2, heading: f32, margin: f64) -> [DVec2; 4] {
     let (position, ahead) = (position.as_dvec2(), DVec2::from_angle(f64::from(heading)));
     let (front, rear) = (f64::from(body.front) + margin, f64::from(body.rear) - margin);

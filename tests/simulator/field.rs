@@ -37,7 +37,7 @@ pub(crate) fn places(gutter: Gutter) -> Vec<(String, Outline, Field)> {
 }
 
 /// A truck at a random pose with its drive axle on the road or at most `beyond` behind a kerb; a function of `index`
-/// [m].
+/// (m).
 pub(crate) fn pose(kerbs: &Outline, index: u32, beyond: f64) -> Truck {
     let (low, high) = kerbs.bounds();
     let mut tries = (0..).map(|attempt| words(11, index, attempt, 0).map(signed_unit));

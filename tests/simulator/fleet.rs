@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use offtrack::physics::drawn_start;
 use offtrack::layout::{Start, Truck};
+use offtrack::physics::drawn_start;
 use offtrack::scenario::{Fleet, Member, Ranges, Scenario};
 use offtrack::simulator::{Begin, Engine, Error, RouteChoice, Simulator};
 use offtrack::vehicle::Model;

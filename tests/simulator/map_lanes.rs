@@ -7,9 +7,9 @@ use glam::DVec2;
 use offtrack::geometry::Piece;
 use offtrack::map::opendrive::{Hand, Map};
 
-/// Cell of the grid that lines are found by \[m].
+/// Cell of the grid that lines are found by (m).
 const CELL: f64 = 2.0;
-/// What lines may be apart \[m].
+/// What lines may be apart (m).
 const APART: f64 = 0.02;
 
 /// Lines in square cells.

@@ -4,10 +4,10 @@
 use std::f64::consts::PI;
 
 use glam::DVec2;
-use offtrack::physics::observed;
 use offtrack::layout::random;
 use offtrack::layout::{N_RAYS, Progress, Truck};
 use offtrack::map::route::{Lane, Route};
+use offtrack::physics::observed;
 use offtrack::world::World;
 
 use crate::benchmark;

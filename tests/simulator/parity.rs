@@ -6,13 +6,13 @@ mod states;
 use std::sync::Arc;
 
 use glam::Vec2;
-use offtrack::physics::drive_max;
-use offtrack::physics::reference_point;
 use offtrack::engine::stages::{STAGES, Stage};
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::random::{Draw, index_below, signed_unit, words};
 use offtrack::layout::{Column, Ended, Truck, WaypointRow};
 use offtrack::map::Gutter;
+use offtrack::physics::drive_max;
+use offtrack::physics::reference_point;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 

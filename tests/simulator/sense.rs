@@ -15,7 +15,7 @@ use offtrack::scenario::FIELD_CELL;
 use crate::field::{after_stage, places, pose};
 use crate::{benchmark, engines};
 
-/// Error that a range may have [m].
+/// Error that a range may have (m).
 const TOLERANCE: f64 = 0.02;
 
 /// Origin and unit vector of a truck's ray.

@@ -82,11 +82,11 @@ fn the_laden_benchmarks_of_random_roads_differ_from_laden2026_in_roads_and_train
         let ending = laden["ending"].as_table_mut().unwrap();
         let is_training = empty["reward"].get("clearance").is_some();
         assert_eq!(ending.remove("rollover_ratio").is_some(), is_training);
-        // Training has less grip than is examined, from below the least of it.
+        // Training has less grip than is evaluated, from below the least of it.
         let friction = |table: &mut toml::Table| table["draw"].as_table_mut().unwrap().remove("friction").unwrap();
-        let (drawn, examined) = (friction(&mut laden), friction(&mut expected));
-        assert_eq!(drawn[0].as_float() < examined[0].as_float(), is_training);
-        assert!(is_training || drawn == examined);
+        let (drawn, evaluated) = (friction(&mut laden), friction(&mut expected));
+        assert_eq!(drawn[0].as_float() < evaluated[0].as_float(), is_training);
+        assert!(is_training || drawn == evaluated);
         for key in ["reward", "start", "roundabout"] {
             laden.remove(key);
             expected.remove(key);

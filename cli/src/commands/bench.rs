@@ -39,7 +39,7 @@ pub struct Args {
     /// Transitions in an update; several numbers, separated by commas, are measured one after the other.
     #[arg(long, value_delimiter = ',', default_value = "256,1024")]
     batch: Vec<usize>,
-    /// Time for each number of transitions [s].
+    /// Time for each number of transitions (s).
     #[arg(long, default_value_t = 5.0, allow_negative_numbers = true)]
     seconds: f64,
     /// Write the result to this file as JSON.
@@ -66,11 +66,11 @@ struct Bench {
 struct Run {
     hidden: Vec<usize>,
     batch: usize,
-    /// Time of an update whose batch is at hand [ms].
+    /// Time of an update whose batch is at hand (ms).
     update: f64,
-    /// The shortest of all windows [ms].
+    /// The shortest of all windows (ms).
     fastest: f64,
-    /// Time of an update and of sampling its batch [ms].
+    /// Time of an update and of sampling its batch (ms).
     with_sampling: f64,
     windows: usize,
 }
@@ -178,7 +178,7 @@ impl Learner {
         })
     }
 
-    /// Time of an update whose batch is at hand [s].
+    /// Time of an update whose batch is at hand (s).
     fn alone(&mut self, n: usize) -> Result<f64, Error> {
         let batches: Result<Vec<_>, Error> = (0..n).map(|_| self.training.rollout_mut().sample()).collect();
         let batches = batches?;
@@ -189,7 +189,7 @@ impl Learner {
         Ok(begun.elapsed().as_secs_f64() / n as f64)
     }
 
-    /// Time of an update and of drawing its batch [s].
+    /// Time of an update and of drawing its batch (s).
     fn sampled(&mut self, n: usize) -> Result<f64, Error> {
         let begun = Instant::now();
         for _ in 0..n {

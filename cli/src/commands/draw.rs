@@ -40,8 +40,8 @@ pub struct Args {
     /// With --route also "sweep": {"vehicle", "load", "speed_kmh", "own_lane_suffices", "tractor_clearance",
     /// "trailer_clearance", "limits": [{"limit", "unit", "has", "needs", "exceeded", "stretches": [[from, to], ...]},
     /// ...], "demands": [[station, steer angle, steer rate, lateral acceleration, load transfer ratio], ...]}.
-    /// Clearances are the least, negative beyond a kerb [m]. The limits are lock (deg), steer_rate (deg/s), tyres (g)
-    /// and rollover (ratio); `stretches` are stations of the front axle on the route [m] where one is exceeded.
+    /// Clearances are the least, negative beyond a kerb (m). The limits are lock (deg), steer_rate (deg/s), tyres (g)
+    /// and rollover (ratio); `stretches` are stations of the front axle on the route (m) where one is exceeded.
     /// `demands` has a row every 0.25 m, in m, deg, deg/s, g and 1, left positive. `own_lane_suffices` is true where
     /// the path touches no kerb and the lock allows it.
     #[arg(short, long, verbatim_doc_comment)]
@@ -56,19 +56,19 @@ pub struct Args {
     /// With --route: one of the vehicle's loads.
     #[arg(long, default_value = "empty", requires = "route")]
     load: String,
-    /// With --route: speed at which the front axle follows the lane's centre [km/h].
+    /// With --route: speed at which the front axle follows the lane's centre (km/h).
     #[arg(long, default_value_t = 30.0, requires = "route")]
     speed_kmh: f64,
     /// Whether gutters may be driven on.
     #[arg(long, default_value = "drivable", value_parser = PossibleValuesParser::new(["drivable", "solid"]).map(gutter))]
     gutter: Gutter,
-    /// Length of the routes before the ring [m].
+    /// Length of the routes before the ring (m).
     #[arg(long, default_value_t = APPROACH)]
     approach: f64,
-    /// Length of the routes after the ring [m].
+    /// Length of the routes after the ring (m).
     #[arg(long, default_value_t = DEPARTURE)]
     departure: f64,
-    /// Width of a PNG [pixels] \[default: 1000\].
+    /// Width of a PNG (pixels) \[default: 1000\].
     #[arg(long)]
     size: Option<u32>,
 }

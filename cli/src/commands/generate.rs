@@ -19,7 +19,7 @@ use super::roads;
 const MOST: u32 = 100_000;
 /// Roads on a contact sheet at most.
 const ON_SHEET: usize = 200;
-/// Width of a PNG \[pixels].
+/// Width of a PNG (pixels).
 const WIDTH: u32 = 1600;
 
 /// Draw random roundabouts and write them as files.

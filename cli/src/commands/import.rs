@@ -40,7 +40,7 @@ pub struct Args {
 /// Which place of a map.
 #[derive(Debug, Clone, clap::Args)]
 pub struct PlaceArgs {
-    /// A point of the map near the roundabout's centre, X,Y [m]; needed where a map has several.
+    /// A point of the map near the roundabout's centre, X,Y (m); needed where a map has several.
     #[arg(long, value_name = "X,Y", value_parser = point, allow_hyphen_values = true)]
     pub ring: Option<DVec2>,
     /// A way through a junction in place of a roundabout, from a road's lane to another's: 12:-1,30:1. May be given

@@ -40,7 +40,7 @@ pub struct Args {
     /// The file to write: .gif, .png, .svg, or .json for data.
     ///
     /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed",
-    /// "episode", "episodes", "step" [s], "ended", "class": {"vehicle", "load"}: their names, where the benchmark has
+    /// "episode", "episodes", "step" (s), "ended", "class": {"vehicle", "load"}: their names, where the benchmark has
     /// several, "vehicle": dimensions and sensors of the truck that drove, "actions": [[steer angle, speed], ...],
     /// "map": {"drivable", "lanes"}, "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state after
     /// step n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's
@@ -59,7 +59,7 @@ pub struct Args {
     /// How many episodes a route that evaluation has: start poses depend on it.
     #[arg(long, default_value_t = 30)]
     episodes: usize,
-    /// Width of a film or a PNG [pixels]; by default 720 for a film, 1000 for a PNG.
+    /// Width of a film or a PNG (pixels); by default 720 for a film, 1000 for a PNG.
     #[arg(long)]
     size: Option<u32>,
 }
@@ -129,7 +129,7 @@ struct Recorded {
     roundabout: Road,
     gutter: Gutter,
     route: Route,
-    /// Distances along the route at which its ring begins and ends \[m].
+    /// Distances along the route at which its ring begins and ends (m).
     ring: [f64; 2],
 }
 

@@ -43,7 +43,7 @@ pub struct Args {
     /// trucks, and its replay buffer is as small as an update allows.
     #[arg(long)]
     config: Option<PathBuf>,
-    /// Time for each number of trucks and each mode [s].
+    /// Time for each number of trucks and each mode (s).
     #[arg(long, default_value_t = 5.0, allow_negative_numbers = true)]
     seconds: f64,
     /// A benchmark's name, or the path of its file.

@@ -78,7 +78,7 @@ pub struct Args {
     /// 3,7,9. Each has its own folder seed-N in the run's folder. The same command with the same --name continues.
     #[arg(long, conflicts_with = "seed")]
     seeds: Option<String>,
-    /// Another training time [min].
+    /// Another training time (min).
     #[arg(long, allow_negative_numbers = true)]
     minutes: Option<f64>,
     /// Another number of env steps.
@@ -111,7 +111,7 @@ struct Finished {
     /// The run was stopped before its budget was spent.
     interrupted: bool,
     seed: u32,
-    /// Training time [s].
+    /// Training time (s).
     seconds: f64,
     env_steps: u64,
     episodes: u64,

@@ -206,7 +206,7 @@ fn a_folder_that_cannot_be_written_to_is_a_failure_with_exit_code_1() {
     }
 }
 
-/// The largest distance of a point on a polygon's side from the kerbs [m].
+/// The largest distance of a point on a polygon's side from the kerbs (m).
 fn furthest(polygons: &[Polygon], kerbs: &Outline) -> f64 {
     let points = polygons.iter().flat_map(sides).flat_map(|(a, b)| (0..9).map(move |n| a.lerp(b, f64::from(n) / 8.0)));
     points.map(|p| kerbs.distance(p)).fold(0.0, f64::max)

@@ -11,13 +11,13 @@ use crate::figure::{View, colour};
 use crate::legend::chevron_corners;
 use crate::lettering::{Align, Lettering};
 
-/// Margin around the ring and around the path of the truck's middle \[m].
+/// Margin around the ring and around the path of the truck's middle (m).
 const MARGIN: f64 = 6.0;
-/// Distance between arrows on the route, at the scale of the pens \[px].
+/// Distance between arrows on the route, at the scale of the pens (px).
 const BETWEEN_ARROWS: f64 = 75.0;
-/// Dashes of a lane's centre line, and the gaps between them \[px].
+/// Dashes of a lane's centre line, and the gaps between them (px).
 const LANE_DASHES: [f64; 2] = [6.0, 5.0];
-/// Extent of the ground that is shown of a route that is not known \[m].
+/// Extent of the ground that is shown of a route that is not known (m).
 const NOWHERE: f64 = 50.0;
 /// Longest words of a caption beside the name.
 const LONGEST: [&str; 2] = ["100.0 km/h", "trailer collided"];
@@ -25,11 +25,11 @@ const LONGEST: [&str; 2] = ["100.0 km/h", "trailer collided"];
 /// Sizes that depend on the picture's alone.
 #[derive(Clone, Copy)]
 pub struct Format {
-    /// Side of the picture \[px].
+    /// Side of the picture (px).
     pub side: u32,
-    /// Height of the caption above the map \[px].
+    /// Height of the caption above the map (px).
     pub caption: u32,
-    /// Width of a line of width 1 \[px].
+    /// Width of a line of width 1 (px).
     pub pen: f64,
 }
 
@@ -40,7 +40,7 @@ impl Format {
         Format { side, caption: (1.6 * text).ceil() as u32, pen: (f64::from(side) / 480.0).min(1.0).max(f64::from(side) / 960.0) }
     }
 
-    /// Size of the text if the caption is not too long for it \[px].
+    /// Size of the text if the caption is not too long for it (px).
     fn text(self) -> f64 {
         f64::from(self.caption) / 1.6
     }
@@ -54,11 +54,11 @@ pub struct Backdrop {
     pub view: View,
     /// RGBA, `[side, side, 4]`, opaque.
     pub pixels: Vec<u8>,
-    /// Size of the caption's text \[px].
+    /// Size of the caption's text (px).
     pub text: f64,
-    /// Where the speed begins: left end of its base line \[px].
+    /// Where the speed begins: left end of its base line (px).
     pub speed_at: DVec2,
-    /// Where the end in words ends: right end of its base line \[px].
+    /// Where the end in words ends: right end of its base line (px).
     pub ended_at: DVec2,
 }
 
@@ -141,7 +141,7 @@ fn draw_kerbs(map: &mut Canvas, view: &View, pen: f64, roundabout: &Road, gutter
     map.lines(&lines(view, &roundabout.kerbs(gutter).loops), true, Ink(colour::KERB, 1.0), 1.6 * pen);
 }
 
-/// Curves as points, within a tenth of a pixel \[px].
+/// Curves as points, within a tenth of a pixel (px).
 fn lines(view: &View, curves: &[Curve]) -> Vec<Vec<DVec2>> {
     let points = |curve: &Curve| curve.polyline(0.1 / view.scale).into_iter().map(|p| view.point(p)).collect();
     curves.iter().map(points).collect()

@@ -6,7 +6,7 @@ use resvg::tiny_skia::{Color, FillRule, LineCap, Paint, Path, PathBuilder, Pixma
 use crate::lettering::{Align, Lettering};
 
 /// Shapes with a point further than this from the upper left corner are left out: the painter's numbers are fixed-point
-/// \[px].
+/// (px).
 const FAR: f64 = 16000.0;
 
 /// A colour as `#rrggbb`, and how opaque it is.

@@ -10,7 +10,7 @@ use super::canvas::{Canvas, Ink};
 use crate::episode::{GAUGE, WHEEL};
 use crate::figure::{View, colour};
 
-/// The windscreen's edges behind the front end \[m].
+/// The windscreen's edges behind the front end (m).
 const SCREEN_FRONT: f32 = 0.25;
 const SCREEN_REAR: f32 = 0.8;
 
@@ -27,7 +27,7 @@ impl Shape {
         Shape { rigs: world.rigs.clone(), rays: world.rays.clone(), sensor_range: world.params.sensor_range }
     }
 
-    /// A truck on a map. A line of width 1 is `pen` wide \[px].
+    /// A truck on a map. A line of width 1 is `pen` wide (px).
     pub fn draw(&self, map: &mut Canvas, view: &View, pen: f64, shown: &Shown) {
         self.rays(map, view, pen, shown);
         self.units(map, view, pen, shown);

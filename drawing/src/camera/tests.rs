@@ -1,8 +1,8 @@
 use std::sync::LazyLock;
 
 use glam::{DVec2, Vec2};
-use offtrack::physics;
 use offtrack::map::Gutter;
+use offtrack::physics;
 use offtrack::scenario::APPROACH;
 use offtrack::vehicle::swept::{Pose, corners, swept_path};
 
@@ -36,7 +36,7 @@ fn drawn(camera: &mut Camera, truck: &Truck, ended: Ended) -> Vec<u8> {
     camera.draw(&Shown { truck, ranges: &ranges(truck), ended }).to_vec()
 }
 
-/// Column and row of a point of the world, for the route drawn last \[pixels].
+/// Column and row of a point of the world, for the route drawn last (pixels).
 fn pixel_of(camera: &Camera, p: DVec2) -> DVec2 {
     camera.backdrops.last().unwrap().view.point(p) + DVec2::new(0.0, camera.format.caption.into())
 }

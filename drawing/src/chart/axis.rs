@@ -28,7 +28,7 @@ pub(crate) struct Axis {
     scale: Scale,
     low: f64,
     high: f64,
-    /// Positions of the ends \[px].
+    /// Positions of the ends (px).
     pub(crate) from: f64,
     pub(crate) to: f64,
 }

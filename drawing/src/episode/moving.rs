@@ -15,7 +15,7 @@ use offtrack_evaluation::recording::Recording;
 const FILMED: Layout = Layout { corner: DVec2::new(16.0, 96.0), width: WIDTH - 32.0, margin: 5.0, ratio: 1.0 };
 /// Text size of a film's legend relative to that of a still: films are shown smaller.
 const LEGEND_SCALE: f64 = 1.3;
-/// Text size of a film's title and of the end of its episode in words, on the same line \[px].
+/// Text size of a film's title and of the end of its episode in words, on the same line (px).
 const TITLE: f64 = 30.0;
 
 impl Scene<'_> {

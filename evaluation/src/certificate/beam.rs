@@ -17,7 +17,7 @@ use crate::error::Error;
 
 /// Discount of a candidate's cost with each step: what lies long ago says little about what follows.
 const DISCOUNT: f32 = 0.95;
-/// Clearance below which a candidate has a cost \[m].
+/// Clearance below which a candidate has a cost (m).
 const MARGIN: f32 = 0.6;
 /// Cost of the squared distance to the lane centre [1/m^2]; the cost of touching a kerb is 1.
 const LANE_WEIGHT: f32 = 0.1;
@@ -31,14 +31,14 @@ const LOAD_TRANSFER_WEIGHT: f32 = 0.3;
 /// Cost of a standing truck where there are several speeds; at the highest it is 0. A load transfer ratio of 0.8 costs
 /// as much as half of the highest speed.
 const SLOWNESS_WEIGHT: f32 = 0.25;
-/// Two candidates are in nearly the same state if these agree after rounding: position \[m], headings \[rad], steer
-/// angle \[rad].
+/// Two candidates are in nearly the same state if these agree after rounding: position (m), headings (rad), steer
+/// angle (rad).
 const POSITION_BIN: f32 = 0.2;
 const HEADING_BIN: f32 = 0.035;
 const STEER_BIN: f32 = 0.07;
-/// Speed, where it is chosen [m/s].
+/// Speed, where it is chosen (m/s).
 const SPEED_BIN: f32 = 1.0;
-/// Steer angles that differ by less are equal \[rad].
+/// Steer angles that differ by less are equal (rad).
 const SAME_STEER: f32 = 1e-6;
 /// The parent of the first segment.
 const ROOT: u32 = u32::MAX;

@@ -52,7 +52,7 @@ pub struct Certificate {
     pub machine: String,
     /// The commit that the program was built from.
     pub commit: String,
-    /// Time of the search so far \[s].
+    /// Time of the search so far (s).
     pub seconds: f64,
     /// Env steps of the search so far.
     pub env_steps: u64,

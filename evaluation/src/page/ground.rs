@@ -18,9 +18,9 @@ type Line = Vec<i64>;
 /// See the module.
 #[derive(Serialize)]
 pub(super) struct Ground<'a> {
-    /// Time between two frames \[s].
+    /// Time between two frames (s).
     step: f64,
-    /// Length of a route before its ring, and after it \[m].
+    /// Length of a route before its ring, and after it (m).
     approach: f64,
     departure: f64,
     /// Those of the trucks that are shown, each once.

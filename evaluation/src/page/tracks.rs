@@ -13,11 +13,11 @@ use offtrack::layout::N_RAYS;
 
 use crate::recording::{Frame, Track};
 
-/// Resolution of lengths \[m].
+/// Resolution of lengths (m).
 const LENGTH: f64 = 0.01;
-/// Resolution of angles \[rad].
+/// Resolution of angles (rad).
 const ANGLE: f64 = 1e-4;
-/// Resolution of speeds [m/s] and of load transfer ratios.
+/// Resolution of speeds (m/s) and of load transfer ratios.
 const HUNDREDTH: f64 = 0.01;
 /// Resolution of ranges: this many parts of a sensor's reach.
 const RANGE_PARTS: f64 = 255.0;

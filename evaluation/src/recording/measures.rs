@@ -12,11 +12,11 @@ use super::{MILLI, to};
 /// A rectangle in its unit's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Rectangle {
-    /// Front end, ahead of the frame's origin \[m].
+    /// Front end, ahead of the frame's origin (m).
     pub front: f32,
-    /// Rear end, ahead of the frame's origin (negative when behind) \[m].
+    /// Rear end, ahead of the frame's origin (negative when behind) (m).
     pub rear: f32,
-    /// Half of the width \[m].
+    /// Half of the width (m).
     pub half_width: f32,
 }
 
@@ -30,11 +30,11 @@ impl From<Rectangle> for Body {
 /// `trailer_position`; x forward, y left.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measures {
-    /// Front axle ahead of the drive axle \[m].
+    /// Front axle ahead of the drive axle (m).
     pub wheelbase: f32,
-    /// Fifth wheel ahead of the drive axle \[m].
+    /// Fifth wheel ahead of the drive axle (m).
     pub fifth_wheel: f32,
-    /// Kingpin ahead of the trailer's axle group \[m].
+    /// Kingpin ahead of the trailer's axle group (m).
     pub trailer_wheelbase: f32,
     /// The tractor's outline.
     pub tractor_body: Rectangle,
@@ -44,7 +44,7 @@ pub struct Measures {
     pub trailer_rays: Vec<[f32; 4]>,
     /// The tractor's sensors.
     pub tractor_rays: Vec<[f32; 4]>,
-    /// Reach of a sensor \[m].
+    /// Reach of a sensor (m).
     pub sensor_range: f32,
 }
 

@@ -14,13 +14,13 @@ pub struct Steps {
     pub n_values: usize,
     /// Normalised observations that the actions were chosen for, `[rows * values]`.
     pub observation: Vec<f32>,
-    /// Indices of the actions, `[rows]`.
+    /// Indices of the actions, `(rows)`.
     pub action: Vec<u32>,
-    /// Logarithms of their probabilities, `[rows]`.
+    /// Logarithms of their probabilities, `(rows)`.
     pub log_prob: Vec<f32>,
-    /// Scaled rewards, `[rows]`.
+    /// Scaled rewards, `(rows)`.
     pub reward: Vec<f32>,
-    /// Whether and why the episode ended, `[rows]`.
+    /// Whether and why the episode ended, `(rows)`.
     pub ended: Vec<Ended>,
     /// Normalised observations after the steps whose value no later row has: those that ran out of time, and the last
     /// of each truck, in the order of their rows.
@@ -40,7 +40,7 @@ impl Steps {
         matrix(TensorData::new(values, [rows.len(), self.n_values]))
     }
 
-    /// Generalised advantage estimates of the actions, and the returns that their values are learned from, `[rows]`
+    /// Generalised advantage estimates of the actions, and the returns that their values are learned from, `(rows)`
     /// each (J. Schulman and others, 2016). `values` are those of the observations, `next_values` of
     /// `next_observation`.
     pub fn advantages(&self, values: &[f32], next_values: &[f32], gamma: f32, lambda: f32) -> (Vec<f32>, Vec<f32>) {

@@ -46,7 +46,7 @@ impl Priorities {
         self.settings
     }
 
-    /// The priority of each row, `[rows]`.
+    /// The priority of each row, `(rows)`.
     pub(super) fn rows(&self) -> &[f64] {
         &self.sums[self.n_leaves..self.n_leaves + self.n_rows]
     }

@@ -3,9 +3,9 @@
 use std::borrow::Cow;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use offtrack::physics;
 use offtrack::layout::random;
 use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES, RewardTerms};
+use offtrack::physics;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 use offtrack_policy::Normalisation;

@@ -11,7 +11,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use offtrack_evaluation::error::Error;
 
-/// What TensorBoard looks for in a file's name. The Unix time \[s] follows: it reads files in the order of their names.
+/// What TensorBoard looks for in a file's name. The Unix time (s) follows: it reads files in the order of their names.
 const PREFIX: &str = "events.out.tfevents.";
 /// The column that is the step of all others.
 const STEP: &str = "env_steps";
@@ -27,7 +27,7 @@ pub struct EventsFile {
 
 impl EventsFile {
     /// A new file in a run's folder, after those of earlier processes. `row_steps` is the step of the last row that the
-    /// run keeps \[env steps].
+    /// run keeps (env steps).
     pub fn create(folder: &Path, row_steps: u64) -> Result<EventsFile, Error> {
         let latest = std::fs::read_dir(folder).map_err(Error::read(folder))?.flatten().filter_map(|entry| written_at(&entry.path())).max();
         let time = latest.map_or(0, |latest| latest + 1).max(now() as u64);
@@ -70,12 +70,12 @@ impl EventsFile {
     }
 }
 
-/// The time in an event file's name \[s].
+/// The time in an event file's name (s).
 fn written_at(path: &Path) -> Option<u64> {
     path.file_name()?.to_str()?.strip_prefix(PREFIX)?.split('.').next()?.parse().ok()
 }
 
-/// Unix time \[s].
+/// Unix time (s).
 fn now() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64())
 }

@@ -53,11 +53,11 @@ pub struct Progress {
     validation: Option<(f64, f64)>,
     /// Sums since the last row.
     sums: Update,
-    /// Time \[s], steps and updates at the last row.
+    /// Time (s), steps and updates at the last row.
     row_seconds: f64,
     row_steps: u64,
     row_updates: u64,
-    /// Time \[s] and steps when one was last tried to be written.
+    /// Time (s) and steps when one was last tried to be written.
     tried: (f64, u64),
     /// When the display was last updated, and the steps and updates by then.
     shown: (Instant, u64, u64),
@@ -109,7 +109,7 @@ impl Progress {
         by_time.max(by_steps).min(1.0)
     }
 
-    /// Training time \[s].
+    /// Training time (s).
     pub fn seconds(&self) -> f64 {
         (self.before + self.begun.elapsed()).as_secs_f64()
     }
@@ -308,7 +308,7 @@ fn per_second(seconds: f64, counts: [u64; 2]) -> [f64; 2] {
 const COUNTS: &str = "progress, counts";
 const SECONDS: &str = "progress, seconds";
 
-/// Training time \[s] and env steps when a checkpoint was written.
+/// Training time (s) and env steps when a checkpoint was written.
 pub fn reached(stored: &Stored) -> Result<(f64, u64), Error> {
     let [seconds, _] = stored.array(SECONDS)?;
     let [env_steps, ..] = stored.array::<u64, 6>(COUNTS)?;

@@ -50,7 +50,7 @@ pub struct RouteCount {
     pub route: String,
     /// The part of it before the last `/`.
     pub roundabout: String,
-    /// Radius of the island \[m].
+    /// Radius of the island (m).
     pub island_radius: f64,
     /// `left` or `right`.
     pub lane: &'static str,

@@ -34,7 +34,7 @@ pub struct Validated {
     pub arrived: u64,
     /// Fraction that arrived.
     pub success: f64,
-    /// Mean distance to the lane centre of those that arrived, `None` if none did \[m].
+    /// Mean distance to the lane centre of those that arrived, `None` if none did (m).
     pub lane_distance_mean_arrived: Option<f64>,
 }
 

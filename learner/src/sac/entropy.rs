@@ -13,7 +13,7 @@ const EPSILON: f32 = 1e-8;
 #[derive(Debug)]
 pub(super) struct EntropyCoefficient {
     pub(super) log: Scalar,
-    /// Entropy that it is adapted to [nat]; none keeps it.
+    /// Entropy that it is adapted to (nat); none keeps it.
     target: Option<f32>,
     learning_rate: f32,
     pub(super) moments: [Scalar; 2],

@@ -7,7 +7,7 @@ use offtrack::layout::{Lag, Rig};
 use offtrack::vehicle::{GRAVITY, SLIP_LEVER, Suspension};
 use serde::Deserialize;
 
-/// Lateral acceleration [m/s^2] and power [W/kg] far beyond any truck's, for cases without friction or power.
+/// Lateral acceleration (m/s^2) and power (W/kg) far beyond any truck's, for cases without friction or power.
 const UNLIMITED: f32 = 1e6;
 
 /// A case whose values make no sense.
@@ -31,18 +31,18 @@ pub struct Case {
     pub id: String,
     /// The truck.
     pub vehicle: CaseVehicle,
-    /// Length of a sub-step \[s].
+    /// Length of a sub-step (s).
     pub dt: f64,
-    /// Time between two decisions of the speed control \[s].
+    /// Time between two decisions of the speed control (s).
     #[serde(default = "control_step")]
     pub control_step: f64,
     /// Initial state.
     pub init: Init,
     /// Commands in order of time.
     pub commands: Vec<Command>,
-    /// End of the case \[s].
+    /// End of the case (s).
     pub t_end: f64,
-    /// Instants to report, ascending; those of `expected` where absent \[s].
+    /// Instants to report, ascending; those of `expected` where absent (s).
     pub times: Option<Vec<f64>>,
     /// Reference states. Only their instants are used here.
     #[serde(default)]
@@ -53,67 +53,67 @@ pub struct Case {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[expect(non_snake_case, reason = "the format's own symbols")]
 pub struct CaseVehicle {
-    /// Wheelbase \[m].
+    /// Wheelbase (m).
     pub L1: f64,
-    /// Fifth wheel ahead of the drive axle \[m].
+    /// Fifth wheel ahead of the drive axle (m).
     pub a: f64,
-    /// Kingpin to axle group \[m].
+    /// Kingpin to axle group (m).
     pub L2: f64,
     /// Slip factor [rad/(m/s^2)].
     pub K: f64,
     /// Lateral acceleration that the tyres can hold, in units of gravity; unlimited where absent.
     pub mu: Option<f64>,
-    /// Lock \[rad].
+    /// Lock (rad).
     pub delta_max: f64,
-    /// Steer rate [rad/s].
+    /// Steer rate (rad/s).
     pub delta_rate: f64,
-    /// Strongest drive [m/s^2].
+    /// Strongest drive (m/s^2).
     pub a_max: f64,
-    /// Strongest braking, negative [m/s^2].
+    /// Strongest braking, negative (m/s^2).
     pub a_min: f64,
-    /// Articulation beyond which the truck is jackknifed \[rad].
+    /// Articulation beyond which the truck is jackknifed (rad).
     #[serde(default = "right_angle")]
     pub gamma_max: f64,
-    /// Track of the tractor \[m].
+    /// Track of the tractor (m).
     pub T1: f64,
-    /// Height of the tractor's centre of gravity \[m].
+    /// Height of the tractor's centre of gravity (m).
     pub h1: f64,
-    /// Height of the tractor's roll centre \[m].
+    /// Height of the tractor's roll centre (m).
     pub hr1: f64,
-    /// Roll gain of the tractor [rad/g].
+    /// Roll gain of the tractor (rad/g).
     pub Rphi1: f64,
-    /// Roll frequency of the tractor \[Hz].
+    /// Roll frequency of the tractor (Hz).
     pub fn1: f64,
     /// Roll damping of the tractor.
     pub zeta1: f64,
-    /// Track of the trailer \[m].
+    /// Track of the trailer (m).
     pub T2: f64,
-    /// Height of the trailer's centre of gravity \[m].
+    /// Height of the trailer's centre of gravity (m).
     pub h2: f64,
-    /// Height of the trailer's roll centre \[m].
+    /// Height of the trailer's roll centre (m).
     pub hr2: f64,
-    /// Roll gain of the trailer [rad/g].
+    /// Roll gain of the trailer (rad/g).
     pub Rphi2: f64,
-    /// Roll frequency of the trailer \[Hz].
+    /// Roll frequency of the trailer (Hz).
     pub fn2: f64,
     /// Roll damping of the trailer.
     pub zeta2: f64,
-    /// Bound of `K v²` \[m].
+    /// Bound of `K v²` (m).
     #[serde(default = "slip_lever")]
     pub lever_max: f64,
     /// Time constant of the tractor's yaw over `K v`.
     #[serde(default)]
     pub yaw_lag: f64,
-    /// Time constant of the drive \[s].
+    /// Time constant of the drive (s).
     #[serde(default)]
     pub drive_lag: f64,
-    /// Time constant of the brakes \[s].
+    /// Time constant of the brakes (s).
     #[serde(default)]
     pub brake_lag: f64,
-    /// Time from a steer command to the first movement of the wheels \[s].
+    /// Time from a steer command to the first movement of the wheels (s).
     #[serde(default)]
     pub delta_delay: f64,
-    /// Engine power over the mass of the truck [W/kg]; unlimited where absent.
+    /// Engine power over the mass of the truck (W/kg); unlimited where absent.
     pub power: Option<f64>,
     /// Whether drive and braking take lateral grip; it needs `mu`.
     #[serde(default)]
@@ -121,16 +121,16 @@ pub struct CaseVehicle {
     /// Fall of the road to the right, as a tangent.
     #[serde(default)]
     pub crossfall: f64,
-    /// Speed control: acceleration per speed error [1/s].
+    /// Speed control: acceleration per speed error (1/s).
     #[serde(default = "speed_gain")]
     pub kp: f64,
-    /// Speed control: acceleration per integral of the speed error [1/s^2].
+    /// Speed control: acceleration per integral of the speed error (1/s^2).
     #[serde(default = "speed_integral_gain")]
     pub ki: f64,
-    /// Speed control: speed error beyond which the integral is reset to 0 [m/s].
+    /// Speed control: speed error beyond which the integral is reset to 0 (m/s).
     #[serde(default = "speed_band")]
     pub band: f64,
-    /// Speed control: strongest braking, negative [m/s^2].
+    /// Speed control: strongest braking, negative (m/s^2).
     #[serde(default = "speed_braking")]
     pub brake: f64,
 }
@@ -138,38 +138,38 @@ pub struct CaseVehicle {
 /// Initial state of a case.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Init {
-    /// Middle of the drive axle \[m].
+    /// Middle of the drive axle (m).
     pub x: f64,
-    /// Middle of the drive axle \[m].
+    /// Middle of the drive axle (m).
     pub y: f64,
-    /// Tractor's heading \[rad].
+    /// Tractor's heading (rad).
     pub psi1: f64,
-    /// Trailer's heading \[rad].
+    /// Trailer's heading (rad).
     pub psi2: f64,
-    /// Speed [m/s].
+    /// Speed (m/s).
     pub v: f64,
-    /// Steer angle \[rad].
+    /// Steer angle (rad).
     pub delta: f64,
 }
 
 /// A command, in force until the next one.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Command {
-    /// Time from which it is in force \[s].
+    /// Time from which it is in force (s).
     pub t: f64,
-    /// Target steer angle \[rad].
+    /// Target steer angle (rad).
     pub delta_cmd: f64,
-    /// Target acceleration [m/s^2].
+    /// Target acceleration (m/s^2).
     #[serde(default)]
     pub a_cmd: f64,
-    /// Target speed, in place of a target acceleration: the speed control asks for one every `control_step` [m/s].
+    /// Target speed, in place of a target acceleration: the speed control asks for one every `control_step` (m/s).
     pub v_cmd: Option<f64>,
 }
 
 /// An instant to report.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Instant {
-    /// Time \[s].
+    /// Time (s).
     pub t: f64,
 }
 
@@ -257,7 +257,7 @@ impl CaseVehicle {
 }
 
 impl Case {
-    /// Checks every value and gives the instants to report, ascending \[s].
+    /// Checks every value and gives the instants to report, ascending (s).
     pub(super) fn checked_times(&self) -> Result<Vec<f64>, Error> {
         let vehicle = &self.vehicle;
         let (any, positive, speed) = (-1e5..=1e5, 1e-3..=1e3, -60.0..=60.0);

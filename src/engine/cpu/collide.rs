@@ -20,13 +20,13 @@ constants! {
     const LANES: usize = 8;
     /// Points of a unit sampled first, at most.
     const N_FIRST: usize = 2 * LANES;
-    /// Further than any clearance [m].
+    /// Further than any clearance (m).
     const FAR: f32 = f32::MAX;
     /// Points of a tractor's centre line sampled first: with its corners as many as are sampled at once.
     const N_TRACTOR: usize = LANES - 4;
     /// Points of a trailer's centre line sampled first: with its corners twice as many.
     const N_TRAILER: usize = N_FIRST - 4;
-    /// Error of a clearance that is always tolerated [m].
+    /// Error of a clearance that is always tolerated (m).
     const TOLERANCE: f32 = 0.01;
     /// Error that is tolerated as a fraction of the clearance: far from a kerb a centimetre does not matter.
     const FRACTION: f32 = 0.5;
@@ -56,7 +56,7 @@ pub fn clearance(field: &Field, rig: &Rig, truck: &Truck) -> Clearance {
 struct Line {
     begin: Vec2,
     end: Vec2,
-    /// What is subtracted from distances: the radius of the capsule, or nothing on the outline itself [m].
+    /// What is subtracted from distances: the radius of the capsule, or nothing on the outline itself (m).
     radius: f32,
 }
 
@@ -66,7 +66,7 @@ struct Span {
     line: u32,
     /// Which part: 1 is all of the line, 2 and 3 are its halves, 4 to 7 its quarters.
     part: u32,
-    /// Lower bounds of the distance to the kerb at both ends [m].
+    /// Lower bounds of the distance to the kerb at both ends (m).
     at_begin: f32,
     at_end: f32,
 }
@@ -122,7 +122,7 @@ fn middle(line: &Line, part: u32) -> Vec2 {
     line.begin + fraction * (line.end - line.begin)
 }
 
-/// Lower bound of the clearance on a span, as the distance is 1-Lipschitz [m].
+/// Lower bound of the clearance on a span, as the distance is 1-Lipschitz (m).
 #[inline(always)]
 fn bound(line: &Line, span: &Span) -> f32 {
     0.5 * (span.at_begin + span.at_end - width(span.part) * line.begin.distance(line.end)) - line.radius
@@ -153,7 +153,7 @@ fn body_clearance<const N: usize, const ALL: usize>(field: &Field, body: &Body, 
     spans.settled::<N>(field, body, position, heading, least)
 }
 
-/// Signed distance at points of a unit's frame [m].
+/// Signed distance at points of a unit's frame (m).
 #[inline(always)]
 fn sampled<const N: usize>(field: &Field, position: Vec2, heading: Vec2, points: &[Vec2; N]) -> [f32; N] {
     let (mut x, mut y) = ([0.0; N], [0.0; N]);

@@ -13,9 +13,9 @@ use crate::layout::{Control, Rig, Roll, Truck};
 use crate::world::World;
 
 constants! {
-    /// Lowest speed that the engine's power is divided by \[m/s].
+    /// Lowest speed that the engine's power is divided by (m/s).
     const POWER_SPEED_MIN: f32 = 1.0;
-    /// Keeps a quotient finite at a standstill [m^2/s^2].
+    /// Keeps a quotient finite at a standstill (m^2/s^2).
     const SPEED_SQUARED_MIN: f32 = 0.01;
 }
 
@@ -51,21 +51,21 @@ pub struct Moving {
 /// Motion of both units at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    /// Curvature of the tractor's steer angle, without lag and limit of grip \[1/m].
+    /// Curvature of the tractor's steer angle, without lag and limit of grip (1/m).
     pub steered_curvature: f32,
-    /// Of the tractor \[rad/s].
+    /// Of the tractor (rad/s).
     pub yaw_rate: f32,
-    /// Of the trailer \[rad/s].
+    /// Of the trailer (rad/s).
     pub trailer_yaw_rate: f32,
-    /// Speed of the drive axle to the left \[m/s].
+    /// Speed of the drive axle to the left (m/s).
     pub side_speed: f32,
-    /// Of the tractor, to the left \[m/s^2].
+    /// Of the tractor, to the left (m/s^2).
     pub lateral_acceleration: f32,
-    /// Of the trailer's axle group, to the left \[m/s^2].
+    /// Of the trailer's axle group, to the left (m/s^2).
     pub trailer_lateral_acceleration: f32,
 }
 
-/// The steer angle that was asked for `delay` sub-steps before sub-step `n` of the step, at most two steps ago \[rad].
+/// The steer angle that was asked for `delay` sub-steps before sub-step `n` of the step, at most two steps ago (rad).
 #[inline]
 pub fn delayed(delay: u32, n: u32, n_substeps: u32, control: &Control) -> f32 {
     if delay <= n {
@@ -84,21 +84,21 @@ pub fn motion_of(rig: &Rig, truck: &Truck) -> Motion {
     motion(rig, truck.speed, curvature, truck.curvature_lag, truck.acceleration, truck.heading - truck.trailer_heading)
 }
 
-/// Curvature of the path on which the tractor's wheels roll at a steer angle \[rad], without slip \[1/m].
+/// Curvature of the path on which the tractor's wheels roll at a steer angle (rad), without slip (1/m).
 #[inline]
 pub fn steered_curvature(rig: &Rig, steering: f32) -> f32 {
     let (sin, cos) = sin_cos(steering);
     sin / (cos * rig.wheelbase)
 }
 
-/// Strongest drive at a speed \[m/s^2].
+/// Strongest drive at a speed (m/s^2).
 #[inline]
 pub fn drive_max(rig: &Rig, speed: f32) -> f32 {
     rig.acceleration_max.min(rig.power / speed.max(POWER_SPEED_MIN))
 }
 
-/// Motion of a truck with this speed \[m/s], curvature of the steer angle and deviation from it \[1/m], acceleration
-/// [m/s^2] and articulation \[rad].
+/// Motion of a truck with this speed (m/s), curvature of the steer angle and deviation from it (1/m), acceleration
+/// (m/s^2) and articulation (rad).
 #[inline]
 pub fn motion(rig: &Rig, speed: f32, steered_curvature: f32, curvature_lag: f32, acceleration: f32, articulation: f32) -> Motion {
     // The tyres' grip bounds the curvature.
@@ -122,7 +122,7 @@ pub fn motion(rig: &Rig, speed: f32, steered_curvature: f32, curvature_lag: f32,
 }
 
 /// The deviation of the path's curvature from the steer angle's, `duration` seconds after it was `lag`, where the steer
-/// angle's changes by `rise` in that time \[1/m].
+/// angle's changes by `rise` in that time (1/m).
 ///
 /// The tractor's yaw follows its front wheels with the time constant `yaw_lag * speed`: tyres build up lateral force
 /// only as slip angles grow. The exponential is its Padé approximant, which is stable at any speed.

@@ -16,7 +16,7 @@ pub fn follow(world: &World, row: &mut Row) {
     *row.progress = followed(waypoints, point, row.progress.waypoint, world.params.stray_distance);
 }
 
-/// Middle of the wheelbase \[m].
+/// Middle of the wheelbase (m).
 #[inline]
 pub fn reference_point(wheelbase: f32, truck: &Truck) -> Vec2 {
     truck.position + 0.5 * wheelbase * direction(truck.heading)
@@ -43,7 +43,7 @@ fn is_passed(waypoint: &WaypointRow, point: Vec2, reach: f32) -> bool {
     0.0 <= offset.dot(waypoint.direction) && offset.length_squared() <= reach * reach
 }
 
-/// Distance of `point` from the segment `from`..`to` \[m].
+/// Distance of `point` from the segment `from`..`to` (m).
 #[inline]
 pub fn distance_to_segment(point: Vec2, from: Vec2, to: Vec2) -> f32 {
     let along = to - from;

@@ -12,11 +12,11 @@ use crate::layout::{Control, N_EXTRAS, N_RAYS, N_VALUES, Progress, Truck, first_
 use crate::world::World;
 
 constants! {
-    /// Speed that is observed as 1 \[m/s].
+    /// Speed that is observed as 1 (m/s).
     pub const SPEED_SCALE: f32 = 27.8;
-    /// Distance to a waypoint or its crossing line that is observed as 1 \[m].
+    /// Distance to a waypoint or its crossing line that is observed as 1 (m).
     pub const WAYPOINT_SCALE: f32 = 20.0;
-    /// Distance to the lane centre that is observed as 1 \[m].
+    /// Distance to the lane centre that is observed as 1 (m).
     pub const LANE_SCALE: f32 = 10.0;
     /// Number of waypoints that angles are taken to.
     pub const N_LOOK_AHEAD: usize = 5;
@@ -44,17 +44,17 @@ constants! {
     const RANGES_AT: usize = first_of("trailer_range");
     /// Index of the radii ahead.
     const RADII_AT: usize = first_of("radius");
-    /// Acceleration that is observed as 1 [m/s^2].
+    /// Acceleration that is observed as 1 (m/s^2).
     const ACCELERATION_SCALE: f32 = 2.5;
-    /// Lateral acceleration that is observed as 1 [m/s^2].
+    /// Lateral acceleration that is observed as 1 (m/s^2).
     const G: f32 = 9.81;
-    /// Wheelbase that is observed as 1 \[m].
+    /// Wheelbase that is observed as 1 (m).
     const WHEELBASE_SCALE: f32 = 10.0;
-    /// Roll that is observed as 1 \[rad].
+    /// Roll that is observed as 1 (rad).
     const ROLL_SCALE: f32 = 0.15;
-    /// Roll rate that is observed as 1 \[rad/s].
+    /// Roll rate that is observed as 1 (rad/s).
     const ROLL_RATE_SCALE: f32 = 0.3;
-    /// Mass that is observed as 1 \[kg].
+    /// Mass that is observed as 1 (kg).
     const MASS_SCALE: f32 = 40000.0;
 }
 
@@ -131,7 +131,7 @@ pub fn extras(world: &World, truck: &Truck, control: &Control) -> [f32; N_EXTRAS
     observed
 }
 
-/// Signed angle from `from` to `to`, left positive \[rad].
+/// Signed angle from `from` to `to`, left positive (rad).
 #[inline]
 fn angle_between(from: Vec2, to: Vec2) -> f32 {
     arc_tangent(from.perp_dot(to), from.dot(to))

@@ -84,7 +84,7 @@ fn route_of(row: &Row, episode: u32) -> u32 {
     }
 }
 
-/// A truck at `waypoint`, where the lane has this heading \[rad]: trailer straight, offset and turned as `start` says.
+/// A truck at `waypoint`, where the lane has this heading (rad): trailer straight, offset and turned as `start` says.
 pub fn started(params: &Params, rig: &Rig, waypoint: &WaypointRow, lane_heading: f32, start: &Start) -> Truck {
     let heading = wrapped(lane_heading + start.heading * params.start_heading);
     let point = waypoint.position + start.offset * params.start_offset * waypoint.direction.perp();

@@ -26,17 +26,17 @@ const NO_RAY: usize = N_RAYS;
 /// soon. It changes no range.
 const ORDER: [usize; N_RAYS] = [23, 24, 19, 22, 20, 21, 18, 25, 17, 16, 26, 14, 0, 12, 2, 4, 8, 10, 6, 27, 28, 1, 3, 5, 7, 9, 11, 13, 15];
 constants! {
-    /// The circles at both ends of a step may lie this far apart [m]: a kerb thinner than this along the ray can hide
+    /// The circles at both ends of a step may lie this far apart (m): a kerb thinner than this along the ray can hide
     /// between them.
     const RAY_GAP: f32 = 0.05;
-    /// A step this short is never taken back \[m].
+    /// A step this short is never taken back (m).
     const RAY_SHORT: f32 = 0.25;
-    /// Closer to a kerb than this, it is taken for straight \[m].
+    /// Closer to a kerb than this, it is taken for straight (m).
     const RAY_CLOSE: f32 = 0.15;
-    /// This close to a kerb the ray has met it \[m].
+    /// This close to a kerb the ray has met it (m).
     const RAY_MET: f32 = 0.004;
     /// Head-on, a ray has met the kerb from this far off: a straight kerb's position is known to a few millimetres then
-    /// \[m].
+    /// (m).
     const RAY_MET_HEAD_ON: f32 = 0.02;
     /// Slope of a ray 5 deg from grazing; flatter ones are not followed to the last centimetre.
     const RAY_GRAZING: f32 = 0.087;
@@ -53,7 +53,7 @@ pub fn sense(world: &World, row: &mut Row) {
     *row.ranges = ranges(world.route_field(row.truck.route), rig, world.rays_of(rig), row.truck, world.params.sensor_range);
 }
 
-/// Distance along each ray to the kerb: `reach` where none is met before, 0 from inside one \[m].
+/// Distance along each ray to the kerb: `reach` where none is met before, 0 from inside one (m).
 ///
 /// Within 2 cm of the exact distance, except for rays that come within 2 cm of a kerb at less than 5 deg to it.
 #[inline(always)]
@@ -82,7 +82,7 @@ pub fn ranges(field: &Field, rig: &Rig, rays: &[Ray; N_RAYS], truck: &Truck, rea
 
 /// The rays of a truck where they begin.
 struct Placed {
-    /// Where each ray begins \[m].
+    /// Where each ray begins (m).
     origin_x: [f32; N_RAYS],
     origin_y: [f32; N_RAYS],
     /// Its unit vector.
@@ -110,17 +110,17 @@ impl Placed {
 /// Rays that are traced side by side.
 #[derive(Clone, Copy)]
 struct Bundle<const N: usize> {
-    /// Where each ray begins \[m].
+    /// Where each ray begins (m).
     origin_x: [f32; N],
     origin_y: [f32; N],
     /// Its unit vector.
     direction_x: [f32; N],
     direction_y: [f32; N],
-    /// Distance along it of the next sample, or where it ended \[m].
+    /// Distance along it of the next sample, or where it ended (m).
     along: [f32; N],
-    /// Distance along it of the start of the last accepted step \[m].
+    /// Distance along it of the start of the last accepted step (m).
     base: [f32; N],
-    /// Radius of the free circle there \[m].
+    /// Radius of the free circle there (m).
     free: [f32; N],
     /// Samples that may still be taken on it; 0 once it has ended.
     left: [u32; N],

@@ -9,7 +9,7 @@ use crate::layout::{Action, Control, Params, Rig};
 use crate::world::World;
 
 constants! {
-    /// Braking at which a truck comes to stand [m/s^2].
+    /// Braking at which a truck comes to stand (m/s^2).
     const HOLD_BRAKING: f32 = 0.5;
 }
 
@@ -28,7 +28,7 @@ pub fn targeted(params: &Params, action: &Action, before: &Control) -> Action {
     Action { speed: if params.changes_speed == 1 { changed } else { action.speed }, ..*action }
 }
 
-/// The control for the next `step` seconds of a truck at `speed` [m/s] that was controlled by `before`.
+/// The control for the next `step` seconds of a truck at `speed` (m/s) that was controlled by `before`.
 ///
 /// PI controller with anti-windup: the integral is reset to 0 while the error is large, and kept while the acceleration
 /// asked for is out of reach. Otherwise a long approach to the target speed would overshoot it. A target of 0 is

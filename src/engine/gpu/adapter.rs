@@ -17,7 +17,7 @@ pub struct Adapter {
     pub driver: String,
     /// Discrete, integrated, virtual or software.
     pub kind: &'static str,
-    /// The largest buffer that a shader may see \[bytes].
+    /// The largest buffer that a shader may see (bytes).
     pub binding_max: u64,
 }
 

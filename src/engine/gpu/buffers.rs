@@ -16,9 +16,9 @@ use crate::world::World;
 pub struct Slice {
     /// The buffer; shaders may write to it, and it may be copied from and to.
     pub buffer: Buffer,
-    /// Offset of the slice \[bytes].
+    /// Offset of the slice (bytes).
     pub offset: u64,
-    /// Its length \[bytes].
+    /// Its length (bytes).
     pub size: u64,
 }
 
@@ -86,7 +86,7 @@ fn column_slice(device: &Device, column: Column, n_envs: usize, external: &Colum
     }
 }
 
-/// The adapter's largest buffer that a shader may see \[bytes].
+/// The adapter's largest buffer that a shader may see (bytes).
 fn largest(device: &Device) -> u64 {
     let limits = device.device.limits();
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)

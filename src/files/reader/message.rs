@@ -5,12 +5,12 @@ use std::borrow::Cow;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-/// Maximum length of the parser's own words \[characters].
+/// Maximum length of the parser's own words (characters).
 const LONGEST_MESSAGE: usize = 600;
-/// Maximum length of a line that is repeated \[characters].
+/// Maximum length of a line that is repeated (characters).
 const LONGEST_LINE: usize = 100;
 
-/// Maximum length of a path \[characters].
+/// Maximum length of a path (characters).
 pub const LONGEST_PATH: usize = 400;
 
 /// Characters beside the control characters that are not seen, or that move or hide what is beside them: the formats of
@@ -119,7 +119,7 @@ fn excerpt(line: &str, column: usize) -> String {
     format!("{}{}{}", cut(0 < from), printable(&part), cut(from + LONGEST_LINE < n))
 }
 
-/// The table that byte `at` lies in, `arm[1].entry.kerb`; `None` at the top level.
+/// The table that byte `at` lies in, `arm(1).entry.kerb`; `None` at the top level.
 fn table_at(text: &str, at: usize) -> Option<String> {
     let end = text[at..].find('\n').map_or(text.len(), |end| at + end);
     // Name and number of the arrays of tables opened so far.

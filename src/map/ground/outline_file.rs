@@ -14,7 +14,7 @@ use crate::geometry::area::signed_area;
 use crate::geometry::{Curve, Outline, Piece, arc_of_height};
 use crate::map::route::Lane;
 
-/// Largest coordinate \[m].
+/// Largest coordinate (m).
 const FARTHEST: f64 = 2000.0;
 /// Most points of a path.
 const MOST_POINTS: usize = 20_000;
@@ -211,7 +211,7 @@ fn number(value: f64, decimals: usize) -> String {
     if short == "-0.0" { "0.0".into() } else { short.into() }
 }
 
-/// The area that a closed curve encloses, positive if it lies on its left \[m²].
+/// The area that a closed curve encloses, positive if it lies on its left (m²).
 fn enclosed(curve: &Curve) -> f64 {
     let contour: Vec<[f64; 2]> = curve.polyline(0.01).into_iter().map(DVec2::into).collect();
     signed_area(&contour)

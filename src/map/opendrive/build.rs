@@ -21,9 +21,9 @@ use crate::geometry::{Curve, Outline, Piece};
 use crate::map::ground::{Arm, Edges, Ground, Kerb};
 use crate::map::route::Lane;
 
-/// A way through the ring comes as near to its outer kerb as this, inside or outside \[m].
+/// A way through the ring comes as near to its outer kerb as this, inside or outside (m).
 const BESIDE_RING: f64 = 6.0;
-/// Ring lanes whose centre lines are nearer to each other than this are one \[m].
+/// Ring lanes whose centre lines are nearer to each other than this are one (m).
 const ONE_LANE: f64 = 1.2;
 /// Most arms of a place.
 const MOST_ARMS: usize = 8;
@@ -40,7 +40,7 @@ pub struct Options {
 pub struct Imported {
     /// What is driven on; its origin is the ring's centre.
     pub ground: Ground,
-    /// The ring's centre in the map's own coordinates \[m].
+    /// The ring's centre in the map's own coordinates (m).
     pub centre: DVec2,
     /// What is odd about it.
     pub warnings: Vec<String>,
@@ -100,11 +100,11 @@ pub(super) struct Site<'a> {
     pub(super) map: &'a Map,
     pub(super) refused: &'a Refusals<'a>,
     pub(super) network: &'a Network<'a>,
-    /// What is the origin of the rest, in the map's records \[m].
+    /// What is the origin of the rest, in the map's records (m).
     pub(super) origin: DVec2,
-    /// How far the world reaches \[m].
+    /// How far the world reaches (m).
     pub(super) extent: f64,
-    /// Radius of the circle where arms begin \[m].
+    /// Radius of the circle where arms begin (m).
     pub(super) circle: f64,
     pub(super) faces: Outline,
     pub(super) edges: Outline,
@@ -266,7 +266,7 @@ fn outer_radius(faces: &Outline, island_radius: f64) -> f64 {
     island_radius + 0.5 + between
 }
 
-/// Radius at which a line follows the ring: the middle of its distances from the centre \[m].
+/// Radius at which a line follows the ring: the middle of its distances from the centre (m).
 fn ring_radius(line: &[DVec2], island_radius: f64, outer_radius: f64) -> f64 {
     let mut radii: Vec<f64> = Vec::new();
     for pair in line.windows(2) {

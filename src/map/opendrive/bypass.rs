@@ -10,7 +10,7 @@ use super::paths::Network;
 
 /// Most entry lanes of an arm, with its bypass.
 const MOST_ENTRIES: usize = 2;
-/// Lanes whose outer ends are this near to each other belong to one road \[m].
+/// Lanes whose outer ends are this near to each other belong to one road (m).
 const ONE_ROAD: f64 = BESIDE;
 
 /// A lane of an arm: the arm's index, and the lane's among those that enter or leave.
@@ -26,11 +26,11 @@ struct Bypass {
 /// What is found of a ring's lanes around it.
 pub(super) struct Around<'a> {
     pub(super) network: &'a Network<'a>,
-    /// Radius of the ring's outer kerb \[m].
+    /// Radius of the ring's outer kerb (m).
     pub(super) outer_radius: f64,
-    /// Ways that pass farther than this from the centre are not the ring's \[m].
+    /// Ways that pass farther than this from the centre are not the ring's (m).
     pub(super) reach: f64,
-    /// How far the world reaches \[m].
+    /// How far the world reaches (m).
     pub(super) extent: f64,
 }
 

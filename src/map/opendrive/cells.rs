@@ -7,13 +7,13 @@ use glam::DVec2;
 /// Things in square cells.
 #[derive(Debug)]
 pub(super) struct Cells<T> {
-    /// Width of a cell \[m].
+    /// Width of a cell (m).
     width: f64,
     cells: HashMap<(i64, i64), Vec<T>>,
 }
 
 impl<T> Cells<T> {
-    /// Empty cells of a width \[m].
+    /// Empty cells of a width (m).
     pub(super) fn new(width: f64) -> Cells<T> {
         Cells { width, cells: HashMap::new() }
     }

@@ -11,18 +11,18 @@ use super::lanes::Strip;
 use super::records::Records;
 use super::rings::NEAR;
 
-/// Crossings of lanes in the same direction that are nearer than this are one lane \[m].
+/// Crossings of lanes in the same direction that are nearer than this are one lane (m).
 const ONE_LANE: f64 = 1.2;
-/// Lanes of one road in the same direction are at most this far from each other on the circle \[m].
+/// Lanes of one road in the same direction are at most this far from each other on the circle (m).
 pub(super) const BESIDE: f64 = 7.0;
 /// A lane that leaves and the next that enters are one road if they are at most this far from each other, beside a
-/// splitter island, or at most at this angle seen from the centre \[m], \[rad].
+/// splitter island, or at most at this angle seen from the centre (m), (rad).
 const ONE_ROAD: (f64, f64) = (21.0, 0.55);
-/// How far beyond its junctions a ring's circle lies \[m].
+/// How far beyond its junctions a ring's circle lies (m).
 const BEYOND: f64 = 0.5;
-/// How far from the island a ring's junctions are followed at most \[m].
+/// How far from the island a ring's junctions are followed at most (m).
 const FARTHEST: f64 = 60.0;
-/// How far from the island the circle lies where the ring is in no junction \[m].
+/// How far from the island the circle lies where the ring is in no junction (m).
 const ALONE: f64 = 20.0;
 
 /// A lane that crosses the circle; several strips where lanes of a junction overlap.
@@ -30,7 +30,7 @@ const ALONE: f64 = 20.0;
 pub(super) struct Crossing {
     /// Whether it leads into the ring.
     pub(super) inwards: bool,
-    /// Where it crosses \[m].
+    /// Where it crosses (m).
     pub(super) at: DVec2,
     pub(super) strips: Vec<usize>,
 }
@@ -43,13 +43,13 @@ pub(super) struct ArmLanes {
 }
 
 impl ArmLanes {
-    /// Direction from the ring's centre to the middle of the arm's lanes \[rad].
+    /// Direction from the ring's centre to the middle of the arm's lanes (rad).
     pub(super) fn bearing(&self) -> f64 {
         self.entries.iter().chain(&self.exits).map(|crossing| crossing.at).sum::<DVec2>().to_angle()
     }
 }
 
-/// Radius of a circle around the origin outside the junctions of a ring of this radius \[m].
+/// Radius of a circle around the origin outside the junctions of a ring of this radius (m).
 pub(super) fn circle(records: &Records, strips: &[Strip], radius: f64) -> f64 {
     let in_ring = |strip: &&Strip| {
         let path = strip.path();

@@ -7,7 +7,7 @@ use crate::files::reader::{Error, shortened};
 
 /// Characters of Windows-1252 from 0x80 to 0x9f; those of ISO-8859-1 there are control characters, which no map has.
 const WINDOWS_1252: &str = "€\u{fffd}‚ƒ„…†‡ˆ‰Š‹Œ\u{fffd}Ž\u{fffd}\u{fffd}‘’“”•–—˜™š›œ\u{fffd}žŸ";
-/// Where the declaration of an encoding is looked for \[bytes].
+/// Where the declaration of an encoding is looked for (bytes).
 const HEAD: usize = 200;
 
 /// The text of a map's bytes, in the encoding that its byte order mark or its first line declares.

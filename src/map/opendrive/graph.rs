@@ -12,11 +12,11 @@ use super::read::MOST_WARNINGS;
 use super::records::{Kind, Records};
 use super::sections::SHORTEST;
 
-/// A joint that jumps further is not believed \[m].
+/// A joint that jumps further is not believed (m).
 const JUMP: f64 = 0.5;
-/// How far a lane is looked for that begins where one ends \[m].
+/// How far a lane is looked for that begins where one ends (m).
 const SEARCH: f64 = 1.5;
-/// A joint that turns more is not believed \[rad].
+/// A joint that turns more is not believed (rad).
 const TURN: f64 = 0.6;
 
 /// Most lanes of no length that a link is followed across.
@@ -52,7 +52,7 @@ impl End {
         Some([End { at: first, ahead: from }, End { at: last, ahead: to }])
     }
 
-    /// Distance to the beginning of another lane, and the angle between them \[m], \[rad].
+    /// Distance to the beginning of another lane, and the angle between them (m), (rad).
     fn to(&self, next: &End) -> (f64, f64) {
         (self.at.distance(next.at), self.ahead.angle_to(next.ahead).abs())
     }

@@ -17,11 +17,11 @@ use super::{COARSE, FINEST, Map};
 use crate::files::reader::{Error, Reader};
 use crate::map::route::Lane;
 
-/// How far beyond its junction the circle lies on which arms begin \[m].
+/// How far beyond its junction the circle lies on which arms begin (m).
 const BEYOND: f64 = 0.5;
-/// Least radius of that circle \[m].
+/// Least radius of that circle (m).
 const SMALLEST: f64 = 5.0;
-/// Largest radius of that circle \[m].
+/// Largest radius of that circle (m).
 const LARGEST: f64 = 60.0;
 
 /// A lane of a map.
@@ -59,7 +59,7 @@ impl fmt::Display for Way {
 pub struct Junction {
     /// Its id in the map.
     pub id: String,
-    /// Middle of its lanes in the map's own coordinates \[m].
+    /// Middle of its lanes in the map's own coordinates (m).
     pub centre: DVec2,
     /// Every way through it.
     pub ways: Vec<Way>,
@@ -67,7 +67,7 @@ pub struct Junction {
 
 impl Map {
     /// The centre line of every lane that is driven on, a section at a time, in its direction of travel and the map's
-    /// own coordinates; chords leave their curves by at most `tolerance` \[m].
+    /// own coordinates; chords leave their curves by at most `tolerance` (m).
     pub fn lane_centres(&self, tolerance: f64) -> Vec<(RoadLane, Vec<DVec2>)> {
         let mut centres = Vec::new();
         for (index, road) in self.records.roads.iter().enumerate() {
@@ -229,7 +229,7 @@ impl Map {
         })
     }
 
-    /// The middle of the junctions that ways lead through, and the radius of the circle around them \[m].
+    /// The middle of the junctions that ways lead through, and the radius of the circle around them (m).
     fn around(&self, refused: &Refusals, found: &[(&Way, Vec<usize>)]) -> Result<(DVec2, f64), Error> {
         let (first, last) = (|way: &Way| way.from.road.clone(), |way: &Way| way.to.road.clone());
         let road = |strip: usize| &self.records.roads[self.strips[strip].road].id;
@@ -256,7 +256,7 @@ impl Map {
     }
 }
 
-/// Middle of the smallest upright rectangle around points \[m].
+/// Middle of the smallest upright rectangle around points (m).
 fn middle<'a>(points: impl Iterator<Item = &'a DVec2>) -> DVec2 {
     let (low, high) = points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
     (low + high) / 2.0

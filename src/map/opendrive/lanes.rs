@@ -10,19 +10,19 @@ use super::records::{Kind, Lane, Records, RoadRecord, Section, active};
 
 /// Most halvings of the stretch between two records.
 const MOST_HALVINGS: u32 = 9;
-/// Longest distance between two samples \[m].
+/// Longest distance between two samples (m).
 const LONGEST_STEP: f64 = 20.0;
 /// Most points that are sampled on one map.
 const MOST_POINTS: usize = 10_000_000;
-/// Longest that all lanes of a map are together \[m].
+/// Longest that all lanes of a map are together (m).
 const MOST_LENGTH: f64 = 2e6;
-/// A lane that is nowhere wider than this only looks like one \[m].
+/// A lane that is nowhere wider than this only looks like one (m).
 const NARROWEST: f64 = 1.5;
-/// Farthest that a lane lies from its reference line \[m].
+/// Farthest that a lane lies from its reference line (m).
 const FARTHEST: f64 = 1000.0;
 /// A strip that folds over at more samples than this has no shape that could be paved.
 const MOST_FOLDS: usize = 200;
-/// Stretches shorter than this are left out, unless the section has no other \[m].
+/// Stretches shorter than this are left out, unless the section has no other (m).
 const SHORTEST: f64 = 1e-6;
 
 /// A lane of a section, in the direction of the reference line.
@@ -44,7 +44,7 @@ pub(super) struct Strip {
 }
 
 impl Strip {
-    /// The centre line in the direction of travel \[m].
+    /// The centre line in the direction of travel (m).
     pub(super) fn path(&self) -> Vec<DVec2> {
         let mut path = self.centre.clone();
         if self.backward {
@@ -53,7 +53,7 @@ impl Strip {
         path
     }
 
-    /// Length of its centre line \[m].
+    /// Length of its centre line (m).
     pub(super) fn length(&self) -> f64 {
         self.centre.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
     }
@@ -63,7 +63,7 @@ impl Strip {
         self.kind == Kind::Lane && self.left.iter().zip(&self.right).any(|(left, right)| NARROWEST < left.distance(*right))
     }
 
-    /// Corners of the smallest upright rectangle around it \[m].
+    /// Corners of the smallest upright rectangle around it (m).
     pub(super) fn bounds(&self) -> (DVec2, DVec2) {
         let points = self.left.iter().chain(&self.right);
         points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)))
@@ -91,7 +91,7 @@ impl Strip {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct TooDetailed;
 
-/// Every lane of a map, sampled so that no chord leaves its curve by more than `tolerance` \[m].
+/// Every lane of a map, sampled so that no chord leaves its curve by more than `tolerance` (m).
 pub(super) fn strips(records: &Records, tolerance: f64) -> Result<Vec<Strip>, TooDetailed> {
     let mut left = MOST_POINTS;
     let mut length = 0.0;
@@ -214,12 +214,12 @@ impl Sample {
         Sample { s, edges }
     }
 
-    /// Largest distance between the edges of two samples \[m].
+    /// Largest distance between the edges of two samples (m).
     fn apart(&self, other: &Sample) -> f64 {
         self.edges.iter().flatten().zip(other.edges.iter().flatten()).map(|(one, other)| one.distance(*other)).fold(0.0, f64::max)
     }
 
-    /// Largest distance of this sample's edges from the chords between those of two others \[m].
+    /// Largest distance of this sample's edges from the chords between those of two others (m).
     fn off_chord(&self, before: &Sample, after: &Sample) -> f64 {
         let all = self.edges.iter().flatten().zip(before.edges.iter().flatten().zip(after.edges.iter().flatten()));
         all.map(|(&p, (&from, &to))| crate::geometry::Piece::Segment { from, to }.distance(p)).fold(0.0, f64::max)

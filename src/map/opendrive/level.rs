@@ -9,9 +9,9 @@ use crate::files::reader::Error;
 
 /// A grade beyond this is warned of.
 pub(super) const GRADE: f64 = 0.03;
-/// A step of the elevation beyond this is warned of \[m].
+/// A step of the elevation beyond this is warned of (m).
 const STEP: f64 = 0.05;
-/// Records that are nearer to each other than this say nothing of the grade between them \[m].
+/// Records that are nearer to each other than this say nothing of the grade between them (m).
 const APART: f64 = 1.0;
 /// Largest factor of an elevation.
 const LARGEST: f64 = 1e9;
@@ -117,7 +117,7 @@ impl Source<'_, '_> {
     }
 }
 
-/// How far a road's lanes reach to its right and to its left at a station, left positive \[m].
+/// How far a road's lanes reach to its right and to its left at a station, left positive (m).
 fn reach(road: &RoadRecord, s: f64) -> [f64; 2] {
     let Some(section) = active(&road.sections, s, |section| section.start) else { return [0.0; 2] };
     let offset = active(&road.offsets, s, |offset| offset.start).map_or(0.0, |offset| offset.at(s));

@@ -8,9 +8,9 @@ use crate::geometry::{Curve, Outline, fitted_line};
 use crate::map::ground::{Arm, Line};
 use crate::map::route::Lane;
 
-/// Joints that jump further are warned of \[m].
+/// Joints that jump further are warned of (m).
 const JUMP: f64 = 0.1;
-/// A centre line that is nearer to a kerb than half a truck's width is warned of \[m].
+/// A centre line that is nearer to a kerb than half a truck's width is warned of (m).
 const NEAREST: f64 = 1.3;
 
 /// Reach of crossing lines to either side of a lane that is in no ring, in widths of the lane: over its neighbours too.
@@ -24,9 +24,9 @@ pub(super) struct Lines<'a> {
     pub(super) place: &'a str,
     /// Whether the map has left-hand traffic, so that lanes change their names.
     pub(super) mirrored: bool,
-    /// How far from the origin lines reach \[m].
+    /// How far from the origin lines reach (m).
     pub(super) extent: f64,
-    /// Radius of the circle where arms begin \[m].
+    /// Radius of the circle where arms begin (m).
     pub(super) circle: f64,
     /// The routes so far.
     pub(super) lines: Vec<Line>,
@@ -87,7 +87,7 @@ impl Lines<'_> {
     }
 }
 
-/// Width of the lane along a way at the point nearest to `p` \[m].
+/// Width of the lane along a way at the point nearest to `p` (m).
 fn width(network: &Network, way: &[usize], p: DVec2) -> f64 {
     let strips = way.iter().filter_map(|strip| network.strips.get(strip));
     let samples = strips.flat_map(|strip| strip.left.iter().zip(&strip.right).zip(&strip.centre));
@@ -95,7 +95,7 @@ fn width(network: &Network, way: &[usize], p: DVec2) -> f64 {
     nearest.map_or(3.5, |((left, right), _)| left.distance(*right))
 }
 
-/// The least distance of a line from the kerbs, away from its ends, and where \[m].
+/// The least distance of a line from the kerbs, away from its ends, and where (m).
 fn closest(line: &Curve, faces: &Outline) -> Option<(f64, DVec2)> {
     let n = (line.length() - 2.0 * NEAREST) as usize;
     let at = |i: usize| line.point_at(2.0 * NEAREST + i as f64 * 0.98);

@@ -8,7 +8,7 @@ use super::records::{Island, RoadRecord};
 use super::xml::{attribute, child, children};
 use crate::files::reader::Error;
 
-/// Largest size of an object \[m].
+/// Largest size of an object (m).
 const LARGEST: f64 = 1000.0;
 /// Most corners of an outline.
 const MOST_CORNERS: usize = 1000;

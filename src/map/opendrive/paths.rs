@@ -16,7 +16,7 @@ pub(super) type Way = ((usize, usize), Vec<usize>);
 
 /// Lanes that an approach or a departure is made of at most.
 const MOST_LANES: usize = 500;
-/// A joint of two lanes is spread over this length on either side \[m].
+/// A joint of two lanes is spread over this length on either side (m).
 const SPREAD: f64 = 5.0;
 
 /// A lane that the search has reached.
@@ -48,7 +48,7 @@ pub(super) struct Network<'a> {
 }
 
 impl Network<'_> {
-    /// The centre line of a lane in its direction of travel \[m].
+    /// The centre line of a lane in its direction of travel (m).
     pub(super) fn path(&self, strip: usize) -> Vec<DVec2> {
         self.strips.get(&strip).map_or(Vec::new(), |strip| strip.path())
     }
@@ -116,7 +116,7 @@ impl Network<'_> {
         ways
     }
 
-    /// The least distance of a way from the ring's centre \[m].
+    /// The least distance of a way from the ring's centre (m).
     pub(super) fn nearest_to_centre(&self, way: &[usize]) -> f64 {
         let strips = way.iter().filter_map(|strip| self.strips.get(strip));
         strips.flat_map(|strip| &strip.centre).map(|p| p.length()).fold(f64::INFINITY, f64::min)
@@ -142,7 +142,7 @@ impl Network<'_> {
         None
     }
 
-    /// How much a lane turns from its beginning to its end \[rad].
+    /// How much a lane turns from its beginning to its end (rad).
     fn turn(&self, strip: usize) -> f64 {
         let path = self.path(strip);
         match path.as_slice() {
@@ -151,7 +151,7 @@ impl Network<'_> {
         }
     }
 
-    /// The way continued at both ends, straight on where lanes part, until it is `extent` from the centre \[m].
+    /// The way continued at both ends, straight on where lanes part, until it is `extent` from the centre (m).
     pub(super) fn continued(&self, way: &[usize], extent: f64) -> Vec<usize> {
         let mut all = std::collections::VecDeque::from(way.to_vec());
         let straightest = |of: &[usize], all: &std::collections::VecDeque<usize>| {
@@ -173,7 +173,7 @@ impl Network<'_> {
         all.into()
     }
 
-    /// The centre line along lanes, their joints spread so that it has no step, and the largest step \[m].
+    /// The centre line along lanes, their joints spread so that it has no step, and the largest step (m).
     pub(super) fn line(&self, way: &[usize]) -> (Vec<DVec2>, f64) {
         let mut points: Vec<DVec2> = Vec::new();
         let mut stations: Vec<f64> = Vec::new();
@@ -217,7 +217,7 @@ fn dense(path: &[DVec2]) -> Vec<DVec2> {
     dense
 }
 
-/// The stretch of a line around its point nearest to the origin that lies within `extent` of the origin \[m].
+/// The stretch of a line around its point nearest to the origin that lies within `extent` of the origin (m).
 pub(super) fn within(line: &[DVec2], extent: f64) -> Vec<DVec2> {
     if line.is_empty() {
         return Vec::new();

@@ -8,18 +8,18 @@ use super::records::{Geometry, Shape};
 use super::xml::{attribute, children, shown};
 use crate::files::reader::Error;
 
-/// Largest coordinate \[m].
+/// Largest coordinate (m).
 const FARTHEST: f64 = 1e8;
-/// A curvature beyond this is warned of: editors write such pieces of a centimetre or so \[1/m].
+/// A curvature beyond this is warned of: editors write such pieces of a centimetre or so (1/m).
 const SHARPEST: f64 = 10.0;
-/// Largest number that is read as a curvature \[1/m].
+/// Largest number that is read as a curvature (1/m).
 const LARGEST_CURVATURE: f64 = 1e9;
-/// Most that one piece of a reference line turns \[rad].
+/// Most that one piece of a reference line turns (rad).
 const MOST_TURN: f64 = 30.0;
-/// A reference line whose pieces leave a gap beyond this is warned of \[m].
+/// A reference line whose pieces leave a gap beyond this is warned of (m).
 const GAP: f64 = 0.01;
 /// A gap beyond this is refused, and a curve whose points lie this much farther from its beginning than it is long
-/// \[m].
+/// (m).
 const WIDEST_GAP: f64 = 100.0;
 
 impl Source<'_, '_> {

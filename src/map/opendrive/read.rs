@@ -13,7 +13,7 @@ use super::records::{Connection, Cubic, Link, Records, RoadRecord};
 use super::xml::{attribute, child, children, line, shown};
 use crate::files::reader::{Error, Reader, shortened};
 
-/// Largest file \[bytes].
+/// Largest file (bytes).
 pub(super) const FILE_LIMIT: u64 = 256 << 20;
 /// Most elements of a file that are read.
 const MOST_ELEMENTS: usize = 4_000_000;
@@ -21,11 +21,11 @@ const MOST_ELEMENTS: usize = 4_000_000;
 const MOST_NODES: u32 = 8_000_000;
 /// Deepest nesting of elements.
 const DEEPEST: u16 = 64;
-/// Longest road \[m].
+/// Longest road (m).
 pub(super) const LONGEST: f64 = 100_000.0;
-/// A lane above this is raised \[m].
+/// A lane above this is raised (m).
 pub(super) const RAISED: f64 = 0.02;
-/// A raised lane of at most this width is a kerb \[m].
+/// A raised lane of at most this width is a kerb (m).
 pub(super) const KERB_WIDTH: f64 = 1.0;
 /// Most warnings that are kept.
 pub(super) const MOST_WARNINGS: usize = 1000;

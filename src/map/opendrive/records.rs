@@ -11,14 +11,14 @@ use super::level::Level;
 /// A polynomial `a + b x + c x² + d x³` that holds from `start` on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Cubic {
-    /// Where it begins: x is counted from here \[m].
+    /// Where it begins: x is counted from here (m).
     pub(super) start: f64,
     /// a, b, c, d.
     pub(super) factors: [f64; 4],
 }
 
 impl Cubic {
-    /// Value at station `s` \[m].
+    /// Value at station `s` (m).
     pub(super) fn at(&self, s: f64) -> f64 {
         let [a, b, c, d] = self.factors;
         let x = s - self.start;
@@ -36,9 +36,9 @@ pub(super) fn active<T>(records: &[T], s: f64, start: impl Fn(&T) -> f64) -> Opt
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Shape {
     Line,
-    /// Its curvature, left positive \[1/m].
+    /// Its curvature, left positive (1/m).
     Arc(f64),
-    /// Curvature at its beginning and at its end, linear between \[1/m].
+    /// Curvature at its beginning and at its end, linear between (1/m).
     Spiral(f64, f64),
     /// v as a cubic of u, in the frame of its beginning.
     Poly3([f64; 4]),
@@ -53,13 +53,13 @@ pub(super) enum Shape {
 /// A piece of a reference line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Geometry {
-    /// Station of its beginning \[m].
+    /// Station of its beginning (m).
     pub(super) start: f64,
-    /// Its beginning \[m].
+    /// Its beginning (m).
     pub(super) origin: DVec2,
-    /// Direction there \[rad].
+    /// Direction there (rad).
     pub(super) heading: f64,
-    /// Its length \[m].
+    /// Its length (m).
     pub(super) length: f64,
     pub(super) shape: Shape,
 }
@@ -98,7 +98,7 @@ impl Kind {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Height {
     pub(super) start: f64,
-    /// The greater of the inner and the outer edge's \[m].
+    /// The greater of the inner and the outer edge's (m).
     pub(super) height: f64,
 }
 
@@ -123,7 +123,7 @@ pub(super) struct Lane {
 /// A stretch of a road with the same lanes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Section {
-    /// Station of its beginning \[m].
+    /// Station of its beginning (m).
     pub(super) start: f64,
     /// From left to right, the centre lane left out.
     pub(super) lanes: Vec<Lane>,
@@ -140,7 +140,7 @@ pub(super) enum Link {
 /// An object's outline that is solid: a traffic island.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Island {
-    /// Its corners in the map \[m].
+    /// Its corners in the map (m).
     pub(super) corners: Vec<DVec2>,
 }
 
@@ -148,7 +148,7 @@ pub(super) struct Island {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RoadRecord {
     pub(super) id: String,
-    /// Length of its reference line \[m].
+    /// Length of its reference line (m).
     pub(super) length: f64,
     /// The junction that it is a part of.
     pub(super) junction: Option<String>,
@@ -163,7 +163,7 @@ pub(super) struct RoadRecord {
 }
 
 impl RoadRecord {
-    /// Station where a section ends \[m].
+    /// Station where a section ends (m).
     pub(super) fn section_end(&self, section: usize) -> f64 {
         self.sections.get(section + 1).map_or(self.length, |next| next.start)
     }

@@ -58,7 +58,7 @@ fn abscissa(v: [f64; 4], s: f64) -> f64 {
 }
 
 impl Geometry {
-    /// Point and heading `s` metres from the piece's beginning \[m], \[rad].
+    /// Point and heading `s` metres from the piece's beginning (m), (rad).
     pub(super) fn pose(&self, s: f64) -> (DVec2, f64) {
         let turn = DVec2::from_angle(self.heading);
         let placed = |local: DVec2, heading: f64| (self.origin + turn.rotate(local), self.heading + heading);
@@ -92,14 +92,14 @@ impl Geometry {
         }
     }
 
-    /// Its last point \[m].
+    /// Its last point (m).
     pub(super) fn end(&self) -> DVec2 {
         self.pose(self.length).0
     }
 }
 
 impl RoadRecord {
-    /// Point and heading of the reference line at station `s` \[m], \[rad].
+    /// Point and heading of the reference line at station `s` (m), (rad).
     pub(super) fn pose(&self, s: f64) -> (DVec2, f64) {
         // A road that was read has at least one geometry. Where the next begins late, the one before goes on straight.
         active(&self.plan, s, |geometry| geometry.start).map_or((DVec2::ZERO, 0.0), |geometry| {
@@ -109,7 +109,7 @@ impl RoadRecord {
         })
     }
 
-    /// The point `t` metres left of the reference line at station `s` \[m].
+    /// The point `t` metres left of the reference line at station `s` (m).
     pub(super) fn point(&self, s: f64, t: f64) -> DVec2 {
         let (p, heading) = self.pose(s);
         p + t * DVec2::from_angle(heading).perp()

@@ -13,9 +13,9 @@ use super::records::Kind;
 use super::surface::{GAP, of};
 use crate::geometry::area::{Area, points};
 
-/// Smallest and largest radius of an island \[m].
+/// Smallest and largest radius of an island (m).
 const RADII: [f64; 2] = [1.5, 200.0];
-/// Lanes within this distance of the island may be the ring's \[m].
+/// Lanes within this distance of the island may be the ring's (m).
 pub(super) const NEAR: f64 = 7.5;
 /// Part of the angles around the island at which the nearest lane must circulate.
 const COVERED: f64 = 0.85;
@@ -27,11 +27,11 @@ const BINS: usize = 72;
 /// A roundabout in a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ring {
-    /// Centre of the island in the map's own coordinates \[m].
+    /// Centre of the island in the map's own coordinates (m).
     pub centre: DVec2,
-    /// Radius of the circle that fits the island's edge best \[m].
+    /// Radius of the circle that fits the island's edge best (m).
     pub radius: f64,
-    /// Largest distance of the island's edge from that circle \[m].
+    /// Largest distance of the island's edge from that circle (m).
     pub residual: f64,
     /// Part of the angles at which the lane nearest to the island circulates around it.
     pub covered: f64,
@@ -40,15 +40,15 @@ pub struct Ring {
 /// A hole in the paved surface that is no roundabout, and why not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refused {
-    /// Its middle in the map's own coordinates \[m].
+    /// Its middle in the map's own coordinates (m).
     pub centre: DVec2,
-    /// Radius of the circle that fits its edge best \[m].
+    /// Radius of the circle that fits its edge best (m).
     pub radius: f64,
     /// What speaks against it.
     pub reason: String,
 }
 
-/// A circle through points as well as may be: centre, radius, largest distance of a point from it \[m].
+/// A circle through points as well as may be: centre, radius, largest distance of a point from it (m).
 pub(super) fn fitted_circle(points: &[DVec2]) -> Option<(DVec2, f64, f64)> {
     let n = points.len() as f64;
     let mean = points.iter().sum::<DVec2>() / n;
@@ -70,7 +70,7 @@ pub(super) fn fitted_circle(points: &[DVec2]) -> Option<(DVec2, f64, f64)> {
     residual.is_finite().then_some((centre, radius, residual))
 }
 
-/// A closed contour with points at most `step` apart \[m].
+/// A closed contour with points at most `step` apart (m).
 pub(super) fn densified(contour: &[DVec2], step: f64) -> Vec<DVec2> {
     let n = contour.len();
     let mut dense = Vec::new();
@@ -119,7 +119,7 @@ pub(super) fn rings(strips: &[Strip], graph: &Graph) -> (Vec<Ring>, Vec<Refused>
     (rings, refused)
 }
 
-/// Width of the cells that lanes are found by \[m].
+/// Width of the cells that lanes are found by (m).
 const CELL: f64 = 10.0;
 
 /// Lanes in rectangles, each given by its corners, as points with directions of travel.

@@ -10,9 +10,9 @@ use super::records::{Cubic, Height, Kind, Lane, Section};
 use super::xml::{attribute, child, children};
 use crate::files::reader::Error;
 
-/// Widest lane \[m].
+/// Widest lane (m).
 const WIDEST: f64 = 1000.0;
-/// A section shorter than this has no lanes that could be driven on \[m].
+/// A section shorter than this has no lanes that could be driven on (m).
 pub(super) const SHORTEST: f64 = 1e-6;
 /// Most records of lanes that are repeated because a section describes the other side alone.
 const MOST_REPEATED: usize = 1_000_000;

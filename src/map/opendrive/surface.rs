@@ -13,21 +13,21 @@ use super::rings::densified;
 use crate::geometry::Piece;
 use crate::geometry::area::{Area, counter_clockwise, points};
 
-/// Gaps between strips that are closed first \[m].
+/// Gaps between strips that are closed first (m).
 pub(super) const GAP: f64 = 0.02;
-/// Voids narrower than this are paved where they touch a lane \[m].
+/// Voids narrower than this are paved where they touch a lane (m).
 const SLIVER: f64 = 0.6;
-/// A void that holds a circle of this radius is solid where a map has no kerbs \[m].
+/// A void that holds a circle of this radius is solid where a map has no kerbs (m).
 const INSCRIBED: f64 = 0.5;
-/// The same for a void beside a lane where a map has kerbs, which then lie around all that is solid \[m].
+/// The same for a void beside a lane where a map has kerbs, which then lie around all that is solid (m).
 const INSCRIBED_AMONG_KERBS: f64 = 3.0;
-/// Drivable strips narrower than this are solid \[m].
+/// Drivable strips narrower than this are solid (m).
 const SLIT: f64 = 0.2;
-/// Edges are replaced by longer ones within this where the exact place does not matter \[m].
+/// Edges are replaced by longer ones within this where the exact place does not matter (m).
 const SIMPLE: f64 = 0.003;
-/// Distance between the points of a void's edge that are looked at \[m].
+/// Distance between the points of a void's edge that are looked at (m).
 const CONTACT: f64 = 0.05;
-/// Length of contact with a lane from which a void lies beside it \[m].
+/// Length of contact with a lane from which a void lies beside it (m).
 const BESIDE: f64 = 0.5;
 
 /// What can be driven on.
@@ -99,7 +99,7 @@ impl Edge {
         Edge { cells }
     }
 
-    /// Length of edge that a part has in common with the area \[m].
+    /// Length of edge that a part has in common with the area (m).
     fn contact(&self, part: &[Vec<[f64; 2]>]) -> f64 {
         let near = |p: &DVec2| self.cells.at(self.cells.cell(*p)).any(|piece| piece.distance(*p) < GAP);
         let outline = densified(&points(&part[0]), CONTACT);

@@ -12,15 +12,15 @@ use super::surface::Surface;
 use crate::geometry::area::{Area, points, signed_area};
 use crate::geometry::{Curve, Outline, fitted_outline};
 
-/// Chords of edges leave their curves by at most this much before arcs are fitted \[m].
+/// Chords of edges leave their curves by at most this much before arcs are fitted (m).
 const FINE: f64 = 1e-3;
-/// What arcs and segments may add to that \[m].
+/// What arcs and segments may add to that (m).
 pub(super) const FITTED: f64 = 4e-3;
-/// How far beyond its island or its junction the world reaches \[m].
+/// How far beyond its island or its junction the world reaches (m).
 pub(super) const REACH: f64 = 85.0;
-/// How far beyond the world lanes are looked at \[m].
+/// How far beyond the world lanes are looked at (m).
 const MARGIN: f64 = 10.0;
-/// Islands smaller than this are left out \[m²].
+/// Islands smaller than this are left out (m²).
 const SMALLEST: f64 = 0.02;
 
 /// Contours of one connected part of a surface: its outer one, then its holes.
@@ -30,7 +30,7 @@ pub(super) fn moved(points: &[DVec2], centre: DVec2) -> Vec<DVec2> {
     points.iter().map(|&p| p - centre).collect()
 }
 
-/// The surface of the map around a point, which becomes the origin, up to `extent` from it and a little more \[m].
+/// The surface of the map around a point, which becomes the origin, up to `extent` from it and a little more (m).
 pub(super) fn surface(map: &Map, centre: DVec2, extent: f64) -> Surface {
     let islands: Vec<Vec<DVec2>> =
         map.records.roads.iter().flat_map(|road| &road.islands).map(|island| moved(&island.corners, centre)).collect();

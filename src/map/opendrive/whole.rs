@@ -8,7 +8,7 @@ use super::records::{Connection, Link, Records};
 use super::xml::shown;
 use crate::files::reader::{Error, Reader};
 
-/// Farthest that a road begins from the middle of a map: beyond it polygons are computed on too coarse a grid \[m].
+/// Farthest that a road begins from the middle of a map: beyond it polygons are computed on too coarse a grid (m).
 const FARTHEST: f64 = 500_000.0;
 /// A crossfall beyond this is warned of: what drains a road is less.
 pub(super) const TILTED: f64 = 0.03;

@@ -24,7 +24,7 @@ pub(super) fn attribute<'a>(node: Node<'a, '_>, name: &str) -> &'a str {
     node.attribute(name).unwrap_or("").trim()
 }
 
-/// Longest name of a map in a message \[characters].
+/// Longest name of a map in a message (characters).
 const LONGEST_NAME: usize = 40;
 
 /// A name of a map as messages show it: of bounded length, and without characters that a terminal would obey.

@@ -40,15 +40,15 @@ impl Way {
 /// Why an alignment is no curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Fault {
-    /// The arc at this point does not fit; largest radius that does \[m].
+    /// The arc at this point does not fit; largest radius that does (m).
     Point(usize, f64),
     /// No arc of `ring_radius` leads the last straight into the ring.
     Ring,
     /// The last straights of two arms do not meet.
     Apart,
-    /// The arc between two arms does not fit; largest radius that does \[m].
+    /// The arc between two arms does not fit; largest radius that does (m).
     Corner(f64),
-    /// The arc at this point of the next arm does not fit; largest radius that does \[m].
+    /// The arc at this point of the next arm does not fit; largest radius that does (m).
     NextPoint(usize, f64),
 }
 
@@ -61,7 +61,7 @@ pub(super) struct Alignment {
 
 impl Alignment {
     /// The curve from the arm's end to where it touches the circle of radius `circle` around the ring's centre, and the
-    /// direction from the centre to that point \[rad].
+    /// direction from the centre to that point (rad).
     pub(super) fn lead(&self, circle: f64) -> Result<(Curve, f64), Fault> {
         let (legs, origin, direction) = self.last_straight();
         let (arc, arrival) = to_circle(origin, direction, circle, self.ring_radius).ok_or(Fault::Ring)?;
@@ -73,7 +73,7 @@ impl Alignment {
     }
 
     /// The alignment `distance` to the left of this one, which leads to the circle of radius `circle`; `None` if a bend
-    /// is too sharp for it \[m].
+    /// is too sharp for it (m).
     pub(super) fn beside(&self, distance: f64, circle: f64) -> Option<Alignment> {
         let n = self.bends.len();
         let direction = |index: usize| (self.bends[index + 1].at - self.bends[index].at).normalize_or_zero();
@@ -111,7 +111,7 @@ impl Alignment {
 }
 
 /// The curve from the end of one arm to the end of the next outside the ring: the corner of the last straights, rounded
-/// by `radius` \[m].
+/// by `radius` (m).
 pub(super) fn around(entry: (&Alignment, f64), exit: (&Alignment, f64), radius: f64) -> Result<Curve, Fault> {
     let placed = |alignment: &Alignment, way: Way, bearing: f64| -> Vec<Bend> {
         alignment.bends.iter().map(|bend| Bend { at: way.point(bend.at, bearing), radius: bend.radius }).collect()

@@ -13,9 +13,9 @@ use crate::files::reader::{Error, Reader, differing, shown};
 use crate::geometry::{Curve, Outline};
 use crate::map::route::Lane;
 
-/// Half the width of a truck and 5 cm: a lane whose centre line is nearer to a kerb cannot be driven \[m].
+/// Half the width of a truck and 5 cm: a lane whose centre line is nearer to a kerb cannot be driven (m).
 const NEAREST: f64 = 1.3;
-/// Width of a truck: two lanes whose centre lines are nearer to each other cannot both be driven \[m].
+/// Width of a truck: two lanes whose centre lines are nearer to each other cannot both be driven (m).
 const LANES_APART: f64 = 2.5;
 
 /// A rounding arc that does not fit between its neighbours.
@@ -59,7 +59,7 @@ pub(super) fn fault(reader: &Reader, arms: &[Arm], arm: usize, corner: Option<&s
     }
 }
 
-/// An exit's only lane that routes from left lanes cannot reach from their ring lane, of radius `circle` \[m].
+/// An exit's only lane that routes from left lanes cannot reach from their ring lane, of radius `circle` (m).
 pub(super) fn no_merge(reader: &Reader, arms: &[Arm], arm: usize, circle: f64) -> Error {
     reader.invalid(
         format!("arm[{arm}].exit.right.ring_radius"),
@@ -72,7 +72,7 @@ pub(super) fn no_merge(reader: &Reader, arms: &[Arm], arm: usize, circle: f64) -
     )
 }
 
-/// Two arms that overlap: `length` of ring is left between their kerbs, a negative length \[m].
+/// Two arms that overlap: `length` of ring is left between their kerbs, a negative length (m).
 pub(super) fn no_room(reader: &Reader, arms: &[Arm], arm: usize, length: f64) -> Error {
     let next = &arms[(arm + 1) % arms.len()];
     reader.invalid(
@@ -261,7 +261,7 @@ impl Display for Beside<'_> {
 
 /// The first of the points every 25 cm along a curve, from station `from` to `to`, at which `distance` is below
 /// `limit`. `distance` is to something that does not move, so it changes by at most a metre a metre: stations that
-/// cannot be nearer than `limit` are left out \[m].
+/// cannot be nearer than `limit` are left out (m).
 fn nearer(curve: &Curve, from: f64, to: f64, limit: f64, distance: impl Fn(DVec2) -> f64) -> Option<DVec2> {
     const STEP: f64 = 0.25;
     let last = (curve.length() / STEP) as usize;

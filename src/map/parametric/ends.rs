@@ -9,10 +9,10 @@ use crate::geometry::{Curve, Outline, Piece};
 use crate::map::ground::{Edges, Line};
 use crate::map::{Gutter, Road};
 
-/// By how much an arm is prolonged: more than the longest truck \[m].
+/// By how much an arm is prolonged: more than the longest truck (m).
 const BEYOND: f64 = 60.0;
 /// Farthest that an arm's end may lie from the end of a lane: a solid gutter is that wide, and maps are cut roughly
-/// \[m].
+/// (m).
 const NEAR: f64 = 3.0;
 
 impl Road {
@@ -67,7 +67,7 @@ mod tests {
     use crate::vehicle::Vehicle;
     use crate::vehicle::swept::{own_lane_suffices, swept_path};
 
-    /// A ring of one lane and 17 m with four arms of this length \[m].
+    /// A ring of one lane and 17 m with four arms of this length (m).
     fn one_lane(length: u32) -> Road {
         let carriageway =
             |way: &str, offset: f64| format!("[arm.{way}.kerb]\npoints = [{{ along = 30.0, offset = {offset:?} }}]\nring_radius = 15.0\n");

@@ -14,15 +14,15 @@ use crate::files::reader::{Error, Reader, shown};
 use crate::geometry::area::{Area, counter_clockwise, points, signed_area};
 use crate::geometry::{Curve, Outline, Piece, fitted_outline, wrapped};
 
-/// Chords of faces and edges leave their curves by at most this much \[m].
+/// Chords of faces and edges leave their curves by at most this much (m).
 const FINE: f64 = 1e-3;
-/// What arcs and segments may add to that \[m].
+/// What arcs and segments may add to that (m).
 const FITTED: f64 = 4e-3;
-/// Gaps between gutters that are narrower are solid \[m].
+/// Gaps between gutters that are narrower are solid (m).
 const SLIT: f64 = 0.1;
-/// A width is applied at points at most this far apart, and nearer where it does not change linearly \[m].
+/// A width is applied at points at most this far apart, and nearer where it does not change linearly (m).
 const SPACING: f64 = 0.5;
-/// Least such distance \[m].
+/// Least such distance (m).
 const NEAREST: f64 = 0.01;
 /// Most points of a gutter.
 const MOST_POINTS: usize = 64;
@@ -46,7 +46,7 @@ pub(crate) struct WrittenDirection {
 /// A width that changes linearly from point to point.
 #[derive(Debug, Clone, PartialEq)]
 struct Profile {
-    /// Station or angle, rising, and the width there \[m].
+    /// Station or angle, rising, and the width there (m).
     points: Vec<(f64, f64)>,
     /// Whether the last point is followed by the first, a turn later; else the widths at the ends hold beyond them.
     around: bool,
@@ -70,14 +70,14 @@ impl Profile {
 /// The gutters of a roundabout where one width does not do.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Gutters {
-    /// Where nothing else is written \[m].
+    /// Where nothing else is written (m).
     ring: f64,
     island: Option<Profile>,
     /// On the ring's outer circle, where arms open into it too.
     mouths: Option<Profile>,
     /// By arm: of the kerb from it to the next.
     kerbs: Vec<Option<Profile>>,
-    /// Of the arms with a splitter island, in their order \[m].
+    /// Of the arms with a splitter island, in their order (m).
     splitters: Vec<f64>,
 }
 

@@ -22,7 +22,7 @@ struct Lead {
     /// In the direction of travel: inwards for an entry, outwards for an exit.
     curve: Curve,
     /// Direction from the centre to where the curve meets the ring lane, relative to the arm's bearing, in (-pi, pi]
-    /// \[rad].
+    /// (rad).
     angle: f64,
 }
 
@@ -62,7 +62,7 @@ pub(super) fn exits(n_arms: usize, entry_lanes: usize) -> Vec<(Lane, u32)> {
 }
 
 /// The stations at which a line first reaches and last leaves the circle of radius `outer` around the ring's centre; if
-/// it passes outside, the station nearest to the centre, twice \[m].
+/// it passes outside, the station nearest to the centre, twice (m).
 pub(in crate::map) fn ring_stations(line: &Curve, outer: f64) -> (f64, f64) {
     let circle = Curve::circle(DVec2::ZERO, outer);
     let mut begin = 0.0;

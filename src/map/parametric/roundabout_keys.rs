@@ -14,9 +14,9 @@ use crate::geometry::Bend;
 use crate::map::ground::Hand;
 use crate::map::route::Lane;
 
-/// The smallest radius of a bend in a lane; no vehicle follows a smaller one \[m].
+/// The smallest radius of a bend in a lane; no vehicle follows a smaller one (m).
 const SHARPEST_LANE: f64 = 1.0;
-/// Widths that a lane may have; a truck uses all of the wide ring lane of a small roundabout \[m].
+/// Widths that a lane may have; a truck uses all of the wide ring lane of a small roundabout (m).
 const LANE_WIDTHS: RangeInclusive<f64> = 2.5..=12.0;
 
 /// The file as written. Its values are not checked yet.
@@ -109,17 +109,17 @@ impl Carriageway {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Arm {
     pub(super) name: String,
-    /// Counter-clockwise from east \[rad].
+    /// Counter-clockwise from east (rad).
     pub(super) bearing: f64,
-    /// Distance from the ring's centre to the solid edge that ends the arm \[m].
+    /// Distance from the ring's centre to the solid edge that ends the arm (m).
     pub(super) length: f64,
-    /// Width of the carriageways' lanes \[m].
+    /// Width of the carriageways' lanes (m).
     pub(super) lane_width: f64,
     pub(super) entry: Carriageway,
     pub(super) exit: Carriageway,
-    /// Radius that joins the entry's kerb to the next arm's exit kerb outside the ring \[m].
+    /// Radius that joins the entry's kerb to the next arm's exit kerb outside the ring (m).
     pub(super) kerb_corner: Option<f64>,
-    /// The same for the right lane to the first exit; without it that lane lies beside such a kerb \[m].
+    /// The same for the right lane to the first exit; without it that lane lies beside such a kerb (m).
     pub(super) lane_corner: Option<f64>,
     /// Whether that lane follows the ring although the kerb does not.
     pub(super) lane_on_ring: bool,
@@ -246,7 +246,7 @@ impl WrittenWay {
 }
 
 impl WrittenAlignment {
-    /// `least` is the smallest radius of a bend \[m].
+    /// `least` is the smallest radius of a bend (m).
     fn checked(self, reader: &Reader, key: &str, way: Way, length: f64, least: f64) -> Result<Alignment, Error> {
         reader.count(&format!("{key}.points"), self.points.len(), 1..=8)?;
         let last = self.points.len() - 1;

@@ -9,15 +9,15 @@ use super::line::{Line, millimetres};
 use crate::geometry::Bend;
 use crate::map::parametric::written::{WrittenPoint, WrittenWay};
 
-/// Straight between two bends at least \[m].
+/// Straight between two bends at least (m).
 const BETWEEN: f64 = 1.0;
 /// Part of the straight between the two bends of an S-bend by which they lengthen it at either end.
 const S_TANGENT: f64 = 0.3;
 
-/// Turn below which a splitter island has no corner \[rad].
+/// Turn below which a splitter island has no corner (rad).
 const LEAST_TURN: f64 = 0.04;
 
-/// What all arms of a road have in common: lengths \[m], and the ring's number of lanes.
+/// What all arms of a road have in common: lengths (m), and the ring's number of lanes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ring {
     pub(super) outer: f64,
@@ -48,13 +48,13 @@ pub(super) struct Carriageway {
 
 /// What both carriageways follow.
 struct Course {
-    /// Where the arm's axis lies beside the ring's centre, positive on the entry's side \[m].
+    /// Where the arm's axis lies beside the ring's centre, positive on the entry's side (m).
     beside: f64,
-    /// Half the width between the carriageways \[m].
+    /// Half the width between the carriageways (m).
     median: f64,
     /// The S-bend's two bends, in the arm's frame; the second begins the straight beside the ring.
     s_bend: Option<[DVec2; 2]>,
-    /// Beyond the ring, nearer to it than any S-bend \[m].
+    /// Beyond the ring, nearer to it than any S-bend (m).
     room: f64,
 }
 

@@ -20,9 +20,9 @@ const MOST_ATTEMPTS: u32 = 1000;
 pub struct Distribution {
     /// The file's stem.
     pub name: String,
-    /// Length of the routes before the ring for which start poses keep clear of kerbs \[m].
+    /// Length of the routes before the ring for which start poses keep clear of kerbs (m).
     pub approach: f64,
-    /// Length of the routes after the ring \[m].
+    /// Length of the routes after the ring (m).
     pub departure: f64,
     file: PathBuf,
     pub(super) text: String,

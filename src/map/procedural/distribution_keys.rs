@@ -39,13 +39,13 @@ pub(super) struct Ring {
     /// Weights of rings of one, two and three lanes.
     #[serde(default = "two_lanes")]
     pub(super) lanes: [f64; 3],
-    /// Log-uniform \[m].
+    /// Log-uniform (m).
     pub(super) island_radius: Range,
-    /// Islands below this radius are `small_weight` times as frequent as log-uniform draws would have them \[m].
+    /// Islands below this radius are `small_weight` times as frequent as log-uniform draws would have them (m).
     pub(super) small_radius: f64,
     pub(super) small_weight: f64,
     pub(super) lane_width: Range,
-    /// Islands below this radius have lanes of at least `narrow_lane_width` \[m].
+    /// Islands below this radius have lanes of at least `narrow_lane_width` (m).
     pub(super) narrow_radius: f64,
     pub(super) narrow_lane_width: f64,
     pub(super) gutter: Range,
@@ -59,7 +59,7 @@ fn two_lanes() -> [f64; 3] {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Single {
-    /// Log-uniform \[m].
+    /// Log-uniform (m).
     pub(super) island_radius: Range,
     /// Of the ring's lane; it is widened up to the greatest where the outer radius would be less than `outer_radius`.
     pub(super) lane_width: Range,
@@ -71,11 +71,11 @@ pub(super) struct Single {
 pub(super) struct Arms {
     /// Of three, four and five arms.
     pub(super) shares: [f64; 3],
-    /// Outer radius of the ring below which there are no five arms \[m].
+    /// Outer radius of the ring below which there are no five arms (m).
     pub(super) five_from: f64,
     pub(super) gap_variation: f64,
     pub(super) least_gap_deg: f64,
-    /// Beyond the ring \[m].
+    /// Beyond the ring (m).
     pub(super) length: Range,
 }
 
@@ -108,7 +108,7 @@ pub(super) struct SBend {
     pub(super) share: f64,
     pub(super) shift: Range,
     pub(super) length: Range,
-    /// Beyond the ring; farther out the arm is straight \[m].
+    /// Beyond the ring; farther out the arm is straight (m).
     pub(super) end: f64,
 }
 
@@ -118,7 +118,7 @@ pub(super) struct Straight {
     pub(super) share: f64,
     pub(super) angle_deg: f64,
     pub(super) angle_deviation_deg: f64,
-    /// Log-uniform \[m].
+    /// Log-uniform (m).
     pub(super) kerb_arc: Range,
 }
 
@@ -127,7 +127,7 @@ pub(super) struct Straight {
 pub(super) struct Flared {
     /// As a fraction of the ring's outer radius.
     pub(super) aim: Range,
-    /// Log-uniform \[m].
+    /// Log-uniform (m).
     pub(super) kerb_arc: Range,
 }
 
@@ -161,7 +161,7 @@ pub(super) struct Lanes {
 pub(super) struct Corners {
     pub(super) shares: Vec<f64>,
     pub(super) weights: Vec<f64>,
-    /// Log-uniform \[m].
+    /// Log-uniform (m).
     pub(super) kerb_radius: Range,
 }
 
@@ -182,7 +182,7 @@ pub(super) struct Rules {
     pub(super) departure: f64,
     pub(super) start_offset: f64,
     pub(super) start_heading_deg: f64,
-    /// Reach of the truck ahead of and behind the point that follows the lane \[m].
+    /// Reach of the truck ahead of and behind the point that follows the lane (m).
     pub(super) truck_ahead: f64,
     pub(super) truck_behind: f64,
     pub(super) truck_width: f64,

@@ -76,7 +76,7 @@ fn ring(keys: &Keys, draws: &Draws) -> (WrittenRing, Ring) {
     (written, Ring { outer, lanes, ring_lane_width, lane_width, gutter })
 }
 
-/// Radius of the island of a ring of two or three lanes, and the least width of its lanes \[m].
+/// Radius of the island of a ring of two or three lanes, and the least width of its lanes (m).
 fn island(keys: &Keys, draws: &Draws) -> (f64, f64) {
     let ring = &keys.ring;
     let [least, most] = ring.island_radius;
@@ -92,7 +92,7 @@ fn island(keys: &Keys, draws: &Draws) -> (f64, f64) {
     (island, if island < ring.narrow_radius { narrowest.max(ring.narrow_lane_width).min(widest) } else { narrowest })
 }
 
-/// Bearings of the arms in hundredths of a degree, counter-clockwise from the first \[deg].
+/// Bearings of the arms in hundredths of a degree, counter-clockwise from the first (deg).
 fn bearings(keys: &Keys, draws: &Draws, ring: &Ring) -> Result<Vec<f64>, Reason> {
     let mut shares = keys.arms.shares;
     if ring.outer < keys.arms.five_from && 0.0 < shares[0] + shares[1] {
@@ -117,7 +117,7 @@ fn bearings(keys: &Keys, draws: &Draws, ring: &Ring) -> Result<Vec<f64>, Reason>
 }
 
 /// The radius of a kerb that leaves the ring aside between an arm's entry and the next arm's exit, `gap` farther
-/// counter-clockwise \[rad], or `None` where no radius of the range does and fits \[m].
+/// counter-clockwise (rad), or `None` where no radius of the range does and fits (m).
 fn corner_radius(keys: &Keys, draws: &Draws, ring: &Ring, arm: usize, entry: &Line, exit: &Line, gap: f64) -> Option<f64> {
     let mirrored = |p: DVec2| DVec2::from_angle(gap).rotate(p * DVec2::new(1.0, -1.0));
     let (from, ahead) = (entry.bends.last()?.at, entry.direction);

@@ -19,12 +19,12 @@ pub(super) struct Line {
     pub(super) bends: Vec<Bend>,
     /// Direction of the last straight, of length 1.
     pub(super) direction: DVec2,
-    /// Radius of the arc that leads it into the ring \[m].
+    /// Radius of the arc that leads it into the ring (m).
     pub(super) ring_radius: f64,
 }
 
 impl Line {
-    /// The line `distance` to the left of this one; `None` where a bend is too sharp for it \[m].
+    /// The line `distance` to the left of this one; `None` where a bend is too sharp for it (m).
     pub(super) fn beside(&self, distance: f64) -> Option<Line> {
         let n = self.bends.len();
         let direction = |index: usize| {
@@ -44,20 +44,20 @@ impl Line {
         Some(Line { bends, direction: self.direction, ring_radius: self.ring_radius + distance })
     }
 
-    /// Radius of the widest arc that leads the last straight into a circle without taking all of it \[m].
+    /// Radius of the widest arc that leads the last straight into a circle without taking all of it (m).
     pub(super) fn widest_arc(&self, circle: f64) -> f64 {
         let last = self.bends[self.bends.len() - 1].at;
         let (ahead, left) = (-last.dot(self.direction), self.direction.perp_dot(-last));
         ((0.9 * ahead).powi(2) - circle.powi(2) + left.powi(2)) / (2.0 * (circle - left)).max(1e-9)
     }
 
-    /// Direction from the ring's centre to where the line meets a circle around it, from the arm's bearing \[rad].
+    /// Direction from the ring's centre to where the line meets a circle around it, from the arm's bearing (rad).
     pub(super) fn arrival(&self, circle: f64) -> Option<f64> {
         to_circle(self.bends[self.bends.len() - 1].at, self.direction, circle, self.ring_radius).map(|(_, arrival)| arrival)
     }
 
     /// Makes each bend as wide as its straights allow where it is wider. `circle` is the radius of the circle that the
-    /// line leads into \[m].
+    /// line leads into (m).
     pub(super) fn fit(&mut self, circle: f64) -> Result<(), Reason> {
         let n = self.bends.len();
         let last = self.bends[n - 1].at;
@@ -76,14 +76,14 @@ impl Line {
         Ok(())
     }
 
-    /// Length of the last straight that its bend takes \[m].
+    /// Length of the last straight that its bend takes (m).
     pub(super) fn tangent(&self) -> f64 {
         let n = self.bends.len();
         let arriving = if 1 < n { (self.bends[n - 1].at - self.bends[n - 2].at).normalize_or_zero() } else { self.direction };
         self.bends[n - 1].radius * (arriving.angle_to(self.direction) / 2.0).abs().tan()
     }
 
-    /// Where the line's straights, prolonged where the bends are, lie at this distance along the arm \[m].
+    /// Where the line's straights, prolonged where the bends are, lie at this distance along the arm (m).
     pub(super) fn y(&self, x: f64) -> f64 {
         let after = self.bends.iter().position(|bend| bend.at.x <= x).unwrap_or(self.bends.len());
         let (from, along) = match after {
@@ -106,7 +106,7 @@ impl Line {
     }
 }
 
-/// Rounded to millimetres, never to -0: the text of a road must not depend on a platform's last bit \[m].
+/// Rounded to millimetres, never to -0: the text of a road must not depend on a platform's last bit (m).
 pub(super) fn millimetres(value: f64) -> f64 {
     (value * 1e3).round() / 1e3 + 0.0
 }

@@ -60,7 +60,7 @@ fn is_sound(outline: &Outline, n_loops: usize) -> bool {
     outline.loops.len() == n_loops && outline.loops.iter().all(closed)
 }
 
-/// Least distance from a route to an outline; once it is below `enough`, less is not looked for \[m].
+/// Least distance from a route to an outline; once it is below `enough`, less is not looked for (m).
 pub(super) fn lane_clearance(kerbs: &Outline, routes: &[Route], enough: f64) -> f64 {
     let mut pieces: Vec<Piece> = Vec::new();
     for &piece in routes.iter().flat_map(|route| &route.centre_line.pieces) {
@@ -84,7 +84,7 @@ pub(super) fn lane_clearance(kerbs: &Outline, routes: &[Route], enough: f64) -> 
 }
 
 /// Least distance from a curve to an outline, at stations `step` apart. Once it is below `enough`, a point below is
-/// not looked for any more \[m].
+/// not looked for any more (m).
 fn clearance(kerbs: &Outline, curve: &Curve, step: f64, enough: f64) -> f64 {
     let (length, mut s, mut least) = (curve.length(), 0.0, f64::INFINITY);
     while s <= length && enough <= least {

@@ -9,13 +9,13 @@ const SEED: u32 = 2026;
 /// Ranges, each `[least, greatest]`; what has none stays as its file has it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ranges {
-    /// Added to the trailer's wheelbase; its rear end moves with it \[m].
+    /// Added to the trailer's wheelbase; its rear end moves with it (m).
     pub trailer_wheelbase: Option<[f64; 2]>,
-    /// Added to the tractor's wheelbase; its front end moves with it \[m].
+    /// Added to the tractor's wheelbase; its front end moves with it (m).
     pub tractor_wheelbase: Option<[f64; 2]>,
-    /// Added to the fifth wheel's distance ahead of the drive axle \[m].
+    /// Added to the fifth wheel's distance ahead of the drive axle (m).
     pub fifth_wheel: Option<[f64; 2]>,
-    /// Added to the height of the loaded trailer's centre of gravity \[m].
+    /// Added to the height of the loaded trailer's centre of gravity (m).
     pub centre_of_gravity: Option<[f64; 2]>,
     /// Factor of the trailer's roll gain.
     pub roll_gain: Option<[f64; 2]>,
@@ -31,11 +31,11 @@ pub struct Ranges {
     pub steer_rate: Option<[f64; 2]>,
     /// Factor of the strongest drive.
     pub acceleration_max: Option<[f64; 2]>,
-    /// From a steer command to the first movement of the wheels \[s].
+    /// From a steer command to the first movement of the wheels (s).
     pub steer_delay: Option<[f64; 2]>,
-    /// Time constant of the drive \[s].
+    /// Time constant of the drive (s).
     pub drive_lag: Option<[f64; 2]>,
-    /// Time constant of the brakes \[s].
+    /// Time constant of the brakes (s).
     pub brake_lag: Option<[f64; 2]>,
 }
 

@@ -8,13 +8,13 @@ use crate::vehicle::GRAVITY;
 /// What the truck does at a pose. All are left positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Demand {
-    /// Station of the front axle on the line \[m].
+    /// Station of the front axle on the line (m).
     pub station: f64,
-    /// Steer angle of the front wheels \[rad].
+    /// Steer angle of the front wheels (rad).
     pub steering: f64,
-    /// Mean change of the steer angle since the pose before [rad/s].
+    /// Mean change of the steer angle since the pose before (rad/s).
     pub steer_rate: f64,
-    /// Of the tractor's drive axle [m/s^2].
+    /// Of the tractor's drive axle (m/s^2).
     pub lateral_acceleration: f64,
     /// Of the unit with the greater one, its roll included.
     pub load_transfer_ratio: f64,
@@ -116,7 +116,7 @@ pub fn demands(rig: &Rig, centre_line: &Curve, path: &[Pose], speed: f64, spacin
 }
 
 /// Largest steer angle, in magnitude, of a path of [`super::swept_path`]; the other arguments are those of [`demands`]
-/// \[rad].
+/// (rad).
 pub fn steer_angle_max(rig: &Rig, centre_line: &Curve, path: &[Pose], speed: f64, spacing: f64) -> f64 {
     let towing = Towing::of(rig, speed);
     let angle = |(index, pose): (usize, &Pose)| steer_angle(&towing, centre_line.heading_at(index as f64 * spacing) - pose.heading);
@@ -124,7 +124,7 @@ pub fn steer_angle_max(rig: &Rig, centre_line: &Curve, path: &[Pose], speed: f64
 }
 
 /// Steer angle with which the front axle moves in this direction relative to the tractor: as the tyres slip, the wheels
-/// are turned further. Beyond 90 deg the truck could only be pushed aside \[rad].
+/// are turned further. Beyond 90 deg the truck could only be pushed aside (rad).
 fn steer_angle(towing: &Towing, direction: f64) -> f64 {
     let (sin, cos) = direction.sin_cos();
     (towing.wheelbase * sin).atan2((towing.wheelbase - towing.slip) * cos)
@@ -139,7 +139,7 @@ struct Rolling {
 }
 
 impl Rolling {
-    /// The load transfer ratio one interval later, with this lateral acceleration there [m/s^2].
+    /// The load transfer ratio one interval later, with this lateral acceleration there (m/s^2).
     fn next(&mut self, roll: &Roll, lateral_acceleration: f64) -> f64 {
         let mean = 0.5 * (self.lateral_acceleration + lateral_acceleration);
         let [a, b, c, d] = roll.transition.map(f64::from);

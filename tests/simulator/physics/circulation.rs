@@ -1,14 +1,14 @@
 //! Steady circulation in a roundabout's lane: off-tracking and load transfer of the trailer.
 
-use offtrack::physics::{driven, motion_of};
 use offtrack::layout::{Control, Rig, Truck};
+use offtrack::physics::{driven, motion_of};
 
 use super::vehicle;
 
 const SUBSTEP: f32 = 0.05;
 const SPEED: f32 = 30.0 / 3.6;
 
-/// A truck in steady circulation at [`SPEED`], and the radii of its front axle and its trailer's axle group [m].
+/// A truck in steady circulation at [`SPEED`], and the radii of its front axle and its trailer's axle group (m).
 fn circulating(rig: &Rig, steering: f32) -> (Truck, f32, f32) {
     let control = Control { steering, ..Control::default() };
     let truck = driven(rig, SUBSTEP, 1200, &control, &Truck { speed: SPEED, ..Truck::default() });
@@ -21,7 +21,7 @@ fn circulating(rig: &Rig, steering: f32) -> (Truck, f32, f32) {
     (truck, SPEED.hypot(front_side_speed) / turning.yaw_rate, trailer_speed.hypot(trailer_side_speed) / turning.yaw_rate)
 }
 
-/// The truck with its front axle on a circle of `radius` [m], and the off-tracking of its trailer's axle group [m].
+/// The truck with its front axle on a circle of `radius` (m), and the off-tracking of its trailer's axle group (m).
 fn on_circle(rig: &Rig, radius: f32) -> (Truck, f32) {
     let (mut tight, mut wide) = (0.4f32, 0.02f32);
     for _ in 0..25 {

@@ -6,15 +6,15 @@
 mod reference;
 
 use glam::DVec2;
-use offtrack::physics::{driven, motion_of};
 use offtrack::layout::{Control, Rig, Truck};
+use offtrack::physics::{driven, motion_of};
 use offtrack::vehicle::{GRAVITY, Model, Suspension, Vehicle};
 
 use super::vehicle;
 use reference::{Reference, State};
 
 const SUBSTEP: f64 = 0.05;
-/// Lateral acceleration beyond which no truck drives: an empty trailer rolls over at 0.77 g, tyres hold 0.7 g [m/s^2].
+/// Lateral acceleration beyond which no truck drives: an empty trailer rolls over at 0.77 g, tyres hold 0.7 g (m/s^2).
 const GRIP: f64 = 6.5;
 
 /// The truck with its repairs: the slip lever's bound, and the yaw that follows the front wheels.
@@ -24,7 +24,7 @@ fn repaired(name: &str, slip_lever: f64, yaw_lag: f64) -> Vehicle {
     vehicle
 }
 
-/// Off-tracking of the simulator's truck in the steady turn with its front axle on a circle of `radius` [m].
+/// Off-tracking of the simulator's truck in the steady turn with its front axle on a circle of `radius` (m).
 fn off_tracking(rig: &Rig, speed: f64, radius: f64) -> f64 {
     let (mut tight, mut wide) = (0.45f32, 0.02f32);
     let mut found = 0.0;
@@ -85,15 +85,15 @@ fn without_the_repairs_both_comparisons_fail() {
     assert!(0.4 < trailer, "{trailer}");
 }
 
-/// Steer angle of an S at a time: to one side, to the other, and back [rad].
+/// Steer angle of an S at a time: to one side, to the other, and back (rad).
 fn s_bend(t: f64, most: f64, rate: f64) -> f64 {
     let (ramp, hold) = (most / rate, 2.5);
     let first = t.min(ramp) - (t - ramp - hold).clamp(0.0, 2.0 * ramp) + (t - 3.0 * ramp - 2.0 * hold).clamp(0.0, ramp);
     rate * first
 }
 
-/// Both trucks steered through the same S at a speed [km/h]: the largest distance of their trailers' axles [m], the
-/// largest off-tracking of each [m], the peak of each trailer's load transfer ratio.
+/// Both trucks steered through the same S at a speed (km/h): the largest distance of their trailers' axles (m), the
+/// largest off-tracking of each (m), the peak of each trailer's load transfer ratio.
 fn bend(vehicle: &Vehicle, load: &str, speed: f64) -> (f64, [f64; 2], [f64; 2]) {
     let (rig, reference) = (vehicle.rig(load, SUBSTEP as f32, None), Reference::of(vehicle, load));
     let speed = speed / 3.6;
@@ -122,7 +122,7 @@ fn bend(vehicle: &Vehicle, load: &str, speed: f64) -> (f64, [f64; 2], [f64; 2]) 
     (apart, paths.map(|path| largest_off_tracking(&path)), ratios)
 }
 
-/// One sub-step of the roll by RK4 with a held lateral acceleration [m/s^2], and the load transfer ratio after it.
+/// One sub-step of the roll by RK4 with a held lateral acceleration (m/s^2), and the load transfer ratio after it.
 fn rolled(suspension: &Suspension, state: &mut [f64; 2], acceleration: f64) -> f64 {
     let Suspension { centre_of_gravity, roll_centre, track, roll_gain, roll_frequency, roll_damping } = *suspension;
     let natural = std::f64::consts::TAU * roll_frequency;
@@ -141,7 +141,7 @@ fn rolled(suspension: &Suspension, state: &mut [f64; 2], acceleration: f64) -> f
     2.0 / track * (roll_centre * acceleration / GRAVITY + settled)
 }
 
-/// Largest distance of a trailer's axle from the path of the front axle, of (front, trailer) positions [m].
+/// Largest distance of a trailer's axle from the path of the front axle, of (front, trailer) positions (m).
 fn largest_off_tracking(path: &[[DVec2; 2]]) -> f64 {
     let before = std::iter::once(path[0][0] - 20.0 * DVec2::X);
     let front: Vec<DVec2> = before.chain(path.iter().map(|pair| pair[0])).collect();

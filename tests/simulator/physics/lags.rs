@@ -1,8 +1,8 @@
 //! Lags and limits of a vehicle's model, each by its closed form.
 
-use offtrack::physics::{drive_max, driven, motion_of};
-use offtrack::physics::controlled;
 use offtrack::layout::{Action, Control, Rig, Truck};
+use offtrack::physics::controlled;
+use offtrack::physics::{drive_max, driven, motion_of};
 use offtrack::vehicle::{GRAVITY, Model};
 
 use super::vehicle;

@@ -3,9 +3,9 @@
 use std::f32::consts::PI;
 
 use glam::Vec2;
-use offtrack::physics::driven;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Control, Rig, Truck};
+use offtrack::physics::driven;
 use proptest::prelude::*;
 
 use super::{VEHICLES, vehicle};
@@ -43,7 +43,7 @@ fn driven_through(rig: &Rig, truck: Truck, controls: &[Control]) -> Truck {
     controls.iter().fold(truck, |truck, control| driven(rig, SUBSTEP, 2, control, &truck))
 }
 
-/// Largest difference of two trucks' positions [m] and headings [rad].
+/// Largest difference of two trucks' positions (m) and headings (rad).
 fn apart(a: &Truck, b: &Truck) -> (f32, f32) {
     let headings = wrapped(a.heading - b.heading).abs().max(wrapped(a.trailer_heading - b.trailer_heading).abs());
     (a.position.distance(b.position), headings)

@@ -24,21 +24,21 @@ fn turned(vehicle: &Vehicle, radius: f64, turn: f64) -> Vec<Pose> {
     swept_path(&rig, &Curve { pieces: vec![approach, one, two, departure] }, 1.0, 0.05)
 }
 
-/// Overall length of tractor and trailer in line [m].
+/// Overall length of tractor and trailer in line (m).
 fn length(vehicle: &Vehicle) -> f64 {
     let (tractor, trailer) = (&vehicle.tractor, &vehicle.trailer);
     tractor.front_overhang + tractor.wheelbase - tractor.fifth_wheel + trailer.kingpin_to_rear
 }
 
 /// Least distance of the trailer's inner rear wheels from the centre of AASHTO's minimum turn: half a turn, the front
-/// axle on 41 ft [m].
+/// axle on 41 ft (m).
 fn inside_radius(vehicle: &Vehicle) -> f64 {
     let wheel =
         |pose: &Pose| (pose.trailer_position + 0.5 * vehicle.trailer.width * DVec2::from_angle(pose.trailer_heading).perp()).length();
     turned(vehicle, 41.0 * FOOT, PI).iter().map(wheel).fold(f64::INFINITY, f64::min)
 }
 
-/// Off-tracking once it is steady, the front axle on 20 m: by driving on, and by SAE J695 from the sum of squares [m].
+/// Off-tracking once it is steady, the front axle on 20 m: by driving on, and by SAE J695 from the sum of squares (m).
 fn off_tracking(vehicle: &Vehicle) -> [f64; 2] {
     const RADIUS: f64 = 20.0;
     // Two turns, and no way out of them.

@@ -1,18 +1,18 @@
 //! The target speed is reached and held without overshoot.
 
-use offtrack::physics::driven;
-use offtrack::physics::controlled;
 use offtrack::layout::{Action, Control, Rig, Truck};
+use offtrack::physics::controlled;
+use offtrack::physics::driven;
 use proptest::prelude::*;
 
 use super::{VEHICLES, vehicle};
 
 const SUBSTEP: f32 = 0.05;
 const KMH: f32 = 1.0 / 3.6;
-/// Largest overshoot [m/s].
+/// Largest overshoot (m/s).
 const OVERSHOOT_MAX: f32 = 0.05 * KMH;
 
-/// Drives at `target` for `seconds`: the truck, its control, and the largest overshoot [m/s].
+/// Drives at `target` for `seconds`: the truck, its control, and the largest overshoot (m/s).
 fn approached(rig: &Rig, truck: Truck, control: Control, target: f32, seconds: f32) -> (Truck, Control, f32) {
     let from = truck.speed;
     let (mut truck, mut control, mut past) = (truck, control, 0.0f32);

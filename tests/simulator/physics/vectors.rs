@@ -7,9 +7,9 @@ use std::sync::{Arc, OnceLock};
 
 use bytemuck::bytes_of;
 use glam::DVec2;
-use offtrack::physics::{Moving, motion_of};
 use offtrack::engine::stages::Stage;
 use offtrack::layout::{Column, Rig, Truck};
+use offtrack::physics::{Moving, motion_of};
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 use offtrack_reference::trace::{Case, CaseVehicle, Command, Init, Traced, trace, trace_by};

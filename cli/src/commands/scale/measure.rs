@@ -14,9 +14,9 @@ use offtrack_evaluation::error::Error;
 
 use super::mode::Driven;
 
-/// A window lasts this long, or a fifth of the time for a size where that is shorter [s].
+/// A window lasts this long, or a fifth of the time for a size where that is shorter (s).
 const WINDOW: f64 = 0.25;
-/// A run of steps lasts about this long, then it is waited for [s].
+/// A run of steps lasts about this long, then it is waited for (s).
 const RUN: f64 = 0.02;
 /// Most steps in a run.
 const RUN_MOST: u64 = 1024;

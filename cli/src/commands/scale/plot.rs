@@ -9,7 +9,7 @@ use super::{Measured, Scale};
 use offtrack_drawing::chart::{Chart, Kind, LINES, Line, Panel};
 use offtrack_evaluation::error::Error;
 
-/// Width of a PNG [px].
+/// Width of a PNG (px).
 pub(super) const PNG_WIDTH: u32 = 1600;
 
 /// Whether a picture can be written under this name.

@@ -18,7 +18,7 @@ use crate::commands::roads;
 /// Where a benchmark has no training or no validation routes of its own, it is driven on the roads of this one.
 const ROADS: &str = "random2026";
 /// By how much an approach or a departure that does not fit these roads is shortened at a time, and its least length
-/// \[m].
+/// (m).
 const SHORTER: f64 = 5.0;
 
 /// What a run is trained on.

@@ -6,19 +6,19 @@
 use glam::DVec2;
 use offtrack::vehicle::Vehicle;
 
-/// Longest step [s].
+/// Longest step (s).
 const STEP: f64 = 2e-3;
 
 /// A truck.
 pub struct Reference {
-    /// Masses [kg] and yaw inertias [kg m^2].
+    /// Masses (kg) and yaw inertias [kg m^2].
     mass: [f64; 2],
     inertia: [f64; 2],
-    /// From the drive axle ahead: tractor's centre of gravity, front axle, hitch [m].
+    /// From the drive axle ahead: tractor's centre of gravity, front axle, hitch (m).
     centre: f64,
     pub wheelbase: f64,
     hitch: f64,
-    /// From the kingpin back: trailer's centre of gravity, axle group [m].
+    /// From the kingpin back: trailer's centre of gravity, axle group (m).
     trailer_centre: f64,
     pub trailer_wheelbase: f64,
     /// Cornering stiffness of front, drive and trailer axles [N/rad].
@@ -28,17 +28,17 @@ pub struct Reference {
 /// Its motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct State {
-    /// Middle of the drive axle [m].
+    /// Middle of the drive axle (m).
     pub position: DVec2,
     pub heading: f64,
     pub trailer_heading: f64,
-    /// Of the drive axle, to the left [m/s].
+    /// Of the drive axle, to the left (m/s).
     pub side_speed: f64,
     pub yaw_rate: f64,
     pub trailer_yaw_rate: f64,
 }
 
-/// What changes, per second; and the lateral acceleration of the trailer's centre of gravity [m/s^2].
+/// What changes, per second; and the lateral acceleration of the trailer's centre of gravity (m/s^2).
 struct Rates {
     state: State,
     trailer_lateral_acceleration: f64,
@@ -115,7 +115,7 @@ impl Reference {
     }
 
     /// The state after `duration` seconds with a steer angle that changes linearly, and the trailer's lateral
-    /// acceleration there [m/s^2].
+    /// acceleration there (m/s^2).
     pub fn driven(&self, mut state: State, speed: f64, from: f64, to: f64, duration: f64) -> (State, f64) {
         let n = (duration / STEP).ceil().max(1.0);
         let step = duration / n;
@@ -130,7 +130,7 @@ impl Reference {
         (state, self.rates(&state, speed, to).trailer_lateral_acceleration)
     }
 
-    /// Off-tracking in the steady turn with the front axle on a circle of `radius` [m].
+    /// Off-tracking in the steady turn with the front axle on a circle of `radius` (m).
     pub fn off_tracking(&self, speed: f64, radius: f64) -> f64 {
         let (mut tight, mut wide) = (0.6, 0.01);
         let mut found = 0.0;
@@ -144,14 +144,14 @@ impl Reference {
         found
     }
 
-    /// Velocity of the trailer's axle group in its frame [m/s].
+    /// Velocity of the trailer's axle group in its frame (m/s).
     fn trailer_velocity(&self, state: &State, speed: f64) -> DVec2 {
         let at_hitch = DVec2::new(speed, state.side_speed + self.hitch * state.yaw_rate);
         DVec2::from_angle(state.heading - state.trailer_heading).rotate(at_hitch)
             - DVec2::new(0.0, self.trailer_wheelbase * state.trailer_yaw_rate)
     }
 
-    /// Middle of the trailer's axle group [m].
+    /// Middle of the trailer's axle group (m).
     pub fn trailer_position(&self, state: &State) -> DVec2 {
         state.position + self.hitch * DVec2::from_angle(state.heading) - self.trailer_wheelbase * DVec2::from_angle(state.trailer_heading)
     }

@@ -3,9 +3,9 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec2;
-use offtrack::physics::motion_of;
 use offtrack::geometry::{Curve, Piece};
 use offtrack::layout::{Rig, Truck};
+use offtrack::physics::motion_of;
 use offtrack::vehicle::swept::swept_path;
 use offtrack::vehicle::{SingleTrack, Suspension};
 use serde_json::Value;
@@ -86,7 +86,7 @@ pub(super) fn rollover_static(written: &Value) -> Worst {
 }
 
 /// Least distances of a point on the drive axle and one on the trailer's axle group, both `aside` metres left of the
-/// middle, from the centre of a left turn, the front axle on a straight, an arc and a straight [m].
+/// middle, from the centre of a left turn, the front axle on a straight, an arc and a straight (m).
 fn least_radii(rig: &Rig, radius: f64, turn: f64, aside: f64) -> (f64, f64) {
     let arc = Piece::Arc { centre: DVec2::ZERO, radius, from: -FRAC_PI_2, sweep: turn };
     let approach = Piece::Segment { from: arc.start() - DVec2::X, to: arc.start() };
