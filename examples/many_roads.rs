@@ -26,12 +26,16 @@ const TURN: Duration = Duration::from_millis(100);
 fn random(count: usize, loading: &Loading) -> Result<Scenario, Box<dyn Error>> {
     let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
     let text = std::fs::read_to_string(scenarios.join("random2026.toml"))?;
-    let head =
-        text.split("[procedural]").next().unwrap_or_default().replace("\"vehicles/", &format!("\"{}/vehicles/", scenarios.display()));
+    let head = text
+        .split("[procedural]")
+        .next()
+        .unwrap_or_default()
+        .replace("\"vehicles/", &format!("\"{}/vehicles/", scenarios.display()));
     let distribution = scenarios.join("distributions/wide.toml");
     let folder = tempfile::tempdir()?;
     let file = folder.path().join(format!("random-{count}.toml"));
-    let tail = format!("distribution = \"{}\"\nseed = 2026\ncount = {count}\ntrain = [0, {count}]\n", distribution.display());
+    let tail =
+        format!("distribution = \"{}\"\nseed = 2026\ncount = {count}\ntrain = [0, {count}]\n", distribution.display());
     std::fs::write(&file, format!("{head}[procedural]\n{tail}"))?;
     Ok(Scenario::load(&file.display().to_string(), loading)?)
 }

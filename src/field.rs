@@ -70,7 +70,9 @@ fn pairs([west, first]: [u32; 2]) -> Option<(usize, usize)> {
 #[inline(always)]
 fn cell_index(columns: u32, column: u32, row: u32) -> u32 {
     let (tile_column, tile_row) = (column / TILE_COLUMNS, row / TILE_ROWS);
-    (tile_row * columns + tile_column * TILE_COLUMNS) * TILE_ROWS + row % TILE_ROWS * TILE_COLUMNS + column % TILE_COLUMNS
+    (tile_row * columns + tile_column * TILE_COLUMNS) * TILE_ROWS
+        + row % TILE_ROWS * TILE_COLUMNS
+        + column % TILE_COLUMNS
 }
 
 /// 2^23. An f32 of this size has no fraction, so adding it to a smaller number leaves the integer part in the lower
@@ -186,10 +188,12 @@ impl Field {
         if 0 < paired {
             for n in 0..N {
                 if 0 < second[n] {
-                    let block = Blocks { own: [0], own_west: [0], own_east: [0], first: [second[n]], size: [blocks.size[n]] };
+                    let block =
+                        Blocks { own: [0], own_west: [0], own_east: [0], first: [second[n]], size: [blocks.size[n]] };
                     let other = self.interpolated(&block, &[across[n]], &[up[n]]);
                     if (samples.distance[n] < other.distance[0]) == (kind[n] == GREATER) {
-                        (samples.distance[n], samples.east[n], samples.north[n]) = (other.distance[0], other.east[0], other.north[0]);
+                        (samples.distance[n], samples.east[n], samples.north[n]) =
+                            (other.distance[0], other.east[0], other.north[0]);
                     }
                 }
             }
@@ -340,7 +344,8 @@ mod tests {
 
     #[test]
     fn every_cell_has_an_index_of_its_own() {
-        let mut indices: Vec<u32> = (0..6).flat_map(|row| (0..8).map(move |column| cell_index(8, column, row))).collect();
+        let mut indices: Vec<u32> =
+            (0..6).flat_map(|row| (0..8).map(move |column| cell_index(8, column, row))).collect();
         indices.sort_unstable();
         assert_eq!(indices, (0..48).collect::<Vec<u32>>());
     }

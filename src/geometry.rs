@@ -73,7 +73,9 @@ impl Piece {
     pub fn point_at(&self, s: f64) -> DVec2 {
         match *self {
             Piece::Segment { from, to } => from + (to - from).normalize_or_zero() * s,
-            Piece::Arc { centre, radius, from, sweep } => centre + radius * DVec2::from_angle(from + s / radius * sweep.signum()),
+            Piece::Arc { centre, radius, from, sweep } => {
+                centre + radius * DVec2::from_angle(from + s / radius * sweep.signum())
+            }
         }
     }
 
@@ -95,7 +97,11 @@ impl Piece {
             }
             Piece::Arc { centre, radius, .. } => {
                 let out = p - centre;
-                if self.faces(out) { (out.length() - radius).abs() } else { p.distance(self.start()).min(p.distance(self.end())) }
+                if self.faces(out) {
+                    (out.length() - radius).abs()
+                } else {
+                    p.distance(self.start()).min(p.distance(self.end()))
+                }
             }
         }
     }
@@ -104,7 +110,9 @@ impl Piece {
     pub fn reversed(&self) -> Piece {
         match *self {
             Piece::Segment { from, to } => Piece::Segment { from: to, to: from },
-            Piece::Arc { centre, radius, from, sweep } => Piece::Arc { centre, radius, from: from + sweep, sweep: -sweep },
+            Piece::Arc { centre, radius, from, sweep } => {
+                Piece::Arc { centre, radius, from: from + sweep, sweep: -sweep }
+            }
         }
     }
 
@@ -113,7 +121,9 @@ impl Piece {
         let turn = DVec2::from_angle(angle);
         match *self {
             Piece::Segment { from, to } => Piece::Segment { from: turn.rotate(from), to: turn.rotate(to) },
-            Piece::Arc { centre, radius, from, sweep } => Piece::Arc { centre: turn.rotate(centre), radius, from: from + angle, sweep },
+            Piece::Arc { centre, radius, from, sweep } => {
+                Piece::Arc { centre: turn.rotate(centre), radius, from: from + angle, sweep }
+            }
         }
     }
 
@@ -122,7 +132,9 @@ impl Piece {
         let mirror = DVec2::new(1.0, -1.0);
         match *self {
             Piece::Segment { from, to } => Piece::Segment { from: from * mirror, to: to * mirror },
-            Piece::Arc { centre, radius, from, sweep } => Piece::Arc { centre: centre * mirror, radius, from: -from, sweep: -sweep },
+            Piece::Arc { centre, radius, from, sweep } => {
+                Piece::Arc { centre: centre * mirror, radius, from: -from, sweep: -sweep }
+            }
         }
     }
 
@@ -130,9 +142,12 @@ impl Piece {
     pub fn part(&self, from: f64, to: f64) -> Piece {
         match *self {
             Piece::Segment { .. } => Piece::Segment { from: self.point_at(from), to: self.point_at(to) },
-            Piece::Arc { centre, radius, from: angle, sweep } => {
-                Piece::Arc { centre, radius, from: angle + from / radius * sweep.signum(), sweep: (to - from) / radius * sweep.signum() }
-            }
+            Piece::Arc { centre, radius, from: angle, sweep } => Piece::Arc {
+                centre,
+                radius,
+                from: angle + from / radius * sweep.signum(),
+                sweep: (to - from) / radius * sweep.signum(),
+            },
         }
     }
 

@@ -65,13 +65,21 @@ impl Simulator {
     ///
     /// Fails where the routes do not fit the world or the number of trucks, or the columns neither the host's memory
     /// nor the device's.
-    pub fn on(engine: Engine, world: Arc<World>, n_envs: usize, seed: u32, choice: RouteChoice) -> Result<Simulator, Error> {
+    pub fn on(
+        engine: Engine,
+        world: Arc<World>,
+        n_envs: usize,
+        seed: u32,
+        choice: RouteChoice,
+    ) -> Result<Simulator, Error> {
         check_routes(&world, n_envs, &choice)?;
         let drawn = matches!(choice, RouteChoice::Drawn(_)).then_some(choice.routes().len());
         let batch: Box<dyn EngineBatch> = match engine {
             Engine::Cpu => Box::new(Batch::new(n_envs, seed, choice)?),
             #[cfg(feature = "gpu")]
-            Engine::Gpu { device, columns } => Box::new(gpu::Batch::new(&device, &world, n_envs, seed, choice, columns)?),
+            Engine::Gpu { device, columns } => {
+                Box::new(gpu::Batch::new(&device, &world, n_envs, seed, choice, columns)?)
+            }
         };
         let mut simulator = Simulator { batch, world, drawn };
         simulator.reset();
@@ -162,7 +170,10 @@ impl Simulator {
             route.map_or(Ok(()), |route| check_known(&self.world, &[route]))?;
             start.map_or(Ok(()), |start| check_start(&self.world, env, &start))?;
             let flag = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
-            let what = BEGINS | flag(stream.is_some(), IS_FIRST) | flag(route.is_some(), HAS_ROUTE) | flag(start.is_some(), HAS_START);
+            let what = BEGINS
+                | flag(stream.is_some(), IS_FIRST)
+                | flag(route.is_some(), HAS_ROUTE)
+                | flag(start.is_some(), HAS_START);
             *begin = BeginRow { start: start.unwrap_or_default(), route: route.unwrap_or_default(), what };
             streams[env] = stream.unwrap_or(streams[env]);
             has_stream |= stream.is_some();
@@ -224,7 +235,12 @@ impl Simulator {
         for (column, bytes) in batch.columns_mut() {
             let found = bytes_of(column);
             let fitting = found.filter(|found| found.len() == bytes.len());
-            let error = || Error::ColumnSize { column: column.name(), found: found.map(<[u8]>::len), n_envs, n_bytes: bytes.len() };
+            let error = || Error::ColumnSize {
+                column: column.name(),
+                found: found.map(<[u8]>::len),
+                n_envs,
+                n_bytes: bytes.len(),
+            };
             bytes.copy_from_slice(fitting.ok_or_else(error)?);
         }
         check_state(&self.world, &batch)?;

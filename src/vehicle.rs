@@ -151,19 +151,31 @@ impl Vehicle {
 
     /// The lengths that decide the trailer's path.
     pub fn single_track(&self) -> SingleTrack {
-        SingleTrack { wheelbase: self.tractor.wheelbase, fifth_wheel: self.tractor.fifth_wheel, trailer_wheelbase: self.trailer.wheelbase }
+        SingleTrack {
+            wheelbase: self.tractor.wheelbase,
+            fifth_wheel: self.tractor.fifth_wheel,
+            trailer_wheelbase: self.trailer.wheelbase,
+        }
     }
 
     /// The tractor's outline in the frame of its drive axle.
     pub fn tractor_body(&self) -> Body {
         let Tractor { wheelbase, front_overhang, rear_overhang, width, .. } = self.tractor;
-        Body { front: (wheelbase + front_overhang) as f32, rear: -rear_overhang as f32, half_width: (0.5 * width) as f32 }
+        Body {
+            front: (wheelbase + front_overhang) as f32,
+            rear: -rear_overhang as f32,
+            half_width: (0.5 * width) as f32,
+        }
     }
 
     /// The trailer's outline in the frame of its axle group.
     pub fn trailer_body(&self) -> Body {
         let Trailer { wheelbase, kingpin_to_front, kingpin_to_rear, width } = self.trailer;
-        Body { front: (wheelbase + kingpin_to_front) as f32, rear: (wheelbase - kingpin_to_rear) as f32, half_width: (0.5 * width) as f32 }
+        Body {
+            front: (wheelbase + kingpin_to_front) as f32,
+            rear: (wheelbase - kingpin_to_rear) as f32,
+            half_width: (0.5 * width) as f32,
+        }
     }
 
     /// Reach of the straight truck behind and ahead of the middle of its wheelbase, the point that follows a route,
@@ -262,11 +274,17 @@ impl Vehicle {
                 let fraction = (index / 2) as f64 / (N_TRAILER_RAYS / 2 - 1) as f64;
                 let behind_front = trailer_first + fraction * (trailer_last - trailer_first);
                 let side = if index % 2 == 0 { 1.0 } else { -1.0 };
-                Ray { origin: Vec2::new(body.front - behind_front as f32, side * body.half_width), direction: Vec2::new(0.0, side) }
+                Ray {
+                    origin: Vec2::new(body.front - behind_front as f32, side * body.half_width),
+                    direction: Vec2::new(0.0, side),
+                }
             } else {
                 let mount = index - N_TRAILER_RAYS;
                 let angle = PI * (0.5 - mount as f64 / (N_TRACTOR_RAYS - 1) as f64);
-                Ray { origin: self.sensors.tractor_mounts[mount].as_vec2(), direction: DVec2::from_angle(angle).as_vec2() }
+                Ray {
+                    origin: self.sensors.tractor_mounts[mount].as_vec2(),
+                    direction: DVec2::from_angle(angle).as_vec2(),
+                }
             }
         })
     }

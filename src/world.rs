@@ -138,7 +138,9 @@ impl World {
 
     /// Memory that its tables take, whatever the number of trucks (bytes).
     pub fn bytes(&self) -> usize {
-        let routes = size_of_val(self.waypoints.as_slice()) + size_of_val(self.previews.as_slice()) + size_of_val(self.routes.as_slice());
+        let routes = size_of_val(self.waypoints.as_slice())
+            + size_of_val(self.previews.as_slice())
+            + size_of_val(self.routes.as_slice());
         let routes = routes + size_of_val(self.step_limits.as_slice());
         let vehicles = size_of_val(self.rigs.as_slice()) + size_of_val(self.rays.as_slice());
         let shared = size_of_val(&self.params) + size_of_val(self.actions.as_slice());
@@ -234,7 +236,9 @@ fn step_limits(
             let n_classes = scenario.classes().len();
             let length = |route: &Route| route.centre_line.length();
             // In this order of operations for as long as there have been benchmarks.
-            let limit = |route| (scenario.time_limit * length(route) / (scenario.cruising_speed() * scenario.step)).ceil() as u32;
+            let limit = |route| {
+                (scenario.time_limit * length(route) / (scenario.cruising_speed() * scenario.step)).ceil() as u32
+            };
             Ok(scenario.routes().flat_map(|(_, route)| std::iter::repeat_n(limit(route), n_classes)).collect())
         }
         Clock::Feasible => {

@@ -38,7 +38,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         for &route in &chosen {
             let trucks = driven(&scenario, &world, route);
             for (n, truck) in trucks.iter().enumerate() {
-                let ranges = physics::ranges(world.route_field(route), &world.rigs[0], &world.rays[0], truck, world.params.sensor_range);
+                let ranges = physics::ranges(
+                    world.route_field(route),
+                    &world.rigs[0],
+                    &world.rays[0],
+                    truck,
+                    world.params.sensor_range,
+                );
                 let ended = match (n + 1 < trucks.len(), route % 2) {
                     (true, _) => Ended::Running,
                     (false, 0) => Ended::TrailerCollided,
@@ -55,7 +61,11 @@ fn main() -> Result<(), Box<dyn Error>> {
                 }
             }
         }
-        println!("{side} pixels: {:.3} ms a picture, {:.1} ms the first of a route", median(&mut next), median(&mut first));
+        println!(
+            "{side} pixels: {:.3} ms a picture, {:.1} ms the first of a route",
+            median(&mut next),
+            median(&mut first)
+        );
     }
     Ok(())
 }

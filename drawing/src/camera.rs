@@ -127,10 +127,24 @@ impl Camera {
 fn draw_caption(caption: &mut Canvas, backdrop: &Backdrop, lettering: &Lettering, Shown { truck, ended, .. }: &Shown) {
     // A speed rounded to zero has no sign.
     let speed = (36.0 * f64::from(truck.speed)).round() / 10.0 + 0.0;
-    caption.words(lettering, &format!("{speed:.1} km/h"), backdrop.speed_at, backdrop.text, Align::Left, Ink(colour::INK, 1.0));
+    caption.words(
+        lettering,
+        &format!("{speed:.1} km/h"),
+        backdrop.speed_at,
+        backdrop.text,
+        Align::Left,
+        Ink(colour::INK, 1.0),
+    );
     if *ended != Ended::Running {
         let ink = if ended.failed() { colour::OVERLAP } else { colour::ROUTE };
-        caption.words(lettering, &ended.name().replace('_', " "), backdrop.ended_at, backdrop.text, Align::Right, Ink(ink, 1.0));
+        caption.words(
+            lettering,
+            &ended.name().replace('_', " "),
+            backdrop.ended_at,
+            backdrop.text,
+            Align::Right,
+            Ink(ink, 1.0),
+        );
     }
 }
 

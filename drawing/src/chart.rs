@@ -121,22 +121,42 @@ impl Panel {
             Kind::Curve | Kind::Reference => &[],
         });
         let x = Axis::logarithmic(points().map(|p| p.x), corner.x, end.x);
-        let y = Axis::logarithmic(points().map(|p| p.y).chain(spreads.flat_map(|&(low, high)| [low, high])), end.y, corner.y);
+        let y = Axis::logarithmic(
+            points().map(|p| p.y).chain(spreads.flat_map(|&(low, high)| [low, high])),
+            end.y,
+            corner.y,
+        );
         let mut group = Group::new().add(axes(lettering, &x, &y));
         let middle = DVec2::new(corner.x + 0.5 * PLOT.x, end.y + 44.0);
         group = group.add(lettering.text(self.x, middle, 15.0, Align::Middle, colour::INK));
         let upright = format!("rotate(-90 {} {})", corner.x - 62.0, corner.y + 0.5 * PLOT.y);
-        let words = lettering.text(self.y, DVec2::new(corner.x - 62.0, corner.y + 0.5 * PLOT.y), 15.0, Align::Middle, colour::INK);
+        let words = lettering.text(
+            self.y,
+            DVec2::new(corner.x - 62.0, corner.y + 0.5 * PLOT.y),
+            15.0,
+            Align::Middle,
+            colour::INK,
+        );
         group = group.add(words.set("transform", upright));
-        group = group.add(lettering.text(self.title, DVec2::new(corner.x, corner.y - 10.0), 16.0, Align::Left, colour::INK));
+        group = group.add(lettering.text(
+            self.title,
+            DVec2::new(corner.x, corner.y - 10.0),
+            16.0,
+            Align::Left,
+            colour::INK,
+        ));
         // Lines for comparison lie below measured ones.
-        let (references, measured): (Vec<&Line>, Vec<&Line>) = self.lines.iter().partition(|line| line.kind == Kind::Reference);
+        let (references, measured): (Vec<&Line>, Vec<&Line>) =
+            self.lines.iter().partition(|line| line.kind == Kind::Reference);
         for line in references.into_iter().chain(measured) {
             group = group.add(line.drawn(&x, &y));
         }
         let entries = self.lines.iter().filter_map(|line| {
-            let swatch =
-                if line.kind == Kind::Reference { Swatch::Line(line.colour, 1.4, "6 4") } else { Swatch::Line(line.colour, 2.4, "") };
+            let swatch = if line.kind == Kind::Reference {
+                Swatch::Line(line.colour, 1.4, "6 4")
+            } else {
+                Swatch::Line(line.colour, 2.4, "")
+            };
             Some(Entry::new(swatch, line.name?))
         });
         let entries: Vec<Entry> = entries.collect();
@@ -154,7 +174,8 @@ impl Line {
             // Writing to a string cannot fail.
             let _ = write!(data, "{}{across} {down}", if index == 0 { 'M' } else { 'L' });
         }
-        let path = Path::new().set("d", data).set("fill", "none").set("stroke", self.colour).set("stroke-linejoin", "round");
+        let path =
+            Path::new().set("d", data).set("fill", "none").set("stroke", self.colour).set("stroke-linejoin", "round");
         let spread = match &self.kind {
             Kind::Measured(spread) => spread,
             Kind::Curve => return Group::new().add(path.set("stroke-width", 2.4)),

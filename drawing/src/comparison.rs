@@ -73,9 +73,14 @@ impl Comparison<'_> {
         for index in 0..self.scenes.len() {
             let view = self.view(index);
             let clip = format!("map-{index}");
-            definitions = definitions.add(ClipPath::new().set("id", clip.as_str()).add(Path::new().set("d", view.frame())));
+            definitions =
+                definitions.add(ClipPath::new().set("id", clip.as_str()).add(Path::new().set("d", view.frame())));
             contents = contents.add(self.panel(&lettering, index, &view).set("clip-path", format!("url(#{clip})")));
-            let edge = Path::new().set("d", view.frame()).set("fill", "none").set("stroke", colour::INK).set("stroke-width", 1.2);
+            let edge = Path::new()
+                .set("d", view.frame())
+                .set("fill", "none")
+                .set("stroke", colour::INK)
+                .set("stroke-width", 1.2);
             contents = contents.add(edge).add(self.caption(&lettering, index, &view));
             bottom = view.point(view.low).y;
         }
@@ -92,7 +97,8 @@ impl Comparison<'_> {
             bottom += PLOT + NUMBERS;
         }
         let loads = self.scenes.iter().zip(LINES.iter().cycle());
-        let loads: Vec<Entry> = loads.map(|(scene, line)| Entry::new(Swatch::Line(line, 2.4, ""), load(scene))).collect();
+        let loads: Vec<Entry> =
+            loads.map(|(scene, line)| Entry::new(Swatch::Line(line, 2.4, ""), load(scene))).collect();
         let (load_legend, height) = legend::drawn(&lettering, &loads, DVec2::new(LEFT, bottom + 4.0), width);
         let size = DVec2::new(WIDTH, (bottom + 4.0 + height + 12.0).ceil());
         let title = self.title();
@@ -144,7 +150,13 @@ impl Comparison<'_> {
         let sample = sample.set("stroke", LINES[index % LINES.len()]).set("stroke-width", 2.4);
         let width = view.scale * (view.high.x - view.low.x) - 30.0;
         let letters = lettering.fitting(&words, 16.0, width);
-        Group::new().add(sample).add(lettering.text(&words, to + DVec2::new(8.0, 6.0), letters, Align::Left, colour::INK))
+        Group::new().add(sample).add(lettering.text(
+            &words,
+            to + DVec2::new(8.0, 6.0),
+            letters,
+            Align::Left,
+            colour::INK,
+        ))
     }
 
     /// Of each scene the distance along the route at each frame (m).
@@ -173,10 +185,12 @@ impl Comparison<'_> {
         let y = Axis::linear_to_ticks(low, high, top + PLOT, top);
         let mut group = Group::new();
         let [from, to] = self.ring.map(|station| x.at(station));
-        let band = Rectangle::new().set("x", number(from)).set("width", number(to - from)).set("y", top).set("height", PLOT);
+        let band =
+            Rectangle::new().set("x", number(from)).set("width", number(to - from)).set("y", top).set("height", PLOT);
         group = group.add(band.set("fill", "#eeeeee"));
         let between = self.scenes.first().map_or("", |scene| scene.roundabout.between_arms());
-        group = group.add(lettering.text(between, DVec2::new(from + 6.0, top + 17.0), 14.0, Align::Left, colour::FAINT));
+        group =
+            group.add(lettering.text(between, DVec2::new(from + 6.0, top + 17.0), 14.0, Align::Left, colour::FAINT));
         group = group.add(axes(lettering, x, &y));
         for (points, &colour) in lines.into_iter().zip(LINES.iter().cycle()) {
             group = group.add(Line { name: None, colour, kind: Kind::Curve, points }.drawn(x, &y));
@@ -216,7 +230,8 @@ fn load(scene: &Scene) -> String {
 
 /// The least and the greatest of some values.
 fn spread(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    let (low, high) =
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     if low <= high { [low, high] } else { [0.0, 1.0] }
 }
 
@@ -238,7 +253,8 @@ mod tests {
         let mut simulator = Simulator::new(world.clone(), 1, 3, RouteChoice::Fixed(vec![0])).unwrap();
         let mut recorder = Recorder::new(&world, simulator.batch(), [0]);
         let fastest = world.actions.iter().map(|action| action.speed).fold(0.0, f32::max);
-        let straight_on = world.actions.iter().position(|action| action.steering == 0.0 && action.speed == fastest).unwrap() as u32;
+        let straight_on =
+            world.actions.iter().position(|action| action.steering == 0.0 && action.speed == fastest).unwrap() as u32;
         while recorder.is_running() {
             simulator.step(&[straight_on]).unwrap();
             recorder.follow(&world, simulator.batch());
@@ -257,10 +273,13 @@ mod tests {
         assert_eq!(recorded[0].0.vehicle, recorded[1].0.vehicle, "a load does not change the truck that is drawn");
         let (place, route) = recorded[0].1.routes().next().unwrap();
         let roundabout = &recorded[0].1.places[place].roundabout;
-        let scenes = recorded.iter().map(|(recording, scenario)| Scene::new(recording, roundabout, scenario.gutter, route).unwrap());
+        let scenes = recorded
+            .iter()
+            .map(|(recording, scenario)| Scene::new(recording, roundabout, scenario.gutter, route).unwrap());
         let comparison = Comparison { scenes: scenes.collect(), ring: [40.0, 60.0] };
         let svg = comparison.drawn().unwrap();
-        for words in ["pure pursuit: empty and laden_high", "\"ring\"", "Speed [km/h]", "distance along the route [m]"] {
+        for words in ["pure pursuit: empty and laden_high", "\"ring\"", "Speed [km/h]", "distance along the route [m]"]
+        {
             assert!(svg.contains(words), "{words}");
         }
         assert_eq!(svg.matches("<clipPath").count(), 2);

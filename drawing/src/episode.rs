@@ -48,10 +48,18 @@ impl<'a> Scene<'a> {
     /// # Errors
     ///
     /// [`Error::Typeface`].
-    pub fn new(recording: &'a Recording, roundabout: &'a Road, gutter: Gutter, route: &'a Route) -> Result<Scene<'a>, Error> {
+    pub fn new(
+        recording: &'a Recording,
+        roundabout: &'a Road,
+        gutter: Gutter,
+        route: &'a Route,
+    ) -> Result<Scene<'a>, Error> {
         let vehicle = &recording.vehicle;
-        let tractor = |frame: &Frame| corners(&vehicle.tractor_body.into(), point(frame.position), frame.heading.into());
-        let trailer = |frame: &Frame| corners(&vehicle.trailer_body.into(), point(frame.trailer_position), frame.trailer_heading.into());
+        let tractor =
+            |frame: &Frame| corners(&vehicle.tractor_body.into(), point(frame.position), frame.heading.into());
+        let trailer = |frame: &Frame| {
+            corners(&vehicle.trailer_body.into(), point(frame.trailer_position), frame.trailer_heading.into())
+        };
         Ok(Scene {
             recording,
             roundabout,
@@ -69,13 +77,22 @@ impl<'a> Scene<'a> {
     pub fn still(&self) -> String {
         let view = View::around(self.shown());
         let (map, entries) = (self.map(&view), self.legend(&view));
-        crate::figure::composed(&view, &self.lettering, &self.title(), &[&self.summary()], Definitions::new(), map, &entries)
+        crate::figure::composed(
+            &view,
+            &self.lettering,
+            &self.title(),
+            &[&self.summary()],
+            Definitions::new(),
+            map,
+            &entries,
+        )
     }
 
     /// The whole episode on the map.
     pub(crate) fn map(&self, view: &View) -> Group {
         let road = self.road(view);
-        let area = |corners: &[[DVec2; 4]], colour: &str| Path::new().set("d", swept_area(view, corners)).set("fill", colour);
+        let area =
+            |corners: &[[DVec2; 4]], colour: &str| Path::new().set("d", swept_area(view, corners)).set("fill", colour);
         Group::new()
             .add(road.surface())
             .add(area(&self.trailer, colour::SWEPT_BY_TRAILER))
@@ -112,7 +129,8 @@ impl<'a> Scene<'a> {
     /// The ring, and the points of the path and of the route near it.
     pub(crate) fn shown(&self) -> impl Iterator<Item = DVec2> {
         let radius = self.roundabout.outer_radius();
-        let driven = self.recording.frames.iter().flat_map(|frame| [point(frame.position), point(frame.trailer_position)]);
+        let driven =
+            self.recording.frames.iter().flat_map(|frame| [point(frame.position), point(frame.trailer_position)]);
         let planned = self.route.waypoints.iter().map(|waypoint| waypoint.position);
         let near = driven.chain(planned).filter(move |p| p.length() < radius + SHOWN);
         near.chain([DVec2::splat(-radius), DVec2::splat(radius)])
@@ -126,7 +144,8 @@ impl<'a> Scene<'a> {
     /// Paths of the drive axle and of the trailer's axles up to frame `last`.
     fn axle_paths(&self, view: &View, last: usize) -> Group {
         let line = |position: fn(&Frame) -> [f32; 2], colour: &str| {
-            let points: Vec<DVec2> = self.recording.frames[..=last].iter().map(|frame| point(position(frame))).collect();
+            let points: Vec<DVec2> =
+                self.recording.frames[..=last].iter().map(|frame| point(position(frame))).collect();
             Path::new().set("d", view.line(&points)).set("fill", "none").set("stroke", colour).set("stroke-width", 2.0)
         };
         let drive = line(|frame| frame.position, colour::DRIVE_AXLE).set("stroke-dasharray", DASHES);
@@ -145,8 +164,12 @@ impl<'a> Scene<'a> {
         let half = 0.5 * WHEEL * DVec2::from_angle(f64::from(frame.heading) + f64::from(frame.steering));
         let wheel = |side: f64| front + 0.5 * side * GAUGE * ahead.perp();
         let wheels: String = [1.0, -1.0].map(|side| view.line(&[wheel(side) - half, wheel(side) + half])).concat();
-        let wheels = Path::new().set("d", wheels).set("stroke", colour::INK).set("stroke-width", number(0.3 * view.scale));
-        Group::new().add(body(&self.tractor[index], colour::TRACTOR)).add(wheels).add(body(&self.trailer[index], colour::TRAILER))
+        let wheels =
+            Path::new().set("d", wheels).set("stroke", colour::INK).set("stroke-width", number(0.3 * view.scale));
+        Group::new()
+            .add(body(&self.tractor[index], colour::TRACTOR))
+            .add(wheels)
+            .add(body(&self.trailer[index], colour::TRAILER))
     }
 
     /// Trucks at nearly equal distances, with those of the first and the last frame.
@@ -159,7 +182,8 @@ impl<'a> Scene<'a> {
         }));
         let length = driven[driven.len() - 1];
         let n = (length / BETWEEN_TRUCKS).round().max(1.0);
-        let stations = (0..=n as usize).map(|part| driven.partition_point(|&s| s < length * part as f64 / n).min(positions.len() - 1));
+        let stations = (0..=n as usize)
+            .map(|part| driven.partition_point(|&s| s < length * part as f64 / n).min(positions.len() - 1));
         stations.fold(Group::new(), |group, index| group.add(self.truck(view, index, 0.3)))
     }
 
@@ -172,12 +196,19 @@ impl<'a> Scene<'a> {
             // A position outside the map is marked at its edge.
             let within = position.clamp(view.low + 2.5, view.high - 2.5);
             let at = view.point(within);
-            let dot = Circle::new().set("cx", number(at.x)).set("cy", number(at.y)).set("r", 6).set("fill", colour::INK);
+            let dot =
+                Circle::new().set("cx", number(at.x)).set("cy", number(at.y)).set("r", 6).set("fill", colour::INK);
             let dot = dot.set("stroke", "white").set("stroke-width", 1.5);
             // Words that would leave the map on the right stand on the left.
             let leaves = view.point(view.high).x < at.x + 12.0 + self.lettering.width(words, 18.0);
             let (beside, align) = if leaves { (-12.0, Align::Right) } else { (12.0, Align::Left) };
-            group = group.add(dot).add(self.lettering.text_on_map(words, at + DVec2::new(beside, 6.0), 18.0, align, colour::INK));
+            group = group.add(dot).add(self.lettering.text_on_map(
+                words,
+                at + DVec2::new(beside, 6.0),
+                18.0,
+                align,
+                colour::INK,
+            ));
         }
         if let Some(touched) = self.touched() {
             let at = view.point(touched);

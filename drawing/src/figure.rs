@@ -90,7 +90,8 @@ pub(crate) struct Layout {
 }
 
 /// The layout of a still. The ratio limits the height of the page.
-const PRINTED: Layout = Layout { corner: DVec2::new(LEFT, TOP), width: WIDTH - LEFT - RIGHT, margin: MARGIN, ratio: 0.85 };
+const PRINTED: Layout =
+    Layout { corner: DVec2::new(LEFT, TOP), width: WIDTH - LEFT - RIGHT, margin: MARGIN, ratio: 0.85 };
 
 impl View {
     /// All of the given points with a margin.
@@ -100,7 +101,8 @@ impl View {
 
     /// All of the given points in a map of another layout.
     pub fn laid_out(points: impl Iterator<Item = DVec2>, layout: &Layout) -> View {
-        let (low, high) = points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+        let (low, high) =
+            points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
         let (low, high) = (low - layout.margin, high + layout.margin);
         // The map is at least half as high as wide.
         let centre = (low + high) / 2.0;
@@ -118,7 +120,8 @@ impl View {
     /// All of the given points with `margin` around them (m), in the middle of a map that fills a picture of `size`
     /// (px).
     pub fn fitted(points: impl Iterator<Item = DVec2>, size: DVec2, margin: f64) -> View {
-        let (low, high) = points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+        let (low, high) =
+            points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
         let scale = (size / (high - low + 2.0 * margin)).min_element();
         let (centre, half) = ((low + high) / 2.0, size / scale / 2.0);
         View { low: centre - half, high: centre + half, scale, corner: DVec2::ZERO, mirrored: false }
@@ -206,8 +209,13 @@ pub fn roundabout(roundabout: &Road, routes: &[Route], straights: Straights, gut
     let lettering = Lettering::new()?;
     let view = View::around(routes.iter().flat_map(|route| &route.waypoints).map(|waypoint| waypoint.position));
     let road = RoadLayers::new(&view, &lettering, roundabout, routes, straights, gutter);
-    let map =
-        Group::new().add(road.surface()).add(road.distances()).add(road.lanes()).add(road.kerbs()).add(road.routes()).add(road.arm_names());
+    let map = Group::new()
+        .add(road.surface())
+        .add(road.distances())
+        .add(road.lanes())
+        .add(road.kerbs())
+        .add(road.routes())
+        .add(road.arm_names());
     let legend: Vec<Entry> = road.legend().into_iter().chain(road.route_legend()).collect();
     let kind = if roundabout.island_radius() == 0.0 { "Junction" } else { "Roundabout" };
     let title = format!("{kind} {}: {} arms, {} routes", roundabout.name, roundabout.arms().count(), routes.len());
@@ -216,7 +224,9 @@ pub fn roundabout(roundabout: &Road, routes: &[Route], straights: Straights, gut
     let subtitle = match &lanes[..] {
         [] => format!("Its arms begin {radius:.2} m from the middle of the junction."),
         [only] => format!("Lane centre at {only}, outer kerb at {radius:.2} m from the centre."),
-        [inner @ .., last] => format!("Lane centres at {} and {last}, outer kerb at {radius:.2} m from the centre.", inner.join(", ")),
+        [inner @ .., last] => {
+            format!("Lane centres at {} and {last}, outer kerb at {radius:.2} m from the centre.", inner.join(", "))
+        }
     };
     Ok(composed(&view, &lettering, &title, &[&subtitle], Definitions::new(), map, &legend))
 }
@@ -226,9 +236,18 @@ pub fn roundabout(roundabout: &Road, routes: &[Route], straights: Straights, gut
 /// # Errors
 ///
 /// [`Error::Typeface`].
-pub fn swept_path(roundabout: &Road, routes: &[Route], straights: Straights, gutter: Gutter, sweep: &Sweep) -> Result<String, Error> {
+pub fn swept_path(
+    roundabout: &Road,
+    routes: &[Route],
+    straights: Straights,
+    gutter: Gutter,
+    sweep: &Sweep,
+) -> Result<String, Error> {
     let lettering = Lettering::new()?;
-    let line = sweep.route.centre_line.part(straights.approach - SHOWN, sweep.route.centre_line.length() - straights.departure + SHOWN);
+    let line = sweep
+        .route
+        .centre_line
+        .part(straights.approach - SHOWN, sweep.route.centre_line.length() - straights.departure + SHOWN);
     let layout = Layout { corner: DVec2::new(LEFT, TOP + LINE), ..PRINTED };
     let view = View::laid_out(line.polyline(0.1).into_iter(), &layout);
     let road = RoadLayers::new(&view, &lettering, roundabout, routes, straights, gutter);
@@ -253,10 +272,12 @@ pub(crate) fn composed(
     legend: &[Entry],
 ) -> String {
     let bottom = view.point(view.low).y;
-    let (legend, legend_height) = legend::drawn(lettering, legend, DVec2::new(LEFT, bottom + AXIS + 14.0), WIDTH - LEFT - RIGHT);
+    let (legend, legend_height) =
+        legend::drawn(lettering, legend, DVec2::new(LEFT, bottom + AXIS + 14.0), WIDTH - LEFT - RIGHT);
     let height = (bottom + AXIS + legend_height + 16.0).ceil();
     let paper = Rectangle::new().set("width", WIDTH).set("height", height).set("fill", "white");
-    let edge = Path::new().set("d", view.frame()).set("fill", "none").set("stroke", colour::INK).set("stroke-width", 1.2);
+    let edge =
+        Path::new().set("d", view.frame()).set("fill", "none").set("stroke", colour::INK).set("stroke-width", 1.2);
     let clip = ClipPath::new().set("id", "map").add(Path::new().set("d", view.frame()));
     let fitted = |words: &str, base: f64, largest: f64, colour: &str| {
         let size = lettering.fitting(words, largest, WIDTH - LEFT - RIGHT);
@@ -285,7 +306,9 @@ pub(crate) fn composed(
 fn axes(view: &View, lettering: &Lettering) -> Group {
     let extent = view.high - view.low;
     let every = if extent.x < 90.0 { 10.0 } else { 20.0 };
-    let ticks = |low: f64, high: f64| ((low / every).ceil() as i64..=(high / every).floor() as i64).map(move |tick| tick as f64 * every);
+    let ticks = |low: f64, high: f64| {
+        ((low / every).ceil() as i64..=(high / every).floor() as i64).map(move |tick| tick as f64 * every)
+    };
     let mut data = String::new();
     let mut group = Group::new();
     for x in ticks(view.low.x, view.high.x) {
@@ -307,7 +330,8 @@ pub(crate) fn scale_bar(view: &View, lettering: &Lettering) -> Group {
     let length = 10.0 * view.scale;
     let box_corner = right - DVec2::new(length + 14.0, 32.0);
     let paper = Rectangle::new().set("x", number(box_corner.x)).set("y", number(box_corner.y)).set("rx", 4);
-    let paper = paper.set("width", number(length + 24.0)).set("height", 42).set("fill", "white").set("fill-opacity", 0.85);
+    let paper =
+        paper.set("width", number(length + 24.0)).set("height", 42).set("fill", "white").set("fill-opacity", 0.85);
     let data = format!("M{} {}v6h{}v-6", number(right.x - length), number(right.y - 6.0), number(length));
     let bar = Path::new().set("d", data).set("fill", "none").set("stroke", colour::INK).set("stroke-width", 2.0);
     let words = lettering.text("10 m", right - DVec2::new(length / 2.0, 10.0), 15.0, Align::Middle, colour::INK);

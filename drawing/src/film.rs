@@ -48,20 +48,29 @@ pub struct Take<'a> {
 /// If there is no take, or if one has no frames or an index beyond its recording.
 pub fn gif(takes: &[Take], width: u32, mut drawn: impl FnMut()) -> Result<Vec<u8>, Error> {
     let options = usvg::Options::default();
-    let backgrounds = takes.iter().map(|take| painted(&usvg::Tree::from_str(&take.scene.film_background(), &options)?, width, None));
+    let backgrounds =
+        takes.iter().map(|take| painted(&usvg::Tree::from_str(&take.scene.film_background(), &options)?, width, None));
     let backgrounds = backgrounds.collect::<Result<Vec<Pixmap>, Error>>()?;
     let picture = |take: usize, index: usize| {
-        painted(&usvg::Tree::from_str(&takes[take].scene.film_picture(index), &options)?, width, Some(&backgrounds[take]))
+        painted(
+            &usvg::Tree::from_str(&takes[take].scene.film_picture(index), &options)?,
+            width,
+            Some(&backgrounds[take]),
+        )
     };
     // The colours of the film: the last picture has the longest paths and the end in words, one half way has the truck
     // in the ring.
-    let sampled =
-        takes.iter().enumerate().flat_map(|(take, Take { frames, .. })| [frames.len() / 2, frames.len() - 1].map(|at| (take, frames[at])));
+    let sampled = takes
+        .iter()
+        .enumerate()
+        .flat_map(|(take, Take { frames, .. })| [frames.len() / 2, frames.len() - 1].map(|at| (take, frames[at])));
     let samples = sampled.map(|(take, index)| picture(take, index)).collect::<Result<Vec<Pixmap>, Error>>()?;
     let palette = Palette::of(&samples);
     // Legends may take another line.
     let (width, height) = (backgrounds[0].width(), backgrounds.iter().map(Pixmap::height).max().unwrap_or_default());
-    let (Ok(wide), Ok(high)) = (u16::try_from(width), u16::try_from(height)) else { return Err(Error::Size { width, height }) };
+    let (Ok(wide), Ok(high)) = (u16::try_from(width), u16::try_from(height)) else {
+        return Err(Error::Size { width, height });
+    };
     let mut encoder = Encoder::new(Vec::new(), wide, high, &palette.colours)?;
     encoder.set_repeat(Repeat::Infinite)?;
     let white = palette.nearest[palette.nearest.len() - 1];
@@ -123,11 +132,13 @@ impl Palette {
         let mut frequent: Vec<([u8; 3], usize)> = counts.into_iter().collect();
         // The sort is stable: equally frequent colours keep their order.
         frequent.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
-        let chosen: Vec<[u8; 3]> = frequent.into_iter().map(|(colour, _)| colour).take(usize::from(UNCHANGED)).collect();
+        let chosen: Vec<[u8; 3]> =
+            frequent.into_iter().map(|(colour, _)| colour).take(usize::from(UNCHANGED)).collect();
         let level = |index: usize, digit: u32| (index / N_LEVELS.pow(digit) % N_LEVELS) as i32 * i32::from(COLOUR_STEP);
         let nearest = (0..N_LEVELS.pow(3)).map(|index| {
             let wanted = [level(index, 2), level(index, 1), level(index, 0)];
-            let off = |colour: &[u8; 3]| wanted.iter().zip(colour).map(|(a, &b)| (a - i32::from(b)).pow(2)).sum::<i32>();
+            let off =
+                |colour: &[u8; 3]| wanted.iter().zip(colour).map(|(a, &b)| (a - i32::from(b)).pow(2)).sum::<i32>();
             (0..chosen.len()).min_by_key(|&n| off(&chosen[n])).unwrap_or(0) as u8
         });
         let nearest = nearest.collect();

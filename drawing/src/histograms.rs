@@ -91,7 +91,8 @@ impl Panel {
     /// The axis over all values: its ends are steps for measured values, halves beyond them for counts.
     fn axis(&self) -> Axis {
         let all = || self.values.iter().chain(&self.marks).copied().filter(|value| value.is_finite());
-        let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let (low, high) =
+            all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
         let (low, high) = match (low.is_finite(), low < high) {
             (false, _) => (0.0, 1.0),
             (true, false) => (low.min(0.0), low.max(0.0) + 1.0),
@@ -99,7 +100,11 @@ impl Panel {
         };
         let rough = (high - low) / 6.0;
         let power = 10f64.powf(rough.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0].map(|digit| digit * power).into_iter().find(|step| rough <= *step).unwrap_or(10.0 * power);
+        let step = [1.0, 2.0, 5.0, 10.0]
+            .map(|digit| digit * power)
+            .into_iter()
+            .find(|step| rough <= *step)
+            .unwrap_or(10.0 * power);
         if all().all(|value| value.fract() == 0.0) && high - low < BINS as f64 {
             let step = step.max(1.0);
             return Axis { low: low - 0.5, high: high + 0.5, first: low, step, n_bins: (high - low) as usize + 1 };
@@ -131,7 +136,14 @@ impl Panel {
             let height = count as f64 / most * (PLOT.y - 8.0);
             let left = corner.x + bin as f64 * width;
             // Writing to a string cannot fail.
-            let _ = write!(bars, "M{} {base}h{}v-{}h-{}Z", number(left), number(width - 1.0), number(height), number(width - 1.0));
+            let _ = write!(
+                bars,
+                "M{} {base}h{}v-{}h-{}Z",
+                number(left),
+                number(width - 1.0),
+                number(height),
+                number(width - 1.0)
+            );
         }
         let mut group = Group::new().add(Path::new().set("d", bars).set("fill", "#c3cdd7"));
         let mut ticks = format!("M{} {base}H{}", corner.x, corner.x + PLOT.x);
@@ -139,9 +151,11 @@ impl Panel {
             let value = first + tick as f64 * step;
             let _ = write!(ticks, "M{} {base}v5", number(x(value)));
             let words = format!("{}", (value * 1e6).round() / 1e6);
-            group = group.add(lettering.text(&words, DVec2::new(x(value), base + 20.0), 13.0, Align::Middle, colour::INK));
+            group =
+                group.add(lettering.text(&words, DVec2::new(x(value), base + 20.0), 13.0, Align::Middle, colour::INK));
         }
-        group = group.add(Path::new().set("d", ticks).set("fill", "none").set("stroke", colour::INK).set("stroke-width", 1.1));
+        group = group
+            .add(Path::new().set("d", ticks).set("fill", "none").set("stroke", colour::INK).set("stroke-width", 1.1));
         let middle = DVec2::new(corner.x + PLOT.x / 2.0, base + 42.0);
         group = group.add(lettering.text(self.x, middle, 15.0, Align::Middle, colour::INK));
         // Marks that would cover each other stand above each other.
@@ -174,9 +188,14 @@ mod tests {
 
     #[test]
     fn every_value_is_counted_once_and_lies_on_the_axis() {
-        for values in
-            [vec![1.5], vec![], vec![0.3, 0.31, 0.9], (0..1000).map(f64::from).collect(), vec![f64::NAN, 2.5, 3.0], vec![3.0, 4.0]]
-        {
+        for values in [
+            vec![1.5],
+            vec![],
+            vec![0.3, 0.31, 0.9],
+            (0..1000).map(f64::from).collect(),
+            vec![f64::NAN, 2.5, 3.0],
+            vec![3.0, 4.0],
+        ] {
             let panel = panel(values.clone(), vec![]);
             let axis = panel.axis();
             assert!(0.0 < axis.step && axis.low < axis.high && (axis.high - axis.low) / axis.step < 12.0, "{values:?}");

@@ -22,7 +22,8 @@ pub fn isolines(field: &Field, view: &View) -> Vec<Vec<DVec2>> {
     let levels: Vec<f64> = (1..).map(f64::from).take_while(|&level| level < highest).collect();
     // The builder takes values at the middles of cells.
     let corner = low - STEP / 2.0;
-    let builder = ContourBuilder::new(columns, rows, true).x_origin(corner.x).y_origin(corner.y).x_step(STEP).y_step(STEP);
+    let builder =
+        ContourBuilder::new(columns, rows, true).x_origin(corner.x).y_origin(corner.y).x_step(STEP).y_step(STEP);
     // It fails only when the number of values is not columns * rows.
     let lines = builder.lines(&values, &levels).unwrap_or_default();
     let rings = lines.iter().flat_map(|line| line.geometry());

@@ -43,7 +43,11 @@ pub fn written(kerbs: &Outline, routes: &[Route], sweep: Option<&Sweep>) -> serd
     let drivable = drivable(kerbs);
     let routes = routes.iter().map(|route| WrittenRoute {
         name: &route.name,
-        waypoints: route.waypoints.iter().map(|w| [to(1e4, w.position.x), to(1e4, w.position.y), to(1e6, w.heading)]).collect(),
+        waypoints: route
+            .waypoints
+            .iter()
+            .map(|w| [to(1e4, w.position.x), to(1e4, w.position.y), to(1e6, w.heading)])
+            .collect(),
     });
     let sweep = sweep.map(Sweep::written);
     let mut text = serde_json::to_string(&Written { solids, drivable, routes: routes.collect(), sweep })?;
@@ -55,7 +59,8 @@ pub fn written(kerbs: &Outline, routes: &[Route], sweep: Option<&Sweep>) -> serd
 /// southern polygon.
 fn ground(boundary: &[DVec2]) -> [Vec<DVec2>; 2] {
     let n = boundary.len();
-    let furthest = |sign: f64| (0..n).max_by(|&a, &b| (sign * boundary[a].x).total_cmp(&(sign * boundary[b].x))).unwrap_or(0);
+    let furthest =
+        |sign: f64| (0..n).max_by(|&a, &b| (sign * boundary[a].x).total_cmp(&(sign * boundary[b].x))).unwrap_or(0);
     let (west, east) = (furthest(-1.0), furthest(1.0));
     // Clockwise along the boundary, so that the ground lies on the left.
     let back = |from: usize, to: usize| (0..=(from + n - to) % n).map(move |step| boundary[(from + n - step) % n]);

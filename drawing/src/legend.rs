@@ -59,8 +59,17 @@ pub fn drawn(lettering: &Lettering, entries: &[Entry], corner: DVec2, width: f64
 pub fn chevron(at: DVec2, direction: DVec2, colour: &str) -> Path {
     let [tip, left, notch, right] = chevron_corners(at, 9.0 * direction);
     let n = number;
-    let data =
-        format!("M{} {}L{} {}L{} {}L{} {}Z", n(tip.x), n(tip.y), n(left.x), n(left.y), n(notch.x), n(notch.y), n(right.x), n(right.y));
+    let data = format!(
+        "M{} {}L{} {}L{} {}L{} {}Z",
+        n(tip.x),
+        n(tip.y),
+        n(left.x),
+        n(left.y),
+        n(notch.x),
+        n(notch.y),
+        n(right.x),
+        n(right.y)
+    );
     Path::new().set("d", data).set("fill", colour).set("stroke", "white").set("stroke-width", 0.6)
 }
 
@@ -78,7 +87,11 @@ fn sample(swatch: &Swatch, at: DVec2) -> Group {
     };
     match *swatch {
         Swatch::Area(fill) => {
-            let area = Rectangle::new().set("x", number(at.x)).set("y", number(at.y - 7.5)).set("width", SWATCH).set("height", 15);
+            let area = Rectangle::new()
+                .set("x", number(at.x))
+                .set("y", number(at.y - 7.5))
+                .set("width", SWATCH)
+                .set("height", 15);
             Group::new().add(area.set("fill", fill).set("stroke", colour::FAINT).set("stroke-width", 0.8))
         }
         Swatch::Line(colour, width, "") => Group::new().add(line(colour, width)),
@@ -87,7 +100,11 @@ fn sample(swatch: &Swatch, at: DVec2) -> Group {
             Group::new().add(line(colour, 1.8)).add(chevron(at + DVec2::new(SWATCH / 2.0 + 5.0, 0.0), DVec2::X, colour))
         }
         Swatch::Ring(colour) => {
-            let ring = Circle::new().set("cx", number(at.x + SWATCH / 2.0)).set("cy", number(at.y)).set("r", 8).set("fill", "none");
+            let ring = Circle::new()
+                .set("cx", number(at.x + SWATCH / 2.0))
+                .set("cy", number(at.y))
+                .set("r", 8)
+                .set("fill", "none");
             Group::new().add(ring.set("stroke", colour).set("stroke-width", 2.2))
         }
     }

@@ -29,7 +29,8 @@ impl Lettering {
 
     /// Width of `words` in text of `size` (px).
     pub fn width(&self, words: &str, size: f64) -> f64 {
-        let advance = |letter| self.face.glyph_index(letter).and_then(|glyph| self.face.glyph_hor_advance(glyph)).unwrap_or(0);
+        let advance =
+            |letter| self.face.glyph_index(letter).and_then(|glyph| self.face.glyph_hor_advance(glyph)).unwrap_or(0);
         words.chars().map(|letter| f64::from(advance(letter))).sum::<f64>() * self.scale(size)
     }
 
@@ -42,13 +43,18 @@ impl Lettering {
     pub fn text(&self, words: &str, at: DVec2, size: f64, align: Align, colour: &str) -> Path {
         // The typeface is light: a thin stroke keeps it readable in small pictures.
         let weight = number(0.035 * size);
-        self.outlines(words, at, size, align).set("fill", colour).set("stroke", colour).set("stroke-width", weight).set("aria-label", words)
+        self.outlines(words, at, size, align)
+            .set("fill", colour)
+            .set("stroke", colour)
+            .set("stroke-width", weight)
+            .set("aria-label", words)
     }
 
     /// The same with a light rim, to be read over a map.
     pub fn text_on_map(&self, words: &str, at: DVec2, size: f64, align: Align, colour: &str) -> Group {
         let rim = self.outlines(words, at, size, align).set("fill", "white").set("stroke", "white");
-        let rim = rim.set("stroke-width", number(0.3 * size)).set("stroke-linejoin", "round").set("stroke-opacity", 0.85);
+        let rim =
+            rim.set("stroke-width", number(0.3 * size)).set("stroke-linejoin", "round").set("stroke-opacity", 0.85);
         Group::new().add(rim).add(self.text(words, at, size, align, colour))
     }
 

@@ -82,7 +82,8 @@ pub enum Error {
 pub fn rasterised(svg: &str, width: u32) -> Result<Vec<u8>, Error> {
     let tree = usvg::Tree::from_str(svg, &usvg::Options::default())?;
     let pixels = painted(&tree, width, None)?;
-    let colours: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|pixel| [0, 1, 2].map(|channel| stepped(pixel[channel]))).collect();
+    let colours: Vec<u8> =
+        pixels.data().chunks_exact(4).flat_map(|pixel| [0, 1, 2].map(|channel| stepped(pixel[channel]))).collect();
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, pixels.width(), pixels.height());
     encoder.set_color(png::ColorType::Rgb);

@@ -74,7 +74,9 @@ impl Need {
     fn words(&self) -> String {
         let digits = if matches!(self.limit, Limit::Lock | Limit::SteerRate) { 1 } else { 2 };
         // What is exceeded by less than a digit shows must not look as if it were not.
-        let digits = if self.is_exceeded() && self.needs - self.has < 0.5 * 10f64.powi(-digits) { digits + 2 } else { digits } as usize;
+        let digits =
+            if self.is_exceeded() && self.needs - self.has < 0.5 * 10f64.powi(-digits) { digits + 2 } else { digits }
+                as usize;
         let Need { needs, has, .. } = self;
         let words = format!("{} {needs:.digits$} of {has:.digits$} {}", self.limit.quantity(), self.limit.unit());
         words.trim_end().to_owned()
@@ -131,11 +133,13 @@ pub(crate) fn lines(view: &View, needs: &[Need], front: &[DVec2]) -> Group {
             // A stretch of one pose is as long as the way to its neighbours.
             let shown = stretch.start.saturating_sub(1)..(stretch.end + 1).min(points.len());
             let data: Vec<String> = shown.map(&beside).map(|p| format!("{} {}", number(p.x), number(p.y))).collect();
-            let line = Path::new().set("d", format!("M{}", data.join("L"))).set("fill", "none").set("stroke", need.colour());
+            let line =
+                Path::new().set("d", format!("M{}", data.join("L"))).set("fill", "none").set("stroke", need.colour());
             group = group.add(line.set("stroke-width", WIDTH).set("stroke-linecap", "round"));
         }
         let worst = beside(need.worst);
-        let dot = Circle::new().set("cx", number(worst.x)).set("cy", number(worst.y)).set("r", 5).set("fill", need.colour());
+        let dot =
+            Circle::new().set("cx", number(worst.x)).set("cy", number(worst.y)).set("r", 5).set("fill", need.colour());
         group = group.add(dot.set("stroke", "white").set("stroke-width", 1.2));
     }
     group
@@ -149,7 +153,10 @@ pub(crate) fn legend(needs: &[Need]) -> impl Iterator<Item = Entry> {
         Limit::Tyres => "beyond the tyres' grip (dot: worst)",
         Limit::Rollover => "wheels lift (dot: worst)",
     };
-    needs.iter().filter(|need| need.is_exceeded()).map(move |need| Entry::new(Swatch::Line(need.colour(), WIDTH, ""), words(need)))
+    needs
+        .iter()
+        .filter(|need| need.is_exceeded())
+        .map(move |need| Entry::new(Swatch::Line(need.colour(), WIDTH, ""), words(need)))
 }
 
 fn rounded(parts: f64, value: f64) -> f64 {
@@ -162,7 +169,8 @@ pub(crate) fn rows(demands: &[Demand]) -> Vec<[f64; 5]> {
     let row = |demand: &Demand| {
         let Demand { station, steering, steer_rate, lateral_acceleration, load_transfer_ratio } = *demand;
         let lateral = lateral_acceleration / offtrack::vehicle::GRAVITY;
-        [station, steering.to_degrees(), steer_rate.to_degrees(), lateral, load_transfer_ratio].map(|value| rounded(1e4, value))
+        [station, steering.to_degrees(), steer_rate.to_degrees(), lateral, load_transfer_ratio]
+            .map(|value| rounded(1e4, value))
     };
     demands.iter().map(row).collect()
 }

@@ -71,20 +71,28 @@ impl<'a> RoadLayers<'a> {
     pub(crate) fn distances(&self) -> Group {
         let field = Field::bake(&self.kerbs, FIELD_CELL);
         let lines: String = isolines(&field, self.view).iter().map(|ring| self.view.line(ring)).collect();
-        let lines = Path::new().set("d", lines).set("fill", "none").set("stroke", colour::CONTOUR).set("stroke-width", 0.8);
+        let lines =
+            Path::new().set("d", lines).set("fill", "none").set("stroke", colour::CONTOUR).set("stroke-width", 0.8);
         Group::new().add(lines)
     }
 
     /// The centre lines of the lanes.
     pub(crate) fn lanes(&self) -> Group {
         let lanes: String = self.roundabout.lanes().iter().map(|lane| self.view.curve(lane)).collect();
-        let lanes = Path::new().set("d", lanes).set("fill", "none").set("stroke", colour::LANE).set("stroke-width", 0.9);
+        let lanes =
+            Path::new().set("d", lanes).set("fill", "none").set("stroke", colour::LANE).set("stroke-width", 0.9);
         Group::new().add(lanes.set("stroke-dasharray", LANE_DASHES))
     }
 
     /// The edges of the drivable area.
     pub(crate) fn kerbs(&self) -> Group {
-        Group::new().add(Path::new().set("d", self.kerb_data()).set("fill", "none").set("stroke", colour::KERB).set("stroke-width", 1.6))
+        Group::new().add(
+            Path::new()
+                .set("d", self.kerb_data())
+                .set("fill", "none")
+                .set("stroke", colour::KERB)
+                .set("stroke-width", 1.6),
+        )
     }
 
     /// The centre lines of the lanes for a small map.
@@ -129,7 +137,8 @@ impl<'a> RoadLayers<'a> {
         let (enters, leaves) = (self.straights.approach, line.length() - self.straights.departure);
         let around = (0..).map(|step| enters + 0.2 * f64::from(step)).take_while(|&s| s < leaves);
         let mut stations: Vec<f64> = around.filter(|&s| eighth(s) != eighth(s + 0.2)).collect();
-        stations.extend([0.3, 0.75].into_iter().flat_map(|part| [part * enters, leaves + part * self.straights.departure]));
+        stations
+            .extend([0.3, 0.75].into_iter().flat_map(|part| [part * enters, leaves + part * self.straights.departure]));
         stations
     }
 
@@ -160,7 +169,13 @@ impl<'a> RoadLayers<'a> {
     /// The legend's lines for a map with distances.
     pub(crate) fn legend(&self) -> Vec<Entry> {
         let [solid, gutter, edge, lane] = self.surface_legend();
-        vec![solid, gutter, edge, Entry::new(Swatch::Line(colour::CONTOUR, 1.2, ""), "distance to it, each metre"), lane]
+        vec![
+            solid,
+            gutter,
+            edge,
+            Entry::new(Swatch::Line(colour::CONTOUR, 1.2, ""), "distance to it, each metre"),
+            lane,
+        ]
     }
 
     /// The legend's lines for surface, kerbs and lanes.

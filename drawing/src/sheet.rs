@@ -41,7 +41,8 @@ pub fn drawn(title: &str, roundabouts: &[&Road]) -> Result<String, Error> {
     let mut definitions = Definitions::new();
     let mut maps = Group::new();
     for (index, roundabout) in roundabouts.iter().enumerate() {
-        let corner = DVec2::new(MARGIN, MARGIN + TITLE) + DVec2::new((index % columns) as f64, (index / columns) as f64) * cell;
+        let corner =
+            DVec2::new(MARGIN, MARGIN + TITLE) + DVec2::new((index % columns) as f64, (index / columns) as f64) * cell;
         let layout = Layout { corner, width: MAP, margin: 0.0, ratio: 1.0 };
         let view = View::laid_out([DVec2::splat(-reach), DVec2::splat(reach)].into_iter(), &layout);
         let road = RoadLayers::new(&view, &lettering, roundabout, &[], straights, Gutter::Drivable);
@@ -55,7 +56,13 @@ pub fn drawn(title: &str, roundabouts: &[&Road]) -> Result<String, Error> {
         let facts = format!("{} arms, island {:.1} m", roundabout.arms().count(), roundabout.island_radius());
         maps = maps
             .add(map.set("clip-path", format!("url(#{clip})")))
-            .add(Path::new().set("d", view.frame()).set("fill", "none").set("stroke", colour::FAINT).set("stroke-width", 0.8))
+            .add(
+                Path::new()
+                    .set("d", view.frame())
+                    .set("fill", "none")
+                    .set("stroke", colour::FAINT)
+                    .set("stroke-width", 0.8),
+            )
             .add(lettering.text(&roundabout.name, below, 13.5, Align::Left, colour::INK))
             .add(lettering.text(&facts, below + DVec2::new(0.0, 16.0), 12.5, Align::Left, colour::FAINT));
     }

@@ -57,8 +57,17 @@ mod tests {
             assert!((found - expected).abs() < 1e-9, "{found} {expected}");
         }
         // Eleven metres a step, through the bend and beyond the end.
-        let positions =
-            [[30.0f32, 0.0], [40.0, 0.0], [50.5, 2.0], [44.0, 4.0], [34.0, 4.0], [24.0, 4.0], [14.0, 4.0], [4.0, 4.0], [-6.0, 5.0]];
+        let positions = [
+            [30.0f32, 0.0],
+            [40.0, 0.0],
+            [50.5, 2.0],
+            [44.0, 4.0],
+            [34.0, 4.0],
+            [24.0, 4.0],
+            [14.0, 4.0],
+            [4.0, 4.0],
+            [-6.0, 5.0],
+        ];
         let found = stations(&route, &[&[[0.0f32, 0.0], [10.0, 0.0], [20.0, 0.0]], &positions[..]].concat());
         let expected = [0.0, 10.0, 20.0, 30.0, 40.0, 52.0, 60.0, 70.0, 80.0, 90.0, 100.0, 110.0];
         for (found, expected) in found.iter().zip(expected) {

@@ -135,7 +135,10 @@ impl<'a> Sweep<'a> {
     pub fn lines(&self) -> [String; 2] {
         let Driven { vehicle, load, speed_kmh } = &self.driven;
         let driven = format!("{vehicle}, {load}, {} km/h", shown(*speed_kmh));
-        [format!("Swept path of {driven}, front axle on the lane's centre: {}.", self.summary()), limits::words(&self.needs)]
+        [
+            format!("Swept path of {driven}, front axle on the lane's centre: {}.", self.summary()),
+            limits::words(&self.needs),
+        ]
     }
 
     pub(crate) fn written(&self) -> Written<'_> {
@@ -166,9 +169,12 @@ impl<'a> Sweep<'a> {
     /// Definitions of the swept areas, which are used twice.
     pub(crate) fn shapes(&self, view: &View) -> Definitions {
         // Half of the poses are dense enough.
-        let drawn = |unit: &Unit| unit.corners.iter().step_by(2).chain(unit.corners.last()).copied().collect::<Vec<_>>();
+        let drawn =
+            |unit: &Unit| unit.corners.iter().step_by(2).chain(unit.corners.last()).copied().collect::<Vec<_>>();
         let area = |unit: &Unit| swept_area(view, &drawn(unit));
-        self.units.iter().fold(Definitions::new(), |all, unit| all.add(Path::new().set("id", unit.name).set("d", area(unit))))
+        self.units
+            .iter()
+            .fold(Definitions::new(), |all, unit| all.add(Path::new().set("id", unit.name).set("d", area(unit))))
     }
 
     /// The swept areas, to be drawn below the kerbs. The tractor's hides the trailer's: what remains of it is the
@@ -188,7 +194,8 @@ impl<'a> Sweep<'a> {
         let every = (BETWEEN_TRUCKS / SPACING) as usize;
         for unit in self.units.iter().rev() {
             for corners in unit.corners.iter().step_by(every) {
-                let body = Path::new().set("d", view.polygon(corners)).set("fill", unit.colour).set("fill-opacity", 0.22);
+                let body =
+                    Path::new().set("d", view.polygon(corners)).set("fill", unit.colour).set("fill-opacity", 0.22);
                 group = group.add(body.set("stroke", unit.colour).set("stroke-width", 1.5));
             }
         }
@@ -196,7 +203,11 @@ impl<'a> Sweep<'a> {
         let drive = |pose: &Pose| pose.position;
         let trailer = |pose: &Pose| pose.trailer_position;
         let line = |points: Vec<DVec2>, colour: &str, dashes: &str| {
-            let path = Path::new().set("d", view.line(&points)).set("fill", "none").set("stroke", colour).set("stroke-width", 1.6);
+            let path = Path::new()
+                .set("d", view.line(&points))
+                .set("fill", "none")
+                .set("stroke", colour)
+                .set("stroke-width", 1.6);
             if dashes.is_empty() { path } else { path.set("stroke-dasharray", dashes) }
         };
         group = group.add(line(self.poses.iter().map(trailer).collect(), colour::TRAILER_AXLES, ""));
@@ -206,7 +217,8 @@ impl<'a> Sweep<'a> {
         for (unit, below) in self.units.iter().zip([false, true]) {
             for &(deepest, depth) in &unit.overlaps {
                 let at = view.point(deepest);
-                let ring = Circle::new().set("cx", number(at.x)).set("cy", number(at.y)).set("r", 11).set("fill", "none");
+                let ring =
+                    Circle::new().set("cx", number(at.x)).set("cy", number(at.y)).set("r", 11).set("fill", "none");
                 group = group.add(ring.set("stroke", colour::OVERLAP).set("stroke-width", 2.2));
                 let words = format!("{} {depth:.2} m", unit.name);
                 let corner = at + DVec2::new(16.0, if below { 18.0 } else { -8.0 });
@@ -236,7 +248,13 @@ impl<'a> Sweep<'a> {
 const DASHES: &str = "7 4";
 
 impl Unit {
-    fn new(name: &'static str, colour: &'static str, light: &'static str, corners: Vec<[DVec2; 4]>, kerbs: &Outline) -> Unit {
+    fn new(
+        name: &'static str,
+        colour: &'static str,
+        light: &'static str,
+        corners: Vec<[DVec2; 4]>,
+        kerbs: &Outline,
+    ) -> Unit {
         let mut unit = Unit { name, colour, light, corners, clearance: f64::INFINITY, overlaps: Vec::new() };
         let mut overlapping = false;
         for corners in &unit.corners {
@@ -278,7 +296,9 @@ pub(crate) fn nearest(corners: &[DVec2; 4], kerbs: &Outline) -> (DVec2, f64) {
         let n = (from.distance(to) / BETWEEN_POINTS).ceil();
         (0..n as usize).map(move |step| from.lerp(to, step as f64 / n))
     });
-    points.map(|p| (p, nearby.signed_distance(p))).fold((centre, f64::INFINITY), |least, here| if here.1 < least.1 { here } else { least })
+    points
+        .map(|p| (p, nearby.signed_distance(p)))
+        .fold((centre, f64::INFINITY), |least, here| if here.1 < least.1 { here } else { least })
 }
 
 /// The corners of the convex hull, counter-clockwise (A. M. Andrew, "Another efficient algorithm for convex hulls in
@@ -314,7 +334,8 @@ mod tests {
     fn a_hull_of_two_squares_has_their_outer_corners_counter_clockwise() {
         let square = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
         let shifted = square.map(|p| p + DVec2::new(1.0, 0.5));
-        let expected = [(0.0, 0.0), (2.0, 0.0), (3.0, 0.5), (3.0, 2.5), (1.0, 2.5), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
+        let expected =
+            [(0.0, 0.0), (2.0, 0.0), (3.0, 0.5), (3.0, 2.5), (1.0, 2.5), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
         assert_eq!(hull([square, shifted].concat()), expected);
     }
 

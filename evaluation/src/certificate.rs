@@ -22,14 +22,23 @@ use verify::Sequence;
 /// driven again first.
 pub fn certified(path: &Path, scenario: &Scenario, world: &Arc<World>, routes: &[u32]) -> Result<Vec<u32>, Error> {
     let (certificate, _) = verified(path, scenario, world, routes)?;
-    let names: HashSet<&str> =
-        certificate.routes.iter().filter(|searched| searched.certified()).map(|searched| searched.name.as_str()).collect();
+    let names: HashSet<&str> = certificate
+        .routes
+        .iter()
+        .filter(|searched| searched.certified())
+        .map(|searched| searched.name.as_str())
+        .collect();
     Ok(routes.iter().copied().filter(|&route| names.contains(world.route_names[route as usize].as_str())).collect())
 }
 
 /// A certificate that was made for these conditions and has all of `routes`, and the sequences that completed them,
 /// driven again.
-fn verified(path: &Path, scenario: &Scenario, world: &Arc<World>, routes: &[u32]) -> Result<(Certificate, Vec<Sequence>), Error> {
+fn verified(
+    path: &Path,
+    scenario: &Scenario,
+    world: &Arc<World>,
+    routes: &[u32],
+) -> Result<(Certificate, Vec<Sequence>), Error> {
     let certificate = Certificate::read(path)?;
     certificate.check(scenario, world, path)?;
     let names: HashSet<&str> = routes.iter().map(|&route| world.route_names[route as usize].as_str()).collect();
@@ -37,7 +46,8 @@ fn verified(path: &Path, scenario: &Scenario, world: &Arc<World>, routes: &[u32]
     let searched: HashSet<&str> = certificate.routes.iter().map(|route| route.name.as_str()).collect();
     if let Some(&route) = routes.iter().find(|&&route| !searched.contains(world.route_names[route as usize].as_str())) {
         let (name, benchmark) = (&world.route_names[route as usize], &scenario.name);
-        let message = format!("has no route {name}; make one with `offtrack certify --benchmark {benchmark} --json FILE`");
+        let message =
+            format!("has no route {name}; make one with `offtrack certify --benchmark {benchmark} --json FILE`");
         return Err(Error::contents(path, message));
     }
     Ok((certificate, sequences))

@@ -67,7 +67,11 @@ pub fn open(adapter: Option<&str>) -> Result<Device, Error> {
 /// Opens the first adapter whose name contains `adapter`.
 #[cfg(not(feature = "gpu"))]
 pub fn open(_: Option<&str>) -> Result<Device, Error> {
-    Err(Error::Setting { name: "--device", value: "gpu".to_owned(), expected: format!("{NOT_BUILT_IN}, or leave --device out") })
+    Err(Error::Setting {
+        name: "--device",
+        value: "gpu".to_owned(),
+        expected: format!("{NOT_BUILT_IN}, or leave --device out"),
+    })
 }
 
 /// Whether the error is a failure of the device rather than wrong input.
@@ -75,8 +79,9 @@ pub fn open(_: Option<&str>) -> Result<Device, Error> {
 pub fn has_failed(error: &Error) -> bool {
     use offtrack::gpu;
 
-    let broken =
-        |error: &simulator::Error| matches!(error, simulator::Error::Gpu(gpu::Error::NoAdapter { .. } | gpu::Error::Broken { .. }));
+    let broken = |error: &simulator::Error| {
+        matches!(error, simulator::Error::Gpu(gpu::Error::NoAdapter { .. } | gpu::Error::Broken { .. }))
+    };
     matches!(error, Error::Device(_)) || matches!(error, Error::Simulator(error) if broken(error))
 }
 

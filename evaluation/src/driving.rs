@@ -61,7 +61,9 @@ impl Driving {
         self.switches += u32::from(SAME_SPEED < (control.target_speed - self.target_speed).abs());
         let jerk = f64::from((truck.acceleration - self.acceleration).abs()) / step;
         let lateral = f64::from(truck.lateral_acceleration.abs());
-        for (bins, bin) in [(&mut self.lateral_accelerations, lateral / LATERAL_BIN), (&mut self.jerks, jerk / JERK_BIN)] {
+        for (bins, bin) in
+            [(&mut self.lateral_accelerations, lateral / LATERAL_BIN), (&mut self.jerks, jerk / JERK_BIN)]
+        {
             let count = &mut bins[(bin as usize).min(N_BINS - 1)];
             *count = count.saturating_add(1);
         }
@@ -127,21 +129,30 @@ pub(super) fn has_classes(scenario: &Scenario) -> bool {
 
 /// The report of each class of vehicles in these episodes; none without [`has_classes`]. `possible` says of each
 /// episode whether its start is shown to be possible.
-pub(super) fn classes(scenario: &Scenario, world: &World, episodes: &[Episode], possible: Option<&[bool]>) -> Vec<ClassReport> {
+pub(super) fn classes(
+    scenario: &Scenario,
+    world: &World,
+    episodes: &[Episode],
+    possible: Option<&[bool]>,
+) -> Vec<ClassReport> {
     if !has_classes(scenario) {
         return Vec::new();
     }
     let mut profiles: HashMap<(u32, u32), f64> = HashMap::new();
     let mut feasible = |truck: &Truck| {
-        let profile = || Profile::of(world.rig(truck), world.route_waypoints(truck.route), world.params.target_speed_max.into());
+        let profile =
+            || Profile::of(world.rig(truck), world.route_waypoints(truck.route), world.params.target_speed_max.into());
         *profiles.entry((truck.route, truck.vehicle)).or_insert_with(|| profile().time)
     };
     let class = |index: usize| {
         let is_own = |episode: &Episode| world.rig(&episode.last).class_index as usize == index;
         let own: Vec<&Episode> = episodes.iter().filter(|episode| is_own(episode)).collect();
-        let shown = |possible: &[bool]| episodes.iter().zip(possible).filter(|&(episode, &possible)| possible && is_own(episode)).count();
+        let shown = |possible: &[bool]| {
+            episodes.iter().zip(possible).filter(|&(episode, &possible)| possible && is_own(episode)).count()
+        };
         let shown = possible.map(shown);
-        (!own.is_empty()).then(|| ClassReport { possible: shown, ..class_report(scenario, world, index, &own, &mut feasible) })
+        (!own.is_empty())
+            .then(|| ClassReport { possible: shown, ..class_report(scenario, world, index, &own, &mut feasible) })
     };
     (0..world.classes.len()).filter_map(class).collect()
 }
@@ -156,15 +167,19 @@ fn class_report(
     let n = episodes.len();
     let ended = |code: Ended| episodes.iter().filter(move |episode| episode.ended == code);
     let (arrived, rolled_over) = (ended(Ended::Arrived).count(), ended(Ended::RolledOver).count());
-    let ratios: Vec<Option<f64>> =
-        ended(Ended::Arrived).map(|episode| Some(f64::from(episode.steps) * scenario.step / feasible(&episode.last))).collect();
+    let ratios: Vec<Option<f64>> = ended(Ended::Arrived)
+        .map(|episode| Some(f64::from(episode.steps) * scenario.step / feasible(&episode.last)))
+        .collect();
     let mut peaks: Vec<f64> = episodes.iter().map(|episode| episode.load_transfer_ratio_peak).collect();
     peaks.sort_by(f64::total_cmp);
     // The nearest rank.
     let peak = |fraction: f64| peaks[((fraction * n as f64).ceil() as usize).clamp(1, n) - 1];
     let steps: f64 = episodes.iter().map(|episode| f64::from(episode.steps)).sum();
-    let sum = |value: fn(&Driving) -> f64| episodes.iter().filter_map(|episode| episode.driving.as_ref()).map(value).sum::<f64>();
-    let lateral = |fraction| LATERAL_BIN * percentile(episodes, |driving| &driving.lateral_accelerations, fraction) / GRAVITY;
+    let sum = |value: fn(&Driving) -> f64| {
+        episodes.iter().filter_map(|episode| episode.driving.as_ref()).map(value).sum::<f64>()
+    };
+    let lateral =
+        |fraction| LATERAL_BIN * percentile(episodes, |driving| &driving.lateral_accelerations, fraction) / GRAVITY;
     let contact = |code| mean(ended(code).map(|episode| f64::from(episode.last.speed) * 3.6));
     ClassReport {
         vehicle: world.classes[index].vehicle.clone(),
@@ -213,10 +228,10 @@ fn percentile(episodes: &[&Episode], bins: impl Fn(&Driving) -> &[u16], fraction
 
 /// A line for each class, under a heading.
 pub(super) fn lines(classes: &[ClassReport]) -> Vec<String> {
-    let heading =
-        "vehicle and load             arrived       % rolled over   % (to)      LTR p50  p90  p99  km/h  time  ay g p50  p95  switches/s";
+    let heading = "vehicle and load             arrived       % rolled over   % (to)      LTR p50  p90  p99  km/h  time  ay g p50  p95  switches/s";
     let line = |class: &ClassReport| {
-        let name = if class.vehicle.is_empty() { class.load.clone() } else { format!("{} {}", class.vehicle, class.load) };
+        let name =
+            if class.vehicle.is_empty() { class.load.clone() } else { format!("{} {}", class.vehicle, class.load) };
         let time = class.time_over_feasible_mean.map_or("-".to_owned(), |time| format!("{time:.2}"));
         format!(
             "{name:<27} {:>4}/{:<5} {:>5.1} {:>7} {:>6.2} ({:>5.2}) {:>9.2} {:>4.2} {:>4.2} {:>5.1} {time:>5} {:>9.2} {:>4.2} {:>9.2}",
@@ -254,18 +269,29 @@ mod tests {
         let driving = one.driving.as_mut().unwrap();
         (driving.jerks[2], driving.jerks[10]) = (95, 5);
         let found = [0.5, 0.95, 0.96].map(|fraction| percentile(&[&one], |driving| &driving.jerks, fraction));
-        assert!(found.iter().zip([3.0, 3.0, 11.0]).all(|(found, expected)| (found - expected).abs() < 1e-9), "{found:?}");
+        assert!(
+            found.iter().zip([3.0, 3.0, 11.0]).all(|(found, expected)| (found - expected).abs() < 1e-9),
+            "{found:?}"
+        );
     }
 
     #[test]
     fn classes_are_reported_where_a_benchmark_has_speeds_or_vehicles_alone() {
         let mut scenario = Scenario::named("attard2023").unwrap();
         let world = World::bake(&scenario).unwrap();
-        let episodes = [episode(Ended::Arrived), episode(Ended::RolledOver), episode(Ended::TrailerCollided), episode(Ended::Arrived)];
+        let episodes = [
+            episode(Ended::Arrived),
+            episode(Ended::RolledOver),
+            episode(Ended::TrailerCollided),
+            episode(Ended::Arrived),
+        ];
         assert_eq!(classes(&scenario, &world, &episodes, None), []);
         scenario.speeds.push(5.0);
         let found = classes(&scenario, &world, &episodes, None);
-        assert_eq!((found.len(), found[0].arrived, found[0].rolled_over, found[0].rolled_over_fraction), (1, 2, 1, 0.25));
+        assert_eq!(
+            (found.len(), found[0].arrived, found[0].rolled_over, found[0].rolled_over_fraction),
+            (1, 2, 1, 0.25)
+        );
         assert_eq!((found[0].load_transfer_ratio_p50, found[0].load.as_str()), (1.5, "empty"));
         // 999 steps on a route that takes some 16 s at 30 km/h.
         assert!((4.0..9.0).contains(&found[0].time_over_feasible_mean.unwrap()), "{found:?}");

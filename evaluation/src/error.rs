@@ -108,7 +108,10 @@ impl Error {
     /// Whether the input was wrong: a file, a setting or a batch asked for. Otherwise something failed on valid input:
     /// a device, a disk, the learner, or a certificate.
     pub fn is_wrong_input(&self) -> bool {
-        let failed = matches!(self, Error::Write { .. } | Error::Threads(_) | Error::Diverged { .. } | Error::NotVerified { .. });
+        let failed = matches!(
+            self,
+            Error::Write { .. } | Error::Threads(_) | Error::Diverged { .. } | Error::NotVerified { .. }
+        );
         !failed && !device::has_failed(self)
     }
 

@@ -63,7 +63,11 @@ pub struct Driven {
 
 impl Evaluation<'_> {
     /// The policy's report and, if recorded, the episodes that a page shows. `progress` is as in [`Evaluation::drive`].
-    pub fn report(&self, policy: &mut dyn Controller, progress: &mut dyn FnMut(usize, usize)) -> Result<(Report, Vec<Track>), Error> {
+    pub fn report(
+        &self,
+        policy: &mut dyn Controller,
+        progress: &mut dyn FnMut(usize, usize),
+    ) -> Result<(Report, Vec<Track>), Error> {
         let driven = self.drive(policy, progress)?;
         Ok((self.summarised(policy.name(), &driven.episodes, None), driven.tracks))
     }
@@ -76,7 +80,8 @@ impl Evaluation<'_> {
     pub fn drive(&self, policy: &mut dyn Controller, progress: &mut dyn FnMut(usize, usize)) -> Result<Driven, Error> {
         let mut simulator = self.simulator()?;
         let (world, n_episodes) = (self.world, simulator.n_envs());
-        let lanes: Vec<LaneWidths> = self.routes().iter().map(|(_, place, route)| LaneWidths::of(self.scenario, place, route)).collect();
+        let lanes: Vec<LaneWidths> =
+            self.routes().iter().map(|(_, place, route)| LaneWidths::of(self.scenario, place, route)).collect();
         let mut running: Vec<Running> = {
             let batch = simulator.batch();
             let has_classes = driving::has_classes(self.scenario);
@@ -97,7 +102,9 @@ impl Evaluation<'_> {
             simulator.step(&actions)?;
             let batch = simulator.batch();
             for (env, (running, finished)) in running.iter_mut().zip(&mut finished).enumerate() {
-                if finished.is_none() && running.follow(world.rig(&batch.truck[env]), &lanes[env / self.episodes], batch, env) {
+                if finished.is_none()
+                    && running.follow(world.rig(&batch.truck[env]), &lanes[env / self.episodes], batch, env)
+                {
                     *finished = Some(running.finish(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running)));
                     n_finished += 1;
                 }
@@ -120,7 +127,11 @@ impl Evaluation<'_> {
         let routes = scenario.split(split);
         if routes.is_empty() {
             let value = split.name().to_owned();
-            return Err(Error::Setting { name: "split", value, expected: format!("the benchmark {} has no such routes", scenario.name) });
+            return Err(Error::Setting {
+                name: "split",
+                value,
+                expected: format!("the benchmark {} has no such routes", scenario.name),
+            });
         }
         let trucks: Vec<u32> = routes.iter().flat_map(|&route| std::iter::repeat_n(route, episodes)).collect();
         Ok(Simulator::on(device.engine.clone(), world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?)
@@ -134,7 +145,8 @@ impl Evaluation<'_> {
         }
         let (routes, starts): (Vec<u32>, Vec<Start>) = indices.iter().map(|&index| self.start(index)).unzip();
         let engine = self.device.engine.clone();
-        let mut simulator = Simulator::on(engine, self.world.clone(), indices.len(), self.seed, RouteChoice::Fixed(routes))?;
+        let mut simulator =
+            Simulator::on(engine, self.world.clone(), indices.len(), self.seed, RouteChoice::Fixed(routes))?;
         simulator.reset_from(&starts)?;
         let mut recorder = Recorder::new(self.world, simulator.batch(), 0..indices.len());
         for step in 0.. {
@@ -146,7 +158,8 @@ impl Evaluation<'_> {
         }
         simulator.wait()?;
         let routes = self.routes();
-        let seen = |(track, &env): (Track, &usize)| Track { env, ..track.seen(&routes[env / self.episodes].1.roundabout) };
+        let seen =
+            |(track, &env): (Track, &usize)| Track { env, ..track.seen(&routes[env / self.episodes].1.roundabout) };
         Ok(recorder.finish().into_iter().zip(indices).map(seen).collect())
     }
 
@@ -158,13 +171,20 @@ impl Evaluation<'_> {
         let own_lane = self.own_lane_suffices(&routes);
         let chunks = || own_lane.iter().zip(finished.chunks(episodes));
         let of_routes = |suffices: bool| {
-            let kept: Vec<&Episode> = chunks().filter(|&(&own, _)| own == suffices).flat_map(|(_, chunk)| chunk).collect();
+            let kept: Vec<&Episode> =
+                chunks().filter(|&(&own, _)| own == suffices).flat_map(|(_, chunk)| chunk).collect();
             Summary::of(kept.into_iter(), scenario.step)
         };
-        let route_reports = routes.iter().zip(chunks()).filter_map(|(&(_, place, route), (&own_lane_suffices, chunk))| {
-            let summary = Summary::of(chunk.iter(), scenario.step)?;
-            Some(RouteReport { name: route.name.clone(), own_lane_suffices, island_radius: place.roundabout.island_radius(), summary })
-        });
+        let route_reports =
+            routes.iter().zip(chunks()).filter_map(|(&(_, place, route), (&own_lane_suffices, chunk))| {
+                let summary = Summary::of(chunk.iter(), scenario.step)?;
+                Some(RouteReport {
+                    name: route.name.clone(),
+                    own_lane_suffices,
+                    island_radius: place.roundabout.island_radius(),
+                    summary,
+                })
+            });
         let (possible, is_possible) = searched.unzip();
         let is_possible = is_possible.as_deref();
         Report {
@@ -173,7 +193,8 @@ impl Evaluation<'_> {
             policy: policy.to_owned(),
             seed,
             engine: device.name.clone(),
-            summary: Summary::of(finished.iter(), scenario.step).expect("a split has a route and a route an episode: both were checked"),
+            summary: Summary::of(finished.iter(), scenario.step)
+                .expect("a split has a route and a route an episode: both were checked"),
             own_lane_suffices: of_routes(true),
             needs_deviation: of_routes(false),
             certified: None,
@@ -188,13 +209,17 @@ impl Evaluation<'_> {
     /// The routes of the split, in its order.
     pub(crate) fn routes(&self) -> Vec<Evaluated<'_>> {
         let Evaluation { scenario, split, .. } = *self;
-        let all: Vec<Evaluated> = scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
+        let all: Vec<Evaluated> =
+            scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
         scenario.split(split).iter().map(|&route| all[route as usize]).collect()
     }
 
     /// The route of an episode as an index of the world, and its start.
     pub(crate) fn start(&self, episode: usize) -> (u32, Start) {
-        (self.scenario.split(self.split)[episode / self.episodes], drawn_start(self.world.params.n_vehicles, self.seed, episode as u32, 0))
+        (
+            self.scenario.split(self.split)[episode / self.episodes],
+            drawn_start(self.world.params.n_vehicles, self.seed, episode as u32, 0),
+        )
     }
 
     /// Whether the own lane suffices on each route: for the truck that needs most room, and within the lock of the one

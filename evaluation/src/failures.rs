@@ -68,7 +68,8 @@ impl Evaluation<'_> {
             members.entry(cause).or_default().push(index);
         }
         let of = |(cause, members): (String, Vec<usize>)| {
-            let completed = possible.map(|possible| members.iter().copied().filter(|&index| possible[index]).collect::<Vec<_>>());
+            let completed =
+                possible.map(|possible| members.iter().copied().filter(|&index| possible[index]).collect::<Vec<_>>());
             let shown = completed.as_ref().filter(|completed| !completed.is_empty()).unwrap_or(&members);
             let example = self.example(&routes, finished, shown[shown.len() / 2]);
             let (episodes, share) = (members.len(), members.len() as f64 / failed.len() as f64);
@@ -104,7 +105,9 @@ impl Evaluation<'_> {
         }
         let (unit, body, position, heading) = match episode.ended {
             Ended::TractorCollided => ("tractor", &rig.tractor_body, truck.position, truck.heading),
-            Ended::TrailerCollided => ("trailer", &rig.trailer_body, truck.trailer_position(rig), truck.trailer_heading),
+            Ended::TrailerCollided => {
+                ("trailer", &rig.trailer_body, truck.trailer_position(rig), truck.trailer_heading)
+            }
             other => return other.name().replace('_', " "),
         };
         let field = self.world.route_field(truck.route);
@@ -121,7 +124,9 @@ impl Evaluation<'_> {
         let station = route.centre_line.station(p);
         match place.roundabout.nearest_kerb(p) {
             Kerb::Island => "island".to_owned(),
-            Kerb::Outer => format!("outer kerb of the {}", Part::at(self.scenario, route, station).name(&place.roundabout)),
+            Kerb::Outer => {
+                format!("outer kerb of the {}", Part::at(self.scenario, route, station).name(&place.roundabout))
+            }
             Kerb::Splitter(arm) => {
                 // A U-turn leaves by the arm that it enters by.
                 let first_half = station < 0.5 * route.centre_line.length();
@@ -143,12 +148,12 @@ fn points(body: &Body) -> impl Iterator<Item = Vec2> {
     let n = |length: f32| (length / SPACING).ceil() as usize;
     let (n_along, n_across) = (n(along.1 - along.0), n(2.0 * body.half_width));
     let half_width = body.half_width;
-    let lines = [-half_width, 0.0, half_width]
-        .into_iter()
-        .flat_map(move |y| (0..=n_along).map(move |index| Vec2::new(along.0 + (along.1 - along.0) * index as f32 / n_along as f32, y)));
-    let ends = [along.0, along.1]
-        .into_iter()
-        .flat_map(move |x| (0..=n_across).map(move |index| Vec2::new(x, half_width * (2.0 * index as f32 / n_across as f32 - 1.0))));
+    let lines = [-half_width, 0.0, half_width].into_iter().flat_map(move |y| {
+        (0..=n_along).map(move |index| Vec2::new(along.0 + (along.1 - along.0) * index as f32 / n_along as f32, y))
+    });
+    let ends = [along.0, along.1].into_iter().flat_map(move |x| {
+        (0..=n_across).map(move |index| Vec2::new(x, half_width * (2.0 * index as f32 / n_across as f32 - 1.0)))
+    });
     lines.chain(ends)
 }
 
@@ -171,7 +176,15 @@ mod tests {
         scenario.retain(|_, route| route.name.starts_with("40m/"));
         let world = Arc::new(World::bake(&scenario).unwrap());
         let device = Device::processor();
-        work(&Evaluation { scenario: &scenario, world: &world, split: Split::Test, episodes: 2, seed: 0, record: false, device: &device })
+        work(&Evaluation {
+            scenario: &scenario,
+            world: &world,
+            split: Split::Test,
+            episodes: 2,
+            seed: 0,
+            record: false,
+            device: &device,
+        })
     }
 
     /// An episode of the route at `index` that ended this way with both units at a pose.
@@ -199,10 +212,15 @@ mod tests {
             let ring = 0.5 * line.length();
             // To the right across the other lane until the wheels are on the kerb; to the left onto the island.
             assert_eq!(cause(Ended::TractorCollided, 20.0, -2.0 - lane), "tractor on the outer kerb of the entry");
-            assert_eq!(cause(Ended::TractorCollided, line.length() - 10.0, -2.0 - lane), "tractor on the outer kerb of the exit");
+            assert_eq!(
+                cause(Ended::TractorCollided, line.length() - 10.0, -2.0 - lane),
+                "tractor on the outer kerb of the exit"
+            );
             assert_eq!(cause(Ended::TractorCollided, ring, 2.0), "tractor on the island");
             assert_eq!(cause(Ended::TrailerCollided, ring, 2.0), "trailer on the island");
-            for (other, words) in [(Ended::Strayed, "strayed"), (Ended::TimedOut, "timed out"), (Ended::RolledOver, "rolled over")] {
+            for (other, words) in
+                [(Ended::Strayed, "strayed"), (Ended::TimedOut, "timed out"), (Ended::RolledOver, "rolled over")]
+            {
                 assert_eq!(cause(other, ring, 0.0), words);
             }
         });
@@ -218,7 +236,10 @@ mod tests {
                 let line = &route.2.centre_line;
                 for station in (0..line.length() as usize).map(|station| station as f64) {
                     let p = line.point_at(station) + 4.5 * DVec2::from_angle(line.heading_at(station)).perp();
-                    found.insert((evaluation.kerb(route, p), Part::at(evaluation.scenario, route.2, station).name(&route.1.roundabout)));
+                    found.insert((
+                        evaluation.kerb(route, p),
+                        Part::at(evaluation.scenario, route.2, station).name(&route.1.roundabout),
+                    ));
                 }
             }
             for expected in [("splitter of the entry", "entry"), ("splitter of the exit", "exit")] {
@@ -232,11 +253,21 @@ mod tests {
         let scenario = Scenario::named("maps2026-crossing").unwrap();
         let (world, device) = (Arc::new(World::bake(&scenario).unwrap()), Device::processor());
         let split = Split::Test;
-        let evaluation = Evaluation { scenario: &scenario, world: &world, split, episodes: 1, seed: 0, record: false, device: &device };
+        let evaluation = Evaluation {
+            scenario: &scenario,
+            world: &world,
+            split,
+            episodes: 1,
+            seed: 0,
+            record: false,
+            device: &device,
+        };
         let mut found = std::collections::BTreeSet::new();
         for route in &evaluation.routes() {
             let line = &route.2.centre_line;
-            found.extend((0..line.length() as usize).map(|station| evaluation.kerb(route, line.point_at(station as f64))));
+            found.extend(
+                (0..line.length() as usize).map(|station| evaluation.kerb(route, line.point_at(station as f64))),
+            );
         }
         assert!(found.contains("outer kerb of the junction") && found.contains("outer kerb of the entry"), "{found:?}");
         assert!(!found.iter().any(|kerb| kerb.contains("ring")), "{found:?}");
@@ -257,7 +288,8 @@ mod tests {
             let mut possible = vec![true; n];
             (possible[2], possible[5]) = (false, false);
             let causes = evaluation.failures(&finished, Some(&possible));
-            let told: Vec<_> = causes.iter().map(|cause| (cause.cause.as_str(), cause.episodes, cause.possible.unwrap())).collect();
+            let told: Vec<_> =
+                causes.iter().map(|cause| (cause.cause.as_str(), cause.episodes, cause.possible.unwrap())).collect();
             assert_eq!(told, [("timed out", 3, 1), ("lost at start", 1, 1), ("strayed", 1, 1)]);
             assert_eq!(causes.iter().map(|cause| cause.share).sum::<f64>(), 1.0);
             let example = &causes[0].example;

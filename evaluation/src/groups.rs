@@ -11,7 +11,8 @@ use super::report::{Episode, Summary};
 /// Island radii from which on a route is in the next band (m).
 const BANDS: [f64; 4] = [9.0, 12.0, 16.0, 22.0];
 /// Their names, and behind them that of the routes of a crossing, which has no island.
-const BAND_NAMES: [&str; BANDS.len() + 2] = ["below 9 m", "9 to 12 m", "12 to 16 m", "16 to 22 m", "22 m and more", "none"];
+const BAND_NAMES: [&str; BANDS.len() + 2] =
+    ["below 9 m", "9 to 12 m", "12 to 16 m", "16 to 22 m", "22 m and more", "none"];
 
 /// A route that is evaluated: the index of its place in the benchmark, the place, the route.
 pub type Evaluated<'a> = (usize, &'a Place, &'a Route);
@@ -105,7 +106,8 @@ mod tests {
         let routes: Vec<_> = scenario.split(Split::Test).iter().map(|&route| all[route as usize]).collect();
         // Two episodes a route; the second fails on right lanes.
         let ends = |right| [Ended::Arrived, if right { Ended::TrailerCollided } else { Ended::Arrived }];
-        let finished: Vec<Episode> = routes.iter().flat_map(|(_, _, route)| ends(route.lane.name() == "right")).map(episode).collect();
+        let finished: Vec<Episode> =
+            routes.iter().flat_map(|(_, _, route)| ends(route.lane.name() == "right")).map(episode).collect();
         let groups = Groups::of(&routes, &finished, scenario.step);
         for kind in [&groups.island_radius, &groups.lane, &groups.exit, &groups.roundabout] {
             assert_eq!(kind.iter().map(|group| group.routes).sum::<usize>(), routes.len());

@@ -67,7 +67,14 @@ impl Page<'_> {
             ground.route_reports = Some(rounded(evaluation["routes"].take()));
         }
         // A row of the page for each further evaluation; their routes are in the report's own file.
-        for also in self.run.get_mut("also").and_then(Value::as_array_mut).into_iter().flatten().filter_map(Value::as_object_mut) {
+        for also in self
+            .run
+            .get_mut("also")
+            .and_then(Value::as_array_mut)
+            .into_iter()
+            .flatten()
+            .filter_map(Value::as_object_mut)
+        {
             also.retain(|name, _| name != "routes" && name != "groups");
         }
         let ground = json!(ground).to_string();
@@ -75,12 +82,16 @@ impl Page<'_> {
             Some(run) => drop(run.insert("evaluation".to_owned(), evaluation)),
             None => self.run = json!({ "evaluation": evaluation }),
         }
-        let [ground, tracks] = [ground.into_bytes(), tracks::differences(self.tracks, &columns)].map(|bytes| tracks::packed(&bytes));
+        let [ground, tracks] =
+            [ground.into_bytes(), tracks::differences(self.tracks, &columns)].map(|bytes| tracks::packed(&bytes));
         let (ground, tracks) = (ground.map_err(Error::write(file))?, tracks.map_err(Error::write(file))?);
         let summary = &self.evaluation.summary;
         let (benchmark, split) = (&self.evaluation.benchmark, self.evaluation.split);
-        let title =
-            escaped(&format!("{:.1} % of {} episodes arrived, {benchmark} {split} routes", 100.0 * summary.success, summary.episodes));
+        let title = escaped(&format!(
+            "{:.1} % of {} episodes arrived, {benchmark} {split} routes",
+            100.0 * summary.success,
+            summary.episodes
+        ));
         let page = filled(&[
             ("title", &title),
             ("heading", &escaped(&format!("Evaluation on {benchmark}, {split} routes"))),
@@ -100,7 +111,9 @@ fn rounded(value: Value) -> Value {
     match value {
         Value::Array(values) => values.into_iter().map(rounded).collect(),
         Value::Object(values) => values.into_iter().map(|(name, value)| (name, rounded(value))).collect(),
-        Value::Number(number) if number.is_f64() => number.as_f64().map_or(Value::Null, |value| json!((1e4 * value).round() / 1e4)),
+        Value::Number(number) if number.is_f64() => {
+            number.as_f64().map_or(Value::Null, |value| json!((1e4 * value).round() / 1e4))
+        }
         other => other,
     }
 }
@@ -109,7 +122,9 @@ fn rounded(value: Value) -> Value {
 fn filled(values: &[(&str, &str)]) -> String {
     let mut page = String::new();
     let mut rest = TEMPLATE;
-    while let Some((before, (name, after))) = rest.split_once("{{").and_then(|(before, tail)| Some((before, tail.split_once("}}")?))) {
+    while let Some((before, (name, after))) =
+        rest.split_once("{{").and_then(|(before, tail)| Some((before, tail.split_once("}}")?)))
+    {
         page.push_str(before);
         page.push_str(values.iter().find(|&&(known, _)| known == name).map_or("", |&(_, value)| value));
         rest = after;

@@ -32,7 +32,13 @@ pub trait Controller {
 /// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its name. Its
 /// action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where there is none, the
 /// first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random actions.
-pub fn find(policy: Option<&str>, benchmark: &str, pursuit: PurePursuit, seed: u32, world: &World) -> Result<Box<dyn Controller>, Error> {
+pub fn find(
+    policy: Option<&str>,
+    benchmark: &str,
+    pursuit: PurePursuit,
+    seed: u32,
+    world: &World,
+) -> Result<Box<dyn Controller>, Error> {
     let learned = match policy {
         Some("pursuit") => return Ok(Box::new(pursuit)),
         Some("random") => return Ok(Box::new(UniformRandom { seed })),
@@ -88,7 +94,8 @@ impl Controller for UniformRandom {
     fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
         actions.clear();
         actions.extend(batch.truck.iter().enumerate().map(|(env, truck)| {
-            let [word, ..] = random::words(self.seed, env as u32, truck.episode, (Draw::Action as u32).wrapping_add(truck.steps));
+            let [word, ..] =
+                random::words(self.seed, env as u32, truck.episode, (Draw::Action as u32).wrapping_add(truck.steps));
             random::index_below(word, world.params.n_actions)
         }));
     }
@@ -117,12 +124,18 @@ impl Controller for PurePursuit {
 
     fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
         actions.clear();
-        actions.extend(batch.truck.iter().zip(&batch.progress).zip(&batch.control).map(|((truck, progress), control)| {
-            let (waypoints, next) = (line(&self.lines, world, truck.route), progress.waypoint as usize);
-            let steering = self.steering(world.rig(truck).wheelbase, truck, waypoints, next);
-            let speed = self.speed(world, truck, next);
-            nearest(world, steering, if world.params.changes_speed == 1 { speed - control.target_speed } else { speed })
-        }));
+        actions.extend(batch.truck.iter().zip(&batch.progress).zip(&batch.control).map(
+            |((truck, progress), control)| {
+                let (waypoints, next) = (line(&self.lines, world, truck.route), progress.waypoint as usize);
+                let steering = self.steering(world.rig(truck).wheelbase, truck, waypoints, next);
+                let speed = self.speed(world, truck, next);
+                nearest(
+                    world,
+                    steering,
+                    if world.params.changes_speed == 1 { speed - control.target_speed } else { speed },
+                )
+            },
+        ));
     }
 }
 

@@ -39,7 +39,8 @@ pub struct Possible {
 impl Possible {
     /// How it was found out, in words.
     pub(super) fn note(&self) -> String {
-        let passes: Vec<String> = self.passes.iter().map(|pass| format!("{} (held {})", pass.width, pass.hold)).collect();
+        let passes: Vec<String> =
+            self.passes.iter().map(|pass| format!("{} (held {})", pass.width, pass.hold)).collect();
         format!(
             "possible: the episodes that arrived and those whose own start a search completed, {} of the {} searched with {} candidates, \
              {} env steps.",
@@ -60,7 +61,12 @@ impl Evaluation<'_> {
     /// Searches the starts of the episodes that did not arrive; the episodes stand as [`Evaluation::drive`] gives them.
     /// Every sequence found is driven again. `done` is called after each search, from any thread. Given beside the
     /// figures is whether each episode's start is shown to be possible.
-    pub fn possible(&self, finished: &[Episode], passes: &[Pass], done: &(dyn Fn() + Sync)) -> Result<(Possible, Vec<bool>), Error> {
+    pub fn possible(
+        &self,
+        finished: &[Episode],
+        passes: &[Pass],
+        done: &(dyn Fn() + Sync),
+    ) -> Result<(Possible, Vec<bool>), Error> {
         let searched: Vec<usize> = to_search(finished).collect();
         let starts: Vec<_> = searched.iter().map(|&index| self.start(index)).collect();
         let searches = attempts(self.world, &starts, passes, done)?;
@@ -77,7 +83,8 @@ impl Evaluation<'_> {
         let routes = self.routes();
         let chunks = finished.chunks(self.episodes).zip(is_possible.chunks(self.episodes));
         let kept = |(episode, &possible)| if possible { Some(episode) } else { None };
-        let possible: Vec<Vec<&Episode>> = chunks.map(|(chunk, possible)| chunk.iter().zip(possible).filter_map(kept).collect()).collect();
+        let possible: Vec<Vec<&Episode>> =
+            chunks.map(|(chunk, possible)| chunk.iter().zip(possible).filter_map(kept).collect()).collect();
         let step = self.scenario.step;
         let figures = Possible {
             summary: Summary::of(possible.iter().flatten().copied(), step),
@@ -111,8 +118,15 @@ mod tests {
         scenario.start_offset = start_offset;
         let world = Arc::new(World::bake(&scenario).unwrap());
         let device = Device::processor();
-        let evaluation =
-            Evaluation { scenario: &scenario, world: &world, split: Split::Test, episodes: 6, seed: 3, record: false, device: &device };
+        let evaluation = Evaluation {
+            scenario: &scenario,
+            world: &world,
+            split: Split::Test,
+            episodes: 6,
+            seed: 3,
+            record: false,
+            device: &device,
+        };
         let Driven { episodes, .. } = evaluation.drive(policy, &mut |_, _| {}).unwrap();
         let (possible, _) = evaluation.possible(&episodes, &[pass], &|| {}).unwrap();
         (episodes, possible)
@@ -125,7 +139,10 @@ mod tests {
         assert_eq!((possible.searched, possible.found), (6, 6));
         let summary = possible.summary.unwrap();
         assert_eq!((summary.episodes, summary.arrived), (6, 0));
-        assert_eq!(possible.lane.iter().map(|group| (group.name.as_str(), group.summary.episodes)).collect::<Vec<_>>(), [("right", 6)]);
+        assert_eq!(
+            possible.lane.iter().map(|group| (group.name.as_str(), group.summary.episodes)).collect::<Vec<_>>(),
+            [("right", 6)]
+        );
     }
 
     #[test]

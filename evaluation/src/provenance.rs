@@ -10,7 +10,8 @@ static COMMIT: OnceLock<&'static str> = OnceLock::new();
 /// The processor's name and number of cores.
 pub fn machine() -> String {
     let name = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
-        text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|(_, name)| name.trim().to_owned()))
+        text.lines()
+            .find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|(_, name)| name.trim().to_owned()))
     });
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     described(&name.unwrap_or_else(|| std::env::consts::ARCH.to_owned()), cores)

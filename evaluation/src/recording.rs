@@ -205,7 +205,10 @@ impl Map {
     /// the curves.
     pub fn of(roundabout: &Road, gutter: Gutter) -> Map {
         let roundabout = roundabout.seen();
-        Map { drivable: polygons::drivable(&roundabout.kerbs(gutter)), lanes: roundabout.lanes().iter().map(polygons::line).collect() }
+        Map {
+            drivable: polygons::drivable(&roundabout.kerbs(gutter)),
+            lanes: roundabout.lanes().iter().map(polygons::line).collect(),
+        }
     }
 }
 

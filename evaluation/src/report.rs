@@ -108,7 +108,9 @@ impl Summary {
         let most = |value: fn(&Episode) -> f64| episodes.clone().map(value).fold(f64::NEG_INFINITY, f64::max);
         let least = |value: fn(&Episode) -> f64| episodes.clone().map(value).fold(f64::INFINITY, f64::min);
         let mean = |value: fn(&Episode) -> f64| episodes.clone().map(value).sum::<f64>() / count as f64;
-        let mean_arrived = |value: fn(&Episode) -> f64| (0 < n_arrived).then(|| arrived.clone().map(value).sum::<f64>() / n_arrived as f64);
+        let mean_arrived = |value: fn(&Episode) -> f64| {
+            (0 < n_arrived).then(|| arrived.clone().map(value).sum::<f64>() / n_arrived as f64)
+        };
         let mut ends: BTreeMap<&'static str, usize> =
             Ended::ALL.into_iter().filter(|&ended| ended != Ended::Running).map(|ended| (ended.name(), 0)).collect();
         for episode in episodes.clone() {
@@ -209,7 +211,8 @@ impl Report {
 
     /// Routes with an episode that failed, those with the least success first.
     pub fn failing_routes(&self) -> Vec<&RouteReport> {
-        let mut failing: Vec<&RouteReport> = self.routes.iter().filter(|route| route.summary.arrived < route.summary.episodes).collect();
+        let mut failing: Vec<&RouteReport> =
+            self.routes.iter().filter(|route| route.summary.arrived < route.summary.episodes).collect();
         failing.sort_by(|a, b| a.summary.success.total_cmp(&b.summary.success));
         failing
     }

@@ -100,11 +100,18 @@ impl Seeds {
             finished.iter().map(|report| report.evaluation.iter().chain(&report.also).collect()).collect();
         let n = evaluations.iter().map(Vec::len).min().unwrap_or(0);
         let of = |index: usize| {
-            let each: Vec<(u32, &Evaluated)> =
-                finished.iter().zip(&evaluations).map(|(report, evaluations)| (report.seed, evaluations[index])).collect();
+            let each: Vec<(u32, &Evaluated)> = finished
+                .iter()
+                .zip(&evaluations)
+                .map(|(report, evaluations)| (report.seed, evaluations[index]))
+                .collect();
             SeedsEvaluation::of(&each)
         };
-        Seeds { seeds: seeds.to_vec(), runs: finished.iter().map(run).collect(), evaluations: (0..n).filter_map(of).collect() }
+        Seeds {
+            seeds: seeds.to_vec(),
+            runs: finished.iter().map(run).collect(),
+            evaluations: (0..n).filter_map(of).collect(),
+        }
     }
 
     /// A Markdown table: a row for each seed, then mean, worst and interval.
@@ -161,12 +168,20 @@ impl SeedsEvaluation {
         let lane = |mean: Option<f64>| mean.map(|mean| format!(", {mean:.2} m")).unwrap_or_default();
         let mut cells = vec![format!("{} {}, {familiarity}", self.benchmark, self.split)];
         cells.extend(self.seeds.iter().map(|seed| {
-            format!("{:.1} % ({}/{}){}", 100.0 * seed.success, seed.arrived, seed.episodes, lane(seed.lane_distance_mean_arrived))
+            format!(
+                "{:.1} % ({}/{}){}",
+                100.0 * seed.success,
+                seed.arrived,
+                seed.episodes,
+                lane(seed.lane_distance_mean_arrived)
+            )
         }));
         cells.push(format!("{:.1} %{}", 100.0 * self.success_mean, lane(self.lane_distance_mean_arrived)));
         cells.push(format!("{:.1} %, seed {}", 100.0 * self.success_worst, self.worst_seed));
         let ends = self.success_mean_low.zip(self.success_mean_high);
-        cells.push(ends.map_or_else(|| "-".to_owned(), |(low, high)| format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high)));
+        cells.push(
+            ends.map_or_else(|| "-".to_owned(), |(low, high)| format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high)),
+        );
         cells
     }
 }
@@ -191,8 +206,8 @@ fn interval(values: &[f64]) -> Option<(f64, f64)> {
 /// formula 26.7.5 of M. Abramowitz and I. Stegun, "Handbook of Mathematical Functions" (1964).
 fn student_t(freedom: usize) -> f64 {
     const TABLE: [f64; 20] = [
-        12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131, 2.120, 2.110, 2.101,
-        2.093, 2.086,
+        12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131,
+        2.120, 2.110, 2.101, 2.093, 2.086,
     ];
     const Z: f64 = 1.959_964;
     let n = freedom as f64;
@@ -208,7 +223,8 @@ fn student_t(freedom: usize) -> f64 {
 /// Rows of equally many cells as a Markdown table with aligned columns; the first row is its head.
 fn markdown(rows: &[Vec<String>]) -> String {
     let n_columns = rows.first().map_or(0, Vec::len);
-    let widths: Vec<usize> = (0..n_columns).map(|column| rows.iter().map(|row| row[column].len()).max().unwrap_or(0)).collect();
+    let widths: Vec<usize> =
+        (0..n_columns).map(|column| rows.iter().map(|row| row[column].len()).max().unwrap_or(0)).collect();
     let mut text = String::new();
     for (index, row) in rows.iter().enumerate() {
         for (cell, width) in row.iter().zip(&widths) {
@@ -242,7 +258,10 @@ mod tests {
         // Fractions of ten seeds: 92.2 %, 87.0 to 97.4 %.
         let arrived = [642, 605, 681, 688, 662, 661, 619, 591, 531, 684].map(|arrived| f64::from(arrived) / 690.0);
         let (low, high) = interval(&arrived).unwrap();
-        assert!((mean(&arrived) - 0.9223).abs() < 5e-5 && (low - 0.870).abs() < 5e-4 && (high - 0.974).abs() < 5e-4, "{low} {high}");
+        assert!(
+            (mean(&arrived) - 0.9223).abs() < 5e-5 && (low - 0.870).abs() < 5e-4 && (high - 0.974).abs() < 5e-4,
+            "{low} {high}"
+        );
         assert_eq!(interval(&[0.5]), None);
         let (low, high) = interval(&[1.0, 0.9]).unwrap();
         // 0.95 - 12.706 * 0.05.
@@ -272,6 +291,9 @@ mod tests {
         assert_eq!(seeds.table(), expected);
         let json = serde_json::to_value(&seeds).unwrap();
         assert_eq!(json["seeds"], serde_json::json!([3, 4, 5]));
-        assert_eq!((&json["evaluations"][0]["worst_seed"], &json["evaluations"][1]["trained_on"]), (&4.into(), &3.into()));
+        assert_eq!(
+            (&json["evaluations"][0]["worst_seed"], &json["evaluations"][1]["trained_on"]),
+            (&4.into(), &3.into())
+        );
     }
 }

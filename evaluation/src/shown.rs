@@ -18,7 +18,8 @@ pub fn shown(episodes: &[Episode]) -> Vec<usize> {
     if episodes.len() <= MOST_EPISODES {
         return (0..episodes.len()).collect();
     }
-    let (arrived, failed): (Vec<usize>, Vec<usize>) = (0..episodes.len()).partition(|&index| episodes[index].ended == Ended::Arrived);
+    let (arrived, failed): (Vec<usize>, Vec<usize>) =
+        (0..episodes.len()).partition(|&index| episodes[index].ended == Ended::Arrived);
     let mut shown = drawn(&failed, MOST_FAILED);
     shown.extend(drawn(&arrived, SAMPLE));
     shown.sort_unstable();

@@ -53,7 +53,11 @@ struct Line<'a> {
 
 const ALL: [Column; 13] = [
     Column { head: ["", "route"], rank: 0, text: |line| line.name.clone() },
-    Column { head: ["", "arrived"], rank: 0, text: |line| format!("{}/{}", line.summary.arrived, line.summary.episodes) },
+    Column {
+        head: ["", "arrived"],
+        rank: 0,
+        text: |line| format!("{}/{}", line.summary.arrived, line.summary.episodes),
+    },
     Column { head: ["success", "%"], rank: 0, text: |line| format!("{:.1}", 100.0 * line.summary.success) },
     Column {
         head: ["95 %", "interval"],
@@ -82,7 +86,11 @@ impl Report {
     /// success: a line a route, or where there are many a line for each group and the worst routes; then the sums, then
     /// what the columns mean.
     pub fn table(&self, width: usize) -> String {
-        let mut sections = if self.has_many_routes() { self.groups_and_worst() } else { vec![whole(self.routes.iter().map(of_route))] };
+        let mut sections = if self.has_many_routes() {
+            self.groups_and_worst()
+        } else {
+            vec![whole(self.routes.iter().map(of_route))]
+        };
         let sums = [
             ("lane own", lane(true), self.own_lane_suffices.as_ref()),
             ("lane wide", lane(false), self.needs_deviation.as_ref()),
@@ -90,8 +98,10 @@ impl Report {
             ("possible", "", self.possible.as_ref().and_then(|possible| possible.summary.as_ref())),
             ("all", "", Some(&self.summary)),
         ];
-        sections
-            .push(whole(sums.into_iter().filter_map(|(name, lane, summary)| Some(Line { name: name.into(), lane, summary: summary? }))));
+        sections.push(whole(
+            sums.into_iter()
+                .filter_map(|(name, lane, summary)| Some(Line { name: name.into(), lane, summary: summary? })),
+        ));
         let (columns, left_out) = fitting(width, &sections);
         let mut text = String::new();
         for row in 0..2 {
@@ -111,7 +121,11 @@ impl Report {
         if let Some(outside) = self.summary.outside_lane_mean {
             let own = self.own_lane_suffices.as_ref().and_then(|summary| summary.outside_lane_mean);
             let own = own.map(|own| format!(", where the own lane suffices {:.1} %", 100.0 * own)).unwrap_or_default();
-            push_wrapped(&mut text, &format!("Outside its own lane for {:.1} % of an episode that arrived{own}.", 100.0 * outside), width);
+            push_wrapped(
+                &mut text,
+                &format!("Outside its own lane for {:.1} % of an episode that arrived{own}.", 100.0 * outside),
+                width,
+            );
         }
         for line in driving::lines(&self.classes) {
             let _ = writeln!(text, "{line}");
@@ -121,7 +135,8 @@ impl Report {
             push_wrapped(&mut text, &possible.note(), width);
         }
         if !left_out.is_empty() {
-            let names: Vec<String> = left_out.iter().map(|column| column.head.join(" ").trim().replace("- ", "-")).collect();
+            let names: Vec<String> =
+                left_out.iter().map(|column| column.head.join(" ").trim().replace("- ", "-")).collect();
             push_wrapped(
                 &mut text,
                 &format!("Left out for want of width: {}. A wider terminal and --json have them.", names.join(", ")),
@@ -134,13 +149,18 @@ impl Report {
     /// The commonest causes of failures, and how many more there are.
     fn push_causes(&self, text: &mut String, width: usize) {
         let cause = |cause: &Cause| {
-            let possible = cause.possible.map(|possible| format!(" ({possible} from a possible start)")).unwrap_or_default();
+            let possible =
+                cause.possible.map(|possible| format!(" ({possible} from a possible start)")).unwrap_or_default();
             format!("{} {}{possible}", cause.episodes, cause.cause)
         };
         let mut words: Vec<String> = self.failures.iter().take(CAUSES).map(cause).collect();
         if CAUSES < self.failures.len() {
             let rest = &self.failures[CAUSES..];
-            words.push(format!("{} for {} other causes", rest.iter().map(|cause| cause.episodes).sum::<usize>(), rest.len()));
+            words.push(format!(
+                "{} for {} other causes",
+                rest.iter().map(|cause| cause.episodes).sum::<usize>(),
+                rest.len()
+            ));
         }
         if !words.is_empty() {
             push_wrapped(text, &format!("Not arrived, by cause: {}.", words.join(", ")), width);
@@ -209,7 +229,8 @@ fn fitting(width: usize, sections: &[Section]) -> (Vec<(&'static Column, usize)>
     let mut left_out = Vec::new();
     let total = |columns: &[(&Column, usize)]| columns.iter().map(|(_, width)| width + GAP).sum::<usize>() - GAP;
     while width < total(&columns) {
-        let last = (0..columns.len()).max_by_key(|&index| columns[index].0.rank).filter(|&index| 0 < columns[index].0.rank);
+        let last =
+            (0..columns.len()).max_by_key(|&index| columns[index].0.rank).filter(|&index| 0 < columns[index].0.rank);
         let Some(last) = last else { break };
         left_out.insert(0, columns.remove(last).0);
     }

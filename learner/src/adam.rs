@@ -48,7 +48,14 @@ impl Adam {
     ///
     /// Both are given up and returned so that no copy has to be made; a parameter that is also held elsewhere is
     /// copied.
-    pub fn step<M: Module>(&mut self, network: M, follower: M, gradients: Vec<GradientsParams>, learning_rate: f64, tau: f64) -> (M, M) {
+    pub fn step<M: Module>(
+        &mut self,
+        network: M,
+        follower: M,
+        gradients: Vec<GradientsParams>,
+        learning_rate: f64,
+        tau: f64,
+    ) -> (M, M) {
         match self {
             Adam::Fused(fused) => fused.step(network, follower, gradients, learning_rate, tau),
             Adam::Tensors(tensors) => tensors.step(network, follower, gradients, learning_rate, tau),
@@ -84,6 +91,10 @@ impl Step {
     /// up for it.
     fn new(n_steps: i32, learning_rate: f64, tau: f64) -> Step {
         let [first, second] = DECAY.map(|decay| 1.0 - f64::from(decay).powi(n_steps));
-        Step { learning_rate: (learning_rate * second.sqrt() / first) as f32, epsilon: (EPSILON * second.sqrt()) as f32, tau: tau as f32 }
+        Step {
+            learning_rate: (learning_rate * second.sqrt() / first) as f32,
+            epsilon: (EPSILON * second.sqrt()) as f32,
+            tau: tau as f32,
+        }
     }
 }

@@ -115,7 +115,9 @@ impl Backend {
             #[cfg(feature = "gpu")]
             Backend::Device(shared) => device::caught(work, || shared.check().err()).map_err(|error| match error {
                 // What the driver reported says more than the panic that followed.
-                Error::Device(message) => Error::Device(shared.check().err().map_or(message, |error| error.to_string())),
+                Error::Device(message) => {
+                    Error::Device(shared.check().err().map_or(message, |error| error.to_string()))
+                }
                 error => error,
             }),
         }

@@ -141,7 +141,9 @@ impl Stored {
 
     /// The error is a message without the file's name.
     fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<Stored, String> {
-        let damaged = |what: String| format!("is no checkpoint, or a damaged one: {what}; put a copy of it back or begin a new run");
+        let damaged = |what: String| {
+            format!("is no checkpoint, or a damaged one: {what}; put a copy of it back or begin a new run")
+        };
         let (n, header) = SafeTensors::read_metadata(&bytes).map_err(|error| damaged(error.to_string()))?;
         let entry = header.metadata().as_ref().and_then(|metadata| metadata.get(KEY));
         let entry = entry.ok_or_else(|| damaged(format!("its metadata has no entry `{KEY}`")))?;
@@ -186,7 +188,9 @@ impl Stored {
         let mut numbers = vec![T::zeroed(); bytes.len() / size_of::<T>()];
         cast_slice_mut(&mut numbers).copy_from_slice(bytes);
         match numbers.iter().position(|number| !number.is_finite()) {
-            Some(index) => Err(self.error(format!("its column `{name}` has {} at {index}: put a sound copy back", numbers[index]))),
+            Some(index) => {
+                Err(self.error(format!("its column `{name}` has {} at {index}: put a sound copy back", numbers[index])))
+            }
             None => Ok(numbers),
         }
     }
@@ -274,7 +278,10 @@ mod tests {
             (stored.column::<u64>("word").unwrap_err(), "has no column `word`"),
             (stored.exactly::<u64>("words", 3).unwrap_err(), "`words` has 2 numbers where this run needs 3"),
         ] {
-            assert!(error.to_string().starts_with("checkpoint.safetensors: ") && error.to_string().contains(expected), "{error}");
+            assert!(
+                error.to_string().starts_with("checkpoint.safetensors: ") && error.to_string().contains(expected),
+                "{error}"
+            );
         }
     }
 

@@ -23,8 +23,11 @@ pub fn moments(parameters: &Named, state: State) -> Named {
 
 /// A network of the sizes of `like`.
 pub fn network(stored: &Stored, name: &str, like: &Mlp, device: &Device) -> Result<Mlp, Error> {
-    let parameters: Result<_, Error> =
-        like.parameters().iter().map(|(part, values)| stored.exactly(&format!("{name}, {part}"), values.len())).collect();
+    let parameters: Result<_, Error> = like
+        .parameters()
+        .iter()
+        .map(|(part, values)| stored.exactly(&format!("{name}, {part}"), values.len()))
+        .collect();
     Ok(like.with_parameters(parameters?, device))
 }
 

@@ -297,11 +297,21 @@ impl Config {
     pub fn origin(file: &Path, benchmark: Option<&str>, settings: &[String]) -> PathBuf {
         let flags = benchmark.map(|name| format!("--benchmark {name}")).into_iter();
         let flags: Vec<String> = flags.chain(settings.iter().map(|setting| format!("--set {setting}"))).collect();
-        if flags.is_empty() { file.to_owned() } else { PathBuf::from(format!("{} with {}", file.display(), flags.join(" "))) }
+        if flags.is_empty() {
+            file.to_owned()
+        } else {
+            PathBuf::from(format!("{} with {}", file.display(), flags.join(" ")))
+        }
     }
 
     /// Values from the command line replace the file's. `--minutes` or `--steps` replaces the whole budget.
-    pub fn override_with(&mut self, seed: Option<u32>, minutes: Option<f64>, steps: Option<u64>, envs: Option<usize>) -> Result<(), Error> {
+    pub fn override_with(
+        &mut self,
+        seed: Option<u32>,
+        minutes: Option<f64>,
+        steps: Option<u64>,
+        envs: Option<usize>,
+    ) -> Result<(), Error> {
         self.seed = seed.unwrap_or(self.seed);
         self.n_envs = envs.unwrap_or(self.n_envs);
         if minutes.is_some() || steps.is_some() {

@@ -20,7 +20,11 @@ impl Generator {
     /// The one whose state is a column of a checkpoint. From all zeros every number would be zero: that is an error.
     pub fn stored(stored: &Stored, column: &str) -> Result<Generator, Error> {
         let generator = Generator { state: stored.array(column)? };
-        if generator.state == [0; 4] { Err(stored.error(format!("its column `{column}` is all zeros"))) } else { Ok(generator) }
+        if generator.state == [0; 4] {
+            Err(stored.error(format!("its column `{column}` is all zeros")))
+        } else {
+            Ok(generator)
+        }
     }
 }
 

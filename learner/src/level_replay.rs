@@ -44,7 +44,14 @@ impl LevelReplay {
         for (index, &route) in routes.iter().enumerate() {
             indices[route as usize] = Some(index);
         }
-        let mut replay = LevelReplay { settings, failures: vec![UNKNOWN; routes.len()], routes, indices, list: Vec::new(), n_steps: 0 };
+        let mut replay = LevelReplay {
+            settings,
+            failures: vec![UNKNOWN; routes.len()],
+            routes,
+            indices,
+            list: Vec::new(),
+            n_steps: 0,
+        };
         replay.fill();
         replay
     }
@@ -83,7 +90,9 @@ impl LevelReplay {
         let mut reached = 0.0;
         for (&route, &failures) in self.routes.iter().zip(&self.failures) {
             reached += score(failures) / sum * n_replayed as f64;
-            while ((self.list.len() - self.routes.len()) as f64) + 0.5 < reached && self.list.len() - self.routes.len() < n_replayed {
+            while ((self.list.len() - self.routes.len()) as f64) + 0.5 < reached
+                && self.list.len() - self.routes.len() < n_replayed
+            {
                 self.list.push(route);
             }
         }
@@ -106,11 +115,14 @@ impl LevelReplay {
     pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
         let failures: Vec<f32> = stored.exactly(FAILURES, self.failures.len())?;
         if let Some(wrong) = failures.iter().find(|failures| !(0.0..=1.0).contains(*failures)) {
-            return Err(stored.error(format!("its column `{FAILURES}` has {wrong}: must lie in 0..1; put a sound copy back")));
+            return Err(
+                stored.error(format!("its column `{FAILURES}` has {wrong}: must lie in 0..1; put a sound copy back"))
+            );
         }
         let list: Vec<u32> = stored.exactly(LIST, self.list.len())?;
         if let Some(wrong) = list.iter().find(|&&route| self.indices.get(route as usize).copied().flatten().is_none()) {
-            return Err(stored.error(format!("its column `{LIST}` has {wrong}, which is no training route: put a sound copy back")));
+            return Err(stored
+                .error(format!("its column `{LIST}` has {wrong}, which is no training route: put a sound copy back")));
         }
         [self.n_steps] = stored.array("level replay, steps")?;
         (self.failures, self.list) = (failures, list);

@@ -26,7 +26,9 @@ struct Part {
 /// Transitions that the replay buffer ever holds: no more than there are steps.
 pub fn transitions(config: &Config) -> usize {
     let slots = config.replay_buffer.capacity.div_ceil(config.n_envs);
-    let stepped = config.steps.map_or(usize::MAX, |steps| usize::try_from(steps.div_ceil(config.n_envs as u64)).unwrap_or(usize::MAX));
+    let stepped = config
+        .steps
+        .map_or(usize::MAX, |steps| usize::try_from(steps.div_ceil(config.n_envs as u64)).unwrap_or(usize::MAX));
     // A refinement's last steps, and the one under way.
     slots.min(stepped.saturating_add(1)).saturating_mul(config.n_envs)
 }
@@ -40,12 +42,15 @@ pub fn check(config: &Config, n_values: usize, n_actions: usize) -> Result<(), E
 fn check_within(config: &Config, n_values: usize, n_actions: usize, available: u128) -> Result<(), Error> {
     let parts = parts(config, n_values as u128, n_actions as u128);
     let needed: u128 = parts.iter().map(|part| part.bytes).sum();
-    let Some(Part { key, value, bytes }) = parts.into_iter().max_by_key(|part| part.bytes).filter(|_| available < needed) else {
+    let Some(Part { key, value, bytes }) =
+        parts.into_iter().max_by_key(|part| part.bytes).filter(|_| available < needed)
+    else {
         return Ok(());
     };
     let [needed, bytes, available] = [needed, bytes, available].map(gigabytes);
-    let expected =
-        format!("the run would take about {needed} of memory, {bytes} of them for this, and {available} are free: less would do");
+    let expected = format!(
+        "the run would take about {needed} of memory, {bytes} of them for this, and {available} are free: less would do"
+    );
     Err(Error::Setting { name: key, value, expected })
 }
 
@@ -66,14 +71,30 @@ fn parts(config: &Config, n_values: u128, n_actions: u128) -> [Part; 6] {
     let refined = refinement.as_ref().map_or(0, |Refinement { n_steps, .. }| *n_steps as u128 * n_envs);
     let part = |key, value, bytes| Part { key, value, bytes };
     [
-        part("replay_buffer.capacity", replay_buffer.capacity.to_string(), transitions(config) as u128 * (observation + 9) + tree),
-        part("replay_buffer.warmup", replay_buffer.warmup.to_string(), replay_buffer.warmup as u128 * observation * normalised),
+        part(
+            "replay_buffer.capacity",
+            replay_buffer.capacity.to_string(),
+            transitions(config) as u128 * (observation + 9) + tree,
+        ),
+        part(
+            "replay_buffer.warmup",
+            replay_buffer.warmup.to_string(),
+            replay_buffer.warmup as u128 * observation * normalised,
+        ),
         part("learning.hidden", format!("{:?}", learning.hidden), copies * weights * F32),
         // Three networks forward and backward, each layer's output kept.
-        part("learning.batch", learning.batch.to_string(), batch * (6 * observation + 9 * F32 * hidden.iter().sum::<u128>())),
+        part(
+            "learning.batch",
+            learning.batch.to_string(),
+            batch * (6 * observation + 9 * F32 * hidden.iter().sum::<u128>()),
+        ),
         part("n_envs", config.n_envs.to_string(), n_envs * (TRUCK + 3 * observation + 2 * F32 * widest)),
         // Twice while a list of them grows.
-        part("refinement.n_steps", refinement.as_ref().map_or(0, |of| of.n_steps).to_string(), 2 * refined * (observation + 32)),
+        part(
+            "refinement.n_steps",
+            refinement.as_ref().map_or(0, |of| of.n_steps).to_string(),
+            2 * refined * (observation + 32),
+        ),
     ]
 }
 
@@ -98,12 +119,28 @@ mod tests {
     #[test]
     fn a_run_that_does_not_fit_is_refused_by_the_key_that_takes_most_of_the_memory() {
         for (file, settings, expected) in [
-            ("default", &["replay_buffer.capacity=100000000", "steps=1000000000000"][..], "replay_buffer.capacity: 100000000; the run"),
-            ("default", &["replay_buffer.capacity=100000000", "replay_buffer.warmup=100000000"], "replay_buffer.warmup: 100000000;"),
+            (
+                "default",
+                &["replay_buffer.capacity=100000000", "steps=1000000000000"][..],
+                "replay_buffer.capacity: 100000000; the run",
+            ),
+            (
+                "default",
+                &["replay_buffer.capacity=100000000", "replay_buffer.warmup=100000000"],
+                "replay_buffer.warmup: 100000000;",
+            ),
             ("default", &["learning.hidden=[8192, 8192, 8192]"], "learning.hidden: [8192, 8192, 8192];"),
             ("default", &["learning.batch=1048576"], "learning.batch: 1048576;"),
-            ("default", &["n_envs=1048576", "replay_buffer.capacity=100000000", "learning.hidden=[8192]"], "n_envs: 1048576;"),
-            ("lane", &["refinement.n_steps=10000", "n_envs=20000", "replay_buffer.capacity=1000000"], "refinement.n_steps: 10000;"),
+            (
+                "default",
+                &["n_envs=1048576", "replay_buffer.capacity=100000000", "learning.hidden=[8192]"],
+                "n_envs: 1048576;",
+            ),
+            (
+                "lane",
+                &["refinement.n_steps=10000", "n_envs=20000", "replay_buffer.capacity=1000000"],
+                "refinement.n_steps: 10000;",
+            ),
         ] {
             let message = checked(file, settings, 4).unwrap_err();
             assert!(message.starts_with(expected) && message.contains("4.0 GB are free"), "{settings:?}: {message}");
@@ -119,6 +156,9 @@ mod tests {
 
     #[test]
     fn a_replay_buffer_takes_no_more_than_the_steps_of_the_run() {
-        assert_eq!(checked("paper", &["replay_buffer.capacity=100000000", "replay_buffer.priority=", "steps=100000"], 2), Ok(()));
+        assert_eq!(
+            checked("paper", &["replay_buffer.capacity=100000000", "replay_buffer.priority=", "steps=100000"], 2),
+            Ok(())
+        );
     }
 }

@@ -12,7 +12,12 @@ use offtrack_evaluation::error::Error;
 
 /// Index of the first distance sensor in an observation.
 fn first_ray() -> usize {
-    OBSERVATION.iter().filter(|values| values.name.ends_with("_range")).map(|values| values.first).min().unwrap_or_default()
+    OBSERVATION
+        .iter()
+        .filter(|values| values.name.ends_with("_range"))
+        .map(|values| values.first)
+        .min()
+        .unwrap_or_default()
 }
 
 /// Tolerance of two sensors' mounts or two steer angles that are mirror images [m, rad]: f32 rounds at 1e-6 of a few
@@ -31,29 +36,42 @@ pub struct Mirror {
 impl Mirror {
     /// The mirror of a world. Its action table and its sensors must be symmetric.
     pub fn of(world: &World) -> Result<Mirror, Error> {
-        let refused = |expected: String| Error::Setting { name: "learning.mirror_augmentation", value: "true".to_owned(), expected };
+        let refused = |expected: String| Error::Setting {
+            name: "learning.mirror_augmentation",
+            value: "true".to_owned(),
+            expected,
+        };
         let factors = OBSERVATION.iter().flat_map(|values| std::iter::repeat_n(values.mirror, values.n));
         let extras = EXTRAS[..world.params.n_extras as usize].iter().map(|extra| extra.mirror);
         let mut values: Vec<(usize, f32)> = factors.chain(extras).enumerate().collect();
         if world.rigs.iter().any(|rig| rig.crossfall != 0.0) {
             return Err(refused(
-                "the vehicle's road falls to one side (model.crossfall): leave learning.mirror_augmentation out".to_owned(),
+                "the vehicle's road falls to one side (model.crossfall): leave learning.mirror_augmentation out"
+                    .to_owned(),
             ));
         }
         let first_ray = first_ray();
         for index in 0..N_RAYS {
             // The image of a trailer's sensor is one of the trailer's.
-            let unit = if index < N_TRAILER_RAYS { 0..N_TRAILER_RAYS } else { N_TRAILER_RAYS..N_TRAILER_RAYS + N_TRACTOR_RAYS };
+            let unit = if index < N_TRAILER_RAYS {
+                0..N_TRAILER_RAYS
+            } else {
+                N_TRAILER_RAYS..N_TRAILER_RAYS + N_TRACTOR_RAYS
+            };
             // One that is an image on every chassis.
             let on_all = |other: usize| world.rays.iter().all(|rays| are_images(&rays[index], &rays[other]));
             let image = unit.into_iter().find(|&other| on_all(other));
             let image = image.ok_or_else(|| {
-                refused(format!("the vehicle's distance sensor {index} has no mirror image: leave learning.mirror_augmentation out"))
+                refused(format!(
+                    "the vehicle's distance sensor {index} has no mirror image: leave learning.mirror_augmentation out"
+                ))
             })?;
             values[first_ray + index].0 = first_ray + image;
         }
         let image = |action: &Action| {
-            let same = |other: &Action| (action.steering + other.steering).abs() <= SAME && (action.speed - other.speed).abs() <= SAME;
+            let same = |other: &Action| {
+                (action.steering + other.steering).abs() <= SAME && (action.speed - other.speed).abs() <= SAME
+            };
             world.actions.iter().position(same).map(|index| index as u32).ok_or_else(|| {
                 let degrees = action.steering.to_degrees();
                 refused(format!(

@@ -226,9 +226,12 @@ mod tests {
             wrong.layers[1].weights.iter_mut().for_each(|weight| *weight *= 1.001);
             for _ in 0..4 {
                 for _ in 0..20 {
-                    simulator.step(&policy.act_beside(&simulator.batch().observation, &simulator.batch().extras)).unwrap();
+                    simulator
+                        .step(&policy.act_beside(&simulator.batch().observation, &simulator.batch().extras))
+                        .unwrap();
                 }
-                let (observations, extras): (&[[f32; N_VALUES]], &[_]) = (&simulator.batch().observation, &simulator.batch().extras);
+                let (observations, extras): (&[[f32; N_VALUES]], &[_]) =
+                    (&simulator.batch().observation, &simulator.batch().extras);
                 let expected = match policy.extras.is_empty() {
                     true => logits(&network, &policy.normalisation, observations),
                     false => logits::<LADEN>(&network, &policy.normalisation, &observed(observations, extras)),
@@ -236,7 +239,10 @@ mod tests {
                 let n_actions = policy.actions.len();
                 // Sums over 256 values may round in another order or without fused multiply-adds.
                 assert!(difference(&policy.logits_beside(observations, extras), &expected, n_actions) < 1e-5);
-                assert!(1e-5 < difference(&wrong.logits_beside(observations, extras), &expected, n_actions), "a wrong weight must show");
+                assert!(
+                    1e-5 < difference(&wrong.logits_beside(observations, extras), &expected, n_actions),
+                    "a wrong weight must show"
+                );
             }
             assert_eq!(network.plain_layers(), policy.layers);
         }

@@ -85,7 +85,13 @@ impl Pass {
                     let (scale, shift) = (&norm.gamma, norm.beta.as_ref());
                     let norm = Norm::of(norm);
                     let mut by_norm = [0; 2].map(|_| vec![0.0; norm.scale.len()]);
-                    normalise_back(elements_mut(&mut by_values), elements(&hidden.values), &hidden.factors, &norm, &mut by_norm);
+                    normalise_back(
+                        elements_mut(&mut by_values),
+                        elements(&hidden.values),
+                        &hidden.factors,
+                        &norm,
+                        &mut by_norm,
+                    );
                     let [by_scale, by_shift] = by_norm.map(row);
                     gradients.register(scale.id, by_scale);
                     shift.into_iter().for_each(|shift| gradients.register(shift.id, by_shift.clone()));
@@ -153,7 +159,9 @@ fn rectify_back(gradients: &mut [f32], values: &[f32]) {
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn normalise(values: &mut [f32], biases: &[f32], norm: &Norm, factors: &mut [f32], activations: &mut [f32]) {
     let width = biases.len();
-    for ((row, activations), factor) in values.chunks_exact_mut(width).zip(activations.chunks_exact_mut(width)).zip(factors) {
+    for ((row, activations), factor) in
+        values.chunks_exact_mut(width).zip(activations.chunks_exact_mut(width)).zip(factors)
+    {
         for (value, bias) in row.iter_mut().zip(biases) {
             *value += bias;
         }
@@ -172,12 +180,22 @@ fn normalise(values: &mut [f32], biases: &[f32], norm: &Norm, factors: &mut [f32
 /// From the gradients by what the rectifier left to those by the values before normalisation and biases; adds those by
 /// scale and shift.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn normalise_back(gradients: &mut [f32], normalised: &[f32], factors: &[f32], norm: &Norm, by_norm: &mut [Vec<f32>; 2]) {
+fn normalise_back(
+    gradients: &mut [f32],
+    normalised: &[f32],
+    factors: &[f32],
+    norm: &Norm,
+    by_norm: &mut [Vec<f32>; 2],
+) {
     let width = norm.scale.len();
     let [by_scale, by_shift] = by_norm;
-    for ((gradients, normalised), factor) in gradients.chunks_exact_mut(width).zip(normalised.chunks_exact(width)).zip(factors) {
+    for ((gradients, normalised), factor) in
+        gradients.chunks_exact_mut(width).zip(normalised.chunks_exact(width)).zip(factors)
+    {
         let parameters = norm.scale.iter().zip(&norm.shift).zip(by_scale.iter_mut().zip(by_shift.iter_mut()));
-        for ((gradient, normalised), ((scale, shift), (by_scale, by_shift))) in gradients.iter_mut().zip(normalised).zip(parameters) {
+        for ((gradient, normalised), ((scale, shift), (by_scale, by_shift))) in
+            gradients.iter_mut().zip(normalised).zip(parameters)
+        {
             let open = if 0.0 < normalised * scale + shift { *gradient } else { 0.0 };
             *by_scale += open * normalised;
             *by_shift += open;

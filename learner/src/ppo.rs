@@ -128,9 +128,11 @@ impl Ppo {
             of_critic.push(critic);
         }
         self.n_summed += 1;
-        let Refinement { actor_learning_rate, critic_learning_rate, actor_ema_rate, critic_iterations, .. } = self.settings;
+        let Refinement { actor_learning_rate, critic_learning_rate, actor_ema_rate, critic_iterations, .. } =
+            self.settings;
         let critic = std::mem::take(&mut self.critic);
-        (self.critic, _) = self.critic_optimizer.step(critic.clone(), critic, of_critic, critic_learning_rate * rate_factor, 0.0);
+        (self.critic, _) =
+            self.critic_optimizer.step(critic.clone(), critic, of_critic, critic_learning_rate * rate_factor, 0.0);
         if critic_iterations <= self.n_iterations {
             let (actor, ema) = (std::mem::take(&mut self.actor), std::mem::take(&mut self.actor_ema));
             (self.actor, self.actor_ema) =

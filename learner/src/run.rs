@@ -153,8 +153,15 @@ impl Run {
     /// Lets the policy drive on the validation routes when it is time to; true if it did.
     fn validate_if_due(&mut self) -> Result<bool, Error> {
         let fraction = self.progress.fraction();
-        let Some(validation) = self.validation.as_mut().filter(|validation| validation.is_due(fraction)) else { return Ok(false) };
-        let validated = validation.validate(self.training.policy()?, self.progress.env_steps(), fraction, self.training.is_refining())?;
+        let Some(validation) = self.validation.as_mut().filter(|validation| validation.is_due(fraction)) else {
+            return Ok(false);
+        };
+        let validated = validation.validate(
+            self.training.policy()?,
+            self.progress.env_steps(),
+            fraction,
+            self.training.is_refining(),
+        )?;
         self.progress.validated(validated.success, validation.best().map_or(validated.success, |best| best.success));
         Ok(true)
     }
@@ -202,7 +209,8 @@ impl Run {
     /// The best policy by validation or, without one, the policy as it is; waits for a device.
     pub fn policy(&self) -> Result<Policy, Error> {
         let best = self.validation.as_ref().and_then(Validation::best_policy);
-        let read = |bytes| Policy::from_bytes("best policy", bytes).expect("the bytes were made from a policy that drove");
+        let read =
+            |bytes| Policy::from_bytes("best policy", bytes).expect("the bytes were made from a policy that drove");
         best.map_or_else(|| self.training.policy(), |bytes| Ok(read(bytes)))
     }
 

@@ -141,7 +141,8 @@ impl Sac {
     ) -> Result<Sac, ThreadPoolBuildError> {
         let device = placement.learning();
         let rng = &mut SmallRng::seed_from_u64(seed);
-        let sizes: Vec<usize> = [n_values].into_iter().chain(learning.hidden.iter().copied()).chain([n_actions]).collect();
+        let sizes: Vec<usize> =
+            [n_values].into_iter().chain(learning.hidden.iter().copied()).chain([n_actions]).collect();
         let actor = Mlp::new(&sizes, 0.01, rng, &device);
         let mut critic = || {
             let plain = Mlp::new(&sizes, 0.1, rng, &device);
@@ -210,7 +211,8 @@ impl Sac {
         let Some(figures) = figures else { return td_errors };
 
         self.n_updates += 1;
-        let Learning { critic_learning_rate, actor_learning_rate, tau, target_interval, actor_ema_rate, .. } = self.learning;
+        let Learning { critic_learning_rate, actor_learning_rate, tau, target_interval, actor_ema_rate, .. } =
+            self.learning;
         let tau = if self.n_updates.is_multiple_of(target_interval as u64) { tau } else { 0.0 };
         let [critics, target] = [&mut self.critics, &mut self.target_critics].map(take);
         (self.critics, self.target_critics) =
@@ -218,7 +220,8 @@ impl Sac {
         // Until the critics know the policy its rates are 0. It is stepped nevertheless: its leaves must be new ones in
         // each update, or the graph of every update stays in memory.
         let is_learning = self.learning.actor_delay < self.n_updates;
-        let (rate, ema_rate) = if is_learning { (actor_learning_rate * rate_factor, actor_ema_rate) } else { (0.0, 0.0) };
+        let (rate, ema_rate) =
+            if is_learning { (actor_learning_rate * rate_factor, actor_ema_rate) } else { (0.0, 0.0) };
         let [actor, ema] = [&mut self.actor, &mut self.actor_ema].map(take);
         (self.actor, self.actor_ema) = self.actor_optimizer.step(actor, ema, actor_gradients, rate, ema_rate);
         if is_learning {
@@ -239,7 +242,8 @@ impl Sac {
 
     /// The first of the latest figures that is not finite, with its name; none where they are not at hand.
     pub fn diverged(&self) -> Option<(&'static str, f32)> {
-        let [critic_loss, actor_loss, entropy, value] = [0, 1, 2, 3].map(|n: usize| self.sums[n].known().unwrap_or_default());
+        let [critic_loss, actor_loss, entropy, value] =
+            [0, 1, 2, 3].map(|n: usize| self.sums[n].known().unwrap_or_default());
         not_finite(&Update { critic_loss, actor_loss, entropy, value })
     }
 }

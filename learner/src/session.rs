@@ -40,7 +40,13 @@ impl Session {
         let mirror = config.learning.mirror_augmentation.then(|| Mirror::of(&world)).transpose()?;
         Ok(Session {
             rollout: backend.rollout(config, &world, routes, mirror.clone())?,
-            sac: Sac::new(&config.learning, n_values(&world), world.actions.len(), u64::from(config.seed), backend.placement())?,
+            sac: Sac::new(
+                &config.learning,
+                n_values(&world),
+                world.actions.len(),
+                u64::from(config.seed),
+                backend.placement(),
+            )?,
             ppo: None,
             normalisation: None,
             config: config.clone(),
@@ -56,12 +62,16 @@ impl Session {
         let policy = policies::learned(from)?;
         policy.check(&self.world)?;
         if policy.activation != Activation::Relu {
-            let expected = format!("has the activation {}: the learner continues with relu alone", policy.activation.name());
+            let expected =
+                format!("has the activation {}: the learner continues with relu alone", policy.activation.name());
             return Err(Error::Setting { name: "from", value: from.clone(), expected });
         }
         let hidden: Vec<usize> = policy.layers[..policy.layers.len() - 1].iter().map(Layer::n_outputs).collect();
         if hidden != self.config.learning.hidden {
-            let expected = format!("has hidden layers of {hidden:?}: learning.hidden must be equal, not {:?}", self.config.learning.hidden);
+            let expected = format!(
+                "has hidden layers of {hidden:?}: learning.hidden must be equal, not {:?}",
+                self.config.learning.hidden
+            );
             return Err(Error::Setting { name: "from", value: from.clone(), expected });
         }
         self.sac.set_actor(&Mlp::of(&policy.layers, &Device::flex()));
@@ -193,7 +203,11 @@ impl Session {
             benchmark: self.config.benchmark.clone(),
             actions: self.world.actions.clone(),
             normalisation: self.normalisation.clone().map_or_else(|| self.found_normalisation(), Ok)?,
-            layers: self.ppo.as_ref().map_or_else(|| self.sac.actor_ema(), |ppo| ppo.actor_ema().clone()).plain_layers(),
+            layers: self
+                .ppo
+                .as_ref()
+                .map_or_else(|| self.sac.actor_ema(), |ppo| ppo.actor_ema().clone())
+                .plain_layers(),
             extras: EXTRAS[..self.world.params.n_extras as usize].iter().map(|extra| extra.name.to_owned()).collect(),
             activation: Activation::Relu,
         })
@@ -216,7 +230,10 @@ impl Session {
         self.sac.restore(stored)?;
         if stored.bytes("normalisation, mean").is_some() {
             let values = |name: &str| stored.exactly(name, self.n_values());
-            self.set_normalisation(Normalisation { mean: values("normalisation, mean")?, factor: values("normalisation, factor")? });
+            self.set_normalisation(Normalisation {
+                mean: values("normalisation, mean")?,
+                factor: values("normalisation, factor")?,
+            });
         }
         if Ppo::is_in(stored) {
             self.begin_refinement(&self.policy()?)?;

@@ -24,7 +24,8 @@ impl Shards {
             return shards.into_iter().map(work).collect();
         }
         let mut results: Vec<Option<O>> = shards.iter().map(|_| None).collect();
-        let mut jobs: Vec<_> = self.0.iter().zip(shards).zip(&mut results).map(|((pool, shard), result)| (pool, shard, result)).collect();
+        let mut jobs: Vec<_> =
+            self.0.iter().zip(shards).zip(&mut results).map(|((pool, shard), result)| (pool, shard, result)).collect();
         start(&mut jobs.drain(..), &work);
         results.into_iter().flatten().collect()
     }

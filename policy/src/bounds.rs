@@ -31,7 +31,8 @@ mod tests {
 
     #[test]
     fn sums_are_bounded_through_a_rectifier_and_by_1_behind_a_tangent() {
-        let layers = [Layer { weights: vec![1e20; 2], biases: vec![1.0] }, Layer { weights: vec![-1e20], biases: vec![0.0] }];
+        let layers =
+            [Layer { weights: vec![1e20; 2], biases: vec![1.0] }, Layer { weights: vec![-1e20], biases: vec![0.0] }];
         let (index, most) = overflowing(&layers, Activation::Relu).unwrap();
         // Two inputs of at most 10.
         assert!(index == 1 && (most / 2e41 - 1.0).abs() < 1e-6, "{most}");

@@ -58,7 +58,9 @@ impl Policy {
             activation: (self.activation != Activation::Relu).then(|| self.activation.name().to_owned()),
             checksum: 0,
         };
-        let text = |description: &Description| serde_json::to_string(description).expect("numbers and words can be written as JSON");
+        let text = |description: &Description| {
+            serde_json::to_string(description).expect("numbers and words can be written as JSON")
+        };
         description.checksum = checksum(&text(&description), tensors.iter().map(|tensor| tensor.bytes.as_slice()));
         let views = tensors.iter().map(|tensor| {
             let view = TensorView::new(Dtype::F32, tensor.shape.clone(), &tensor.bytes);
@@ -102,11 +104,16 @@ fn read(name: &str, bytes: &[u8]) -> Result<Policy, String> {
     let (_, header) = SafeTensors::read_metadata(bytes).map_err(unreadable)?;
     let tensors = SafeTensors::deserialize(bytes).map_err(unreadable)?;
     let text = header.metadata().as_ref().and_then(|metadata| metadata.get(KEY));
-    let text = text.ok_or_else(|| format!("is not a policy file: its metadata has no entry `{KEY}`; `offtrack train` writes one"))?;
-    let description: Description =
-        serde_json::from_str(text).map_err(|error| format!("is not a policy file, or is damaged: its description: {error}; {AGAIN}"))?;
+    let text = text.ok_or_else(|| {
+        format!("is not a policy file: its metadata has no entry `{KEY}`; `offtrack train` writes one")
+    })?;
+    let description: Description = serde_json::from_str(text)
+        .map_err(|error| format!("is not a policy file, or is damaged: its description: {error}; {AGAIN}"))?;
     if description.version != VERSION {
-        return Err(format!("is a policy file of version {}; this program reads version {VERSION}", description.version));
+        return Err(format!(
+            "is a policy file of version {}; this program reads version {VERSION}",
+            description.version
+        ));
     }
     if !(1..=MOST_LAYERS).contains(&description.layers) || description.actions.is_empty() {
         return Err(format!("is a damaged policy file: it has no layers, far too many, or no actions; {AGAIN}"));
@@ -139,25 +146,42 @@ fn checked(name: &str, description: Description, tensors: &[(String, TensorView)
     };
     for (name, tensor) in tensors {
         if let Some((index, value)) = floats(tensor).into_iter().enumerate().find(|(_, value)| !value.is_finite()) {
-            return Err(format!("is a policy that cannot drive: {name}[{index}] is {value}; every number must be finite; train it again"));
+            return Err(format!(
+                "is a policy that cannot drive: {name}[{index}] is {value}; every number must be finite; train it again"
+            ));
         }
     }
-    if !description.extras.iter().map(String::as_str).eq(EXTRAS.iter().map(|extra| extra.name).take(description.extras.len())) {
+    if !description
+        .extras
+        .iter()
+        .map(String::as_str)
+        .eq(EXTRAS.iter().map(|extra| extra.name).take(description.extras.len()))
+    {
         let known: Vec<&str> = EXTRAS.iter().map(|extra| extra.name).collect();
-        return Err(format!("is a policy with the extras {:?}; must be the first of {}", description.extras, known.join(", ")));
+        return Err(format!(
+            "is a policy with the extras {:?}; must be the first of {}",
+            description.extras,
+            known.join(", ")
+        ));
     }
     let n_values = N_VALUES + description.extras.len();
     let (statistics, layers) = tensors.split_at(2);
     for (name, tensor) in statistics {
         if tensor.shape() != [n_values] {
-            return Err(format!("is a policy of another shape: {name} is {:?}; an observation has {n_values} values", tensor.shape()));
+            return Err(format!(
+                "is a policy of another shape: {name} is {:?}; an observation has {n_values} values",
+                tensor.shape()
+            ));
         }
     }
     let mut n_inputs = n_values;
     for pair in layers.chunks_exact(2) {
         let [(weight_name, weight), (bias_name, bias)] = [&pair[0], &pair[1]];
         let &[n_outputs] = bias.shape() else {
-            return Err(format!("is a policy of another shape: {bias_name} is {:?}; one number an output is needed", bias.shape()));
+            return Err(format!(
+                "is a policy of another shape: {bias_name} is {:?}; one number an output is needed",
+                bias.shape()
+            ));
         };
         if n_outputs == 0 || weight.shape() != [n_inputs, n_outputs] {
             return Err(format!(
@@ -173,7 +197,8 @@ fn checked(name: &str, description: Description, tensors: &[(String, TensorView)
             description.actions.len()
         ));
     }
-    let layers: Vec<Layer> = layers.chunks_exact(2).map(|pair| Layer { weights: floats(&pair[0].1), biases: floats(&pair[1].1) }).collect();
+    let layers: Vec<Layer> =
+        layers.chunks_exact(2).map(|pair| Layer { weights: floats(&pair[0].1), biases: floats(&pair[1].1) }).collect();
     if let Some((index, most)) = overflowing(&layers, activation) {
         return Err(format!(
             "is a policy that cannot drive: the outputs of actor.{index} may reach {most:.0e}, beyond 32-bit floats; train it again"

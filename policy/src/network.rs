@@ -57,7 +57,12 @@ impl Layer {
 }
 
 /// The last layer's outputs for each observation of `[rows * values]`, `[rows * outputs]`.
-pub(crate) fn forward(normalisation: &Normalisation, layers: &[Layer], activation: Activation, observations: &[f32]) -> Vec<f32> {
+pub(crate) fn forward(
+    normalisation: &Normalisation,
+    layers: &[Layer],
+    activation: Activation,
+    observations: &[f32],
+) -> Vec<f32> {
     let (n_values, n_outputs) = (normalisation.mean.len(), layers.last().map_or(0, Layer::n_outputs));
     let mut logits = vec![0.0; observations.len() / n_values * n_outputs];
     let block = |(observations, logits): (&[f32], &mut [f32])| {
@@ -87,7 +92,9 @@ pub(crate) fn forward(normalisation: &Normalisation, layers: &[Layer], activatio
 /// group is filled with zeros.
 fn grouped(values: &[f32], n_values: usize) -> Vec<[f32; ROWS]> {
     let groups = values.chunks(ROWS * n_values);
-    let value = |group: &[f32], index: usize| std::array::from_fn(|row| group.get(row * n_values + index).copied().unwrap_or_default());
+    let value = |group: &[f32], index: usize| {
+        std::array::from_fn(|row| group.get(row * n_values + index).copied().unwrap_or_default())
+    };
     groups.flat_map(|group| (0..n_values).map(move |index| value(group, index))).collect()
 }
 
@@ -99,8 +106,10 @@ fn linear(layer: &Layer, inputs: &[[f32; ROWS]], outputs: &mut [[f32; ROWS]]) {
         let width = OUTPUTS.min(n_outputs - first);
         for (inputs, outputs) in inputs.chunks_exact(n_inputs).zip(outputs.chunks_exact_mut(n_outputs)) {
             // The width is known to the compiler where it matters.
-            let sums = if width == OUTPUTS { sums(layer, inputs, first, OUTPUTS) } else { sums(layer, inputs, first, width) };
-            for (index, (output, bias)) in outputs[first..][..width].iter_mut().zip(&layer.biases[first..]).enumerate() {
+            let sums =
+                if width == OUTPUTS { sums(layer, inputs, first, OUTPUTS) } else { sums(layer, inputs, first, width) };
+            for (index, (output, bias)) in outputs[first..][..width].iter_mut().zip(&layer.biases[first..]).enumerate()
+            {
                 *output = std::array::from_fn(|row| sums[row][index] + bias);
             }
         }

@@ -80,7 +80,8 @@ impl Policy {
         if Policy::shipped_names().contains(&benchmark) {
             return Policy::shipped(benchmark);
         }
-        let mut policies = Policy::shipped_names().into_iter().map(Policy::shipped).collect::<Result<Vec<Policy>, Error>>()?;
+        let mut policies =
+            Policy::shipped_names().into_iter().map(Policy::shipped).collect::<Result<Vec<Policy>, Error>>()?;
         let fits = policies.iter().position(|policy| policy.check(world).is_ok());
         Ok(policies.swap_remove(fits.unwrap_or_default()))
     }
@@ -110,7 +111,10 @@ impl Policy {
         if self.extras.is_empty() {
             return self.logits(observations);
         }
-        let rows = observations.iter().zip(extras).flat_map(|(values, extras)| values.iter().chain(&extras[..self.extras.len()]));
+        let rows = observations
+            .iter()
+            .zip(extras)
+            .flat_map(|(values, extras)| values.iter().chain(&extras[..self.extras.len()]));
         network::forward(&self.normalisation, &self.layers, self.activation, &rows.copied().collect::<Vec<f32>>())
     }
 

@@ -24,7 +24,9 @@ fn observations(n: usize) -> Vec<[f32; N_VALUES]> {
 fn policy(hidden: &[usize], n_actions: usize) -> Policy {
     let sizes = [&[N_VALUES], hidden, &[n_actions]].concat();
     let layer = |(index, ends): (usize, &[usize])| Layer {
-        weights: (0..ends[0] * ends[1]).map(|at| number(at as u32, 1000 + index as u32) * (3.0 / ends[0] as f32).sqrt()).collect(),
+        weights: (0..ends[0] * ends[1])
+            .map(|at| number(at as u32, 1000 + index as u32) * (3.0 / ends[0] as f32).sqrt())
+            .collect(),
         biases: (0..ends[1]).map(|at| 0.1 * number(at as u32, 2000 + index as u32)).collect(),
     };
     Policy {
@@ -60,7 +62,8 @@ fn described(policy: &Policy, change: impl Fn(&str) -> String) -> Vec<u8> {
     let tensors = safetensors::SafeTensors::deserialize(&bytes).unwrap();
     let (before, _) = header.metadata().as_ref().unwrap()["offtrack"].split_once("\"checksum\":").unwrap();
     let text = change(&format!("{before}\"checksum\":@}}"));
-    let layers = (0..policy.layers.len()).flat_map(|layer| ["weight", "bias"].map(|part| format!("actor.{layer}.{part}")));
+    let layers =
+        (0..policy.layers.len()).flat_map(|layer| ["weight", "bias"].map(|part| format!("actor.{layer}.{part}")));
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(text.replace('@', "0").as_bytes());
     for name in ["observation.mean", "observation.factor"].map(str::to_owned).into_iter().chain(layers) {
@@ -127,22 +130,30 @@ fn a_small_network_gives_the_values_computed_by_hand() {
         Layer { weights: vec![2.0, 0.0, 1.0, 1.0, -1.0, 4.0], biases: vec![0.0, 0.25, 0.5] },
     ];
     let (a, b) = (0.462_117_16f32, -0.761_594_2f32); // tanh(0.5), tanh(-1)
-    for (activation, expected) in [(Activation::Relu, [1.0, 0.25, 1.0]), (Activation::Tanh, [2.0 * a + b, 0.25 - b, a + 4.0 * b + 0.5])] {
-        let policy = Policy { layers: layers.clone(), normalisation: normalisation.clone(), activation, ..policy(&[], 3) };
+    for (activation, expected) in
+        [(Activation::Relu, [1.0, 0.25, 1.0]), (Activation::Tanh, [2.0 * a + b, 0.25 - b, a + 4.0 * b + 0.5])]
+    {
+        let policy =
+            Policy { layers: layers.clone(), normalisation: normalisation.clone(), activation, ..policy(&[], 3) };
         let logits = policy.logits(&[observation]);
-        assert!(logits.iter().zip(expected).all(|(logit, expected)| (logit - expected).abs() < 1e-6), "{activation:?}: {logits:?}");
+        assert!(
+            logits.iter().zip(expected).all(|(logit, expected)| (logit - expected).abs() < 1e-6),
+            "{activation:?}: {logits:?}"
+        );
     }
 }
 
 /// What the crate says that it computes, one number at a time.
 fn chained(policy: &Policy, observation: &[f32; N_VALUES]) -> Vec<f32> {
     let Normalisation { mean, factor } = &policy.normalisation;
-    let mut values: Vec<f32> = (0..N_VALUES).map(|at| ((observation[at] - mean[at]) * factor[at]).clamp(-10.0, 10.0)).collect();
+    let mut values: Vec<f32> =
+        (0..N_VALUES).map(|at| ((observation[at] - mean[at]) * factor[at]).clamp(-10.0, 10.0)).collect();
     for (index, Layer { weights, biases }) in policy.layers.iter().enumerate() {
         let last = index + 1 == policy.layers.len();
         let sum = |output: usize| {
             let terms = values.iter().enumerate();
-            terms.fold(0.0f32, |sum, (input, value)| value.mul_add(weights[input * biases.len() + output], sum)) + biases[output]
+            terms.fold(0.0f32, |sum, (input, value)| value.mul_add(weights[input * biases.len() + output], sum))
+                + biases[output]
         };
         values = (0..biases.len()).map(|output| if last { sum(output) } else { sum(output).max(0.0) }).collect();
     }
@@ -188,7 +199,10 @@ fn a_policy_of_another_action_table_is_refused_by_the_world() {
     policy.check(&world).unwrap();
     policy.actions[3].steering += 0.01;
     let message = policy.check(&world).unwrap_err().to_string();
-    assert!(message.starts_with("attard2023 (shipped): learned with another action table: 9 actions, -32.0..32.0 deg"), "{message}");
+    assert!(
+        message.starts_with("attard2023 (shipped): learned with another action table: 9 actions, -32.0..32.0 deg"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -222,11 +236,17 @@ fn a_policy_of_another_shape_is_refused_with_the_tensor_and_what_is_needed() {
     refused(&|policy| policy.normalisation.mean.truncate(40), "observation.mean is [40]; an observation has 69 values");
     refused(&|policy| policy.normalisation.factor.clear(), "observation.factor is [0]; an observation has 69 values");
     refused(&|policy| policy.actions.truncate(8), "its last layer has 9 outputs, and its action table 8 actions");
-    refused(&|policy| policy.layers.rotate_left(1), "actor.0.weight is [8, 7]; [69, 7] is needed, inputs before outputs");
+    refused(
+        &|policy| policy.layers.rotate_left(1),
+        "actor.0.weight is [8, 7]; [69, 7] is needed, inputs before outputs",
+    );
     // The order in which PyTorch keeps weights.
     let swapped = policy(&[8], 8).layers.remove(0);
     let outputs_first = Layer { weights: swapped.weights, biases: vec![0.0; N_VALUES] };
-    refused(&|policy| policy.layers[0] = outputs_first.clone(), "actor.0.weight is [8, 69]; [69, 69] is needed, inputs before outputs");
+    refused(
+        &|policy| policy.layers[0] = outputs_first.clone(),
+        "actor.0.weight is [8, 69]; [69, 69] is needed, inputs before outputs",
+    );
     // Seven values lead to nine actions with one layer fewer as well.
     let mut fewer = policy(&[8, 8], 9);
     fewer.layers.remove(1);
@@ -279,7 +299,11 @@ fn an_unknown_activation_key_or_version_is_refused_by_its_word() {
         assert!(message.contains(expected), "{message}");
     };
     let layers = "\"layers\":2";
-    refused(layers, "\"layers\":2,\"activation\":\"gelu\"", "is a policy with the activation \"gelu\"; must be relu or tanh");
+    refused(
+        layers,
+        "\"layers\":2,\"activation\":\"gelu\"",
+        "is a policy with the activation \"gelu\"; must be relu or tanh",
+    );
     refused(layers, "\"layers\":2,\"activaton\":\"tanh\"", "unknown field `activaton`");
     refused("\"version\":1", "\"version\":2", "is a policy file of version 2; this program reads version 1");
     refused(layers, "\"layers\":0", "it has no layers, far too many, or no actions");
@@ -348,20 +372,24 @@ fn a_policy_with_extras_drives_by_them_and_its_file_names_them() {
     let read = Policy::load(&file).unwrap();
     assert_eq!((&read.extras, &read.layers), (&policy.extras, &policy.layers));
     let rows = observations(9);
-    let extras: Vec<[f32; N_EXTRAS]> = (0..9).map(|row| std::array::from_fn(|index| number(row, 500 + index as u32))).collect();
+    let extras: Vec<[f32; N_EXTRAS]> =
+        (0..9).map(|row| std::array::from_fn(|index| number(row, 500 + index as u32))).collect();
     let logits = read.logits_beside(&rows, &extras);
     // By the definition: 69 values, then the first 8 extras.
     let layer = &read.layers[0];
     let inputs: Vec<f32> = rows[3].iter().chain(&extras[3][..8]).copied().collect();
     let hidden = |output: usize| {
-        let sum = inputs.iter().enumerate().fold(0.0f32, |sum, (input, value)| value.mul_add(layer.weights[input * 16 + output], sum));
+        let sum = inputs
+            .iter()
+            .enumerate()
+            .fold(0.0f32, |sum, (input, value)| value.mul_add(layer.weights[input * 16 + output], sum));
         (sum + layer.biases[output]).max(0.0)
     };
     let hidden: Vec<f32> = (0..16).map(hidden).collect();
     let last = &read.layers[1];
     for action in 0..9 {
-        let expected =
-            (0..16).fold(0.0f32, |sum, input| hidden[input].mul_add(last.weights[input * 9 + action], sum)) + last.biases[action];
+        let expected = (0..16).fold(0.0f32, |sum, input| hidden[input].mul_add(last.weights[input * 9 + action], sum))
+            + last.biases[action];
         assert!((logits[3 * 9 + action] - expected).abs() < 1e-5, "{action}: {} {expected}", logits[3 * 9 + action]);
     }
     // An extra that it observes changes what it says, one beyond does not.
@@ -385,10 +413,16 @@ fn a_policy_is_refused_where_a_benchmark_observes_other_extras() {
     assert_eq!(check(ObservedExtras::Mass, &with_extras(8)), Ok(()));
     assert_eq!(check(ObservedExtras::None, &with_extras(0)), Ok(()));
     let message = check(ObservedExtras::Blind, &with_extras(8)).unwrap_err();
-    assert!(message.contains("trailer_mass here") && message.contains("trailer_wheelbase in the benchmark"), "{message}");
+    assert!(
+        message.contains("trailer_mass here") && message.contains("trailer_wheelbase in the benchmark"),
+        "{message}"
+    );
     assert!(check(ObservedExtras::None, &with_extras(8)).unwrap_err().contains("none in the benchmark"));
     assert!(check(ObservedExtras::Oracle, &with_extras(0)).unwrap_err().contains("none here"));
     // Extras are the first of their list.
     let wrong = Policy { extras: vec!["trailer_mass".to_owned()], ..with_extras(1) };
-    assert!(refusal(&wrong.to_bytes()).contains("is a policy with the extras [\"trailer_mass\"]; must be the first of steering,"));
+    assert!(
+        refusal(&wrong.to_bytes())
+            .contains("is a policy with the extras [\"trailer_mass\"]; must be the first of steering,")
+    );
 }

@@ -48,7 +48,10 @@ impl Of {
         let array = actions.extract::<PyReadonlyArray1<T>>().ok()?;
         // Before anything is copied: a broadcast array may be longer than any memory.
         if array.len() != n_envs {
-            return Some(Err(PyValueError::new_err(format!("actions: {} of them; {n_envs} are needed, one a truck", array.len()))));
+            return Some(Err(PyValueError::new_err(format!(
+                "actions: {} of them; {n_envs} are needed, one a truck",
+                array.len()
+            ))));
         }
         let known = |(env, &action): (usize, &T)| match u32::try_from(action) {
             Ok(index) if index < limit => Ok(index),

@@ -27,7 +27,8 @@ use state::State;
 use stored::GivenEnds;
 
 /// Observation, reward, terminated, truncated of a step.
-type Step<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<bool>>);
+type Step<'py> =
+    (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<bool>>);
 /// One whole number for each of some trucks.
 type Indices<'py> = Bound<'py, PyArray1<i64>>;
 /// Trucks whose episode ended, why, on which route, their last observations, and which vehicle they were.
@@ -133,7 +134,8 @@ impl Batch {
 
     #[getter]
     fn action_table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let table: Vec<f32> = self.place.world.actions.iter().flat_map(|action| [action.steering, action.speed]).collect();
+        let table: Vec<f32> =
+            self.place.world.actions.iter().flat_map(|action| [action.steering, action.speed]).collect();
         PyArray1::from_vec(py, table).reshape([self.place.world.actions.len(), 2])
     }
 
@@ -169,10 +171,12 @@ impl Batch {
         guarded(|| {
             let actions = actions::of_array(actions, self.n_envs, &self.place.world.actions)?;
             let mut state = self.state()?;
-            let (observation, reward, terminated, truncated) = state.step(py, self, &actions, |observation, reward, codes| {
-                let flags = |is: fn(Ended) -> bool| -> Vec<bool> { codes.iter().map(|&code| holds(code, is)).collect() };
-                (observation.to_vec(), reward.to_vec(), flags(Ended::terminated), flags(Ended::truncated))
-            })?;
+            let (observation, reward, terminated, truncated) =
+                state.step(py, self, &actions, |observation, reward, codes| {
+                    let flags =
+                        |is: fn(Ended) -> bool| -> Vec<bool> { codes.iter().map(|&code| holds(code, is)).collect() };
+                    (observation.to_vec(), reward.to_vec(), flags(Ended::terminated), flags(Ended::truncated))
+                })?;
             let vector = |flags| PyArray1::from_vec(py, flags);
             let observation = PyArray1::from_vec(py, observation).reshape([self.n_envs, self.n_values()])?;
             Ok((observation, PyArray1::from_vec(py, reward), vector(terminated), vector(truncated)))
@@ -192,7 +196,8 @@ impl Batch {
             let actions = actions::of_array(actions, self.n_envs, &self.place.world.actions)?;
             let (n_envs, n_values) = (self.n_envs, self.n_values());
             let shape = format!("float32 of shape ({n_envs}, {n_values})");
-            let mut observation: PyReadwriteArray2<f32> = observation.extract().map_err(|_| unfit("observation", &shape))?;
+            let mut observation: PyReadwriteArray2<f32> =
+                observation.extract().map_err(|_| unfit("observation", &shape))?;
             if observation.shape() != [n_envs, n_values] {
                 return Err(unfit("observation", &shape));
             }
@@ -236,7 +241,8 @@ impl Batch {
                 return Ok(None);
             }
             let of = |value: fn(&End) -> i64| PyArray1::from_iter(py, state.ends.iter().map(value));
-            let observations: Vec<f32> = state.ends.iter().flat_map(|end| &end.observation[..self.n_values()]).copied().collect();
+            let observations: Vec<f32> =
+                state.ends.iter().flat_map(|end| &end.observation[..self.n_values()]).copied().collect();
             Ok(Some((
                 of(|end| end.env as i64),
                 of(|end| end.code.into()),
@@ -255,7 +261,8 @@ impl Batch {
             if state.ends.is_empty() {
                 return Ok(None);
             }
-            let infos = Infos { names: (!numeric).then_some(&self.names), is_same_step: self.autoreset == Autoreset::SameStep };
+            let infos =
+                Infos { names: (!numeric).then_some(&self.names), is_same_step: self.autoreset == Autoreset::SameStep };
             infos.of_ends(py, &state.ends, &state.episodes, self.n_values()).map(Some)
         })
     }
@@ -277,7 +284,12 @@ impl Batch {
     }
 
     /// Goes on from the bytes of every column, each `[num_envs * width]`, and from streams, `[num_envs]`.
-    fn restore_bytes(&self, py: Python, columns: Vec<(String, PyReadonlyArray1<u8>)>, streams: Vec<(u32, u32)>) -> PyResult<()> {
+    fn restore_bytes(
+        &self,
+        py: Python,
+        columns: Vec<(String, PyReadonlyArray1<u8>)>,
+        streams: Vec<(u32, u32)>,
+    ) -> PyResult<()> {
         guarded(|| self.restore(py, &columns, &streams))
     }
 
@@ -323,12 +335,15 @@ impl Batch {
                     camera.insert(made.map_err(|error| PyValueError::new_err(format!("size: {error}")))?)
                 }
             };
-            let read = simulator.read(&[Column::Truck, Column::Ranges, Column::Ended]).map_err(|error| errors::of_simulator(&error))?;
+            let read = simulator
+                .read(&[Column::Truck, Column::Ranges, Column::Ended])
+                .map_err(|error| errors::of_simulator(&error))?;
             let truck = rows_of::<Truck>(&read[0])[env];
             let ranges = rows_of::<[f32; N_RAYS]>(&read[1])[env];
             // A truck that goes on in another episode has not ended.
             let code = if truck.held == 1 { rows_of::<u32>(&read[2])[env] } else { Ended::Running as u32 };
-            let shown = Shown { truck: &truck, ranges: &ranges, ended: Ended::from_code(code).unwrap_or(Ended::Running) };
+            let shown =
+                Shown { truck: &truck, ranges: &ranges, ended: Ended::from_code(code).unwrap_or(Ended::Running) };
             let picture = camera.draw(&shown);
             PyArray1::from_slice(py, picture).reshape([size as usize, size as usize, 3])
         })
@@ -337,7 +352,15 @@ impl Batch {
 
 impl Batch {
     /// A batch, with its threads and, where one is named, its device.
-    fn made(py: Python, asked: &Asked, num_envs: i64, seed: u32, autoreset: &str, num_threads: usize, device: &str) -> PyResult<Batch> {
+    fn made(
+        py: Python,
+        asked: &Asked,
+        num_envs: i64,
+        seed: u32,
+        autoreset: &str,
+        num_threads: usize,
+        device: &str,
+    ) -> PyResult<Batch> {
         let n_envs = match usize::try_from(num_envs) {
             Ok(n_envs) if 0 < n_envs => n_envs,
             _ => return Err(PyValueError::new_err(format!("num_envs: {num_envs}; must be at least 1"))),
@@ -354,8 +377,15 @@ impl Batch {
         let made = pool.run(py, || Simulator::on(engine, world, n_envs, seed, choice))?;
         let mut simulator = made.map_err(|error| errors::of_simulator(&error))?;
         simulator.set_autoreset(autoreset);
-        let mut state =
-            State { simulator, pool, camera: None, episodes: Vec::new(), held: Vec::new(), ends: Vec::new(), earlier: Tally::default() };
+        let mut state = State {
+            simulator,
+            pool,
+            camera: None,
+            episodes: Vec::new(),
+            held: Vec::new(),
+            ends: Vec::new(),
+            earlier: Tally::default(),
+        };
         state.look()?;
         let n_extras = place.world.params.n_extras as usize;
         let (names, read) = (Names::new(py, &place.world), observed::columns_of_step(autoreset, n_extras));
@@ -367,9 +397,9 @@ impl Batch {
         match self.state.try_lock() {
             Ok(state) => Ok(state),
             Err(TryLockError::Poisoned(_)) => Err(PyRuntimeError::new_err("this batch failed before; make another")),
-            Err(TryLockError::WouldBlock) => {
-                Err(PyRuntimeError::new_err("this batch is in use by another thread; give each thread a batch of its own"))
-            }
+            Err(TryLockError::WouldBlock) => Err(PyRuntimeError::new_err(
+                "this batch is in use by another thread; give each thread a batch of its own",
+            )),
         }
     }
 }

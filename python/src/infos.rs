@@ -54,7 +54,10 @@ impl Names {
         let classes: Vec<_> = world.classes.iter().map(|class| [text(&class.vehicle), text(&class.load)]).collect();
         let pair = |class: u32| classes[class as usize].each_ref().map(|name| name.clone_ref(py));
         let rows = world.rigs.iter().filter(|_| 1 < classes.len());
-        Names { routes: world.route_names.iter().map(text).collect(), vehicles: rows.map(|rig| pair(rig.class_index)).collect() }
+        Names {
+            routes: world.route_names.iter().map(text).collect(),
+            vehicles: rows.map(|rig| pair(rig.class_index)).collect(),
+        }
     }
 
     /// What an episode's [`KEYS`] are.
@@ -97,7 +100,13 @@ pub struct Infos<'a> {
 impl Infos<'_> {
     /// The infos of the episodes that a step ended, whose last observations have `n_values` values; `begun` has the
     /// episodes that trucks are in after the step.
-    pub fn of_ends<'py>(&self, py: Python<'py>, ends: &[End], begun: &[Episode], n_values: usize) -> PyResult<Bound<'py, PyDict>> {
+    pub fn of_ends<'py>(
+        &self,
+        py: Python<'py>,
+        ends: &[End],
+        begun: &[Episode],
+        n_values: usize,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let n_envs = begun.len();
         let mut mask = vec![false; n_envs];
         let mut codes = vec![0i64; n_envs];
@@ -149,7 +158,13 @@ impl Infos<'_> {
     }
 
     /// The last observations of ended episodes, of all trucks: arrays and None, or rows with zeros for the others.
-    fn last_observations<'py>(&self, py: Python<'py>, n_envs: usize, ends: &[End], n_values: usize) -> PyResult<Bound<'py, PyAny>> {
+    fn last_observations<'py>(
+        &self,
+        py: Python<'py>,
+        n_envs: usize,
+        ends: &[End],
+        n_values: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
         if self.names.is_none() {
             let mut rows = vec![0.0f32; n_envs * n_values];
             for End { env, observation, .. } in ends {

@@ -100,17 +100,23 @@ impl Network {
     fn split(&self, observations: &Bound<PyAny>) -> PyResult<Split> {
         let n_extras = self.policy.extras.len();
         let n_values = N_VALUES + n_extras;
-        let needed = || PyTypeError::new_err(format!("observations: a numpy array of float32 and shape (n, {n_values}) is needed"));
+        let needed = || {
+            PyTypeError::new_err(format!("observations: a numpy array of float32 and shape (n, {n_values}) is needed"))
+        };
         let array: PyReadonlyArray2<f32> = observations.extract().map_err(|_| needed())?;
         let found = array.shape()[1];
         if found != n_values {
             let extras = observed::described(self.policy.extras.iter().map(String::as_str));
-            return Err(PyValueError::new_err(format!("observations: {found} values each; {n_values} are needed{extras}")));
+            return Err(PyValueError::new_err(format!(
+                "observations: {found} values each; {n_values} are needed{extras}"
+            )));
         }
         let values = array.as_slice().map_err(|_| needed())?;
         if let Some(at) = values.iter().position(|value| !value.is_finite()) {
             let (row, column, value) = (at / n_values, at % n_values, values[at]);
-            return Err(PyValueError::new_err(format!("observations[{row}, {column}]: {value}; every value must be finite")));
+            return Err(PyValueError::new_err(format!(
+                "observations[{row}, {column}]: {value}; every value must be finite"
+            )));
         }
         if n_extras == 0 {
             return Ok((values.as_chunks().0.to_vec(), Vec::new()));
@@ -153,7 +159,8 @@ pub fn write_policy(
             let known = Activation::ALL.map(Activation::name).join(", ");
             return Err(PyValueError::new_err(format!("activation: {activation:?}; must be one of {known}")));
         };
-        let (name, actions, extras) = Pool::new(0).run_until_signal(py, |stop| worlds::policy_table(scenario, stop))??;
+        let (name, actions, extras) =
+            Pool::new(0).run_until_signal(py, |stop| worlds::policy_table(scenario, stop))??;
         let n_values = N_VALUES + extras.len();
         check_layers(&layers, n_values)?;
         let vector = |array: &PyReadonlyArray1<f32>| array.as_array().to_vec();
@@ -163,11 +170,14 @@ pub fn write_policy(
         };
         // The factor is that of a variance.
         let described = observed::described(extras.iter().copied());
-        for (name, given) in
-            [("mean", normalisation.as_ref().map(|given| &given.0)), ("variance", normalisation.as_ref().map(|given| &given.1))]
-        {
+        for (name, given) in [
+            ("mean", normalisation.as_ref().map(|given| &given.0)),
+            ("variance", normalisation.as_ref().map(|given| &given.1)),
+        ] {
             if let Some(found) = given.map(|given| given.len()).filter(|&found| found != n_values) {
-                return Err(PyValueError::new_err(format!("{name}: shape ({found},); ({n_values},) is needed{described}")));
+                return Err(PyValueError::new_err(format!(
+                    "{name}: shape ({found},); ({n_values},) is needed{described}"
+                )));
             }
         }
         let normalisation = match &normalisation {
@@ -214,7 +224,9 @@ fn check_layers(layers: &[(PyReadonlyArray2<f32>, PyReadonlyArray1<f32>)], n_val
         }
         n_numbers = n_numbers.saturating_add(n_outputs.saturating_mul(n_inputs + 1));
         if MOST_NUMBERS < n_numbers {
-            return refused(format!("layers: {n_numbers} numbers up to layers[{index}]; a policy file has at most {MOST_NUMBERS}"));
+            return refused(format!(
+                "layers: {n_numbers} numbers up to layers[{index}]; a policy file has at most {MOST_NUMBERS}"
+            ));
         }
         n_inputs = n_outputs;
     }

@@ -79,7 +79,9 @@ impl Pool {
             None => {
                 let n_threads = if self.n_threads == 0 { offtrack::files::cache::n_threads() } else { self.n_threads };
                 let pool = ThreadPoolBuilder::new().num_threads(n_threads).build();
-                let pool = pool.map_err(|error| PyRuntimeError::new_err(format!("num_threads: {n_threads}; {error}; ask for fewer")))?;
+                let pool = pool.map_err(|error| {
+                    PyRuntimeError::new_err(format!("num_threads: {n_threads}; {error}; ask for fewer"))
+                })?;
                 self.made.insert((std::process::id(), pool))
             }
         };

@@ -85,7 +85,19 @@ impl Place {
 
     /// CRC-32 of all that trucks drive by: a state goes on in an equal world alone.
     pub fn fingerprint(&self) -> u32 {
-        let World { params, rigs, classes: _, rays, actions, fields, waypoints, previews, routes, route_names, step_limits } = &*self.world;
+        let World {
+            params,
+            rigs,
+            classes: _,
+            rays,
+            actions,
+            fields,
+            waypoints,
+            previews,
+            routes,
+            route_names,
+            step_limits,
+        } = &*self.world;
         let mut hasher = crc32fast::Hasher::new();
         hasher.update(bytes_of(params));
         hasher.update(cast_slice(rigs));

@@ -136,12 +136,19 @@ pub enum Error {
 impl Measured {
     /// Every line with its key, `kerbs[2]`.
     fn lines(&self) -> impl Iterator<Item = (String, &Line)> {
-        let parts = [("island", &self.island), ("ring", &self.ring), ("kerbs", &self.kerbs), ("splitters", &self.splitters)];
+        let parts =
+            [("island", &self.island), ("ring", &self.ring), ("kerbs", &self.kerbs), ("splitters", &self.splitters)];
         let parts = parts.into_iter().chain([("faces", &self.faces), ("edges", &self.edges)]);
         let parts = parts.map(|(key, lines)| (key.to_owned(), lines));
-        let routes = self.routes.iter().enumerate().map(|(index, route)| (format!("routes[{index}].stretches"), &route.stretches));
+        let routes = self
+            .routes
+            .iter()
+            .enumerate()
+            .map(|(index, route)| (format!("routes[{index}].stretches"), &route.stretches));
         let lines = parts.chain(routes);
-        lines.flat_map(|(key, lines)| lines.iter().enumerate().map(move |(index, line)| (format!("{key}[{index}]"), line)))
+        lines.flat_map(|(key, lines)| {
+            lines.iter().enumerate().map(move |(index, line)| (format!("{key}[{index}]"), line))
+        })
     }
 
     /// Bounds the work of a comparison, which grows with the lines' length.
@@ -151,7 +158,10 @@ impl Measured {
             for (point, coordinates) in line.iter().enumerate() {
                 let far = coordinates.iter().position(|value| !(-FARTHEST..=FARTHEST).contains(value));
                 if let Some(axis) = far {
-                    return Err(Error::TooFar { key: format!("{key}[{point}][{axis}]"), value: shown(coordinates[axis]) });
+                    return Err(Error::TooFar {
+                        key: format!("{key}[{point}][{axis}]"),
+                        value: shown(coordinates[axis]),
+                    });
                 }
             }
             length += curve(line).length();
@@ -176,7 +186,8 @@ pub fn deviations(roundabout: &Road, measured: &Measured) -> Result<Vec<Deviatio
         let unknown = || Error::UnknownRoute { key: format!("routes[{index}]"), route: shortened(&what, 100) };
         let line = [roundabout.line(&route.entry, route.lane, route.exit).ok_or_else(unknown)?];
         // Beside a broken line the nearest measured point may belong to another part of the route.
-        let outside = |end: Option<&[f64; 2]>| end.is_some_and(|end| roundabout.outer_radius() < DVec2::from(*end).length());
+        let outside =
+            |end: Option<&[f64; 2]>| end.is_some_and(|end| roundabout.outer_radius() < DVec2::from(*end).length());
         let whole = matches!(&route.stretches[..], [stretch] if outside(stretch.first()) && outside(stretch.last()));
         let from_model = if whole { to_lines(&line, &route.stretches) } else { Spread::default() };
         rows.push(Deviation { what, from_measured: to_curves(&route.stretches, &line), from_model });
@@ -187,8 +198,10 @@ pub fn deviations(roundabout: &Road, measured: &Measured) -> Result<Vec<Deviatio
 /// The rows of the road's edges: island, ring, kerbs and splitter islands.
 fn edges(roundabout: &Road, measured: &Measured) -> Vec<Deviation> {
     let solid = roundabout.kerbs(Gutter::Solid);
-    let (boundary, holes): (Vec<Curve>, Vec<Curve>) = solid.loops.into_iter().partition(|curve| 0.0 < curve.signed_area());
-    let splitters: Vec<Curve> = holes.into_iter().filter(|curve| curve.distance(DVec2::ZERO) > roundabout.outer_radius() - 1.0).collect();
+    let (boundary, holes): (Vec<Curve>, Vec<Curve>) =
+        solid.loops.into_iter().partition(|curve| 0.0 < curve.signed_area());
+    let splitters: Vec<Curve> =
+        holes.into_iter().filter(|curve| curve.distance(DVec2::ZERO) > roundabout.outer_radius() - 1.0).collect();
     let face = roundabout.island_radius();
     let island = |p: DVec2| (face - p.length()).max(p.length() - face - roundabout.gutter()).max(0.0);
     let row = |what: &str, from_measured, from_model| Deviation { what: what.into(), from_measured, from_model };
@@ -198,7 +211,9 @@ fn edges(roundabout: &Road, measured: &Measured) -> Vec<Deviation> {
         row("kerbs", to_curves(&measured.kerbs, &boundary), to_lines(&boundary, &measured.kerbs)),
         row("splitters", to_curves(&measured.splitters, &splitters), to_lines(&splitters, &measured.splitters)),
     ];
-    for (what, lines, gutter) in [("faces", &measured.faces, Gutter::Drivable), ("edges", &measured.edges, Gutter::Solid)] {
+    for (what, lines, gutter) in
+        [("faces", &measured.faces, Gutter::Drivable), ("edges", &measured.edges, Gutter::Solid)]
+    {
         if !lines.is_empty() {
             let all = roundabout.kerbs(gutter).loops;
             rows.push(row(what, to_curves(lines, &all), to_lines(&all, lines)));
@@ -229,8 +244,11 @@ fn to_curves(lines: &[Line], curves: &[Curve]) -> Spread {
 
 fn to_lines(curves: &[Curve], lines: &[Line]) -> Spread {
     let lines: Vec<Curve> = lines.iter().map(curve).collect();
-    let loose: Vec<DVec2> =
-        lines.iter().filter(|line| !closed(line)).flat_map(|line| [line.point_at(0.0), line.point_at(f64::INFINITY)]).collect();
+    let loose: Vec<DVec2> = lines
+        .iter()
+        .filter(|line| !closed(line))
+        .flat_map(|line| [line.point_at(0.0), line.point_at(f64::INFINITY)])
+        .collect();
     let distance = |p: DVec2| {
         let nearest = lines.iter().map(|line| line.distance(p)).fold(f64::INFINITY, f64::min);
         let end = loose.iter().map(|end| end.distance(p)).fold(f64::INFINITY, f64::min);
@@ -261,7 +279,9 @@ mod tests {
     use super::*;
 
     fn measured() -> Measured {
-        let circle = |radius: f64| (0..=60).map(|step| (radius * DVec2::from_angle(f64::from(step) * 0.104_72)).to_array()).collect();
+        let circle = |radius: f64| {
+            (0..=60).map(|step| (radius * DVec2::from_angle(f64::from(step) * 0.104_72)).to_array()).collect()
+        };
         Measured {
             note: String::new(),
             island: vec![circle(8.0)],
@@ -280,7 +300,9 @@ mod tests {
 
     #[test]
     fn a_coordinate_far_away_is_refused_with_its_key_and_value() {
-        for (value, shown) in [(1e9, "1e9"), (-1e7, "-1e7"), (1000.5, "1000.5"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
+        for (value, shown) in
+            [(1e9, "1e9"), (-1e7, "-1e7"), (1000.5, "1000.5"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")]
+        {
             let mut measured = measured();
             measured.kerbs[0][17][1] = value;
             assert_eq!(refusal(&measured), format!("kerbs[0][17][1]: {shown} m; must lie in -1000..1000 m"));

@@ -104,7 +104,8 @@ pub fn trace_by(case: &Case, mut moved: impl FnMut(&Rig, f32, &Control, &Moving)
     let times = case.checked_times()?;
     let mut pending = times.iter().copied().peekable();
     let mut run = Run::new(case);
-    let mut traced = Traced { id: case.id.clone(), states: Vec::with_capacity(times.len()), peak: None, t_jackknife: None };
+    let mut traced =
+        Traced { id: case.id.clone(), states: Vec::with_capacity(times.len()), peak: None, t_jackknife: None };
     let mut peak = Peak::default();
     loop {
         let here = run.state();
@@ -113,13 +114,18 @@ pub fn trace_by(case: &Case, mut moved: impl FnMut(&Rig, f32, &Control, &Moving)
         // At the end every remaining request is answered by the last instant.
         let until = next.unwrap_or(f64::INFINITY);
         while let Some(t) = pending.next_if(|&t| t < until - SAME_INSTANT) {
-            traced.states.push(if t - run.t <= SAME_INSTANT { State { t, ..here } } else { run.after(t, &mut moved).state() });
+            traced.states.push(if t - run.t <= SAME_INSTANT {
+                State { t, ..here }
+            } else {
+                run.after(t, &mut moved).state()
+            });
         }
         let Some(next) = next else { break };
         run = run.after(next, &mut moved);
         let (before, after) = (here.gamma.abs(), run.state().gamma.abs());
         if traced.t_jackknife.is_none() && case.vehicle.gamma_max < after {
-            traced.t_jackknife = Some(here.t + (run.t - here.t) * ((case.vehicle.gamma_max - before) / (after - before)).max(0.0));
+            traced.t_jackknife =
+                Some(here.t + (run.t - here.t) * ((case.vehicle.gamma_max - before) / (after - before)).max(0.0));
         }
     }
     traced.peak = traced.t_jackknife.is_none().then_some(peak);
@@ -156,7 +162,16 @@ impl Run<'_> {
         };
         let motion = motion_of(&case.vehicle.rig(case.dt), &truck);
         let asked = Control::default();
-        Run { case, t: 0.0, grid: 0, asked, decides: 0.0, moving: Moving { truck, motion }, psi1: init.psi1, psi2: init.psi2 }
+        Run {
+            case,
+            t: 0.0,
+            grid: 0,
+            asked,
+            decides: 0.0,
+            moving: Moving { truck, motion },
+            psi1: init.psi1,
+            psi2: init.psi2,
+        }
     }
 
     /// The end of the next sub-step: the grid's next instant, or a command or the case's end before it. `None` at the
@@ -175,20 +190,30 @@ impl Run<'_> {
     fn after(&self, t: f64, moved: &mut impl FnMut(&Rig, f32, &Control, &Moving) -> Moving) -> Self {
         let in_force = |since: f64| self.case.commands.iter().rfind(|command| command.t <= since + SAME_INSTANT);
         // Before the first command the steer angle and the speed stay as they are.
-        let steering =
-            in_force(self.t - self.case.vehicle.delta_delay).map_or(self.moving.truck.steering, |command| command.delta_cmd as f32);
+        let steering = in_force(self.t - self.case.vehicle.delta_delay)
+            .map_or(self.moving.truck.steering, |command| command.delta_cmd as f32);
         let command = in_force(self.t);
         let (mut asked, mut decides) = (self.asked, self.decides);
         if decides <= self.t + SAME_INSTANT {
             decides += self.case.control_step;
             if let Some(speed) = command.and_then(|command| command.v_cmd) {
                 let (action, step) = (Action { steering: 0.0, speed: speed as f32 }, self.case.control_step as f32);
-                asked = controlled(&self.case.vehicle.rig(self.case.dt), step, &action, self.moving.truck.speed, &self.asked);
+                asked = controlled(
+                    &self.case.vehicle.rig(self.case.dt),
+                    step,
+                    &action,
+                    self.moving.truck.speed,
+                    &self.asked,
+                );
             }
         }
         let control = match command {
             Some(Command { v_cmd: Some(_), .. }) => Control { steering, ..asked },
-            command => Control { steering, acceleration: command.map_or(0.0, |command| command.a_cmd as f32), ..Control::default() },
+            command => Control {
+                steering,
+                acceleration: command.map_or(0.0, |command| command.a_cmd as f32),
+                ..Control::default()
+            },
         };
         let duration = t - self.t;
         // A whole sub-step uses the simulator's own `dt`, not a difference of instants, which would round differently.
@@ -246,7 +271,12 @@ impl Run<'_> {
     fn tractor_ratio(&self) -> f64 {
         let Moving { truck, motion } = &self.moving;
         let roll = self.case.vehicle.tractor_suspension().roll(self.case.dt);
-        load_transfer_ratio(&roll, Vec2::new(truck.tractor_roll, truck.tractor_roll_rate), motion.lateral_acceleration + self.fall()).into()
+        load_transfer_ratio(
+            &roll,
+            Vec2::new(truck.tractor_roll, truck.tractor_roll_rate),
+            motion.lateral_acceleration + self.fall(),
+        )
+        .into()
     }
 }
 

@@ -6,7 +6,9 @@ use rayon::prelude::*;
 use super::order::{Order, Place};
 use super::{Autoreset, Error, Tally, memory};
 use crate::layout::columns::{columns, row_bytes};
-use crate::layout::{Clearance, Column, Control, N_COLUMNS, N_EXTRAS, N_RAYS, N_VALUES, Progress, RewardTerms, Stream, Truck};
+use crate::layout::{
+    Clearance, Column, Control, N_COLUMNS, N_EXTRAS, N_RAYS, N_VALUES, Progress, RewardTerms, Stream, Truck,
+};
 use crate::world::World;
 
 /// Which route an episode runs on.
@@ -234,7 +236,11 @@ fn check_size(n_envs: usize) -> Result<(), Error> {
     let width = row_bytes();
     let available = memory::available().unwrap_or(u64::MAX);
     let fitting = (available / width as u64).min(u32::MAX.into());
-    if n_envs as u64 <= fitting { Ok(()) } else { Err(Error::BatchTooLarge { n_envs, n_bytes: n_envs as u128 * width as u128, fitting }) }
+    if n_envs as u64 <= fitting {
+        Ok(())
+    } else {
+        Err(Error::BatchTooLarge { n_envs, n_bytes: n_envs as u128 * width as u128, fitting })
+    }
 }
 
 /// A column of zeros, whose memory is taken page by page when it is first written to.

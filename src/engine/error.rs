@@ -11,7 +11,9 @@ pub enum Error {
     #[error("n_envs: 0; a batch needs at least 1 truck")]
     EmptyBatch,
     /// The columns do not fit into the host's memory.
-    #[error("n_envs: {n_envs}; the columns would take {n_bytes} bytes, more than this machine has free: at most {fitting} trucks fit")]
+    #[error(
+        "n_envs: {n_envs}; the columns would take {n_bytes} bytes, more than this machine has free: at most {fitting} trucks fit"
+    )]
     BatchTooLarge {
         /// Trucks asked for.
         n_envs: usize,

@@ -49,7 +49,9 @@ impl Device {
         let adapters = found(&instance);
         let names: Vec<String> = adapters.iter().map(|adapter| adapter.get_info().name).collect();
         let wanted = name.unwrap_or_default().to_lowercase();
-        let Some(adapter) = adapters.into_iter().find(|adapter| adapter.get_info().name.to_lowercase().contains(&wanted)) else {
+        let Some(adapter) =
+            adapters.into_iter().find(|adapter| adapter.get_info().name.to_lowercase().contains(&wanted))
+        else {
             return Err(match name {
                 Some(name) if !names.is_empty() => Error::UnknownAdapter { name: name.to_owned(), found: names },
                 _ => Error::NoAdapter { looked_for: interfaces() },
@@ -59,12 +61,15 @@ impl Device {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("offtrack"),
             // Other users of the device may need any of them.
-            required_features: adapter.features() - Features::MAPPABLE_PRIMARY_BUFFERS - Features::all_experimental_mask(),
+            required_features: adapter.features()
+                - Features::MAPPABLE_PRIMARY_BUFFERS
+                - Features::all_experimental_mask(),
             required_limits: adapter.limits(),
             ..Default::default()
         };
         let opened = pollster::block_on(adapter.request_device(&descriptor));
-        let (device, queue) = opened.map_err(|error| Error::Broken { adapter: adapter.get_info().name, message: error.to_string() })?;
+        let (device, queue) =
+            opened.map_err(|error| Error::Broken { adapter: adapter.get_info().name, message: error.to_string() })?;
         let broken = Arc::new(Mutex::new(None));
         let note = |message: String, broken: &Mutex<Option<String>>| {
             broken.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
@@ -72,7 +77,9 @@ impl Device {
         let on_error = broken.clone();
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| note(error.to_string(), &on_error)));
         let on_loss = broken.clone();
-        device.set_device_lost_callback(move |reason, message| note(format!("the device was lost: {reason:?} {message}"), &on_loss));
+        device.set_device_lost_callback(move |reason, message| {
+            note(format!("the device was lost: {reason:?} {message}"), &on_loss)
+        });
         Ok(Device { instance, adapter, device, queue, broken, kernels: Arc::default() })
     }
 
@@ -97,7 +104,12 @@ impl Device {
         self.check()?;
         let size = slices.iter().map(|slice| slice.size).sum();
         let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
-        let staging = self.device.create_buffer(&BufferDescriptor { label: Some("staging"), size, usage, mapped_at_creation: false });
+        let staging = self.device.create_buffer(&BufferDescriptor {
+            label: Some("staging"),
+            size,
+            usage,
+            mapped_at_creation: false,
+        });
         let mut encoder = self.device.create_command_encoder(&Default::default());
         let mut at = 0;
         for slice in slices {
@@ -129,7 +141,8 @@ impl Device {
     /// A buffer of `size` bytes, all 0, that shaders may read and write and that may be copied from and to.
     pub fn empty(&self, label: &str, size: u64) -> Slice {
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        let buffer = self.device.create_buffer(&BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
+        let buffer =
+            self.device.create_buffer(&BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
         Slice { buffer, offset: 0, size }
     }
 

@@ -48,8 +48,9 @@ mod tests {
     }
     #[test]
     fn a_limit_of_the_address_space_is_read_in_bytes() {
-        let limits =
-            |soft: &str| format!("Max locked memory  8388608  8388608  bytes\nMax address space         {soft}  unlimited  bytes\n");
+        let limits = |soft: &str| {
+            format!("Max locked memory  8388608  8388608  bytes\nMax address space         {soft}  unlimited  bytes\n")
+        };
         assert_eq!(address_limit(&limits("4096000000")), Some(4_096_000_000));
         assert_eq!(address_limit(&limits("unlimited")), None);
     }

@@ -64,7 +64,9 @@ impl Field {
     pub fn bake(outline: &Outline, cell: f64) -> Field {
         let (low, high) = outline.bounds();
         let origin = low - MARGIN;
-        let count = |extent: f64, tile: u32| (((extent + 2.0 * MARGIN) / cell).ceil().max(1.0) as usize).next_multiple_of(tile as usize);
+        let count = |extent: f64, tile: u32| {
+            (((extent + 2.0 * MARGIN) / cell).ceil().max(1.0) as usize).next_multiple_of(tile as usize)
+        };
         let (columns, rows) = (count(high.x - low.x, TILE_COLUMNS), count(high.y - low.y, TILE_ROWS));
         let (across, up) = (columns.div_ceil(REGION), rows.div_ceil(REGION));
         let grid = Grid { origin, cell, columns, rows };
@@ -203,7 +205,8 @@ fn found(nearby: &Nearby, corner: DVec2, cell: f64) -> Cell {
     let finest = (cell / FINEST).log2().ceil().clamp(0.0, 7.0) as u32;
     // Two blocks take 16 bytes and more: where 24 suffice for one, they are not searched for.
     let simple = finest.min(1);
-    let coarsest = |mut levels: std::ops::Range<u32>| levels.find_map(|level| Some(square.block(level, exact)).filter(close));
+    let coarsest =
+        |mut levels: std::ops::Range<u32>| levels.find_map(|level| Some(square.block(level, exact)).filter(close));
     if let Some(block) = coarsest(0..simple + 1) {
         return Cell::Single(block);
     }
@@ -233,7 +236,8 @@ fn kinked(nearby: &Nearby, square: &Square, free: bool) -> Option<Cell> {
         let blocks = [0, 1].map(|side| square.block(level, |p| extended(nearby, &sides[side], p)));
         let allowed = |exact: f64| if exact.abs() < SURFACE { SURFACE_TOLERANCE } else { TOLERANCE };
         let close = |joined: fn(f64, f64) -> f64| {
-            let values = square.values(&blocks[0]).zip(square.values(&blocks[1])).map(|(one, other)| joined(one, other));
+            let values =
+                square.values(&blocks[0]).zip(square.values(&blocks[1])).map(|(one, other)| joined(one, other));
             values.zip(square.sampled(level, exact)).all(|(value, exact)| (value - exact).abs() <= allowed(exact))
         };
         if close(f64::min) {
@@ -291,7 +295,8 @@ fn sides(nearby: &Nearby, square: &Square) -> Option<[Vec<usize>; 2]> {
 
 /// Signed distance from `p` to a group of pieces, extended beyond the group's ends (m).
 fn extended(nearby: &Nearby, pieces: &[usize], p: DVec2) -> f64 {
-    let nearest = pieces.iter().copied().min_by(|&a, &b| nearby.piece_distance(a, p).total_cmp(&nearby.piece_distance(b, p)));
+    let nearest =
+        pieces.iter().copied().min_by(|&a, &b| nearby.piece_distance(a, p).total_cmp(&nearby.piece_distance(b, p)));
     nearest.map_or(0.0, |piece| nearby.extended(piece, p).0)
 }
 
@@ -314,8 +319,11 @@ impl Square {
     fn values(&self, block: &Block) -> impl Iterator<Item = f64> {
         points(block.level).map(move |(column, row, u, v)| {
             let lines = (1 << block.level) + 1;
-            let node = |right: usize, above: usize| f64::from(block.nodes[(row + above) * lines + column + right]) * f64::from(STORED_UNIT);
-            let (south, north) = (node(0, 0) + u * (node(1, 0) - node(0, 0)), node(0, 1) + u * (node(1, 1) - node(0, 1)));
+            let node = |right: usize, above: usize| {
+                f64::from(block.nodes[(row + above) * lines + column + right]) * f64::from(STORED_UNIT)
+            };
+            let (south, north) =
+                (node(0, 0) + u * (node(1, 0) - node(0, 0)), node(0, 1) + u * (node(1, 1) - node(0, 1)));
             south + v * (north - south)
         })
     }
@@ -323,8 +331,9 @@ impl Square {
     /// `distance` there, as far as it is stored (m).
     fn sampled(&self, level: u32, distance: impl Fn(DVec2) -> f64) -> impl Iterator<Item = f64> {
         let step = self.step(level);
-        points(level)
-            .map(move |(column, row, u, v)| distance(self.corner + DVec2::new(column as f64 + u, row as f64 + v) * step).clamp(-DEEP, FAR))
+        points(level).map(move |(column, row, u, v)| {
+            distance(self.corner + DVec2::new(column as f64 + u, row as f64 + v) * step).clamp(-DEEP, FAR)
+        })
     }
 
     /// The error of a block there, and the exact distance (m).

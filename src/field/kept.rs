@@ -33,7 +33,8 @@ impl Field {
 /// The field that these bytes are; `None` if they are none.
 fn parsed(bytes: &[u8]) -> Option<Field> {
     let mut words = bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
-    let [x, y, cells_per_metre, columns, rows] = [words.next()?, words.next()?, words.next()?, words.next()?, words.next()?];
+    let [x, y, cells_per_metre, columns, rows] =
+        [words.next()?, words.next()?, words.next()?, words.next()?, words.next()?];
     let n_cells = (columns as usize).checked_mul(rows as usize)?;
     let cells: Vec<[u32; 2]> = (0..n_cells).map_while(|_| Some([words.next()?, words.next()?])).collect();
     let values: Vec<u32> = words.collect();

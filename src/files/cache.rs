@@ -28,7 +28,10 @@ pub struct Progress {
 /// than 16. More would be no faster, and their stacks alone may not fit into the address space.
 pub fn n_threads() -> usize {
     let n_cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|number| number.parse().ok()).filter(|&number: &usize| 0 < number);
+    let asked = std::env::var("RAYON_NUM_THREADS")
+        .ok()
+        .and_then(|number| number.parse().ok())
+        .filter(|&number: &usize| 0 < number);
     asked.map_or(n_cores, |asked| asked.min((4 * n_cores).max(16)))
 }
 
@@ -122,7 +125,8 @@ impl Cache {
         if checksum != fnv_1a(content).to_le_bytes() {
             return None;
         }
-        let payload = content.strip_prefix(MAGIC)?.strip_prefix(&(key.len() as u64).to_le_bytes())?.strip_prefix(key)?.len();
+        let payload =
+            content.strip_prefix(MAGIC)?.strip_prefix(&(key.len() as u64).to_le_bytes())?.strip_prefix(key)?.len();
         let end = bytes.len() - 8;
         bytes.truncate(end);
         Some(bytes.split_off(end - payload))

@@ -148,8 +148,8 @@ impl<'a> Reader<'a> {
     ///
     /// [`Error::Malformed`].
     pub fn parse<T: DeserializeOwned>(file: &'a Path, text: &str) -> Result<(Reader<'a>, T), Error> {
-        let written =
-            toml::from_str(text).map_err(|error| Error::Malformed { file: file.to_owned(), message: message::malformed(text, &error) })?;
+        let written = toml::from_str(text)
+            .map_err(|error| Error::Malformed { file: file.to_owned(), message: message::malformed(text, &error) })?;
         Ok((Reader { file }, written))
     }
 
@@ -160,7 +160,12 @@ impl<'a> Reader<'a> {
 
     /// The error for a value that makes no sense.
     pub fn invalid(&self, key: impl Into<String>, value: impl Display, expected: impl Into<String>) -> Error {
-        Error::Invalid { file: self.file.to_owned(), key: key.into(), value: value.to_string(), expected: expected.into() }
+        Error::Invalid {
+            file: self.file.to_owned(),
+            key: key.into(),
+            value: value.to_string(),
+            expected: expected.into(),
+        }
     }
 
     /// A finite number within `range`; `unit` is for the message.

@@ -158,7 +158,9 @@ fn standard_stream(found: &Metadata) -> Option<File> {
     let (output, error) = (io::stdout(), io::stderr());
     // What cannot be printed is not this file's failure.
     let _ = (&output).flush();
-    let streams = [output.as_fd(), error.as_fd()].into_iter().filter_map(|stream| stream.try_clone_to_owned().map(File::from).ok());
+    let streams = [output.as_fd(), error.as_fd()]
+        .into_iter()
+        .filter_map(|stream| stream.try_clone_to_owned().map(File::from).ok());
     let is_found = |own: Metadata| (own.dev(), own.ino()) == (found.dev(), found.ino());
     streams.into_iter().find(|stream| stream.metadata().is_ok_and(is_found))
 }

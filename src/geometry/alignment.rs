@@ -46,7 +46,10 @@ pub fn rounded(bends: &[Bend], closed: bool) -> Result<Curve, Misfit> {
         if free < -1e-9 || !free.is_finite() {
             let at_fault = if here.tangent < there.tangent { next } else { index };
             let rounding = &arcs[at_fault];
-            return Err(Misfit { bend: at_fault, largest: (bends[at_fault].radius * (1.0 + free / rounding.tangent)).max(0.0) });
+            return Err(Misfit {
+                bend: at_fault,
+                largest: (bends[at_fault].radius * (1.0 + free / rounding.tangent)).max(0.0),
+            });
         }
         if 1e-9 < free {
             pieces.push(Piece::Segment { from: here.end, to: there.begin });

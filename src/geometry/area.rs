@@ -49,7 +49,8 @@ pub(crate) fn signed_area(contour: &[[f64; 2]]) -> f64 {
 impl Area {
     /// The union of counter-clockwise contours.
     pub(crate) fn union(contours: impl Iterator<Item = Vec<DVec2>>) -> Area {
-        let contours: Vec<Vec<[f64; 2]>> = contours.map(|contour| contour.into_iter().map(DVec2::into).collect()).collect();
+        let contours: Vec<Vec<[f64; 2]>> =
+            contours.map(|contour| contour.into_iter().map(DVec2::into).collect()).collect();
         Area { parts: overlaid(&contours, &Vec::new(), OverlayRule::Subject) }
     }
 
@@ -168,7 +169,8 @@ mod tests {
 
     #[test]
     fn a_simplified_circle_has_fewer_points_and_nearly_its_size() {
-        let circle: Vec<DVec2> = (0..1000).map(|i| 10.0 * DVec2::from_angle(f64::from(i) * std::f64::consts::TAU / 1000.0)).collect();
+        let circle: Vec<DVec2> =
+            (0..1000).map(|i| 10.0 * DVec2::from_angle(f64::from(i) * std::f64::consts::TAU / 1000.0)).collect();
         let whole = Area::union(std::iter::once(circle));
         let simple = whole.simplified(0.003);
         assert!(simple.parts[0][0].len() < 200 && (simple.size() - whole.size()).abs() < 0.003 * 63.0);
@@ -178,7 +180,8 @@ mod tests {
 
     #[test]
     fn a_gap_is_closed_if_it_is_narrow_and_left_if_it_is_wide() {
-        let apart = |gap: f64| Area::union([square(0.0, 0.0, 1.0), square(1.0 + gap, 0.0, 1.0)].into_iter()).closed(0.02);
+        let apart =
+            |gap: f64| Area::union([square(0.0, 0.0, 1.0), square(1.0 + gap, 0.0, 1.0)].into_iter()).closed(0.02);
         assert_eq!(apart(0.015).parts.len(), 1);
         assert_eq!(apart(0.025).parts.len(), 2);
         assert!((apart(0.025).size() - 2.0).abs() < 1e-6);

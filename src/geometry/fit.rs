@@ -319,7 +319,8 @@ mod tests {
         }
         assert!((curve.length() - 40.0).abs() < 1e-3);
         // The curve has no point far from the polyline either.
-        let polyline = Curve { pieces: points.windows(2).map(|pair| Piece::Segment { from: pair[0], to: pair[1] }).collect() };
+        let polyline =
+            Curve { pieces: points.windows(2).map(|pair| Piece::Segment { from: pair[0], to: pair[1] }).collect() };
         assert!(farthest(&curve.polyline(1e-3), &polyline) <= 0.006);
     }
 
@@ -328,7 +329,9 @@ mod tests {
         let mut points = Vec::new();
         for corner in 0..4 {
             let turn = DVec2::from_angle(f64::from(corner) * FRAC_PI_2);
-            points.extend((0..=10).map(|i| turn.rotate(DVec2::new(10.0, 10.0) + 3.0 * DVec2::from_angle(f64::from(i) * FRAC_PI_2 / 10.0))));
+            points.extend((0..=10).map(|i| {
+                turn.rotate(DVec2::new(10.0, 10.0) + 3.0 * DVec2::from_angle(f64::from(i) * FRAC_PI_2 / 10.0))
+            }));
         }
         let square = fitted_outline(&points, 0.02);
         assert!((8..=12).contains(&square.pieces.len()), "{}", square.pieces.len());

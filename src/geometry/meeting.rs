@@ -11,7 +11,13 @@ impl Piece {
             (Piece::Segment { from, to }, _) => {
                 let along = to - from;
                 let on = |fraction: &f64| (0.0..=1.0).contains(fraction);
-                other.on_line(from, along).into_iter().flatten().filter(on).map(|fraction| from + fraction * along).collect()
+                other
+                    .on_line(from, along)
+                    .into_iter()
+                    .flatten()
+                    .filter(on)
+                    .map(|fraction| from + fraction * along)
+                    .collect()
             }
             (Piece::Arc { .. }, Piece::Segment { .. }) => other.meetings(self),
             (Piece::Arc { centre, radius, .. }, Piece::Arc { centre: other_centre, radius: other_radius, .. }) => {

@@ -16,7 +16,8 @@ pub(super) fn grown(outline: &Outline, distance: f64) -> Vec<Curve> {
         let mut cuts: Vec<f64> = others.flat_map(|other| piece.meetings(other)).map(|p| piece.station(p)).collect();
         cuts.extend([0.0, piece.length()]);
         cuts.sort_by(f64::total_cmp);
-        let parts: Vec<Piece> = cuts.windows(2).filter(|cut| SAME < cut[1] - cut[0]).map(|cut| piece.part(cut[0], cut[1])).collect();
+        let parts: Vec<Piece> =
+            cuts.windows(2).filter(|cut| SAME < cut[1] - cut[0]).map(|cut| piece.part(cut[0], cut[1])).collect();
         parts
     });
     let far_enough = |part: &Piece| distance - SAME <= outline.signed_distance(part.point_at(part.length() / 2.0));
@@ -32,7 +33,12 @@ fn moved(curve: &Curve, distance: f64) -> Vec<Piece> {
         let heading = piece.heading_at(piece.length());
         let turn = wrapped(next.heading_at(0.0) - heading);
         if turn < -1e-9 {
-            pieces.push(Piece::Arc { centre: piece.end(), radius: distance, from: heading + std::f64::consts::FRAC_PI_2, sweep: turn });
+            pieces.push(Piece::Arc {
+                centre: piece.end(),
+                radius: distance,
+                from: heading + std::f64::consts::FRAC_PI_2,
+                sweep: turn,
+            });
         }
     }
     pieces

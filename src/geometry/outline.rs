@@ -76,7 +76,9 @@ impl Rise {
             return false;
         }
         let x = match self.arc {
-            Some((centre, radius, side)) => centre.x + side * (radius * radius - (p.y - centre.y).powi(2)).max(0.0).sqrt(),
+            Some((centre, radius, side)) => {
+                centre.x + side * (radius * radius - (p.y - centre.y).powi(2)).max(0.0).sqrt()
+            }
             None => self.from.x + (p.y - self.from.y) / (self.to.y - self.from.y) * (self.to.x - self.from.x),
         };
         p.x < x
@@ -182,11 +184,14 @@ fn culled(pieces: &[Placed], rises: &[Rise], centre: DVec2, radius: f64) -> Near
     // A point within `radius` is at most `least + radius` from the outline and sees each piece at most `radius` nearer
     // than the centre.
     let reach = least + 2.0 * radius + 1e-9;
-    let pieces = pieces.iter().zip(&distances).filter(|&(_, &distance)| distance <= reach).map(|(placed, _)| *placed).collect();
+    let pieces =
+        pieces.iter().zip(&distances).filter(|&(_, &distance)| distance <= reach).map(|(placed, _)| *placed).collect();
     let side = if radius < least {
         Side::Same(odd(rises, centre))
     } else {
-        let level = |rise: &&Rise| rise.from.y.min(rise.to.y) <= centre.y + radius && centre.y - radius <= rise.from.y.max(rise.to.y);
+        let level = |rise: &&Rise| {
+            rise.from.y.min(rise.to.y) <= centre.y + radius && centre.y - radius <= rise.from.y.max(rise.to.y)
+        };
         Side::Mixed(rises.iter().filter(level).copied().collect())
     };
     Nearby { pieces, side }
@@ -259,8 +264,10 @@ fn rises_of(curve: &Curve) -> Vec<Rise> {
                 // Arcs are cut at their northernmost and southernmost points.
                 let (low, high) = (from.min(from + sweep), from.max(from + sweep));
                 let first = ((low - FRAC_PI_2) / PI).floor() as i64 + 1;
-                let mut cuts: Vec<f64> =
-                    (first..first + 4).map(|turn| FRAC_PI_2 + turn as f64 * PI).filter(|&cut| low < cut && cut < high).collect();
+                let mut cuts: Vec<f64> = (first..first + 4)
+                    .map(|turn| FRAC_PI_2 + turn as f64 * PI)
+                    .filter(|&cut| low < cut && cut < high)
+                    .collect();
                 cuts.insert(0, low);
                 cuts.push(high);
                 if sweep < 0.0 {

@@ -19,7 +19,11 @@ fn outline() -> Outline {
         bend(-30.0, 30.0, 9.0),
     ];
     let splitter = [bend(14.0, -2.0, 0.3), bend(22.0, 0.0, 0.2), bend(14.0, 2.5, 0.5)];
-    Outline::new(vec![rounded(&square, true).unwrap(), Curve::circle(DVec2::new(1.0, -2.0), 8.0), rounded(&splitter, true).unwrap()])
+    Outline::new(vec![
+        rounded(&square, true).unwrap(),
+        Curve::circle(DVec2::new(1.0, -2.0), 8.0),
+        rounded(&splitter, true).unwrap(),
+    ])
 }
 
 /// The outline's polylines; chords leave the arcs by at most a hundredth of a millimetre.
@@ -143,7 +147,9 @@ fn a_fillet_smaller_than_the_offset_leaves_a_corner() {
 fn a_rectangle_around_a_whole_island_is_not_free() {
     let island = Curve::circle(DVec2::new(10.0, 0.0), 0.5);
     let outline = Outline::new(vec![Curve::circle(DVec2::ZERO, 30.0), island]);
-    let around = |x: f64| [DVec2::new(x + 2.0, 2.0), DVec2::new(x - 2.0, 2.0), DVec2::new(x - 2.0, -2.0), DVec2::new(x + 2.0, -2.0)];
+    let around = |x: f64| {
+        [DVec2::new(x + 2.0, 2.0), DVec2::new(x - 2.0, 2.0), DVec2::new(x - 2.0, -2.0), DVec2::new(x + 2.0, -2.0)]
+    };
     assert!(outline.intersects_rectangle(&around(10.0)));
     assert!(!outline.intersects_rectangle(&around(14.0)));
     assert!(outline.intersects_rectangle(&around(40.0)));
@@ -157,7 +163,11 @@ fn bounds_reach_the_bulge_of_arcs() {
 
 #[test]
 fn a_curve_is_walked_by_arc_length() {
-    let curve = rounded(&[(0.0, 0.0), (10.0, 0.0), (10.0, 10.0)].map(|(x, y)| Bend { at: DVec2::new(x, y), radius: 4.0 }), false).unwrap();
+    let curve = rounded(
+        &[(0.0, 0.0), (10.0, 0.0), (10.0, 10.0)].map(|(x, y)| Bend { at: DVec2::new(x, y), radius: 4.0 }),
+        false,
+    )
+    .unwrap();
     assert!((curve.length() - (12.0 + 2.0 * PI)).abs() < 1e-12);
     assert_eq!(curve.point_at(3.0), DVec2::new(3.0, 0.0));
     assert!((curve.heading_at(6.0 + PI) - PI / 4.0).abs() < 1e-12);

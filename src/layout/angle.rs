@@ -93,7 +93,10 @@ mod tests {
             let (sin, cos) = sin_cos(angle);
             let (true_sin, true_cos) = f64::from(angle).sin_cos();
             // Two units in the last place of a number near 1.
-            assert!((f64::from(sin) - true_sin).abs() < 1.2e-7 && (f64::from(cos) - true_cos).abs() < 1.2e-7, "{angle}");
+            assert!(
+                (f64::from(sin) - true_sin).abs() < 1.2e-7 && (f64::from(cos) - true_cos).abs() < 1.2e-7,
+                "{angle}"
+            );
         }
         assert_eq!(sin_cos(0.0), (0.0, 1.0));
     }

@@ -1,6 +1,9 @@
 //! The buffers that the kernels of a step see: one bind group, a binding each, in this order.
 
-use super::{Action, BatchFacts, BeginRow, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, Rig, RouteRow, Stream, WaypointRow};
+use super::{
+    Action, BatchFacts, BeginRow, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, Rig, RouteRow, Stream,
+    WaypointRow,
+};
 use crate::layout::shared::{Named, Shared, comment};
 
 /// What shaders may do to a buffer.
@@ -71,8 +74,11 @@ pub const BUFFERS: [Buffer; N_BUFFERS] = {
     let mut buffers = [Buffer::Tally; N_BUFFERS];
     let mut binding = 0;
     while binding < N_BUFFERS - 1 {
-        buffers[binding] =
-            if binding < N_TABLES { Buffer::Table(Table::ALL[binding]) } else { Buffer::Column(Column::ALL[binding - N_TABLES]) };
+        buffers[binding] = if binding < N_TABLES {
+            Buffer::Table(Table::ALL[binding])
+        } else {
+            Buffer::Column(Column::ALL[binding - N_TABLES])
+        };
         binding += 1;
     }
     buffers
@@ -101,10 +107,13 @@ impl Buffer {
     fn declared(self) -> (String, String) {
         match self {
             Buffer::Table(table) => table.declared(),
-            Buffer::Column(column) => (format!("{}, {}.", column.doc().trim(), column.shape()), format!("array<{}>", column.element())),
-            Buffer::Tally => {
-                ("Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].".to_owned(), "array<atomic<u32>>".to_owned())
+            Buffer::Column(column) => {
+                (format!("{}, {}.", column.doc().trim(), column.shape()), format!("array<{}>", column.element()))
             }
+            Buffer::Tally => (
+                "Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].".to_owned(),
+                "array<atomic<u32>>".to_owned(),
+            ),
         }
     }
 }
@@ -132,7 +141,9 @@ impl Table {
             Table::Batch => ("Facts that the trucks of a batch share.", BatchFacts::wgsl()),
             Table::Choice => ("Routes that episodes run on: to be drawn from, or one for each truck.", rows::<u32>()),
             Table::Streams => ("The stream of random numbers that each truck draws from, [n_envs].", rows::<Stream>()),
-            Table::Begins => ("Which trucks begin an episode when the caller says so, and how, [n_envs].", rows::<BeginRow>()),
+            Table::Begins => {
+                ("Which trucks begin an episode when the caller says so, and how, [n_envs].", rows::<BeginRow>())
+            }
         };
         (doc.to_owned(), kind)
     }

@@ -51,10 +51,22 @@ pub const OBSERVATION: [Values; 13] = numbered([
     angles("heading", 5, "tractor's heading less the lane's at these waypoints / pi"),
     angles("trailer_heading", 5, "trailer's heading less the lane's at these waypoints / pi"),
     angles("articulation", 1, "tractor's heading less the trailer's / pi"),
-    values("future_curvature", 4, "interior angle of the route ahead / pi, chords of 5, 7, 10, 12 waypoints; 1 is straight"),
+    values(
+        "future_curvature",
+        4,
+        "interior angle of the route ahead / pi, chords of 5, 7, 10, 12 waypoints; 1 is straight",
+    ),
     values("current_curvature", 4, "interior angle at the next waypoint / pi, the same chords"),
-    values("trailer_range", N_TRAILER_RAYS, "trailer's distance sensors, left and right alternating, front to rear / sensor range"),
-    values("tractor_range", N_TRACTOR_RAYS, "tractor's distance sensors, from left 90 deg to right 90 deg / sensor range"),
+    values(
+        "trailer_range",
+        N_TRAILER_RAYS,
+        "trailer's distance sensors, left and right alternating, front to rear / sensor range",
+    ),
+    values(
+        "tractor_range",
+        N_TRACTOR_RAYS,
+        "tractor's distance sensors, from left 90 deg to right 90 deg / sensor range",
+    ),
     values("radius", 10, "radius of the route over two chords of 5 waypoints, 0 to 9 chords ahead / 100 m, at most 1"),
 ]);
 

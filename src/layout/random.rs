@@ -40,7 +40,8 @@ pub enum Draw {
 
 /// Four random words.
 pub fn words(seed: u32, env: u32, episode: u32, draw: u32) -> [u32; 4] {
-    let [mut x, mut y, mut z, mut w] = [seed, env, episode, draw].map(|word| word.wrapping_mul(FACTOR).wrapping_add(ADDEND));
+    let [mut x, mut y, mut z, mut w] =
+        [seed, env, episode, draw].map(|word| word.wrapping_mul(FACTOR).wrapping_add(ADDEND));
     x = x.wrapping_add(y.wrapping_mul(w));
     y = y.wrapping_add(z.wrapping_mul(x));
     z = z.wrapping_add(x.wrapping_mul(y));

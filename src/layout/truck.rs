@@ -9,7 +9,8 @@ impl Truck {
     /// Middle of the trailer's axle group (m).
     #[inline]
     pub fn trailer_position(&self, rig: &Rig) -> Vec2 {
-        self.position + rig.fifth_wheel * direction(self.heading) - rig.trailer_wheelbase * direction(self.trailer_heading)
+        self.position + rig.fifth_wheel * direction(self.heading)
+            - rig.trailer_wheelbase * direction(self.trailer_heading)
     }
 
     /// The larger load transfer ratio of both units, without its sign.

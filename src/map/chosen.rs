@@ -40,7 +40,8 @@ impl Choice {
         }
         let rings = map.rings();
         if let [_, _, ..] = rings.as_slice() {
-            let listed: Vec<String> = rings.iter().map(|ring| format!("{:.1},{:.1}", ring.centre.x, ring.centre.y)).collect();
+            let listed: Vec<String> =
+                rings.iter().map(|ring| format!("{:.1},{:.1}", ring.centre.x, ring.centre.y)).collect();
             let expected = format!("the map has several; one of {}", listed.join("  "));
             return Err(Reader::of(file).invalid("ring", "missing", expected));
         }
@@ -75,7 +76,11 @@ impl Road {
         let stem = || file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let name = choice.name.clone().unwrap_or_else(stem);
         if name.is_empty() || 40 < name.len() || name.contains('/') || name.chars().any(char::is_control) {
-            return Err(Reader::of(file).invalid("name", format!("{name:?}"), "must be 1 to 40 characters without a slash"));
+            return Err(Reader::of(file).invalid(
+                "name",
+                format!("{name:?}"),
+                "must be 1 to 40 characters without a slash",
+            ));
         }
         let map = Map::read(file, choice.hand)?;
         Ok(Road::on(name, choice.imported(file, &map)?.ground))

@@ -20,7 +20,9 @@ mod text;
 /// A roundabout as a file has it.
 pub(crate) mod written {
     pub(crate) use super::corner::WrittenCorner;
-    pub(crate) use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenPoint, WrittenRing, WrittenWay};
+    pub(crate) use super::roundabout_keys::{
+        Written, WrittenAlignment, WrittenArm, WrittenPoint, WrittenRing, WrittenWay,
+    };
 }
 
 use std::path::Path;
@@ -142,7 +144,16 @@ fn ground(ring: &Ring, arms: &[Arm], kerbs: Outline, edges: Edges, lanes: &Lanes
     let line = |&RouteLine { entry, lane, exit, ref line }: &RouteLine| {
         let exit_arm = (entry + exit as usize) % arms.len();
         let widths = [arms[entry].lane_width, ring.lane_width, arms[exit_arm].lane_width];
-        Line { entry, lane, exit, exit_arm, line: line.clone(), crossing: ring.crossing(lane), widths, ends: [None, None] }
+        Line {
+            entry,
+            lane,
+            exit,
+            exit_arm,
+            line: line.clone(),
+            crossing: ring.crossing(lane),
+            widths,
+            ends: [None, None],
+        }
     };
     Ground {
         mirrored: false,

@@ -110,7 +110,10 @@ impl Road {
     }
 
     fn line_of(&self, route: &Route) -> Option<&Line> {
-        self.ground.lines.iter().find(|line| (line.entry, line.lane, line.exit) == (route.entry, route.lane, route.exit))
+        self.ground
+            .lines
+            .iter()
+            .find(|line| (line.entry, line.lane, line.exit) == (route.entry, route.lane, route.exit))
     }
 
     /// The centre lines of all lanes: those around the ring, the innermost first, then for every arm those that enter,

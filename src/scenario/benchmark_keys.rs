@@ -188,7 +188,13 @@ pub(super) struct WrittenEnding {
 
 impl Default for WrittenEnding {
     fn default() -> Self {
-        WrittenEnding { stray_distance: 10.0, jackknife_deg: 90.0, rollover_ratio: 1.0, time_limit: 3.0, clock: Clock::default() }
+        WrittenEnding {
+            stray_distance: 10.0,
+            jackknife_deg: 90.0,
+            rollover_ratio: 1.0,
+            time_limit: 3.0,
+            clock: Clock::default(),
+        }
     }
 }
 

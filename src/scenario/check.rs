@@ -36,7 +36,11 @@ impl Scenario {
     pub fn check(&self) -> Result<(), Invalid> {
         if !self.vehicle.loads.contains_key(&self.load) {
             let loads: Vec<&str> = self.vehicle.loads.keys().map(String::as_str).collect();
-            return Err(invalid("load", format_args!("{:?}", self.load), format!("the vehicle has {}", loads.join(", "))));
+            return Err(invalid(
+                "load",
+                format_args!("{:?}", self.load),
+                format!("the vehicle has {}", loads.join(", ")),
+            ));
         }
         self.check_numbers()?;
         list("steer_levels", &self.steer_levels, [-1.0, 1.0])?;
@@ -51,7 +55,11 @@ impl Scenario {
         if let Some(fleet) = &self.fleet {
             within("fleet.n_vehicles", fleet.n_vehicles as f64, [1.0, 1e6])?;
             if fleet.classes().is_empty() {
-                return Err(invalid("fleet.members", "no loads", "at least one vehicle with a load of a positive share is needed"));
+                return Err(invalid(
+                    "fleet.members",
+                    "no loads",
+                    "at least one vehicle with a load of a positive share is needed",
+                ));
             }
             fleet.extremes().try_for_each(|(_, vehicle)| check_vehicle(&vehicle))?;
         }
@@ -89,7 +97,10 @@ impl Scenario {
     /// Every route leads somewhere, and there is one.
     fn check_routes(&self) -> Result<(), Invalid> {
         if self.places.iter().all(|place| place.routes.is_empty()) {
-            let expected = format!("at least one route is needed: the file of {} must list some in the split that is used", self.name);
+            let expected = format!(
+                "at least one route is needed: the file of {} must list some in the split that is used",
+                self.name
+            );
             return Err(invalid("places", "no routes", expected));
         }
         for (index, place) in self.places.iter().enumerate() {
@@ -103,7 +114,9 @@ impl Scenario {
                 within(&format!("{key}.crossing.1"), route.crossing.1, FINITE)?;
                 for (at, waypoint) in route.waypoints.iter().enumerate() {
                     let values = [waypoint.position.x, waypoint.position.y, waypoint.heading];
-                    values.into_iter().try_for_each(|value| within(&format!("{key}.waypoints[{at}]"), value, FINITE))?;
+                    values
+                        .into_iter()
+                        .try_for_each(|value| within(&format!("{key}.waypoints[{at}]"), value, FINITE))?;
                 }
             }
         }
@@ -184,7 +197,11 @@ fn list(key: &str, values: &[f64], range: [f64; 2]) -> Result<(), Invalid> {
 
 /// NaN lies in no range.
 fn within(key: &str, value: f64, [least, most]: [f64; 2]) -> Result<(), Invalid> {
-    if (least..=most).contains(&value) { Ok(()) } else { Err(invalid(key, value, format!("must lie in {least}..{most}"))) }
+    if (least..=most).contains(&value) {
+        Ok(())
+    } else {
+        Err(invalid(key, value, format!("must lie in {least}..{most}")))
+    }
 }
 
 fn invalid(key: &str, value: impl Display, expected: impl Into<String>) -> Invalid {

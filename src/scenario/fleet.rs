@@ -65,14 +65,21 @@ impl Fleet {
     fn shares(&self) -> Vec<(&Member, &str, f64)> {
         let members: f64 = self.members.iter().map(|member| member.share).sum();
         let of_member = |member: &'_ Member| member.loads.values().sum::<f64>();
-        let all = self.members.iter().flat_map(|member| member.loads.iter().map(move |(load, share)| (member, load.as_str(), *share)));
-        let shares = all.map(|(member, load, share)| (member, load, member.share / members * share / of_member(member)));
+        let all = self
+            .members
+            .iter()
+            .flat_map(|member| member.loads.iter().map(move |(load, share)| (member, load.as_str(), *share)));
+        let shares =
+            all.map(|(member, load, share)| (member, load, member.share / members * share / of_member(member)));
         shares.filter(|(.., share)| 0.0 < *share).collect()
     }
 
     /// The classes, in the order of the file.
     pub fn classes(&self) -> Vec<Class> {
-        self.shares().into_iter().map(|(member, load, _)| Class { vehicle: member.name.clone(), load: load.to_owned() }).collect()
+        self.shares()
+            .into_iter()
+            .map(|(member, load, _)| Class { vehicle: member.name.clone(), load: load.to_owned() })
+            .collect()
     }
 
     /// The table of vehicles, class by class: a function of the fleet alone.
@@ -98,7 +105,8 @@ impl Fleet {
 
     /// Rows of the table.
     fn n_rows(&self, shares: &[(&Member, &str, f64)]) -> usize {
-        let whole = |n: &usize| shares.iter().all(|(.., share)| (share * *n as f64 - (share * *n as f64).round()).abs() < 1e-9);
+        let whole =
+            |n: &usize| shares.iter().all(|(.., share)| (share * *n as f64 - (share * *n as f64).round()).abs() < 1e-9);
         if self.draw.is_empty() { (1..self.n_vehicles).find(whole).unwrap_or(self.n_vehicles) } else { self.n_vehicles }
     }
 

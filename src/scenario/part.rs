@@ -11,7 +11,8 @@ use crate::map::route::Route;
 impl Scenario {
     /// Drops the routes of all other splits, and roundabouts of which none is left. Indices of routes change.
     pub fn keep(&mut self, splits: &[Split]) {
-        let dropped = Split::ALL.into_iter().filter(|split| !splits.contains(split)).flat_map(|split| self.split(split).to_vec());
+        let dropped =
+            Split::ALL.into_iter().filter(|split| !splits.contains(split)).flat_map(|split| self.split(split).to_vec());
         let dropped: HashSet<u32> = dropped.collect();
         self.retain(|index, _| !dropped.contains(&index));
     }

@@ -25,7 +25,8 @@ impl Scenario {
             return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
         }
         // Drawing takes longest: everything else is checked first.
-        let procedural = written.procedural.as_ref().map(|written| Procedural::checked(&reader, source, written)).transpose()?;
+        let procedural =
+            written.procedural.as_ref().map(|written| Procedural::checked(&reader, source, written)).transpose()?;
         if procedural.is_none() {
             reader.count("roundabout", written.roundabout.len(), 1..=MOST_ROADS)?;
         }
@@ -51,10 +52,15 @@ fn without_routes(
     written: &Written,
 ) -> Result<Scenario, Error> {
     let Written { time, field, actions, sensors, start, ending, reward, routes, .. } = written;
-    let steer_max = written.steer_max_deg.map(|lock| reader.within("steer_max_deg", lock, 1.0..=80.0, "deg")).transpose()?;
+    let steer_max =
+        written.steer_max_deg.map(|lock| reader.within("steer_max_deg", lock, 1.0..=80.0, "deg")).transpose()?;
     let speeds = numbers(reader, "actions.speeds_kmh", &actions.speeds_kmh, 90.0, 0.0, "km/h")?;
     if speeds.iter().all(|&speed| speed < 1.0) {
-        return Err(reader.invalid("actions.speeds_kmh", "no speed of 1 km/h or more", "at least one is needed, or no truck moves"));
+        return Err(reader.invalid(
+            "actions.speeds_kmh",
+            "no speed of 1 km/h or more",
+            "at least one is needed, or no truck moves",
+        ));
     }
     let speed_changes = match actions.speed_changes_kmh.as_slice() {
         [] => Vec::new(),
@@ -102,7 +108,11 @@ fn start_speed(reader: &Reader, written: &WrittenSpeeds) -> Result<[f64; 2], Err
     reader.within("start.speed_kmh", least, 0.0..=90.0, "km/h")?;
     reader.within("start.speed_kmh", greatest, 0.0..=90.0, "km/h")?;
     if greatest < least {
-        return Err(reader.invalid("start.speed_kmh", format_args!("[{least}, {greatest}]"), "must be a speed or [least, greatest]"));
+        return Err(reader.invalid(
+            "start.speed_kmh",
+            format_args!("[{least}, {greatest}]"),
+            "must be a speed or [least, greatest]",
+        ));
     }
     Ok([least / 3.6, greatest / 3.6])
 }
@@ -130,5 +140,9 @@ pub(super) fn referred<T>(
 /// A non-empty list of finite numbers within a range.
 fn numbers(reader: &Reader, key: &str, values: &[f64], most: f64, least: f64, unit: &str) -> Result<Vec<f64>, Error> {
     reader.count(key, values.len(), 1..=64)?;
-    values.iter().enumerate().map(|(index, &value)| reader.within(&format!("{key}[{index}]"), value, least..=most, unit)).collect()
+    values
+        .iter()
+        .enumerate()
+        .map(|(index, &value)| reader.within(&format!("{key}[{index}]"), value, least..=most, unit))
+        .collect()
 }

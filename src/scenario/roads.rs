@@ -33,16 +33,24 @@ impl Procedural {
     /// Reads the distribution and checks the ranges. No road is drawn.
     pub(super) fn checked(reader: &Reader, source: &Source, written: &WrittenProcedural) -> Result<Procedural, Error> {
         let WrittenProcedural { distribution, seed, count, train, validation, test } = written;
-        let distribution =
-            referred(reader, "procedural.distribution", source, Kind::Distribution, distribution, Distribution::from_source)?;
+        let distribution = referred(
+            reader,
+            "procedural.distribution",
+            source,
+            Kind::Distribution,
+            distribution,
+            Distribution::from_source,
+        )?;
         reader.count("procedural.count", *count, 1..=MOST_INDICES)?;
         let mut ranges: [Range<u32>; 3] = Default::default();
         let given = [train, validation, test].map(Option::as_ref);
-        for (split, &[from, to]) in Split::ALL.into_iter().zip(given).filter_map(|(split, range)| Some((split, range?))) {
+        for (split, &[from, to]) in Split::ALL.into_iter().zip(given).filter_map(|(split, range)| Some((split, range?)))
+        {
             let key = format!("procedural.{}", split.name());
             let value = format!("[{from}, {to}]");
             if to <= from || *count < to as usize {
-                let expected = format!("must be [first, last + 1] with first < last + 1 <= procedural.count, which is {count}");
+                let expected =
+                    format!("must be [first, last + 1] with first < last + 1 <= procedural.count, which is {count}");
                 return Err(reader.invalid(key, value, expected));
             }
             let shares = |other: &Split| from < ranges[*other as usize].end && ranges[*other as usize].start < to;
@@ -67,12 +75,19 @@ impl Procedural {
 
 impl Scenario {
     /// Adds a roundabout of the file, written under `key`, and its routes.
-    pub(super) fn add_file(&mut self, reader: &Reader, key: &str, source: &Source, written: &WrittenRoundabout) -> Result<(), Error> {
+    pub(super) fn add_file(
+        &mut self,
+        reader: &Reader,
+        key: &str,
+        source: &Source,
+        written: &WrittenRoundabout,
+    ) -> Result<(), Error> {
         let read = |source: &Source| match source {
             Source::Disk(file) if is_map(file) => {
                 let WrittenRoundabout { hand, name, arms, .. } = written;
                 let ring = written.ring.map(DVec2::from);
-                let ways = written.way.iter().map(|way| Way { from: (&way.from).into(), to: (&way.to).into() }).collect();
+                let ways =
+                    written.way.iter().map(|way| Way { from: (&way.from).into(), to: (&way.to).into() }).collect();
                 Road::from_map(file, &Choice { ring, hand: *hand, name: name.clone(), arms: arms.clone(), ways })
             }
             source => Road::from_source(source),
@@ -85,12 +100,20 @@ impl Scenario {
                 ("way", !written.way.is_empty()),
             ];
             if let Some((name, _)) = given.into_iter().find(|(_, given)| *given) {
-                return Err(reader.invalid(format!("{key}.{name}"), "given", "is for a map, a file that ends in .xodr; leave it out"));
+                return Err(reader.invalid(
+                    format!("{key}.{name}"),
+                    "given",
+                    "is for a map, a file that ends in .xodr; leave it out",
+                ));
             }
         }
         let roundabout = referred(reader, &format!("{key}.file"), source, Kind::Roundabout, &written.file, read)?;
         if self.places.iter().any(|other| other.roundabout.name == roundabout.name) {
-            return Err(reader.invalid(format!("{key}.file"), written.file.display(), "each roundabout may be listed once"));
+            return Err(reader.invalid(
+                format!("{key}.file"),
+                written.file.display(),
+                "each roundabout may be listed once",
+            ));
         }
         let routes = self.routes_of(reader, &roundabout)?;
         let mut splits = vec![None; routes.len()];
@@ -99,7 +122,11 @@ impl Scenario {
             for index in chosen(reader, &format!("{key}.{}", split.name()), choice, &routes)? {
                 if let Some(other) = splits[index].replace(split) {
                     let (key, name) = (format!("{key}.{}", split.name()), &routes[index].name);
-                    return Err(reader.invalid(key, name, format!("is listed under `{}` too; a route is in one split", other.name())));
+                    return Err(reader.invalid(
+                        key,
+                        name,
+                        format!("is listed under `{}` too; a route is in one split", other.name()),
+                    ));
                 }
             }
         }
@@ -107,14 +134,21 @@ impl Scenario {
     }
 
     /// Draws the random roads and adds them with all their routes, in the order of their indices.
-    pub(super) fn add_random(&mut self, reader: &Reader, procedural: &Procedural, loading: &Loading) -> Result<(), Error> {
+    pub(super) fn add_random(
+        &mut self,
+        reader: &Reader,
+        procedural: &Procedural,
+        loading: &Loading,
+    ) -> Result<(), Error> {
         let mut split_of: Vec<(u32, Split)> = Vec::new();
         for split in Split::ALL {
             split_of.extend(procedural.ranges[split as usize].clone().map(|index| (index, split)));
         }
         split_of.sort_unstable_by_key(|&(index, _)| index);
         let indices: Vec<u32> = split_of.iter().map(|&(index, _)| index).collect();
-        for (road, (_, split)) in procedural.distribution.roads(procedural.seed, &indices, loading)?.into_iter().zip(split_of) {
+        for (road, (_, split)) in
+            procedural.distribution.roads(procedural.seed, &indices, loading)?.into_iter().zip(split_of)
+        {
             loading.check()?;
             let routes = self.routes_of(reader, &road.roundabout)?;
             self.place(reader, road.roundabout, routes.into_iter().map(|route| (route, Some(split))))?;
@@ -125,7 +159,11 @@ impl Scenario {
     /// All routes of a roundabout.
     pub(super) fn routes_of(&self, reader: &Reader, roundabout: &Road) -> Result<Vec<Route>, Error> {
         roundabout.routes(self.approach, self.departure, self.spacing).map_err(|leaves| {
-            reader.invalid(format!("routes.{}", leaves.part), format_args!("{} m", shown(leaves.asked)), leaves.to_string())
+            reader.invalid(
+                format!("routes.{}", leaves.part),
+                format_args!("{} m", shown(leaves.asked)),
+                leaves.to_string(),
+            )
         })
     }
 
@@ -163,7 +201,8 @@ impl Scenario {
             let Some((room, route)) = room.filter(|(room, _)| *room < 0.0) else { continue };
             // Rounded down, so that the length in the message does fit.
             let longest = ((asked + room) * 100.0).floor() / 100.0;
-            let expected = format!("the truck needs {reach:.2} m of the arm {side}: at most {longest} m fit {}", route.name);
+            let expected =
+                format!("the truck needs {reach:.2} m of the arm {side}: at most {longest} m fit {}", route.name);
             return Err(reader.invalid(format!("routes.{part}"), format_args!("{} m", shown(asked)), expected));
         }
         Ok(())

@@ -26,7 +26,8 @@ pub(super) fn check_start(world: &World, env: usize, start: &Start) -> Result<()
     if n_vehicles <= start.vehicle as usize {
         return Err(Error::UnknownVehicle { vehicle: start.vehicle, n_vehicles });
     }
-    let outside = [start.offset, start.heading, start.speed].into_iter().find(|fraction| !(-1.0..=1.0).contains(fraction));
+    let outside =
+        [start.offset, start.heading, start.speed].into_iter().find(|fraction| !(-1.0..=1.0).contains(fraction));
     outside.map_or(Ok(()), |fraction| Err(Error::UnknownStart { env, fraction: fraction.to_string() }))
 }
 

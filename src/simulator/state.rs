@@ -52,7 +52,15 @@ pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
 }
 
 fn check_control(env: usize, control: &Control) -> Result<(), Error> {
-    let Control { steering, acceleration, speed_error_integral, steering_before, steering_earlier, target_speed, holds } = *control;
+    let Control {
+        steering,
+        acceleration,
+        speed_error_integral,
+        steering_before,
+        steering_earlier,
+        target_speed,
+        holds,
+    } = *control;
     for (field, value, most) in [
         (".steering", steering, STEEPEST),
         (".acceleration", acceleration, MOST),
@@ -117,18 +125,29 @@ fn all_within(column: Column, env: usize, values: &[f32], range: RangeInclusive<
 }
 
 /// NaN lies in no range.
-fn within<T: PartialOrd + Debug>(column: Column, env: usize, field: &str, value: T, range: RangeInclusive<T>) -> Result<(), Error> {
+fn within<T: PartialOrd + Debug>(
+    column: Column,
+    env: usize,
+    field: &str,
+    value: T,
+    range: RangeInclusive<T>,
+) -> Result<(), Error> {
     if range.contains(&value) {
         return Ok(());
     }
     let expected = format!("{:?}..{:?}", range.start(), range.end());
-    Err(Error::ImpossibleValue { place: format!("{}[{env}]{field}", column.name()), found: format!("{value:?}"), expected })
+    Err(Error::ImpossibleValue {
+        place: format!("{}[{env}]{field}", column.name()),
+        found: format!("{value:?}"),
+        expected,
+    })
 }
 
 /// An error if a truck's route, vehicle, waypoint or action is not in the world: stages use them as indices without a
 /// check.
 fn check_indices(world: &World, batch: &Batch) -> Result<(), Error> {
-    if let Some((env, &found)) = batch.action.iter().enumerate().find(|&(_, &action)| world.params.n_actions <= action) {
+    if let Some((env, &found)) = batch.action.iter().enumerate().find(|&(_, &action)| world.params.n_actions <= action)
+    {
         let limit = format!("actions 0..{}", world.params.n_actions);
         return Err(Error::OutsideWorld { column: Column::Action.name(), env, found, limit });
     }

@@ -32,9 +32,11 @@ pub struct Profile {
 impl Profile {
     /// The fastest of a vehicle on a route, at most `fastest` (m/s). The route has at least two waypoints.
     pub fn of(rig: &Rig, waypoints: &[WaypointRow], fastest: f64) -> Profile {
-        let lengths: Vec<f64> = waypoints.windows(2).map(|pair| f64::from(pair[0].position.distance(pair[1].position))).collect();
+        let lengths: Vec<f64> =
+            waypoints.windows(2).map(|pair| f64::from(pair[0].position.distance(pair[1].position))).collect();
         let slowest = SLOWEST.min(fastest);
-        let mut speeds: Vec<f64> = limits(rig, waypoints, &lengths).into_iter().map(|limit| limit.clamp(slowest, fastest)).collect();
+        let mut speeds: Vec<f64> =
+            limits(rig, waypoints, &lengths).into_iter().map(|limit| limit.clamp(slowest, fastest)).collect();
         let braking = BRAKING.min(-f64::from(rig.speed_braking));
         for index in (0..lengths.len()).rev() {
             speeds[index] = speeds[index].min((speeds[index + 1].powi(2) + 2.0 * braking * lengths[index]).sqrt());
@@ -62,12 +64,14 @@ fn limits(rig: &Rig, waypoints: &[WaypointRow], lengths: &[f64]) -> Vec<f64> {
     let heading = |index: usize| f64::from(waypoints[index].direction.y).atan2(waypoints[index].direction.x.into());
     let turn = |from: f64, to: f64| (to - from + 3.0 * PI).rem_euclid(2.0 * PI) - PI;
     let grip = GRIP_MAX * f64::from(rig.lateral_acceleration_max);
-    let held = (LOAD_TRANSFER_MAX * f64::from(rig.rollover_threshold) * GRAVITY - f64::from(rig.crossfall).abs()).max(0.05 * GRAVITY);
+    let held = (LOAD_TRANSFER_MAX * f64::from(rig.rollover_threshold) * GRAVITY - f64::from(rig.crossfall).abs())
+        .max(0.05 * GRAVITY);
     let last = waypoints.len() - 1;
     let mut articulation = 0.0f64;
     let limit = |index: usize| {
         let (before, after) = (index.saturating_sub(1), (index + 1).min(last));
-        let curvature = turn(heading(before), heading(after)).abs() / lengths[before..after].iter().sum::<f64>().max(1e-6);
+        let curvature =
+            turn(heading(before), heading(after)).abs() / lengths[before..after].iter().sum::<f64>().max(1e-6);
         if 0 < index {
             // The trailer turns towards the tractor by the sine of the articulation over its wheelbase.
             let turned = turn(heading(index - 1), heading(index));

@@ -44,8 +44,12 @@ impl Suspension {
         let decay = (-roll_damping * natural * substep).exp();
         let (sin, cos) = (damped * substep).sin_cos();
         let lag = roll_damping * natural / damped;
-        let transition =
-            [decay * (cos + lag * sin), decay * sin / damped, -decay * natural * natural / damped * sin, decay * (cos - lag * sin)];
+        let transition = [
+            decay * (cos + lag * sin),
+            decay * sin / damped,
+            -decay * natural * natural / damped * sin,
+            decay * (cos - lag * sin),
+        ];
         // Under constant acceleration the state converges to rest at a roll of `settled` per m/s^2.
         let settled = roll_gain / GRAVITY;
         let input = [(1.0 - transition[0]) * settled, -transition[2] * settled];

@@ -88,7 +88,12 @@ impl Towing {
 pub fn corners(body: &Body, origin: DVec2, heading: f64) -> [DVec2; 4] {
     let ahead = DVec2::from_angle(heading);
     let (front, rear, side) = (f64::from(body.front), f64::from(body.rear), f64::from(body.half_width) * ahead.perp());
-    [origin + front * ahead + side, origin + rear * ahead + side, origin + rear * ahead - side, origin + front * ahead - side]
+    [
+        origin + front * ahead + side,
+        origin + rear * ahead + side,
+        origin + rear * ahead - side,
+        origin + front * ahead - side,
+    ]
 }
 
 /// Poses every `spacing` metres of a truck whose front axle runs along `centre_line` at `speed`; both units start in
@@ -122,7 +127,8 @@ pub fn swept_path(rig: &Rig, centre_line: &Curve, speed: f64, spacing: f64) -> V
             let duration = step / speed;
             let (yaw, trailer_yaw) = rates(centre_line.heading_at(station), heading, trailer_heading);
             let line = centre_line.heading_at(station + 0.5 * step);
-            let (yaw, trailer_yaw) = rates(line, heading + 0.5 * duration * yaw, trailer_heading + 0.5 * duration * trailer_yaw);
+            let (yaw, trailer_yaw) =
+                rates(line, heading + 0.5 * duration * yaw, trailer_heading + 0.5 * duration * trailer_yaw);
             heading += duration * yaw;
             trailer_heading += duration * trailer_yaw;
         }
@@ -133,7 +139,7 @@ pub fn swept_path(rig: &Rig, centre_line: &Curve, speed: f64, spacing: f64) -> V
 
 /// Whether no pose of the path touches a solid: then a truck that can steer it need not leave its lane on this route.
 pub fn own_lane_suffices(rig: &Rig, kerbs: &Outline, path: &[Pose]) -> bool {
-    !path
-        .iter()
-        .any(|pose| kerbs.intersects_rectangle(&pose.tractor_corners(rig)) || kerbs.intersects_rectangle(&pose.trailer_corners(rig)))
+    !path.iter().any(|pose| {
+        kerbs.intersects_rectangle(&pose.tractor_corners(rig)) || kerbs.intersects_rectangle(&pose.trailer_corners(rig))
+    })
 }

@@ -112,7 +112,8 @@ pub(crate) struct WrittenModel {
 
 impl Default for WrittenModel {
     fn default() -> Self {
-        let Model { slip_lever, yaw_lag, drive_lag, brake_lag, steer_delay, power, friction_ellipse, crossfall } = Model::default();
+        let Model { slip_lever, yaw_lag, drive_lag, brake_lag, steer_delay, power, friction_ellipse, crossfall } =
+            Model::default();
         WrittenModel { slip_lever, yaw_lag, drive_lag, brake_lag, steer_delay, power, friction_ellipse, crossfall }
     }
 }
@@ -192,7 +193,8 @@ fn load(reader: &Reader, key: &str, written: &WrittenLoad) -> Result<Load, Error
 }
 
 fn suspension(reader: &Reader, key: &str, written: &WrittenSuspension) -> Result<Suspension, Error> {
-    let within = |name: &str, value, range, unit| reader.within(&format!("{key}.suspension.{name}"), value, range, unit);
+    let within =
+        |name: &str, value, range, unit| reader.within(&format!("{key}.suspension.{name}"), value, range, unit);
     let centre_of_gravity = within("centre_of_gravity", written.centre_of_gravity, 0.2..=5.0, "m")?;
     Ok(Suspension {
         centre_of_gravity,
@@ -232,8 +234,10 @@ pub(crate) fn model(reader: &Reader, key: &str, written: &WrittenModel, trailer:
 
 fn sensors(reader: &Reader, written: &WrittenSensors, tractor: &Tractor, trailer: &Trailer) -> Result<Sensors, Error> {
     let length = trailer.kingpin_to_front + trailer.kingpin_to_rear;
-    let trailer_first = reader.within("sensors.trailer_first", written.trailer_first.unwrap_or(0.0), 0.0..=length, "m")?;
-    let trailer_last = reader.within("sensors.trailer_last", written.trailer_last.unwrap_or(length), trailer_first..=length, "m")?;
+    let trailer_first =
+        reader.within("sensors.trailer_first", written.trailer_first.unwrap_or(0.0), 0.0..=length, "m")?;
+    let trailer_last =
+        reader.within("sensors.trailer_last", written.trailer_last.unwrap_or(length), trailer_first..=length, "m")?;
     let front = tractor.wheelbase + tractor.front_overhang;
     let mut tractor_mounts = [DVec2::new(front, 0.0); N_TRACTOR_RAYS];
     if let Some(mounts) = &written.tractor_mounts {

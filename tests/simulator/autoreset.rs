@@ -43,7 +43,10 @@ fn a_truck_that_ended_begins_its_next_episode_in_the_next_step_and_that_is_no_en
                     assert_eq!((is.held, is.steps, is.episode), (0, 0, was.episode + 1), "{name}");
                     assert_eq!((after.ended[env], after.reward[env]), (Ended::Running as u32, 0.0));
                     assert_eq!(after.terms[env], Default::default());
-                    assert!(after.observation[env] == after.next_observation[env] && after.observation[env] != before.observation[env]);
+                    assert!(
+                        after.observation[env] == after.next_observation[env]
+                            && after.observation[env] != before.observation[env]
+                    );
                 } else {
                     driven += 1;
                     assert_eq!((is.steps, is.episode), (was.steps + 1, was.episode));
@@ -105,10 +108,16 @@ fn a_truck_with_a_stream_drives_as_the_one_of_that_seed_and_index_wherever_it_st
         let untouched = row(other.batch(), 1);
         let stream = |env| Some(Stream { seed: 41, env });
         other
-            .begin(&[Begin { env: 2, stream: stream(17), ..Begin::default() }, Begin { env: 0, stream: stream(4), ..Begin::default() }])
+            .begin(&[
+                Begin { env: 2, stream: stream(17), ..Begin::default() },
+                Begin { env: 0, stream: stream(4), ..Begin::default() },
+            ])
             .unwrap();
         assert!(untouched == row(other.batch(), 1), "{name}: a truck that was not named stays as it was");
-        assert_eq!(other.streams(), [Stream { seed: 41, env: 4 }, Stream { seed: 7, env: 1 }, Stream { seed: 41, env: 17 }]);
+        assert_eq!(
+            other.streams(),
+            [Stream { seed: 41, env: 4 }, Stream { seed: 7, env: 1 }, Stream { seed: 41, env: 17 }]
+        );
         for _ in 0..400 {
             whole.step_at_random();
             other.step_at_random();
@@ -150,7 +159,10 @@ fn an_episode_begins_on_the_stated_route_at_the_stated_start_and_the_next_one_is
                 "starts[0]: NaN of the largest start error; must lie in -1..1".to_owned(),
             ),
         ] {
-            assert_eq!(simulator.begin(&[Begin { env: 2, ..Begin::default() }, wrong]).unwrap_err().to_string(), message);
+            assert_eq!(
+                simulator.begin(&[Begin { env: 2, ..Begin::default() }, wrong]).unwrap_err().to_string(),
+                message
+            );
             assert!(before == rows(simulator.batch()), "{name}: nothing has begun");
         }
     }
@@ -166,7 +178,8 @@ fn chosen_columns_are_read_as_the_batch_has_them() {
         }
         let columns = [Column::Reward, Column::Observation, Column::Truck];
         // Before all are read, and after.
-        let first: Vec<Vec<u8>> = simulator.read(&columns).unwrap().into_iter().map(|bytes| bytes.into_owned()).collect();
+        let first: Vec<Vec<u8>> =
+            simulator.read(&columns).unwrap().into_iter().map(|bytes| bytes.into_owned()).collect();
         let batch = simulator.batch();
         for ((column, bytes), again) in columns.iter().zip(&first).zip(simulator.read(&columns).unwrap()) {
             assert!(bytes == batch.column(*column) && bytes[..] == *again, "{name}: {column:?}");

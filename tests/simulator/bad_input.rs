@@ -146,14 +146,16 @@ fn values(text: &str) -> Vec<(usize, usize)> {
 #[test]
 fn no_wrong_value_of_any_key_makes_a_reader_panic() {
     let folder = copy();
-    let nasty = ["0", "-1.0", "nan", "inf", "-inf", "1e300", "1000000000", "0.001", "\"text\"", "true", "[]", "{}", "\"\""];
+    let nasty =
+        ["0", "-1.0", "nan", "inf", "-inf", "1e300", "1000000000", "0.001", "\"text\"", "true", "[]", "{}", "\"\""];
     let (mut tried, mut refused) = (0, 0);
     for file in files() {
         let text = text_of(&file);
         let mut found = values(&text);
         assert!(10 < found.len(), "{}: {} values found", file.display(), found.len());
         // Names of routes are read alike, and a benchmark has dozens: two of them stand for all.
-        let is_route = |&(from, to): &(usize, usize)| ["-left-", "-right-"].iter().any(|lane| text[from..to].contains(lane));
+        let is_route =
+            |&(from, to): &(usize, usize)| ["-left-", "-right-"].iter().any(|lane| text[from..to].contains(lane));
         let mut n_routes = 0;
         found.retain(|range| {
             n_routes += usize::from(is_route(range));
@@ -162,8 +164,10 @@ fn no_wrong_value_of_any_key_makes_a_reader_panic() {
         for (from, to) in found {
             for value in nasty {
                 tried += 1;
-                refused +=
-                    usize::from(broken(folder.path(), &file, format!("{}{value}{}", &text[..from], &text[to..]).as_bytes()).is_err());
+                refused += usize::from(
+                    broken(folder.path(), &file, format!("{}{value}{}", &text[..from], &text[to..]).as_bytes())
+                        .is_err(),
+                );
             }
         }
     }
@@ -178,7 +182,8 @@ fn no_missing_line_cut_or_unknown_key_makes_a_reader_panic() {
         let text = text_of(&file);
         let lines: Vec<&str> = text.lines().collect();
         for without in 0..lines.len() {
-            let kept: Vec<&str> = lines.iter().enumerate().filter(|&(line, _)| line != without).map(|(_, line)| *line).collect();
+            let kept: Vec<&str> =
+                lines.iter().enumerate().filter(|&(line, _)| line != without).map(|(_, line)| *line).collect();
             let _ = broken(folder.path(), &file, kept.join("\n").as_bytes());
         }
         for end in (0..text.len()).step_by(7) {
@@ -235,7 +240,9 @@ fn a_route_that_leaves_no_room_for_the_whole_truck_is_refused_with_the_longest_t
     let folder = copy();
     let file = Path::new("attard2023.toml");
     let text = std::fs::read_to_string(scenarios().join(file)).unwrap();
-    for (part, too_long, reach) in [("approach", 65.0, "13.02 m of the arm behind"), ("departure", 68.0, "3.18 m of the arm ahead")] {
+    for (part, too_long, reach) in
+        [("approach", 65.0, "13.02 m of the arm behind"), ("departure", 68.0, "3.18 m of the arm ahead")]
+    {
         let with = |length: f64| text.replacen("[sensors]", &format!("[routes]\n{part} = {length}\n\n[sensors]"), 1);
         let message = broken(folder.path(), file, with(too_long).as_bytes()).unwrap_err();
         assert!(message.contains(&format!("routes.{part}: {too_long} m; the truck needs {reach}")), "{message}");
@@ -290,7 +297,8 @@ fn pipes_devices_folders_and_large_files_are_refused_as_every_kind_of_file() {
     for kind in ["", "roundabouts", "vehicles", "distributions"] {
         let below = folder.path().join(kind);
         std::fs::create_dir_all(&below).unwrap();
-        let [pipe, zero, directory, large] = ["pipe.toml", "zero.toml", "folder.toml", "large.toml"].map(|name| below.join(name));
+        let [pipe, zero, directory, large] =
+            ["pipe.toml", "zero.toml", "folder.toml", "large.toml"].map(|name| below.join(name));
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
         std::os::unix::fs::symlink("/dev/zero", &zero).unwrap();
         std::fs::create_dir(&directory).unwrap();
@@ -299,7 +307,12 @@ fn pipes_devices_folders_and_large_files_are_refused_as_every_kind_of_file() {
             let message = read(path).unwrap_err().to_string();
             assert_eq!(message, format!("{}: is not a regular file; a file is needed", path.display()));
         }
-        assert!(read(&large).unwrap_err().to_string().ends_with("large.toml: is larger than 1 MiB, the most that is read of such a file"));
+        assert!(
+            read(&large)
+                .unwrap_err()
+                .to_string()
+                .ends_with("large.toml: is larger than 1 MiB, the most that is read of such a file")
+        );
     }
 }
 
@@ -307,7 +320,8 @@ fn pipes_devices_folders_and_large_files_are_refused_as_every_kind_of_file() {
 fn a_batch_that_cannot_be_is_refused_and_a_wrong_action_changes_nothing() {
     let world = std::sync::Arc::new(benchmark("attard2023").1);
     for (_, engine) in engines() {
-        let new = |n_envs, choice| Simulator::on(engine.clone(), world.clone(), n_envs, 0, choice).map(|_| ()).unwrap_err();
+        let new =
+            |n_envs, choice| Simulator::on(engine.clone(), world.clone(), n_envs, 0, choice).map(|_| ()).unwrap_err();
         assert_eq!(new(0, RouteChoice::Drawn(vec![0])), simulator::Error::EmptyBatch);
         assert_eq!(new(4, RouteChoice::Drawn(vec![])), simulator::Error::NoRoutes);
         assert_eq!(new(4, RouteChoice::Drawn(vec![75])), simulator::Error::UnknownRoute { route: 75, n_routes: 75 });
@@ -317,10 +331,17 @@ fn a_batch_that_cannot_be_is_refused_and_a_wrong_action_changes_nothing() {
         assert_eq!(simulator.step(&[0, 9]).unwrap_err().to_string(), "actions[1]: 9; must lie in 0..9");
         assert_eq!(simulator.step(&[0]).unwrap_err().to_string(), "actions: 1 for 2 trucks; one each is needed");
         let start = |offset| offtrack::layout::Start { offset, ..Default::default() };
-        let refused = |starts: &[_]| batch_on(&engine, &world, 2, 0, RouteChoice::Drawn(vec![0])).reset_from(starts).unwrap_err();
+        let refused =
+            |starts: &[_]| batch_on(&engine, &world, 2, 0, RouteChoice::Drawn(vec![0])).reset_from(starts).unwrap_err();
         assert_eq!(refused(&[start(0.0)]).to_string(), "starts: 1 for 2 trucks; one each is needed");
-        assert_eq!(refused(&[start(0.0), start(1.5)]).to_string(), "starts[1]: 1.5 of the largest start error; must lie in -1..1");
-        assert_eq!(refused(&[start(f32::NAN), start(0.0)]).to_string(), "starts[0]: NaN of the largest start error; must lie in -1..1");
+        assert_eq!(
+            refused(&[start(0.0), start(1.5)]).to_string(),
+            "starts[1]: 1.5 of the largest start error; must lie in -1..1"
+        );
+        assert_eq!(
+            refused(&[start(f32::NAN), start(0.0)]).to_string(),
+            "starts[0]: NaN of the largest start error; must lie in -1..1"
+        );
         assert_eq!(simulator.gather(&[1, 2]).unwrap_err().to_string(), "indices[1]: 2; the batch has trucks 0..2");
         assert_eq!(simulator.gather(&[]).unwrap_err(), simulator::Error::EmptyBatch);
         assert_eq!(simulator.batch().truck, before);
@@ -340,6 +361,9 @@ fn a_load_whose_name_a_terminal_would_obey_or_a_table_could_not_hold_is_refused(
     assert_eq!(read("à moitié"), Ok(true));
     for name in ["", "\\u001b[2J", "a\\nb", "\\u202e", &"x".repeat(41)] {
         let said = read(name).unwrap_err();
-        assert!(said.contains("vehicle.toml: loads: ") && said.contains("1 to 40 characters, all of them visible"), "{said}");
+        assert!(
+            said.contains("vehicle.toml: loads: ") && said.contains("1 to 40 characters, all of them visible"),
+            "{said}"
+        );
     }
 }

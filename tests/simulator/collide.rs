@@ -34,7 +34,14 @@ fn touches(kerbs: &Outline, rig: &Rig, truck: &Truck, margin: f64) -> [bool; 2] 
 }
 
 /// Verdicts that are wrong by more than `margin`, and verdicts that differ at all from the `exact` ones.
-fn verdicts(kerbs: &Outline, rig: &Rig, trucks: &[Truck], exact: &[[bool; 2]], found: &[Clearance], margin: f64) -> [usize; 2] {
+fn verdicts(
+    kerbs: &Outline,
+    rig: &Rig,
+    trucks: &[Truck],
+    exact: &[[bool; 2]],
+    found: &[Clearance],
+    margin: f64,
+) -> [usize; 2] {
     let count = |((truck, exact), found): ((&Truck, &[bool; 2]), &Clearance)| {
         let differs: [bool; 2] = [(found.tractor <= 0.0) != exact[0], (found.trailer <= 0.0) != exact[1]];
         if differs == [false; 2] {
@@ -100,14 +107,19 @@ fn a_clearance_is_the_distance_or_up_to_twice_that() {
                     continue;
                 }
                 let on_edges = (0..4).flat_map(|i| (0..200).map(move |k| (i, f64::from(k) / 200.0)));
-                let exact = on_edges.map(|(i, s)| kerbs.signed_distance(corners[i].lerp(corners[(i + 1) % 4], s))).fold(f64::MAX, f64::min);
+                let exact = on_edges
+                    .map(|(i, s)| kerbs.signed_distance(corners[i].lerp(corners[(i + 1) % 4], s)))
+                    .fold(f64::MAX, f64::min);
                 // The edges are sampled 7 cm apart here, and the field is off by 3 cm at most, up to 5 m from a kerb.
                 if 5.0 < exact {
                     continue;
                 }
                 for clearance in found.iter().map(|simulator| simulator.batch().clearance[index]) {
                     let found = f64::from([clearance.tractor, clearance.trailer][unit]);
-                    assert!(exact - 0.07 < found && found < 2.0 * exact + 0.08, "{name} {index}: {found}, exact {exact}");
+                    assert!(
+                        exact - 0.07 < found && found < 2.0 * exact + 0.08,
+                        "{name} {index}: {found}, exact {exact}"
+                    );
                 }
             }
         });

@@ -165,14 +165,23 @@ fn benchmarks() -> Kind {
         (ONE_VEHICLE, MAP),
         (ONE_VEHICLE, JUNCTION),
     ];
-    let documents = bodies.map(|(head, tail)| document(&format!("{head}{BENCHMARK}{tail}").replace("SCENARIOS", &scenarios)));
+    let documents =
+        bodies.map(|(head, tail)| document(&format!("{head}{BENCHMARK}{tail}").replace("SCENARIOS", &scenarios)));
     Kind { documents: documents.into(), read: |path| boxed(Scenario::read(path)) }
 }
 
 fn roundabouts() -> Kind {
-    let keys =
-        [("hand", "\"right\""), ("ring.lanes", "2"), ("arm[].lane_width", "3.7"), ("arm[].entry.lanes", "2"), ("arm[].exit.lanes", "2")];
-    let documents = Vec::from([with_keys(&text_of("roundabouts/16m.toml"), &keys), document(&text_of("roundabouts/40m-maps.toml"))]);
+    let keys = [
+        ("hand", "\"right\""),
+        ("ring.lanes", "2"),
+        ("arm[].lane_width", "3.7"),
+        ("arm[].entry.lanes", "2"),
+        ("arm[].exit.lanes", "2"),
+    ];
+    let documents = Vec::from([
+        with_keys(&text_of("roundabouts/16m.toml"), &keys),
+        document(&text_of("roundabouts/40m-maps.toml")),
+    ]);
     Kind { documents, read: |path| boxed(Road::read(path)) }
 }
 
@@ -197,7 +206,10 @@ fn vehicles() -> Kind {
         ("model.friction_ellipse", "true"),
         ("model.crossfall", "0.01"),
     ];
-    Kind { documents: Vec::from([with_keys(&text_of("vehicles/daf_xf.toml"), &keys)]), read: |path| boxed(Vehicle::read(path)) }
+    Kind {
+        documents: Vec::from([with_keys(&text_of("vehicles/daf_xf.toml"), &keys)]),
+        read: |path| boxed(Vehicle::read(path)),
+    }
 }
 
 /// The rows of a section; of `vehicle[].model`, which has the keys of a vehicle's `model`, those too.
@@ -259,13 +271,29 @@ fn a_wrong_row_and_a_missing_one_are_found_and_all_at_once() {
     let read: Read = |path| boxed(Vehicle::read(path));
     let kind = Kind { read, ..vehicles() };
     let changes = [
-        ("| `trailer.width` | m | 1..4 |", "| `trailer.width` | m | 1..5 |", "`trailer.width` has the range 1..5 in its row"),
-        ("| `tractor.steer_rate_deg` | deg/s |", "| `tractor.steer_rate_deg` | rad/s |", "`tractor.steer_rate_deg` has the unit rad/s"),
-        ("| 0.05..2 | 0.7 |", "| 0.05..2 | 0.8 |", "`tractor.friction` left out is not the same as with its default, 0.8"),
+        (
+            "| `trailer.width` | m | 1..4 |",
+            "| `trailer.width` | m | 1..5 |",
+            "`trailer.width` has the range 1..5 in its row",
+        ),
+        (
+            "| `tractor.steer_rate_deg` | deg/s |",
+            "| `tractor.steer_rate_deg` | rad/s |",
+            "`tractor.steer_rate_deg` has the unit rad/s",
+        ),
+        (
+            "| 0.05..2 | 0.7 |",
+            "| 0.05..2 | 0.8 |",
+            "`tractor.friction` left out is not the same as with its default, 0.8",
+        ),
         ("| 0.01..10 | 0.8 |", "| 0.01..10 | |", "`speed_control.gain` may be left out, so its row needs a default"),
         ("| 2..10 | |", "| 2..10 | 3 |", "`tractor.wheelbase` has no default 3"),
         ("| `trailer.kingpin_to_front` |", "| `trailer.colour` |", "`trailer.colour` is in no document of this test"),
-        ("| `model.crossfall` |", "| `model.cross_fall` |", "`model.crossfall` is taken and has no row: add | `model.crossfall` |"),
+        (
+            "| `model.crossfall` |",
+            "| `model.cross_fall` |",
+            "`model.crossfall` is taken and has no row: add | `model.crossfall` |",
+        ),
     ];
     let readme = changes.iter().fold(text_of("README.md"), |text, (from, to, _)| {
         assert_eq!(text.matches(from).count(), 1, "{from}");

@@ -17,7 +17,14 @@ pub(crate) fn all_routes(world: &World) -> RouteChoice {
 }
 
 /// Every byte of a batch of `n_envs` trucks after `n_steps` random steps on `threads` threads, truck by truck.
-fn driven(engine: &Engine, world: &Arc<World>, n_envs: usize, n_steps: usize, seed: u32, threads: usize) -> Vec<Vec<u8>> {
+fn driven(
+    engine: &Engine,
+    world: &Arc<World>,
+    n_envs: usize,
+    n_steps: usize,
+    seed: u32,
+    threads: usize,
+) -> Vec<Vec<u8>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
         let mut simulator = batch_on(engine, world, n_envs, seed, all_routes(world));
@@ -59,7 +66,10 @@ fn on_many_roads_the_order_in_which_trucks_are_stepped_changes_nothing() {
         let many = driven(&engine, &world, 500, 150, 6, 2);
         // Other numbers of trucks and threads make other blocks, each with an order of its own.
         for (n_envs, threads) in [(1, 1), (40, 3), (500, 1)] {
-            assert!(driven(&engine, &world, n_envs, 150, 6, threads) == many[..n_envs], "{n_envs} trucks, {threads} threads on the {name}");
+            assert!(
+                driven(&engine, &world, n_envs, 150, 6, threads) == many[..n_envs],
+                "{n_envs} trucks, {threads} threads on the {name}"
+            );
         }
     }
 }
@@ -72,9 +82,12 @@ fn a_trucks_index_in_the_batch_and_its_neighbours_change_nothing() {
         // Every route twice, in opposite orders, and another truck between.
         let routes: Vec<usize> = (0..n_routes).chain([3]).chain((0..n_routes).rev()).collect();
         let of_routes = |value: &dyn Fn(usize) -> u32| routes.iter().map(|&route| value(route)).collect::<Vec<u32>>();
-        let mut simulator = batch_on(&engine, &world, routes.len(), 8, RouteChoice::Fixed(of_routes(&|route| route as u32)));
-        let starts: Vec<Start> =
-            routes.iter().map(|&route| Start { offset: route as f32 / 100.0, heading: -0.5, ..Start::default() }).collect();
+        let mut simulator =
+            batch_on(&engine, &world, routes.len(), 8, RouteChoice::Fixed(of_routes(&|route| route as u32)));
+        let starts: Vec<Start> = routes
+            .iter()
+            .map(|&route| Start { offset: route as f32 / 100.0, heading: -0.5, ..Start::default() })
+            .collect();
         simulator.reset_from(&starts).unwrap();
         for step in 0..80 {
             simulator.step(&of_routes(&|route| random::words(1, route as u32, step, 0)[0] % 9)).unwrap();
@@ -99,7 +112,9 @@ fn stepping_a_stage_at_a_time_gives_the_same_bytes() {
             let action = whole.batch().action.clone();
             let before = staged.batch().clone();
             staged
-                .restore(|column| Some(if column == Column::Action { bytemuck::cast_slice(&action) } else { before.column(column) }))
+                .restore(|column| {
+                    Some(if column == Column::Action { bytemuck::cast_slice(&action) } else { before.column(column) })
+                })
                 .unwrap();
             STAGES.iter().for_each(|&stage| staged.run_stage(stage));
         }
@@ -148,7 +163,8 @@ fn assert_in_range(world: &World, bounds: &[(Vec2, Vec2)], batch: &Batch) {
         let pi = std::f32::consts::PI;
         assert!(truck.heading.abs() <= pi && truck.trailer_heading.abs() <= pi, "{truck:?}");
         assert!((0.0..30.0).contains(&truck.speed) && truck.steering.abs() <= world.rigs[0].steer_max, "{truck:?}");
-        let finite = [truck.tractor_roll, truck.trailer_roll_rate, truck.trailer_load_transfer_ratio, batch.reward[env]];
+        let finite =
+            [truck.tractor_roll, truck.trailer_roll_rate, truck.trailer_load_transfer_ratio, batch.reward[env]];
         assert!(finite.into_iter().all(f32::is_finite), "{truck:?}");
         assert!(batch.clearance[env].tractor.is_finite() && batch.clearance[env].trailer.is_finite());
         for values in [&batch.observation[env], &batch.next_observation[env]] {

@@ -54,8 +54,12 @@ fn each_extra_is_what_its_definition_says() {
 
 #[test]
 fn a_track_observes_the_first_extras_and_leaves_the_others_0() {
-    for (track, n) in [(ObservedExtras::None, 0), (ObservedExtras::Blind, 5), (ObservedExtras::Mass, 8), (ObservedExtras::Oracle, N_EXTRAS)]
-    {
+    for (track, n) in [
+        (ObservedExtras::None, 0),
+        (ObservedExtras::Blind, 5),
+        (ObservedExtras::Mass, 8),
+        (ObservedExtras::Oracle, N_EXTRAS),
+    ] {
         let world = world(track);
         for (name, engine) in engines() {
             let mut simulator = batch_on(&engine, &world, 32, 5, RouteChoice::Drawn(vec![1, 3, 5]));
@@ -69,7 +73,10 @@ fn a_track_observes_the_first_extras_and_leaves_the_others_0() {
         assert_eq!(track.names().len(), n);
     }
     assert!(!ObservedExtras::Blind.names().iter().any(|name| name.contains("mass") || name.contains("roll")));
-    assert!(ObservedExtras::Mass.names().contains(&"trailer_mass") && !ObservedExtras::Mass.names().contains(&"rollover_threshold"));
+    assert!(
+        ObservedExtras::Mass.names().contains(&"trailer_mass")
+            && !ObservedExtras::Mass.names().contains(&"rollover_threshold")
+    );
 }
 
 #[test]

@@ -41,7 +41,8 @@ pub(crate) fn places(gutter: Gutter) -> Vec<(String, Outline, Field)> {
 pub(crate) fn pose(kerbs: &Outline, index: u32, beyond: f64) -> Truck {
     let (low, high) = kerbs.bounds();
     let mut tries = (0..).map(|attempt| words(11, index, attempt, 0).map(signed_unit));
-    let [x, y, heading, articulation] = tries.find(|[x, y, ..]| -beyond <= kerbs.signed_distance(between(low, high, *x, *y))).unwrap();
+    let [x, y, heading, articulation] =
+        tries.find(|[x, y, ..]| -beyond <= kerbs.signed_distance(between(low, high, *x, *y))).unwrap();
     Truck {
         position: between(low, high, x, y).as_vec2(),
         heading: PI * heading,
@@ -57,7 +58,11 @@ pub(crate) fn after_stage(engine: &Engine, world: &World, field: &Field, trucks:
     world.routes.iter_mut().for_each(|route| route.roundabout = 0);
     let mut simulator = batch_on(engine, &Arc::new(world), trucks.len(), 0, RouteChoice::Drawn(vec![0]));
     let batch = simulator.batch().clone();
-    simulator.restore(|column| Some(if column == Column::Truck { bytemuck::cast_slice(trucks) } else { batch.column(column) })).unwrap();
+    simulator
+        .restore(|column| {
+            Some(if column == Column::Truck { bytemuck::cast_slice(trucks) } else { batch.column(column) })
+        })
+        .unwrap();
     simulator.run_stage(stage);
     simulator
 }
@@ -128,7 +133,8 @@ fn the_size_of_a_cell_changes_the_layout_and_not_the_accuracy() {
     let (name, kerbs, _) = places(Gutter::Drivable).swap_remove(0);
     for cell in [0.1, 0.25, 1.0] {
         let field = Field::bake(&kerbs, cell);
-        let worst = near_kerbs(&kerbs, &field).iter().map(|(_, exact, baked)| (exact - baked).abs()).fold(0.0, f64::max);
+        let worst =
+            near_kerbs(&kerbs, &field).iter().map(|(_, exact, baked)| (exact - baked).abs()).fold(0.0, f64::max);
         assert!(worst < 0.03, "{name}, {cell} m: {worst}");
     }
 }

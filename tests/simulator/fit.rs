@@ -107,7 +107,8 @@ fn five_routes_leave_every_entry_each_smooth_and_clear_of_the_kerbs() {
                     assert!(5.0 <= *radius, "{}: radius {radius} m", route.name);
                 }
             }
-            let nearest = (0..(route.centre_line.length() * 4.0) as usize).map(|step| route.centre_line.point_at(step as f64 / 4.0));
+            let nearest = (0..(route.centre_line.length() * 4.0) as usize)
+                .map(|step| route.centre_line.point_at(step as f64 / 4.0));
             let nearest = nearest.map(|p| kerbs.signed_distance(p)).fold(f64::INFINITY, f64::min);
             // Half a lane of 3.7 m less 5 cm: some measured right lanes are 3.5 m wide.
             assert!(1.8 <= nearest, "{}: {nearest} m from a kerb", route.name);
@@ -137,7 +138,11 @@ fn solid_gutters_leave_every_road_edge_half_a_metre_nearer() {
         assert_eq!(drivable.loops.len(), solid.loops.len(), "{name}: an island vanished or merged");
         for point in solid.loops.iter().flat_map(|curve| curve.polyline(0.01)) {
             // Offset arcs and segments are exact; a micrometre is the tolerance of joining them.
-            assert!((drivable.signed_distance(point) - 0.5).abs() < 2e-6, "{name} at {point}: {}", drivable.signed_distance(point));
+            assert!(
+                (drivable.signed_distance(point) - 0.5).abs() < 2e-6,
+                "{name} at {point}: {}",
+                drivable.signed_distance(point)
+            );
         }
     }
 }

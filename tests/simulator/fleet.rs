@@ -17,8 +17,14 @@ use crate::{batch_on, benchmark, engines};
 pub fn all_drawn() -> Fleet {
     let member = |name: &str, share: f64| {
         let mut vehicle = vehicle(name);
-        vehicle.model =
-            Model { slip_lever: 3.0, yaw_lag: 1.0, power: Some(330_000.0), friction_ellipse: true, crossfall: 0.01, ..Model::default() };
+        vehicle.model = Model {
+            slip_lever: 3.0,
+            yaw_lag: 1.0,
+            power: Some(330_000.0),
+            friction_ellipse: true,
+            crossfall: 0.01,
+            ..Model::default()
+        };
         let loads = ["empty", "half", "laden", "laden_high"].map(|load| (load.to_owned(), 1.0)).into();
         Member { name: name.to_owned(), vehicle, share, loads }
     };
@@ -62,8 +68,9 @@ fn each_episode_draws_its_vehicle_alike_on_every_engine() {
         let drawn = |env: u32, truck: &Truck| drawn_start(512, 7, env, truck.episode).vehicle;
         assert!((0..).zip(&batch.truck).all(|(env, truck)| truck.vehicle == drawn(env, truck)), "{name}");
         // Two thirds are of the first kind, a quarter has each load; 512 draws deviate by 6 % at most (3 sigma).
-        let part =
-            |keeps: &dyn Fn(u32) -> bool| batch.truck.iter().filter(|truck| keeps(world.rig(truck).class_index)).count() as f64 / 512.0;
+        let part = |keeps: &dyn Fn(u32) -> bool| {
+            batch.truck.iter().filter(|truck| keeps(world.rig(truck).class_index)).count() as f64 / 512.0
+        };
         assert!((part(&|class| class < 4) - 2.0 / 3.0).abs() < 0.063, "{}", part(&|class| class < 4));
         assert!((part(&|class| class % 4 == 0) - 0.25).abs() < 0.058);
         assert!(batch.truck.iter().any(|truck| 0 < truck.episode), "no truck began another episode");
@@ -85,7 +92,11 @@ fn a_truck_among_others_drives_as_it_would_alone() {
         let mut last = Vec::new();
         for vehicle in [0u32, 100, 300, 511] {
             let (rig, rays) = (all.rigs[vehicle as usize], *all.rays_of(&all.rigs[vehicle as usize]));
-            let mut alone = World { rigs: vec![offtrack::layout::Rig { chassis: 0, ..rig }], rays: vec![rays], ..World::clone(&all) };
+            let mut alone = World {
+                rigs: vec![offtrack::layout::Rig { chassis: 0, ..rig }],
+                rays: vec![rays],
+                ..World::clone(&all)
+            };
             alone.params.n_vehicles = 1;
             let start = Start { offset: 0.4, heading: -0.3, speed: 0.0, vehicle };
             let (truck, observation) = driven(&engine, &all, start, 20);
@@ -133,7 +144,8 @@ fn a_benchmark_states_vehicles_shares_and_ranges() {
         "[[vehicle]]\nfile = \"daf_xf\"\nloads = { empty = 1, laden = 3 }\n[[vehicle]]\nfile = \"us_wb62\"\nloads = { half = 1 }\nshare = 3\n[draw]\nn_vehicles = 64\nslip = [0.9, 1.1]",
     );
     let scenario = scenario.unwrap();
-    let counts: Vec<usize> = (0..3).map(|class| scenario.vehicles().iter().filter(|entry| entry.class == class).count()).collect();
+    let counts: Vec<usize> =
+        (0..3).map(|class| scenario.vehicles().iter().filter(|entry| entry.class == class).count()).collect();
     assert_eq!((counts, scenario.load.as_str()), (Vec::from([4, 12, 48]), "empty"));
     // One vehicle and load, drawn from ranges.
     let one = written("vehicle = \"daf_xf\"\nload = \"laden\"\n[draw]\nfriction = [0.6, 1.1]").unwrap();
@@ -150,8 +162,14 @@ fn what_is_wrong_with_a_fleet_is_named() {
             "[[vehicle]]\nfile = \"daf_xf\"\nloads = { water = 1 }".to_owned(),
             "fleet.toml: vehicle[0].loads: \"water\"; the vehicle has empty",
         ),
-        ("[[vehicle]]\nfile = \"daf_xf\"\nloads = { empty = -1 }".to_owned(), "vehicle[0].loads.empty: -1; must lie in 0..1"),
-        ("[[vehicle]]\nfile = \"daf_xf\"\nloads = { empty = 0 }".to_owned(), "vehicle[0].loads: none; at least one is needed"),
+        (
+            "[[vehicle]]\nfile = \"daf_xf\"\nloads = { empty = -1 }".to_owned(),
+            "vehicle[0].loads.empty: -1; must lie in 0..1",
+        ),
+        (
+            "[[vehicle]]\nfile = \"daf_xf\"\nloads = { empty = 0 }".to_owned(),
+            "vehicle[0].loads: none; at least one is needed",
+        ),
         ("[[vehicle]]\nfile = \"tank\"\nloads = { empty = 1 }".to_owned(), "vehicle[0].file: \"tank\""),
         ("[[vehicle]]\nfile = \"daf_xf\"\nloads = { empty = 1 }\nshares = 2".to_owned(), "unknown field `shares`"),
         (format!("{member}model = {{ slip_lever = 9.0 }}"), "vehicle[0].model.slip_lever: 9 m; must lie in 0..4 m"),
@@ -159,9 +177,15 @@ fn what_is_wrong_with_a_fleet_is_named() {
         (format!("{member}[draw]\nslip = [1.1, 0.9]"), "draw.slip: [1.1, 0.9]; must be [least, greatest]"),
         (format!("{member}[draw]\nslip = [0.9, 100]"), "draw.slip[1]: 100; must lie in 0..10"),
         (format!("{member}[draw]\nn_vehicles = 0"), "draw.n_vehicles: 0; must lie in 1..65536"),
-        (format!("{member}[draw]\nsteer_delay = [0.0, 0.5]"), "time.step: 0.1 s; the vehicle's steer delay is up to 0.5 s"),
+        (
+            format!("{member}[draw]\nsteer_delay = [0.0, 0.5]"),
+            "time.step: 0.1 s; the vehicle's steer delay is up to 0.5 s",
+        ),
         (format!("{member}[draw]\nmass = [1, 2]"), "unknown field `mass`"),
-        (format!("{member}[draw]\nroll_damping = [1, 10]"), "draw: vehicle.loads.empty.suspension.roll_damping: 2; of daf_xf"),
+        (
+            format!("{member}[draw]\nroll_damping = [1, 10]"),
+            "draw: vehicle.loads.empty.suspension.roll_damping: 2; of daf_xf",
+        ),
         (format!("{member}[draw]\nfifth_wheel = [-0.1, nan]"), "draw.fifth_wheel[1]: NaN m; must lie in -3..3 m"),
     ] {
         let Err(error) = written(&lines) else { panic!("{lines} was accepted") };
@@ -173,5 +197,9 @@ fn what_is_wrong_with_a_fleet_is_named() {
 fn a_simulator_of_one_vehicle_has_one_row() {
     let world = Arc::new(benchmark("attard2023").1);
     let simulator = Simulator::new(world.clone(), 3, 0, all_routes(&world)).unwrap();
-    assert!(world.rigs.len() == 1 && world.rays.len() == 1 && simulator.batch().truck.iter().all(|truck| truck.vehicle == 0));
+    assert!(
+        world.rigs.len() == 1
+            && world.rays.len() == 1
+            && simulator.batch().truck.iter().all(|truck| truck.vehicle == 0)
+    );
 }

@@ -38,7 +38,8 @@ fn all_routes() -> Scenario {
     let text = std::fs::read_to_string(Path::new(ROOT).join("scenarios/attard2023.toml")).unwrap();
     let head = &text[..text.find("[[roundabout]]").unwrap()];
     let head = head.replace("vehicles/", &format!("{ROOT}/scenarios/vehicles/"));
-    let places: String = NAMES.iter().map(|name| format!("[[roundabout]]\nfile = {:?}\ntrain = \"all\"\n", file(name))).collect();
+    let places: String =
+        NAMES.iter().map(|name| format!("[[roundabout]]\nfile = {:?}\ntrain = \"all\"\n", file(name))).collect();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("kinds.toml");
     std::fs::write(&path, head + &places).unwrap();
@@ -47,27 +48,46 @@ fn all_routes() -> Scenario {
 
 #[test]
 fn every_lane_of_an_entry_has_its_routes() {
-    let names = |name: &str| -> Vec<String> { routes(name).iter().map(|route| route.name.split_once('/').unwrap().1.to_owned()).collect() };
+    let names = |name: &str| -> Vec<String> {
+        routes(name).iter().map(|route| route.name.split_once('/').unwrap().1.to_owned()).collect()
+    };
     let [compact, mini, three_lanes] = NAMES.map(names);
     assert_eq!(
         compact,
-        ["E-right-1", "E-right-2", "E-right-3", "NW-right-1", "NW-right-2", "NW-right-3", "S-right-1", "S-right-2", "S-right-3"]
+        [
+            "E-right-1",
+            "E-right-2",
+            "E-right-3",
+            "NW-right-1",
+            "NW-right-2",
+            "NW-right-3",
+            "S-right-1",
+            "S-right-2",
+            "S-right-3"
+        ]
     );
     let one_lane = |arm: &str| (1..=4).map(|exit| format!("{arm}-right-{exit}")).collect::<Vec<_>>();
     assert_eq!(mini, ["E", "N", "W", "S"].map(one_lane).concat());
-    let two_lanes = |arm: &str| ["left-2", "left-3", "left-4", "right-1", "right-2"].map(|way| format!("{arm}-{way}")).to_vec();
+    let two_lanes =
+        |arm: &str| ["left-2", "left-3", "left-4", "right-1", "right-2"].map(|way| format!("{arm}-{way}")).to_vec();
     assert_eq!(three_lanes, [two_lanes("E"), two_lanes("N"), one_lane("W"), two_lanes("S")].concat());
 }
 
 #[test]
 fn ring_lanes_are_counted_from_the_outer_kerb() {
-    for (name, outer, radii) in
-        [("compact", 18.0, vec![14.0]), ("mini", 13.5, vec![7.5]), ("three-lanes", 20.0 + 1.0 + 3.0 * 3.8, vec![22.4, 26.2, 30.0])]
-    {
+    for (name, outer, radii) in [
+        ("compact", 18.0, vec![14.0]),
+        ("mini", 13.5, vec![7.5]),
+        ("three-lanes", 20.0 + 1.0 + 3.0 * 3.8, vec![22.4, 26.2, 30.0]),
+    ] {
         let roundabout = roundabout(name);
         let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
         assert!(near(roundabout.outer_radius(), outer), "{name}: {}", roundabout.outer_radius());
-        assert!(roundabout.lane_radii().iter().zip(&radii).all(|(&a, &b)| near(a, b)), "{name}: {:?}", roundabout.lane_radii());
+        assert!(
+            roundabout.lane_radii().iter().zip(&radii).all(|(&a, &b)| near(a, b)),
+            "{name}: {:?}",
+            roundabout.lane_radii()
+        );
         assert_eq!(roundabout.lane_radii().len(), radii.len());
         for route in routes(name) {
             let of_lane = roundabout.lane_radii()[radii.len() - 1 - usize::from(route.lane == Lane::Left)];
@@ -125,7 +145,8 @@ fn routes_are_smooth_and_keep_off_the_kerbs() {
                 assert!(turn.abs() < 1e-6, "{}: a kink of {turn} rad", route.name);
                 assert!(joint[0].end().distance(joint[1].start()) < 1e-6, "{}: a gap", route.name);
             }
-            let points = (0..(route.centre_line.length() * 4.0) as usize).map(|step| route.centre_line.point_at(step as f64 / 4.0));
+            let points = (0..(route.centre_line.length() * 4.0) as usize)
+                .map(|step| route.centre_line.point_at(step as f64 / 4.0));
             let nearest = points.map(|p| kerbs.signed_distance(p)).fold(f64::INFINITY, f64::min);
             assert!(1.6 <= nearest, "{}: {nearest} m from a kerb", route.name);
         }
@@ -155,7 +176,10 @@ fn ranges_are_exact_to_two_centimetres() {
         for (on, engine) in engines() {
             let [wrong, grazing, met] = sense::errors(&engine, &world, &kerbs, &field, n_trucks);
             assert_eq!(wrong, 0, "{name}, {on}");
-            assert!(grazing < 45 && n_trucks as usize * N_RAYS / 3 < met, "{name}, {on}: {grazing} graze, {met} meet a kerb");
+            assert!(
+                grazing < 45 && n_trucks as usize * N_RAYS / 3 < met,
+                "{name}, {on}: {grazing} graze, {met} meet a kerb"
+            );
         }
     }
 }
@@ -172,12 +196,16 @@ fn trucks_start_clear_of_kerbs_on_every_route_and_can_be_stepped() {
         let mut simulator = batch_on(&engine, &world, n_envs, 3, RouteChoice::Fixed(every_route.clone()));
         simulator.step(&vec![straight; n_envs]).unwrap();
         assert!(simulator.batch().ended.iter().all(|&ended| ended == Ended::Running as u32), "{on}");
-        let mut simulator = batch_on(&engine, &world, n_envs, 3, RouteChoice::Drawn((0..world.routes.len() as u32).collect()));
+        let mut simulator =
+            batch_on(&engine, &world, n_envs, 3, RouteChoice::Drawn((0..world.routes.len() as u32).collect()));
         let mut ended = 0;
         for _ in 0..200 {
             simulator.step_at_random();
             let batch = simulator.batch();
-            assert!(batch.observation.as_flattened().iter().chain(&batch.reward).all(|value| value.is_finite()), "{on}");
+            assert!(
+                batch.observation.as_flattened().iter().chain(&batch.reward).all(|value| value.is_finite()),
+                "{on}"
+            );
             ended += batch.ended.iter().filter(|&&ended| ended != Ended::Running as u32).count();
         }
         assert!(n_envs < ended, "{on}: only {ended} episodes ended");
@@ -202,7 +230,9 @@ fn a_truck_passes_the_island_of_a_metre_and_a_half_to_every_exit() {
     let rig = benchmark("attard2023").1.rigs[0];
     let roundabout = roundabout("mini");
     let kerbs = roundabout.kerbs(Gutter::Drivable);
-    let suffices = |line: &Curve| own_lane_suffices(&rig, &kerbs, &swept_path(&rig, &line.part(20.0, line.length() - 20.0), 2.0, 0.25));
+    let suffices = |line: &Curve| {
+        own_lane_suffices(&rig, &kerbs, &swept_path(&rig, &line.part(20.0, line.length() - 20.0), 2.0, 0.25))
+    };
     for exit in 1..=4 {
         assert!(suffices(&wide_way(9.0, exit)), "exit {exit}");
     }

@@ -35,7 +35,9 @@ fn left_hand(text: &str) -> String {
         let line = negated(&negated(line, "bearing_deg"), "offset");
         match line.strip_suffix(".right]") {
             Some(table) => format!("{table}.left]\n"),
-            None => line.strip_suffix(".left]").map_or_else(|| format!("{line}\n"), |table| format!("{table}.right]\n")),
+            None => {
+                line.strip_suffix(".left]").map_or_else(|| format!("{line}\n"), |table| format!("{table}.right]\n"))
+            }
         }
     };
     format!("hand = \"left\"\n{}", text.lines().map(line).collect::<String>())
@@ -63,7 +65,8 @@ fn world(folder: &Path, roundabout: &str, gutter: &str) -> (Scenario, Arc<World>
 fn a_left_hand_world_driven_with_mirrored_actions_is_the_mirrored_right_hand_one_to_the_last_bit() {
     let folder = tempfile::tempdir().unwrap();
     for gutter in ["drivable", "solid"] {
-        let [(_, right), (_, left)] = [text("16m-maps"), left_hand(&text("16m-maps"))].map(|text| world(folder.path(), &text, gutter));
+        let [(_, right), (_, left)] =
+            [text("16m-maps"), left_hand(&text("16m-maps"))].map(|text| world(folder.path(), &text, gutter));
         for (name, engine) in engines() {
             // The mirror image is driven: the action that mirrors another has its index.
             let [mut one, mut other] = [&right, &left].map(|world| batch_on(&engine, world, 256, 7, all_routes(world)));
@@ -80,8 +83,10 @@ fn a_left_hand_world_driven_with_mirrored_actions_is_the_mirrored_right_hand_one
 #[test]
 fn a_left_hand_world_is_another_one_than_the_same_file_with_right_hand_traffic() {
     let folder = tempfile::tempdir().unwrap();
-    let [(_, right), (_, left)] = [text("20m-maps"), left_hand(&text("16m-maps"))].map(|text| world(folder.path(), &text, "drivable"));
-    let [mut one, mut other] = [&right, &left].map(|world| batch_on(&engines()[0].1, world, 64, 7, RouteChoice::Drawn(vec![0, 1])));
+    let [(_, right), (_, left)] =
+        [text("20m-maps"), left_hand(&text("16m-maps"))].map(|text| world(folder.path(), &text, "drivable"));
+    let [mut one, mut other] =
+        [&right, &left].map(|world| batch_on(&engines()[0].1, world, 64, 7, RouteChoice::Drawn(vec![0, 1])));
     (0..30).for_each(|_| one.step_at_random());
     (0..30).for_each(|_| other.step_at_random());
     assert!(rows(one.batch()) != rows(other.batch()));
@@ -108,9 +113,10 @@ fn what_is_seen_of_a_left_hand_road_is_the_mirror_image_of_what_is_driven() {
             assert_eq!((&driven.centre_line, &driven.name), (&twin.centre_line, &seen.name));
             let mirrored = left.seen_route(driven);
             assert_eq!((mirrored.lane, mirrored.crossing), (seen.lane, seen.crossing));
-            for (one, other) in [(&mirrored.waypoints, &seen.waypoints), (&mirrored.waypoints, &driven.mirrored().waypoints)]
-                .iter()
-                .flat_map(|(one, other)| one.iter().zip(other.iter()))
+            for (one, other) in
+                [(&mirrored.waypoints, &seen.waypoints), (&mirrored.waypoints, &driven.mirrored().waypoints)]
+                    .iter()
+                    .flat_map(|(one, other)| one.iter().zip(other.iter()))
             {
                 assert!(one.position.distance(other.position) < 1e-9);
             }
@@ -123,7 +129,9 @@ fn a_left_hand_road_has_its_lanes_by_the_names_that_a_driver_there_would_say() {
     let [right, left] = pair("16m");
     // E-right-1 is the lane next to the kerb to the first exit; in left-hand traffic that lane is the left one, and the
     // first exit clockwise is N's mirror image.
-    let names = |roundabout: &Road| roundabout.routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect::<Vec<_>>();
+    let names = |roundabout: &Road| {
+        roundabout.routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect::<Vec<_>>()
+    };
     let (right, left) = (names(&right), names(&left));
     assert!(right.contains(&"road/E-right-1".to_owned()) && !right.contains(&"road/E-left-1".to_owned()));
     assert!(left.contains(&"road/E-left-1".to_owned()) && !left.contains(&"road/E-right-1".to_owned()));

@@ -38,7 +38,11 @@ fn a_junction_has_every_way_through_it_and_drives_them() {
     let routes = crossing.routes(20.0, 20.0, 2.0).unwrap();
     assert_eq!(routes.len(), 14);
     for route in &routes {
-        assert!(route.waypoints.iter().all(|waypoint| 0.9 < faces.signed_distance(waypoint.position)), "{}", route.name);
+        assert!(
+            route.waypoints.iter().all(|waypoint| 0.9 < faces.signed_distance(waypoint.position)),
+            "{}",
+            route.name
+        );
         let (first, last) = (route.waypoints[0].position, route.waypoints[route.waypoints.len() - 1].position);
         // Exits are counted counter-clockwise: the first turns right, the second leads ahead, the third turns left.
         let turn = first.perp_dot(last) / (first.length() * last.length());
@@ -100,7 +104,8 @@ fn a_benchmark_drives_ways_by_road_and_lane() {
     let written = |keys: &str| {
         let map = folder().join("Town03.xodr");
         let _ = fs::remove_file(&file);
-        fs::write(&file, format!("{head}[[roundabout]]\nfile = {map:?}\nname = \"crossing\"\ntest = \"all\"\n{keys}")).unwrap();
+        fs::write(&file, format!("{head}[[roundabout]]\nfile = {map:?}\nname = \"crossing\"\ntest = \"all\"\n{keys}"))
+            .unwrap();
         Scenario::read(&file)
     };
     let turn = "[[roundabout.way]]\nfrom = { road = 90, lane = 1 }\nto = { road = \"34\", lane = -1 }\n";

@@ -34,7 +34,8 @@ fn arms(imported: &Imported) -> Vec<&str> {
 
 /// `text` with every `from` of road 1 replaced, which leads east from (38, 0).
 fn in_road_1(text: &str, from: &str, to: &str) -> String {
-    let replaced = |line: &str| if line.contains(" id=\"1\" junction") { line.replace(from, to) } else { line.to_owned() };
+    let replaced =
+        |line: &str| if line.contains(" id=\"1\" junction") { line.replace(from, to) } else { line.to_owned() };
     let changed = text.lines().map(replaced).collect::<Vec<_>>().join("\n");
     assert_ne!(changed, text, "{from}");
     changed
@@ -46,7 +47,10 @@ fn continued(link: &str, back: &str, more: &str) -> String {
     let road = text.lines().find(|line| line.contains(" id=\"1\" junction")).unwrap();
     let junction = "<predecessor elementType=\"junction\" elementId=\"900\"/>";
     let near = road.replace("length=\"70\"", "length=\"10\"").replace(junction, &format!("{junction}{link}"));
-    let far = road.replace(junction, back).replace("id=\"1\" junction", "id=\"801\" junction").replace("x=\"38\"", "x=\"48\"");
+    let far = road
+        .replace(junction, back)
+        .replace("id=\"1\" junction", "id=\"801\" junction")
+        .replace("x=\"38\"", "x=\"48\"");
     text.replace(road, &format!("{near}\n{far}")).replace("</OpenDRIVE>", &format!("{more}</OpenDRIVE>"))
 }
 
@@ -62,7 +66,8 @@ fn lanes_that_a_section_of_one_side_does_not_describe_go_on() {
     let lanes = text.lines().find(|line| line.contains(" id=\"1\" junction")).unwrap();
     let (_, left) = lanes.split_once("<left>").unwrap();
     let (left, _) = left.split_once("</left>").unwrap();
-    let single = format!("</laneSection><laneSection s=\"5\" singleSide=\"true\"><left>{left}</left></laneSection></lanes>");
+    let single =
+        format!("</laneSection><laneSection s=\"5\" singleSide=\"true\"><left>{left}</left></laneSection></lanes>");
     let linked = |text: &str, id: &str| {
         let link = format!("<link><predecessor id=\"{id}\"/><successor id=\"{id}\"/></link><width");
         text.replace(
@@ -100,15 +105,18 @@ fn lanes_without_links_are_joined_by_place_where_their_roads_are_linked() {
         let warnings: Vec<&str> = map.warnings().collect();
         assert_eq!(warnings.len(), 2, "{warnings:?}");
         assert!(
-            warnings.contains(&"road 1 lane -1: has no link to a lane, and is joined to road 801 lane -1, which begins there"),
+            warnings.contains(
+                &"road 1 lane -1: has no link to a lane, and is joined to road 801 lane -1, which begins there"
+            ),
             "{warnings:?}"
         );
     }
     // The same through a junction whose connections have no lane links.
-    let (link, back) =
-        ("<successor elementType=\"junction\" elementId=\"950\"/>", "<predecessor elementType=\"junction\" elementId=\"950\"/>");
-    let junction =
-        "<junction id=\"950\"><connection id=\"0\" incomingRoad=\"1\" connectingRoad=\"801\" contactPoint=\"start\"/></junction>";
+    let (link, back) = (
+        "<successor elementType=\"junction\" elementId=\"950\"/>",
+        "<predecessor elementType=\"junction\" elementId=\"950\"/>",
+    );
+    let junction = "<junction id=\"950\"><connection id=\"0\" incomingRoad=\"1\" connectingRoad=\"801\" contactPoint=\"start\"/></junction>";
     let map = parsed(&continued(link, back, junction));
     assert!(map.warnings().any(|warning| warning.contains("road 1 lane -1: has no link to a lane, and is joined to road 801 lane -1")));
 }
@@ -117,12 +125,21 @@ fn lanes_without_links_are_joined_by_place_where_their_roads_are_linked() {
 fn an_arm_that_ends_early_is_refused_with_what_the_map_says_there() {
     for (link, expected) in [
         ("", "road 1 is linked to no road there"),
-        ("<successor elementType=\"junction\" elementId=\"950\"/>", "junction 950 has no connection that fits for road 1 lane 1"),
-        ("<successor elementType=\"road\" elementId=\"99\" contactPoint=\"start\"/>", "road 99, which the map does not have"),
+        (
+            "<successor elementType=\"junction\" elementId=\"950\"/>",
+            "junction 950 has no connection that fits for road 1 lane 1",
+        ),
+        (
+            "<successor elementType=\"road\" elementId=\"99\" contactPoint=\"start\"/>",
+            "road 99, which the map does not have",
+        ),
     ] {
         let map = parsed(&continued(link, "", "<junction id=\"950\"/>"));
         let Imported { ground, warnings, .. } = imported(&map);
-        assert!(warnings.iter().any(|warning| warning.contains("arm E: a lane begins 48.0 m from the centre: ")), "{warnings:?}");
+        assert!(
+            warnings.iter().any(|warning| warning.contains("arm E: a lane begins 48.0 m from the centre: ")),
+            "{warnings:?}"
+        );
         let message = Road::on("ring".to_owned(), ground).routes(45.0, 45.0, 2.0).unwrap_err().to_string();
         assert!(message.contains("m fit: ") && message.contains(expected), "{message}");
     }
@@ -132,22 +149,26 @@ fn an_arm_that_ends_early_is_refused_with_what_the_map_says_there() {
 fn lanes_are_joined_across_a_section_of_no_length() {
     let text = plain();
     let link = |id: i32| {
-        format!("<lane id=\"{id}\" type=\"driving\" level=\"false\"><link><predecessor id=\"{id}\"/><successor id=\"{id}\"/></link>")
+        format!(
+            "<lane id=\"{id}\" type=\"driving\" level=\"false\"><link><predecessor id=\"{id}\"/><successor id=\"{id}\"/></link>"
+        )
     };
-    let linked = [1, -1]
-        .iter()
-        .fold(text, |text, id| in_road_1(&text, &format!("<lane id=\"{id}\" type=\"driving\" level=\"false\"><link></link>"), &link(*id)));
+    let linked = [1, -1].iter().fold(text, |text, id| {
+        in_road_1(&text, &format!("<lane id=\"{id}\" type=\"driving\" level=\"false\"><link></link>"), &link(*id))
+    });
     let road = linked.lines().find(|line| line.contains(" id=\"1\" junction")).unwrap();
     let (_, section) = road.split_once("<laneSection s=\"0\">").unwrap();
     let (section, _) = section.split_once("</laneSection>").unwrap();
     for stations in [&["0", "30", "30"][..], &["0", "0"], &["0", "70"]] {
-        let sections: String = stations.iter().map(|s| format!("<laneSection s=\"{s}\">{section}</laneSection>")).collect();
-        let map = parsed(
-            &linked.replace(&format!("<laneSection s=\"0\">{section}</laneSection></lanes></road>"), &format!("{sections}</lanes></road>")),
-        );
-        assert!(
-            map.warnings().any(|warning| warning.starts_with("road ") && warning.contains("has no length; lanes are joined across it"))
-        );
+        let sections: String =
+            stations.iter().map(|s| format!("<laneSection s=\"{s}\">{section}</laneSection>")).collect();
+        let map = parsed(&linked.replace(
+            &format!("<laneSection s=\"0\">{section}</laneSection></lanes></road>"),
+            &format!("{sections}</lanes></road>"),
+        ));
+        assert!(map.warnings().any(
+            |warning| warning.starts_with("road ") && warning.contains("has no length; lanes are joined across it")
+        ));
         assert_drivable(&map);
     }
 }
@@ -161,10 +182,8 @@ fn a_short_sharp_spiral_is_read_with_a_warning_and_one_that_turns_too_much_is_re
         in_road_1(&plain(), "</planView>", &piece)
     };
     let map = parsed(&spiral(0.01));
-    assert!(
-        map.warnings()
-            .any(|warning| warning == "road 1, geometry s 70: has a radius of 0.0100 m on a length of 0.0100 m; it is read as it is")
-    );
+    assert!(map.warnings().any(|warning| warning
+        == "road 1, geometry s 70: has a radius of 0.0100 m on a length of 0.0100 m; it is read as it is"));
     assert_drivable(&map);
     assert!(refusal(&spiral(0.31)).contains("road 1, geometry s 70, spiral: curvStart: 100; turns more than 30 rad"));
 }
@@ -176,18 +195,27 @@ fn grades_and_crossfall_are_warned_of_with_their_largest_value() {
         let at_ring = imported(&map).warnings.join("\n");
         (map.warnings().collect::<Vec<_>>().join("\n"), at_ring)
     };
-    let (of_map, of_ring) = with("<elevationProfile><elevation s=\"0\" a=\"0\" b=\"0\" c=\"0.006\" d=\"-0.00005\"/></elevationProfile>");
+    let (of_map, of_ring) =
+        with("<elevationProfile><elevation s=\"0\" a=\"0\" b=\"0\" c=\"0.006\" d=\"-0.00005\"/></elevationProfile>");
     assert!(of_map.contains("road 1: has a grade of 24.0 %; the simulated road is level"), "{of_map}");
     assert!(of_ring.contains("grades of up to 24.0 % (road 1); the simulated road is level"), "{of_ring}");
     // Heights in pieces of 10 m, each level by itself.
-    let pieces: String =
-        (0..7).map(|i| format!("<elevation s=\"{}\" a=\"{}\" b=\"0\" c=\"0\" d=\"0\"/>", 10 * i, f64::from(i) / 2.0)).collect();
+    let pieces: String = (0..7)
+        .map(|i| format!("<elevation s=\"{}\" a=\"{}\" b=\"0\" c=\"0\" d=\"0\"/>", 10 * i, f64::from(i) / 2.0))
+        .collect();
     let (of_map, _) = with(&format!("<elevationProfile>{pieces}</elevationProfile>"));
-    assert!(of_map.contains("road 1: has a grade of 5.0 %") && of_map.contains("elevation jumps by up to 0.50 m, at s "), "{of_map}");
-    let superelevation = "<lateralProfile><superelevation s=\"0\" a=\"-0.1\" b=\"-0.001\" c=\"0\" d=\"0\"/></lateralProfile>";
+    assert!(
+        of_map.contains("road 1: has a grade of 5.0 %") && of_map.contains("elevation jumps by up to 0.50 m, at s "),
+        "{of_map}"
+    );
+    let superelevation =
+        "<lateralProfile><superelevation s=\"0\" a=\"-0.1\" b=\"-0.001\" c=\"0\" d=\"0\"/></lateralProfile>";
     let (of_map, of_ring) = with(superelevation);
     // tan(0.17) = 0.172.
-    assert!(of_map.contains("1 of 20 roads have a crossfall (superelevation, shape), up to 17.2 % on road 1"), "{of_map}");
+    assert!(
+        of_map.contains("1 of 20 roads have a crossfall (superelevation, shape), up to 17.2 % on road 1"),
+        "{of_map}"
+    );
     assert!(of_ring.contains("crossfall of up to 17.2 % (road 1)"), "{of_ring}");
     // Steeper beyond the lanes, which end 4 m left of the reference line.
     let shape = "<lateralProfile><shape s=\"0\" t=\"0\" a=\"0\" b=\"0\" c=\"0.01\" d=\"0\"/><shape s=\"0\" t=\"50\" a=\"0\" b=\"9\" c=\"0\" d=\"0\"/></lateralProfile>";
@@ -205,7 +233,8 @@ fn a_reversed_lane_is_travelled_against_its_side() {
         (centre[0], centre[centre.len() - 1])
     };
     let (near, far) = (DVec2::new(38.0, -2.0), DVec2::new(108.0, -2.0));
-    let apart = |(from, to): (DVec2, DVec2), expected: (DVec2, DVec2)| from.distance(expected.0) + to.distance(expected.1);
+    let apart =
+        |(from, to): (DVec2, DVec2), expected: (DVec2, DVec2)| from.distance(expected.0) + to.distance(expected.1);
     assert!(apart(ends(&plain()), (near, far)) < 1e-6);
     let reversed = in_road_1(&plain(), "<lane id=\"-1\" type", "<lane id=\"-1\" direction=\"reversed\" type");
     assert!(apart(ends(&reversed), (far, near)) < 1e-6);
@@ -232,13 +261,15 @@ fn a_map_is_read_in_other_encodings_and_with_a_document_type() {
 
 #[test]
 fn lane_types_that_are_not_known_are_named_once_with_their_number_of_lanes() {
-    let arms = |line: &str| if line.contains("length=\"70\"") { line.replace("driving", "shared") } else { line.to_owned() };
+    let arms =
+        |line: &str| if line.contains("length=\"70\"") { line.replace("driving", "shared") } else { line.to_owned() };
     let map = parsed(&plain().lines().map(arms).collect::<Vec<_>>().join("\n"));
     let warnings: Vec<&str> = map.warnings().collect();
     assert_eq!(warnings, ["lane types that are not known: \"shared\" (8 lanes); nothing is driven on there"]);
     let message = map.ground(&map.rings()[0], &Options::default()).unwrap_err().to_string();
     assert!(
-        message.contains("arms: 0 on a circle") && message.ends_with("it has lane types that are not known: \"shared\" (8 lanes)"),
+        message.contains("arms: 0 on a circle")
+            && message.ends_with("it has lane types that are not known: \"shared\" (8 lanes)"),
         "{message}"
     );
 }
@@ -251,7 +282,8 @@ fn a_link_that_turns_is_not_said_to_jump() {
     let (heading, after) = after.split_once('"').unwrap();
     let heading = heading.parse::<f64>().unwrap() + 1.0;
     let map = parsed(&turned.replace(line, &format!("{before}hdg=\"{heading}\"{after}")));
-    let warning = map.warnings().find(|warning| warning.starts_with("road 103 lane -1: its link to road 300 lane -1 ")).unwrap();
+    let warning =
+        map.warnings().find(|warning| warning.starts_with("road 103 lane -1: its link to road 300 lane -1 ")).unwrap();
     assert!(warning.contains(" turns by 57 deg; ") && !warning.contains("jumps"), "{warning}");
     // A left-hand map's lanes have the numbers that they have in the map.
     let left = Map::parse(Path::new("ring.xodr"), &turned, Hand::Left).unwrap();
@@ -267,15 +299,28 @@ fn pieces_of_a_road_that_lie_apart_are_refused_with_road_and_geometry() {
         in_road_1(&plain(), "length=\"70\"><line/></geometry></planView>", &pieces)
     };
     assert_drivable(&parsed(&second("73")));
-    assert!(parsed(&second("90")).warnings().any(|warning| warning == "road 1: its reference line jumps by 17.000 m at s 35.00 m"));
+    assert!(
+        parsed(&second("90"))
+            .warnings()
+            .any(|warning| warning == "road 1: its reference line jumps by 17.000 m at s 35.00 m")
+    );
     let message = refusal(&second("1e7"));
-    assert!(message.contains("road 1, geometry s 35: x and y: 9999927.0 m away; must begin where the piece before it ends"), "{message}");
+    assert!(
+        message.contains("road 1, geometry s 35: x and y: 9999927.0 m away; must begin where the piece before it ends"),
+        "{message}"
+    );
     // One piece that is longer than it says, and a whole road elsewhere.
     let cubic = "<paramPoly3 aU=\"0\" bU=\"1e7\" cU=\"0\" dU=\"0\" aV=\"0\" bV=\"0\" cV=\"0\" dV=\"0\"/>";
     let message = refusal(&in_road_1(&plain(), "<line/>", cubic));
-    assert!(message.contains("road 1, geometry s 0: curve: ") && message.contains("leads too far for a length of 70.000 m"), "{message}");
+    assert!(
+        message.contains("road 1, geometry s 0: curve: ") && message.contains("leads too far for a length of 70.000 m"),
+        "{message}"
+    );
     let message = refusal(&in_road_1(&plain(), "x=\"38\"", "x=\"1e7\""));
-    assert!(message.contains("road 1, geometry s 0: x and y: 10000 km from the middle of the map; must be at most 500 km"), "{message}");
+    assert!(
+        message.contains("road 1, geometry s 0: x and y: 10000 km from the middle of the map; must be at most 500 km"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -302,7 +347,9 @@ fn a_bypass_far_from_its_arms_is_a_lane_of_the_arms_that_it_joins() {
     let with = imported(&map);
     assert_eq!(arms(&with), ["E", "N", "W", "S"]);
     assert!(
-        with.warnings.iter().any(|warning| warning.contains("passes beside the ring to") && warning.contains("next to the kerb")),
+        with.warnings
+            .iter()
+            .any(|warning| warning.contains("passes beside the ring to") && warning.contains("next to the kerb")),
         "{:?}",
         with.warnings
     );
@@ -333,12 +380,13 @@ fn a_bypass_that_comes_from_no_arm_is_left_out_with_a_warning() {
 /// A shoulder among lanes is paved but no lane: the lanes' edges go round it, where the kerb faces do not.
 #[test]
 fn an_outline_with_a_shoulder_among_its_lanes_is_read_again() {
-    let lane =
-        "<lane id=\"-1\" type=\"driving\" level=\"false\"><link></link><width sOffset=\"0\" a=\"4\" b=\"0\" c=\"0\" d=\"0\"/></lane>";
+    let lane = "<lane id=\"-1\" type=\"driving\" level=\"false\"><link></link><width sOffset=\"0\" a=\"4\" b=\"0\" c=\"0\" d=\"0\"/></lane>";
     let widths = "<width sOffset=\"0\" a=\"0\" b=\"0\" c=\"0\" d=\"0\"/><width sOffset=\"20\" a=\"1\" b=\"0\" c=\"0\" d=\"0\"/>\
         <width sOffset=\"40\" a=\"0\" b=\"0\" c=\"0\" d=\"0\"/>";
     let beside = "<width sOffset=\"0\" a=\"2.5\" b=\"0\" c=\"0\" d=\"0\"/>";
-    let more = format!("{lane}<lane id=\"-2\" type=\"shoulder\">{widths}</lane><lane id=\"-3\" type=\"driving\">{beside}</lane>");
+    let more = format!(
+        "{lane}<lane id=\"-2\" type=\"shoulder\">{widths}</lane><lane id=\"-3\" type=\"driving\">{beside}</lane>"
+    );
     let map = parsed(&in_road_1(&plain(), lane, &more));
     let ground = imported(&map).ground;
     let folder = tempfile::tempdir().unwrap();

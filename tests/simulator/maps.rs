@@ -47,7 +47,11 @@ fn routes_of_a_map_are_smooth_stay_on_the_road_and_lead_where_their_names_say() 
     for route in roundabout.routes(40.0, 35.0, 2.0).unwrap() {
         for pair in route.centre_line.pieces.windows(2) {
             let step = turn(pair[0].heading_at(pair[0].length()), pair[1].heading_at(0.0));
-            assert!(pair[0].end().distance(pair[1].start()) < 1e-6 && step < 3f64.to_radians(), "{}: {step}", route.name);
+            assert!(
+                pair[0].end().distance(pair[1].start()) < 1e-6 && step < 3f64.to_radians(),
+                "{}: {step}",
+                route.name
+            );
         }
         for waypoint in &route.waypoints {
             assert!(1.0 < faces.signed_distance(waypoint.position), "{} at {}", route.name, waypoint.position);
@@ -124,7 +128,10 @@ fn a_faulty_outline_file_is_refused_with_its_key() {
 #[test]
 fn a_map_without_a_roundabout_says_so() {
     let message = Road::from_map(&map("maliput_Roundabout.xodr"), &Choice::default()).unwrap_err().to_string();
-    assert!(message.contains("maliput_Roundabout.xodr: ring: ") && message.contains("no roundabout here: 1 roads"), "{message}");
+    assert!(
+        message.contains("maliput_Roundabout.xodr: ring: ") && message.contains("no roundabout here: 1 roads"),
+        "{message}"
+    );
 }
 
 /// Roads, lanes and junctions mirrored in the x axis as text: a left-hand twin of a right-hand map.
@@ -194,7 +201,8 @@ fn a_benchmark_drives_a_ring_of_a_map() {
         let file = folder.path().join("map.toml");
         let vehicles = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/vehicles");
         let head = head.replace("\"vehicles/", &format!("\"{}/", vehicles.display()));
-        fs::write(&file, format!("{head}[[roundabout]]\nfile = {:?}\ntest = \"all\"\n{keys}", map("sumo_ring22.xodr"))).unwrap();
+        fs::write(&file, format!("{head}[[roundabout]]\nfile = {:?}\ntest = \"all\"\n{keys}", map("sumo_ring22.xodr")))
+            .unwrap();
         Scenario::read(&file)
     };
     let scenario = written("ring = [140, 140]\nname = \"sumo\"\narms = [\"A\", \"B\", \"C\", \"D\"]").unwrap();
@@ -215,7 +223,10 @@ fn values_out_of_range_are_refused_with_road_and_line() {
         Map::parse(Path::new("m.xodr"), &text.replacen(from, to, 1), Hand::Map).unwrap_err().to_string()
     };
     let message = refused("hdg=\"", "hdg=\"x");
-    assert!(message.starts_with("m.xodr: line ") && message.contains("road ") && message.contains("hdg: \"x"), "{message}");
+    assert!(
+        message.starts_with("m.xodr: line ") && message.contains("road ") && message.contains("hdg: \"x"),
+        "{message}"
+    );
     let message = Map::parse(Path::new("m.xodr"), "<a/>", Hand::Map).unwrap_err().to_string();
     assert!(message.contains("the first element is <a>, not <OpenDRIVE>"), "{message}");
     let deep = format!("<OpenDRIVE>{}{}</OpenDRIVE>", "<a>".repeat(200), "</a>".repeat(200));
@@ -231,7 +242,9 @@ fn attempt(text: &str) -> Result<(), TestCaseError> {
                 let _ = map.ground(ring, &Options::default());
             }
         }
-        Err(error @ (Error::Malformed { .. } | Error::Invalid { .. })) => prop_assert!(error.to_string().starts_with("broken.xodr: ")),
+        Err(error @ (Error::Malformed { .. } | Error::Invalid { .. })) => {
+            prop_assert!(error.to_string().starts_with("broken.xodr: "))
+        }
         Err(error) => return Err(TestCaseError::fail(error.to_string())),
     }
     Ok(())

@@ -45,13 +45,16 @@ fn code(line: &str) -> &str {
 /// The modules of `lib.rs` in their order.
 fn modules() -> Vec<String> {
     let lib = fs::read_to_string(source().join("lib.rs")).unwrap();
-    let modules = lib.lines().filter_map(|line| code(line).trim().strip_prefix("pub mod ")?.strip_suffix(';').map(str::to_owned));
+    let modules =
+        lib.lines().filter_map(|line| code(line).trim().strip_prefix("pub mod ")?.strip_suffix(';').map(str::to_owned));
     modules.collect()
 }
 
 /// Names after `crate::` in a text, also those in braces.
 fn used(text: &str) -> Vec<String> {
-    let name = |text: &str| text.trim().chars().take_while(|letter| letter.is_alphanumeric() || *letter == '_').collect::<String>();
+    let name = |text: &str| {
+        text.trim().chars().take_while(|letter| letter.is_alphanumeric() || *letter == '_').collect::<String>()
+    };
     let mut used = Vec::new();
     for part in text.split("crate::").skip(1) {
         match part.strip_prefix('{') {
@@ -100,7 +103,8 @@ fn names_after_crate_are_found_also_in_braces() {
 
 #[test]
 fn the_feature_gpu_is_named_only_where_an_engine_or_device_is_chosen() {
-    let expected = |files: &[(&str, usize)]| files.iter().map(|&(file, count)| (file.to_owned(), count)).collect::<Vec<_>>();
+    let expected =
+        |files: &[(&str, usize)]| files.iter().map(|&(file, count)| (file.to_owned(), count)).collect::<Vec<_>>();
     let simulator = [("engine/error.rs", 2), ("engine.rs", 1), ("lib.rs", 1), ("simulator.rs", 4)];
     assert_eq!(naming_gpu(files()), expected(&simulator));
     let training = files_below(&Path::new(env!("CARGO_MANIFEST_DIR")).join("training/src"));

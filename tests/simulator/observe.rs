@@ -42,7 +42,11 @@ impl View<'_> {
 
     fn interior_angle(&self, from: i64, at: i64, to: i64) -> f64 {
         let (a, b) = (self.w(from) - self.w(at), self.w(to) - self.w(at));
-        if a.length() < 1e-9 || b.length() < 1e-9 { 1.0 } else { (a.dot(b) / (a.length() * b.length())).clamp(-1.0, 1.0).acos() / PI }
+        if a.length() < 1e-9 || b.length() < 1e-9 {
+            1.0
+        } else {
+            (a.dot(b) / (a.length() * b.length())).clamp(-1.0, 1.0).acos() / PI
+        }
     }
 
     /// Where the bisectors of two chords meet: solve for the point that is as far from all three ends.
@@ -100,14 +104,16 @@ fn worst_differences(shift: usize) -> [f64; 69] {
     for (index, (_, route)) in scenario.routes().enumerate() {
         let (waypoints, previews) = (world.route_waypoints(index as u32), world.route_previews(index as u32));
         for state in 0..200 {
-            let draws: Vec<f32> = (0..3).flat_map(|draw| random::words(11, index as u32, state, draw)).map(random::signed_unit).collect();
+            let draws: Vec<f32> =
+                (0..3).flat_map(|draw| random::words(11, index as u32, state, draw)).map(random::signed_unit).collect();
             let next = 1 + ((draws[0] + 1.0) * 0.5 * (waypoints.len() - 1) as f32) as usize;
             let near = &waypoints[next.min(waypoints.len() - 1)];
             let mut ranges = [0.0; N_RAYS];
             for (ray, range) in ranges.iter_mut().enumerate() {
                 *range = 10.0 + 10.0 * random::signed_unit(random::words(12, index as u32, state, ray as u32)[0]);
             }
-            let heading = offtrack::layout::angle::wrapped(previews[next.min(waypoints.len() - 1)].heading + 1.5 * draws[1]);
+            let heading =
+                offtrack::layout::angle::wrapped(previews[next.min(waypoints.len() - 1)].heading + 1.5 * draws[1]);
             let truck = Truck {
                 route: index as u32,
                 position: near.position + 4.0 * glam::Vec2::new(draws[2], draws[3]),
@@ -117,9 +123,17 @@ fn worst_differences(shift: usize) -> [f64; 69] {
                 ..Truck::default()
             };
             let wheelbase = f64::from(world.rigs[0].wheelbase);
-            let view = View { route, next: next.min(waypoints.len() - 1), truck, wheelbase, ranges, range: scenario.sensor_range };
+            let view = View {
+                route,
+                next: next.min(waypoints.len() - 1),
+                truck,
+                wheelbase,
+                ranges,
+                range: scenario.sensor_range,
+            };
             let point = truck.position.as_dvec2() + 0.5 * wheelbase * DVec2::from_angle(f64::from(truck.heading));
-            let lane_distance = distance_to_segment(point, view.w(view.next as i64 - 1), view.w(view.next as i64)) as f32;
+            let lane_distance =
+                distance_to_segment(point, view.w(view.next as i64 - 1), view.w(view.next as i64)) as f32;
             let progress = Progress { waypoint: next as u32, lane_distance, ..Progress::default() };
             let values = observed(&world, &truck, &progress, &ranges);
             for (value, worst) in worst.iter_mut().enumerate() {

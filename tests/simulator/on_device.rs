@@ -42,7 +42,9 @@ fn after_400_steps_every_truck_is_in_the_same_step_of_the_same_episode_as_on_the
     let moment = |truck: &Truck| (truck.route, truck.episode, truck.steps, truck.held);
     let shared = trucks().filter(|(here, there)| moment(here) == moment(there)).count();
     let distance = trucks().map(|(here, there)| here.position.distance(there.position)).fold(0.0, f32::max);
-    let turned = |angle: fn(&Truck) -> f32| trucks().map(|(here, there)| wrapped(angle(here) - angle(there)).abs()).fold(0.0, f32::max);
+    let turned = |angle: fn(&Truck) -> f32| {
+        trucks().map(|(here, there)| wrapped(angle(here) - angle(there)).abs()).fold(0.0, f32::max)
+    };
     let angle = turned(|truck| truck.heading).max(turned(|truck| truck.trailer_heading));
     println!("{shared} of {n_envs} in the same step of the same episode, at most {distance} m and {angle} rad apart");
     assert_eq!(shared, n_envs);
@@ -58,7 +60,10 @@ fn an_adapter_that_is_not_there_is_refused_with_those_that_are() {
     let names: Vec<String> = adapters().into_iter().map(|adapter| adapter.name).collect();
     let error = Device::open(Some("no such adapter")).unwrap_err();
     assert_eq!(error, Error::UnknownAdapter { name: "no such adapter".to_owned(), found: names.clone() });
-    assert!(error.to_string().contains("no such adapter") && names.iter().all(|name| error.to_string().contains(name)), "{error}");
+    assert!(
+        error.to_string().contains("no such adapter") && names.iter().all(|name| error.to_string().contains(name)),
+        "{error}"
+    );
     // Part of a name in any case will do.
     let part: String = names[0].chars().take(6).collect();
     assert!(Device::open(Some(&part.to_uppercase())).unwrap().name().starts_with(&part));
@@ -73,14 +78,17 @@ fn a_batch_too_large_for_the_adapter_is_refused_with_what_would_fit() {
     let largest = (limit / (69 * 4)) as usize;
     let new = |n_envs| Simulator::on(engine(), world.clone(), n_envs, 0, choice.clone());
     let error = new(largest + 1).unwrap_err();
-    let simulator::Error::Gpu(Error::TooManyTrucks { n_envs, buffer, n_bytes, limit: found, fitting, .. }) = &error else {
+    let simulator::Error::Gpu(Error::TooManyTrucks { n_envs, buffer, n_bytes, limit: found, fitting, .. }) = &error
+    else {
         panic!("{error}")
     };
     assert_eq!((*n_envs, *buffer, *n_bytes, *found), (largest + 1, "observation", (largest as u64 + 1) * 276, limit));
     assert_eq!(*fitting as usize, largest);
     let message = error.to_string();
     assert!(
-        [&(largest + 1).to_string(), "observation", &limit.to_string(), &largest.to_string()].iter().all(|part| message.contains(*part))
+        [&(largest + 1).to_string(), "observation", &limit.to_string(), &largest.to_string()]
+            .iter()
+            .all(|part| message.contains(*part))
     );
     // The number of bytes does not wrap around.
     for absurd in [1 << 62, usize::MAX] {
@@ -106,7 +114,9 @@ fn a_world_too_large_for_the_adapter_is_refused_with_the_number_of_roundabouts_t
     // One field that is larger than the limit stands for many. Its zeros are never touched, so they take no memory.
     large.fields[0].values = vec![0; limit as usize / 4 + 1];
     let error = Simulator::on(engine(), Arc::new(large), 16, 0, choice).unwrap_err();
-    let simulator::Error::Gpu(Error::WorldTooLarge { table, n_roundabouts, n_bytes, limit: found, fitting, .. }) = &error else {
+    let simulator::Error::Gpu(Error::WorldTooLarge { table, n_roundabouts, n_bytes, limit: found, fitting, .. }) =
+        &error
+    else {
         panic!("{error}");
     };
     assert_eq!((*table, *n_roundabouts, *found), ("corners", 5, limit));
@@ -117,7 +127,9 @@ fn a_world_too_large_for_the_adapter_is_refused_with_the_number_of_roundabouts_t
 #[test]
 fn external_columns_are_stepped_in_place_and_refused_when_too_small_or_gathered() {
     let (world, choice) = full();
-    let with = |columns| Simulator::on(Engine::Gpu { device: device().clone(), columns }, world.clone(), 100, 4, choice.clone());
+    let with = |columns| {
+        Simulator::on(Engine::Gpu { device: device().clone(), columns }, world.clone(), 100, 4, choice.clone())
+    };
     let error = with(vec![(Column::Reward, slice(396))]).unwrap_err();
     assert_eq!(error, Error::ColumnSize { column: "reward", found: 396, n_envs: 100, needed: 400 }.into());
     assert_eq!(error.to_string(), "reward: 396 bytes; 100 trucks need 400");
@@ -136,7 +148,15 @@ fn external_columns_are_stepped_in_place_and_refused_when_too_small_or_gathered(
 fn a_lost_device_fails_the_next_step_and_every_other_request() {
     let (world, choice) = full();
     let device = Device::open(None).unwrap();
-    let new = || Simulator::on(Engine::Gpu { device: device.clone(), columns: Columns::new() }, world.clone(), 64, 0, choice.clone());
+    let new = || {
+        Simulator::on(
+            Engine::Gpu { device: device.clone(), columns: Columns::new() },
+            world.clone(),
+            64,
+            0,
+            choice.clone(),
+        )
+    };
     let mut simulator = new().unwrap();
     simulator.step(&[4; 64]).unwrap();
     // A device with work under way is lost once that is done.
@@ -149,5 +169,7 @@ fn a_lost_device_fails_the_next_step_and_every_other_request() {
     simulator.reset();
     let _ = simulator.batch();
     assert!(simulator.step_at_random_by_stage().is_err() && simulator.tally().is_err() && simulator.wait().is_err());
-    assert!(simulator.reset_from(&[Default::default(); 64]).is_err() && simulator.gather(&[0]).is_err() && new().is_err());
+    assert!(
+        simulator.reset_from(&[Default::default(); 64]).is_err() && simulator.gather(&[0]).is_err() && new().is_err()
+    );
 }

@@ -28,15 +28,29 @@ type Written = (&'static [Column], Option<fn(&mut World)>);
 /// of the world.
 fn written(stage: Stage) -> Written {
     match stage {
-        Stage::Steer => (&[Column::Control], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.speed_gain *= 1.001))),
-        Stage::Drive => (&[Column::Truck], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_wheelbase *= 1.001))),
-        Stage::Collide => (&[Column::Clearance], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_body.half_width *= 1.001))),
-        Stage::Follow => (&[Column::Progress], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.wheelbase *= 1.001))),
-        Stage::Sense => (&[Column::Ranges], Some(|world| world.rays.iter_mut().flatten().for_each(|ray| ray.origin *= 1.001))),
-        Stage::Observe => (&[Column::NextObservation, Column::NextExtras], Some(|world| world.params.sensor_range *= 1.001)),
-        Stage::Judge => {
-            (&[Column::Truck, Column::Ended, Column::Terms, Column::Reward], Some(|world| world.params.reward.lane_distance_limit *= 1.001))
+        Stage::Steer => {
+            (&[Column::Control], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.speed_gain *= 1.001)))
         }
+        Stage::Drive => {
+            (&[Column::Truck], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_wheelbase *= 1.001)))
+        }
+        Stage::Collide => (
+            &[Column::Clearance],
+            Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_body.half_width *= 1.001)),
+        ),
+        Stage::Follow => {
+            (&[Column::Progress], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.wheelbase *= 1.001)))
+        }
+        Stage::Sense => {
+            (&[Column::Ranges], Some(|world| world.rays.iter_mut().flatten().for_each(|ray| ray.origin *= 1.001)))
+        }
+        Stage::Observe => {
+            (&[Column::NextObservation, Column::NextExtras], Some(|world| world.params.sensor_range *= 1.001))
+        }
+        Stage::Judge => (
+            &[Column::Truck, Column::Ended, Column::Terms, Column::Reward],
+            Some(|world| world.params.reward.lane_distance_limit *= 1.001),
+        ),
         Stage::Count => (&[], None),
         Stage::CopyObservation => (&[Column::Observation, Column::Extras], None),
         Stage::Reset => (
@@ -52,7 +66,10 @@ fn written(stage: Stage) -> Written {
 const MARGIN: f32 = 1e-4;
 
 fn simulators(world: &Arc<World>, choice: &RouteChoice) -> [Simulator; 2] {
-    [Simulator::new(world.clone(), N_ENVS, 3, choice.clone()).unwrap(), batch_on(&engine(), world, N_ENVS, 3, choice.clone())]
+    [
+        Simulator::new(world.clone(), N_ENVS, 3, choice.clone()).unwrap(),
+        batch_on(&engine(), world, N_ENVS, 3, choice.clone()),
+    ]
 }
 
 /// A device that computes with a world that is wrong in one number.
@@ -86,7 +103,10 @@ fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bo
         || (asks_for != 0.0 && near(asks_for, 0.0))
         || near(clearance.tractor, 0.0)
         || near(clearance.trailer, 0.0)
-        || near(truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs()), params.rollover_ratio)
+        || near(
+            truck.tractor_load_transfer_ratio.abs().max(truck.trailer_load_transfer_ratio.abs()),
+            params.rollover_ratio,
+        )
         || near(wrapped(truck.heading - truck.trailer_heading).abs(), params.jackknife_angle)
         || near(after.progress[env].waypoint_distance, params.stray_distance)
 }
@@ -118,7 +138,10 @@ fn assert_untouched(before: &Batch, after: &Batch, written: &[Column]) {
         assert!(written.contains(&column) || bytes == now, "{column:?}");
         let width = bytes.len() / N_ENVS;
         let held = (0..N_ENVS).filter(|&env| before.truck[env].held == 1);
-        assert!(held.map(|env| env * width..(env + 1) * width).all(|row| bytes[row.clone()] == now[row]), "{column:?} of held trucks");
+        assert!(
+            held.map(|env| env * width..(env + 1) * width).all(|row| bytes[row.clone()] == now[row]),
+            "{column:?} of held trucks"
+        );
     }
 }
 
@@ -139,7 +162,8 @@ fn every_stage_does_the_same_to_every_value_and_touches_no_other() {
             }
             let here = cpu.batch();
             let counted = judged(&world, &before, here);
-            let fails = |there: &Batch| compared(here, there, written, &counted).iter().any(|agreement| !agreement.holds());
+            let fails =
+                |there: &Batch| compared(here, there, written, &counted).iter().any(|agreement| !agreement.holds());
             assert!(written.is_empty() || fails(&before), "{name}: a stage that changes nothing would pass");
             // On fixed routes no truck begins another episode.
             if let (false, Some(change)) = (fixed, change) {
@@ -171,10 +195,16 @@ fn a_whole_step_from_any_state_ends_alike_for_every_reason_there_is() {
         STAGES[..STAGES.len() - 1].iter().for_each(|&stage| simulator.run_stage(stage));
     }
     let counted = judged(&world, &before, cpu.batch());
-    let decisive = compared(cpu.batch(), device.batch(), &[Column::Truck, Column::Clearance, Column::Progress], &counted);
+    let decisive =
+        compared(cpu.batch(), device.batch(), &[Column::Truck, Column::Clearance, Column::Progress], &counted);
     assert!(decisive.iter().all(|agreement| agreement.worst < MARGIN), "the margin is too small: {decisive:?}");
     let mut codes = [0; Ended::ALL.len()];
-    cpu.batch().ended.iter().zip(&counted).filter(|(_, counted)| **counted).for_each(|(&code, _)| codes[code as usize] += 1);
+    cpu.batch()
+        .ended
+        .iter()
+        .zip(&counted)
+        .filter(|(_, counted)| **counted)
+        .for_each(|(&code, _)| codes[code as usize] += 1);
     println!("{codes:?}");
     assert!(codes.iter().all(|&count| 100 <= count), "{codes:?}");
     for simulator in [&mut cpu, &mut device, &mut wrong] {
@@ -201,7 +231,10 @@ fn the_largest_rewards_that_a_benchmark_may_give_are_summed_alike() {
     let [here, there] = simulators(&Arc::new(world), &choice).map(|mut simulator| {
         put(&mut simulator, &before);
         simulator.step(&before.action).unwrap();
-        (simulator.batch().reward.iter().map(|&reward| f64::from(reward)).sum::<f64>(), simulator.tally().unwrap().reward())
+        (
+            simulator.batch().reward.iter().map(|&reward| f64::from(reward)).sum::<f64>(),
+            simulator.tally().unwrap().reward(),
+        )
     });
     assert_eq!(here.0, here.1);
     assert_eq!(there, here);
@@ -212,7 +245,10 @@ fn routes_poses_and_actions_are_drawn_alike_to_the_last_bit() {
     // A world where a pose consists of its drawn numbers alone.
     let mut world = World::clone(&world(Gutter::Drivable));
     (world.params.start_offset, world.params.start_heading, world.rigs[0].wheelbase) = (1.0, 1.0, 0.0);
-    world.waypoints.iter_mut().for_each(|waypoint| *waypoint = WaypointRow { position: Vec2::ZERO, direction: Vec2::X });
+    world
+        .waypoints
+        .iter_mut()
+        .for_each(|waypoint| *waypoint = WaypointRow { position: Vec2::ZERO, direction: Vec2::X });
     world.previews.iter_mut().for_each(|preview| preview.heading = 0.0);
     let world = Arc::new(world);
     let (n_envs, seed, n_actions) = (16_384, 0xdead_beef, world.params.n_actions);
@@ -229,11 +265,19 @@ fn routes_poses_and_actions_are_drawn_alike_to_the_last_bit() {
             put(&mut simulator, &before);
             simulator.step_at_random();
             let action = |seed: u32, env: u32, truck: &Truck| {
-                index_below(words(seed, env, truck.episode, (Draw::Action as u32).wrapping_add(truck.steps))[0], n_actions)
+                index_below(
+                    words(seed, env, truck.episode, (Draw::Action as u32).wrapping_add(truck.steps))[0],
+                    n_actions,
+                )
             };
             let drawn = simulator.batch().action.clone();
-            let agreeing =
-                |seed| (0..).zip(&before.truck).zip(&drawn).filter(|((env, truck), drawn)| action(seed, *env, truck) == **drawn).count();
+            let agreeing = |seed| {
+                (0..)
+                    .zip(&before.truck)
+                    .zip(&drawn)
+                    .filter(|((env, truck), drawn)| action(seed, *env, truck) == **drawn)
+                    .count()
+            };
             assert_eq!(agreeing(seed), n_envs, "actions on the {name}");
             assert!(agreeing(seed + 1) < n_envs / 5, "another seed would pass");
 
@@ -241,7 +285,11 @@ fn routes_poses_and_actions_are_drawn_alike_to_the_last_bit() {
             simulator.run_stage(Stage::Reset);
             let first = |seed: u32, env: u32, episode: u32| {
                 let [offset, heading, ..] = words(seed, env, episode, Draw::Pose as u32).map(signed_unit);
-                (routes[index_below(words(seed, env, episode, Draw::Route as u32)[0], routes.len() as u32) as usize], offset, heading)
+                (
+                    routes[index_below(words(seed, env, episode, Draw::Route as u32)[0], routes.len() as u32) as usize],
+                    offset,
+                    heading,
+                )
             };
             let trucks = (0..).zip(before.truck.iter().zip(&simulator.batch().truck));
             let agreeing = |seed| {

@@ -83,8 +83,11 @@ fn published(batch: &Batch, column: Column) -> Vec<u8> {
 
 /// Hashes of what both engines give to the last bit, of the same trucks: why episodes ended, route, episode and step of
 /// each truck, and the waypoints passed.
-const PINNED_INTEGERS: [(&str, u64); 3] =
-    [("attard2023", 0x48c8_cba1_098f_6d5b), ("attard2023-full", 0xea12_cc9f_5053_302c), ("attard2023-as-run", 0x4aa0_1029_58ab_16e9)];
+const PINNED_INTEGERS: [(&str, u64); 3] = [
+    ("attard2023", 0x48c8_cba1_098f_6d5b),
+    ("attard2023-full", 0xea12_cc9f_5053_302c),
+    ("attard2023-as-run", 0x4aa0_1029_58ab_16e9),
+];
 
 /// Hashes that python/tests/test_batch.py has too: what a step gives on the training routes of attard2023, to 512
 /// trucks after 300 random steps with seed 7, on the CPU.

@@ -38,7 +38,8 @@ fn benchmark(folder: &Path, procedural: &str) -> PathBuf {
 
 /// The roundabouts of a split, in their order.
 fn roads(scenario: &Scenario, split: Split) -> Vec<String> {
-    let mut roads: Vec<String> = scenario.split_names(split).iter().map(|name| name.rsplit_once('/').unwrap().0.to_owned()).collect();
+    let mut roads: Vec<String> =
+        scenario.split_names(split).iter().map(|name| name.rsplit_once('/').unwrap().0.to_owned()).collect();
     roads.dedup();
     roads
 }
@@ -90,10 +91,18 @@ fn every_wrong_key_of_procedural_is_named_with_what_would_do() {
             "procedural.validation: [15, 16]; must be [first, last + 1] with first < last + 1 <= procedural.count, which is 15",
         ),
         ("train = [0, 3]", "train = [3, 3]", "procedural.train: [3, 3]; must be [first, last + 1]"),
-        ("train = [0, 3]", "train = [0, 11]", "procedural.test: [10, 12]; shares roads with procedural.train; a road is in one split"),
+        (
+            "train = [0, 3]",
+            "train = [0, 11]",
+            "procedural.test: [10, 12]; shares roads with procedural.train; a road is in one split",
+        ),
         ("train = [0, 3]", "train = [0, 16]", "procedural.validation: [15, 16]; shares roads with procedural.train"),
         ("train = [0, 3]", "train = [0]", "invalid length 1"),
-        (ROADS, "seed = 7\ncount = 20\n", "procedural: no roads; at least one of `train`, `validation` and `test` is needed"),
+        (
+            ROADS,
+            "seed = 7\ncount = 20\n",
+            "procedural: no roads; at least one of `train`, `validation` and `test` is needed",
+        ),
         (
             ROADS,
             "seed = 7\ncount = 200000\ntrain = [0, 100001]\n",
@@ -116,7 +125,10 @@ fn every_wrong_key_of_procedural_is_named_with_what_would_do() {
     let text = std::fs::read_to_string(&path).unwrap();
     std::fs::write(&path, text.replace("wide.toml", "narrow.toml")).unwrap();
     let message = Scenario::read(&path).unwrap_err().to_string();
-    assert!(message.contains("random.toml: procedural.distribution: ") && message.contains("narrow.toml: cannot be read"), "{message}");
+    assert!(
+        message.contains("random.toml: procedural.distribution: ") && message.contains("narrow.toml: cannot be read"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -174,7 +186,10 @@ fn a_benchmark_on_another_roundabout_has_all_its_routes_to_test_and_otherwise_th
     let alone = whole.on(find("wide/7/12").unwrap()).unwrap();
     assert_eq!(roads(&alone, Split::Test), ["wide/7/12"]);
     assert_eq!(alone.routes().count(), alone.split(Split::Test).len());
-    assert_eq!((alone.steer_levels.clone(), alone.vehicle.clone()), (whole.steer_levels.clone(), whole.vehicle.clone()));
+    assert_eq!(
+        (alone.steer_levels.clone(), alone.vehicle.clone()),
+        (whole.steer_levels.clone(), whole.vehicle.clone())
+    );
     whole.add(find("wide/7/12").unwrap(), Split::Validation).unwrap();
     assert_eq!(whole.split_names(Split::Validation), alone.split_names(Split::Test));
     assert_eq!(whole.split(Split::Test).len(), 23);
@@ -188,7 +203,8 @@ fn trucks_start_on_random_roads_without_touching_a_kerb() {
     for name in ["wide", "mixed"] {
         let mut scenario = Scenario::named("attard2023").unwrap();
         scenario.keep(&[]);
-        for road in Distribution::named(name).unwrap().roads(21, &(0..20).collect::<Vec<_>>(), &Loading::PLAIN).unwrap() {
+        for road in Distribution::named(name).unwrap().roads(21, &(0..20).collect::<Vec<_>>(), &Loading::PLAIN).unwrap()
+        {
             scenario.add(road.roundabout, Split::Train).unwrap();
         }
         let world = Arc::new(World::bake(&scenario).unwrap());

@@ -23,7 +23,10 @@ fn a_batch_too_large_for_the_memory_is_refused_with_its_size_and_what_would_fit(
         assert_eq!((found, n_bytes), (n_envs, n_envs as u128 * width as u128));
         assert!(1_000 < fitting && fitting < 1 << 32, "{fitting}");
         let message = error.to_string();
-        assert!([n_envs.to_string(), n_bytes.to_string(), fitting.to_string()].iter().all(|part| message.contains(part)), "{message}");
+        assert!(
+            [n_envs.to_string(), n_bytes.to_string(), fitting.to_string()].iter().all(|part| message.contains(part)),
+            "{message}"
+        );
     }
     // More than the machine has, less than it grants: filling the columns would end the process.
     let Err(Error::BatchTooLarge { fitting, .. }) = new(1 << 40) else { panic!() };
@@ -53,7 +56,9 @@ fn refused(change: impl FnOnce(&mut Scenario)) -> String {
 #[test]
 fn a_scenario_changed_in_memory_is_checked_before_it_is_baked() {
     assert_eq!(refused(|_| ()), "accepted");
-    assert!(refused(|scenario| scenario.load = "feathers".to_owned()).starts_with("load: \"feathers\"; the vehicle has "));
+    assert!(
+        refused(|scenario| scenario.load = "feathers".to_owned()).starts_with("load: \"feathers\"; the vehicle has ")
+    );
     assert_eq!(refused(|scenario| scenario.speeds.clear()), "speeds: empty; at least one value is needed");
     assert_eq!(refused(|scenario| scenario.steer_levels.clear()), "steer_levels: empty; at least one value is needed");
     assert_eq!(refused(|scenario| scenario.speeds[0] = f64::NAN), "speeds[0]: NaN; must lie in 0..100");

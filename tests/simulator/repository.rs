@@ -18,7 +18,8 @@ fn the_scenarios_readme_names_every_file_of_the_library() {
             if path.extension().is_some_and(|extension| extension == "toml") {
                 let [name, stem] = [path.file_name(), path.file_stem()].map(|name| name.unwrap().to_str().unwrap());
                 // A benchmark has a row of its own; its name begins those of others.
-                let named = if folder.is_empty() { readme.contains(&format!("| `{name}` |")) } else { readme.contains(stem) };
+                let named =
+                    if folder.is_empty() { readme.contains(&format!("| `{name}` |")) } else { readme.contains(stem) };
                 assert!(named, "{folder}/{name}");
                 n_files += 1;
             }
@@ -37,12 +38,14 @@ fn a_tracked_link_and_a_path_of_one_machine_are_refused() {
     };
     let refusal = || {
         git(&["add", "--all"]);
-        let checked = std::process::Command::new(repository().join(".ci/tracked")).current_dir(clone.path()).output().unwrap();
+        let checked =
+            std::process::Command::new(repository().join(".ci/tracked")).current_dir(clone.path()).output().unwrap();
         (checked.status.success(), String::from_utf8(checked.stderr).unwrap())
     };
     git(&["init", "--quiet"]);
     let text = clone.path().join("text.md");
-    fs::write(&text, "https://example.org/home/x, ../work/x, ~/work/x, $HOME/work/x, and/or/root/x, /dev/null\n").unwrap();
+    fs::write(&text, "https://example.org/home/x, ../work/x, ~/work/x, $HOME/work/x, and/or/root/x, /dev/null\n")
+        .unwrap();
     assert_eq!(refusal(), (true, String::new()));
     // Written in parts: this file is tracked.
     for (before, folder) in [("", "root"), ("`", "home"), ("\"", "work"), ("(", "Users")] {

@@ -14,7 +14,11 @@ fn a_truck_begins_at_the_stated_fractions_of_the_largest_start_errors() {
     let world = Arc::new(benchmark("attard2023-full").1);
     for (_, engine) in engines() {
         let route = 3;
-        let starts = [(0.0, 0.0), (1.0, -1.0), (-0.5, 0.0)].map(|(offset, heading)| Start { offset, heading, ..Start::default() });
+        let starts = [(0.0, 0.0), (1.0, -1.0), (-0.5, 0.0)].map(|(offset, heading)| Start {
+            offset,
+            heading,
+            ..Start::default()
+        });
         let mut simulator = batch_on(&engine, &world, 3, 0, RouteChoice::Fixed(vec![route; 3]));
         simulator.reset_from(&starts).unwrap();
         let first = &world.route_waypoints(route)[0];
@@ -23,7 +27,8 @@ fn a_truck_begins_at_the_stated_fractions_of_the_largest_start_errors() {
             // The benchmark's largest errors: 0.3 m and 2 deg. Positions of about 50 m are exact to 4 um in f32.
             assert!((point.dot(first.direction.perp()) - 0.3 * start.offset).abs() < 2e-5, "{truck:?}");
             assert!(point.dot(first.direction).abs() < 2e-5, "{truck:?}");
-            let heading = offtrack::layout::angle::wrapped(truck.heading - world.route_previews(route)[0].heading).to_degrees();
+            let heading =
+                offtrack::layout::angle::wrapped(truck.heading - world.route_previews(route)[0].heading).to_degrees();
             assert!((heading - 2.0 * start.heading).abs() < 1e-4, "{heading}");
         }
     }
@@ -45,7 +50,10 @@ fn a_stated_start_equal_to_the_drawn_one_is_the_same() {
         simulator.reset_from(&starts).unwrap();
         // A reset keeps the clearance of the last step: only what the next action depends on is compared.
         let stated = simulator.batch();
-        assert!(stated.truck == drawn.truck && stated.control == drawn.control && stated.progress == drawn.progress, "{name}");
+        assert!(
+            stated.truck == drawn.truck && stated.control == drawn.control && stated.progress == drawn.progress,
+            "{name}"
+        );
         assert!(stated.ranges == drawn.ranges && stated.observation == drawn.observation, "{name}");
         simulator.reset_from(&[Start::default(); 64]).unwrap();
         assert!(simulator.batch().observation != drawn.observation, "other starts must differ");
@@ -136,7 +144,9 @@ fn a_restored_batch_goes_on_bit_for_bit_and_wrong_columns_are_refused() {
         let wrong = |n_envs: usize, wrong: Option<Column>, changed: Option<Vec<u8>>| {
             let mut simulator = begun(n_envs);
             let before = rows(simulator.batch());
-            let error = simulator.restore(|column| if Some(column) == wrong { changed.as_deref() } else { find(column) }).unwrap_err();
+            let error = simulator
+                .restore(|column| if Some(column) == wrong { changed.as_deref() } else { find(column) })
+                .unwrap_err();
             assert!(rows(simulator.batch()) == before);
             error.to_string()
         };

@@ -39,11 +39,16 @@ fn every_shader_file_is_part_of_the_module() {
 #[test]
 fn every_shader_of_a_stage_has_a_twin_on_the_cpu_and_every_twin_a_shader() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/engine/cpu");
-    let mut found: Vec<String> =
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_str().unwrap().replace(".rs", "")).collect();
+    let mut found: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_str().unwrap().replace(".rs", ""))
+        .collect();
     found.sort_unstable();
-    let mut known: Vec<&str> =
-        SHADERS.iter().map(|(name, _)| *name).filter(|name| *name != "layout" && !name.starts_with("common/")).collect();
+    let mut known: Vec<&str> = SHADERS
+        .iter()
+        .map(|(name, _)| *name)
+        .filter(|name| *name != "layout" && !name.starts_with("common/"))
+        .collect();
     known.sort_unstable();
     assert_eq!(found, known);
 }
@@ -115,8 +120,13 @@ fn no_number_of_a_shader_is_above_the_largest_f32_as_a_real_number() {
     }
     assert!(400 < n_numbers, "{n_numbers}");
     // What a decimal that is rounded to the nearest f32 may look like.
-    assert_eq!(numbers("const A1: f32 = 3.4028235e38f; let b = -0.5e-3 + 0xffffu - x.y2;"), ["3.4028235e38f", "0.5e-3", "0xffffu"]);
-    assert!(!is_in_range("3.4028235e38f") && !is_in_range("4294967296u") && is_in_range("0.5e-3") && is_in_range("0xffffu"));
+    assert_eq!(
+        numbers("const A1: f32 = 3.4028235e38f; let b = -0.5e-3 + 0xffffu - x.y2;"),
+        ["3.4028235e38f", "0.5e-3", "0xffffu"]
+    );
+    assert!(
+        !is_in_range("3.4028235e38f") && !is_in_range("4294967296u") && is_in_range("0.5e-3") && is_in_range("0xffffu")
+    );
 }
 
 #[test]
@@ -204,7 +214,10 @@ mod module {
         assert_eq!(found, known);
         let of_stages: Vec<Kernel> = STAGES.iter().flat_map(|stage| stage.kernels()).copied().collect();
         let beside = [Kernel::Draw, Kernel::Begin, Kernel::ObserveBegun];
-        assert!(Kernel::ALL.iter().all(|kernel| beside.contains(kernel) != of_stages.contains(kernel)), "a kernel without a stage");
+        assert!(
+            Kernel::ALL.iter().all(|kernel| beside.contains(kernel) != of_stages.contains(kernel)),
+            "a kernel without a stage"
+        );
     }
 
     /// Differences between the layouts of WGSL and of Rust, struct by struct.
@@ -220,8 +233,10 @@ mod module {
             if *span as usize != size {
                 differences.push(format!("{name} takes {span} bytes instead of {size}"));
             }
-            let offsets: Vec<(&str, usize)> =
-                members.iter().map(|member| (member.name.as_deref().unwrap_or_default(), member.offset as usize)).collect();
+            let offsets: Vec<(&str, usize)> = members
+                .iter()
+                .map(|member| (member.name.as_deref().unwrap_or_default(), member.offset as usize))
+                .collect();
             if offsets != fields {
                 differences.push(format!("{name}: {offsets:?} instead of {fields:?}"));
             }

@@ -30,8 +30,13 @@ fn on_disk(folder: &Path, below: &Path, files: &mut BTreeMap<String, String>) {
 fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
     let mut files = BTreeMap::new();
     on_disk(&scenarios(), Path::new(""), &mut files);
-    let embedded: BTreeMap<String, String> = FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
-    assert_eq!((files.len(), FILES.len()), (44, 44), "24 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions");
+    let embedded: BTreeMap<String, String> =
+        FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
+    assert_eq!(
+        (files.len(), FILES.len()),
+        (44, 44),
+        "24 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions"
+    );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
     assert_eq!(kinds.map(|kind| kind.names().count()), [24, 10, 3, 2]);
@@ -52,7 +57,8 @@ fn the_large_benchmarks_are_random2026_with_other_test_roads_that_no_split_share
         Some((range[0].as_integer()?, range[1].as_integer()?))
     };
     let small = table("random2026");
-    let mut ranges: Vec<(i64, i64)> = ["train", "validation", "test"].iter().filter_map(|split| range(&small, split)).collect();
+    let mut ranges: Vec<(i64, i64)> =
+        ["train", "validation", "test"].iter().filter_map(|split| range(&small, split)).collect();
     for (name, n_roads) in LARGE.into_iter().zip([1000, 10_000]) {
         let mut large = table(name);
         let (from, to) = range(&large, "test").unwrap();
@@ -107,7 +113,8 @@ fn the_random_roads_of_laden2026_50_differ_from_it_in_roads_and_the_room_before_
 
 #[test]
 fn the_random_roads_of_laden2026_odd_differ_from_those_of_laden2026_in_its_vehicles_alone() {
-    let (mut odd_random, mut random, odd) = (table("laden2026-odd-random"), table("laden2026-random"), table("laden2026-odd"));
+    let (mut odd_random, mut random, odd) =
+        (table("laden2026-odd-random"), table("laden2026-random"), table("laden2026-odd"));
     assert_eq!(odd_random.remove("draw").as_ref(), Some(&odd["draw"]));
     assert_ne!(random.remove("draw").as_ref(), Some(&odd["draw"]));
     assert_eq!(odd_random, random);
@@ -138,7 +145,10 @@ fn every_name_gives_what_its_file_gives() {
 #[test]
 fn an_unknown_name_is_refused_with_the_names_there_are() {
     let benchmark = Scenario::find("nowhere").unwrap_err().to_string();
-    assert!(benchmark.starts_with("benchmark: nowhere; must be a path ending in .toml or one of attard2023, "), "{benchmark}");
+    assert!(
+        benchmark.starts_with("benchmark: nowhere; must be a path ending in .toml or one of attard2023, "),
+        "{benchmark}"
+    );
     assert_eq!(
         Road::find("17m").unwrap_err().to_string(),
         "roundabout: 17m; must be a path ending in .toml or one of 16m, 20m, 32m, 40m, 50m, \
@@ -158,7 +168,9 @@ fn an_unknown_name_is_refused_with_the_names_there_are() {
 fn a_path_is_read_from_disk_whatever_the_embedded_files_are_called() {
     let folder = tempfile::tempdir().unwrap();
     let wrong = folder.path().join("attard2023.toml");
-    assert!(Scenario::find(wrong.to_str().unwrap()).unwrap_err().to_string().contains("attard2023.toml: cannot be read"));
+    assert!(
+        Scenario::find(wrong.to_str().unwrap()).unwrap_err().to_string().contains("attard2023.toml: cannot be read")
+    );
     std::fs::write(&wrong, "no_such_key = 1").unwrap();
     assert!(Scenario::find(wrong.to_str().unwrap()).unwrap_err().to_string().contains("no_such_key"));
     // An existing file needs no extension.

@@ -46,7 +46,11 @@ fn a_target_of_0_stops_the_truck_and_holds_it_until_another_is_asked_for() {
             assert!(speeds.windows(2).all(|pair| pair[1] <= pair[0]), "{name}: {speeds:?}");
             let stopped = speeds.iter().position(|&speed| speed == 0.0).unwrap_or_else(|| panic!("{name}: {speeds:?}"));
             assert!(stopped < 60 && speeds[stopped..].iter().all(|&speed| speed == 0.0), "{name}: {speeds:?}");
-            assert!(trucks[stopped..].iter().all(|truck| truck.position == trucks[79].position && truck.acceleration == 0.0));
+            assert!(
+                trucks[stopped..]
+                    .iter()
+                    .all(|truck| truck.position == trucks[79].position && truck.acceleration == 0.0)
+            );
             let trucks = driven(&mut simulator, std::iter::repeat_n(13, 60));
             assert!(1.0 < trucks[59].speed && trucks[0].position != trucks[59].position, "{name}");
         }
@@ -60,14 +64,19 @@ fn an_action_may_change_the_target_speed_within_its_bounds() {
         scenario.speed_changes = [-4.0, 0.0, 4.0].map(|change| change * KMH).into();
         scenario.start_speed = Some([15.0 * KMH; 2]);
     });
-    assert_eq!((world.params.n_actions, world.actions[4].speed, world.params.changes_speed), (27, (-4.0 * KMH) as f32, 1));
+    assert_eq!(
+        (world.params.n_actions, world.actions[4].speed, world.params.changes_speed),
+        (27, (-4.0 * KMH) as f32, 1)
+    );
     for (name, engine) in engines() {
         let mut simulator = batch_on(&engine, &world, 1, 0, RouteChoice::Fixed(vec![3]));
         let mut target = |action: u32| {
             simulator.step(&[action]).unwrap();
             f64::from(simulator.batch().control[0].target_speed) / KMH
         };
-        for (action, expected) in [(13, 15.0), (22, 19.0), (22, 20.0), (4, 16.0), (4, 12.0), (4, 10.0), (13, 10.0), (22, 14.0)] {
+        for (action, expected) in
+            [(13, 15.0), (22, 19.0), (22, 20.0), (4, 16.0), (4, 12.0), (4, 10.0), (13, 10.0), (22, 14.0)]
+        {
             let found = target(action);
             assert!((found - expected).abs() < 1e-4, "{name}: {found} km/h, expected {expected}");
         }
@@ -88,7 +97,14 @@ fn trucks_begin_at_speeds_of_the_stated_range() {
         // The mean of 1024 uniform numbers of a range of 20 deviates by 0.18.
         let mean = speeds.iter().sum::<f64>() / 1024.0;
         assert!((mean - 15.0).abs() < 0.6 && speeds.iter().any(|&speed| speed < 6.0), "{name}: {mean}");
-        assert!(simulator.batch().control.iter().zip(&simulator.batch().truck).all(|(control, truck)| control.target_speed == truck.speed));
+        assert!(
+            simulator
+                .batch()
+                .control
+                .iter()
+                .zip(&simulator.batch().truck)
+                .all(|(control, truck)| control.target_speed == truck.speed)
+        );
         let fastest = Start { speed: 1.0, ..Start::default() };
         simulator.reset_from(&[fastest; 1024]).unwrap();
         assert!((f64::from(simulator.batch().truck[9].speed) / KMH - 25.0).abs() < 1e-4, "{name}");
@@ -114,7 +130,10 @@ fn the_clock_counts_against_the_feasible_time_of_the_vehicle_on_the_route() {
         assert!(limit(&highest, route, 0) < limit(&feasible, route, 0), "{route}");
         assert!((0..3).all(|class| limit(&feasible, route, class) <= limit(&feasible, route, class + 1)), "{route}");
     }
-    let typical = offtrack::vehicle::Vehicle { model: all_drawn().members[0].vehicle.model.clone(), ..crate::physics::vehicle("daf_xf") };
+    let typical = offtrack::vehicle::Vehicle {
+        model: all_drawn().members[0].vehicle.model.clone(),
+        ..crate::physics::vehicle("daf_xf")
+    };
     let time = Profile::of(&typical.rig("laden", 0.05, None), feasible.route_waypoints(5), 50.0 * KMH).time;
     assert_eq!(limit(&feasible, 5, 2), (2.0 * time / 0.1).ceil() as u32);
     for (name, engine) in engines() {
@@ -123,7 +142,10 @@ fn the_clock_counts_against_the_feasible_time_of_the_vehicle_on_the_route() {
         (0..900).for_each(|_| simulator.step(&[4; 64]).unwrap());
         let batch = simulator.batch();
         let timed_out = |env: usize| batch.ended[env] == offtrack::layout::Ended::TimedOut as u32;
-        assert!((0..64).all(|env| timed_out(env) && batch.truck[env].steps == feasible.step_limit(&batch.truck[env]) + 1), "{name}");
+        assert!(
+            (0..64).all(|env| timed_out(env) && batch.truck[env].steps == feasible.step_limit(&batch.truck[env]) + 1),
+            "{name}"
+        );
     }
 }
 

@@ -11,7 +11,14 @@ use crate::{batch_on, benchmark, engines};
 
 /// Every number that a step gives.
 fn numbers(simulator: &Simulator) -> Vec<f32> {
-    let columns = [Column::Observation, Column::NextObservation, Column::Extras, Column::NextExtras, Column::Reward, Column::Terms];
+    let columns = [
+        Column::Observation,
+        Column::NextObservation,
+        Column::Extras,
+        Column::NextExtras,
+        Column::Reward,
+        Column::Terms,
+    ];
     let batch = simulator.batch();
     columns.iter().flat_map(|&column| bytemuck::pod_collect_to_vec::<u8, f32>(batch.column(column))).collect()
 }
@@ -26,7 +33,8 @@ fn driven(world: &Arc<World>, engine: &offtrack::simulator::Engine) -> Simulator
 
 #[test]
 fn a_state_with_any_number_replaced_is_refused_or_gives_finite_observations_and_rewards() {
-    let floats = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38, -1e38, f32::MAX, 1e7, 2000.0, -300.0, 5.0, -1.0, 0.5, 1e-38];
+    let floats =
+        [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38, -1e38, f32::MAX, 1e7, 2000.0, -300.0, 5.0, -1.0, 0.5, 1e-38];
     let words = floats.into_iter().map(f32::to_bits).chain([0, 1, 23, 1000, u32::MAX - 1]);
     let words: Vec<u32> = words.collect();
     for name in ["attard2023", "laden2026"] {
@@ -41,7 +49,8 @@ fn a_state_with_any_number_replaced_is_refused_or_gives_finite_observations_and_
                 for word in &words {
                     let mut changed = kept.column(column).to_vec();
                     changed[at..at + 4].copy_from_slice(&word.to_le_bytes());
-                    let found = simulator.restore(|other| Some(if other == column { &changed } else { kept.column(other) }));
+                    let found =
+                        simulator.restore(|other| Some(if other == column { &changed } else { kept.column(other) }));
                     if found.is_err() {
                         n_refused += 1;
                         continue;
@@ -83,7 +92,9 @@ fn a_state_that_no_truck_can_have_is_refused_by_column_truck_field_and_value() {
         for (change, expected) in cases {
             let mut trucks = kept.truck.clone();
             change(&mut trucks[2]);
-            let bytes = |column| Some(if column == Column::Truck { bytemuck::cast_slice(&trucks) } else { kept.column(column) });
+            let bytes = |column| {
+                Some(if column == Column::Truck { bytemuck::cast_slice(&trucks) } else { kept.column(column) })
+            };
             let message = simulator.restore(bytes).unwrap_err().to_string();
             assert!(message.starts_with(&expected), "{name}: {message}");
             assert!(simulator.batch().columns() == kept.columns(), "{name}: the batch is as it was");

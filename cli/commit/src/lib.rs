@@ -13,7 +13,9 @@ use proc_macro::TokenStream;
 #[proc_macro]
 pub fn commit(_: TokenStream) -> TokenStream {
     let stated = || std::env::var("OFFTRACK_COMMIT").ok().filter(|commit| !commit.is_empty());
-    let commit = git(&["describe", "--always", "--dirty", "--abbrev=12"]).or_else(stated).unwrap_or_else(|| "unknown".to_owned());
+    let commit = git(&["describe", "--always", "--dirty", "--abbrev=12"])
+        .or_else(stated)
+        .unwrap_or_else(|| "unknown".to_owned());
     // The compiler notes files and variables that a crate includes: a change of one makes it compile the crate again.
     let mut watched = "const _: Option<&str> = option_env!(\"OFFTRACK_COMMIT\");".to_owned();
     let branch = git(&["symbolic-ref", "--quiet", "HEAD"]);
@@ -29,6 +31,12 @@ pub fn commit(_: TokenStream) -> TokenStream {
 /// What git prints in the folder of the calling crate.
 fn git(arguments: &[&str]) -> Option<String> {
     let folder = std::env::var_os("CARGO_MANIFEST_DIR")?;
-    let output = Command::new("git").arg("-C").arg(folder).args(arguments).output().ok().filter(|output| output.status.success())?;
+    let output = Command::new("git")
+        .arg("-C")
+        .arg(folder)
+        .args(arguments)
+        .output()
+        .ok()
+        .filter(|output| output.status.success())?;
     Some(String::from_utf8_lossy(&output.stdout).trim().to_owned()).filter(|text| !text.is_empty())
 }

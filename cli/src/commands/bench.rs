@@ -78,13 +78,25 @@ struct Run {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     if !(0.1..=3600.0).contains(&args.seconds) {
-        return Err(Error::Setting { name: "--seconds", value: format!("{} s", args.seconds), expected: "must lie in 0.1..3600 s".into() });
+        return Err(Error::Setting {
+            name: "--seconds",
+            value: format!("{} s", args.seconds),
+            expected: "must lie in 0.1..3600 s".into(),
+        });
     }
     if let Some(size) = args.hidden.iter().find(|size| !(1..=8192).contains(*size)) {
-        return Err(Error::Setting { name: "--hidden", value: size.to_string(), expected: "sizes must lie in 1..8192".into() });
+        return Err(Error::Setting {
+            name: "--hidden",
+            value: size.to_string(),
+            expected: "sizes must lie in 1..8192".into(),
+        });
     }
     if let Some(batch) = args.batch.iter().find(|batch| !(2..=1 << 20).contains(*batch)) {
-        return Err(Error::Setting { name: "--batch", value: batch.to_string(), expected: "must lie in 2..1048576".into() });
+        return Err(Error::Setting {
+            name: "--batch",
+            value: batch.to_string(),
+            expected: "must lie in 2..1048576".into(),
+        });
     }
     if args.lines {
         return in_turns(args);
@@ -97,7 +109,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
         actions: Scenario::named(BENCHMARK)?.actions(1.0).len(),
         runs: Vec::new(),
     };
-    files::print(&format!("{}; {N_VALUES} values, {} actions, hidden layers {:?}\n", bench.machine, bench.actions, args.hidden))?;
+    files::print(&format!(
+        "{}; {N_VALUES} values, {} actions, hidden layers {:?}\n",
+        bench.machine, bench.actions, args.hidden
+    ))?;
     files::print(&format!("{:>8} {:>14} {:>22}\n", "batch", "update [ms]", "with sampling [ms]"))?;
     for &batch in &args.batch {
         let run = Learner::new(&args.hidden, batch)?.warm(0.1 * args.seconds)?.round(0.9 * args.seconds)?;
@@ -120,7 +135,8 @@ fn in_turns(args: &Args) -> Result<(), Error> {
         line.map_err(Error::read(Path::new("standard input")))?;
         for learner in &mut learners {
             let run = learner.warm(0.1 * args.seconds)?.round(0.9 * args.seconds)?;
-            let text = serde_json::to_string(&run).map_err(|error| Error::write(Path::new("standard output"))(error.into()))?;
+            let text = serde_json::to_string(&run)
+                .map_err(|error| Error::write(Path::new("standard output"))(error.into()))?;
             files::print_json(&text)?;
         }
     }
@@ -137,7 +153,8 @@ impl Learner {
     fn new(hidden: &[usize], batch: usize) -> Result<Learner, Error> {
         let mut config = Config::read(Path::new("default"))?;
         config.n_envs = N_ENVS;
-        config.replay_buffer = config::ReplayBuffer { capacity: N_ENVS * N_SLOTS, warmup: N_ENVS * N_SLOTS, priority: None };
+        config.replay_buffer =
+            config::ReplayBuffer { capacity: N_ENVS * N_SLOTS, warmup: N_ENVS * N_SLOTS, priority: None };
         // Plain networks, as benches/peers/torch_sac_bench.py has them.
         config.learning = Learning { hidden: hidden.to_vec(), batch, layer_norm: false, ..config.learning };
         let scenario = Scenario::named(BENCHMARK)?;

@@ -64,7 +64,11 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     if !(1..=50).contains(&args.hold) {
-        return Err(Error::Setting { name: "--hold", value: args.hold.to_string(), expected: "must lie in 1..50".into() });
+        return Err(Error::Setting {
+            name: "--hold",
+            value: args.hold.to_string(),
+            expected: "must lie in 1..50".into(),
+        });
     }
     match &args.verify {
         Some(file) => again(file, args.benchmark.as_deref(), args.load.as_deref()),
@@ -92,11 +96,13 @@ fn again(path: &Path, benchmark: Option<&str>, load: Option<&str>) -> Result<(),
 /// Searches every route from every start.
 fn certify(args: &Args) -> Result<(), Error> {
     let passes = passes(&args.widths, args.hold)?;
-    let read = [("--policy", args.policy.as_ref().map(Path::new)), ("--benchmark", args.benchmark.as_ref().map(Path::new))];
+    let read =
+        [("--policy", args.policy.as_ref().map(Path::new)), ("--benchmark", args.benchmark.as_ref().map(Path::new))];
     outputs::distinct(&[("--json", args.json.as_deref())], &read)?;
     let scenario = roads::benchmark(args.benchmark.as_deref().unwrap_or("attard2023"))?;
     let mut scenario = roads::with_load(scenario, args.load.as_deref())?;
-    let splits: Vec<Split> = Split::ALL.into_iter().filter(|split| args.split == "all" || args.split == split.name()).collect();
+    let splits: Vec<Split> =
+        Split::ALL.into_iter().filter(|split| args.split == "all" || args.split == split.name()).collect();
     if !args.route.is_empty() {
         roads::narrow(&mut scenario, &args.route, &splits)?;
     }
@@ -142,7 +148,8 @@ fn certify(args: &Args) -> Result<(), Error> {
 /// The result as text: the budget, the sums, and every route and start that was not completed.
 fn table(certificate: &Certificate) -> String {
     let mut text = String::new();
-    let passes: Vec<String> = certificate.passes.iter().map(|pass| format!("{} (held {})", pass.width, pass.hold)).collect();
+    let passes: Vec<String> =
+        certificate.passes.iter().map(|pass| format!("{} (held {})", pass.width, pass.hold)).collect();
     let all: Vec<&Found> = certificate.routes.iter().flat_map(|route| &route.found).collect();
     let _ = writeln!(
         text,
@@ -154,18 +161,30 @@ fn table(certificate: &Certificate) -> String {
         certificate.seconds
     );
     for pass in &certificate.passes {
-        let by = all.iter().filter(|found| found.arrived() && (found.width, found.hold) == (pass.width, pass.hold)).count();
+        let by =
+            all.iter().filter(|found| found.arrived() && (found.width, found.hold) == (pass.width, pass.hold)).count();
         let _ = writeln!(text, "  {by} starts completed with {} (held {})", pass.width, pass.hold);
     }
     for route in &certificate.routes {
-        for (found, [offset, heading]) in route.found.iter().zip(&certificate.starts).filter(|(found, _)| !found.arrived()) {
+        for (found, [offset, heading]) in
+            route.found.iter().zip(&certificate.starts).filter(|(found, _)| !found.arrived())
+        {
             let (furthest, ended, steps) = (100.0 * found.progress, &found.ended, found.steps);
             let from = format!("from ({offset:+}, {heading:+})");
-            let _ = writeln!(text, "  {:<18} {from}: not completed; {ended} after {furthest:.0} % of the way, step {steps}", route.name);
+            let _ = writeln!(
+                text,
+                "  {:<18} {from}: not completed; {ended} after {furthest:.0} % of the way, step {steps}",
+                route.name
+            );
         }
     }
     let routes = certificate.routes.iter().filter(|route| route.certified()).count();
     let arrived = all.iter().filter(|found| found.arrived()).count();
-    let _ = writeln!(text, "{routes}/{} routes completed from every start, {arrived}/{} starts", certificate.routes.len(), all.len());
+    let _ = writeln!(
+        text,
+        "{routes}/{} routes completed from every start, {arrived}/{} starts",
+        certificate.routes.len(),
+        all.len()
+    );
     text
 }

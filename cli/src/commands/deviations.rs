@@ -27,9 +27,14 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let wrong = |message: String| Error::contents(&args.measured, message);
     let measured: Measured = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     let rows = deviations(&roundabout, &measured).map_err(|error| wrong(error.to_string()))?;
-    let mut table =
-        format!("{:<14} {:>21} {:>30} {:>33}\n", roundabout.name, "measured to model", "model to measured", "% within, both ways");
-    table += &format!("{:<14} {:>8} {:>8} {:>8} {:>12} {:>8} {:>8}", "", "worst m", "mean m", "points", "worst m", "mean m", "points");
+    let mut table = format!(
+        "{:<14} {:>21} {:>30} {:>33}\n",
+        roundabout.name, "measured to model", "model to measured", "% within, both ways"
+    );
+    table += &format!(
+        "{:<14} {:>8} {:>8} {:>8} {:>12} {:>8} {:>8}",
+        "", "worst m", "mean m", "points", "worst m", "mean m", "points"
+    );
     table += &NEAR.map(|limit| format!(" {:>8}", format!("{limit} m"))).concat();
     table.push('\n');
     for row in &rows {

@@ -50,7 +50,8 @@ pub fn run(_: &Args) -> Result<(), Error> {
         let largest = format!("{} MiB", adapter.binding_max >> 20);
         [mark.to_owned(), adapter.name, adapter.interface, adapter.driver, adapter.kind.to_owned(), largest]
     }));
-    let widths: [usize; 6] = std::array::from_fn(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0));
+    let widths: [usize; 6] =
+        std::array::from_fn(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0));
     for row in rows {
         let cells: Vec<String> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:width$}")).collect();
         files::print(&format!("{}\n", cells.join("  ").trim_end()))?;
@@ -61,5 +62,9 @@ pub fn run(_: &Args) -> Result<(), Error> {
 /// Runs the command.
 #[cfg(not(feature = "gpu"))]
 pub fn run(_: &Args) -> Result<(), Error> {
-    Err(Error::Setting { name: "devices", value: "none can be listed".to_owned(), expected: device::NOT_BUILT_IN.to_owned() })
+    Err(Error::Setting {
+        name: "devices",
+        value: "none can be listed".to_owned(),
+        expected: device::NOT_BUILT_IN.to_owned(),
+    })
 }

@@ -106,7 +106,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     };
     let roundabout = roundabout.seen();
     let routes = roundabout.routes(args.approach, args.departure, WAYPOINT_SPACING).map_err(|leaves| {
-        let (flag, value) = if leaves.part == "approach" { ("--approach", args.approach) } else { ("--departure", args.departure) };
+        let (flag, value) =
+            if leaves.part == "approach" { ("--approach", args.approach) } else { ("--departure", args.departure) };
         Error::Setting { name: flag, value: format!("{value} m"), expected: leaves.to_string() }
     })?;
     let route = args.route.as_deref().map(|name| chosen(&routes, name)).transpose()?;
@@ -121,8 +122,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
             None => figure::roundabout(&roundabout, &routes, straights, args.gutter),
             Some(sweep) => figure::swept_path(&roundabout, &routes, straights, args.gutter, sweep),
         };
-        let drawn =
-            page.and_then(|svg| if format == Format::Png { rasterised(&svg, args.size.unwrap_or(1000)) } else { Ok(svg.into_bytes()) });
+        let drawn = page.and_then(|svg| {
+            if format == Format::Png { rasterised(&svg, args.size.unwrap_or(1000)) } else { Ok(svg.into_bytes()) }
+        });
         drawn.map_err(|error| Error::write(&args.output)(std::io::Error::other(error)))?
     };
     files::write_whole(&args.output, &bytes)?;
@@ -175,6 +177,10 @@ fn chosen<'a>(routes: &'a [Route], name: &str) -> Result<&'a Route, Error> {
     let short = |route: &'a Route| route.name.rsplit('/').next().unwrap_or(&route.name);
     routes.iter().find(|route| route.name == name || short(route) == name).ok_or_else(|| {
         let known: Vec<&str> = routes.iter().map(short).collect();
-        Error::Setting { name: "--route", value: name.to_owned(), expected: format!("the roundabout has {}", known.join(", ")) }
+        Error::Setting {
+            name: "--route",
+            value: name.to_owned(),
+            expected: format!("the roundabout has {}", known.join(", ")),
+        }
     })
 }

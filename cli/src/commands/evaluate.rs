@@ -94,11 +94,18 @@ struct Written<'a> {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     if let Some(episodes) = args.episodes.filter(|episodes| !(1..=100_000).contains(episodes)) {
-        return Err(Error::Setting { name: "--episodes", value: episodes.to_string(), expected: "must lie in 1..100000".into() });
+        return Err(Error::Setting {
+            name: "--episodes",
+            value: episodes.to_string(),
+            expected: "must lie in 1..100000".into(),
+        });
     }
     let passes = passes(&args.widths, HOLD)?;
     let read = [("--certified", args.certified.as_deref()), ("--benchmark", Some(Path::new(&args.benchmark)))];
-    outputs::distinct(&[("--json", args.json.as_deref()), ("--html", args.html.as_deref())], &[&args.policy.files()[..], &read].concat())?;
+    outputs::distinct(
+        &[("--json", args.json.as_deref()), ("--html", args.html.as_deref())],
+        &[&args.policy.files()[..], &read].concat(),
+    )?;
     let device = args.device.open()?;
     let split = Split::ALL.into_iter().find(|split| split.name() == args.split).unwrap_or(Split::Test);
     let mut scenario = roads::with_load(roads::benchmark(&args.benchmark)?, args.load.as_deref())?;
@@ -118,7 +125,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         }
         None => (Value::Null, None),
     };
-    let possible = args.certified.as_ref().map(|file| certified(file, &scenario, &world, scenario.split(split))).transpose()?;
+    let possible =
+        args.certified.as_ref().map(|file| certified(file, &scenario, &world, scenario.split(split))).transpose()?;
     let (seed, record) = (args.seed, args.html.is_some());
     let evaluation = Evaluation { scenario: &scenario, world: &world, split, episodes, seed, record, device: &device };
     let Driven { episodes: finished, tracks, sequences } = {
@@ -135,7 +143,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let mut report = evaluation.summarised(policy.name(), &finished, searched);
     report.certified = possible.and_then(|possible| {
         let chunks = scenario.split(split).iter().zip(finished.chunks(episodes));
-        let kept: Vec<&Episode> = chunks.filter(|(route, _)| possible.contains(route)).flat_map(|(_, chunk)| chunk).collect();
+        let kept: Vec<&Episode> =
+            chunks.filter(|(route, _)| possible.contains(route)).flat_map(|(_, chunk)| chunk).collect();
         Summary::of(kept.into_iter(), scenario.step)
     });
     if let Some(file) = &args.json {
@@ -159,8 +168,10 @@ fn write_films(folder: &Path, evaluation: &Evaluation, report: &Report, sequence
     let &Evaluation { scenario, world, seed, .. } = evaluation;
     for (n, (cause, track)) in causes.iter().zip(evaluation.repeated(sequences, &indices)?).enumerate() {
         let Example { route: name, episode, .. } = &cause.example;
-        let (place, route) = scenario.routes().find(|(_, route)| route.name == *name).expect("a report's routes are the scenario's");
-        let of = Of { scenario, world, roundabout: &scenario.places[place].roundabout, route, policy: &report.policy, seed };
+        let (place, route) =
+            scenario.routes().find(|(_, route)| route.name == *name).expect("a report's routes are the scenario's");
+        let of =
+            Of { scenario, world, roundabout: &scenario.places[place].roundabout, route, policy: &report.policy, seed };
         let file = folder.join(format!("{}-{}.gif", n + 1, cause.cause.replace(' ', "-")));
         record::write_film(&of, &file, *episode, evaluation.episodes, track)?;
     }
@@ -180,7 +191,8 @@ fn read_run(folder: &Path) -> Result<(Value, Option<String>), Error> {
     let [report, metrics] = ["report.json", "metrics.csv"].map(|name| folder.join(name));
     let wrong = |message: String| Error::contents(&report, message);
     let text = reader::read_text(&report, RUN_LIMIT)?;
-    let run: Value = serde_json::from_str(&text).map_err(|error| wrong(format!("{error}; a run's report is needed")))?;
+    let run: Value =
+        serde_json::from_str(&text).map_err(|error| wrong(format!("{error}; a run's report is needed")))?;
     if run.get("env_steps").is_none() {
         return Err(wrong("has no env_steps; a run's report is needed, as `train` writes it".to_owned()));
     }

@@ -54,7 +54,11 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     if !(1..=MOST).contains(&args.count) {
-        return Err(Error::Setting { name: "--count", value: args.count.to_string(), expected: format!("must lie in 1..{MOST}") });
+        return Err(Error::Setting {
+            name: "--count",
+            value: args.count.to_string(),
+            expected: format!("must lie in 1..{MOST}"),
+        });
     }
     let Some(end) = args.first.checked_add(args.count) else {
         let expected = format!("must be at most {} for so many roads", u32::MAX - args.count);
@@ -63,7 +67,11 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if let Some(plot) = &args.plot
         && !plot.extension().is_some_and(|extension| extension == "svg" || extension == "png")
     {
-        return Err(Error::Setting { name: "--plot", value: plot.display().to_string(), expected: "must end in .svg or .png".into() });
+        return Err(Error::Setting {
+            name: "--plot",
+            value: plot.display().to_string(),
+            expected: "must end in .svg or .png".into(),
+        });
     }
     let distribution = Distribution::find(&args.distribution)?;
     let indices: Vec<u32> = (args.first..end).collect();
@@ -78,7 +86,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let file = |road: &RandomRoad| {
             (format!("{}-{}-{}.toml", distribution.name, args.seed, road.index), text(&distribution, road).into_bytes())
         };
-        let files = || roads.iter().map(file).chain(sheets.iter().cloned()).map(|(name, bytes)| (folder.join(name), bytes));
+        let files =
+            || roads.iter().map(file).chain(sheets.iter().cloned()).map(|(name, bytes)| (folder.join(name), bytes));
         if !args.overwrite {
             files().try_for_each(|(file, bytes)| free(&file, &bytes))?;
         }
@@ -96,7 +105,8 @@ fn free(file: &Path, bytes: &[u8]) -> Result<(), Error> {
     if !file.exists() || read_bytes(file, bytes.len() as u64).is_ok_and(|found| found == bytes) {
         return Ok(());
     }
-    let expected = "exists and holds something else; another folder would do, or --overwrite to write over it".to_owned();
+    let expected =
+        "exists and holds something else; another folder would do, or --overwrite to write over it".to_owned();
     Err(Error::Setting { name: "--output", value: file.display().to_string(), expected })
 }
 
@@ -112,7 +122,12 @@ fn text(distribution: &Distribution, road: &RandomRoad) -> String {
 }
 
 /// Names and contents of the contact sheets.
-fn sheets(folder: &Path, distribution: &Distribution, args: &Args, roads: &[RandomRoad]) -> Result<Vec<(String, Vec<u8>)>, Error> {
+fn sheets(
+    folder: &Path,
+    distribution: &Distribution,
+    args: &Args,
+    roads: &[RandomRoad],
+) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let shown: Vec<&Road> = roads.iter().take(ON_SHEET).map(|road| &road.roundabout).collect();
     let of = if shown.len() < roads.len() {
         format!("The first {} of {} random roads", shown.len(), roads.len())
@@ -121,7 +136,8 @@ fn sheets(folder: &Path, distribution: &Distribution, args: &Args, roads: &[Rand
     };
     let title = format!("{of}: distribution {}, seed {}", distribution.name, args.seed);
     let names = ["contact-sheet.svg", "contact-sheet.png"];
-    let svg = sheet::drawn(&title, &shown).map_err(|error| Error::write(&folder.join(names[0]))(std::io::Error::other(error)))?;
+    let svg = sheet::drawn(&title, &shown)
+        .map_err(|error| Error::write(&folder.join(names[0]))(std::io::Error::other(error)))?;
     names.into_iter().map(|name| Ok((name.to_owned(), picture(&folder.join(name), &svg)?))).collect()
 }
 
@@ -137,7 +153,8 @@ fn picture(file: &Path, svg: &str) -> Result<Vec<u8>, Error> {
 fn histograms(distribution: &Distribution, args: &Args, roads: &[RandomRoad]) -> Result<String, Error> {
     let (approach, departure) = (distribution.approach, distribution.departure);
     // Those with the maps' kerbs have the same dimensions as the others.
-    let marked: Vec<String> = Kind::Roundabout.names().filter(|name| !name.ends_with("-maps")).map(str::to_owned).collect();
+    let marked: Vec<String> =
+        Kind::Roundabout.names().filter(|name| !name.ends_with("-maps")).map(str::to_owned).collect();
     let known: Vec<Road> = marked.iter().map(|name| Road::named(name)).collect::<Result<_, _>>()?;
     let panel = |x: &'static str, measure: &dyn Fn(&Road) -> f64| Panel {
         x,
@@ -164,15 +181,17 @@ fn histograms(distribution: &Distribution, args: &Args, roads: &[RandomRoad]) ->
                 roundabout.kerbs(offtrack::map::Gutter::Drivable).loops.len() as f64 - 2.0
             }),
             panel("tightest radius of a route's centre line [m]", &|roundabout| {
-                roundabout
-                    .routes(approach, departure, 5.0)
-                    .map_or(f64::NAN, |routes| routes.iter().map(|route| route.centre_line.least_radius()).fold(f64::INFINITY, f64::min))
+                roundabout.routes(approach, departure, 5.0).map_or(f64::NAN, |routes| {
+                    routes.iter().map(|route| route.centre_line.least_radius()).fold(f64::INFINITY, f64::min)
+                })
             }),
-            panel("least distance of a route from a kerb [m]", &|roundabout| lane_clearance(roundabout, approach, departure)),
+            panel("least distance of a route from a kerb [m]", &|roundabout| {
+                lane_clearance(roundabout, approach, departure)
+            }),
             panel("mean length of a route [m]", &|roundabout| {
-                roundabout
-                    .routes(approach, departure, 5.0)
-                    .map_or(f64::NAN, |routes| routes.iter().map(|route| route.centre_line.length()).sum::<f64>() / routes.len() as f64)
+                roundabout.routes(approach, departure, 5.0).map_or(f64::NAN, |routes| {
+                    routes.iter().map(|route| route.centre_line.length()).sum::<f64>() / routes.len() as f64
+                })
             }),
         ],
     };

@@ -66,7 +66,11 @@ impl PlaceArgs {
             ("--hand", (self.hand != Hand::Map).then(|| format!("{:?}", self.hand).to_lowercase())),
         ];
         let Some((flag, Some(value))) = given.into_iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
-        Err(Error::Setting { name: flag, value, expected: "is for an OpenDRIVE map, a file that ends in .xodr; leave it out".into() })
+        Err(Error::Setting {
+            name: flag,
+            value,
+            expected: "is for an OpenDRIVE map, a file that ends in .xodr; leave it out".into(),
+        })
     }
 }
 
@@ -120,7 +124,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let _ = writeln!(summary, "warning: {warning}");
     }
     let (arms, routes) = (ground.arms.len(), ground.lines.len());
-    let island = if 0.0 < ground.island_radius { format!(", island {:.2} m", ground.island_radius) } else { String::new() };
+    let island =
+        if 0.0 < ground.island_radius { format!(", island {:.2} m", ground.island_radius) } else { String::new() };
     let _ = writeln!(summary, "written: {}: {arms} arms, {routes} routes{island}", shown_path(output));
     files::print(&summary)
 }
@@ -132,16 +137,24 @@ fn text(file: &Path, output: &Path, map: &Map, choice: &Choice, imported: &Impor
     let name = file.file_name().map(|name| name.to_string_lossy().escape_debug().to_string()).unwrap_or_default();
     let (what, flags) = match choice.ways.as_slice() {
         [] => ("roundabout", format!(" --ring {:.1},{:.1}", centre.x, centre.y)),
-        ways => ("junction", ways.iter().map(|way| format!(" --way {},{}", way.from, way.to).escape_debug().to_string()).collect()),
+        ways => (
+            "junction",
+            ways.iter().map(|way| format!(" --way {},{}", way.from, way.to).escape_debug().to_string()).collect(),
+        ),
     };
     let mut origin = vec![
-        format!("A {what} of the map {name}: its centre, here the origin, lies at ({:.4}, {:.4}) there.", centre.x, centre.y),
+        format!(
+            "A {what} of the map {name}: its centre, here the origin, lies at ({:.4}, {:.4}) there.",
+            centre.x, centre.y
+        ),
         format!("Made by: offtrack import {name}{flags} -o NAME.outline.toml"),
     ];
     if map.is_mirrored() {
         origin.push("The map has left-hand traffic; this is its mirror image in the x axis.".into());
     }
-    origin.push("A path is a list of [x, y] and [x, y, bulge]: a straight or an arc ends there. Metres; docs/maps.md.".into());
+    origin.push(
+        "A path is a list of [x, y] and [x, y, bulge]: a straight or an arc ends there. Metres; docs/maps.md.".into(),
+    );
     Ok(ground.checked_text(output, &origin)?)
 }
 
@@ -152,7 +165,8 @@ fn list(file: &Path, map: &Map) -> Result<(), Error> {
     let (mut drivable, mut refused) = (0, None);
     for ring in map.rings() {
         let (x, y) = (ring.centre.x, ring.centre.y);
-        let _ = write!(text, "ring {x:.1},{y:.1}: island {:.2} m, within {:.2} m of a circle", ring.radius, ring.residual);
+        let _ =
+            write!(text, "ring {x:.1},{y:.1}: island {:.2} m, within {:.2} m of a circle", ring.radius, ring.residual);
         match map.ground(&ring, &Options::default()) {
             Ok(Imported { ground, .. }) => {
                 let arms: Vec<&str> = ground.arms.iter().map(|arm| arm.name.as_str()).collect();
@@ -186,15 +200,24 @@ fn junctions(file: &Path, map: &Map) -> Result<(), Error> {
     let mut text = String::new();
     let junctions = map.junctions();
     for junction in &junctions {
-        let _ = writeln!(text, "junction {} at {:.1},{:.1}", junction.id.escape_debug(), junction.centre.x, junction.centre.y);
+        let _ = writeln!(
+            text,
+            "junction {} at {:.1},{:.1}",
+            junction.id.escape_debug(),
+            junction.centre.x,
+            junction.centre.y
+        );
         for way in &junction.ways {
             let _ = writeln!(text, "  --way {}", format!("{},{}", way.from, way.to).escape_debug());
         }
     }
     files::print(&text)?;
     if junctions.is_empty() {
-        let none: InputError =
-            Reader::of(file).invalid("junction", "none", format!("no lanes lead through one of its {} roads", map.n_roads()));
+        let none: InputError = Reader::of(file).invalid(
+            "junction",
+            "none",
+            format!("no lanes lead through one of its {} roads", map.n_roads()),
+        );
         return Err(none.into());
     }
     Ok(())

@@ -13,7 +13,8 @@ pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
     for (index, (flag, file)) in written.iter().enumerate() {
         let Some(file) = file else { continue };
         let others = written[..index].iter().chain(read);
-        if let Some((other, _)) = others.into_iter().find(|(_, other)| other.is_some_and(|other| is_same(file, other))) {
+        if let Some((other, _)) = others.into_iter().find(|(_, other)| other.is_some_and(|other| is_same(file, other)))
+        {
             let expected = format!("is the file of {other} too: name another one");
             return Err(Error::Setting { name: flag, value: file.display().to_string(), expected });
         }

@@ -38,7 +38,9 @@ impl Choice {
         let policy = policies::find(self.policy.as_deref(), &scenario.name, pursuit, seed, world)?;
         if self.policy.is_none() && !offtrack_policy::Policy::shipped_names().contains(&scenario.name.as_str()) {
             let (benchmark, drives) = (&scenario.name, policy.name());
-            files::say(&format!("no policy comes with the program for {benchmark}; {drives} drives; --policy chooses another"));
+            files::say(&format!(
+                "no policy comes with the program for {benchmark}; {drives} drives; --policy chooses another"
+            ));
         }
         Ok(policy)
     }
@@ -60,7 +62,10 @@ impl Choice {
         if learned.is_some_and(|policy| policy.to_bytes() == expected) {
             return Ok(());
         }
-        let expected = format!("another policy is evaluated: give the run's own, --policy {}, or leave --run out", of_run.display());
+        let expected = format!(
+            "another policy is evaluated: give the run's own, --policy {}, or leave --run out",
+            of_run.display()
+        );
         Err(Error::Setting { name: "--run", value: folder.display().to_string(), expected })
     }
 
@@ -70,7 +75,11 @@ impl Choice {
         let given = self.look_ahead.map(|distance| ("--look-ahead", format!("{} m", shown(distance))));
         let given = given.or_else(|| Some(("--line", self.line.as_ref()?.display().to_string())));
         if let (Some((flag, value)), true) = (given, self.policy.as_deref() != Some("pursuit")) {
-            return Err(Error::Setting { name: flag, value, expected: "is for pure pursuit: give --policy pursuit, too".into() });
+            return Err(Error::Setting {
+                name: flag,
+                value,
+                expected: "is for pure pursuit: give --policy pursuit, too".into(),
+            });
         }
         if !(1.0..=50.0).contains(&distance) {
             let value = format!("{} m", shown(distance));
@@ -82,7 +91,10 @@ impl Choice {
         let without = world.route_names.len() - lines.len();
         if 0 < without {
             let (n, all) = (lines.len(), world.route_names.len());
-            files::say(&format!("{} completes {n} of {all} routes; on the others pursuit follows the lane's centre", shown_path(file)));
+            files::say(&format!(
+                "{} completes {n} of {all} routes; on the others pursuit follows the lane's centre",
+                shown_path(file)
+            ));
         }
         Ok(pursuit.planned(lines, &shown_path(file)))
     }

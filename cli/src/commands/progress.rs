@@ -57,8 +57,13 @@ pub struct TrainingDisplay {
 impl TrainingDisplay {
     /// A bar at its beginning. `label`, which may be empty, begins each line.
     pub fn new(label: &str) -> TrainingDisplay {
-        let style = ProgressStyle::with_template("{bar:24} {percent:>3} % {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
-        TrainingDisplay { bar: ProgressBar::new(1000).with_style(style), since_line: Instant::now(), label: label.to_owned() }
+        let style = ProgressStyle::with_template("{bar:24} {percent:>3} % {wide_msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        TrainingDisplay {
+            bar: ProgressBar::new(1000).with_style(style),
+            since_line: Instant::now(),
+            label: label.to_owned(),
+        }
     }
 }
 

@@ -78,15 +78,27 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let format = format(&args.output)?;
     outputs::distinct(&[("--output", Some(&args.output))], &args.policy.files())?;
     if let (Some(size), Format::Svg | Format::Json) = (args.size, format) {
-        return Err(Error::Setting { name: "--size", value: size.to_string(), expected: "is for .gif and .png: leave it out".into() });
+        return Err(Error::Setting {
+            name: "--size",
+            value: size.to_string(),
+            expected: "is for .gif and .png: leave it out".into(),
+        });
     }
     if let Some(size) = args.size
         && !(200..=4000).contains(&size)
     {
-        return Err(Error::Setting { name: "--size", value: size.to_string(), expected: "must lie in 200..4000 pixels".into() });
+        return Err(Error::Setting {
+            name: "--size",
+            value: size.to_string(),
+            expected: "must lie in 200..4000 pixels".into(),
+        });
     }
     if !(1..=100_000).contains(&args.episodes) {
-        return Err(Error::Setting { name: "--episodes", value: args.episodes.to_string(), expected: "must lie in 1..100000".into() });
+        return Err(Error::Setting {
+            name: "--episodes",
+            value: args.episodes.to_string(),
+            expected: "must lie in 1..100000".into(),
+        });
     }
     if args.episodes <= args.episode {
         let expected = format!("must lie in 0..{}: --episodes says how many there are", args.episodes - 1);
@@ -101,12 +113,17 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return Err(Error::Setting { name: "--output", value: args.output.display().to_string(), expected });
     }
     if let Some((_, twice)) = args.load.iter().enumerate().find(|(index, load)| args.load[..*index].contains(load)) {
-        return Err(Error::Setting { name: "--load", value: twice.clone(), expected: "is given twice; each load once".into() });
+        return Err(Error::Setting {
+            name: "--load",
+            value: twice.clone(),
+            expected: "is given twice; each load once".into(),
+        });
     }
     let loads: Vec<Option<&str>> =
         if args.load.is_empty() { vec![None] } else { args.load.iter().map(|load| Some(load.as_str())).collect() };
     let each = || args.route.iter().flat_map(|route| loads.iter().map(move |&load| (route, load)));
-    let scenarios = each().map(|(route, load)| scenario(args, route, load)).collect::<Result<Vec<Scenario>, Error>>()?;
+    let scenarios =
+        each().map(|(route, load)| scenario(args, route, load)).collect::<Result<Vec<Scenario>, Error>>()?;
     let chosen = |(scenario, (route, _)): (_, (&String, _))| Chosen::new(scenario, route);
     let chosen = scenarios.iter().zip(each()).map(chosen).collect::<Result<Vec<Chosen>, Error>>()?;
     let mut takes = Vec::new();
@@ -152,7 +169,13 @@ fn recorded(of: &Of, episode: usize, episodes: usize, track: Track) -> Recorded 
     let Of { scenario, roundabout, route, .. } = *of;
     let recording = of.recording(episode, episodes, track);
     let ring = [scenario.approach, route.centre_line.length() - scenario.departure];
-    Recorded { recording, roundabout: roundabout.seen(), gutter: scenario.gutter, route: roundabout.seen_route(route), ring }
+    Recorded {
+        recording,
+        roundabout: roundabout.seen(),
+        gutter: scenario.gutter,
+        route: roundabout.seen_route(route),
+        ring,
+    }
 }
 
 /// Writes a film of a track, in the usual size.
@@ -172,9 +195,11 @@ fn bytes(format: Format, size: Option<u32>, recorded: &[Recorded]) -> Result<Vec
     if format != Format::Gif {
         let svg = match recorded {
             [one] => one.scene()?.still(),
-            several => {
-                Comparison { scenes: several.iter().map(Recorded::scene).collect::<Result<_, _>>()?, ring: several[0].ring }.drawn()?
+            several => Comparison {
+                scenes: several.iter().map(Recorded::scene).collect::<Result<_, _>>()?,
+                ring: several[0].ring,
             }
+            .drawn()?,
         };
         return if format == Format::Png { Ok(rasterised(&svg, size.unwrap_or(1000))?) } else { Ok(svg.into_bytes()) };
     }
@@ -210,11 +235,15 @@ struct Chosen<'a> {
 
 impl<'a> Chosen<'a> {
     fn new(scenario: &'a Scenario, name: &str) -> Result<Chosen<'a>, Error> {
-        let Some((index, (roundabout, route))) = scenario.routes().enumerate().find(|(_, (_, route))| route.name == name) else {
+        let Some((index, (roundabout, route))) =
+            scenario.routes().enumerate().find(|(_, (_, route))| route.name == name)
+        else {
             return Err(roads::unknown(scenario, name));
         };
-        let within = |split: Split| Some((split, scenario.split(split).iter().position(|&other| other as usize == index)?));
-        let (split, in_split) = Split::ALL.into_iter().find_map(within).expect("a benchmark's route is in one of its splits");
+        let within =
+            |split: Split| Some((split, scenario.split(split).iter().position(|&other| other as usize == index)?));
+        let (split, in_split) =
+            Split::ALL.into_iter().find_map(within).expect("a benchmark's route is in one of its splits");
         Ok(Chosen { route, roundabout: &scenario.places[roundabout].roundabout, split, in_split })
     }
 }
@@ -238,8 +267,15 @@ fn scenario(args: &Args, route: &str, load: Option<&str>) -> Result<Scenario, Er
 }
 
 /// Drives the batch of the evaluation until the episode has ended.
-fn driven(args: &Args, scenario: &Scenario, world: &Arc<World>, chosen: &Chosen, policy: &mut dyn Controller) -> Result<Track, Error> {
-    let trucks: Vec<u32> = scenario.split(chosen.split).iter().flat_map(|&route| std::iter::repeat_n(route, args.episodes)).collect();
+fn driven(
+    args: &Args,
+    scenario: &Scenario,
+    world: &Arc<World>,
+    chosen: &Chosen,
+    policy: &mut dyn Controller,
+) -> Result<Track, Error> {
+    let trucks: Vec<u32> =
+        scenario.split(chosen.split).iter().flat_map(|&route| std::iter::repeat_n(route, args.episodes)).collect();
     let env = chosen.in_split * args.episodes + args.episode;
     let mut simulator = Simulator::new(world.clone(), trucks.len(), args.seed, RouteChoice::Fixed(trucks))?;
     let mut recorder = Recorder::new(world, simulator.batch(), [env]);

@@ -83,7 +83,12 @@ pub fn narrow(scenario: &mut Scenario, names: &[String], splits: &[Split]) -> Re
     let mut wanted = names.to_vec();
     for (road, roundabout) in added {
         // Routes of a file are named after its stem.
-        wanted.extend(names.iter().filter_map(|name| name.strip_prefix(road.as_str())).map(|rest| format!("{}{rest}", roundabout.name)));
+        wanted.extend(
+            names
+                .iter()
+                .filter_map(|name| name.strip_prefix(road.as_str()))
+                .map(|rest| format!("{}{rest}", roundabout.name)),
+        );
         scenario.add(roundabout, split)?;
     }
     scenario.keep(splits);
@@ -97,8 +102,10 @@ pub fn keep(scenario: &mut Scenario, split: Split, benchmark: &str) -> Result<()
         let name = split.name();
         let has = Split::ALL.into_iter().filter(|&other| !scenario.split(other).is_empty()).map(Split::name);
         let has = shortened(&has.collect::<Vec<_>>().join(", "), LONGEST_LIST);
-        let expected =
-            format!("{} has routes under {has} alone; list some under `{name}`, or ask for another split", shortened(benchmark, 200));
+        let expected = format!(
+            "{} has routes under {has} alone; list some under `{name}`, or ask for another split",
+            shortened(benchmark, 200)
+        );
         return Err(Error::Setting { name: "--split", value: name.to_owned(), expected });
     }
     scenario.keep(&[split]);
@@ -117,8 +124,11 @@ fn short(route: &str) -> &str {
 
 /// The road and, if it names one, the route within it that a name means apart from any benchmark.
 fn road_of(name: &str) -> Option<(&str, Option<&str>)> {
-    let is_road =
-        |name: &str| procedural::address(name).is_some() || Kind::Roundabout.names().any(|known| known == name) || name.ends_with(".toml");
+    let is_road = |name: &str| {
+        procedural::address(name).is_some()
+            || Kind::Roundabout.names().any(|known| known == name)
+            || name.ends_with(".toml")
+    };
     let split = || name.rsplit_once('/').filter(|(road, _)| is_road(road)).map(|(road, route)| (road, Some(route)));
     if is_road(name) { Some((name, None)) } else { split() }
 }
@@ -127,13 +137,18 @@ fn road_of(name: &str) -> Option<(&str, Option<&str>)> {
 /// each roundabout.
 pub fn unknown(scenario: &Scenario, name: &str) -> Error {
     let of = |place: &Place| place.routes.iter().map(|route| route.name.clone()).collect::<Vec<_>>();
-    let begins = |place: &&Place| name.strip_prefix(&place.roundabout.name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'));
+    let begins = |place: &&Place| {
+        name.strip_prefix(&place.roundabout.name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    };
     let meant = scenario.places.iter().find(begins);
-    let names = meant.map_or_else(|| scenario.places.iter().filter_map(|place| of(place).first().cloned()).collect(), of);
+    let names =
+        meant.map_or_else(|| scenario.places.iter().filter_map(|place| of(place).first().cloned()).collect(), of);
     let (from, list) = (&scenario.name, shortened(&names.join(", "), LONGEST_LIST));
     let expected = match meant {
         Some(place) => format!("of {} the benchmark {from} has {list}", place.roundabout.name),
-        None => format!("a route of the benchmark {from} is needed, such as {list}, or one of a random road, such as wide/7/12"),
+        None => format!(
+            "a route of the benchmark {from} is needed, such as {list}, or one of a random road, such as wide/7/12"
+        ),
     };
     Error::Setting { name: "--route", value: name.to_owned(), expected }
 }
@@ -145,6 +160,10 @@ pub fn with_load(scenario: Scenario, load: Option<&str>) -> Result<Scenario, Err
         let mut known: Vec<String> = scenario.classes().into_iter().map(|class| class.load).collect();
         known.sort();
         known.dedup();
-        Error::Setting { name: "--load", value: load.to_owned(), expected: format!("{} has {}", scenario.name, known.join(", ")) }
+        Error::Setting {
+            name: "--load",
+            value: load.to_owned(),
+            expected: format!("{} has {}", scenario.name, known.join(", ")),
+        }
     })
 }

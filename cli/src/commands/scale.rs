@@ -125,7 +125,8 @@ enum Outcome {
 impl Scale {
     /// The runs of a mode that could be measured, fewest trucks first.
     fn measured(&self, mode: Mode) -> Vec<(usize, &Measured)> {
-        let mut runs: Vec<(usize, &Measured)> = self.runs.iter().filter(|run| run.mode == mode).filter_map(Run::measured).collect();
+        let mut runs: Vec<(usize, &Measured)> =
+            self.runs.iter().filter(|run| run.mode == mode).filter_map(Run::measured).collect();
         runs.sort_by_key(|(envs, _)| *envs);
         runs
     }
@@ -144,7 +145,11 @@ impl Run {
 pub fn run(args: &Args) -> Result<(), Error> {
     let envs = sizes(&args.envs)?;
     if !(0.1..=3600.0).contains(&args.seconds) {
-        return Err(Error::Setting { name: "--seconds", value: format!("{} s", args.seconds), expected: "must lie in 0.1..3600 s".into() });
+        return Err(Error::Setting {
+            name: "--seconds",
+            value: format!("{} s", args.seconds),
+            expected: "must lie in 0.1..3600 s".into(),
+        });
     }
     if let Some(file) = &args.plot {
         plot::check(file)?;
@@ -153,7 +158,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = "is for --mode training: add that mode, or leave --config out".to_owned();
         return Err(Error::Setting { name: "--config", value: file.display().to_string(), expected });
     }
-    outputs::distinct(&[("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())], &[("--config", args.config.as_deref())])?;
+    outputs::distinct(
+        &[("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())],
+        &[("--config", args.config.as_deref())],
+    )?;
     let mut device = args.device.open()?;
     let start = Instant::now();
     let scenario = roads::benchmark(&args.benchmark)?;
@@ -161,7 +169,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let world = roads::world(&scenario)?;
     let baked = start.elapsed() - drawn;
     let learner = match args.mode.iter().any(|mode| *mode != Mode::Random) {
-        true => Some(Learner::read(&scenario.name, &args.config.clone().unwrap_or_else(|| PathBuf::from("gpu")), &world)?),
+        true => {
+            Some(Learner::read(&scenario.name, &args.config.clone().unwrap_or_else(|| PathBuf::from("gpu")), &world)?)
+        }
         false => None,
     };
     let mut scale = Scale {
@@ -191,7 +201,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     };
     files::print(&heading(&scale, &device))?;
     let bar = ProgressBar::new((envs.len() * args.mode.len()) as u64).with_style(
-        ProgressStyle::with_template("measuring {bar:30} {pos}/{len} {msg}, {elapsed}").unwrap_or_else(|_| ProgressStyle::default_bar()),
+        ProgressStyle::with_template("measuring {bar:30} {pos}/{len} {msg}, {elapsed}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
     let routes = Split::ALL.map(|split| scenario.split(split)).concat();
     let (mut refusal, mut backend) = (None, None);
@@ -200,11 +211,19 @@ pub fn run(args: &Args) -> Result<(), Error> {
             bar.set_message(format!("{envs} trucks, {}", mode.name()));
             bar.tick();
             let (engine, adapter) = (&device.engine, device.adapter());
-            let setting =
-                Setting { engine, adapter, backend: &mut backend, world: &world, routes: &routes, envs, learner: learner.as_ref() };
+            let setting = Setting {
+                engine,
+                adapter,
+                backend: &mut backend,
+                world: &world,
+                routes: &routes,
+                envs,
+                learner: learner.as_ref(),
+            };
             let work = || measured(&mut mode.driven(setting)?, args.seconds);
             // The tensor library panics where a device fails.
-            let outcome = if device.kind == "gpu" { offtrack_evaluation::device::caught(work, || None) } else { work() };
+            let outcome =
+                if device.kind == "gpu" { offtrack_evaluation::device::caught(work, || None) } else { work() };
             let outcome = match outcome {
                 Ok(measured) => Outcome::Measured(Box::new(measured)),
                 Err(error) => {
@@ -237,7 +256,8 @@ fn sizes(text: &str) -> Result<Vec<usize>, Error> {
         value: value.to_owned(),
         expected: format!("must lie in 1..{MOST_ENVS}, as in 1024,4096 or 256..1048576"),
     };
-    let size = |word: &str| word.trim().parse().ok().filter(|size| (1..=MOST_ENVS).contains(size)).ok_or_else(|| wrong(word));
+    let size =
+        |word: &str| word.trim().parse().ok().filter(|size| (1..=MOST_ENVS).contains(size)).ok_or_else(|| wrong(word));
     let mut sizes = Vec::new();
     for part in text.split(',') {
         let Some((first, last)) = part.split_once("..") else {
@@ -263,8 +283,11 @@ fn write(args: &Args, scale: &Scale, title: &str) -> Result<(), Error> {
     }
     if let Some(file) = &args.plot {
         let svg = plot::drawn(scale, title).map_err(failed(file))?;
-        let bytes =
-            if plot::is_png(file) { offtrack_drawing::rasterised(&svg, plot::PNG_WIDTH).map_err(failed(file))? } else { svg.into_bytes() };
+        let bytes = if plot::is_png(file) {
+            offtrack_drawing::rasterised(&svg, plot::PNG_WIDTH).map_err(failed(file))?
+        } else {
+            svg.into_bytes()
+        };
         files::write_whole(file, &bytes)?;
     }
     Ok(())
@@ -299,10 +322,16 @@ fn row(run: &Run) -> String {
     match outcome {
         Outcome::Refused { error } => format!("{envs:>8} {:>9} {error}\n", mode.name()),
         Outcome::Measured(measured) => {
-            let stages: String =
-                measured.stages.iter().map(|(name, time)| format!(" {time:>width$.1}", width = name.len().max(7))).collect();
+            let stages: String = measured
+                .stages
+                .iter()
+                .map(|(name, time)| format!(" {time:>width$.1}", width = name.len().max(7)))
+                .collect();
             let (steps, rays) = (measured.env_steps_per_second, measured.rays_per_second);
-            format!("{envs:>8} {:>9} {steps:>14.0} {rays:>14.0}                                 {stages}\n", mode.name())
+            format!(
+                "{envs:>8} {:>9} {steps:>14.0} {rays:>14.0}                                 {stages}\n",
+                mode.name()
+            )
         }
     }
 }

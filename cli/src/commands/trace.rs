@@ -47,13 +47,17 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let report = report(&args.cases)?;
     for Skipped { id, kind } in &report.skipped {
         let [id, kind] = [id, kind].map(|text| shortened(&format!("{text:?}"), 100));
-        files::say(&format!("{}: case {id} is skipped: its kind is {kind}, not \"trajectory\"", shown_path(&args.cases)));
+        files::say(&format!(
+            "{}: case {id} is skipped: its kind is {kind}, not \"trajectory\"",
+            shown_path(&args.cases)
+        ));
     }
     match &args.output {
         Some(file) => files::write_json(file, &report),
         None => {
             let standard_output = Path::new("standard output");
-            let text = serde_json::to_string_pretty(&report).map_err(|error| Error::write(standard_output)(error.into()))?;
+            let text =
+                serde_json::to_string_pretty(&report).map_err(|error| Error::write(standard_output)(error.into()))?;
             files::print_json(&text)
         }
     }
@@ -63,12 +67,16 @@ fn report(file: &Path) -> Result<Report, Error> {
     let wrong = |message: String| Error::contents(file, message);
     let text = read_text(file, FILE_LIMIT)?;
     let written: Value = serde_json::from_str(&text).map_err(|error| wrong(format!("is not JSON: {error}")))?;
-    let cases = written["cases"].as_array().ok_or_else(|| wrong("cases: missing or not a list; a list of cases is needed".to_owned()))?;
+    let cases = written["cases"]
+        .as_array()
+        .ok_or_else(|| wrong("cases: missing or not a list; a list of cases is needed".to_owned()))?;
     let mut report = Report { cases: Vec::new(), skipped: Vec::new() };
     for (index, case) in cases.iter().enumerate() {
         let text = |key: &str| {
             let text = case[key].as_str().map(str::to_owned);
-            text.ok_or_else(|| wrong(format!("cases[{index}].{key}: {}; must be text", shortened(&case[key].to_string(), 100))))
+            text.ok_or_else(|| {
+                wrong(format!("cases[{index}].{key}: {}; must be text", shortened(&case[key].to_string(), 100)))
+            })
         };
         let (id, kind) = (text("id")?, text("kind")?);
         if kind == "trajectory" {

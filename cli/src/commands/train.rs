@@ -207,8 +207,16 @@ pub fn run(args: &Args) -> Result<(), Error> {
 }
 
 /// A run from its beginning or its checkpoint to what it leaves behind, or until it is stopped.
-fn train(config: &Config, worlds: &Worlds, prepared: Prepared, opened: Opened, manner: &Manner, stop: &AtomicU8) -> Result<(), Error> {
-    let (Prepared { backend, training, validation }, Opened { folder, metrics, stored, has_new_budget }) = (prepared, opened);
+fn train(
+    config: &Config,
+    worlds: &Worlds,
+    prepared: Prepared,
+    opened: Opened,
+    manner: &Manner,
+    stop: &AtomicU8,
+) -> Result<(), Error> {
+    let (Prepared { backend, training, validation }, Opened { folder, metrics, stored, has_new_budget }) =
+        (prepared, opened);
     let label = manner.label.as_deref().unwrap_or_default();
     let progress = Progress::new(config, metrics, Box::new(progress::TrainingDisplay::new(label)));
     let counts = RouteCounts::new(&worlds.training, folder.routes());
@@ -220,7 +228,11 @@ fn train(config: &Config, worlds: &Worlds, prepared: Prepared, opened: Opened, m
         // The earlier evaluation was of another policy.
         files::write_json(&folder.report(), &Finished { interrupted: true, ..finished(config, &run) })?;
         let _ = std::fs::remove_file(folder.page());
-        doing = format!("continuing after {} env steps and {:.2} min", run.progress.env_steps(), run.progress.seconds() / 60.0);
+        doing = format!(
+            "continuing after {} env steps and {:.2} min",
+            run.progress.env_steps(),
+            run.progress.seconds() / 60.0
+        );
     }
     if has_new_budget {
         folder.write_config(config)?;
@@ -249,7 +261,9 @@ fn read(args: &Args, file: &Path, n_runs: usize) -> Result<(Config, Worlds), Err
     let _ = files::print(&beginning::line(&config, file, n_runs));
     let worlds = Worlds::read(&config, &Config::origin(file, args.benchmark.as_deref(), &args.settings))?;
     // A benchmark of one's own may have any actions and sensors.
-    if let (Some(_), true, Err(error)) = (&args.benchmark, config.learning.mirror_augmentation, Mirror::of(&worlds.training_world)) {
+    if let (Some(_), true, Err(error)) =
+        (&args.benchmark, config.learning.mirror_augmentation, Mirror::of(&worlds.training_world))
+    {
         config.learning.mirror_augmentation = false;
         let _ = writeln!(std::io::stderr(), "note: trains without mirror augmentation: {error}");
     }
@@ -287,7 +301,9 @@ fn conclude(
     if finished.interrupted {
         files::write_json(&folder.report(), &finished)?;
         written?;
-        return files::print(&format!("stopped: policy and metrics are in {path}; not evaluated; train --resume {path} continues\n"));
+        return files::print(&format!(
+            "stopped: policy and metrics are in {path}; not evaluated; train --resume {path} continues\n"
+        ));
     }
     let mut policy = Policy { name: shown_path(&folder.policy()), ..policy };
     let evaluated = evaluate(worlds, &mut policy)?;
@@ -298,7 +314,8 @@ fn conclude(
     if let Some((report, tracks)) = evaluated {
         let metrics = Some(read_text(&folder.metrics(), METRICS_LIMIT)?);
         let (scenario, world) = (&worlds.benchmark, &worlds.benchmark_world);
-        Page { scenario, world, evaluation: &report, tracks: &tracks, run: json!(finished), metrics }.write(&folder.page())?;
+        Page { scenario, world, evaluation: &report, tracks: &tracks, run: json!(finished), metrics }
+            .write(&folder.page())?;
         if manner.label.is_none() {
             said += &report.table(terminal::width());
         }
@@ -318,7 +335,10 @@ fn checkpoint(folder: &Folder) -> String {
     let file = folder.checkpoint();
     let Ok(size) = std::fs::metadata(&file).map(|metadata| metadata.len()) else { return String::new() };
     let megabytes = size.div_ceil(1_000_000);
-    format!("{} ({megabytes} MB) is for train --resume with more --steps or --minutes alone; it may be deleted\n", file.display())
+    format!(
+        "{} ({megabytes} MB) is for train --resume with more --steps or --minutes alone; it may be deleted\n",
+        file.display()
+    )
 }
 
 /// The evaluation on `benchmark`, with the episodes that its page shows; none where it has no test routes.
@@ -342,8 +362,11 @@ fn evaluate(worlds: &Worlds, policy: &mut Policy) -> Result<Option<(Report, Vec<
 
 /// A line about the training routes with least success.
 fn worst(WorstRoutes { routes, window, worst }: &WorstRoutes) -> String {
-    let shown: Vec<String> =
-        worst.iter().take(N_WORST).map(|route| format!("{} {:.0} %", route.route, 100.0 * route.recent_success)).collect();
+    let shown: Vec<String> = worst
+        .iter()
+        .take(N_WORST)
+        .map(|route| format!("{} {:.0} %", route.route, 100.0 * route.recent_success))
+        .collect();
     if shown.is_empty() {
         return String::new();
     }

@@ -33,7 +33,8 @@ fn each_line_read_asks_for_a_round() {
     program.stdin.take().unwrap().write_all(b"\nagain\n").unwrap();
     let output = program.wait_with_output().unwrap();
     succeed(&output);
-    let lines: Vec<Value> = String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let lines: Vec<Value> =
+        String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(lines.len(), 4);
     for (line, batch) in lines.iter().zip([2, 6, 2, 6]) {
         assert_measured(line, batch);

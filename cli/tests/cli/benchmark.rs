@@ -18,8 +18,9 @@ fn validation_that_drives_another_vehicle_or_otherwise_is_refused_before_a_folde
         assert!(validated.contains(from), "{from}");
         std::fs::write(place.file("validated.toml"), validated.replacen(from, to, 1)).unwrap();
         let message = refusal(&place.train(&[]), 2);
-        let whole =
-            format!("it differs from short, which is trained on, {expected}: with --set validation.benchmark= validation is as short says");
+        let whole = format!(
+            "it differs from short, which is trained on, {expected}: with --set validation.benchmark= validation is as short says"
+        );
         assert!(message.contains("tiny.toml: validation.benchmark: ") && message.contains(&whole), "{message}");
         assert!(!place.file("runs").exists());
     }
@@ -54,7 +55,10 @@ fn a_benchmark_of_ones_own_is_trained_on_validated_and_evaluated_by_one_command_
     let own = own_benchmark(&place, ["train = [\"E-left-3\"]\nvalidation = [\"N-right-1\"]", "test = [\"W-left-3\"]"]);
     let output = place.train(&["--name", "run", "--benchmark", &own]);
     let said = refusal(&output, 0);
-    assert!(said.contains("note: trains without mirror augmentation") && said.contains("its opposite is not"), "{said}");
+    assert!(
+        said.contains("note: trains without mirror augmentation") && said.contains("its opposite is not"),
+        "{said}"
+    );
     let report = place.json("runs/run/report.json");
     assert_eq!((&report["validation"]["benchmark"], &report["validation"]["routes"]), (&"own".into(), &1.into()));
     assert_eq!(report["evaluation"]["routes"][0]["name"], "20m/W-left-3");
@@ -63,11 +67,15 @@ fn a_benchmark_of_ones_own_is_trained_on_validated_and_evaluated_by_one_command_
     // The folder has all that it takes to begin again.
     let config = place.text("runs/run/config.toml");
     succeed(&offtrack(&["train", &config, "--name", "again", "--out", &place.text("runs")]));
-    let read = |place: &Place, run: &str| std::fs::read(place.file("runs").join(run).join("policy.safetensors")).unwrap();
+    let read =
+        |place: &Place, run: &str| std::fs::read(place.file("runs").join(run).join("policy.safetensors")).unwrap();
     assert!(read(&place, "again") == read(&place, "run"));
     // Single keys can be set on top.
     let message = refusal(&place.train(&["--benchmark", &own, "--set", "validation.benchmark=random2026"]), 2);
-    assert!(message.contains("validation.benchmark: random2026; it differs from own, which is trained on, in actions"), "{message}");
+    assert!(
+        message.contains("validation.benchmark: random2026; it differs from own, which is trained on, in actions"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -77,7 +85,10 @@ fn a_benchmark_of_ones_own_without_training_or_validation_routes_is_driven_on_ra
     let output = place.train(&["--name", "run", "--benchmark", &own]);
     succeed(&output);
     let report = place.json("runs/run/report.json");
-    assert_eq!((&report["validation"]["benchmark"], &report["validation"]["routes"]), (&"own on roads of random2026".into(), &775.into()));
+    assert_eq!(
+        (&report["validation"]["benchmark"], &report["validation"]["routes"]),
+        (&"own on roads of random2026".into(), &775.into())
+    );
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(said.contains("training on 3765 training routes of own on roads of random2026, cpu"), "{said}");
     assert_eq!(report["evaluation"]["routes"].as_array().unwrap().len(), 2);

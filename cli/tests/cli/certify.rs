@@ -10,7 +10,15 @@ use crate::place::{Place, offtrack, program, refusal, succeed};
 fn certified() -> Place {
     let place = Place::new();
     let benchmark = place.text("short.toml");
-    succeed(&offtrack(&["certify", "--benchmark", &benchmark, "--widths", "16", "--json", &place.text("certificate.json")]));
+    succeed(&offtrack(&[
+        "certify",
+        "--benchmark",
+        &benchmark,
+        "--widths",
+        "16",
+        "--json",
+        &place.text("certificate.json"),
+    ]));
     place
 }
 
@@ -114,7 +122,8 @@ fn a_certificate_made_under_other_conditions_is_refused_by_the_condition_that_di
 fn an_evaluation_reports_the_success_on_certified_routes() {
     let place = certified();
     let (certificate, report) = (place.text("certificate.json"), place.text("report.json"));
-    let evaluate = || place.evaluate(&["--policy", "pursuit", "--episodes", "2", "--certified", &certificate, "--json", &report]);
+    let evaluate =
+        || place.evaluate(&["--policy", "pursuit", "--episodes", "2", "--certified", &certificate, "--json", &report]);
     succeed(&evaluate());
     assert_eq!(place.json("report.json")["certified"]["episodes"], 4);
     // A route that was not completed from one of the starts is left out.
@@ -138,18 +147,28 @@ fn pursuit_follows_the_paths_of_a_certificate_and_the_lanes_centre_where_it_has_
     let (certificate, report) = (place.text("certificate.json"), place.text("report.json"));
     let routes = ["--benchmark", "attard2023", "--route", "20m/E-right-1", "--route", "40m/E-left-2"];
     succeed(&offtrack(&[&["certify"], &routes[..], &["--widths", "64", "--json", &certificate]].concat()));
-    let drive = |flags: &[&str]| offtrack(&[&["evaluate"], &routes[..], &["--episodes", "4", "--json", &report], flags].concat());
+    let drive = |flags: &[&str]| {
+        offtrack(&[&["evaluate"], &routes[..], &["--episodes", "4", "--json", &report], flags].concat())
+    };
     let evaluate = || drive(&["--policy", "pursuit", "--line", &certificate]);
     succeed(&drive(&["--policy", "pursuit"]));
     let centre = place.json("report.json");
     succeed(&evaluate());
     let planned = place.json("report.json");
-    assert_eq!((&centre["policy"], &planned["policy"]), (&Value::from("pursuit"), &Value::from(format!("pursuit of {certificate}"))));
+    assert_eq!(
+        (&centre["policy"], &planned["policy"]),
+        (&Value::from("pursuit"), &Value::from(format!("pursuit of {certificate}")))
+    );
     // Along the lane's centre the trailer does not come round the first of them.
     assert_eq!((&centre["arrived"], &planned["arrived"]), (&Value::from(4), &Value::from(8)));
     // Without a sequence a route is followed along its lane's centre.
     change(&place, |certificate| {
-        for found in certificate["routes"].as_array_mut().unwrap().iter_mut().flat_map(|route| route["found"].as_array_mut().unwrap()) {
+        for found in certificate["routes"]
+            .as_array_mut()
+            .unwrap()
+            .iter_mut()
+            .flat_map(|route| route["found"].as_array_mut().unwrap())
+        {
             found["ended"] = "strayed".into();
         }
     });
@@ -161,7 +180,10 @@ fn pursuit_follows_the_paths_of_a_certificate_and_the_lanes_centre_where_it_has_
     change(&place, |certificate| drop(certificate["routes"].as_array_mut().unwrap().remove(1)));
     assert!(refusal(&evaluate(), 2).contains("has no route 40m/E-left-2"));
     let said = refusal(&drive(&["--policy", "random", "--line", &certificate]), 2);
-    assert!(said.contains(&format!("--line: {certificate}; is for pure pursuit: give --policy pursuit, too")), "{said}");
+    assert!(
+        said.contains(&format!("--line: {certificate}; is for pure pursuit: give --policy pursuit, too")),
+        "{said}"
+    );
 }
 
 #[test]
@@ -224,14 +246,21 @@ fn a_result_states_the_commit_of_the_build_and_not_that_of_the_sources_when_it_r
 fn an_interrupted_search_exits_with_130_and_leaves_no_temporary_file() {
     let place = Place::new();
     let arguments = ["certify", "--benchmark", "attard2023", "--json", &place.text("certificate.json")];
-    let search = program().args(arguments).stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let search = program()
+        .args(arguments)
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
     // The first write shows that the search has begun.
     while !place.file("certificate.json").is_file() {
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
     assert!(Command::new("kill").args(["-INT", &search.id().to_string()]).status().unwrap().success());
     assert_eq!(search.wait_with_output().unwrap().status.code(), Some(130));
-    let names: Vec<String> =
-        std::fs::read_dir(place.file("")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    let names: Vec<String> = std::fs::read_dir(place.file(""))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
     assert!(names.iter().all(|name| !name.ends_with(".tmp")), "{names:?}");
 }

@@ -22,18 +22,23 @@ fn with_column(whole: &[u8], name: &str, change: impl FnOnce(&mut [u8])) -> Vec<
     // CRC-32 of the description with a 0 for it, then each column's name and bytes in the order of names.
     let text = |checksum: u64, description: &serde_json::Map<String, Value>| {
         let config = serde_json::to_string(&description["config"]).unwrap();
-        format!(r#"{{"version":{},"config":{config},"world":{},"checksum":{checksum}}}"#, description["version"], description["world"])
+        format!(
+            r#"{{"version":{},"config":{config},"world":{},"checksum":{checksum}}}"#,
+            description["version"], description["world"]
+        )
     };
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(text(0, &description).as_bytes());
-    let mut names: Vec<String> = header.as_object().unwrap().keys().filter(|name| *name != "__metadata__").cloned().collect();
+    let mut names: Vec<String> =
+        header.as_object().unwrap().keys().filter(|name| *name != "__metadata__").cloned().collect();
     names.sort();
     for name in names {
         hasher.update(name.as_bytes());
         hasher.update(&body[range(&header, &name)]);
     }
     description["checksum"] = hasher.finalize().into();
-    header["__metadata__"]["offtrack-checkpoint"] = text(description["checksum"].as_u64().unwrap(), &description).into();
+    header["__metadata__"]["offtrack-checkpoint"] =
+        text(description["checksum"].as_u64().unwrap(), &description).into();
     let mut header = serde_json::to_vec(&header).unwrap();
     header.resize(header.len().next_multiple_of(8), b' ');
     [&(header.len() as u64).to_le_bytes()[..], &header, &body].concat()
@@ -52,20 +57,32 @@ fn a_checkpoint_with_a_right_checksum_and_wrong_contents_is_refused_by_its_colum
         ("replay buffer, action", &77u32.to_le_bytes(), "`replay buffer, action` has action 77; the table has 0..5"),
         ("replay buffer, reward", &f32::NAN.to_le_bytes(), "`replay buffer, reward` has NaN"),
         ("replay buffer, reward", &1e38f32.to_le_bytes(), "`replay buffer, reward` has 1e38, which no run makes"),
-        ("replay buffer, observation", &1e38f32.to_le_bytes(), "`replay buffer, observation` has 1e38, which no run makes"),
+        (
+            "replay buffer, observation",
+            &1e38f32.to_le_bytes(),
+            "`replay buffer, observation` has 1e38, which no run makes",
+        ),
         ("batch, observation", &f32::NAN.to_le_bytes(), "observation"),
         ("replay buffer, after", &[9], "`replay buffer, after` has an unknown code"),
         ("replay buffer, after", &[2], "`replay buffer, truncated rows` does not list the rows"),
         ("replay buffer, priorities", &f64::NAN.to_le_bytes(), "`replay buffer, priorities` has NaN"),
         ("replay buffer, priorities", &(-1.0f64).to_le_bytes(), "`replay buffer, priorities` has one that is negative"),
-        ("replay buffer, priorities", &0f64.to_le_bytes(), "`replay buffer, priorities` has one where none may be, or lacks one"),
+        (
+            "replay buffer, priorities",
+            &0f64.to_le_bytes(),
+            "`replay buffer, priorities` has one where none may be, or lacks one",
+        ),
         ("rollout, acting", &[0; 32], "`rollout, acting` is all zeros"),
         ("batch, action", &77u32.to_le_bytes(), "action[0]: 77"),
         ("batch, truck", &f32::NAN.to_le_bytes(), "`batch, truck` has NaN"),
         ("batch, reward", &f32::INFINITY.to_le_bytes(), "`batch, reward` has inf"),
     ];
     for (column, value, expected) in cases {
-        std::fs::write(place.file(file), with_column(&whole, column, |bytes| bytes[..value.len()].copy_from_slice(value))).unwrap();
+        std::fs::write(
+            place.file(file),
+            with_column(&whole, column, |bytes| bytes[..value.len()].copy_from_slice(value)),
+        )
+        .unwrap();
         let message = refusal(&resume(&place, "run", &ENDLESS), 2);
         assert!(message.contains(file) && message.contains(expected), "{column}: {message}");
     }
@@ -86,7 +103,11 @@ fn a_checkpoint_that_a_run_fails_by_is_not_called_the_last_good_one() {
     });
     std::fs::write(place.file(file), &damaged).unwrap();
     let message = refusal(&resume(&place, "run", &ENDLESS), 1);
-    assert!(message.contains("training has diverged; it continued from ") && message.contains("so that one may be at fault"), "{message}");
+    assert!(
+        message.contains("training has diverged; it continued from ")
+            && message.contains("so that one may be at fault"),
+        "{message}"
+    );
     assert!(!message.contains("last good"), "{message}");
     assert!(bytes(&place, file) == damaged);
 }

@@ -26,10 +26,16 @@ fn assert_networks_acted(scale: &Value, envs: u64) {
     for run in runs {
         let count = |key: &str| run[key].as_u64().unwrap_or_else(|| panic!("{key}: {run}"));
         assert!(0 < count("steps") && count("env_steps") == envs * count("steps") && count("envs") == envs, "{run}");
-        assert!(0.0 < run["env_steps_per_second"].as_f64().unwrap() && run["stages"].as_object().unwrap().is_empty(), "{run}");
+        assert!(
+            0.0 < run["env_steps_per_second"].as_f64().unwrap() && run["stages"].as_object().unwrap().is_empty(),
+            "{run}"
+        );
     }
     // As the training file says.
-    assert_eq!((&scale["step"]["learning"]["updates_per_step"], &scale["step"]["learning"]["batch"]), (&1.into(), &32.into()));
+    assert_eq!(
+        (&scale["step"]["learning"]["updates_per_step"], &scale["step"]["learning"]["batch"]),
+        (&1.into(), &32.into())
+    );
 }
 
 /// A run that was measured: its counts agree with each other, and its speed lies between its windows.
@@ -47,7 +53,10 @@ fn assert_measured(run: &Value, envs: u64, rays: f64) {
     assert_eq!(speed("bytes_per_truck"), 924.0);
     let stages = run["stages"].as_object().unwrap();
     assert!(stages.len() == STAGES.len() && STAGES.iter().all(|stage| stages.contains_key(stage.name())), "{run}");
-    assert!(stages.values().all(|time| 0.0 <= time.as_f64().unwrap()) && 0.0 < stages["sense"].as_f64().unwrap(), "{run}");
+    assert!(
+        stages.values().all(|time| 0.0 <= time.as_f64().unwrap()) && 0.0 < stages["sense"].as_f64().unwrap(),
+        "{run}"
+    );
 }
 
 #[test]
@@ -55,9 +64,15 @@ fn a_scale_on_the_processor_holds_every_size_and_draws_them_whole() {
     let place = Place::new();
     let scale = scaled(&place, &["--envs", "3,16..70", "--plot", &place.text("scale.svg")]);
     assert_eq!((&scale["engine"], &scale["device"]), (&Value::from("cpu"), &Value::from("cpu")));
-    assert!(["machine", "commit", "date"].iter().all(|key| scale[key].as_str().is_some_and(|text| !text.is_empty())), "{scale}");
+    assert!(
+        ["machine", "commit", "date"].iter().all(|key| scale[key].as_str().is_some_and(|text| !text.is_empty())),
+        "{scale}"
+    );
     let step = &scale["step"];
-    assert_eq!((&step["dt"], &step["substeps"], &step["rays"], &step["values"]), (&0.1.into(), &2.into(), &29.into(), &69.into()));
+    assert_eq!(
+        (&step["dt"], &step["substeps"], &step["rays"], &step["values"]),
+        (&0.1.into(), &2.into(), &29.into(), &69.into())
+    );
     // The fields of five roundabouts take some megabytes each.
     assert!((1 << 20..1 << 27).contains(&scale["world_bytes"].as_u64().unwrap()), "{scale}");
     let runs = scale["runs"].as_array().unwrap();
@@ -67,7 +82,14 @@ fn a_scale_on_the_processor_holds_every_size_and_draws_them_whole() {
     }
     let svg = std::fs::read_to_string(place.file("scale.svg")).unwrap();
     assert!(svg.trim_end().ends_with("</svg>"));
-    for words in ["trucks", "env steps / s", "time a truck and step [ns]", "random actions", "time in proportion to the trucks", "sense"] {
+    for words in [
+        "trucks",
+        "env steps / s",
+        "time a truck and step [ns]",
+        "random actions",
+        "time in proportion to the trucks",
+        "sense",
+    ] {
         assert!(svg.contains(&format!("aria-label=\"{words}\"")), "{words}");
     }
     assert!(svg.contains(scale["machine"].as_str().unwrap()) && svg.contains(scale["commit"].as_str().unwrap()));
@@ -101,7 +123,10 @@ fn networks_act_and_learn_on_the_processor() {
 #[test]
 fn an_adapter_for_a_training_run_on_the_processor_is_refused() {
     let place = Place::new();
-    let said = refusal(&offtrack(&["train", &place.text("tiny.toml"), "--out", &place.text("runs"), "--adapter", "abacus"]), 2);
+    let said = refusal(
+        &offtrack(&["train", &place.text("tiny.toml"), "--out", &place.text("runs"), "--adapter", "abacus"]),
+        2,
+    );
     assert!(said.contains("--adapter: abacus; the training file uses the processor"), "{said}");
 }
 
@@ -109,7 +134,10 @@ fn an_adapter_for_a_training_run_on_the_processor_is_refused() {
 #[test]
 fn a_training_file_for_a_device_is_refused_by_a_program_without_the_feature() {
     let place = Place::new();
-    let said = refusal(&offtrack(&["train", &place.text("tiny.toml"), "--out", &place.text("runs"), "--set", "device=gpu"]), 2);
+    let said = refusal(
+        &offtrack(&["train", &place.text("tiny.toml"), "--out", &place.text("runs"), "--set", "device=gpu"]),
+        2,
+    );
     assert!(said.contains("device: \"gpu\"; this program was built without the feature gpu"), "{said}");
     assert!(!std::path::Path::new(&place.text("runs")).exists());
 }
@@ -140,7 +168,10 @@ mod on_a_device {
         succeed(&output);
         let listed = String::from_utf8(output.stdout).unwrap();
         let lines: Vec<&str> = listed.lines().collect();
-        assert!(["adapter", "interface", "driver", "kind", "largest buffer"].iter().all(|head| lines[0].contains(head)), "{listed}");
+        assert!(
+            ["adapter", "interface", "driver", "kind", "largest buffer"].iter().all(|head| lines[0].contains(head)),
+            "{listed}"
+        );
         assert!(lines[1].starts_with("*  ") && lines[1].contains("MiB"), "{listed}");
         assert!(lines[2..lines.len() - 1].iter().all(|line| line.starts_with("   ")), "{listed}");
         let place = Place::new();
@@ -173,9 +204,19 @@ mod on_a_device {
         for arguments in [&["devices"][..], &["scale", "--device", "gpu"], &["evaluate", "--device", "gpu"]] {
             let mut command = program();
             // The second name is that of older loaders.
-            let output = command.args(arguments).env("VK_DRIVER_FILES", "/no.json").env("VK_ICD_FILENAMES", "/no.json").output().unwrap();
+            let output = command
+                .args(arguments)
+                .env("VK_DRIVER_FILES", "/no.json")
+                .env("VK_ICD_FILENAMES", "/no.json")
+                .output()
+                .unwrap();
             let said = refusal(&output, 1);
-            assert!(["no adapter", "VULKAN", "driver", "mesa-vulkan-drivers", "CPU"].iter().all(|words| said.contains(words)), "{said}");
+            assert!(
+                ["no adapter", "VULKAN", "driver", "mesa-vulkan-drivers", "CPU"]
+                    .iter()
+                    .all(|words| said.contains(words)),
+                "{said}"
+            );
         }
     }
 
@@ -207,7 +248,16 @@ mod on_a_device {
         let place = Place::new();
         // In the second one networks observe extras.
         for benchmark in ["attard2023", "laden2026"] {
-            let arguments = ["--device", "gpu", "--envs", "16", "--mode", &NETWORKS.join(","), "--config", &place.text("tiny.toml")];
+            let arguments = [
+                "--device",
+                "gpu",
+                "--envs",
+                "16",
+                "--mode",
+                &NETWORKS.join(","),
+                "--config",
+                &place.text("tiny.toml"),
+            ];
             assert_networks_acted(&scaled(&place, &[&["--benchmark", benchmark], &arguments[..]].concat()), 16);
         }
     }
@@ -220,8 +270,9 @@ mod on_a_device {
             succeed(&offtrack(&[&fixed, arguments].concat()));
             let report = place.json("report.json");
             let routes = report["routes"].as_array().unwrap().iter();
-            let arrived: Vec<(String, u64)> =
-                routes.map(|route| (route["name"].as_str().unwrap().to_owned(), route["arrived"].as_u64().unwrap())).collect();
+            let arrived: Vec<(String, u64)> = routes
+                .map(|route| (route["name"].as_str().unwrap().to_owned(), route["arrived"].as_u64().unwrap()))
+                .collect();
             (report["engine"].as_str().unwrap().to_owned(), arrived)
         };
         let (processor, device) = (arrived(&[]), arrived(&["--device", "gpu"]));

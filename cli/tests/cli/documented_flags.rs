@@ -65,7 +65,9 @@ fn faults(command: &str, section: &str, help: &str) -> Vec<String> {
         }
     }
     let known = |name: &&str| flags.iter().any(|flag| flag.long == **name) || OF_ALL.contains(name);
-    faults.extend(named.iter().filter(|name| !known(name)).map(|name| format!("{command}: has no flag {name}: take it out")));
+    faults.extend(
+        named.iter().filter(|name| !known(name)).map(|name| format!("{command}: has no flag {name}: take it out")),
+    );
     let rows = section.lines().filter_map(|line| line.strip_prefix("| `--"));
     let rows = rows.map(|row| row.split('|').map(str::trim).collect::<Vec<_>>());
     // Rows without a default have a cell less.

@@ -19,11 +19,16 @@ fn the_polygons_follow_the_kerbs_within_a_centimetre_both_ways() {
         let kerbs = roundabout().kerbs(gutter);
         let drivable = polygons(&written["drivable"]);
         assert!(furthest(&drivable, &kerbs) < 0.01);
-        let beside = |p: DVec2| drivable.iter().flat_map(sides).map(|(a, b)| to_segment(p, a, b)).fold(f64::INFINITY, f64::min);
-        let along = kerbs.loops.iter().flat_map(|curve| (0..1000).map(move |n| curve.point_at(curve.length() * f64::from(n) / 1000.0)));
+        let beside =
+            |p: DVec2| drivable.iter().flat_map(sides).map(|(a, b)| to_segment(p, a, b)).fold(f64::INFINITY, f64::min);
+        let along = kerbs
+            .loops
+            .iter()
+            .flat_map(|curve| (0..1000).map(move |n| curve.point_at(curve.length() * f64::from(n) / 1000.0)));
         assert!(along.map(beside).fold(0.0, f64::max) < 0.01);
         // The comparison can fail: without every other corner the polygons leave the kerbs.
-        let coarse: Vec<Polygon> = drivable.iter().map(|polygon| polygon.iter().step_by(2).copied().collect()).collect();
+        let coarse: Vec<Polygon> =
+            drivable.iter().map(|polygon| polygon.iter().step_by(2).copied().collect()).collect();
         assert!(0.01 < furthest(&coarse, &kerbs));
     }
 }
@@ -34,7 +39,8 @@ fn a_point_is_in_a_solid_exactly_where_it_is_not_in_the_drivable_polygons() {
     let (solids, drivable) = (polygons(&written["solids"]), polygons(&written["drivable"]));
     let kerbs = roundabout().kerbs(Gutter::Drivable);
     let mut seen = [0, 0];
-    for (x, y) in (-43..43).flat_map(|x| (-43..43).map(move |y| (2.0 * f64::from(x) + 0.37, 2.0 * f64::from(y) + 0.61))) {
+    for (x, y) in (-43..43).flat_map(|x| (-43..43).map(move |y| (2.0 * f64::from(x) + 0.37, 2.0 * f64::from(y) + 0.61)))
+    {
         let p = DVec2::new(x, y);
         // Chords and kerbs differ by up to a centimetre.
         if kerbs.distance(p) < 0.01 {
@@ -128,7 +134,10 @@ fn a_turn_that_the_truck_cannot_steer_is_not_said_to_fit() {
     assert!(said.starts_with("16m/N-left-3: the lock does not suffice for its own lane\n"), "{said}");
     // At a crawl on the inner lane of 10.2 m the angle nears asin(5.94 / 10.2) = 35.6 deg; the ring ends before.
     assert!(said.contains("Too much for the truck: steer angle 34.8") && said.contains(" of 28.4 deg"), "{said}");
-    assert_eq!((&sweep["own_lane_suffices"], &sweep["limits"][0]["limit"]), (&Value::from(false), &Value::from("lock")));
+    assert_eq!(
+        (&sweep["own_lane_suffices"], &sweep["limits"][0]["limit"]),
+        (&Value::from(false), &Value::from("lock"))
+    );
     assert_eq!(sweep["limits"][0]["exceeded"], true);
     let [from, to] = [0, 1].map(|end| sweep["limits"][0]["stretches"][0][end].as_f64().expect("a station"));
     let at = |row: &&Value| row[0].as_f64().is_some_and(|station| from <= station && station <= to);
@@ -137,7 +146,10 @@ fn a_turn_that_the_truck_cannot_steer_is_not_said_to_fit() {
     assert!(10 < beyond.len() && beyond.iter().all(|row| 28.4 < row[1].as_f64().expect("an angle").abs()));
     // With its own lock the study's truck can, and the picture says neither.
     let (said, sweep) = swept(&place("16m"), &["--route", "W-right-2", "--speed-kmh", "5"]);
-    assert!(said.starts_with("16m/W-right-2: its own lane suffices\n") && said.contains("Within the truck's limits: "), "{said}");
+    assert!(
+        said.starts_with("16m/W-right-2: its own lane suffices\n") && said.contains("Within the truck's limits: "),
+        "{said}"
+    );
     assert_eq!(sweep["own_lane_suffices"], true);
 }
 
@@ -146,19 +158,32 @@ fn a_stiff_truck_at_90_kmh_around_a_small_island_exceeds_every_limit_in_title_wo
     let folder = tempfile::tempdir().expect("a folder");
     let vehicle = folder.path().join("stiff.toml");
     let repository: PathBuf = [env!("CARGO_MANIFEST_DIR"), ".."].iter().collect();
-    let own = std::fs::read_to_string(repository.join("scenarios/vehicles/eu_4x2_13m6.toml")).expect("the repository's file");
+    let own =
+        std::fs::read_to_string(repository.join("scenarios/vehicles/eu_4x2_13m6.toml")).expect("the repository's file");
     assert!(own.contains("steer_max_deg = 40.0"));
     std::fs::write(&vehicle, own.replace("steer_max_deg = 40.0", "steer_max_deg = 5.0")).expect("written");
     let arguments = ["--route", "W-right-2", "--speed-kmh", "90", "--vehicle", text(&vehicle)];
     let (said, sweep) = swept(&place("16m"), &arguments);
-    assert!(said.contains("the lock does not suffice for its own lane") && !said.contains("within its limits"), "{said}");
+    assert!(
+        said.contains("the lock does not suffice for its own lane") && !said.contains("within its limits"),
+        "{said}"
+    );
     let limits = sweep["limits"].as_array().expect("a list");
     assert_eq!(limits.len(), 4);
-    assert!(limits.iter().all(|limit| limit["exceeded"] == true && limit["has"].as_f64() < limit["needs"].as_f64()), "{limits:?}");
+    assert!(
+        limits.iter().all(|limit| limit["exceeded"] == true && limit["has"].as_f64() < limit["needs"].as_f64()),
+        "{limits:?}"
+    );
     let svg = folder.path().join("a.svg");
     succeed(&[&[place("16m").as_str(), "-o", text(&svg)], &arguments[..]].concat());
     let drawn = std::fs::read_to_string(svg).expect("written");
-    for words in ["the lock does not suffice for its own lane", "beyond the lock", "beyond the steer rate", "grip", "wheels lift"] {
+    for words in [
+        "the lock does not suffice for its own lane",
+        "beyond the lock",
+        "beyond the steer rate",
+        "grip",
+        "wheels lift",
+    ] {
         assert!(drawn.contains(words), "{words}");
     }
 }
@@ -182,20 +207,36 @@ fn wrong_input_is_refused_with_exit_code_2_and_says_what_would_do() {
     refuse(&[&place, "-o", text(&png), "--size", "199"], 2, "--size: 199; must lie in 200..8000 pixels");
     refuse(&[&place, "-o", svg, "--size", "400"], 2, "--size: 400; is for .png");
     refuse(&[&place, "-o", svg, "--route", "N-left-9"], 2, "--route: N-left-9; the roundabout has E-left-2, E-left-3,");
-    refuse(&[&place, "-o", svg, "--route", "N-left-3", "--load", "bricks"], 2, "--load: bricks; the vehicle has empty,");
+    refuse(
+        &[&place, "-o", svg, "--route", "N-left-3", "--load", "bricks"],
+        2,
+        "--load: bricks; the vehicle has empty,",
+    );
     refuse(
         &[&place, "-o", svg, "--route", "N-left-3", "--vehicle", "bus"],
         2,
         "vehicle: bus; must be a path ending in .toml or one of daf_xf, ",
     );
     refuse(&[&place, "-o", svg, "--load", "laden"], 2, "--route <ROUTE>");
-    refuse(&[&place, "-o", svg, "--route", "N-left-3", "--speed-kmh", "0"], 2, "--speed-kmh: 0 km/h; must lie in 1..90 km/h");
-    refuse(&[&place, "-o", svg, "--route", "N-left-3", "--speed-kmh", "1e308"], 2, "--speed-kmh: 1e308 km/h; must lie in 1..90 km/h");
+    refuse(
+        &[&place, "-o", svg, "--route", "N-left-3", "--speed-kmh", "0"],
+        2,
+        "--speed-kmh: 0 km/h; must lie in 1..90 km/h",
+    );
+    refuse(
+        &[&place, "-o", svg, "--route", "N-left-3", "--speed-kmh", "1e308"],
+        2,
+        "--speed-kmh: 1e308 km/h; must lie in 1..90 km/h",
+    );
     refuse(&[&place, "-o", svg, "--approach", "1e308"], 2, "--approach: 1e308 m; must lie in 5..500 m");
     refuse(&[&place, "-o", svg, "--approach", "400"], 2, "--approach: 400 m; approach of 400 m leaves arm");
     refuse(&["21m", "-o", svg], 2, "roundabout: 21m; must be a path ending in .toml or one of 16m, ");
     refuse(&["nowhere.toml", "-o", svg], 2, "nowhere.toml: cannot be read");
-    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0, "a refused picture leaves nothing behind");
+    assert_eq!(
+        std::fs::read_dir(folder.path()).expect("a folder").count(),
+        0,
+        "a refused picture leaves nothing behind"
+    );
 }
 
 #[test]
@@ -223,7 +264,8 @@ fn to_segment(p: DVec2, a: DVec2, b: DVec2) -> f64 {
 }
 
 fn contains(polygon: &Polygon, p: DVec2) -> bool {
-    let crossed = |&(a, b): &(DVec2, DVec2)| (a.y <= p.y) != (b.y <= p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
+    let crossed =
+        |&(a, b): &(DVec2, DVec2)| (a.y <= p.y) != (b.y <= p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
     sides(polygon).filter(crossed).count() % 2 == 1
 }
 

@@ -21,19 +21,29 @@ fn every_episode_is_counted_once_by_its_end_and_once_by_its_route() {
             (&Value::from("short"), &Value::from("test"), &Value::from(policy), &Value::from(0))
         );
         assert_eq!((report["engine"].as_str(), report["device"].as_str()), (Some("cpu"), Some("cpu")));
-        assert!(["machine", "commit"].iter().all(|key| report[key].as_str().is_some_and(|text| !text.is_empty())), "{report}");
+        assert!(
+            ["machine", "commit"].iter().all(|key| report[key].as_str().is_some_and(|text| !text.is_empty())),
+            "{report}"
+        );
         let count = |value: &Value| value.as_u64().unwrap();
         let ends = |value: &Value| value["ends"].as_object().unwrap().values().map(count).sum::<u64>();
         let routes = report["routes"].as_array().unwrap();
         assert_eq!((routes.len(), count(&report["episodes"]), ends(&report)), (2, 6, 6));
         for route in routes {
             assert_eq!((count(&route["episodes"]), ends(route), &route["ends"]["arrived"]), (3, 3, &route["arrived"]));
-            assert!(route["name"].is_string() && route["own_lane_suffices"].is_boolean() && route["lane_distance_mean"].is_f64());
+            assert!(
+                route["name"].is_string()
+                    && route["own_lane_suffices"].is_boolean()
+                    && route["lane_distance_mean"].is_f64()
+            );
         }
         let arrived: u64 = routes.iter().map(|route| count(&route["arrived"])).sum();
         assert_eq!(arrived, count(&report["arrived"]));
         let [low, success, high] = ["success_low", "success", "success_high"].map(|key| report[key].as_f64().unwrap());
-        assert!(low <= success && success <= high && (success - arrived as f64 / 6.0).abs() < 1e-9, "{low} {success} {high}");
+        assert!(
+            low <= success && success <= high && (success - arrived as f64 / 6.0).abs() < 1e-9,
+            "{low} {success} {high}"
+        );
     }
 }
 
@@ -42,11 +52,27 @@ fn a_lane_that_the_lock_does_not_allow_is_not_said_to_suffice() {
     let place = Place::new();
     let own = |lock: &str| {
         let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
-        let benchmark = benchmark.replace("20m.toml", "40m.toml").replace("\"E-right-1\", \"W-left-3\"", "\"SW-left-1\"");
+        let benchmark =
+            benchmark.replace("20m.toml", "40m.toml").replace("\"E-right-1\", \"W-left-3\"", "\"SW-left-1\"");
         std::fs::write(place.file("locked.toml"), format!("steer_max_deg = {lock}\n{benchmark}")).unwrap();
         let (benchmark, report) = (place.text("locked.toml"), place.text("report.json"));
-        succeed(&offtrack(&["evaluate", "--benchmark", &benchmark, "--policy", "random", "--episodes", "1", "--json", &report]));
-        place.json("report.json")["routes"].as_array().unwrap().iter().filter(|route| route["own_lane_suffices"] == true).count()
+        succeed(&offtrack(&[
+            "evaluate",
+            "--benchmark",
+            &benchmark,
+            "--policy",
+            "random",
+            "--episodes",
+            "1",
+            "--json",
+            &report,
+        ]));
+        place.json("report.json")["routes"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|route| route["own_lane_suffices"] == true)
+            .count()
     };
     // The path needs 8.4 deg.
     assert_eq!([own("40.0"), own("9.0"), own("5.0")], [1, 1, 0]);
@@ -55,12 +81,21 @@ fn a_lane_that_the_lock_does_not_allow_is_not_said_to_suffice() {
 #[test]
 fn a_benchmark_slower_than_3_6_kmh_is_evaluated_with_either_clock() {
     let place = Place::new();
-    let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap().replace("speeds_kmh = [30.0]", "speeds_kmh = [3.5]");
+    let benchmark =
+        std::fs::read_to_string(place.file("short.toml")).unwrap().replace("speeds_kmh = [30.0]", "speeds_kmh = [3.5]");
     assert!(benchmark.contains("[3.5]"));
     for clock in ["highest_speed", "feasible"] {
         let ending = format!("ending = {{ time_limit = 1.5, clock = \"{clock}\" }}\n");
         std::fs::write(place.file("slow.toml"), format!("{ending}{benchmark}")).unwrap();
-        succeed(&offtrack(&["evaluate", "--benchmark", &place.text("slow.toml"), "--policy", "pursuit", "--episodes", "1"]));
+        succeed(&offtrack(&[
+            "evaluate",
+            "--benchmark",
+            &place.text("slow.toml"),
+            "--policy",
+            "pursuit",
+            "--episodes",
+            "1",
+        ]));
     }
 }
 
@@ -68,8 +103,10 @@ fn a_benchmark_slower_than_3_6_kmh_is_evaluated_with_either_clock() {
 fn an_empty_split_is_named_with_its_file_and_those_that_have_routes() {
     let place = Place::new();
     let message = refusal(&place.evaluate(&["--policy", "pursuit", "--split", "validation"]), 2);
-    let expected =
-        format!("--split: validation; {} has routes under train, test alone; list some under `validation`", place.text("short.toml"));
+    let expected = format!(
+        "--split: validation; {} has routes under train, test alone; list some under `validation`",
+        place.text("short.toml")
+    );
     assert!(message.contains(&expected), "{message}");
 }
 
@@ -77,11 +114,24 @@ fn an_empty_split_is_named_with_its_file_and_those_that_have_routes() {
 fn equal_seeds_give_equal_reports_and_another_seed_gives_another() {
     let place = Place::new();
     let report = |seed: &str| {
-        succeed(&place.evaluate(&["--policy", "random", "--episodes", "2", "--seed", seed, "--json", &place.text("report.json")]));
+        succeed(&place.evaluate(&[
+            "--policy",
+            "random",
+            "--episodes",
+            "2",
+            "--seed",
+            seed,
+            "--json",
+            &place.text("report.json"),
+        ]));
         std::fs::read_to_string(place.file("report.json")).unwrap()
     };
     assert_eq!(report("4"), report("4"));
-    assert_ne!(report("4").replace("\"seed\": 4", ""), report("5").replace("\"seed\": 5", ""), "not only the line of the seed differs");
+    assert_ne!(
+        report("4").replace("\"seed\": 4", ""),
+        report("5").replace("\"seed\": 5", ""),
+        "not only the line of the seed differs"
+    );
 }
 
 #[test]
@@ -106,8 +156,13 @@ fn starts_where_the_policy_failed_are_searched_and_told_apart() {
     let causes = report["failures"].as_array().unwrap();
     assert_eq!(causes.iter().map(|cause| count(&cause["episodes"])).sum::<u64>(), 4);
     assert!(causes.iter().all(|cause| cause["possible"] == cause["episodes"]), "{causes:?}");
-    assert!(printed.lines().any(|line| line.starts_with("possible ")) && printed.contains("Not arrived, by cause: "), "{printed}");
-    assert!(refusal(&place.evaluate(&["--certify", "--widths", "0"]), 2).contains("--widths: 0; must lie in 1..262144"));
+    assert!(
+        printed.lines().any(|line| line.starts_with("possible ")) && printed.contains("Not arrived, by cause: "),
+        "{printed}"
+    );
+    assert!(
+        refusal(&place.evaluate(&["--certify", "--widths", "0"]), 2).contains("--widths: 0; must lie in 1..262144")
+    );
     refusal(&place.evaluate(&["--widths", "16"]), 2);
 }
 
@@ -131,11 +186,13 @@ fn a_film_of_each_cause_shows_the_episode_that_its_example_names() {
         assert_eq!(recording["ended"], example["ended"]);
         assert_eq!(frames.len() as u64, example["steps"].as_u64().unwrap() + 1);
         for axis in 0..2 {
-            let [film, named] = [&frames[frames.len() - 1], example].map(|state| state["position"][axis].as_f64().unwrap());
+            let [film, named] =
+                [&frames[frames.len() - 1], example].map(|state| state["position"][axis].as_f64().unwrap());
             assert!((film - named).abs() < 1e-3, "a recording is rounded to 1 mm: {film} {named}");
         }
         let name = format!("{}-{}.gif", n + 1, cause["cause"].as_str().unwrap().replace(' ', "-"));
-        let mut film = gif::DecodeOptions::new().read_info(std::fs::File::open(place.file("films").join(name)).unwrap()).unwrap();
+        let mut film =
+            gif::DecodeOptions::new().read_info(std::fs::File::open(place.file("films").join(name)).unwrap()).unwrap();
         let mut pages = 0;
         while film.read_next_frame().unwrap().is_some() {
             pages += 1;
@@ -263,12 +320,15 @@ fn the_shipped_policy_near_its_lane_keeps_half_the_distance_and_arrives() {
 #[test]
 fn the_shipped_policy_and_benchmark_are_found_wherever_the_program_runs_and_by_name() {
     let elsewhere = tempfile::tempdir().unwrap();
-    for arguments in [&["evaluate", "--episodes", "1"][..], &["evaluate", "--episodes", "1", "--policy", "attard2023"]] {
+    for arguments in [&["evaluate", "--episodes", "1"][..], &["evaluate", "--episodes", "1", "--policy", "attard2023"]]
+    {
         let output = program().current_dir(elsewhere.path()).args(arguments).output().unwrap();
         succeed(&output);
         let printed = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(
-            printed.starts_with("policy attard2023 (shipped); benchmark attard2023, test routes; 1 episode a route, seed 0\n"),
+            printed.starts_with(
+                "policy attard2023 (shipped); benchmark attard2023, test routes; 1 episode a route, seed 0\n"
+            ),
             "{printed}"
         );
     }
@@ -287,8 +347,14 @@ fn a_benchmark_without_a_policy_of_its_own_is_driven_by_a_shipped_one_that_can_a
     for (benchmark, policy) in [("attard2023-full", "attard2023"), ("attard2023-maps-as-run", "attard2023-as-run")] {
         let output = offtrack(&["evaluate", "--benchmark", benchmark, "--episodes", "1"]);
         let said = refusal(&output, 0);
-        assert!(said.contains(&format!("no policy comes with the program for {benchmark}; {policy} (shipped) drives")), "{said}");
-        assert!(String::from_utf8_lossy(&output.stdout).starts_with(&format!("policy {policy} (shipped); benchmark {benchmark}")));
+        assert!(
+            said.contains(&format!("no policy comes with the program for {benchmark}; {policy} (shipped) drives")),
+            "{said}"
+        );
+        assert!(
+            String::from_utf8_lossy(&output.stdout)
+                .starts_with(&format!("policy {policy} (shipped); benchmark {benchmark}"))
+        );
     }
     // None has these actions.
     let said = refusal(&Place::new().evaluate(&["--episodes", "1"]), 2);
@@ -310,7 +376,15 @@ fn the_table_fits_the_terminal() {
     let place = Place::new();
     for (columns, limit) in [(None, 100), (Some("60"), 60), (Some("120"), 120)] {
         let mut evaluation = program();
-        evaluation.args(["evaluate", "--benchmark", &place.text("short.toml"), "--policy", "random", "--episodes", "30"]);
+        evaluation.args([
+            "evaluate",
+            "--benchmark",
+            &place.text("short.toml"),
+            "--policy",
+            "random",
+            "--episodes",
+            "30",
+        ]);
         match columns {
             Some(columns) => evaluation.env("COLUMNS", columns),
             None => evaluation.env_remove("COLUMNS"),
@@ -331,7 +405,8 @@ fn the_curves_of_another_policys_run_are_refused_and_those_of_a_copys_are_shown(
         succeed(&place.train(&["--name", run, "--seed", seed, "--steps", "800"]));
     }
     let (page, run) = (place.text("page.html"), place.text("runs/one"));
-    let evaluated = |policy: &str| place.evaluate(&["--policy", policy, "--episodes", "1", "--html", &page, "--run", &run]);
+    let evaluated =
+        |policy: &str| place.evaluate(&["--policy", policy, "--episodes", "1", "--html", &page, "--run", &run]);
     for other in [place.text("runs/two/policy.safetensors"), "pursuit".to_owned(), "random".to_owned()] {
         let said = refusal(&evaluated(&other), 2);
         assert!(said.contains(&format!("--run: {run}; another policy is evaluated: give the run's own")), "{said}");

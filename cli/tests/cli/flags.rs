@@ -9,9 +9,12 @@ fn a_flag_without_effect_is_refused() {
         let said = refusal(&offtrack(&["evaluate", "--policy", policy, "--episodes", "1", "--look-ahead", "9"]), 2);
         assert!(said.contains("--look-ahead: 9 m; is for pure pursuit: give --policy pursuit"), "{said}");
     }
-    let said = refusal(&offtrack(&["scale", "--envs", "8", "--seconds", "0.1", "--config", &place.text("tiny.toml")]), 2);
+    let said =
+        refusal(&offtrack(&["scale", "--envs", "8", "--seconds", "0.1", "--config", &place.text("tiny.toml")]), 2);
     assert!(said.contains("tiny.toml; is for --mode training"), "{said}");
-    for both in [&["--list", "--check"][..], &["--junctions", "-o", "a.outline.toml"], &["--check", "-o", "a.outline.toml"]] {
+    for both in
+        [&["--list", "--check"][..], &["--junctions", "-o", "a.outline.toml"], &["--check", "-o", "a.outline.toml"]]
+    {
         let said = refusal(&offtrack(&[&["import", "scenarios/maps/sumo_ring22.xodr"], both].concat()), 2);
         assert!(said.contains("cannot be used with"), "{said}");
     }
@@ -36,7 +39,10 @@ fn a_file_to_be_written_that_is_another_of_the_commands_files_is_refused_before_
         assert!(said.contains(expected), "{said}");
         assert!(!place.file("report").exists() && std::fs::read(&policy).unwrap() == before);
     }
-    let said = refusal(&offtrack(&["scale", "--envs", "8", "--json", &place.text("a.svg"), "--plot", &place.text("a.svg")]), 2);
+    let said = refusal(
+        &offtrack(&["scale", "--envs", "8", "--json", &place.text("a.svg"), "--plot", &place.text("a.svg")]),
+        2,
+    );
     assert!(said.contains("--plot: ") && said.contains("is the file of --json too"), "{said}");
     let vectors = place.text("vectors.json");
     std::fs::copy(repository().join("tests/data/physics_vectors.json"), &vectors).unwrap();

@@ -11,14 +11,20 @@ use crate::place::{Place, offtrack, program, refusal, succeed};
 /// The program with an empty cache, that of the place.
 fn cached(place: &Place, arguments: &[&str]) -> Output {
     let mut command = program();
-    command.current_dir(crate::place::repository()).env("OFFTRACK_CACHE", place.file("cache")).args(arguments).output().unwrap()
+    command
+        .current_dir(crate::place::repository())
+        .env("OFFTRACK_CACHE", place.file("cache"))
+        .args(arguments)
+        .output()
+        .unwrap()
 }
 
 #[test]
 fn generated_files_are_the_roads_of_the_library_and_a_second_run_writes_the_same_bytes() {
     let place = Place::new();
     let run = |folder: &str| {
-        let output = cached(&place, &["generate", "--seed", "7", "--first", "10", "--count", "3", "-o", &place.text(folder)]);
+        let output =
+            cached(&place, &["generate", "--seed", "7", "--first", "10", "--count", "3", "-o", &place.text(folder)]);
         succeed(&output);
         String::from_utf8(output.stdout).unwrap()
     };
@@ -33,7 +39,9 @@ fn generated_files_are_the_roads_of_the_library_and_a_second_run_writes_the_same
         let text = std::fs::read_to_string(&path).unwrap();
         let attempt = road.attempt;
         assert!(
-            text.starts_with(&format!("# A random roundabout: distribution wide, seed 7, index {index}, attempt {attempt}.\n")),
+            text.starts_with(&format!(
+                "# A random roundabout: distribution wide, seed 7, index {index}, attempt {attempt}.\n"
+            )),
             "{text}"
         );
         assert!(text.ends_with(&road.text()));
@@ -41,14 +49,19 @@ fn generated_files_are_the_roads_of_the_library_and_a_second_run_writes_the_same
         assert_eq!(read.name, format!("wide-7-{index}"));
         assert_eq!(format!("{:?}", read.lanes()), format!("{:?}", road.roundabout.lanes()));
     }
-    let counted: u32 = said.lines().filter_map(|line| line.split_once(" %  ")?.0.split_whitespace().next()?.parse::<u32>().ok()).sum();
+    let counted: u32 =
+        said.lines().filter_map(|line| line.split_once(" %  ")?.0.split_whitespace().next()?.parse::<u32>().ok()).sum();
     assert_eq!(counted, refused, "{said}");
     let sheet = std::fs::read_to_string(place.file("a/contact-sheet.svg")).unwrap();
     assert!(sheet.contains("3 random roads: distribution wide, seed 7") && sheet.contains("wide/7/12"));
     assert!(std::fs::read(place.file("a/contact-sheet.png")).unwrap().starts_with(b"\x89PNG"));
     assert_eq!(run("b").replace("/b", "/a"), said);
     for file in ["wide-7-11.toml", "contact-sheet.svg", "contact-sheet.png"] {
-        assert_eq!(std::fs::read(place.file("a").join(file)).unwrap(), std::fs::read(place.file("b").join(file)).unwrap(), "{file}");
+        assert_eq!(
+            std::fs::read(place.file("a").join(file)).unwrap(),
+            std::fs::read(place.file("b").join(file)).unwrap(),
+            "{file}"
+        );
     }
 }
 
@@ -65,7 +78,8 @@ fn files_that_exist_are_not_written_over_unless_asked() {
     std::fs::remove_file(Path::new(&folder).join("wide-0-0.toml")).unwrap();
     let said = refusal(&run(&[]), 2);
     assert!(
-        said.contains("--output: ") && said.contains("wide-0-1.toml; exists and holds something else; another folder would do"),
+        said.contains("--output: ")
+            && said.contains("wide-0-1.toml; exists and holds something else; another folder would do"),
         "{said}"
     );
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
@@ -122,8 +136,14 @@ fn wrong_flags_are_refused_with_what_would_do() {
             vec!["evaluate", "--route", "wide/7/12/N-left-9"],
             "--route: wide/7/12/N-left-9; of wide/7/12 the benchmark attard2023 has wide/7/12/",
         ),
-        (vec!["evaluate", "--route", "16m/N-left-3"], "--route: 16m/N-left-3; is not in the split asked for: give --split train"),
-        (vec!["evaluate", "--route", "nowhere"], "--route: nowhere; a route of the benchmark attard2023 is needed, such as"),
+        (
+            vec!["evaluate", "--route", "16m/N-left-3"],
+            "--route: 16m/N-left-3; is not in the split asked for: give --split train",
+        ),
+        (
+            vec!["evaluate", "--route", "nowhere"],
+            "--route: nowhere; a route of the benchmark attard2023 is needed, such as",
+        ),
         (vec!["record", "--route", "wide/7/12/N-left-9", "-o", "x.json"], "--route: wide/7/12/N-left-9; of wide/7/12"),
     ] {
         let said = refusal(&offtrack(&arguments), 2);
@@ -148,12 +168,16 @@ fn a_random_road_is_drawn_evaluated_recorded_and_certified_by_name() {
     assert_eq!(whole["routes"].as_array().unwrap().len(), routes.len());
     assert_eq!(whole["split"], "test");
     let some = evaluate(&["--route", name, "--route", "20m/E-left-2", "--route", "wide/7/13"]);
-    let names: Vec<&str> = some["routes"].as_array().unwrap().iter().map(|route| route["name"].as_str().unwrap()).collect();
+    let names: Vec<&str> =
+        some["routes"].as_array().unwrap().iter().map(|route| route["name"].as_str().unwrap()).collect();
     assert!(
-        names[..2] == ["20m/E-left-2", name] && names[2..].iter().all(|name| name.starts_with("wide/7/13/")) && 10 < names.len(),
+        names[..2] == ["20m/E-left-2", name]
+            && names[2..].iter().all(|name| name.starts_with("wide/7/13/"))
+            && 10 < names.len(),
         "{names:?}"
     );
-    let record = ["record", "--policy", "pursuit", "--episodes", "2", "--route", name, "-o", &place.text("episode.json")];
+    let record =
+        ["record", "--policy", "pursuit", "--episodes", "2", "--route", name, "-o", &place.text("episode.json")];
     succeed(&offtrack(&record));
     assert_eq!(place.json("episode.json")["route"], name.as_str());
     let easy = routes.iter().find(|route| route.name.ends_with("left-2")).unwrap_or(&routes[0]);

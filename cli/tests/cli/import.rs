@@ -41,15 +41,21 @@ fn a_map_without_a_roundabout_is_wrong_input() {
     assert!(error.contains("no roundabout here: 1 roads around 1 islands and blocks"), "{error}");
     assert!(text.contains("1 other islands and blocks are none"), "{text}");
     assert_eq!(offtrack(&["import", "missing.xodr", "--list"]).status.code(), Some(2));
-    assert_eq!(offtrack(&["import", map("sumo_ring22.xodr").to_str().unwrap(), "-o", "ring.toml"]).status.code(), Some(2));
+    assert_eq!(
+        offtrack(&["import", map("sumo_ring22.xodr").to_str().unwrap(), "-o", "ring.toml"]).status.code(),
+        Some(2)
+    );
 }
 
 #[test]
 fn a_map_whose_rings_cannot_be_driven_is_wrong_input() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("ring.xodr");
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/maps/plain_ring.xodr")).unwrap();
-    let arms = |line: &str| if line.contains("length=\"70\"") { line.replace("driving", "shared") } else { line.to_owned() };
+    let text =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/maps/plain_ring.xodr"))
+            .unwrap();
+    let arms =
+        |line: &str| if line.contains("length=\"70\"") { line.replace("driving", "shared") } else { line.to_owned() };
     std::fs::write(&file, text.lines().map(arms).collect::<Vec<_>>().join("\n")).unwrap();
     let listed = offtrack(&["import", file.to_str().unwrap(), "--list"]);
     let (text, error) = (String::from_utf8(listed.stdout).unwrap(), String::from_utf8(listed.stderr).unwrap());

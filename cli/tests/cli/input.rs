@@ -166,8 +166,10 @@ fn names_in_files_and_arguments_do_nothing_to_a_terminal_and_are_not_repeated_wh
     std::fs::write(place.file("table.toml"), "vehicle = \"daf_xf\"\nload = \"\\u001b[2J\\u202e\\nforged\"\n").unwrap();
     std::fs::write(place.file("key.toml"), "\"\\u001b[2J\\u202e\\nforged\" = 1\n").unwrap();
     std::fs::write(place.file("text.json"), format!("{{\"{ODD}\": 1}}")).unwrap();
-    std::fs::write(place.file("cases.json"), serde_json::json!({"cases": [{"id": ODD, "kind": ODD}]}).to_string()).unwrap();
-    let [tiny, tables, text, cases, svg] = ["tiny.toml", "table.toml", "text.json", "cases.json", "x.svg"].map(|name| place.text(name));
+    std::fs::write(place.file("cases.json"), serde_json::json!({"cases": [{"id": ODD, "kind": ODD}]}).to_string())
+        .unwrap();
+    let [tiny, tables, text, cases, svg] =
+        ["tiny.toml", "table.toml", "text.json", "cases.json", "x.svg"].map(|name| place.text(name));
     let mut n_commands = 0;
     for file in [ODD, &long, &place.text("escape.toml"), &tables, &place.text("key.toml"), &text, &cases] {
         let set = format!("{file}=1");
@@ -263,5 +265,10 @@ fn the_help_says_what_happens_without_a_command_and_lists_the_exit_codes() {
     assert!(help.contains("Without a command `offtrack` trains"), "{help}");
     assert!(["  0 ", "  1 ", "  2 ", "  130 "].iter().all(|code| help.contains(code)), "{help}");
     let help = printed(&["evaluate", "--help"]);
-    assert!(["lane: own", "off-track: largest", "LTR: largest load transfer ratio"].iter().all(|words| help.contains(words)), "{help}");
+    assert!(
+        ["lane: own", "off-track: largest", "LTR: largest load transfer ratio"]
+            .iter()
+            .all(|words| help.contains(words)),
+        "{help}"
+    );
 }

@@ -8,7 +8,12 @@ use crate::place::{Place, program, succeed};
 
 /// A run far too long to end by itself, once it writes figures.
 fn begun(place: &Place) -> Child {
-    let run = place.training(&["--name", "run", "--steps", "1000000000"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let run = place
+        .training(&["--name", "run", "--steps", "1000000000"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
     while !place.file("runs/run/metrics.csv").is_file() {
         std::thread::sleep(Duration::from_millis(10));
     }
@@ -23,7 +28,8 @@ fn ended(run: Child, signal: &str) -> Output {
 /// Every row that ends with a line break has as many columns as the first.
 fn assert_whole_rows(place: &Place) {
     let metrics = std::fs::read_to_string(place.file("runs/run/metrics.csv")).unwrap();
-    let rows: Vec<usize> = metrics.split_inclusive('\n').filter(|row| row.ends_with('\n')).map(|row| row.split(',').count()).collect();
+    let rows: Vec<usize> =
+        metrics.split_inclusive('\n').filter(|row| row.ends_with('\n')).map(|row| row.split(',').count()).collect();
     assert!(rows.iter().all(|&columns| columns == rows[0]), "{metrics}");
 }
 

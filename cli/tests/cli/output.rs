@@ -39,7 +39,8 @@ fn an_output_behind_a_link_is_written_where_the_link_leads_and_stays_private() {
         command.current_dir(repository()).args(&arguments);
         let mut files = Vec::new();
         for (flag, extension) in outputs {
-            let (link, file) = (place.file(&format!("link{n_files}.{extension}")), place.file(&format!("disk/{n_files}.{extension}")));
+            let (link, file) =
+                (place.file(&format!("link{n_files}.{extension}")), place.file(&format!("disk/{n_files}.{extension}")));
             fs::write(&file, "").unwrap();
             fs::set_permissions(&file, Permissions::from_mode(0o600)).unwrap();
             symlink(&file, &link).unwrap();
@@ -78,7 +79,15 @@ fn what_is_written_to_standard_output_by_its_path_and_what_is_printed_stand_one_
     let place = Place::new();
     let file = place.file("said");
     let mut command = program();
-    command.current_dir(repository()).args(["scale", "--benchmark", &place.text("short.toml"), "--envs", "1", "--seconds", "0.1"]);
+    command.current_dir(repository()).args([
+        "scale",
+        "--benchmark",
+        &place.text("short.toml"),
+        "--envs",
+        "1",
+        "--seconds",
+        "0.1",
+    ]);
     assert!(command.args(["--json", "/dev/stdout"]).stdout(File::create(&file).unwrap()).status().unwrap().success());
     let said = fs::read_to_string(&file).unwrap();
     let (printed, json) = said.split_once("\n{").unwrap();
@@ -91,7 +100,8 @@ fn a_run_goes_on_in_a_folder_whose_files_are_links_and_keeps_them_private() {
     let place = Place::new();
     succeed(&place.train(&["--name", "run", "--steps", "800"]));
     fs::create_dir(place.file("disk")).unwrap();
-    let names = ["checkpoint.safetensors", "policy.safetensors", "metrics.csv", "routes.csv", "report.json", "config.toml"];
+    let names =
+        ["checkpoint.safetensors", "policy.safetensors", "metrics.csv", "routes.csv", "report.json", "config.toml"];
     for name in names {
         let (file, link) = (place.file("disk").join(name), place.file("runs/run").join(name));
         fs::rename(&link, &file).unwrap();

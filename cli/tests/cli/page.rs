@@ -11,14 +11,16 @@ use crate::place::{Place, offtrack, refusal, repository, succeed};
 fn browser() -> PathBuf {
     let folders: Vec<PathBuf> = std::env::var_os("PATH").iter().flat_map(std::env::split_paths).collect();
     let names = ["chromium", "chromium-browser", "google-chrome"];
-    let found = names.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name))).find(|file| file.is_file());
+    let found =
+        names.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name))).find(|file| file.is_file());
     found.expect("a browser opens the page in this test: install the package `chromium`")
 }
 
 /// The outcome of the page's checks of itself.
 fn selftest(page: &Path) -> String {
     let document = opened(page);
-    let (_, outcome) = document.rsplit_once("<pre id=\"selftest\">").unwrap_or_else(|| panic!("no outcome in {document}"));
+    let (_, outcome) =
+        document.rsplit_once("<pre id=\"selftest\">").unwrap_or_else(|| panic!("no outcome in {document}"));
     outcome.to_owned()
 }
 
@@ -73,18 +75,33 @@ fn a_training_run_leaves_a_page_that_holds_its_report_and_passes_its_own_checks(
     let page = place.file("runs/run/report.html");
     let text = read(&page);
     assert_eq!(serde_json::from_str::<Value>(block(&text, "report")).unwrap(), place.json("runs/run/report.json"));
-    assert_eq!(serde_json::from_str::<Value>(block(&text, "metrics")).unwrap(), read(&place.file("runs/run/metrics.csv")));
+    assert_eq!(
+        serde_json::from_str::<Value>(block(&text, "metrics")).unwrap(),
+        read(&place.file("runs/run/metrics.csv"))
+    );
     let outcome = selftest(&page);
     assert!(outcome.starts_with("selftest passed\n"), "{outcome}");
     // Its only address is the name space of SVG: the page loads no other file.
-    assert_eq!(text.matches("http://").count() + text.matches("https://").count(), text.matches("\"http://www.w3.org/2000/svg\"").count());
+    assert_eq!(
+        text.matches("http://").count() + text.matches("https://").count(),
+        text.matches("\"http://www.w3.org/2000/svg\"").count()
+    );
 }
 
 #[test]
 fn a_page_of_an_evaluation_alone_passes_its_own_checks_and_one_with_a_wrong_figure_fails_them() {
     let place = Place::new();
     let page = place.file("page.html");
-    let arguments = ["--policy", "pursuit", "--episodes", "2", "--html", &place.text("page.html"), "--json", &place.text("report.json")];
+    let arguments = [
+        "--policy",
+        "pursuit",
+        "--episodes",
+        "2",
+        "--html",
+        &place.text("page.html"),
+        "--json",
+        &place.text("report.json"),
+    ];
     succeed(&place.evaluate(&arguments));
     let text = read(&page);
     // The page has machine and commit elsewhere.
@@ -125,8 +142,14 @@ fn a_page_takes_its_curves_from_the_folder_of_a_run() {
     succeed(&with_run("runs/run"));
     let text = read(Path::new(&page));
     let report: Value = serde_json::from_str(block(&text, "report")).unwrap();
-    assert_eq!((&report["env_steps"], &report["evaluation"]["policy"]), (&Value::from(800), &Value::from(policy.as_str())));
-    assert_eq!(serde_json::from_str::<Value>(block(&text, "metrics")).unwrap(), read(&place.file("runs/run/metrics.csv")));
+    assert_eq!(
+        (&report["env_steps"], &report["evaluation"]["policy"]),
+        (&Value::from(800), &Value::from(policy.as_str()))
+    );
+    assert_eq!(
+        serde_json::from_str::<Value>(block(&text, "metrics")).unwrap(),
+        read(&place.file("runs/run/metrics.csv"))
+    );
 
     let said = refusal(&with_run("runs/none"), 2);
     assert!(said.contains("runs/none/report.json") && said.contains("cannot be read"), "{said}");
@@ -141,7 +164,8 @@ fn large(place: &Place, n: usize) -> String {
     let short = read(&place.file("short.toml"));
     let (head, _) = short.split_once("[[roundabout]]").unwrap();
     // With finer steer levels pure pursuit arrives now and then.
-    let mut benchmark = head.replace("[-0.8, -0.4, 0.0, 0.4, 0.8]", "[-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8]");
+    let mut benchmark =
+        head.replace("[-0.8, -0.4, 0.0, 0.4, 0.8]", "[-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8]");
     std::fs::create_dir(place.file("roads")).unwrap();
     for index in 0..n {
         let name = format!("roads/r{index}.toml");
@@ -227,7 +251,8 @@ fn a_page_has_a_row_for_each_further_evaluation_and_their_routes_are_left_to_the
     assert_eq!(shown, all);
     let document = opened(&page);
     assert!(
-        document.contains("Success, short, train routes (1 of them trained on)") && document.contains("selftest passed\n"),
+        document.contains("Success, short, train routes (1 of them trained on)")
+            && document.contains("selftest passed\n"),
         "{document}"
     );
 }
@@ -239,18 +264,28 @@ fn a_page_of_a_fleet_shows_each_episode_with_its_own_truck_and_names_vehicle_and
     let flags = ["--route", route, "--episodes", "12", "--policy", "pursuit", "--html", &place.text("page.html")];
     succeed(&offtrack(&[&["evaluate", "--benchmark", "laden2026"], &flags[..]].concat()));
     let document = opened(&page);
-    assert!(document.contains("selftest passed") && document.contains("holds: the replay shows the truck that was driven"), "{document}");
+    assert!(
+        document.contains("selftest passed") && document.contains("holds: the replay shows the truck that was driven"),
+        "{document}"
+    );
     let (_, line) = document.split_once("id=\"truck\"").unwrap();
     let (_, words) = line.split_once('>').unwrap();
     let (words, _) = words.split_once('<').unwrap();
     let (vehicle, load) = words.split_once(", ").unwrap();
-    assert!(["daf_xf", "eu_4x2_13m6"].contains(&vehicle) && ["empty", "half", "laden", "laden_high"].contains(&load), "{words}");
-    assert!(document.matches("<tr class=\"class\">").count() > 2 && document.contains("the route open in the replay"), "{document}");
+    assert!(
+        ["daf_xf", "eu_4x2_13m6"].contains(&vehicle) && ["empty", "half", "laden", "laden_high"].contains(&load),
+        "{words}"
+    );
+    assert!(
+        document.matches("<tr class=\"class\">").count() > 2 && document.contains("the route open in the replay"),
+        "{document}"
+    );
     // With the dimensions of another truck, its rays do not end at kerbs.
     let text = read(&page);
     let own = "ground.vehicles[episode.vehicle ?? 0]";
     assert!(text.contains(own));
-    std::fs::write(&page, text.replace(own, "ground.vehicles[((episode.vehicle ?? 0) + 1) % ground.vehicles.length]")).unwrap();
+    std::fs::write(&page, text.replace(own, "ground.vehicles[((episode.vehicle ?? 0) + 1) % ground.vehicles.length]"))
+        .unwrap();
     let outcome = selftest(&page);
     assert!(outcome.contains("fails: the replay shows the truck that was driven: rays of episode"), "{outcome}");
 }
@@ -266,14 +301,19 @@ fn a_page_is_as_wide_as_its_window_on_a_telephone_and_on_a_desk() {
     assert!(benchmark.contains(&own));
     std::fs::write(place.file("short.toml"), benchmark.replace(&own, &format!("{road}.toml"))).unwrap();
     succeed(&place.train(&["--name", "run"]));
-    let fleet = ["--route", "20m/E-right-1", "--episodes", "4", "--policy", "pursuit", "--html", &place.text("fleet.html")];
+    let fleet =
+        ["--route", "20m/E-right-1", "--episodes", "4", "--policy", "pursuit", "--html", &place.text("fleet.html")];
     succeed(&offtrack(&[&["evaluate", "--benchmark", "laden2026"], &fleet[..]].concat()));
     for page in ["runs/run/report.html", "fleet.html"] {
         let page = place.file(page);
         for window in [400, 1200] {
             let (width, contents) = widths(&page, window);
             // A bar to scroll with takes a few pixels of the window.
-            assert!(contents <= width && (window - 20..=window).contains(&width), "{}: {contents} of {width}", page.display());
+            assert!(
+                contents <= width && (window - 20..=window).contains(&width),
+                "{}: {contents} of {width}",
+                page.display()
+            );
         }
     }
     assert!(opened(&place.file("runs/run/report.html")).contains(&format!("{road}/E-right-1")));

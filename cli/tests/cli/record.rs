@@ -14,8 +14,9 @@ fn record(place: &Place, output: &str, arguments: &[&str]) {
 
 /// The arguments for an episode of the short benchmark.
 fn recording(place: &Place, output: &str, arguments: &[&str]) -> Vec<String> {
-    let mut all =
-        ["record", "--benchmark", &place.text("short.toml"), "--route", ROUTE, "-o", &place.text(output)].map(str::to_owned).to_vec();
+    let mut all = ["record", "--benchmark", &place.text("short.toml"), "--route", ROUTE, "-o", &place.text(output)]
+        .map(str::to_owned)
+        .to_vec();
     if !arguments.contains(&"--policy") {
         all.extend(["--policy", "pursuit"].map(str::to_owned));
     }
@@ -26,7 +27,16 @@ fn recording(place: &Place, output: &str, arguments: &[&str]) -> Vec<String> {
 #[test]
 fn the_episodes_recorded_are_those_that_the_evaluation_counts() {
     let place = Place::new();
-    succeed(&place.evaluate(&["--policy", "random", "--episodes", "3", "--seed", "7", "--json", &place.text("report.json")]));
+    succeed(&place.evaluate(&[
+        "--policy",
+        "random",
+        "--episodes",
+        "3",
+        "--seed",
+        "7",
+        "--json",
+        &place.text("report.json"),
+    ]));
     let report = place.json("report.json");
     let counted = report["routes"].as_array().unwrap().iter().find(|route| route["name"] == ROUTE).unwrap();
     let mut reward = 0.0;
@@ -36,14 +46,20 @@ fn the_episodes_recorded_are_those_that_the_evaluation_counts() {
         record(&place, "episode.json", &flags);
         let recording = place.json("episode.json");
         let frames = recording["frames"].as_array().unwrap();
-        assert_eq!((&recording["route"], &recording["episode"]), (&Value::from(ROUTE), &Value::from(episode.parse::<u32>().unwrap())));
+        assert_eq!(
+            (&recording["route"], &recording["episode"]),
+            (&Value::from(ROUTE), &Value::from(episode.parse::<u32>().unwrap()))
+        );
         assert!(0 < counted["ends"][recording["ended"].as_str().unwrap()].as_u64().unwrap());
         assert!(frames[0]["action"].is_null() && frames[1..].iter().all(|frame| frame["action"].is_u64()));
         assert!(frames.iter().all(|frame| frame["ranges"].as_array().unwrap().len() == 29));
         steps += frames.len() - 1;
         reward += frames.iter().map(|frame| frame["reward"].as_f64().unwrap()).sum::<f64>();
     }
-    assert!((0.1 * steps as f64 / 3.0 - counted["time_mean"].as_f64().unwrap()).abs() < 1e-9, "a frame a step, and the start");
+    assert!(
+        (0.1 * steps as f64 / 3.0 - counted["time_mean"].as_f64().unwrap()).abs() < 1e-9,
+        "a frame a step, and the start"
+    );
     // Rewards are written to a thousandth; an episode has fewer than a thousand steps.
     assert!((reward / 3.0 - counted["reward_mean"].as_f64().unwrap()).abs() < 1.0);
 }
@@ -150,10 +166,16 @@ fn wrong_input_is_refused_with_exit_code_2_and_leaves_nothing_behind() {
     }
     let said = |route: &str, benchmark: &str| {
         let output = place.text("a.json");
-        refusal(&offtrack(&["record", "--policy", &policy, "--benchmark", benchmark, "--route", route, "-o", &output]), 2)
+        refusal(
+            &offtrack(&["record", "--policy", &policy, "--benchmark", benchmark, "--route", route, "-o", &output]),
+            2,
+        )
     };
     let near = said("20m/E-right-9", &short);
-    assert!(near.contains("--route: 20m/E-right-9; of 20m the benchmark short has 20m/E-right-1, 20m/W-left-3"), "{near}");
+    assert!(
+        near.contains("--route: 20m/E-right-9; of 20m the benchmark short has 20m/E-right-1, 20m/W-left-3"),
+        "{near}"
+    );
     let far = said("E-right-1", &short);
     assert!(far.contains("a route of the benchmark short is needed, such as 16m/E-right-1, 20m/E-right-1"), "{far}");
     // The benchmark of the repository has nine actions where this policy learned five.
@@ -175,7 +197,18 @@ fn a_recording_that_cannot_be_written_is_a_failure() {
 fn a_recording_of_a_fleet_has_the_truck_of_its_episode_by_name_and_dimensions() {
     let place = Place::new();
     let recorded = |episode: &str| {
-        let flags = ["--benchmark", "laden2026", "--route", ROUTE, "--policy", "pursuit", "--episode", episode, "--episodes", "6"];
+        let flags = [
+            "--benchmark",
+            "laden2026",
+            "--route",
+            ROUTE,
+            "--policy",
+            "pursuit",
+            "--episode",
+            episode,
+            "--episodes",
+            "6",
+        ];
         succeed(&offtrack(&[&["record", "-o", &place.text("a.json")], &flags[..]].concat()));
         let recording = place.json("a.json");
         let class = ["vehicle", "load"].map(|key| recording["class"][key].as_str().unwrap().to_owned());
@@ -184,7 +217,10 @@ fn a_recording_of_a_fleet_has_the_truck_of_its_episode_by_name_and_dimensions() 
     let all: Vec<_> = ["0", "1", "2", "3", "4", "5"].map(recorded).into();
     assert!(all.iter().all(|([vehicle, _], _)| ["daf_xf", "eu_4x2_13m6"].contains(&vehicle.as_str())), "{all:?}");
     // Loads and lengths are drawn.
-    assert!(all.iter().any(|(class, _)| class[1] != all[0].0[1]) && all.iter().any(|(_, length)| *length != all[0].1), "{all:?}");
+    assert!(
+        all.iter().any(|(class, _)| class[1] != all[0].0[1]) && all.iter().any(|(_, length)| *length != all[0].1),
+        "{all:?}"
+    );
     record(&place, "a.json", &[]);
     assert!(place.json("a.json").get("class").is_none(), "one vehicle has no name");
 }

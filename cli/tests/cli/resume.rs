@@ -51,15 +51,23 @@ fn metrics(place: &Place, run: &str) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(place.file(&format!("runs/{run}/metrics.csv"))).unwrap();
     let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
     assert!(TIMES.iter().all(|time| names.contains(time)), "{names:?}");
-    let timeless =
-        |row: &str| row.split(',').zip(&names).filter(|(_, name)| !TIMES.contains(name)).map(|(value, _)| value.to_owned()).collect();
+    let timeless = |row: &str| {
+        row.split(',')
+            .zip(&names)
+            .filter(|(_, name)| !TIMES.contains(name))
+            .map(|(value, _)| value.to_owned())
+            .collect()
+    };
     text.lines().map(timeless).collect()
 }
 
 /// The env steps after which a run said it continues.
 fn continued_after(output: &Output) -> u64 {
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    let steps = said.split_once("continuing after ").and_then(|(_, rest)| rest.split_once(" env steps")).map(|(steps, _)| steps.parse());
+    let steps = said
+        .split_once("continuing after ")
+        .and_then(|(_, rest)| rest.split_once(" env steps"))
+        .map(|(steps, _)| steps.parse());
     steps.unwrap_or_else(|| panic!("{said}{}", String::from_utf8_lossy(&output.stderr))).unwrap()
 }
 
@@ -92,7 +100,11 @@ fn a_refinement_stopped_on_the_way_equals_one_never_stopped_bit_for_bit_and_its_
     };
     wait_until("a checkpoint of the refinement", refined);
     succeed(&interrupted(run));
-    assert_eq!(place.json("runs/parts/report.json")["interrupted"], true, "60000 steps are over too soon for this test");
+    assert_eq!(
+        place.json("runs/parts/report.json")["interrupted"],
+        true,
+        "60000 steps are over too soon for this test"
+    );
     let output = resume(&place, "parts", &[]);
     succeed(&output);
     assert!(15_000 < continued_after(&output));
@@ -121,13 +133,20 @@ fn a_run_killed_and_stopped_on_the_way_equals_one_never_stopped_bit_for_bit() {
         let output = interrupted(run);
         succeed(&output);
         stops.push(continued_after(&output));
-        assert_eq!(place.json("runs/parts/report.json")["interrupted"], true, "40000 steps are over too soon for this test");
+        assert_eq!(
+            place.json("runs/parts/report.json")["interrupted"],
+            true,
+            "40000 steps are over too soon for this test"
+        );
     }
     let output = resume(&place, "parts", &[]);
     succeed(&output);
     stops.push(continued_after(&output));
     assert!(stops.is_sorted() && stops[0] < stops[2], "{stops:?}");
-    assert!(bytes(&place, "runs/parts/policy.safetensors") == bytes(&place, "runs/whole/policy.safetensors"), "{stops:?}");
+    assert!(
+        bytes(&place, "runs/parts/policy.safetensors") == bytes(&place, "runs/whole/policy.safetensors"),
+        "{stops:?}"
+    );
     let (parts, whole) = (metrics(&place, "parts"), metrics(&place, "whole"));
     assert!(100 < whole.len(), "{}", whole.len());
     assert_eq!(parts, whole);
@@ -221,14 +240,30 @@ fn a_run_that_cannot_go_on_is_refused_with_the_file_and_what_would_do() {
     let config = String::from_utf8(bytes(&place, "runs/run/config.toml")).unwrap();
     let other = config.replace("gamma = 0.97", "gamma = 0.9");
     assert_ne!(other, config);
-    refused("runs/run/config.toml", other.as_bytes(), &["runs/run/config.toml", "is not the training file that the checkpoint"]);
+    refused(
+        "runs/run/config.toml",
+        other.as_bytes(),
+        &["runs/run/config.toml", "is not the training file that the checkpoint"],
+    );
     refused("runs/run/metrics.csv", b"seconds,env_steps\n", &["runs/run/metrics.csv", "columns"]);
     let benchmark = String::from_utf8(bytes(&place, "short.toml")).unwrap();
-    refused("short.toml", benchmark.replace("waypoint = 100.0", "waypoint = 99.0").as_bytes(), &[checkpoint, "short.toml was different"]);
+    refused(
+        "short.toml",
+        benchmark.replace("waypoint = 100.0", "waypoint = 99.0").as_bytes(),
+        &[checkpoint, "short.toml was different"],
+    );
     // What only says when an episode ends is a part of what trucks drive by.
-    refused("short.toml", benchmark.replace("sensors", "ending = { time_limit = 2.5 }\nsensors").as_bytes(), &["short.toml was different"]);
+    refused(
+        "short.toml",
+        benchmark.replace("sensors", "ending = { time_limit = 2.5 }\nsensors").as_bytes(),
+        &["short.toml was different"],
+    );
     let validated = String::from_utf8(bytes(&place, "validated.toml")).unwrap();
-    refused("validated.toml", validated.replace("N-right-1", "N-left-2").as_bytes(), &[checkpoint, "validated was different"]);
+    refused(
+        "validated.toml",
+        validated.replace("N-right-1", "N-left-2").as_bytes(),
+        &[checkpoint, "validated was different"],
+    );
     let message = refusal(&resume(&place, "elsewhere", &[]), 2);
     assert!(message.contains("--resume") && message.contains("the folder of a run is needed"), "{message}");
     let message = refusal(&offtrack(&["train", "--resume", &place.text("runs/run"), "--seed", "3"]), 2);
@@ -247,8 +282,10 @@ fn a_run_killed_before_its_first_checkpoint_starts_from_the_beginning() {
     succeed(&resume(&place, "run", &[]));
     assert!(bytes(&place, "runs/run/policy.safetensors") == bytes(&place, "runs/whole/policy.safetensors"));
     assert_eq!(metrics(&place, "run"), metrics(&place, "whole"));
-    let left: Vec<String> =
-        std::fs::read_dir(place.file("runs/run")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    let left: Vec<String> = std::fs::read_dir(place.file("runs/run"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
     assert!(left.iter().all(|name| !name.ends_with(".part") && !name.contains(".tmp")), "{left:?}");
 }
 
@@ -271,14 +308,22 @@ fn a_learner_that_diverges_stops_with_the_step_the_parameter_and_the_last_good_c
         ("actor_learning_rate = 3e-4", "actor_learning_rate = 1.0"),
         ("critic_learning_rate = 3e-4", "critic_learning_rate = 1.0"),
     ];
-    let wild = wild.iter().fold(training, |text, (from, to)| text.replace(from, to)).replace("rate = 3e-4 }", "rate = 1.0 }");
+    let wild =
+        wild.iter().fold(training, |text, (from, to)| text.replace(from, to)).replace("rate = 3e-4 }", "rate = 1.0 }");
     std::fs::write(place.file("tiny.toml"), wild).unwrap();
     let message = refusal(&place.train(&[&["--name", "run"], &ENDLESS[..]].concat()), 1);
-    for expected in ["env steps", "training has diverged", "checkpoint.safetensors is the last good checkpoint", "lower learning rates"] {
+    for expected in [
+        "env steps",
+        "training has diverged",
+        "checkpoint.safetensors is the last good checkpoint",
+        "lower learning rates",
+    ] {
         assert!(message.contains(expected), "{message}");
     }
     assert!(
-        ["critic 1, layer", "critic 2, layer", "actor, layer", "entropy coefficient"].iter().any(|name| message.contains(name)),
+        ["critic 1, layer", "critic 2, layer", "actor, layer", "entropy coefficient"]
+            .iter()
+            .any(|name| message.contains(name)),
         "{message}"
     );
     // It is good as far as it goes: it can be read, and training diverges again.
@@ -317,7 +362,10 @@ fn a_full_disk_fails_a_run_only_at_its_end_after_the_evaluation() {
     let message = refusal(&output, 1);
     // So short a run may meet the full disk at its end alone.
     assert!(message.matches("training goes on").count() <= 1, "{message}");
-    assert!(message.lines().last().unwrap().contains("checkpoint.safetensors: cannot be written: File too large"), "{message}");
+    assert!(
+        message.lines().last().unwrap().contains("checkpoint.safetensors: cannot be written: File too large"),
+        "{message}"
+    );
     assert!(!place.file("runs/run/checkpoint.part").exists());
     // One from the beginning, when the replay buffer was small, may have fitted: it is whole, and with room the run
     // continues from it.

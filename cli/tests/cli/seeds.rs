@@ -27,9 +27,10 @@ fn each_seed_has_its_folder_and_all_are_compared() {
     assert_eq!(seeds["seeds"], json!([5, 6]));
     let evaluations = seeds["evaluations"].as_array().unwrap();
     assert_eq!(evaluations.len(), 2);
-    for (evaluation, (name, trained_on, pointer)) in
-        evaluations.iter().zip([("test", 0, "/evaluation/lane_distance_mean_arrived"), ("train", 1, "/also/0/lane_distance_mean_arrived")])
-    {
+    for (evaluation, (name, trained_on, pointer)) in evaluations.iter().zip([
+        ("test", 0, "/evaluation/lane_distance_mean_arrived"),
+        ("train", 1, "/also/0/lane_distance_mean_arrived"),
+    ]) {
         assert_eq!(
             (&evaluation["benchmark"], &evaluation["split"], &evaluation["trained_on"]),
             (&json!("short"), &json!(name), &json!(trained_on))
@@ -42,10 +43,15 @@ fn each_seed_has_its_folder_and_all_are_compared() {
     }
     assert!(0.0 < seeds["runs"][0]["seconds"].as_f64().unwrap());
     let said = String::from_utf8(output.stdout).unwrap();
-    for begin in ["seed 5, 1 of 2: ", "seed 6, 2 of 2: ", "| seed ", "| 5 ", "| 6 ", "| mean ", "| worst ", "| 95 % interval "] {
+    for begin in
+        ["seed 5, 1 of 2: ", "seed 6, 2 of 2: ", "| seed ", "| 5 ", "| 6 ", "| mean ", "| worst ", "| 95 % interval "]
+    {
         assert_eq!(said.lines().filter(|line| line.starts_with(begin)).count(), 1, "{begin}: {said}");
     }
-    assert!(String::from_utf8(output.stderr).unwrap().contains("% seed 6, 2 of 2: "), "the progress says which seed it is");
+    assert!(
+        String::from_utf8(output.stderr).unwrap().contains("% seed 6, 2 of 2: "),
+        "the progress says which seed it is"
+    );
 }
 
 #[test]
@@ -67,14 +73,20 @@ fn a_stopped_command_goes_on_with_the_seed_in_hand() {
     let output = run.wait_with_output().unwrap();
     succeed(&output);
     let said = String::from_utf8(output.stdout).unwrap();
-    assert!(said.contains("stopped: 1 of 2 seeds have finished; the same command with --name many continues"), "{said}");
+    assert!(
+        said.contains("stopped: 1 of 2 seeds have finished; the same command with --name many continues"),
+        "{said}"
+    );
     assert_eq!(place.json("runs/many/seeds.json")["runs"].as_array().unwrap().len(), 1);
     assert_eq!(place.json("runs/many/seed-6/report.json")["interrupted"], true);
     let finished = bytes(&place, "many/seed-5/checkpoint.safetensors");
     let output = place.train(&arguments);
     succeed(&output);
     let said = String::from_utf8(output.stdout).unwrap();
-    assert!(said.contains("seed 6, 2 of 2: ") && said.contains("continuing after ") && !said.contains("seed 5, 1 of 2: "), "{said}");
+    assert!(
+        said.contains("seed 6, 2 of 2: ") && said.contains("continuing after ") && !said.contains("seed 5, 1 of 2: "),
+        "{said}"
+    );
     assert!(bytes(&place, "many/seed-5/checkpoint.safetensors") == finished);
     assert_eq!(place.json("runs/many/seed-6/report.json")["env_steps"], 40_000);
     assert_eq!(place.json("runs/many/seeds.json")["runs"].as_array().unwrap().len(), 2);
@@ -95,7 +107,10 @@ fn seeds_that_cannot_be_compared_are_refused_and_more_can_be_added() {
     }
     succeed(&train(&["--seeds", "5"]));
     for (arguments, expected) in [
-        (&["--seeds", "5,7", "--set", "learning.gamma=0.9"][..], "seed-5/config.toml: learning.gamma: 0.97; now it would be 0.9"),
+        (
+            &["--seeds", "5,7", "--set", "learning.gamma=0.9"][..],
+            "seed-5/config.toml: learning.gamma: 0.97; now it would be 0.9",
+        ),
         (&["--seeds", "5,7", "--minutes", "1"][..], "seed-5/config.toml: minutes: nothing; now it would be 1"),
         (&["--seeds", "6..7"][..], "--seeds: 6..7; "),
         (&["--seed", "5"][..], "exists and is never overwritten"),

@@ -18,7 +18,9 @@ struct Event {
 
 /// CRC-32C bit by bit, as RFC 3720 defines it.
 fn crc32c(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(!0, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0x82f6_3b78 * (crc & 1))))
+    !bytes
+        .iter()
+        .fold(!0, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0x82f6_3b78 * (crc & 1))))
 }
 
 /// The four bytes at `at` are the masked checksum of `bytes`.
@@ -64,7 +66,10 @@ fn event(bytes: &[u8]) -> Event {
                 assert_eq!(field, 1);
                 let value = fields(&value);
                 assert_eq!(value.iter().map(|(field, ..)| *field).collect::<Vec<_>>(), [1, 2]);
-                (String::from_utf8(value[0].2.clone()).unwrap(), f32::from_le_bytes(value[1].2.clone().try_into().unwrap()))
+                (
+                    String::from_utf8(value[0].2.clone()).unwrap(),
+                    f32::from_le_bytes(value[1].2.clone().try_into().unwrap()),
+                )
             })),
             7 => event.session = Some(fields(&bytes)[0].1),
             other => panic!("field {other}"),
@@ -92,7 +97,8 @@ fn events(file: &PathBuf) -> Vec<Event> {
 /// The run's event files in the order of their names.
 fn event_files(place: &Place) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(place.file("runs/run")).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<PathBuf> = entries.filter(|path| path.to_str().unwrap().contains("events.out.tfevents.")).collect();
+    let mut files: Vec<PathBuf> =
+        entries.filter(|path| path.to_str().unwrap().contains("events.out.tfevents.")).collect();
     files.sort();
     files
 }

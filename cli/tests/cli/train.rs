@@ -35,7 +35,14 @@ fn a_run_leaves_its_config_metrics_policy_and_report() {
     assert_eq!(report["env_steps"], 2400);
     assert_eq!(report["evaluation"]["split"], "test");
     // The config that was written begins the same run again.
-    succeed(&offtrack(&["train", run.join("config.toml").to_str().unwrap(), "--name", "again", "--out", &place.text("runs")]));
+    succeed(&offtrack(&[
+        "train",
+        run.join("config.toml").to_str().unwrap(),
+        "--name",
+        "again",
+        "--out",
+        &place.text("runs"),
+    ]));
     assert!(policy(&place, "again") == policy(&place, "tiny-1"));
 }
 
@@ -75,11 +82,19 @@ fn a_run_that_cannot_be_is_refused_before_a_folder_is_made() {
 fn training_on_a_test_route_or_with_other_actions_is_refused_before_a_folder_is_made() {
     let place = Place::new();
     let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
-    std::fs::write(place.file("tiny.toml"), format!("training_benchmark = \"{}\"\n{training}", place.text("training.toml"))).unwrap();
+    std::fs::write(
+        place.file("tiny.toml"),
+        format!("training_benchmark = \"{}\"\n{training}", place.text("training.toml")),
+    )
+    .unwrap();
     let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
     for (from, to, expected) in [
         ("test = ", "train = ", "20m/E-right-1 is a test route of short"),
-        ("-0.8, -0.4,", "-0.8, -0.5,", "short, on which the policy is evaluated, differs in actions and vehicle lock: --benchmark"),
+        (
+            "-0.8, -0.4,",
+            "-0.8, -0.5,",
+            "short, on which the policy is evaluated, differs in actions and vehicle lock: --benchmark",
+        ),
         ("load =", "steer_max_deg = 30.0\nload =", "differs in actions and vehicle lock"),
         ("load = \"empty\"", "load = \"half\"", "differs in vehicle and load (empty)"),
         ("range = 20.0", "range = 19.0", "differs in sensors.range (20 m in place of 19 m)"),
@@ -101,7 +116,10 @@ fn a_mirror_that_the_actions_do_not_have_is_refused_before_a_folder_is_made() {
     std::fs::write(place.file("short.toml"), benchmark.replacen("-0.8, -0.4,", "-0.8, -0.5,", 1)).unwrap();
     let arguments = ["--name", "run", "--set", "learning.mirror_augmentation=true"];
     let message = refusal(&place.train(&arguments), 2);
-    assert!(message.contains("learning.mirror_augmentation: true; steering") && message.contains("its opposite is not"), "{message}");
+    assert!(
+        message.contains("learning.mirror_augmentation: true; steering") && message.contains("its opposite is not"),
+        "{message}"
+    );
     assert!(!place.file("runs").exists());
     // So the corrected retry may have the same name.
     std::fs::write(place.file("short.toml"), benchmark).unwrap();
@@ -126,8 +144,18 @@ fn a_training_file_is_found_by_its_name() {
         ),
         "{message}"
     );
-    let arguments =
-        ["train", "paper", "--steps", "12000", "--set", "learning.hidden=[8]", "--set", "device=cpu", "--out", &place.text("runs")];
+    let arguments = [
+        "train",
+        "paper",
+        "--steps",
+        "12000",
+        "--set",
+        "learning.hidden=[8]",
+        "--set",
+        "device=cpu",
+        "--out",
+        &place.text("runs"),
+    ];
     let message = refusal(&offtrack(&[&arguments[..], &["--set", "benchmark=nowhere"]].concat()), 2);
     assert!(message.contains("nowhere"), "{message}");
 }
@@ -139,14 +167,18 @@ fn the_policy_kept_is_the_best_of_the_validations_and_the_last_of_equals() {
     succeed(&place.train(&["--name", "run"]));
     let report = place.json("runs/run/report.json");
     let validation = &report["validation"];
-    assert_eq!((&validation["routes"], &validation["episodes"], &validation["times"]), (&1.into(), &3.into(), &5.into()));
+    assert_eq!(
+        (&validation["routes"], &validation["episodes"], &validation["times"]),
+        (&1.into(), &3.into(), &5.into())
+    );
     // A learner so small arrives nowhere, so all validations are equal.
     assert_eq!(validation["best"], validation["last"]);
     assert_eq!(validation["last"]["env_steps"], report["env_steps"]);
     let metrics = std::fs::read_to_string(place.file("runs/run/metrics.csv")).unwrap();
     let (head, rows) = metrics.split_once('\n').unwrap();
     let column = head.split(',').position(|name| name == "validation_success").unwrap();
-    let validated: Vec<&str> = rows.lines().filter_map(|row| row.split(',').nth(column)).filter(|text| !text.is_empty()).collect();
+    let validated: Vec<&str> =
+        rows.lines().filter_map(|row| row.split(',').nth(column)).filter(|text| !text.is_empty()).collect();
     assert_eq!(validated, ["0.0000"; 5]);
     // Validation changes nothing that is learned.
     succeed(&place.train(&["--name", "without", "--set", "validation="]));
@@ -158,7 +190,9 @@ fn validation_routes_that_are_missing_or_trained_on_are_refused_before_a_folder_
     let place = Place::new();
     let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
     std::fs::write(place.file("same.toml"), benchmark.replace("train = ", "validation = ")).unwrap();
-    for (file, expected) in [("short.toml", "it has no validation routes"), ("same.toml", "16m/E-right-1 is a training route of short")] {
+    for (file, expected) in
+        [("short.toml", "it has no validation routes"), ("same.toml", "16m/E-right-1 is a training route of short")]
+    {
         let setting = format!("validation.benchmark={}", place.text(file));
         let arguments = ["--set", &setting, "--set", "validation.times=2", "--set", "validation.episodes=1"];
         let message = refusal(&place.train(&arguments), 2);
@@ -172,7 +206,16 @@ fn a_run_that_begins_with_a_policy_keeps_it_until_the_actor_learns() {
     let place = Place::new();
     succeed(&place.train(&["--name", "first"]));
     let first = place.text("runs/first/policy.safetensors");
-    succeed(&place.train(&["--name", "kept", "--seed", "6", "--from", &first, "--set", "learning.actor_delay=1000000"]));
+    succeed(&place.train(&[
+        "--name",
+        "kept",
+        "--seed",
+        "6",
+        "--from",
+        &first,
+        "--set",
+        "learning.actor_delay=1000000",
+    ]));
     assert!(policy(&place, "kept") == policy(&place, "first"));
     succeed(&place.train(&["--name", "changed", "--seed", "6", "--from", &first]));
     assert!(policy(&place, "changed") != policy(&place, "first"));
@@ -181,7 +224,10 @@ fn a_run_that_begins_with_a_policy_keeps_it_until_the_actor_learns() {
     let policy = Policy { activation: Activation::Tanh, ..Policy::load(Path::new(&first)).unwrap() };
     std::fs::write(&tanh, policy.to_bytes()).unwrap();
     for (arguments, expected) in [
-        (vec!["--from", &first, "--set", "learning.hidden=[8]"], "has hidden layers of [16]: learning.hidden must be equal, not [8]"),
+        (
+            vec!["--from", &first, "--set", "learning.hidden=[8]"],
+            "has hidden layers of [16]: learning.hidden must be equal, not [8]",
+        ),
         (vec!["--from", "attard2023"], "learned with another action table"),
         (vec!["--from", "nowhere.safetensors"], "nowhere.safetensors"),
         (vec!["--from", &tanh], "has the activation tanh: the learner continues with relu alone"),
@@ -196,22 +242,29 @@ fn a_run_that_begins_with_a_policy_keeps_it_until_the_actor_learns() {
 fn level_replay_changes_what_is_learned_and_keeps_every_byte_the_same_for_a_seed() {
     let place = Place::new();
     let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
-    std::fs::write(place.file("short.toml"), benchmark.replace("train = [\"E-right-1\"]", "train = [\"E-right-1\", \"E-left-3\"]"))
-        .unwrap();
+    std::fs::write(
+        place.file("short.toml"),
+        benchmark.replace("train = [\"E-right-1\"]", "train = [\"E-right-1\", \"E-left-3\"]"),
+    )
+    .unwrap();
     let replay = ["--set", "level_replay.fraction=0.5", "--set", "level_replay.rate=0.2"];
     for (run, settings) in [("uniform", &[][..]), ("one", &replay[..]), ("two", &replay[..])] {
         succeed(&place.train(&[&["--name", run], settings].concat()));
     }
     assert!(policy(&place, "one") == policy(&place, "two"));
     assert!(policy(&place, "one") != policy(&place, "uniform"));
-    let message = refusal(&place.train(&["--name", "none", "--set", "level_replay.fraction=1.0", "--set", "level_replay.rate=0.2"]), 2);
+    let message = refusal(
+        &place.train(&["--name", "none", "--set", "level_replay.fraction=1.0", "--set", "level_replay.rate=0.2"]),
+        2,
+    );
     assert!(message.contains("level_replay.fraction: 1; must lie in 0..0.95"), "{message}");
 }
 
 /// The short benchmark with other splits, as `other.toml`: `short` is trained on 16m/E-right-1.
 fn other_benchmark(place: &Place) -> String {
     let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
-    let other = benchmark.replace("test = [\"E-right-1\", \"W-left-3\"]", "train = [\"E-right-1\"]\ntest = [\"W-left-3\"]");
+    let other =
+        benchmark.replace("test = [\"E-right-1\", \"W-left-3\"]", "train = [\"E-right-1\"]\ntest = [\"W-left-3\"]");
     assert_ne!(other, benchmark);
     std::fs::write(place.file("other.toml"), other).unwrap();
     place.text("other.toml")
@@ -225,9 +278,16 @@ fn further_evaluations_are_reported_with_the_number_of_routes_trained_on() {
     let output = place.train(&["--name", "run", "--set", &also]);
     succeed(&output);
     let report = place.json("runs/run/report.json");
-    let also: Vec<_> =
-        report["also"].as_array().unwrap().iter().map(|also| (&also["benchmark"], &also["split"], &also["trained_on"])).collect();
-    assert_eq!(serde_json::json!(also), serde_json::json!([["short", "train", 1], ["other", "train", 1], ["other", "test", 0]]));
+    let also: Vec<_> = report["also"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|also| (&also["benchmark"], &also["split"], &also["trained_on"]))
+        .collect();
+    assert_eq!(
+        serde_json::json!(also),
+        serde_json::json!([["short", "train", 1], ["other", "train", 1], ["other", "test", 0]])
+    );
     let said = String::from_utf8(output.stdout).unwrap();
     // The same seed, start poses and routes: the same episodes as in the evaluation on `benchmark`.
     let route = |report: &serde_json::Value| {
@@ -301,11 +361,16 @@ fn a_run_says_first_what_it_will_do_and_last_what_its_checkpoint_is_for() {
     let said = String::from_utf8(output.stdout).unwrap();
     let first = said.lines().next().unwrap();
     assert!(
-        first.contains("tiny.toml: trains for 800 env steps of 8 trucks; while it trains a line says how long is left; then"),
+        first.contains(
+            "tiny.toml: trains for 800 env steps of 8 trucks; while it trains a line says how long is left; then"
+        ),
         "{said}"
     );
     let last = said.lines().last().unwrap();
-    assert!(last.contains("checkpoint.safetensors (1 MB) is for train --resume") && last.ends_with("it may be deleted"), "{said}");
+    assert!(
+        last.contains("checkpoint.safetensors (1 MB) is for train --resume") && last.ends_with("it may be deleted"),
+        "{said}"
+    );
 }
 
 /// Linux has the limit; other systems do not say what is free.
@@ -315,14 +380,23 @@ fn a_run_that_does_not_fit_into_memory_is_refused_before_a_folder_is_made() {
     let place = Place::new();
     for (setting, expected) in [
         ("replay_buffer.capacity=100000000", "replay_buffer.capacity: 100000000; the run would take about 28"),
-        ("learning.hidden=[8192, 8192, 8192, 8192]", "learning.hidden: [8192, 8192, 8192, 8192]; the run would take about 2"),
+        (
+            "learning.hidden=[8192, 8192, 8192, 8192]",
+            "learning.hidden: [8192, 8192, 8192, 8192]; the run would take about 2",
+        ),
         ("learning.batch=1048576", "learning.batch: 1048576; the run would take about"),
     ] {
         let (program, training, runs) = (env!("CARGO_BIN_EXE_offtrack"), place.text("tiny.toml"), place.text("runs"));
         // Four gigabytes of address space; a batch of so many transitions takes a little less on its own.
         let hidden = if setting.starts_with("learning.batch") { "--set 'learning.hidden=[256, 256]'" } else { "" };
-        let line = format!("ulimit -v 4000000; exec {program} train {training} --out {runs} --steps 1000000000 {hidden} --set '{setting}'");
-        let output = std::process::Command::new("sh").env("OFFTRACK_CACHE", crate::place::CACHE).args(["-c", &line]).output().unwrap();
+        let line = format!(
+            "ulimit -v 4000000; exec {program} train {training} --out {runs} --steps 1000000000 {hidden} --set '{setting}'"
+        );
+        let output = std::process::Command::new("sh")
+            .env("OFFTRACK_CACHE", crate::place::CACHE)
+            .args(["-c", &line])
+            .output()
+            .unwrap();
         let message = refusal(&output, 2);
         assert!(message.contains(expected) && message.contains("GB are free: less would do"), "{message}");
         assert!(!place.file("runs").exists());

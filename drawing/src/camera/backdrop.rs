@@ -37,7 +37,11 @@ impl Format {
     pub fn new(side: u32) -> Format {
         let text = (f64::from(side) / 34.0).max(11.0);
         // Lines keep their widths in pictures of common sizes; they are thinner in small ones and wider in large ones.
-        Format { side, caption: (1.6 * text).ceil() as u32, pen: (f64::from(side) / 480.0).min(1.0).max(f64::from(side) / 960.0) }
+        Format {
+            side,
+            caption: (1.6 * text).ceil() as u32,
+            pen: (f64::from(side) / 480.0).min(1.0).max(f64::from(side) / 960.0),
+        }
     }
 
     /// Size of the text if the caption is not too long for it (px).
@@ -77,7 +81,8 @@ impl Backdrop {
         };
         let name = found.as_ref().map_or("", |(_, line, _)| line.name.as_str());
         let gap = format.text();
-        let width = [name, LONGEST[0], LONGEST[1]].map(|words| lettering.width(words, format.text()) + gap).iter().sum::<f64>();
+        let width =
+            [name, LONGEST[0], LONGEST[1]].map(|words| lettering.width(words, format.text()) + gap).iter().sum::<f64>();
         let text = format.text() * (side / width).min(1.0);
         let base = f64::from(format.caption) / 2.0 + 0.35 * text;
         let name_at = DVec2::new(0.5 * text, base);
@@ -119,7 +124,12 @@ fn draw_road(map: &mut Canvas, view: &View, pen: f64, roundabout: &Road) {
     for (area, ink) in [(Gutter::Drivable, colour::GUTTER), (Gutter::Solid, colour::ROAD)] {
         map.areas(&lines(view, &roundabout.kerbs(area).loops), Ink(ink, 1.0));
     }
-    map.dashes(&lines(view, &roundabout.lanes()), Ink(colour::LANE, 1.0), 0.9 * pen, LANE_DASHES.map(|length| length * pen));
+    map.dashes(
+        &lines(view, &roundabout.lanes()),
+        Ink(colour::LANE, 1.0),
+        0.9 * pen,
+        LANE_DASHES.map(|length| length * pen),
+    );
 }
 
 fn draw_route(map: &mut Canvas, view: &View, pen: f64, roundabout: &Road, route: &Route) {

@@ -1,7 +1,9 @@
 //! Pixels that shapes are painted on, with anti-aliasing.
 
 use glam::DVec2;
-use resvg::tiny_skia::{Color, FillRule, LineCap, Paint, Path, PathBuilder, PixmapMut, Shader, Stroke, StrokeDash, Transform};
+use resvg::tiny_skia::{
+    Color, FillRule, LineCap, Paint, Path, PathBuilder, PixmapMut, Shader, Stroke, StrokeDash, Transform,
+};
 
 use crate::lettering::{Align, Lettering};
 

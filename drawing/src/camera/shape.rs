@@ -62,14 +62,21 @@ impl Shape {
         let rig = &self.rigs[truck.vehicle as usize];
         let (position, heading) = (point(truck.position), f64::from(truck.heading));
         let ahead = DVec2::from_angle(heading);
-        let on_page = |body: &Body, position: DVec2, heading: f64| corners(body, position, heading).map(|p| view.point(p));
+        let on_page =
+            |body: &Body, position: DVec2, heading: f64| corners(body, position, heading).map(|p| view.point(p));
         // A kerb is touched by one unit; other failures are of the whole truck.
-        let fill = |colour, of_the_other| Ink(if ended.failed() && *ended != of_the_other { colour::OVERLAP } else { colour }, 1.0);
+        let fill = |colour, of_the_other| {
+            Ink(if ended.failed() && *ended != of_the_other { colour::OVERLAP } else { colour }, 1.0)
+        };
 
         let body = on_page(&rig.tractor_body, position, heading);
         map.polygon(&body, fill(colour::TRACTOR, Ended::TrailerCollided), Ink(colour::DRIVE_AXLE, 1.0), 1.2 * pen);
         let front = rig.tractor_body.front;
-        let windscreen = Body { front: front - SCREEN_FRONT, rear: front - SCREEN_REAR, half_width: 0.82 * rig.tractor_body.half_width };
+        let windscreen = Body {
+            front: front - SCREEN_FRONT,
+            rear: front - SCREEN_REAR,
+            half_width: 0.82 * rig.tractor_body.half_width,
+        };
         map.areas(&[on_page(&windscreen, position, heading)], Ink(colour::ROAD, 0.9));
         let axle = position + f64::from(rig.wheelbase) * ahead;
         let half = 0.5 * WHEEL * DVec2::from_angle(heading + f64::from(truck.steering));

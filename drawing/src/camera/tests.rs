@@ -55,7 +55,8 @@ fn is(colour: &'static str) -> [u8; 3] {
 /// Points of a truck that no detail covers: between the front wheels, and in the middle of the trailer.
 fn middles(truck: &Truck) -> [DVec2; 2] {
     let rig = &DRIVEN.1.rigs[0];
-    let [ahead, trailer_ahead] = [truck.heading, truck.trailer_heading].map(|heading| DVec2::from_angle(heading.into()));
+    let [ahead, trailer_ahead] =
+        [truck.heading, truck.trailer_heading].map(|heading| DVec2::from_angle(heading.into()));
     let body = &rig.trailer_body;
     let front_axle = truck.position.as_dvec2() + f64::from(rig.wheelbase) * ahead;
     [front_axle, truck.trailer_position(rig).as_dvec2() + 0.5 * f64::from(body.front + body.rear) * trailer_ahead]
@@ -99,7 +100,9 @@ fn ground_road_kerbs_route_and_both_units_have_their_colours() {
         let solid = roundabout.kerbs(Gutter::Solid);
         let lines: Vec<_> = roundabout.lanes().into_iter().chain([line.centre_line.clone()]).collect();
         let far = |p: DVec2| 15.0 < p.distance(tractor) && 1.0 < solid.signed_distance(p);
-        let bare = |p: &DVec2| far(*p) && lines.iter().all(|line| 1.0 < line.distance(*p)) && 3.0 < line.centre_line.distance(*p);
+        let bare = |p: &DVec2| {
+            far(*p) && lines.iter().all(|line| 1.0 < line.distance(*p)) && 3.0 < line.centre_line.distance(*p)
+        };
         let radius = roundabout.outer_radius();
         let grid = (0..60).flat_map(|x| (0..60).map(move |y| (DVec2::new(x.into(), y.into()) / 30.0 - 1.0) * radius));
         let road: Vec<[u8; 3]> = grid.filter(bare).map(at).collect();
@@ -126,11 +129,16 @@ fn the_whole_truck_is_in_the_picture_at_the_start_and_at_the_end_of_every_route(
             let along = waypoint.direction.as_dvec2();
             let position = waypoint.position.as_dvec2() - 0.5 * f64::from(rig.wheelbase) * along;
             let trailer_position = position + f64::from(rig.fifth_wheel - rig.trailer_wheelbase) * along;
-            let both = [corners(&rig.tractor_body, position, heading), corners(&rig.trailer_body, trailer_position, heading)];
+            let both =
+                [corners(&rig.tractor_body, position, heading), corners(&rig.trailer_body, trailer_position, heading)];
             for corner in both.as_flattened() {
                 let at = pixel_of(&camera, *corner);
                 let low = DVec2::new(0.0, camera.format.caption.into());
-                assert!(low.cmple(at).all() && at.cmplt(DVec2::splat(64.0)).all(), "{}: {at}", world.route_names[route as usize]);
+                assert!(
+                    low.cmple(at).all() && at.cmplt(DVec2::splat(64.0)).all(),
+                    "{}: {at}",
+                    world.route_names[route as usize]
+                );
             }
         }
     }
@@ -153,10 +161,11 @@ fn a_moved_truck_changes_pixels_near_it_and_its_rays_alone() {
     let mut camera = camera(480);
     let before = truck(5, 30.0);
     let after = truck(5, 33.0);
-    let pictures =
-        [before, after].map(|truck| camera.draw(&Shown { truck: &truck, ranges: &[4.0; N_RAYS], ended: Ended::Running }).to_vec());
+    let pictures = [before, after]
+        .map(|truck| camera.draw(&Shown { truck: &truck, ranges: &[4.0; N_RAYS], ended: Ended::Running }).to_vec());
     let side = camera.side() as usize;
-    let changed: Vec<usize> = (0..side * side).filter(|n| pictures[0][3 * n..][..3] != pictures[1][3 * n..][..3]).collect();
+    let changed: Vec<usize> =
+        (0..side * side).filter(|n| pictures[0][3 * n..][..3] != pictures[1][3 * n..][..3]).collect();
     assert!(200 < changed.len(), "{}", changed.len());
     // A trailer's far end is less than 9 m from its middle, the tractor's front less than 4 m from its front axle; rays
     // of 4 m begin at their outlines.
@@ -204,7 +213,10 @@ fn backgrounds_are_kept_up_to_a_bound_and_those_last_used_stay() {
     let last: Vec<u32> = (n_routes - N_KEPT as u32 + 1..n_routes - 1).chain([0, n_routes - 1]).collect();
     assert_eq!(kept, last);
     for side in [64, 480, 1000, 1024, 2048, 4096] {
-        assert!((1..=N_KEPT).contains(&n_kept(side)) && n_kept(side) * 4 * (side * side) as usize <= KEPT_BYTES, "{side}");
+        assert!(
+            (1..=N_KEPT).contains(&n_kept(side)) && n_kept(side) * 4 * (side * side) as usize <= KEPT_BYTES,
+            "{side}"
+        );
     }
 }
 
@@ -246,9 +258,11 @@ fn a_left_hand_road_is_drawn_as_it_lies_and_not_as_it_is_driven() {
     let (side, caption) = (right.side() as usize, right.format.caption as usize);
     let row = |picture: &[u8], row: usize| picture[3 * side * row..][..3 * side].to_vec();
     let difference = |flipped: bool| {
-        let rows = (caption..side).map(|n| (row(&one, n), row(&other, if flipped { side - 1 - (n - caption) } else { n })));
-        let all: Vec<f64> =
-            rows.flat_map(|(a, b)| a.into_iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(b))).collect::<Vec<_>>()).collect();
+        let rows =
+            (caption..side).map(|n| (row(&one, n), row(&other, if flipped { side - 1 - (n - caption) } else { n })));
+        let all: Vec<f64> = rows
+            .flat_map(|(a, b)| a.into_iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(b))).collect::<Vec<_>>())
+            .collect();
         all.iter().sum::<f64>() / all.len() as f64
     };
     assert!(difference(true) < 1.0, "{}", difference(true));

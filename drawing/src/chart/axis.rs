@@ -72,7 +72,8 @@ impl Axis {
         }
         let decades = (self.high / self.low).log10();
         let first = self.low.log10().floor() as i32;
-        let all = (first..first + 40).flat_map(|power| (1..10).map(move |digit| (f64::from(digit) * 10f64.powi(power), digit)));
+        let all = (first..first + 40)
+            .flat_map(|power| (1..10).map(move |digit| (f64::from(digit) * 10f64.powi(power), digit)));
         let shown = all.filter(|(value, _)| self.low <= *value && *value <= self.high);
         shown.map(|(value, digit)| (value, digit == 1 || decades < 2.5 && (digit == 2 || digit == 5))).collect()
     }
@@ -82,7 +83,11 @@ impl Axis {
 fn step(low: f64, high: f64) -> f64 {
     let rough = (high - low) / STEPS;
     let power = 10f64.powf(rough.log10().floor());
-    [1.0, 2.0, 5.0].map(|digit| digit * power).into_iter().find(|step| rough <= *step * (1.0 + 1e-9)).unwrap_or(10.0 * power)
+    [1.0, 2.0, 5.0]
+        .map(|digit| digit * power)
+        .into_iter()
+        .find(|step| rough <= *step * (1.0 + 1e-9))
+        .unwrap_or(10.0 * power)
 }
 
 /// The plot's frame, a faint line at each numbered tick, and the numbers.
@@ -94,7 +99,13 @@ pub(crate) fn axes(lettering: &Lettering, x: &Axis, y: &Axis) -> Group {
         let _ = write!(marks, "M{at} {}v{}", y.from, if numbered { -7 } else { -4 });
         if numbered {
             let _ = write!(grid, "M{at} {}V{}", y.from, y.to);
-            group = group.add(lettering.text(&written(value), DVec2::new(at, y.from + 20.0), 14.0, Align::Middle, colour::INK));
+            group = group.add(lettering.text(
+                &written(value),
+                DVec2::new(at, y.from + 20.0),
+                14.0,
+                Align::Middle,
+                colour::INK,
+            ));
         }
     }
     for (value, numbered) in y.ticks() {
@@ -102,14 +113,24 @@ pub(crate) fn axes(lettering: &Lettering, x: &Axis, y: &Axis) -> Group {
         let _ = write!(marks, "M{} {at}h{}", x.from, if numbered { 7 } else { 4 });
         if numbered {
             let _ = write!(grid, "M{} {at}H{}", x.from, x.to);
-            group = group.add(lettering.text(&written(value), DVec2::new(x.from - 8.0, at + 5.0), 14.0, Align::Right, colour::INK));
+            group = group.add(lettering.text(
+                &written(value),
+                DVec2::new(x.from - 8.0, at + 5.0),
+                14.0,
+                Align::Right,
+                colour::INK,
+            ));
         }
     }
     let line = |data: String, colour: &str, width: f64| {
         Path::new().set("d", data).set("fill", "none").set("stroke", colour).set("stroke-width", width)
     };
     let frame = format!("M{} {}H{}V{}H{}Z", x.from, y.to, x.to, y.from, x.from);
-    Group::new().add(line(grid, "#e1e1e1", 1.0)).add(line(marks, colour::INK, 1.0)).add(line(frame, colour::INK, 1.2)).add(group)
+    Group::new()
+        .add(line(grid, "#e1e1e1", 1.0))
+        .add(line(marks, colour::INK, 1.0))
+        .add(line(frame, colour::INK, 1.2))
+        .add(group)
 }
 
 /// A tick's number with a prefix for thousands.
@@ -145,7 +166,10 @@ mod tests {
         let axis = Axis::logarithmic([1.0, 1e6].into_iter(), 500.0, 0.0);
         let length = |from: f64| axis.at(10.0 * from) - axis.at(from);
         assert!((length(1.0) - length(3e4)).abs() < 1e-9 && length(1.0) < 0.0);
-        assert_eq!([0.1, 5.0, 200.0, 1e3, 2e5, 1e6, 5e9].map(written), ["0.1", "5", "200", "1 k", "200 k", "1 M", "5 G"]);
+        assert_eq!(
+            [0.1, 5.0, 200.0, 1e3, 2e5, 1e6, 5e9].map(written),
+            ["0.1", "5", "200", "1 k", "200 k", "1 M", "5 G"]
+        );
     }
 
     #[test]
@@ -160,6 +184,9 @@ mod tests {
         }
         let axis = Axis::linear(-60.0, 98.3, 0.0, 1.0);
         assert_eq!([axis.at(-60.0), axis.at(98.3)], [0.0, 1.0]);
-        assert_eq!(axis.ticks().iter().map(|&(value, _)| written(value)).collect::<Vec<_>>(), ["\u{2212}50", "0", "50"]);
+        assert_eq!(
+            axis.ticks().iter().map(|&(value, _)| written(value)).collect::<Vec<_>>(),
+            ["\u{2212}50", "0", "50"]
+        );
     }
 }

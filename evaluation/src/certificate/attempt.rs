@@ -21,7 +21,11 @@ const WIDEST: usize = 1 << 18;
 /// that is 0 or that no memory holds.
 pub fn passes(widths: &[usize], hold: usize) -> Result<Vec<Pass>, Error> {
     if let Some(width) = widths.iter().find(|width| !(1..=WIDEST).contains(*width)) {
-        return Err(Error::Setting { name: "--widths", value: width.to_string(), expected: format!("must lie in 1..{WIDEST}") });
+        return Err(Error::Setting {
+            name: "--widths",
+            value: width.to_string(),
+            expected: format!("must lie in 1..{WIDEST}"),
+        });
     }
     let mut passes: Vec<Pass> = widths.iter().map(|&width| Pass { width, hold }).collect();
     if let Some(&width) = widths.iter().max()
@@ -34,7 +38,13 @@ pub fn passes(widths: &[usize], hold: usize) -> Result<Vec<Pass>, Error> {
 
 /// Searches from one start until a pass arrives or all have been made. Without an arrival the result is the pass with
 /// the most progress.
-pub fn attempt(world: &Arc<World>, route: u32, start: &Start, passes: &[Pass], policy: Option<&Policy>) -> Result<Found, Error> {
+pub fn attempt(
+    world: &Arc<World>,
+    route: u32,
+    start: &Start,
+    passes: &[Pass],
+    policy: Option<&Policy>,
+) -> Result<Found, Error> {
     let mut env_steps = 0;
     let mut best: Option<(Pass, Outcome)> = None;
     for &pass in passes {
@@ -64,7 +74,12 @@ pub fn attempt(world: &Arc<World>, route: u32, start: &Start, passes: &[Pass], p
 /// The same from many starts, each on its route, in their order. `done` is called after each.
 ///
 /// Every core makes searches of its own: the batch of a narrow search is too small to be divided among them.
-pub fn attempts(world: &Arc<World>, starts: &[(u32, Start)], passes: &[Pass], done: &(dyn Fn() + Sync)) -> Result<Vec<Found>, Error> {
+pub fn attempts(
+    world: &Arc<World>,
+    starts: &[(u32, Start)],
+    passes: &[Pass],
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Found>, Error> {
     let next = AtomicUsize::new(0);
     let searches = || -> Result<Vec<(usize, Found)>, Error> {
         // Steps run in the pool of the thread that asks for them.
@@ -79,7 +94,8 @@ pub fn attempts(world: &Arc<World>, starts: &[(u32, Start)], passes: &[Pass], do
         })
     };
     let mut found = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..rayon::current_num_threads().min(starts.len())).map(|_| scope.spawn(searches)).collect();
+        let threads: Vec<_> =
+            (0..rayon::current_num_threads().min(starts.len())).map(|_| scope.spawn(searches)).collect();
         let joined = threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)));
         joined.collect::<Result<Vec<_>, Error>>().map(|found| found.concat())
     })?;

@@ -89,12 +89,19 @@ struct Candidate {
 
 /// Searches for a sequence of actions that completes `route` from `start`. With a `policy`, its own sequence is a
 /// candidate until it fails.
-pub fn search(world: &Arc<World>, route: u32, start: &Start, pass: Pass, policy: Option<&Policy>) -> Result<Outcome, Error> {
+pub fn search(
+    world: &Arc<World>,
+    route: u32,
+    start: &Start,
+    pass: Pass,
+    policy: Option<&Policy>,
+) -> Result<Outcome, Error> {
     let mut simulator = Simulator::new(world.clone(), 1, 0, RouteChoice::Fixed(vec![route]))?;
     simulator.reset_from(&[*start])?;
     let mut segments: Vec<Segment> = Vec::new();
     let straight = nearest_to_straight(world);
-    let mut beam = vec![Candidate { parent: ROOT, actions: Vec::new(), held: policy.is_none().then_some(straight), cost: 0.0 }];
+    let mut beam =
+        vec![Candidate { parent: ROOT, actions: Vec::new(), held: policy.is_none().then_some(straight), cost: 0.0 }];
     let mut outcome = Outcome { ended: Ended::Running, progress: 0.0, steps: 0, env_steps: 0, actions: Vec::new() };
     while !beam.is_empty() {
         let (rows, mut children) = branched(world, simulator.batch(), &beam, straight, pass.hold);
@@ -137,14 +144,26 @@ fn nearest_to_straight(world: &World) -> u32 {
 }
 
 /// The children of all candidates, and the row that each branches from.
-fn branched(world: &World, batch: &Batch, beam: &[Candidate], straight: u32, hold: usize) -> (Vec<u32>, Vec<Candidate>) {
+fn branched(
+    world: &World,
+    batch: &Batch,
+    beam: &[Candidate],
+    straight: u32,
+    hold: usize,
+) -> (Vec<u32>, Vec<Candidate>) {
     let (mut rows, mut children) = (Vec::new(), Vec::new());
     for (row, candidate) in beam.iter().enumerate() {
         if candidate.held.is_none() {
             rows.push(row as u32);
             children.push(candidate.clone());
         }
-        for action in distinct(world, world.rig(&batch.truck[row]), batch.truck[row].steering, candidate.held.unwrap_or(straight), hold) {
+        for action in distinct(
+            world,
+            world.rig(&batch.truck[row]),
+            batch.truck[row].steering,
+            candidate.held.unwrap_or(straight),
+            hold,
+        ) {
             rows.push(row as u32);
             children.push(Candidate { held: Some(action), ..candidate.clone() });
         }
@@ -174,8 +193,11 @@ fn distinct(world: &World, rig: &Rig, steering: f32, last: u32, hold: usize) -> 
 
 /// Each child's action for the next step: the held one, or the policy's for its observation.
 fn chosen(policy: Option<&Policy>, batch: &Batch, children: &[Candidate], straight: u32) -> Vec<u32> {
-    let own =
-        |env: usize| policy.and_then(|policy| policy.act_beside(&batch.observation[env..=env], &batch.extras[env..=env]).first().copied());
+    let own = |env: usize| {
+        policy.and_then(|policy| {
+            policy.act_beside(&batch.observation[env..=env], &batch.extras[env..=env]).first().copied()
+        })
+    };
     children.iter().enumerate().map(|(env, child)| child.held.or_else(|| own(env)).unwrap_or(straight)).collect()
 }
 
@@ -282,8 +304,14 @@ mod tests {
         let mut simulator = Simulator::new(world, 6, 0, RouteChoice::Fixed(vec![0, 0, 0, 20, 20, 40])).unwrap();
         simulator.reset_from(&[Start::default(); 6]).unwrap();
         let child = |held, cost| Candidate { parent: ROOT, actions: Vec::new(), held, cost };
-        let children =
-            [child(Some(4), 0.3), child(Some(4), 0.1), child(None, 9.0), child(Some(4), 0.5), child(Some(4), 0.4), child(Some(4), 0.2)];
+        let children = [
+            child(Some(4), 0.3),
+            child(Some(4), 0.1),
+            child(None, 9.0),
+            child(Some(4), 0.5),
+            child(Some(4), 0.4),
+            child(Some(4), 0.2),
+        ];
         // The policy's own first, whatever its cost; then the cheapest of each state.
         assert_eq!(selected(simulator.batch(), &children, 64), [2, 5, 4]);
         assert_eq!(selected(simulator.batch(), &children, 2), [2, 5]);
@@ -296,6 +324,9 @@ mod tests {
         // A beam of one candidate turns too late.
         let outcome = search(&world, route, &Start::default(), Pass { width: 1, hold: 1 }, None).unwrap();
         assert!(outcome.ended.failed() && outcome.actions.is_empty(), "{outcome:?}");
-        assert!(0.1 < outcome.progress && outcome.progress < 1.0 && 0 < outcome.steps && 0 < outcome.env_steps, "{outcome:?}");
+        assert!(
+            0.1 < outcome.progress && outcome.progress < 1.0 && 0 < outcome.steps && 0 < outcome.env_steps,
+            "{outcome:?}"
+        );
     }
 }

@@ -134,21 +134,30 @@ impl Certificate {
     pub fn read(file: &Path) -> Result<Certificate, Error> {
         let bytes = reader::read_bytes(file, FILE_LIMIT)?;
         let wrong = |message: String| Error::contents(file, message);
-        let certificate: Certificate = serde_json::from_slice(&bytes)
-            .map_err(|error| wrong(format!("is not a certificate, or is damaged: {error}; `offtrack certify --json` writes one")))?;
+        let certificate: Certificate = serde_json::from_slice(&bytes).map_err(|error| {
+            wrong(format!("is not a certificate, or is damaged: {error}; `offtrack certify --json` writes one"))
+        })?;
         if certificate.version != VERSION {
-            return Err(wrong(format!("is a certificate of version {}; this program reads version {VERSION}", certificate.version)));
+            return Err(wrong(format!(
+                "is a certificate of version {}; this program reads version {VERSION}",
+                certificate.version
+            )));
         }
         if certificate.starts.is_empty() {
             return Err(wrong("is a damaged certificate: starts: empty; at least 1 is needed".into()));
         }
         if MOST_STARTS < certificate.starts.len() {
             let n = certificate.starts.len();
-            return Err(wrong(format!("is a damaged certificate: starts: {n} entries; at most {MOST_STARTS} are read")));
+            return Err(wrong(format!(
+                "is a damaged certificate: starts: {n} entries; at most {MOST_STARTS} are read"
+            )));
         }
         let mut names = HashSet::new();
         if let Some(twice) = certificate.routes.iter().find(|route| !names.insert(&route.name)) {
-            return Err(wrong(format!("is a damaged certificate: {}: is there twice; a route has one entry", twice.name)));
+            return Err(wrong(format!(
+                "is a damaged certificate: {}: is there twice; a route has one entry",
+                twice.name
+            )));
         }
         for route in &certificate.routes {
             let (found, starts) = (route.found.len(), certificate.starts.len());
@@ -177,7 +186,9 @@ impl Certificate {
     pub fn check(&self, scenario: &Scenario, world: &World, file: &Path) -> Result<(), Error> {
         let here = conditions(scenario, world);
         let keys = self.conditions.keys().chain(here.keys());
-        let value = |conditions: &BTreeMap<String, String>, key: &String| conditions.get(key).cloned().unwrap_or_else(|| "nothing".into());
+        let value = |conditions: &BTreeMap<String, String>, key: &String| {
+            conditions.get(key).cloned().unwrap_or_else(|| "nothing".into())
+        };
         for key in keys {
             let (there, here) = (value(&self.conditions, key), value(&here, key));
             if there != here {
@@ -195,9 +206,11 @@ impl Certificate {
 /// Whatever moves a truck or ends its episode, apart from the roads. Numbers are rounded, so that they are equal on all
 /// machines.
 fn conditions(scenario: &Scenario, world: &World) -> BTreeMap<String, String> {
-    let list = |values: &mut dyn Iterator<Item = f32>| values.map(|value| format!("{value:.4}")).collect::<Vec<_>>().join(" ");
+    let list =
+        |values: &mut dyn Iterator<Item = f32>| values.map(|value| format!("{value:.4}")).collect::<Vec<_>>().join(" ");
     let params = &world.params;
-    let mut rig: Vec<String> = bytemuck::cast_slice(&world.rigs).iter().map(|value: &f32| format!("{value:.4e}")).collect();
+    let mut rig: Vec<String> =
+        bytemuck::cast_slice(&world.rigs).iter().map(|value: &f32| format!("{value:.4e}")).collect();
     // What a vehicle without a `model` has in the fields that came with it changes no certificate.
     if scenario.fleet.is_none() && scenario.vehicle.model == Model::default() {
         rig.truncate(std::mem::offset_of!(Rig, slip_lever_max) / size_of::<f32>());
@@ -214,14 +227,18 @@ fn conditions(scenario: &Scenario, world: &World) -> BTreeMap<String, String> {
         ("largest start errors", list(&mut [params.start_offset, params.start_heading].into_iter())),
         (
             "ending",
-            list(&mut [params.stray_distance, params.jackknife_angle, params.rollover_ratio, scenario.time_limit as f32].into_iter()),
+            list(
+                &mut [params.stray_distance, params.jackknife_angle, params.rollover_ratio, scenario.time_limit as f32]
+                    .into_iter(),
+            ),
         ),
     ];
     // A search drives the first vehicle; a benchmark of one vehicle and one speed has had none of these entries.
     let first = &world.classes[world.rigs[0].class_index as usize];
     let fleet = scenario.fleet.is_some().then(|| ("load", format!("{} {}", first.vehicle, first.load)));
     let clock = (scenario.clock != Clock::default()).then(|| ("clock", "feasible".to_owned()));
-    let start = scenario.start_speed.map(|[least, greatest]| ("start speed", format!("{least:.4} to {greatest:.4} m/s")));
+    let start =
+        scenario.start_speed.map(|[least, greatest]| ("start speed", format!("{least:.4} to {greatest:.4} m/s")));
     let changes = (!scenario.speed_changes.is_empty())
         .then(|| ("target speeds", list(&mut [params.target_speed_min, params.target_speed_max].into_iter())));
     let later = [fleet, clock, start, changes].into_iter().flatten();
@@ -243,7 +260,9 @@ pub fn actions(text: &str, n_actions: u32, limit: usize) -> Result<Vec<u32>, Str
     let mut actions = Vec::new();
     let mut total = 0;
     for run in text.split_whitespace() {
-        let numbers = run.split_once('x').and_then(|(action, count)| Some((action.parse::<u32>().ok()?, count.parse::<usize>().ok()?)));
+        let numbers = run
+            .split_once('x')
+            .and_then(|(action, count)| Some((action.parse::<u32>().ok()?, count.parse::<usize>().ok()?)));
         match numbers {
             Some((action, count)) if action < n_actions && count <= MOST_STEPS - total => {
                 total += count;

@@ -28,7 +28,9 @@ pub fn lines(path: &Path, scenario: &Scenario, world: &Arc<World>) -> Result<Lin
             driven[index].push(batch.truck[index].position);
         }
     })?;
-    let line = |(sequence, driven): (&Sequence, &Vec<Vec2>)| (sequence.route, beside(world.route_waypoints(sequence.route), driven));
+    let line = |(sequence, driven): (&Sequence, &Vec<Vec2>)| {
+        (sequence.route, beside(world.route_waypoints(sequence.route), driven))
+    };
     Ok(sequences.iter().zip(&driven).map(line).collect())
 }
 

@@ -26,13 +26,19 @@ pub struct Sequence {
 pub fn driven(world: &Arc<World>, sequences: &[Sequence]) -> Result<Vec<Ended>, simulator::Error> {
     // A truck drives on after its sequence, so its end code is taken at the sequence's last step.
     let mut ended = vec![Ended::Running; sequences.len()];
-    follow(world, sequences, |index, batch| ended[index] = Ended::from_code(batch.ended[index]).unwrap_or(Ended::Running))?;
+    follow(world, sequences, |index, batch| {
+        ended[index] = Ended::from_code(batch.ended[index]).unwrap_or(Ended::Running)
+    })?;
     Ok(ended)
 }
 
 /// Drives sequences in one batch. `seen` is called with the index of a sequence and the batch, whose truck of that
 /// index drives it: at its start and after each of its steps.
-pub fn follow(world: &Arc<World>, sequences: &[Sequence], mut seen: impl FnMut(usize, &Batch)) -> Result<(), simulator::Error> {
+pub fn follow(
+    world: &Arc<World>,
+    sequences: &[Sequence],
+    mut seen: impl FnMut(usize, &Batch),
+) -> Result<(), simulator::Error> {
     if sequences.is_empty() {
         return Ok(());
     }
@@ -44,7 +50,8 @@ pub fn follow(world: &Arc<World>, sequences: &[Sequence], mut seen: impl FnMut(u
         seen(index, simulator.batch());
     }
     for step in 0..sequences.iter().map(|sequence| sequence.actions.len()).max().unwrap_or(0) {
-        let actions: Vec<u32> = sequences.iter().map(|sequence| sequence.actions.get(step).copied().unwrap_or(0)).collect();
+        let actions: Vec<u32> =
+            sequences.iter().map(|sequence| sequence.actions.get(step).copied().unwrap_or(0)).collect();
         simulator.step(&actions)?;
         for (index, sequence) in sequences.iter().enumerate() {
             if step < sequence.actions.len() {
@@ -57,18 +64,30 @@ pub fn follow(world: &Arc<World>, sequences: &[Sequence], mut seen: impl FnMut(u
 
 /// Drives the sequences of the routes that `wanted` accepts and gives them, or the first that does not arrive as an
 /// error. Every such route must be one of the world's. They come in the order of the file: routes, and starts of each.
-pub fn verify(certificate: &Certificate, world: &Arc<World>, path: &Path, wanted: impl Fn(&str) -> bool) -> Result<Vec<Sequence>, Error> {
+pub fn verify(
+    certificate: &Certificate,
+    world: &Arc<World>,
+    path: &Path,
+    wanted: impl Fn(&str) -> bool,
+) -> Result<Vec<Sequence>, Error> {
     let wrong = |message: String| Error::contents(path, message);
     let mut sequences = Vec::new();
     for route in certificate.routes.iter().filter(|route| wanted(&route.name)) {
         let index = world.route_names.iter().position(|name| *name == route.name);
-        let index = index.ok_or_else(|| wrong(format!("has a route {} that the benchmark does not have", route.name)))?;
-        for (found, &[offset, heading]) in route.found.iter().zip(&certificate.starts).filter(|(found, _)| found.arrived()) {
+        let index =
+            index.ok_or_else(|| wrong(format!("has a route {} that the benchmark does not have", route.name)))?;
+        for (found, &[offset, heading]) in
+            route.found.iter().zip(&certificate.starts).filter(|(found, _)| found.arrived())
+        {
             let damaged = |message| wrong(format!("is a damaged certificate: {}: {message}", route.name));
             // Beyond the time limit of its route no action changes the outcome.
             let limit = world.step_limit(&Truck { route: index as u32, ..Truck::default() }) as usize;
             let actions = file::actions(&found.actions, world.params.n_actions, limit).map_err(damaged)?;
-            sequences.push(Sequence { route: index as u32, start: Start { offset, heading, ..Start::default() }, actions });
+            sequences.push(Sequence {
+                route: index as u32,
+                start: Start { offset, heading, ..Start::default() },
+                actions,
+            });
         }
     }
     let ended = driven(world, &sequences).map_err(|error| match error {

@@ -51,7 +51,9 @@ pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>, failed: impl FnOnce() 
         Err(panic) => panic,
     };
     match seen {
-        Some(Seen { is_own: false, place, .. }) => Err(Error::Device(format!("{} (at {place})", message(panic.as_ref())))),
+        Some(Seen { is_own: false, place, .. }) => {
+            Err(Error::Device(format!("{} (at {place})", message(panic.as_ref()))))
+        }
         _ => Err(failed().unwrap_or_else(|| resume_unwind(panic))),
     }
 }
@@ -144,11 +146,16 @@ mod tests {
         let error = caught(own, || Some(Error::Device("is lost".to_owned()))).unwrap_err();
         assert!(matches!(error, Error::Device(message) if message == "is lost"));
         // A thread's fault is that of the work that waits for it.
-        let handed_on = || -> Result<(), Error> { resume_unwind(std::thread::spawn(|| panic!("our own fault")).join().unwrap_err()) };
+        let handed_on = || -> Result<(), Error> {
+            resume_unwind(std::thread::spawn(|| panic!("our own fault")).join().unwrap_err())
+        };
         assert!(catch_unwind(AssertUnwindSafe(|| caught(handed_on, || None))).is_err());
         let none: &[f32] = &[];
         let error = caught(|| Ok(glam::Vec2::from_slice(none)), || None).unwrap_err();
-        assert!(matches!(&error, Error::Device(message) if message.contains("(at ") && message.contains("vec2.rs:")), "{error}");
+        assert!(
+            matches!(&error, Error::Device(message) if message.contains("(at ") && message.contains("vec2.rs:")),
+            "{error}"
+        );
         assert!(caught(|| Ok(3), || None).is_ok_and(|value| value == 3));
     }
 }

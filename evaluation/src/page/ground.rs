@@ -101,7 +101,14 @@ impl<'a> Ground<'a> {
             }
             let (route, number) = (routes.len() - 1, track.env % per_route);
             let (vehicle, class) = fleet.index(page.world, track.vehicle);
-            episodes.push(Episode { route, number, vehicle, class, ended: track.ended.name(), n_frames: track.frames.len() });
+            episodes.push(Episode {
+                route,
+                number,
+                vehicle,
+                class,
+                ended: track.ended.name(),
+                n_frames: track.frames.len(),
+            });
         }
         let map = |&place: &usize| {
             let roundabout = &page.scenario.places[place].roundabout;

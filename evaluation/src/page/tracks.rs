@@ -33,7 +33,11 @@ pub(super) struct Column {
 
 /// The values kept of a frame. The trailer's position follows from the tractor's and both headings.
 pub(super) fn columns(sensor_range: f32) -> Vec<Column> {
-    let column = |name: &str, unit: f64, value: fn(&Frame) -> f32| Column { name: name.to_owned(), unit, value: Box::new(value) };
+    let column = |name: &str, unit: f64, value: fn(&Frame) -> f32| Column {
+        name: name.to_owned(),
+        unit,
+        value: Box::new(value),
+    };
     let mut columns = vec![
         column("x", LENGTH, |frame| frame.position[0]),
         column("y", LENGTH, |frame| frame.position[1]),
@@ -96,9 +100,14 @@ mod tests {
     #[test]
     fn whole_numbers_are_encoded_as_in_protocol_buffers() {
         // The table of Protocol Buffers' documentation of its encoding, and its varint of 150 (75 as zigzag).
-        for (value, expected) in
-            [(0, &[0][..]), (-1, &[1]), (1, &[2]), (-2, &[3]), (75, &[0x96, 0x01]), (i32::MIN, &[255, 255, 255, 255, 15])]
-        {
+        for (value, expected) in [
+            (0, &[0][..]),
+            (-1, &[1]),
+            (1, &[2]),
+            (-2, &[3]),
+            (75, &[0x96, 0x01]),
+            (i32::MIN, &[255, 255, 255, 255, 15]),
+        ] {
             let mut bytes = Vec::new();
             push(&mut bytes, value);
             assert_eq!(bytes, expected, "{value}");

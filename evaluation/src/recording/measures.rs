@@ -52,9 +52,14 @@ impl Measures {
     /// Of a vehicle of a world: row `vehicle` of its `rigs`.
     pub fn of(world: &World, vehicle: u32) -> Measures {
         let rig = &world.rigs[vehicle as usize];
-        let body =
-            |body: &Body| Rectangle { front: to(MILLI, body.front), rear: to(MILLI, body.rear), half_width: to(MILLI, body.half_width) };
-        let ray = |ray: &Ray| [to(MILLI, ray.origin.x), to(MILLI, ray.origin.y), to(1e6, ray.direction.x), to(1e6, ray.direction.y)];
+        let body = |body: &Body| Rectangle {
+            front: to(MILLI, body.front),
+            rear: to(MILLI, body.rear),
+            half_width: to(MILLI, body.half_width),
+        };
+        let ray = |ray: &Ray| {
+            [to(MILLI, ray.origin.x), to(MILLI, ray.origin.y), to(1e6, ray.direction.x), to(1e6, ray.direction.y)]
+        };
         let (trailer, tractor) = world.rays_of(rig).split_at(N_TRAILER_RAYS);
         Measures {
             wheelbase: to(MILLI, rig.wheelbase),

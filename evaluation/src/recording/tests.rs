@@ -38,7 +38,9 @@ fn frames_are_the_simulators_states_from_the_start_to_the_last_step() {
         for (n, (frame, batch)) in frames.iter().zip(&states).enumerate() {
             let truck = &batch.truck[env];
             // Half of a rounding step, and as much again for f32 at 60 m.
-            let same = |parts: f64, a: f32, b: f32| assert!(f64::from((a - b).abs()) <= 0.51 / parts + 4e-6, "frame {n}: {a} {b}");
+            let same = |parts: f64, a: f32, b: f32| {
+                assert!(f64::from((a - b).abs()) <= 0.51 / parts + 4e-6, "frame {n}: {a} {b}")
+            };
             same(MILLI, frame.position[0], truck.position.x);
             same(MILLI, frame.position[1], truck.position.y);
             same(MILLI, frame.trailer_position[0], truck.trailer_position(world.rig(truck)).x);
@@ -66,8 +68,14 @@ fn a_recording_read_back_is_the_recording() {
     let scenario = scenario();
     let (world, mut tracks, _) = driven(&scenario);
     let (roundabout, route) = scenario.routes().nth(scenario.split(Split::Test)[1] as usize).unwrap();
-    let of =
-        Of { scenario: &scenario, world: &world, roundabout: &scenario.places[roundabout].roundabout, route, policy: "pursuit", seed: 3 };
+    let of = Of {
+        scenario: &scenario,
+        world: &world,
+        roundabout: &scenario.places[roundabout].roundabout,
+        route,
+        policy: "pursuit",
+        seed: 3,
+    };
     let recording = of.recording(0, 1, tracks.remove(0));
     let text = serde_json::to_string(&recording).unwrap();
     assert_eq!(serde_json::from_str::<Recording>(&text).unwrap(), recording);
@@ -118,8 +126,9 @@ fn a_truck_of_a_fleet_is_drawn_with_the_dimensions_and_the_sensors_that_it_drove
         assert_eq!(measures.tractor_rays[0][0], to(MILLI, world.rays_of(rig)[N_TRAILER_RAYS].origin.x));
         // The trailer's axles lie where both positions of a frame say: at the drawn wheelbase behind the kingpin.
         for frame in &track.frames {
-            let kingpin =
-                |position: [f32; 2], heading: f32, ahead: f32| [position[0] + ahead * heading.cos(), position[1] + ahead * heading.sin()];
+            let kingpin = |position: [f32; 2], heading: f32, ahead: f32| {
+                [position[0] + ahead * heading.cos(), position[1] + ahead * heading.sin()]
+            };
             let a = kingpin(frame.position, frame.heading, measures.fifth_wheel);
             let b = kingpin(frame.trailer_position, frame.trailer_heading, measures.trailer_wheelbase);
             // Positions are rounded to 1 mm, headings to 0.1 mrad.

@@ -16,7 +16,13 @@ fn cause(index: usize) -> Cause {
         steps: 9,
         position: [0.0; 2],
     };
-    Cause { cause: format!("trailer on kerb {index}"), episodes: 20 - index, share: 0.1, possible: Some(index), example }
+    Cause {
+        cause: format!("trailer on kerb {index}"),
+        episodes: 20 - index,
+        share: 0.1,
+        possible: Some(index),
+        example,
+    }
 }
 
 /// A report with the widest figures that an evaluation gives.
@@ -52,7 +58,12 @@ fn report() -> Report {
         }),
         failures: (0..CAUSES + 2).map(cause).collect(),
         classes: Vec::new(),
-        groups: Groups { island_radius: group("22 m and more"), lane: group("right"), exit: group("1"), roundabout: group("40m") },
+        groups: Groups {
+            island_radius: group("22 m and more"),
+            lane: group("right"),
+            exit: group("1"),
+            roundabout: group("40m"),
+        },
         routes: vec![route(true), route(false)],
     }
 }
@@ -79,10 +90,14 @@ fn every_heading_is_explained_below_the_table() {
     let legend = legend(1000);
     let table = report().table(100);
     for column in &ALL[1..] {
-        let word = column.head.iter().flat_map(|head| head.split(' ')).find(|word| 1 < word.len() && *word != "95").unwrap();
+        let word =
+            column.head.iter().flat_map(|head| head.split(' ')).find(|word| 1 < word.len() && *word != "95").unwrap();
         assert!(legend.contains(word), "{word}");
     }
-    assert!(table.contains("own: a truck whose front axle follows") && table.contains("load transfer ratio"), "{table}");
+    assert!(
+        table.contains("own: a truck whose front axle follows") && table.contains("load transfer ratio"),
+        "{table}"
+    );
 }
 
 #[test]
@@ -93,7 +108,10 @@ fn failures_are_counted_below_their_line() {
 #[test]
 fn the_commonest_causes_of_failures_are_told_and_the_others_counted() {
     let table = report().table(1000);
-    assert!(table.contains("Not arrived, by cause: 20 trailer on kerb 0 (0 from a possible start), 19 trailer on kerb 1 "), "{table}");
+    assert!(
+        table.contains("Not arrived, by cause: 20 trailer on kerb 0 (0 from a possible start), 19 trailer on kerb 1 "),
+        "{table}"
+    );
     assert!(table.contains("13 trailer on kerb 7 (7 from a possible start), 23 for 2 other causes.\n"), "{table}");
 }
 
@@ -107,7 +125,10 @@ fn the_time_outside_the_own_lane_is_told() {
 fn the_searches_for_possible_starts_are_told_below_the_sums() {
     let table = report().table(100);
     assert!(table.lines().any(|line| line.starts_with("possible ") && line.contains("692/695")), "{table}");
-    assert!(table.contains("possible: the episodes that arrived and those whose own start a search completed, 1 of the 2"), "{table}");
+    assert!(
+        table.contains("possible: the episodes that arrived and those whose own start a search completed, 1 of the 2"),
+        "{table}"
+    );
 }
 
 /// The same with many routes on as many roundabouts, of which every `one_in`th failed once.
@@ -139,7 +160,10 @@ fn of_many_routes_the_table_has_the_groups_and_the_worst_routes_and_says_how_man
     }
     assert!(!table.contains("wide/7/1/SW") && !table.contains("wide/7/100/SW"), "{table}");
     assert_eq!(table.matches("SW-right-1").count(), WORST);
-    assert!(table.contains("The worst 20 of 40 routes with a failure, of 200; --json and --html have all.\n"), "{table}");
+    assert!(
+        table.contains("The worst 20 of 40 routes with a failure, of 200; --json and --html have all.\n"),
+        "{table}"
+    );
     assert!(table.lines().all(|line| line.chars().count() <= 100), "{table}");
 }
 

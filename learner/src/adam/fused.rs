@@ -35,11 +35,13 @@ impl Fused {
         let (network, follower) = (network.map(&mut taken), follower.map(&mut following));
         let state = &mut self.0;
         if state.moments.is_empty() {
-            state.moments = taken.values.iter().map(|values| [0; 2].map(|_| vec![0.0; values.num_elements()])).collect();
+            state.moments =
+                taken.values.iter().map(|values| [0; 2].map(|_| vec![0.0; values.num_elements()])).collect();
         }
         state.n_steps = state.n_steps.saturating_add(1);
         let step = Step::new(state.n_steps, learning_rate, tau);
-        let parameters = taken.values.iter_mut().zip(&taken.gradients).zip(following.values.iter_mut().zip(&mut state.moments));
+        let parameters =
+            taken.values.iter_mut().zip(&taken.gradients).zip(following.values.iter_mut().zip(&mut state.moments));
         let blocks: Vec<Block> = parameters
             .flat_map(|((values, gradients), (follower, [first, second]))| {
                 let gradients: Vec<&[f32]> = gradients.iter().map(elements).collect();
@@ -130,7 +132,8 @@ impl ModuleMapper for Take<'_> {
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
         let (id, tensor, mapper) = param.consume();
         let empty = Tensor::empty([0; D], &tensor.device()).set_require_grad(tensor.is_require_grad());
-        self.gradients.push(self.shards.iter_mut().filter_map(|shard| shard.remove::<D>(id)).map(Tensor::into_data).collect());
+        self.gradients
+            .push(self.shards.iter_mut().filter_map(|shard| shard.remove::<D>(id)).map(Tensor::into_data).collect());
         self.values.push(tensor.without_autodiff().into_data());
         Param::from_mapped_value(id, empty, mapper)
     }
@@ -225,7 +228,10 @@ mod tests {
             let parts = gradients(&network, 0);
             let (network, follower) = Fused::default().step(network, follower, parts, 0.01, follow);
             let way = |(from, to): (&f32, &f32)| (1.0 - follow as f32) * from + follow as f32 * to;
-            assert_eq!(weights(&follower), weights(&begun[1]).iter().zip(&weights(&network)).map(way).collect::<Vec<_>>());
+            assert_eq!(
+                weights(&follower),
+                weights(&begun[1]).iter().zip(&weights(&network)).map(way).collect::<Vec<_>>()
+            );
             assert_ne!(weights(&network), weights(&begun[0]));
         }
     }

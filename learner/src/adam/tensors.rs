@@ -16,12 +16,18 @@ pub struct Tensors {
 impl Tensors {
     pub(super) fn new(state: &State, device: &Device) -> Tensors {
         let tensor = |values: &Vec<f32>| Tensor::from_data(TensorData::new(values.clone(), [values.len()]), device);
-        Tensors { n_steps: state.n_steps, moments: state.moments.iter().map(|[first, second]| [tensor(first), tensor(second)]).collect() }
+        Tensors {
+            n_steps: state.n_steps,
+            moments: state.moments.iter().map(|[first, second]| [tensor(first), tensor(second)]).collect(),
+        }
     }
 
     pub(super) fn state(&self) -> State {
         let values = |tensor: Tensor<1>| tensor.into_data().try_to_vec().expect("moments of f32 parameters are f32");
-        State { n_steps: self.n_steps, moments: self.moments.iter().map(|moments| moments.clone().map(values)).collect() }
+        State {
+            n_steps: self.n_steps,
+            moments: self.moments.iter().map(|moments| moments.clone().map(values)).collect(),
+        }
     }
 
     /// See [`super::Adam::step`].
@@ -64,7 +70,8 @@ impl ModuleMapper for Descend {
         let (shape, learning) = (tensor.dims(), tensor.is_require_grad());
         let value: Tensor<1> = tensor.without_autodiff().flatten(0, D - 1);
         let [first, second] = self.moments.next().unwrap_or_else(|| [value.zeros_like(), value.zeros_like()]);
-        let gradient = self.gradients.iter_mut().filter_map(|shard| shard.remove::<D>(id)).reduce(|sum, gradient| sum + gradient);
+        let gradient =
+            self.gradients.iter_mut().filter_map(|shard| shard.remove::<D>(id)).reduce(|sum, gradient| sum + gradient);
         // A parameter that has no part in the loss stays.
         let (value, moments) = match gradient {
             None => (value, [first, second]),
@@ -72,7 +79,8 @@ impl ModuleMapper for Descend {
                 let gradient: Tensor<1> = gradient.flatten(0, D - 1);
                 let first = first.mul_scalar(DECAY[0]) + gradient.clone().mul_scalar(1.0 - DECAY[0]);
                 let second = second.mul_scalar(DECAY[1]) + gradient.square().mul_scalar(1.0 - DECAY[1]);
-                let moved = first.clone().mul_scalar(self.step.learning_rate) / second.clone().sqrt().add_scalar(self.step.epsilon);
+                let moved = first.clone().mul_scalar(self.step.learning_rate)
+                    / second.clone().sqrt().add_scalar(self.step.epsilon);
                 (value - moved, [first, second])
             }
         };
@@ -94,7 +102,9 @@ impl ModuleMapper for Follow {
         let (id, tensor, mapper) = param.consume();
         let shape = tensor.dims();
         let value = match self.values.next() {
-            Some(value) if self.tau != 0.0 => tensor.mul_scalar(1.0 - self.tau) + value.reshape(shape).mul_scalar(self.tau),
+            Some(value) if self.tau != 0.0 => {
+                tensor.mul_scalar(1.0 - self.tau) + value.reshape(shape).mul_scalar(self.tau)
+            }
             _ => tensor,
         };
         Param::from_mapped_value(id, value, mapper)

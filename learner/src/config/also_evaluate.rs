@@ -7,7 +7,8 @@ use super::Config;
 use offtrack_evaluation::error::Error;
 
 /// What would do as one of the key's texts.
-const EXPECTED: &str = "must be a benchmark's name or a path ending in .toml; `/train`, `/validation` or `/test` may follow it";
+const EXPECTED: &str =
+    "must be a benchmark's name or a path ending in .toml; `/train`, `/validation` or `/test` may follow it";
 
 /// A benchmark and one of its splits to evaluate the policy on.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,10 +47,13 @@ impl Config {
     pub(super) fn check_also_evaluate(&self, reader: &Reader) -> Result<(), Error> {
         let mut known = vec![AlsoEvaluate { benchmark: self.benchmark.clone(), split: Split::Test }];
         for (index, text) in self.also_evaluate.iter().enumerate() {
-            let invalid = |expected: &str| reader.invalid(format!("also_evaluate[{index}]"), format!("{text:?}"), expected);
+            let invalid =
+                |expected: &str| reader.invalid(format!("also_evaluate[{index}]"), format!("{text:?}"), expected);
             let named = AlsoEvaluate::of(text).ok_or_else(|| invalid(EXPECTED))?;
             if known.contains(&named) {
-                return Err(invalid("is evaluated already, as `benchmark` or before it in this list: leave it out").into());
+                return Err(
+                    invalid("is evaluated already, as `benchmark` or before it in this list: leave it out").into()
+                );
             }
             known.push(named);
         }

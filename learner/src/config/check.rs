@@ -21,7 +21,9 @@ impl Config {
             reader.within("steps", steps as f64, 1.0..=1e12, "")?;
         }
         if self.minutes.is_none() && self.steps.is_none() {
-            return Err(reader.invalid("minutes", "missing", "`minutes`, `steps` or both must say when to stop").into());
+            return Err(reader
+                .invalid("minutes", "missing", "`minutes`, `steps` or both must say when to stop")
+                .into());
         }
         reader.within("checkpoint_minutes", self.checkpoint_minutes, 1e-4..=100_000.0, "min")?;
         reader.count("replay_buffer.capacity", replay_buffer.capacity, 1_000..=100_000_000)?;
@@ -51,7 +53,10 @@ impl Config {
         // A ring of fewer slots than that would hold no step that enough others follow.
         let slots = replay_buffer.capacity / self.n_envs;
         if slots <= learning.n_steps {
-            let expected = format!("must hold more than learning.n_steps = {} steps of n_envs = {} trucks", learning.n_steps, self.n_envs);
+            let expected = format!(
+                "must hold more than learning.n_steps = {} steps of n_envs = {} trucks",
+                learning.n_steps, self.n_envs
+            );
             return Err(reader.invalid("replay_buffer.capacity", replay_buffer.capacity, expected).into());
         }
         if self.device == Device::Cpu && self.adapter.is_some() {
@@ -66,7 +71,9 @@ impl Config {
                 ("learning.arrival", learning.arrival.is_some()),
             ];
             if let Some((key, _)) = without.into_iter().find(|(_, given)| *given) {
-                return Err(reader.invalid(key, "given", "works with device = \"cpu\" alone: leave one of them out").into());
+                return Err(reader
+                    .invalid(key, "given", "works with device = \"cpu\" alone: leave one of them out")
+                    .into());
             }
         }
         Ok(())

@@ -27,8 +27,10 @@ impl Block {
     fn has(&self, key: &str) -> bool {
         let (table, name) = key.rsplit_once('.').unwrap_or(("", key));
         // Weights of the reward are named alone: the benchmarks' own description has their ranges.
-        let is_word = |word: &str| word.trim_matches(|letter: char| !letter.is_ascii_lowercase() && letter != '_') == name;
-        self.table == table && (self.keys.iter().any(|key| key == name) || is_reward(key) && self.text.split_whitespace().any(is_word))
+        let is_word =
+            |word: &str| word.trim_matches(|letter: char| !letter.is_ascii_lowercase() && letter != '_') == name;
+        self.table == table
+            && (self.keys.iter().any(|key| key == name) || is_reward(key) && self.text.split_whitespace().any(is_word))
     }
 
     fn ranges(&self) -> Vec<Ends> {
@@ -95,15 +97,22 @@ fn same(stated: &Ends, of_reader: &Ends) -> bool {
 }
 
 fn refused(file: &str, setting: String) -> String {
-    Config::read_with(Path::new(file), &[setting]).map(drop).map_err(|error| error.to_string()).err().unwrap_or_default()
+    Config::read_with(Path::new(file), &[setting])
+        .map(drop)
+        .map_err(|error| error.to_string())
+        .err()
+        .unwrap_or_default()
 }
 
 /// Every key that the reader takes, those of tables after the table's name.
 fn keys(table: &str) -> Vec<String> {
     let message = refused("default", format!("{table}{UNKNOWN}=1"));
-    let Some((_, listed)) = message.split_once(&format!("unknown field `{UNKNOWN}`, expected ")) else { return Vec::new() };
+    let Some((_, listed)) = message.split_once(&format!("unknown field `{UNKNOWN}`, expected ")) else {
+        return Vec::new();
+    };
     // The parser names the table in a line of its own.
-    let names = listed.lines().next().unwrap_or_default().split('`').skip(1).step_by(2).map(|name| format!("{table}{name}"));
+    let names =
+        listed.lines().next().unwrap_or_default().split('`').skip(1).step_by(2).map(|name| format!("{table}{name}"));
     let of_name = |name: String| {
         let below = keys(&format!("{name}."));
         if below.is_empty() { vec![name] } else { below }
@@ -131,11 +140,13 @@ fn faults(keys: &[String], blocks: &[Block]) -> (BTreeSet<String>, usize) {
     let (mut faults, mut n_ranges) = (BTreeSet::new(), 0);
     for key in keys {
         let Some(first) = blocks.iter().find(|block| block.has(key)) else {
-            faults.insert(format!("{key}: no file explains it: add a comment above it, with its range, to default.toml"));
+            faults
+                .insert(format!("{key}: no file explains it: add a comment above it, with its range, to default.toml"));
             continue;
         };
         for range in ranges(first.file, key).iter().filter(|_| !is_reward(key)) {
-            let stated = blocks.iter().filter(|block| block.has(key)).flat_map(Block::ranges).any(|stated| same(&stated, range));
+            let stated =
+                blocks.iter().filter(|block| block.has(key)).flat_map(Block::ranges).any(|stated| same(&stated, range));
             if !stated {
                 let [least, most] = range.map(Option::unwrap_or_default);
                 faults.insert(format!("{key}: lies in {least}..{most}: say so above it in {}.toml", first.file));
@@ -144,7 +155,8 @@ fn faults(keys: &[String], blocks: &[Block]) -> (BTreeSet<String>, usize) {
         }
     }
     for block in blocks {
-        let of_block: Vec<Ends> = keys.iter().filter(|key| block.has(key)).flat_map(|key| ranges(block.file, key)).collect();
+        let of_block: Vec<Ends> =
+            keys.iter().filter(|key| block.has(key)).flat_map(|key| ranges(block.file, key)).collect();
         for [least, most] in block.ranges().iter().filter(|stated| !of_block.iter().any(|range| same(stated, range))) {
             let place = format!("{}.toml, [{}] {}", block.file, block.table, block.keys.join(", "));
             faults.insert(format!("{place}: {least:?}..{most:?} is the range of none of these keys: {of_block:?}"));
@@ -171,9 +183,14 @@ fn every_key_is_explained_with_its_range() {
 
 #[test]
 fn a_key_without_a_comment_and_a_wrong_range_are_found() {
-    let text = text_of("default").replace("Discount factor; 0..1.", "Discount factor; 0..2.").replace("`adapter`", "adapter");
+    let text =
+        text_of("default").replace("Discount factor; 0..1.", "Discount factor; 0..2.").replace("`adapter`", "adapter");
     let keys = ["learning.gamma", "learning.tau", "adapter"].map(str::to_owned);
     let (faults, _) = faults(&keys, &blocks("default", &text));
-    let starts = ["adapter: no file explains it", "default.toml, [learning] gamma: Some(0.0)..Some(2.0)", "learning.gamma: lies in 0..1"];
+    let starts = [
+        "adapter: no file explains it",
+        "default.toml, [learning] gamma: Some(0.0)..Some(2.0)",
+        "learning.gamma: lies in 0..1",
+    ];
     assert!(starts.iter().all(|start| faults.iter().any(|fault| fault.starts_with(start))), "{faults:#?}");
 }

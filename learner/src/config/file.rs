@@ -43,7 +43,9 @@ fn with_bases(file: &Path, depth: usize) -> Result<Table, Error> {
             let expected = format!("at most {DEPTH} files may follow each other: one of them is its own base");
             return Err(invalid(format!("{base:?}"), expected).into());
         }
-        Some(other) => return Err(invalid(other.to_string(), "must be the name or the path of a training file".to_owned()).into()),
+        Some(other) => {
+            return Err(invalid(other.to_string(), "must be the name or the path of a training file".to_owned()).into());
+        }
     };
     let path = match shipped(file).is_some() || shipped(Path::new(&base)).is_some() && !beside(file, &base).is_file() {
         true => PathBuf::from(base.trim_end_matches(".toml")),
@@ -73,7 +75,8 @@ fn without(file: &Path, table: &mut Table) -> Result<Vec<String>, Error> {
     let read = |value: Value| value.try_into::<Vec<String>>();
     let keys = table.remove("without").map(read).transpose();
     let expected = "must be a list of keys of the base, as in [\"validation\", \"replay_buffer.priority\"]";
-    keys.map(Option::unwrap_or_default).map_err(|error| Reader::of(file).invalid("without", error.message(), expected).into())
+    keys.map(Option::unwrap_or_default)
+        .map_err(|error| Reader::of(file).invalid("without", error.message(), expected).into())
 }
 
 fn beside(file: &Path, base: &str) -> PathBuf {
@@ -91,7 +94,10 @@ fn table(file: &Path) -> Result<Table, Error> {
         Some(text) => text.to_owned(),
         None if is_name(file) => {
             let known: Vec<&str> = SHIPPED.iter().map(|(name, _)| *name).collect();
-            let expected = format!("is no training file: the program comes with {}; or give a path ending in .toml", known.join(", "));
+            let expected = format!(
+                "is no training file: the program comes with {}; or give a path ending in .toml",
+                known.join(", ")
+            );
             return Err(Error::Contents { file: file.to_owned(), message: expected });
         }
         None => read_text(file, TEXT_LIMIT)?,

@@ -23,7 +23,8 @@ pub(super) fn set(table: &mut Table, settings: &[String]) -> Result<(), Error> {
 
 fn one(table: &mut Table, setting: &str) -> Result<(), Error> {
     let wrong = |expected: String| Error::Setting { name: "--set", value: setting.to_owned(), expected };
-    let (key, value) = setting.split_once('=').ok_or_else(|| wrong("KEY=VALUE is needed, as in learning.n_steps=5".into()))?;
+    let (key, value) =
+        setting.split_once('=').ok_or_else(|| wrong("KEY=VALUE is needed, as in learning.n_steps=5".into()))?;
     let path: Vec<&str> = key.trim().split('.').collect();
     let [tables @ .., last] = path.as_slice() else { return Err(wrong("a key is needed before the `=`".into())) };
     if path.iter().any(|part| part.is_empty()) {
@@ -46,7 +47,9 @@ fn one(table: &mut Table, setting: &str) -> Result<(), Error> {
 pub(super) fn remove(table: &mut Table, key: &str) -> bool {
     match key.split_once('.') {
         None => table.remove(key).is_some(),
-        Some((part, rest)) => table.get_mut(part).and_then(Value::as_table_mut).is_some_and(|inner| remove(inner, rest)),
+        Some((part, rest)) => {
+            table.get_mut(part).and_then(Value::as_table_mut).is_some_and(|inner| remove(inner, rest))
+        }
     }
 }
 

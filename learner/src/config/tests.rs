@@ -61,7 +61,11 @@ fn every_value_out_of_its_range_is_refused_with_its_key_and_what_would_do() {
         ("gamma", "gamma = 1.01", "learning.gamma: 1.01; must lie in 0..1"),
         ("gamma", "gamma = -0.1", "learning.gamma: -0.1; must lie in 0..1"),
         ("reward_scale", "reward_scale = 0.0", "learning.reward_scale: 0; must lie in"),
-        ("reward_scale", "reward_scale = 1.0\narrival = 2e6", "learning.arrival: 2000000; must lie in -1000000..1000000"),
+        (
+            "reward_scale",
+            "reward_scale = 1.0\narrival = 2e6",
+            "learning.arrival: 2000000; must lie in -1000000..1000000",
+        ),
         ("actor_learning_rate", "actor_learning_rate = 0.0", "learning.actor_learning_rate: 0; must lie in"),
         ("critic_learning_rate", "critic_learning_rate = inf", "learning.critic_learning_rate: inf; must lie in"),
         ("tau", "tau = 1.5", "learning.tau: 1.5; must lie in"),
@@ -124,7 +128,8 @@ fn a_run_that_nothing_would_end_is_refused() {
 
 #[test]
 fn a_replay_buffer_too_small_for_its_trucks_is_refused() {
-    let text = default_file().replace("n_envs = 512", "n_envs = 65536").replace("capacity = 600000", "capacity = 655360");
+    let text =
+        default_file().replace("n_envs = 512", "n_envs = 65536").replace("capacity = 600000", "capacity = 655360");
     let message = read(&text).unwrap_err();
     // Of ten slots none is followed by ten others.
     assert!(message.contains("replay_buffer.capacity: 655360; must hold more than learning.n_steps = 10"), "{message}");
@@ -142,8 +147,14 @@ fn the_command_line_replaces_keys_and_a_budget_there_replaces_both() {
 #[test]
 fn a_key_that_works_on_the_processor_alone_is_refused_for_a_device() {
     // The default file has two of them.
-    let own =
-        ["[replay_buffer.priority]\n", "\nexponent = 0.6", "\ncorrection = 0.4", "[level_replay]\n", "\nfraction = 0.5", "\nrate = 0.2"];
+    let own = [
+        "[replay_buffer.priority]\n",
+        "\nexponent = 0.6",
+        "\ncorrection = 0.4",
+        "[level_replay]\n",
+        "\nfraction = 0.5",
+        "\nrate = 0.2",
+    ];
     let plain = own.iter().fold(default_file(), |text, part| text.replace(part, ""));
     let on_device = format!("device = \"gpu\"\n{plain}");
     assert_eq!(read(&on_device).unwrap().device, Device::Gpu);
@@ -152,10 +163,15 @@ fn a_key_that_works_on_the_processor_alone_is_refused_for_a_device() {
     let level_replay = "[level_replay]\nfraction = 0.5\nrate = 0.2\n";
     let lane = std::fs::read_to_string(files::repository().join("learner/configs/lane.toml")).unwrap();
     let refinement = &lane[lane.find("\n[refinement]").unwrap()..];
-    let tables =
-        [("exploration", exploration), ("level_replay", level_replay), ("replay_buffer.priority", priority), ("refinement", refinement)];
+    let tables = [
+        ("exploration", exploration),
+        ("level_replay", level_replay),
+        ("replay_buffer.priority", priority),
+        ("refinement", refinement),
+    ];
     let with_tables = tables.map(|(key, table)| (key, format!("{plain}\n{table}")));
-    let with_arrival = ("learning.arrival", plain.replace("\n[learning.entropy]", "arrival = 1500.0\n[learning.entropy]"));
+    let with_arrival =
+        ("learning.arrival", plain.replace("\n[learning.entropy]", "arrival = 1500.0\n[learning.entropy]"));
     for (key, text) in with_tables.into_iter().chain([with_arrival]) {
         assert!(read(&text).is_ok(), "{key}");
         let message = read(&format!("device = \"gpu\"\n{text}")).unwrap_err().to_string();
@@ -168,8 +184,10 @@ fn any_value_of_any_key_is_taken_or_refused_by_its_key() {
     let text = default_file();
     let lines: Vec<&str> = text.lines().collect();
     // Tables may have keys of the same name, so a key is its line.
-    let key = |line: &str| if line.starts_with('#') { None } else { line.split_once(" = ").map(|(key, _)| key.to_owned()) };
-    let keys: Vec<(usize, String)> = lines.iter().enumerate().filter_map(|(index, line)| Some((index, key(line)?))).collect();
+    let key =
+        |line: &str| if line.starts_with('#') { None } else { line.split_once(" = ").map(|(key, _)| key.to_owned()) };
+    let keys: Vec<(usize, String)> =
+        lines.iter().enumerate().filter_map(|(index, line)| Some((index, key(line)?))).collect();
     assert_eq!(keys.len(), 38, "{keys:?}");
     let mut taken = 0;
     for (index, key) in &keys {
@@ -192,7 +210,8 @@ fn any_value_of_any_key_is_taken_or_refused_by_its_key() {
             "1979-05-27",
         ] {
             let changed = format!("{key} = {value}");
-            let text: Vec<&str> = lines.iter().enumerate().map(|(other, &line)| if other == *index { &changed } else { line }).collect();
+            let text: Vec<&str> =
+                lines.iter().enumerate().map(|(other, &line)| if other == *index { &changed } else { line }).collect();
             match read(&text.join("\n")) {
                 Ok(config) => {
                     taken += 1;
@@ -225,7 +244,8 @@ fn single_keys_can_be_set_added_and_taken_out() {
     assert_eq!(config.learning.n_steps, 7);
     assert_eq!(config.replay_buffer.priority, Some(Priority { exponent: 0.6, correction: 0.4 }));
     assert_eq!(config.training_benchmark, None);
-    let words = with_set(&["learning.critics=minimum", "training_benchmark=elsewhere", "learning.hidden=[8, 8]"]).unwrap();
+    let words =
+        with_set(&["learning.critics=minimum", "training_benchmark=elsewhere", "learning.hidden=[8, 8]"]).unwrap();
     assert_eq!(
         (words.learning.critics, words.training_benchmark.as_deref(), words.learning.hidden),
         (Critics::Minimum, Some("elsewhere"), vec![8, 8])
@@ -245,7 +265,10 @@ fn a_key_that_is_not_there_can_be_taken_out() {
 fn a_benchmark_of_ones_own_takes_the_place_of_all_that_a_training_file_says_of_others() {
     let config = Config::read_for(Path::new("default"), Some("mine.toml"), &["reward.failure=-9".to_owned()]).unwrap();
     let usual = with_set(&[]).unwrap();
-    assert_eq!((config.benchmark.as_str(), &config.training_benchmark, &config.also_evaluate), ("mine.toml", &None, &Vec::new()));
+    assert_eq!(
+        (config.benchmark.as_str(), &config.training_benchmark, &config.also_evaluate),
+        ("mine.toml", &None, &Vec::new())
+    );
     assert_eq!(config.changed_rewards(), "reward.failure = -9.0");
     assert_eq!(config.validation, Some(Validation { benchmark: None, ..usual.validation.unwrap() }));
     assert_eq!(config.learning, usual.learning);
@@ -265,7 +288,9 @@ fn weights_of_the_reward_can_be_changed_one_by_one() {
     assert_eq!(changed.changed_rewards(), "reward.clearance = -70.0, reward.failure = -3.0");
     changed.reward.apply(&mut scenario.reward);
     assert_eq!((scenario.reward.clearance, scenario.reward.failure), (-70.0, -3.0));
-    let others = |of: &Scenario| (of.reward.waypoint, of.reward.lane_distance, of.reward.lane_distance_limit, of.reward.clearance_limit);
+    let others = |of: &Scenario| {
+        (of.reward.waypoint, of.reward.lane_distance, of.reward.lane_distance_limit, of.reward.clearance_limit)
+    };
     assert_eq!(others(&scenario), others(&before));
 }
 
@@ -314,7 +339,10 @@ fn a_file_gives_only_what_differs_from_its_base() {
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     let read = |name: &str| Config::read(&folder.path().join(name)).map_err(|error| error.to_string());
     write("own.toml", &default_file());
-    write("longer.toml", "base = \"own.toml\"\nsteps = 40000\n[learning]\ngamma = 0.5\n[learning.entropy]\ncoefficient = 0.1\n");
+    write(
+        "longer.toml",
+        "base = \"own.toml\"\nsteps = 40000\n[learning]\ngamma = 0.5\n[learning.entropy]\ncoefficient = 0.1\n",
+    );
     write("longest.toml", "base = \"longer.toml\"\nsteps = 50000\n");
     let (own, longest) = (read("own.toml").unwrap(), read("longest.toml").unwrap());
     assert_eq!((longest.steps, longest.learning.gamma, longest.learning.entropy.coefficient), (Some(50_000), 0.5, 0.1));
@@ -341,7 +369,9 @@ fn a_file_gives_only_what_differs_from_its_base() {
 
 #[test]
 fn a_budget_that_ends_before_the_first_update_is_refused() {
-    let checked = |steps: &str| with("steps", steps).unwrap().check_budget(Path::new("fast.toml")).map_err(|error| error.to_string());
+    let checked = |steps: &str| {
+        with("steps", steps).unwrap().check_budget(Path::new("fast.toml")).map_err(|error| error.to_string())
+    };
     let message = checked("steps = 20000").unwrap_err();
     assert!(message.contains("fast.toml: steps: 20000; must be above 20000, or nothing is learned"), "{message}");
     assert_eq!(checked("steps = 20001"), Ok(()));
@@ -350,7 +380,8 @@ fn a_budget_that_ends_before_the_first_update_is_refused() {
 #[test]
 fn further_evaluations_are_benchmarks_with_or_without_a_split() {
     let with_also = |list: &str| with("also_evaluate", &format!("also_evaluate = {list}"));
-    let config = with_also(r#"["attard2023-full", "attard2023-full/train", "own/a.toml/validation", "b.toml"]"#).unwrap();
+    let config =
+        with_also(r#"["attard2023-full", "attard2023-full/train", "own/a.toml/validation", "b.toml"]"#).unwrap();
     let named: Vec<String> = config.also_evaluated().iter().map(AlsoEvaluate::name).collect();
     assert_eq!(named, ["attard2023-full/test", "attard2023-full/train", "own/a.toml/validation", "b.toml/test"]);
     assert_eq!(read(&config.to_toml()).unwrap(), config);

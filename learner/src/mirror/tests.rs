@@ -48,8 +48,11 @@ fn a_mirrored_truck_in_a_mirrored_world_has_mirrored_observations_and_the_same_r
     let begin = |world: World, side: f32| {
         let choice = RouteChoice::Fixed(routes.clone());
         let mut simulator = Simulator::new(Arc::new(world), routes.len(), 0, choice).unwrap();
-        let start =
-            |env: usize| Start { offset: side * (env as f32 * 0.37).sin(), heading: side * (env as f32 * 0.73).sin(), ..Start::default() };
+        let start = |env: usize| Start {
+            offset: side * (env as f32 * 0.37).sin(),
+            heading: side * (env as f32 * 0.73).sin(),
+            ..Start::default()
+        };
         simulator.reset_from(&(0..routes.len()).map(start).collect::<Vec<_>>()).unwrap();
         simulator
     };
@@ -57,9 +60,11 @@ fn a_mirrored_truck_in_a_mirrored_world_has_mirrored_observations_and_the_same_r
     let rng = &mut Generator::seed_from_u64(5);
     let (mut n_ranges, mut n_grazing, mut n_steps, mut mirrored) = (0, 0, 0, 0.0f32);
     for _ in 0..60 {
-        let held: Vec<bool> = real.batch().truck.iter().zip(&image.batch().truck).map(|(one, other)| one.held + other.held > 0).collect();
+        let held: Vec<bool> =
+            real.batch().truck.iter().zip(&image.batch().truck).map(|(one, other)| one.held + other.held > 0).collect();
         // Mostly straight on, so that trucks come as far as the ring.
-        let actions: Vec<u32> = routes.iter().map(|_| if rng.random_bool(0.5) { 4 } else { rng.random_range(1..8) }).collect();
+        let actions: Vec<u32> =
+            routes.iter().map(|_| if rng.random_bool(0.5) { 4 } else { rng.random_range(1..8) }).collect();
         let images: Vec<u32> = actions.iter().map(|&action| mirror.actions[action as usize]).collect();
         real.step(&actions).unwrap();
         image.step(&images).unwrap();
@@ -67,7 +72,10 @@ fn a_mirrored_truck_in_a_mirrored_world_has_mirrored_observations_and_the_same_r
         for env in (0..routes.len()).filter(|&env| !held[env]) {
             n_steps += 1;
             // A truck that misses a kerb by less than the field's error may hit its image.
-            assert!(one.ended[env] == other.ended[env] || nearest(&one.clearance[env]).min(nearest(&other.clearance[env])).abs() < 0.02);
+            assert!(
+                one.ended[env] == other.ended[env]
+                    || nearest(&one.clearance[env]).min(nearest(&other.clearance[env])).abs() < 0.02
+            );
             // A waypoint is worth 100; the price on the lane distance differs by rounding.
             assert!(one.ended[env] != other.ended[env] || (one.reward[env] - other.reward[env]).abs() < 0.1);
             let expected = mirror.observation(&one.next_observation[env]);
@@ -111,7 +119,9 @@ fn an_action_table_or_sensors_without_an_image_are_refused() {
     world.actions[8].steering *= 0.9;
     let message = Mirror::of(&world).unwrap_err().to_string();
     assert!(
-        message.starts_with("learning.mirror_augmentation: true; steering -32.0 deg is in the action table and its opposite is not"),
+        message.starts_with(
+            "learning.mirror_augmentation: true; steering -32.0 deg is in the action table and its opposite is not"
+        ),
         "{message}"
     );
     let mut world = World::bake(&scenario()).unwrap();

@@ -40,8 +40,8 @@ impl Ppo {
     /// Continues from a learner of the same sizes.
     pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
         let device = Device::flex();
-        let [actor, actor_ema] =
-            [(ACTOR, &self.actor), (ACTOR_EMA, &self.actor_ema)].map(|(name, like)| network(stored, name, like, &device));
+        let [actor, actor_ema] = [(ACTOR, &self.actor), (ACTOR_EMA, &self.actor_ema)]
+            .map(|(name, like)| network(stored, name, like, &device));
         let (actor, actor_ema, critic) = (actor?, actor_ema?, network(stored, CRITIC, &self.critic, &device)?);
         let [actor_steps, critic_steps] = stored.array::<u32, 2>(STEPS)?;
         let actor_state = optimizer(stored, STEPS, actor_steps, &named(ACTOR, &actor))?;
@@ -59,13 +59,16 @@ impl Ppo {
 
     /// The first of the learner's numbers that is not finite: its name and value.
     pub fn broken(&self) -> Option<(String, f32)> {
-        self.numbers().into_iter().find_map(|(name, values)| Some((name, values.into_iter().find(|value| !value.is_finite())?)))
+        self.numbers()
+            .into_iter()
+            .find_map(|(name, values)| Some((name, values.into_iter().find(|value| !value.is_finite())?)))
     }
 
     fn numbers(&self) -> Named {
         let networks = [named(ACTOR, &self.actor), named(CRITIC, &self.critic)];
         let states = [&self.actor_optimizer, &self.critic_optimizer].map(|optimizer| optimizer.state());
-        let moments: Vec<_> = states.into_iter().zip(&networks).flat_map(|(state, parameters)| moments(parameters, state)).collect();
+        let moments: Vec<_> =
+            states.into_iter().zip(&networks).flat_map(|(state, parameters)| moments(parameters, state)).collect();
         networks.into_iter().flatten().chain(moments).chain(named(ACTOR_EMA, &self.actor_ema)).collect()
     }
 }

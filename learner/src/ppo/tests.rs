@@ -51,7 +51,11 @@ fn bandit(actor: &Mlp, seen: &[f32], reward: impl Fn(f32, u32) -> f32, rng: &mut
         n_envs: seen.len(),
         n_values: 1,
         observation: seen.to_vec(),
-        log_prob: output.chunks_exact(n_actions).zip(&action).map(|(row, &action)| softmax(row).1[action as usize]).collect(),
+        log_prob: output
+            .chunks_exact(n_actions)
+            .zip(&action)
+            .map(|(row, &action)| softmax(row).1[action as usize])
+            .collect(),
         reward: seen.iter().zip(&action).map(|(&seen, &action)| reward(seen, action)).collect(),
         ended: vec![Ended::Arrived; seen.len()],
         next_observation: Vec::new(),
@@ -63,8 +67,11 @@ fn bandit(actor: &Mlp, seen: &[f32], reward: impl Fn(f32, u32) -> f32, rng: &mut
 fn advantages_are_discounted_sums_of_td_errors_within_an_episode() {
     use Ended::{Running, TimedOut, TractorCollided};
     // The first truck fails in its second step; the second one runs out of time in its first. Both then go on.
-    let steps =
-        steps(&[1.0, 2.0, -8.0, 4.0, 16.0, 32.0], &[Running, TimedOut, TractorCollided, Running, Running, Running], &[100.0, 200.0, 300.0]);
+    let steps = steps(
+        &[1.0, 2.0, -8.0, 4.0, 16.0, 32.0],
+        &[Running, TimedOut, TractorCollided, Running, Running, Running],
+        &[100.0, 200.0, 300.0],
+    );
     let needs: Vec<usize> = (0..6).filter(|&row| steps.needs_next(row, 6)).collect();
     assert_eq!(needs, [1, 4, 5]);
     let values = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0];
@@ -97,8 +104,14 @@ fn the_gradients_are_those_of_the_tensor_librarys_differentiation() {
     let output = Pass::forward(&ppo.actor, matrix(TensorData::new(seen.to_vec(), [6, 1]))).output;
     let ratios = [1.1f32, 1.5, 0.6, 0.9, 1.5, 0.6];
     let advantage = [1.0f32, 1.0, 1.0, -2.0, -2.0, -2.0];
-    let log_prob = (0..6).map(|row| softmax(row_of(&output, row, n_actions)).1[action[row] as usize] - ratios[row].ln()).collect();
-    let steps = Steps { observation: seen.to_vec(), action: action.clone(), log_prob, ..steps(&[0.0; 6], &[Ended::Running; 6], &[]) };
+    let log_prob =
+        (0..6).map(|row| softmax(row_of(&output, row, n_actions)).1[action[row] as usize] - ratios[row].ln()).collect();
+    let steps = Steps {
+        observation: seen.to_vec(),
+        action: action.clone(),
+        log_prob,
+        ..steps(&[0.0; 6], &[Ended::Running; 6], &[])
+    };
     let returned = [0.5f32, -1.0, 2.0, 0.0, 1.0, -0.5];
     let rows = Rows { steps: &steps, advantage: &advantage, returned: &returned, rows: &[0, 1, 2, 3, 4, 5] };
     let ShardGradients { figures, actor: of_actor, critic: of_critic } = ppo.gradients(&rows, 1.0 / 6.0);
@@ -116,8 +129,9 @@ fn the_gradients_are_those_of_the_tensor_librarys_differentiation() {
     let loss = surrogate.clone() - entropy.clone().mul_scalar(0.01);
     let critic_loss = (own_critic.forward(column(&seen)) - column(&returned)).square().mean();
     let number = |tensor: Tensor<1>| tensor.into_data().try_to_vec::<f32>().unwrap()[0];
-    for (found, expected) in [(figures.actor_loss, surrogate), (figures.entropy, entropy), (figures.critic_loss, critic_loss.clone())]
-        .map(|(a, b)| (a, number(b)))
+    for (found, expected) in
+        [(figures.actor_loss, surrogate), (figures.entropy, entropy), (figures.critic_loss, critic_loss.clone())]
+            .map(|(a, b)| (a, number(b)))
     {
         assert!((found - expected).abs() < 1e-5, "{found} {expected}");
     }
@@ -148,7 +162,8 @@ fn the_action_that_pays_where_it_is_becomes_probable_and_the_values_are_learned(
     let mut rng = Generator::seed_from_u64(3);
     let seen: Vec<f32> = (0..64).map(|n| if n % 2 == 0 { 1.0 } else { -1.0 }).collect();
     for _ in 0..200 {
-        let steps = bandit(&ppo.actor, &seen, |seen, action| if (seen < 0.0) == (action == 0) { 2.0 } else { 0.0 }, &mut rng);
+        let steps =
+            bandit(&ppo.actor, &seen, |seen, action| if (seen < 0.0) == (action == 0) { 2.0 } else { 0.0 }, &mut rng);
         assert_eq!(ppo.learn(&steps, 1.0), 8);
     }
     let output = Pass::forward(ppo.actor_ema(), matrix(TensorData::new(vec![-1.0, 1.0], [2, 1]))).output;

@@ -93,7 +93,8 @@ impl Priorities {
     /// Importance-sampling weights of `rows`, `(n p) ^ -correction` over the largest of them; `n_rows` can be sampled.
     pub(super) fn weights(&self, rows: &[usize], n_rows: usize) -> Vec<f32> {
         let probability = |&row: &usize| self.sums[self.n_leaves + row] / self.sums[1];
-        let weights: Vec<f64> = rows.iter().map(|row| (n_rows as f64 * probability(row)).powf(-self.settings.correction)).collect();
+        let weights: Vec<f64> =
+            rows.iter().map(|row| (n_rows as f64 * probability(row)).powf(-self.settings.correction)).collect();
         let largest = weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         weights.iter().map(|weight| (weight / largest) as f32).collect()
     }

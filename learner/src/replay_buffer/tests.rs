@@ -20,7 +20,12 @@ fn histories(n_steps: usize) -> [History; 2] {
 /// With and without priorities.
 const SETTINGS: [Option<config::Priority>; 2] = [None, Some(config::Priority { exponent: 0.6, correction: 0.4 })];
 
-fn filled(histories: &[History; 2], n_steps: usize, capacity: usize, priority: Option<config::Priority>) -> ReplayBuffer<2> {
+fn filled(
+    histories: &[History; 2],
+    n_steps: usize,
+    capacity: usize,
+    priority: Option<config::Priority>,
+) -> ReplayBuffer<2> {
     let mut buffer = ReplayBuffer::new(2, n_steps, &config::ReplayBuffer { capacity, warmup: 1, priority });
     for (step, (first, second)) in histories[0].iter().zip(&histories[1]).enumerate() {
         let of = |value: usize| [0, 1].map(|env| [value as f32, env as f32]);
@@ -77,7 +82,11 @@ fn returns_over_several_steps_equal_their_definition() {
     for n_steps in [1, 2, 5] {
         for priority in SETTINGS {
             let starts = check(&filled(&histories, n_steps, 200, priority), &histories, n_steps);
-            assert_eq!(starts, (0..60 - n_steps).collect::<Vec<_>>(), "every step that enough others follow can be sampled");
+            assert_eq!(
+                starts,
+                (0..60 - n_steps).collect::<Vec<_>>(),
+                "every step that enough others follow can be sampled"
+            );
         }
     }
 }

@@ -158,7 +158,8 @@ impl<const N: usize> DeviceRollout<N> {
         let (observation, action) = (floats(&self.sample.observation)?, integers(&self.sample.action)?);
         let (reward, discount, next) =
             (floats(&self.sample.reward)?, floats(&self.sample.discount)?, floats(&self.sample.next_observation)?);
-        let batch = self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
+        let batch =
+            self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
         let column = |column: Column| batch.column(column).clone();
         let held = (self.facts.n_slots * self.facts.n_envs) as usize;
         let row_bytes = N * size_of::<f32>();
@@ -211,7 +212,8 @@ impl<const N: usize> DeviceRollout<N> {
         self.write_now();
         let mut encoder = device.create_command_encoder(&Default::default());
         let (kernels, facts) = (&self.kernels, &self.facts);
-        let batch = self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
+        let batch =
+            self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
         if logits.is_some() {
             memory_kernels::add(kernels, &mut encoder, &group, Kernel::Choose, facts);
         } else {
@@ -268,7 +270,8 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
     fn found_normalisation(&self, mirror: Option<&Mirror>) -> Result<Normalisation, Error> {
         let held = self.buffers.slice(Binding::held_observation);
         let size = (self.n_transitions() * N * size_of::<f32>()) as u64;
-        let bytes = self.shared.gpu.read(&[Slice { size, ..held.clone() }]).map_err(offtrack::simulator::Error::from)?;
+        let bytes =
+            self.shared.gpu.read(&[Slice { size, ..held.clone() }]).map_err(offtrack::simulator::Error::from)?;
         // Bytes need not be aligned as floats are.
         let rows: Vec<[f32; N]> = bytes[0].chunks_exact(N * 4).map(bytemuck::pod_read_unaligned).collect();
         Ok(super::normalisation_of(rows, mirror))
@@ -279,7 +282,9 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
         let rows = normalisation.mean.iter().zip(&normalisation.factor);
         let rows: Vec<Normal> = rows.map(|(&mean, &factor)| Normal { mean, factor, noise }).collect();
         self.shared.gpu.queue.write_buffer(&self.buffers.slice(Binding::normalisation).buffer, 0, cast_slice(&rows));
-        let row = |values: &[f32]| Tensor::from_data(TensorData::new(values.to_vec(), [1, values.len()]), &self.shared.tensors);
+        let row = |values: &[f32]| {
+            Tensor::from_data(TensorData::new(values.to_vec(), [1, values.len()]), &self.shared.tensors)
+        };
         self.normalisation = [row(&normalisation.mean), row(&normalisation.factor)];
     }
 
@@ -333,7 +338,8 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
         let tally = self.simulator.tally()?;
         let since = tally.since(&self.counted);
         self.counted = tally;
-        let episodes = Episodes { count: since.episodes(), arrived: since.ended(Ended::Arrived), reward: since.reward() };
+        let episodes =
+            Episodes { count: since.episodes(), arrived: since.ended(Ended::Arrived), reward: since.reward() };
         Ok(Vec::from_iter((0 < episodes.count).then_some(episodes)))
     }
 
@@ -351,7 +357,14 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
         // Other actions and samples than the first time.
         let seeds = seeds(self.config.seed, n_updates as u32);
         let world = self.simulator.world().clone();
-        *self = DeviceRollout::with_seeds(&self.shared, &self.config, &world, self.routes.clone(), self.mirror.clone(), seeds)?;
+        *self = DeviceRollout::with_seeds(
+            &self.shared,
+            &self.config,
+            &world,
+            self.routes.clone(),
+            self.mirror.clone(),
+            seeds,
+        )?;
         Ok(())
     }
 }
@@ -370,7 +383,8 @@ fn check_capacity<const N: usize>(shared: &Shared, config: &Config, n_transition
         return Ok(());
     }
     let (name, most) = (shared.gpu.name(), limit / row_bytes);
-    let expected = format!("its observations take {needed} bytes where {name} allows {limit} in a buffer: at most {most}");
+    let expected =
+        format!("its observations take {needed} bytes where {name} allows {limit} in a buffer: at most {most}");
     Err(Error::Setting { name: "replay_buffer.capacity", value: config.replay_buffer.capacity.to_string(), expected })
 }
 

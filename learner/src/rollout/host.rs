@@ -32,7 +32,10 @@ mod tests;
 
 /// Each truck's `N` values: those of its observation, and its first extras, `[n_envs]`. Without extras nothing is
 /// copied.
-pub fn observed<'a, const N: usize>(observation: &'a [[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Cow<'a, [[f32; N]]> {
+pub fn observed<'a, const N: usize>(
+    observation: &'a [[f32; N_VALUES]],
+    extras: &[[f32; N_EXTRAS]],
+) -> Cow<'a, [[f32; N]]> {
     if N == N_VALUES {
         return Cow::Borrowed(bytemuck::cast_slice(observation));
     }
@@ -70,8 +73,14 @@ pub struct HostRollout<const N: usize> {
 impl<const N: usize> HostRollout<N> {
     /// Trucks at the start of their first episodes, and an empty replay buffer. A route that the world does not have
     /// and a batch that does not fit into the memory are errors.
-    pub fn new(config: &Config, world: &Arc<World>, routes: Vec<u32>, mirror: Option<Mirror>) -> Result<HostRollout<N>, Error> {
-        let stream = |purpose: u32| Generator::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
+    pub fn new(
+        config: &Config,
+        world: &Arc<World>,
+        routes: Vec<u32>,
+        mirror: Option<Mirror>,
+    ) -> Result<HostRollout<N>, Error> {
+        let stream =
+            |purpose: u32| Generator::seed_from_u64(u64::from(random::words(config.seed, purpose, 0, u32::MAX)[0]));
         let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
         let choice = RouteChoice::Drawn(level_replay.as_ref().map_or(routes, |replay| replay.list().to_vec()));
         let mut replay_buffer = ReplayBuffer::new(config.n_envs, config.learning.n_steps, &config.replay_buffer);
@@ -134,7 +143,9 @@ impl<const N: usize> HostRollout<N> {
     fn count(&mut self) -> Result<(), Error> {
         let batch = self.simulator.batch();
         let codes = batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running));
-        for (((sum, &reward), ended), &route) in self.episode_rewards.iter_mut().zip(&batch.reward).zip(codes).zip(&self.routes) {
+        for (((sum, &reward), ended), &route) in
+            self.episode_rewards.iter_mut().zip(&batch.reward).zip(codes).zip(&self.routes)
+        {
             *sum += reward;
             if ended != Ended::Running {
                 let arrived = u64::from(ended == Ended::Arrived);
@@ -203,13 +214,16 @@ impl<const N: usize> Rollout for HostRollout<N> {
             steps.observation.extend_from_slice(&normalised);
             let logits = logits_of_normalised(actor, normalised, N);
             let actions = sampled(&logits, n_actions, &mut self.acting);
-            steps.log_prob.extend(logits.chunks_exact(n_actions).zip(&actions).map(|(row, &action)| softmax(row).1[action as usize]));
+            steps.log_prob.extend(
+                logits.chunks_exact(n_actions).zip(&actions).map(|(row, &action)| softmax(row).1[action as usize]),
+            );
             steps.action.extend_from_slice(&actions);
             self.simulator.step(&actions)?;
             let batch = self.simulator.batch();
             for env in 0..n_envs {
                 let terms = RewardTerms {
-                    lane_distance: (batch.terms[env].lane_distance * limit / params.reward.lane_distance_limit).min(1.0),
+                    lane_distance: (batch.terms[env].lane_distance * limit / params.reward.lane_distance_limit)
+                        .min(1.0),
                     clearance: physics::closeness(&params, &batch.clearance[env]).powf(settings.clearance_power as f32),
                     ..batch.terms[env]
                 };
@@ -249,7 +263,8 @@ impl<const N: usize> Rollout for HostRollout<N> {
 
     fn set_td_errors(&mut self, errors: Vec<Tensor<2>>) {
         if self.replay_buffer.has_priorities() {
-            let read = |errors: Tensor<2>| errors.into_data().try_to_vec::<f32>().expect("TD errors of f32 critics are f32");
+            let read =
+                |errors: Tensor<2>| errors.into_data().try_to_vec::<f32>().expect("TD errors of f32 critics are f32");
             let errors: Vec<f32> = errors.into_iter().flat_map(read).collect();
             self.replay_buffer.set_td_errors(&self.sampled_rows, &errors);
         }
@@ -283,9 +298,12 @@ impl<const N: usize> Rollout for HostRollout<N> {
     }
 
     fn restore(&mut self, stored: &Stored, _: u64) -> Result<(), Error> {
-        self.simulator.restore(|column| stored.bytes(&column_name(column))).map_err(|error| stored.error(error.to_string()))?;
+        self.simulator
+            .restore(|column| stored.bytes(&column_name(column)))
+            .map_err(|error| stored.error(error.to_string()))?;
         check_finite(self.simulator.batch(), stored)?;
-        (self.acting, self.sampling) = (Generator::stored(stored, "rollout, acting")?, Generator::stored(stored, "rollout, sampling")?);
+        (self.acting, self.sampling) =
+            (Generator::stored(stored, "rollout, acting")?, Generator::stored(stored, "rollout, sampling")?);
         self.episode_rewards = stored.exactly("rollout, episode rewards", self.config.n_envs)?;
         if let Some(replay) = &mut self.level_replay {
             replay.restore(stored)?;
@@ -316,13 +334,17 @@ fn check_finite(batch: &Batch, stored: &Stored) -> Result<(), Error> {
         let floats: Vec<f32> = match column {
             // Indices, or floats beside indices.
             Column::Action | Column::Ended | Column::Progress => continue,
-            Column::Truck => {
-                batch.truck.iter().flat_map(|truck| [truck.position.x, truck.position.y, truck.heading, truck.speed]).collect()
-            }
+            Column::Truck => batch
+                .truck
+                .iter()
+                .flat_map(|truck| [truck.position.x, truck.position.y, truck.heading, truck.speed])
+                .collect(),
             _ => bytes.chunks_exact(size_of::<f32>()).map(bytemuck::pod_read_unaligned).collect(),
         };
         if let Some(value) = floats.iter().find(|value| !value.is_finite()) {
-            return Err(stored.error(format!("its column `{}` has {value}: put a sound copy back", column_name(column))));
+            return Err(
+                stored.error(format!("its column `{}` has {value}: put a sound copy back", column_name(column)))
+            );
         }
     }
     Ok(())
@@ -348,7 +370,8 @@ pub fn shards<const N: usize>(
         let shape = [rows.len(), 1];
         let actions: Vec<i32> = sample.action[rows.clone()].iter().map(|&action| action as i32).collect();
         let rewards: Vec<f32> = sample.reward[rows.clone()].iter().map(|reward| reward * reward_scale).collect();
-        let mut normalised = [&sample.observation, &sample.next_observation].map(|column| normalisation.apply(&column[rows.clone()]));
+        let mut normalised =
+            [&sample.observation, &sample.next_observation].map(|column| normalisation.apply(&column[rows.clone()]));
         if 0.0 < noise {
             let [observation, next] = &mut normalised;
             for (value, next) in observation.iter_mut().zip(next) {
@@ -357,7 +380,8 @@ pub fn shards<const N: usize>(
                 *next += added;
             }
         }
-        let [observation, next_observation] = normalised.map(|values| Tensor::from_data(TensorData::new(values, [rows.len(), N]), &device));
+        let [observation, next_observation] =
+            normalised.map(|values| Tensor::from_data(TensorData::new(values, [rows.len(), N]), &device));
         Transitions {
             observation,
             action: Tensor::from_data(TensorData::new(actions, shape), &device),

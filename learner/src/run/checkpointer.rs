@@ -104,7 +104,8 @@ impl Checkpointer {
             // Where the owner cannot be kept, the checkpoint is this user's.
             let _ = keep_access(&last, file);
         }
-        let (part, whole, policy_file, metrics) = (self.part.clone(), self.file.clone(), self.policy.clone(), self.metrics.clone());
+        let (part, whole, policy_file, metrics) =
+            (self.part.clone(), self.file.clone(), self.policy.clone(), self.metrics.clone());
         let finish = move || {
             // The rows of metrics are on the disk before the checkpoint that refers to them.
             let moved = written
@@ -115,7 +116,10 @@ impl Checkpointer {
                 // A part of a checkpoint would fill the disk for nothing.
                 let _ = std::fs::remove_file(&part);
             }
-            Written { checkpoint: moved.map_err(Error::write(&whole)), policy: files::write_whole(&policy_file, &policy) }
+            Written {
+                checkpoint: moved.map_err(Error::write(&whole)),
+                policy: files::write_whole(&policy_file, &policy),
+            }
         };
         self.pending = Some(std::thread::spawn(finish));
     }

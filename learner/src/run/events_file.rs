@@ -29,7 +29,11 @@ impl EventsFile {
     /// A new file in a run's folder, after those of earlier processes. `row_steps` is the step of the last row that the
     /// run keeps (env steps).
     pub fn create(folder: &Path, row_steps: u64) -> Result<EventsFile, Error> {
-        let latest = std::fs::read_dir(folder).map_err(Error::read(folder))?.flatten().filter_map(|entry| written_at(&entry.path())).max();
+        let latest = std::fs::read_dir(folder)
+            .map_err(Error::read(folder))?
+            .flatten()
+            .filter_map(|entry| written_at(&entry.path()))
+            .max();
         let time = latest.map_or(0, |latest| latest + 1).max(now() as u64);
         let path = folder.join(format!("{PREFIX}{time:010}.offtrack"));
         let file = OpenOptions::new().append(true).create_new(true).open(&path).map_err(Error::write(&path))?;
@@ -50,7 +54,9 @@ impl EventsFile {
         let columns = || head.trim_end().split(',').zip(row.trim_end().split(','));
         let step = columns().find(|(name, _)| *name == STEP).and_then(|(_, value)| value.parse().ok()).unwrap_or(0);
         // A mean over nothing is left out of the row, and so of the event.
-        let values = columns().filter(|(name, _)| *name != STEP).filter_map(|(name, value)| Some((name, value.parse::<f32>().ok()?)));
+        let values = columns()
+            .filter(|(name, _)| *name != STEP)
+            .filter_map(|(name, value)| Some((name, value.parse::<f32>().ok()?)));
         let summary = values.fold(Message::default(), |summary, (name, value)| {
             let value = Message::default().bytes(1, name.as_bytes()).float(2, value);
             summary.bytes(1, &value.0)
@@ -148,7 +154,10 @@ mod tests {
         // The first record of a file that PyTorch's SummaryWriter writes has 24 bytes, and this checksum of its length.
         assert_eq!(masked(&24u64.to_le_bytes()).to_le_bytes(), [0xa3, 0x7f, 0x4b, 0x22]);
         let record = record(b"abc");
-        assert_eq!((record.len(), &record[..8], &record[12..15]), (8 + 4 + 3 + 4, &3u64.to_le_bytes()[..], &b"abc"[..]));
+        assert_eq!(
+            (record.len(), &record[..8], &record[12..15]),
+            (8 + 4 + 3 + 4, &3u64.to_le_bytes()[..], &b"abc"[..])
+        );
     }
 
     #[test]

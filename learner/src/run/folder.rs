@@ -103,9 +103,12 @@ pub fn make(runs: &Path, name: Option<&str>, config_file: &Path) -> Result<PathB
 }
 
 fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
-    let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) && !name.starts_with('.') && !name.is_empty();
+    let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
+        && !name.starts_with('.')
+        && !name.is_empty();
     if !plain {
-        let expected = "a name of letters, digits, `-`, `_` and `.` that begins with none of the last is needed".to_owned();
+        let expected =
+            "a name of letters, digits, `-`, `_` and `.` that begins with none of the last is needed".to_owned();
         return Err(Error::Setting { name: "--name", value: format!("{name:?}"), expected });
     }
     let path = runs.join(name);

@@ -16,7 +16,13 @@ use crate::sac::{Placement, Sac};
 
 /// A small run in `folder` on a device, and the device.
 fn run(folder: &Path, settings: &[&str]) -> (Run, Folder, Shared) {
-    let small = ["n_envs=64", "replay_buffer.capacity=4000", "replay_buffer.warmup=800", "learning.hidden=[16]", "learning.batch=32"];
+    let small = [
+        "n_envs=64",
+        "replay_buffer.capacity=4000",
+        "replay_buffer.warmup=800",
+        "learning.hidden=[16]",
+        "learning.batch=32",
+    ];
     let settings: Vec<String> = small.iter().chain(settings).map(|setting| (*setting).to_owned()).collect();
     let config = Config::read_with(Path::new("gpu"), &settings).unwrap();
     let folder = Folder::create(folder, Some("run"), Path::new("gpu"), &config).unwrap();
@@ -58,7 +64,8 @@ fn a_device_that_fails_ends_the_run_with_its_last_checkpoint_intact() {
 #[test]
 fn the_critics_loss_goes_down() {
     let place = tempfile::tempdir().unwrap();
-    let (mut run, folder, _) = run(place.path(), &["steps=20000", "learning.updates_per_step=2", "learning.critic_learning_rate=0.003"]);
+    let (mut run, folder, _) =
+        run(place.path(), &["steps=20000", "learning.updates_per_step=2", "learning.critic_learning_rate=0.003"]);
     run.learn(|| false).unwrap();
     run.close().unwrap();
     let metrics = std::fs::read_to_string(folder.metrics()).unwrap();

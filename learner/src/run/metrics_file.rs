@@ -41,7 +41,8 @@ impl MetricsFile {
         let mut head = String::new();
         BufReader::new(&metrics_file.file).read_line(&mut head).map_err(Error::read(&metrics_file.path))?;
         if head != HEAD {
-            let message = "its columns are not those that this program writes: continue with the program that wrote it".to_owned();
+            let message = "its columns are not those that this program writes: continue with the program that wrote it"
+                .to_owned();
             return Err(Error::Contents { file: metrics_file.path, message });
         }
         Ok(metrics_file)
@@ -53,7 +54,9 @@ impl MetricsFile {
         loop {
             match self.file.try_lock() {
                 // A killed process holds its lock until it has ended.
-                Err(TryLockError::WouldBlock) if begun.elapsed() < LOCK_TIME => std::thread::sleep(Duration::from_millis(20)),
+                Err(TryLockError::WouldBlock) if begun.elapsed() < LOCK_TIME => {
+                    std::thread::sleep(Duration::from_millis(20))
+                }
                 Err(TryLockError::WouldBlock) => {
                     let message = "another run is writing it: stop that one first".to_owned();
                     return Err(Error::Contents { file: self.path.clone(), message });
@@ -89,7 +92,8 @@ impl MetricsFile {
     /// Removes the rows after the first `length` bytes.
     pub fn cut(&mut self, length: u64) -> Result<(), Error> {
         if self.length < length {
-            let message = format!("has {} bytes where its checkpoint expects {length}: put the whole file back", self.length);
+            let message =
+                format!("has {} bytes where its checkpoint expects {length}: put the whole file back", self.length);
             return Err(Error::Contents { file: self.path.clone(), message });
         }
         self.file.set_len(length).map_err(Error::write(&self.path))?;

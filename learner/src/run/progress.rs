@@ -221,9 +221,11 @@ impl Progress {
     fn append_row(&mut self, entropy_coefficient: f32) -> Result<(), Error> {
         self.tried = (self.seconds(), self.env_steps);
         let n = self.updates - self.row_updates;
-        let [steps_rate, update_rate] = per_second(self.seconds() - self.row_seconds, [self.env_steps - self.row_steps, n]);
+        let [steps_rate, update_rate] =
+            per_second(self.seconds() - self.row_seconds, [self.env_steps - self.row_steps, n]);
         // A mean over no updates is left out.
-        let mean = |sum: f32, decimals: usize| if n == 0 { String::new() } else { format!("{:.decimals$}", sum / n as f32) };
+        let mean =
+            |sum: f32, decimals: usize| if n == 0 { String::new() } else { format!("{:.decimals$}", sum / n as f32) };
         let success = self.success().map(|success| format!("{success:.4}")).unwrap_or_default();
         let reward = self.window.reward().map(|reward| format!("{reward:.2}")).unwrap_or_default();
         let validated = self.validated.map(|success| format!("{success:.4}")).unwrap_or_default();
@@ -252,12 +254,16 @@ impl Progress {
 
     /// Shows how far the run is.
     fn show(&mut self) {
-        let (since, steps, updates) = std::mem::replace(&mut self.shown, (Instant::now(), self.env_steps, self.updates));
-        let [steps_rate, update_rate] = per_second(since.elapsed().as_secs_f64(), [self.env_steps - steps, self.updates - updates]);
+        let (since, steps, updates) =
+            std::mem::replace(&mut self.shown, (Instant::now(), self.env_steps, self.updates));
+        let [steps_rate, update_rate] =
+            per_second(since.elapsed().as_secs_f64(), [self.env_steps - steps, self.updates - updates]);
         let fraction = self.fraction();
         let left = if 0.0 < fraction { self.seconds() * (1.0 - fraction) / fraction } else { 0.0 };
         let success = self.success().map_or_else(|| "-".to_owned(), |success| format!("{:.1} %", 100.0 * success));
-        let validation = self.validation.map(|(last, best)| format!(", validation {:.1} % (best {:.1} %)", 100.0 * last, 100.0 * best));
+        let validation = self
+            .validation
+            .map(|(last, best)| format!(", validation {:.1} % (best {:.1} %)", 100.0 * last, 100.0 * best));
         let validation = validation.unwrap_or_default();
         let line = format!(
             "{:.2} M steps, {steps_rate:.0} steps/s, {update_rate:.0} updates/s, success {success} of the last {}{validation}, {}:{:02} left",
@@ -274,7 +280,8 @@ impl Progress {
     /// Adds the counters' columns.
     pub fn save(&self, columns: &mut Columns) {
         let Update { critic_loss, actor_loss, entropy, value } = self.sums;
-        let counts = [self.env_steps, self.episodes, self.updates, self.row_steps, self.row_updates, self.metrics.length()];
+        let counts =
+            [self.env_steps, self.episodes, self.updates, self.row_steps, self.row_updates, self.metrics.length()];
         columns.put(COUNTS, counts.to_vec());
         columns.put(SECONDS, vec![self.seconds(), self.row_seconds]);
         columns.put("progress, sums", vec![critic_loss, actor_loss, entropy, value]);
@@ -284,15 +291,19 @@ impl Progress {
     /// Continues counting where a checkpoint of this run left off, and removes the rows after it.
     pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
         let length;
-        [self.env_steps, self.episodes, self.updates, self.row_steps, self.row_updates, length] = stored.array(COUNTS)?;
+        [self.env_steps, self.episodes, self.updates, self.row_steps, self.row_updates, length] =
+            stored.array(COUNTS)?;
         let [seconds, row_seconds] = stored.array(SECONDS)?;
         if self.env_steps < self.row_steps || self.updates < self.row_updates || seconds < row_seconds {
-            return Err(stored.error(format!("its columns `{COUNTS}` and `{SECONDS}` say that the last row is yet to come")));
+            return Err(
+                stored.error(format!("its columns `{COUNTS}` and `{SECONDS}` say that the last row is yet to come"))
+            );
         }
         let [critic_loss, actor_loss, entropy, value] = stored.array("progress, sums")?;
         self.sums = Update { critic_loss, actor_loss, entropy, value };
         self.window = Window::restored(stored)?;
-        let before = Duration::try_from_secs_f64(seconds).map_err(|error| stored.error(format!("its column `{SECONDS}`: {error}")))?;
+        let before = Duration::try_from_secs_f64(seconds)
+            .map_err(|error| stored.error(format!("its column `{SECONDS}`: {error}")))?;
         (self.before, self.begun, self.row_seconds) = (before, Instant::now(), row_seconds);
         self.tried = (seconds, self.row_steps);
         self.shown = (Instant::now(), self.env_steps, self.updates);

@@ -35,8 +35,10 @@ impl Resumed {
         let mut config = Config::read(&folder.config())?;
         if !folder.checkpoint().is_file() && is_evaluated(&folder) {
             let policy = folder.policy();
-            let expected =
-                format!("it has finished and its checkpoint is gone: train --from {} begins a run with its policy", policy.display());
+            let expected = format!(
+                "it has finished and its checkpoint is gone: train --from {} begins a run with its policy",
+                policy.display()
+            );
             return Err(refused(path, expected));
         }
         let file = folder.metrics();
@@ -46,21 +48,25 @@ impl Resumed {
             return Ok(Resumed { folder, config, metrics, stored: None });
         }
         let stored = Stored::read(&folder.checkpoint())?;
-        let written = toml::from_str(stored.config()).map_err(|error| stored.error(format!("its training file: {error}")))?;
+        let written =
+            toml::from_str(stored.config()).map_err(|error| stored.error(format!("its training file: {error}")))?;
         if !config.is_same_run(&written) {
-            let message =
-                "is not the training file that the checkpoint was written with; only minutes, steps and checkpoint_minutes may differ";
+            let message = "is not the training file that the checkpoint was written with; only minutes, steps and checkpoint_minutes may differ";
             return Err(Error::Contents { file: folder.config(), message: message.to_owned() });
         }
         config.override_with(None, minutes, steps, None)?;
         let (seconds, env_steps) = progress::reached(&stored)?;
-        let over = config.minutes.is_some_and(|minutes| 60.0 * minutes <= seconds) || config.steps.is_some_and(|steps| steps <= env_steps);
+        let over = config.minutes.is_some_and(|minutes| 60.0 * minutes <= seconds)
+            || config.steps.is_some_and(|steps| steps <= env_steps);
         if over && (minutes.is_some() || steps.is_some()) {
-            let expected = format!("it was trained for {:.2} min and {env_steps} env steps: more are needed", seconds / 60.0);
+            let expected =
+                format!("it was trained for {:.2} min and {env_steps} env steps: more are needed", seconds / 60.0);
             return Err(refused(path, expected));
         }
         if over && is_evaluated(&folder) {
-            let expected = "it has finished, see its report.json; with more --minutes or --steps than it had it continues".to_owned();
+            let expected =
+                "it has finished, see its report.json; with more --minutes or --steps than it had it continues"
+                    .to_owned();
             return Err(refused(path, expected));
         }
         Ok(Resumed { folder, config, metrics, stored: Some(stored) })
@@ -73,6 +79,7 @@ fn refused(path: &Path, expected: String) -> Error {
 
 /// The final evaluation has been written.
 fn is_evaluated(folder: &Folder) -> bool {
-    let report = read_bytes(&folder.report(), REPORT_LIMIT).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+    let report =
+        read_bytes(&folder.report(), REPORT_LIMIT).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
     report.is_some_and(|report| report["interrupted"] == false)
 }

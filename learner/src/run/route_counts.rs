@@ -21,7 +21,8 @@ const WINDOW: u32 = u32::BITS;
 /// Routes in a run's report.
 const N_WORST: usize = 20;
 /// Names of the file's columns.
-const HEAD: &str = "route,roundabout,island_radius,lane,exit,episodes,arrived,failed,timed_out,success,recent_success\n";
+const HEAD: &str =
+    "route,roundabout,island_radius,lane,exit,episodes,arrived,failed,timed_out,success,recent_success\n";
 
 /// Episodes on one route.
 #[derive(Debug, Clone, Copy, Default)]
@@ -103,7 +104,13 @@ impl RouteCounts {
             let roundabout = &scenario.places[place].roundabout;
             let (before, _) = route.name.rsplit_once('/').unwrap_or((&roundabout.name, ""));
             let (lane, exit) = (route.lane.seen(roundabout.is_mirrored()).name(), route.exit);
-            Name { route: route.name.clone(), roundabout: before.to_owned(), island_radius: roundabout.island_radius(), lane, exit }
+            Name {
+                route: route.name.clone(),
+                roundabout: before.to_owned(),
+                island_radius: roundabout.island_radius(),
+                lane,
+                exit,
+            }
         };
         let names: Vec<Name> = scenario.split(Split::Train).iter().enumerate().map(name).collect();
         RouteCounts { file, written: None, counts: vec![Counts::default(); names.len()], names, indices }
@@ -116,7 +123,10 @@ impl RouteCounts {
 
     /// Counts an episode.
     pub fn count(&mut self, RouteEnd { route, ended }: RouteEnd) {
-        let Some(counts) = self.indices.get(route as usize).copied().flatten().map(|index| &mut self.counts[index]) else { return };
+        let Some(counts) = self.indices.get(route as usize).copied().flatten().map(|index| &mut self.counts[index])
+        else {
+            return;
+        };
         let arrived = ended == Ended::Arrived;
         counts.episodes += 1;
         counts.arrived += u64::from(arrived);
@@ -142,7 +152,9 @@ impl RouteCounts {
     fn text(&self) -> String {
         let mut text = HEAD.to_owned();
         for row in self.rows() {
-            let RouteCount { route, roundabout, island_radius, lane, exit, episodes, arrived, failed, timed_out, .. } = &row;
+            let RouteCount {
+                route, roundabout, island_radius, lane, exit, episodes, arrived, failed, timed_out, ..
+            } = &row;
             let fraction = |value: f64| if *episodes == 0 { String::new() } else { format!("{value:.4}") };
             let (success, recent) = (fraction(row.success), fraction(row.recent_success));
             // Writing to a string cannot fail.
@@ -175,7 +187,8 @@ impl RouteCounts {
 
     /// The routes on which the policy fails most; none before an episode was counted.
     pub fn worst(&self) -> Option<WorstRoutes> {
-        let mut worst: Vec<RouteCount> = self.rows().filter(|row| 0 < row.episodes && row.recent_success < 1.0).collect();
+        let mut worst: Vec<RouteCount> =
+            self.rows().filter(|row| 0 < row.episodes && row.recent_success < 1.0).collect();
         worst.sort_by(|a, b| a.recent_success.total_cmp(&b.recent_success).then(a.success.total_cmp(&b.success)));
         worst.truncate(N_WORST);
         (!self.is_empty()).then_some(WorstRoutes { routes: self.names.len(), window: WINDOW, worst })
@@ -201,14 +214,23 @@ impl RouteCounts {
         }
         let n = self.names.len();
         let counted = |name: &str| stored.exactly::<u64>(name, n);
-        let (episodes, arrived, timed_out) = (counted(EPISODES)?, counted("routes, arrived")?, counted("routes, timed out")?);
+        let (episodes, arrived, timed_out) =
+            (counted(EPISODES)?, counted("routes, arrived")?, counted("routes, timed out")?);
         let recent: Vec<u32> = stored.exactly("routes, recent", n)?;
         for (index, counts) in self.counts.iter_mut().enumerate() {
-            *counts = Counts { episodes: episodes[index], arrived: arrived[index], timed_out: timed_out[index], recent: recent[index] };
+            *counts = Counts {
+                episodes: episodes[index],
+                arrived: arrived[index],
+                timed_out: timed_out[index],
+                recent: recent[index],
+            };
             let Counts { episodes, arrived, timed_out, recent } = *counts;
-            if arrived.checked_add(timed_out).is_none_or(|ended| episodes < ended) || arrived < recent.count_ones().into() {
+            if arrived.checked_add(timed_out).is_none_or(|ended| episodes < ended)
+                || arrived < recent.count_ones().into()
+            {
                 let name = &self.names[index].route;
-                return Err(stored.error(format!("has {arrived} arrivals of {episodes} episodes on {name}, {timed_out} timed out")));
+                return Err(stored
+                    .error(format!("has {arrived} arrivals of {episodes} episodes on {name}, {timed_out} timed out")));
             }
         }
         Ok(())
@@ -238,7 +260,10 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         // Of the latest 32 episodes seven collided and one timed out.
         assert_eq!(lines[2].split_once("left,").unwrap().1, "3,45,24,20,1,0.5333,0.7500", "{text}");
-        assert!(lines[1].ends_with(",left,2,1,1,0,0,1.0000,1.0000") && lines[3].ends_with(",left,4,0,0,0,0,,"), "{text}");
+        assert!(
+            lines[1].ends_with(",left,2,1,1,0,0,1.0000,1.0000") && lines[3].ends_with(",left,4,0,0,0,0,,"),
+            "{text}"
+        );
         assert_eq!((lines.len(), lines[0].split(',').count()), (53, 11));
         let worst = counts.worst().unwrap();
         assert_eq!((worst.routes, worst.worst.len(), worst.worst[0].route.as_str()), (52, 1, "16m/E-left-3"));

@@ -87,7 +87,13 @@ impl Validation {
     /// Lets the policy drive. It becomes the best one unless an earlier one arrived more often. A refined one
     /// always becomes it: it learns by other rewards, and its learning rates fall. Where a run was too slow for several
     /// validations, they become one.
-    pub fn validate(&mut self, policy: Policy, env_steps: u64, fraction: f64, is_refined: bool) -> Result<Validated, Error> {
+    pub fn validate(
+        &mut self,
+        policy: Policy,
+        env_steps: u64,
+        fraction: f64,
+        is_refined: bool,
+    ) -> Result<Validated, Error> {
         let bytes = policy.to_bytes();
         let device = Device::processor();
         let evaluation = Evaluation {
@@ -101,7 +107,8 @@ impl Validation {
         };
         let mut policy = policy;
         let driven = evaluation.drive(&mut policy, &mut |_, _| {})?;
-        let summary = Summary::of(driven.episodes.iter(), self.scenario.step).expect("there is a validation route, and an episode on it");
+        let summary = Summary::of(driven.episodes.iter(), self.scenario.step)
+            .expect("there is a validation route, and an episode on it");
         let Summary { arrived, success, lane_distance_mean_arrived, .. } = summary;
         let arrived = arrived as u64;
         let validated = Validated { env_steps, arrived, success, lane_distance_mean_arrived };
@@ -134,7 +141,16 @@ impl Validation {
         let episodes = (routes * self.settings.episodes) as u64;
         let (best_success_low, best_success_high) = wilson(best.arrived as usize, episodes as usize);
         let benchmark = self.scenario.name.clone();
-        Some(Validations { benchmark, routes, episodes, times: self.n_made, best, best_success_low, best_success_high, last })
+        Some(Validations {
+            benchmark,
+            routes,
+            episodes,
+            times: self.n_made,
+            best,
+            best_success_low,
+            best_success_high,
+            last,
+        })
     }
 
     /// Adds its columns to a checkpoint, if one was made.
@@ -160,7 +176,9 @@ impl Validation {
         let episodes = (self.scenario.split(Split::Validation).len() * self.settings.episodes) as u64;
         if episodes < last_arrived.max(best_arrived) {
             let most = last_arrived.max(best_arrived);
-            return Err(stored.error(format!("its column `{COUNTS}` has {most} arrivals of {episodes} episodes: put a sound copy back")));
+            return Err(stored.error(format!(
+                "its column `{COUNTS}` has {most} arrivals of {episodes} episodes: put a sound copy back"
+            )));
         }
         let [last_distance, best_distance] = stored.array(DISTANCES)?;
         let validated = |env_steps, arrived: u64, distance: f64| Validated {
@@ -170,7 +188,8 @@ impl Validation {
             lane_distance_mean_arrived: (0 < arrived).then_some(distance),
         };
         let policy: Vec<u8> = stored.column(BEST)?;
-        Policy::from_bytes(&format!("its column `{BEST}`"), &policy).map_err(|error| stored.error(error.to_string()))?;
+        Policy::from_bytes(&format!("its column `{BEST}`"), &policy)
+            .map_err(|error| stored.error(error.to_string()))?;
         self.n_made = n_made;
         self.last = Some(validated(last_steps, last_arrived, last_distance));
         self.best = Some((validated(best_steps, best_arrived, best_distance), policy));

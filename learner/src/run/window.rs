@@ -55,9 +55,12 @@ impl Window {
         let arrived: Vec<u64> = stored.exactly("window, arrived", counts.len())?;
         let rewards: Vec<f64> = stored.exactly("window, rewards", counts.len())?;
         let groups = counts.into_iter().zip(arrived).zip(rewards);
-        let groups: VecDeque<Episodes> = groups.map(|((count, arrived), reward)| Episodes { count, arrived, reward }).collect();
+        let groups: VecDeque<Episodes> =
+            groups.map(|((count, arrived), reward)| Episodes { count, arrived, reward }).collect();
         match groups.iter().find(|group| group.count < group.arrived || 1 << 40 < group.count) {
-            Some(group) => Err(stored.error(format!("its window has {} arrivals of {} episodes", group.arrived, group.count))),
+            Some(group) => {
+                Err(stored.error(format!("its window has {} arrivals of {} episodes", group.arrived, group.count)))
+            }
             None => Ok(Window { groups }),
         }
     }

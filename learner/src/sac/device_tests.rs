@@ -69,7 +69,9 @@ fn furthest(a: &Sac, b: &Sac) -> (f32, String) {
 fn an_update_on_a_device_is_that_on_the_host() {
     for device in devices() {
         let actor_alone = Entropy { in_target: false, ..learning().entropy };
-        for learning in [learning(), Learning { layer_norm: true, critics: Critics::Minimum, entropy: actor_alone, ..learning() }] {
+        for learning in
+            [learning(), Learning { layer_norm: true, critics: Critics::Minimum, entropy: actor_alone, ..learning() }]
+        {
             let new = |seed, placement| Sac::new(&learning, 6, 4, seed, placement).unwrap();
             let (mut host, mut on_device) = (new(3, Placement::Host), new(3, Placement::Device(device.clone())));
             for step in 0..3 {

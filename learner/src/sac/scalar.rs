@@ -83,7 +83,9 @@ impl Scalar {
         let on = |value: f32, like: &Tensor<2>| like.zeros_like().add_scalar(value);
         match (self, other) {
             (Scalar::Host(a), Scalar::Host(b)) => Scalar::Host(host(*a, *b)),
-            (Scalar::Device(a), Scalar::Device(b)) => Scalar::Device(Box::new(device(Tensor::clone(a), Tensor::clone(b)))),
+            (Scalar::Device(a), Scalar::Device(b)) => {
+                Scalar::Device(Box::new(device(Tensor::clone(a), Tensor::clone(b))))
+            }
             (Scalar::Host(a), Scalar::Device(b)) => Scalar::Device(Box::new(device(on(*a, b), Tensor::clone(b)))),
             (Scalar::Device(a), Scalar::Host(b)) => Scalar::Device(Box::new(device(Tensor::clone(a), on(*b, a)))),
         }

@@ -17,7 +17,8 @@ impl Sac {
         for (name, values) in self.numbers() {
             columns.put(name, values);
         }
-        let [actor, critics] = [&self.actor_optimizer, &self.critic_optimizer].map(|optimizer| optimizer.state().n_steps);
+        let [actor, critics] =
+            [&self.actor_optimizer, &self.critic_optimizer].map(|optimizer| optimizer.state().n_steps);
         columns.put("learner, updates", vec![self.n_updates, self.n_summed]);
         columns.put(STEPS, [actor, critics, self.entropy_coefficient.n_updates].map(|steps| steps as u32).to_vec());
         columns.put("learner, sums", self.sums.iter().map(Scalar::read).collect::<Vec<_>>());
@@ -27,7 +28,10 @@ impl Sac {
     pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
         let (plain, learning) = (self.placement.plain(), self.placement.learning());
         let twins = |names: [&str; 2], like: &Twins, device: &Device| -> Result<Twins, Error> {
-            Ok(Twins { first: network(stored, names[0], &like.first, device)?, second: network(stored, names[1], &like.second, device)? })
+            Ok(Twins {
+                first: network(stored, names[0], &like.first, device)?,
+                second: network(stored, names[1], &like.second, device)?,
+            })
         };
         let actor = network(stored, "actor", &self.actor, &learning)?;
         let actor_ema = network(stored, "actor EMA", &self.actor_ema, &plain)?;
@@ -37,7 +41,8 @@ impl Sac {
         let [actor_steps, critic_steps, entropy_steps] = stored.array::<u32, 3>(STEPS)?;
         let actor_state = optimizer(stored, STEPS, actor_steps, &named("actor", &actor))?;
         let critic_state = optimizer(stored, STEPS, critic_steps, &critics_named(&critics))?;
-        let [log, first, second] = stored.array::<f32, 3>("entropy coefficient")?.map(|value| self.placement.scalar(value));
+        let [log, first, second] =
+            stored.array::<f32, 3>("entropy coefficient")?.map(|value| self.placement.scalar(value));
         let [n_updates, n_summed] = stored.array("learner, updates")?;
         let sums = stored.array::<f32, 4>("learner, sums")?.map(|sum| self.placement.scalar(sum));
 
@@ -52,17 +57,23 @@ impl Sac {
 
     /// The first of the learner's numbers that is not finite: its name and value. Waits for a device.
     pub fn broken(&self) -> Option<(String, f32)> {
-        self.numbers().into_iter().find_map(|(name, values)| Some((name, values.into_iter().find(|value| !value.is_finite())?)))
+        self.numbers()
+            .into_iter()
+            .find_map(|(name, values)| Some((name, values.into_iter().find(|value| !value.is_finite())?)))
     }
 
     pub(super) fn numbers(&self) -> Named {
         let networks = [named("actor", &self.actor), critics_named(&self.critics)];
         let states = [&self.actor_optimizer, &self.critic_optimizer].map(|optimizer| optimizer.state());
-        let moments: Vec<_> = states.into_iter().zip(&networks).flat_map(|(state, parameters)| moments(parameters, state)).collect();
+        let moments: Vec<_> =
+            states.into_iter().zip(&networks).flat_map(|(state, parameters)| moments(parameters, state)).collect();
         let [first, second] = &self.entropy_coefficient.moments;
         let entropy = [&self.entropy_coefficient.log, first, second].map(Scalar::read).to_vec();
-        let followers =
-            [("target 1", &self.target_critics.first), ("target 2", &self.target_critics.second), ("actor EMA", &self.actor_ema)];
+        let followers = [
+            ("target 1", &self.target_critics.first),
+            ("target 2", &self.target_critics.second),
+            ("actor EMA", &self.actor_ema),
+        ];
         let followers = followers.into_iter().flat_map(|(name, network)| named(name, network));
         let entropy = ("entropy coefficient".to_owned(), entropy);
         networks.into_iter().flatten().chain(moments).chain([entropy]).chain(followers).collect()

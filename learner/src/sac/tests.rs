@@ -115,13 +115,21 @@ fn assert_near(found: &[f32], expected: &[f32], tolerance: f32) {
 
 fn weights(network: &Mlp) -> Vec<f32> {
     let plain = |data: burn::tensor::TensorData| data.try_to_vec::<f32>().unwrap();
-    let of = |layer: &burn::nn::Linear| [plain(layer.weight.val().into_data()), plain(layer.bias.as_ref().unwrap().val().into_data())];
+    let of = |layer: &burn::nn::Linear| {
+        [plain(layer.weight.val().into_data()), plain(layer.bias.as_ref().unwrap().val().into_data())]
+    };
     network.layers.iter().flat_map(of).flatten().collect()
 }
 
 fn all_weights(sac: &Sac) -> Vec<f32> {
-    let networks =
-        [&sac.actor, &sac.critics.first, &sac.critics.second, &sac.target_critics.first, &sac.target_critics.second, &sac.actor_ema];
+    let networks = [
+        &sac.actor,
+        &sac.critics.first,
+        &sac.critics.second,
+        &sac.target_critics.first,
+        &sac.target_critics.second,
+        &sac.actor_ema,
+    ];
     networks.into_iter().flat_map(weights).collect()
 }
 
@@ -130,7 +138,12 @@ fn gradients_of(gradients: &GradientsParams, network: &Mlp) -> Vec<f32> {
     fn of<const D: usize>(gradients: &GradientsParams, param: &Param<Tensor<D>>) -> Vec<f32> {
         gradients.get::<D>(param.id).unwrap().into_data().try_to_vec().unwrap()
     }
-    network.layers.iter().flat_map(|layer| [of(gradients, &layer.weight), of(gradients, layer.bias.as_ref().unwrap())]).flatten().collect()
+    network
+        .layers
+        .iter()
+        .flat_map(|layer| [of(gradients, &layer.weight), of(gradients, layer.bias.as_ref().unwrap())])
+        .flatten()
+        .collect()
 }
 
 #[test]
@@ -153,7 +166,11 @@ fn a_chains_values_and_policy_are_the_soft_optimal_ones() {
         }
         entropy -= 0.5 * probs.iter().map(|prob| prob * prob.ln()).sum::<f32>();
     }
-    assert_near(&[last.entropy, last.value], &[entropy, (end.iter().sum::<f32>() + begin.iter().sum::<f32>()) / 6.0], CONVERGED);
+    assert_near(
+        &[last.entropy, last.value],
+        &[entropy, (end.iter().sum::<f32>() + begin.iter().sum::<f32>()) / 6.0],
+        CONVERGED,
+    );
     // Values without the entropy term are far off.
     assert!(10.0 * CONVERGED < 0.8 * (soft_maximum - 1.0));
 }
@@ -188,7 +205,11 @@ fn critics_with_layer_normalisation_find_the_same_values() {
 /// reward 1.
 fn learned_value(ended: Ended) -> f32 {
     let learning = learning();
-    let mut buffer = ReplayBuffer::<2>::new(1, learning.n_steps, &config::ReplayBuffer { capacity: 1000, warmup: 1, priority: None });
+    let mut buffer = ReplayBuffer::<2>::new(
+        1,
+        learning.n_steps,
+        &config::ReplayBuffer { capacity: 1000, warmup: 1, priority: None },
+    );
     for step in 0..8 {
         buffer.append(Rows {
             observation: &[PLAIN],
@@ -281,7 +302,8 @@ fn shards_of_a_batch_make_the_update_of_the_whole() {
         assert_near(&found_weights, &weights, 1e-5);
     }
     let (losses_of_a_half, weights_of_a_half) = after(|sample| vec![halves(sample).remove(0)]);
-    let furthest = |found: &[f32], whole: &[f32]| found.iter().zip(whole).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    let furthest =
+        |found: &[f32], whole: &[f32]| found.iter().zip(whole).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(1e-3 < furthest(&losses_of_a_half, &losses) && 1e-3 < furthest(&weights_of_a_half, &weights));
 }
 
@@ -292,7 +314,8 @@ fn the_target_critics_follow_every_so_many_updates_by_tau() {
     learn(&mut sac, chain, 2);
     assert_eq!(weights(&sac.target_critics.second), begun);
     learn(&mut sac, chain, 1);
-    let expected: Vec<f32> = begun.iter().zip(weights(&sac.critics.second)).map(|(old, new)| 0.75 * old + 0.25 * new).collect();
+    let expected: Vec<f32> =
+        begun.iter().zip(weights(&sac.critics.second)).map(|(old, new)| 0.75 * old + 0.25 * new).collect();
     // Two ways to round a sum of numbers below 2.
     assert_near(&weights(&sac.target_critics.second), &expected, 1e-6);
     assert_ne!(weights(&sac.target_critics.second), begun);

@@ -24,9 +24,9 @@ const MODES: [(&str, Autoreset); 3] =
 
 pub(super) fn autoreset_of(name: &str) -> PyResult<Autoreset> {
     let found = MODES.iter().find(|(known, _)| *known == name);
-    found
-        .map(|(_, mode)| *mode)
-        .ok_or_else(|| PyValueError::new_err(format!("autoreset: {name:?}; must be one of {}", MODES.map(|(name, _)| name).join(", "))))
+    found.map(|(_, mode)| *mode).ok_or_else(|| {
+        PyValueError::new_err(format!("autoreset: {name:?}; must be one of {}", MODES.map(|(name, _)| name).join(", ")))
+    })
 }
 
 pub(super) fn name_of(autoreset: Autoreset) -> &'static str {
@@ -48,7 +48,9 @@ pub(super) fn engine_of(device: &str) -> PyResult<(Engine, String)> {
         Ok((Engine::Gpu { device: opened, columns: gpu::Columns::new() }, name))
     }
     #[cfg(not(feature = "gpu"))]
-    Err(PyRuntimeError::new_err(format!("device: {device:?}; this build has only \"cpu\": it was made without the feature gpu")))
+    Err(PyRuntimeError::new_err(format!(
+        "device: {device:?}; this build has only \"cpu\": it was made without the feature gpu"
+    )))
 }
 
 /// An output array of the caller.

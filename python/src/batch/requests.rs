@@ -26,7 +26,10 @@ impl Batch {
         let lengths = [streams.map(<[_]>::len), routes.map(<[_]>::len), starts.map(<[_]>::len)];
         for (name, found) in ["streams", "routes", "starts"].into_iter().zip(lengths) {
             if found.is_some_and(|found| found != n) {
-                return Err(PyValueError::new_err(format!("{name}: {} of them; {n} are needed, one a truck", found.unwrap_or(0))));
+                return Err(PyValueError::new_err(format!(
+                    "{name}: {} of them; {n} are needed, one a truck",
+                    found.unwrap_or(0)
+                )));
             }
         }
         let request = |(index, &env): (usize, &usize)| {

@@ -43,7 +43,10 @@ impl State {
         if batch.autoreset == Autoreset::Disabled
             && let Some(env) = held.iter().position(|held| *held)
         {
-            return Err(errors::reset_needed(py, &format!("truck {env}: its episode has ended; begin another before the next step")));
+            return Err(errors::reset_needed(
+                py,
+                &format!("truck {env}: its episode has ended; begin another before the next step"),
+            ));
         }
         let stepped = pool.run(py, || {
             simulator.step(actions)?;
@@ -86,7 +89,8 @@ impl State {
     /// An error in a forked child whose batch is on a device: the device is its parent's.
     pub(super) fn check_process(&self, device: &str) -> PyResult<()> {
         if device != CPU && self.pool.is_forked() {
-            let message = format!("this batch is on {device}, which a forked process cannot use; make the batch in the child");
+            let message =
+                format!("this batch is on {device}, which a forked process cannot use; make the batch in the child");
             return Err(PyRuntimeError::new_err(message));
         }
         Ok(())

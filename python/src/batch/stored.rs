@@ -24,12 +24,18 @@ impl Batch {
         let state = self.state()?;
         state.check_process(&self.device)?;
         let read = state.simulator.read(&columns).map_err(|error| errors::of_simulator(&error))?;
-        let shaped = |bytes: &Cow<[u8]>| PyArray1::from_slice(py, bytes).reshape([self.n_envs, bytes.len() / self.n_envs]);
+        let shaped =
+            |bytes: &Cow<[u8]>| PyArray1::from_slice(py, bytes).reshape([self.n_envs, bytes.len() / self.n_envs]);
         read.iter().map(shaped).collect()
     }
 
     /// Goes on from every column's bytes and from streams, or stays as it was.
-    pub(super) fn restore(&self, py: Python, columns: &[(String, PyReadonlyArray1<u8>)], streams: &[(u32, u32)]) -> PyResult<()> {
+    pub(super) fn restore(
+        &self,
+        py: Python,
+        columns: &[(String, PyReadonlyArray1<u8>)],
+        streams: &[(u32, u32)],
+    ) -> PyResult<()> {
         let mut given = Vec::new();
         for (name, bytes) in columns {
             given.push((column_of(name)?, bytes.as_slice().map_err(|_| unfit(name, "contiguous"))?));
@@ -53,7 +59,9 @@ impl Batch {
     pub(super) fn take_up(&self, (fingerprint, sums): (u32, Vec<i64>), ends: Option<GivenEnds>) -> PyResult<()> {
         if fingerprint != self.place.fingerprint() {
             let name = &self.place.scenario.name;
-            return Err(PyValueError::new_err(format!("scenario: {name} has changed since this state was kept, or is another one here")));
+            return Err(PyValueError::new_err(format!(
+                "scenario: {name} has changed since this state was kept, or is another one here"
+            )));
         }
         let mut state = self.state()?;
         let before = state.simulator.tally().map_err(|error| errors::of_simulator(&error))?;
@@ -77,7 +85,8 @@ impl Batch {
             let (env, code) = (envs[index], codes[index]);
             let episode = Episode { route: routes[index], vehicle: vehicles[index] };
             let (n_routes, n_vehicles) = (self.place.world.routes.len(), self.place.world.rigs.len());
-            let fits = env < self.n_envs && (episode.route as usize) < n_routes && (episode.vehicle as usize) < n_vehicles;
+            let fits =
+                env < self.n_envs && (episode.route as usize) < n_routes && (episode.vehicle as usize) < n_vehicles;
             if !fits || Ended::from_code(code).is_none() {
                 return Err(wrong());
             }

@@ -24,13 +24,19 @@ pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) ->
         if scenario.split(split).is_empty() {
             let has = Split::ALL.into_iter().filter(|&split| !scenario.split(split).is_empty()).map(Split::name);
             let has = has.collect::<Vec<_>>().join(", ");
-            return Err(PyValueError::new_err(format!("split: {:?}; {} has no such routes, only {has}", split.name(), scenario.name)));
+            return Err(PyValueError::new_err(format!(
+                "split: {:?}; {} has no such routes, only {has}",
+                split.name(),
+                scenario.name
+            )));
         }
         scenario.keep(&[split]);
         return Ok(());
     };
     if names.is_empty() {
-        return Err(PyValueError::new_err("routes: empty; name at least one route or roundabout, or give None for a split"));
+        return Err(PyValueError::new_err(
+            "routes: empty; name at least one route or roundabout, or give None for a split",
+        ));
     }
     let mut wanted = names.to_vec();
     let of_benchmark = known(scenario);
@@ -45,7 +51,8 @@ pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) ->
         }
         let roundabout = procedural::find(road).map_err(|error| errors::of_reader(&error))?;
         // Routes of a file are named after its stem.
-        let renamed = names.iter().filter_map(|name| name.strip_prefix(road)).map(|rest| format!("{}{rest}", roundabout.name));
+        let renamed =
+            names.iter().filter_map(|name| name.strip_prefix(road)).map(|rest| format!("{}{rest}", roundabout.name));
         wanted.extend(renamed);
         scenario.add(roundabout, Split::Test).map_err(|error| errors::of_reader(&error))?;
         added.push(road);
@@ -76,7 +83,10 @@ fn is_of(route: &str, name: &str) -> bool {
 
 /// The road that a name of it or of one of its routes means apart from any benchmark.
 fn road_of(name: &str) -> Option<&str> {
-    let is_road =
-        |name: &str| procedural::address(name).is_some() || Kind::Roundabout.names().any(|known| known == name) || name.ends_with(".toml");
+    let is_road = |name: &str| {
+        procedural::address(name).is_some()
+            || Kind::Roundabout.names().any(|known| known == name)
+            || name.ends_with(".toml")
+    };
     if is_road(name) { Some(name) } else { name.rsplit_once('/').map(|(road, _)| road).filter(|road| is_road(road)) }
 }

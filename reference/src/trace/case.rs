@@ -289,7 +289,12 @@ impl Case {
         for (unit, suspension) in [("1", vehicle.tractor_suspension()), ("2", vehicle.trailer_suspension())] {
             self.within(&format!("vehicle.T{unit}"), suspension.track, positive.clone(), "m")?;
             self.within(&format!("vehicle.h{unit}"), suspension.centre_of_gravity, positive.clone(), "m")?;
-            self.within(&format!("vehicle.hr{unit}"), suspension.roll_centre, -10.0..=suspension.centre_of_gravity, "m")?;
+            self.within(
+                &format!("vehicle.hr{unit}"),
+                suspension.roll_centre,
+                -10.0..=suspension.centre_of_gravity,
+                "m",
+            )?;
             self.within(&format!("vehicle.Rphi{unit}"), suspension.roll_gain, 1e-4..=10.0, "rad/g")?;
             self.within(&format!("vehicle.fn{unit}"), suspension.roll_frequency, 1e-2..=100.0, "Hz")?;
             self.within(&format!("vehicle.zeta{unit}"), suspension.roll_damping, 0.0..=0.99, "")?;
@@ -329,6 +334,11 @@ impl Case {
         } else {
             format!("must lie in {}..{}{unit}", shown(*range.start()), shown(*range.end()))
         };
-        Err(Error { id: self.id.clone(), key: key.to_owned(), value: format!("{}{unit}", shown(value)), expected: limits })
+        Err(Error {
+            id: self.id.clone(),
+            key: key.to_owned(),
+            value: format!("{}{unit}", shown(value)),
+            expected: limits,
+        })
     }
 }

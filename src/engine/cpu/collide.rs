@@ -86,7 +86,10 @@ fn point(body: &Body, n_points: usize, index: usize) -> Vec2 {
         return Vec2::new(ends.x + index as f32 * ((ends.y - ends.x) / (n_points - 1) as f32), 0.0);
     }
     let corner = index - n_points;
-    Vec2::new(if corner < 2 { body.rear } else { body.front }, if corner.is_multiple_of(2) { body.half_width } else { -body.half_width })
+    Vec2::new(
+        if corner < 2 { body.rear } else { body.front },
+        if corner.is_multiple_of(2) { body.half_width } else { -body.half_width },
+    )
 }
 
 /// One of a body's lines: the pieces of its centre line, then two from each corner. These run along the unit's end to
@@ -94,7 +97,11 @@ fn point(body: &Body, n_points: usize, index: usize) -> Vec2 {
 #[inline(always)]
 fn line(body: &Body, n_points: usize, index: usize) -> Line {
     if index < n_points - 1 {
-        return Line { begin: point(body, n_points, index), end: point(body, n_points, index + 1), radius: body.half_width };
+        return Line {
+            begin: point(body, n_points, index),
+            end: point(body, n_points, index + 1),
+            radius: body.half_width,
+        };
     }
     let corner_line = index - (n_points - 1);
     let begin = point(body, n_points, n_points + corner_line / 2);
@@ -182,7 +189,14 @@ impl Spans {
 
     /// Halves spans until the clearance on none can be much less than the least found. Stops at contact.
     #[inline(always)]
-    fn settled<const N: usize>(mut self, field: &Field, body: &Body, position: Vec2, heading: Vec2, mut least: f32) -> f32 {
+    fn settled<const N: usize>(
+        mut self,
+        field: &Field,
+        body: &Body,
+        position: Vec2,
+        heading: Vec2,
+        mut least: f32,
+    ) -> f32 {
         while 0 < self.n && 0.0 < least {
             let taken = self.n.min(LANES);
             self.n -= taken;

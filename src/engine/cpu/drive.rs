@@ -100,9 +100,17 @@ pub fn drive_max(rig: &Rig, speed: f32) -> f32 {
 /// Motion of a truck with this speed (m/s), curvature of the steer angle and deviation from it (1/m), acceleration
 /// (m/s^2) and articulation (rad).
 #[inline]
-pub fn motion(rig: &Rig, speed: f32, steered_curvature: f32, curvature_lag: f32, acceleration: f32, articulation: f32) -> Motion {
+pub fn motion(
+    rig: &Rig,
+    speed: f32,
+    steered_curvature: f32,
+    curvature_lag: f32,
+    acceleration: f32,
+    articulation: f32,
+) -> Motion {
     // The tyres' grip bounds the curvature.
-    let grip = rig.lateral_acceleration_max * (1.0 - rig.friction_ellipse * acceleration * acceleration).max(0.0).sqrt();
+    let grip =
+        rig.lateral_acceleration_max * (1.0 - rig.friction_ellipse * acceleration * acceleration).max(0.0).sqrt();
     let curvature = limited(steered_curvature + curvature_lag, grip / (speed * speed).max(SPEED_SQUARED_MIN));
     let yaw_rate = speed * curvature;
     let side_speed = -limited(rig.slip * speed * speed.abs(), rig.slip_lever_max) * yaw_rate;
@@ -158,17 +166,26 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
     let middle_lag = lagging(rig, middle_speed, truck.curvature_lag, rise, half);
     let middle = motion(rig, middle_speed, middle_curvature, middle_lag, mean_acceleration, middle_articulation);
     let (sin, cos) = sin_cos(truck.heading + half * start.motion.yaw_rate);
-    let velocity = Vec2::new(middle_speed * cos - middle.side_speed * sin, middle_speed * sin + middle.side_speed * cos);
+    let velocity =
+        Vec2::new(middle_speed * cos - middle.side_speed * sin, middle_speed * sin + middle.side_speed * cos);
 
     let heading = wrapped(truck.heading + substep * middle.yaw_rate);
     let trailer_heading = wrapped(truck.trailer_heading + substep * middle.trailer_yaw_rate);
     let curvature = steered_curvature(rig, steering);
-    let curvature_lag = lagging(rig, middle_speed, truck.curvature_lag, curvature - start.motion.steered_curvature, substep);
+    let curvature_lag =
+        lagging(rig, middle_speed, truck.curvature_lag, curvature - start.motion.steered_curvature, substep);
     let end = motion(rig, speed, curvature, curvature_lag, acceleration, heading - trailer_heading);
     let tilted = |lateral_acceleration: f32| lateral_acceleration + rig.crossfall;
-    let tractor = rolled(&rig.tractor_roll, Vec2::new(truck.tractor_roll, truck.tractor_roll_rate), tilted(middle.lateral_acceleration));
-    let trailer =
-        rolled(&rig.trailer_roll, Vec2::new(truck.trailer_roll, truck.trailer_roll_rate), tilted(middle.trailer_lateral_acceleration));
+    let tractor = rolled(
+        &rig.tractor_roll,
+        Vec2::new(truck.tractor_roll, truck.tractor_roll_rate),
+        tilted(middle.lateral_acceleration),
+    );
+    let trailer = rolled(
+        &rig.trailer_roll,
+        Vec2::new(truck.trailer_roll, truck.trailer_roll_rate),
+        tilted(middle.trailer_lateral_acceleration),
+    );
     Moving {
         truck: Truck {
             position: truck.position + substep * velocity,
@@ -180,8 +197,16 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
             tractor_roll_rate: tractor.y,
             trailer_roll: trailer.x,
             trailer_roll_rate: trailer.y,
-            tractor_load_transfer_ratio: load_transfer_ratio(&rig.tractor_roll, tractor, tilted(end.lateral_acceleration)),
-            trailer_load_transfer_ratio: load_transfer_ratio(&rig.trailer_roll, trailer, tilted(end.trailer_lateral_acceleration)),
+            tractor_load_transfer_ratio: load_transfer_ratio(
+                &rig.tractor_roll,
+                tractor,
+                tilted(end.lateral_acceleration),
+            ),
+            trailer_load_transfer_ratio: load_transfer_ratio(
+                &rig.trailer_roll,
+                trailer,
+                tilted(end.trailer_lateral_acceleration),
+            ),
             acceleration,
             curvature_lag,
             lateral_acceleration: end.trailer_lateral_acceleration,
@@ -197,7 +222,10 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
 fn rolled(roll: &Roll, state: Vec2, lateral_acceleration: f32) -> Vec2 {
     let [a, b, c, d] = roll.transition;
     let [angle, rate] = roll.input;
-    Vec2::new(a * state.x + b * state.y + angle * lateral_acceleration, c * state.x + d * state.y + rate * lateral_acceleration)
+    Vec2::new(
+        a * state.x + b * state.y + angle * lateral_acceleration,
+        c * state.x + d * state.y + rate * lateral_acceleration,
+    )
 }
 
 /// Fraction of a unit's weight that has moved to its right wheels, for its (roll, roll rate): at 1 the left ones lift.

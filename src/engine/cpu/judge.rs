@@ -19,7 +19,14 @@ pub fn judge(world: &World, row: &mut Row) {
 }
 
 /// Why the episode ended, [`Ended::Running`] when it did not.
-pub fn ending(params: &Params, route: &RouteRow, step_limit: u32, truck: &Truck, clearance: &Clearance, progress: &Progress) -> Ended {
+pub fn ending(
+    params: &Params,
+    route: &RouteRow,
+    step_limit: u32,
+    truck: &Truck,
+    clearance: &Clearance,
+    progress: &Progress,
+) -> Ended {
     let articulation = wrapped(truck.heading - truck.trailer_heading);
     let load_transfer_ratio = truck.load_transfer_ratio();
     let arrived = route.n_waypoints <= progress.waypoint;

@@ -83,7 +83,8 @@ pub fn observed(world: &World, truck: &Truck, progress: &Progress, ranges: &[f32
     for n in 0..2 {
         let waypoint = &waypoints[(next + n).min(last)];
         let normal = waypoint.direction.perp();
-        let (left, right) = (waypoint.position + route.crossing_left * normal, waypoint.position - route.crossing_right * normal);
+        let (left, right) =
+            (waypoint.position + route.crossing_left * normal, waypoint.position - route.crossing_right * normal);
         values[DISTANCES_AT + n] = (point.distance(waypoint.position) / WAYPOINT_SCALE).min(1.0);
         values[CROSSINGS_AT + n] = (distance_to_segment(point, left, right) / WAYPOINT_SCALE).min(1.0);
     }
@@ -146,8 +147,12 @@ mod tests {
     fn the_documented_scales_and_numbers_of_values_are_those_that_are_written() {
         assert_eq!(CURVATURES_AT + N_CURVATURES / 2, first_of("current_curvature"));
         assert_eq!(RANGES_AT + N_TRAILER_RAYS, first_of("tractor_range"));
-        let doc = |name: &str| OBSERVATION.iter().find(|values| values.name == name).map(|values| values.doc).unwrap_or_default();
-        for (name, scale) in [("speed", SPEED_SCALE), ("waypoint_distance", WAYPOINT_SCALE), ("lane_distance", LANE_SCALE)] {
+        let doc = |name: &str| {
+            OBSERVATION.iter().find(|values| values.name == name).map(|values| values.doc).unwrap_or_default()
+        };
+        for (name, scale) in
+            [("speed", SPEED_SCALE), ("waypoint_distance", WAYPOINT_SCALE), ("lane_distance", LANE_SCALE)]
+        {
             assert!(doc(name).contains(&format!("/ {scale} m")), "{name}: {}", doc(name));
         }
         assert!(

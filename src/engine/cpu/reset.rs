@@ -8,12 +8,14 @@ use crate::engine::{Autoreset, RouteChoice, Row};
 use crate::layout::angle::{direction, wrapped};
 use crate::layout::random::{self, Draw};
 use crate::layout::{
-    BEGINS, BeginRow, Control, Ended, HAS_ROUTE, HAS_START, IS_FIRST, Params, RewardTerms, Rig, Start, Stream, Truck, WaypointRow,
+    BEGINS, BeginRow, Control, Ended, HAS_ROUTE, HAS_START, IS_FIRST, Params, RewardTerms, Rig, Start, Stream, Truck,
+    WaypointRow,
 };
 use crate::world::World;
 
 /// The next episode, as drawn.
-const NEXT: BeginRow = BeginRow { start: Start { offset: 0.0, heading: 0.0, speed: 0.0, vehicle: 0 }, route: 0, what: BEGINS };
+const NEXT: BeginRow =
+    BeginRow { start: Start { offset: 0.0, heading: 0.0, speed: 0.0, vehicle: 0 }, route: 0, what: BEGINS };
 
 /// Begins and observes another episode where one ended, or holds the truck. A truck that was held when the step began
 /// begins its next episode with [`Autoreset::NextStep`].
@@ -56,7 +58,11 @@ fn start(world: &World, row: &mut Row, begin: &BeginRow) {
     let Stream { seed, env } = row.stream;
     let episode = if begin.what & IS_FIRST == 0 { row.truck.episode + 1 } else { 0 };
     let route = if begin.what & HAS_ROUTE == 0 { route_of(row, episode) } else { begin.route };
-    let start = if begin.what & HAS_START == 0 { drawn_start(world.params.n_vehicles, seed, env, episode) } else { begin.start };
+    let start = if begin.what & HAS_START == 0 {
+        drawn_start(world.params.n_vehicles, seed, env, episode)
+    } else {
+        begin.start
+    };
     let waypoints = world.route_waypoints(route);
     let rig = &world.rigs[start.vehicle as usize];
     let at_start = started(&world.params, rig, &waypoints[0], world.route_previews(route)[0].heading, &start);

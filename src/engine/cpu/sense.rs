@@ -24,7 +24,8 @@ const REFILL: usize = 4;
 const NO_RAY: usize = N_RAYS;
 /// The order in which rays are traced: those that take the most samples on average first, so that the last ones end
 /// soon. It changes no range.
-const ORDER: [usize; N_RAYS] = [23, 24, 19, 22, 20, 21, 18, 25, 17, 16, 26, 14, 0, 12, 2, 4, 8, 10, 6, 27, 28, 1, 3, 5, 7, 9, 11, 13, 15];
+const ORDER: [usize; N_RAYS] =
+    [23, 24, 19, 22, 20, 21, 18, 25, 17, 16, 26, 14, 0, 12, 2, 4, 8, 10, 6, 27, 28, 1, 3, 5, 7, 9, 11, 13, 15];
 constants! {
     /// The circles at both ends of a step may lie this far apart (m): a kerb thinner than this along the ray can hide
     /// between them.
@@ -50,7 +51,8 @@ constants! {
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 pub fn sense(world: &World, row: &mut Row) {
     let rig = world.rig(row.truck);
-    *row.ranges = ranges(world.route_field(row.truck.route), rig, world.rays_of(rig), row.truck, world.params.sensor_range);
+    *row.ranges =
+        ranges(world.route_field(row.truck.route), rig, world.rays_of(rig), row.truck, world.params.sensor_range);
 }
 
 /// Distance along each ray to the kerb: `reach` where none is met before, 0 from inside one (m).
@@ -95,8 +97,12 @@ impl Placed {
     fn new(rig: &Rig, rays: &[Ray; N_RAYS], truck: &Truck) -> Placed {
         let tractor = (truck.position, direction(truck.heading));
         let trailer = (truck.trailer_position(rig), direction(truck.trailer_heading));
-        let mut placed =
-            Placed { origin_x: [0.0; N_RAYS], origin_y: [0.0; N_RAYS], direction_x: [0.0; N_RAYS], direction_y: [0.0; N_RAYS] };
+        let mut placed = Placed {
+            origin_x: [0.0; N_RAYS],
+            origin_y: [0.0; N_RAYS],
+            direction_x: [0.0; N_RAYS],
+            direction_y: [0.0; N_RAYS],
+        };
         for (n, ray) in rays.iter().enumerate() {
             let (position, heading) = if n < N_TRAILER_RAYS { trailer } else { tractor };
             let (origin, direction) = (position + heading.rotate(ray.origin), heading.rotate(ray.direction));

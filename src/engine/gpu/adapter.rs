@@ -78,6 +78,8 @@ pub(super) fn check_limits(adapter: &wgpu::Adapter) -> Result<(), Error> {
     ];
     match needs.into_iter().find(|(_, has, needed)| has < needed) {
         None => Ok(()),
-        Some((limit, has, needed)) => Err(Error::Limit { adapter: adapter.get_info().name, limit, has: has.into(), needed: needed.into() }),
+        Some((limit, has, needed)) => {
+            Err(Error::Limit { adapter: adapter.get_info().name, limit, has: has.into(), needed: needed.into() })
+        }
     }
 }

@@ -46,7 +46,14 @@ impl Batch {
         let host = engine::Batch::new(n_envs, seed, choice)?;
         let buffers = Buffers::new(device, &Tables::new(world, &host), n_envs, &columns)?;
         let room = Mutex::new(Some(host));
-        Ok(Batch { device: device.clone(), n_envs, buffers, external: !columns.is_empty(), seen: OnceLock::new(), room })
+        Ok(Batch {
+            device: device.clone(),
+            n_envs,
+            buffers,
+            external: !columns.is_empty(),
+            seen: OnceLock::new(),
+            room,
+        })
     }
 
     /// Where it lives.
@@ -198,7 +205,8 @@ impl EngineBatch for Batch {
             return Err(Error::ExternalColumns.into());
         }
         let host = self.columns().gathered(indices)?;
-        let mut batch = Batch::new(&self.device, world, indices.len(), host.seed(), host.choice().clone(), Columns::new())?;
+        let mut batch =
+            Batch::new(&self.device, world, indices.len(), host.seed(), host.choice().clone(), Columns::new())?;
         batch.set_autoreset(host.autoreset());
         batch.upload(&host);
         *self = batch;

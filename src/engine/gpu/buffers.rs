@@ -53,7 +53,8 @@ impl Buffers {
         });
         let entries: Vec<BindGroupEntry> = entries.collect();
         let layout = &device.kernels().layout;
-        let group = device.device.create_bind_group(&BindGroupDescriptor { label: Some("batch"), layout, entries: &entries });
+        let group =
+            device.device.create_bind_group(&BindGroupDescriptor { label: Some("batch"), layout, entries: &entries });
         device.check()?;
         Ok(Buffers { slices, group })
     }

@@ -1,8 +1,9 @@
 //! Shaders, compiled: a pipeline for each entry point of a module, one bind group layout for all.
 
 use wgpu::{
-    BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType, ComputePass, ComputePipeline,
-    ComputePipelineDescriptor, PipelineLayoutDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType, ComputePass,
+    ComputePipeline, ComputePipelineDescriptor, PipelineLayoutDescriptor, ShaderModuleDescriptor, ShaderSource,
+    ShaderStages,
 };
 
 use crate::engine::stages::{Kernel, SHADERS, Threads};
@@ -26,10 +27,20 @@ pub struct Kernels<K> {
 impl<K: Named> Kernels<K> {
     /// Compiles an entry point of `source` for each of `K`. The bindings are storage buffers with these accesses, in
     /// their order.
-    pub fn compile(device: &wgpu::Device, label: &str, source: String, accesses: impl IntoIterator<Item = Access>) -> Kernels<K> {
-        let module = device.create_shader_module(ShaderModuleDescriptor { label: Some(label), source: ShaderSource::Wgsl(source.into()) });
-        let bindings: Vec<BindGroupLayoutEntry> = (0..).zip(accesses).map(|(binding, access)| bound(binding, access)).collect();
-        let layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some(label), entries: &bindings });
+    pub fn compile(
+        device: &wgpu::Device,
+        label: &str,
+        source: String,
+        accesses: impl IntoIterator<Item = Access>,
+    ) -> Kernels<K> {
+        let module = device.create_shader_module(ShaderModuleDescriptor {
+            label: Some(label),
+            source: ShaderSource::Wgsl(source.into()),
+        });
+        let bindings: Vec<BindGroupLayoutEntry> =
+            (0..).zip(accesses).map(|(binding, access)| bound(binding, access)).collect();
+        let layout =
+            device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some(label), entries: &bindings });
         let pipeline_layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
             label: Some(label),
             bind_group_layouts: &[Some(&layout)],

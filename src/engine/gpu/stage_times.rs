@@ -15,10 +15,16 @@ pub(super) fn step_by_stage(batch: &mut Batch) -> Result<[Duration; N_STAGES], E
 fn by_device(batch: &mut Batch) -> Result<[Duration; N_STAGES], Error> {
     let device = batch.device().clone();
     let count = 2 * N_STAGES as u32;
-    let set = device.device.create_query_set(&QuerySetDescriptor { label: Some("stages"), ty: QueryType::Timestamp, count });
+    let set =
+        device.device.create_query_set(&QuerySetDescriptor { label: Some("stages"), ty: QueryType::Timestamp, count });
     let size = u64::from(count) * size_of::<u64>() as u64;
     let usage = BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC;
-    let resolved = device.device.create_buffer(&BufferDescriptor { label: Some("stages"), size, usage, mapped_at_creation: false });
+    let resolved = device.device.create_buffer(&BufferDescriptor {
+        label: Some("stages"),
+        size,
+        usage,
+        mapped_at_creation: false,
+    });
     batch.submit(|batch, encoder| {
         for (index, stage) in (0..).zip(STAGES) {
             let timestamp_writes = ComputePassTimestampWrites {

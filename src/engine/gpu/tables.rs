@@ -23,7 +23,14 @@ pub(super) struct Tables<'a> {
 
 impl<'a> Tables<'a> {
     pub(super) fn new(world: &'a World, batch: &'a Batch) -> Tables<'a> {
-        let mut tables = Tables { world, batch, facts: BatchFacts::of(batch), fields: Vec::new(), cells: Vec::new(), corners: Vec::new() };
+        let mut tables = Tables {
+            world,
+            batch,
+            facts: BatchFacts::of(batch),
+            fields: Vec::new(),
+            cells: Vec::new(),
+            corners: Vec::new(),
+        };
         for field in &world.fields {
             let first_cell = tables.cells.len() as u32;
             tables.cells.extend(&field.cells);

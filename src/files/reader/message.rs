@@ -67,7 +67,11 @@ pub fn shown_path(path: &Path) -> String {
 /// `value` in at most two dozen characters: with an exponent from 1e7 on and below 1e-4.
 pub fn shown(value: f64) -> String {
     let size = value.abs();
-    if size == 0.0 || !size.is_finite() || (1e-4..1e7).contains(&size) { value.to_string() } else { format!("{value:e}") }
+    if size == 0.0 || !size.is_finite() || (1e-4..1e7).contains(&size) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
 }
 
 /// `value` rounded to two decimals, or to as many more as it takes to differ from `limit`.
@@ -156,6 +160,7 @@ fn header(line: &str) -> Option<(&str, bool)> {
     let array = line.starts_with("[[");
     let (name, rest) = if array { line[2..].split_once("]]")? } else { line.strip_prefix('[')?.split_once(']')? };
     let (name, rest) = (name.trim(), rest.trim_start());
-    let named = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') && !name.contains([',', '"', '\'', '[', ' ']);
+    let named =
+        name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') && !name.contains([',', '"', '\'', '[', ' ']);
     (named && (rest.is_empty() || rest.starts_with('#'))).then_some((name, array))
 }

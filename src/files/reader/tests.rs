@@ -14,7 +14,10 @@ fn file(contents: &[u8]) -> (tempfile::TempDir, PathBuf) {
 
 /// The message for a TOML text that is not a table of numbers by name.
 fn refusal(text: &str) -> String {
-    Reader::parse::<BTreeMap<String, BTreeMap<String, f64>>>(Path::new("numbers.toml"), text).map(|_| ()).unwrap_err().to_string()
+    Reader::parse::<BTreeMap<String, BTreeMap<String, f64>>>(Path::new("numbers.toml"), text)
+        .map(|_| ())
+        .unwrap_err()
+        .to_string()
 }
 
 #[test]
@@ -51,10 +54,14 @@ fn tables_of_an_array_are_counted() {
         #[serde(default)]
         corner: Vec<BTreeMap<String, f64>>,
     }
-    let refusal = |text: &str| Reader::parse::<BTreeMap<String, Vec<Arm>>>(Path::new("x"), text).unwrap_err().to_string();
+    let refusal =
+        |text: &str| Reader::parse::<BTreeMap<String, Vec<Arm>>>(Path::new("x"), text).unwrap_err().to_string();
     let arms = "[[arm]]\n[arm.entry]\na = 1\n[[arm.corner]]\n[[arm.corner]]\n[[arm]]\n";
     assert!(refusal(&format!("{arms}[arm.entry]\nb = \"x\"")).contains("line 8, column 5: arm[1].entry: invalid type"));
-    assert!(refusal(&format!("{arms}[arm.entry]\n[[arm.corner]]\nb = \"x\"")).contains("column 5: arm[1].corner[0]: invalid type"));
+    assert!(
+        refusal(&format!("{arms}[arm.entry]\n[[arm.corner]]\nb = \"x\""))
+            .contains("column 5: arm[1].corner[0]: invalid type")
+    );
     assert!(refusal(arms).contains("arm[1]: missing field `entry`"));
 }
 
@@ -72,7 +79,12 @@ fn a_missing_key_of_no_table_is_said_to_be_missing_at_the_top_level() {
 #[test]
 fn a_line_of_a_mebibyte_is_repeated_around_the_fault_only() {
     let long = "x".repeat(1 << 20);
-    for text in [format!("[a]\nb = 1 {long}"), format!("[a]\nb = \"{long}\""), format!("{long} = 1"), format!("[a]\n{long}{long}")] {
+    for text in [
+        format!("[a]\nb = 1 {long}"),
+        format!("[a]\nb = \"{long}\""),
+        format!("{long} = 1"),
+        format!("[a]\n{long}{long}"),
+    ] {
         let message = refusal(&text);
         assert!(message.len() < 1000, "{} characters: {message:.1000}", message.len());
         assert!(message.contains("…"), "{message}");
@@ -83,8 +95,13 @@ fn a_line_of_a_mebibyte_is_repeated_around_the_fault_only() {
 
 #[test]
 fn a_long_key_or_value_is_cut_and_both_its_ends_are_shown() {
-    let error = Reader::of(Path::new("x")).invalid("k".repeat(5000), format!("<{}>", "v".repeat(5000)), "e".repeat(5000)).to_string();
-    assert!(error.len() < 1000 && error.contains("x: kkk") && error.contains(": <vvv") && error.contains("vvv>; eee"), "{error}");
+    let error = Reader::of(Path::new("x"))
+        .invalid("k".repeat(5000), format!("<{}>", "v".repeat(5000)), "e".repeat(5000))
+        .to_string();
+    assert!(
+        error.len() < 1000 && error.contains("x: kkk") && error.contains(": <vvv") && error.contains("vvv>; eee"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -110,7 +127,12 @@ fn characters_that_a_terminal_obeys_are_escaped_in_every_part_of_a_message() {
         assert_eq!(text.matches(shown).count(), times, "{text}");
     }
     // What the parser repeats of a file.
-    for text in ["[a]\nb = \"\u{1b}[2J\u{202e}\"", "[a]\nb = true # \u{202e}", "\u{202e}", "[\"\\u001b\"]\n\"\\u001b[2J\" = true"] {
+    for text in [
+        "[a]\nb = \"\u{1b}[2J\u{202e}\"",
+        "[a]\nb = true # \u{202e}",
+        "\u{202e}",
+        "[\"\\u001b\"]\n\"\\u001b[2J\" = true",
+    ] {
         let text = refusal(text);
         assert_eq!(printable(&text), text);
     }

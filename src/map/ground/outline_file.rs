@@ -86,7 +86,11 @@ impl Ground {
         }
         let list = |values: &[f64]| values.iter().map(|value| number(*value, 4)).collect::<Vec<_>>().join(", ");
         let (island, outer) = (number(self.island_radius, 5), number(self.outer_radius, 5));
-        let _ = writeln!(text, "\nisland_radius = {island}\nouter_radius = {outer}\nlane_radii = [{}]", list(&self.lane_radii));
+        let _ = writeln!(
+            text,
+            "\nisland_radius = {island}\nouter_radius = {outer}\nlane_radii = [{}]",
+            list(&self.lane_radii)
+        );
         for Arm { name, bearing } in &self.arms {
             let _ = writeln!(text, "\n[[arm]]\nname = {name:?}\nbearing_deg = {}", number(bearing.to_degrees(), 3));
         }
@@ -166,10 +170,12 @@ impl Ground {
         for (i, WrittenArm { name, bearing_deg }) in written.arm.into_iter().enumerate() {
             let usual = !name.is_empty() && name.len() <= 20 && name.chars().all(|c| c.is_ascii_alphanumeric());
             if !usual || arms.iter().any(|arm| arm.name == name) || ["outer", "island"].contains(&name.as_str()) {
-                let expected = "must be 1 to 20 letters and digits, unlike those of other arms, and neither outer nor island";
+                let expected =
+                    "must be 1 to 20 letters and digits, unlike those of other arms, and neither outer nor island";
                 return Err(reader.invalid(format!("arm[{i}].name"), format!("{name:?}"), expected));
             }
-            let bearing = reader.within(&format!("arm[{i}].bearing_deg"), bearing_deg, -360.0..=360.0, "deg")?.to_radians();
+            let bearing =
+                reader.within(&format!("arm[{i}].bearing_deg"), bearing_deg, -360.0..=360.0, "deg")?.to_radians();
             arms.push(Arm { name, bearing });
         }
         let (faces, kerbs) = loops(&reader, "face", written.face, &arms, is_ring)?;
@@ -178,15 +184,18 @@ impl Ground {
         let mut lines: Vec<Line> = Vec::new();
         for (i, route) in written.route.into_iter().enumerate() {
             let key = |name: &str| format!("route[{i}].{name}");
-            let (entry, exit_arm) = (arm(&reader, &key("entry"), &route.entry, &arms)?, arm(&reader, &key("to"), &route.to, &arms)?);
+            let (entry, exit_arm) =
+                (arm(&reader, &key("entry"), &route.entry, &arms)?, arm(&reader, &key("to"), &route.to, &arms)?);
             let (lane, exit) = (route.lane, route.exit);
             reader.count(&key("exit"), exit as usize, 1..=arms.len())?;
             if lines.iter().any(|line| (line.entry, line.lane, line.exit) == (entry, lane, exit)) {
                 return Err(reader.invalid(key("exit"), exit, "an earlier route has this entry, lane and exit"));
             }
             let [left, right] = route.crossing;
-            let crossing =
-                (reader.within(&key("crossing[0]"), left, 0.5..=50.0, "m")?, reader.within(&key("crossing[1]"), right, 0.5..=50.0, "m")?);
+            let crossing = (
+                reader.within(&key("crossing[0]"), left, 0.5..=50.0, "m")?,
+                reader.within(&key("crossing[1]"), right, 0.5..=50.0, "m")?,
+            );
             for width in route.widths {
                 reader.within(&key("widths"), width, 1.0..=20.0, "m")?;
             }
@@ -195,11 +204,26 @@ impl Ground {
         }
         lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
         reader.count("lane", written.lane.len(), 0..=1000)?;
-        let lanes = written.lane.iter().enumerate().map(|(i, lane)| curve(&reader, &format!("lane[{i}].path"), &lane.path, false));
+        let lanes = written
+            .lane
+            .iter()
+            .enumerate()
+            .map(|(i, lane)| curve(&reader, &format!("lane[{i}].path"), &lane.path, false));
         let lanes = lanes.collect::<Result<_, _>>()?;
         let edges = Edges::Own(edges);
         let mirrored = written.hand == Hand::Left;
-        Ok(Ground { mirrored, island_radius, outer_radius, lane_radii: written.lane_radii, arms, faces, kerbs, edges, lanes, lines })
+        Ok(Ground {
+            mirrored,
+            island_radius,
+            outer_radius,
+            lane_radii: written.lane_radii,
+            arms,
+            faces,
+            kerbs,
+            edges,
+            lanes,
+            lines,
+        })
     }
 }
 
@@ -233,7 +257,9 @@ fn path(curve: &Curve, closed: bool) -> String {
         for part in 1..=parts as usize {
             let end = piece.point_at(piece.length() * part as f64 / parts);
             let _ = match piece {
-                Piece::Arc { sweep, .. } => write!(text, "\n    [{}, {}],", point(end), number((sweep / parts / 4.0).tan(), 8)),
+                Piece::Arc { sweep, .. } => {
+                    write!(text, "\n    [{}, {}],", point(end), number((sweep / parts / 4.0).tan(), 8))
+                }
                 Piece::Segment { .. } => write!(text, "\n    [{}],", point(end)),
             };
         }
@@ -246,7 +272,11 @@ fn curve(reader: &Reader, key: &str, path: &[Vec<f64>], closed: bool) -> Result<
     reader.count(key, path.len(), 2..=MOST_POINTS)?;
     let point = |i: usize| -> Result<DVec2, Error> {
         if !(2..=3).contains(&path[i].len()) {
-            return Err(reader.invalid(format!("{key}[{i}]"), format!("{:?}", path[i]), "must be [x, y] or [x, y, bulge]"));
+            return Err(reader.invalid(
+                format!("{key}[{i}]"),
+                format!("{:?}", path[i]),
+                "must be [x, y] or [x, y, bulge]",
+            ));
         }
         let of = |axis: usize| reader.within(&format!("{key}[{i}][{axis}]"), path[i][axis], -FARTHEST..=FARTHEST, "m");
         Ok(DVec2::new(of(0)?, of(1)?))
@@ -255,7 +285,8 @@ fn curve(reader: &Reader, key: &str, path: &[Vec<f64>], closed: bool) -> Result<
     let mut from = point(if closed { path.len() - 1 } else { 0 })?;
     for (i, written) in path.iter().enumerate().skip(usize::from(!closed)) {
         let to = point(i)?;
-        let bulge = written.get(2).map_or(Ok(0.0), |&bulge| reader.within(&format!("{key}[{i}][2]"), bulge, -1.0..=1.0, ""))?;
+        let bulge =
+            written.get(2).map_or(Ok(0.0), |&bulge| reader.within(&format!("{key}[{i}][2]"), bulge, -1.0..=1.0, ""))?;
         // Points that rounding has made one are one.
         if 1e-6 < from.distance(to) {
             let piece = arc_of_height(from, to, bulge * from.distance(to) / 2.0);
@@ -277,7 +308,13 @@ fn arm(reader: &Reader, key: &str, name: &str, arms: &[Arm]) -> Result<usize, Er
 }
 
 /// The loops of an outline, the outer one first in the world: they neither cross nor lie outside it.
-fn loops(reader: &Reader, table: &str, written: Vec<WrittenLoop>, arms: &[Arm], is_ring: bool) -> Result<(Outline, Vec<Kerb>), Error> {
+fn loops(
+    reader: &Reader,
+    table: &str,
+    written: Vec<WrittenLoop>,
+    arms: &[Arm],
+    is_ring: bool,
+) -> Result<(Outline, Vec<Kerb>), Error> {
     reader.count(table, written.len(), 1 + usize::from(is_ring)..=MOST_LOOPS)?;
     let (mut curves, mut kerbs): (Vec<Curve>, Vec<Kerb>) = (Vec::new(), Vec::new());
     for (i, WrittenLoop { of, path }) in written.into_iter().enumerate() {
@@ -288,7 +325,11 @@ fn loops(reader: &Reader, table: &str, written: Vec<WrittenLoop>, arms: &[Arm], 
             name => Kerb::Splitter(arm(reader, &format!("{table}[{i}].of"), name, arms)?),
         };
         if let Some(other) = curves.iter().position(|other| crosses(other, &loop_)) {
-            return Err(reader.invalid(format!("{table}[{i}].path"), "crosses", format!("must not cross {table}[{other}]")));
+            return Err(reader.invalid(
+                format!("{table}[{i}].path"),
+                "crosses",
+                format!("must not cross {table}[{other}]"),
+            ));
         }
         curves.push(loop_);
         kerbs.push(kerb);

@@ -69,14 +69,20 @@ struct Island {
 /// A ring of a map's records.
 pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Imported, Error> {
     let outside = map.outside(ring.centre);
-    let refused = Refusals { reader: Reader::of(&map.file), place: format!("ring at ({:.1}, {:.1})", outside.x, outside.y) };
+    let refused =
+        Refusals { reader: Reader::of(&map.file), place: format!("ring at ({:.1}, {:.1})", outside.x, outside.y) };
     let extent = ring.radius + REACH;
     let expected = "its edge is lost among narrow voids; another ring would do";
-    let Island { origin, radius, faces, edges } = island(map, ring, extent).ok_or_else(|| refused.error("island", "none", expected))?;
+    let Island { origin, radius, faces, edges } =
+        island(map, ring, extent).ok_or_else(|| refused.error("island", "none", expected))?;
     let outer_radius = outer_radius(&faces, radius);
 
     let fine = surroundings::lanes(map, origin, extent, FINEST);
-    let network = Network { records: &map.records, graph: &map.graph, strips: fine.iter().map(|(index, strip)| (*index, strip)).collect() };
+    let network = Network {
+        records: &map.records,
+        graph: &map.graph,
+        strips: fine.iter().map(|(index, strip)| (*index, strip)).collect(),
+    };
     let around = Around { network: &network, outer_radius, reach: outer_radius + BESIDE_RING, extent };
     let (circle, lanes, bypasses) = ring_arms(map, origin, radius, &around);
     let site = Site { map, refused: &refused, network: &network, origin, extent, circle, faces, edges };
@@ -121,9 +127,18 @@ impl Site<'_> {
         let Site { map, refused, network, origin, extent, circle, faces, edges } = self;
         check_arms(map, refused, lanes, circle)?;
         let mirrored = map.is_mirrored();
-        let arms = named(lanes, options, mirrored).map_err(|expected| refused.error("arms", format!("{:?}", options.arms), expected))?;
-        let mut routes =
-            Lines { network, mirrored, arms: &arms, place: &refused.place, extent, circle, lines: Vec::new(), warnings: Vec::new() };
+        let arms = named(lanes, options, mirrored)
+            .map_err(|expected| refused.error("arms", format!("{:?}", options.arms), expected))?;
+        let mut routes = Lines {
+            network,
+            mirrored,
+            arms: &arms,
+            place: &refused.place,
+            extent,
+            circle,
+            lines: Vec::new(),
+            warnings: Vec::new(),
+        };
         add(&mut routes)?;
         if routes.lines.is_empty() {
             let found = format!("none between {} arms", lanes.len());
@@ -137,7 +152,18 @@ impl Site<'_> {
         let kerbs = faces.loops.iter().map(|curve| kerb(curve, &arms)).collect();
         let (lanes, edges) = (shown(&lines), Edges::Own(edges));
         let (island_radius, lane_radii) = (0.0, Vec::new());
-        let ground = Ground { mirrored, island_radius, outer_radius: circle, lane_radii, arms, faces, kerbs, edges, lanes, lines };
+        let ground = Ground {
+            mirrored,
+            island_radius,
+            outer_radius: circle,
+            lane_radii,
+            arms,
+            faces,
+            kerbs,
+            edges,
+            lanes,
+            lines,
+        };
         Ok(Imported { ground, centre: map.outside(origin), warnings })
     }
 }
@@ -150,7 +176,12 @@ fn island(map: &Map, ring: &Ring, extent: f64) -> Option<Island> {
     let edges = clipped(&surface.edges, extent).into_iter().find(around)?;
     let island = faces.iter().skip(1).find(|hole| encloses_origin(hole))?;
     let (centre, radius, _) = fitted_circle(&densified(&points(island), 0.1))?;
-    Some(Island { origin: ring.centre + centre, radius, faces: outline(&faces, centre), edges: outline(&edges, centre) })
+    Some(Island {
+        origin: ring.centre + centre,
+        radius,
+        faces: outline(&faces, centre),
+        edges: outline(&edges, centre),
+    })
 }
 
 /// Radius of the circle around a ring where its arms begin, the lanes of the arms, and what became of bypasses.
@@ -187,8 +218,10 @@ fn unknown_lanes(map: &Map) -> String {
 /// The steepest that the lanes around a place are, where that is worth a warning.
 fn tilt(map: &Map, network: &Network) -> Option<String> {
     let largest = |of: fn(&Level) -> f64, least: f64, what: &str| {
-        let roads = network.strips.values().map(|strip| &map.records.roads[strip.road]).filter(|road| least < of(&road.level));
-        let steepest = roads.max_by(|one, other| of(&one.level).total_cmp(&of(&other.level)).then(other.id.cmp(&one.id)))?;
+        let roads =
+            network.strips.values().map(|strip| &map.records.roads[strip.road]).filter(|road| least < of(&road.level));
+        let steepest =
+            roads.max_by(|one, other| of(&one.level).total_cmp(&of(&other.level)).then(other.id.cmp(&one.id)))?;
         Some(format!("{what} of up to {:.1} % (road {})", 100.0 * of(&steepest.level), super::xml::shown(&steepest.id)))
     };
     let parts = [largest(|level| level.grade, GRADE, "grades"), largest(|level| level.crossfall, TILTED, "crossfall")];
@@ -203,13 +236,16 @@ fn add_routes(routes: &mut Lines, lanes: &[ArmLanes], island_radius: f64, outer_
         let n = arm.entries.len();
         if 2 < n {
             let (place, name) = (routes.place, &routes.arms[entry].name);
-            routes.warnings.push(format!("{place}: arm {name} has {n} entry lanes; the two next to the kerb are driven"));
+            routes
+                .warnings
+                .push(format!("{place}: arm {name} has {n} entry lanes; the two next to the kerb are driven"));
         }
         for lane in [Lane::Left, Lane::Right].into_iter().filter(|lane| lane.index() < n.min(2)) {
             let mut ways = routes.network.ways(&arm.entries[lane.index()], lanes);
             ways.retain(|(_, way)| routes.network.nearest_to_centre(way) < outer_radius + BESIDE_RING);
             let mut exit = 0;
-            for exit_arm in (1..=n_arms).map(|turn| (entry + turn) % n_arms).filter(|&arm| !lanes[arm].exits.is_empty()) {
+            for exit_arm in (1..=n_arms).map(|turn| (entry + turn) % n_arms).filter(|&arm| !lanes[arm].exits.is_empty())
+            {
                 exit += 1;
                 // The lane that keeps its place from the kerb, or the one nearest to it.
                 let kept = lane.index().min(lanes[exit_arm].exits.len() - 1);

@@ -44,9 +44,13 @@ impl Around<'_> {
         let alone: Vec<bool> = arms
             .iter()
             .enumerate()
-            .map(|(i, arm)| (0..arm.entries.len()).all(|lane| is_entry(i, lane)) && (0..arm.exits.len()).all(|lane| is_exit(i, lane)))
+            .map(|(i, arm)| {
+                (0..arm.entries.len()).all(|lane| is_entry(i, lane))
+                    && (0..arm.exits.len()).all(|lane| is_exit(i, lane))
+            })
             .collect();
-        let apart: Vec<Bypass> = all.iter().copied().filter(|bypass| alone[bypass.entry.0] || alone[bypass.exit.0]).collect();
+        let apart: Vec<Bypass> =
+            all.iter().copied().filter(|bypass| alone[bypass.entry.0] || alone[bypass.exit.0]).collect();
         let (mut warnings, mut gone_entries, mut gone_exits) = (Vec::new(), Vec::new(), Vec::new());
         let (mut entries, mut exits): (Vec<(usize, Crossing)>, Vec<(usize, Crossing)>) = (Vec::new(), Vec::new());
         for &Bypass { entry, exit } in &apart {
@@ -54,7 +58,8 @@ impl Around<'_> {
             let what = format!("{} passes beside the ring to {}", self.name(&from), self.name(&to));
             let n = arms.len();
             // Traffic enters on the arm before the bypass, counter-clockwise, and leaves on the arm after it.
-            let before = (1..n).map(|step| (entry.0 + n - step) % n).find(|&arm| !alone[arm]).filter(|_| alone[entry.0]);
+            let before =
+                (1..n).map(|step| (entry.0 + n - step) % n).find(|&arm| !alone[arm]).filter(|_| alone[entry.0]);
             let after = (1..n).map(|step| (exit.0 + step) % n).find(|&arm| !alone[arm]).filter(|_| alone[exit.0]);
             let comes = !alone[entry.0] || before.is_some_and(|arm| self.one_road(&from, &arms[arm].entries));
             let leads = !alone[exit.0] || after.is_some_and(|arm| self.one_road(&to, &arms[arm].exits));
@@ -131,9 +136,12 @@ impl Around<'_> {
         let (strips, path) = far(lane);
         others.iter().map(far).any(|(other_strips, other_path)| {
             let near = |p: &DVec2, along: &[DVec2]| {
-                along.windows(2).any(|pair| crate::geometry::Piece::Segment { from: pair[0], to: pair[1] }.distance(*p) < ONE_ROAD)
+                along
+                    .windows(2)
+                    .any(|pair| crate::geometry::Piece::Segment { from: pair[0], to: pair[1] }.distance(*p) < ONE_ROAD)
             };
-            let beside = path.first().is_some_and(|p| near(p, &other_path)) || other_path.first().is_some_and(|p| near(p, &path));
+            let beside = path.first().is_some_and(|p| near(p, &other_path))
+                || other_path.first().is_some_and(|p| near(p, &path));
             beside || strips.iter().any(|strip| other_strips.contains(strip))
         })
     }

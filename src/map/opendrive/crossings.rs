@@ -64,8 +64,13 @@ pub(super) fn circle(records: &Records, strips: &[Strip], radius: f64) -> f64 {
     };
     let junction = |strip: &Strip| records.roads[strip.road].junction.as_deref();
     let junctions: Vec<&str> = strips.iter().filter(in_ring).filter_map(junction).collect();
-    let parts = strips.iter().filter(|strip| strip.is_driven() && junction(strip).is_some_and(|id| junctions.contains(&id)));
-    let reach = parts.flat_map(|strip| &strip.centre).map(|p| p.length()).filter(|&reach| reach < radius + FARTHEST).fold(0.0, f64::max);
+    let parts =
+        strips.iter().filter(|strip| strip.is_driven() && junction(strip).is_some_and(|id| junctions.contains(&id)));
+    let reach = parts
+        .flat_map(|strip| &strip.centre)
+        .map(|p| p.length())
+        .filter(|&reach| reach < radius + FARTHEST)
+        .fold(0.0, f64::max);
     if reach == 0.0 { radius + ALONE } else { reach.max(radius + NEAR) + BEYOND }
 }
 
@@ -129,10 +134,15 @@ pub(super) fn joined(mut arms: Vec<ArmLanes>, gate: impl Fn(&Crossing) -> Option
     let mut i = 0;
     while i < arms.len() && 1 < arms.len() {
         let next = (i + 1) % arms.len();
-        let one_road = match (arms[i].entries.as_slice(), arms[i].exits.last(), arms[next].entries.last(), arms[next].exits.as_slice()) {
-            ([], Some(leaves), Some(enters), []) => gate(leaves)
-                .zip(gate(enters))
-                .is_some_and(|(out, into)| out.distance(into) < ONE_ROAD.0.max(ONE_ROAD.1 * radius) && 0.0 < out.perp_dot(into)),
+        let one_road = match (
+            arms[i].entries.as_slice(),
+            arms[i].exits.last(),
+            arms[next].entries.last(),
+            arms[next].exits.as_slice(),
+        ) {
+            ([], Some(leaves), Some(enters), []) => gate(leaves).zip(gate(enters)).is_some_and(|(out, into)| {
+                out.distance(into) < ONE_ROAD.0.max(ONE_ROAD.1 * radius) && 0.0 < out.perp_dot(into)
+            }),
             _ => false,
         };
         if one_road {

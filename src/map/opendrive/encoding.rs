@@ -19,12 +19,18 @@ pub(super) fn text(file: &Path, bytes: Vec<u8>) -> Result<String, Error> {
     let malformed = |message: String| Error::Malformed { file: file.to_owned(), message: shortened(&message, 300) };
     let pairs = |of: fn([u8; 2]) -> u16, bytes: &[u8]| -> Result<String, Error> {
         let (pairs, rest) = bytes.as_chunks::<2>();
-        let text = if rest.is_empty() { String::from_utf16(&pairs.iter().map(|&pair| of(pair)).collect::<Vec<_>>()).ok() } else { None };
+        let text = if rest.is_empty() {
+            String::from_utf16(&pairs.iter().map(|&pair| of(pair)).collect::<Vec<_>>()).ok()
+        } else {
+            None
+        };
         text.ok_or_else(|| malformed("is no valid UTF-16; save it as UTF-8".into()))
     };
     match bytes.as_slice() {
         [0x1f, 0x8b, ..] => return Err(malformed("is compressed by gzip; unpack it with gunzip first".into())),
-        [b'P', b'K', 3, 4, ..] => return Err(malformed("is a zip archive; unpack it first and give the .xodr file in it".into())),
+        [b'P', b'K', 3, 4, ..] => {
+            return Err(malformed("is a zip archive; unpack it first and give the .xodr file in it".into()));
+        }
         [0xff, 0xfe, rest @ ..] => return pairs(u16::from_le_bytes, rest),
         [0xfe, 0xff, rest @ ..] => return pairs(u16::from_be_bytes, rest),
         [b'<', 0, ..] => return pairs(u16::from_le_bytes, &bytes),
@@ -34,13 +40,20 @@ pub(super) fn text(file: &Path, bytes: Vec<u8>) -> Result<String, Error> {
     let encoding = declared(&bytes[..bytes.len().min(HEAD)]);
     if ["iso-8859-1", "latin1", "windows-1252", "cp1252"].contains(&encoding.as_str()) {
         let high: Vec<char> = WINDOWS_1252.chars().collect();
-        let of = |byte: u8| if (0x80..0xa0).contains(&byte) { high[usize::from(byte - 0x80)] } else { char::from(byte) };
+        let of =
+            |byte: u8| if (0x80..0xa0).contains(&byte) { high[usize::from(byte - 0x80)] } else { char::from(byte) };
         return Ok(bytes.into_iter().map(of).collect());
     }
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
-        let declared = if encoding.is_empty() { String::new() } else { format!(", and its encoding, {}, is not read", shown(&encoding)) };
-        malformed(format!("is no valid UTF-8 from byte {at} on{declared}; save it as UTF-8 and declare that in its first line"))
+        let declared = if encoding.is_empty() {
+            String::new()
+        } else {
+            format!(", and its encoding, {}, is not read", shown(&encoding))
+        };
+        malformed(format!(
+            "is no valid UTF-8 from byte {at} on{declared}; save it as UTF-8 and declare that in its first line"
+        ))
     })
 }
 

@@ -73,8 +73,10 @@ struct Places<'a> {
 
 impl<'a> Places<'a> {
     fn new(records: &'a Records, strips: &'a [Strip]) -> Places<'a> {
-        let ends = strips.iter().map(|strip| if strip.kind == Kind::Lane { End::both(&strip.path()) } else { None }).collect();
-        let index = strips.iter().enumerate().map(|(index, strip)| ((strip.road, strip.section, strip.id), index)).collect();
+        let ends =
+            strips.iter().map(|strip| if strip.kind == Kind::Lane { End::both(&strip.path()) } else { None }).collect();
+        let index =
+            strips.iter().enumerate().map(|(index, strip)| ((strip.road, strip.section, strip.id), index)).collect();
         Places { records, strips, ends, index }
     }
 
@@ -97,7 +99,9 @@ impl<'a> Places<'a> {
 
     /// Sections that the file says a lane leads to, or comes from, without naming a lane of theirs that there is.
     fn unnamed(&self, strip: usize, follow: bool) -> impl Iterator<Item = Contact> {
-        let names = |contact: &Contact| contact.lane.is_some_and(|lane| self.index.contains_key(&(contact.road, contact.section, lane)));
+        let names = |contact: &Contact| {
+            contact.lane.is_some_and(|lane| self.index.contains_key(&(contact.road, contact.section, lane)))
+        };
         contacts(self.records, &self.strips[strip], follow).into_iter().filter(move |contact| !names(contact))
     }
 
@@ -113,7 +117,11 @@ impl Graph {
         let places = Places::new(records, strips);
         let ends = &places.ends;
         let starts = starts(ends);
-        let mut graph = Graph { next: vec![Vec::new(); strips.len()], previous: vec![Vec::new(); strips.len()], warnings: Vec::new() };
+        let mut graph = Graph {
+            next: vec![Vec::new(); strips.len()],
+            previous: vec![Vec::new(); strips.len()],
+            warnings: Vec::new(),
+        };
         for index in 0..strips.len() {
             let Some([_, end]) = ends[index] else { continue };
             let mut linked = places.linked(index, true);
@@ -205,8 +213,9 @@ impl Graph {
 
 /// Why links to lanes that begin there are not believed.
 fn misfit(end: &End, starts: impl Iterator<Item = End>) -> String {
-    let (jump, turn) =
-        starts.map(|start| end.to(&start)).fold((0.0f64, 0.0f64), |(jump, turn), other| (jump.max(other.0), turn.max(other.1)));
+    let (jump, turn) = starts
+        .map(|start| end.to(&start))
+        .fold((0.0f64, 0.0f64), |(jump, turn), other| (jump.max(other.0), turn.max(other.1)));
     match (JUMP < jump, TURN < turn) {
         (true, true) => format!("jumps by {jump:.2} m and turns by {:.0} deg", turn.to_degrees()),
         (false, true) => format!("turns by {:.0} deg", turn.to_degrees()),

@@ -96,24 +96,24 @@ impl Map {
             let entries = strips.iter().flat_map(|&strip| self.graph.previous[strip].iter().filter(outside));
             let exits = strips.iter().flat_map(|&strip| self.graph.next[strip].iter().filter(outside));
             let crossing = |&strip: &usize| Crossing { inwards: true, at: DVec2::ZERO, strips: vec![strip] };
-            let (mut entries, mut exits): (Vec<usize>, Vec<usize>) = (entries.copied().collect(), exits.copied().collect());
+            let (mut entries, mut exits): (Vec<usize>, Vec<usize>) =
+                (entries.copied().collect(), exits.copied().collect());
             for ends in [&mut entries, &mut exits] {
                 ends.sort_unstable();
                 ends.dedup();
             }
-            let arms: Vec<ArmLanes> = exits.iter().map(|exit| ArmLanes { entries: Vec::new(), exits: vec![crossing(exit)] }).collect();
+            let arms: Vec<ArmLanes> =
+                exits.iter().map(|exit| ArmLanes { entries: Vec::new(), exits: vec![crossing(exit)] }).collect();
             let mut ways: Vec<Way> = Vec::new();
             for &entry in &entries {
                 let found = network.ways(&crossing(&entry), &arms).into_iter();
                 // Through this junction alone.
                 let through = |(_, way): &Lanes| way[1..way.len() - 1].iter().all(|strip| strips.contains(strip));
                 let inner = found.filter(|(_, way)| 2 < way.len()).filter(through);
-                ways.extend(
-                    inner.map(|((arm, _), _)| Way {
-                        from: self.road_lane(&self.strips[entry]),
-                        to: self.road_lane(&self.strips[exits[arm]]),
-                    }),
-                );
+                ways.extend(inner.map(|((arm, _), _)| Way {
+                    from: self.road_lane(&self.strips[entry]),
+                    to: self.road_lane(&self.strips[exits[arm]]),
+                }));
             }
             if !ways.is_empty() {
                 let centre = self.outside(middle(strips.iter().flat_map(|&strip| &self.strips[strip].centre)));
@@ -154,9 +154,13 @@ impl Map {
         let edges = outline(&part(&surface.edges).ok_or_else(no_surface)?, DVec2::ZERO);
 
         let fine = surroundings::lanes(self, origin, extent, FINEST);
-        let network =
-            Network { records: &self.records, graph: &self.graph, strips: fine.iter().map(|(index, strip)| (*index, strip)).collect() };
-        let (indices, coarse): (Vec<usize>, Vec<Strip>) = surroundings::nearby(self, origin, extent, COARSE).into_iter().unzip();
+        let network = Network {
+            records: &self.records,
+            graph: &self.graph,
+            strips: fine.iter().map(|(index, strip)| (*index, strip)).collect(),
+        };
+        let (indices, coarse): (Vec<usize>, Vec<Strip>) =
+            surroundings::nearby(self, origin, extent, COARSE).into_iter().unzip();
         let lanes = arms(&crossings(&coarse, &indices, &self.graph, circle), circle);
         let site = Site { map: self, refused: &refused, network: &network, origin, extent, circle, faces, edges };
         site.imported(&lanes, options, |routes| {
@@ -195,7 +199,12 @@ impl Map {
     }
 
     /// The strips of a lane.
-    fn strips_of(&self, refused: &Refusals, end: &str, RoadLane { road, lane }: &RoadLane) -> Result<Vec<usize>, Error> {
+    fn strips_of(
+        &self,
+        refused: &Refusals,
+        end: &str,
+        RoadLane { road, lane }: &RoadLane,
+    ) -> Result<Vec<usize>, Error> {
         let Some(&index) = self.records.by_id.get(road) else {
             let expected = "the map has no such road; `offtrack import MAP --junctions` lists the ways through it";
             return Err(refused.error(&format!("{end}.road"), format!("{road:?}"), expected));
@@ -221,10 +230,19 @@ impl Map {
         let found = network.ways(&entry, &[exit]).into_iter().next();
         let along = found.map(|(_, along)| along).filter(|along| 1 < along.len());
         along.ok_or_else(|| {
-            let onward = entry.strips.iter().flat_map(|&strip| &self.graph.next[strip]).filter(|next| !entry.strips.contains(next));
-            let mut onward: Vec<String> = onward.map(|&next| shown(&self.road_lane(&self.strips[next]).to_string())).collect();
+            let onward = entry
+                .strips
+                .iter()
+                .flat_map(|&strip| &self.graph.next[strip])
+                .filter(|next| !entry.strips.contains(next));
+            let mut onward: Vec<String> =
+                onward.map(|&next| shown(&self.road_lane(&self.strips[next]).to_string())).collect();
             onward.dedup();
-            let expected = format!("no links of the map lead there; {} leads on to {}", shown(&way.from.to_string()), onward.join(", "));
+            let expected = format!(
+                "no links of the map lead there; {} leads on to {}",
+                shown(&way.from.to_string()),
+                onward.join(", ")
+            );
             refused.error("to", shown(&way.to.to_string()), expected)
         })
     }
@@ -239,7 +257,9 @@ impl Map {
         });
         let inner: Vec<usize> = inner.collect();
         let ids: Vec<&str> = inner.iter().filter_map(|&strip| self.junction_of(&self.strips[strip])).collect();
-        let belongs = |index: usize, strip: &Strip| inner.contains(&index) || self.junction_of(strip).is_some_and(|id| ids.contains(&id));
+        let belongs = |index: usize, strip: &Strip| {
+            inner.contains(&index) || self.junction_of(strip).is_some_and(|id| ids.contains(&id))
+        };
         let parts = self.strips.iter().enumerate().filter(|(index, strip)| strip.is_driven() && belongs(*index, strip));
         let mut points: Vec<DVec2> = parts.flat_map(|(_, strip)| &strip.centre).copied().collect();
         if points.is_empty() {
@@ -249,7 +269,8 @@ impl Map {
         let centre = middle(points.iter());
         let reach = points.iter().map(|p| p.distance(centre)).fold(0.0, f64::max) + BEYOND;
         if LARGEST < reach {
-            let expected = format!("the junctions that it leads through reach as far from their middle; at most {LARGEST} m");
+            let expected =
+                format!("the junctions that it leads through reach as far from their middle; at most {LARGEST} m");
             return Err(refused.error("radius", format!("{reach:.1} m"), expected));
         }
         Ok((centre, reach.max(SMALLEST)))
@@ -265,12 +286,22 @@ fn middle<'a>(points: impl Iterator<Item = &'a DVec2>) -> DVec2 {
 /// Entry arm, lane, exit and exit arm of a way that was continued at both ends.
 fn route(along: &[usize], way: &[usize], lanes: &[ArmLanes]) -> Option<(usize, Lane, u32, usize)> {
     let at = |crossing: &Crossing| along.iter().position(|strip| crossing.strips.contains(strip));
-    let (first, last) = (along.iter().position(|strip| *strip == way[0])?, along.iter().position(|strip| *strip == way[way.len() - 1])?);
-    let entries = lanes.iter().enumerate().flat_map(|(arm, lanes)| lanes.entries.iter().enumerate().map(move |(lane, c)| (arm, lane, c)));
-    let (entry, lane, _) =
-        entries.filter(|(.., crossing)| at(crossing).is_some_and(|at| at < last)).max_by_key(|(.., crossing)| at(crossing))?;
-    let exits = lanes.iter().enumerate().flat_map(|(arm, lanes)| lanes.exits.iter().map(move |crossing| (arm, crossing)));
-    let (exit_arm, _) = exits.filter(|(_, crossing)| at(crossing).is_some_and(|at| first < at)).min_by_key(|(_, crossing)| at(crossing))?;
+    let (first, last) = (
+        along.iter().position(|strip| *strip == way[0])?,
+        along.iter().position(|strip| *strip == way[way.len() - 1])?,
+    );
+    let entries = lanes
+        .iter()
+        .enumerate()
+        .flat_map(|(arm, lanes)| lanes.entries.iter().enumerate().map(move |(lane, c)| (arm, lane, c)));
+    let (entry, lane, _) = entries
+        .filter(|(.., crossing)| at(crossing).is_some_and(|at| at < last))
+        .max_by_key(|(.., crossing)| at(crossing))?;
+    let exits =
+        lanes.iter().enumerate().flat_map(|(arm, lanes)| lanes.exits.iter().map(move |crossing| (arm, crossing)));
+    let (exit_arm, _) = exits
+        .filter(|(_, crossing)| at(crossing).is_some_and(|at| first < at))
+        .min_by_key(|(_, crossing)| at(crossing))?;
     let turns = (1..=lanes.len()).map(|turn| (entry + turn) % lanes.len()).filter(|&arm| !lanes[arm].exits.is_empty());
     let exit = turns.take_while(|&arm| arm != exit_arm).count() + 1;
     Some((entry, if lane == 0 { Lane::Right } else { Lane::Left }, exit as u32, exit_arm))

@@ -60,7 +60,8 @@ impl Strip {
 
     /// Whether vehicles drive on it: a lane as wide as one somewhere.
     pub(super) fn is_driven(&self) -> bool {
-        self.kind == Kind::Lane && self.left.iter().zip(&self.right).any(|(left, right)| NARROWEST < left.distance(*right))
+        self.kind == Kind::Lane
+            && self.left.iter().zip(&self.right).any(|(left, right)| NARROWEST < left.distance(*right))
     }
 
     /// Corners of the smallest upright rectangle around it (m).
@@ -140,7 +141,8 @@ pub(super) fn sampled(road: &RoadRecord, index: usize, section: usize, tolerance
     let mut samples: Vec<Sample> = Vec::new();
     for pair in breaks.windows(2) {
         // The stretch's end is approached from within: another record begins there.
-        let (from, to) = (Sample::new(road, of, pair[0]), Sample::new(road, of, pair[1] - 1e-9 * (pair[1] - pair[0]).min(1.0)));
+        let (from, to) =
+            (Sample::new(road, of, pair[0]), Sample::new(road, of, pair[1] - 1e-9 * (pair[1] - pair[0]).min(1.0)));
         if samples.last().is_none_or(|last| 1e-7 < last.apart(&from)) {
             samples.push(from.clone());
         }
@@ -155,7 +157,9 @@ pub(super) fn sampled(road: &RoadRecord, index: usize, section: usize, tolerance
     }
     let kinds = of.lanes.iter().map(|lane| kind(lane, of, &breaks));
     let strip = |(index_of_lane, (lane, kind)): (usize, (&Lane, Kind))| {
-        let edge = |inner: bool| samples.iter().map(move |sample| sample.edges[index_of_lane][usize::from(!inner)]).collect::<Vec<_>>();
+        let edge = |inner: bool| {
+            samples.iter().map(move |sample| sample.edges[index_of_lane][usize::from(!inner)]).collect::<Vec<_>>()
+        };
         let (inner, outer) = (edge(true), edge(false));
         let centre = inner.iter().zip(&outer).map(|(&one, &other)| (one + other) / 2.0).collect();
         let (left, right) = if 0 < lane.id { (outer, inner) } else { (inner, outer) };
@@ -172,8 +176,10 @@ fn kind(lane: &Lane, section: &Section, breaks: &[f64]) -> Kind {
         Kind::Lane | Kind::Kerb => lane.kind,
         _ if !raised => lane.kind,
         _ => {
-            let width =
-                |s: f64| active(&lane.widths, s - section.start, |width| width.start).map_or(0.0, |width| width.at(s - section.start));
+            let width = |s: f64| {
+                active(&lane.widths, s - section.start, |width| width.start)
+                    .map_or(0.0, |width| width.at(s - section.start))
+            };
             let narrow = breaks.windows(2).all(|pair| width((pair[0] + pair[1]) / 2.0) <= KERB_WIDTH + 1e-6);
             if narrow { Kind::Kerb } else { Kind::Solid }
         }
@@ -192,21 +198,27 @@ impl Sample {
     fn new(road: &RoadRecord, section: &Section, s: f64) -> Sample {
         let (p, heading) = road.pose(s);
         let across = DVec2::from_angle(heading).perp();
-        let offset = active(&road.offsets, s, |offset| offset.start).filter(|offset| offset.start <= s).map_or(0.0, |offset| offset.at(s));
+        let offset = active(&road.offsets, s, |offset| offset.start)
+            .filter(|offset| offset.start <= s)
+            .map_or(0.0, |offset| offset.at(s));
         let offset = if offset.is_finite() { offset.clamp(-FARTHEST, FARTHEST) } else { 0.0 };
         let local = s - section.start;
         let mut edges = vec![[p; 2]; section.lanes.len()];
         // Lanes stand from left to right, and widths add up from the centre outwards.
         let first_right = section.lanes.partition_point(|lane| 0 < lane.id);
-        let sides: [(Vec<usize>, f64); 2] = [((0..first_right).rev().collect(), 1.0), ((first_right..section.lanes.len()).collect(), -1.0)];
+        let sides: [(Vec<usize>, f64); 2] =
+            [((0..first_right).rev().collect(), 1.0), ((first_right..section.lanes.len()).collect(), -1.0)];
         for (lanes, side) in sides {
             let mut inner = offset;
             for index in lanes {
                 let lane = &section.lanes[index];
                 let value = active(&lane.widths, local, |width| width.start).map_or(0.0, |width| width.at(local));
                 let value = if value.is_finite() { value.clamp(-FARTHEST, FARTHEST) } else { 0.0 };
-                let outer =
-                    if lane.bordered { side * (side * inner).max(value.abs() + side * offset) } else { inner + side * value.max(0.0) };
+                let outer = if lane.bordered {
+                    side * (side * inner).max(value.abs() + side * offset)
+                } else {
+                    inner + side * value.max(0.0)
+                };
                 edges[index] = [p + inner * across, p + outer * across];
                 inner = outer;
             }
@@ -216,7 +228,12 @@ impl Sample {
 
     /// Largest distance between the edges of two samples (m).
     fn apart(&self, other: &Sample) -> f64 {
-        self.edges.iter().flatten().zip(other.edges.iter().flatten()).map(|(one, other)| one.distance(*other)).fold(0.0, f64::max)
+        self.edges
+            .iter()
+            .flatten()
+            .zip(other.edges.iter().flatten())
+            .map(|(one, other)| one.distance(*other))
+            .fold(0.0, f64::max)
     }
 
     /// Largest distance of this sample's edges from the chords between those of two others (m).
@@ -227,12 +244,22 @@ impl Sample {
 }
 
 /// Adds the samples after `before` up to `after`.
-fn halved(road: &RoadRecord, section: &Section, before: &Sample, after: &Sample, tolerance: f64, depth: u32, samples: &mut Vec<Sample>) {
+fn halved(
+    road: &RoadRecord,
+    section: &Section,
+    before: &Sample,
+    after: &Sample,
+    tolerance: f64,
+    depth: u32,
+    samples: &mut Vec<Sample>,
+) {
     let at = |fraction: f64| Sample::new(road, section, before.s + fraction * (after.s - before.s));
     let middle = at(0.5);
     // A curve that turns both ways may cross the chord's middle.
     let bends = |sample: &Sample| tolerance < sample.off_chord(before, after);
-    if depth < MOST_HALVINGS && (bends(&middle) || (depth < 2 && [0.25, 0.75].into_iter().any(|fraction| bends(&at(fraction))))) {
+    if depth < MOST_HALVINGS
+        && (bends(&middle) || (depth < 2 && [0.25, 0.75].into_iter().any(|fraction| bends(&at(fraction)))))
+    {
         halved(road, section, before, &middle, tolerance, depth + 1, samples);
         halved(road, section, &middle, after, tolerance, depth + 1, samples);
     } else {
@@ -263,7 +290,8 @@ mod tests {
 
     #[test]
     fn lanes_of_a_circular_road_are_circles_to_a_millimetre() {
-        let plan = r#"<geometry s="0" x="20" y="0" hdg="1.5707963267948966" length="60"><arc curvature="0.05"/></geometry>"#;
+        let plan =
+            r#"<geometry s="0" x="20" y="0" hdg="1.5707963267948966" length="60"><arc curvature="0.05"/></geometry>"#;
         let strips = strips(&map(plan, LANES, 60.0), 1e-3).unwrap();
         // The centre of the road's circle is the origin, and left is inwards.
         for (strip, (id, inner, outer)) in strips.iter().zip([(1, 16.5, 19.5), (-1, 19.5, 23.5), (-2, 23.5, 24.1)]) {
@@ -311,7 +339,8 @@ mod tests {
         let (right, left) = (plan("RHT", 0.02), plan("LHT", 0.02));
         for strip in &right {
             let twin = left.iter().find(|other| other.id == -strip.id).unwrap();
-            let mirrored = strip.centre.iter().zip(&twin.centre).all(|(p, q)| p.distance(DVec2::new(q.x, -q.y)) < 1e-12);
+            let mirrored =
+                strip.centre.iter().zip(&twin.centre).all(|(p, q)| p.distance(DVec2::new(q.x, -q.y)) < 1e-12);
             assert!(mirrored && strip.centre.len() == twin.centre.len());
         }
     }

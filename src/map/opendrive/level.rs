@@ -65,7 +65,8 @@ impl Source<'_, '_> {
     /// How far a road is from level, with a warning where it is steep.
     pub(super) fn level(&mut self, node: Node, road: &RoadRecord) -> Result<Level, Error> {
         let elevation = self.profile(children(node, "elevationProfile"), "elevation")?;
-        let mut grade = stretches(&elevation, road.length).map(|(record, from, to)| record.steepest(from, to)).fold(0.0, f64::max);
+        let mut grade =
+            stretches(&elevation, road.length).map(|(record, from, to)| record.steepest(from, to)).fold(0.0, f64::max);
         for pair in elevation.windows(2) {
             // Elevations in pieces: heights alone, or one that begins elsewhere than the last one ended.
             let apart = pair[1].start - pair[0].start;
@@ -76,7 +77,10 @@ impl Source<'_, '_> {
         let step = |pair: &[Cubic]| ((pair[1].factors[0] - pair[0].at(pair[1].start)).abs(), pair[1].start);
         let largest = elevation.windows(2).map(step).max_by(|one, other| one.0.total_cmp(&other.0));
         if let Some((step, s)) = largest.filter(|(step, _)| STEP < *step) {
-            self.warn(node, &format!("its elevation jumps by up to {step:.2} m, at s {s:.2} m; the simulated road is level"));
+            self.warn(
+                node,
+                &format!("its elevation jumps by up to {step:.2} m, at s {s:.2} m; the simulated road is level"),
+            );
         }
         if GRADE < grade {
             self.warn(node, &format!("has a grade of {:.1} %; the simulated road is level", 100.0 * grade));
@@ -87,7 +91,9 @@ impl Source<'_, '_> {
     /// The largest rise across a road.
     fn crossfall(&mut self, node: Node, road: &RoadRecord) -> Result<f64, Error> {
         let superelevation = self.profile(children(node, "lateralProfile"), "superelevation")?;
-        let angle = stretches(&superelevation, road.length).map(|(record, from, to)| record.largest(from, to)).fold(0.0, f64::max);
+        let angle = stretches(&superelevation, road.length)
+            .map(|(record, from, to)| record.largest(from, to))
+            .fold(0.0, f64::max);
         let Some(profile) = child(node, "lateralProfile") else { return Ok(0.0) };
         if child(profile, "crossSectionSurface").is_some() {
             self.warn(node, "its crossSectionSurface is not read; the simulated road is level");
@@ -96,7 +102,10 @@ impl Source<'_, '_> {
         let mut shapes: Vec<(f64, Cubic)> = Vec::new();
         for shape in children(profile, "shape") {
             let t = self.number(shape, "t", None, LARGEST)?;
-            shapes.push((self.length(shape, "s")?, Cubic { start: t, factors: self.factors(shape, ["a", "b", "c", "d"])? }));
+            shapes.push((
+                self.length(shape, "s")?,
+                Cubic { start: t, factors: self.factors(shape, ["a", "b", "c", "d"])? },
+            ));
         }
         shapes.sort_by(|(s, one), (t, other)| s.total_cmp(t).then(one.start.total_cmp(&other.start)));
         let mut steepest: f64 = 0.0;
@@ -112,7 +121,11 @@ impl Source<'_, '_> {
     }
 
     /// Cubics of an element's children in the order of their beginnings.
-    fn profile<'a, 'i: 'a>(&mut self, of: impl Iterator<Item = Node<'a, 'i>>, name: &'static str) -> Result<Vec<Cubic>, Error> {
+    fn profile<'a, 'i: 'a>(
+        &mut self,
+        of: impl Iterator<Item = Node<'a, 'i>>,
+        name: &'static str,
+    ) -> Result<Vec<Cubic>, Error> {
         self.cubics(of.flat_map(|profile| children(profile, name)), "s")
     }
 }

@@ -52,7 +52,8 @@ impl Lines<'_> {
         }
         if JUMP < jump {
             let route = self.name(entry, lane, exit);
-            self.warnings.push(format!("{}: {route}: its lanes jump by up to {jump:.2} m; the joints were spread", self.place));
+            self.warnings
+                .push(format!("{}: {route}: its lanes jump by up to {jump:.2} m; the joints were spread", self.place));
         }
         let (from, to) = (line[0], line[line.len() - 1]);
         let middle = line.iter().copied().min_by(|one, other| one.length().total_cmp(&other.length())).unwrap_or(from);
@@ -109,7 +110,8 @@ pub(super) fn shown(lines: &[Line]) -> Vec<Curve> {
     let mut shown: Vec<Curve> = Vec::new();
     for Line { line, .. } in lines {
         let n = (line.length() / STEP) as usize;
-        let known: Vec<bool> = (0..=n).map(|i| shown.iter().any(|other| other.distance(line.point_at(i as f64 * STEP)) < SAME)).collect();
+        let known: Vec<bool> =
+            (0..=n).map(|i| shown.iter().any(|other| other.distance(line.point_at(i as f64 * STEP)) < SAME)).collect();
         let mut from = 0;
         while from <= n {
             let to = (from..=n).find(|&i| known[i] != known[from]).unwrap_or(n + 1);

@@ -21,7 +21,9 @@ fn end_of(road: &RoadRecord, at_start: bool) -> usize {
 /// What the map says follows a lane in its direction of travel, or precedes it.
 pub(super) fn contacts(records: &Records, strip: &Strip, follow: bool) -> Vec<Contact> {
     let road = &records.roads[strip.road];
-    let Some(lane) = road.sections[strip.section].lanes.iter().find(|lane| lane.id == strip.id) else { return Vec::new() };
+    let Some(lane) = road.sections[strip.section].lanes.iter().find(|lane| lane.id == strip.id) else {
+        return Vec::new();
+    };
     let forward = strip.backward != follow;
     let to = if forward { lane.successor } else { lane.predecessor };
     if forward && strip.section + 1 < road.sections.len() {
@@ -30,12 +32,19 @@ pub(super) fn contacts(records: &Records, strip: &Strip, follow: bool) -> Vec<Co
     if !forward && 0 < strip.section {
         return vec![Contact { road: strip.road, section: strip.section - 1, lane: to }];
     }
-    let at = |road: usize, at_start: bool, lane: Option<i32>| Contact { road, section: end_of(&records.roads[road], at_start), lane };
+    let at = |road: usize, at_start: bool, lane: Option<i32>| Contact {
+        road,
+        section: end_of(&records.roads[road], at_start),
+        lane,
+    };
     match if forward { &road.successor } else { &road.predecessor } {
         None => Vec::new(),
-        Some(Link::RoadRecord(id, at_start)) => records.by_id.get(id).map(|&next| at(next, *at_start, to)).into_iter().collect(),
+        Some(Link::RoadRecord(id, at_start)) => {
+            records.by_id.get(id).map(|&next| at(next, *at_start, to)).into_iter().collect()
+        }
         Some(Link::Junction(id)) => {
-            let all = records.junctions.get(id).into_iter().flatten().filter(|connection| connection.incoming == road.id);
+            let all =
+                records.junctions.get(id).into_iter().flatten().filter(|connection| connection.incoming == road.id);
             let mut found = Vec::new();
             for connection in all {
                 let Some(&next) = records.by_id.get(&connection.connecting) else { continue };
@@ -64,7 +73,11 @@ pub(super) fn reason(records: &Records, strip: &Strip, follow: bool) -> String {
     let road = &records.roads[strip.road];
     let lane = records.lane_name(strip);
     let forward = strip.backward != follow;
-    let (verb, inner) = if forward { ("leads on to", strip.section + 1 < road.sections.len()) } else { ("comes from", 0 < strip.section) };
+    let (verb, inner) = if forward {
+        ("leads on to", strip.section + 1 < road.sections.len())
+    } else {
+        ("comes from", 0 < strip.section)
+    };
     if inner {
         return format!("{lane} has no link to a lane of the road's next section");
     }

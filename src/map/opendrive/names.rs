@@ -15,7 +15,8 @@ pub(super) fn named(lanes: &[ArmLanes], options: &Options, mirrored: bool) -> Re
             let bearing = if mirrored { -bearing } else { *bearing };
             let point = (bearing / TAU * 8.0).round().rem_euclid(8.0) as usize % 8;
             let name = ["E", "NE", "N", "NW", "W", "SW", "S", "SE"][point];
-            let same = names.iter().filter(|other| other.trim_end_matches(|c: char| c.is_ascii_digit()) == name).count();
+            let same =
+                names.iter().filter(|other| other.trim_end_matches(|c: char| c.is_ascii_digit()) == name).count();
             names.push(if same == 0 { name.to_owned() } else { format!("{name}{}", same + 1) });
         }
     }
@@ -27,8 +28,14 @@ pub(super) fn named(lanes: &[ArmLanes], options: &Options, mirrored: bool) -> Re
         ));
     }
     for (i, name) in names.iter().enumerate() {
-        if name.is_empty() || 20 < name.len() || !name.chars().all(|c| c.is_ascii_alphanumeric()) || names[..i].contains(name) {
-            return Err("names must differ and be 1 to 20 letters and digits, because they are part of route names".into());
+        if name.is_empty()
+            || 20 < name.len()
+            || !name.chars().all(|c| c.is_ascii_alphanumeric())
+            || names[..i].contains(name)
+        {
+            return Err(
+                "names must differ and be 1 to 20 letters and digits, because they are part of route names".into()
+            );
         }
     }
     Ok(names.into_iter().zip(bearings).map(|(name, bearing)| Arm { name, bearing }).collect())

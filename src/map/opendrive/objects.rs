@@ -28,13 +28,17 @@ pub(super) fn islands(source: &mut Source, node: Node, road: &RoadRecord) -> Res
         let turn = DVec2::from_angle(heading + source.number(object, "hdg", Some(0.0), 1e6)?);
         let of = |key: &str| source.number(object, key, Some(0.0), LARGEST);
         let (length, width, radius) = (of("length")?, of("width")?, of("radius")?);
-        let outlines: Vec<Node> =
-            children(object, "outline").chain(children(object, "outlines").flat_map(|outlines| children(outlines, "outline"))).collect();
+        let outlines: Vec<Node> = children(object, "outline")
+            .chain(children(object, "outlines").flat_map(|outlines| children(outlines, "outline")))
+            .collect();
         let mut corners = Vec::new();
         for corner in outlines.first().into_iter().flat_map(|outline| outline.children()).filter(Node::is_element) {
             match corner.tag_name().name() {
                 "cornerLocal" => {
-                    let local = DVec2::new(source.number(corner, "u", None, LARGEST)?, source.number(corner, "v", None, LARGEST)?);
+                    let local = DVec2::new(
+                        source.number(corner, "u", None, LARGEST)?,
+                        source.number(corner, "v", None, LARGEST)?,
+                    );
                     corners.push(place + turn.rotate(local));
                 }
                 "cornerRoad" => {
@@ -45,7 +49,9 @@ pub(super) fn islands(source: &mut Source, node: Node, road: &RoadRecord) -> Res
             }
         }
         if corners.is_empty() && 0.0 < radius {
-            corners = (0..32).map(|corner| place + radius * DVec2::from_angle(f64::from(corner) * std::f64::consts::TAU / 32.0)).collect();
+            corners = (0..32)
+                .map(|corner| place + radius * DVec2::from_angle(f64::from(corner) * std::f64::consts::TAU / 32.0))
+                .collect();
         } else if corners.is_empty() && 0.0 < length && 0.0 < width {
             let half = DVec2::new(length, width) / 2.0;
             let unit = [DVec2::new(-1.0, -1.0), DVec2::new(1.0, -1.0), DVec2::ONE, DVec2::new(-1.0, 1.0)];

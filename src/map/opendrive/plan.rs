@@ -54,7 +54,12 @@ impl Source<'_, '_> {
         let mut curvature = |form: Node, key: &str| -> Result<f64, Error> {
             let curvature = self.number(form, key, None, LARGEST_CURVATURE)?;
             if MOST_TURN < curvature.abs() * length {
-                return Err(self.invalid(form, key, attribute(form, key), format!("turns more than {MOST_TURN} rad on its length")));
+                return Err(self.invalid(
+                    form,
+                    key,
+                    attribute(form, key),
+                    format!("turns more than {MOST_TURN} rad on its length"),
+                ));
             }
             sharpest = sharpest.max(curvature.abs());
             Ok(curvature)
@@ -75,7 +80,10 @@ impl Source<'_, '_> {
             }
         };
         if SHARPEST < sharpest {
-            self.warn(node, &format!("has a radius of {:.4} m on a length of {length:.4} m; it is read as it is", 1.0 / sharpest));
+            self.warn(
+                node,
+                &format!("has a radius of {:.4} m on a length of {length:.4} m; it is read as it is", 1.0 / sharpest),
+            );
         }
         let origin = DVec2::new(self.number(node, "x", None, FARTHEST)?, self.number(node, "y", None, FARTHEST)?);
         let heading = self.number(node, "hdg", None, 1e6)?;

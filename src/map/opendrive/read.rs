@@ -33,17 +33,23 @@ pub(super) const MOST_WARNINGS: usize = 1000;
 /// The records of a file's text.
 pub(super) fn records(file: &Path, text: &str, hand: Hand) -> Result<Records, Error> {
     // A document type is passed over; one that declares entities could make a large map of a small file.
-    let options = ParsingOptions { nodes_limit: MOST_NODES, allow_dtd: !text.contains("<!ENTITY"), ..ParsingOptions::default() };
+    let options =
+        ParsingOptions { nodes_limit: MOST_NODES, allow_dtd: !text.contains("<!ENTITY"), ..ParsingOptions::default() };
     let malformed = |message: String| Error::Malformed { file: file.to_owned(), message: shortened(&message, 300) };
     let document = Document::parse_with_options(text, options).map_err(|error| {
         malformed(match error {
-            roxmltree::Error::DtdDetected => "declares entities (<!ENTITY ...>), which are not read; put their text in their place".into(),
+            roxmltree::Error::DtdDetected => {
+                "declares entities (<!ENTITY ...>), which are not read; put their text in their place".into()
+            }
             error => format!("is no OpenDRIVE map: {}", error.to_string().escape_debug()),
         })
     })?;
     let root = document.root_element();
     if root.tag_name().name() != "OpenDRIVE" {
-        return Err(malformed(format!("is no OpenDRIVE map: the first element is <{}>, not <OpenDRIVE>", shown(root.tag_name().name()))));
+        return Err(malformed(format!(
+            "is no OpenDRIVE map: the first element is <{}>, not <OpenDRIVE>",
+            shown(root.tag_name().name())
+        )));
     }
     check_size(&document).map_err(malformed)?;
     let mut source = Source { reader: Reader::of(file), document: &document, records: Records::default(), repeated: 0 };
@@ -137,7 +143,9 @@ impl Source<'_, '_> {
     /// A number within `-limit..limit`, or `default` where the attribute is missing.
     pub(super) fn number(&self, node: Node, key: &str, default: Option<f64>, limit: f64) -> Result<f64, Error> {
         let Some(text) = node.attribute(key) else {
-            return default.ok_or_else(|| self.invalid(node, key, "missing", format!("a number within {limit:e} of 0 is needed")));
+            return default.ok_or_else(|| {
+                self.invalid(node, key, "missing", format!("a number within {limit:e} of 0 is needed"))
+            });
         };
         match text.trim().parse::<f64>() {
             Ok(value) if value.abs() <= limit => Ok(value),
@@ -167,7 +175,11 @@ impl Source<'_, '_> {
     }
 
     /// Cubics in the order of their beginnings.
-    pub(super) fn cubics<'a, 'i: 'a>(&mut self, nodes: impl Iterator<Item = Node<'a, 'i>>, start: &str) -> Result<Vec<Cubic>, Error> {
+    pub(super) fn cubics<'a, 'i: 'a>(
+        &mut self,
+        nodes: impl Iterator<Item = Node<'a, 'i>>,
+        start: &str,
+    ) -> Result<Vec<Cubic>, Error> {
         let mut cubics = nodes.map(|node| self.cubic(node, start)).collect::<Result<Vec<_>, _>>()?;
         cubics.sort_by(|one, other| one.start.total_cmp(&other.start));
         Ok(cubics)
@@ -182,7 +194,10 @@ impl Source<'_, '_> {
         let plan = self.plan(plan_node)?;
         let measured = plan.last().map_or(0.0, |last| last.start + last.length).min(LONGEST);
         if 0.01 < (measured - length).abs() {
-            self.warn(node, &format!("has a length of {length:.3} m, but its geometries end at {measured:.3} m; they count"));
+            self.warn(
+                node,
+                &format!("has a length of {length:.3} m, but its geometries end at {measured:.3} m; they count"),
+            );
             length = measured;
         }
         let link = child(node, "link");
@@ -192,7 +207,8 @@ impl Source<'_, '_> {
             Some(lanes) => self.cubics(children(lanes, "laneOffset"), "s")?,
             None => Vec::new(),
         };
-        let sections = self.sections(node, lanes.into_iter().flat_map(|lanes| children(lanes, "laneSection")), length)?;
+        let sections =
+            self.sections(node, lanes.into_iter().flat_map(|lanes| children(lanes, "laneSection")), length)?;
         let junction = Some(attribute(node, "junction")).filter(|id| !id.is_empty() && *id != "-1").map(str::to_owned);
         let mut road = RoadRecord {
             id,
@@ -222,7 +238,8 @@ impl Source<'_, '_> {
                 }
             }
             // A direct junction joins roads without one between them.
-            let direct = connection.attribute("connectingRoad").is_none() && connection.attribute("linkedRoad").is_some();
+            let direct =
+                connection.attribute("connectingRoad").is_none() && connection.attribute("linkedRoad").is_some();
             connections.push(Connection {
                 incoming: attribute(connection, "incomingRoad").to_owned(),
                 connecting: attribute(connection, if direct { "linkedRoad" } else { "connectingRoad" }).to_owned(),
@@ -239,7 +256,10 @@ impl Source<'_, '_> {
         let rules: Vec<bool> = children(root, "road").map(|road| attribute(road, "rule") == "LHT").collect();
         let left = rules.iter().filter(|&&left| left).count();
         if 0 < left && left < rules.len() {
-            let both = format!("{left} of {} roads have left-hand traffic, the others right-hand; most count for all", rules.len());
+            let both = format!(
+                "{left} of {} roads have left-hand traffic, the others right-hand; most count for all",
+                rules.len()
+            );
             self.records.warnings.push(both);
         }
         rules.len() < 2 * left

@@ -83,8 +83,8 @@ impl Kind {
     /// What a lane of this type is for; `None` if the type is not known.
     pub(super) fn named(name: &str) -> Option<Kind> {
         Some(match name {
-            "driving" | "bidirectional" | "entry" | "exit" | "onRamp" | "offRamp" | "connectingRamp" | "slipLane" | "bus" | "taxi"
-            | "HOV" | "mwyEntry" | "mwyExit" => Kind::Lane,
+            "driving" | "bidirectional" | "entry" | "exit" | "onRamp" | "offRamp" | "connectingRamp" | "slipLane"
+            | "bus" | "taxi" | "HOV" | "mwyEntry" | "mwyExit" => Kind::Lane,
             "shoulder" | "stop" | "parking" | "biking" => Kind::Flat,
             "curb" => Kind::Kerb,
             "sidewalk" | "walking" | "median" | "border" | "restricted" => Kind::Solid,

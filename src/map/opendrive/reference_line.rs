@@ -145,7 +145,11 @@ mod tests {
         assert!(large.end().distance(100.0 * fresnel) < 1e-9);
         // C(5) and S(5): thirteen turns.
         let long = Geometry { length: 5.0, shape: Shape::Spiral(0.0, 5.0 * PI), ..spiral };
-        assert!(long.end().distance(DVec2::new(0.563_631_188_704_012_3, 0.499_191_381_917_116_9)) < 1e-9, "{}", long.end());
+        assert!(
+            long.end().distance(DVec2::new(0.563_631_188_704_012_3, 0.499_191_381_917_116_9)) < 1e-9,
+            "{}",
+            long.end()
+        );
     }
 
     #[test]

@@ -87,7 +87,8 @@ pub(super) fn rings(strips: &[Strip], graph: &Graph) -> (Vec<Ring>, Vec<Refused>
     let drivable = of(strips.iter(), Kind::Lane).plus(&of(strips.iter(), Kind::Flat));
     let paved = drivable.closed(GAP).minus(&of(strips.iter(), Kind::Kerb));
     let holes: Vec<Area> = paved.holes().collect();
-    let around: Vec<(DVec2, DVec2)> = holes.iter().map(Area::bounds).map(|(low, high)| (low - NEAR, high + NEAR)).collect();
+    let around: Vec<(DVec2, DVec2)> =
+        holes.iter().map(Area::bounds).map(|(low, high)| (low - NEAR, high + NEAR)).collect();
     let traffic = traffic(strips, graph, &around);
     let (mut rings, mut refused) = (Vec::new(), Vec::new());
     for hole in &holes {
@@ -128,7 +129,8 @@ fn traffic(strips: &[Strip], graph: &Graph, around: &[(DVec2, DVec2)]) -> Cells<
     let mut cells = Cells::new(CELL);
     for (index, strip) in strips.iter().enumerate() {
         let (low, high) = strip.bounds();
-        if !strip.is_driven() || (graph.next[index].is_empty() && graph.previous[index].is_empty()) || !near(low, high) {
+        if !strip.is_driven() || (graph.next[index].is_empty() && graph.previous[index].is_empty()) || !near(low, high)
+        {
             continue;
         }
         for pair in strip.path().windows(2).filter(|pair| near(pair[0].min(pair[1]), pair[0].max(pair[1]))) {
@@ -162,7 +164,8 @@ fn circulating(traffic: &Cells<(DVec2, DVec2)>, hole: &Area, outline: &[DVec2], 
             nearest[bin] = Some((distance, turning));
         }
     }
-    let part = |way: f64| nearest.iter().flatten().filter(|(_, turning)| 0.0 < way * turning).count() as f64 / BINS as f64;
+    let part =
+        |way: f64| nearest.iter().flatten().filter(|(_, turning)| 0.0 < way * turning).count() as f64 / BINS as f64;
     (part(1.0), part(-1.0))
 }
 
@@ -173,7 +176,8 @@ mod tests {
     #[test]
     fn a_circle_is_found_from_part_of_its_points() {
         let at = |angle: f64| DVec2::new(3.0, -4.0) + 7.0 * DVec2::from_angle(angle);
-        let (centre, radius, residual) = fitted_circle(&(0..20).map(|i| at(f64::from(i) * 0.2)).collect::<Vec<_>>()).unwrap();
+        let (centre, radius, residual) =
+            fitted_circle(&(0..20).map(|i| at(f64::from(i) * 0.2)).collect::<Vec<_>>()).unwrap();
         assert!(centre.distance(DVec2::new(3.0, -4.0)) < 1e-9 && (radius - 7.0).abs() < 1e-9 && residual < 1e-9);
         assert_eq!(fitted_circle(&[DVec2::ZERO, DVec2::X, 2.0 * DVec2::X]), None);
     }

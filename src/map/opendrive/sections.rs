@@ -43,7 +43,10 @@ impl Source<'_, '_> {
         for (i, section) in sections.iter().enumerate() {
             let end = sections.get(i + 1).map_or(length, |next| next.start);
             if end - section.start < SHORTEST {
-                self.warn(road, &format!("its lane section at s {} m has no length; lanes are joined across it", section.start));
+                self.warn(
+                    road,
+                    &format!("its lane section at s {} m has no length; lanes are joined across it", section.start),
+                );
             }
         }
         Ok(sections)
@@ -71,7 +74,9 @@ impl Source<'_, '_> {
 
     fn lane(&mut self, node: Node) -> Result<Lane, Error> {
         let id = attribute(node, "id").parse::<i32>().ok().filter(|id| (-1000..=1000).contains(id) && *id != 0);
-        let id = id.ok_or_else(|| self.invalid(node, "id", &format!("{:?}", attribute(node, "id")), "must be a number in -1000..1000"))?;
+        let id = id.ok_or_else(|| {
+            self.invalid(node, "id", &format!("{:?}", attribute(node, "id")), "must be a number in -1000..1000")
+        })?;
         let widths = self.cubics(children(node, "width"), "sOffset")?;
         let borders = self.cubics(children(node, "border"), "sOffset")?;
         let mut heights = Vec::new();
@@ -90,7 +95,9 @@ impl Source<'_, '_> {
             return Err(self.invalid(node, "width", &value, format!("must be at most {WIDEST} m")));
         }
         let link = child(node, "link");
-        let end = |name: &'static str| link.and_then(|link| child(link, name)).and_then(|end| attribute(end, "id").parse::<i32>().ok());
+        let end = |name: &'static str| {
+            link.and_then(|link| child(link, name)).and_then(|end| attribute(end, "id").parse::<i32>().ok())
+        };
         let reversed = match attribute(node, "direction") {
             "reversed" => true,
             "" | "standard" | "both" => false,
@@ -104,7 +111,16 @@ impl Source<'_, '_> {
             *self.records.unknown_types.entry(name.to_owned()).or_default() += 1;
             Kind::Nothing
         });
-        Ok(Lane { id, kind, reversed, widths, bordered, heights, predecessor: end("predecessor"), successor: end("successor") })
+        Ok(Lane {
+            id,
+            kind,
+            reversed,
+            widths,
+            bordered,
+            heights,
+            predecessor: end("predecessor"),
+            successor: end("successor"),
+        })
     }
 
     /// Sections with both sides: where one describes a single side, the other side's lanes of the section before go on.
@@ -127,12 +143,14 @@ impl Source<'_, '_> {
             for lane in before.lanes.iter_mut().filter(|lane| !described(lane)) {
                 // Records count from their section's beginning.
                 let widths = lane.widths.iter().map(|width| Cubic { start: width.start - later, ..*width }).collect();
-                let heights = lane.heights.iter().map(|height| Height { start: height.start - later, ..*height }).collect();
+                let heights =
+                    lane.heights.iter().map(|height| Height { start: height.start - later, ..*height }).collect();
                 self.repeated += 1 + lane.widths.len() + lane.heights.len();
                 lanes.push(Lane { widths, heights, predecessor: Some(lane.id), ..lane.clone() });
                 lane.successor = Some(lane.id);
                 if MOST_REPEATED < self.repeated {
-                    let expected = "must be fewer: with the lanes of the other side they are more than a million records";
+                    let expected =
+                        "must be fewer: with the lanes of the other side they are more than a million records";
                     return Err(self.invalid(road, "laneSection", "singleSide", expected));
                 }
             }

@@ -67,7 +67,10 @@ fn paved_voids(paved: &Area, solid: &Area, inscribed: f64) -> Area {
     let all = paved.plus(solid);
     let slivers = all.closed(SLIVER).minus(&all);
     let edge = Edge::new(paved);
-    let small = all.holes().flat_map(|hole| hole.simplified(SIMPLE).grown(-inscribed).parts.is_empty().then_some(hole.parts)).flatten();
+    let small = all
+        .holes()
+        .flat_map(|hole| hole.simplified(SIMPLE).grown(-inscribed).parts.is_empty().then_some(hole.parts))
+        .flatten();
     let small = small.filter(|void| BESIDE < edge.contact(void));
     Area { parts: slivers.parts.into_iter().filter(|void| edge.touches(void)).chain(small).collect() }
 }

@@ -41,7 +41,9 @@ pub(super) fn surface(map: &Map, centre: DVec2, extent: f64) -> Surface {
 /// The parts of a surface within `extent` of the origin, clipped to that circle.
 pub(super) fn clipped(surface: &Area, extent: f64) -> Vec<Part> {
     let corners = (TAU / (2.0 * (1.0 - FINE / extent).acos())).ceil() as usize;
-    let disc = Area::union(std::iter::once((0..corners).map(|i| extent * DVec2::from_angle(i as f64 * TAU / corners as f64)).collect()));
+    let disc = Area::union(std::iter::once(
+        (0..corners).map(|i| extent * DVec2::from_angle(i as f64 * TAU / corners as f64)).collect(),
+    ));
     surface.common(&disc).parts
 }
 

@@ -29,7 +29,11 @@ impl Records {
 
     /// The types of lanes that are not known, each with its number of lanes; `None` if all are.
     pub(super) fn unknown_lanes(&self) -> Option<String> {
-        let named = self.unknown_types.iter().take(MOST_TYPES).map(|(name, lanes)| format!("\"{}\" ({lanes} lanes)", shown(name)));
+        let named = self
+            .unknown_types
+            .iter()
+            .take(MOST_TYPES)
+            .map(|(name, lanes)| format!("\"{}\" ({lanes} lanes)", shown(name)));
         let list = named.collect::<Vec<_>>().join(", ");
         let more = if MOST_TYPES < self.unknown_types.len() { ", and more" } else { "" };
         (!self.unknown_types.is_empty()).then(|| format!("lane types that are not known: {list}{more}"))
@@ -38,7 +42,8 @@ impl Records {
     /// An error if a road begins too far from the others.
     fn check_extent(&self, reader: &Reader) -> Result<(), Error> {
         let middle = |axis: fn(glam::DVec2) -> f64| {
-            let mut all: Vec<f64> = self.roads.iter().filter_map(|road| road.plan.first()).map(|piece| axis(piece.origin)).collect();
+            let mut all: Vec<f64> =
+                self.roads.iter().filter_map(|road| road.plan.first()).map(|piece| axis(piece.origin)).collect();
             all.sort_by(f64::total_cmp);
             all.get(all.len() / 2).copied().unwrap_or(0.0)
         };
@@ -68,7 +73,11 @@ impl Records {
             }
         }
         let warnings = missing.into_iter().take(MOST_WARNINGS).map(|(road, what, id)| {
-            format!("road {}: is linked to {what} {}, which the file does not have; it is a dead end", shown(road), shown(id))
+            format!(
+                "road {}: is linked to {what} {}, which the file does not have; it is a dead end",
+                shown(road),
+                shown(id)
+            )
         });
         self.warnings.extend(warnings.collect::<Vec<_>>());
     }
@@ -76,11 +85,15 @@ impl Records {
     /// Warns of the largest crossfall.
     fn warn_of_tilt(&mut self) {
         let tilted = self.roads.iter().filter(|road| TILTED < road.level.crossfall);
-        let Some(most) = tilted.clone().max_by(|one, other| one.level.crossfall.total_cmp(&other.level.crossfall)) else { return };
+        let Some(most) = tilted.clone().max_by(|one, other| one.level.crossfall.total_cmp(&other.level.crossfall))
+        else {
+            return;
+        };
         let (percent, roads, all) = (100.0 * most.level.crossfall, tilted.count(), self.roads.len());
         let largest = format!("up to {percent:.1} % on road {}", shown(&most.id));
-        self.warnings
-            .push(format!("{roads} of {all} roads have a crossfall (superelevation, shape), {largest}; the simulated road is level"));
+        self.warnings.push(format!(
+            "{roads} of {all} roads have a crossfall (superelevation, shape), {largest}; the simulated road is level"
+        ));
     }
 
     /// A direct junction joins two roads without a road of its own: what it says of one of them holds for the other too.

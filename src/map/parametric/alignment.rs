@@ -106,7 +106,11 @@ impl Alignment {
 
     /// The first bend is the arm's end, which is not a point of the file: point 0 is bend 1.
     fn fault(&self, misfit: Misfit) -> Fault {
-        if misfit.bend == 0 || self.bends.len() <= misfit.bend + 1 { Fault::Ring } else { Fault::Point(misfit.bend - 1, misfit.largest) }
+        if misfit.bend == 0 || self.bends.len() <= misfit.bend + 1 {
+            Fault::Ring
+        } else {
+            Fault::Point(misfit.bend - 1, misfit.largest)
+        }
     }
 }
 

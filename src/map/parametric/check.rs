@@ -22,11 +22,23 @@ const LANES_APART: f64 = 2.5;
 pub(super) fn too_large(reader: &Reader, key: &str, radius: f64, largest: f64) -> Error {
     // Rounded down to centimetres, so that the radius in the message does fit.
     let largest = (largest * 100.0).floor() / 100.0;
-    reader.invalid(key, format_args!("{} m", shown(radius)), format!("does not fit between its neighbours: at most {} m", shown(largest)))
+    reader.invalid(
+        key,
+        format_args!("{} m", shown(radius)),
+        format!("does not fit between its neighbours: at most {} m", shown(largest)),
+    )
 }
 
 /// An alignment that gives no curve. `corner` is the key of the arc between this arm and the next, if there is one.
-pub(super) fn fault(reader: &Reader, arms: &[Arm], arm: usize, corner: Option<&str>, part: &str, way: Way, fault: Fault) -> Error {
+pub(super) fn fault(
+    reader: &Reader,
+    arms: &[Arm],
+    arm: usize,
+    corner: Option<&str>,
+    part: &str,
+    way: Way,
+    fault: Fault,
+) -> Error {
     let next = (arm + 1) % arms.len();
     let alignment = |arm: usize, way: Way| {
         let carriageway = arms[arm].way(way);
@@ -78,7 +90,10 @@ pub(super) fn no_room(reader: &Reader, arms: &[Arm], arm: usize, length: f64) ->
     reader.invalid(
         format!("arm[{arm}].entry.kerb"),
         format_args!("{} m of ring left before {}", differing(length, 0.0), next.name),
-        format!("arms {} and {} overlap: move them apart, or join their kerbs with corner.kerb_radius", arms[arm].name, next.name),
+        format!(
+            "arms {} and {} overlap: move them apart, or join their kerbs with corner.kerb_radius",
+            arms[arm].name, next.name
+        ),
     )
 }
 
@@ -95,8 +110,10 @@ pub(super) fn backwards(reader: &Reader, arms: &[Arm], entry: usize, lane: Lane,
 /// A kerb between two arms that turns too sharply for a lane beside it.
 pub(super) fn no_way_beside(reader: &Reader, arms: &[Arm], arm: usize) -> Error {
     let next = &arms[(arm + 1) % arms.len()];
-    let expected =
-        format!("the kerb from {} to {} turns too sharply for a lane beside it: give the lane's radius", arms[arm].name, next.name);
+    let expected = format!(
+        "the kerb from {} to {} turns too sharply for a lane beside it: give the lane's radius",
+        arms[arm].name, next.name
+    );
     reader.invalid(format!("arm[{arm}].corner.lane_radius"), "missing", expected)
 }
 
@@ -142,7 +159,9 @@ pub(super) fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) ->
             ));
         }
         let meets = |corner: &Curve| corner.pieces.iter().filter(|piece| !piece.meetings(&end).is_empty()).count();
-        if let Some(other) = (0..n).find(|&corner| usize::from(corner == index || (corner + 1) % n == index) < meets(&corners[corner])) {
+        if let Some(other) =
+            (0..n).find(|&corner| usize::from(corner == index || (corner + 1) % n == index) < meets(&corners[corner]))
+        {
             let message = format!("arms {} and {} overlap: shorten one or move them apart", arm.name, arms[other].name);
             return Err(reader.invalid(format!("arm[{index}].length"), format_args!("{} m", arm.length), message));
         }
@@ -159,7 +178,9 @@ fn cross(curve: &Curve, other: Option<&Curve>) -> bool {
             Some(other) => other.pieces.iter().any(|there| !piece.meetings(there).is_empty()),
             None => {
                 let after = curve.pieces.iter().enumerate().skip(index + 1);
-                after.into_iter().any(|(next, there)| piece.meetings(there).into_iter().any(|p| index + 1 != next || !joint(index, p)))
+                after.into_iter().any(|(next, there)| {
+                    piece.meetings(there).into_iter().any(|p| index + 1 != next || !joint(index, p))
+                })
             }
         }
     })
@@ -177,7 +198,9 @@ pub(super) fn splitter(reader: &Reader, ring: &Ring, arm: usize, island: &Curve,
         let value = format!("{} m from the ring's centre", differing(nearest, edge));
         return refused(value, &format!("must stay out of the ring: {} m", shown(edge)));
     }
-    if loops.iter().any(|other| cross(island, Some(other))) || !Outline::new(loops.to_vec()).contains(island.point_at(0.0)) {
+    if loops.iter().any(|other| cross(island, Some(other)))
+        || !Outline::new(loops.to_vec()).contains(island.point_at(0.0))
+    {
         return refused("meets a kerb".into(), "must lie on the road, away from the kerbs and other islands");
     }
     Ok(())
@@ -210,9 +233,11 @@ pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lan
     for (index, arm) in arms.iter().enumerate() {
         let named = |way: Way| move |(lane, curve)| Beside { way, lane, curve };
         let entries = lanes.of(index, Way::Entry).map(named(Way::Entry));
-        let mut from_left: Vec<Beside> = entries.chain(lanes.of(index, Way::Exit).rev().map(named(Way::Exit))).collect();
+        let mut from_left: Vec<Beside> =
+            entries.chain(lanes.of(index, Way::Exit).rev().map(named(Way::Exit))).collect();
         let left = DVec2::from_angle(arm.bearing).perp();
-        let offset = |lane: &Beside| lane.curve.point_at(if lane.way == Way::Entry { 0.0 } else { f64::INFINITY }).dot(left);
+        let offset =
+            |lane: &Beside| lane.curve.point_at(if lane.way == Way::Entry { 0.0 } else { f64::INFINITY }).dot(left);
         for pair in from_left.windows(2) {
             if offset(&pair[0]) - offset(&pair[1]) < LANES_APART {
                 return Err(reader.invalid(
@@ -236,7 +261,12 @@ pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lan
                 if let Some(p) = nearer(one.curve, 0.0, f64::INFINITY, LANES_APART, distance) {
                     return Err(reader.invalid(
                         format!("arm[{index}].{one}"),
-                        format_args!("{} m from {other} at ({:.1}, {:.1})", differing(distance(p), LANES_APART), p.x, p.y),
+                        format_args!(
+                            "{} m from {other} at ({:.1}, {:.1})",
+                            differing(distance(p), LANES_APART),
+                            p.x,
+                            p.y
+                        ),
                         format!("the centre lines of an arm's lanes must keep {LANES_APART} m from each other"),
                     ));
                 }

@@ -69,10 +69,13 @@ mod tests {
 
     /// A ring of one lane and 17 m with four arms of this length (m).
     fn one_lane(length: u32) -> Road {
-        let carriageway =
-            |way: &str, offset: f64| format!("[arm.{way}.kerb]\npoints = [{{ along = 30.0, offset = {offset:?} }}]\nring_radius = 15.0\n");
+        let carriageway = |way: &str, offset: f64| {
+            format!("[arm.{way}.kerb]\npoints = [{{ along = 30.0, offset = {offset:?} }}]\nring_radius = 15.0\n")
+        };
         let arm = |(name, bearing): (&str, f64)| {
-            let head = format!("[[arm]]\nname = \"{name}\"\nbearing_deg = {bearing:?}\nlength = {length}.0\nlane_width = 4.0\n");
+            let head = format!(
+                "[[arm]]\nname = \"{name}\"\nbearing_deg = {bearing:?}\nlength = {length}.0\nlane_width = 4.0\n"
+            );
             head + &carriageway("entry", 5.0) + &carriageway("exit", -5.0)
         };
         let arms: String = [("E", 0.0), ("N", 90.0), ("W", 180.0), ("S", 270.0)].map(arm).concat();
@@ -113,7 +116,10 @@ mod tests {
                     let inside = line.length() - 40.0;
                     for s in [0.25 * inside, 0.5 * inside, inside] {
                         let p = line.point_at(s);
-                        assert!((open.signed_distance(p) - kerbs.signed_distance(p)).abs() < 1e-9, "{name} {gutter:?} {s}");
+                        assert!(
+                            (open.signed_distance(p) - kerbs.signed_distance(p)).abs() < 1e-9,
+                            "{name} {gutter:?} {s}"
+                        );
                     }
                     seen += 1;
                 }

@@ -85,7 +85,9 @@ impl Written {
     /// Its gutters, if they differ.
     pub(super) fn gutters(&self, reader: &Reader) -> Result<Option<Gutters>, Error> {
         let directions = |key: &str, written: &Option<Vec<WrittenDirection>>| {
-            let points = written.as_ref().map(|points| points.iter().map(|point| (point.bearing_deg, point.width)).collect::<Vec<_>>());
+            let points = written
+                .as_ref()
+                .map(|points| points.iter().map(|point| (point.bearing_deg, point.width)).collect::<Vec<_>>());
             points.map(|points| profile(reader, key, "bearing_deg", -360.0..=360.0, points)).transpose()
         };
         let island = directions("ring.island_gutter", &self.ring.island_gutter)?;
@@ -93,12 +95,19 @@ impl Written {
         let (mut kerbs, mut splitters, mut differ) = (Vec::new(), Vec::new(), island.is_some() || mouths.is_some());
         for (index, arm) in self.arm.iter().enumerate() {
             let key = format!("arm[{index}].kerb_gutter");
-            let points = arm.kerb_gutter.as_ref().map(|points| points.iter().map(|point| (point.station, point.width)).collect());
+            let points = arm
+                .kerb_gutter
+                .as_ref()
+                .map(|points| points.iter().map(|point| (point.station, point.width)).collect());
             kerbs.push(points.map(|points| profile(reader, &key, "station", 0.0..=5000.0, points)).transpose()?);
             let key = format!("arm[{index}].splitter_gutter");
             let written = arm.splitter_gutter.map(|width| reader.within(&key, width, 0.0..=3.0, "m")).transpose()?;
             if written.is_some() && arm.splitter.is_empty() {
-                return Err(reader.invalid(key, "given", "this arm has no splitter island: give it one or leave this out"));
+                return Err(reader.invalid(
+                    key,
+                    "given",
+                    "this arm has no splitter island: give it one or leave this out",
+                ));
             }
             differ |= written.is_some();
             if !arm.splitter.is_empty() {
@@ -125,12 +134,17 @@ fn profile(
     for (index, &(x, width)) in written.iter().enumerate() {
         let x = reader.within(&format!("{key}[{index}].{name}"), x, range.clone(), unit)?;
         let width = reader.within(&format!("{key}[{index}].width"), width, 0.0..=3.0, "m")?;
-        let (least, most) = (points.last().map(|last| last.0), if around { written[0].0 + 360.0 } else { f64::INFINITY });
+        let (least, most) =
+            (points.last().map(|last| last.0), if around { written[0].0 + 360.0 } else { f64::INFINITY });
         if least.is_some_and(|least| x <= least) || most <= x {
             let value = format_args!("{} {unit}", shown(x)).to_string();
             let expected = match (least, around) {
-                (Some(least), true) => format!("must be more than {} deg and less than a turn after the first", shown(least)),
-                (least, _) => format!("must be more than {} m, because points follow the kerb", shown(least.unwrap_or(0.0))),
+                (Some(least), true) => {
+                    format!("must be more than {} deg and less than a turn after the first", shown(least))
+                }
+                (least, _) => {
+                    format!("must be more than {} m, because points follow the kerb", shown(least.unwrap_or(0.0)))
+                }
             };
             return Err(reader.invalid(format!("{key}[{index}].{name}"), value, expected));
         }
@@ -145,7 +159,13 @@ fn profile(
 impl Gutters {
     /// The edges of the lanes between `faces`, whose first loop consists of the kerbs from each arm to the next, and
     /// the arms' ends; then come the island and the splitter islands.
-    pub(super) fn edges(&self, reader: &Reader, ring: &Ring, faces: &Outline, corners: &[Curve]) -> Result<Outline, Error> {
+    pub(super) fn edges(
+        &self,
+        reader: &Reader,
+        ring: &Ring,
+        faces: &Outline,
+        corners: &[Curve],
+    ) -> Result<Outline, Error> {
         let mut solid = Vec::new();
         for (index, corner) in corners.iter().enumerate() {
             let width = |s: f64, _| self.kerbs[index].as_ref().map_or(self.ring, |profile| profile.at(s));
@@ -155,7 +175,12 @@ impl Gutters {
             strip(&Curve { pieces: vec![end] }, false, |_, _| self.ring, &mut solid);
         }
         let at = |profile: &Profile, p: DVec2| profile.at(p.to_angle());
-        strip(&faces.loops[1], true, |_, p| self.island.as_ref().map_or(self.ring, |profile| at(profile, p)), &mut solid);
+        strip(
+            &faces.loops[1],
+            true,
+            |_, p| self.island.as_ref().map_or(self.ring, |profile| at(profile, p)),
+            &mut solid,
+        );
         for (&width, splitter) in self.splitters.iter().zip(faces.loops.iter().skip(2)) {
             strip(splitter, true, |_, _| width, &mut solid);
         }
@@ -166,7 +191,11 @@ impl Gutters {
         // The outer boundary and the island, apart from each other.
         if edges.loops.len() < 2 {
             let value = format_args!("{} m and others", shown(self.ring)).to_string();
-            return Err(reader.invalid("ring.gutter", value, "leave no way around the island: make the gutters narrower"));
+            return Err(reader.invalid(
+                "ring.gutter",
+                value,
+                "leave no way around the island: make the gutters narrower",
+            ));
         }
         Ok(edges)
     }
@@ -175,7 +204,8 @@ impl Gutters {
 /// Adds the triangles that cover the strip of varying width on the left of a curve.
 fn strip(curve: &Curve, closed: bool, width: impl Fn(f64, DVec2) -> f64, triangles: &mut Vec<Vec<DVec2>>) {
     let mut begin = 0.0;
-    let mut before: Option<f64> = if closed { curve.pieces.last().map(|last| last.heading_at(last.length())) } else { None };
+    let mut before: Option<f64> =
+        if closed { curve.pieces.last().map(|last| last.heading_at(last.length())) } else { None };
     for piece in &curve.pieces {
         let length = piece.length();
         let step = match piece {
@@ -194,8 +224,10 @@ fn strip(curve: &Curve, closed: bool, width: impl Fn(f64, DVec2) -> f64, triangl
             pie(first, at_first, before, wrapped(piece.heading_at(0.0) - before), triangles);
         }
         let at = |i: f64| width(begin + length * i / steps as f64, piece.point_at(length * i / steps as f64));
-        let stations: Vec<f64> =
-            (0..steps).flat_map(|i| linear(&at, i as f64, (i + 1) as f64, NEAREST / step)).chain([steps as f64]).collect();
+        let stations: Vec<f64> = (0..steps)
+            .flat_map(|i| linear(&at, i as f64, (i + 1) as f64, NEAREST / step))
+            .chain([steps as f64])
+            .collect();
         for ends in stations.windows(2) {
             let ((a, a_left, from), (b, b_left, to)) = (across(ends[0]), across(ends[1]));
             if 0.0 < from.max(to) {
@@ -211,7 +243,9 @@ fn strip(curve: &Curve, closed: bool, width: impl Fn(f64, DVec2) -> f64, triangl
 /// `least`.
 fn linear(width: &impl Fn(f64) -> f64, from: f64, to: f64, least: f64) -> Vec<f64> {
     let (first, last) = (width(from), width(to));
-    let bent = |i: i32| 1e-3 < (width(from + (to - from) * f64::from(i) / 16.0) - (first + (last - first) * f64::from(i) / 16.0)).abs();
+    let bent = |i: i32| {
+        1e-3 < (width(from + (to - from) * f64::from(i) / 16.0) - (first + (last - first) * f64::from(i) / 16.0)).abs()
+    };
     if to - from <= least || !(1..16).any(bent) {
         return vec![from];
     }
@@ -232,7 +266,8 @@ fn pie(corner: DVec2, radius: f64, heading: f64, turn: f64, triangles: &mut Vec<
 /// What is left between the faces without the triangles.
 fn left(faces: &Outline, triangles: Vec<Vec<DVec2>>) -> Outline {
     let polygon = |curve: &Curve| counter_clockwise(curve.polyline(FINE));
-    let road = Area::union(faces.loops.iter().take(1).map(polygon)).minus(&Area::union(faces.loops.iter().skip(1).map(polygon)));
+    let road = Area::union(faces.loops.iter().take(1).map(polygon))
+        .minus(&Area::union(faces.loops.iter().skip(1).map(polygon)));
     let lanes = road.minus(&Area::union(triangles.into_iter().map(counter_clockwise)));
     let lanes = lanes.without_slits(SLIT, 0.0);
     let size = |part: &[Vec<[f64; 2]>]| part.iter().map(|contour| signed_area(contour)).sum::<f64>();

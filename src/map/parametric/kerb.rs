@@ -15,7 +15,8 @@ use crate::map::ground::Kerb;
 
 /// The kerbs in the order of the loops that [`kerbs`] makes.
 pub(super) fn order(arms: &[Arm]) -> impl Iterator<Item = Kerb> {
-    let splitters = arms.iter().enumerate().filter(|(_, arm)| !arm.splitter.is_empty()).map(|(index, _)| Kerb::Splitter(index));
+    let splitters =
+        arms.iter().enumerate().filter(|(_, arm)| !arm.splitter.is_empty()).map(|(index, _)| Kerb::Splitter(index));
     [Kerb::Outer, Kerb::Island].into_iter().chain(splitters)
 }
 
@@ -57,8 +58,10 @@ pub(super) fn corner(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -
         return around((entry, arm.bearing), (exit, next.bearing), radius).map_err(fault);
     }
     let circle = ring.outer();
-    let (inward, arrival) = entry.lead(circle).map_err(|fault| check::fault(reader, arms, index, None, "kerb", Way::Entry, fault))?;
-    let (outward, leaving) = exit.lead(circle).map_err(|fault| check::fault(reader, arms, next_index, None, "kerb", Way::Exit, fault))?;
+    let (inward, arrival) =
+        entry.lead(circle).map_err(|fault| check::fault(reader, arms, index, None, "kerb", Way::Entry, fault))?;
+    let (outward, leaving) =
+        exit.lead(circle).map_err(|fault| check::fault(reader, arms, next_index, None, "kerb", Way::Exit, fault))?;
     let between = (next.bearing - arm.bearing).rem_euclid(TAU);
     let sweep = between - leaving - arrival;
     if !(0.0..=TAU).contains(&sweep) {

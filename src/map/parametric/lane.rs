@@ -57,7 +57,9 @@ pub(super) fn exits(n_arms: usize, entry_lanes: usize) -> Vec<(Lane, u32)> {
     let of = |lane: Lane, exits: RangeInclusive<u32>| exits.map(move |exit| (lane, exit));
     match entry_lanes {
         1 => of(Lane::Right, 1..=n_arms).collect(),
-        _ => of(Lane::Left, n_arms.saturating_sub(2).max(1)..=n_arms).chain(of(Lane::Right, 1..=n_arms.min(2))).collect(),
+        _ => {
+            of(Lane::Left, n_arms.saturating_sub(2).max(1)..=n_arms).chain(of(Lane::Right, 1..=n_arms.min(2))).collect()
+        }
     }
 }
 
@@ -95,7 +97,12 @@ impl Lanes {
         };
         let leads = |way: Way| -> Result<Vec<Vec<Lead>>, Error> {
             let of = |index: usize| {
-                Lane::BOTH.into_iter().rev().take(arms[index].way(way).lanes.len()).map(|lane| lead(index, way, lane)).collect()
+                Lane::BOTH
+                    .into_iter()
+                    .rev()
+                    .take(arms[index].way(way).lanes.len())
+                    .map(|lane| lead(index, way, lane))
+                    .collect()
             };
             (0..arms.len()).map(of).collect()
         };
@@ -140,7 +147,11 @@ impl Lanes {
     }
 
     /// The lanes of a carriageway in the direction of travel, from the kerb.
-    pub(super) fn of(&self, arm: usize, way: Way) -> impl DoubleEndedIterator<Item = (Lane, &Curve)> + ExactSizeIterator {
+    pub(super) fn of(
+        &self,
+        arm: usize,
+        way: Way,
+    ) -> impl DoubleEndedIterator<Item = (Lane, &Curve)> + ExactSizeIterator {
         let leads = if way == Way::Entry { &self.entries } else { &self.exits };
         Lane::BOTH.into_iter().rev().zip(leads[arm].iter().map(|lead| &lead.curve))
     }
@@ -167,7 +178,9 @@ fn first_exit(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -> Resul
     let (arm, next) = (&arms[index], &arms[(index + 1) % arms.len()]);
     if let Some(radius) = arm.lane_corner {
         let (entry, exit) = (arm.entry.lane(Lane::Right), next.exit.lane(Lane::Right));
-        let fault = |fault| check::fault(reader, arms, index, Some("corner.lane_radius"), Lane::Right.name(), Way::Entry, fault);
+        let fault = |fault| {
+            check::fault(reader, arms, index, Some("corner.lane_radius"), Lane::Right.name(), Way::Entry, fault)
+        };
         return around((entry, arm.bearing), (exit, next.bearing), radius).map(Some).map_err(fault);
     }
     if arm.kerb_corner.is_none() || arm.lane_on_ring {
@@ -177,9 +190,12 @@ fn first_exit(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -> Resul
         return Err(check::widths_differ(reader, arms, index));
     }
     let kerb = corner(reader, ring, arms, index)?;
-    let smooth =
-        kerb.pieces.windows(2).all(|joint| wrapped(joint[1].heading_at(0.0) - joint[0].heading_at(joint[0].length())).abs() < 1e-6);
-    let pieces: Option<Vec<Piece>> = kerb.pieces.iter().map(|piece| piece.beside(ring.gutter + arm.lane_width / 2.0)).collect();
+    let smooth = kerb
+        .pieces
+        .windows(2)
+        .all(|joint| wrapped(joint[1].heading_at(0.0) - joint[0].heading_at(joint[0].length())).abs() < 1e-6);
+    let pieces: Option<Vec<Piece>> =
+        kerb.pieces.iter().map(|piece| piece.beside(ring.gutter + arm.lane_width / 2.0)).collect();
     match pieces.filter(|_| smooth) {
         Some(pieces) => Ok(Some(Curve { pieces })),
         None => Err(check::no_way_beside(reader, arms, index)),

@@ -148,8 +148,12 @@ impl Written {
             lanes: reader.count("ring.lanes", self.ring.lanes.unwrap_or(2), 1..=3)?,
         };
         reader.count("arm", self.arm.len(), 2..=8)?;
-        let arms: Vec<Arm> =
-            self.arm.into_iter().enumerate().map(|(index, arm)| arm.checked(reader, index, &ring)).collect::<Result<_, _>>()?;
+        let arms: Vec<Arm> = self
+            .arm
+            .into_iter()
+            .enumerate()
+            .map(|(index, arm)| arm.checked(reader, index, &ring))
+            .collect::<Result<_, _>>()?;
         let mut around = 0.0;
         for (index, arm) in arms.iter().enumerate() {
             let key = |name: &str| format!("arm[{index}].{name}");
@@ -165,7 +169,10 @@ impl Written {
                 return Err(reader.invalid(
                     format!("arm[{index}].bearing_deg"),
                     format_args!("{bearing:.1} deg"),
-                    format!("arms must follow each other counter-clockwise, and {} comes before {}", arm.name, next.name),
+                    format!(
+                        "arms must follow each other counter-clockwise, and {} comes before {}",
+                        arm.name, next.name
+                    ),
                 ));
             }
         }
@@ -185,13 +192,17 @@ impl WrittenArm {
         }
         let bearing = reader.within(&key("bearing_deg"), self.bearing_deg, -360.0..=360.0, "deg")?.to_radians();
         let length = reader.within(&key("length"), self.length, ring.outer() + 10.0..=1000.0, "m")?;
-        let lane_width = reader.within(&key("lane_width"), self.lane_width.unwrap_or(ring.lane_width), LANE_WIDTHS, "m")?;
-        let radius = |name: &str, value: Option<f64>| value.map(|value| reader.within(&key(name), value, 0.1..=1000.0, "m")).transpose();
+        let lane_width =
+            reader.within(&key("lane_width"), self.lane_width.unwrap_or(ring.lane_width), LANE_WIDTHS, "m")?;
+        let radius = |name: &str, value: Option<f64>| {
+            value.map(|value| reader.within(&key(name), value, 0.1..=1000.0, "m")).transpose()
+        };
         let splitter = self.splitter.iter().enumerate();
         let splitter = splitter.map(|(point, written)| {
             let at = |name: &str| key(&format!("splitter[{point}].{name}"));
-            let radius =
-                written.radius.ok_or_else(|| reader.invalid(at("radius"), "missing", "every corner of a splitter island needs one"))?;
+            let radius = written.radius.ok_or_else(|| {
+                reader.invalid(at("radius"), "missing", "every corner of a splitter island needs one")
+            })?;
             let along = reader.within(&at("along"), written.along, 0.0..=length, "m")?;
             let offset = reader.within(&at("offset"), written.offset, -200.0..=200.0, "m")?;
             Ok(Bend { at: DVec2::new(along, offset), radius: reader.within(&at("radius"), radius, 0.1..=1000.0, "m")? })
@@ -217,10 +228,19 @@ impl WrittenArm {
 }
 
 impl WrittenWay {
-    fn checked(self, reader: &Reader, key: &str, way: Way, length: f64, lane_width: f64, ring: &Ring) -> Result<Carriageway, Error> {
+    fn checked(
+        self,
+        reader: &Reader,
+        key: &str,
+        way: Way,
+        length: f64,
+        lane_width: f64,
+        ring: &Ring,
+    ) -> Result<Carriageway, Error> {
         let lanes = reader.count(&format!("{key}.lanes"), self.lanes.unwrap_or(ring.lanes.min(2)), 1..=2)?;
         if ring.lanes < lanes {
-            let expected = format!("must be at most {}, as many lanes as the ring has: change it or ring.lanes", ring.lanes);
+            let expected =
+                format!("must be at most {}, as many lanes as the ring has: change it or ring.lanes", ring.lanes);
             return Err(reader.invalid(format!("{key}.lanes"), lanes, expected));
         }
         if lanes == 1 && self.left.is_some() {
@@ -267,7 +287,9 @@ impl WrittenAlignment {
             let radius = match (point.radius, index == last) {
                 (Some(radius), false) => reader.within(&at("radius"), radius, least..=1000.0, "m")?,
                 (None, true) => 0.0,
-                (None, false) => return Err(reader.invalid(at("radius"), "missing", "every point but the last needs one")),
+                (None, false) => {
+                    return Err(reader.invalid(at("radius"), "missing", "every point but the last needs one"));
+                }
                 (Some(radius), true) => {
                     return Err(reader.invalid(
                         at("radius"),

@@ -15,7 +15,8 @@ fn plain() -> String {
     for (index, name) in ["E", "N", "W", "S"].iter().enumerate() {
         text += &format!("\n[[arm]]\nname = \"{name}\"\nbearing_deg = {:.1}\nlength = 100.0\n", index as f64 * 90.0);
         for (way, offset) in [("entry", 8.5), ("exit", -8.5)] {
-            text += &format!("[arm.{way}.kerb]\npoints = [{{ along = 30.0, offset = {offset} }}]\nring_radius = 15.0\n");
+            text +=
+                &format!("[arm.{way}.kerb]\npoints = [{{ along = 30.0, offset = {offset} }}]\nring_radius = 15.0\n");
         }
     }
     text
@@ -48,16 +49,24 @@ fn the_required_keys_give_a_roundabout_with_lanes_beside_its_kerbs() {
 
 #[test]
 fn every_entry_has_five_routes_with_names() {
-    let names: Vec<String> = read(&plain()).unwrap().routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect();
-    let of_north: Vec<&str> =
-        names.iter().filter_map(|name| name.split_once('/')).map(|(_, way)| way).filter(|way| way.starts_with("N-")).collect();
+    let names: Vec<String> =
+        read(&plain()).unwrap().routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect();
+    let of_north: Vec<&str> = names
+        .iter()
+        .filter_map(|name| name.split_once('/'))
+        .map(|(_, way)| way)
+        .filter(|way| way.starts_with("N-"))
+        .collect();
     assert_eq!(of_north, ["N-left-2", "N-left-3", "N-left-4", "N-right-1", "N-right-2"]);
     assert_eq!(names.len(), 20);
 }
 
 #[test]
 fn three_arms_give_the_left_lane_all_three_exits() {
-    assert_eq!(lane::exits(3, 2), [(Lane::Left, 1), (Lane::Left, 2), (Lane::Left, 3), (Lane::Right, 1), (Lane::Right, 2)]);
+    assert_eq!(
+        lane::exits(3, 2),
+        [(Lane::Left, 1), (Lane::Left, 2), (Lane::Left, 3), (Lane::Right, 1), (Lane::Right, 2)]
+    );
 }
 
 #[test]
@@ -66,22 +75,26 @@ fn a_route_has_the_requested_approach_and_departure() {
     let outer = roundabout.outer_radius();
     for route in roundabout.routes(40.0, 35.0, 2.0).unwrap() {
         let (reaches, leaves) = lane::ring_stations(&route.centre_line, outer);
-        assert!((reaches - 40.0).abs() < 1e-6 && (route.centre_line.length() - leaves - 35.0).abs() < 1e-6, "{}", route.name);
+        assert!(
+            (reaches - 40.0).abs() < 1e-6 && (route.centre_line.length() - leaves - 35.0).abs() < 1e-6,
+            "{}",
+            route.name
+        );
     }
 }
 
 #[test]
 fn the_kerb_nearest_to_a_point_is_named() {
     // Splitter islands on the arms N and S, the second and the fourth.
-    let corners = [(24.0, -0.6), (34.0, 0.0), (24.0, 0.6)].map(|(a, o)| format!("{{ along = {a:.1}, offset = {o:.1}, radius = 0.3 }}"));
+    let corners = [(24.0, -0.6), (34.0, 0.0), (24.0, 0.6)]
+        .map(|(a, o)| format!("{{ along = {a:.1}, offset = {o:.1}, radius = 0.3 }}"));
     let splitter = format!("length = 100.0\nsplitter = [{}]", corners.join(", "));
     let text = plain();
     let mut arms: Vec<String> = text.split("length = 100.0").map(str::to_owned).collect();
     let rest = arms.split_off(1);
-    let filled = rest
-        .iter()
-        .enumerate()
-        .map(|(index, part)| if index % 2 == 1 { format!("{splitter}{part}") } else { format!("length = 100.0{part}") });
+    let filled = rest.iter().enumerate().map(|(index, part)| {
+        if index % 2 == 1 { format!("{splitter}{part}") } else { format!("length = 100.0{part}") }
+    });
     let roundabout = read(&(arms.concat() + &filled.collect::<String>())).unwrap();
     for (x, y, kerb) in [
         (14.0, 0.0, Kerb::Island),
@@ -97,10 +110,13 @@ fn the_kerb_nearest_to_a_point_is_named() {
 
 #[test]
 fn a_routes_lane_has_the_widths_of_its_arms_and_of_the_ring() {
-    let text = plain().replace("name = \"N\"", "name = \"N\"\nlane_width = 3.5").replace("name = \"W\"", "name = \"W\"\nlane_width = 3.6");
+    let text = plain()
+        .replace("name = \"N\"", "name = \"N\"\nlane_width = 3.5")
+        .replace("name = \"W\"", "name = \"W\"\nlane_width = 3.6");
     let roundabout = read(&text).unwrap();
     let routes = roundabout.routes(40.0, 35.0, 2.0).unwrap();
-    let widths = |name: &str| roundabout.lane_widths(routes.iter().find(|route| route.name == format!("plain/{name}")).unwrap());
+    let widths =
+        |name: &str| roundabout.lane_widths(routes.iter().find(|route| route.name == format!("plain/{name}")).unwrap());
     assert_eq!(widths("N-right-1"), [3.5, 3.7, 3.6]);
     assert_eq!(widths("E-left-4"), [3.7, 3.7, 3.7]);
     assert_eq!(widths("W-left-3"), [3.6, 3.7, 3.5]);
@@ -185,7 +201,9 @@ fn a_lane_that_runs_into_a_kerb_is_refused() {
 
 /// The plain roundabout with `offset` in place of the offset of every kerb.
 fn with_kerbs_at(offset: f64) -> String {
-    plain().replace("offset = 8.5", &format!("offset = {offset}")).replace("offset = -8.5", &format!("offset = -{offset}"))
+    plain()
+        .replace("offset = 8.5", &format!("offset = {offset}"))
+        .replace("offset = -8.5", &format!("offset = -{offset}"))
 }
 
 #[test]
@@ -202,8 +220,9 @@ fn kerbs_too_near_to_each_other_for_four_lanes_are_refused() {
 
 #[test]
 fn lanes_of_one_carriageway_in_the_wrong_order_are_refused() {
-    let lane =
-        |name: &str, offset: f64| format!("[arm.entry.{name}]\npoints = [{{ along = 30.0, offset = {offset} }}]\nring_radius = 15.0\n");
+    let lane = |name: &str, offset: f64| {
+        format!("[arm.entry.{name}]\npoints = [{{ along = 30.0, offset = {offset} }}]\nring_radius = 15.0\n")
+    };
     let swapped = lane("left", 6.15) + &lane("right", 2.45) + "[arm.exit.kerb]";
     assert!(refusal("[arm.exit.kerb]", 0, &swapped).contains("arm[0].entry.right: 2.45 m left of the bearing"));
 }
@@ -226,7 +245,8 @@ fn lanes_of_the_shipped_roundabouts_fail_once_a_carriageway_is_moved_over_the_ot
             // At the arm's end the left entry lane moves by a lane's width, onto the left exit lane.
             let from = at + text[at..].find("offset = ").unwrap() + "offset = ".len();
             let to = from + text[from..].find('}').unwrap();
-            let (offset, radius) = text[from..to].split_once(',').map_or((&text[from..to], ""), |(offset, _)| (offset, ", radius = 2.0"));
+            let (offset, radius) =
+                text[from..to].split_once(',').map_or((&text[from..to], ""), |(offset, _)| (offset, ", radius = 2.0"));
             let offset = offset.trim().parse::<f64>().unwrap() - 3.7;
             let changed = format!("{}{offset}{radius} {}", &text[..from], &text[to..]);
             let message = read(&changed).unwrap_err().to_string();

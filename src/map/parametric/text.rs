@@ -11,7 +11,11 @@ use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenPoint
 /// TOML. Numbers are written so that reading them gives the same bits.
 impl Display for Written {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
-        let Written { hand, ring: WrittenRing { island_radius, gutter, lane_width, lanes, island_gutter, mouth_gutter }, arm } = self;
+        let Written {
+            hand,
+            ring: WrittenRing { island_radius, gutter, lane_width, lanes, island_gutter, mouth_gutter },
+            arm,
+        } = self;
         if *hand == Hand::Left {
             writeln!(f, "hand = \"left\"\n")?;
         }
@@ -19,7 +23,8 @@ impl Display for Written {
         lanes.iter().try_for_each(|lanes| writeln!(f, "lanes = {lanes}"))?;
         for (name, gutter) in [("island_gutter", island_gutter), ("mouth_gutter", mouth_gutter)] {
             let Some(gutter) = gutter else { continue };
-            let point = |&WrittenDirection { bearing_deg, width }: &WrittenDirection| ("bearing_deg", bearing_deg, width);
+            let point =
+                |&WrittenDirection { bearing_deg, width }: &WrittenDirection| ("bearing_deg", bearing_deg, width);
             writeln!(f, "{name} = [{}\n]", widths(gutter.iter().map(point))?)?;
         }
         arm.iter().try_for_each(|arm| arm.fmt(f))
@@ -28,7 +33,18 @@ impl Display for Written {
 
 impl Display for WrittenArm {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
-        let WrittenArm { name, bearing_deg, length, lane_width, entry, exit, corner, splitter, splitter_gutter, kerb_gutter } = self;
+        let WrittenArm {
+            name,
+            bearing_deg,
+            length,
+            lane_width,
+            entry,
+            exit,
+            corner,
+            splitter,
+            splitter_gutter,
+            kerb_gutter,
+        } = self;
         writeln!(f, "\n[[arm]]\nname = {name:?}\nbearing_deg = {bearing_deg:?}\nlength = {length:?}")?;
         lane_width.iter().try_for_each(|width| writeln!(f, "lane_width = {width:?}"))?;
         let WrittenCorner { kerb_radius, lane_radius, lane } = corner;

@@ -83,13 +83,15 @@ impl Arm {
         let wide = steps.take_while(|&x| x < ring.outer + keys.s_bend.end && keys.splitters.least_width <= width(x));
         let Some(tip) = wide.last().filter(|tip| nose + 2.0 <= *tip) else { return Vec::new() };
         let side = |line: &Line| -> Vec<DVec2> {
-            let inner = line.bends.iter().map(|bend| bend.at).filter(|at| nose + BETWEEN < at.x && at.x < tip - BETWEEN);
+            let inner =
+                line.bends.iter().map(|bend| bend.at).filter(|at| nose + BETWEEN < at.x && at.x < tip - BETWEEN);
             let mut points: Vec<DVec2> = inner.chain([nose, tip].map(|x| DVec2::new(x, line.y(x)))).collect();
             points.sort_by(|a, b| a.x.total_cmp(&b.x));
             points
         };
         let (left, right) = (side(&entry), side(&exit));
-        let around: Vec<DVec2> = left.into_iter().chain(right.into_iter().rev().map(|at| DVec2::new(at.x, -at.y))).collect();
+        let around: Vec<DVec2> =
+            left.into_iter().chain(right.into_iter().rev().map(|at| DVec2::new(at.x, -at.y))).collect();
         let n = around.len();
         let turn = |index: usize| {
             let [before, here, after] = [index + n - 1, index, index + 1].map(|index| around[index % n]);
@@ -98,7 +100,8 @@ impl Arm {
         // Corners that hardly turn would be arcs of millimetres.
         let corners = (0..n).filter(|&index| LEAST_TURN < turn(index)).map(|index| around[index]);
         let radius = millimetres(draws.within(place, Q::SplitterRadius, keys.splitters.corner_radius));
-        let corner = |at: DVec2| WrittenPoint { along: millimetres(at.x), offset: millimetres(at.y), radius: Some(radius) };
+        let corner =
+            |at: DVec2| WrittenPoint { along: millimetres(at.x), offset: millimetres(at.y), radius: Some(radius) };
         corners.map(corner).collect()
     }
 }
@@ -144,8 +147,10 @@ fn carriageway(
     length: f64,
 ) -> Result<Carriageway, Reason> {
     let n_lanes = if ring.lanes == 1 || draws.happens(place, Q::IsSingle, keys.lanes.single_share) { 1 } else { 2 };
-    let half_width =
-        n_lanes as f64 * ring.lane_width + ring.gutter + course.median + keys.kerb.deviation * draws.normal(place, Q::KerbOffset);
+    let half_width = n_lanes as f64 * ring.lane_width
+        + ring.gutter
+        + course.median
+        + keys.kerb.deviation * draws.normal(place, Q::KerbOffset);
     let beside = side * course.beside;
     let mut bends = Vec::new();
     let bend = |x: f64, y: f64, radius: f64| Bend { at: DVec2::new(x, y), radius };
@@ -155,7 +160,11 @@ fn carriageway(
             let tangent = S_TANGENT * far.distance(near);
             let half = ((far.y - near.y) / (far.x - near.x)).atan().abs() / 2.0;
             let radius = (tangent / half.tan()).min(900.0);
-            let axis = [bend(length, side * far.y, 0.0), bend(far.x, side * far.y, radius), bend(near.x, side * near.y, radius)];
+            let axis = [
+                bend(length, side * far.y, 0.0),
+                bend(far.x, side * far.y, radius),
+                bend(near.x, side * near.y, radius),
+            ];
             let axis = Line { bends: axis.to_vec(), direction: DVec2::NEG_X, ring_radius: half_width + 1.0 };
             bends.extend(axis.beside(-half_width).ok_or(Reason::TooSharp)?.bends);
         }

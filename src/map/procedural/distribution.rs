@@ -75,13 +75,16 @@ impl Distribution {
         let mut refused = Refused::default();
         for attempt in 0..MOST_ATTEMPTS {
             match self.attempt(seed, index, attempt) {
-                Ok((roundabout, written)) => return Ok(RandomRoad { roundabout, seed, index, attempt, refused, written }),
+                Ok((roundabout, written)) => {
+                    return Ok(RandomRoad { roundabout, seed, index, attempt, refused, written });
+                }
                 Err(reason) => refused.note(reason),
             }
         }
         let mut reasons: Vec<Reason> = Reason::ALL.into_iter().filter(|&reason| 0 < refused.count(reason)).collect();
         reasons.sort_by_key(|&reason| std::cmp::Reverse(refused.count(reason)));
-        let reasons: Vec<String> = reasons.into_iter().map(|reason| format!("{} {}", refused.count(reason), reason.words())).collect();
+        let reasons: Vec<String> =
+            reasons.into_iter().map(|reason| format!("{} {}", refused.count(reason), reason.words())).collect();
         let expected = format!("wider ranges or milder rules are needed; refused were {}", reasons.join(", "));
         Err(Reader::of(&self.file).invalid(
             format!("road {index} of seed {seed}"),
@@ -94,13 +97,14 @@ impl Distribution {
     pub(super) fn attempt(&self, seed: u32, index: u32, attempt: u32) -> Result<(Road, Written), Reason> {
         let written = drawn(&self.keys, &Draws { seed, road: index, attempt })?;
         let name = format!("{}/{seed}/{index}", self.name);
-        let roundabout = Road::staged(name, Reader::of(&self.file), written.clone()).map_err(|(stage, _)| match stage {
-            Stage::Values => Reason::Values,
-            Stage::Kerbs => Reason::Kerbs,
-            Stage::Lanes => Reason::Lanes,
-            Stage::Clear => Reason::LaneNearKerb,
-            Stage::Beside => Reason::LanesTooNear,
-        })?;
+        let roundabout =
+            Road::staged(name, Reader::of(&self.file), written.clone()).map_err(|(stage, _)| match stage {
+                Stage::Values => Reason::Values,
+                Stage::Kerbs => Reason::Kerbs,
+                Stage::Lanes => Reason::Lanes,
+                Stage::Clear => Reason::LaneNearKerb,
+                Stage::Beside => Reason::LanesTooNear,
+            })?;
         self.keys.rules.keeps(&roundabout)?;
         Ok((roundabout, written))
     }

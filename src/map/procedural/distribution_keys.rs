@@ -191,8 +191,23 @@ pub(super) struct Rules {
 impl Keys {
     /// An error for the first value out of its range.
     pub(super) fn check(&self, reader: &Reader) -> Result<(), Error> {
-        let Keys { ring, single, arms, axis, median, widening, s_bend, straight, flared, bend, kerb, lanes, corners, splitters, rules } =
-            self;
+        let Keys {
+            ring,
+            single,
+            arms,
+            axis,
+            median,
+            widening,
+            s_bend,
+            straight,
+            flared,
+            bend,
+            kerb,
+            lanes,
+            corners,
+            splitters,
+            rules,
+        } = self;
         let ranges: [(&str, Range, RangeInclusive<f64>, &str); 17] = [
             ("ring.island_radius", ring.island_radius, 1.5..=200.0, "m"),
             ("ring.lane_width", ring.lane_width, 2.5..=12.0, "m"),
@@ -221,7 +236,11 @@ impl Keys {
                 reader.within("single.outer_radius", single.outer_radius, 5.0..=200.0, "m")?;
             }
             None if 0.0 < ring.lanes[0] => {
-                return Err(reader.invalid("single", "missing", "rings of one lane, which ring.lanes has, need this table"));
+                return Err(reader.invalid(
+                    "single",
+                    "missing",
+                    "rings of one lane, which ring.lanes has, need this table",
+                ));
             }
             None => {}
         }
@@ -275,7 +294,10 @@ impl Keys {
         weights(reader, "corners.weights", &corners.weights)?;
         let needed = rules.approach.max(rules.departure) + rules.truck_behind.max(rules.truck_ahead);
         if arms.length[0] < needed.max(s_bend.end) {
-            let expected = format!("must be at least {} m: the way that rules.* need beside the ring", shown(needed.max(s_bend.end)));
+            let expected = format!(
+                "must be at least {} m: the way that rules.* need beside the ring",
+                shown(needed.max(s_bend.end))
+            );
             return Err(reader.invalid("arms.length", format_args!("{} m", shown(arms.length[0])), expected));
         }
         Ok(())

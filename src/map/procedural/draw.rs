@@ -19,7 +19,8 @@ const COMPASS: [&str; 8] = ["E", "NE", "N", "NW", "W", "SW", "S", "SE"];
 pub(super) fn drawn(keys: &Keys, draws: &Draws) -> Result<Written, Reason> {
     let (written_ring, ring) = ring(keys, draws);
     let bearings = bearings(keys, draws, &ring)?;
-    let arms: Vec<Arm> = (0..bearings.len()).map(|arm| Arm::drawn(keys, draws, &ring, arm)).collect::<Result<_, _>>()?;
+    let arms: Vec<Arm> =
+        (0..bearings.len()).map(|arm| Arm::drawn(keys, draws, &ring, arm)).collect::<Result<_, _>>()?;
     let share = keys.corners.shares[draws.index(Place::Ring, Q::CornerShare, &keys.corners.weights)];
     let written = arms.iter().enumerate().map(|(index, arm)| {
         let next = (index + 1) % arms.len();
@@ -56,7 +57,8 @@ fn ring(keys: &Keys, draws: &Draws) -> (WrittenRing, Ring) {
         Some(single) => (draws.log_within(place, Q::IslandRadius, single.island_radius), keys.ring.lane_width[0]),
         None => island(keys, draws),
     };
-    let (island, lane_width) = (millimetres(island), millimetres(draws.within(place, Q::LaneWidth, [narrowest, keys.ring.lane_width[1]])));
+    let (island, lane_width) =
+        (millimetres(island), millimetres(draws.within(place, Q::LaneWidth, [narrowest, keys.ring.lane_width[1]])));
     let ring_lane_width = match keys.single.as_ref().filter(|_| lanes == 1) {
         Some(single) => {
             let needed = single.outer_radius - island - 2.0 * gutter;
@@ -118,7 +120,15 @@ fn bearings(keys: &Keys, draws: &Draws, ring: &Ring) -> Result<Vec<f64>, Reason>
 
 /// The radius of a kerb that leaves the ring aside between an arm's entry and the next arm's exit, `gap` farther
 /// counter-clockwise (rad), or `None` where no radius of the range does and fits (m).
-fn corner_radius(keys: &Keys, draws: &Draws, ring: &Ring, arm: usize, entry: &Line, exit: &Line, gap: f64) -> Option<f64> {
+fn corner_radius(
+    keys: &Keys,
+    draws: &Draws,
+    ring: &Ring,
+    arm: usize,
+    entry: &Line,
+    exit: &Line,
+    gap: f64,
+) -> Option<f64> {
     let mirrored = |p: DVec2| DVec2::from_angle(gap).rotate(p * DVec2::new(1.0, -1.0));
     let (from, ahead) = (entry.bends.last()?.at, entry.direction);
     let (after, back) = (mirrored(exit.bends.last()?.at), mirrored(exit.direction));

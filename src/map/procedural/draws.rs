@@ -159,7 +159,9 @@ mod tests {
     #[test]
     fn neighbouring_places_and_quantities_are_unrelated() {
         let one = numbers(|draws| draws.unit(Place::Entry(0), Quantity::Angle));
-        for (place, quantity) in [(Place::Exit(0), Quantity::Angle), (Place::Entry(0), Quantity::Aim), (Place::Entry(1), Quantity::Angle)] {
+        for (place, quantity) in
+            [(Place::Exit(0), Quantity::Angle), (Place::Entry(0), Quantity::Aim), (Place::Entry(1), Quantity::Angle)]
+        {
             let other = numbers(|draws| draws.unit(place, quantity));
             let product: f64 = one.iter().zip(&other).map(|(a, b)| (a - 0.5) * (b - 0.5)).sum::<f64>() / 4000.0;
             // A product of two has a deviation of 1/12, its mean over 4,000 one of 0.0013.

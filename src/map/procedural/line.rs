@@ -28,14 +28,19 @@ impl Line {
     pub(super) fn beside(&self, distance: f64) -> Option<Line> {
         let n = self.bends.len();
         let direction = |index: usize| {
-            if index + 1 < n { (self.bends[index + 1].at - self.bends[index].at).normalize_or_zero() } else { self.direction }
+            if index + 1 < n {
+                (self.bends[index + 1].at - self.bends[index].at).normalize_or_zero()
+            } else {
+                self.direction
+            }
         };
         let mut bends = Vec::with_capacity(n);
         for (index, bend) in self.bends.iter().enumerate() {
             let (arriving, leaving) = (direction(index.saturating_sub(1)), direction(index));
             // The moved straights meet on the bisector of the bend.
             let bisector = (arriving + leaving).perp();
-            let radius = if bend.radius == 0.0 { 0.0 } else { bend.radius - arriving.perp_dot(leaving).signum() * distance };
+            let radius =
+                if bend.radius == 0.0 { 0.0 } else { bend.radius - arriving.perp_dot(leaving).signum() * distance };
             if radius < 0.0 {
                 return None;
             }
@@ -53,7 +58,8 @@ impl Line {
 
     /// Direction from the ring's centre to where the line meets a circle around it, from the arm's bearing (rad).
     pub(super) fn arrival(&self, circle: f64) -> Option<f64> {
-        to_circle(self.bends[self.bends.len() - 1].at, self.direction, circle, self.ring_radius).map(|(_, arrival)| arrival)
+        to_circle(self.bends[self.bends.len() - 1].at, self.direction, circle, self.ring_radius)
+            .map(|(_, arrival)| arrival)
     }
 
     /// Makes each bend as wide as its straights allow where it is wider. `circle` is the radius of the circle that the
@@ -79,7 +85,8 @@ impl Line {
     /// Length of the last straight that its bend takes (m).
     pub(super) fn tangent(&self) -> f64 {
         let n = self.bends.len();
-        let arriving = if 1 < n { (self.bends[n - 1].at - self.bends[n - 2].at).normalize_or_zero() } else { self.direction };
+        let arriving =
+            if 1 < n { (self.bends[n - 1].at - self.bends[n - 2].at).normalize_or_zero() } else { self.direction };
         self.bends[n - 1].radius * (arriving.angle_to(self.direction) / 2.0).abs().tan()
     }
 
@@ -88,7 +95,9 @@ impl Line {
         let after = self.bends.iter().position(|bend| bend.at.x <= x).unwrap_or(self.bends.len());
         let (from, along) = match after {
             0 => (self.bends[0].at, DVec2::NEG_X),
-            after if after < self.bends.len() => (self.bends[after - 1].at, self.bends[after].at - self.bends[after - 1].at),
+            after if after < self.bends.len() => {
+                (self.bends[after - 1].at, self.bends[after].at - self.bends[after - 1].at)
+            }
             after => (self.bends[after - 1].at, self.direction),
         };
         from.y + (x - from.x) * along.y / along.x
@@ -100,7 +109,11 @@ impl Line {
         // The last straight aims at its point nearest to the ring's centre.
         let aim = last + self.direction * last.dot(-self.direction).max(1.0);
         let bends = self.bends.iter().skip(1);
-        let point = |at: DVec2, radius: Option<f64>| WrittenPoint { along: millimetres(at.x), offset: millimetres(side * at.y), radius };
+        let point = |at: DVec2, radius: Option<f64>| WrittenPoint {
+            along: millimetres(at.x),
+            offset: millimetres(side * at.y),
+            radius,
+        };
         let points = bends.map(|bend| point(bend.at, Some(millimetres(bend.radius)))).chain([point(aim, None)]);
         WrittenAlignment { points: points.collect(), ring_radius: millimetres(self.ring_radius) }
     }
@@ -144,6 +157,9 @@ mod tests {
 
     #[test]
     fn a_rounded_number_has_three_decimals_and_no_minus_before_zero() {
-        assert_eq!([1.23449, -0.0004, -2.0006].map(millimetres).map(|value| value.to_string()), ["1.234", "0", "-2.001"]);
+        assert_eq!(
+            [1.23449, -0.0004, -2.0006].map(millimetres).map(|value| value.to_string()),
+            ["1.234", "0", "-2.001"]
+        );
     }
 }

@@ -36,7 +36,9 @@ impl Distribution {
         let road = |&index: &u32| {
             loading.check()?;
             let road = match chunks.get(&(index / CHUNK)).and_then(|known| known.get(&index)) {
-                Some(&(attempt, refused)) => self.known(seed, index, attempt, refused).map_or_else(|| self.road(seed, index), Ok),
+                Some(&(attempt, refused)) => {
+                    self.known(seed, index, attempt, refused).map_or_else(|| self.road(seed, index), Ok)
+                }
                 None => self.road(seed, index),
             };
             loading.count("drawing roads", &done, indices.len());
@@ -72,12 +74,14 @@ impl Distribution {
 }
 
 pub(super) fn bytes(known: &Known) -> Vec<u8> {
-    let words = known.iter().flat_map(|(&index, &(attempt, Refused(counts)))| [index, attempt].into_iter().chain(counts));
+    let words =
+        known.iter().flat_map(|(&index, &(attempt, Refused(counts)))| [index, attempt].into_iter().chain(counts));
     words.flat_map(u32::to_le_bytes).collect()
 }
 
 fn parsed(bytes: &[u8]) -> Known {
-    let words: Vec<u32> = bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect();
+    let words: Vec<u32> =
+        bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect();
     let entry = |entry: &[u32]| {
         let mut refused = Refused::default();
         refused.0.copy_from_slice(&entry[2..]);

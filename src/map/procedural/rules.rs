@@ -24,7 +24,11 @@ impl Rules {
             let start = route.centre_line.point_at(0.0);
             if !starts.contains(&start) {
                 starts.push(start);
-                if self.poses(route).iter().any(|outline| clearance(&kerbs, outline, 0.05, self.start_clearance) < self.start_clearance) {
+                if self
+                    .poses(route)
+                    .iter()
+                    .any(|outline| clearance(&kerbs, outline, 0.05, self.start_clearance) < self.start_clearance)
+                {
                     return Err(Reason::StartOnKerb);
                 }
             }
@@ -66,7 +70,9 @@ pub(super) fn lane_clearance(kerbs: &Outline, routes: &[Route], enough: f64) -> 
     for &piece in routes.iter().flat_map(|route| &route.centre_line.pieces) {
         // Routes share their pieces, and together follow all of a ring lane.
         let piece = match piece {
-            Piece::Arc { centre: DVec2::ZERO, radius, .. } => Piece::Arc { centre: DVec2::ZERO, radius, from: 0.0, sweep: TAU },
+            Piece::Arc { centre: DVec2::ZERO, radius, .. } => {
+                Piece::Arc { centre: DVec2::ZERO, radius, from: 0.0, sweep: TAU }
+            }
             piece => piece,
         };
         if !pieces.contains(&piece) {

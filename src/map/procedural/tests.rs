@@ -37,7 +37,10 @@ fn a_road_is_the_same_alone_and_among_others_whatever_the_threads() {
     for distribution in shipped() {
         let texts = |threads: usize, indices: &[u32]| -> Vec<String> {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| distribution.roads(3, indices, &Loading::PLAIN).unwrap()).iter().map(RandomRoad::text).collect()
+            pool.install(|| distribution.roads(3, indices, &Loading::PLAIN).unwrap())
+                .iter()
+                .map(RandomRoad::text)
+                .collect()
         };
         let all: Vec<u32> = (0..20).collect();
         let one = texts(1, &all);
@@ -75,7 +78,8 @@ fn start_poses_of_a_hundred_roads_keep_clear_of_kerbs_and_routes_keep_their_dist
                     assert!(!moved.intersects_rectangle(&corners), "{}", route.name);
                 }
                 let length = route.centre_line.length();
-                let nearest = (0..(length * 20.0) as usize).map(|n| kerbs.signed_distance(route.centre_line.point_at(n as f64 / 20.0)));
+                let nearest = (0..(length * 20.0) as usize)
+                    .map(|n| kerbs.signed_distance(route.centre_line.point_at(n as f64 / 20.0)));
                 // Between the stations that the rule looks at a kerb may be nearer by half their distance.
                 assert!(rules.lane_clearance - 0.13 < nearest.fold(f64::INFINITY, f64::min), "{}", route.name);
             }
@@ -109,11 +113,17 @@ fn a_cache_gives_the_same_roads_and_an_entry_that_is_wrong_is_not_believed() {
     let cache = Cache::new(folder.path());
     let told = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
     let telling = told.clone();
-    let watcher = move |progress: crate::files::cache::Progress| telling.lock().unwrap().push((progress.done, progress.total));
+    let watcher =
+        move |progress: crate::files::cache::Progress| telling.lock().unwrap().push((progress.done, progress.total));
     let loading = Loading { cache: Some(&cache), watcher: &watcher, ..Loading::PLAIN };
     let distribution = Distribution::named("wide").unwrap();
     let texts = |indices: &[u32], loading: &Loading| -> Vec<(String, u32, Refused)> {
-        distribution.roads(4, indices, loading).unwrap().into_iter().map(|road| (road.text(), road.attempt, road.refused)).collect()
+        distribution
+            .roads(4, indices, loading)
+            .unwrap()
+            .into_iter()
+            .map(|road| (road.text(), road.attempt, road.refused))
+            .collect()
     };
     let plain = texts(&[1, 2, 3, 70, 100], &Loading::PLAIN);
     assert_eq!(texts(&[1, 2, 3], &loading), plain[..3]);
@@ -123,7 +133,8 @@ fn a_cache_gives_the_same_roads_and_an_entry_that_is_wrong_is_not_believed() {
     }
     assert_eq!(told.lock().unwrap().iter().copied().max(), Some((5, 5)));
     // Attempts that are not valid, and counts that do not add up.
-    let (attempt, refused) = plain.iter().map(|&(_, attempt, refused)| (attempt, refused)).find(|&(attempt, _)| 1 < attempt).unwrap();
+    let (attempt, refused) =
+        plain.iter().map(|&(_, attempt, refused)| (attempt, refused)).find(|&(attempt, _)| 1 < attempt).unwrap();
     let mut fewer = Refused::default();
     fewer.note(Reason::Kerbs);
     for (attempt, refused) in [(1, fewer), (attempt + 500, refused), (attempt, Refused::default())] {
@@ -131,7 +142,9 @@ fn a_cache_gives_the_same_roads_and_an_entry_that_is_wrong_is_not_believed() {
         cache.put(roads::KIND, &distribution.key(4, 0), &roads::bytes(&known.into_iter().collect()));
         let kept = texts(&[1, 2, 3], &loading);
         assert!(
-            kept.iter().zip(&plain).all(|(kept, plain)| kept.0 == plain.0 || kept.1 != attempt || refused.total() == attempt),
+            kept.iter()
+                .zip(&plain)
+                .all(|(kept, plain)| kept.0 == plain.0 || kept.1 != attempt || refused.total() == attempt),
             "{kept:?}"
         );
     }
@@ -159,12 +172,16 @@ fn a_name_gives_distribution_seed_and_index_and_other_names_are_of_files() {
     let routes: Vec<String> = road.routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect();
     let named = |name: &String| {
         name.starts_with("wide/7/12/")
-            && ["E", "NE", "N", "NW", "W", "SW", "S", "SE"].contains(&name["wide/7/12/".len()..].split('-').next().unwrap())
+            && ["E", "NE", "N", "NW", "W", "SW", "S", "SE"]
+                .contains(&name["wide/7/12/".len()..].split('-').next().unwrap())
     };
     assert!(routes.iter().all(named), "{routes:?}");
     assert_eq!(find("16m").unwrap().name, "16m");
     assert!(
-        find("narrow/7/12").unwrap_err().to_string().contains("distribution: narrow; must be a path ending in .toml or one of mixed, wide")
+        find("narrow/7/12")
+            .unwrap_err()
+            .to_string()
+            .contains("distribution: narrow; must be a path ending in .toml or one of mixed, wide")
     );
 }
 
@@ -175,7 +192,8 @@ fn the_truck_of_the_rules_is_that_of_daf_xf() {
     let value = |table: &str, key: &str| file[table][key].as_float().unwrap();
     // The middle of the wheelbase follows the lane.
     let ahead = value("tractor", "wheelbase") / 2.0 + value("tractor", "front_overhang");
-    let behind = value("trailer", "kingpin_to_rear") - value("tractor", "fifth_wheel") + value("tractor", "wheelbase") / 2.0;
+    let behind =
+        value("trailer", "kingpin_to_rear") - value("tractor", "fifth_wheel") + value("tractor", "wheelbase") / 2.0;
     for distribution in shipped() {
         let rules = distribution.rules();
         assert!(
@@ -223,8 +241,13 @@ fn every_wrong_value_of_a_distribution_is_named_with_what_would_do() {
     for (table, values) in &file {
         for (key, value) in values.as_table().unwrap() {
             keys += 1;
-            let line =
-                shipped.split(&format!("[{table}]\n")).nth(1).unwrap().lines().find(|line| line.starts_with(&format!("{key} ="))).unwrap();
+            let line = shipped
+                .split(&format!("[{table}]\n"))
+                .nth(1)
+                .unwrap()
+                .lines()
+                .find(|line| line.starts_with(&format!("{key} =")))
+                .unwrap();
             let n = value.as_array().map_or(1, Vec::len);
             for wrong in ["-1e9", "1e9", "nan"] {
                 let list = vec![wrong; n].join(", ");
@@ -233,7 +256,9 @@ fn every_wrong_value_of_a_distribution_is_named_with_what_would_do() {
                 let text = format!("{before}[{table}]\n{}", after.replacen(line, &format!("{key} = {value}"), 1));
                 let message = read(&text).unwrap_err();
                 assert!(
-                    message.contains("own.toml: ") && message.contains(&format!("{table}.{key}")) && message.contains("must lie in"),
+                    message.contains("own.toml: ")
+                        && message.contains(&format!("{table}.{key}"))
+                        && message.contains("must lie in"),
                     "{message}"
                 );
             }
@@ -248,15 +273,26 @@ fn every_wrong_value_of_a_distribution_is_named_with_what_would_do() {
         without("half_width = [0.0, 1.2]", "half_width = [1.2, 0.0]")
             .contains("median.half_width: [1.2, 0] m; the least value comes first")
     );
-    assert!(without("shares = [0.3, 0.5, 0.2]", "shares = [0.0, 0.0, 0.0]").contains("arms.shares: all 0; one of them must be above 0"));
-    assert!(without("weights = [0.4, 0.35, 0.25]", "weights = [0.4, 0.35]").contains("corners.weights: 2; corners.shares has 3"));
-    assert!(without("length = [66.0, 66.0]", "length = [50.0, 66.0]").contains("arms.length: 50 m; must be at least 52.984 m"));
+    assert!(
+        without("shares = [0.3, 0.5, 0.2]", "shares = [0.0, 0.0, 0.0]")
+            .contains("arms.shares: all 0; one of them must be above 0")
+    );
+    assert!(
+        without("weights = [0.4, 0.35, 0.25]", "weights = [0.4, 0.35]")
+            .contains("corners.weights: 2; corners.shares has 3")
+    );
+    assert!(
+        without("length = [66.0, 66.0]", "length = [50.0, 66.0]")
+            .contains("arms.length: 50 m; must be at least 52.984 m")
+    );
     assert!(
         without("[single]\nisland_radius = [1.5, 20.0]\nlane_width = [4.5, 12.0]\nouter_radius = 14.5\n", "")
             .contains("single: missing; rings of one lane")
     );
     assert!(without("gutter =", "guter =").contains("guter"));
-    assert!(Distribution::read(Path::new("no/such.toml")).unwrap_err().to_string().contains("no/such.toml: cannot be read"));
+    assert!(
+        Distribution::read(Path::new("no/such.toml")).unwrap_err().to_string().contains("no/such.toml: cannot be read")
+    );
 }
 
 #[test]
@@ -268,7 +304,9 @@ fn a_distribution_of_which_no_draw_is_valid_is_refused_with_the_reasons() {
     let distribution = Distribution::read(&path).unwrap();
     let message = distribution.road(1, 2).unwrap_err().to_string();
     assert!(
-        message.contains("narrow.toml: road 2 of seed 1: none of 1000 draws is valid; wider ranges or milder rules are needed"),
+        message.contains(
+            "narrow.toml: road 2 of seed 1: none of 1000 draws is valid; wider ranges or milder rules are needed"
+        ),
         "{message}"
     );
     assert!(message.contains("a route nearer to a kerb than the rules allow"), "{message}");

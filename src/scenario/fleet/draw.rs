@@ -52,7 +52,10 @@ impl Drawn {
         let mut places = [0.0; N_RANGES];
         for (group, places) in (0..).zip(places.chunks_mut(4)) {
             let words = random::words(SEED, row, 0, group);
-            places.iter_mut().zip(words).for_each(|(place, word)| *place = 0.5 * (f64::from(random::signed_unit(word)) + 1.0));
+            places
+                .iter_mut()
+                .zip(words)
+                .for_each(|(place, word)| *place = 0.5 * (f64::from(random::signed_unit(word)) + 1.0));
         }
         Drawn(places)
     }

@@ -34,7 +34,11 @@ pub(in crate::scenario) fn vehicles(
         }
         WrittenVehicles::Many(tables) => {
             if let Some(load) = &written.load {
-                return Err(reader.invalid("load", format_args!("{load:?}"), "each [[vehicle]] has its own `loads`: leave it out"));
+                return Err(reader.invalid(
+                    "load",
+                    format_args!("{load:?}"),
+                    "each [[vehicle]] has its own `loads`: leave it out",
+                ));
             }
             reader.count("vehicle", tables.len(), 1..=MOST_MEMBERS)?;
             let read = |(index, table)| member(reader, source, &format!("vehicle[{index}]"), table);
@@ -73,7 +77,11 @@ fn member(reader: &Reader, source: &Source, key: &str, written: &WrittenMember) 
         reader.within(&format!("{key}.loads.{load}"), share, 0.0..=1e6, "")?;
     }
     if written.loads.values().all(|&share| share == 0.0) {
-        return Err(reader.invalid(format!("{key}.loads"), "none", format!("at least one is needed; the vehicle has {}", known(&vehicle))));
+        return Err(reader.invalid(
+            format!("{key}.loads"),
+            "none",
+            format!("at least one is needed; the vehicle has {}", known(&vehicle)),
+        ));
     }
     let share = reader.within(&format!("{key}.share"), written.share, 1e-6..=1e6, "")?;
     Ok(Member { name, vehicle, share, loads: written.loads.clone() })
@@ -89,7 +97,11 @@ fn drawn(reader: &Reader, members: Vec<Member>, written: &WrittenDraw) -> Result
         }
         let [from, to] = range;
         if to < from {
-            return Err(reader.invalid(format!("draw.{key}"), format_args!("[{from}, {to}]"), "must be [least, greatest]"));
+            return Err(reader.invalid(
+                format!("draw.{key}"),
+                format_args!("[{from}, {to}]"),
+                "must be [least, greatest]",
+            ));
         }
         Ok(Some(range))
     };

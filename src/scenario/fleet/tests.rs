@@ -3,11 +3,19 @@ use crate::scenario::Scenario;
 
 fn member(name: &str, share: f64, loads: &[(&str, f64)]) -> Member {
     let vehicle = Vehicle::named(name).unwrap();
-    Member { name: name.to_owned(), vehicle, share, loads: loads.iter().map(|&(load, share)| (load.to_owned(), share)).collect() }
+    Member {
+        name: name.to_owned(),
+        vehicle,
+        share,
+        loads: loads.iter().map(|&(load, share)| (load.to_owned(), share)).collect(),
+    }
 }
 
 fn fleet(draw: Ranges) -> Fleet {
-    let members = Vec::from([member("daf_xf", 2.0, &[("empty", 1.0), ("laden", 1.0)]), member("eu_4x2_13m6", 1.0, &[("laden", 1.0)])]);
+    let members = Vec::from([
+        member("daf_xf", 2.0, &[("empty", 1.0), ("laden", 1.0)]),
+        member("eu_4x2_13m6", 1.0, &[("laden", 1.0)]),
+    ]);
     Fleet { members, draw, n_vehicles: 300 }
 }
 
@@ -21,14 +29,19 @@ fn a_table_has_every_class_by_its_share() {
     assert_eq!(counts(&fleet(Ranges { slip: Some([0.9, 1.1]), ..Ranges::default() })), [100, 100, 100]);
     // Without ranges three rows give the shares.
     assert_eq!(counts(&fleet(Ranges::default())), [1, 1, 1]);
-    let names: Vec<String> = fleet(Ranges::default()).classes().into_iter().map(|class| class.vehicle + " " + &class.load).collect();
+    let names: Vec<String> =
+        fleet(Ranges::default()).classes().into_iter().map(|class| class.vehicle + " " + &class.load).collect();
     assert_eq!(names, ["daf_xf empty", "daf_xf laden", "eu_4x2_13m6 laden"]);
 }
 
 #[test]
 fn a_row_lies_in_every_range_and_another_range_does_not_shift_it() {
-    let ranges =
-        Ranges { trailer_wheelbase: Some([-0.5, 0.4]), friction: Some([0.6, 1.1]), drive_lag: Some([0.3, 0.6]), ..Ranges::default() };
+    let ranges = Ranges {
+        trailer_wheelbase: Some([-0.5, 0.4]),
+        friction: Some([0.6, 1.1]),
+        drive_lag: Some([0.3, 0.6]),
+        ..Ranges::default()
+    };
     let table = fleet(ranges.clone()).table();
     let lengths: Vec<f64> = table.iter().map(|entry| entry.vehicle.trailer.wheelbase).collect();
     let of_daf = &lengths[..200];
@@ -43,7 +56,12 @@ fn a_row_lies_in_every_range_and_another_range_does_not_shift_it() {
         assert!((trailer.kingpin_to_rear - trailer.wheelbase - overhang).abs() < 1e-9);
     }
     let more = fleet(Ranges { brake_lag: Some([0.2, 0.5]), ..ranges }).table();
-    assert!(table.iter().zip(&more).all(|(a, b)| a.vehicle.trailer == b.vehicle.trailer && a.vehicle.tractor == b.vehicle.tractor));
+    assert!(
+        table
+            .iter()
+            .zip(&more)
+            .all(|(a, b)| a.vehicle.trailer == b.vehicle.trailer && a.vehicle.tractor == b.vehicle.tractor)
+    );
 }
 
 #[test]
@@ -54,5 +72,8 @@ fn a_part_of_the_classes_is_a_benchmark_of_its_own() {
     assert_eq!((laden.classes().len(), laden.load.as_str()), (2, "laden"));
     assert!(scenario.with_classes(|class| class.load == "feathers").is_none());
     let one = Scenario::named("attard2023").unwrap();
-    assert!(one.with_classes(|class| class.load == "empty").is_some() && one.with_classes(|class| class.load == "laden").is_none());
+    assert!(
+        one.with_classes(|class| class.load == "empty").is_some()
+            && one.with_classes(|class| class.load == "laden").is_none()
+    );
 }

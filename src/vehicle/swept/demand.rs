@@ -119,7 +119,9 @@ pub fn demands(rig: &Rig, centre_line: &Curve, path: &[Pose], speed: f64, spacin
 /// (rad).
 pub fn steer_angle_max(rig: &Rig, centre_line: &Curve, path: &[Pose], speed: f64, spacing: f64) -> f64 {
     let towing = Towing::of(rig, speed);
-    let angle = |(index, pose): (usize, &Pose)| steer_angle(&towing, centre_line.heading_at(index as f64 * spacing) - pose.heading);
+    let angle = |(index, pose): (usize, &Pose)| {
+        steer_angle(&towing, centre_line.heading_at(index as f64 * spacing) - pose.heading)
+    };
     path.iter().enumerate().map(angle).map(f64::abs).fold(0.0, f64::max)
 }
 
@@ -169,7 +171,8 @@ mod tests {
 
     /// 30 m straight, then one and a half circles to the left or the right.
     fn line(radius: f64, side: f64) -> Curve {
-        let arc = |from: f64| Piece::Arc { centre: DVec2::new(0.0, side * radius), radius, from, sweep: 1.5 * side * PI };
+        let arc =
+            |from: f64| Piece::Arc { centre: DVec2::new(0.0, side * radius), radius, from, sweep: 1.5 * side * PI };
         let approach = Piece::Segment { from: DVec2::new(-30.0, 0.0), to: DVec2::ZERO };
         Curve { pieces: vec![approach, arc(-side * FRAC_PI_2), arc(side * PI)] }
     }
@@ -205,7 +208,9 @@ mod tests {
     #[test]
     fn a_bend_after_a_straight_asks_for_a_steer_rate_that_no_truck_has_at_speed() {
         let vehicle = Vehicle::named("daf_xf").unwrap();
-        let rate = |speed: f64| driven(&vehicle, "empty", 10.2, 1.0, speed).1.iter().map(|d| d.steer_rate).fold(0.0, f64::max).to_degrees();
+        let rate = |speed: f64| {
+            driven(&vehicle, "empty", 10.2, 1.0, speed).1.iter().map(|d| d.steer_rate).fold(0.0, f64::max).to_degrees()
+        };
         // The front axle's direction turns by speed / radius at once; slip adds to it.
         assert!((rate(1.0) - 5.6).abs() < 0.2 && 46.0 < rate(8.33), "{} {}", rate(1.0), rate(8.33));
     }

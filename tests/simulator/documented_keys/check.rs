@@ -46,7 +46,10 @@ pub fn compared(kind: &Kind, rows: &[Row]) -> Found {
         let parts = parts(&row.key);
         let mut found = kind.documents.iter().map(|document| (document, places(document, &parts)));
         let Some((document, places)) = found.find(|(_, places)| !places.is_empty()) else {
-            check.fault(row, "is in no document of this test: add it to one or, if no reader takes it, take its row out");
+            check.fault(
+                row,
+                "is in no document of this test: add it to one or, if no reader takes it, take its row out",
+            );
             continue;
         };
         for place in places {
@@ -82,8 +85,11 @@ impl Check<'_> {
             let key = [&table[..], &[Step::Key(UNKNOWN.to_owned())]].concat();
             let message = self.read(&with(document, &key, Value::Integer(1))).map(drop).unwrap_err().to_string();
             // A table whose keys are names takes any.
-            let Some((_, listed)) = message.split_once(&format!("unknown field `{UNKNOWN}`, expected ")) else { continue };
-            let documented: BTreeSet<&str> = rows.iter().filter_map(|row| next(&super::places::parts(&row.key), &table)).collect();
+            let Some((_, listed)) = message.split_once(&format!("unknown field `{UNKNOWN}`, expected ")) else {
+                continue;
+            };
+            let documented: BTreeSet<&str> =
+                rows.iter().filter_map(|row| next(&super::places::parts(&row.key), &table)).collect();
             for name in quoted(listed).filter(|name| !documented.contains(name)) {
                 let key = written(&[&table[..], &[Step::Key(name.to_owned())]].concat()).replace("[0]", "[]");
                 let row = format!("| `{key}` | unit | range | default | meaning |");
@@ -100,13 +106,18 @@ impl Check<'_> {
         if row.is_required() {
             match left_out {
                 Err(error) if error.to_string().contains(&name) => self.found.required += 1,
-                other => self.fault(row, format_args!("may be left out, so its row needs a default: {:?}", other.map(|_| ()))),
+                other => self
+                    .fault(row, format_args!("may be left out, so its row needs a default: {:?}", other.map(|_| ()))),
             }
         } else if let Some(default) = literal(row) {
             let given = self.read(&with(document, place, default));
             match (left_out, given) {
-                (Ok(left_out), Ok(given)) if format!("{left_out:?}") == format!("{given:?}") => self.found.defaults += 1,
-                (Err(error), _) | (_, Err(error)) => self.fault(row, format_args!("has no default {}: {error}", row.default)),
+                (Ok(left_out), Ok(given)) if format!("{left_out:?}") == format!("{given:?}") => {
+                    self.found.defaults += 1
+                }
+                (Err(error), _) | (_, Err(error)) => {
+                    self.fault(row, format_args!("has no default {}: {error}", row.default))
+                }
                 _ => self.fault(row, format_args!("left out is not the same as with its default, {}", row.default)),
             }
         } else if let Err(error @ Error::Malformed { .. }) = left_out {
@@ -120,7 +131,8 @@ impl Check<'_> {
         if listed.is_empty() || !at(document, place).is_str() {
             return;
         }
-        let message = self.read(&with(document, place, Value::String(UNKNOWN.to_owned()))).map(drop).unwrap_err().to_string();
+        let message =
+            self.read(&with(document, place, Value::String(UNKNOWN.to_owned()))).map(drop).unwrap_err().to_string();
         let taken = message.split_once(", expected ").map(|(_, words)| quoted(words).collect::<BTreeSet<&str>>());
         if taken.as_ref() != Some(&listed) {
             self.fault(row, format_args!("has the words {listed:?} in its row: {message}"));
@@ -139,7 +151,13 @@ impl Check<'_> {
             }
             if let Some(ends) = row.ends.filter(|_| is_of_numbers) {
                 // The first is the least one of `[least, greatest]`.
-                self.ends(document, [&below(Step::Element(0)), &below(Step::Element(list.len() - 1))], place, row, ends);
+                self.ends(
+                    document,
+                    [&below(Step::Element(0)), &below(Step::Element(list.len() - 1))],
+                    place,
+                    row,
+                    ends,
+                );
             }
         } else if let Some(ends) = row.ends {
             match at(document, place) {
@@ -184,7 +202,10 @@ impl Check<'_> {
         match self.read(outside).map(drop).map_err(|error| stated(&error, place).ok_or(error)) {
             Err(Ok((range, unit))) => {
                 if (0..2).any(|side| ends[side].is_some() && ends[side] != range[side]) {
-                    self.fault(row, format_args!("has the range {} in its row, and {range:?} in the reader", row.range));
+                    self.fault(
+                        row,
+                        format_args!("has the range {} in its row, and {range:?} in the reader", row.range),
+                    );
                 }
                 if !unit.is_empty() && unit != row.unit {
                     self.fault(row, format_args!("has the unit {} in its row, and {unit} in the reader", row.unit));

@@ -31,7 +31,8 @@ pub fn places(value: &Value, parts: &[&str]) -> Vec<Vec<Step>> {
     let [first, rest @ ..] = parts else { return vec![vec![]] };
     match value {
         Value::Array(list) if *first == "[]" => {
-            let found = list.iter().enumerate().map(|(index, element)| behind(Step::Element(index), places(element, rest)));
+            let found =
+                list.iter().enumerate().map(|(index, element)| behind(Step::Element(index), places(element, rest)));
             found.into_iter().find(|places| !places.is_empty()).unwrap_or_default()
         }
         // `*` goes through the first element of a list, too.

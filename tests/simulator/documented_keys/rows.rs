@@ -24,8 +24,13 @@ impl Row {
 
     /// The words that a value may be, where the range lists words alone.
     pub fn words(&self) -> Vec<&str> {
-        let listed: Vec<Option<&str>> = self.range.split(", ").map(|word| word.strip_prefix('`')?.strip_suffix('`')).collect();
-        listed.into_iter().map(|word| word.map(|word| word.trim_matches('"'))).collect::<Option<_>>().unwrap_or_default()
+        let listed: Vec<Option<&str>> =
+            self.range.split(", ").map(|word| word.strip_prefix('`')?.strip_suffix('`')).collect();
+        listed
+            .into_iter()
+            .map(|word| word.map(|word| word.trim_matches('"')))
+            .collect::<Option<_>>()
+            .unwrap_or_default()
     }
 
     /// How many values a list may have, where the range says so: `1 to 64 values`.

@@ -83,9 +83,12 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("vehicle", 1, SAME),
         ],
         Column::Clearance => &[("tractor", 1, CLEARANCE), ("trailer", 1, CLEARANCE)],
-        Column::Progress => {
-            &[("lane_distance", 1, POSITION), ("waypoint_distance", 1, POSITION), ("waypoint", 1, SAME), ("passed", 1, SAME)]
-        }
+        Column::Progress => &[
+            ("lane_distance", 1, POSITION),
+            ("waypoint_distance", 1, POSITION),
+            ("waypoint", 1, SAME),
+            ("passed", 1, SAME),
+        ],
         Column::Ranges => &[("", N_RAYS, RANGE)],
         Column::Observation | Column::NextObservation => &[
             ("speed", 1, SMALL),
@@ -100,9 +103,12 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("ranges", N_RAYS, SCALED_RANGE),
             ("radii", 10, SAME),
         ],
-        Column::Terms => {
-            &[("waypoints", 1, SAME), ("lane_distance", 1, SCALED_POSITION), ("clearance", 1, CLEARANCE), ("failure", 1, SAME)]
-        }
+        Column::Terms => &[
+            ("waypoints", 1, SAME),
+            ("lane_distance", 1, SCALED_POSITION),
+            ("clearance", 1, CLEARANCE),
+            ("failure", 1, SAME),
+        ],
         Column::Reward => &[("", 1, REWARD)],
         Column::Extras | Column::NextExtras => &[("", N_EXTRAS, SMALL)],
     }
@@ -135,7 +141,11 @@ impl Agreement {
 impl fmt::Display for Agreement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Agreement { value, n, equal, unusual, worst, .. } = self;
-        write!(f, "{value} | {:.2} % equal | at most {worst:.1e} | {unusual} of {n} unusual", 100.0 * *equal as f64 / *n as f64)
+        write!(
+            f,
+            "{value} | {:.2} % equal | at most {worst:.1e} | {unusual} of {n} unusual",
+            100.0 * *equal as f64 / *n as f64
+        )
     }
 }
 

@@ -22,7 +22,11 @@ pub fn world(gutter: Gutter) -> Arc<World> {
     static WORLDS: OnceLock<[Arc<World>; 2]> = OnceLock::new();
     let worlds = WORLDS.get_or_init(|| {
         let (scenario, drivable) = benchmark("attard2023-full");
-        let solid = scenario.places.iter().map(|place| Field::bake(&place.roundabout.kerbs(Gutter::Solid), scenario.cell)).collect();
+        let solid = scenario
+            .places
+            .iter()
+            .map(|place| Field::bake(&place.roundabout.kerbs(Gutter::Solid), scenario.cell))
+            .collect();
         let solid = World { fields: solid, ..drivable.clone() };
         [drivable, solid].map(Arc::new)
     });

@@ -18,7 +18,11 @@ fn circulating(rig: &Rig, steering: f32) -> (Truck, f32, f32) {
     let front_side_speed = turning.side_speed + rig.wheelbase * turning.yaw_rate;
     let trailer_speed = turning.trailer_lateral_acceleration / turning.trailer_yaw_rate;
     let trailer_side_speed = rig.slip * trailer_speed * trailer_speed.abs() * turning.trailer_yaw_rate;
-    (truck, SPEED.hypot(front_side_speed) / turning.yaw_rate, trailer_speed.hypot(trailer_side_speed) / turning.yaw_rate)
+    (
+        truck,
+        SPEED.hypot(front_side_speed) / turning.yaw_rate,
+        trailer_speed.hypot(trailer_side_speed) / turning.yaw_rate,
+    )
 }
 
 /// The truck with its front axle on a circle of `radius` (m), and the off-tracking of its trailer's axle group (m).
@@ -71,7 +75,13 @@ fn an_articulation_decays_straight_ahead_and_grows_in_reverse_by_the_closed_form
     let vehicle = vehicle("eu_4x2_13m6");
     let rig = Rig { slip: 0.0, ..vehicle.rig("empty", SUBSTEP, None) };
     for (speed, articulation) in [(8.0f32, 0.8f32), (-1.5, 0.035)] {
-        let truck = driven(&rig, SUBSTEP, 100, &Control::default(), &Truck { speed, trailer_heading: -articulation, ..Truck::default() });
+        let truck = driven(
+            &rig,
+            SUBSTEP,
+            100,
+            &Control::default(),
+            &Truck { speed, trailer_heading: -articulation, ..Truck::default() },
+        );
         let expected = vehicle.single_track().articulation_after_straight(articulation.into(), f64::from(speed) * 5.0);
         let found = f64::from(truck.heading - truck.trailer_heading);
         // The error of the midpoint rule at 0.05 s.

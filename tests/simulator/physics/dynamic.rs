@@ -35,7 +35,8 @@ fn off_tracking(rig: &Rig, speed: f64, radius: f64) -> f64 {
         let truck = driven(rig, SUBSTEP as f32, (400.0 / (speed * SUBSTEP)) as u32, &control, &start);
         let motion = motion_of(rig, &truck);
         let yaw_rate = f64::from(motion.yaw_rate);
-        let front = DVec2::new(speed, f64::from(motion.side_speed) + f64::from(rig.wheelbase) * yaw_rate).length() / yaw_rate;
+        let front =
+            DVec2::new(speed, f64::from(motion.side_speed) + f64::from(rig.wheelbase) * yaw_rate).length() / yaw_rate;
         // Velocity of the trailer's axle group: the hitch's, less the trailer's turning.
         let articulation = f64::from(truck.heading - truck.trailer_heading);
         let hitch = DVec2::new(speed, f64::from(motion.side_speed) + f64::from(rig.fifth_wheel) * yaw_rate);
@@ -66,8 +67,14 @@ fn off_tracking_in_a_circle_is_that_of_a_dynamic_single_track() {
                 let found = off_tracking(&rig, speed / 3.6, radius);
                 let expected = reference.off_tracking(speed / 3.6, radius);
                 let bound = if speed <= 30.0 { 0.05 } else { 0.10 };
-                println!("{name} {load} {speed} km/h {radius} m: {found:.3} m, reference {expected:.3} m, {:.3}", found - expected);
-                assert!((found - expected).abs() <= bound, "{name} {load} {speed} km/h {radius} m: {found} m, reference {expected} m");
+                println!(
+                    "{name} {load} {speed} km/h {radius} m: {found:.3} m, reference {expected:.3} m, {:.3}",
+                    found - expected
+                );
+                assert!(
+                    (found - expected).abs() <= bound,
+                    "{name} {load} {speed} km/h {radius} m: {found} m, reference {expected} m"
+                );
                 checked += 1;
             }
         }
@@ -137,7 +144,8 @@ fn rolled(suspension: &Suspension, state: &mut [f64; 2], acceleration: f64) -> f
     let last = rates(plus(*state, third, h));
     *state = plus(plus(plus(plus(*state, first, h / 6.0), second, h / 3.0), third, h / 3.0), last, h / 6.0);
     let lever = centre_of_gravity - roll_centre;
-    let settled = lever * (1.0 + 1.0 / roll_gain) * state[0] + 2.0 * roll_damping * lever / (roll_gain * natural) * state[1];
+    let settled =
+        lever * (1.0 + 1.0 / roll_gain) * state[0] + 2.0 * roll_damping * lever / (roll_gain * natural) * state[1];
     2.0 / track * (roll_centre * acceleration / GRAVITY + settled)
 }
 
@@ -145,7 +153,9 @@ fn rolled(suspension: &Suspension, state: &mut [f64; 2], acceleration: f64) -> f
 fn largest_off_tracking(path: &[[DVec2; 2]]) -> f64 {
     let before = std::iter::once(path[0][0] - 20.0 * DVec2::X);
     let front: Vec<DVec2> = before.chain(path.iter().map(|pair| pair[0])).collect();
-    let nearest = |point: DVec2| front.windows(2).map(|pair| distance_to_segment(point, pair[0], pair[1])).fold(f64::MAX, f64::min);
+    let nearest = |point: DVec2| {
+        front.windows(2).map(|pair| distance_to_segment(point, pair[0], pair[1])).fold(f64::MAX, f64::min)
+    };
     path.iter().map(|&[_, trailer]| nearest(trailer)).fold(0.0, f64::max)
 }
 
@@ -163,11 +173,16 @@ fn an_s_bend_is_that_of_a_dynamic_single_track_with_equal_steering() {
             for speed in [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0] {
                 let (trailer, [found, expected], [ratio, reference]) = bend(&vehicle, load, speed);
                 let case = format!("{name} {load} {speed} km/h");
-                println!("{case}: {trailer:.3} m, off-tracking {found:.3} of {expected:.3} m, ratio {ratio:.3} of {reference:.3}");
+                println!(
+                    "{case}: {trailer:.3} m, off-tracking {found:.3} of {expected:.3} m, ratio {ratio:.3} of {reference:.3}"
+                );
                 let bound = if speed <= 30.0 { 0.05 } else { 0.10 };
                 assert!((found - expected).abs() <= bound, "{case}: off-tracking {found} m, reference {expected} m");
                 // Where no wheel is near to lifting the point that lateral acceleration is taken at counts for more.
-                assert!((ratio - reference).abs() <= 0.05 * reference.max(0.3), "{case}: ratio {ratio}, reference {reference}");
+                assert!(
+                    (ratio - reference).abs() <= 0.05 * reference.max(0.3),
+                    "{case}: ratio {ratio}, reference {reference}"
+                );
             }
         }
     }

@@ -53,7 +53,8 @@ fn the_yaw_follows_a_step_of_the_wheels_with_its_time_constant() {
 #[test]
 fn while_the_wheels_turn_steadily_the_yaw_lags_by_their_rate_times_its_time_constant() {
     let rig = Rig { steer_rate: 0.05, ..rig(Model { yaw_lag: 1.0, ..Model::default() }) };
-    let truck = driving(&rig, &Control { steering: 0.5, ..Control::default() }, Truck { speed: 8.0, ..Truck::default() }, 2.0);
+    let truck =
+        driving(&rig, &Control { steering: 0.5, ..Control::default() }, Truck { speed: 8.0, ..Truck::default() }, 2.0);
     let rate = 0.05 / truck.steering.cos().powi(2) / rig.wheelbase;
     let expected = -rate * 0.0185 * 8.0;
     assert!((truck.curvature_lag - expected).abs() < 0.01 * expected.abs(), "{} {expected}", truck.curvature_lag);
@@ -67,7 +68,12 @@ fn power_limits_the_drive_at_speed() {
     assert!((drive_max(&rig, 17.0) - 0.5).abs() < 1e-6);
     let control = controlled(&rig, 0.1, &Action { steering: 0.0, speed: 25.0 }, 17.0, &Control::default());
     assert!((control.acceleration - 0.5).abs() < 1e-6 && control.speed_error_integral == 0.0);
-    let truck = driving(&rig, &Control { acceleration: 9.0, ..Control::default() }, Truck { speed: 17.0, ..Truck::default() }, 0.05);
+    let truck = driving(
+        &rig,
+        &Control { acceleration: 9.0, ..Control::default() },
+        Truck { speed: 17.0, ..Truck::default() },
+        0.05,
+    );
     assert!((truck.acceleration - 0.5).abs() < 1e-6);
 }
 
@@ -85,14 +91,20 @@ fn braking_takes_lateral_grip_by_the_friction_ellipse() {
 #[test]
 fn a_steer_command_takes_effect_after_its_delay() {
     let (step, steps) = (0.1f32, 4);
-    for (delay, expected) in [(0.0, [2, 4, 6, 8]), (0.05, [1, 3, 5, 7]), (0.1, [0, 2, 4, 6]), (0.15, [0, 1, 3, 5]), (0.2, [0, 0, 2, 4])] {
+    for (delay, expected) in
+        [(0.0, [2, 4, 6, 8]), (0.05, [1, 3, 5, 7]), (0.1, [0, 2, 4, 6]), (0.15, [0, 1, 3, 5]), (0.2, [0, 0, 2, 4])]
+    {
         let rig = rig(Model { steer_delay: delay, ..Model::default() });
         let (mut control, mut truck) = (Control::default(), Truck { speed: 8.0, ..Truck::default() });
         for expected in expected.into_iter().take(steps) {
             control = controlled(&rig, step, &Action { steering: 0.6, speed: 8.0 }, truck.speed, &control);
             truck = driven(&rig, SUBSTEP, 2, &control, &truck);
             // The wheels move by a degree a sub-step.
-            assert!((truck.steering.to_degrees() - expected as f32).abs() < 1e-4, "{delay} s: {}", truck.steering.to_degrees());
+            assert!(
+                (truck.steering.to_degrees() - expected as f32).abs() < 1e-4,
+                "{delay} s: {}",
+                truck.steering.to_degrees()
+            );
         }
     }
 }
@@ -104,5 +116,9 @@ fn a_road_that_falls_to_the_right_loads_the_right_wheels() {
     let truck = driving(&rig, &Control::default(), Truck { speed: 8.0, ..Truck::default() }, 60.0);
     let truck = driving(&rig, &Control::default(), truck, 0.05);
     let expected = vehicle.loads["laden"].suspension.quasi_static_load_transfer_ratio(0.025 * GRAVITY);
-    assert!((f64::from(truck.trailer_load_transfer_ratio) - expected).abs() < 1e-3, "{}", truck.trailer_load_transfer_ratio);
+    assert!(
+        (f64::from(truck.trailer_load_transfer_ratio) - expected).abs() < 1e-3,
+        "{}",
+        truck.trailer_load_transfer_ratio
+    );
 }

@@ -33,8 +33,9 @@ fn length(vehicle: &Vehicle) -> f64 {
 /// Least distance of the trailer's inner rear wheels from the centre of AASHTO's minimum turn: half a turn, the front
 /// axle on 41 ft (m).
 fn inside_radius(vehicle: &Vehicle) -> f64 {
-    let wheel =
-        |pose: &Pose| (pose.trailer_position + 0.5 * vehicle.trailer.width * DVec2::from_angle(pose.trailer_heading).perp()).length();
+    let wheel = |pose: &Pose| {
+        (pose.trailer_position + 0.5 * vehicle.trailer.width * DVec2::from_angle(pose.trailer_heading).perp()).length()
+    };
     turned(vehicle, 41.0 * FOOT, PI).iter().map(wheel).fold(f64::INFINITY, f64::min)
 }
 
@@ -45,7 +46,10 @@ fn off_tracking(vehicle: &Vehicle) -> [f64; 2] {
     let poses = turned(vehicle, RADIUS, 4.0 * PI - 1e-9);
     let steady = &poses[poses.len() - 1 - (30.5 / 0.05) as usize];
     let (first, second, third) = (vehicle.tractor.wheelbase, vehicle.tractor.fifth_wheel, vehicle.trailer.wheelbase);
-    [RADIUS - steady.trailer_position.length(), RADIUS - (RADIUS.powi(2) - first.powi(2) + second.powi(2) - third.powi(2)).sqrt()]
+    [
+        RADIUS - steady.trailer_position.length(),
+        RADIUS - (RADIUS.powi(2) - first.powi(2) + second.powi(2) - third.powi(2)).sqrt(),
+    ]
 }
 
 fn metres(value: f64) -> String {
@@ -60,8 +64,14 @@ fn rows() -> Vec<[String; 4]> {
     let circle = |vehicle: &Vehicle| metres(vehicle.turning_circle_inner_radius(12.5).unwrap());
     let mut rows = vec![
         row(["`us_wb62`", "overall length", "69.0 ft"], feet(length(&us))),
-        row(["`us_wb62`", "length of the trailer", "48.0 ft"], feet(us.trailer.kingpin_to_front + us.trailer.kingpin_to_rear)),
-        row(["`us_wb62`", "radius of the front axle at the lock", "41.0 ft"], feet(us.tractor.wheelbase / us.tractor.steer_max.sin())),
+        row(
+            ["`us_wb62`", "length of the trailer", "48.0 ft"],
+            feet(us.trailer.kingpin_to_front + us.trailer.kingpin_to_rear),
+        ),
+        row(
+            ["`us_wb62`", "radius of the front axle at the lock", "41.0 ft"],
+            feet(us.tractor.wheelbase / us.tractor.steer_max.sin()),
+        ),
         row(["`us_wb62`", "inside radius of half a turn on it", "7.4 ft"], feet(inside_radius(&us))),
         row(["`eu_4x2_13m6`", "overall length", "at most 16.50 m"], metres(length(&eu))),
         row(["`eu_4x2_13m6`", "kingpin to the trailer's rear", "at most 12.00 m"], metres(eu.trailer.kingpin_to_rear)),

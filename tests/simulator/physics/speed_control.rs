@@ -31,11 +31,17 @@ fn a_truck_reaches_its_target_speed_without_overshoot() {
         let vehicle = vehicle(name);
         for load in vehicle.loads.keys() {
             let rig = vehicle.rig(load, SUBSTEP, None);
-            for (from, to) in [(0.0, 30.0), (30.0, 0.0), (15.0, 30.0), (30.0, 15.0), (29.0, 30.0), (29.6, 30.0), (8.0, 8.3)] {
+            for (from, to) in
+                [(0.0, 30.0), (30.0, 0.0), (15.0, 30.0), (30.0, 15.0), (29.0, 30.0), (29.6, 30.0), (8.0, 8.3)]
+            {
                 let truck = Truck { speed: from * KMH, ..Truck::default() };
                 let (truck, _, past) = approached(&rig, truck, Control::default(), to * KMH, 60.0);
                 assert!(past <= OVERSHOOT_MAX, "{name} {load} {from} to {to} km/h: {} km/h past", past / KMH);
-                assert!((truck.speed - to * KMH).abs() <= OVERSHOOT_MAX, "{name} {load} {from} to {to} km/h: {} km/h", truck.speed / KMH);
+                assert!(
+                    (truck.speed - to * KMH).abs() <= OVERSHOOT_MAX,
+                    "{name} {load} {from} to {to} km/h: {} km/h",
+                    truck.speed / KMH
+                );
                 checked += 1;
             }
         }
@@ -66,7 +72,8 @@ fn a_constant_loss_of_drive_is_compensated_by_the_integral() {
 #[test]
 fn the_control_requests_no_more_than_the_truck_can_do() {
     let rig = vehicle("daf_xf").rig("laden", SUBSTEP, None);
-    let ask = |speed, target| controlled(&rig, 0.1, &Action { steering: 0.3, speed: target }, speed, &Control::default());
+    let ask =
+        |speed, target| controlled(&rig, 0.1, &Action { steering: 0.3, speed: target }, speed, &Control::default());
     assert_eq!(ask(0.0, 8.0), Control { steering: 0.3, acceleration: 0.7, target_speed: 8.0, ..Control::default() });
     assert_eq!(ask(8.0, 0.0), Control { steering: 0.3, acceleration: -2.5, holds: 1, ..Control::default() });
 }

@@ -31,8 +31,10 @@ impl Worst {
         let ratio = error.abs() / tolerance;
         // NaN counts as the largest error.
         if ratio.is_nan() || self.ratio < ratio {
-            *self =
-                Worst { ratio: if ratio.is_nan() { f64::INFINITY } else { ratio }, what: format!("{what}: {error:e} of {tolerance:e}") };
+            *self = Worst {
+                ratio: if ratio.is_nan() { f64::INFINITY } else { ratio },
+                what: format!("{what}: {error:e} of {tolerance:e}"),
+            };
         }
     }
 
@@ -74,7 +76,15 @@ fn rows(case: &Value) -> &[Value] {
 /// A vehicle for cases that only give the positions of the axles.
 fn kinematic(row: &Value) -> CaseVehicle {
     let any: CaseVehicle = serde_json::from_value(case("straight_30")["vehicle"].clone()).unwrap();
-    CaseVehicle { L1: number(row, "L1"), a: number(row, "a"), L2: number(row, "L2"), K: 0.0, delta_max: 1.5, gamma_max: 10.0, ..any }
+    CaseVehicle {
+        L1: number(row, "L1"),
+        a: number(row, "a"),
+        L2: number(row, "L2"),
+        K: 0.0,
+        delta_max: 1.5,
+        gamma_max: 10.0,
+        ..any
+    }
 }
 
 /// Drives a case on an engine, a sub-step at a time. Each is one drive stage of a world that has this rig.
@@ -110,7 +120,13 @@ fn alone(engine: &Engine, rig: &Rig, substep: f32) -> Simulator {
 }
 
 /// The state that a truck reaches `t` seconds after `init` under one command.
-fn driven(engine: &Engine, vehicle: CaseVehicle, init: Init, command: Command, t: f64) -> offtrack_reference::trace::State {
+fn driven(
+    engine: &Engine,
+    vehicle: CaseVehicle,
+    init: Init,
+    command: Command,
+    t: f64,
+) -> offtrack_reference::trace::State {
     let case = Case {
         id: String::new(),
         vehicle,
@@ -130,7 +146,11 @@ fn trajectory(engine: &Engine, written: &Value, changed: impl Fn(&mut Case)) -> 
     assert_eq!(case.dt, 0.05);
     changed(&mut case);
     let traced = traced(engine, &case);
-    assert!(!matches!(engine, Engine::Cpu) || traced == trace(&case).unwrap(), "{}: a trace differs from the drive stage", case.id);
+    assert!(
+        !matches!(engine, Engine::Cpu) || traced == trace(&case).unwrap(),
+        "{}: a trace differs from the drive stage",
+        case.id
+    );
     compare(&traced, written)
 }
 
@@ -144,7 +164,11 @@ fn compare(traced: &Traced, written: &Value) -> Worst {
         let place = DVec2::new(number(expected, "x"), number(expected, "y"));
         worst.see("pos", DVec2::new(state.x, state.y).distance(place), tolerance("pos"));
         worst.see("hitch", DVec2::from(state.hitch).distance(point(&expected["hitch"])), tolerance("pos"));
-        worst.see("trailer_pos", DVec2::from(state.trailer_axle).distance(point(&expected["trailer_axle"])), tolerance("trailer_pos"));
+        worst.see(
+            "trailer_pos",
+            DVec2::from(state.trailer_axle).distance(point(&expected["trailer_axle"])),
+            tolerance("trailer_pos"),
+        );
         worst.see("psi1", state.psi1 - number(expected, "psi1"), tolerance("psi1"));
         worst.see("psi2", state.psi2 - number(expected, "psi2"), tolerance("psi1") + tolerance("gamma"));
         worst.see("gamma", state.gamma - number(expected, "gamma"), tolerance("gamma"));
@@ -162,7 +186,11 @@ fn compare(traced: &Traced, written: &Value) -> Worst {
         for (key, expected) in expected {
             let expected = expected.as_f64().unwrap();
             // A peak of nothing at all may still be the rounding of an f32.
-            worst.see(&format!("peak {key}"), number(&peak, key) - expected, tolerance("peak_rel") * expected.abs() + 1e-6);
+            worst.see(
+                &format!("peak {key}"),
+                number(&peak, key) - expected,
+                tolerance("peak_rel") * expected.abs() + 1e-6,
+            );
         }
     }
     let jackknife_tolerance = written["tolerance"]["t_jackknife"].as_f64().unwrap_or(0.05);
@@ -176,7 +204,13 @@ fn closed_form(engine: &Engine, written: &Value) -> Worst {
     for row in rows(written) {
         let (delta, v) = (number(row, "delta"), number(row, "v"));
         let init = Init { x: 0.0, y: 0.0, psi1: 0.0, psi2: -number(row, "gamma0"), v, delta };
-        let state = driven(engine, kinematic(row), init, Command { t: 0.0, delta_cmd: delta, a_cmd: 0.0, v_cmd: None }, number(row, "t"));
+        let state = driven(
+            engine,
+            kinematic(row),
+            init,
+            Command { t: 0.0, delta_cmd: delta, a_cmd: 0.0, v_cmd: None },
+            number(row, "t"),
+        );
         worst.see("pos", DVec2::new(state.x, state.y).distance(DVec2::new(number(row, "x"), number(row, "y"))), pos);
         worst.see("psi1", state.psi1 - number(row, "psi1"), angle);
         worst.see("gamma", state.gamma - number(row, "gamma"), angle);
@@ -195,8 +229,13 @@ fn cross_check(engine: &Engine, written: &Value) -> Worst {
         let [steer_rate, a_cmd]: [f64; 2] = serde_json::from_value(check["u"].clone()).unwrap();
         let vehicle = CaseVehicle { delta_rate: steer_rate.abs(), ..kinematic(&row([3.6, 0.0, 8.1])) };
         let command = Command { t: 0.0, delta_cmd: 1.5_f64.copysign(steer_rate), a_cmd, v_cmd: None };
-        let state = driven(engine, vehicle, Init { x, y, psi1, psi2: psi1 + alpha, v, delta }, command, number(check, "t"));
-        worst.see("pos", DVec2::new(state.x, state.y).distance(DVec2::new(number(check, "x"), number(check, "y"))), pos);
+        let state =
+            driven(engine, vehicle, Init { x, y, psi1, psi2: psi1 + alpha, v, delta }, command, number(check, "t"));
+        worst.see(
+            "pos",
+            DVec2::new(state.x, state.y).distance(DVec2::new(number(check, "x"), number(check, "y"))),
+            pos,
+        );
         for (key, value) in [("psi1", state.psi1), ("gamma", state.gamma), ("delta", state.delta), ("v", state.v)] {
             worst.see(key, value - number(check, key), angle);
         }
@@ -277,9 +316,9 @@ fn a_roll_with_the_wrong_damping_fails_the_vectors() {
 
 #[test]
 fn tyres_that_hold_seven_tenths_of_gravity_fail_the_one_vector_that_asks_for_more() {
-    let failing = cases()
-        .into_iter()
-        .filter(|case| case["kind"] == "trajectory" && 1.0 < trajectory(&Engine::Cpu, case, |case| case.vehicle.mu = Some(0.7)).ratio);
+    let failing = cases().into_iter().filter(|case| {
+        case["kind"] == "trajectory" && 1.0 < trajectory(&Engine::Cpu, case, |case| case.vehicle.mu = Some(0.7)).ratio
+    });
     let failing: Vec<String> = failing.map(|case| case["id"].as_str().unwrap().to_owned()).collect();
     assert_eq!(failing, ["circle_paper_R9p57_30"]);
 }
@@ -301,7 +340,10 @@ fn an_instant_between_two_sub_steps_lies_on_the_arc_and_changes_no_other() {
         assert!(DVec2::new(state.x, state.y).distance(place) < 1e-3 && (state.psi1 - turned).abs() < 1e-4, "{state:?}");
     }
     // One sub-step more, in two parts, rounds differently.
-    assert!((among.states[2].x - alone.states[0].x).abs() < 1e-4 && (among.states[2].psi2 - alone.states[0].psi2).abs() < 1e-5);
+    assert!(
+        (among.states[2].x - alone.states[0].x).abs() < 1e-4
+            && (among.states[2].psi2 - alone.states[0].psi2).abs() < 1e-5
+    );
 }
 
 #[test]
@@ -312,7 +354,8 @@ fn explicit_euler_at_the_same_step_fails_the_vectors() {
     let Init { mut x, mut y, mut psi1, mut psi2, v, delta } = case.init;
     let expected = &written["expected"][1];
     for _ in 0..(number(expected, "t") / case.dt).round() as usize {
-        let truck = Truck { speed: v as f32, steering: delta as f32, heading: (psi1 - psi2) as f32, ..Truck::default() };
+        let truck =
+            Truck { speed: v as f32, steering: delta as f32, heading: (psi1 - psi2) as f32, ..Truck::default() };
         let motion = motion_of(&rig, &truck);
         (x, y) = (x + case.dt * v * psi1.cos(), y + case.dt * v * psi1.sin());
         psi1 += case.dt * f64::from(motion.yaw_rate);

@@ -24,7 +24,11 @@ fn a_rig_has_the_files_dimensions_in_metres_and_radians() {
     let rig = vehicle("daf_xf").rig("empty", 0.05, None);
     assert_eq!([rig.wheelbase, rig.fifth_wheel, rig.trailer_wheelbase, rig.slip], [3.543, 0.408, 7.756, 0.0136]);
     assert!((rig.steer_max - 0.698_131_7).abs() < 1e-6 && (rig.steer_rate - 0.349_065_85).abs() < 1e-6);
-    assert!((rig.tractor_body.front - 4.906).abs() < 1e-5 && rig.tractor_body.rear == -0.958 && rig.tractor_body.half_width == 1.25);
+    assert!(
+        (rig.tractor_body.front - 4.906).abs() < 1e-5
+            && rig.tractor_body.rear == -0.958
+            && rig.tractor_body.half_width == 1.25
+    );
     assert!((rig.trailer_body.front - 9.846).abs() < 1e-5 && (rig.trailer_body.rear + 3.864).abs() < 1e-5);
     let agile = vehicle("daf_xf").rig("empty", 0.05, Some(70.0f64.to_radians()));
     assert!((agile.steer_max - 1.221_730_5).abs() < 1e-6);
@@ -59,7 +63,9 @@ fn units_roll_over_at_the_thresholds_of_the_presets() {
         let vehicle = vehicle(name);
         // The table rounds 0.858 down.
         assert!((vehicle.tractor.suspension.rollover_threshold() - 0.85).abs() < 0.01);
-        for (load, threshold) in [("empty", 0.77), ("half", 0.57), ("laden", 0.41), ("laden_high", 0.37), ("laden_worst", 0.324)] {
+        for (load, threshold) in
+            [("empty", 0.77), ("half", 0.57), ("laden", 0.41), ("laden_high", 0.37), ("laden_worst", 0.324)]
+        {
             assert!((vehicle.loads[load].suspension.rollover_threshold() - threshold).abs() < 0.005, "{load}");
         }
     }
@@ -108,13 +114,21 @@ fn a_wrong_vehicle_file_is_refused_with_its_key_its_value_and_what_would_do() {
         ("roll_centre = 0.75", "roll_centre = 1.5", "loads.empty.suspension.roll_centre: 1.5 m; must lie in 0..1.25 m"),
         ("width = 2.5", "widht = 2.5", "unknown field `widht`"),
         ("mass = 7800.0\n", "", "missing field `mass`"),
-        ("[loads.empty]", "[sensors]\ntractor_mounts = [[4.0, 0.0]]\n[loads.empty]", "sensors.tractor_mounts: 1; must lie in 13..13"),
+        (
+            "[loads.empty]",
+            "[sensors]\ntractor_mounts = [[4.0, 0.0]]\n[loads.empty]",
+            "sensors.tractor_mounts: 1; must lie in 13..13",
+        ),
         (
             "[loads.empty]",
             "[sensors]\ntrailer_first = 8.0\ntrailer_last = 3.0\n[loads.empty]",
             "sensors.trailer_last: 3 m; must lie in 8..13.7",
         ),
-        ("[loads.empty]", "[speed_control]\ngain = 0.0\n[loads.empty]", "speed_control.gain: 0 1/s; must lie in 0.01..10 1/s"),
+        (
+            "[loads.empty]",
+            "[speed_control]\ngain = 0.0\n[loads.empty]",
+            "speed_control.gain: 0 1/s; must lie in 0.01..10 1/s",
+        ),
     ];
     for (from, to, expected) in wrong {
         let message = refusal(from, to);
@@ -128,7 +142,8 @@ fn a_wrong_vehicle_file_is_refused_with_its_key_its_value_and_what_would_do() {
 fn a_file_can_move_its_sensors() {
     let text = std::fs::read_to_string(vehicle_file("daf_xf")).unwrap();
     let mounts: Vec<String> = (0..13).map(|mount| format!("[4.5, {}]", 1.2 - 0.2 * f64::from(mount))).collect();
-    let sensors = format!("[sensors]\ntrailer_first = 1.0\ntrailer_last = 8.0\ntractor_mounts = [{}]\n", mounts.join(", "));
+    let sensors =
+        format!("[sensors]\ntrailer_first = 1.0\ntrailer_last = 8.0\ntractor_mounts = [{}]\n", mounts.join(", "));
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("truck.toml");
     std::fs::write(&file, format!("{text}\n{sensors}")).unwrap();

@@ -16,7 +16,11 @@ pub(super) const PNG_WIDTH: u32 = 1600;
 pub(super) fn check(file: &Path) -> Result<(), Error> {
     match file.extension().and_then(|extension| extension.to_str()) {
         Some("svg" | "png") => Ok(()),
-        _ => Err(Error::Setting { name: "--plot", value: file.display().to_string(), expected: "must end in .svg or .png".into() }),
+        _ => Err(Error::Setting {
+            name: "--plot",
+            value: file.display().to_string(),
+            expected: "must end in .svg or .png".into(),
+        }),
     }
 }
 
@@ -48,9 +52,19 @@ pub(super) fn drawn(scale: &Scale, device: &str) -> Result<String, offtrack_draw
         speeds.push(Line { name: Some(words(mode)), colour, kind: Kind::Measured(spread), points });
     }
     let stages = stage_lines(&scale.measured(Mode::Random));
-    let mut panels = vec![Panel { title: "Speed: median, slowest and fastest window", x: "trucks", y: "env steps / s", lines: speeds }];
+    let mut panels = vec![Panel {
+        title: "Speed: median, slowest and fastest window",
+        x: "trucks",
+        y: "env steps / s",
+        lines: speeds,
+    }];
     if !stages.is_empty() {
-        panels.push(Panel { title: "Time of each stage, random actions", x: "trucks", y: "time a truck and step [ns]", lines: stages });
+        panels.push(Panel {
+            title: "Time of each stage, random actions",
+            x: "trucks",
+            y: "time a truck and step [ns]",
+            lines: stages,
+        });
     }
     let step = &scale.step;
     let subtitles = vec![

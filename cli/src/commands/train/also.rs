@@ -47,12 +47,18 @@ impl Also {
             }
             let both = scenario.shared_names(named.split, training, Split::Train);
             if let (Some(route), true) = (both.first(), named.split != Split::Train) {
-                return Err(wrong(format!("{route} is trained on, so no {} route may be: leave it out", named.split.name())));
+                return Err(wrong(format!(
+                    "{route} is trained on, so no {} route may be: leave it out",
+                    named.split.name()
+                )));
             }
             let trained_on = both.len();
             if let Some(difference) = alike::needed(training, &scenario) {
                 let out = "leave it out, or all of them with --set also_evaluate=";
-                return Err(wrong(format!("it differs from {}, which is trained on, in {difference}: {out}", training.name)));
+                return Err(wrong(format!(
+                    "it differs from {}, which is trained on, in {difference}: {out}",
+                    training.name
+                )));
             }
             Ok(Also { scenario, split: named.split, trained_on })
         };
@@ -89,22 +95,27 @@ fn familiarity(trained_on: usize, n_routes: usize) -> String {
 /// A line for each evaluation, that on `benchmark` first.
 pub fn lines(evaluation: Option<&Report>, also: &[AlsoReport]) -> String {
     // No test route is trained on.
-    let all = evaluation.map(|report| (0, report)).into_iter().chain(also.iter().map(|also| (also.trained_on, &also.report)));
-    let named: Vec<(String, usize, &Report)> =
-        all.map(|(trained_on, report)| (format!("{} {}", report.benchmark, report.split), trained_on, report)).collect();
+    let all =
+        evaluation.map(|report| (0, report)).into_iter().chain(also.iter().map(|also| (also.trained_on, &also.report)));
+    let named: Vec<(String, usize, &Report)> = all
+        .map(|(trained_on, report)| (format!("{} {}", report.benchmark, report.split), trained_on, report))
+        .collect();
     let width = named.iter().map(|(name, ..)| name.len()).max().unwrap_or(0);
     let line = |(name, trained_on, report): &(String, usize, &Report)| {
         let summary = &report.summary;
         let lane = summary.lane_distance_mean_arrived.map_or_else(|| "-".to_owned(), |mean| format!("{mean:.2} m"));
         let arrived = format!("{}/{}", summary.arrived, summary.episodes);
-        let [success, low, high] = [summary.success, summary.success_low, summary.success_high].map(|fraction| 100.0 * fraction);
+        let [success, low, high] =
+            [summary.success, summary.success_low, summary.success_high].map(|fraction| 100.0 * fraction);
         format!(
             "{name:width$}  {arrived:>11} arrived, {success:5.1} % ({low:.1} to {high:.1} %), lane distance {lane} ({})\n",
             familiarity(*trained_on, report.routes.len())
         )
     };
     let lines: String = named.iter().map(line).collect();
-    format!("{lines}lane distance: to the lane's centre, mean over the episodes that arrived; in brackets 95 % intervals\n")
+    format!(
+        "{lines}lane distance: to the lane's centre, mean over the episodes that arrived; in brackets 95 % intervals\n"
+    )
 }
 
 #[cfg(test)]

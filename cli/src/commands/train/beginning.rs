@@ -12,7 +12,8 @@ pub fn line(config: &Config, file: &Path, n_runs: usize) -> String {
     let steps = config.steps.map(|steps| format!("{steps} env steps of {} trucks", config.n_envs));
     let minutes = config.minutes.map(|minutes| format!("{minutes} min"));
     let budget: Vec<String> = steps.into_iter().chain(minutes).collect();
-    let known = Config::read(Path::new("default")).is_ok_and(|default| Config { seed: config.seed, ..default } == *config);
+    let known =
+        Config::read(Path::new("default")).is_ok_and(|default| Config { seed: config.seed, ..default } == *config);
     let time = match (known, config.minutes) {
         (true, _) => format!(": {DEFAULT_TIME}"),
         (false, Some(_)) => String::new(),
@@ -42,7 +43,9 @@ mod tests {
         };
         let usual = "default: trains for 4800000 env steps of 512 trucks: three to five minutes on two idle cores";
         assert!(said(&[], 1).starts_with(usual) && said(&["seed=3"], 1).starts_with(usual), "{}", said(&[], 1));
-        assert!(said(&["steps=9600000"], 1).contains("of 512 trucks; while it trains a line says how long is left; then"));
+        assert!(
+            said(&["steps=9600000"], 1).contains("of 512 trucks; while it trains a line says how long is left; then")
+        );
         let timed = said(&["steps=", "minutes=2"], 5);
         assert!(timed.starts_with("default: 5 seeds, each trains for 2 min; then evaluates on attard2023."), "{timed}");
     }

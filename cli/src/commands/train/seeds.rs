@@ -67,7 +67,14 @@ pub fn run(args: &Args, file: &Path, text: &str) -> Result<(), Error> {
         };
         let opened = group.open(seed, file, &config)?;
         let label = format!("seed {seed}, {} of {}: ", index + 1, seeds.len());
-        train(&config, &worlds, prepared, opened, &Manner { label: Some(label), tensorboard: args.tensorboard }, &stop)?;
+        train(
+            &config,
+            &worlds,
+            prepared,
+            opened,
+            &Manner { label: Some(label), tensorboard: args.tensorboard },
+            &stop,
+        )?;
         group.write(&seeds)?;
     }
     let finished = group.all_finished(&seeds)?;
@@ -75,14 +82,19 @@ pub fn run(args: &Args, file: &Path, text: &str) -> Result<(), Error> {
     let (path, n, all) = (shown_path(&group.0), finished.len(), seeds.len());
     files::print(&match n == all {
         true => format!("{table}written: {path}\n"),
-        false => format!("{table}stopped: {n} of {all} seeds have finished; the same command with --name {} continues\n", group.name()),
+        false => format!(
+            "{table}stopped: {n} of {all} seeds have finished; the same command with --name {} continues\n",
+            group.name()
+        ),
     })
 }
 
 /// The seeds that `20..24` (both included) or `3,7,9` names.
 fn parsed(text: &str) -> Result<Vec<u32>, Error> {
     let wrong = |expected: String| Error::Setting { name: "--seeds", value: text.to_owned(), expected };
-    let form = || wrong("a range as in 20..24, both included, or numbers separated by commas, as in 3,7,9, are needed".to_owned());
+    let form = || {
+        wrong("a range as in 20..24, both included, or numbers separated by commas, as in 3,7,9, are needed".to_owned())
+    };
     let seed = |word: &str| word.trim().parse::<u32>().map_err(|_| form());
     let many = || wrong(format!("at most {MOST} seeds are trained by one command"));
     let mut seeds: Vec<u32> = Vec::new();
@@ -125,10 +137,12 @@ impl Group {
     /// Whether a command with these seeds and this training file, whatever its seed, can go on in this folder.
     fn check(&self, text: &str, seeds: &[u32], config: &Config) -> Result<(), Error> {
         let file = self.file();
-        let earlier: Earlier = serde_json::from_str(&read_text(&file, REPORT_LIMIT)?)
-            .map_err(|error| Error::contents(&file, format!("{error}; it must be as `train --seeds` has written it")))?;
+        let earlier: Earlier = serde_json::from_str(&read_text(&file, REPORT_LIMIT)?).map_err(|error| {
+            Error::contents(&file, format!("{error}; it must be as `train --seeds` has written it"))
+        })?;
         if let Some(missing) = earlier.seeds.iter().find(|seed| !seeds.contains(seed)) {
-            let expected = format!("{} has seed {missing} too: name it as well, or choose another --name", self.0.display());
+            let expected =
+                format!("{} has seed {missing} too: name it as well, or choose another --name", self.0.display());
             return Err(Error::Setting { name: "--seeds", value: text.to_owned(), expected });
         }
         for &seed in seeds {
@@ -136,8 +150,11 @@ impl Group {
             if !file.is_file() {
                 continue;
             }
-            if let Some((key, before, now)) = Config::read(&file)?.first_difference(&Config { seed, ..config.clone() }) {
-                let message = format!("{key}: {before}; now it would be {now}: give the same training file and flags, or another --name");
+            if let Some((key, before, now)) = Config::read(&file)?.first_difference(&Config { seed, ..config.clone() })
+            {
+                let message = format!(
+                    "{key}: {before}; now it would be {now}: give the same training file and flags, or another --name"
+                );
                 return Err(Error::contents(&file, message));
             }
         }

@@ -49,7 +49,9 @@ impl Worlds {
         }
         let wrong = |expected: String| reader.invalid("training_benchmark", &training.name, expected);
         if let Some(route) = training.shared_names(Split::Train, &benchmark, Split::Test).first() {
-            return Err(wrong(format!("{route} is a test route of {} and must not be trained on", benchmark.name)).into());
+            return Err(
+                wrong(format!("{route} is a test route of {} and must not be trained on", benchmark.name)).into()
+            );
         }
         if let Some(difference) = alike::difference(&training, &benchmark) {
             let expected = format!(
@@ -59,7 +61,8 @@ impl Worlds {
             return Err(wrong(expected).into());
         }
         let also = Also::read(config, &reader, &training)?;
-        let validation = config.validation.is_some().then(|| validation(&reader, config, &own, &training)).transpose()?;
+        let validation =
+            config.validation.is_some().then(|| validation(&reader, config, &own, &training)).transpose()?;
         let baked = |scenario: Scenario| Ok::<_, Error>((roads::world(&scenario)?, Arc::new(scenario)));
         let validation = validation.map(baked).transpose()?.map(|(world, scenario)| (scenario, world));
         let (benchmark_world, training_world) = (roads::world(&benchmark)?, roads::world(&training)?);
@@ -77,9 +80,9 @@ impl Worlds {
 pub fn named(reader: &Reader, key: &str, name: &str) -> Result<Scenario, Error> {
     roads::benchmark(name).map_err(|error| match error {
         // Its own file was not found or is none, so the key that names it is what is wrong.
-        Error::Input(error @ (InputError::UnknownName { .. } | InputError::Unreadable { .. } | InputError::NotAFile { .. })) => {
-            reader.invalid(key, name, error.to_string()).into()
-        }
+        Error::Input(
+            error @ (InputError::UnknownName { .. } | InputError::Unreadable { .. } | InputError::NotAFile { .. }),
+        ) => reader.invalid(key, name, error.to_string()).into(),
         error => error,
     })
 }
@@ -139,7 +142,9 @@ fn on_random_roads(own: &Scenario, split: Split) -> Result<Scenario, Error> {
         let mut scenario = bare.clone();
         match roads.places.iter().try_for_each(|place| scenario.add(place.roundabout.clone(), split)) {
             Ok(()) => return Ok(scenario),
-            Err(InputError::Invalid { key, .. }) if key == "routes.approach" && 2.0 * SHORTER <= bare.approach => bare.approach -= SHORTER,
+            Err(InputError::Invalid { key, .. }) if key == "routes.approach" && 2.0 * SHORTER <= bare.approach => {
+                bare.approach -= SHORTER
+            }
             Err(InputError::Invalid { key, .. }) if key == "routes.departure" && 2.0 * SHORTER <= bare.departure => {
                 bare.departure -= SHORTER;
             }

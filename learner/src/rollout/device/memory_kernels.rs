@@ -6,7 +6,10 @@ use offtrack::engine::wgsl;
 use offtrack::gpu::{Kernels, Slice};
 use offtrack::layout::buffers::Access;
 use offtrack::layout::shared::Shared as _;
-use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, BufferBinding, CommandEncoder, ComputePassDescriptor, Device};
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, BufferBinding, CommandEncoder,
+    ComputePassDescriptor, Device,
+};
 
 offtrack::shared! {
     /// What does not change in a run.
@@ -149,11 +152,19 @@ impl Buffers {
         let entries: Vec<BindGroupEntry> = slices
             .iter()
             .map(|(binding, Slice { buffer, offset, size })| {
-                let resource = BindingResource::Buffer(BufferBinding { buffer, offset: *offset, size: std::num::NonZero::new(*size) });
+                let resource = BindingResource::Buffer(BufferBinding {
+                    buffer,
+                    offset: *offset,
+                    size: std::num::NonZero::new(*size),
+                });
                 BindGroupEntry { binding: *binding, resource }
             })
             .collect();
-        device.create_bind_group(&BindGroupDescriptor { label: Some("replay buffer"), layout: &kernels.layout, entries: &entries })
+        device.create_bind_group(&BindGroupDescriptor {
+            label: Some("replay buffer"),
+            layout: &kernels.layout,
+            entries: &entries,
+        })
     }
 }
 
@@ -185,7 +196,8 @@ impl Kernel {
 
 /// The module's text.
 fn source() -> String {
-    let common = SHADERS.iter().filter(|(name, _)| ["common/thread", "common/random"].contains(name)).map(|(_, text)| *text);
+    let common =
+        SHADERS.iter().filter(|(name, _)| ["common/thread", "common/random"].contains(name)).map(|(_, text)| *text);
     let bindings: String = Binding::ALL.map(Binding::declaration).concat();
     let own = [wgsl::shared(), printed_structs(), bindings];
     own.iter().map(String::as_str).chain(common).chain([include_str!("../../../shaders/replay_buffer.wgsl")]).collect()
@@ -199,7 +211,13 @@ pub(super) fn compile(device: &Device) -> Kernels<Kernel> {
 }
 
 /// Adds a kernel to the commands.
-pub(super) fn add(kernels: &Kernels<Kernel>, encoder: &mut CommandEncoder, group: &BindGroup, kernel: Kernel, facts: &Facts) {
+pub(super) fn add(
+    kernels: &Kernels<Kernel>,
+    encoder: &mut CommandEncoder,
+    group: &BindGroup,
+    kernel: Kernel,
+    facts: &Facts,
+) {
     let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
     pass.set_bind_group(0, group, &[]);
     kernels.dispatch(&mut pass, kernel, kernel.threads(facts));

@@ -77,7 +77,8 @@ fn owned(tensor: Located) -> Result<Owned, Error> {
     if !contiguous {
         return Err(Error::Device("a tensor is not contiguous, or not of 32-bit values".to_owned()));
     }
-    let held = client.get_resource::<WgpuServer<AutoCompiler>>(handle).map_err(|error| Error::Device(error.to_string()))?;
+    let held =
+        client.get_resource::<WgpuServer<AutoCompiler>>(handle).map_err(|error| Error::Device(error.to_string()))?;
     let resource = held.resource();
     let slice = Slice { buffer: resource.buffer.clone(), offset: resource.offset, size: resource.size };
     Ok(Owned { slice, _held: Arc::new(Mutex::new(held)) })

@@ -62,8 +62,15 @@ fn check_samples<const N: usize>(benchmark: &str) {
     ] {
         let config = config(&settings);
         let (n_envs, n_steps, seeds) = (config.n_envs, config.learning.n_steps, [7, 8]);
-        let mut rollout =
-            DeviceRollout::<N>::with_seeds(&shared, &config, &world, routes.clone(), mirror_of(&config, &mirror), seeds).unwrap();
+        let mut rollout = DeviceRollout::<N>::with_seeds(
+            &shared,
+            &config,
+            &world,
+            routes.clone(),
+            mirror_of(&config, &mirror),
+            seeds,
+        )
+        .unwrap();
         let mut history: Vec<Vec<Step<N>>> = Vec::new();
         // Three times round the ring of 32 steps.
         for _ in 0..100 {
@@ -84,7 +91,8 @@ fn check_samples<const N: usize>(benchmark: &str) {
                     .collect(),
             );
         }
-        let normalisation = Normalisation { mean: vec![0.25; N], factor: (0..N).map(|index| 1.0 + index as f32).collect() };
+        let normalisation =
+            Normalisation { mean: vec![0.25; N], factor: (0..N).map(|index| 1.0 + index as f32).collect() };
         rollout.set_normalisation(&normalisation);
         let sample = rollout.sample().unwrap().remove(0);
         let (observation, next) = (host(&sample.observation), host(&sample.next_observation));
@@ -114,15 +122,21 @@ fn check_samples<const N: usize>(benchmark: &str) {
             mirrored += usize::from(is_mirrored);
             let image = |seen: &[f32; N]| if is_mirrored { mirror.observation(seen) } else { *seen };
             let expected_action = history[first][env].action;
-            let expected_action = if is_mirrored { mirror.images().1[expected_action as usize] } else { expected_action };
+            let expected_action =
+                if is_mirrored { mirror.images().1[expected_action as usize] } else { expected_action };
             assert_eq!(action[row], expected_action as i32);
             assert_eq!(discount[row], weight);
             let expected_reward = sum * config.learning.reward_scale as f32;
-            assert!((reward[row] - expected_reward).abs() <= 1e-5 * expected_reward.abs().max(1.0), "{} {expected_reward}", reward[row]);
+            assert!(
+                (reward[row] - expected_reward).abs() <= 1e-5 * expected_reward.abs().max(1.0),
+                "{} {expected_reward}",
+                reward[row]
+            );
             for (found, seen) in [(&observation, &history[first][env].seen), (&next, &history[last][env].next)] {
                 let expected = normalisation.apply(&[image(seen)]);
                 for value in 0..N {
-                    let noise = config.learning.observation_noise as f32 * signed_unit(words(seeds[1], row as u32, 0, 1 + value as u32)[0]);
+                    let noise = config.learning.observation_noise as f32
+                        * signed_unit(words(seeds[1], row as u32, 0, 1 + value as u32)[0]);
                     let difference = found[row * N + value] - (expected[value] + noise);
                     // Normalised values lie within 10.
                     assert!(difference.abs() < 1e-5, "{value}: {difference}");
@@ -152,7 +166,10 @@ fn actions_follow_the_actors_distribution() {
     for (rank, count) in counts.into_iter().enumerate() {
         let fraction = (rank + 1) as f64 / 45.0;
         // Five standard deviations of a count.
-        assert!((count as f64 - n * fraction).abs() < 5.0 * (n * fraction * (1.0 - fraction)).sqrt(), "{rank}: {count}");
+        assert!(
+            (count as f64 - n * fraction).abs() < 5.0 * (n * fraction * (1.0 - fraction)).sqrt(),
+            "{rank}: {count}"
+        );
     }
 }
 
@@ -161,9 +178,15 @@ fn rewards(skips_flush: bool) -> Vec<Vec<f32>> {
     let (world, routes) = training();
     let mut shared = Shared::open(None).unwrap();
     shared.skips_flush = skips_flush;
-    let mut rollout =
-        DeviceRollout::<N_VALUES>::with_seeds(&shared, &config(&["learning.mirror_augmentation=false"]), &world, routes, None, [7, 8])
-            .unwrap();
+    let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(
+        &shared,
+        &config(&["learning.mirror_augmentation=false"]),
+        &world,
+        routes,
+        None,
+        [7, 8],
+    )
+    .unwrap();
     for _ in 0..40 {
         rollout.step_at_random().unwrap();
     }
@@ -190,9 +213,15 @@ fn a_sample_is_read_before_the_next_one_overwrites_it_and_only_because_of_the_fl
 fn trucks_take_the_actions_of_the_latest_output() {
     let (world, routes) = training();
     let shared = Shared::open(None).unwrap();
-    let mut rollout =
-        DeviceRollout::<N_VALUES>::with_seeds(&shared, &config(&["learning.mirror_augmentation=false"]), &world, routes, None, [7, 8])
-            .unwrap();
+    let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(
+        &shared,
+        &config(&["learning.mirror_augmentation=false"]),
+        &world,
+        routes,
+        None,
+        [7, 8],
+    )
+    .unwrap();
     let output = |step: usize| {
         let row = (0..9).map(|action| if action == step % 9 { 50.0 } else { 0.0 });
         Tensor::<2>::from_data(TensorData::new(row.collect::<Vec<f32>>(), [1, 9]), &shared.tensors).repeat_dim(0, 64)

@@ -13,8 +13,13 @@ const N_STEPS: usize = 400;
 
 /// Trucks of the shipped policy, and its network. `settings` change the file `lane`.
 fn rollout(settings: &[String]) -> (HostRollout<N_VALUES>, Mlp) {
-    let sizes = [format!("n_envs={N_ENVS}"), "learning.n_steps=1".into(), format!("replay_buffer.capacity={}", N_ENVS * (N_STEPS + 2))];
-    let settings: Vec<String> = sizes.into_iter().chain(["replay_buffer.warmup=16".into()]).chain(settings.to_vec()).collect();
+    let sizes = [
+        format!("n_envs={N_ENVS}"),
+        "learning.n_steps=1".into(),
+        format!("replay_buffer.capacity={}", N_ENVS * (N_STEPS + 2)),
+    ];
+    let settings: Vec<String> =
+        sizes.into_iter().chain(["replay_buffer.warmup=16".into()]).chain(settings.to_vec()).collect();
     let config = Config::read_with(Path::new("lane"), &settings).unwrap();
     let scenario = Scenario::named("attard2023").unwrap();
     let world = Arc::new(World::bake(&scenario).unwrap());

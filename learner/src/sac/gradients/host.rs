@@ -45,7 +45,8 @@ impl Sac {
         let q = combined([&passes[0].output, &passes[1].output]);
         let scale = fraction / n_rows as f32;
         let taken = |row: usize| row * n_actions + action[row] as usize;
-        let value: Vec<f32> = (0..n_rows).map(|row| 0.5 * (passes[0].output[taken(row)] + passes[1].output[taken(row)])).collect();
+        let value: Vec<f32> =
+            (0..n_rows).map(|row| 0.5 * (passes[0].output[taken(row)] + passes[1].output[taken(row)])).collect();
         let td_errors = value.iter().zip(&target).map(|(value, target)| (value - target).abs()).collect();
         let mut critic_loss = 0.0;
         let mut of_critics = GradientsParams::new();
@@ -65,7 +66,8 @@ impl Sac {
         let mut by_output = Vec::with_capacity(pass.output.len());
         for row in 0..n_rows {
             let (probs, log_probs) = softmax(row_of(&pass.output, row, n_actions));
-            let cost: Vec<f32> = log_probs.iter().zip(row_of(&q, row, n_actions)).map(|(log_prob, q)| alpha * log_prob - q).collect();
+            let cost: Vec<f32> =
+                log_probs.iter().zip(row_of(&q, row, n_actions)).map(|(log_prob, q)| alpha * log_prob - q).collect();
             let mean: f32 = probs.iter().zip(&cost).map(|(prob, cost)| prob * cost).sum();
             actor_loss += scale * mean;
             entropy -= scale * probs.iter().zip(&log_probs).map(|(prob, log_prob)| prob * log_prob).sum::<f32>();

@@ -28,7 +28,8 @@ impl Sac {
         // Critics: squared TD error of the action taken.
         let q = critics.forward(shard.observation.clone().autodiff()); // [B, A] twice
         let [first, second] = q.clone().map(|q| q.gather(1, shard.action.clone().autodiff())); // [B, 1] each
-        let [first_loss, second_loss] = [&first, &second].map(|taken| (taken.clone() - target.clone().autodiff()).square());
+        let [first_loss, second_loss] =
+            [&first, &second].map(|taken| (taken.clone() - target.clone().autodiff()).square());
         let critic_loss = ((first_loss + second_loss) * shard.weight.autodiff()).mean();
         let value = (first.inner() + second.inner()).mul_scalar(0.5); // [B, 1]
         let td_errors = (value.clone() - target).abs(); // [B, 1]

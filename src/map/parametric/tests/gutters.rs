@@ -4,7 +4,9 @@ use super::*;
 
 /// The plain roundabout with lines after `gutter` and after every arm's `length`.
 fn with(ring: &str, arm: &str) -> String {
-    plain().replace("gutter = 0.5\n", &format!("gutter = 0.5\n{ring}")).replace("length = 100.0\n", &format!("length = 100.0\n{arm}"))
+    plain()
+        .replace("gutter = 0.5\n", &format!("gutter = 0.5\n{ring}"))
+        .replace("length = 100.0\n", &format!("length = 100.0\n{arm}"))
 }
 
 const SPLITTER: &str = "splitter = [{ along = 30.0, offset = 0.8, radius = 0.3 }, { along = 45.0, offset = 0.0, radius = 0.2 }, \
@@ -14,7 +16,8 @@ const SPLITTER: &str = "splitter = [{ along = 30.0, offset = 0.8, radius = 0.3 }
 fn a_gutter_that_is_written_for_every_kerb_is_the_one_gutter() {
     let one = read(&with("", SPLITTER)).unwrap();
     let each = "splitter_gutter = 0.5\nkerb_gutter = [{ station = 0.0, width = 0.5 }]\n";
-    let all = read(&with("island_gutter = [{ bearing_deg = 0.0, width = 0.5 }]\n", &format!("{SPLITTER}{each}"))).unwrap();
+    let all =
+        read(&with("island_gutter = [{ bearing_deg = 0.0, width = 0.5 }]\n", &format!("{SPLITTER}{each}"))).unwrap();
     assert_eq!(format!("{:?}", one.kerbs(Gutter::Drivable)), format!("{:?}", all.kerbs(Gutter::Drivable)));
     let (one, all) = (one.kerbs(Gutter::Solid), all.kerbs(Gutter::Solid));
     assert_eq!(one.loops.len(), all.loops.len());
@@ -32,7 +35,8 @@ fn each_kerb_has_the_gutter_that_is_written_for_it() {
     let island = "island_gutter = [{ bearing_deg = 0.0, width = 0.0 }, { bearing_deg = 180.0, width = 1.0 }]\n";
     let mouth = "mouth_gutter = [{ bearing_deg = -5.0, width = 0.0 }, { bearing_deg = -4.9, width = 0.5 }, \
                  { bearing_deg = 4.9, width = 0.5 }, { bearing_deg = 5.0, width = 0.0 }]\n";
-    let kerb = "splitter_gutter = 0.0\nkerb_gutter = [{ station = 20.0, width = 0.2 }, { station = 40.0, width = 0.6 }]\n";
+    let kerb =
+        "splitter_gutter = 0.0\nkerb_gutter = [{ station = 20.0, width = 0.2 }, { station = 40.0, width = 0.6 }]\n";
     let roundabout = read(&with(&format!("{island}{mouth}"), &format!("{SPLITTER}{kerb}"))).unwrap();
     assert!(matches!(roundabout.ground().edges, Edges::Own(_)));
     let edges = roundabout.kerbs(Gutter::Solid);
@@ -62,14 +66,23 @@ fn gutters_that_make_no_sense_are_refused_with_their_keys() {
         assert!(message.contains(expected), "{message}");
     };
     refused("island_gutter = []\n", "", "ring.island_gutter: 0; must lie in 1..64");
-    refused("island_gutter = [{ bearing_deg = 0.0, width = 4.0 }]\n", "", "ring.island_gutter[0].width: 4 m; must lie in 0..3 m");
+    refused(
+        "island_gutter = [{ bearing_deg = 0.0, width = 4.0 }]\n",
+        "",
+        "ring.island_gutter[0].width: 4 m; must lie in 0..3 m",
+    );
     let turn = "mouth_gutter = [{ bearing_deg = -10.0, width = 0.0 }, { bearing_deg = 350.0, width = 0.5 }]\n";
-    refused(turn, "", "ring.mouth_gutter[1].bearing_deg: 350 deg; must be more than -10 deg and less than a turn after the first");
+    refused(
+        turn,
+        "",
+        "ring.mouth_gutter[1].bearing_deg: 350 deg; must be more than -10 deg and less than a turn after the first",
+    );
     let falling = "kerb_gutter = [{ station = 20.0, width = 0.2 }, { station = 20.0, width = 0.6 }]\n";
     refused("", falling, "arm[0].kerb_gutter[1].station: 20 m; must be more than 20 m");
     refused("", "splitter_gutter = 0.0\n", "arm[0].splitter_gutter: given; this arm has no splitter island");
     let wide = "kerb_gutter = [{ station = 0.0, width = 3.0 }]\n";
-    let narrow = with("island_gutter = [{ bearing_deg = 0.0, width = 3.0 }]\n", wide).replace("lane_width = 3.7", "lane_width = 2.6");
+    let narrow = with("island_gutter = [{ bearing_deg = 0.0, width = 3.0 }]\n", wide)
+        .replace("lane_width = 3.7", "lane_width = 2.6");
     let message = read(&narrow.replace("gutter = 0.5\n", "gutter = 0.1\n")).unwrap_err().to_string();
     assert!(message.contains("leave no way around the island"), "{message}");
     refused("", "corner = { lane = \"ring\" }\n", "arm[0].corner.lane: \"ring\"; is for a corner with kerb_radius");

@@ -16,7 +16,10 @@ fn refusal_of(text: &str) -> String {
 #[test]
 fn without_a_number_there_are_two_lanes_and_no_more_than_the_ring_has() {
     let n_routes = |text: &str| read(text).unwrap().routes(40.0, 35.0, 2.0).unwrap().len();
-    assert_eq!(read(&plain()).unwrap().lanes(), read(&with_lanes("lanes = 2", "lanes = 2", "lanes = 2")).unwrap().lanes());
+    assert_eq!(
+        read(&plain()).unwrap().lanes(),
+        read(&with_lanes("lanes = 2", "lanes = 2", "lanes = 2")).unwrap().lanes()
+    );
     assert_eq!(read(&with_lanes("lanes = 1", "", "")).unwrap().lanes().len(), 1 + 4 + 4);
     assert_eq!(read(&with_lanes("lanes = 3", "", "")).unwrap().lanes().len(), 3 + 8 + 8);
     assert_eq!(n_routes(&with_lanes("lanes = 1", "", "")), 16);
@@ -30,7 +33,12 @@ fn a_wrong_number_of_lanes_is_refused_by_its_key() {
         ("lanes = 4", "", "", "plain: ring.lanes: 4; must lie in 1..3"),
         ("lanes = 3", "lanes = 3", "", "plain: arm[0].entry.lanes: 3; must lie in 1..2"),
         ("", "", "lanes = 0", "plain: arm[0].exit.lanes: 0; must lie in 1..2"),
-        ("lanes = 1", "lanes = 2", "", "plain: arm[0].entry.lanes: 2; must be at most 1, as many lanes as the ring has"),
+        (
+            "lanes = 1",
+            "lanes = 2",
+            "",
+            "plain: arm[0].entry.lanes: 2; must be at most 1, as many lanes as the ring has",
+        ),
         ("lanes = 1", "lanes = 1", "lanes = 2", "plain: arm[0].exit.lanes: 2; must be at most 1"),
     ] {
         let message = refusal_of(&with_lanes(ring, entry, exit));
@@ -47,7 +55,10 @@ fn a_left_lane_on_a_carriageway_of_one_lane_is_refused() {
     let lane = "[arm.entry.left]\npoints = [{ along = 30.0, offset = 2.5 }]\nring_radius = 15.0\n[arm.exit.kerb]";
     let text = with_lanes("", "lanes = 1", "").replacen("[arm.exit]\n\n[arm.exit.kerb]", lane, 1);
     let message = refusal_of(&text);
-    assert!(message.starts_with("plain: arm[0].entry.left: given; this carriageway has one lane, which is `right`"), "{message}");
+    assert!(
+        message.starts_with("plain: arm[0].entry.left: given; this carriageway has one lane, which is `right`"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -69,7 +80,8 @@ fn the_lane_beside_a_corner_between_arms_of_different_lane_widths_needs_its_radi
     assert!(read(&corner).is_ok(), "{}", refusal_of(&corner));
     let differing = corner.replacen("length = 100.0\ncorner", "length = 100.0\nlane_width = 3.5\ncorner", 1);
     let message = refusal_of(&differing);
-    let expected = "plain: arm[0].corner.lane_radius: missing; lanes are 3.5 m wide on E and 3.7 m on N: give the radius";
+    let expected =
+        "plain: arm[0].corner.lane_radius: missing; lanes are 3.5 m wide on E and 3.7 m on N: give the radius";
     assert!(message.starts_with(expected), "{message}");
     assert!(read(&differing.replacen("kerb_radius = 28.0", "kerb_radius = 28.0, lane_radius = 30.0", 1)).is_ok());
 }
@@ -77,8 +89,18 @@ fn the_lane_beside_a_corner_between_arms_of_different_lane_widths_needs_its_radi
 #[test]
 fn left_lanes_lead_into_an_exit_of_one_lane_or_are_refused_by_name() {
     let one_exit = with_lanes("", "", "lanes = 1");
-    let names: Vec<String> = read(&one_exit).unwrap().routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect();
-    assert_eq!(names, read(&plain()).unwrap().routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect::<Vec<_>>());
+    let names: Vec<String> =
+        read(&one_exit).unwrap().routes(40.0, 35.0, 2.0).unwrap().into_iter().map(|route| route.name).collect();
+    assert_eq!(
+        names,
+        read(&plain())
+            .unwrap()
+            .routes(40.0, 35.0, 2.0)
+            .unwrap()
+            .into_iter()
+            .map(|route| route.name)
+            .collect::<Vec<_>>()
+    );
     // The exit's straight misses the inner ring lane, and its wide arc into the outer one is too narrow for a left
     // turn.
     let flared = "points = [{ along = 60.0, offset = -8.5, radius = 30.0 }, { along = 0.0, offset = -22.0 }]\nring_radius = 15.0";
@@ -93,7 +115,8 @@ fn left_lanes_lead_into_an_exit_of_one_lane_or_are_refused_by_name() {
 
 #[test]
 fn a_file_with_every_kind_of_lane_is_written_as_it_was_read() {
-    let text = with_lanes("lanes = 3", "lanes = 1", "lanes = 2").replace("length = 100.0", "length = 100.0\nlane_width = 4.0");
+    let text =
+        with_lanes("lanes = 3", "lanes = 1", "lanes = 2").replace("length = 100.0", "length = 100.0\nlane_width = 4.0");
     let written: Written = toml::from_str(&text).unwrap();
     let again = toml::to_string(&written).unwrap();
     assert_eq!(toml::from_str::<Written>(&again).unwrap(), written, "{again}");

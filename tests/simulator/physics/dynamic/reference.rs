@@ -125,7 +125,11 @@ impl Reference {
             let second = self.rates(&state.plus(&first, 0.5 * step), speed, steering(0.5)).state;
             let third = self.rates(&state.plus(&second, 0.5 * step), speed, steering(0.5)).state;
             let last = self.rates(&state.plus(&third, step), speed, steering(1.0)).state;
-            state = state.plus(&first, step / 6.0).plus(&second, step / 3.0).plus(&third, step / 3.0).plus(&last, step / 6.0);
+            state = state
+                .plus(&first, step / 6.0)
+                .plus(&second, step / 3.0)
+                .plus(&third, step / 3.0)
+                .plus(&last, step / 6.0);
         }
         (state, self.rates(&state, speed, to).trailer_lateral_acceleration)
     }
@@ -153,7 +157,8 @@ impl Reference {
 
     /// Middle of the trailer's axle group (m).
     pub fn trailer_position(&self, state: &State) -> DVec2 {
-        state.position + self.hitch * DVec2::from_angle(state.heading) - self.trailer_wheelbase * DVec2::from_angle(state.trailer_heading)
+        state.position + self.hitch * DVec2::from_angle(state.heading)
+            - self.trailer_wheelbase * DVec2::from_angle(state.trailer_heading)
     }
 }
 

@@ -34,7 +34,8 @@ pub(super) fn steady_state(written: &Value) -> Worst {
             worst.see("RH", steady.fifth_wheel_radius - number(row, "RH"), length);
             // In a steady turn of the simulator's own both units turn at one rate.
             let (steering, heading) = (steady.steering as f32, steady.articulation as f32);
-            let turning = motion_of(&kinematic(row).rig(0.05), &Truck { speed: 5.0, steering, heading, ..Truck::default() });
+            let turning =
+                motion_of(&kinematic(row).rig(0.05), &Truck { speed: 5.0, steering, heading, ..Truck::default() });
             worst.see("rates", f64::from(turning.yaw_rate - turning.trailer_yaw_rate), 1e-5);
         }
     }
@@ -46,7 +47,10 @@ pub(super) fn steady_state_limit(written: &Value) -> Worst {
     for row in rows(written) {
         let critical = single_track(row).critical_steering();
         worst.see("critical", critical - number(row, "delta_critical"), number(&written["tolerance"], "angle"));
-        assert!(single_track(row).at_steering(critical - 1e-3).is_some() && single_track(row).at_steering(critical + 1e-3).is_none());
+        assert!(
+            single_track(row).at_steering(critical - 1e-3).is_some()
+                && single_track(row).at_steering(critical + 1e-3).is_none()
+        );
     }
     worst
 }
@@ -94,7 +98,8 @@ fn least_radii(rig: &Rig, radius: f64, turn: f64, aside: f64) -> (f64, f64) {
     let poses = swept_path(rig, &Curve { pieces: vec![approach, arc, departure] }, 1.0, 0.05);
     let radius = |axle: DVec2, heading: f64| (axle + aside * DVec2::from_angle(heading).perp()).length();
     let drive = poses.iter().map(|pose| radius(pose.position, pose.heading)).fold(f64::INFINITY, f64::min);
-    let trailer = poses.iter().map(|pose| radius(pose.trailer_position, pose.trailer_heading)).fold(f64::INFINITY, f64::min);
+    let trailer =
+        poses.iter().map(|pose| radius(pose.trailer_position, pose.trailer_heading)).fold(f64::INFINITY, f64::min);
     (drive, trailer)
 }
 
@@ -115,7 +120,11 @@ pub(super) fn path_follow(written: &Value) -> Worst {
             let (drive, trailer) = least_radii(&rig, radius, turn, 0.5 * width);
             let inside = if row["L2_ft"].is_null() { drive } else { trailer } / FOOT;
             let tolerance = number(&written["tolerance"], "length_ft");
-            worst.see(&format!("{} published", row["vehicle"]), inside - number(row, "published_min_inside_radius_ft"), tolerance);
+            worst.see(
+                &format!("{} published", row["vehicle"]),
+                inside - number(row, "published_min_inside_radius_ft"),
+                tolerance,
+            );
             // The reference is the same equation, sampled every 5 cm here; without a trailer it looks no further than
             // the turn's end, which leaves out the last 0.038 ft of a city bus.
             let sampling = if row["L2_ft"].is_null() { 0.05 } else { 0.01 };
