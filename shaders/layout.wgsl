@@ -1,4 +1,4 @@
-// What shaders share with Rust. Printed by src/wgsl.rs from the layout and the constants beside each stage: change those.
+// What shaders share with Rust. Printed by src/engine/wgsl.rs from the layout and the constants beside each stage: change those.
 
 // Threads of a workgroup.
 const WORKGROUP: u32 = 64u;
@@ -105,18 +105,18 @@ const FRACTION: f32 = 0.5f;
 const N_SPANS: u32 = 96u;
 // The circles at both ends of a step may lie this far apart (m): a kerb thinner than this along the ray can hide
 // between them.
-const GAP: f32 = 0.05f;
+const RAY_GAP: f32 = 0.05f;
 // A step this short is never taken back (m).
-const SHORT: f32 = 0.25f;
+const RAY_SHORT: f32 = 0.25f;
 // Closer to a kerb than this, it is taken for straight (m).
-const CLOSE: f32 = 0.15f;
+const RAY_CLOSE: f32 = 0.15f;
 // This close to a kerb the ray has met it (m).
-const MET: f32 = 0.004f;
+const RAY_MET: f32 = 0.004f;
 // Head-on, a ray has met the kerb from this far off: a straight kerb's position is known to a few millimetres then
 // (m).
-const MET_HEAD_ON: f32 = 0.02f;
+const RAY_MET_HEAD_ON: f32 = 0.02f;
 // Slope of a ray 5 deg from grazing; flatter ones are not followed to the last centimetre.
-const GRAZING: f32 = 0.087f;
+const RAY_GRAZING: f32 = 0.087f;
 // Fraction of the longest step that is tried, so that the circles overlap where the field is slightly off.
 const CAUTION: f32 = 0.98f;
 // Most samples of a ray. A ray along a kerb at the longest range takes fewer.
@@ -363,7 +363,7 @@ struct Rig {
     fifth_wheel: f32,
     // Kingpin ahead of the trailer's axle group (m).
     trailer_wheelbase: f32,
-    // Slip factor [rad/(m/s^2)].
+    // Slip factor (rad/(m/s^2)).
     slip: f32,
     // Largest steer angle (rad).
     steer_max: f32,
@@ -393,7 +393,7 @@ struct Rig {
     trailer_roll: Roll,
     // Largest shift of a no-slip point by tyre slip (m).
     slip_lever_max: f32,
-    // Time constant, per speed, with which the tractor's yaw follows the steer angle; 0 for at once [s/(m/s)].
+    // Time constant, per speed, with which the tractor's yaw follows the steer angle; 0 for at once (s/(m/s)).
     yaw_lag: f32,
     // How the acceleration follows what is asked for when that is drive.
     drive_lag: Lag,
@@ -402,7 +402,7 @@ struct Rig {
     // Engine power over the mass of the whole truck (W/kg).
     power: f32,
     // Friction ellipse: the lateral grip is that of free rolling times `sqrt(1 - friction_ellipse acceleration²)`;
-    // 0 where drive and braking take no lateral grip [(s^2/m)^2].
+    // 0 where drive and braking take no lateral grip ((s^2/m)^2).
     friction_ellipse: f32,
     // Lateral acceleration that the road's fall to the right adds to the roll (m/s^2).
     crossfall: f32,
@@ -424,6 +424,22 @@ struct Action {
     steering: f32,
     // Speed asked for or, with `Params::changes_speed`, by how much the target speed changes (m/s).
     speed: f32,
+}
+
+// The weights of the reward's terms and the limits of two of them, by the keys of a benchmark's `[reward]`.
+struct Reward {
+    // Reward for each waypoint passed.
+    waypoint: f32,
+    // Reward for the lane-distance term, each step.
+    lane_distance: f32,
+    // Distance to the lane centre at which that term is 1 (m).
+    lane_distance_limit: f32,
+    // Reward for the clearance term, each step.
+    clearance: f32,
+    // Margin kept from kerbs, within which that term counts (m).
+    clearance_limit: f32,
+    // Reward when the episode fails.
+    failure: f32,
 }
 
 // Time and weights, shared by all trucks.
@@ -462,18 +478,8 @@ struct Params {
     jackknife_angle: f32,
     // Load transfer ratio from which the truck has rolled over.
     rollover_ratio: f32,
-    // Distance to the lane centre at which its reward term is 1 (m).
-    lane_distance_limit: f32,
-    // Reward for each waypoint passed.
-    waypoint_weight: f32,
-    // Reward for the lane-distance term, each step.
-    lane_distance_weight: f32,
-    // Margin kept from kerbs, within which the clearance term counts (m).
-    clearance_limit: f32,
-    // Reward for the clearance term, each step.
-    clearance_weight: f32,
-    // Reward when the episode fails.
-    failure_weight: f32,
+    // Weights and limits of the reward.
+    reward: Reward,
 }
 
 // One waypoint of one route.

@@ -1,4 +1,4 @@
-//! Policies for tractor-trailers in roundabouts: learned and evaluated. The crate `offtrack_policy` is their files.
+//! How well a policy drives tractor-trailers through roundabouts. The crate `offtrack_policy` is its file.
 //!
 //! A policy that comes with the project, one truck on each route that it never saw in training, until every episode has
 //! ended:
@@ -28,34 +28,33 @@
 //! # }
 //! ```
 //!
-//! The command line `offtrack` is the binary of this package; the feature `cli`, on by default, builds it. Without the
-//! feature `gpu` no graphics crate is built.
+//! An [`Evaluation`] drives every route of a split from drawn starts, and makes a [`report::Report`] of every episode.
 
-pub mod device; // what steps the trucks
-pub mod error;
+pub mod error; // what can go wrong
 pub mod files; // results, written whole
 pub mod provenance; // machine and commit of a result
-pub mod polygons; // curves as points
-pub mod recording; // the states of an episode
+pub mod device; // what steps the trucks
+pub mod policies; // what chooses the actions: learned, pure pursuit, random
 mod evaluation; // every route, every start, every episode counted
-pub mod certificate; // routes shown to be possible
+mod part; // entry, ring and exit of a route
+mod running; // an episode under way
 pub mod driving; // how trucks drive, by vehicle and load
 pub mod failures; // why episodes did not arrive
-pub mod groups; // routes that have something in common
-pub mod page; // a report as an HTML page
-mod part; // entry, ring and exit of a route
-pub mod policies; // what chooses the actions: learned, pure pursuit, random
+pub mod certificate; // routes shown to be possible
 pub mod possible; // success over the starts that are shown to be possible
+pub mod groups; // routes that have something in common
 pub mod report; // figures of an evaluation
-mod running; // an episode under way
-pub mod seeds; // figures of several seeds
-pub mod shown; // which episodes a page shows
 mod table; // a report as text
+pub mod seeds; // figures of several seeds
+pub mod polygons; // curves as points
+pub mod recording; // the states of an episode
+pub mod shown; // which episodes a page shows
+pub mod page; // a report as an HTML page
 
 pub use evaluation::*;
 pub use table::legend;
 
-/// The README's examples, compiled and run as tests.
+/// The library's examples, compiled and run as tests.
 #[cfg(doctest)]
-#[doc = include_str!("../../README.md")]
-struct Readme;
+#[doc = include_str!("../../docs/library.md")]
+struct Library;

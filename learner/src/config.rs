@@ -287,7 +287,7 @@ impl Config {
         }
         set::set(&mut table, settings)?;
         let origin = Config::origin(file, benchmark, settings);
-        let wrong = |error: toml::de::Error| Error::contents(&origin, error.to_string().trim());
+        let wrong = |error: toml::de::Error| Error::contents(&origin, error.to_string().trim().replace('\n', ", "));
         let config: Config = table.try_into().map_err(wrong)?;
         config.check(&Reader::of(&origin))?;
         Ok(config)

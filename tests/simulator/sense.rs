@@ -6,6 +6,7 @@ use offtrack::field::Field;
 use offtrack::geometry::Outline;
 use offtrack::layout::{N_RAYS, N_TRAILER_RAYS, Truck};
 use offtrack::map::Gutter;
+use offtrack::physics;
 use offtrack::simulator::Engine;
 use offtrack::world::World;
 use rayon::prelude::*;
@@ -112,13 +113,19 @@ fn a_sensor_inside_a_kerb_reads_nothing_and_one_in_the_open_its_reach() {
 }
 
 #[test]
-fn a_truck_at_a_position_that_is_not_finite_still_gets_ranges() {
+fn a_truck_far_away_or_at_a_position_that_is_not_finite_still_gets_ranges() {
     let world = benchmark("attard2023").1;
     let (_, _, field) = places(Gutter::Drivable).swap_remove(0);
-    let nowhere = [f32::NAN, f32::INFINITY, 1e9].map(|x| Truck { position: Vec2::new(x, 0.0), ..Truck::default() });
+    let at = |x: f32| Truck { position: Vec2::new(x, 0.0), ..Truck::default() };
+    let is_range = |range: &f32| (0.0..=20.0).contains(range);
+    // As far as a batch may be given a truck.
     for (_, engine) in engines() {
-        let simulator = after_stage(&engine, &world, &field, &nowhere, Stage::Sense);
+        let simulator = after_stage(&engine, &world, &field, &[at(9e3), at(-9e3)], Stage::Sense);
         let found = &simulator.batch().ranges;
-        assert!(found.as_flattened().iter().all(|range| (0.0..=20.0).contains(range)), "{found:?}");
+        assert!(found.as_flattened().iter().all(is_range), "{found:?}");
+    }
+    for x in [f32::NAN, f32::INFINITY, 1e9] {
+        let found = physics::ranges(&field, &world.rigs[0], &world.rays[0], &at(x), world.params.sensor_range);
+        assert!(found.iter().all(is_range), "{x}: {found:?}");
     }
 }

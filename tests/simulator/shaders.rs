@@ -57,7 +57,7 @@ fn every_shader_of_a_stage_has_a_twin_on_the_cpu_and_every_twin_a_shader() {
 fn shaders() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut shaders = Vec::new();
-    for folder in ["shaders", "shaders/common", "training/shaders"] {
+    for folder in ["shaders", "shaders/common", "learner/shaders"] {
         for entry in fs::read_dir(root.join(folder)).unwrap() {
             let path = entry.unwrap().path();
             if path.extension().is_some_and(|extension| extension == "wgsl") {

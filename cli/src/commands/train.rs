@@ -337,7 +337,7 @@ fn checkpoint(folder: &Folder) -> String {
     let megabytes = size.div_ceil(1_000_000);
     format!(
         "{} ({megabytes} MB) is for train --resume with more --steps or --minutes alone; it may be deleted\n",
-        file.display()
+        shown_path(&file)
     )
 }
 

@@ -74,8 +74,8 @@ fn a_checkpoint_with_a_right_checksum_and_wrong_contents_is_refused_by_its_colum
         ),
         ("rollout, acting", &[0; 32], "`rollout, acting` is all zeros"),
         ("batch, action", &77u32.to_le_bytes(), "action[0]: 77"),
-        ("batch, truck", &f32::NAN.to_le_bytes(), "`batch, truck` has NaN"),
-        ("batch, reward", &f32::INFINITY.to_le_bytes(), "`batch, reward` has inf"),
+        ("batch, truck", &f32::NAN.to_le_bytes(), "truck[0].position[0]: NaN; must lie in "),
+        ("batch, reward", &f32::INFINITY.to_le_bytes(), "reward[0]: inf; must lie in "),
     ];
     for (column, value, expected) in cases {
         std::fs::write(

@@ -38,7 +38,7 @@ fn a_stopped_run_leaves_a_policy_and_says_that_it_was_interrupted() {
     let place = Place::new();
     let patient = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
     // Stopped while it learns or soon before, and while its actions are certainly still random.
-    let endless = patient.replace("capacity = 2000, warmup = 400", "capacity = 100000000, warmup = 100000000");
+    let endless = patient.replace("capacity = 2000, warmup = 400", "capacity = 5000000, warmup = 5000000");
     assert_ne!(endless, patient);
     for (training, signal) in [(&patient, "-INT"), (&patient, "-TERM"), (&patient, "-HUP"), (&endless, "-INT")] {
         std::fs::write(place.file("tiny.toml"), training).unwrap();

@@ -4,6 +4,8 @@
 
 mod bench;
 mod benchmark;
+#[cfg(feature = "browser")]
+mod browser;
 mod certify;
 mod checkpoint;
 mod device;

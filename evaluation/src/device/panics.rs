@@ -11,7 +11,8 @@ use std::thread::ThreadId;
 use crate::error::Error;
 
 /// Folders of the project, below [`root`].
-const OWN: [&str; 6] = ["src/", "training/", "policy/", "drawing/", "comparison/", "python/"];
+const OWN: [&str; 8] =
+    ["src/", "cli/", "drawing/", "evaluation/", "learner/", "policy/", "python/", "reference/"];
 
 /// Panics since work began that may panic, and how many such works are under way.
 static WATCHED: Mutex<Watched> = Mutex::new(Watched { n_works: 0, panics: Vec::new() });
@@ -98,7 +99,7 @@ fn is_own(file: &str) -> bool {
 /// repository.
 fn root() -> String {
     let this = file!().replace('\\', "/");
-    this.strip_suffix("training/src/device/panics.rs").unwrap_or_default().to_owned()
+    this.strip_suffix("evaluation/src/device/panics.rs").unwrap_or_default().to_owned()
 }
 
 fn message(panic: &(dyn Any + Send)) -> String {
@@ -114,11 +115,11 @@ mod tests {
 
     #[test]
     fn files_of_the_project_are_told_from_those_of_libraries() {
-        for own in [file!(), "src/simulator.rs", "training\\src\\learner\\sac.rs", "policy/src/policy.rs"] {
+        for own in [file!(), "src/simulator.rs", "learner\\src\\sac.rs", "policy/src/policy.rs"] {
             assert!(is_own(own), "{own}");
         }
         for library in [
-            "/home/user/.cargo/registry/src/index/burn-tensor-0.22.0/src/tensor.rs",
+            "/.cargo/registry/src/index/burn-tensor-0.22.0/src/tensor.rs",
             "/rustc/0123456789/library/core/src/option.rs",
             "C:\\Users\\user\\.cargo\\registry\\src\\index\\wgpu-30.0.0\\src\\lib.rs",
         ] {

@@ -110,9 +110,15 @@ fn keys(table: &str) -> Vec<String> {
     let Some((_, listed)) = message.split_once(&format!("unknown field `{UNKNOWN}`, expected ")) else {
         return Vec::new();
     };
-    // The parser names the table in a line of its own.
-    let names =
-        listed.lines().next().unwrap_or_default().split('`').skip(1).step_by(2).map(|name| format!("{table}{name}"));
+    // The parser names the table behind them.
+    let names = listed
+        .split(", in `")
+        .next()
+        .unwrap_or_default()
+        .split('`')
+        .skip(1)
+        .step_by(2)
+        .map(|name| format!("{table}{name}"));
     let of_name = |name: String| {
         let below = keys(&format!("{name}."));
         if below.is_empty() { vec![name] } else { below }

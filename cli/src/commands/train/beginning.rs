@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use offtrack::files::reader::{printable, shown_path};
 use offtrack_learner::config::Config;
 
 /// Time of the default run, as docs/benchmarks has it: two quiet cores, and one core beside other work.
@@ -22,9 +23,9 @@ pub fn line(config: &Config, file: &Path, n_runs: usize) -> String {
     let seeds = if n_runs == 1 { String::new() } else { format!("{n_runs} seeds, each ") };
     format!(
         "{}: {seeds}trains for {}{time}; then evaluates on {}. Ctrl-C stops it; offtrack --help lists all commands\n",
-        file.display(),
+        shown_path(file),
         budget.join(" or "),
-        config.benchmark
+        printable(&config.benchmark)
     )
 }
 
