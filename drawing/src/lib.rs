@@ -13,11 +13,11 @@
 //!   machine.
 //!
 //! ```
-//! use offtrack::map::parametric::{Gutter, Roundabout};
+//! use offtrack::map::{Gutter, Road};
 //! use offtrack_drawing::figure::{self, Straights};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let roundabout = Roundabout::named("16m")?;
+//! let roundabout = Road::named("16m")?;
 //! let straights = Straights { approach: 40.0, departure: 35.0 };
 //! let routes = roundabout.routes(straights.approach, straights.departure, 2.0)?;
 //! let svg = figure::roundabout(&roundabout, &routes, straights, Gutter::Drivable)?;

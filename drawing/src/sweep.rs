@@ -74,7 +74,7 @@ struct Unit {
 
 impl<'a> Sweep<'a> {
     /// The path of `vehicle`, which `driven` names, on a road with these kerbs. Those of
-    /// [`Road::kerbs_beyond_ends`](offtrack::map::parametric::Roundabout::kerbs_beyond_ends) do not take the road's end
+    /// [`Road::kerbs_beyond_ends`](offtrack::map::Road::kerbs_beyond_ends) do not take the road's end
     /// for one.
     ///
     /// # Panics

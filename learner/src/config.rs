@@ -372,4 +372,6 @@ impl Config {
 #[cfg(test)]
 mod documented_tests;
 #[cfg(test)]
+mod set_tests;
+#[cfg(test)]
 mod tests;

@@ -290,7 +290,7 @@ mod tests {
         assert_eq!(printed("  Rates, [n_envs]."), "    // Rates, [n_envs].\n");
         assert_eq!(printed(" Bits: [`BEGINS`], [`Row::what`]."), "    // Bits: `BEGINS`, `Row::what`.\n");
         assert_eq!(printed(" Codes of [`crate::layout::Ended`]."), "    // Codes of `Ended`.\n");
-        assert_eq!(printed(" See [`Field`](crate::field::Field) for it."), "    // See `Field` for it.\n");
+        assert_eq!(printed(" See [`Ended`](crate::layout::Ended) for it."), "    // See `Ended` for it.\n");
         assert_eq!(printed(""), "    //\n");
         assert_eq!(printed(" An open [`bracket"), "    // An open [`bracket\n");
     }

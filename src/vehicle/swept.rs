@@ -143,3 +143,44 @@ pub fn own_lane_suffices(rig: &Rig, kerbs: &Outline, path: &[Pose]) -> bool {
         kerbs.intersects_rectangle(&pose.tractor_corners(rig)) || kerbs.intersects_rectangle(&pose.trailer_corners(rig))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::{Gutter, Road};
+    use crate::vehicle::Vehicle;
+
+    /// A ring of one lane and 17 m with four arms of this length (m).
+    fn one_lane(length: u32) -> Road {
+        let carriageway = |way: &str, offset: f64| {
+            format!("[arm.{way}.kerb]\npoints = [{{ along = 30.0, offset = {offset:?} }}]\nring_radius = 15.0\n")
+        };
+        let arm = |(name, bearing): (&str, f64)| {
+            let head = format!(
+                "[[arm]]\nname = \"{name}\"\nbearing_deg = {bearing:?}\nlength = {length}.0\nlane_width = 4.0\n"
+            );
+            head + &carriageway("entry", 5.0) + &carriageway("exit", -5.0)
+        };
+        let arms: String = [("E", 0.0), ("N", 90.0), ("W", 180.0), ("S", 270.0)].map(arm).concat();
+        let ring = "[ring]\nisland_radius = 10.0\ngutter = 0.5\nlane_width = 6.0\nlanes = 1\n";
+        Road::from_toml("one", &format!("{ring}{arms}")).unwrap()
+    }
+
+    #[test]
+    fn an_arm_too_short_for_the_truck_is_no_kerb_that_it_sweeps() {
+        let rig = Vehicle::named("eu_4x2_13m6").unwrap().rig("empty", 0.05, None);
+        let suffices = |length: u32, kerbs: fn(&Road) -> Outline| {
+            let roundabout = one_lane(length);
+            let routes = roundabout.routes(40.0, 35.0, 2.0).unwrap();
+            let path = |line: &Curve| swept_path(&rig, line, 20.0 / 3.6, 0.25);
+            let kerbs = kerbs(&roundabout);
+            routes.iter().map(|route| own_lane_suffices(&rig, &kerbs, &path(&route.centre_line))).collect::<Vec<bool>>()
+        };
+        let beyond = |roundabout: &Road| roundabout.kerbs_beyond_ends(Gutter::Drivable);
+        let (short, long) = (suffices(70, beyond), suffices(90, beyond));
+        let n_own = long.iter().filter(|&&own| own).count();
+        assert!((short == long) && long.len() == 16 && 0 < n_own && n_own < 16, "{short:?} {long:?}");
+        // With the road's end as a kerb no lane would do.
+        assert!(!suffices(70, |roundabout| roundabout.kerbs(Gutter::Drivable)).contains(&true));
+    }
+}

@@ -21,6 +21,7 @@ mod fleet;
 mod kinds;
 
 mod left_hand;
+mod map_bypass;
 mod map_junctions;
 mod map_kinds;
 mod map_lanes;

@@ -93,3 +93,72 @@ fn a_benchmark_of_ones_own_without_training_or_validation_routes_is_driven_on_ra
     assert!(said.contains("training on 3765 training routes of own on roads of random2026, cpu"), "{said}");
     assert_eq!(report["evaluation"]["routes"].as_array().unwrap().len(), 2);
 }
+
+#[test]
+fn a_lane_that_the_lock_does_not_allow_is_not_said_to_suffice() {
+    let place = Place::new();
+    let own = |lock: &str| {
+        let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
+        let benchmark =
+            benchmark.replace("20m.toml", "40m.toml").replace("\"E-right-1\", \"W-left-3\"", "\"SW-left-1\"");
+        std::fs::write(place.file("locked.toml"), format!("steer_max_deg = {lock}\n{benchmark}")).unwrap();
+        let (benchmark, report) = (place.text("locked.toml"), place.text("report.json"));
+        succeed(&offtrack(&[
+            "evaluate",
+            "--benchmark",
+            &benchmark,
+            "--policy",
+            "random",
+            "--episodes",
+            "1",
+            "--json",
+            &report,
+        ]));
+        place.json("report.json")["routes"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|route| route["own_lane_suffices"] == true)
+            .count()
+    };
+    // The path needs 8.4 deg.
+    assert_eq!([own("40.0"), own("9.0"), own("5.0")], [1, 1, 0]);
+}
+
+#[test]
+fn a_benchmark_slower_than_3_6_kmh_is_evaluated_with_either_clock() {
+    let place = Place::new();
+    let benchmark =
+        std::fs::read_to_string(place.file("short.toml")).unwrap().replace("speeds_kmh = [30.0]", "speeds_kmh = [3.5]");
+    assert!(benchmark.contains("[3.5]"));
+    for clock in ["highest_speed", "feasible"] {
+        let ending = format!("ending = {{ time_limit = 1.5, clock = \"{clock}\" }}\n");
+        std::fs::write(place.file("slow.toml"), format!("{ending}{benchmark}")).unwrap();
+        succeed(&offtrack(&[
+            "evaluate",
+            "--benchmark",
+            &place.text("slow.toml"),
+            "--policy",
+            "pursuit",
+            "--episodes",
+            "1",
+        ]));
+    }
+}
+
+#[test]
+fn a_mirror_that_the_actions_do_not_have_is_refused_before_a_folder_is_made() {
+    let place = Place::new();
+    let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
+    std::fs::write(place.file("short.toml"), benchmark.replacen("-0.8, -0.4,", "-0.8, -0.5,", 1)).unwrap();
+    let arguments = ["--name", "run", "--set", "learning.mirror_augmentation=true"];
+    let message = refusal(&place.train(&arguments), 2);
+    assert!(
+        message.contains("learning.mirror_augmentation: true; steering") && message.contains("its opposite is not"),
+        "{message}"
+    );
+    assert!(!place.file("runs").exists());
+    // So the corrected retry may have the same name.
+    std::fs::write(place.file("short.toml"), benchmark).unwrap();
+    succeed(&place.train(&arguments));
+}

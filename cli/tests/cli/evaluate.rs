@@ -48,58 +48,6 @@ fn every_episode_is_counted_once_by_its_end_and_once_by_its_route() {
 }
 
 #[test]
-fn a_lane_that_the_lock_does_not_allow_is_not_said_to_suffice() {
-    let place = Place::new();
-    let own = |lock: &str| {
-        let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
-        let benchmark =
-            benchmark.replace("20m.toml", "40m.toml").replace("\"E-right-1\", \"W-left-3\"", "\"SW-left-1\"");
-        std::fs::write(place.file("locked.toml"), format!("steer_max_deg = {lock}\n{benchmark}")).unwrap();
-        let (benchmark, report) = (place.text("locked.toml"), place.text("report.json"));
-        succeed(&offtrack(&[
-            "evaluate",
-            "--benchmark",
-            &benchmark,
-            "--policy",
-            "random",
-            "--episodes",
-            "1",
-            "--json",
-            &report,
-        ]));
-        place.json("report.json")["routes"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .filter(|route| route["own_lane_suffices"] == true)
-            .count()
-    };
-    // The path needs 8.4 deg.
-    assert_eq!([own("40.0"), own("9.0"), own("5.0")], [1, 1, 0]);
-}
-
-#[test]
-fn a_benchmark_slower_than_3_6_kmh_is_evaluated_with_either_clock() {
-    let place = Place::new();
-    let benchmark =
-        std::fs::read_to_string(place.file("short.toml")).unwrap().replace("speeds_kmh = [30.0]", "speeds_kmh = [3.5]");
-    assert!(benchmark.contains("[3.5]"));
-    for clock in ["highest_speed", "feasible"] {
-        let ending = format!("ending = {{ time_limit = 1.5, clock = \"{clock}\" }}\n");
-        std::fs::write(place.file("slow.toml"), format!("{ending}{benchmark}")).unwrap();
-        succeed(&offtrack(&[
-            "evaluate",
-            "--benchmark",
-            &place.text("slow.toml"),
-            "--policy",
-            "pursuit",
-            "--episodes",
-            "1",
-        ]));
-    }
-}
-
-#[test]
 fn an_empty_split_is_named_with_its_file_and_those_that_have_routes() {
     let place = Place::new();
     let message = refusal(&place.evaluate(&["--policy", "pursuit", "--split", "validation"]), 2);
@@ -414,10 +362,4 @@ fn the_curves_of_another_policys_run_are_refused_and_those_of_a_copys_are_shown(
     }
     std::fs::copy(place.file("runs/one/policy.safetensors"), place.file("copy.safetensors")).unwrap();
     succeed(&evaluated(&place.text("copy.safetensors")));
-}
-
-#[test]
-fn a_split_without_routes_is_refused_with_those_that_there_are() {
-    let said = refusal(&offtrack(&["evaluate", "--policy", "random", "--split", "validation"]), 2);
-    assert!(said.contains("--split: validation; attard2023 has routes under train, test alone"), "{said}");
 }

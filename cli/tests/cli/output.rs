@@ -9,8 +9,11 @@ use crate::place::{Place, program, repository, succeed};
 
 const VECTORS: &str = "tests/data/physics_vectors.json";
 
+/// Flags that name a file to write, each with a name.
+type Outputs = Vec<(&'static str, &'static str)>;
+
 /// Every command that writes a file, with the flags that name it.
-fn writers(benchmark: &str) -> Vec<(Vec<&str>, Vec<(&'static str, &'static str)>)> {
+fn writers(benchmark: &str) -> Vec<(Vec<&str>, Outputs)> {
     let arguments = |text: &'static str| text.split(' ').collect::<Vec<&str>>();
     let on_benchmark = |text: &'static str| [arguments(text), vec!["--benchmark", benchmark]].concat();
     vec![

@@ -110,23 +110,6 @@ fn training_on_a_test_route_or_with_other_actions_is_refused_before_a_folder_is_
 }
 
 #[test]
-fn a_mirror_that_the_actions_do_not_have_is_refused_before_a_folder_is_made() {
-    let place = Place::new();
-    let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
-    std::fs::write(place.file("short.toml"), benchmark.replacen("-0.8, -0.4,", "-0.8, -0.5,", 1)).unwrap();
-    let arguments = ["--name", "run", "--set", "learning.mirror_augmentation=true"];
-    let message = refusal(&place.train(&arguments), 2);
-    assert!(
-        message.contains("learning.mirror_augmentation: true; steering") && message.contains("its opposite is not"),
-        "{message}"
-    );
-    assert!(!place.file("runs").exists());
-    // So the corrected retry may have the same name.
-    std::fs::write(place.file("short.toml"), benchmark).unwrap();
-    succeed(&place.train(&arguments));
-}
-
-#[test]
 fn a_budget_too_small_for_any_update_is_refused() {
     let place = Place::new();
     let message = refusal(&place.train(&["--steps", "400"]), 2);

@@ -11,8 +11,7 @@ use std::thread::ThreadId;
 use crate::error::Error;
 
 /// Folders of the project, below [`root`].
-const OWN: [&str; 8] =
-    ["src/", "cli/", "drawing/", "evaluation/", "learner/", "policy/", "python/", "reference/"];
+const OWN: [&str; 8] = ["src/", "cli/", "drawing/", "evaluation/", "learner/", "policy/", "python/", "reference/"];
 
 /// Panics since work began that may panic, and how many such works are under way.
 static WATCHED: Mutex<Watched> = Mutex::new(Watched { n_works: 0, panics: Vec::new() });

@@ -6,7 +6,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use offtrack::layout::random;
 use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES, RewardTerms};
 use offtrack::physics;
-use offtrack::simulator::{Batch, RouteChoice, Simulator};
+use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;
 use offtrack_policy::Normalisation;
 use rand::{Rng, SeedableRng};
@@ -301,7 +301,6 @@ impl<const N: usize> Rollout for HostRollout<N> {
         self.simulator
             .restore(|column| stored.bytes(&column_name(column)))
             .map_err(|error| stored.error(error.to_string()))?;
-        check_finite(self.simulator.batch(), stored)?;
         (self.acting, self.sampling) =
             (Generator::stored(stored, "rollout, acting")?, Generator::stored(stored, "rollout, sampling")?);
         self.episode_rewards = stored.exactly("rollout, episode rewards", self.config.n_envs)?;
@@ -326,28 +325,6 @@ fn reserve<const N: usize>(replay_buffer: &mut ReplayBuffer<N>, config: &Config)
 fn add_arrivals(reward: &mut [f32], ended: &[u32], arrival: f32) {
     let arrived = reward.iter_mut().zip(ended).filter(|(_, code)| **code == Ended::Arrived as u32);
     arrived.for_each(|(reward, _)| *reward += arrival);
-}
-
-/// An error if a truck of a checkpoint has a number that is not finite.
-fn check_finite(batch: &Batch, stored: &Stored) -> Result<(), Error> {
-    for (column, bytes) in batch.columns() {
-        let floats: Vec<f32> = match column {
-            // Indices, or floats beside indices.
-            Column::Action | Column::Ended | Column::Progress => continue,
-            Column::Truck => batch
-                .truck
-                .iter()
-                .flat_map(|truck| [truck.position.x, truck.position.y, truck.heading, truck.speed])
-                .collect(),
-            _ => bytes.chunks_exact(size_of::<f32>()).map(bytemuck::pod_read_unaligned).collect(),
-        };
-        if let Some(value) = floats.iter().find(|value| !value.is_finite()) {
-            return Err(
-                stored.error(format!("its column `{}` has {value}: put a sound copy back", column_name(column)))
-            );
-        }
-    }
-    Ok(())
 }
 
 fn column_name(column: Column) -> String {

@@ -52,7 +52,8 @@ impl Around<'_> {
         let apart: Vec<Bypass> =
             all.iter().copied().filter(|bypass| alone[bypass.entry.0] || alone[bypass.exit.0]).collect();
         let (mut warnings, mut gone_entries, mut gone_exits) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut entries, mut exits): (Vec<(usize, Crossing)>, Vec<(usize, Crossing)>) = (Vec::new(), Vec::new());
+        let mut entries: Vec<(usize, Crossing)> = Vec::new();
+        let mut exits: Vec<(usize, Crossing)> = Vec::new();
         for &Bypass { entry, exit } in &apart {
             let (from, to) = (arms[entry.0].entries[entry.1].clone(), arms[exit.0].exits[exit.1].clone());
             let what = format!("{} passes beside the ring to {}", self.name(&from), self.name(&to));
