@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -38,3 +39,12 @@ def test_the_snippets_run(
         assert list(tmp_path.glob("films/*.mp4"))
     else:
         assert "attard2023 test: 100.0% (46/46); arrived 46" in printed
+
+
+def test_the_wheel_has_the_licence_of_everything_in_it() -> None:
+    whole = DOCUMENTS.parent / "LICENSES"
+    found = {file.name: file for file in metadata.files("offtrack-sim") or [] if "licenses" in file.parts}
+    names = {"MIT.txt", "Apache-2.0.txt", "Ubuntu-font-1.0.txt", "MIT-carla.txt", "MIT-zalazone.txt"}
+    assert found.keys() == names
+    for name, file in found.items():
+        assert file.read_text() == (whole / name).read_text(), name
