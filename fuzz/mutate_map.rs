@@ -50,7 +50,7 @@ fn value_after(bytes: &[u8], at: usize) -> Option<std::ops::Range<usize>> {
     Some(from..from + length)
 }
 
-/// Another value: extreme, near the old one, or that of another attribute.
+/// A changed value of an attribute: extreme, near the old one, or that of another attribute.
 fn changed(value: &str, bytes: &[u8], state: &mut u64) -> String {
     let near = |value: f64, state: &mut u64| match next(state) % 5 {
         0 => -value,

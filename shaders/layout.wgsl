@@ -40,7 +40,7 @@ const ARC_TANGENT: array<f32, 4> = array<f32, 4>(0.080537446f, -0.13877685f, 0.1
 const QUARTER: array<f32, 3> = array<f32, 3>(1.5703125f, 0.0004837513f, 7.54979e-8f);
 // Polynomial of the sine up to pi/4, in the square, highest power first.
 const SINE: array<f32, 3> = array<f32, 3>(-0.00019515296f, 0.008332161f, -0.16666655f);
-// That of the cosine.
+// Polynomial of the cosine up to pi/4, in the square, highest power first.
 const COSINE: array<f32, 3> = array<f32, 3>(2.4433157e-5f, -0.0013887316f, 0.041666646f);
 // The smallest divisor.
 const TINY: f32 = 1.1754944e-38f;
@@ -48,7 +48,7 @@ const TINY: f32 = 1.1754944e-38f;
 const ELSEWHERE: u32 = 32768u;
 // Lowest bits of what the northern half says then: the logarithm of the sub-cells a side of its first block.
 const LEVEL_MASK: u32 = 7u;
-// Shift of the same of a ridge's other two blocks.
+// Shift of the logarithm of the sub-cells a side of a ridge's other two blocks.
 const RIDGE_SHIFT: u32 = 3u;
 // Shift of a cell's kind.
 const KIND_SHIFT: u32 = 6u;
@@ -60,7 +60,7 @@ const LESSER: u32 = 2u;
 const GREATER: u32 = 3u;
 // Cells a side of the tiles that lie together in memory, west to east.
 const TILE_COLUMNS: u32 = 4u;
-// The same south to north.
+// Cells a side of the tiles that lie together in memory, south to north.
 const TILE_ROWS: u32 = 2u;
 // What a stored value of 1 means: 0.5 mm. Exact in f32 (m).
 const STORED_UNIT: f32 = 0.00048828125f;
@@ -272,9 +272,9 @@ struct Stream {
 
 // What the caller asks of a truck: whether and how it begins an episode.
 struct BeginRow {
-    // Its start, where `HAS_START` is set.
+    // Start of the episode, where `HAS_START` is set.
     start: Start,
-    // Index of its route in the world, where `HAS_ROUTE` is set.
+    // Index of the episode's route in the world, where `HAS_ROUTE` is set.
     route: u32,
     // Bits: `BEGINS`, `IS_FIRST`, `HAS_ROUTE`, `HAS_START`.
     what: u32,
@@ -397,7 +397,7 @@ struct Rig {
     yaw_lag: f32,
     // How the acceleration follows what is asked for when that is drive.
     drive_lag: Lag,
-    // The same when it is braking.
+    // How the acceleration follows what is asked for when that is braking.
     brake_lag: Lag,
     // Engine power over the mass of the whole truck (W/kg).
     power: f32,
@@ -500,11 +500,11 @@ struct PreviewRow {
 
 // One route in the world's table of waypoints.
 struct RouteRow {
-    // Its first waypoint in the table.
+    // The route's first waypoint in the table.
     first: u32,
-    // Its number of waypoints.
+    // The route's number of waypoints.
     n_waypoints: u32,
-    // Its roundabout.
+    // The route's roundabout.
     roundabout: u32,
     // Reach of a waypoint's crossing line to the left (m).
     crossing_left: f32,
@@ -596,7 +596,7 @@ struct BatchFacts {
 @group(0) @binding(25) var<storage, read_write> reward: array<f32>;
 // What is observed beside the observation before the next action; zeros beyond what the benchmark observes, [n_envs, 12].
 @group(0) @binding(26) var<storage, read_write> extras: array<f32>;
-// The same beside the observation after the last action, [n_envs, 12].
+// What is observed beside the observation after the last action, [n_envs, 12].
 @group(0) @binding(27) var<storage, read_write> next_extras: array<f32>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
 @group(0) @binding(28) var<storage, read_write> tally: array<atomic<u32>>;

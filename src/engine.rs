@@ -71,7 +71,7 @@ pub(crate) trait EngineBatch: Any + Debug + Send + Sync {
     /// One step of every truck with random actions.
     fn step_at_random(&mut self, world: &World);
 
-    /// The same a stage at a time: the time of each.
+    /// One step of every truck with random actions, a stage at a time: the time of each stage.
     fn step_at_random_by_stage(&mut self, world: &World) -> Result<[Duration; N_STAGES], Error>;
 
     /// One stage over every truck.

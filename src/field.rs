@@ -16,7 +16,7 @@ constants! {
     const ELSEWHERE: u32 = 0x8000;
     /// Lowest bits of what the northern half says then: the logarithm of the sub-cells a side of its first block.
     const LEVEL_MASK: u32 = 7;
-    /// Shift of the same of a ridge's other two blocks.
+    /// Shift of the logarithm of the sub-cells a side of a ridge's other two blocks.
     const RIDGE_SHIFT: u32 = 3;
     /// Shift of a cell's kind.
     const KIND_SHIFT: u32 = 6;
@@ -28,7 +28,7 @@ constants! {
     const GREATER: u32 = Kind::Greater as u32;
     /// Cells a side of the tiles that lie together in memory, west to east.
     const TILE_COLUMNS: u32 = 4;
-    /// The same south to north.
+    /// Cells a side of the tiles that lie together in memory, south to north.
     const TILE_ROWS: u32 = 2;
     /// What a stored value of 1 means: 0.5 mm. Exact in f32 (m).
     pub(crate) const STORED_UNIT: f32 = 1.0 / 2048.0;
@@ -333,7 +333,7 @@ mod tests {
 
     #[test]
     fn every_block_has_the_position_and_size_of_its_cells_word() {
-        // Its centre is a kink, within the range of the stated accuracy: both the coarsest and the finest blocks occur.
+        // The disc's centre is a kink, in the range of the stated accuracy: the coarsest and the finest blocks occur.
         let field = disc(4.0);
         let mut ends: Vec<(usize, usize)> = field.cells.iter().filter_map(|&cell| pairs(cell)).collect();
         ends.sort_unstable();

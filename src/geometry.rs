@@ -26,18 +26,18 @@ pub use outline::{Nearby, Outline};
 pub enum Piece {
     /// A straight piece.
     Segment {
-        /// Where it begins (m).
+        /// Where the segment begins (m).
         from: DVec2,
-        /// Where it ends (m).
+        /// Where the segment ends (m).
         to: DVec2,
     },
     /// A circular piece.
     Arc {
-        /// Centre of its circle (m).
+        /// Centre of the arc's circle (m).
         centre: DVec2,
-        /// Radius of its circle, positive (m).
+        /// Radius of the arc's circle, positive (m).
         radius: f64,
-        /// Direction from the centre to its beginning (rad).
+        /// Direction from the centre to the arc's beginning (rad).
         from: f64,
         /// Angle covered, positive counter-clockwise, at most a full turn either way (rad).
         sweep: f64,
@@ -106,7 +106,7 @@ impl Piece {
         }
     }
 
-    /// The same piece in the opposite direction.
+    /// This piece in the opposite direction.
     pub fn reversed(&self) -> Piece {
         match *self {
             Piece::Segment { from, to } => Piece::Segment { from: to, to: from },
@@ -116,7 +116,7 @@ impl Piece {
         }
     }
 
-    /// The same piece turned counter-clockwise around the origin by `angle` (rad).
+    /// This piece turned counter-clockwise around the origin by `angle` (rad).
     pub fn turned(&self, angle: f64) -> Piece {
         let turn = DVec2::from_angle(angle);
         match *self {
@@ -250,12 +250,12 @@ impl Curve {
         points
     }
 
-    /// The same curve in the opposite direction.
+    /// This curve in the opposite direction.
     pub fn reversed(&self) -> Curve {
         Curve { pieces: self.pieces.iter().rev().map(Piece::reversed).collect() }
     }
 
-    /// The same curve turned counter-clockwise around the origin by `angle` (rad).
+    /// This curve turned counter-clockwise around the origin by `angle` (rad).
     pub fn turned(&self, angle: f64) -> Curve {
         Curve { pieces: self.pieces.iter().map(|piece| piece.turned(angle)).collect() }
     }

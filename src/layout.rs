@@ -133,9 +133,9 @@ crate::shared! {
 
     /// What the caller asks of a truck: whether and how it begins an episode.
     pub struct BeginRow {
-        /// Its start, where [`HAS_START`] is set.
+        /// Start of the episode, where [`HAS_START`] is set.
         pub start: Start,
-        /// Index of its route in the world, where [`HAS_ROUTE`] is set.
+        /// Index of the episode's route in the world, where [`HAS_ROUTE`] is set.
         pub route: u32,
         /// Bits: [`BEGINS`], [`IS_FIRST`], [`HAS_ROUTE`], [`HAS_START`].
         pub what: u32,
@@ -258,7 +258,7 @@ crate::shared! {
         pub yaw_lag: f32,
         /// How the acceleration follows what is asked for when that is drive.
         pub drive_lag: Lag,
-        /// The same when it is braking.
+        /// How the acceleration follows what is asked for when that is braking.
         pub brake_lag: Lag,
         /// Engine power over the mass of the whole truck (W/kg).
         pub power: f32,
@@ -361,11 +361,11 @@ crate::shared! {
 
     /// One route in the world's table of waypoints.
     pub struct RouteRow {
-        /// Its first waypoint in the table.
+        /// The route's first waypoint in the table.
         pub first: u32,
-        /// Its number of waypoints.
+        /// The route's number of waypoints.
         pub n_waypoints: u32,
-        /// Its roundabout.
+        /// The route's roundabout.
         pub roundabout: u32,
         /// Reach of a waypoint's crossing line to the left (m).
         pub crossing_left: f32,

@@ -168,7 +168,7 @@ impl Scenario {
         Scenario::load(name_or_path, &Loading::PLAIN)
     }
 
-    /// The same, telling of progress, and with a cache of what is known of random roads.
+    /// Finds a benchmark as [`Scenario::find`], telling of progress, and with a cache of what is known of random roads.
     ///
     /// # Errors
     ///

@@ -65,7 +65,7 @@ pub struct Tractor {
     pub friction: f64,
     /// Mass (kg).
     pub mass: f64,
-    /// Its roll.
+    /// The tractor's roll.
     pub suspension: Suspension,
 }
 

@@ -72,7 +72,7 @@ impl World {
         })
     }
 
-    /// The same, with fields from a cache and a watcher who is told of each roundabout. All cores work at it.
+    /// Bakes a world with fields from a cache and a watcher who is told of each roundabout. All cores work at it.
     ///
     /// # Errors
     ///
@@ -159,7 +159,7 @@ impl World {
         self.step_limits[(truck.route * self.params.n_classes + self.rig(truck).class_index) as usize]
     }
 
-    /// Its distance sensors, trailer's first.
+    /// A rig's distance sensors, trailer's first.
     #[inline]
     pub fn rays_of(&self, rig: &Rig) -> &[Ray; N_RAYS] {
         &self.rays[rig.chassis as usize]

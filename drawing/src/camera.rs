@@ -50,7 +50,7 @@ pub struct Camera {
     shape: Shape,
     lettering: Lettering,
     format: Format,
-    /// Those last used, the last one last.
+    /// The backdrops last used, the latest one last.
     backdrops: Vec<Backdrop>,
     /// RGBA, `[side, side, 4]`.
     canvas: Vec<u8>,

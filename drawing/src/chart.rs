@@ -55,7 +55,7 @@ pub struct Panel {
 pub struct Line {
     /// Words in the legend; without them the line is not in it.
     pub name: Option<&'static str>,
-    /// As SVG writes it, such as one of [`LINES`].
+    /// The line's colour as SVG writes it, such as one of [`LINES`].
     pub colour: &'static str,
     /// Measured, or for comparison.
     pub kind: Kind,

@@ -133,7 +133,7 @@ impl View {
         self.corner + DVec2::new(p.x - self.low.x, self.high.y - y) * self.scale
     }
 
-    /// The same view for points of the mirror image in the x axis.
+    /// This view for points of the mirror image in the x axis.
     pub fn for_mirrored(&self) -> View {
         View { mirrored: true, ..*self }
     }

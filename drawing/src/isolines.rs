@@ -24,7 +24,7 @@ pub fn isolines(field: &Field, view: &View) -> Vec<Vec<DVec2>> {
     let corner = low - STEP / 2.0;
     let builder =
         ContourBuilder::new(columns, rows, true).x_origin(corner.x).y_origin(corner.y).x_step(STEP).y_step(STEP);
-    // It fails only when the number of values is not columns * rows.
+    // The builder fails only when the number of values is not columns * rows.
     let lines = builder.lines(&values, &levels).unwrap_or_default();
     let rings = lines.iter().flat_map(|line| line.geometry());
     rings.map(|ring| thinned(ring.coords().map(|p| DVec2::new(p.x, p.y)))).collect()

@@ -50,7 +50,7 @@ impl Lettering {
             .set("aria-label", words)
     }
 
-    /// The same with a light rim, to be read over a map.
+    /// One line of text with a light rim, to be read over a map, with its base line at `at` (px).
     pub fn text_on_map(&self, words: &str, at: DVec2, size: f64, align: Align, colour: &str) -> Group {
         let rim = self.outlines(words, at, size, align).set("fill", "white").set("stroke", "white");
         let rim =

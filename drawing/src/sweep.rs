@@ -315,7 +315,7 @@ fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
             }
             kept.push(p);
         }
-        // Its last point is the other chain's first.
+        // The chain's last point is the other chain's first.
         kept.pop();
         kept
     };

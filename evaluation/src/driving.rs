@@ -89,15 +89,15 @@ pub struct ClassReport {
     pub possible: Option<usize>,
     /// Episodes that ended with a rollover.
     pub rolled_over: usize,
-    /// Fraction that did.
+    /// Fraction of the episodes that ended with a rollover.
     pub rolled_over_fraction: f64,
-    /// Upper end of its 95 % Wilson interval.
+    /// Upper end of the 95 % Wilson interval of the fraction that ended with a rollover.
     pub rolled_over_high: f64,
-    /// Largest load transfer ratio of an episode: half, nine in ten and 99 in 100 of the episodes have at most this.
+    /// Largest load transfer ratio of an episode: half of the episodes have at most this.
     pub load_transfer_ratio_p50: f64,
-    /// The same of nine in ten.
+    /// Largest load transfer ratio of an episode: nine in ten of the episodes have at most this.
     pub load_transfer_ratio_p90: f64,
-    /// The same of 99 in 100.
+    /// Largest load transfer ratio of an episode: 99 in 100 of the episodes have at most this.
     pub load_transfer_ratio_p99: f64,
     /// Mean time of an episode with a load transfer ratio of at least 0.9 (s).
     pub time_at_limit_mean: f64,
@@ -108,9 +108,9 @@ pub struct ClassReport {
     pub time_over_feasible_mean: Option<f64>,
     /// Lateral acceleration of the trailer: half of the steps have at most this (g).
     pub lateral_acceleration_p50: f64,
-    /// The same of 95 in 100.
+    /// Lateral acceleration of the trailer: 95 in 100 of the steps have at most this (g).
     pub lateral_acceleration_p95: f64,
-    /// The same of 99 in 100.
+    /// Lateral acceleration of the trailer: 99 in 100 of the steps have at most this (g).
     pub lateral_acceleration_p99: f64,
     /// Change of the acceleration that 95 in 100 steps have at most (m/s^3).
     pub jerk_p95: f64,
@@ -118,7 +118,7 @@ pub struct ClassReport {
     pub switches_per_second: f64,
     /// Mean speed at contact of the episodes in which the tractor touched a kerb (km/h).
     pub tractor_contact_speed_kmh: Option<f64>,
-    /// The same of the trailer (km/h).
+    /// Mean speed at contact of the episodes in which the trailer touched a kerb (km/h).
     pub trailer_contact_speed_kmh: Option<f64>,
 }
 

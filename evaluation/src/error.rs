@@ -93,7 +93,7 @@ pub enum Error {
     Diverged {
         /// Which figure or parameter.
         what: String,
-        /// Its value, no number.
+        /// Value of the figure or parameter, no number.
         value: f32,
         /// Env steps taken.
         env_steps: u64,

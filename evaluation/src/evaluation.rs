@@ -36,9 +36,9 @@ pub fn usual_episodes(n_routes: usize) -> usize {
 pub struct Evaluation<'a> {
     /// The benchmark.
     pub scenario: &'a Scenario,
-    /// The same, baked.
+    /// The benchmark, baked.
     pub world: &'a Arc<World>,
-    /// Which of its routes.
+    /// The split whose routes are driven.
     pub split: Split,
     /// Episodes on each route.
     pub episodes: usize,

@@ -25,14 +25,14 @@ pub struct Cause {
     /// `trailer on the island`, `tractor on the outer kerb of the exit`, `lost at start`, `strayed` and the like; on a
     /// crossing, which has no ring, `trailer on the outer kerb of the junction`.
     pub cause: String,
-    /// Their number.
+    /// Number of the episodes that did not arrive for this cause.
     pub episodes: usize,
-    /// Fraction of all episodes that did not arrive.
+    /// This cause's fraction of all episodes that did not arrive.
     pub share: f64,
-    /// Those whose own start is shown to be possible; `None` where nobody asked for it.
+    /// Episodes of this cause whose own start is shown to be possible; `None` where nobody asked for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub possible: Option<usize>,
-    /// One of them, if there is one from a start that is shown to be possible.
+    /// One episode of this cause, if there is one from a start that is shown to be possible.
     pub example: Example,
 }
 
@@ -42,17 +42,17 @@ pub struct Example {
     /// Index among all episodes of the evaluation.
     #[serde(skip)]
     pub index: usize,
-    /// Its route's name.
+    /// Name of the episode's route.
     pub route: String,
-    /// Index among the episodes of its route.
+    /// Index among the episodes of the route.
     pub episode: usize,
-    /// Lateral offset and heading error of its start, as fractions of the largest ones.
+    /// Lateral offset and heading error of the episode's start, as fractions of the largest ones.
     pub start: [f64; 2],
-    /// Why it ended.
+    /// Why the episode ended.
     pub ended: &'static str,
-    /// Its number of steps.
+    /// The episode's number of steps.
     pub steps: u32,
-    /// Middle of the tractor's drive axle at its end, x east, y north (m).
+    /// Middle of the tractor's drive axle at the episode's end, x east, y north (m).
     pub position: [f64; 2],
 }
 

@@ -10,7 +10,7 @@ use super::report::{Episode, Summary};
 
 /// Island radii from which on a route is in the next band (m).
 const BANDS: [f64; 4] = [9.0, 12.0, 16.0, 22.0];
-/// Their names, and behind them that of the routes of a crossing, which has no island.
+/// Names of the bands of [`BANDS`], and behind them that of the routes of a crossing, which has no island.
 const BAND_NAMES: [&str; BANDS.len() + 2] =
     ["below 9 m", "9 to 12 m", "12 to 16 m", "16 to 22 m", "22 m and more", "none"];
 
@@ -22,9 +22,9 @@ pub type Evaluated<'a> = (usize, &'a Place, &'a Route);
 pub struct Group {
     /// What the routes have in common: `16m`, `left`, `2`, `9 to 12 m`.
     pub name: String,
-    /// Their number.
+    /// Number of the routes.
     pub routes: usize,
-    /// Figures of their episodes.
+    /// Figures of the episodes on the routes.
     #[serde(flatten)]
     pub summary: Summary,
 }

@@ -106,7 +106,7 @@ impl Page<'_> {
     }
 }
 
-/// The same with at most four decimals.
+/// A JSON value with its floating-point numbers rounded to four decimals.
 fn rounded(value: Value) -> Value {
     match value {
         Value::Array(values) => values.into_iter().map(rounded).collect(),

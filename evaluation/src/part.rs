@@ -28,7 +28,7 @@ impl Part {
         }
     }
 
-    /// Its name in reports.
+    /// The part's name in reports.
     pub(super) fn name(self, roundabout: &Road) -> &'static str {
         match self {
             Part::Entry => "entry",

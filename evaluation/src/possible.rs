@@ -19,7 +19,7 @@ use crate::error::Error;
 /// The episodes whose own start is shown to be possible.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Possible {
-    /// Their figures; `None` without such an episode.
+    /// Figures of the episodes with a possible start; `None` without such an episode.
     #[serde(flatten)]
     pub summary: Option<Summary>,
     /// Starts searched: those of the episodes that did not arrive, without those lost in their first step.
@@ -30,9 +30,9 @@ pub struct Possible {
     pub env_steps: u64,
     /// Searches made in turn from each start until one arrived.
     pub passes: Vec<Pass>,
-    /// The same episodes by band of the island's radius, smallest first.
+    /// The episodes with a possible start by band of the island's radius, smallest first.
     pub island_radius: Vec<Group>,
-    /// By the lane of approach.
+    /// The episodes with a possible start by the lane of approach.
     pub lane: Vec<Group>,
 }
 

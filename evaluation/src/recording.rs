@@ -134,7 +134,7 @@ impl Frame {
 pub struct Track {
     /// The truck's index in its batch.
     pub env: usize,
-    /// Its vehicle in this episode: a row of the world's `rigs`.
+    /// The truck's vehicle in this episode: a row of the world's `rigs`.
     pub vehicle: u32,
     /// Why the episode ended; `Running` before its end.
     pub ended: Ended,

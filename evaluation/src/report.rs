@@ -64,11 +64,11 @@ pub struct Summary {
     pub lost_at_start: usize,
     /// Mean distance to the lane centre, all episodes (m).
     pub lane_distance_mean: f64,
-    /// The same of those that arrived, `None` if none did (m).
+    /// Mean distance to the lane centre, episodes that arrived; `None` if none did (m).
     pub lane_distance_mean_arrived: Option<f64>,
-    /// Largest distance to the lane centre (m).
+    /// Largest distance to the lane centre, all episodes (m).
     pub lane_distance_max: f64,
-    /// The same of those that arrived (m).
+    /// Largest distance to the lane centre, episodes that arrived; `None` if none did (m).
     pub lane_distance_max_arrived: Option<f64>,
     /// Mean fraction of an episode's steps outside of its own lane, of those that arrived; `None` if none did.
     pub outside_lane_mean: Option<f64>,
@@ -89,7 +89,7 @@ pub struct Summary {
 }
 
 impl Episode {
-    /// It failed in its first step: the truck starts on or against a kerb, and no action helps.
+    /// Whether the episode failed in its first step: the truck starts on or against a kerb, and no action helps.
     pub fn lost_at_start(&self) -> bool {
         self.ended.failed() && self.steps == 1
     }

@@ -19,7 +19,7 @@ pub(super) struct Running {
     lane_distance_sum: f64,
     /// Steps after which the tractor's middle was outside of the route's own lane.
     outside: u32,
-    /// Its figures so far; the means and the off-tracking follow at its end.
+    /// The episode's figures so far; the means and the off-tracking follow at its end.
     episode: Episode,
     off_tracking: OffTracking,
     /// Duration of a step (s).
@@ -78,7 +78,7 @@ impl Running {
         batch.ended[env] != Ended::Running as u32
     }
 
-    /// Its figures, once it has ended this way.
+    /// The episode's figures, once it has ended by `ended`.
     pub(super) fn finish(&mut self, ended: Ended) -> Episode {
         let steps = f64::from(self.episode.steps.max(1));
         Episode {
@@ -111,7 +111,7 @@ impl OffTracking {
         OffTracking { front: VecDeque::from([from, to]), waiting: VecDeque::new(), most: 0.0 }
     }
 
-    /// Both axles after another step.
+    /// Adds the positions of both axles after another step (m).
     fn push(&mut self, front: Vec2, trailer: Vec2) {
         self.front.push_back(front);
         self.waiting.push_back(trailer);
@@ -169,7 +169,7 @@ mod tests {
     fn a_trailer_on_a_smaller_circle_is_off_by_the_difference_of_the_radii() {
         let at = |radius: f32, step: usize| radius * Vec2::from_angle(0.02 * step as f32);
         let front: Vec<Vec2> = (0..2000).map(|step| at(20.0, step)).collect();
-        // It waits beside the path's beginning until the front axle is 30 steps ahead.
+        // The trailer waits beside the path's beginning until the front axle is 30 steps ahead.
         let trailer: Vec<Vec2> = (0..1998usize).map(|step| at(18.0, 1 + step.saturating_sub(30))).collect();
         let (most, held) = off_tracking(&front, &trailer);
         // The chords of the path lie up to 1 mm inside its circle.

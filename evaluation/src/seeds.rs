@@ -38,11 +38,11 @@ struct Evaluated {
 /// Several seeds, as written to `seeds.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Seeds {
-    /// All that were asked for.
+    /// All seeds that were asked for.
     seeds: Vec<u32>,
-    /// Those that have finished.
+    /// The runs that have finished.
     runs: Vec<SeedRun>,
-    /// Their evaluations, that on `benchmark` first.
+    /// Evaluations of the finished runs, that on `benchmark` first.
     evaluations: Vec<SeedsEvaluation>,
 }
 
@@ -159,7 +159,7 @@ impl SeedsEvaluation {
         })
     }
 
-    /// Its column: head, seeds, mean, worst and interval.
+    /// The evaluation's column: head, seeds, mean, worst and interval.
     fn cells(&self) -> Vec<String> {
         let familiarity = match self.trained_on {
             0 => "zero-shot".to_owned(),

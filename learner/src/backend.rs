@@ -47,7 +47,7 @@ impl Backend {
         Err(Error::Setting { name: "device", value: "\"gpu\"".to_owned(), expected })
     }
 
-    /// Its name in results: `cpu`, or the adapter's with its interface and driver.
+    /// The backend's name in results: `cpu`, or the adapter's with its interface and driver.
     pub fn name(&self) -> String {
         match self {
             Backend::Host => "cpu".to_owned(),
@@ -93,7 +93,7 @@ impl Backend {
         }
     }
 
-    /// The same where the networks observe `N` values.
+    /// Trucks and a replay buffer on this backend, where the networks observe `N` values.
     fn rollout_of<const N: usize>(
         &self,
         config: &Config,

@@ -28,7 +28,7 @@ const LIMIT: u64 = 64 << 30;
 
 /// What a column holds.
 pub trait Number: Pod + Display {
-    /// Its type as the file names it.
+    /// The number's type as the file names it.
     const DTYPE: Dtype;
 
     /// Whether it is a number at all.

@@ -97,9 +97,9 @@ pub enum Device {
 pub struct Exploration {
     /// Fraction of random actions at the beginning.
     pub initial_fraction: f64,
-    /// The same from `steps` on.
+    /// Fraction of random actions from `steps` on.
     pub final_fraction: f64,
-    /// Env steps over which it goes from one to the other.
+    /// Env steps over which the fraction goes from the initial to the final one.
     pub steps: u64,
     /// How differently the trucks explore: the fraction of truck i of n is raised to the power 1 + spread i / (n - 1).
     #[serde(default)]
@@ -246,9 +246,9 @@ pub struct Refinement {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Critics {
-    /// Their mean.
+    /// The mean of the two values.
     Mean,
-    /// The lower of the two.
+    /// The lower of the two values.
     Minimum,
 }
 
@@ -274,12 +274,12 @@ impl Config {
         Config::read_with(file, &[])
     }
 
-    /// The same with some of its keys set to other values, each `KEY=VALUE`.
+    /// Reads a training file with some of its keys set to other values, each `KEY=VALUE`.
     pub fn read_with(file: &Path, settings: &[String]) -> Result<Config, Error> {
         Config::read_for(file, None, settings)
     }
 
-    /// The same for another benchmark alone, if one is given.
+    /// Reads a training file as [`Config::read_with`] does, for another benchmark alone if one is given.
     pub fn read_for(file: &Path, benchmark: Option<&str>, settings: &[String]) -> Result<Config, Error> {
         let mut table = file::resolved(file)?;
         if let Some(benchmark) = benchmark {

@@ -11,7 +11,7 @@ const F32: u128 = 4;
 /// Copies of the parameters of the learner's networks: parameters of three networks, target networks and EMA, Adam's
 /// moments, gradients of two shards and their sum, and a checkpoint's copy of each.
 const COPIES: u128 = 33;
-/// The same of the refinement's two networks.
+/// Copies of the parameters of the refinement's two networks, counted as in [`COPIES`].
 const REFINED_COPIES: u128 = 24;
 /// Bytes of a truck beside its observations: its row of the batch.
 const TRUCK: u128 = 1_000;

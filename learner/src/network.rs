@@ -59,7 +59,7 @@ impl Mlp {
         self.layers.iter().map(plain).collect()
     }
 
-    /// The same layers with layer normalisation before each rectifier.
+    /// This network with layer normalisation before each rectifier.
     pub fn with_layer_norm(self) -> Mlp {
         let hidden = self.layers.len() - 1;
         let config = |layer: &Linear| LayerNormConfig::new(layer.weight.dims()[1]).with_epsilon(NORM_EPSILON);
@@ -95,7 +95,7 @@ impl Mlp {
         layers.chain(norms).collect()
     }
 
-    /// The same network on a device; waits for the one that it is on.
+    /// A copy of this network on a device; waits for the device that this network is on.
     pub fn on(&self, device: &Device) -> Mlp {
         self.with_parameters(self.parameters().into_iter().map(|(_, values)| values).collect(), device)
     }

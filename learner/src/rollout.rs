@@ -23,20 +23,20 @@ use offtrack_evaluation::error::Error;
 /// Some episodes that ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Episodes {
-    /// Their number.
+    /// Number of episodes.
     pub count: u64,
-    /// Those that arrived.
+    /// Episodes that arrived.
     pub arrived: u64,
-    /// Sum of their rewards; of several trucks counted together, of all steps since the last count.
+    /// Sum of the episodes' rewards; of several trucks counted together, of all steps since the last count.
     pub reward: f64,
 }
 
 /// An episode that ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RouteEnd {
-    /// Its route, an index in the world.
+    /// The episode's route, an index in the world.
     pub route: u32,
-    /// Why it ended.
+    /// Why the episode ended.
     pub ended: Ended,
 }
 
@@ -68,7 +68,7 @@ pub trait Rollout {
     /// once: not remembered. The lane distance counts as far as the world's limit.
     fn collect(&mut self, actor: &Mlp, settings: &Refinement) -> Result<Steps, Error>;
 
-    /// One such step, not kept at all.
+    /// One step of every truck with actions sampled from the actor's distribution, not kept at all.
     fn drive(&mut self, actor: &Mlp) -> Result<(), Error>;
 
     /// Samples a batch, in shards.
@@ -81,7 +81,7 @@ pub trait Rollout {
     /// `wait`.
     fn take_episodes(&mut self, wait: bool) -> Result<Vec<Episodes>, Error>;
 
-    /// The same episodes one by one, since this was last called; none where the device counts all trucks together.
+    /// The episodes that ended since this was last called, one by one; none where a device counts all trucks together.
     fn take_route_ends(&mut self) -> Vec<RouteEnd> {
         Vec::new()
     }

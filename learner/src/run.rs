@@ -72,7 +72,7 @@ impl Run {
         }
     }
 
-    /// Where it runs, as results name it.
+    /// Name of the device that the run uses, as in results.
     pub fn device(&self) -> String {
         self.backend.name()
     }

@@ -103,7 +103,7 @@ impl Session {
         self.rollout.as_ref()
     }
 
-    /// The same, to be stepped.
+    /// Trucks and replay buffer, to be stepped.
     pub fn rollout_mut(&mut self) -> &mut dyn Rollout {
         self.rollout.as_mut()
     }

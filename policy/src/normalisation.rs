@@ -23,7 +23,7 @@ impl Normalisation {
         Normalisation { mean: vec![0.0; n_values], factor: vec![1.0; n_values] }
     }
 
-    /// Of these observations.
+    /// The normalisation of these observations.
     pub fn of<const N: usize>(observations: &[[f32; N]]) -> Normalisation {
         let n = observations.len().max(1) as f64;
         let mean_of = |value: &dyn Fn(&[f32; N]) -> f64| observations.iter().map(value).sum::<f64>() / n;
@@ -42,7 +42,7 @@ impl Normalisation {
         self.apply_rows(observations.as_flattened())
     }
 
-    /// The same of rows that lie one after the other, `[rows * values]`.
+    /// The normalised rows of observations that lie one after the other, `[rows * values]`.
     pub fn apply_rows(&self, observations: &[f32]) -> Vec<f32> {
         let normalised = |((value, mean), factor): ((&f32, &f32), &f32)| ((value - mean) * factor).clamp(-LIMIT, LIMIT);
         let mut values = Vec::with_capacity(observations.len());

@@ -102,7 +102,8 @@ impl Policy {
         network::forward(&self.normalisation, &self.layers, self.activation, observations.as_flattened())
     }
 
-    /// The same with the extras beside each observation, of which it takes the first, `[n_envs]` each.
+    /// One value an action for each observation, `[n_envs * n_actions]`, with the extras beside each observation, of
+    /// which the policy takes the first, `[n_envs]` each.
     ///
     /// # Panics
     ///

@@ -34,9 +34,9 @@ pub struct End {
     pub env: usize,
     /// Why it ended.
     pub code: u32,
-    /// What it was drawn from.
+    /// Route and vehicle of the episode.
     pub episode: Episode,
-    /// After the last action; zeros behind the benchmark's values.
+    /// The observation after the last action; zeros behind the benchmark's values.
     pub observation: [f32; N_VALUES_MAX],
 }
 
@@ -48,7 +48,7 @@ pub struct Names {
 }
 
 impl Names {
-    /// Those of a world.
+    /// The names of a world's routes and vehicles.
     pub fn new(py: Python, world: &World) -> Names {
         let text = |name: &String| PyString::new(py, name).unbind();
         let classes: Vec<_> = world.classes.iter().map(|class| [text(&class.vehicle), text(&class.load)]).collect();

@@ -52,7 +52,7 @@ impl<'a> Read<'a> {
         self.observed_in(BEFORE, n_extras)
     }
 
-    /// What they observed after the last action.
+    /// What trucks observed after the last action.
     pub fn observed_last(&self, n_extras: usize) -> Observed<'_> {
         let was_read = self.columns.contains(&AFTER[0]);
         self.observed_in(if was_read { AFTER } else { BEFORE }, n_extras)
@@ -95,7 +95,7 @@ impl Observed<'_> {
         row
     }
 
-    /// Copies all of them, `[n_envs * n_values]`, on the threads of the caller's pool.
+    /// Copies all observations, `[n_envs * n_values]`, on the threads of the caller's pool.
     pub fn write(&self, observation: &mut [f32]) {
         if self.n_extras == 0 {
             let (rows, _) = observation.as_chunks_mut::<N_VALUES>();
@@ -110,7 +110,7 @@ impl Observed<'_> {
         });
     }
 
-    /// The same as a new array.
+    /// All observations as a new array, `[n_envs * n_values]`.
     pub fn to_vec(&self) -> Vec<f32> {
         if self.n_extras == 0 {
             let rows: Vec<[f32; N_VALUES]> = self.values.par_iter().with_min_len(ROWS_MIN).copied().collect();

@@ -71,7 +71,7 @@ impl Pool {
         if self.is_forked()
             && let Some((_, pool)) = self.made.take()
         {
-            // Its threads are the parent's: there is nothing to stop here.
+            // The pool's threads are the parent's: there is nothing to stop here.
             std::mem::forget(pool);
         }
         let (_, pool) = match self.made.take() {

@@ -27,7 +27,7 @@ const POLL: Duration = Duration::from_millis(20);
 pub struct Place {
     /// The benchmark, of which the routes to be driven are left.
     pub scenario: Arc<Scenario>,
-    /// The same, baked.
+    /// The benchmark, baked.
     pub world: Arc<World>,
     /// Routes to draw from, as indices into the world's.
     pub routes: Vec<u32>,

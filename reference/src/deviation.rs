@@ -63,7 +63,7 @@ pub struct MeasuredRoute {
     pub lane: Lane,
     /// Exit number, counter-clockwise from 1.
     pub exit: u32,
-    /// Its unbroken stretches.
+    /// The route's unbroken stretches.
     pub stretches: Vec<Line>,
 }
 

@@ -144,7 +144,7 @@ macro_rules! batch {
                 [$((Column::$variant, cast_slice(&self.$name)),)*]
             }
 
-            /// The same to be written to.
+            /// Every column's bytes, to be written to.
             pub(crate) fn columns_mut(&mut self) -> [(Column, &mut [u8]); N_COLUMNS] {
                 [$((Column::$variant, cast_slice_mut(&mut self.$name)),)*]
             }
@@ -219,7 +219,7 @@ impl Batch {
         self.tally
     }
 
-    /// As many trucks with the same streams, routes and tally, and all columns zero.
+    /// A batch of as many trucks with the same streams, routes and tally as this one, and all columns zero.
     pub(crate) fn blank(&self) -> Result<Batch, Error> {
         let batch = Batch::new(self.n_envs(), self.seed, self.choice.clone())?;
         Ok(Batch { tally: self.tally, autoreset: self.autoreset, streams: self.streams.clone(), ..batch })

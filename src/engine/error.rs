@@ -84,7 +84,7 @@ pub enum Error {
     /// A row that the batch does not have.
     #[error("indices[{position}]: {index}; the batch has trucks 0..{n_envs}")]
     UnknownTruck {
-        /// Its position among the indices.
+        /// Position of the unknown truck's index among the indices.
         position: usize,
         /// The index asked for.
         index: usize,

@@ -36,7 +36,7 @@ pub struct Device {
     pub adapter: wgpu::Adapter,
     /// The device.
     pub device: wgpu::Device,
-    /// Its one queue.
+    /// The device's one queue.
     pub queue: wgpu::Queue,
     broken: Arc<Mutex<Option<String>>>,
     kernels: Arc<OnceLock<Kernels<Kernel>>>,
@@ -146,7 +146,7 @@ impl Device {
         Slice { buffer, offset: 0, size }
     }
 
-    /// Such a buffer with contents.
+    /// A buffer like that of [`Device::empty`], but with contents.
     pub fn filled(&self, label: &str, contents: &[u8]) -> Slice {
         // Not created with its contents: on a lost device that would panic.
         let slice = self.empty(label, contents.len() as u64);

@@ -11,7 +11,7 @@ use crate::geometry::{Outline, Piece};
 const FORM: u32 = 1;
 
 impl Field {
-    /// The same as [`Field::bake`], from the cache if it was kept there before; else it is kept now.
+    /// What [`Field::bake`] gives, from the cache if it was kept there before; else it is kept now.
     pub fn cached(outline: &Outline, cell: f64, cache: &Cache) -> Field {
         let key = key(outline, cell);
         if let Some(field) = cache.get("field", &key).and_then(|bytes| parsed(&bytes)) {

@@ -86,7 +86,7 @@ impl Kind {
         }
     }
 
-    /// Its folder below `scenarios/`, with the slash that ends it; empty for benchmarks.
+    /// The kind's folder below `scenarios/`, with the slash that ends it; empty for benchmarks.
     pub fn folder(self) -> &'static str {
         match self {
             Kind::Benchmark => "",

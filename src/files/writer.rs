@@ -79,7 +79,8 @@ impl Output {
         self.finish_unsynced()
     }
 
-    /// The same without waiting for the disk: after a crash of the system the file may have lost bytes.
+    /// Puts what was written into its place without waiting for the disk: after a crash of the system the file may have
+    /// lost bytes.
     ///
     /// # Errors
     ///

@@ -79,7 +79,7 @@ impl Area {
         Area { parts: self.parts.outline_fixed_scale(&style, GRID).unwrap_or_else(|_| self.parts.outline(&style)) }
     }
 
-    /// The same area with fewer points: what is left out lies within `tolerance` of the new edges (m).
+    /// The area with fewer points: what is left out lies within `tolerance` of the new edges (m).
     pub(crate) fn simplified(&self, tolerance: f64) -> Area {
         let contour = |contour: &Vec<[f64; 2]>| simplified(contour, tolerance);
         let part = |part: &Part| part.iter().map(contour).filter(|contour| 2 < contour.len()).collect();
@@ -108,7 +108,7 @@ impl Area {
         holes.map(|hole| Area { parts: vec![vec![hole.iter().rev().copied().collect()]] })
     }
 
-    /// Its size (m²).
+    /// The area's size (m²).
     pub(crate) fn size(&self) -> f64 {
         self.parts.iter().flatten().map(|contour| signed_area(contour)).sum()
     }

@@ -95,7 +95,7 @@ fn distinct(polyline: &[DVec2]) -> Vec<DVec2> {
     points
 }
 
-/// The same polyline with points at most [`STEP`] apart.
+/// The polyline with points at most [`STEP`] apart.
 fn dense(points: &[DVec2]) -> Vec<DVec2> {
     let mut dense: Vec<DVec2> = points.first().copied().into_iter().collect();
     for pair in points.windows(2) {

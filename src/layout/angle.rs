@@ -23,7 +23,7 @@ constants! {
     const QUARTER: [f32; 3] = [1.570_312_5, 4.837_513e-4, 7.549_79e-8];
     /// Polynomial of the sine up to pi/4, in the square, highest power first.
     const SINE: [f32; 3] = [-1.951_529_6e-4, 8.332_161e-3, -0.166_666_55];
-    /// That of the cosine.
+    /// Polynomial of the cosine up to pi/4, in the square, highest power first.
     const COSINE: [f32; 3] = [2.443_315_7e-5, -1.388_731_6e-3, 4.166_664_6e-2];
     /// The smallest divisor.
     pub const TINY: f32 = f32::MIN_POSITIVE;

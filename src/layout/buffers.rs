@@ -85,7 +85,7 @@ pub const BUFFERS: [Buffer; N_BUFFERS] = {
 };
 
 impl Buffer {
-    /// Its name in WGSL.
+    /// The buffer's name in WGSL.
     pub fn name(self) -> &'static str {
         match self {
             Buffer::Table(table) => table.name(),
@@ -103,7 +103,7 @@ impl Buffer {
         }
     }
 
-    /// What it holds, and its type in WGSL.
+    /// What the buffer holds, and the type of that in WGSL.
     fn declared(self) -> (String, String) {
         match self {
             Buffer::Table(table) => table.declared(),

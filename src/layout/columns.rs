@@ -35,7 +35,7 @@ macro_rules! columns {
             Reward reward: f32,
             /// What is observed beside the observation before the next action; zeros beyond what the benchmark observes
             Extras extras: [f32; N_EXTRAS],
-            /// The same beside the observation after the last action
+            /// What is observed beside the observation after the last action
             NextExtras next_extras: [f32; N_EXTRAS],
         }
     };
@@ -52,7 +52,7 @@ macro_rules! column_names {
         }
 
         impl Column {
-            /// Its name.
+            /// The column's name.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Column::$variant => stringify!($name),)*
@@ -80,7 +80,7 @@ macro_rules! column_names {
                 }
             }
 
-            /// Its shape.
+            /// The column's shape.
             pub(super) fn shape(self) -> String {
                 match self {
                     $(Column::$variant => format!("[n_envs{}]", <$type>::lengths()),)*

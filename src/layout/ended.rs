@@ -5,7 +5,7 @@ crate::named! {
     /// the time limit.
     #[repr(u32)]
     pub enum Ended {
-        /// It goes on.
+        /// The episode goes on.
         Running = "running",
         /// The last waypoint was passed.
         Arrived = "arrived",

@@ -7,11 +7,11 @@ use super::N_EXTRAS;
 /// A value that is observed beside the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extra {
-    /// Its name.
+    /// The extra's name.
     pub name: &'static str,
-    /// Its factor in a mirror: -1 where left and right change places.
+    /// The extra's factor in a mirror: -1 where left and right change places.
     pub mirror: f32,
-    /// What it is, what it is divided by, and where it is limited.
+    /// What the extra is, what it is divided by, and where it is limited.
     pub doc: &'static str,
 }
 
@@ -57,7 +57,7 @@ impl ObservedExtras {
         }
     }
 
-    /// Their names.
+    /// Names of the extras.
     pub fn names(self) -> Vec<&'static str> {
         EXTRAS[..self.n_extras()].iter().map(|extra| extra.name).collect()
     }

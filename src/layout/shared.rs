@@ -7,7 +7,7 @@ use glam::Vec2;
 
 /// A type that WGSL has too.
 pub trait Shared {
-    /// Its name in WGSL.
+    /// The type's name in WGSL.
     fn wgsl() -> String;
 
     /// Name in WGSL of what a buffer of such values is an array of: arrays lie flat in it.
@@ -54,28 +54,28 @@ impl<T: Shared, const N: usize> Shared for [T; N] {
 /// A shared struct, described.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Struct {
-    /// Its name.
+    /// The struct's name.
     pub name: &'static str,
-    /// Its size (bytes).
+    /// The struct's size (bytes).
     pub size: usize,
-    /// Its fields, in order and without gaps.
+    /// The struct's fields, in order and without gaps.
     pub fields: Vec<Field>,
 }
 
 /// A field of a shared struct.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Field {
-    /// Its name.
+    /// The field's name.
     pub name: &'static str,
-    /// Its offset in the struct (bytes).
+    /// The field's offset in the struct (bytes).
     pub offset: usize,
-    /// Its type in WGSL: `f32`, `u32`, `vec2<f32>`, another struct or an array.
+    /// The field's type in WGSL: `f32`, `u32`, `vec2<f32>`, another struct or an array.
     pub wgsl: String,
 }
 
 /// A value that can be written as a WGSL literal.
 pub trait Literal {
-    /// Its type in WGSL.
+    /// The value's type in WGSL.
     fn type_name() -> String;
     /// The value as WGSL reads it, to the last bit.
     fn literal(&self) -> String;
@@ -153,7 +153,7 @@ pub trait Named: Copy + Eq + std::fmt::Debug + 'static {
     /// The name.
     fn name(self) -> &'static str;
 
-    /// Its index in [`Named::ALL`].
+    /// The item's index in [`Named::ALL`].
     fn index(self) -> usize;
 }
 

@@ -13,7 +13,7 @@ use crate::map::opendrive::{Hand, Imported, Map, Options, Ring, Way};
 pub struct Choice {
     /// A point of the map near the ring; needed where the map has several (m).
     pub ring: Option<DVec2>,
-    /// Its hand of traffic.
+    /// The map's hand of traffic.
     pub hand: Hand,
     /// The roundabout's name; the file's stem without one.
     pub name: Option<String>,

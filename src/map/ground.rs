@@ -43,7 +43,7 @@ pub enum Edges {
 /// A road that leads to the ring.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arm {
-    /// Its name, a part of the names of its routes.
+    /// The arm's name, a part of the names of its routes.
     pub name: String,
     /// Direction in which it leaves the ring, counter-clockwise from east (rad).
     pub bearing: f64,
@@ -60,7 +60,7 @@ pub struct Line {
     pub exit: u32,
     /// Index of the exit arm.
     pub exit_arm: usize,
-    /// Its centre line.
+    /// The route's centre line.
     pub line: Curve,
     /// Reach of a crossing line from the centre line to its left and to its right, over all lanes of the ring (m).
     pub crossing: (f64, f64),

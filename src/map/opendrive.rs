@@ -57,7 +57,8 @@ pub enum Hand {
 
 /// Chords of lanes leave their curves by at most this much where rings are looked for (m).
 const COARSE: f64 = 0.02;
-/// The same for centre lines of routes, before arcs are fitted; headings matter too (m).
+/// Chords of routes' centre lines leave their curves by at most this much before arcs are fitted; headings matter
+/// too (m).
 const FINEST: f64 = 1e-4;
 
 /// A map that was read.
@@ -82,7 +83,7 @@ impl Map {
         Map::parse(file, &encoding::text(file, read_bytes(file, read::FILE_LIMIT)?)?, hand)
     }
 
-    /// The same from the file's text; `file` names it in errors.
+    /// Reads a map from the file's text and finds its rings; `file` names the map in errors.
     ///
     /// # Errors
     ///
@@ -98,7 +99,7 @@ impl Map {
         Ok(Map { file: file.to_owned(), records, strips, graph, rings, refused })
     }
 
-    /// Its roundabouts, the largest first.
+    /// The map's roundabouts, the largest first.
     pub fn rings(&self) -> Vec<Ring> {
         self.rings.iter().map(|ring| Ring { centre: self.outside(ring.centre), ..*ring }).collect()
     }

@@ -114,7 +114,7 @@ impl Road {
         Road::staged(name, reader, written).map_err(|(_, error)| error)
     }
 
-    /// The same; an error says in which stage of the check it was found.
+    /// The road that `written` describes, checked; an error says in which stage of the check it was found.
     pub(crate) fn staged(name: String, reader: Reader, written: Written) -> Result<Road, (Stage, Error)> {
         if written.is_left_hand() {
             let roundabout = Road::staged(name, reader, written.mirrored());

@@ -27,7 +27,7 @@ pub struct RandomRoad {
     pub roundabout: Road,
     /// Seed that it was drawn with.
     pub seed: u32,
-    /// Its index among the roads of the seed.
+    /// The road's index among the roads of the seed.
     pub index: u32,
     /// The attempt that was valid, from 0.
     pub attempt: u32,

@@ -147,7 +147,7 @@ impl Scenario {
         drawn.fold(self.vehicle.reach(self.start_heading), |(a, b), (c, d)| (a.max(c), b.max(d)))
     }
 
-    /// The same benchmark for those of its vehicles and loads alone for which `keeps` holds; `None` if there are none.
+    /// This benchmark for those of its vehicles and loads alone for which `keeps` holds; `None` if there are none.
     pub fn with_classes(&self, keeps: impl Fn(&Class) -> bool) -> Option<Scenario> {
         let mut scenario = self.clone();
         let Some(fleet) = &mut scenario.fleet else {

@@ -36,7 +36,7 @@ impl Scenario {
         }
     }
 
-    /// The same benchmark on this roundabout alone, with all its routes in the test split.
+    /// This benchmark on the given roundabout alone, with all the roundabout's routes in the test split.
     ///
     /// # Errors
     ///

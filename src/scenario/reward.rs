@@ -13,11 +13,11 @@ const WEIGHT: [f64; 2] = [-1e6, 1e6];
 /// A key of `[reward]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RewardKey {
-    /// Its name.
+    /// The key's name.
     pub name: &'static str,
     /// Least and greatest value that a file may give.
     pub range: [f64; 2],
-    /// Its unit; empty for a weight.
+    /// The key's unit; empty for a weight.
     pub unit: &'static str,
 }
 
@@ -41,7 +41,7 @@ macro_rules! reward {
         pub const REWARD_KEYS: &[RewardKey] = &[$(RewardKey { name: stringify!($key), range: $range, unit: $unit },)*];
 
         impl Reward {
-            /// Its values in the order of [`REWARD_KEYS`].
+            /// The reward's values in the order of [`REWARD_KEYS`].
             pub fn values(&self) -> Vec<f64> {
                 vec![$(self.$key),*]
             }
@@ -54,7 +54,7 @@ macro_rules! reward {
         }
 
         impl RewardChanges {
-            /// Its values in the order of [`REWARD_KEYS`].
+            /// The changed values in the order of [`REWARD_KEYS`]; `None` where a key does not change.
             fn values(&self) -> Vec<Option<f64>> {
                 vec![$(self.$key),*]
             }

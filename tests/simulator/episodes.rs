@@ -235,7 +235,7 @@ fn a_truck_that_only_drives_straight_leaves_its_route_and_the_reward_says_so() {
         }
         assert_eq!(simulator.batch().ended[0], Ended::TractorCollided as u32);
         assert_eq!(reward, terms);
-        // It passes the approach of 40 m, a waypoint every 2 m, meets the island and pays for it.
+        // The truck passes the approach of 40 m, a waypoint every 2 m, meets the island and pays for it.
         assert!((15..35).contains(&passed), "{passed}");
         assert!((100.0 * passed as f32 - 550.0..100.0 * passed as f32 - 500.0).contains(&reward), "{reward}");
     }

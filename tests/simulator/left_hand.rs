@@ -21,8 +21,8 @@ fn text(name: &str) -> String {
     fs::read_to_string(file).unwrap()
 }
 
-/// The same road with left-hand traffic, as one would write it: other signs of bearings and offsets, and the lanes'
-/// names exchanged.
+/// A roundabout file's text with left-hand traffic, as one would write it: other signs of bearings and offsets, and the
+/// lanes' names exchanged.
 fn left_hand(text: &str) -> String {
     let negated = |line: &str, key: &str| match line.split_once(&format!("{key} = ")) {
         Some((before, after)) => match after.strip_prefix('-') {

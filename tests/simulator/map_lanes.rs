@@ -51,8 +51,8 @@ fn apart(lines: &[Vec<DVec2>], others: &[Vec<DVec2>]) -> Vec<(usize, usize)> {
 
 /// A map with the numbers of lines that may be apart, ours and theirs.
 const MAPS: [(&str, usize, usize); 5] = [
-    // Its lane offsets jump inside and at the ends of roads, some of 7e-6 m: there the other reader has one vertex with
-    // the offset of the far side, and ours two.
+    // Town03's lane offsets jump inside and at the ends of roads, some of 7e-6 m: there the other reader has one vertex
+    // with the offset of the far side, and ours two.
     ("Town03", 2, 56),
     // The other reader's chords leave six sharp bends by up to 7 cm, and it leaves one lane out.
     ("zala_full", 7, 0),

@@ -138,7 +138,7 @@ fn the_clock_counts_against_the_feasible_time_of_the_vehicle_on_the_route() {
     assert_eq!(limit(&feasible, 5, 2), (2.0 * time / 0.1).ceil() as u32);
     for (name, engine) in engines() {
         let mut simulator = batch_on(&engine, &feasible, 64, 3, RouteChoice::Fixed(vec![5; 64]));
-        // They stand, and each runs out of time by its own clock.
+        // The trucks stand, and each runs out of time by its own clock.
         (0..900).for_each(|_| simulator.step(&[4; 64]).unwrap());
         let batch = simulator.batch();
         let timed_out = |env: usize| batch.ended[env] == offtrack::layout::Ended::TimedOut as u32;

@@ -16,7 +16,7 @@ use offtrack_evaluation::files;
 pub struct Args {
     /// A roundabout's name, or the path of its file.
     roundabout: String,
-    /// Its measured counterpart as JSON: tests/data/measured/16m.json.
+    /// The roundabout's measured counterpart as JSON: tests/data/measured/16m.json.
     measured: PathBuf,
 }
 

@@ -152,7 +152,7 @@ fn picture(file: &Path, svg: &str) -> Result<Vec<u8>, Error> {
 /// Histograms of the roads with the shipped roundabouts marked, as SVG text.
 fn histograms(distribution: &Distribution, args: &Args, roads: &[RandomRoad]) -> Result<String, Error> {
     let (approach, departure) = (distribution.approach, distribution.departure);
-    // Those with the maps' kerbs have the same dimensions as the others.
+    // Roundabouts with the maps' kerbs have the same dimensions as the others.
     let marked: Vec<String> =
         Kind::Roundabout.names().filter(|name| !name.ends_with("-maps")).map(str::to_owned).collect();
     let known: Vec<Road> = marked.iter().map(|name| Road::named(name)).collect::<Result<_, _>>()?;

@@ -142,7 +142,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 /// A recording and what is drawn around it.
 struct Recorded {
     recording: Recording,
-    /// As it lies in the world.
+    /// The roundabout as it lies in the world.
     roundabout: Road,
     gutter: Gutter,
     route: Route,

@@ -114,7 +114,7 @@ struct Run {
     outcome: Outcome,
 }
 
-/// Its result.
+/// The result of a run.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 enum Outcome {

@@ -68,7 +68,7 @@ pub struct Args {
     /// Folder of runs.
     #[arg(long, default_value = "runs")]
     out: Option<PathBuf>,
-    /// Another seed than the training file's.
+    /// Seed in place of the training file's.
     #[arg(long)]
     seed: Option<u32>,
     /// Begin with a policy instead of random weights: its file, or a shipped one's name.
@@ -78,16 +78,16 @@ pub struct Args {
     /// 3,7,9. Each has its own folder seed-N in the run's folder. The same command with the same --name continues.
     #[arg(long, conflicts_with = "seed")]
     seeds: Option<String>,
-    /// Another training time (min).
+    /// Training time in place of the training file's (min).
     #[arg(long, allow_negative_numbers = true)]
     minutes: Option<f64>,
-    /// Another number of env steps.
+    /// Number of env steps in place of the training file's.
     #[arg(long)]
     steps: Option<u64>,
-    /// Another number of trucks.
+    /// Number of trucks in place of the training file's.
     #[arg(long)]
     envs: Option<usize>,
-    /// Part of another graphics adapter's name, see `offtrack devices`.
+    /// Part of the name of a graphics adapter in place of the training file's, see `offtrack devices`.
     #[arg(long)]
     adapter: Option<String>,
     /// Another value of one of the training file's keys, as in `learning.n_steps=5`; nothing after the `=` removes the

@@ -91,7 +91,7 @@ fn a_training_run_leaves_a_page_that_holds_its_report_and_passes_its_own_checks(
     );
     let outcome = selftest(&page);
     assert!(outcome.starts_with("selftest passed\n"), "{outcome}");
-    // Its only address is the name space of SVG: the page loads no other file.
+    // The page's only address is the name space of SVG: the page loads no other file.
     assert_eq!(
         text.matches("http://").count() + text.matches("https://").count(),
         text.matches("\"http://www.w3.org/2000/svg\"").count()

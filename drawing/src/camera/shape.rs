@@ -16,7 +16,7 @@ const SCREEN_REAR: f32 = 0.8;
 
 /// Dimensions of the trucks of a world.
 pub struct Shape {
-    /// As the world numbers vehicles and chassis.
+    /// Rigs and rays as the world numbers vehicles and chassis.
     rigs: Vec<Rig>,
     rays: Vec<[Ray; N_RAYS]>,
     sensor_range: f32,

@@ -48,7 +48,7 @@ impl Axis {
         Axis { scale: Scale::Linear(step(low, high)), low, high, from, to }
     }
 
-    /// The same moved outwards to the next ticks.
+    /// A linear axis from `low` to `high`, both moved outwards to the next ticks.
     pub(crate) fn linear_to_ticks(low: f64, high: f64, from: f64, to: f64) -> Axis {
         let axis = Axis::linear(low, high, from, to);
         let step = step(axis.low, axis.high);

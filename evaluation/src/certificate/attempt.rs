@@ -71,7 +71,7 @@ pub fn attempt(
     })
 }
 
-/// The same from many starts, each on its route, in their order. `done` is called after each.
+/// The results of [`attempt`] from many starts, each on its route, in their order. `done` is called after each.
 ///
 /// Every core makes searches of its own: the batch of a narrow search is too small to be divided among them.
 pub fn attempts(

@@ -60,7 +60,7 @@ pub struct Outcome {
     pub ended: Ended,
     /// Fraction of the waypoints that this candidate passed.
     pub progress: f64,
-    /// Its number of steps.
+    /// Number of steps of this candidate.
     pub steps: u32,
     /// Env steps of the search.
     pub env_steps: u64,

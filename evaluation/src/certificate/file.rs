@@ -76,9 +76,9 @@ pub struct CertifiedRoute {
 pub struct Found {
     /// `arrived`, or the end of the candidate with the most progress.
     pub ended: String,
-    /// Fraction of the waypoints that it passed.
+    /// Fraction of the waypoints that the candidate passed.
     pub progress: f64,
-    /// Its number of steps.
+    /// The candidate's number of steps.
     pub steps: u32,
     /// Beam width of the search that found it.
     pub width: usize,

@@ -18,7 +18,7 @@ pub struct Sequence {
     pub route: u32,
     /// Where the truck begins.
     pub start: Start,
-    /// Its action at each step.
+    /// The truck's action at each step.
     pub actions: Vec<u32>,
 }
 

@@ -23,7 +23,7 @@ pub(super) struct Ground<'a> {
     /// Length of a route before its ring, and after it (m).
     approach: f64,
     departure: f64,
-    /// Those of the trucks that are shown, each once.
+    /// Measures of the trucks that are shown, each once.
     vehicles: Vec<Measures>,
     /// Names of vehicle and load; empty where the benchmark has one vehicle.
     #[serde(skip_serializing_if = "Vec::is_empty")]

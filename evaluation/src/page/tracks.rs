@@ -24,9 +24,9 @@ const RANGE_PARTS: f64 = 255.0;
 
 /// One value of every frame.
 pub(super) struct Column {
-    /// Its name in the page's scripts.
+    /// The column's name in the page's scripts.
     pub(super) name: String,
-    /// The unit of its whole numbers.
+    /// The unit of the column's whole numbers.
     pub(super) unit: f64,
     value: Box<dyn Fn(&Frame) -> f32>,
 }

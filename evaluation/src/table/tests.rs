@@ -131,7 +131,7 @@ fn the_searches_for_possible_starts_are_told_below_the_sums() {
     );
 }
 
-/// The same with many routes on as many roundabouts, of which every `one_in`th failed once.
+/// A report on many routes on as many roundabouts, of which every `one_in`th failed once.
 fn large_report(one_in: usize) -> Report {
     let summary = |fails: bool| {
         let ends = [Ended::Arrived, if fails { Ended::TrailerCollided } else { Ended::Arrived }];

@@ -42,7 +42,7 @@ fn steps(reward: &[f32], ended: &[Ended], next_observation: &[f32]) -> Steps {
     }
 }
 
-/// As many steps as `seen`, each ended at once with the reward of its action.
+/// One step for each value of `seen`, ended at once with the reward of its action.
 fn bandit(actor: &Mlp, seen: &[f32], reward: impl Fn(f32, u32) -> f32, rng: &mut Generator) -> Steps {
     let output = Pass::forward(actor, matrix(TensorData::new(seen.to_vec(), [seen.len(), 1]))).output;
     let n_actions = output.len() / seen.len();

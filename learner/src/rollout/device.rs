@@ -308,7 +308,7 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
         self.step_by(Some(&logits), false)
     }
 
-    /// The same tensors every time, with other values in them; one shard.
+    /// Samples a batch in one shard: the same tensors every time, with other values in them.
     fn sample(&mut self) -> Result<Vec<Transitions>, Error> {
         self.shared.flush()?;
         let group = self.buffers.group(&self.shared.gpu.device, &self.kernels, None);

@@ -376,7 +376,7 @@ pub fn logits<const N: usize>(network: &Mlp, normalisation: &Normalisation, obse
     logits_of_normalised(network, normalisation.apply(observations), N)
 }
 
-/// The same for normalised observations of `n_values` each, one after the other.
+/// The network's output for normalised observations of `n_values` each, one after the other, `[rows * actions]`.
 fn logits_of_normalised(network: &Mlp, observations: Vec<f32>, n_values: usize) -> Vec<f32> {
     let shape = [observations.len() / n_values, n_values];
     let data = TensorData::new(observations, shape);

@@ -87,7 +87,7 @@ impl Folder {
         self.0.join("report.json")
     }
 
-    /// The same as a page to look at.
+    /// The report as a page to look at.
     pub fn page(&self) -> PathBuf {
         self.0.join("report.html")
     }

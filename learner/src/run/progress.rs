@@ -63,7 +63,7 @@ pub struct Progress {
     shown: (Instant, u64, u64),
     display: Box<dyn Display>,
     metrics: MetricsFile,
-    /// The same rows for TensorBoard.
+    /// The rows of `metrics` for TensorBoard.
     events: Option<EventsFile>,
     /// Files that could not be written when that was last tried.
     unwritten: Vec<PathBuf>,

@@ -22,9 +22,9 @@ pub struct Resumed {
     pub folder: Folder,
     /// The run's own training file, with another budget where the command line gives one.
     pub config: Config,
-    /// Its metrics, locked: no other run can write a checkpoint meanwhile.
+    /// The run's metrics, locked: no other run can write a checkpoint meanwhile.
     pub metrics: MetricsFile,
-    /// Its last checkpoint; none where it was killed before the first one, so that it starts from the beginning.
+    /// The run's last checkpoint; none where it was killed before the first one, so that it starts from the beginning.
     pub stored: Option<Stored>,
 }
 

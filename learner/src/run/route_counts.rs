@@ -59,15 +59,15 @@ pub struct RouteCount {
     pub exit: u32,
     /// Training episodes that ended.
     pub episodes: u64,
-    /// Those that arrived.
+    /// Training episodes that arrived.
     pub arrived: u64,
-    /// Those that failed.
+    /// Training episodes that failed.
     pub failed: u64,
-    /// Those that ran out of time.
+    /// Training episodes that ran out of time.
     pub timed_out: u64,
-    /// Fraction that arrived.
+    /// Fraction of the training episodes that arrived.
     pub success: f64,
-    /// The same of the latest ones.
+    /// Fraction of the latest training episodes that arrived.
     pub recent_success: f64,
 }
 
@@ -78,7 +78,7 @@ pub struct WorstRoutes {
     pub routes: usize,
     /// Latest episodes of each that `recent_success` is a fraction of, at most.
     pub window: u32,
-    /// Those with the least recent success, if it is below 1.
+    /// The routes with the least recent success, if it is below 1.
     pub worst: Vec<RouteCount>,
 }
 

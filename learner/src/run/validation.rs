@@ -43,7 +43,7 @@ pub struct Validated {
 pub struct Validations {
     /// The benchmark with the validation routes.
     pub benchmark: String,
-    /// Their number.
+    /// Number of the validation routes.
     pub routes: usize,
     /// Episodes in each validation.
     pub episodes: u64,

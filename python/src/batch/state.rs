@@ -54,7 +54,7 @@ impl State {
             let (codes, trucks) = (read.rows::<u32>(Column::Ended), read.rows::<Truck>(Column::Truck));
             let last = read.observed_last(batch.n_extras);
             if batch.autoreset == Autoreset::NextStep {
-                // Those that were held have begun, and no other is in another episode.
+                // Trucks that were held have begun, and no other is in another episode.
                 for env in (0..trucks.len()).filter(|&env| std::mem::take(&mut held[env])) {
                     episodes[env] = Episode::of(&trucks[env]);
                 }

@@ -27,7 +27,7 @@ pub struct Error {
 /// A truck, its initial state and its commands, in the symbols of the reference equations. Other keys are ignored.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Case {
-    /// Its name.
+    /// The case's name.
     pub id: String,
     /// The truck.
     pub vehicle: CaseVehicle,

@@ -44,7 +44,7 @@ pub fn driven(rig: &Rig, substep: f32, n_substeps: u32, control: &Control, truck
 pub struct Moving {
     /// The truck.
     pub truck: Truck,
-    /// Its motion.
+    /// The truck's motion.
     pub motion: Motion,
 }
 

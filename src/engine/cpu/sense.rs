@@ -87,7 +87,7 @@ struct Placed {
     /// Where each ray begins (m).
     origin_x: [f32; N_RAYS],
     origin_y: [f32; N_RAYS],
-    /// Its unit vector.
+    /// Unit vector of each ray.
     direction_x: [f32; N_RAYS],
     direction_y: [f32; N_RAYS],
 }
@@ -119,18 +119,18 @@ struct Bundle<const N: usize> {
     /// Where each ray begins (m).
     origin_x: [f32; N],
     origin_y: [f32; N],
-    /// Its unit vector.
+    /// Unit vector of each ray.
     direction_x: [f32; N],
     direction_y: [f32; N],
-    /// Distance along it of the next sample, or where it ended (m).
+    /// Distance along each ray of the next sample, or where the ray ended (m).
     along: [f32; N],
-    /// Distance along it of the start of the last accepted step (m).
+    /// Distance along each ray of the start of the last accepted step (m).
     base: [f32; N],
     /// Radius of the free circle there (m).
     free: [f32; N],
-    /// Samples that may still be taken on it; 0 once it has ended.
+    /// Samples that may still be taken on each ray; 0 once the ray has ended.
     left: [u32; N],
-    /// Its index among the ranges.
+    /// Index of each ray among the ranges.
     ray: [usize; N],
 }
 

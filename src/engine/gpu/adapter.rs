@@ -9,11 +9,11 @@ use crate::layout::buffers::N_BUFFERS;
 /// An adapter as it presents itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Adapter {
-    /// Its name.
+    /// The adapter's name.
     pub name: String,
     /// The interface it is reached by.
     pub interface: String,
-    /// Its driver and that one's version.
+    /// The adapter's driver and the driver's version.
     pub driver: String,
     /// Discrete, integrated, virtual or software.
     pub kind: &'static str,

@@ -56,7 +56,7 @@ impl Batch {
         })
     }
 
-    /// Where it lives.
+    /// The device that the batch lives on.
     pub fn device(&self) -> &Device {
         &self.device
     }

@@ -18,7 +18,7 @@ pub struct Slice {
     pub buffer: Buffer,
     /// Offset of the slice (bytes).
     pub offset: u64,
-    /// Its length (bytes).
+    /// Length of the slice (bytes).
     pub size: u64,
 }
 

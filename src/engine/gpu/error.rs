@@ -24,11 +24,11 @@ pub enum Error {
     /// The adapter is too small for any batch.
     #[error("{adapter}: {limit} is {has}; at least {needed} is needed")]
     Limit {
-        /// Its name.
+        /// The adapter's name.
         adapter: String,
-        /// What it has too little of.
+        /// What the adapter has too little of.
         limit: &'static str,
-        /// What it has.
+        /// Value of the limit on the adapter.
         has: u64,
         /// What is needed.
         needed: u64,
@@ -42,7 +42,7 @@ pub enum Error {
         n_envs: usize,
         /// The column that is too large.
         buffer: &'static str,
-        /// What it would take.
+        /// What the column would take (bytes).
         n_bytes: u64,
         /// The adapter's name.
         adapter: String,
@@ -83,7 +83,7 @@ pub enum Error {
     ColumnSize {
         /// The column.
         column: &'static str,
-        /// Its size.
+        /// The column's size (bytes).
         found: u64,
         /// Trucks in the batch.
         n_envs: usize,

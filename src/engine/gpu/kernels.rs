@@ -17,7 +17,7 @@ const ROW: u32 = 65_535;
 /// The kernels of a module, named by `K`.
 #[derive(Debug)]
 pub struct Kernels<K> {
-    /// Their bindings: storage buffers in one bind group.
+    /// The kernels' bindings: storage buffers in one bind group.
     pub layout: BindGroupLayout,
     /// A pipeline for each of [`Named::ALL`].
     pipelines: Vec<ComputePipeline>,

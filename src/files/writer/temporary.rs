@@ -90,7 +90,7 @@ fn unnamed(folder: &Path, mut options: OpenOptions) -> Option<File> {
     use std::os::unix::fs::OpenOptionsExt;
 
     let file = options.custom_flags(rustix::fs::OFlags::TMPFILE.bits().cast_signed()).open(folder).ok()?;
-    // It may have a name for a moment, in `put`.
+    // The file may have a name for a moment, in `put`.
     let _ = file.try_lock();
     fs::metadata(descriptor(&file)).is_ok().then_some(file)
 }

@@ -28,9 +28,9 @@ const ALONE: f64 = 20.0;
 /// A lane that crosses the circle; several strips where lanes of a junction overlap.
 #[derive(Debug, Clone)]
 pub(super) struct Crossing {
-    /// Whether it leads into the ring.
+    /// Whether the lane leads into the ring.
     pub(super) inwards: bool,
-    /// Where it crosses (m).
+    /// Where the lane crosses the circle (m).
     pub(super) at: DVec2,
     pub(super) strips: Vec<usize>,
 }

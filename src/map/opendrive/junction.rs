@@ -42,9 +42,9 @@ impl fmt::Display for RoadLane {
 /// A way through a map, from a lane to another that the map's links lead to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Way {
-    /// Where it comes from.
+    /// Where the way comes from.
     pub from: RoadLane,
-    /// Where it leads.
+    /// Where the way leads.
     pub to: RoadLane,
 }
 
@@ -57,7 +57,7 @@ impl fmt::Display for Way {
 /// The ways through one junction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Junction {
-    /// Its id in the map.
+    /// The junction's id in the map.
     pub id: String,
     /// Middle of its lanes in the map's own coordinates (m).
     pub centre: DVec2,

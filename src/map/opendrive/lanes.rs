@@ -34,9 +34,9 @@ pub(super) struct Strip {
     pub(super) section: usize,
     /// The lane's number.
     pub(super) id: i32,
-    /// Whether it is travelled against the reference line.
+    /// Whether the lane is travelled against the reference line.
     pub(super) backward: bool,
-    /// What it is for; a raised flat lane is a kerb or solid.
+    /// What the lane is for; a raised flat lane is a kerb or solid.
     pub(super) kind: Kind,
     pub(super) left: Vec<DVec2>,
     pub(super) right: Vec<DVec2>,

@@ -157,7 +157,7 @@ mod tests {
         let hill = Cubic { start: 0.0, factors: [0.0, 0.0, 0.006, -0.000_05] };
         assert!((hill.steepest(0.0, 70.0) - 0.24).abs() < 1e-12);
         assert!((hill.steepest(0.0, 10.0) - 0.105).abs() < 1e-12);
-        // Its top lies at s = 80 m, 12.8 m high.
+        // The hill's top lies at s = 80 m, 12.8 m high.
         assert!((hill.largest(0.0, 100.0) - 12.8).abs() < 1e-12);
         assert_eq!(Cubic { start: 3.0, factors: [-0.15, 0.0, 0.0, 0.0] }.largest(3.0, 9.0), 0.15);
     }

@@ -207,7 +207,7 @@ impl Network<'_> {
     }
 }
 
-/// The same polyline with a point every half metre, where a joint may have to be spread.
+/// The polyline with a point every half metre, where a joint may have to be spread.
 fn dense(path: &[DVec2]) -> Vec<DVec2> {
     let mut dense: Vec<DVec2> = path.first().copied().into_iter().collect();
     for pair in path.windows(2) {

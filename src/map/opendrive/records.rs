@@ -11,7 +11,7 @@ use super::level::Level;
 /// A polynomial `a + b x + c x² + d x³` that holds from `start` on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Cubic {
-    /// Where it begins: x is counted from here (m).
+    /// Where the polynomial begins: x is counted from here (m).
     pub(super) start: f64,
     /// a, b, c, d.
     pub(super) factors: [f64; 4],
@@ -36,9 +36,9 @@ pub(super) fn active<T>(records: &[T], s: f64, start: impl Fn(&T) -> f64) -> Opt
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Shape {
     Line,
-    /// Its curvature, left positive (1/m).
+    /// The arc's curvature, left positive (1/m).
     Arc(f64),
-    /// Curvature at its beginning and at its end, linear between (1/m).
+    /// Curvature at the spiral's beginning and at its end, linear between (1/m).
     Spiral(f64, f64),
     /// v as a cubic of u, in the frame of its beginning.
     Poly3([f64; 4]),
@@ -53,13 +53,13 @@ pub(super) enum Shape {
 /// A piece of a reference line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Geometry {
-    /// Station of its beginning (m).
+    /// Station of the piece's beginning (m).
     pub(super) start: f64,
-    /// Its beginning (m).
+    /// The piece's beginning (m).
     pub(super) origin: DVec2,
-    /// Direction there (rad).
+    /// Direction at the beginning (rad).
     pub(super) heading: f64,
-    /// Its length (m).
+    /// The piece's length (m).
     pub(super) length: f64,
     pub(super) shape: Shape,
 }
@@ -140,7 +140,7 @@ pub(super) enum Link {
 /// An object's outline that is solid: a traffic island.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Island {
-    /// Its corners in the map (m).
+    /// The island's corners in the map (m).
     pub(super) corners: Vec<DVec2>,
 }
 

@@ -92,7 +92,7 @@ impl Geometry {
         }
     }
 
-    /// Its last point (m).
+    /// The piece's last point (m).
     pub(super) fn end(&self) -> DVec2 {
         self.pose(self.length).0
     }
@@ -140,7 +140,7 @@ mod tests {
         let spiral = Geometry { origin: DVec2::ZERO, heading: 0.0, ..at(Shape::Spiral(0.0, PI), 1.0) };
         let fresnel = DVec2::new(0.779_893_400_376_822_8, 0.438_259_147_390_354_8);
         assert!(spiral.end().distance(fresnel) < 1e-12, "{}", spiral.end());
-        // The same clothoid a hundred times as large, with 1e-9 m of the closed form.
+        // A clothoid a hundred times as large, with 1e-9 m of the closed form.
         let large = Geometry { length: 100.0, shape: Shape::Spiral(0.0, PI / 100.0), ..spiral };
         assert!(large.end().distance(100.0 * fresnel) < 1e-9);
         // C(5) and S(5): thirteen turns.

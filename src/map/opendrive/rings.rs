@@ -40,7 +40,7 @@ pub struct Ring {
 /// A hole in the paved surface that is no roundabout, and why not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refused {
-    /// Its middle in the map's own coordinates (m).
+    /// The hole's middle in the map's own coordinates (m).
     pub centre: DVec2,
     /// Radius of the circle that fits its edge best (m).
     pub radius: f64,

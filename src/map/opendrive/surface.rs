@@ -19,7 +19,8 @@ pub(super) const GAP: f64 = 0.02;
 const SLIVER: f64 = 0.6;
 /// A void that holds a circle of this radius is solid where a map has no kerbs (m).
 const INSCRIBED: f64 = 0.5;
-/// The same for a void beside a lane where a map has kerbs, which then lie around all that is solid (m).
+/// A void beside a lane that holds a circle of this radius is solid where a map has kerbs, which then lie around all
+/// that is solid (m).
 const INSCRIBED_AMONG_KERBS: f64 = 3.0;
 /// Drivable strips narrower than this are solid (m).
 const SLIT: f64 = 0.2;

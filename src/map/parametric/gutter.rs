@@ -82,7 +82,7 @@ pub(super) struct Gutters {
 }
 
 impl Written {
-    /// Its gutters, if they differ.
+    /// The road's gutters, if they differ.
     pub(super) fn gutters(&self, reader: &Reader) -> Result<Option<Gutters>, Error> {
         let directions = |key: &str, written: &Option<Vec<WrittenDirection>>| {
             let points = written

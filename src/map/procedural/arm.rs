@@ -42,7 +42,7 @@ pub(super) struct Carriageway {
     pub(super) kerb: Line,
     /// Number of lanes.
     n_lanes: usize,
-    /// Its lanes from the kerb where they do not lie beside it; else none.
+    /// The carriageway's lanes from the kerb where they do not lie beside it; else none.
     lanes: Vec<Line>,
 }
 

@@ -109,7 +109,7 @@ impl Distribution {
         Ok((roundabout, written))
     }
 
-    /// Its rules, for tests of the roads drawn.
+    /// The distribution's rules, for tests of the roads drawn.
     #[cfg(test)]
     pub(super) fn rules(&self) -> &super::distribution_keys::Rules {
         &self.keys.rules

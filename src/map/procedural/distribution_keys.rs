@@ -83,7 +83,7 @@ pub(super) struct Arms {
 #[serde(deny_unknown_fields)]
 pub(super) struct Axis {
     pub(super) share: f64,
-    /// As a fraction of the ring's outer radius.
+    /// Deviation as a fraction of the ring's outer radius.
     pub(super) deviation: f64,
 }
 
@@ -125,7 +125,7 @@ pub(super) struct Straight {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Flared {
-    /// As a fraction of the ring's outer radius.
+    /// Aim as a fraction of the ring's outer radius.
     pub(super) aim: Range,
     /// Log-uniform (m).
     pub(super) kerb_arc: Range,

@@ -47,7 +47,7 @@ const N_RANGES: usize = 14;
 pub struct Drawn([f64; N_RANGES]);
 
 impl Drawn {
-    /// That of a row of the table: a function of row and range alone.
+    /// Where the vehicle of a row of the table lies in each range: a function of row and range alone.
     pub fn of_row(row: u32) -> Drawn {
         let mut places = [0.0; N_RANGES];
         for (group, places) in (0..).zip(places.chunks_mut(4)) {

@@ -23,13 +23,13 @@ pub struct Demand {
 /// A limit of the truck.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Limit {
-    /// Of the steer angle.
+    /// Limit of the steer angle.
     Lock,
-    /// Of its change.
+    /// Limit of the steer angle's change.
     SteerRate,
-    /// Of the lateral acceleration: the tyres' grip.
+    /// Limit of the lateral acceleration: the tyres' grip.
     Tyres,
-    /// Of the load transfer ratio: the inner wheels lift.
+    /// Limit of the load transfer ratio: the inner wheels lift.
     Rollover,
 }
 
@@ -37,7 +37,7 @@ impl Limit {
     /// All limits.
     pub const ALL: [Limit; 4] = [Limit::Lock, Limit::SteerRate, Limit::Tyres, Limit::Rollover];
 
-    /// Its name in JSON: `lock`, `steer_rate`, `tyres`, `rollover`.
+    /// The limit's name in JSON: `lock`, `steer_rate`, `tyres`, `rollover`.
     pub fn name(self) -> &'static str {
         match self {
             Limit::Lock => "lock",
@@ -47,7 +47,7 @@ impl Limit {
         }
     }
 
-    /// What it limits, in words.
+    /// The quantity that is limited, in words.
     pub fn quantity(self) -> &'static str {
         match self {
             Limit::Lock => "steer angle",

@@ -11,7 +11,7 @@ pub type Ends = [Option<f64>; 2];
 pub struct Row {
     pub key: String,
     pub unit: String,
-    /// As written, for all keys of the row.
+    /// The range as written, for all keys of the row.
     pub range: String,
     pub ends: Option<Ends>,
     pub default: String,

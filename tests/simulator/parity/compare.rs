@@ -23,7 +23,7 @@ const SAME: Bound = within(0.0);
 const POSITION: Bound = within(4e-5);
 /// Eight units in the last place of an angle in (-pi, pi], of 2.4e-7 rad each.
 const ANGLE: Bound = Bound { turn: std::f32::consts::TAU, ..within(2e-6) };
-/// The same as a fraction of half a turn.
+/// As [`ANGLE`], of angles as fractions of half a turn.
 const TURN: Bound = Bound { turn: 2.0, ..ANGLE };
 /// Eight units of values below 2.
 const SMALL: Bound = within(1e-6);
@@ -35,7 +35,7 @@ const LARGE: Bound = within(3e-5);
 const CLEARANCE: Bound = Bound { rarely: 1.0, ..POSITION };
 /// A ray along a kerb may end a sample later on one engine; each ends within 2 cm of the kerb.
 const RANGE: Bound = Bound { rarely: 0.05, ..within(1e-4) };
-/// The same over a reach of 20 m.
+/// As [`RANGE`], of ranges as fractions of a reach of 20 m.
 const SCALED_RANGE: Bound = Bound { rarely: 2.5e-3, ..within(5e-6) };
 /// The angle at a waypoint to a truck that stands on it depends on the last bits of the truck's position.
 const BEARING: Bound = Bound { usual: 1e-4, rarely: 1e-2, ..TURN };

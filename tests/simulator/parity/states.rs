@@ -33,7 +33,7 @@ pub fn world(gutter: Gutter) -> Arc<World> {
     worlds[usize::from(gutter == Gutter::Solid)].clone()
 }
 
-/// The same routes for trucks of many kinds, with every lag and limit.
+/// Every route of every roundabout for trucks of many kinds, with every lag and limit.
 pub fn fleet_world() -> Arc<World> {
     let mut scenario = benchmark("attard2023-full").0;
     scenario.fleet = Some(crate::fleet::all_drawn());

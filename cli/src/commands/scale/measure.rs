@@ -41,7 +41,7 @@ pub(super) struct Measured {
     pub windows: usize,
     pub slowest_window: f64,
     pub fastest_window: f64,
-    /// The same speed in rays.
+    /// The median speed in rays.
     pub rays_per_second: f64,
     /// Steps of the whole batch before the first window, in which the episodes, all started at once, spread out.
     pub steps_before: u64,

@@ -30,7 +30,7 @@ pub(super) enum Mode {
     Random,
     /// Actions sampled from the distribution of the policy that comes with the program
     Policy,
-    /// The same with an untrained network with hidden layers of 512, 512 and 1024
+    /// Actions sampled from the distribution of an untrained network with hidden layers of 512, 512 and 1024
     LargePolicy,
     /// The training loop: every step remembered, and the updates of the training file after it
     Training,
@@ -83,9 +83,9 @@ impl Learner {
 pub(super) struct Setting<'a> {
     /// What steps the trucks.
     pub engine: &'a Engine,
-    /// Name of its adapter.
+    /// Name of the engine's adapter.
     pub adapter: &'a str,
-    /// The same for tensors too, once a mode has needed that.
+    /// The engine as a backend for tensors too, once a mode has needed that.
     pub backend: &'a mut Option<Backend>,
     /// The world.
     pub world: &'a Arc<World>,
@@ -149,7 +149,7 @@ impl Driven {
 }
 
 impl Mode {
-    /// Its name on the command line and in results.
+    /// The mode's name on the command line and in results.
     pub(super) fn name(self) -> &'static str {
         match self {
             Mode::Random => "random",

@@ -107,7 +107,7 @@ mod tests {
             ("routes.spacing (1 m in place of 2 m)", |of| of.spacing = 1.0),
             ("gutter (solid in place of drivable)", |of| of.gutter = Gutter::Solid),
             ("vehicle and load (half)", |of| of.load = "half".to_owned()),
-            // The same lock, and so the same actions.
+            // The lock stays the same, and so do the actions.
             ("vehicle and load (empty)", |of| of.vehicle.trailer.wheelbase += 1.0),
             ("sensors of the vehicle", |of| of.vehicle.sensors.trailer_last -= 0.5),
         ];

@@ -79,7 +79,7 @@ impl Worlds {
 /// The benchmark that a key names.
 pub fn named(reader: &Reader, key: &str, name: &str) -> Result<Scenario, Error> {
     roads::benchmark(name).map_err(|error| match error {
-        // Its own file was not found or is none, so the key that names it is what is wrong.
+        // The benchmark's own file was not found or is none, so the key that names it is what is wrong.
         Error::Input(
             error @ (InputError::UnknownName { .. } | InputError::Unreadable { .. } | InputError::NotAFile { .. }),
         ) => reader.invalid(key, name, error.to_string()).into(),

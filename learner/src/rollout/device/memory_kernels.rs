@@ -68,7 +68,7 @@ offtrack::shared! {
     pub struct Image {
         /// Index of the value that it is mirrored from.
         pub index: u32,
-        /// Its factor.
+        /// Factor of the mirrored value.
         pub factor: f32,
     }
 }
@@ -87,7 +87,7 @@ macro_rules! bindings {
             /// Every binding; its index is the shader's.
             pub(super) const ALL: [Binding; 0 $(+ { let _ = Binding::$name; 1 })*] = [$(Binding::$name),*];
 
-            /// Its declaration in WGSL.
+            /// The binding's declaration in WGSL.
             fn declaration(self) -> String {
                 let (name, element, single, doc): (_, String, bool, _) = match self {
                     $(Binding::$name => (stringify!($name), $element, $single, $doc),)*

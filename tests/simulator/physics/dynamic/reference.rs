@@ -25,7 +25,7 @@ pub struct Reference {
     stiffness: [f64; 3],
 }
 
-/// Its motion.
+/// The truck's motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct State {
     /// Middle of the drive axle (m).
