@@ -110,7 +110,7 @@ const RAY_GAP: f32 = 0.05f;
 const RAY_SHORT: f32 = 0.25f;
 // Closer to a kerb than this, it is taken for straight (m).
 const RAY_CLOSE: f32 = 0.15f;
-// This close to a kerb the ray has met it (m).
+// Distance to a kerb at which a ray has met the kerb (m).
 const RAY_MET: f32 = 0.004f;
 // Head-on, a ray has met the kerb from this far off: a straight kerb's position is known to a few millimetres then
 // (m).
@@ -285,9 +285,9 @@ struct BeginRow {
 // Contact is exact to 2 cm. Otherwise the value is at least the true distance less the field's error, and at most
 // twice the true distance plus 2 cm: far from a kerb fewer points are sampled.
 struct Clearance {
-    // Of the tractor (m).
+    // Clearance of the tractor (m).
     tractor: f32,
-    // Of the trailer (m).
+    // Clearance of the trailer (m).
     trailer: f32,
 }
 

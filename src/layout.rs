@@ -146,9 +146,9 @@ crate::shared! {
     /// Contact is exact to 2 cm. Otherwise the value is at least the true distance less the field's error, and at most
     /// twice the true distance plus 2 cm: far from a kerb fewer points are sampled.
     pub struct Clearance {
-        /// Of the tractor (m).
+        /// Clearance of the tractor (m).
         pub tractor: f32,
-        /// Of the trailer (m).
+        /// Clearance of the trailer (m).
         pub trailer: f32,
     }
 

@@ -163,7 +163,7 @@ impl Scenario {
     ///
     /// # Errors
     ///
-    /// Those of [`Scenario::read`] and [`Scenario::named`].
+    /// The errors of [`Scenario::read`] and [`Scenario::named`].
     pub fn find(name_or_path: &str) -> Result<Scenario, Error> {
         Scenario::load(name_or_path, &Loading::PLAIN)
     }
@@ -172,7 +172,7 @@ impl Scenario {
     ///
     /// # Errors
     ///
-    /// Those of [`Scenario::find`], and [`Error::Stopped`].
+    /// The errors of [`Scenario::find`], and [`Error::Stopped`].
     pub fn load(name_or_path: &str, loading: &Loading) -> Result<Scenario, Error> {
         Scenario::from_source(&Source::find(Kind::Benchmark, name_or_path)?, loading)
     }

@@ -144,7 +144,7 @@ impl Vehicle {
     ///
     /// # Errors
     ///
-    /// Those of [`Vehicle::read`] and [`Vehicle::named`].
+    /// The errors of [`Vehicle::read`] and [`Vehicle::named`].
     pub fn find(name_or_path: &str) -> Result<Vehicle, Error> {
         Vehicle::from_source(&Source::find(Kind::Vehicle, name_or_path)?)
     }

@@ -76,7 +76,7 @@ impl World {
     ///
     /// # Errors
     ///
-    /// Those of [`World::bake`], and [`Error::Stopped`].
+    /// The errors of [`World::bake`], and [`Error::Stopped`].
     pub fn bake_with(scenario: &Scenario, loading: &Loading) -> Result<World, Error> {
         scenario.check()?;
         let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;

@@ -18,9 +18,9 @@ pub(crate) use axis::{Axis, axes};
 const CORNER: DVec2 = DVec2::new(92.0, 118.0);
 /// Size of a plot (px).
 const PLOT: DVec2 = DVec2::new(440.0, 380.0);
-/// From one plot's right edge to the next one's left (px).
+/// Distance from one plot's right edge to the next one's left (px).
 const GAP: f64 = 104.0;
-/// From a plot's lower edge to its legend: numbers and axis title (px).
+/// Distance from a plot's lower edge to its legend: numbers and axis title (px).
 const AXIS: f64 = 62.0;
 /// Margin to the right of the last plot and below the longest legend (px).
 const MARGIN: f64 = 24.0;
@@ -47,7 +47,7 @@ pub struct Panel {
     pub x: &'static str,
     /// Title of the vertical axis, with its unit.
     pub y: &'static str,
-    /// In the order of the legend.
+    /// Lines in the order of the legend.
     pub lines: Vec<Line>,
 }
 

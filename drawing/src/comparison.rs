@@ -21,7 +21,7 @@ use offtrack_evaluation::recording::{Frame, Recording};
 /// Margins of the page (px).
 const LEFT: f64 = 64.0;
 const RIGHT: f64 = 16.0;
-/// From the page's upper edge to the first map (px).
+/// Distance from the page's upper edge to the first map (px).
 const TOP: f64 = 106.0;
 /// Maps side by side at most, and the gap between two (px).
 const COLUMNS: usize = 2;
@@ -159,7 +159,7 @@ impl Comparison<'_> {
         ))
     }
 
-    /// Of each scene the distance along the route at each frame (m).
+    /// Distance along the route at each frame of each scene (m).
     fn stations(&self) -> Vec<Vec<f64>> {
         let of = |scene: &Scene| {
             let Recording { frames, centre_line, .. } = scene.recording;
@@ -168,7 +168,7 @@ impl Comparison<'_> {
         self.scenes.iter().map(of).collect()
     }
 
-    /// Of each scene the points of a quantity over the distance along the route, from the first step on.
+    /// Points of a quantity over the distance along the route, of each scene, from the first step on.
     fn lines(&self, quantity: &Quantity, stations: &[Vec<f64>]) -> Vec<Vec<DVec2>> {
         let line = |(scene, stations): (&Scene, &Vec<f64>)| {
             let points = stations.iter().zip(&scene.recording.frames).skip(1);

@@ -17,7 +17,7 @@ use crate::lettering::{Align, Lettering};
 
 /// Least distance between arrows of one colour (m).
 const APART: f64 = 5.0;
-/// From the ring to the name of an arm (m).
+/// Distance from the ring to the name of an arm (m).
 const TO_NAME: f64 = 23.0;
 
 const LANE_DASHES: &str = "6 5";

@@ -42,7 +42,7 @@ pub struct Sweep<'a> {
 pub struct Driven {
     /// Name of the vehicle.
     pub vehicle: String,
-    /// Name of its load.
+    /// Name of the vehicle's load.
     pub load: String,
     /// Speed of the front axle (km/h).
     pub speed_kmh: f64,

@@ -39,7 +39,7 @@ pub struct Driving {
 }
 
 impl Driving {
-    /// At the start of an episode.
+    /// How a truck drives, at the start of an episode.
     pub fn new(truck: &Truck, target_speed: f32) -> Driving {
         Driving {
             speed_sum: 0.0,

@@ -32,13 +32,13 @@ pub struct Group {
 /// Every episode once in each of four partitions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Groups {
-    /// By band of the island's radius, smallest first; `none` for the routes of crossings.
+    /// Episodes by band of the island's radius, smallest first; `none` for the routes of crossings.
     pub island_radius: Vec<Group>,
-    /// By the lane of approach.
+    /// Episodes by the lane of approach.
     pub lane: Vec<Group>,
-    /// By number of the exit; as many as the roundabout has arms is a U-turn.
+    /// Episodes by number of the exit; as many as the roundabout has arms is a U-turn.
     pub exit: Vec<Group>,
-    /// By roundabout, in the benchmark's order.
+    /// Episodes by roundabout, in the benchmark's order.
     pub roundabout: Vec<Group>,
 }
 

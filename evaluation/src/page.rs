@@ -20,7 +20,7 @@ use ground::Ground;
 
 const TEMPLATE: &str = include_str!("page/report.html");
 const STYLE: &str = include_str!("page/style.css");
-/// In the order of the page; the last one starts the others.
+/// Scripts in the order of the page; the last one starts the others.
 const SCRIPTS: [&str; 14] = [
     include_str!("page/elements.js"),
     include_str!("page/data.js"),

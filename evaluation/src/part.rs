@@ -45,7 +45,7 @@ pub(super) struct LaneWidths {
     spacing: f64,
     /// Stations at which the ring and the exit begin (m).
     from: [f64; 2],
-    /// On the entry arm, in the ring, on the exit arm (m).
+    /// Half widths on the entry arm, in the ring, on the exit arm (m).
     half_widths: [f32; 3],
 }
 

@@ -140,7 +140,7 @@ impl Controller for PurePursuit {
 }
 
 impl PurePursuit {
-    /// With this look-ahead distance (m).
+    /// Pure pursuit with this look-ahead distance (m).
     pub fn new(look_ahead: f32) -> PurePursuit {
         PurePursuit { look_ahead, profiles: HashMap::new(), lines: Lines::new(), name: "pursuit".to_owned() }
     }

@@ -32,7 +32,7 @@ pub fn corners(kerbs: &Outline) -> (Vec<Vec<DVec2>>, Vec<Vec<DVec2>>) {
     (boundary.into_iter().map(closed).collect(), islands.into_iter().map(closed).collect())
 }
 
-/// To a tenth of a millimetre.
+/// The polygon of `points`, rounded to a tenth of a millimetre.
 pub fn rounded(points: &[DVec2]) -> Polygon {
     points.iter().map(|p| [to(1e4, p.x), to(1e4, p.y)]).collect()
 }

@@ -30,31 +30,31 @@ const ANGLE: f64 = 1e4;
 pub struct Frame {
     /// Middle of the drive axle, x east, y north (m).
     pub position: [f32; 2],
-    /// Of the tractor, counter-clockwise from east, in (-pi, pi] (rad).
+    /// Heading of the tractor, counter-clockwise from east, in (-pi, pi] (rad).
     pub heading: f32,
     /// Middle of the trailer's axle group (m).
     pub trailer_position: [f32; 2],
-    /// Of the trailer (rad).
+    /// Heading of the trailer (rad).
     pub trailer_heading: f32,
     /// Tractor's heading minus the trailer's, in (-pi, pi] (rad).
     pub articulation: f32,
-    /// Of the front axle, left positive (rad).
+    /// Steer angle of the front axle, left positive (rad).
     pub steering: f32,
-    /// Of the drive axle (m/s).
+    /// Speed of the drive axle (m/s).
     pub speed: f32,
     /// Index of the last action in the action table; `None` at the start.
     pub action: Option<u32>,
-    /// From the reference point to the lane centre (m).
+    /// Distance from the reference point to the lane centre (m).
     pub lane_distance: f32,
-    /// From the tractor's outline to the nearest kerb, negative where they overlap (m).
+    /// Distance from the tractor's outline to the nearest kerb, negative where they overlap (m).
     pub tractor_clearance: f32,
-    /// From the trailer's outline to the nearest kerb (m).
+    /// Distance from the trailer's outline to the nearest kerb (m).
     pub trailer_clearance: f32,
-    /// Of the tractor, the largest of the step in magnitude, signed.
+    /// Load transfer ratio of the tractor, the largest of the step in magnitude, signed.
     pub tractor_load_transfer_ratio: f32,
-    /// Of the trailer, the largest of the step in magnitude, signed.
+    /// Load transfer ratio of the trailer, the largest of the step in magnitude, signed.
     pub trailer_load_transfer_ratio: f32,
-    /// Of the step; 0 at the start.
+    /// Reward of the step; 0 at the start.
     pub reward: f32,
     /// Distance along each ray to the kerb, the trailer's 16 first, left and right alternating, front to rear, then the
     /// tractor's 13 from left to right (m).

@@ -17,9 +17,9 @@ pub const MANY_ROUTES: usize = 100;
 /// The figures of one episode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Episode {
-    /// Why it ended.
+    /// Why the episode ended.
     pub ended: Ended,
-    /// Steps it took.
+    /// Steps that the episode took.
     pub steps: u32,
     /// Sum of the rewards.
     pub reward: f64,
@@ -27,7 +27,7 @@ pub struct Episode {
     pub lane_distance_mean: f64,
     /// Largest distance to the lane centre (m).
     pub lane_distance_max: f64,
-    /// Fraction of its steps after which the tractor's middle was outside of the route's own lane.
+    /// Fraction of the steps after which the tractor's middle was outside of the route's own lane.
     pub outside_lane: f64,
     /// Smallest distance of the tractor to a kerb (m).
     pub tractor_clearance_min: f64,
@@ -39,7 +39,7 @@ pub struct Episode {
     pub articulation_peak: f64,
     /// Largest distance of the trailer axle from the path of the front axle (m).
     pub off_tracking_peak: f64,
-    /// How it drove, where classes of vehicles are reported.
+    /// How the truck drove, where classes of vehicles are reported.
     pub driving: Option<Driving>,
     /// The truck after its last step.
     pub last: Truck,
@@ -52,11 +52,11 @@ pub struct Summary {
     pub episodes: usize,
     /// Episodes that arrived.
     pub arrived: usize,
-    /// Fraction that arrived.
+    /// Fraction of the episodes that arrived.
     pub success: f64,
-    /// Lower end of its 95 % Wilson interval.
+    /// Lower end of the 95 % Wilson interval of `success`.
     pub success_low: f64,
-    /// Upper end.
+    /// Upper end of the 95 % Wilson interval of `success`.
     pub success_high: f64,
     /// Episodes by end code.
     pub ends: BTreeMap<&'static str, usize>,

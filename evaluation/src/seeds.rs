@@ -63,7 +63,7 @@ struct SeedRun {
 struct SeedsEvaluation {
     benchmark: String,
     split: String,
-    /// Number of its routes that were trained on: 0 is zero-shot.
+    /// Number of the evaluation's routes that were trained on: 0 is zero-shot.
     trained_on: usize,
     /// Mean of the seeds' success.
     success_mean: f64,

@@ -20,9 +20,9 @@ const EPSILON: f64 = 1e-5;
 
 /// The optimizer of one network.
 pub enum Adam {
-    /// On the processor.
+    /// The optimizer on the processor.
     Fused(Fused),
-    /// On a device.
+    /// The optimizer on a device.
     Tensors(Tensors),
 }
 
@@ -38,7 +38,7 @@ pub struct State {
 }
 
 impl Adam {
-    /// At its beginning, on the processor or on a device.
+    /// An optimizer before its first step, on the processor or on a device.
     pub fn new(on_host: bool) -> Adam {
         if on_host { Adam::Fused(Fused::default()) } else { Adam::Tensors(Tensors::default()) }
     }

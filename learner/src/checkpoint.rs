@@ -31,7 +31,7 @@ pub trait Number: Pod + Display {
     /// The number's type as the file names it.
     const DTYPE: Dtype;
 
-    /// Whether it is a number at all.
+    /// Whether the value is a number at all.
     fn is_finite(&self) -> bool {
         true
     }

@@ -17,7 +17,7 @@ pub struct Generator {
 }
 
 impl Generator {
-    /// The one whose state is a column of a checkpoint. From all zeros every number would be zero: that is an error.
+    /// The generator whose state is a column of a checkpoint. From all zeros every number would be zero: an error.
     pub fn stored(stored: &Stored, column: &str) -> Result<Generator, Error> {
         let generator = Generator { state: stored.array(column)? };
         if generator.state == [0; 4] {

@@ -28,7 +28,7 @@ pub struct LevelReplay {
     settings: config::LevelReplay,
     /// Every route once.
     routes: Vec<u32>,
-    /// Failure rate of each of them.
+    /// Failure rate of each route.
     failures: Vec<f32>,
     /// Index of each of the world's routes in `routes`.
     indices: Vec<Option<usize>>,
@@ -38,7 +38,7 @@ pub struct LevelReplay {
 }
 
 impl LevelReplay {
-    /// With all of `routes` unknown.
+    /// Level replay with all of `routes` unknown.
     pub fn new(settings: config::LevelReplay, routes: Vec<u32>) -> LevelReplay {
         let mut indices = vec![None; routes.iter().max().map_or(0, |&most| most as usize + 1)];
         for (index, &route) in routes.iter().enumerate() {

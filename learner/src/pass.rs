@@ -17,7 +17,7 @@ const LANES: usize = 16;
 pub struct Pass {
     /// Input of each layer, `[rows, inputs]`.
     inputs: Vec<Tensor<2>>,
-    /// Of each hidden layer.
+    /// Values of each hidden layer before its rectifier.
     hidden: Vec<Hidden>,
     /// `[rows * outputs]`.
     pub output: Vec<f32>,
@@ -27,7 +27,7 @@ pub struct Pass {
 struct Hidden {
     /// Output of the linear layer, normalised where there is a normalisation, `[rows, width]`.
     values: TensorData,
-    /// By what a normalisation multiplied each row; empty without one.
+    /// Factor by which a normalisation multiplied each row; empty without one.
     factors: Vec<f32>,
 }
 

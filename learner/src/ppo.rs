@@ -201,8 +201,8 @@ impl Ppo {
     }
 }
 
-/// To mean 0 and standard deviation 1, then limited. A rare failure is worth many standard deviations, and a batch that
-/// has one would learn nothing else.
+/// Scales to mean 0 and standard deviation 1, then limits. A rare failure is worth many standard deviations, and a
+/// batch that has one would learn nothing else.
 fn standardise(values: &mut [f32], limit: f64) {
     let n = values.len().max(1) as f64;
     let mean = values.iter().map(|&value| f64::from(value)).sum::<f64>() / n;

@@ -40,9 +40,9 @@ pub struct Run {
     /// CRC-32 of the world.
     fingerprint: u32,
     training: Session,
-    /// How far it is.
+    /// How far the run is.
     pub progress: Progress,
-    /// How it does on each training route.
+    /// Success on each training route.
     pub routes: RouteCounts,
     /// None without validation.
     pub validation: Option<Validation>,

@@ -31,14 +31,14 @@ use scalar::Scalar;
 /// Where a learner's tensors are.
 #[derive(Debug, Clone)]
 pub enum Placement {
-    /// In the processor's memory.
+    /// Tensors in the processor's memory.
     Host,
-    /// In the memory of this graphics device.
+    /// Tensors in the memory of this graphics device.
     Device(Device),
 }
 
 impl Placement {
-    /// For tensors without gradients.
+    /// The device for tensors without gradients.
     pub fn plain(&self) -> Device {
         match self {
             Placement::Host => Device::flex(),

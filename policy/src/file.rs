@@ -74,7 +74,7 @@ impl Policy {
     ///
     /// # Errors
     ///
-    /// Those of [`Policy::load`] about contents.
+    /// The errors of [`Policy::load`] about contents.
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Policy, Error> {
         read(name, bytes).map_err(|message| Error::contents(name, &message))
     }

@@ -45,12 +45,12 @@ pub struct Layer {
 }
 
 impl Layer {
-    /// Number of its inputs; 0 without outputs.
+    /// Number of the layer's inputs; 0 without outputs.
     pub fn n_inputs(&self) -> usize {
         self.weights.len().checked_div(self.biases.len()).unwrap_or_default()
     }
 
-    /// Number of its outputs.
+    /// Number of the layer's outputs.
     pub fn n_outputs(&self) -> usize {
         self.biases.len()
     }

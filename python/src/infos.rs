@@ -22,7 +22,7 @@ pub struct Episode {
 }
 
 impl Episode {
-    /// The one that a truck is in.
+    /// The episode that a truck is in.
     pub fn of(truck: &Truck) -> Episode {
         Episode { route: truck.route, vehicle: truck.vehicle }
     }
@@ -32,7 +32,7 @@ impl Episode {
 pub struct End {
     /// Index of the truck.
     pub env: usize,
-    /// Why it ended.
+    /// Why the episode ended.
     pub code: u32,
     /// Route and vehicle of the episode.
     pub episode: Episode,

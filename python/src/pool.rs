@@ -21,7 +21,7 @@ pub struct Pool {
 }
 
 impl Pool {
-    /// With so many threads; 0 for one a core.
+    /// A pool of so many threads; 0 for one a core.
     pub fn new(n_threads: usize) -> Pool {
         Pool { n_threads, made: None }
     }

@@ -42,7 +42,7 @@ impl Tally {
         self.sums[REWARD_SUM] as f64 / f64::from(REWARD_UNITS)
     }
 
-    /// This tally less an `earlier` one of the same batch.
+    /// The tally less an `earlier` one of the same batch.
     pub fn since(mut self, earlier: &Tally) -> Tally {
         self.sums.iter_mut().zip(earlier.sums).for_each(|(sum, earlier)| *sum -= earlier);
         self

@@ -118,7 +118,7 @@ pub fn read_bytes(file: &Path, limit: u64) -> Result<Vec<u8>, Error> {
 ///
 /// # Errors
 ///
-/// Those of [`read_bytes`], and [`Error::Unreadable`] for bytes that are not UTF-8.
+/// The errors of [`read_bytes`], and [`Error::Unreadable`] for bytes that are not UTF-8.
 pub fn read_text(file: &Path, limit: u64) -> Result<String, Error> {
     String::from_utf8(read_bytes(file, limit)?).map_err(|error| Error::Unreadable {
         file: file.to_owned(),
@@ -137,7 +137,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     ///
-    /// Those of [`read_text`], and [`Error::Malformed`].
+    /// The errors of [`read_text`], and [`Error::Malformed`].
     pub fn read<T: DeserializeOwned>(file: &'a Path) -> Result<(Reader<'a>, T), Error> {
         Reader::parse(file, &read_text(file, TEXT_LIMIT)?)
     }

@@ -170,7 +170,7 @@ impl Source {
     ///
     /// # Errors
     ///
-    /// Those of [`read_text`] with a limit of [`TEXT_LIMIT`].
+    /// The errors of [`read_text`] with a limit of [`TEXT_LIMIT`].
     pub fn text(&self) -> Result<String, Error> {
         match self {
             Source::Disk(file) => read_text(file, TEXT_LIMIT),

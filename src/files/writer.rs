@@ -84,7 +84,7 @@ impl Output {
     ///
     /// # Errors
     ///
-    /// Those of [`Output::finish`].
+    /// The errors of [`Output::finish`].
     pub fn finish_unsynced(self) -> io::Result<()> {
         match self.0 {
             Way::Replaced { target, temporary } => temporary.put(&target),
@@ -110,7 +110,7 @@ impl Write for Output {
 ///
 /// # Errors
 ///
-/// Those of [`Output::create`] and [`Output::finish`].
+/// The errors of [`Output::create`] and [`Output::finish`].
 pub fn write_whole(file: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut output = Output::create(file)?;
     output.write_all(bytes)?;

@@ -85,7 +85,7 @@ pub fn to_circle(origin: DVec2, direction: DVec2, circle: f64, radius: f64) -> O
 }
 
 struct Rounding {
-    /// From the bend's point to either end of its arc (m).
+    /// Distance from the bend's point to either end of its arc (m).
     tangent: f64,
     begin: DVec2,
     end: DVec2,

@@ -7,9 +7,9 @@ use super::{N_TRACTOR_RAYS, N_TRAILER_RAYS, N_VALUES};
 pub struct Values {
     /// Name of the group.
     pub name: &'static str,
-    /// Index of its first value.
+    /// Index of the group's first value.
     pub first: usize,
-    /// Number of its values.
+    /// Number of the group's values.
     pub n: usize,
     /// The least that they can be: 0, of angles -1. The largest is 1.
     pub low: f32,

@@ -71,7 +71,7 @@ impl Road {
     ///
     /// # Errors
     ///
-    /// Those of [`Map::read`] and [`Choice::imported`], and a name that no route could have.
+    /// The errors of [`Map::read`] and [`Choice::imported`], and a name that no route could have.
     pub fn from_map(file: &Path, choice: &Choice) -> Result<Road, Error> {
         let stem = || file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let name = choice.name.clone().unwrap_or_else(stem);

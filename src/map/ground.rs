@@ -34,9 +34,9 @@ pub enum Kerb {
 /// Where the lanes' edges lie.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Edges {
-    /// This far from the kerb faces everywhere (m).
+    /// Distance of the edges from the kerb faces, the same everywhere (m).
     Beside(f64),
-    /// On outlines of their own.
+    /// Outlines on which the edges lie.
     Own(Outline),
 }
 
@@ -64,9 +64,9 @@ pub struct Line {
     pub line: Curve,
     /// Reach of a crossing line from the centre line to its left and to its right, over all lanes of the ring (m).
     pub crossing: (f64, f64),
-    /// Widths of its lane: on the entry arm, in the ring, on the exit arm (m).
+    /// Widths of the route's lane: on the entry arm, in the ring, on the exit arm (m).
     pub widths: [f64; 3],
-    /// Why it begins, and why it ends, before the world does, as the map that it is from has it.
+    /// Why the route begins, and why it ends, before the world does, as the map that it is from has it.
     pub ends: [Option<String>; 2],
 }
 

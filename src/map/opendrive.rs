@@ -87,7 +87,7 @@ impl Map {
     ///
     /// # Errors
     ///
-    /// Those of [`Map::read`] but for files that cannot be read.
+    /// The errors of [`Map::read`] but for files that cannot be read.
     pub fn parse(file: &Path, text: &str, hand: Hand) -> Result<Map, Error> {
         let records = read::records(file, text, hand)?;
         let strips = lanes::strips(&records, COARSE).map_err(|_| {

@@ -77,7 +77,7 @@ impl Road {
     ///
     /// # Errors
     ///
-    /// Those of [`Road::read`] and [`Road::named`].
+    /// The errors of [`Road::read`] and [`Road::named`].
     pub fn find(name_or_path: &str) -> Result<Road, Error> {
         Road::from_source(&Source::find(Kind::Roundabout, name_or_path)?)
     }
@@ -86,7 +86,7 @@ impl Road {
     ///
     /// # Errors
     ///
-    /// Those of [`Road::read`].
+    /// The errors of [`Road::read`].
     pub fn from_toml(name: &str, text: &str) -> Result<Road, Error> {
         Road::parsed(name.to_owned(), Path::new(name), text)
     }

@@ -147,7 +147,7 @@ impl Refused {
 ///
 /// # Errors
 ///
-/// Those of [`Distribution::find`], [`Distribution::road`] and [`Road::find`].
+/// The errors of [`Distribution::find`], [`Distribution::road`] and [`Road::find`].
 pub fn find(name_or_path: &str) -> Result<Road, Error> {
     match address(name_or_path) {
         Some((distribution, seed, index)) => Ok(Distribution::find(distribution)?.road(seed, index)?.roundabout),

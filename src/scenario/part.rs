@@ -40,7 +40,7 @@ impl Scenario {
     ///
     /// # Errors
     ///
-    /// Those of [`Scenario::add`].
+    /// The errors of [`Scenario::add`].
     pub fn on(&self, roundabout: Road) -> Result<Scenario, Error> {
         let mut scenario = Scenario { places: Vec::<Place>::new(), splits: Default::default(), ..self.clone() };
         scenario.add(roundabout, Split::Test)?;

@@ -25,7 +25,7 @@ const MOST_INDICES: usize = 1_000_000;
 pub(super) struct Procedural {
     distribution: Distribution,
     seed: u32,
-    /// In the order of [`Split::ALL`].
+    /// Ranges of indices in the order of [`Split::ALL`].
     ranges: [Range<u32>; 3],
 }
 

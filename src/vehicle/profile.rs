@@ -23,9 +23,9 @@ const SLOWEST: f64 = 1.0;
 /// Speeds along a route.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
-    /// At each waypoint (m/s).
+    /// Speed at each waypoint (m/s).
     pub speeds: Vec<f64>,
-    /// From the first waypoint to the last (s).
+    /// Time from the first waypoint to the last (s).
     pub time: f64,
 }
 

@@ -41,12 +41,12 @@ impl Pose {
 /// The lengths that decide how the trailer follows, at one speed.
 #[derive(Debug, Clone, Copy)]
 struct Towing {
-    /// Of the front axle (m/s).
+    /// Speed of the front axle (m/s).
     speed: f64,
     wheelbase: f64,
     fifth_wheel: f64,
     trailer_wheelbase: f64,
-    /// By which slip moves a unit's turning point ahead (m).
+    /// Length by which slip moves a unit's turning point ahead (m).
     slip: f64,
 }
 
@@ -55,11 +55,11 @@ struct Towing {
 struct Turning {
     /// Speed of the drive axle along the tractor (m/s).
     along: f64,
-    /// Of the tractor (rad/s).
+    /// Yaw rate of the tractor (rad/s).
     yaw: f64,
     /// Speed of the trailer's axle group along the trailer (m/s).
     trailer_along: f64,
-    /// Of the trailer (rad/s).
+    /// Yaw rate of the trailer (rad/s).
     trailer_yaw: f64,
 }
 

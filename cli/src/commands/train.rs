@@ -90,8 +90,8 @@ pub struct Args {
     /// Part of the name of a graphics adapter in place of the training file's, see `offtrack devices`.
     #[arg(long)]
     adapter: Option<String>,
-    /// Another value of one of the training file's keys, as in `learning.n_steps=5`; nothing after the `=` removes the
-    /// key. May be given several times.
+    /// Value of one of the training file's keys, as in `learning.n_steps=5`, in place of the file's; nothing after the
+    /// `=` removes the key. May be given several times.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
     /// Write the rows of metrics.csv to a TensorBoard event file in the run's folder too.
@@ -118,7 +118,7 @@ struct Finished {
     updates: u64,
     /// Fraction of the latest training episodes that arrived.
     training_success: Option<f64>,
-    /// Number of those episodes; each row of the metrics is a mean over as many.
+    /// Number of the latest training episodes; each row of the metrics is a mean over as many.
     training_window: u64,
     /// The training routes with least success; none where the trucks were on a device.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -326,7 +326,7 @@ fn a_learner_that_diverges_stops_with_the_step_the_parameter_and_the_last_good_c
             .any(|name| message.contains(name)),
         "{message}"
     );
-    // It is good as far as it goes: it can be read, and training diverges again.
+    // The last good checkpoint is good as far as it goes: it can be read, and training diverges again.
     assert!(refusal(&resume(&place, "run", &[]), 1).contains("diverged"));
 }
 

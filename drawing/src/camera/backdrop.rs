@@ -67,7 +67,7 @@ pub struct Backdrop {
 }
 
 impl Backdrop {
-    /// Of a route of the scenario; bare ground if it has no such route.
+    /// The backdrop of a route of the scenario; bare ground if it has no such route.
     pub fn new(scenario: &Scenario, route: u32, format: Format, lettering: &Lettering) -> Backdrop {
         let found = scenario.routes().nth(route as usize).map(|(place, line)| {
             let driven = &scenario.places[place].roundabout;

@@ -36,7 +36,7 @@ pub struct Canvas<'a> {
 }
 
 impl<'a> Canvas<'a> {
-    /// On opaque RGBA pixels `[rows, width, 4]`; `None` without any.
+    /// A canvas on opaque RGBA pixels `[rows, width, 4]`; `None` without any.
     pub fn on(rgba: &'a mut [u8], width: u32) -> Option<Canvas<'a>> {
         let height = rgba.len() as u32 / (4 * width);
         Some(Canvas { pixels: PixmapMut::from_bytes(rgba, width, height)? })

@@ -19,7 +19,7 @@ const STEPS: f64 = 5.0;
 #[derive(Debug, Clone, Copy)]
 enum Scale {
     Logarithmic,
-    /// With this step from tick to tick.
+    /// A linear scale with this step from tick to tick.
     Linear(f64),
 }
 

@@ -49,7 +49,7 @@ pub struct Measures {
 }
 
 impl Measures {
-    /// Of a vehicle of a world: row `vehicle` of its `rigs`.
+    /// Measures of a vehicle of a world: row `vehicle` of its `rigs`.
     pub fn of(world: &World, vehicle: u32) -> Measures {
         let rig = &world.rigs[vehicle as usize];
         let body = |body: &Body| Rectangle {
@@ -73,7 +73,7 @@ impl Measures {
         }
     }
 
-    /// Of the truck that is seen on a roundabout: the mirror image of the one that is driven, where that is.
+    /// Measures of the truck that is seen on a roundabout: the mirror image of the one driven, where that is.
     #[must_use]
     pub fn seen(mut self, roundabout: &Road) -> Measures {
         if roundabout.is_mirrored() {
@@ -97,7 +97,7 @@ pub struct Class {
 }
 
 impl Class {
-    /// Of row `vehicle` of a world's `rigs`; `None` where the benchmark has one vehicle, which has no name.
+    /// The class of row `vehicle` of a world's `rigs`; `None` where the benchmark has one vehicle, which has no name.
     pub fn of(world: &World, vehicle: u32) -> Option<Class> {
         let class = &world.classes[world.rigs[vehicle as usize].class_index as usize];
         (!class.vehicle.is_empty()).then(|| Class { vehicle: class.vehicle.clone(), load: class.load.clone() })

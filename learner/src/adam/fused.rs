@@ -62,7 +62,7 @@ impl Fused {
 /// Some elements of a parameter, and all that goes with them.
 struct Block<'a> {
     values: &'a mut [f32],
-    /// Of each shard.
+    /// Gradients of each shard.
     gradients: Vec<&'a [f32]>,
     moments: [&'a mut [f32]; 2],
     follower: &'a mut [f32],

@@ -15,7 +15,7 @@ const EXPECTED: &str =
 pub struct AlsoEvaluate {
     /// The benchmark: a name, or the path of a file.
     pub benchmark: String,
-    /// Which of its routes.
+    /// Split whose routes are driven.
     pub split: Split,
 }
 

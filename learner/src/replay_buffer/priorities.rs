@@ -29,7 +29,7 @@ impl Priorities {
         Priorities { settings, n_leaves, n_rows, sums: vec![0.0; 2 * n_leaves], largest: 1.0 }
     }
 
-    /// With the priorities of all rows as [`Priorities::rows`] gave them.
+    /// Priorities of all rows as [`Priorities::rows`] gave them.
     pub(super) fn restored(settings: Priority, rows: &[f64], largest: f64) -> Priorities {
         let mut priorities = Priorities { largest, ..Priorities::new(settings, rows.len()) };
         let n_leaves = priorities.n_leaves;

@@ -82,7 +82,7 @@ impl Checkpointer {
         }
     }
 
-    /// Whether it is time for the next one.
+    /// Whether it is time for the next checkpoint.
     pub fn is_due(&self) -> bool {
         self.pending.is_none() && self.since.is_none_or(|since| self.next.min(self.interval) <= since.elapsed())
     }
@@ -94,7 +94,7 @@ impl Checkpointer {
 
     /// Begins to write a checkpoint of these columns and a policy. It waits for those that are still being written.
     pub fn begin(&mut self, columns: &Columns, config: String, world: u32, policy: Vec<u8>) {
-        // These are newer, whether or not those could be written.
+        // The columns are newer than those still being written, whether or not those can be.
         self.wait();
         if self.since.replace(Instant::now()).is_some() {
             self.next = self.interval.min(self.next.saturating_mul(2));

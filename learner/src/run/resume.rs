@@ -29,7 +29,7 @@ pub struct Resumed {
 }
 
 impl Resumed {
-    /// Reads all of it. Nothing is written but a missing `metrics.csv`.
+    /// Reads what a run left in its folder. Nothing is written but a missing `metrics.csv`.
     pub fn open(path: &Path, minutes: Option<f64>, steps: Option<u64>) -> Result<Resumed, Error> {
         let folder = Folder::of(path)?;
         let mut config = Config::read(&folder.config())?;

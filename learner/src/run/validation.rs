@@ -49,13 +49,13 @@ pub struct Validations {
     pub episodes: u64,
     /// Validations made.
     pub times: u64,
-    /// The best one, whose policy is kept; of equal ones the last, and of a refinement the last.
+    /// The best validation, whose policy is kept; of equal ones the last, and of a refinement the last.
     pub best: Validated,
-    /// Lower end of the 95 % Wilson interval of its success.
+    /// Lower end of the 95 % Wilson interval of the best validation's success.
     pub best_success_low: f64,
-    /// Upper end.
+    /// Upper end of the 95 % Wilson interval of the best validation's success.
     pub best_success_high: f64,
-    /// The last one.
+    /// The last validation.
     pub last: Validated,
 }
 
@@ -73,7 +73,7 @@ pub struct Validation {
 }
 
 impl Validation {
-    /// Of the validation routes of `scenario`, which has at least one and whose world is `world`.
+    /// Validation on the validation routes of `scenario`, which has at least one and whose world is `world`.
     pub fn new(settings: config::Validation, scenario: Arc<Scenario>, world: Arc<World>) -> Validation {
         Validation { fingerprint: fingerprint(&world), settings, scenario, world, n_made: 0, last: None, best: None }
     }
@@ -135,7 +135,7 @@ impl Validation {
         self.best.as_ref().map(|(_, policy)| policy.as_slice())
     }
 
-    /// For a run's report; none before the first one.
+    /// The validations for a run's report; none before the first one.
     pub fn report(&self) -> Option<Validations> {
         let (best, last, routes) = (self.best()?, self.last?, self.scenario.split(Split::Validation).len());
         let episodes = (routes * self.settings.episodes) as u64;

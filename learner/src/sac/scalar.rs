@@ -6,9 +6,9 @@ use burn::tensor::Tensor;
 /// A number, with the few operations that the learner needs of it.
 #[derive(Debug, Clone)]
 pub(super) enum Scalar {
-    /// On the host.
+    /// A number on the host.
     Host(f32),
-    /// On a device, `[1, 1]`, without gradients.
+    /// A number on a device, `[1, 1]`, without gradients.
     Device(Box<Tensor<2>>),
 }
 

@@ -53,15 +53,15 @@ pub struct Moving {
 pub struct Motion {
     /// Curvature of the tractor's steer angle, without lag and limit of grip (1/m).
     pub steered_curvature: f32,
-    /// Of the tractor (rad/s).
+    /// Yaw rate of the tractor (rad/s).
     pub yaw_rate: f32,
-    /// Of the trailer (rad/s).
+    /// Yaw rate of the trailer (rad/s).
     pub trailer_yaw_rate: f32,
     /// Speed of the drive axle to the left (m/s).
     pub side_speed: f32,
-    /// Of the tractor, to the left (m/s^2).
+    /// Lateral acceleration of the tractor, to the left (m/s^2).
     pub lateral_acceleration: f32,
-    /// Of the trailer's axle group, to the left (m/s^2).
+    /// Lateral acceleration of the trailer's axle group, to the left (m/s^2).
     pub trailer_lateral_acceleration: f32,
 }
 

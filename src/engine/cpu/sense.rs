@@ -34,7 +34,7 @@ constants! {
     const RAY_SHORT: f32 = 0.25;
     /// Closer to a kerb than this, it is taken for straight (m).
     const RAY_CLOSE: f32 = 0.15;
-    /// This close to a kerb the ray has met it (m).
+    /// Distance to a kerb at which a ray has met the kerb (m).
     const RAY_MET: f32 = 0.004;
     /// Head-on, a ray has met the kerb from this far off: a straight kerb's position is known to a few millimetres then
     /// (m).

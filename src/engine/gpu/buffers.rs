@@ -29,7 +29,7 @@ pub type Columns = Vec<(Column, Slice)>;
 /// Every buffer of a batch.
 #[derive(Debug)]
 pub(super) struct Buffers {
-    /// In the order of [`BUFFERS`].
+    /// Slices in the order of [`BUFFERS`].
     slices: Vec<Slice>,
     pub(super) group: BindGroup,
 }

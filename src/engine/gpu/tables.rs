@@ -71,7 +71,7 @@ impl<'a> Tables<'a> {
 }
 
 impl BatchFacts {
-    /// Of a batch.
+    /// Facts of a batch.
     pub(super) fn of(batch: &Batch) -> BatchFacts {
         BatchFacts {
             n_envs: batch.n_envs() as u32,

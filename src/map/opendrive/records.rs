@@ -108,7 +108,7 @@ pub(super) struct Lane {
     /// Positive left of the reference line, negative right of it; never 0.
     pub(super) id: i32,
     pub(super) kind: Kind,
-    /// Whether it is travelled against its side's direction.
+    /// Whether the lane is travelled against its side's direction.
     pub(super) reversed: bool,
     /// Widths, or distances of its outer border from the reference line if `bordered`; starts count from the section's.
     pub(super) widths: Vec<Cubic>,
@@ -123,9 +123,9 @@ pub(super) struct Lane {
 /// A stretch of a road with the same lanes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Section {
-    /// Station of its beginning (m).
+    /// Station of the section's beginning (m).
     pub(super) start: f64,
-    /// From left to right, the centre lane left out.
+    /// Lanes from left to right, the centre lane left out.
     pub(super) lanes: Vec<Lane>,
 }
 

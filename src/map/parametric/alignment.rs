@@ -23,7 +23,7 @@ impl Way {
         }
     }
 
-    /// From the alignment's frame into the world.
+    /// The curve moved from the alignment's frame into the world.
     pub(super) fn placed(self, curve: &Curve, bearing: f64) -> Curve {
         match self {
             Way::Entry => curve.turned(bearing),

@@ -77,7 +77,7 @@ pub(super) struct Gutters {
     mouths: Option<Profile>,
     /// By arm: of the kerb from it to the next.
     kerbs: Vec<Option<Profile>>,
-    /// Of the arms with a splitter island, in their order (m).
+    /// Gutters of the arms with a splitter island, in the arms' order (m).
     splitters: Vec<f64>,
 }
 

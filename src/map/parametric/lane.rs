@@ -19,7 +19,7 @@ use crate::map::route::Lane;
 /// One end of a route: from an arm's end to the ring, in the world.
 #[derive(Debug, Clone, PartialEq)]
 struct Lead {
-    /// In the direction of travel: inwards for an entry, outwards for an exit.
+    /// Curve in the direction of travel: inwards for an entry, outwards for an exit.
     curve: Curve,
     /// Direction from the centre to where the curve meets the ring lane, relative to the arm's bearing, in (-pi, pi]
     /// (rad).
@@ -40,14 +40,14 @@ pub(super) struct RouteLine {
 /// Every lane of every arm, and the routes that they form.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Lanes {
-    /// By arm, then from the kerb.
+    /// Leads by arm, then from the kerb.
     entries: Vec<Vec<Lead>>,
     exits: Vec<Vec<Lead>>,
     /// By arm of an exit with one lane that routes from left lanes take: that lane, led to their lane of the ring.
     merges: BTreeMap<usize, Lead>,
     /// By entry arm: the right lane to the first exit, where it passes outside the ring.
     around: Vec<Option<Curve>>,
-    /// By entry arm, lane and exit.
+    /// Routes by entry arm, lane and exit.
     routes: Vec<RouteLine>,
 }
 

@@ -119,7 +119,7 @@ pub(super) struct Arm {
     pub(super) exit: Carriageway,
     /// Radius that joins the entry's kerb to the next arm's exit kerb outside the ring (m).
     pub(super) kerb_corner: Option<f64>,
-    /// Radius of the right lane to the first exit, outside the ring; without it the lane lies beside such a kerb (m).
+    /// Radius of the right lane to the first exit outside the ring (m); without it the lane lies beside the kerb.
     pub(super) lane_corner: Option<f64>,
     /// Whether that lane follows the ring although the kerb does not.
     pub(super) lane_on_ring: bool,

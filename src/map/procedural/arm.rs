@@ -23,7 +23,7 @@ pub(super) struct Ring {
     pub(super) outer: f64,
     pub(super) lanes: usize,
     pub(super) ring_lane_width: f64,
-    /// Of the carriageways' lanes.
+    /// Width of the carriageways' lanes.
     pub(super) lane_width: f64,
     pub(super) gutter: f64,
 }

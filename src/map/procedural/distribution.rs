@@ -53,7 +53,7 @@ impl Distribution {
     ///
     /// # Errors
     ///
-    /// Those of [`Distribution::read`] and [`Distribution::named`].
+    /// The errors of [`Distribution::read`] and [`Distribution::named`].
     pub fn find(name_or_path: &str) -> Result<Distribution, Error> {
         Distribution::from_source(&Source::find(Kind::Distribution, name_or_path)?)
     }

@@ -15,7 +15,7 @@ const TAKEN: f64 = 0.48;
 /// The arm's end, the bends on the way in, and the last straight.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Line {
-    /// From the arm's end inwards; the last begins the last straight.
+    /// Bends from the arm's end inwards; the last begins the last straight.
     pub(super) bends: Vec<Bend>,
     /// Direction of the last straight, of length 1.
     pub(super) direction: DVec2,

@@ -24,7 +24,7 @@ impl Distribution {
     ///
     /// # Errors
     ///
-    /// Those of [`Distribution::road`], and [`Error::Stopped`].
+    /// The errors of [`Distribution::road`], and [`Error::Stopped`].
     pub fn roads(&self, seed: u32, indices: &[u32], loading: &Loading) -> Result<Vec<RandomRoad>, Error> {
         let mut chunks: BTreeMap<u32, Known> = indices.iter().map(|&index| (index / CHUNK, Known::new())).collect();
         if let Some(cache) = loading.cache {

@@ -19,9 +19,9 @@ pub struct Ranges {
     pub centre_of_gravity: Option<[f64; 2]>,
     /// Factor of the trailer's roll gain.
     pub roll_gain: Option<[f64; 2]>,
-    /// Factor of its roll frequency.
+    /// Factor of the trailer's roll frequency.
     pub roll_frequency: Option<[f64; 2]>,
-    /// Factor of its roll damping.
+    /// Factor of the trailer's roll damping.
     pub roll_damping: Option<[f64; 2]>,
     /// Factor of the slip coefficient.
     pub slip: Option<[f64; 2]>,
@@ -31,7 +31,7 @@ pub struct Ranges {
     pub steer_rate: Option<[f64; 2]>,
     /// Factor of the strongest drive.
     pub acceleration_max: Option<[f64; 2]>,
-    /// From a steer command to the first movement of the wheels (s).
+    /// Time from a steer command to the first movement of the wheels (s).
     pub steer_delay: Option<[f64; 2]>,
     /// Time constant of the drive (s).
     pub drive_lag: Option<[f64; 2]>,

@@ -14,9 +14,9 @@ pub struct Demand {
     pub steering: f64,
     /// Mean change of the steer angle since the pose before (rad/s).
     pub steer_rate: f64,
-    /// Of the tractor's drive axle (m/s^2).
+    /// Lateral acceleration of the tractor's drive axle (m/s^2).
     pub lateral_acceleration: f64,
-    /// Of the unit with the greater one, its roll included.
+    /// Load transfer ratio of the unit with the greater one, the unit's roll included.
     pub load_transfer_ratio: f64,
 }
 

@@ -151,7 +151,7 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// To a thousandth: on a large device a stage takes less than a tenth of a nanosecond a truck.
+/// Rounded to a thousandth: on a large device a stage takes less than a tenth of a nanosecond a truck.
 fn rounded(value: f64) -> f64 {
     (1000.0 * value).round() / 1000.0
 }

@@ -93,7 +93,7 @@ pub(super) struct Setting<'a> {
     pub routes: &'a [u32],
     /// Number of trucks.
     pub envs: usize,
-    /// For modes with a network.
+    /// The learner for modes with a network.
     pub learner: Option<&'a Learner>,
 }
 

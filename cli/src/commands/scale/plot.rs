@@ -24,7 +24,7 @@ pub(super) fn check(file: &Path) -> Result<(), Error> {
     }
 }
 
-/// Whether it is to be pixels.
+/// Whether the plot is to be pixels.
 pub(super) fn is_png(file: &Path) -> bool {
     file.extension().is_some_and(|extension| extension == "png")
 }

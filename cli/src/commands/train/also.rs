@@ -28,7 +28,7 @@ pub struct Also {
 /// A further evaluation's result.
 #[derive(Debug, Clone, Serialize)]
 pub struct AlsoReport {
-    /// Number of its routes that the policy was trained on: 0 is zero-shot.
+    /// Number of the evaluation's routes that the policy was trained on: 0 is zero-shot.
     trained_on: usize,
     #[serde(flatten)]
     report: Report,

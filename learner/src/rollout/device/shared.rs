@@ -14,9 +14,9 @@ use offtrack_evaluation::error::Error;
 /// The device, as either knows it.
 #[derive(Clone)]
 pub struct Shared {
-    /// For the simulator.
+    /// The device for the simulator.
     pub gpu: gpu::Device,
-    /// For tensors.
+    /// The device for tensors.
     pub tensors: Device,
     /// Skips the flush, to show that it is needed.
     #[cfg(test)]
