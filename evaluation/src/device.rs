@@ -10,7 +10,7 @@ use offtrack::simulator::Engine;
 
 use crate::error::Error;
 use crate::provenance;
-pub use panics::caught;
+pub use panics::{caught, unreadable};
 
 /// The error text where a program without the feature is asked for a device.
 #[cfg(not(feature = "gpu"))]

@@ -4,6 +4,7 @@ use burn::module::{Module, Param};
 use burn::nn::{LayerNorm, LayerNormConfig, Linear};
 use burn::tensor::activation::{log_softmax, relu};
 use burn::tensor::{Device, Tensor, TensorData};
+use offtrack_evaluation::device::unreadable;
 use rand::rngs::SmallRng;
 use rand::{Rng, SeedableRng};
 
@@ -117,7 +118,7 @@ impl Mlp {
 
 /// A parameter's values; waits for the device that they are on.
 pub fn values_of<const D: usize>(parameter: &Param<Tensor<D>>) -> Vec<f32> {
-    parameter.val().into_data().try_to_vec().expect("parameters are made of f32 values")
+    parameter.val().into_data().try_to_vec().unwrap_or_else(|error| unreadable(&error))
 }
 
 fn vector(values: Vec<f32>, device: &Device) -> Param<Tensor<1>> {

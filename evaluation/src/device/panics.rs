@@ -4,7 +4,8 @@
 //! place and goes on, whatever hook the process has.
 
 use std::any::Any;
-use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, resume_unwind, set_hook, take_hook};
+use std::fmt::Display;
+use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, panic_any, resume_unwind, set_hook, take_hook};
 use std::sync::{Mutex, Once, PoisonError};
 use std::thread::ThreadId;
 
@@ -32,6 +33,14 @@ struct Seen {
     is_own: bool,
 }
 
+/// The payload of a panic for values that could not be read from a device: the device's failure, whoever panics.
+struct Unreadable(String);
+
+/// Ends the work on a device whose values cannot be read: [`caught`] makes an error of it.
+pub fn unreadable(error: &impl Display) -> ! {
+    panic_any(Unreadable(error.to_string()))
+}
+
 /// The outcome of `work` on a device, or an error if a library panicked, with the panic's place. A panic of our own code
 /// goes on, unless `failed` says that the device has failed, which is then the error.
 pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>, failed: impl FnOnce() -> Option<Error>) -> Result<T, Error> {
@@ -50,6 +59,9 @@ pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>, failed: impl FnOnce() 
         Ok(result) => return result,
         Err(panic) => panic,
     };
+    if let Some(Unreadable(message)) = panic.downcast_ref() {
+        return Err(Error::Device(message.clone()));
+    }
     match seen {
         Some(Seen { is_own: false, place, .. }) => {
             Err(Error::Device(format!("{} (at {place})", message(panic.as_ref()))))
@@ -67,7 +79,7 @@ fn is_silenced(panic: &PanicHookInfo) -> bool {
         if is_watched {
             watched.panics.push(Seen { thread: std::thread::current().id(), place, is_own });
         }
-        is_watched && !is_own
+        is_watched && (!is_own || panic.payload().is::<Unreadable>())
     })
 }
 

@@ -3,6 +3,7 @@
 use burn::module::{Module, ModuleMapper, Param};
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
+use offtrack_evaluation::device::unreadable;
 
 use super::{DECAY, State, Step};
 
@@ -23,7 +24,7 @@ impl Tensors {
     }
 
     pub(super) fn state(&self) -> State {
-        let values = |tensor: Tensor<1>| tensor.into_data().try_to_vec().expect("moments of f32 parameters are f32");
+        let values = |tensor: Tensor<1>| tensor.into_data().try_to_vec().unwrap_or_else(|error| unreadable(&error));
         State {
             n_steps: self.n_steps,
             moments: self.moments.iter().map(|moments| moments.clone().map(values)).collect(),
