@@ -1,5 +1,6 @@
 //! What can go wrong while training, evaluating or drawing: one error type for this crate, above those of the
-//! simulator's edges ([`offtrack::files::reader::Error`] for files, [`offtrack::simulator::Error`] for batches and devices).
+//! simulator's edges ([`offtrack::files::reader::Error`] for files, [`offtrack::simulator::Error`] for batches and
+//! devices).
 //!
 //! Names and values are bounded and made harmless where they are shown, so that none can be forgotten.
 

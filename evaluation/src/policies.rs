@@ -29,7 +29,8 @@ pub trait Controller {
     fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>);
 }
 
-/// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its name. Its
+/// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its name.
+/// Its
 /// action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where there is none, the
 /// first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random actions.
 pub fn find(

@@ -65,7 +65,8 @@ impl Backend {
         }
     }
 
-    /// An error if a run there does not fit into the host's memory. A device says what it has no room for when it is asked.
+    /// An error if a run there does not fit into the host's memory. A device says what it has no room for when it is
+    /// asked.
     pub fn check_memory(&self, config: &Config, n_values: usize, n_actions: usize) -> Result<(), Error> {
         match self {
             Backend::Host => memory::check(config, n_values, n_actions),
@@ -108,7 +109,8 @@ impl Backend {
         })
     }
 
-    /// The result of `work`. On a device a panic of the tensor library becomes an error: it panics where a device fails.
+    /// The result of `work`. On a device a panic of the tensor library becomes an error: it panics where a device
+    /// fails.
     pub fn guarded<T>(&self, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
         match self {
             Backend::Host => work(),

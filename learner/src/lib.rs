@@ -1,7 +1,8 @@
 //! The learner: discrete soft actor-critic, its replay buffer, and the training loop, on the processor or on a graphics
 //! device; and proximal policy optimisation, which can refine its policy.
 //!
-//! Start with [`session`], the loop, then [`sac`] and [`ppo`], the algorithms. [`rollout`] is what differs between processor and
+//! Start with [`session`], the loop, then [`sac`] and [`ppo`], the algorithms. [`rollout`] is what differs between
+//! processor and
 //! device.
 
 pub mod session; // the loop: act, learn

@@ -33,7 +33,8 @@ pub fn transitions(config: &Config) -> usize {
     slots.min(stepped.saturating_add(1)).saturating_mul(config.n_envs)
 }
 
-/// An error if a run of networks of so many values and actions does not fit into the memory that the machine has free. It
+/// An error if a run of networks of so many values and actions does not fit into the memory that the machine has free.
+/// It
 /// names the key that takes most.
 pub fn check(config: &Config, n_values: usize, n_actions: usize) -> Result<(), Error> {
     check_within(config, n_values, n_actions, available_memory().map_or(u128::MAX, u128::from))

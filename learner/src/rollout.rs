@@ -64,7 +64,8 @@ pub trait Rollout {
     /// before.
     fn step(&mut self, actor: &Mlp, env_steps: u64) -> Result<(), Error>;
 
-    /// A refinement's steps of every truck with actions sampled from the actor's distribution, for learning from them at
+    /// A refinement's steps of every truck with actions sampled from the actor's distribution, for learning from them
+    /// at
     /// once: not remembered. The lane distance counts as far as the world's limit.
     fn collect(&mut self, actor: &Mlp, settings: &Refinement) -> Result<Steps, Error>;
 

@@ -15,7 +15,8 @@ create_exception!(
     "A scenario, roundabout or vehicle file that cannot be read or makes no sense: the message names file, key and value."
 );
 
-/// Does `work`. A panic in it is a bug on this side of the border: it becomes a `RuntimeError` with the panic's message,
+/// Does `work`. A panic in it is a bug on this side of the border: it becomes a `RuntimeError` with the panic's
+/// message,
 /// which a caller's `except Exception` catches, as it does not PyO3's `PanicException`.
 ///
 /// Nothing that `work` had changed is looked at afterwards: a batch whose lock it held is poisoned and says so.

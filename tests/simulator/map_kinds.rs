@@ -41,7 +41,8 @@ fn in_road_1(text: &str, from: &str, to: &str) -> String {
     changed
 }
 
-/// The ring with its eastern arm cut in two after 10 m: road 1 leads to road 801 by a link, and 801 back to 1 by another.
+/// The ring with its eastern arm cut in two after 10 m: road 1 leads to road 801 by a link, and 801 back to 1 by
+/// another.
 fn continued(link: &str, back: &str, more: &str) -> String {
     let text = plain();
     let road = text.lines().find(|line| line.contains(" id=\"1\" junction")).unwrap();

@@ -46,7 +46,8 @@ pub struct Args {
     /// the path touches no kerb and the lock allows it.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
-    /// Draw the swept path on this route: N-left-3, or 16m/N-left-3. JSON then lists this route alone. Lock, steer rate,
+    /// Draw the swept path on this route: N-left-3, or 16m/N-left-3. JSON then lists this route alone. Lock, steer
+    /// rate,
     /// tyres and rollover are compared with what the path needs, and printed.
     #[arg(long)]
     route: Option<String>,

@@ -22,7 +22,8 @@ pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Whether two paths lead to one file, which may not be there yet. What is written to a device or a pipe replaces nothing.
+/// Whether two paths lead to one file, which may not be there yet. What is written to a device or a pipe replaces
+/// nothing.
 fn is_same(file: &Path, other: &Path) -> bool {
     let replaces = !file.exists() || file.is_file();
     replaces && resolved(file).is_some_and(|file| resolved(other) == Some(file))

@@ -57,7 +57,8 @@ pub struct Args {
     /// `laden-gpu` and `paper`, which come with the program. Without it `default`, in a program built for graphics
     /// devices `gpu`.
     config: Option<PathBuf>,
-    /// A benchmark of your own, a path or a name: train on its training routes, with its own reward, and evaluate on its
+    /// A benchmark of your own, a path or a name: train on its training routes, with its own reward, and evaluate on
+    /// its
     /// test routes. The policy is chosen on its validation routes. Where it has no training or no validation routes,
     /// its vehicle and actions drive on those of random2026.
     #[arg(long)]

@@ -71,7 +71,8 @@ impl Checkpointer {
         self.is_continued = true;
     }
 
-    /// What there is to go back to, in words. That a checkpoint was read does not make it a good one: its numbers may be
+    /// What there is to go back to, in words. That a checkpoint was read does not make it a good one: its numbers may
+    /// be
     /// what the run failed by.
     pub fn last_good(&self) -> String {
         let file = self.file.display();

@@ -62,7 +62,8 @@ impl Folder {
         self.0.join("checkpoint.safetensors")
     }
 
-    /// The next checkpoint while it is being written: beside the last one, also where that is kept elsewhere and linked.
+    /// The next checkpoint while it is being written: beside the last one, also where that is kept elsewhere and
+    /// linked.
     pub fn checkpoint_part(&self) -> PathBuf {
         followed(&self.checkpoint()).with_extension("part")
     }

@@ -54,7 +54,8 @@ impl Batch {
         state.look()
     }
 
-    /// Counts on from the sums of another batch's tally, and tells the episodes that its last step ended. An error where
+    /// Counts on from the sums of another batch's tally, and tells the episodes that its last step ended. An error
+    /// where
     /// that batch drove in another world.
     pub(super) fn take_up(&self, (fingerprint, sums): (u32, Vec<i64>), ends: Option<GivenEnds>) -> PyResult<()> {
         if fingerprint != self.place.fingerprint() {

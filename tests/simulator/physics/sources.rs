@@ -1,4 +1,5 @@
-//! The shipped vehicles against the publications that their lengths are from: the table of scenarios/README.md, computed.
+//! The shipped vehicles against the publications that their lengths are from: the table of scenarios/README.md,
+//! computed.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! What must agree between the benchmark that a policy is trained on and one that it is chosen or evaluated on: what the
+//! What must agree between the benchmark that a policy is trained on and one that it is chosen or evaluated on: what
+//! the
 //! policy drives, and how it observes.
 //!
 //! Roads, start errors, reward and ends of episodes may differ, and so may what `[draw]` varies: training begins from
@@ -15,7 +16,8 @@ pub fn actions(scenario: &Scenario) -> Vec<Action> {
     scenario.actions(scenario.steer_max.unwrap_or(scenario.vehicle.tractor.steer_max) as f32)
 }
 
-/// What of `other` is not as in `trained`: a key, or words, with both values where they are short. None where a policy that
+/// What of `other` is not as in `trained`: a key, or words, with both values where they are short. None where a policy
+/// that
 /// was trained in the one drives and observes the same in the other.
 pub fn difference(trained: &Scenario, other: &Scenario) -> Option<String> {
     let differing = |what: &str, value: fn(&Scenario) -> String| {

@@ -35,7 +35,8 @@ pub struct AlsoReport {
 }
 
 impl Also {
-    /// Reads the benchmarks that a training file names. `training` is what the policy is trained on. They may be for other
+    /// Reads the benchmarks that a training file names. `training` is what the policy is trained on. They may be for
+    /// other
     /// vehicles: how well a policy drives those is something to evaluate.
     pub fn read(config: &Config, reader: &Reader, training: &Scenario) -> Result<Vec<Also>, Error> {
         let read = |named: AlsoEvaluate| {

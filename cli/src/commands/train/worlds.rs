@@ -36,7 +36,8 @@ pub struct Worlds {
 }
 
 impl Worlds {
-    /// The benchmarks of a training file, which `origin` names in errors. None of the routes that the policy is chosen or
+    /// The benchmarks of a training file, which `origin` names in errors. None of the routes that the policy is chosen
+    /// or
     /// evaluated on may be among those it is trained on, and on all of them it drives what it is trained to drive.
     pub fn read(config: &Config, origin: &Path) -> Result<Worlds, Error> {
         let reader = Reader::of(origin);
