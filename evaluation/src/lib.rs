@@ -35,6 +35,7 @@ pub mod files; // results, written whole
 pub mod provenance; // machine and commit of a result
 pub mod device; // what steps the trucks
 pub mod policies; // what chooses the actions: learned, pure pursuit, random
+pub mod episodes; // one a truck, until every one has ended
 mod evaluation; // every route, every start, every episode counted
 mod part; // entry, ring and exit of a route
 mod running; // an episode under way

@@ -84,6 +84,11 @@ impl Network {
 }
 
 impl Network {
+    /// The policy itself.
+    pub fn policy(&self) -> &Policy {
+        &self.policy
+    }
+
     fn of(policy: Policy) -> Network {
         Network { policy, pool: Mutex::new(Pool::new(0)) }
     }
