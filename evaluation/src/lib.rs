@@ -6,10 +6,7 @@
 //! ```
 //! use std::sync::Arc;
 //!
-//! use offtrack::layout::Ended;
-//! use offtrack::scenario::{Scenario, Split};
-//! use offtrack::simulator::{RouteChoice, Simulator};
-//! use offtrack::world::World;
+//! use offtrack::prelude::*;
 //! use offtrack_policy::Policy;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -296,7 +296,7 @@ impl Batch {
 
     /// What `resume` needs beside the columns: a fingerprint of the world, and the sums of the tally.
     fn progress(&self) -> PyResult<(u32, Vec<i64>)> {
-        guarded(|| Ok((self.place.fingerprint(), self.state()?.tally()?.sums.to_vec())))
+        guarded(|| Ok((self.place.world.fingerprint(), self.state()?.tally()?.sums.to_vec())))
     }
 
     /// Takes what another batch's `progress` and `last_ended` gave.
