@@ -12,11 +12,11 @@ use offtrack::vehicle::swept::corners;
 use svg::node::element::{Circle, Definitions, Group, Path};
 
 use crate::Error;
-use crate::figure::{Straights, View, colour, number};
 use crate::legend::{Entry, Swatch};
 use crate::lettering::{Align, Lettering};
 use crate::road::RoadLayers;
 use crate::sweep::{nearest, swept_area};
+use crate::view::{Straights, View, colour, number};
 use offtrack_evaluation::recording::{Frame, Recording};
 
 /// Length of the route shown before and after the ring: all of it at a benchmark's usual lengths (m).

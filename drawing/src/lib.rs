@@ -42,6 +42,7 @@ mod road; // the layers of a map
 pub mod sheet; // many roundabouts side by side
 mod stations; // how far along a route a truck is
 pub mod sweep; // a truck's swept path on a route
+mod view; // metres in pixels, and colours
 
 use resvg::{tiny_skia, usvg};
 
