@@ -7,6 +7,7 @@
 mod records; // what the file says
 mod xml; // elements and attributes
 mod encoding; // bytes -> text
+mod source; // a document that is being read
 mod read; // XML -> records
 mod plan; // reference lines
 mod sections; // lane sections

@@ -3,8 +3,8 @@
 
 use std::collections::HashSet;
 
-use super::read::MOST_WARNINGS;
 use super::records::{Connection, Link, Records};
+use super::source::MOST_WARNINGS;
 use super::xml::shown;
 use crate::files::reader::{Error, Reader};
 
