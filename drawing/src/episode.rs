@@ -242,7 +242,8 @@ impl<'a> Scene<'a> {
         let least = |value: fn(&Frame) -> f32| signed(frames.iter().map(value).fold(f32::INFINITY, f32::min), 2);
         let ratio = most(Frame::load_transfer_ratio);
         format!(
-            "Start {} of seed {}. Least clearance: tractor {} m, trailer {} m. Articulation up to {:.0}\u{b0}, load transfer ratio up to {ratio:.2}.",
+            "Start {} of seed {}. Least clearance: tractor {} m, trailer {} m. Articulation up to {:.0}\u{b0}, load \
+             transfer ratio up to {ratio:.2}.",
             self.recording.episode,
             self.recording.seed,
             least(|frame| frame.tractor_clearance),

@@ -234,7 +234,8 @@ pub(super) fn lines(classes: &[ClassReport]) -> Vec<String> {
             if class.vehicle.is_empty() { class.load.clone() } else { format!("{} {}", class.vehicle, class.load) };
         let time = class.time_over_feasible_mean.map_or("-".to_owned(), |time| format!("{time:.2}"));
         format!(
-            "{name:<27} {:>4}/{:<5} {:>5.1} {:>7} {:>6.2} ({:>5.2}) {:>9.2} {:>4.2} {:>4.2} {:>5.1} {time:>5} {:>9.2} {:>4.2} {:>9.2}",
+            "{name:<27} {:>4}/{:<5} {:>5.1} {:>7} {:>6.2} ({:>5.2}) {:>9.2} {:>4.2} {:>4.2} {:>5.1} {time:>5} {:>9.2} \
+             {:>4.2} {:>9.2}",
             class.arrived,
             class.episodes,
             100.0 * class.success,
@@ -250,7 +251,8 @@ pub(super) fn lines(classes: &[ClassReport]) -> Vec<String> {
             class.switches_per_second,
         )
     };
-    let note = "LTR: of episodes; time: over that of the feasible speed profile, of episodes that arrived; ay: of steps, the trailer's.";
+    let note = "LTR: of episodes; time: over that of the feasible speed profile, of episodes that arrived; ay: of \
+                steps, the trailer's.";
     if classes.is_empty() {
         Vec::new()
     } else {

@@ -42,8 +42,8 @@ impl Possible {
         let passes: Vec<String> =
             self.passes.iter().map(|pass| format!("{} (held {})", pass.width, pass.hold)).collect();
         format!(
-            "possible: the episodes that arrived and those whose own start a search completed, {} of the {} searched with {} candidates, \
-             {} env steps.",
+            "possible: the episodes that arrived and those whose own start a search completed, {} of the {} searched \
+             with {} candidates, {} env steps.",
             self.found,
             self.searched,
             passes.join(", then "),

@@ -12,7 +12,8 @@ pub enum Error {
     EmptyBatch,
     /// The columns do not fit into the host's memory.
     #[error(
-        "n_envs: {n_envs}; the columns would take {n_bytes} bytes, more than this machine has free: at most {fitting} trucks fit"
+        "n_envs: {n_envs}; the columns would take {n_bytes} bytes, more than this machine has free: at most {fitting} \
+         trucks fit"
     )]
     BatchTooLarge {
         /// Trucks asked for.

@@ -135,8 +135,10 @@ impl Map {
         let nearest = self.rings().into_iter().min_by(|one, other| distance(one).total_cmp(&distance(other)));
         nearest.ok_or_else(|| {
             let (roads, holes) = (self.n_roads(), self.refused.len());
-            let expected =
-                format!("no roundabout here: {roads} roads around {holes} islands and blocks, none with one-way traffic around it");
+            let expected = format!(
+                "no roundabout here: {roads} roads around {holes} islands and blocks, none with one-way \
+                         traffic around it"
+            );
             Reader::of(&self.file).invalid("ring", format_args!("({:.1}, {:.1})", p.x, p.y), expected)
         })
     }

@@ -54,7 +54,8 @@ pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lan
                     format!("arm[{index}].{}", pair[0]),
                     format_args!("{:.2} m left of the bearing at the arm's end", offset(&pair[0])),
                     format!(
-                        "must lie at least {LANES_APART} m left of {}, which is at {:.2} m: move the kerbs apart, or give the lanes' points",
+                        "must lie at least {LANES_APART} m left of {}, which is at {:.2} m: move the kerbs apart, or \
+                         give the lanes' points",
                         pair[1],
                         offset(&pair[1])
                     ),

@@ -53,7 +53,8 @@ pub(super) fn fault(
         Fault::Ring => reader.invalid(
             format!("arm[{arm}].{}.{part}.ring_radius", way.name()),
             format_args!("{} m", shown(alignment(arm, way).ring_radius)),
-            "no such arc leads the last straight into the ring after the last point: aim nearer to the centre or change the radius",
+            "no such arc leads the last straight into the ring after the last point: aim nearer to the centre or \
+             change the radius",
         ),
     }
 }
@@ -64,8 +65,8 @@ pub(super) fn no_merge(reader: &Reader, arms: &[Arm], arm: usize, circle: f64) -
         format!("arm[{arm}].exit.right.ring_radius"),
         format_args!("{} m", shown(arms[arm].exit.lane(Lane::Right).ring_radius)),
         format!(
-            "left lanes lead here by the ring lane of {} m, and no such arc joins it to the last straight of an exit of one lane: aim \
-             nearer to the centre, change the radius, or give the exit two lanes",
+            "left lanes lead here by the ring lane of {} m, and no such arc joins it to the last straight of an exit \
+             of one lane: aim nearer to the centre, change the radius, or give the exit two lanes",
             shown(circle)
         ),
     )
@@ -90,7 +91,8 @@ pub(super) fn backwards(reader: &Reader, arms: &[Arm], entry: usize, lane: Lane,
     reader.invalid(
         format!("arm[{entry}].entry.{}", lane.name()),
         format_args!("{} m of ring on the way to {to}", differing(length, 0.0)),
-        "must lie between 0 and a whole turn: change ring_radius, or give corner.lane_radius if it is the right lane's first exit",
+        "must lie between 0 and a whole turn: change ring_radius, or give corner.lane_radius if it is the right \
+         lane's first exit",
     )
 }
 

@@ -210,8 +210,8 @@ fn with_kerbs_at(offset: f64) -> String {
 fn kerbs_too_near_to_each_other_for_four_lanes_are_refused() {
     // At 4.5 m the left lanes lie 1.55 m beyond the middle of the arm, each on the other's carriageway.
     let message = read(&with_kerbs_at(4.5)).unwrap_err().to_string();
-    let expected = "plain: arm[0].entry.left: -1.55 m left of the bearing at the arm's end; must lie at least 2.5 m left of exit.left, \
-                    which is at 1.55 m";
+    let expected = "plain: arm[0].entry.left: -1.55 m left of the bearing at the arm's end; must lie at least 2.5 m \
+                    left of exit.left, which is at 1.55 m";
     assert!(message.contains(expected), "{message}");
     // The left lanes' centre lines are twice (offset - gutter - 1.5 lanes) apart.
     assert!(read(&with_kerbs_at(7.29)).unwrap_err().to_string().contains("arm[0].entry.left"));

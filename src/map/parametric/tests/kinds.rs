@@ -103,10 +103,12 @@ fn left_lanes_lead_into_an_exit_of_one_lane_or_are_refused_by_name() {
     );
     // The exit's straight misses the inner ring lane, and its wide arc into the outer one is too narrow for a left
     // turn.
-    let flared = "points = [{ along = 60.0, offset = -8.5, radius = 30.0 }, { along = 0.0, offset = -22.0 }]\nring_radius = 15.0";
+    let flared = "points = [{ along = 60.0, offset = -8.5, radius = 30.0 }, { along = 0.0, offset = -22.0 }]\n\
+                  ring_radius = 15.0";
     let plain_exit = "points = [{ along = 30.0, offset = -8.5 }]\nring_radius = 15.0";
     let message = refusal_of(&one_exit.replacen(plain_exit, flared, 1).replace("270.0", "260.0"));
-    let expected = "plain: arm[0].exit.right.ring_radius: 17.35 m; left lanes lead here by the ring lane of 17.35 m, and no such arc";
+    let expected = "plain: arm[0].exit.right.ring_radius: 17.35 m; left lanes lead here by the ring lane of 17.35 m, \
+                    and no such arc";
     assert!(message.starts_with(expected), "{message}");
     // Nobody takes that way where all entries have one lane.
     let one_lane = with_lanes("", "lanes = 1", "lanes = 1").replacen(plain_exit, flared, 1).replace("270.0", "260.0");
