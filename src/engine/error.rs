@@ -43,7 +43,10 @@ pub enum Error {
         n_routes: usize,
     },
     /// Routes to draw from where none are drawn, or of another number than before.
-    #[error("routes: {n_routes} to draw from; this batch {}", .drawn.map_or("runs one fixed route a truck".to_owned(), |drawn| format!("draws from {drawn}, and needs as many")))]
+    #[error(
+        "routes: {n_routes} to draw from; this batch {}",
+        .drawn.map_or("runs one fixed route a truck".to_owned(), |drawn| format!("draws from {drawn}, and needs as many"))
+    )]
     DrawnCount {
         /// Routes given.
         n_routes: usize,
@@ -111,7 +114,10 @@ pub enum Error {
         limit: u32,
     },
     /// A stored column that does not fit the batch.
-    #[error("{column}: {}; a batch of {n_envs} trucks needs {n_bytes} bytes", .found.map_or("missing".to_owned(), |found| format!("{found} bytes")))]
+    #[error(
+        "{column}: {}; a batch of {n_envs} trucks needs {n_bytes} bytes",
+        .found.map_or("missing".to_owned(), |found| format!("{found} bytes"))
+    )]
     ColumnSize {
         /// The column's name.
         column: &'static str,

@@ -267,10 +267,14 @@ proptest! {
         let mut lines: Vec<String> = plain().lines().map(str::to_owned).collect();
         for (number, at) in numbers.iter().zip(at) {
             let line = &mut lines[at];
-            if let Some((key, _)) = line.clone().split_once(" = ").filter(|(key, _)| *key != "name" && *key != "points") {
+            let is_number = |(key, _): &(&str, &str)| *key != "name" && *key != "points";
+            if let Some((key, _)) = line.clone().split_once(" = ").filter(is_number) {
                 *line = format!("{key} = {number:?}").replace("NaN", "nan");
             } else if line.starts_with("points") {
-                *line = format!("points = [{{ along = 60.0, offset = {number:?}, radius = {:?} }}, {{ along = 20.0, offset = {:?} }}]", numbers[0], numbers[1]).replace("NaN", "nan");
+                let (radius, offset) = (numbers[0], numbers[1]);
+                let first = format!("{{ along = 60.0, offset = {number:?}, radius = {radius:?} }}");
+                let last = format!("{{ along = 20.0, offset = {offset:?} }}");
+                *line = format!("points = [{first}, {last}]").replace("NaN", "nan");
             }
         }
         if let Ok(roundabout) = read(&lines.join("\n")) {

@@ -128,7 +128,9 @@ fn a_file_with_every_kind_of_lane_is_written_as_it_was_read() {
 
 proptest! {
     #[test]
-    fn two_ring_lanes_lie_where_they_always_lay_to_the_last_bit(island in 1.5..200.0, gutter in 0.0..3.0, width in 2.5..8.0) {
+    fn two_ring_lanes_lie_where_they_always_lay_to_the_last_bit(
+        island in 1.5..200.0, gutter in 0.0..3.0, width in 2.5..8.0,
+    ) {
         let ring = Ring { island_radius: island, gutter, lane_width: width, lanes: 2 };
         let (inner, half) = (island + gutter + width / 2.0, width / 2.0);
         prop_assert_eq!(ring.outer().to_bits(), (island + 2.0 * (gutter + width)).to_bits());
@@ -148,7 +150,8 @@ proptest! {
         offset in 4.0f64..12.0, aim in -10.0..25.0, ring_radius in 3.0..60.0,
     ) {
         let kerb = |side: f64| format!(
-            "points = [{{ along = 90.0, offset = {:?}, radius = 30.0 }}, {{ along = 0.0, offset = {:?} }}]", side * offset, side * aim,
+            "points = [{{ along = 90.0, offset = {:?}, radius = 30.0 }}, {{ along = 0.0, offset = {:?} }}]",
+            side * offset, side * aim,
         );
         let [ring, entry, exit] = [lanes.0, lanes.1, lanes.2].map(|lanes| format!("lanes = {lanes}"));
         let text = with_lanes(&ring, &entry, &exit)
