@@ -13,8 +13,9 @@ use offtrack::world::World;
 
 use rayon::prelude::*;
 
+use crate::classes;
 use crate::device::Device;
-use crate::driving::{self, Driving};
+use crate::driving::Driving;
 use crate::episodes::Episodes;
 use crate::error::Error;
 use crate::groups::{Evaluated, Groups};
@@ -85,7 +86,7 @@ impl Evaluation<'_> {
             self.routes().iter().map(|(_, place, route)| LaneWidths::of(self.scenario, place, route)).collect();
         let mut running: Vec<Running> = {
             let batch = begun.batch();
-            let has_classes = driving::has_classes(self.scenario);
+            let has_classes = classes::has_classes(self.scenario);
             let new = |(truck, control): (&Truck, &Control)| {
                 let driving = has_classes.then(|| Driving::new(truck, control.target_speed));
                 Running::new(world.rig(truck), truck, driving, self.scenario.step)
@@ -198,7 +199,7 @@ impl Evaluation<'_> {
             certified: None,
             possible,
             failures: self.failures(finished, is_possible),
-            classes: driving::classes(scenario, self.world, finished, is_possible),
+            classes: classes::classes(scenario, self.world, finished, is_possible),
             groups: Groups::of(&routes, finished, scenario.step),
             routes: route_reports.collect(),
         }

@@ -36,7 +36,9 @@ pub mod episodes; // one a truck, until every one has ended
 mod evaluation; // every route, every start, every episode counted
 mod part; // entry, ring and exit of a route
 mod running; // an episode under way
-pub mod driving; // how trucks drive, by vehicle and load
+pub mod driving; // how a truck drives through an episode
+pub mod episode; // the figures of an episode, and of several
+pub mod classes; // how trucks drive, by vehicle and load
 pub mod failures; // why episodes did not arrive
 pub mod certificate; // routes shown to be possible
 pub mod possible; // success over the starts that are shown to be possible

@@ -12,8 +12,8 @@ use super::certificate::attempt::attempts;
 use super::certificate::beam::Pass;
 use super::certificate::file;
 use super::certificate::verify::{Sequence, driven};
+use super::episode::{Episode, Summary};
 use super::groups::{self, Group};
-use super::report::{Episode, Summary};
 use crate::error::Error;
 
 /// The episodes whose own start is shown to be possible.

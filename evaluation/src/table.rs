@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use offtrack::layout::Ended;
 
-use super::driving;
+use super::classes;
 use super::failures::Cause;
 use super::groups::Group;
 use super::report::{Report, RouteReport, Summary};
@@ -128,7 +128,7 @@ impl Report {
                 width,
             );
         }
-        for line in driving::lines(&self.classes) {
+        for line in classes::lines(&self.classes) {
             let _ = writeln!(text, "{line}");
         }
         self.push_causes(&mut text, width);
