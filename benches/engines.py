@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Times each stage of a step on the CPU and on a device, in turns on the same machine.
 
-A round is one run of `offtrack scale` on each engine. A ratio is the device's time over the CPU's in the same round, and
-the median of the rounds is reported: load from other programs changes more slowly than the rounds. Standard library only.
+A round is one run of `offtrack scale` on each engine. A ratio is the device's time over the CPU's in the same round,
+and the median of the rounds is reported: load from other programs changes more slowly than the rounds. Standard library
+only.
 
     python3 benches/engines.py --offtrack target/release/offtrack --json docs/results/engines.json
 """
@@ -38,7 +39,8 @@ def main():
     args = parser.parse_args()
     if not args.offtrack.is_file():
         sys.exit(
-            f"--offtrack: {args.offtrack}; no such file: build it with `cargo build --release --features gpu` or name another"
+            f"--offtrack: {args.offtrack}; no such file: build it with `cargo build --release --features gpu` or name "
+            "another"
         )
 
     rounds = []
@@ -124,7 +126,8 @@ def show(size):
     for name, row in [("whole step", size["step"]), *size["stages"].items()]:
         mark = " *" if name in size["beyond_three_times"] else ""
         print(
-            f"  {name:12}{row['cpu']:12.1f} ns{row['gpu']:9.1f} ns{row['ratio']:8.2f}{row['ratio_of_fastest']:9.2f}   {row['lowest']:.2f} to {row['highest']:.2f}{mark}"
+            f"  {name:12}{row['cpu']:12.1f} ns{row['gpu']:9.1f} ns{row['ratio']:8.2f}{row['ratio_of_fastest']:9.2f}"
+            f"   {row['lowest']:.2f} to {row['highest']:.2f}{mark}"
         )
 
 

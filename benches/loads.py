@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Examines policies by load on the benchmarks with loads, and prints how they drive as Markdown tables.
 
-Each policy drives every load on its own: the routes of laden2026 (30 episodes each) and of laden2026-random (four each),
-none of which a policy of learner/configs/laden.toml has seen. The baselines are pure pursuit by the feasible speed
+Each policy drives every load on its own: the routes of laden2026 (30 episodes each) and of laden2026-random (four
+each), none of which a policy of learner/configs/laden.toml has seen. The baselines are pure pursuit by the feasible speed
 profile, of the lane's centre and of paths that a search found, and a policy of attard2023, which knows neither loads
 nor speeds, at 30 and at 20 km/h. What the JSON file already has is not evaluated again, so an interrupted series can
 go on. Standard library only.

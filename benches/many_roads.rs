@@ -84,7 +84,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let of = |index: usize| median(speeds.iter().map(|round| round[index]).collect());
         let ratio = |index: usize| median(speeds.iter().map(|round| round[2] / round[index]).collect());
         println!(
-            "{n_envs:>6} trucks: {:.0}, {:.0} and {:.0} env steps/s; {n_roads} roads over five {:.3}, over five like them {:.3}",
+            "{n_envs:>6} trucks: {:.0}, {:.0} and {:.0} env steps/s; {n_roads} roads over five {:.3}, over five like \
+             them {:.3}",
             of(0),
             of(1),
             of(2),

@@ -5,7 +5,8 @@
     python3 benches/summaries.py --check    # fails if one of them is not what this script writes
 
 A figure over several seeds has the mean, the worst and Student's 95 % interval of the mean. Dates are those of the
-members of the archives: the days on which the reports were committed.
+members of the archives: the days on which the reports were committed. A result has the commit of the program or, where
+no report names it, that with which the reports came.
 """
 
 import argparse
@@ -21,6 +22,12 @@ DATA = ROOT / "docs/data"
 RESULTS = ROOT / "docs/results"
 # Student's t for a 95 % interval, by the number of seeds.
 STUDENT = {2: 12.706, 3: 4.303, 4: 3.182, 5: 2.776}
+# Commits with which reports came that do not name the one of the program, by a member of the archive.
+REPORTED = {
+    "evaluate-pursuit": "c10db4f3ebc1",
+    "evaluate-pursuit-planned": "39d3c330488a",
+    "laden-high-100000": "b0d6e9d563ab",
+}
 LOADS = ["empty", "half", "laden", "laden_high"]
 
 
@@ -40,6 +47,9 @@ class Archive:
     def head(self, commands, reports):
         date = datetime.datetime.fromtimestamp(self.time, datetime.timezone.utc).date().isoformat()
         found = {key: sorted({report[key] for report in reports if report.get(key)}) for key in ["machine", "commit"]}
+        if not found["commit"]:
+            del found["commit"]
+            found["reported_in"] = sorted(REPORTED[name] for name in REPORTED if self.members.get(name) in reports)
         return {"commands": commands, "date": date, **found, "archive": self.path.relative_to(ROOT).as_posix()}
 
 

@@ -4,10 +4,7 @@
 
 use std::error::Error;
 
-use offtrack::layout::Ended;
-use offtrack::scenario::{Scenario, Split};
-use offtrack::simulator::{RouteChoice, Simulator};
-use offtrack::world::World;
+use offtrack::prelude::*;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let scenario = Scenario::named("attard2023")?;

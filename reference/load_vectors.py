@@ -35,7 +35,8 @@ class Roll:
     """One degree of freedom: a mass above a roll centre."""
 
     def __init__(self, truck: dict, unit: str) -> None:
-        track, height, centre, self.gain, frequency, self.damping = (truck[k + unit] for k in ("T", "h", "hr", "Rphi", "fn", "zeta"))
+        keys = ("T", "h", "hr", "Rphi", "fn", "zeta")
+        track, height, centre, self.gain, frequency, self.damping = (truck[k + unit] for k in keys)
         self.natural, lever = math.tau * frequency, height - centre
         self.direct = 2 * centre / (track * G)
         self.of_angle = 2 * lever * (1 + 1 / self.gain) / track
@@ -57,7 +58,9 @@ class Roll:
         return self.direct * lateral + self.of_angle * self.angle + self.of_rate * self.rate
 
 
-def motion(truck: dict, v: float, curvature: float, acceleration: float, gamma: float) -> tuple[float, float, float, float]:
+def motion(
+    truck: dict, v: float, curvature: float, acceleration: float, gamma: float
+) -> tuple[float, float, float, float]:
     """Yaw rates of both units, side speed of the drive axle, speed of the trailer's axle."""
     grip = truck["mu"] * G
     if truck["ellipse"]:
@@ -84,7 +87,8 @@ def drive(truck: dict, init: dict, commands: list[dict], times: list[float]) -> 
         r1, r2, vy, v2 = motion(truck, v, curvature, a, p1 - p2)
         ay1, ay2 = v * r1, v2 * r2
         fall = truck["crossfall"] * G
-        found = {"ay1": ay1, "ay2": ay2, "ltr1_qs": ay1 * tractor.static, "ltr2_qs": ay2 * trailer.static, "gamma": p1 - p2}
+        found = {"ay1": ay1, "ay2": ay2, "ltr1_qs": ay1 * tractor.static, "ltr2_qs": ay2 * trailer.static}
+        found["gamma"] = p1 - p2
         found["ltr1_dyn"], found["ltr2_dyn"] = tractor.ratio(ay1 + fall), trailer.ratio(ay2 + fall)
         peak = {key: max(value, abs(found[key])) for key, value in peak.items()}
         if wanted and n == round(wanted[0] / STEP):
@@ -115,7 +119,8 @@ def drive(truck: dict, init: dict, commands: list[dict], times: list[float]) -> 
         speed = v + STEP * mean
         if holds and v * speed <= 0:
             after, mean, speed = 0.0, 0.0, 0.0
-        turned = delta + clamp(clamp(target_delta, -truck["delta_max"], truck["delta_max"]) - delta, -truck["delta_rate"] * STEP, truck["delta_rate"] * STEP)
+        within_lock, largest = clamp(target_delta, -truck["delta_max"], truck["delta_max"]), truck["delta_rate"] * STEP
+        turned = delta + clamp(within_lock - delta, -largest, largest)
         rolling = math.tan(turned) / truck["L1"]
         tau = truck["yaw_lag"] * truck["K"] * abs(v)
         bent = rolling + (curvature - rolling) * math.exp(-STEP / tau) if tau > 1e-9 else rolling
@@ -150,17 +155,20 @@ def cases() -> list[dict]:
         for course, (speed, steps, end, changes) in courses().items():
             name = list(TRUCKS)[number % 2]
             truck = TRUCKS[name] | roll | TRACTOR
-            truck |= {"K": slip, "mu": 0.7, "delta_max": math.radians(40), "delta_rate": math.radians(20), "a_max": strongest, "a_min": -6.0}
-            truck |= {"lever_max": 4.0, "yaw_lag": 1.0, "drive_lag": 0.45, "brake_lag": 0.35, "delta_delay": 0.0, "power": 330e3 / mass}
-            truck |= {"ellipse": False, "crossfall": 0.0, "kp": 0.8, "ki": 0.05, "band": 0.5 / 3.6, "brake": -2.5} | changes
+            truck |= {"K": slip, "mu": 0.7, "delta_max": math.radians(40), "delta_rate": math.radians(20)}
+            truck |= {"a_max": strongest, "a_min": -6.0, "lever_max": 4.0, "yaw_lag": 1.0, "drive_lag": 0.45}
+            truck |= {"brake_lag": 0.35, "delta_delay": 0.0, "power": 330e3 / mass, "ellipse": False}
+            truck |= {"crossfall": 0.0, "kp": 0.8, "ki": 0.05, "band": 0.5 / 3.6, "brake": -2.5} | changes
             init = {"x": 3.0, "y": -2.0, "psi1": 0.4, "psi2": 0.4, "v": speed / 3.6, "delta": 0.0}
             commands = [{"t": t, "delta_cmd": math.radians(steer), "v_cmd": target / 3.6} for t, steer, target in steps]
             times = [float(t) for t in range(0, end + 1, 2)]
             states, peak = drive(truck, init, commands, times)
-            case = {"id": f"{load}_{course}", "kind": "trajectory", "vehicle": truck, "dt": 0.05, "control_step": CONTROL_STEP}
+            case = {"id": f"{load}_{course}", "kind": "trajectory", "vehicle": truck, "dt": 0.05}
+            case |= {"control_step": CONTROL_STEP}
             case |= {"init": init, "commands": commands, "t_end": times[-1], "expected": states, "expected_peak": peak}
             tolerance = {"pos": 0.02, "trailer_pos": 0.02, "psi1": 0.002, "gamma": 0.002, "v": 0.005, "delta": 1e-3}
-            found.append(case | {"tolerance": tolerance | {"ay": 0.03, "ltr": 0.01, "peak_rel": 0.02}, "t_jackknife": None})
+            tolerance |= {"ay": 0.03, "ltr": 0.01, "peak_rel": 0.02}
+            found.append(case | {"tolerance": tolerance, "t_jackknife": None})
     return found
 
 

@@ -24,7 +24,7 @@ use crate::layout::{BeginRow, Column, Stream};
 use crate::world::World;
 pub use autoreset::Autoreset;
 pub(crate) use batch::Row;
-pub use batch::{Batch, RouteChoice};
+pub use batch::{Batch, RouteChoice, check_size};
 pub use error::Error;
 pub use memory::available as available_memory;
 pub use tally::Tally;

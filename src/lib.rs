@@ -15,8 +15,17 @@ pub mod world; // what trucks share, baked
 pub mod engine; // one step in order, on the two engines
 pub mod simulator; // many trucks, many steps, on either engine
 
+// Types of wgpu are public in `gpu`: a caller needs this very version.
 #[cfg(feature = "gpu")]
-pub use engine::gpu;
+pub use {engine::gpu, wgpu};
+
+/// What a program that steps trucks names: `use offtrack::prelude::*`.
+pub mod prelude {
+    pub use crate::layout::{Ended, Start, Stream};
+    pub use crate::scenario::{Scenario, Split};
+    pub use crate::simulator::{Autoreset, Begin, Engine, RouteChoice, Simulator};
+    pub use crate::world::World;
+}
 
 /// The formulas of a step, each for one truck, as the CPU engine computes them.
 pub mod physics {

@@ -4,6 +4,7 @@
 //! value and what would do.
 
 mod benchmark_keys; // the file as written
+mod referred; // files that it refers to
 mod read; // the file as checked
 mod roads; // its roundabouts and routes
 mod part; // a part of a scenario, or another roundabout in it

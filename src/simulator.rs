@@ -11,7 +11,7 @@ use crate::engine::EngineBatch;
 #[cfg(feature = "gpu")]
 use crate::engine::gpu;
 use crate::engine::stages::{N_STAGES, Stage};
-pub use crate::engine::{Autoreset, Batch, Error, RouteChoice, Tally, available_memory};
+pub use crate::engine::{Autoreset, Batch, Error, RouteChoice, Tally, available_memory, check_size};
 use crate::layout::{BEGINS, BeginRow, Column, HAS_ROUTE, HAS_START, IS_FIRST, Start, Stream};
 use crate::world::World;
 use check::{check_known, check_routes, check_start};

@@ -1,7 +1,9 @@
 //! What all trucks share: the roundabouts baked into fields, the routes as a table of waypoints, vehicle and weights.
 //!
 //! A `World` can be stepped as it was baked: what is wrong with a scenario is found when it is read or baked. The
-//! fields are public, and what is changed in them is not checked again.
+//! tables are public, to be read and to be changed by who compares what a change does; a change is not checked.
+
+mod fingerprint;
 
 use std::f64::consts::PI;
 use std::sync::atomic::AtomicU64;
@@ -25,6 +27,7 @@ const RADIUS_SCALE: f64 = 100.0;
 
 /// The shared, unchanging part of a batch.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct World {
     /// Time and weights.
     pub params: Params,

@@ -68,9 +68,10 @@ def main():
             "python": platform.python_version(),
             **{package: version(package) for package in ("highway-env", "gymnasium", "numpy")},
         },
+        "commit": ours["commit"],
         "offtrack": ours,
-        "peer_step": "1 / policy_frequency s in simulation_frequency / policy_frequency sub-steps: one car driven, 4 others "
-        "simulated; random actions from an array; a new episode where one ended",
+        "peer_step": "1 / policy_frequency s in simulation_frequency / policy_frequency sub-steps: one car driven, 4 "
+        "others simulated; random actions from an array; a new episode where one ended",
         "runs": runs,
     }
     show(result)
@@ -104,8 +105,8 @@ def offtrack(args):
         "envs": run["envs"],
         "env_steps_per_second": speed,
         "simulated_seconds_per_second": round(speed * step["dt"]),
-        "step": f"{step['dt']} s in {step['substeps']} sub-steps: one tractor and its trailer, {step['rays']} distance sensors, "
-        f"{step['values']} observed values; random actions drawn inside; a new episode where one ended",
+        "step": f"{step['dt']} s in {step['substeps']} sub-steps: one tractor and its trailer, {step['rays']} distance "
+        f"sensors, {step['values']} observed values; random actions drawn inside; a new episode where one ended",
     }
 
 

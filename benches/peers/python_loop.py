@@ -12,6 +12,7 @@ import json
 import os
 import platform
 import statistics
+import subprocess
 import sys
 import time
 from importlib.metadata import PackageNotFoundError, version
@@ -148,6 +149,7 @@ def main():
         "machine": processor(),
         "cores": CORES,
         "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
+        "commit": commit(),
         "python": platform.python_version(),
         "gymnasium": gymnasium.__version__,
         "rounds": args.rounds,
@@ -180,6 +182,13 @@ def installed(package):
 def processor():
     lines = Path("/proc/cpuinfo").read_text().splitlines()
     return next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.processor())
+
+
+def commit():
+    """The commit that the sources are at, with `-dirty` where they differ from it."""
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=12"]
+    said = subprocess.run(command, capture_output=True, text=True)
+    return said.stdout.strip() if said.returncode == 0 else "unknown"
 
 
 if __name__ == "__main__":

@@ -44,7 +44,8 @@ def main():
 
     print(f"{machine()}; PyTorch {version('torch')}, {args.threads} threads; medians of {args.rounds} rounds")
     print(
-        f"{'hidden':>16}{'batch':>7}{'offtrack':>13}{'PyTorch':>13}{'ratio':>8}{'fastest':>13}{'PyTorch':>13}{'ratio':>8}   of each round"
+        f"{'hidden':>16}{'batch':>7}{'offtrack':>13}{'PyTorch':>13}{'ratio':>8}{'fastest':>13}{'PyTorch':>13}"
+        f"{'ratio':>8}   of each round"
     )
     cells = []
     for hidden, batch in CELLS:
@@ -66,7 +67,8 @@ def main():
         "seconds_a_round": args.seconds,
         "values": N_VALUES,
         "actions": N_ACTIONS,
-        "times": "milliseconds an update, its batch ready: medians over rounds; offtrack_with_sampling draws the batch as well",
+        "times": "milliseconds an update, its batch ready: medians over rounds; offtrack_with_sampling draws the batch "
+        "as well",
         "ratio": "offtrack's time over PyTorch's: the median of the rounds' ratios",
         "fastest": "the shortest of all windows, which other programs disturbed least",
         "cells": cells,

@@ -17,8 +17,8 @@ use offtrack::scenario::Scenario;
 use offtrack::world::World;
 
 use crate::Error;
-use crate::figure::colour;
 use crate::lettering::{Align, Lettering};
+use crate::view::colour;
 use backdrop::{Backdrop, Format};
 use canvas::{Canvas, Ink};
 use shape::Shape;

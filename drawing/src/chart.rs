@@ -9,9 +9,9 @@ use svg::Document;
 use svg::node::element::{Circle, Group, Path, Rectangle, Title};
 
 use crate::Error;
-use crate::figure::{colour, number};
 use crate::legend::{self, Entry, Swatch};
 use crate::lettering::{Align, Lettering};
+use crate::view::{colour, number};
 pub(crate) use axis::{Axis, axes};
 
 /// Upper left corner of the first panel's plot (px).

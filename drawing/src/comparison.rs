@@ -12,10 +12,11 @@ use svg::node::element::{ClipPath, Definitions, Group, Path, Rectangle, Title};
 use crate::Error;
 use crate::chart::{Axis, Kind, LINES, Line, axes};
 use crate::episode::Scene;
-use crate::figure::{Layout, View, WIDTH, colour, number, scale_bar};
+use crate::figure::scale_bar;
 use crate::legend::{self, Entry, Swatch};
 use crate::lettering::{Align, Lettering};
 use crate::stations::stations;
+use crate::view::{Layout, View, WIDTH, colour, number};
 use offtrack_evaluation::recording::{Frame, Recording};
 
 /// Margins of the page (px).

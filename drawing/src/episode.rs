@@ -12,11 +12,11 @@ use offtrack::vehicle::swept::corners;
 use svg::node::element::{Circle, Definitions, Group, Path};
 
 use crate::Error;
-use crate::figure::{Straights, View, colour, number};
 use crate::legend::{Entry, Swatch};
 use crate::lettering::{Align, Lettering};
 use crate::road::RoadLayers;
 use crate::sweep::{nearest, swept_area};
+use crate::view::{Straights, View, colour, number};
 use offtrack_evaluation::recording::{Frame, Recording};
 
 /// Length of the route shown before and after the ring: all of it at a benchmark's usual lengths (m).
@@ -242,7 +242,8 @@ impl<'a> Scene<'a> {
         let least = |value: fn(&Frame) -> f32| signed(frames.iter().map(value).fold(f32::INFINITY, f32::min), 2);
         let ratio = most(Frame::load_transfer_ratio);
         format!(
-            "Start {} of seed {}. Least clearance: tractor {} m, trailer {} m. Articulation up to {:.0}\u{b0}, load transfer ratio up to {ratio:.2}.",
+            "Start {} of seed {}. Least clearance: tractor {} m, trailer {} m. Articulation up to {:.0}\u{b0}, load \
+             transfer ratio up to {ratio:.2}.",
             self.recording.episode,
             self.recording.seed,
             least(|frame| frame.tractor_clearance),

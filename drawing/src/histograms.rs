@@ -8,8 +8,8 @@ use svg::node::element::{Group, Path, Rectangle, Title};
 
 use crate::Error;
 use crate::chart::LINES;
-use crate::figure::{colour, number};
 use crate::lettering::{Align, Lettering};
+use crate::view::{colour, number};
 
 /// Size of a plot (px).
 const PLOT: DVec2 = DVec2::new(290.0, 130.0);

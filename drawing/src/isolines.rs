@@ -4,7 +4,7 @@ use contour::ContourBuilder;
 use glam::DVec2;
 use offtrack::field::Field;
 
-use crate::figure::View;
+use crate::view::View;
 
 /// Sampling distance of the field: fine enough for ridges between two lines half a metre apart (m).
 const STEP: f64 = 0.2;

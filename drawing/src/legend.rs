@@ -3,8 +3,8 @@
 use glam::DVec2;
 use svg::node::element::{Circle, Group, Path, Rectangle};
 
-use crate::figure::{colour, number};
 use crate::lettering::{Align, Lettering};
+use crate::view::{colour, number};
 
 /// Size of the text (px).
 const SIZE: f64 = 15.0;

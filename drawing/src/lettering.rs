@@ -7,7 +7,7 @@ use resvg::tiny_skia;
 use svg::node::element::{Group, Path};
 use ttf_parser::{Face, FaceParsingError, GlyphId, OutlineBuilder};
 
-use crate::figure::number;
+use crate::view::number;
 
 /// Which part of a line of text is at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,8 +2,8 @@
 //!
 //! - [`figure::roundabout`] draws a roundabout with its routes, [`figure::swept_path`] a [`sweep::Sweep`] on one of
 //!   them.
-//! - [`offtrack_evaluation::recording::Recorder`] records episodes of a batch, [`episode::Scene`] draws one as a still, [`film::gif`] as a
-//!   film.
+//! - [`offtrack_evaluation::recording::Recorder`] records episodes of a batch, [`episode::Scene`] draws one as a still,
+//!   [`film::gif`] as a film.
 //! - [`comparison::Comparison`] draws several on one route, with speed and load transfer along it.
 //! - [`camera::Camera`] draws a truck as it is now, in RGB pixels, while it is stepped.
 //! - [`sheet::drawn`] draws many roundabouts side by side, [`histograms::Histograms`] how their dimensions are
@@ -42,6 +42,7 @@ mod road; // the layers of a map
 pub mod sheet; // many roundabouts side by side
 mod stations; // how far along a route a truck is
 pub mod sweep; // a truck's swept path on a route
+mod view; // metres in pixels, and colours
 
 use resvg::{tiny_skia, usvg};
 
@@ -62,7 +63,11 @@ pub enum Error {
     #[error("the GIF cannot be encoded: {0}")]
     Gif(#[from] gif::EncodingError),
     /// The side of a camera's square pictures (pixels) is out of range.
-    #[error("a picture of {0} x {0} pixels cannot be drawn; its side must lie in {low}..={high} pixels", low = camera::SIDES.start(), high = camera::SIDES.end())]
+    #[error(
+        "a picture of {0} x {0} pixels cannot be drawn; its side must lie in {low}..={high} pixels",
+        low = camera::SIDES.start(),
+        high = camera::SIDES.end()
+    )]
     Side(u32),
     /// The picture has no pixels, or more than its format can hold.
     #[error("a picture of {width} x {height} pixels cannot be drawn")]

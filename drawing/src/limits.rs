@@ -8,8 +8,8 @@ use offtrack::vehicle::swept::{Demand, Limit};
 use serde::Serialize;
 use svg::node::element::{Circle, Group, Path};
 
-use crate::figure::{View, number};
 use crate::legend::{Entry, Swatch};
+use crate::view::{View, number};
 
 /// Distance between the lines beside a path, and from the path to the first (px).
 const BESIDE: f64 = 5.0;

@@ -10,10 +10,10 @@ use offtrack::map::{Gutter, Road};
 use offtrack::scenario::FIELD_CELL;
 use svg::node::element::{Group, Path};
 
-use crate::figure::{Straights, View, colour};
 use crate::isolines::isolines;
 use crate::legend::{Entry, Swatch, chevron};
 use crate::lettering::{Align, Lettering};
+use crate::view::{Straights, View, colour};
 
 /// Least distance between arrows of one colour (m).
 const APART: f64 = 5.0;

@@ -6,9 +6,10 @@ use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Group, Path, Rectangle, Title};
 
 use crate::Error;
-use crate::figure::{Layout, Straights, View, colour, number, scale_bar};
+use crate::figure::scale_bar;
 use crate::lettering::{Align, Lettering};
 use crate::road::RoadLayers;
+use crate::view::{Layout, Straights, View, colour, number};
 
 /// Side of a map (px).
 const MAP: f64 = 190.0;

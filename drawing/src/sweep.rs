@@ -11,10 +11,10 @@ use offtrack::vehicle::swept::{Demand, Limit, Pose, demands, own_lane_suffices, 
 use serde::Serialize;
 use svg::node::element::{Circle, Definitions, Group, Path, Use};
 
-use crate::figure::{View, colour, number};
 use crate::legend::{Entry, Swatch};
 use crate::lettering::{Align, Lettering};
 use crate::limits::{self, Need, WrittenNeed};
+use crate::view::{View, colour, number};
 
 /// Distance between poses (m).
 const SPACING: f64 = 0.25;

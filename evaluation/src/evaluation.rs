@@ -13,8 +13,10 @@ use offtrack::world::World;
 
 use rayon::prelude::*;
 
+use crate::classes;
 use crate::device::Device;
-use crate::driving::{self, Driving};
+use crate::driving::Driving;
+use crate::episodes::Episodes;
 use crate::error::Error;
 use crate::groups::{Evaluated, Groups};
 use crate::part::LaneWidths;
@@ -78,13 +80,13 @@ impl Evaluation<'_> {
     /// No states are held while the policy drives, only its actions. The episodes to be shown are chosen once it is
     /// known which failed, and recorded as they are driven again.
     pub fn drive(&self, policy: &mut dyn Controller, progress: &mut dyn FnMut(usize, usize)) -> Result<Driven, Error> {
-        let mut simulator = self.simulator()?;
-        let (world, n_episodes) = (self.world, simulator.n_envs());
+        let begun = self.begin()?;
+        let (world, n_episodes) = (self.world, begun.batch().n_envs());
         let lanes: Vec<LaneWidths> =
             self.routes().iter().map(|(_, place, route)| LaneWidths::of(self.scenario, place, route)).collect();
         let mut running: Vec<Running> = {
-            let batch = simulator.batch();
-            let has_classes = driving::has_classes(self.scenario);
+            let batch = begun.batch();
+            let has_classes = classes::has_classes(self.scenario);
             let new = |(truck, control): (&Truck, &Control)| {
                 let driving = has_classes.then(|| Driving::new(truck, control.target_speed));
                 Running::new(world.rig(truck), truck, driving, self.scenario.step)
@@ -95,7 +97,7 @@ impl Evaluation<'_> {
         let mut actions = Vec::new();
         let mut finished: Vec<Option<Episode>> = vec![None; n_episodes];
         let mut n_finished = 0;
-        while n_finished < n_episodes {
+        begun.drive(|simulator| {
             let n_before = n_finished;
             policy.choose(world, simulator.batch(), &mut actions);
             sequences.add(&actions, &finished);
@@ -112,17 +114,15 @@ impl Evaluation<'_> {
             if n_before < n_finished {
                 progress(n_finished, n_episodes);
             }
-        }
-        // A device that failed in the last step reports it here.
-        simulator.wait()?;
-        drop(simulator);
+            Ok::<(), Error>(())
+        })?;
         let episodes: Vec<Episode> = finished.into_iter().flatten().collect();
         let tracks = if self.record { self.repeated(&sequences, &shown(&episodes))? } else { Vec::new() };
         Ok(Driven { episodes, tracks, sequences })
     }
 
     /// One truck an episode, at its start.
-    fn simulator(&self) -> Result<Simulator, Error> {
+    fn begin(&self) -> Result<Episodes, Error> {
         let Evaluation { scenario, world, split, episodes, seed, device, .. } = *self;
         let routes = scenario.split(split);
         if routes.is_empty() {
@@ -133,8 +133,7 @@ impl Evaluation<'_> {
                 expected: format!("the benchmark {} has no such routes", scenario.name),
             });
         }
-        let trucks: Vec<u32> = routes.iter().flat_map(|&route| std::iter::repeat_n(route, episodes)).collect();
-        Ok(Simulator::on(device.engine.clone(), world.clone(), trucks.len(), seed, RouteChoice::Fixed(trucks))?)
+        Ok(Episodes::begin(device.engine.clone(), world.clone(), routes, episodes, seed)?)
     }
 
     /// Records the episodes at these indices as they are driven again: the same actions from the same start give the
@@ -200,7 +199,7 @@ impl Evaluation<'_> {
             certified: None,
             possible,
             failures: self.failures(finished, is_possible),
-            classes: driving::classes(scenario, self.world, finished, is_possible),
+            classes: classes::classes(scenario, self.world, finished, is_possible),
             groups: Groups::of(&routes, finished, scenario.step),
             routes: route_reports.collect(),
         }

@@ -12,9 +12,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::Evaluation;
+use super::episode::Episode;
 use super::groups::Evaluated;
 use super::part::Part;
-use super::report::Episode;
 
 /// Largest distance between two points of a unit that are looked at (m).
 const SPACING: f32 = 0.1;
@@ -165,7 +165,7 @@ mod tests {
     use offtrack::scenario::{Scenario, Split};
     use offtrack::world::World;
 
-    use super::super::report::tests::episode;
+    use super::super::episode::tests::episode;
     use super::*;
     use crate::device::Device;
 

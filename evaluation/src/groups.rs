@@ -6,7 +6,7 @@ use offtrack::map::route::Route;
 use offtrack::scenario::Place;
 use serde::Serialize;
 
-use super::report::{Episode, Summary};
+use super::episode::{Episode, Summary};
 
 /// Island radii from which on a route is in the next band (m).
 const BANDS: [f64; 4] = [9.0, 12.0, 16.0, 22.0];
@@ -96,7 +96,7 @@ mod tests {
     use offtrack::layout::Ended;
     use offtrack::scenario::{Scenario, Split};
 
-    use super::super::report::tests::episode;
+    use super::super::episode::tests::episode;
     use super::*;
 
     #[test]

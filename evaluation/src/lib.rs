@@ -6,10 +6,7 @@
 //! ```
 //! use std::sync::Arc;
 //!
-//! use offtrack::layout::Ended;
-//! use offtrack::scenario::{Scenario, Split};
-//! use offtrack::simulator::{RouteChoice, Simulator};
-//! use offtrack::world::World;
+//! use offtrack::prelude::*;
 //! use offtrack_policy::Policy;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -35,10 +32,13 @@ pub mod files; // results, written whole
 pub mod provenance; // machine and commit of a result
 pub mod device; // what steps the trucks
 pub mod policies; // what chooses the actions: learned, pure pursuit, random
+pub mod episodes; // one a truck, until every one has ended
 mod evaluation; // every route, every start, every episode counted
 mod part; // entry, ring and exit of a route
 mod running; // an episode under way
-pub mod driving; // how trucks drive, by vehicle and load
+pub mod driving; // how a truck drives through an episode
+pub mod episode; // the figures of an episode, and of several
+pub mod classes; // how trucks drive, by vehicle and load
 pub mod failures; // why episodes did not arrive
 pub mod certificate; // routes shown to be possible
 pub mod possible; // success over the starts that are shown to be possible

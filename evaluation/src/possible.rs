@@ -12,8 +12,8 @@ use super::certificate::attempt::attempts;
 use super::certificate::beam::Pass;
 use super::certificate::file;
 use super::certificate::verify::{Sequence, driven};
+use super::episode::{Episode, Summary};
 use super::groups::{self, Group};
-use super::report::{Episode, Summary};
 use crate::error::Error;
 
 /// The episodes whose own start is shown to be possible.
@@ -42,8 +42,8 @@ impl Possible {
         let passes: Vec<String> =
             self.passes.iter().map(|pass| format!("{} (held {})", pass.width, pass.hold)).collect();
         format!(
-            "possible: the episodes that arrived and those whose own start a search completed, {} of the {} searched with {} candidates, \
-             {} env steps.",
+            "possible: the episodes that arrived and those whose own start a search completed, {} of the {} searched \
+             with {} candidates, {} env steps.",
             self.found,
             self.searched,
             passes.join(", then "),

@@ -1,155 +1,16 @@
 //! The result of an evaluation: every episode counted, for each route and in all. It is serialised as JSON; `table`
 //! prints it.
 
-use std::collections::BTreeMap;
-
-use offtrack::layout::{Ended, Truck};
 use serde::Serialize;
 
-use super::driving::{ClassReport, Driving};
+use super::classes::ClassReport;
+pub use super::episode::{Episode, Summary, wilson};
 use super::failures::Cause;
 use super::groups::Groups;
 use super::possible::Possible;
 
 /// Routes from which on a table and a page show groups of routes, and the worst routes instead of every one.
 pub const MANY_ROUTES: usize = 100;
-
-/// The figures of one episode.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Episode {
-    /// Why the episode ended.
-    pub ended: Ended,
-    /// Steps that the episode took.
-    pub steps: u32,
-    /// Sum of the rewards.
-    pub reward: f64,
-    /// Mean distance to the lane centre (m).
-    pub lane_distance_mean: f64,
-    /// Largest distance to the lane centre (m).
-    pub lane_distance_max: f64,
-    /// Fraction of the steps after which the tractor's middle was outside of the route's own lane.
-    pub outside_lane: f64,
-    /// Smallest distance of the tractor to a kerb (m).
-    pub tractor_clearance_min: f64,
-    /// Smallest distance of the trailer to a kerb (m).
-    pub trailer_clearance_min: f64,
-    /// Largest load transfer ratio of either unit.
-    pub load_transfer_ratio_peak: f64,
-    /// Largest articulation (rad).
-    pub articulation_peak: f64,
-    /// Largest distance of the trailer axle from the path of the front axle (m).
-    pub off_tracking_peak: f64,
-    /// How the truck drove, where classes of vehicles are reported.
-    pub driving: Option<Driving>,
-    /// The truck after its last step.
-    pub last: Truck,
-}
-
-/// The figures of several episodes: means over the episodes, and extremes of all.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Summary {
-    /// Episodes run.
-    pub episodes: usize,
-    /// Episodes that arrived.
-    pub arrived: usize,
-    /// Fraction of the episodes that arrived.
-    pub success: f64,
-    /// Lower end of the 95 % Wilson interval of `success`.
-    pub success_low: f64,
-    /// Upper end of the 95 % Wilson interval of `success`.
-    pub success_high: f64,
-    /// Episodes by end code.
-    pub ends: BTreeMap<&'static str, usize>,
-    /// Episodes that failed in their first step: the truck starts on or against a kerb, and no action helps.
-    pub lost_at_start: usize,
-    /// Mean distance to the lane centre, all episodes (m).
-    pub lane_distance_mean: f64,
-    /// Mean distance to the lane centre, episodes that arrived; `None` if none did (m).
-    pub lane_distance_mean_arrived: Option<f64>,
-    /// Largest distance to the lane centre, all episodes (m).
-    pub lane_distance_max: f64,
-    /// Largest distance to the lane centre, episodes that arrived; `None` if none did (m).
-    pub lane_distance_max_arrived: Option<f64>,
-    /// Mean fraction of an episode's steps outside of its own lane, of those that arrived; `None` if none did.
-    pub outside_lane_mean: Option<f64>,
-    /// Smallest distance of the tractor to a kerb (m).
-    pub tractor_clearance_min: f64,
-    /// Smallest distance of the trailer to a kerb (m).
-    pub trailer_clearance_min: f64,
-    /// Largest load transfer ratio.
-    pub load_transfer_ratio_peak: f64,
-    /// Largest articulation (deg).
-    pub articulation_peak_deg: f64,
-    /// Largest off-tracking (m).
-    pub off_tracking_peak: f64,
-    /// Mean time of an episode (s).
-    pub time_mean: f64,
-    /// Mean sum of rewards.
-    pub reward_mean: f64,
-}
-
-impl Episode {
-    /// Whether the episode failed in its first step: the truck starts on or against a kerb, and no action helps.
-    pub fn lost_at_start(&self) -> bool {
-        self.ended.failed() && self.steps == 1
-    }
-}
-
-impl Summary {
-    /// The figures of `episodes`, `None` without an episode. A step takes `step` seconds.
-    pub fn of<'a>(episodes: impl Iterator<Item = &'a Episode> + Clone, step: f64) -> Option<Summary> {
-        let count = episodes.clone().count();
-        if count == 0 {
-            return None;
-        }
-        let arrived = episodes.clone().filter(|episode| episode.ended == Ended::Arrived);
-        let n_arrived = arrived.clone().count();
-        let (success_low, success_high) = wilson(n_arrived, count);
-        let most = |value: fn(&Episode) -> f64| episodes.clone().map(value).fold(f64::NEG_INFINITY, f64::max);
-        let least = |value: fn(&Episode) -> f64| episodes.clone().map(value).fold(f64::INFINITY, f64::min);
-        let mean = |value: fn(&Episode) -> f64| episodes.clone().map(value).sum::<f64>() / count as f64;
-        let mean_arrived = |value: fn(&Episode) -> f64| {
-            (0 < n_arrived).then(|| arrived.clone().map(value).sum::<f64>() / n_arrived as f64)
-        };
-        let mut ends: BTreeMap<&'static str, usize> =
-            Ended::ALL.into_iter().filter(|&ended| ended != Ended::Running).map(|ended| (ended.name(), 0)).collect();
-        for episode in episodes.clone() {
-            *ends.entry(episode.ended.name()).or_default() += 1;
-        }
-        Some(Summary {
-            episodes: count,
-            arrived: n_arrived,
-            success: n_arrived as f64 / count as f64,
-            success_low,
-            success_high,
-            ends,
-            lost_at_start: episodes.clone().filter(|episode| episode.lost_at_start()).count(),
-            lane_distance_mean: mean(|episode| episode.lane_distance_mean),
-            lane_distance_mean_arrived: mean_arrived(|episode| episode.lane_distance_mean),
-            lane_distance_max: most(|episode| episode.lane_distance_max),
-            lane_distance_max_arrived: arrived.clone().map(|episode| episode.lane_distance_max).reduce(f64::max),
-            outside_lane_mean: mean_arrived(|episode| episode.outside_lane),
-            tractor_clearance_min: least(|episode| episode.tractor_clearance_min),
-            trailer_clearance_min: least(|episode| episode.trailer_clearance_min),
-            load_transfer_ratio_peak: most(|episode| episode.load_transfer_ratio_peak),
-            articulation_peak_deg: most(|episode| episode.articulation_peak).to_degrees(),
-            off_tracking_peak: most(|episode| episode.off_tracking_peak),
-            time_mean: step * mean(|episode| f64::from(episode.steps)),
-            reward_mean: mean(|episode| episode.reward),
-        })
-    }
-}
-
-/// The 95 % Wilson interval of the fraction `successes / trials` (E. Wilson, "Probable Inference, the Law of
-/// Succession, and Statistical Inference", 1927).
-pub fn wilson(successes: usize, trials: usize) -> (f64, f64) {
-    const Z: f64 = 1.959_964;
-    let (n, p) = (trials as f64, successes as f64 / trials as f64);
-    let centre = (p + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
-    let half = Z / (1.0 + Z * Z / n) * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
-    // Rounding must not exclude the fraction itself.
-    ((centre - half).clamp(0.0, p), (centre + half).clamp(p, 1.0))
-}
 
 /// One route's episodes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -216,40 +77,5 @@ impl Report {
             self.routes.iter().filter(|route| route.summary.arrived < route.summary.episodes).collect();
         failing.sort_by(|a, b| a.summary.success.total_cmp(&b.summary.success));
         failing
-    }
-}
-
-#[cfg(test)]
-pub(super) mod tests {
-    use super::*;
-
-    /// An episode with the widest figures that an evaluation gives.
-    pub(in super::super) fn episode(ended: Ended) -> Episode {
-        Episode {
-            ended,
-            steps: 999,
-            reward: -500.0,
-            lane_distance_mean: 10.25,
-            lane_distance_max: 19.25,
-            outside_lane: 0.25,
-            tractor_clearance_min: -10.25,
-            trailer_clearance_min: -10.25,
-            load_transfer_ratio_peak: 1.5,
-            articulation_peak: 1.9,
-            off_tracking_peak: 10.25,
-            driving: Some(Driving::new(&Truck::default(), 0.0)),
-            last: Truck::default(),
-        }
-    }
-
-    #[test]
-    fn the_wilson_interval_has_the_published_values() {
-        // The study's own result, 506 of 690, and the two ends of the scale.
-        let (low, high) = wilson(506, 690);
-        assert!((low - 0.6991).abs() < 5e-4 && (high - 0.7650).abs() < 5e-4, "{low} {high}");
-        assert_eq!(wilson(0, 10).0, 0.0);
-        assert_eq!(wilson(10, 10).1, 1.0);
-        // Agresti and Coull's example for 0 of 10: 0.2775.
-        assert!((wilson(0, 10).1 - 0.2775).abs() < 1e-4);
     }
 }

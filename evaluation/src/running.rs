@@ -11,8 +11,8 @@ use offtrack::layout::{Ended, Rig, Truck};
 use offtrack::simulator::Batch;
 
 use super::driving::Driving;
+use super::episode::Episode;
 use super::part::LaneWidths;
-use super::report::Episode;
 
 /// An episode under way.
 pub(super) struct Running {

@@ -245,11 +245,11 @@ mod tests {
 
     fn report(seed: u32, arrived: usize) -> SeedReport {
         let evaluation = |trained_on: usize, arrived: usize| {
-            serde_json::json!({ "benchmark": "b", "split": "test", "trained_on": trained_on, "episodes": 100, "arrived": arrived,
-                "success": arrived as f64 / 100.0, "lane_distance_mean_arrived": 0.5 })
+            serde_json::json!({ "benchmark": "b", "split": "test", "trained_on": trained_on, "episodes": 100,
+                "arrived": arrived, "success": arrived as f64 / 100.0, "lane_distance_mean_arrived": 0.5 })
         };
-        let report = serde_json::json!({ "interrupted": false, "seed": seed, "seconds": 61.0, "env_steps": 5, "updates": 6,
-            "machine": "m", "commit": "c", "evaluation": evaluation(0, arrived), "also": [evaluation(3, 100)] });
+        let report = serde_json::json!({ "interrupted": false, "seed": seed, "seconds": 61.0, "env_steps": 5,
+            "updates": 6, "machine": "m", "commit": "c", "evaluation": evaluation(0, arrived), "also": [evaluation(3, 100)] });
         serde_json::from_value(report).unwrap()
     }
 

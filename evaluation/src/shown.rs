@@ -4,7 +4,7 @@
 use offtrack::layout::Ended;
 use offtrack::layout::random;
 
-use super::report::Episode;
+use super::episode::Episode;
 
 /// Most episodes that are all shown: about 15 MB.
 pub const MOST_EPISODES: usize = 4000;
@@ -40,7 +40,7 @@ fn drawn(items: &[usize], n: usize) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::report::tests::episode;
+    use super::super::episode::tests::episode;
     use super::*;
 
     /// Every `one_in`th of `n` episodes failed.

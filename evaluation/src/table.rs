@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use offtrack::layout::Ended;
 
-use super::driving;
+use super::classes;
 use super::failures::Cause;
 use super::groups::Group;
 use super::report::{Report, RouteReport, Summary};
@@ -23,7 +23,8 @@ const COLUMNS: [(&str, &str); 10] = [
     ("95 % interval", "Wilson interval of the success"),
     (
         "lane",
-        "own: a truck whose front axle follows the lane's centre touches no kerb, and its lock allows that; wide: it has to swing out of its lane",
+        "own: a truck whose front axle follows the lane's centre touches no kerb, and its lock allows that; wide: it \
+         has to swing out of its lane",
     ),
     ("lane m", "distance of the tractor's middle, half way between its axles, to the lane's centre: mean and largest"),
     ("tractor m, trailer m", "smallest distance of the unit's outline to a kerb; negative: it overlaps the kerb"),
@@ -127,7 +128,7 @@ impl Report {
                 width,
             );
         }
-        for line in driving::lines(&self.classes) {
+        for line in classes::lines(&self.classes) {
             let _ = writeln!(text, "{line}");
         }
         self.push_causes(&mut text, width);

@@ -5,7 +5,6 @@
 
 pub mod checkpointer;
 pub mod events_file;
-mod fingerprint;
 pub mod folder;
 #[cfg(test)]
 mod lost_device_tests;
@@ -25,7 +24,6 @@ use crate::config::Config;
 use crate::sac::not_finite;
 use crate::session::Session;
 use checkpointer::{Checkpointer, Written};
-use fingerprint::fingerprint;
 use folder::Folder;
 use offtrack_evaluation::device;
 use offtrack_evaluation::error::Error;
@@ -63,7 +61,7 @@ impl Run {
         Run {
             routes,
             validation: None,
-            fingerprint: fingerprint(world),
+            fingerprint: world.fingerprint(),
             training,
             progress,
             checkpointer: Checkpointer::new(folder, config.checkpoint_minutes),

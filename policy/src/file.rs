@@ -185,7 +185,8 @@ fn checked(name: &str, description: Description, tensors: &[(String, TensorView)
         };
         if n_outputs == 0 || weight.shape() != [n_inputs, n_outputs] {
             return Err(format!(
-                "is a policy of another shape: {weight_name} is {:?}; [{n_inputs}, {n_outputs}] is needed, inputs before outputs",
+                "is a policy of another shape: {weight_name} is {:?}; [{n_inputs}, {n_outputs}] is needed, inputs \
+                 before outputs",
                 weight.shape()
             ));
         }
@@ -201,7 +202,8 @@ fn checked(name: &str, description: Description, tensors: &[(String, TensorView)
         layers.chunks_exact(2).map(|pair| Layer { weights: floats(&pair[0].1), biases: floats(&pair[1].1) }).collect();
     if let Some((index, most)) = overflowing(&layers, activation) {
         return Err(format!(
-            "is a policy that cannot drive: the outputs of actor.{index} may reach {most:.0e}, beyond 32-bit floats; train it again"
+            "is a policy that cannot drive: the outputs of actor.{index} may reach {most:.0e}, beyond 32-bit floats; \
+             train it again"
         ));
     }
     Ok(Policy {

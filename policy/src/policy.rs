@@ -147,7 +147,8 @@ impl Policy {
         if !observed.clone().eq(self.extras.iter().map(String::as_str)) {
             let listed = |names: Vec<&str>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
             let message = format!(
-                "learned with other extras beside the observation: {} here, {} in the benchmark; the key observation.extras must be equal",
+                "learned with other extras beside the observation: {} here, {} in the benchmark; the key \
+                 observation.extras must be equal",
                 listed(self.extras.iter().map(String::as_str).collect()),
                 listed(observed.collect()),
             );

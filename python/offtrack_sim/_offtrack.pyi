@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from typing import Any, final
 
 import numpy as np
@@ -11,6 +12,8 @@ __all__ = [
     "Network",
     "policy_names",
     "write_policy",
+    "drive",
+    "wilson",
     "column_layouts",
     "observation_groups",
     "extra_groups",
@@ -136,6 +139,14 @@ class Network:
     def logits(self, observations: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]: ...
     def act(self, observations: npt.NDArray[np.float32]) -> npt.NDArray[np.int64]: ...
 
+def drive(
+    batch: Batch,
+    policy: Network | Callable[..., Any],
+    episodes: int,
+    seed: int,
+    device: str,
+) -> npt.NDArray[np.int64]: ...
+def wilson(successes: int, trials: int) -> tuple[float, float]: ...
 def column_layouts() -> list[tuple[str, list[tuple[str, str, int]]]]: ...
 def observation_groups() -> list[tuple[str, int, int, float, str]]: ...
 def extra_groups() -> list[tuple[str, int, int, float, str]]: ...

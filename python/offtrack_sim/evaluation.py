@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -12,7 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .arguments import checked_integer, checked_seed
+from . import _offtrack
+from .arguments import checked_integer, checked_seed, text
 from .batch import Batch
 from .layout import Ended
 from .policy import Policy
@@ -41,9 +41,7 @@ class Evaluation:
     @property
     def success_interval(self) -> tuple[float, float]:
         """Wilson's 95 % interval of that fraction."""
-        n, fraction, z = self.ended.size, self.success, 1.959964
-        middle, half = fraction + z * z / (2 * n), z * math.sqrt(fraction * (1 - fraction) / n + z * z / (4 * n * n))
-        return (middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n)
+        return _offtrack.wilson(int((self.ended == Ended.ARRIVED).sum()), self.ended.size)
 
     @property
     def success_by_route(self) -> dict[str, float]:
@@ -107,32 +105,24 @@ def evaluate(
     """
     if not callable(policy) and not isinstance(policy, Policy):
         raise TypeError(f"policy: {policy!r}; a Policy, or a function from observations to actions, is needed")
-    if checked_integer("episodes", episodes) < 1:
+    per_route = checked_integer("episodes", episodes)
+    if per_route < 1:
         raise ValueError(f"episodes: {episodes}; must be at least 1")
-    checked_seed(seed)
-    names = Batch(scenario, 1, split=split, routes=routes).split_routes
-    batch = Batch(scenario, len(names) * episodes, split=split, routes=routes, autoreset="same_step", device=device)
+    seed = checked_seed(seed)
+    batch = Batch(scenario, 1, split=split, routes=routes)
     if isinstance(policy, Policy):
         policy.check(batch)
-        act: Callable[[npt.NDArray[np.float32]], Any] = policy.act
-    else:
-        act = policy
-    batch.begin(
-        streams=[(seed, env) for env in range(batch.num_envs)],
-        routes=[name for name in names for _ in range(episodes)],
-    )
-    ended = np.zeros(batch.num_envs, dtype=np.int64)
-    observation = batch.observation()
-    while (running := ended == Ended.RUNNING).any():
-        actions = np.zeros(batch.num_envs, dtype=np.int64)
-        # Trucks whose episode has ended drive on, and nobody looks at them.
-        actions[running] = _checked(act(observation[running]), int(running.sum()))
-        observation = batch.step(actions)[0]
-        ends = batch.ended()
-        if ends is not None:
-            first = running[ends.envs]
-            ended[ends.envs[first]] = ends.codes[first]
-    return Evaluation(batch.scenario, split, seed, names, ended.reshape(len(names), episodes))
+    ended = _offtrack.drive(batch, _chooser(policy), min(per_route, 2**62), seed, text("device", device))
+    names = batch.split_routes
+    return Evaluation(batch.scenario, split, seed, names, ended.reshape(len(names), per_route))
+
+
+def _chooser(policy: Policy | Callable[[npt.NDArray[np.float32]], Any]) -> _offtrack.Network | Callable[..., Any]:
+    """What drives: a policy's network itself, unless a class that extends `Policy` acts otherwise."""
+    if type(policy) is Policy:
+        return policy._network
+    act = policy.act if isinstance(policy, Policy) else policy
+    return lambda observations: _checked(act(observations), len(observations))
 
 
 def _checked(actions: Any, n: int) -> npt.NDArray[Any]:

@@ -1,6 +1,7 @@
 //! A batch of trucks: the simulator as Python sees it.
 
 mod arguments;
+mod picture;
 mod requests;
 mod state;
 mod stored;
@@ -8,19 +9,19 @@ mod stored;
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray2, PyUntypedArrayMethods};
-use offtrack::layout::{Column, Ended, N_RAYS, N_VALUES, Truck};
+use offtrack::layout::{Column, Ended, N_VALUES};
 use offtrack::simulator::{Autoreset, RouteChoice, Simulator, Tally};
-use offtrack_drawing::camera::{Camera, Shown};
-use pyo3::exceptions::{PyIndexError, PyMemoryError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::infos::{End, Infos, Names};
-use crate::observed::{self, Read, rows_of};
+use crate::observed::{self, Read};
 use crate::pool::Pool;
 use crate::worlds::{Asked, Place};
 use crate::{actions, errors};
-use arguments::{autoreset_of, engine_of, name_of, unfit, writable};
+pub use arguments::engine_of;
+use arguments::{autoreset_of, name_of, unfit, writable};
 use errors::guarded;
 use requests::GivenStart;
 use state::State;
@@ -116,7 +117,7 @@ impl Batch {
 
     /// Values of an observation, its extras among them.
     #[getter]
-    fn n_values(&self) -> usize {
+    pub fn n_values(&self) -> usize {
         N_VALUES + self.n_extras
     }
 
@@ -295,7 +296,7 @@ impl Batch {
 
     /// What `resume` needs beside the columns: a fingerprint of the world, and the sums of the tally.
     fn progress(&self) -> PyResult<(u32, Vec<i64>)> {
-        guarded(|| Ok((self.place.fingerprint(), self.state()?.tally()?.sums.to_vec())))
+        guarded(|| Ok((self.place.world.fingerprint(), self.state()?.tally()?.sums.to_vec())))
     }
 
     /// Takes what another batch's `progress` and `last_ended` gave.
@@ -321,36 +322,16 @@ impl Batch {
     }
 
     fn picture<'py>(&self, py: Python<'py>, env: usize, size: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        guarded(|| {
-            if self.n_envs <= env {
-                return Err(PyIndexError::new_err(format!("env: {env}; the batch has trucks 0..{}", self.n_envs)));
-            }
-            let mut state = self.state()?;
-            state.check_process(&self.device)?;
-            let State { simulator, camera, .. } = &mut *state;
-            let camera = match camera.take_if(|camera| camera.side() == size) {
-                Some(kept) => camera.insert(kept),
-                None => {
-                    let made = Camera::new(self.place.scenario.clone(), &self.place.world, size);
-                    camera.insert(made.map_err(|error| PyValueError::new_err(format!("size: {error}")))?)
-                }
-            };
-            let read = simulator
-                .read(&[Column::Truck, Column::Ranges, Column::Ended])
-                .map_err(|error| errors::of_simulator(&error))?;
-            let truck = rows_of::<Truck>(&read[0])[env];
-            let ranges = rows_of::<[f32; N_RAYS]>(&read[1])[env];
-            // A truck that goes on in another episode has not ended.
-            let code = if truck.held == 1 { rows_of::<u32>(&read[2])[env] } else { Ended::Running as u32 };
-            let shown =
-                Shown { truck: &truck, ranges: &ranges, ended: Ended::from_code(code).unwrap_or(Ended::Running) };
-            let picture = camera.draw(&shown);
-            PyArray1::from_slice(py, picture).reshape([size as usize, size as usize, 3])
-        })
+        guarded(|| self.drawn(py, env, size))
     }
 }
 
 impl Batch {
+    /// What its trucks drive in.
+    pub fn place(&self) -> &Place {
+        &self.place
+    }
+
     /// A batch, with its threads and, where one is named, its device.
     fn made(
         py: Python,

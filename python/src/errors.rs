@@ -12,7 +12,8 @@ create_exception!(
     offtrack_sim,
     ScenarioError,
     PyValueError,
-    "A scenario, roundabout or vehicle file that cannot be read or makes no sense: the message names file, key and value."
+    "A scenario, roundabout or vehicle file that cannot be read or makes no sense: the message names file, key and \
+     value."
 );
 
 /// Does `work`. A panic in it is a bug on this side of the border: it becomes a `RuntimeError` with the panic's

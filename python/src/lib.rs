@@ -5,6 +5,7 @@
 mod actions; // arrays of actions
 mod batch; // the class Batch
 mod errors; // errors of Rust as exceptions of Python
+mod evaluation; // episodes driven and counted
 mod infos; // infos of episodes that ended
 mod layout; // columns as numpy sees them
 mod observed; // observations with the benchmark's extras
@@ -22,6 +23,8 @@ fn _offtrack(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_class::<policy::Network>()?;
     module.add_function(wrap_pyfunction!(policy::policy_names, module)?)?;
     module.add_function(wrap_pyfunction!(policy::write_policy, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::drive, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::wilson, module)?)?;
     module.add_function(wrap_pyfunction!(layout::column_layouts, module)?)?;
     module.add_function(wrap_pyfunction!(layout::observation_groups, module)?)?;
     module.add_function(wrap_pyfunction!(layout::extra_groups, module)?)?;

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use bytemuck::{AnyBitPattern, NoUninit};
 use offtrack::layout::{Column, EXTRAS, N_EXTRAS, N_VALUES};
-use offtrack::simulator::{Autoreset, Error, Simulator};
+use offtrack::simulator::{Autoreset, Batch, Error, Simulator};
 use rayon::prelude::*;
 
 /// Rows of observations that a thread copies at least.
@@ -77,6 +77,13 @@ pub struct Observed<'a> {
     /// Empty without extras.
     extras: Cow<'a, [[f32; N_EXTRAS]]>,
     n_extras: usize,
+}
+
+impl<'a> Observed<'a> {
+    /// What the trucks of a batch observe before the next action.
+    pub fn of(batch: &'a Batch, n_extras: usize) -> Observed<'a> {
+        Observed { values: Cow::Borrowed(&batch.observation), extras: Cow::Borrowed(&batch.extras), n_extras }
+    }
 }
 
 impl Observed<'_> {

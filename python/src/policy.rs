@@ -84,6 +84,11 @@ impl Network {
 }
 
 impl Network {
+    /// The policy itself.
+    pub fn policy(&self) -> &Policy {
+        &self.policy
+    }
+
     fn of(policy: Policy) -> Network {
         Network { policy, pool: Mutex::new(Pool::new(0)) }
     }
@@ -211,14 +216,16 @@ fn check_layers(layers: &[(PyReadonlyArray2<f32>, PyReadonlyArray1<f32>)], n_val
         let (shape, n_outputs) = (weights.shape(), biases.len());
         if shape[1] != n_outputs {
             return refused(format!(
-                "layers[{index}]: biases of shape ({n_outputs},) beside weights of shape ({}, {}); ({},) is needed, one an output",
+                "layers[{index}]: biases of shape ({n_outputs},) beside weights of shape ({}, {}); ({},) is needed, \
+                 one an output",
                 shape[0], shape[1], shape[1]
             ));
         }
         if n_outputs == 0 || shape[0] != n_inputs {
             let last = if index == 0 { "an observation has" } else { "the layer before has" };
             return refused(format!(
-                "layers[{index}]: weights of shape ({}, {n_outputs}); ({n_inputs}, {n_outputs}) is needed, inputs before outputs: {last} {n_inputs}",
+                "layers[{index}]: weights of shape ({}, {n_outputs}); ({n_inputs}, {n_outputs}) is needed, inputs \
+                 before outputs: {last} {n_inputs}",
                 shape[0]
             ));
         }

@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 use std::time::Duration;
 
-use bytemuck::{bytes_of, cast_slice};
 use offtrack::files::cache::{Cache, Loading, Stopped};
 use offtrack::files::shipped::Kind;
 use offtrack::layout::Action;
@@ -81,38 +80,6 @@ impl Place {
         }
         baked.push(place.clone());
         Ok(place)
-    }
-
-    /// CRC-32 of all that trucks drive by: a state goes on in an equal world alone.
-    pub fn fingerprint(&self) -> u32 {
-        let World {
-            params,
-            rigs,
-            classes: _,
-            rays,
-            actions,
-            fields,
-            waypoints,
-            previews,
-            routes,
-            route_names,
-            step_limits,
-        } = &*self.world;
-        let mut hasher = crc32fast::Hasher::new();
-        hasher.update(bytes_of(params));
-        hasher.update(cast_slice(rigs));
-        hasher.update(cast_slice(rays));
-        hasher.update(cast_slice(actions));
-        hasher.update(cast_slice(waypoints));
-        hasher.update(cast_slice(previews));
-        hasher.update(cast_slice(routes));
-        hasher.update(cast_slice(step_limits));
-        route_names.iter().for_each(|name| hasher.update(name.as_bytes()));
-        for field in fields {
-            hasher.update(cast_slice(&field.cells));
-            hasher.update(cast_slice(&field.values));
-        }
-        hasher.finalize()
     }
 }
 

@@ -90,6 +90,18 @@ def test_the_summaries_are_what_the_archives_give() -> None:
     subprocess.run([sys.executable, str(ROOT / "benches/summaries.py"), "--check"], check=True)
 
 
+def test_every_result_says_when_it_was_made_and_by_which_commit_or_with_which_it_came() -> None:
+    """`reported_in` is the commit that brought a result whose program named none."""
+    files = tracked("docs/results/*.json")
+    assert 20 <= len(files), len(files)
+    for file in files:
+        result = json.loads(file.read_text())
+        assert re.match(r"2026-\d\d-\d\d", result.get("date", "")), file.name
+        named = result.get("commit") or result.get("reported_in")
+        commits = [named] if isinstance(named, str) else named
+        assert commits and all(re.fullmatch(r"[0-9a-f]{12}(-dirty)?", commit) for commit in commits), file.name
+
+
 def test_every_result_and_picture_is_linked_from_a_document() -> None:
     linked = {(document.parent / target).resolve() for document in tracked("*.md") for target in links(document)}
     files = [file for file in tracked("docs/results", "docs/images") if file.suffix != ".md"]

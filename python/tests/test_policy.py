@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+import threading
+import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
-from offtrack_sim import Batch, Policy, evaluate
+from offtrack_sim import Batch, Evaluation, Policy, evaluate
 
 DATA = Path(__file__).parent / "data"
 
@@ -34,6 +40,77 @@ def test_any_function_is_evaluated() -> None:
         evaluate(Policy.shipped(), episodes=0)
     with pytest.raises(ValueError, match="has another action table than attard2023-as-run"):
         evaluate(Policy.shipped(), "attard2023-as-run")
+
+
+def test_a_function_drives_as_the_policy_that_it_calls_and_on_the_callers_own_thread() -> None:
+    policy, threads, rows = Policy.shipped(), set(), []
+
+    def act(observations: npt.NDArray[np.float32]) -> Any:
+        threads.add(threading.get_ident())
+        rows.append(len(observations))
+        return policy.act(observations).astype(np.uint8)
+
+    asked = {"scenario": "maps2026", "split": "test", "episodes": 2, "seed": 7}
+    called, native = evaluate(act, **asked), evaluate(policy, **asked)  # type: ignore[arg-type]
+    assert (called.ended == native.ended).all() and 1 < len(native.counts)
+    # Trucks whose episode has ended are not asked about.
+    assert threads == {threading.get_ident()} and rows[0] == native.ended.size and rows[-1] < rows[0]
+
+
+def test_a_class_that_extends_policy_drives_by_its_own_act() -> None:
+    class Straight(Policy):
+        def act(self, observations: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+            return np.full(len(observations), 4)
+
+    straight = Straight(Policy.shipped()._network)
+    expected = evaluate(lambda observations: np.full(len(observations), 4), routes=["16m"], episodes=1)
+    assert (evaluate(straight, routes=["16m"], episodes=1).ended == expected.ended).all()
+
+
+def test_what_a_function_raises_and_an_action_that_there_is_none_of_end_an_evaluation() -> None:
+    def failing(observations: npt.NDArray[np.float32]) -> Any:
+        raise KeyError("of the policy itself")
+
+    with pytest.raises(KeyError, match="of the policy itself"):
+        evaluate(failing, episodes=1)
+    with pytest.raises(ValueError, match=r"actions\[0\]: 9; must lie in 0..9"):
+        evaluate(lambda observations: np.full(len(observations), 9), episodes=1)
+
+
+def test_more_episodes_than_fit_into_memory_are_refused_before_any_is_begun() -> None:
+    for episodes in (10**9, 10**12, 10**30):
+        with pytest.raises(MemoryError, match="num_envs: [0-9]+; "):
+            evaluate(Policy.shipped(), episodes=episodes)
+
+
+def test_ctrl_c_while_trucks_drive_is_answered_at_once() -> None:
+    def press() -> None:
+        pressed.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    pressed: list[float] = []
+    # A job in the background of a script begins with the signal ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    evaluate(Policy.shipped(), episodes=1)
+    timer = threading.Timer(0.5, press)
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            evaluate(Policy.shipped(), episodes=5000)
+    finally:
+        timer.cancel()
+        signal.signal(signal.SIGINT, before)
+    assert time.monotonic() - pressed[0] < 5.0
+
+
+def test_the_interval_of_a_success_is_wilsons_as_published_and_has_the_fraction_in_it() -> None:
+    def interval(arrived: int, episodes: int) -> tuple[float, float]:
+        ended = np.where(np.arange(episodes) < arrived, 1, 2).reshape(1, -1)
+        return Evaluation("attard2023", "test", 0, ["16m/N-left-3"], ended).success_interval
+
+    # The study's own result.
+    assert interval(506, 690) == pytest.approx((0.6991, 0.7650), abs=5e-4)
+    assert interval(690, 690)[1] == 1.0 and interval(0, 690)[0] == 0.0
 
 
 def test_logits_agree_with_actions_whatever_the_number_of_rows() -> None:

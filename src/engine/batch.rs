@@ -232,7 +232,7 @@ impl Batch {
 }
 
 /// An error if the columns of so many trucks do not fit into the host's memory. More than a `u32` counts never fit.
-fn check_size(n_envs: usize) -> Result<(), Error> {
+pub fn check_size(n_envs: usize) -> Result<(), Error> {
     let width = row_bytes();
     let available = memory::available().unwrap_or(u64::MAX);
     let fitting = (available / width as u64).min(u32::MAX.into());

@@ -12,7 +12,8 @@ pub enum Error {
     EmptyBatch,
     /// The columns do not fit into the host's memory.
     #[error(
-        "n_envs: {n_envs}; the columns would take {n_bytes} bytes, more than this machine has free: at most {fitting} trucks fit"
+        "n_envs: {n_envs}; the columns would take {n_bytes} bytes, more than this machine has free: at most {fitting} \
+         trucks fit"
     )]
     BatchTooLarge {
         /// Trucks asked for.
@@ -42,7 +43,10 @@ pub enum Error {
         n_routes: usize,
     },
     /// Routes to draw from where none are drawn, or of another number than before.
-    #[error("routes: {n_routes} to draw from; this batch {}", .drawn.map_or("runs one fixed route a truck".to_owned(), |drawn| format!("draws from {drawn}, and needs as many")))]
+    #[error(
+        "routes: {n_routes} to draw from; this batch {}",
+        .drawn.map_or("runs one fixed route a truck".to_owned(), |drawn| format!("draws from {drawn}, and needs as many"))
+    )]
     DrawnCount {
         /// Routes given.
         n_routes: usize,
@@ -110,7 +114,10 @@ pub enum Error {
         limit: u32,
     },
     /// A stored column that does not fit the batch.
-    #[error("{column}: {}; a batch of {n_envs} trucks needs {n_bytes} bytes", .found.map_or("missing".to_owned(), |found| format!("{found} bytes")))]
+    #[error(
+        "{column}: {}; a batch of {n_envs} trucks needs {n_bytes} bytes",
+        .found.map_or("missing".to_owned(), |found| format!("{found} bytes"))
+    )]
     ColumnSize {
         /// The column's name.
         column: &'static str,

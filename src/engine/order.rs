@@ -1,8 +1,8 @@
 //! The order in which the CPU works on the trucks of a batch: those on one road after each other.
 //!
-//! A road's field and waypoints are then read from memory once for many trucks. The order is renewed now and then, since
-//! trucks change their roads with their episodes; no result depends on it. Each block of neighbouring trucks has an
-//! order of its own, so that a thread that works on it has its rows to itself.
+//! A road's field and waypoints are then read from memory once for many trucks. The order is renewed now and then,
+//! since trucks change their roads with their episodes; no result depends on it. Each block of neighbouring trucks has
+//! an order of its own, so that a thread that works on it has its rows to itself.
 
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;

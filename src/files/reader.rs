@@ -45,7 +45,11 @@ pub enum Error {
         limit: u64,
     },
     /// The library has no file of this name.
-    #[error("{what}: {}; must be a path ending in .toml or one of {}", shortened(name, LONGEST_VALUE), known.join(", "))]
+    #[error(
+        "{what}: {}; must be a path ending in .toml or one of {}",
+        shortened(name, LONGEST_VALUE),
+        known.join(", ")
+    )]
     UnknownName {
         /// What was looked up: `benchmark`, `roundabout` or `vehicle`.
         what: &'static str,

@@ -31,6 +31,18 @@ pub(crate) fn points(contour: &[[f64; 2]]) -> Vec<DVec2> {
     contour.iter().map(|&p| DVec2::from(p)).collect()
 }
 
+/// A closed contour with points at most `step` apart (m).
+pub(crate) fn densified(contour: &[DVec2], step: f64) -> Vec<DVec2> {
+    let n = contour.len();
+    let mut dense = Vec::new();
+    for (i, &from) in contour.iter().enumerate() {
+        let to = contour[(i + 1) % n];
+        let parts = (from.distance(to) / step).ceil().clamp(1.0, 1e5);
+        dense.extend((0..parts as usize).map(|part| from.lerp(to, part as f64 / parts)));
+    }
+    dense
+}
+
 /// A contour that does not cross itself, turned around if it is clockwise.
 pub(crate) fn counter_clockwise(mut contour: Vec<DVec2>) -> Vec<DVec2> {
     let n = contour.len();

@@ -40,7 +40,8 @@ proptest! {
     #[test]
     fn distances_are_those_to_a_dense_polyline(p in point()) {
         let outline = outline();
-        let brute = chords(&outline).iter().map(|&(from, to)| Piece::Segment { from, to }.distance(p)).fold(f64::INFINITY, f64::min);
+        let to_chord = |&(from, to): &(DVec2, DVec2)| Piece::Segment { from, to }.distance(p);
+        let brute = chords(&outline).iter().map(to_chord).fold(f64::INFINITY, f64::min);
         // The polyline's sagitta.
         prop_assert!((outline.distance(p) - brute).abs() < 1.1e-5);
     }
@@ -49,12 +50,17 @@ proptest! {
     fn the_drivable_side_is_that_of_the_winding_polyline(p in point()) {
         let outline = outline();
         prop_assume!(1e-4 < outline.distance(p));
-        let crossings = chords(&outline).iter().filter(|(a, b)| (a.y <= p.y) != (b.y <= p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)).count();
+        let is_right = |(a, b): &&(DVec2, DVec2)| {
+            (a.y <= p.y) != (b.y <= p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
+        };
+        let crossings = chords(&outline).iter().filter(is_right).count();
         prop_assert_eq!(outline.contains(p), crossings % 2 == 1);
     }
 
     #[test]
-    fn what_is_near_gives_the_distances_of_the_whole(centre in point(), radius in 0.0..6.0, angle in 0.0..TAU, fraction in 0.0..1.0) {
+    fn what_is_near_gives_the_distances_of_the_whole(
+        centre in point(), radius in 0.0..6.0, angle in 0.0..TAU, fraction in 0.0..1.0,
+    ) {
         let outline = outline();
         let p = centre + DVec2::from_angle(angle) * radius * fraction;
         prop_assert_eq!(outline.near(centre, radius).signed_distance(p), outline.signed_distance(p));
@@ -68,7 +74,8 @@ proptest! {
         if outline.contains(origin) {
             // No chord is crossed before the ray's end, and the end lies on the outline: grazing rays have no sharper
             // test.
-            let clear = |&(from, to): &(DVec2, DVec2)| Piece::Segment { from: origin, to: origin + direction * (ray - 0.01).max(0.0) }.meetings(&Piece::Segment { from, to }).is_empty();
+            let seen = Piece::Segment { from: origin, to: origin + direction * (ray - 0.01).max(0.0) };
+            let clear = |&(from, to): &(DVec2, DVec2)| seen.meetings(&Piece::Segment { from, to }).is_empty();
             prop_assert!(ray < 0.02 || chords(&outline).iter().all(clear));
             prop_assert!(ray == 20.0 || outline.distance(origin + direction * ray) < 1e-9);
         } else {
@@ -77,13 +84,16 @@ proptest! {
     }
 
     #[test]
-    fn a_rectangle_meets_a_solid_just_when_one_of_its_points_is_solid(centre in point(), angle in 0.0..TAU, length in 1.0..20.0, width in 1.0..3.0) {
+    fn a_rectangle_meets_a_solid_just_when_one_of_its_points_is_solid(
+        centre in point(), angle in 0.0..TAU, length in 1.0..20.0, width in 1.0..3.0,
+    ) {
         let outline = outline();
         let (along, across) = (DVec2::from_angle(angle), DVec2::from_angle(angle).perp());
         let at = |x: f64, y: f64| centre + along * x * length / 2.0 + across * y * width / 2.0;
         let corners = [at(1.0, 1.0), at(-1.0, 1.0), at(-1.0, -1.0), at(1.0, -1.0)];
         let steps = || (-40..=40).map(|step| f64::from(step) / 40.0);
-        let room = steps().flat_map(|x| steps().map(move |y| (x, y))).map(|(x, y)| outline.signed_distance(at(x, y))).fold(f64::INFINITY, f64::min);
+        let points = steps().flat_map(|x| steps().map(move |y| (x, y)));
+        let room = points.map(|(x, y)| outline.signed_distance(at(x, y))).fold(f64::INFINITY, f64::min);
         // Between the sampled points the distance changes by at most half their spacing.
         let unsure = length / 40.0;
         prop_assume!(unsure < room || room < 0.0);
@@ -117,7 +127,8 @@ proptest! {
 
     #[test]
     fn corners_are_rounded_tangentially(x in 5.0..30.0, y in -30.0..30.0, radius in 0.1..4.0) {
-        let bends = [(-30.0, 0.0), (0.0, 0.0), (x, y), (x + 40.0, y)].map(|(x, y)| Bend { at: DVec2::new(x, y), radius });
+        let bends = [(-30.0, 0.0), (0.0, 0.0), (x, y), (x + 40.0, y)];
+        let bends = bends.map(|(x, y)| Bend { at: DVec2::new(x, y), radius });
         let rounded = rounded(&bends, false);
         // Cases in which no such arc fits are not counted.
         prop_assume!(rounded.is_ok());

@@ -131,7 +131,8 @@ impl Table {
             Table::Fields => ("A field for each roundabout.", rows::<FieldRow>()),
             Table::Cells => ("Cells of all fields, two words each.", "array<vec2<u32>>".to_owned()),
             Table::Corners => (
-                "Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of STORED_UNIT.",
+                "Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of \
+                 STORED_UNIT.",
                 rows::<u32>(),
             ),
             Table::Waypoints => ("Every route's waypoints, one route after the other.", rows::<WaypointRow>()),

@@ -1,8 +1,8 @@
 //! Why an episode ended.
 
 crate::named! {
-    /// Why an episode ended, by the number and the name that reports have. Failure wins over arrival, everything wins over
-    /// the time limit.
+    /// Why an episode ended, by the number and the name that reports have. Failure wins over arrival, everything wins
+    /// over the time limit.
     #[repr(u32)]
     pub enum Ended {
         /// The episode goes on.

@@ -87,7 +87,8 @@ impl Literal for f32 {
     }
     fn literal(&self) -> String {
         let shortest = format!("{self:?}");
-        // The shortest decimal that rounds to the largest f32 is above it as a real number: not every compiler reads it.
+        // The shortest decimal that rounds to the largest f32 is above it as a real number: not every compiler reads
+        // it.
         let is_above = shortest.parse().is_ok_and(|real: f64| f64::from(f32::MAX) < real.abs());
         if is_above { format!("{self:.1}f") } else { format!("{shortest}f") }
     }

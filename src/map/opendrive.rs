@@ -7,6 +7,7 @@
 mod records; // what the file says
 mod xml; // elements and attributes
 mod encoding; // bytes -> text
+mod source; // a document that is being read
 mod read; // XML -> records
 mod plan; // reference lines
 mod sections; // lane sections
@@ -134,8 +135,10 @@ impl Map {
         let nearest = self.rings().into_iter().min_by(|one, other| distance(one).total_cmp(&distance(other)));
         nearest.ok_or_else(|| {
             let (roads, holes) = (self.n_roads(), self.refused.len());
-            let expected =
-                format!("no roundabout here: {roads} roads around {holes} islands and blocks, none with one-way traffic around it");
+            let expected = format!(
+                "no roundabout here: {roads} roads around {holes} islands and blocks, none with one-way \
+                         traffic around it"
+            );
             Reader::of(&self.file).invalid("ring", format_args!("({:.1}, {:.1})", p.x, p.y), expected)
         })
     }

@@ -4,9 +4,10 @@
 //! roundabout are refused when the file is read, so the kerbs and lanes of a [`Road`] never fail.
 
 mod alignment;
-mod check;
+mod check; // lanes clear of kerbs and of each other
 mod corner;
 mod ends; // arms prolonged
+mod faults; // of the parts, as errors
 mod gutter; // widths that differ
 mod hand; // left-hand traffic
 mod kerb;

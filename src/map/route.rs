@@ -106,8 +106,12 @@ impl Route {
 
 /// A route that would begin or end beyond the end of its arm.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{part} of {} m leaves arm {arm} of {roundabout}; at most {} m fit{}", shown(*asked), (longest * 100.0).floor() / 100.0,
-    reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default())]
+#[error(
+    "{part} of {} m leaves arm {arm} of {roundabout}; at most {} m fit{}",
+    shown(*asked),
+    (longest * 100.0).floor() / 100.0,
+    reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default()
+)]
 pub struct LeavesWorld {
     /// `approach` or `departure`.
     pub part: &'static str,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec2;
 
 use super::benchmark_keys::{WrittenChoice, WrittenProcedural, WrittenRoundabout};
-use super::read::referred;
+use super::referred::referred;
 use super::{Place, Scenario, Split};
 use crate::files::cache::Loading;
 use crate::files::reader::{Error, Reader, shown};

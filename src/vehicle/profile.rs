@@ -3,8 +3,8 @@
 //!
 //! Forward and backward passes over a speed limit are the usual profile of minimum time (J. Bobrow et al., 1985). The
 //! tractor follows the lane's centre; its trailer cuts the bend and still turns where the tractor drives straight
-//! again. Lock and steer rate are not part of it: [`crate::vehicle::swept::demands`] says where a line asks for more than they
-//! give.
+//! again. Lock and steer rate are not part of it: [`crate::vehicle::swept::demands`] says where a line asks for more
+//! than they give.
 
 use std::f64::consts::PI;
 

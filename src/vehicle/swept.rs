@@ -2,8 +2,8 @@
 //! truck.
 //!
 //! Both depend on vehicle, speed and line alone and are computed in f64. The path itself knows no limit: it turns as
-//! sharply as the line does. Whether lock, steer rate, tyres and load allow that, [`demands`] says. Pictures and reports
-//! use both.
+//! sharply as the line does. Whether lock, steer rate, tyres and load allow that, [`demands`] says. Pictures and
+//! reports use both.
 
 mod demand;
 

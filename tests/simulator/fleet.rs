@@ -92,11 +92,9 @@ fn a_truck_among_others_drives_as_it_would_alone() {
         let mut last = Vec::new();
         for vehicle in [0u32, 100, 300, 511] {
             let (rig, rays) = (all.rigs[vehicle as usize], *all.rays_of(&all.rigs[vehicle as usize]));
-            let mut alone = World {
-                rigs: vec![offtrack::layout::Rig { chassis: 0, ..rig }],
-                rays: vec![rays],
-                ..World::clone(&all)
-            };
+            let mut alone = World::clone(&all);
+            alone.rigs = vec![offtrack::layout::Rig { chassis: 0, ..rig }];
+            alone.rays = vec![rays];
             alone.params.n_vehicles = 1;
             let start = Start { offset: 0.4, heading: -0.3, speed: 0.0, vehicle };
             let (truck, observation) = driven(&engine, &all, start, 20);

@@ -89,7 +89,8 @@ fn roads_joined_by_a_direct_junction_are_one_arm() {
     let link = "<successor elementType=\"junction\" elementId=\"950\"/>";
     let back = "<predecessor elementType=\"junction\" elementId=\"950\"/>";
     // One connection, from road 1 alone: it holds for both directions.
-    let junction = "<junction id=\"950\" type=\"direct\"><connection id=\"0\" incomingRoad=\"1\" linkedRoad=\"801\" contactPoint=\"start\">\
+    let junction = "<junction id=\"950\" type=\"direct\"><connection id=\"0\" incomingRoad=\"1\" linkedRoad=\"801\" \
+                    contactPoint=\"start\">\
         <laneLink from=\"-1\" to=\"-1\"/><laneLink from=\"1\" to=\"1\"/></connection></junction>";
     let map = parsed(&continued(link, back, junction));
     assert_drivable(&map);
@@ -117,9 +118,13 @@ fn lanes_without_links_are_joined_by_place_where_their_roads_are_linked() {
         "<successor elementType=\"junction\" elementId=\"950\"/>",
         "<predecessor elementType=\"junction\" elementId=\"950\"/>",
     );
-    let junction = "<junction id=\"950\"><connection id=\"0\" incomingRoad=\"1\" connectingRoad=\"801\" contactPoint=\"start\"/></junction>";
+    let junction = "<junction id=\"950\"><connection id=\"0\" incomingRoad=\"1\" connectingRoad=\"801\" \
+                    contactPoint=\"start\"/></junction>";
     let map = parsed(&continued(link, back, junction));
-    assert!(map.warnings().any(|warning| warning.contains("road 1 lane -1: has no link to a lane, and is joined to road 801 lane -1")));
+    assert!(map.warnings().any(|warning| warning.contains(
+        "road 1 lane -1: has no link to a lane, and is joined to \
+        road 801 lane -1"
+    )));
 }
 
 #[test]
@@ -151,7 +156,8 @@ fn lanes_are_joined_across_a_section_of_no_length() {
     let text = plain();
     let link = |id: i32| {
         format!(
-            "<lane id=\"{id}\" type=\"driving\" level=\"false\"><link><predecessor id=\"{id}\"/><successor id=\"{id}\"/></link>"
+            "<lane id=\"{id}\" type=\"driving\" level=\"false\"><link><predecessor id=\"{id}\"/><successor \
+             id=\"{id}\"/></link>"
         )
     };
     let linked = [1, -1].iter().fold(text, |text, id| {
@@ -178,7 +184,8 @@ fn lanes_are_joined_across_a_section_of_no_length() {
 fn a_short_sharp_spiral_is_read_with_a_warning_and_one_that_turns_too_much_is_refused() {
     let spiral = |length: f64| {
         let piece = format!(
-            "<geometry s=\"70\" x=\"108\" y=\"0\" hdg=\"0\" length=\"{length}\"><spiral curvStart=\"100\" curvEnd=\"-100\"/></geometry></planView>"
+            "<geometry s=\"70\" x=\"108\" y=\"0\" hdg=\"0\" length=\"{length}\"><spiral curvStart=\"100\" \
+             curvEnd=\"-100\"/></geometry></planView>"
         );
         in_road_1(&plain(), "</planView>", &piece)
     };
@@ -219,7 +226,8 @@ fn grades_and_crossfall_are_warned_of_with_their_largest_value() {
     );
     assert!(of_ring.contains("crossfall of up to 17.2 % (road 1)"), "{of_ring}");
     // Steeper beyond the lanes, which end 4 m left of the reference line.
-    let shape = "<lateralProfile><shape s=\"0\" t=\"0\" a=\"0\" b=\"0\" c=\"0.01\" d=\"0\"/><shape s=\"0\" t=\"50\" a=\"0\" b=\"9\" c=\"0\" d=\"0\"/></lateralProfile>";
+    let shape = "<lateralProfile><shape s=\"0\" t=\"0\" a=\"0\" b=\"0\" c=\"0.01\" d=\"0\"/><shape s=\"0\" t=\"50\" \
+                 a=\"0\" b=\"9\" c=\"0\" d=\"0\"/></lateralProfile>";
     assert!(with(shape).0.contains("up to 8.0 % on road 1"), "{:?}", with(shape));
     let level = "<elevationProfile><elevation s=\"0\" a=\"120\" b=\"0.02\" c=\"0\" d=\"0\"/></elevationProfile>\
         <lateralProfile><superelevation s=\"0\" a=\"0.025\" b=\"0\" c=\"0\" d=\"0\"/></lateralProfile>";
@@ -306,7 +314,8 @@ fn a_link_that_turns_is_not_said_to_jump() {
 fn pieces_of_a_road_that_lie_apart_are_refused_with_road_and_geometry() {
     let second = |x: &str| {
         let pieces = format!(
-            "length=\"35\"><line/></geometry><geometry s=\"35\" x=\"{x}\" y=\"0\" hdg=\"0\" length=\"35\"><line/></geometry></planView>"
+            "length=\"35\"><line/></geometry><geometry s=\"35\" x=\"{x}\" y=\"0\" hdg=\"0\" length=\"35\"><line/>\
+             </geometry></planView>"
         );
         in_road_1(&plain(), "length=\"70\"><line/></geometry></planView>", &pieces)
     };
@@ -356,8 +365,10 @@ fn names_of_a_map_are_shown_without_what_a_terminal_would_obey() {
 /// A shoulder among lanes is paved but no lane: the lanes' edges go round it, where the kerb faces do not.
 #[test]
 fn an_outline_with_a_shoulder_among_its_lanes_is_read_again() {
-    let lane = "<lane id=\"-1\" type=\"driving\" level=\"false\"><link></link><width sOffset=\"0\" a=\"4\" b=\"0\" c=\"0\" d=\"0\"/></lane>";
-    let widths = "<width sOffset=\"0\" a=\"0\" b=\"0\" c=\"0\" d=\"0\"/><width sOffset=\"20\" a=\"1\" b=\"0\" c=\"0\" d=\"0\"/>\
+    let lane = "<lane id=\"-1\" type=\"driving\" level=\"false\"><link></link><width sOffset=\"0\" a=\"4\" b=\"0\" \
+                c=\"0\" d=\"0\"/></lane>";
+    let widths = "<width sOffset=\"0\" a=\"0\" b=\"0\" c=\"0\" d=\"0\"/><width sOffset=\"20\" a=\"1\" b=\"0\" c=\"0\" \
+                  d=\"0\"/>\
         <width sOffset=\"40\" a=\"0\" b=\"0\" c=\"0\" d=\"0\"/>";
     let beside = "<width sOffset=\"0\" a=\"2.5\" b=\"0\" c=\"0\" d=\"0\"/>";
     let more = format!(

@@ -64,7 +64,8 @@ fn random_roads_stand_beside_roundabouts_from_files_that_have_a_validation_split
     let folder = tempfile::tempdir().unwrap();
     let file = scenarios().join("roundabouts/20m.toml");
     let listed = format!(
-        "{ROADS}\n[[roundabout]]\nfile = \"{}\"\ntrain = [\"E-left-2\"]\nvalidation = [\"E-left-3\"]\ntest = [\"N-left-2\"]\n",
+        "{ROADS}\n[[roundabout]]\nfile = \"{}\"\ntrain = [\"E-left-2\"]\nvalidation = [\"E-left-3\"]\n\
+         test = [\"N-left-2\"]\n",
         file.display()
     );
     let scenario = Scenario::read(&benchmark(folder.path(), &listed)).unwrap();
@@ -88,7 +89,8 @@ fn every_wrong_key_of_procedural_is_named_with_what_would_do() {
         (
             "count = 20",
             "count = 15",
-            "procedural.validation: [15, 16]; must be [first, last + 1] with first < last + 1 <= procedural.count, which is 15",
+            "procedural.validation: [15, 16]; must be [first, last + 1] with first < last + 1 <= procedural.count, \
+             which is 15",
         ),
         ("train = [0, 3]", "train = [3, 3]", "procedural.train: [3, 3]; must be [first, last + 1]"),
         (

@@ -30,7 +30,7 @@ fn the_scenarios_readme_names_every_file_of_the_library() {
 
 #[cfg(unix)]
 #[test]
-fn a_tracked_link_and_a_path_of_one_machine_are_refused() {
+fn a_tracked_link_a_path_of_one_machine_and_a_source_above_400_lines_are_refused() {
     let clone = tempfile::tempdir().unwrap();
     let git = |arguments: &[&str]| {
         let done = std::process::Command::new("git").current_dir(clone.path()).args(arguments).output().unwrap();
@@ -55,6 +55,13 @@ fn a_tracked_link_and_a_path_of_one_machine_are_refused() {
         assert!(!passed && said.contains("text.md:1:It lies in"), "{path}: {said}");
     }
     fs::write(&text, "").unwrap();
+    let source = clone.path().join("source.rs");
+    fs::write(&source, "\n".repeat(400)).unwrap();
+    assert_eq!(refusal(), (true, String::new()));
+    fs::write(&source, "\n".repeat(401)).unwrap();
+    let (passed, said) = refusal();
+    assert!(!passed && said.contains("source.rs:401"), "{said}");
+    fs::remove_file(&source).unwrap();
     std::os::unix::fs::symlink("text.md", clone.path().join("resources")).unwrap();
     let (passed, said) = refusal();
     assert!(!passed && said.contains("resources"), "{said}");

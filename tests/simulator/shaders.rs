@@ -183,7 +183,8 @@ fn in_a_loop_every_variable_has_an_initial_value_since_one_compiler_clears_it_on
         assert_eq!(without_value_in_loops(&code), Vec::<String>::new(), "{file}");
     }
     assert!(15 < n_loops, "{n_loops}");
-    let bad = "fn f() { var a: u32; for (var n: u32; n < 2u; n++) { if b { var c: array<u32, 2>; } var d = 0u; } while a { var e: u32; } }";
+    let bad = "fn f() { var a: u32; for (var n: u32; n < 2u; n++) { if b { var c: array<u32, 2>; } var d = 0u; } \
+               while a { var e: u32; } }";
     assert_eq!(without_value_in_loops(bad), ["var n: u32", "var c: array<u32, 2>", "var e: u32"]);
 }
 

@@ -61,7 +61,11 @@ pub struct Args {
     #[arg(long, default_value_t = 30.0, requires = "route")]
     speed_kmh: f64,
     /// Whether gutters may be driven on.
-    #[arg(long, default_value = "drivable", value_parser = PossibleValuesParser::new(["drivable", "solid"]).map(gutter))]
+    #[arg(
+        long,
+        default_value = "drivable",
+        value_parser = PossibleValuesParser::new(["drivable", "solid"]).map(gutter)
+    )]
     gutter: Gutter,
     /// Length of the routes before the ring (m).
     #[arg(long, default_value_t = APPROACH)]

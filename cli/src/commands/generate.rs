@@ -115,8 +115,8 @@ fn text(distribution: &Distribution, road: &RandomRoad) -> String {
     let RandomRoad { seed, index, attempt, .. } = road;
     let name = &distribution.name;
     format!(
-        "# A random roundabout: distribution {name}, seed {seed}, index {index}, attempt {attempt}.\n# Made by: offtrack generate \
-         --distribution {name} --seed {seed} --first {index} --count 1\n\n{}",
+        "# A random roundabout: distribution {name}, seed {seed}, index {index}, attempt {attempt}.\n\
+         # Made by: offtrack generate --distribution {name} --seed {seed} --first {index} --count 1\n\n{}",
         road.text()
     )
 }

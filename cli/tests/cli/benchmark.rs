@@ -19,7 +19,8 @@ fn validation_that_drives_another_vehicle_or_otherwise_is_refused_before_a_folde
         std::fs::write(place.file("validated.toml"), validated.replacen(from, to, 1)).unwrap();
         let message = refusal(&place.train(&[]), 2);
         let whole = format!(
-            "it differs from short, which is trained on, {expected}: with --set validation.benchmark= validation is as short says"
+            "it differs from short, which is trained on, {expected}: with --set validation.benchmark= validation is \
+             as short says"
         );
         assert!(message.contains("tiny.toml: validation.benchmark: ") && message.contains(&whole), "{message}");
         assert!(!place.file("runs").exists());
@@ -42,7 +43,8 @@ fn own_benchmark(place: &Place, splits: [&str; 2]) -> String {
         text.replace(from, to)
     });
     std::fs::write(place.file("own.toml"), own).unwrap();
-    let others = "training_benchmark = \"random2026-training\"\nalso_evaluate = [\"random2026\"]\nreward = { clearance = -100.0 }\n\
+    let others = "training_benchmark = \"random2026-training\"\nalso_evaluate = [\"random2026\"]\n\
+                  reward = { clearance = -100.0 }\n\
                   validation = { benchmark = \"random2026\", times = 1, episodes = 1 }\n";
     let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
     std::fs::write(place.file("tiny.toml"), format!("{others}{training}mirror_augmentation = true\n")).unwrap();

@@ -50,8 +50,10 @@ fn widths(page: &Path, window: u32) -> (u32, u32) {
     let [framed, frame] = ["framed.html", "frame.html"].map(|name| page.with_file_name(name));
     std::fs::write(&framed, read(page).replace("</body>", report)).unwrap();
     let outer = format!(
-        "<iframe src=\"framed.html\" style=\"border: 0; width: {window}px; height: 9000px\"></iframe><script>addEventListener('message', \
-         event => document.body.append(Object.assign(document.createElement('pre'), {{ id: 'selftest', textContent: event.data }})))</script>"
+        "<iframe src=\"framed.html\" style=\"border: 0; width: {window}px; height: 9000px\"></iframe>\
+         <script>addEventListener('message', \
+         event => document.body.append(Object.assign(document.createElement('pre'), {{ id: 'selftest', textContent: \
+         event.data }})))</script>"
     );
     std::fs::write(&frame, outer).unwrap();
     let outcome = selftest(&frame);

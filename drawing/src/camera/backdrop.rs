@@ -7,9 +7,9 @@ use offtrack::map::{Gutter, Road};
 use offtrack::scenario::Scenario;
 
 use super::canvas::{Canvas, Ink};
-use crate::figure::{View, colour};
 use crate::legend::chevron_corners;
 use crate::lettering::{Align, Lettering};
+use crate::view::{View, colour};
 
 /// Margin around the ring and around the path of the truck's middle (m).
 const MARGIN: f64 = 6.0;

@@ -8,7 +8,7 @@ use offtrack::world::World;
 use super::Shown;
 use super::canvas::{Canvas, Ink};
 use crate::episode::{GAUGE, WHEEL};
-use crate::figure::{View, colour};
+use crate::view::{View, colour};
 
 /// The windscreen's edges behind the front end (m).
 const SCREEN_FRONT: f32 = 0.25;

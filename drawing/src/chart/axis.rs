@@ -5,8 +5,8 @@ use std::fmt::Write;
 use glam::DVec2;
 use svg::node::element::{Group, Path};
 
-use crate::figure::{colour, number};
 use crate::lettering::{Align, Lettering};
+use crate::view::{colour, number};
 
 /// Margin beside the outermost points of a logarithmic axis, as a factor.
 const ROOM: f64 = 1.35;

@@ -6,9 +6,10 @@ use svg::Document;
 use svg::node::element::{Circle, ClipPath, Definitions, Group, Path, Rectangle};
 
 use super::{Scene, path_legend, point, signed};
-use crate::figure::{self, Layout, View, WIDTH, colour, number};
+use crate::figure;
 use crate::legend::{self, Entry, Swatch};
 use crate::lettering::Align;
+use crate::view::{Layout, View, WIDTH, colour, number};
 use offtrack_evaluation::recording::Recording;
 
 /// The map of a film.

@@ -194,7 +194,8 @@ impl Certificate {
             if there != here {
                 let (benchmark, made_for) = (&scenario.name, &self.benchmark);
                 let message = format!(
-                    "was made for {made_for} with another {key}: {there} there, {here} in {benchmark}; make one with `offtrack certify --benchmark {benchmark} --json FILE`"
+                    "was made for {made_for} with another {key}: {there} there, {here} in {benchmark}; make one with \
+                     `offtrack certify --benchmark {benchmark} --json FILE`"
                 );
                 return Err(Error::contents(file, message));
             }

@@ -1,8 +1,8 @@
 use super::super::certificate::beam::Pass;
+use super::super::episode::tests::episode;
 use super::super::failures::Example;
 use super::super::groups::Groups;
 use super::super::possible::Possible;
-use super::super::report::tests::episode;
 use super::super::report::{Episode, MANY_ROUTES};
 use super::*;
 

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::checkpoint::{Columns, Stored};
 use crate::config;
-use crate::run::{changed, fingerprint::fingerprint};
+use crate::run::changed;
 use offtrack_evaluation::Evaluation;
 use offtrack_evaluation::device::Device;
 use offtrack_evaluation::error::Error;
@@ -75,7 +75,7 @@ pub struct Validation {
 impl Validation {
     /// Validation on the validation routes of `scenario`, which has at least one and whose world is `world`.
     pub fn new(settings: config::Validation, scenario: Arc<Scenario>, world: Arc<World>) -> Validation {
-        Validation { fingerprint: fingerprint(&world), settings, scenario, world, n_made: 0, last: None, best: None }
+        Validation { fingerprint: world.fingerprint(), settings, scenario, world, n_made: 0, last: None, best: None }
     }
 
     /// Whether it is time for the next one, with this fraction of the budget spent.

@@ -34,7 +34,7 @@ pub(super) fn name_of(autoreset: Autoreset) -> &'static str {
 }
 
 /// The engine that `device` names, and the name that it goes by.
-pub(super) fn engine_of(device: &str) -> PyResult<(Engine, String)> {
+pub fn engine_of(device: &str) -> PyResult<(Engine, String)> {
     if device == CPU {
         return Ok((Engine::Cpu, CPU.to_owned()));
     }

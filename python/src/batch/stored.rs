@@ -58,7 +58,7 @@ impl Batch {
     /// where
     /// that batch drove in another world.
     pub(super) fn take_up(&self, (fingerprint, sums): (u32, Vec<i64>), ends: Option<GivenEnds>) -> PyResult<()> {
-        if fingerprint != self.place.fingerprint() {
+        if fingerprint != self.place.world.fingerprint() {
             let name = &self.place.scenario.name;
             return Err(PyValueError::new_err(format!(
                 "scenario: {name} has changed since this state was kept, or is another one here"

@@ -178,6 +178,7 @@ def main() -> None:
 
     content: dict[str, Any] = {
         "date": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+        "commit": commit(),
         "processor": f"{processor()}, {os.cpu_count()} cores",
         "step": {"seconds": 0.1, "substeps": 2, "rays": 29},
         "speeds": "env steps a second of training: medians over the rows of the curve, updates included; native: the "
@@ -223,6 +224,13 @@ def processor() -> str:
     """Its name, as Linux gives it."""
     lines = Path("/proc/cpuinfo").read_text().splitlines()
     return next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), "unknown")
+
+
+def commit() -> str:
+    """The commit that the sources are at, with `-dirty` where they differ from it."""
+    command = ["git", "-C", str(HERE), "describe", "--always", "--dirty", "--abbrev=12"]
+    said = subprocess.run(command, capture_output=True, text=True)
+    return said.stdout.strip() if said.returncode == 0 else "unknown"
 
 
 if __name__ == "__main__":

@@ -6,8 +6,8 @@
 pub enum Error {
     /// No driver offers one.
     #[error(
-        "no adapter: {looked_for} found none; install the graphics card's driver, or a software one (Debian: mesa-vulkan-drivers), \
-         or run on the CPU"
+        "no adapter: {looked_for} found none; install the graphics card's driver, or a software one (Debian: \
+         mesa-vulkan-drivers), or run on the CPU"
     )]
     NoAdapter {
         /// The interfaces that were searched.
@@ -35,7 +35,8 @@ pub enum Error {
     },
     /// The adapter is too small for this batch.
     #[error(
-        "n_envs: {n_envs}; {buffer} would take {n_bytes} bytes where {adapter} allows {limit} in a buffer: at most {fitting} trucks fit"
+        "n_envs: {n_envs}; {buffer} would take {n_bytes} bytes where {adapter} allows {limit} in a buffer: at most \
+         {fitting} trucks fit"
     )]
     TooManyTrucks {
         /// Trucks asked for.
@@ -53,8 +54,8 @@ pub enum Error {
     },
     /// The adapter is too small for this world.
     #[error(
-        "world: the {table} of {n_roundabouts} roundabouts take {n_bytes} bytes where {adapter} allows {limit} in a buffer: about \
-         {fitting} such roundabouts fit"
+        "world: the {table} of {n_roundabouts} roundabouts take {n_bytes} bytes where {adapter} allows {limit} in a \
+         buffer: about {fitting} such roundabouts fit"
     )]
     WorldTooLarge {
         /// The table that is too large.

@@ -7,16 +7,17 @@ use glam::DVec2;
 use super::bypass::Around;
 use super::crossings::{ArmLanes, Crossing, arms, circle, crossings, joined};
 use super::lanes::Strip;
-use super::level::{GRADE, Level};
+use super::level::GRADE;
 use super::lines::{CROSSING, Lines, shown};
 use super::names::named;
 use super::paths::Network;
-use super::rings::{densified, fitted_circle};
+use super::records::Level;
+use super::rings::fitted_circle;
 use super::surroundings::{self, Part, REACH, clipped, encloses_origin, outline};
 use super::whole::TILTED;
 use super::{FINEST, Map, Ring};
 use crate::files::reader::{Error, Reader};
-use crate::geometry::area::{points, signed_area};
+use crate::geometry::area::{densified, points, signed_area};
 use crate::geometry::{Curve, Outline, Piece};
 use crate::map::ground::{Arm, Edges, Ground, Kerb};
 use crate::map::route::Lane;
@@ -127,7 +128,7 @@ impl Site<'_> {
         let Site { map, refused, network, origin, extent, circle, faces, edges } = self;
         check_arms(map, refused, lanes, circle)?;
         let mirrored = map.is_mirrored();
-        let arms = named(lanes, options, mirrored)
+        let arms = named(lanes, &options.arms, mirrored)
             .map_err(|expected| refused.error("arms", format!("{:?}", options.arms), expected))?;
         let mut routes = Lines {
             network,

@@ -1,7 +1,7 @@
 //! Lanes that pass beside a ring, from an arm's entry to its next exit: bypasses.
 //!
-//! Where such a lane crosses the circle far from its arms, it looks like an arm of its own at either end. It is made the
-//! lane next to the kerb of the arms whose roads it comes from and leads to, or left out.
+//! Where such a lane crosses the circle far from its arms, it looks like an arm of its own at either end. It is made
+//! the lane next to the kerb of the arms whose roads it comes from and leads to, or left out.
 
 use glam::DVec2;
 

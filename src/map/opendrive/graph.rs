@@ -8,9 +8,9 @@ use glam::DVec2;
 use super::cells::Cells;
 use super::lanes::Strip;
 use super::links::{Contact, contacts};
-use super::read::MOST_WARNINGS;
 use super::records::{Kind, Records};
 use super::sections::SHORTEST;
+use super::source::MOST_WARNINGS;
 
 /// A joint that jumps further is not believed (m).
 const JUMP: f64 = 0.5;

@@ -1,5 +1,5 @@
-//! Ways through the junctions of a map, chosen by road and lane, as a [`Ground`](crate::map::ground::Ground): a crossing
-//! instead of a ring.
+//! Ways through the junctions of a map, chosen by road and lane, as a [`Ground`](crate::map::ground::Ground): a
+//! crossing instead of a ring.
 
 use std::collections::HashMap;
 use std::fmt;

@@ -277,7 +277,8 @@ mod tests {
 
     fn map(plan: &str, lanes: &str, length: f64) -> Records {
         let text = format!(
-            r#"<OpenDRIVE><road id="1" length="{length}" junction="-1"><planView>{plan}</planView><lanes>{lanes}</lanes></road></OpenDRIVE>"#
+            r#"<OpenDRIVE><road id="1" length="{length}" junction="-1">
+            <planView>{plan}</planView><lanes>{lanes}</lanes></road></OpenDRIVE>"#
         );
         records(Path::new("test.xodr"), &text, Hand::Map).unwrap()
     }
@@ -285,7 +286,8 @@ mod tests {
     const LANES: &str = r#"<laneOffset s="0" a="0.5" b="0" c="0" d="0"/><laneSection s="0">
         <left><lane id="1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></left>
         <right><lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane>
-        <lane id="-2" type="shoulder"><width sOffset="0" a="0.6" b="0" c="0" d="0"/><height sOffset="0" inner="0.15" outer="0.15"/></lane>
+        <lane id="-2" type="shoulder"><width sOffset="0" a="0.6" b="0" c="0" d="0"/>
+        <height sOffset="0" inner="0.15" outer="0.15"/></lane>
         </right></laneSection>"#;
 
     #[test]
@@ -311,7 +313,8 @@ mod tests {
         let plan = r#"<geometry s="0" x="0" y="0" hdg="0" length="30"><line/></geometry>
             <geometry s="30" x="30" y="0" hdg="0" length="20"><line/></geometry>"#;
         let lanes = r#"<laneSection s="0"><right><lane id="-1" type="driving">
-            <width sOffset="0" a="3" b="0" c="0.01" d="-0.0003"/><width sOffset="17" a="3.5" b="0" c="0" d="0"/></lane></right></laneSection>"#;
+            <width sOffset="0" a="3" b="0" c="0.01" d="-0.0003"/><width sOffset="17" a="3.5" b="0" c="0" d="0"/>
+            </lane></right></laneSection>"#;
         let strips = strips(&map(plan, lanes, 50.0), 1e-3).unwrap();
         let right = &strips[0].right;
         for p in right.iter().filter(|p| p.x < 16.9) {

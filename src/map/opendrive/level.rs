@@ -2,8 +2,8 @@
 
 use roxmltree::Node;
 
-use super::read::Source;
-use super::records::{Cubic, RoadRecord, active};
+use super::records::{Cubic, Level, RoadRecord, active};
+use super::source::Source;
 use super::xml::{child, children};
 use crate::files::reader::Error;
 
@@ -15,15 +15,6 @@ const STEP: f64 = 0.05;
 const APART: f64 = 1.0;
 /// Largest factor of an elevation.
 const LARGEST: f64 = 1e9;
-
-/// The steepest that a road is.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Level {
-    /// Largest rise along the road, as a fraction of the length.
-    pub(super) grade: f64,
-    /// Largest rise across the road, by its superelevation and its shape together at most, as a fraction of the width.
-    pub(super) crossfall: f64,
-}
 
 impl Cubic {
     /// Largest absolute value between two stations.

@@ -2,14 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use super::build::Options;
 use super::crossings::ArmLanes;
 use crate::map::ground::Arm;
 
-/// The arms with their names, or what is wrong with the names that are given.
-pub(super) fn named(lanes: &[ArmLanes], options: &Options, mirrored: bool) -> Result<Vec<Arm>, String> {
+/// The arms with their names, or what is wrong with those that are given; none is given where they are to be found.
+pub(super) fn named(lanes: &[ArmLanes], given: &[String], mirrored: bool) -> Result<Vec<Arm>, String> {
     let bearings: Vec<f64> = lanes.iter().map(|arm| arm.bearing().rem_euclid(TAU)).collect();
-    let mut names = options.arms.clone();
+    let mut names = given.to_vec();
     if names.is_empty() {
         for bearing in &bearings {
             let bearing = if mirrored { -bearing } else { *bearing };

@@ -3,8 +3,8 @@
 use glam::DVec2;
 use roxmltree::Node;
 
-use super::read::Source;
 use super::records::{Island, RoadRecord};
+use super::source::Source;
 use super::xml::{attribute, child, children};
 use crate::files::reader::Error;
 

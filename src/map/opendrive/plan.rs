@@ -3,8 +3,8 @@
 use glam::DVec2;
 use roxmltree::Node;
 
-use super::read::Source;
 use super::records::{Geometry, Shape};
+use super::source::Source;
 use super::xml::{attribute, children, shown};
 use crate::files::reader::Error;
 

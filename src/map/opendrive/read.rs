@@ -7,9 +7,9 @@ use std::path::Path;
 use roxmltree::{Document, Node, ParsingOptions};
 
 use super::Hand;
-use super::level::Level;
 use super::objects::islands;
-use super::records::{Connection, Cubic, Link, Records, RoadRecord};
+use super::records::{Connection, Level, Link, Records, RoadRecord};
+use super::source::{LONGEST, Source};
 use super::xml::{attribute, child, children, line, shown};
 use crate::files::reader::{Error, Reader, shortened};
 
@@ -21,14 +21,10 @@ const MOST_ELEMENTS: usize = 4_000_000;
 const MOST_NODES: u32 = 8_000_000;
 /// Deepest nesting of elements.
 const DEEPEST: u16 = 64;
-/// Longest road (m).
-pub(super) const LONGEST: f64 = 100_000.0;
 /// A lane above this is raised (m).
 pub(super) const RAISED: f64 = 0.02;
 /// A raised lane of at most this width is a kerb (m).
 pub(super) const KERB_WIDTH: f64 = 1.0;
-/// Most warnings that are kept.
-pub(super) const MOST_WARNINGS: usize = 1000;
 
 /// The records of a file's text.
 pub(super) fn records(file: &Path, text: &str, hand: Hand) -> Result<Records, Error> {
@@ -101,90 +97,7 @@ fn check_size(document: &Document) -> Result<(), String> {
     }
 }
 
-/// A document that is being read.
-pub(super) struct Source<'a, 'i> {
-    reader: Reader<'a>,
-    document: &'a Document<'i>,
-    pub(super) records: Records,
-    /// Records of lanes that were repeated so far.
-    pub(super) repeated: usize,
-}
-
 impl Source<'_, '_> {
-    /// Where a node stands, for messages: `road 12, section s 0, lane -1, width`.
-    fn place(&self, node: Node) -> String {
-        let mut parts = Vec::new();
-        for node in node.ancestors() {
-            match node.tag_name().name() {
-                "road" => parts.push(format!("road {}", shown(attribute(node, "id")))),
-                "junction" => parts.push(format!("junction {}", shown(attribute(node, "id")))),
-                "laneSection" => parts.push(format!("section s {}", shown(attribute(node, "s")))),
-                "lane" => parts.push(format!("lane {}", shown(attribute(node, "id")))),
-                "geometry" => parts.push(format!("geometry s {}", shown(attribute(node, "s")))),
-                "planView" | "lanes" | "left" | "right" | "center" | "OpenDRIVE" | "" => {}
-                other => parts.push(shown(other)),
-            }
-        }
-        parts.reverse();
-        parts.join(", ")
-    }
-
-    pub(super) fn warn(&mut self, node: Node, what: &str) {
-        if self.records.warnings.len() < MOST_WARNINGS {
-            self.records.warnings.push(format!("{}: {what}", self.place(node)));
-        }
-    }
-
-    pub(super) fn invalid(&self, node: Node, key: &str, value: &str, expected: impl Into<String>) -> Error {
-        let key = format!("line {}: {}: {key}", line(self.document, node), self.place(node));
-        self.reader.invalid(key, value, expected)
-    }
-
-    /// A number within `-limit..limit`, or `default` where the attribute is missing.
-    pub(super) fn number(&self, node: Node, key: &str, default: Option<f64>, limit: f64) -> Result<f64, Error> {
-        let Some(text) = node.attribute(key) else {
-            return default.ok_or_else(|| {
-                self.invalid(node, key, "missing", format!("a number within {limit:e} of 0 is needed"))
-            });
-        };
-        match text.trim().parse::<f64>() {
-            Ok(value) if value.abs() <= limit => Ok(value),
-            _ => Err(self.invalid(node, key, &format!("{text:?}"), format!("must be a number within {limit:e} of 0"))),
-        }
-    }
-
-    /// A station or a length.
-    pub(super) fn length(&self, node: Node, key: &str) -> Result<f64, Error> {
-        let value = self.number(node, key, None, LONGEST)?;
-        if value < -1e-6 {
-            return Err(self.invalid(node, key, attribute(node, key), "must not be negative"));
-        }
-        Ok(value.max(0.0))
-    }
-
-    pub(super) fn factors(&self, node: Node, keys: [&str; 4]) -> Result<[f64; 4], Error> {
-        let mut factors = [0.0; 4];
-        for (factor, key) in factors.iter_mut().zip(keys) {
-            *factor = self.number(node, key, Some(0.0), 1e30)?;
-        }
-        Ok(factors)
-    }
-
-    fn cubic(&self, node: Node, start: &str) -> Result<Cubic, Error> {
-        Ok(Cubic { start: self.length(node, start)?, factors: self.factors(node, ["a", "b", "c", "d"])? })
-    }
-
-    /// Cubics in the order of their beginnings.
-    pub(super) fn cubics<'a, 'i: 'a>(
-        &mut self,
-        nodes: impl Iterator<Item = Node<'a, 'i>>,
-        start: &str,
-    ) -> Result<Vec<Cubic>, Error> {
-        let mut cubics = nodes.map(|node| self.cubic(node, start)).collect::<Result<Vec<_>, _>>()?;
-        cubics.sort_by(|one, other| one.start.total_cmp(&other.start));
-        Ok(cubics)
-    }
-
     fn road(&mut self, node: Node) -> Result<RoadRecord, Error> {
         let id = attribute(node, "id").to_owned();
         let mut length = self.length(node, "length")?;

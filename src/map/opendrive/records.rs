@@ -6,8 +6,6 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec2;
 
-use super::level::Level;
-
 /// A polynomial `a + b x + c x² + d x³` that holds from `start` on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Cubic {
@@ -24,6 +22,15 @@ impl Cubic {
         let x = s - self.start;
         a + x * (b + x * (c + x * d))
     }
+}
+
+/// The steepest that a road is.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Level {
+    /// Largest rise along the road, as a fraction of the length.
+    pub(super) grade: f64,
+    /// Largest rise across the road, by its superelevation and its shape together at most, as a fraction of the width.
+    pub(super) crossfall: f64,
 }
 
 /// The record that holds at `s` of those sorted by `start`: the last that begins at or before it, or the first.

@@ -11,7 +11,7 @@ use super::graph::Graph;
 use super::lanes::Strip;
 use super::records::Kind;
 use super::surface::{GAP, of};
-use crate::geometry::area::{Area, points};
+use crate::geometry::area::{Area, densified, points};
 
 /// Smallest and largest radius of an island (m).
 const RADII: [f64; 2] = [1.5, 200.0];
@@ -68,18 +68,6 @@ pub(super) fn fitted_circle(points: &[DVec2]) -> Option<(DVec2, f64, f64)> {
     let centre = mean + offset;
     let residual = points.iter().map(|p| (p.distance(centre) - radius).abs()).fold(0.0, f64::max);
     residual.is_finite().then_some((centre, radius, residual))
-}
-
-/// A closed contour with points at most `step` apart (m).
-pub(super) fn densified(contour: &[DVec2], step: f64) -> Vec<DVec2> {
-    let n = contour.len();
-    let mut dense = Vec::new();
-    for (i, &from) in contour.iter().enumerate() {
-        let to = contour[(i + 1) % n];
-        let parts = (from.distance(to) / step).ceil().clamp(1.0, 1e5);
-        dense.extend((0..parts as usize).map(|part| from.lerp(to, part as f64 / parts)));
-    }
-    dense
 }
 
 /// The roundabouts of a map, largest first, and the holes that were looked at and refused.

@@ -5,8 +5,8 @@
 
 use roxmltree::Node;
 
-use super::read::Source;
 use super::records::{Cubic, Height, Kind, Lane, Section};
+use super::source::Source;
 use super::xml::{attribute, child, children};
 use crate::files::reader::Error;
 

@@ -9,9 +9,8 @@ use glam::DVec2;
 use super::cells::Cells;
 use super::lanes::Strip;
 use super::records::Kind;
-use super::rings::densified;
 use crate::geometry::Piece;
-use crate::geometry::area::{Area, counter_clockwise, points};
+use crate::geometry::area::{Area, counter_clockwise, densified, points};
 
 /// Gaps between strips that are closed first (m).
 pub(super) const GAP: f64 = 0.02;

@@ -3,8 +3,8 @@
 
 use std::collections::HashSet;
 
-use super::read::MOST_WARNINGS;
 use super::records::{Connection, Link, Records};
+use super::source::MOST_WARNINGS;
 use super::xml::shown;
 use crate::files::reader::{Error, Reader};
 
@@ -96,7 +96,8 @@ impl Records {
         ));
     }
 
-    /// A direct junction joins two roads without a road of its own: what it says of one of them holds for the other too.
+    /// A direct junction joins two roads without a road of its own: what it says of one of them holds for the other
+    /// too.
     fn turn_direct_connections(&mut self) {
         for (id, connections) in &mut self.junctions {
             let mut turned = Vec::new();

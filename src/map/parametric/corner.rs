@@ -32,7 +32,8 @@ impl WrittenCorner {
     /// Whether the right lane follows the ring although the kerb does not.
     pub(super) fn lane_on_ring(&self, reader: &Reader, key: &str) -> Result<bool, Error> {
         if self.lane.is_some() && (self.kerb_radius.is_none() || self.lane_radius.is_some()) {
-            let expected = "is for a corner with kerb_radius and without lane_radius: leave it out, the lane follows the ring or that radius";
+            let expected = "is for a corner with kerb_radius and without lane_radius: leave it out, the lane follows \
+                            the ring or that radius";
             return Err(reader.invalid(key, "\"ring\"", expected));
         }
         Ok(self.lane.is_some())

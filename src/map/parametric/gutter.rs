@@ -6,10 +6,9 @@
 use std::f64::consts::TAU;
 
 use glam::DVec2;
-use serde::{Deserialize, Serialize};
 
 use super::ring::Ring;
-use super::roundabout_keys::Written;
+use super::roundabout_keys::{Written, WrittenDirection};
 use crate::files::reader::{Error, Reader, shown};
 use crate::geometry::area::{Area, counter_clockwise, points, signed_area};
 use crate::geometry::{Curve, Outline, Piece, fitted_outline, wrapped};
@@ -26,22 +25,6 @@ const SPACING: f64 = 0.5;
 const NEAREST: f64 = 0.01;
 /// Most points of a gutter.
 const MOST_POINTS: usize = 64;
-
-/// The width of a kerb's gutter at a station of the kerb.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct WrittenStation {
-    pub(crate) station: f64,
-    pub(crate) width: f64,
-}
-
-/// The width of a gutter of the ring in a direction from its centre.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct WrittenDirection {
-    pub(crate) bearing_deg: f64,
-    pub(crate) width: f64,
-}
 
 /// A width that changes linearly from point to point.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,10 +6,10 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 
 use super::alignment::{Way, around, ring_arc};
-use super::check;
+use super::faults;
 use super::ring::Ring;
 use super::roundabout_keys::Arm;
-use crate::files::reader::{Error, Reader};
+use crate::files::reader::{Error, Reader, differing, shown};
 use crate::geometry::{Curve, Outline, Piece, rounded, wrapped};
 use crate::map::ground::Kerb;
 
@@ -23,7 +23,7 @@ pub(super) fn order(arms: &[Arm]) -> impl Iterator<Item = Kerb> {
 /// The kerb faces as an outline, and the kerbs from each arm to the next. Fails if they cross each other.
 pub(super) fn kerbs(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<(Outline, Vec<Curve>), Error> {
     let corners: Vec<Curve> = (0..arms.len()).map(|arm| corner(reader, ring, arms, arm)).collect::<Result<_, _>>()?;
-    check::corners_apart(reader, arms, &corners)?;
+    corners_apart(reader, arms, &corners)?;
     let mut boundary = Curve::default();
     for (index, corner) in corners.iter().enumerate() {
         let next = &corners[(index + 1) % corners.len()];
@@ -34,7 +34,7 @@ pub(super) fn kerbs(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<(Outli
     let mut loops = vec![boundary, Curve::circle(DVec2::ZERO, ring.island_radius)];
     for (index, arm) in arms.iter().enumerate().filter(|(_, arm)| !arm.splitter.is_empty()) {
         let island = rounded(&arm.splitter, true).map_err(|misfit| {
-            check::too_large(
+            faults::too_large(
                 reader,
                 &format!("arm[{index}].splitter[{}].radius", misfit.bend),
                 arm.splitter[misfit.bend].radius,
@@ -42,7 +42,7 @@ pub(super) fn kerbs(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<(Outli
             )
         })?;
         let island = island.turned(arm.bearing);
-        check::splitter(reader, ring, index, &island, &loops)?;
+        splitter_apart(reader, ring, index, &island, &loops)?;
         loops.push(island);
     }
     Ok((Outline::new(loops), corners))
@@ -54,18 +54,18 @@ pub(super) fn corner(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -
     let (arm, next) = (&arms[index], &arms[next_index]);
     let (entry, exit) = (&arm.entry.kerb, &next.exit.kerb);
     if let Some(radius) = arm.kerb_corner {
-        let fault = |fault| check::fault(reader, arms, index, Some("corner.kerb_radius"), "kerb", Way::Entry, fault);
+        let fault = |fault| faults::fault(reader, arms, index, Some("corner.kerb_radius"), "kerb", Way::Entry, fault);
         return around((entry, arm.bearing), (exit, next.bearing), radius).map_err(fault);
     }
     let circle = ring.outer();
     let (inward, arrival) =
-        entry.lead(circle).map_err(|fault| check::fault(reader, arms, index, None, "kerb", Way::Entry, fault))?;
+        entry.lead(circle).map_err(|fault| faults::fault(reader, arms, index, None, "kerb", Way::Entry, fault))?;
     let (outward, leaving) =
-        exit.lead(circle).map_err(|fault| check::fault(reader, arms, next_index, None, "kerb", Way::Exit, fault))?;
+        exit.lead(circle).map_err(|fault| faults::fault(reader, arms, next_index, None, "kerb", Way::Exit, fault))?;
     let between = (next.bearing - arm.bearing).rem_euclid(TAU);
     let sweep = between - leaving - arrival;
     if !(0.0..=TAU).contains(&sweep) {
-        return Err(check::no_room(reader, arms, index, sweep * circle));
+        return Err(faults::no_room(reader, arms, index, sweep * circle));
     }
     let mut curve = Way::Entry.placed(&inward, arm.bearing);
     if 1e-9 < sweep {
@@ -73,4 +73,80 @@ pub(super) fn corner(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -
     }
     curve.pieces.extend(Way::Exit.placed(&outward, next.bearing).reversed().pieces);
     Ok(curve)
+}
+
+/// No corner's kerb crosses itself or another corner's.
+fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) -> Result<(), Error> {
+    let n = corners.len();
+    for first in 0..n {
+        for second in first..n {
+            if cross(&corners[first], (first != second).then_some(&corners[second])) {
+                // Corner i lies between arms i and i + 1: neighbouring corners have the arm between them in common.
+                let (a, b) = if first == second { (first, (first + 1) % n) } else { (first, second) };
+                return Err(reader.invalid(
+                    format!("arm[{b}]"),
+                    format!("{:?}", arms[b].name),
+                    format!("arms {} and {} overlap: their kerbs cross", arms[a].name, arms[b].name),
+                ));
+            }
+        }
+    }
+    // The solid edges that end the arms must not cut into another arm.
+    for (index, arm) in arms.iter().enumerate() {
+        let (left, right) = (corners[index].point_at(0.0), corners[(index + n - 1) % n].point_at(f64::INFINITY));
+        let end = Piece::Segment { from: right, to: left };
+        let along = DVec2::from_angle(arm.bearing).perp();
+        if (left - right).dot(along) <= 0.0 {
+            return Err(reader.invalid(
+                format!("arm[{index}].entry.kerb"),
+                format!("{:?}", arm.name),
+                "the entry's kerb must lie left of the exit's, seen from the ring",
+            ));
+        }
+        let meets = |corner: &Curve| corner.pieces.iter().filter(|piece| !piece.meetings(&end).is_empty()).count();
+        if let Some(other) =
+            (0..n).find(|&corner| usize::from(corner == index || (corner + 1) % n == index) < meets(&corners[corner]))
+        {
+            let message = format!("arms {} and {} overlap: shorten one or move them apart", arm.name, arms[other].name);
+            return Err(reader.invalid(format!("arm[{index}].length"), format_args!("{} m", arm.length), message));
+        }
+    }
+    Ok(())
+}
+
+/// Whether two curves cross or, without a second, whether the first crosses itself other than at its joints.
+fn cross(curve: &Curve, other: Option<&Curve>) -> bool {
+    let joint = |index: usize, p: DVec2| p.distance(curve.pieces[index].end()) < 1e-6;
+    (0..curve.pieces.len()).any(|index| {
+        let piece = &curve.pieces[index];
+        match other {
+            Some(other) => other.pieces.iter().any(|there| !piece.meetings(there).is_empty()),
+            None => {
+                let after = curve.pieces.iter().enumerate().skip(index + 1);
+                after.into_iter().any(|(next, there)| {
+                    piece.meetings(there).into_iter().any(|p| index + 1 != next || !joint(index, p))
+                })
+            }
+        }
+    })
+}
+
+/// A splitter island lies outside the ring and does not meet the earlier loops.
+fn splitter_apart(reader: &Reader, ring: &Ring, arm: usize, island: &Curve, loops: &[Curve]) -> Result<(), Error> {
+    let key = format!("arm[{arm}].splitter");
+    let refused = |value: String, expected: &str| Err(reader.invalid(&key, value, expected));
+    if cross(island, None) {
+        return refused("crosses itself".into(), "corners must go around the island once");
+    }
+    let (nearest, edge) = (island.distance(DVec2::ZERO), ring.outer() - ring.gutter);
+    if nearest < edge {
+        let value = format!("{} m from the ring's centre", differing(nearest, edge));
+        return refused(value, &format!("must stay out of the ring: {} m", shown(edge)));
+    }
+    if loops.iter().any(|other| cross(island, Some(other)))
+        || !Outline::new(loops.to_vec()).contains(island.point_at(0.0))
+    {
+        return refused("meets a kerb".into(), "must lie on the road, away from the kerbs and other islands");
+    }
+    Ok(())
 }

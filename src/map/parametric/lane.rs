@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 use glam::DVec2;
 
 use super::alignment::{Way, around, ring_arc};
-use super::check;
+use super::faults;
 use super::kerb::corner;
 use super::ring::Ring;
 use super::roundabout_keys::Arm;
@@ -85,8 +85,8 @@ impl Lanes {
             let (arm, carriageway) = (&arms[index], arms[index].way(way));
             let circle = ring.lane_radius(lane.index());
             let fault = |fault| match carriageway.lanes.len() <= lane.index() {
-                true => check::no_merge(reader, arms, index, circle),
-                false => check::fault(reader, arms, index, None, lane.name(), way, fault),
+                true => faults::no_merge(reader, arms, index, circle),
+                false => faults::fault(reader, arms, index, None, lane.name(), way, fault),
             };
             let (curve, arrival) = carriageway.lane(lane).lead(circle).map_err(fault)?;
             let curve = way.placed(&curve, arm.bearing);
@@ -128,7 +128,7 @@ impl Lanes {
                 let sweep = between + outward.angle - inward.angle;
                 let radius = ring.lane_radius(lane.index());
                 if !(0.0..=TAU).contains(&sweep) {
-                    return Err(check::backwards(reader, arms, entry, lane, exit, sweep * radius));
+                    return Err(faults::backwards(reader, arms, entry, lane, exit, sweep * radius));
                 }
                 let mut line = inward.curve.clone();
                 if 1e-9 < sweep {
@@ -179,7 +179,7 @@ fn first_exit(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -> Resul
     if let Some(radius) = arm.lane_corner {
         let (entry, exit) = (arm.entry.lane(Lane::Right), next.exit.lane(Lane::Right));
         let fault = |fault| {
-            check::fault(reader, arms, index, Some("corner.lane_radius"), Lane::Right.name(), Way::Entry, fault)
+            faults::fault(reader, arms, index, Some("corner.lane_radius"), Lane::Right.name(), Way::Entry, fault)
         };
         return around((entry, arm.bearing), (exit, next.bearing), radius).map(Some).map_err(fault);
     }
@@ -187,7 +187,7 @@ fn first_exit(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -> Resul
         return Ok(None);
     }
     if arm.lane_width != next.lane_width {
-        return Err(check::widths_differ(reader, arms, index));
+        return Err(faults::widths_differ(reader, arms, index));
     }
     let kerb = corner(reader, ring, arms, index)?;
     let smooth = kerb
@@ -198,6 +198,6 @@ fn first_exit(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -> Resul
         kerb.pieces.iter().map(|piece| piece.beside(ring.gutter + arm.lane_width / 2.0)).collect();
     match pieces.filter(|_| smooth) {
         Some(pieces) => Ok(Some(Curve { pieces })),
-        None => Err(check::no_way_beside(reader, arms, index)),
+        None => Err(faults::no_way_beside(reader, arms, index)),
     }
 }

@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 
 use super::alignment::{Alignment, Way};
 use super::corner::WrittenCorner;
-use super::gutter::{WrittenDirection, WrittenStation};
 use super::ring::Ring;
 use crate::files::reader::{Error, Reader, shown};
 use crate::geometry::Bend;
@@ -89,6 +88,22 @@ pub(crate) struct WrittenPoint {
     pub(crate) offset: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) radius: Option<f64>,
+}
+
+/// The width of a kerb's gutter at a station of the kerb.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct WrittenStation {
+    pub(crate) station: f64,
+    pub(crate) width: f64,
+}
+
+/// The width of a gutter of the ring in a direction from its centre.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct WrittenDirection {
+    pub(crate) bearing_deg: f64,
+    pub(crate) width: f64,
 }
 
 /// The alignments of a carriageway.

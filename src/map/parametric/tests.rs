@@ -210,8 +210,8 @@ fn with_kerbs_at(offset: f64) -> String {
 fn kerbs_too_near_to_each_other_for_four_lanes_are_refused() {
     // At 4.5 m the left lanes lie 1.55 m beyond the middle of the arm, each on the other's carriageway.
     let message = read(&with_kerbs_at(4.5)).unwrap_err().to_string();
-    let expected = "plain: arm[0].entry.left: -1.55 m left of the bearing at the arm's end; must lie at least 2.5 m left of exit.left, \
-                    which is at 1.55 m";
+    let expected = "plain: arm[0].entry.left: -1.55 m left of the bearing at the arm's end; must lie at least 2.5 m \
+                    left of exit.left, which is at 1.55 m";
     assert!(message.contains(expected), "{message}");
     // The left lanes' centre lines are twice (offset - gutter - 1.5 lanes) apart.
     assert!(read(&with_kerbs_at(7.29)).unwrap_err().to_string().contains("arm[0].entry.left"));
@@ -267,10 +267,14 @@ proptest! {
         let mut lines: Vec<String> = plain().lines().map(str::to_owned).collect();
         for (number, at) in numbers.iter().zip(at) {
             let line = &mut lines[at];
-            if let Some((key, _)) = line.clone().split_once(" = ").filter(|(key, _)| *key != "name" && *key != "points") {
+            let is_number = |(key, _): &(&str, &str)| *key != "name" && *key != "points";
+            if let Some((key, _)) = line.clone().split_once(" = ").filter(is_number) {
                 *line = format!("{key} = {number:?}").replace("NaN", "nan");
             } else if line.starts_with("points") {
-                *line = format!("points = [{{ along = 60.0, offset = {number:?}, radius = {:?} }}, {{ along = 20.0, offset = {:?} }}]", numbers[0], numbers[1]).replace("NaN", "nan");
+                let (radius, offset) = (numbers[0], numbers[1]);
+                let first = format!("{{ along = 60.0, offset = {number:?}, radius = {radius:?} }}");
+                let last = format!("{{ along = 20.0, offset = {offset:?} }}");
+                *line = format!("points = [{first}, {last}]").replace("NaN", "nan");
             }
         }
         if let Ok(roundabout) = read(&lines.join("\n")) {

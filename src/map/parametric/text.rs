@@ -5,8 +5,9 @@ use std::fmt::{self, Display, Formatter, Write};
 use crate::map::ground::Hand;
 
 use super::corner::{CornerLane, WrittenCorner};
-use super::gutter::{WrittenDirection, WrittenStation};
-use super::roundabout_keys::{Written, WrittenAlignment, WrittenArm, WrittenPoint, WrittenRing, WrittenWay};
+use super::roundabout_keys::{
+    Written, WrittenAlignment, WrittenArm, WrittenDirection, WrittenPoint, WrittenRing, WrittenStation, WrittenWay,
+};
 
 /// TOML. Numbers are written so that reading them gives the same bits.
 impl Display for Written {

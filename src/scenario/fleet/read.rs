@@ -7,7 +7,7 @@ use crate::files::reader::{Error, Reader};
 use crate::files::shipped::{Kind, Source};
 use crate::scenario::benchmark_keys::{Written, WrittenDraw, WrittenMember, WrittenVehicles};
 use crate::scenario::check::check_vehicle;
-use crate::scenario::read::referred;
+use crate::scenario::referred::referred;
 use crate::vehicle::{Vehicle, read_model};
 
 /// Maximum number of rows of a table of vehicles: they take about 45 MB with a chassis each.

@@ -174,7 +174,8 @@ fn an_s_bend_is_that_of_a_dynamic_single_track_with_equal_steering() {
                 let (trailer, [found, expected], [ratio, reference]) = bend(&vehicle, load, speed);
                 let case = format!("{name} {load} {speed} km/h");
                 println!(
-                    "{case}: {trailer:.3} m, off-tracking {found:.3} of {expected:.3} m, ratio {ratio:.3} of {reference:.3}"
+                    "{case}: {trailer:.3} m, off-tracking {found:.3} of {expected:.3} m, ratio {ratio:.3} of \
+                     {reference:.3}"
                 );
                 let bound = if speed <= 30.0 { 0.05 } else { 0.10 };
                 assert!((found - expected).abs() <= bound, "{case}: off-tracking {found} m, reference {expected} m");

@@ -80,8 +80,11 @@ proptest! {
     }
 
     #[test]
-    fn a_mirrored_truck_drives_the_mirrored_path(rig in rigs(), truck in trucks(-2.0..12.0, 1.5), controls in controls(0.8, 3.0, 60)) {
-        let opposite: Vec<Control> = controls.iter().map(|control| Control { steering: -control.steering, ..*control }).collect();
+    fn a_mirrored_truck_drives_the_mirrored_path(
+        rig in rigs(), truck in trucks(-2.0..12.0, 1.5), controls in controls(0.8, 3.0, 60),
+    ) {
+        let opposite = |control: &Control| Control { steering: -control.steering, ..*control };
+        let opposite: Vec<Control> = controls.iter().map(opposite).collect();
         let here = driven_through(&rig, truck, &controls);
         let there = driven_through(&rig, mirrored(&truck), &opposite);
         let (position, heading) = apart(&mirrored(&here), &there);

@@ -123,7 +123,8 @@ fn validation(reader: &Reader, config: &Config, own: &Scenario, training: &Scena
     }
     if let Some(difference) = alike::difference(training, &scenario) {
         return wrong(format!(
-            "it differs from {}, which is trained on, in {difference}: with --set validation.benchmark= validation is as {} says",
+            "it differs from {}, which is trained on, in {difference}: with --set validation.benchmark= validation is \
+             as {} says",
             training.name, own.name
         ));
     }

@@ -16,7 +16,8 @@ impl Sac {
         let combined = |values| self.learning.critics.combined(values);
 
         // TD target: the soft value of the next observation is an expectation over the policy's actions.
-        let (next_probs, next_log_probs) = distribution(actor.valid().forward(shard.next_observation.clone())); // [B, A] each
+        let logits = actor.valid().forward(shard.next_observation.clone()); // [B, A]
+        let (next_probs, next_log_probs) = distribution(logits); // [B, A] each
         let next_q = combined(self.target_critics.forward(shard.next_observation)); // [B, A]
         let next_value = (next_probs.clone() * next_q).sum_dim(1); // [B, 1]
         let next_value = match self.learning.entropy.in_target {

@@ -9,8 +9,8 @@ fn with(ring: &str, arm: &str) -> String {
         .replace("length = 100.0\n", &format!("length = 100.0\n{arm}"))
 }
 
-const SPLITTER: &str = "splitter = [{ along = 30.0, offset = 0.8, radius = 0.3 }, { along = 45.0, offset = 0.0, radius = 0.2 }, \
-                        { along = 30.0, offset = -0.8, radius = 0.3 }]\n";
+const SPLITTER: &str = "splitter = [{ along = 30.0, offset = 0.8, radius = 0.3 }, { along = 45.0, offset = 0.0, \
+                        radius = 0.2 }, { along = 30.0, offset = -0.8, radius = 0.3 }]\n";
 
 #[test]
 fn a_gutter_that_is_written_for_every_kerb_is_the_one_gutter() {

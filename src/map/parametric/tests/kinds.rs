@@ -103,10 +103,12 @@ fn left_lanes_lead_into_an_exit_of_one_lane_or_are_refused_by_name() {
     );
     // The exit's straight misses the inner ring lane, and its wide arc into the outer one is too narrow for a left
     // turn.
-    let flared = "points = [{ along = 60.0, offset = -8.5, radius = 30.0 }, { along = 0.0, offset = -22.0 }]\nring_radius = 15.0";
+    let flared = "points = [{ along = 60.0, offset = -8.5, radius = 30.0 }, { along = 0.0, offset = -22.0 }]\n\
+                  ring_radius = 15.0";
     let plain_exit = "points = [{ along = 30.0, offset = -8.5 }]\nring_radius = 15.0";
     let message = refusal_of(&one_exit.replacen(plain_exit, flared, 1).replace("270.0", "260.0"));
-    let expected = "plain: arm[0].exit.right.ring_radius: 17.35 m; left lanes lead here by the ring lane of 17.35 m, and no such arc";
+    let expected = "plain: arm[0].exit.right.ring_radius: 17.35 m; left lanes lead here by the ring lane of 17.35 m, \
+                    and no such arc";
     assert!(message.starts_with(expected), "{message}");
     // Nobody takes that way where all entries have one lane.
     let one_lane = with_lanes("", "lanes = 1", "lanes = 1").replacen(plain_exit, flared, 1).replace("270.0", "260.0");
@@ -126,7 +128,9 @@ fn a_file_with_every_kind_of_lane_is_written_as_it_was_read() {
 
 proptest! {
     #[test]
-    fn two_ring_lanes_lie_where_they_always_lay_to_the_last_bit(island in 1.5..200.0, gutter in 0.0..3.0, width in 2.5..8.0) {
+    fn two_ring_lanes_lie_where_they_always_lay_to_the_last_bit(
+        island in 1.5..200.0, gutter in 0.0..3.0, width in 2.5..8.0,
+    ) {
         let ring = Ring { island_radius: island, gutter, lane_width: width, lanes: 2 };
         let (inner, half) = (island + gutter + width / 2.0, width / 2.0);
         prop_assert_eq!(ring.outer().to_bits(), (island + 2.0 * (gutter + width)).to_bits());
@@ -146,7 +150,8 @@ proptest! {
         offset in 4.0f64..12.0, aim in -10.0..25.0, ring_radius in 3.0..60.0,
     ) {
         let kerb = |side: f64| format!(
-            "points = [{{ along = 90.0, offset = {:?}, radius = 30.0 }}, {{ along = 0.0, offset = {:?} }}]", side * offset, side * aim,
+            "points = [{{ along = 90.0, offset = {:?}, radius = 30.0 }}, {{ along = 0.0, offset = {:?} }}]",
+            side * offset, side * aim,
         );
         let [ring, entry, exit] = [lanes.0, lanes.1, lanes.2].map(|lanes| format!("lanes = {lanes}"));
         let text = with_lanes(&ring, &entry, &exit)

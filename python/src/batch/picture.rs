@@ -1,0 +1,41 @@
+//! A truck of a batch as it is now, from above.
+
+use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use offtrack::layout::{Column, Ended, N_RAYS, Truck};
+use offtrack_drawing::camera::{Camera, Shown};
+use pyo3::exceptions::{PyIndexError, PyValueError};
+use pyo3::prelude::*;
+
+use super::Batch;
+use super::state::State;
+use crate::errors;
+use crate::observed::rows_of;
+
+impl Batch {
+    /// RGB pixels, `[size, size, 3]`.
+    pub(super) fn drawn<'py>(&self, py: Python<'py>, env: usize, size: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        if self.n_envs <= env {
+            return Err(PyIndexError::new_err(format!("env: {env}; the batch has trucks 0..{}", self.n_envs)));
+        }
+        let mut state = self.state()?;
+        state.check_process(&self.device)?;
+        let State { simulator, camera, .. } = &mut *state;
+        let camera = match camera.take_if(|camera| camera.side() == size) {
+            Some(kept) => camera.insert(kept),
+            None => {
+                let made = Camera::new(self.place.scenario.clone(), &self.place.world, size);
+                camera.insert(made.map_err(|error| PyValueError::new_err(format!("size: {error}")))?)
+            }
+        };
+        let read = simulator
+            .read(&[Column::Truck, Column::Ranges, Column::Ended])
+            .map_err(|error| errors::of_simulator(&error))?;
+        let truck = rows_of::<Truck>(&read[0])[env];
+        let ranges = rows_of::<[f32; N_RAYS]>(&read[1])[env];
+        // A truck that goes on in another episode has not ended.
+        let code = if truck.held == 1 { rows_of::<u32>(&read[2])[env] } else { Ended::Running as u32 };
+        let shown = Shown { truck: &truck, ranges: &ranges, ended: Ended::from_code(code).unwrap_or(Ended::Running) };
+        let picture = camera.draw(&shown);
+        PyArray1::from_slice(py, picture).reshape([size as usize, size as usize, 3])
+    }
+}

@@ -1,0 +1,93 @@
+//! A number for all that trucks drive by: a run, and a copy of a batch, go on in the world that they began in.
+
+use bytemuck::{bytes_of, cast_slice};
+
+use super::World;
+use crate::field::Field;
+use crate::scenario::Class;
+
+impl World {
+    /// CRC-32 of every table. One that is added to the world has to be named here.
+    pub fn fingerprint(&self) -> u32 {
+        let World {
+            params,
+            rigs,
+            classes,
+            rays,
+            actions,
+            fields,
+            waypoints,
+            previews,
+            routes,
+            route_names,
+            step_limits,
+        } = self;
+        let mut hasher = crc32fast::Hasher::new();
+        let tables: [&[u8]; 8] = [
+            bytes_of(params),
+            cast_slice(actions),
+            cast_slice(rigs),
+            cast_slice(rays),
+            cast_slice(waypoints),
+            cast_slice(previews),
+            cast_slice(routes),
+            cast_slice(step_limits),
+        ];
+        tables.into_iter().for_each(|table| hasher.update(table));
+        for Field { origin, cells_per_metre, columns, rows, cells, values } in fields {
+            hasher.update(bytes_of(origin));
+            hasher.update(bytes_of(cells_per_metre));
+            hasher.update(bytes_of(&[*columns, *rows]));
+            hasher.update(cast_slice(cells));
+            hasher.update(cast_slice(values));
+        }
+        let classes = classes.iter().flat_map(|Class { vehicle, load }| [vehicle, load]);
+        for name in classes.chain(route_names) {
+            hasher.update(name.as_bytes());
+            // Names end, so that two lists of other names are not the same text.
+            hasher.update(&[0]);
+        }
+        hasher.finalize()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::Scenario;
+
+    use super::*;
+
+    /// A table, and a change of it.
+    type Change = (&'static str, fn(&mut World));
+
+    #[test]
+    fn a_change_of_any_table_of_a_world_is_another_fingerprint() {
+        let world = World::bake(&Scenario::named("attard2023").unwrap()).unwrap();
+        let before = world.fingerprint();
+        let changes: [Change; 17] = [
+            ("params", |world| world.params.reward.failure -= 1.0),
+            ("rigs", |world| world.rigs[0].slip += 1e-6),
+            ("classes, vehicle", |world| world.classes[0].vehicle += "x"),
+            ("classes, load", |world| world.classes[0].load += "x"),
+            ("rays", |world| world.rays[0][28].origin.x += 0.01),
+            ("actions", |world| world.actions[8].steering += 0.001),
+            ("fields, origin", |world| world.fields[4].origin.y += 0.5),
+            ("fields, cells_per_metre", |world| world.fields[4].cells_per_metre = 2.0),
+            ("fields, columns", |world| world.fields[4].columns += 4),
+            ("fields, rows", |world| world.fields[4].rows += 2),
+            ("fields, cells", |world| world.fields[4].cells[7][1] ^= 1),
+            ("fields, values", |world| world.fields[4].values[7] ^= 1),
+            ("waypoints", |world| world.waypoints[99].position.x += 0.01),
+            ("previews", |world| world.previews[99].heading += 0.01),
+            ("routes", |world| world.routes[3].n_waypoints -= 1),
+            ("route_names", |world| world.route_names[3] += "x"),
+            ("step_limits", |world| world.step_limits[3] += 1),
+        ];
+        for (table, change) in changes {
+            let mut other = world.clone();
+            change(&mut other);
+            assert_ne!(other.fingerprint(), before, "{table}");
+        }
+        assert_eq!(world.clone().fingerprint(), before);
+    }
+}
