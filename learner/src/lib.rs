@@ -21,6 +21,7 @@ pub mod memory; // what a run takes of it, before it begins
 pub mod backend; // the choice of processor or device
 pub mod config; // a training file
 pub mod run; // a training run in its folder
+pub mod train; // from a configuration to a report
 pub mod checkpoint; // all state in a file
 pub mod columns; // networks and optimizers there
 pub mod generator; // random numbers with a state

@@ -4,7 +4,6 @@
 //! checkpoint every few minutes. A stopped run leaves a policy that can be evaluated, and all that it takes to
 //! continue.
 
-mod alike;
 mod also;
 mod args;
 mod beginning;

@@ -13,8 +13,8 @@ use offtrack_learner::config::{AlsoEvaluate, Config};
 use offtrack_policy::Policy;
 use serde::Serialize;
 
-use super::alike;
 use crate::commands::{progress, roads};
+use offtrack_learner::train::alike;
 
 /// A further evaluation, ready to be made.
 pub struct Also {

@@ -11,9 +11,9 @@ use offtrack_evaluation::error::Error;
 use offtrack_learner::config::Config;
 use offtrack_learner::run::validation::Validation;
 
-use super::alike;
 use super::also::Also;
 use crate::commands::roads;
+use offtrack_learner::train::alike;
 
 /// Where a benchmark has no training or no validation routes of its own, it is driven on the roads of this one.
 const ROADS: &str = "random2026";

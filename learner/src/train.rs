@@ -1,0 +1,3 @@
+//! Training from a configuration to a report.
+
+pub mod alike;
