@@ -5,6 +5,7 @@
 //! processor and
 //! device.
 
+pub mod error; // what can go wrong
 pub mod session; // the loop: act, learn
 pub mod sac; // soft actor-critic
 pub mod ppo; // proximal policy optimisation, which refines its policy
@@ -19,6 +20,7 @@ pub mod exploration; // random actions among the policy's
 pub mod level_replay; // routes that fail are drawn more often
 pub mod memory; // what a run takes of it, before it begins
 pub mod backend; // the choice of processor or device
+pub mod panics; // of the tensor library, where a device fails
 pub mod config; // a training file
 pub mod run; // a training run in its folder
 pub mod train; // from a configuration to a report

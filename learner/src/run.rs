@@ -22,13 +22,12 @@ use offtrack_policy::Policy;
 use crate::backend::Backend;
 use crate::checkpoint::{Columns, Stored};
 use crate::config::Config;
+use crate::error::Error;
 use crate::sac::not_finite;
 use crate::session::Session;
 use checkpointer::{Checkpointer, Written};
 use fingerprint::fingerprint;
 use folder::Folder;
-use offtrack_evaluation::device;
-use offtrack_evaluation::error::Error;
 use progress::Progress;
 use route_counts::RouteCounts;
 use validation::Validation;
@@ -82,7 +81,7 @@ impl Run {
     pub fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {
         let backend = self.backend.clone();
         match backend.guarded(|| self.learn_until(&stopped)) {
-            Err(error) if device::has_failed(&error) => {
+            Err(error) if error.is_device_failure() => {
                 let message = match error {
                     Error::Device(message) => message,
                     error => error.to_string(),

@@ -18,7 +18,6 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use offtrack::files::reader::{read_text, shown_path};
 use offtrack::scenario::Split;
 use offtrack_evaluation::device::Device;
-use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::page::Page;
 use offtrack_evaluation::provenance;
@@ -28,6 +27,7 @@ use offtrack_evaluation::{Evaluation, usual_episodes};
 use offtrack_learner::backend::Backend;
 use offtrack_learner::checkpoint::Stored;
 use offtrack_learner::config::{self, Config};
+use offtrack_learner::error::Error;
 use offtrack_learner::mirror::Mirror;
 use offtrack_learner::run::Run;
 use offtrack_learner::run::folder::Folder;
@@ -226,7 +226,7 @@ fn config(args: &Args, file: &Path) -> Result<Config, Error> {
     if let Some(adapter) = &args.adapter {
         if config.device == config::Device::Cpu {
             let expected = "the training file uses the processor: leave it out, or add --set device=gpu".to_owned();
-            return Err(Error::Setting { name: "--adapter", value: adapter.clone(), expected });
+            return Err(Error::setting("--adapter", adapter, expected));
         }
         config.adapter = Some(adapter.clone());
     }
@@ -247,9 +247,9 @@ fn conclude(
     if finished.interrupted {
         files::write_json(&folder.report(), &finished)?;
         written?;
-        return files::print(&format!(
+        return Ok(files::print(&format!(
             "stopped: policy and metrics are in {path}; not evaluated; train --resume {path} continues\n"
-        ));
+        ))?);
     }
     let mut policy = Policy { name: shown_path(&folder.policy()), ..policy };
     let evaluated = evaluate(worlds, &mut policy)?;

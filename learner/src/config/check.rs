@@ -5,7 +5,7 @@ use std::path::Path;
 use offtrack::files::reader::Reader;
 
 use super::{Config, Device, Learning, Refinement};
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 impl Config {
     /// The first key whose value makes no sense is an error.

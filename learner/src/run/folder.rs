@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use offtrack::files::writer::followed;
 
 use crate::config::Config;
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 use offtrack_evaluation::files;
 
 /// Where a run writes.
@@ -39,12 +39,12 @@ impl Folder {
             return Ok(folder);
         }
         let expected = "the folder of a run is needed, with the config.toml that it left".to_owned();
-        Err(Error::Setting { name: "--resume", value: path.display().to_string(), expected })
+        Err(Error::setting("--resume", path.display().to_string(), expected))
     }
 
     /// Writes the training file as used.
     pub fn write_config(&self, config: &Config) -> Result<(), Error> {
-        files::write_whole(&self.config(), config.to_toml().as_bytes())
+        Ok(files::write_whole(&self.config(), config.to_toml().as_bytes())?)
     }
 
     /// The folder itself.
@@ -110,14 +110,14 @@ fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
     if !plain {
         let expected =
             "a name of letters, digits, `-`, `_` and `.` that begins with none of the last is needed".to_owned();
-        return Err(Error::Setting { name: "--name", value: format!("{name:?}"), expected });
+        return Err(Error::setting("--name", format!("{name:?}"), expected));
     }
     let path = runs.join(name);
     match std::fs::create_dir(&path) {
         Ok(()) => Ok(path),
         Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
             let expected = format!("{} exists and is never overwritten: choose another name", path.display());
-            Err(Error::Setting { name: "--name", value: name.to_owned(), expected })
+            Err(Error::setting("--name", name, expected))
         }
         Err(error) => Err(Error::write(&path)(error)),
     }

@@ -8,9 +8,9 @@ use super::metrics_file::{HEAD, MetricsFile};
 use super::window::Window;
 use crate::checkpoint::{Columns, Stored};
 use crate::config::Config;
+use crate::error::Error;
 use crate::rollout::Episodes;
 use crate::sac::Update;
-use offtrack_evaluation::error::Error;
 
 /// Time between two rows of metrics, and two updates of the display.
 pub(super) const ROW_EVERY: Duration = Duration::from_secs(5);

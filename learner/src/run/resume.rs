@@ -10,7 +10,7 @@ use super::metrics_file::MetricsFile;
 use super::progress;
 use crate::checkpoint::Stored;
 use crate::config::Config;
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// Most bytes of a report.
 const REPORT_LIMIT: u64 = 64 << 20;
@@ -52,7 +52,7 @@ impl Resumed {
             toml::from_str(stored.config()).map_err(|error| stored.error(format!("its training file: {error}")))?;
         if !config.is_same_run(&written) {
             let message = "is not the training file that the checkpoint was written with; only minutes, steps and checkpoint_minutes may differ";
-            return Err(Error::Contents { file: folder.config(), message: message.to_owned() });
+            return Err(Error::contents(&folder.config(), message));
         }
         config.override_with(None, minutes, steps, None)?;
         let (seconds, env_steps) = progress::reached(&stored)?;
@@ -74,7 +74,7 @@ impl Resumed {
 }
 
 fn refused(path: &Path, expected: String) -> Error {
-    Error::Setting { name: "--resume", value: path.display().to_string(), expected }
+    Error::setting("--resume", path.display().to_string(), expected)
 }
 
 /// The final evaluation has been written.

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use offtrack::files::reader::{read_text, shown_path};
-use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::seeds::{SeedReport, Seeds};
 use offtrack_learner::config::Config;
+use offtrack_learner::error::Error;
 use offtrack_learner::run::folder::{self, Folder};
 use offtrack_learner::run::resume::Resumed;
 use serde::Deserialize;
@@ -80,18 +80,18 @@ pub fn run(args: &Args, file: &Path, text: &str) -> Result<(), Error> {
     let finished = group.all_finished(&seeds)?;
     let table = if finished.is_empty() { String::new() } else { Seeds::of(&seeds, &finished).table() + "\n" };
     let (path, n, all) = (shown_path(&group.0), finished.len(), seeds.len());
-    files::print(&match n == all {
+    Ok(files::print(&match n == all {
         true => format!("{table}written: {path}\n"),
         false => format!(
             "{table}stopped: {n} of {all} seeds have finished; the same command with --name {} continues\n",
             group.name()
         ),
-    })
+    })?)
 }
 
 /// The seeds that `20..24` (both included) or `3,7,9` names.
 fn parsed(text: &str) -> Result<Vec<u32>, Error> {
-    let wrong = |expected: String| Error::Setting { name: "--seeds", value: text.to_owned(), expected };
+    let wrong = |expected: String| Error::setting("--seeds", text, expected);
     let form = || {
         wrong("a range as in 20..24, both included, or numbers separated by commas, as in 3,7,9, are needed".to_owned())
     };
@@ -143,7 +143,7 @@ impl Group {
         if let Some(missing) = earlier.seeds.iter().find(|seed| !seeds.contains(seed)) {
             let expected =
                 format!("{} has seed {missing} too: name it as well, or choose another --name", self.0.display());
-            return Err(Error::Setting { name: "--seeds", value: text.to_owned(), expected });
+            return Err(Error::setting("--seeds", text, expected));
         }
         for &seed in seeds {
             let file = self.folder(seed).join("config.toml");
@@ -188,7 +188,7 @@ impl Group {
 
     /// Writes `seeds.json`.
     fn write(&self, seeds: &[u32]) -> Result<(), Error> {
-        files::write_json(&self.file(), &Seeds::of(seeds, &self.all_finished(seeds)?))
+        Ok(files::write_json(&self.file(), &Seeds::of(seeds, &self.all_finished(seeds)?))?)
     }
 
     /// A seed's folder: a new one, or that of a run that was begun.

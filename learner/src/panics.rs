@@ -111,7 +111,7 @@ fn is_own(file: &str) -> bool {
 /// repository.
 fn root() -> String {
     let this = file!().replace('\\', "/");
-    this.strip_suffix("evaluation/src/device/panics.rs").unwrap_or_default().to_owned()
+    this.strip_suffix("learner/src/panics.rs").unwrap_or_default().to_owned()
 }
 
 fn message(panic: &(dyn Any + Send)) -> String {
