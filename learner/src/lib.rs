@@ -1,9 +1,8 @@
 //! The learner: discrete soft actor-critic, its replay buffer, and the training loop, on the processor or on a graphics
 //! device; and proximal policy optimisation, which can refine its policy.
 //!
-//! Start with [`session`], the loop, then [`sac`] and [`ppo`], the algorithms. [`rollout`] is what differs between
-//! processor and
-//! device.
+//! Start with [`train()`], which does all of it, then [`session`], the loop, then [`sac`] and [`ppo`], the algorithms.
+//! [`rollout`] is what differs between processor and device.
 
 pub mod error; // what can go wrong
 pub mod session; // the loop: act, learn
@@ -23,7 +22,9 @@ pub mod backend; // the choice of processor or device
 pub mod panics; // of the tensor library, where a device fails
 pub mod config; // a training file
 pub mod run; // a training run in its folder
-pub mod train; // from a configuration to a report
+pub mod train; // from a config to a report, in a folder
 pub mod checkpoint; // all state in a file
 pub mod columns; // networks and optimizers there
 pub mod generator; // random numbers with a state
+
+pub use train::{resume, train};

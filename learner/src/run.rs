@@ -33,14 +33,14 @@ use route_counts::RouteCounts;
 use validation::Validation;
 
 /// A run under way.
-pub struct Run {
+pub struct Run<'a> {
     config: Config,
     backend: Backend,
     /// CRC-32 of the world.
     fingerprint: u32,
     training: Session,
     /// How far the run is.
-    pub progress: Progress,
+    pub progress: Progress<'a>,
     /// Success on each training route.
     pub routes: RouteCounts,
     /// None without validation.
@@ -48,7 +48,7 @@ pub struct Run {
     checkpointer: Checkpointer,
 }
 
-impl Run {
+impl<'a> Run<'a> {
     /// A run at its beginning. Its first checkpoint is written at once.
     pub fn new(
         backend: Backend,
@@ -56,9 +56,9 @@ impl Run {
         world: &World,
         training: Session,
         folder: &Folder,
-        progress: Progress,
+        progress: Progress<'a>,
         routes: RouteCounts,
-    ) -> Run {
+    ) -> Run<'a> {
         Run {
             routes,
             validation: None,

@@ -13,14 +13,34 @@ use offtrack_evaluation::files;
 pub struct Folder(PathBuf);
 
 impl Folder {
+    /// Makes `path`, which must be new, and writes the config into it.
+    pub fn new(path: &Path, config: &Config) -> Result<Folder, Error> {
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).map_err(Error::write(parent))?;
+        }
+        match std::fs::create_dir(path) {
+            Ok(()) => Folder(path.to_owned()).begun(config),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+                Err(Error::setting("folder", path.to_string_lossy(), "exists and is never overwritten: choose another"))
+            }
+            Err(error) => Err(Error::write(path)(error)),
+        }
+    }
+
     /// Makes a folder as [`make`] does and writes the config into it.
     pub fn create(runs: &Path, name: Option<&str>, config_file: &Path, config: &Config) -> Result<Folder, Error> {
-        let folder = Folder(make(runs, name, config_file)?);
-        let written = folder.write_config(config);
-        if written.is_err() {
-            folder.discard();
+        Folder(make(runs, name, config_file)?).begun(config)
+    }
+
+    /// The new folder with the config in it; where that cannot be written, it is removed again.
+    fn begun(self, config: &Config) -> Result<Folder, Error> {
+        match self.write_config(config) {
+            Ok(()) => Ok(self),
+            Err(error) => {
+                self.discard();
+                Err(error)
+            }
         }
-        written.map(|()| folder)
     }
 
     /// Removes the folder of a run that could not begin, which would be in the way of the next attempt. One with more
