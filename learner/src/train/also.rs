@@ -38,8 +38,7 @@ pub struct AlsoReport {
 
 impl Also {
     /// Reads the benchmarks that a training file names. `training` is what the policy is trained on. They may be for
-    /// other
-    /// vehicles: how well a policy drives those is something to evaluate.
+    /// other vehicles: how well a policy drives those is something to evaluate.
     pub(super) fn read(
         config: &Config,
         reader: &Reader,

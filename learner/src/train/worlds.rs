@@ -43,8 +43,7 @@ pub(super) struct Worlds {
 
 impl Worlds {
     /// The benchmarks of a training file, which `origin` names in errors. None of the routes that the policy is chosen
-    /// or
-    /// evaluated on may be among those it is trained on, and on all of them it drives what it is trained to drive.
+    /// or evaluated on may be among those it is trained on, and on all of them it drives what it is trained to drive.
     pub(super) fn read(config: &Config, origin: &Path, roads: Roads) -> Result<Worlds, Error> {
         let reader = Reader::of(origin);
         let own = named(&reader, "benchmark", &config.benchmark, roads)?;
