@@ -1,5 +1,7 @@
 //! Training by the library alone: what a caller is told, how a run is stopped and continued, and what is refused.
 
+#![expect(clippy::unwrap_used, reason = "a failure of a test's helper fails the test")]
+
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
