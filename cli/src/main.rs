@@ -7,8 +7,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use offtrack::files::reader::shortened;
-use offtrack_evaluation::error::Error;
 use offtrack_evaluation::{files, provenance};
+use offtrack_learner::error::Error;
 
 use commands::{bench, certify, deviations, devices, draw, evaluate, generate, import, record, scale, trace, train};
 
@@ -72,17 +72,17 @@ fn main() -> ExitCode {
     }
     let done = start_threads().and_then(|()| match &command {
         Command::Train(args) => train::run(args),
-        Command::Evaluate(args) => evaluate::run(args),
+        Command::Evaluate(args) => Ok(evaluate::run(args)?),
         Command::Scale(args) => scale::run(args),
         Command::Bench(args) => bench::run(args),
-        Command::Devices(args) => devices::run(args),
-        Command::Certify(args) => certify::run(args),
-        Command::Draw(args) => draw::run(args),
-        Command::Generate(args) => generate::run(args),
-        Command::Import(args) => import::run(args),
-        Command::Record(args) => record::run(args),
-        Command::Trace(args) => trace::run(args),
-        Command::Deviations(args) => deviations::run(args),
+        Command::Devices(args) => Ok(devices::run(args)?),
+        Command::Certify(args) => Ok(certify::run(args)?),
+        Command::Draw(args) => Ok(draw::run(args)?),
+        Command::Generate(args) => Ok(generate::run(args)?),
+        Command::Import(args) => Ok(import::run(args)?),
+        Command::Record(args) => Ok(record::run(args)?),
+        Command::Trace(args) => Ok(trace::run(args)?),
+        Command::Deviations(args) => Ok(deviations::run(args)?),
     });
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -2,15 +2,12 @@
 //!
 //! In a program that was built without the feature `gpu` there is no device to open.
 
-mod panics;
-
 #[cfg(feature = "gpu")]
 use offtrack::simulator;
 use offtrack::simulator::Engine;
 
 use crate::error::Error;
 use crate::provenance;
-pub use panics::{caught, unreadable};
 
 /// The error text where a program without the feature is asked for a device.
 #[cfg(not(feature = "gpu"))]
@@ -72,21 +69,4 @@ pub fn open(_: Option<&str>) -> Result<Device, Error> {
         value: "gpu".to_owned(),
         expected: format!("{NOT_BUILT_IN}, or leave --device out"),
     })
-}
-
-/// Whether the error is a failure of the device rather than wrong input.
-#[cfg(feature = "gpu")]
-pub fn has_failed(error: &Error) -> bool {
-    use offtrack::gpu;
-
-    let broken = |error: &simulator::Error| {
-        matches!(error, simulator::Error::Gpu(gpu::Error::NoAdapter { .. } | gpu::Error::Broken { .. }))
-    };
-    matches!(error, Error::Device(_)) || matches!(error, Error::Simulator(error) if broken(error))
-}
-
-/// Whether the error is a failure of the device rather than wrong input.
-#[cfg(not(feature = "gpu"))]
-pub fn has_failed(error: &Error) -> bool {
-    matches!(error, Error::Device(_))
 }

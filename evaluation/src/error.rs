@@ -1,4 +1,4 @@
-//! What can go wrong while training, evaluating or drawing: one error type for this crate, above those of the
+//! What can go wrong while evaluating: one error type for this crate and for pictures, above those of the
 //! simulator's edges ([`offtrack::files::reader::Error`] for files, [`offtrack::simulator::Error`] for batches and
 //! devices).
 //!
@@ -7,15 +7,15 @@
 use std::path::{Path, PathBuf};
 
 use offtrack::files::reader::{LONGEST_PATH, shortened, shown_path};
-
-use crate::device;
+#[cfg(feature = "gpu")]
+use offtrack::{gpu, simulator};
 
 /// Most characters of a message about the contents of a file.
 const LONGEST_MESSAGE: usize = 600;
 /// Most characters of what a flag may be.
 const LONGEST_EXPECTED: usize = 1000;
 
-/// Why training, an evaluation or a command stopped. [`Error::is_wrong_input`] tells wrong input from a failure.
+/// Why an evaluation or a command stopped. [`Error::is_wrong_input`] tells wrong input from a failure.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -68,6 +68,10 @@ pub enum Error {
         /// The system's error.
         source: std::io::Error,
     },
+    /// Threads to work with cannot be started: the system does not give as many as the machine has cores, or as
+    /// `RAYON_NUM_THREADS` asks for.
+    #[error("threads cannot be started: {0}; set RAYON_NUM_THREADS to fewer")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     /// An action sequence of a certificate does not arrive.
     #[error("{}: {} from ({:+}, {:+}) of the largest start errors: the sequence does not arrive: {ended}", shown_path(file), shortened(route, LONGEST_PATH), start[0], start[1])]
     NotVerified {
@@ -80,40 +84,23 @@ pub enum Error {
         /// The end code after the last action of the sequence.
         ended: &'static str,
     },
-    /// The graphics device failed, or cannot do what the learner needs of it.
-    #[error("the graphics device: {0}")]
-    Device(String),
-    /// Threads to work with cannot be started: the system does not give as many as the machine has cores, or as
-    /// `RAYON_NUM_THREADS` asks for.
-    #[error("threads cannot be started: {0}; set RAYON_NUM_THREADS to fewer")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
-    /// Training has diverged.
-    #[error(
-        "{what} is {value} after {env_steps} env steps{also}: training has diverged; {kept}; lower learning rates or a smaller reward_scale would do"
-    )]
-    Diverged {
-        /// Which figure or parameter.
-        what: String,
-        /// Value of the figure or parameter, no number.
-        value: f32,
-        /// Env steps taken.
-        env_steps: u64,
-        /// Where else it shows.
-        also: String,
-        /// What there is to go back to.
-        kept: String,
-    },
 }
 
 impl Error {
     /// Whether the input was wrong: a file, a setting or a batch asked for. Otherwise something failed on valid input:
-    /// a device, a disk, the learner, or a certificate.
+    /// a device, a disk, threads, or a certificate.
     pub fn is_wrong_input(&self) -> bool {
-        let failed = matches!(
-            self,
-            Error::Write { .. } | Error::Threads(_) | Error::Diverged { .. } | Error::NotVerified { .. }
-        );
-        !failed && !device::has_failed(self)
+        let failed = matches!(self, Error::Write { .. } | Error::Threads(_) | Error::NotVerified { .. });
+        !failed && !self.is_device_failure()
+    }
+
+    /// Whether a graphics device failed.
+    pub fn is_device_failure(&self) -> bool {
+        match self {
+            #[cfg(feature = "gpu")]
+            Error::Simulator(simulator::Error::Gpu(gpu::Error::NoAdapter { .. } | gpu::Error::Broken { .. })) => true,
+            _ => false,
+        }
     }
 
     /// A file has wrong contents.

@@ -6,14 +6,13 @@ use offtrack::layout::{N_VALUES, ObservedExtras};
 use offtrack::world::World;
 
 use crate::config::{Config, Device};
+use crate::error::Error;
 use crate::memory;
 use crate::mirror::Mirror;
 #[cfg(feature = "gpu")]
 use crate::rollout::device::{DeviceRollout, Shared};
 use crate::rollout::{Rollout, host::HostRollout};
 use crate::sac::Placement;
-use offtrack_evaluation::device;
-use offtrack_evaluation::error::Error;
 
 /// The processor, or an opened device.
 #[derive(Clone)]
@@ -43,8 +42,8 @@ impl Backend {
     /// An error: this program has no devices.
     #[cfg(not(feature = "gpu"))]
     pub fn on_device(_: Option<&str>) -> Result<Backend, Error> {
-        let expected = format!("{}; or set device = \"cpu\"", device::NOT_BUILT_IN);
-        Err(Error::Setting { name: "device", value: "\"gpu\"".to_owned(), expected })
+        let expected = format!("{}; or set device = \"cpu\"", offtrack_evaluation::device::NOT_BUILT_IN);
+        Err(Error::setting("device", "\"gpu\"", expected))
     }
 
     /// The backend's name in results: `cpu`, or the adapter's with its interface and driver.
@@ -115,13 +114,15 @@ impl Backend {
         match self {
             Backend::Host => work(),
             #[cfg(feature = "gpu")]
-            Backend::Device(shared) => device::caught(work, || shared.check().err()).map_err(|error| match error {
-                // What the driver reported says more than the panic that followed.
-                Error::Device(message) => {
-                    Error::Device(shared.check().err().map_or(message, |error| error.to_string()))
-                }
-                error => error,
-            }),
+            Backend::Device(shared) => {
+                crate::panics::caught(work, || shared.check().err()).map_err(|error| match error {
+                    // What the driver reported says more than the panic that followed.
+                    Error::Device(message) => {
+                        Error::Device(shared.check().err().map_or(message, |error| error.to_string()))
+                    }
+                    error => error,
+                })
+            }
         }
     }
 }

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use offtrack::files::reader::read_bytes;
 
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// Key of the metadata's one entry.
 const KEY: &str = "offtrack-checkpoint";
@@ -136,7 +136,7 @@ impl Stored {
     /// Reads a checkpoint. One that is cut, changed, of another version, or was never one is refused.
     pub fn read(path: &Path) -> Result<Stored, Error> {
         let bytes = read_bytes(path, LIMIT)?;
-        Stored::from_bytes(path, bytes).map_err(|message| Error::Contents { file: path.to_owned(), message })
+        Stored::from_bytes(path, bytes).map_err(|message| Error::contents(path, message))
     }
 
     /// The error is a message without the file's name.
@@ -213,7 +213,7 @@ impl Stored {
 
     /// Something else that is wrong with the file.
     pub fn error(&self, message: String) -> Error {
-        Error::Contents { file: self.path.clone(), message }
+        Error::contents(&self.path, message)
     }
 }
 

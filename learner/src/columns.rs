@@ -5,7 +5,7 @@ use burn::tensor::Device;
 use super::adam::State;
 use super::checkpoint::Stored;
 use super::network::Mlp;
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// Columns by their names.
 pub type Named = Vec<(String, Vec<f32>)>;

@@ -14,7 +14,7 @@ use offtrack::files::reader::Reader;
 use offtrack::scenario::RewardChanges;
 use serde::{Deserialize, Serialize};
 
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 pub use also_evaluate::AlsoEvaluate;
 

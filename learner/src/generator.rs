@@ -4,7 +4,7 @@
 use rand::{RngCore, SeedableRng};
 
 use super::checkpoint::Stored;
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// What splitmix64 adds from one number to the next: 2^64 over the golden ratio.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;

@@ -8,8 +8,8 @@ use offtrack::layout::Ended;
 
 use crate::checkpoint::{Columns, Stored};
 use crate::config;
+use crate::error::Error;
 use crate::rollout::RouteEnd;
-use offtrack_evaluation::error::Error;
 
 /// Steps of all trucks between two new lists of routes.
 const INTERVAL: u64 = 100;

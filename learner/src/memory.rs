@@ -4,7 +4,7 @@
 use offtrack::simulator::available_memory;
 
 use super::config::{Config, Refinement};
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// Bytes of an f32.
 const F32: u128 = 4;
@@ -52,7 +52,7 @@ fn check_within(config: &Config, n_values: usize, n_actions: usize, available: u
     let expected = format!(
         "the run would take about {needed} of memory, {bytes} of them for this, and {available} are free: less would do"
     );
-    Err(Error::Setting { name: key, value, expected })
+    Err(Error::setting(key, value, expected))
 }
 
 fn parts(config: &Config, n_values: u128, n_actions: u128) -> [Part; 6] {

@@ -7,8 +7,8 @@ use offtrack::layout::{Action, EXTRAS, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, O
 use offtrack::world::World;
 use rand::Rng;
 
+use crate::error::Error;
 use crate::replay_buffer::Sample;
-use offtrack_evaluation::error::Error;
 
 /// Index of the first distance sensor in an observation.
 fn first_ray() -> usize {
@@ -36,11 +36,7 @@ pub struct Mirror {
 impl Mirror {
     /// The mirror of a world. Its action table and its sensors must be symmetric.
     pub fn of(world: &World) -> Result<Mirror, Error> {
-        let refused = |expected: String| Error::Setting {
-            name: "learning.mirror_augmentation",
-            value: "true".to_owned(),
-            expected,
-        };
+        let refused = |expected: String| Error::setting("learning.mirror_augmentation", "true", expected);
         let factors = OBSERVATION.iter().flat_map(|values| std::iter::repeat_n(values.mirror, values.n));
         let extras = EXTRAS[..world.params.n_extras as usize].iter().map(|extra| extra.mirror);
         let mut values: Vec<(usize, f32)> = factors.chain(extras).enumerate().collect();

@@ -1,10 +1,10 @@
 //! The network of actor and critics alike: a stack of linear layers with rectifiers between them.
 
+use crate::panics::unreadable;
 use burn::module::{Module, Param};
 use burn::nn::{LayerNorm, LayerNormConfig, Linear};
 use burn::tensor::activation::{log_softmax, relu};
 use burn::tensor::{Device, Tensor, TensorData};
-use offtrack_evaluation::device::unreadable;
 use rand::rngs::SmallRng;
 use rand::{Rng, SeedableRng};
 

@@ -15,10 +15,10 @@ use burn::tensor::{Device, Tensor, TensorData};
 use rand::rngs::SmallRng;
 use rand::seq::SliceRandom;
 use rand::{RngCore, SeedableRng};
-use rayon::ThreadPoolBuildError;
 
 use super::adam::Adam;
 use super::config::Refinement;
+use super::error::Error;
 use super::generator::Generator;
 use super::network::Mlp;
 use super::pass::{Pass, matrix, row_of, softmax};
@@ -63,7 +63,7 @@ struct ShardGradients {
 
 impl Ppo {
     /// Goes on from this actor, with a network of values that knows nothing yet.
-    pub fn new(settings: &Refinement, actor: &Mlp, seed: u64) -> Result<Ppo, ThreadPoolBuildError> {
+    pub fn new(settings: &Refinement, actor: &Mlp, seed: u64) -> Result<Ppo, Error> {
         let device = Device::flex();
         let rng = &mut SmallRng::seed_from_u64(seed);
         let mut sizes: Vec<usize> = actor.layers.iter().map(|layer| layer.weight.dims()[0]).collect();

@@ -14,11 +14,11 @@ use offtrack_policy::Normalisation;
 
 use crate::checkpoint::{Columns, Stored};
 use crate::config::Refinement;
+use crate::error::Error;
 use crate::mirror::Mirror;
 use crate::network::Mlp;
 use crate::ppo::steps::Steps;
 use crate::sac::Transitions;
-use offtrack_evaluation::error::Error;
 
 /// Some episodes that ended.
 #[derive(Debug, Clone, Copy, PartialEq)]

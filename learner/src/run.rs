@@ -21,25 +21,24 @@ use offtrack_policy::Policy;
 use crate::backend::Backend;
 use crate::checkpoint::{Columns, Stored};
 use crate::config::Config;
+use crate::error::Error;
 use crate::sac::not_finite;
 use crate::session::Session;
 use checkpointer::{Checkpointer, Written};
 use folder::Folder;
-use offtrack_evaluation::device;
-use offtrack_evaluation::error::Error;
 use progress::Progress;
 use route_counts::RouteCounts;
 use validation::Validation;
 
 /// A run under way.
-pub struct Run {
+pub struct Run<'a> {
     config: Config,
     backend: Backend,
     /// CRC-32 of the world.
     fingerprint: u32,
     training: Session,
     /// How far the run is.
-    pub progress: Progress,
+    pub progress: Progress<'a>,
     /// Success on each training route.
     pub routes: RouteCounts,
     /// None without validation.
@@ -47,7 +46,7 @@ pub struct Run {
     checkpointer: Checkpointer,
 }
 
-impl Run {
+impl<'a> Run<'a> {
     /// A run at its beginning. Its first checkpoint is written at once.
     pub fn new(
         backend: Backend,
@@ -55,9 +54,9 @@ impl Run {
         world: &World,
         training: Session,
         folder: &Folder,
-        progress: Progress,
+        progress: Progress<'a>,
         routes: RouteCounts,
-    ) -> Run {
+    ) -> Run<'a> {
         Run {
             routes,
             validation: None,
@@ -80,7 +79,7 @@ impl Run {
     pub fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {
         let backend = self.backend.clone();
         match backend.guarded(|| self.learn_until(&stopped)) {
-            Err(error) if device::has_failed(&error) => {
+            Err(error) if error.is_device_failure() => {
                 let message = match error {
                     Error::Device(message) => message,
                     error => error.to_string(),

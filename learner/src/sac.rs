@@ -18,10 +18,10 @@ use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor};
 use rand::SeedableRng;
 use rand::rngs::SmallRng;
-use rayon::ThreadPoolBuildError;
 
 use crate::adam::Adam;
 use crate::config::Learning;
+use crate::error::Error;
 use crate::network::Mlp;
 use crate::shards::{N_SHARDS, Shards};
 use critics::Twins;
@@ -138,7 +138,7 @@ impl Sac {
         n_actions: usize,
         seed: u64,
         placement: Placement,
-    ) -> Result<Sac, ThreadPoolBuildError> {
+    ) -> Result<Sac, Error> {
         let device = placement.learning();
         let rng = &mut SmallRng::seed_from_u64(seed);
         let sizes: Vec<usize> =

@@ -15,7 +15,7 @@ use super::network::Mlp;
 use super::ppo::Ppo;
 use super::rollout::Rollout;
 use super::sac::{Sac, Transitions, Update};
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 use offtrack_evaluation::policies;
 
 /// Trucks, replay buffer and learner.
@@ -64,7 +64,7 @@ impl Session {
         if policy.activation != Activation::Relu {
             let expected =
                 format!("has the activation {}: the learner continues with relu alone", policy.activation.name());
-            return Err(Error::Setting { name: "from", value: from.clone(), expected });
+            return Err(Error::setting("from", from, expected));
         }
         let hidden: Vec<usize> = policy.layers[..policy.layers.len() - 1].iter().map(Layer::n_outputs).collect();
         if hidden != self.config.learning.hidden {
@@ -72,7 +72,7 @@ impl Session {
                 "has hidden layers of {hidden:?}: learning.hidden must be equal, not {:?}",
                 self.config.learning.hidden
             );
-            return Err(Error::Setting { name: "from", value: from.clone(), expected });
+            return Err(Error::setting("from", from, expected));
         }
         self.sac.set_actor(&Mlp::of(&policy.layers, &Device::flex()));
         self.set_normalisation(policy.normalisation);

@@ -4,6 +4,8 @@
 
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
+use crate::error::Error;
+
 /// Shards of a batch on the processor: two, for the cores of the smallest machines. Another number would round sums
 /// differently.
 pub const N_SHARDS: usize = 2;
@@ -13,8 +15,9 @@ pub struct Shards(Vec<ThreadPool>);
 
 impl Shards {
     /// Threads for `n` shards.
-    pub fn new(n: usize) -> Result<Shards, ThreadPoolBuildError> {
-        let pools: Result<_, _> = (0..n).map(|_| ThreadPoolBuilder::new().num_threads(1).build()).collect();
+    pub fn new(n: usize) -> Result<Shards, Error> {
+        let pools: Result<_, ThreadPoolBuildError> =
+            (0..n).map(|_| ThreadPoolBuilder::new().num_threads(1).build()).collect();
         Ok(Shards(pools?))
     }
 

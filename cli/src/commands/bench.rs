@@ -11,11 +11,11 @@ use std::time::{Instant, SystemTime};
 use offtrack::layout::N_VALUES;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
-use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::provenance;
 use offtrack_learner::backend::Backend;
 use offtrack_learner::config::{self, Config, Learning};
+use offtrack_learner::error::Error;
 use offtrack_learner::session::Session;
 use serde::Serialize;
 
@@ -78,25 +78,13 @@ struct Run {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     if !(0.1..=3600.0).contains(&args.seconds) {
-        return Err(Error::Setting {
-            name: "--seconds",
-            value: format!("{} s", args.seconds),
-            expected: "must lie in 0.1..3600 s".into(),
-        });
+        return Err(Error::setting("--seconds", format!("{} s", args.seconds), "must lie in 0.1..3600 s"));
     }
     if let Some(size) = args.hidden.iter().find(|size| !(1..=8192).contains(*size)) {
-        return Err(Error::Setting {
-            name: "--hidden",
-            value: size.to_string(),
-            expected: "sizes must lie in 1..8192".into(),
-        });
+        return Err(Error::setting("--hidden", size.to_string(), "sizes must lie in 1..8192"));
     }
     if let Some(batch) = args.batch.iter().find(|batch| !(2..=1 << 20).contains(*batch)) {
-        return Err(Error::Setting {
-            name: "--batch",
-            value: batch.to_string(),
-            expected: "must lie in 2..1048576".into(),
-        });
+        return Err(Error::setting("--batch", batch.to_string(), "must lie in 2..1048576"));
     }
     if args.lines {
         return in_turns(args);

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use offtrack::files::reader::printable;
 use offtrack_evaluation::files;
-use offtrack_learner::run::progress::Display;
+use offtrack_learner::run::progress::Status;
 
 /// A bar over `length` things called `unit`, after what is done with them.
 pub struct Bar(ProgressBar);
@@ -65,11 +65,10 @@ impl TrainingDisplay {
             label: label.to_owned(),
         }
     }
-}
 
-impl Display for TrainingDisplay {
-    fn show(&mut self, fraction: f64, line: String) {
-        let line = printable(&format!("{}{line}", self.label)).into_owned();
+    /// How far the run is.
+    pub fn show(&mut self, status: &Status) {
+        let (fraction, line) = (status.fraction, printable(&format!("{}{status}", self.label)).into_owned());
         if std::io::stderr().is_terminal() {
             self.bar.set_position((1000.0 * fraction) as u64);
             self.bar.set_message(line);
@@ -79,11 +78,13 @@ impl Display for TrainingDisplay {
         }
     }
 
-    fn warn(&mut self, line: String) {
-        self.bar.suspend(|| files::say(&line));
+    /// A line that is to stay, about something that went wrong.
+    pub fn warn(&self, line: &str) {
+        self.bar.suspend(|| files::say(line));
     }
 
-    fn close(&mut self) {
+    /// Leaves the last state where it is.
+    pub fn close(self) {
         self.bar.abandon();
     }
 }

@@ -15,7 +15,7 @@ use offtrack_evaluation::files;
 use super::progress::Bar;
 
 /// Roads that take no progress bar.
-const FEW: usize = 20;
+pub const FEW: usize = 20;
 /// Most characters of the list of routes in a message.
 const LONGEST_LIST: usize = 600;
 

@@ -19,9 +19,10 @@ use super::{devices as device, outputs, roads};
 pub(crate) use measure::median;
 use measure::{Measured, measured};
 use mode::{Learner, Mode, Setting};
-use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::provenance;
+use offtrack_learner::error::Error;
+use offtrack_learner::panics;
 
 /// The largest batch that may be asked for.
 const MOST_ENVS: usize = 1 << 22;
@@ -145,18 +146,14 @@ impl Run {
 pub fn run(args: &Args) -> Result<(), Error> {
     let envs = sizes(&args.envs)?;
     if !(0.1..=3600.0).contains(&args.seconds) {
-        return Err(Error::Setting {
-            name: "--seconds",
-            value: format!("{} s", args.seconds),
-            expected: "must lie in 0.1..3600 s".into(),
-        });
+        return Err(Error::setting("--seconds", format!("{} s", args.seconds), "must lie in 0.1..3600 s"));
     }
     if let Some(file) = &args.plot {
         plot::check(file)?;
     }
     if let Some(file) = args.config.as_ref().filter(|_| !args.mode.contains(&Mode::Training)) {
         let expected = "is for --mode training: add that mode, or leave --config out".to_owned();
-        return Err(Error::Setting { name: "--config", value: file.display().to_string(), expected });
+        return Err(Error::setting("--config", file.display().to_string(), expected));
     }
     outputs::distinct(
         &[("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())],
@@ -222,8 +219,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
             };
             let work = || measured(&mut mode.driven(setting)?, args.seconds);
             // The tensor library panics where a device fails.
-            let outcome =
-                if device.kind == "gpu" { offtrack_evaluation::device::caught(work, || None) } else { work() };
+            let outcome = if device.kind == "gpu" { panics::caught(work, || None) } else { work() };
             let outcome = match outcome {
                 Ok(measured) => Outcome::Measured(Box::new(measured)),
                 Err(error) => {
@@ -251,10 +247,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
 
 /// The numbers of trucks that `--envs` names.
 fn sizes(text: &str) -> Result<Vec<usize>, Error> {
-    let wrong = |value: &str| Error::Setting {
-        name: "--envs",
-        value: value.to_owned(),
-        expected: format!("must lie in 1..{MOST_ENVS}, as in 1024,4096 or 256..1048576"),
+    let wrong = |value: &str| {
+        Error::setting("--envs", value, format!("must lie in 1..{MOST_ENVS}, as in 1024,4096 or 256..1048576"))
     };
     let size =
         |word: &str| word.trim().parse().ok().filter(|size| (1..=MOST_ENVS).contains(size)).ok_or_else(|| wrong(word));
@@ -295,8 +289,8 @@ fn write(args: &Args, scale: &Scale, title: &str) -> Result<(), Error> {
 
 /// For `map_err` on a picture being drawn.
 fn failed(file: &Path) -> impl FnOnce(offtrack_drawing::Error) -> Error {
-    let file = file.to_owned();
-    move |source| Error::Write { file, source: std::io::Error::other(source) }
+    let error = Error::write(file);
+    move |source| error(std::io::Error::other(source))
 }
 
 fn heading(scale: &Scale, device: &offtrack_evaluation::device::Device) -> String {

@@ -1,9 +1,9 @@
 //! Adam in tensor operations, for a learner on a device: nothing is read back.
 
+use crate::panics::unreadable;
 use burn::module::{Module, ModuleMapper, Param};
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
-use offtrack_evaluation::device::unreadable;
 
 use super::{DECAY, State, Step};
 

@@ -4,7 +4,7 @@ use offtrack::files::reader::Reader;
 use offtrack::scenario::Split;
 
 use super::Config;
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// What would do as one of the key's texts.
 const EXPECTED: &str =

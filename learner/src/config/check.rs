@@ -5,11 +5,11 @@ use std::path::Path;
 use offtrack::files::reader::Reader;
 
 use super::{Config, Device, Learning, Refinement};
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 impl Config {
     /// The first key whose value makes no sense is an error.
-    pub(super) fn check(&self, reader: &Reader) -> Result<(), Error> {
+    pub(crate) fn check(&self, reader: &Reader) -> Result<(), Error> {
         let Config { replay_buffer, learning, .. } = self;
         self.check_also_evaluate(reader)?;
         self.reward.check(reader, "reward")?;

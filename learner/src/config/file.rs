@@ -6,7 +6,8 @@ use offtrack::files::reader::{self, Reader, TEXT_LIMIT, read_text};
 use toml::{Table, Value};
 
 use super::set;
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
+use offtrack_evaluation::error::Error as Evaluation;
 
 /// The training files that come with the program.
 const SHIPPED: [(&str, &str); 10] = [
@@ -52,7 +53,7 @@ fn with_bases(file: &Path, depth: usize) -> Result<Table, Error> {
         false => beside(file, &base),
     };
     let mut merged = with_bases(&path, depth + 1).map_err(|error| match &error {
-        Error::Input(reader::Error::Unreadable { file: missing, .. }) if *missing == path => {
+        Error::Evaluation(Evaluation::Input(reader::Error::Unreadable { file: missing, .. })) if *missing == path => {
             let known = SHIPPED.map(|(name, _)| name).join(", ");
             let expected = format!("{error}; must be a path ending in .toml, relative to this file, or one of {known}");
             invalid(format!("{base:?}"), expected).into()
@@ -98,7 +99,7 @@ fn table(file: &Path) -> Result<Table, Error> {
                 "is no training file: the program comes with {}; or give a path ending in .toml",
                 known.join(", ")
             );
-            return Err(Error::Contents { file: file.to_owned(), message: expected });
+            return Err(Error::contents(file, expected));
         }
         None => read_text(file, TEXT_LIMIT)?,
     };

@@ -2,7 +2,7 @@
 
 use toml::{Table, Value};
 
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// What a training file says of other benchmarks: no key of it holds for another one.
 const OF_OTHERS: [&str; 4] = ["training_benchmark", "reward", "also_evaluate", "validation.benchmark"];
@@ -22,7 +22,7 @@ pub(super) fn set(table: &mut Table, settings: &[String]) -> Result<(), Error> {
 }
 
 fn one(table: &mut Table, setting: &str) -> Result<(), Error> {
-    let wrong = |expected: String| Error::Setting { name: "--set", value: setting.to_owned(), expected };
+    let wrong = |expected: String| Error::setting("--set", setting, expected);
     let (key, value) =
         setting.split_once('=').ok_or_else(|| wrong("KEY=VALUE is needed, as in learning.n_steps=5".into()))?;
     let path: Vec<&str> = key.trim().split('.').collect();

@@ -5,9 +5,9 @@ use burn::tensor::Device;
 use super::Ppo;
 use crate::checkpoint::{Columns, Stored};
 use crate::columns::{Named, moments, named, network, optimizer};
+use crate::error::Error;
 use crate::generator::Generator;
 use crate::sac::Update;
-use offtrack_evaluation::error::Error;
 
 /// Names of its columns in a checkpoint.
 const ACTOR: &str = "refined actor";

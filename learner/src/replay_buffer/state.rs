@@ -3,7 +3,7 @@
 use super::priorities::Priorities;
 use super::{After, ReplayBuffer};
 use crate::checkpoint::{Columns, Stored};
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// Far more than any value of an observation.
 const LARGEST_VALUE: f32 = 1e6;

@@ -23,12 +23,12 @@ use wgpu::{PollType, SubmissionIndex};
 use super::{Episodes, Rollout};
 use crate::checkpoint::{Columns, Stored};
 use crate::config::{Config, Refinement};
+use crate::error::Error;
 use crate::mirror::Mirror;
 use crate::network::Mlp;
 use crate::ppo::steps::Steps;
 use crate::sac::Transitions;
 use memory_kernels::{Binding, Buffers, Facts, Image, Kernel, Normal, Now};
-use offtrack_evaluation::error::Error;
 pub use shared::Shared;
 use shared::{Owned, floats, integers};
 
@@ -300,7 +300,7 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
     /// An error: a refinement is on the processor, and a training file that asks for another is refused.
     fn collect(&mut self, _: &Mlp, _: &Refinement) -> Result<Steps, Error> {
         let expected = "works with device = \"cpu\" alone: leave one of them out".to_owned();
-        Err(Error::Setting { name: "refinement", value: "given".to_owned(), expected })
+        Err(Error::setting("refinement", "given", expected))
     }
 
     fn drive(&mut self, actor: &Mlp) -> Result<(), Error> {
@@ -385,7 +385,7 @@ fn check_capacity<const N: usize>(shared: &Shared, config: &Config, n_transition
     let (name, most) = (shared.gpu.name(), limit / row_bytes);
     let expected =
         format!("its observations take {needed} bytes where {name} allows {limit} in a buffer: at most {most}");
-    Err(Error::Setting { name: "replay_buffer.capacity", value: config.replay_buffer.capacity.to_string(), expected })
+    Err(Error::setting("replay_buffer.capacity", config.replay_buffer.capacity.to_string(), expected))
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use std::sync::Arc;
 use super::{Episodes, Rollout, RouteEnd};
 use crate::checkpoint::{Columns, Stored};
 use crate::config::{Config, Learning, Refinement};
+use crate::error::Error;
 use crate::generator::Generator;
 use crate::level_replay::LevelReplay;
 use crate::memory;
@@ -25,7 +26,6 @@ use crate::ppo::steps::Steps;
 use crate::replay_buffer::{ReplayBuffer, Rows, Sample};
 use crate::sac::Transitions;
 use crate::shards::N_SHARDS;
-use offtrack_evaluation::error::Error;
 
 #[cfg(test)]
 mod tests;
@@ -317,7 +317,7 @@ impl<const N: usize> Rollout for HostRollout<N> {
 fn reserve<const N: usize>(replay_buffer: &mut ReplayBuffer<N>, config: &Config) -> Result<(), Error> {
     replay_buffer.reserve(memory::transitions(config)).map_err(|error| {
         let expected = format!("{error}; fewer transitions would do");
-        Error::Setting { name: "replay_buffer.capacity", value: config.replay_buffer.capacity.to_string(), expected }
+        Error::setting("replay_buffer.capacity", config.replay_buffer.capacity.to_string(), expected)
     })
 }
 

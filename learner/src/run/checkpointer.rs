@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 use offtrack::files::writer::{followed, keep_access};
 
 use crate::checkpoint::Columns;
+use crate::error::Error;
 use crate::run::folder::Folder;
-use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
 /// From the first checkpoint to the second.
@@ -119,7 +119,7 @@ impl Checkpointer {
             }
             Written {
                 checkpoint: moved.map_err(Error::write(&whole)),
-                policy: files::write_whole(&policy_file, &policy),
+                policy: files::write_whole(&policy_file, &policy).map_err(Error::from),
             }
         };
         self.pending = Some(std::thread::spawn(finish));

@@ -9,7 +9,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// What TensorBoard looks for in a file's name. The Unix time (s) follows: it reads files in the order of their names.
 const PREFIX: &str = "events.out.tfevents.";

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use offtrack::files::writer::followed;
 
 use crate::config::Config;
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 use offtrack_evaluation::files;
 
 /// Where a run writes.
@@ -13,14 +13,34 @@ use offtrack_evaluation::files;
 pub struct Folder(PathBuf);
 
 impl Folder {
+    /// Makes `path`, which must be new, and writes the config into it.
+    pub fn new(path: &Path, config: &Config) -> Result<Folder, Error> {
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).map_err(Error::write(parent))?;
+        }
+        match std::fs::create_dir(path) {
+            Ok(()) => Folder(path.to_owned()).begun(config),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+                Err(Error::setting("folder", path.to_string_lossy(), "exists and is never overwritten: choose another"))
+            }
+            Err(error) => Err(Error::write(path)(error)),
+        }
+    }
+
     /// Makes a folder as [`make`] does and writes the config into it.
     pub fn create(runs: &Path, name: Option<&str>, config_file: &Path, config: &Config) -> Result<Folder, Error> {
-        let folder = Folder(make(runs, name, config_file)?);
-        let written = folder.write_config(config);
-        if written.is_err() {
-            folder.discard();
+        Folder(make(runs, name, config_file)?).begun(config)
+    }
+
+    /// The new folder with the config in it; where that cannot be written, it is removed again.
+    fn begun(self, config: &Config) -> Result<Folder, Error> {
+        match self.write_config(config) {
+            Ok(()) => Ok(self),
+            Err(error) => {
+                self.discard();
+                Err(error)
+            }
         }
-        written.map(|()| folder)
     }
 
     /// Removes the folder of a run that could not begin, which would be in the way of the next attempt. One with more
@@ -39,12 +59,12 @@ impl Folder {
             return Ok(folder);
         }
         let expected = "the folder of a run is needed, with the config.toml that it left".to_owned();
-        Err(Error::Setting { name: "--resume", value: path.display().to_string(), expected })
+        Err(Error::setting("--resume", path.display().to_string(), expected))
     }
 
     /// Writes the training file as used.
     pub fn write_config(&self, config: &Config) -> Result<(), Error> {
-        files::write_whole(&self.config(), config.to_toml().as_bytes())
+        Ok(files::write_whole(&self.config(), config.to_toml().as_bytes())?)
     }
 
     /// The folder itself.
@@ -110,14 +130,14 @@ fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
     if !plain {
         let expected =
             "a name of letters, digits, `-`, `_` and `.` that begins with none of the last is needed".to_owned();
-        return Err(Error::Setting { name: "--name", value: format!("{name:?}"), expected });
+        return Err(Error::setting("--name", format!("{name:?}"), expected));
     }
     let path = runs.join(name);
     match std::fs::create_dir(&path) {
         Ok(()) => Ok(path),
         Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
             let expected = format!("{} exists and is never overwritten: choose another name", path.display());
-            Err(Error::Setting { name: "--name", value: name.to_owned(), expected })
+            Err(Error::setting("--name", name, expected))
         }
         Err(error) => Err(Error::write(&path)(error)),
     }

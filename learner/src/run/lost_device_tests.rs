@@ -15,7 +15,7 @@ use crate::rollout::device::Shared;
 use crate::sac::{Placement, Sac};
 
 /// A small run in `folder` on a device, and the device.
-fn run(folder: &Path, settings: &[&str]) -> (Run, Folder, Shared) {
+fn run(folder: &Path, settings: &[&str]) -> (Run<'static>, Folder, Shared) {
     let small = [
         "n_envs=64",
         "replay_buffer.capacity=4000",

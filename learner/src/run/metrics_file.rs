@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// How long a run waits for the lock of a process that is still ending.
 const LOCK_TIME: Duration = Duration::from_secs(3);
@@ -43,7 +43,7 @@ impl MetricsFile {
         if head != HEAD {
             let message = "its columns are not those that this program writes: continue with the program that wrote it"
                 .to_owned();
-            return Err(Error::Contents { file: metrics_file.path, message });
+            return Err(Error::contents(&metrics_file.path, message));
         }
         Ok(metrics_file)
     }
@@ -59,7 +59,7 @@ impl MetricsFile {
                 }
                 Err(TryLockError::WouldBlock) => {
                     let message = "another run is writing it: stop that one first".to_owned();
-                    return Err(Error::Contents { file: self.path.clone(), message });
+                    return Err(Error::contents(&self.path, message));
                 }
                 // Some file systems have no locks; there runs go without.
                 Ok(()) | Err(TryLockError::Error(_)) => return Ok(()),
@@ -94,7 +94,7 @@ impl MetricsFile {
         if self.length < length {
             let message =
                 format!("has {} bytes where its checkpoint expects {length}: put the whole file back", self.length);
-            return Err(Error::Contents { file: self.path.clone(), message });
+            return Err(Error::contents(&self.path, message));
         }
         self.file.set_len(length).map_err(Error::write(&self.path))?;
         self.length = length;

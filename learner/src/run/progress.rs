@@ -1,5 +1,6 @@
 //! Counters and clocks of a run: what it shows, the rows of `metrics.csv`, and when to stop.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -8,18 +9,64 @@ use super::metrics_file::{HEAD, MetricsFile};
 use super::window::Window;
 use crate::checkpoint::{Columns, Stored};
 use crate::config::Config;
+use crate::error::Error;
 use crate::rollout::Episodes;
 use crate::sac::Update;
-use offtrack_evaluation::error::Error;
 
 /// Time between two rows of metrics, and two updates of the display.
 pub(super) const ROW_EVERY: Duration = Duration::from_secs(5);
 /// Rows of a run with a budget of steps alone: equal runs then leave equal rows.
 const N_ROWS: u64 = 500;
+
+/// How far a run is; as text, a line about it.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Status {
+    /// Fraction of the budget that is spent, 1 at the end.
+    pub fraction: f64,
+    /// Env steps made.
+    pub env_steps: u64,
+    /// Env steps per second since the status before.
+    pub steps_per_second: f64,
+    /// Updates per second since the status before.
+    pub updates_per_second: f64,
+    /// Fraction of the latest training episodes that arrived; none before the first ended.
+    pub success: Option<f64>,
+    /// Number of those episodes.
+    pub window: u64,
+    /// Success in the latest validation and in the best one; none before the first.
+    pub validation: Option<(f64, f64)>,
+    /// Training time that is left, as far as it can be known (s).
+    pub seconds_left: f64,
+    /// Names of files that could not be written when that was last tried.
+    pub unwritten: Vec<String>,
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Status { env_steps, steps_per_second, updates_per_second, window, .. } = self;
+        write!(
+            f,
+            "{:.2} M steps, {steps_per_second:.0} steps/s, {updates_per_second:.0} updates/s, success ",
+            *env_steps as f64 / 1e6
+        )?;
+        match self.success {
+            Some(success) => write!(f, "{:.1} % of the last {window}", 100.0 * success)?,
+            None => write!(f, "- of the last {window}")?,
+        }
+        if let Some((last, best)) = self.validation {
+            write!(f, ", validation {:.1} % (best {:.1} %)", 100.0 * last, 100.0 * best)?;
+        }
+        let left = self.seconds_left as u64;
+        write!(f, ", {}:{:02} left", left / 60, left % 60)?;
+        self.unwritten.iter().try_for_each(|name| write!(f, ", {name} cannot be written"))
+    }
+}
+
 /// Where a run shows how far it is.
 pub trait Display {
-    /// The fraction of the budget that is spent, and a line about it.
-    fn show(&mut self, fraction: f64, line: String);
+    /// How far the run is.
+    fn show(&mut self, status: &Status);
 
     /// A line that is to stay, about something that went wrong.
     fn warn(&mut self, line: String);
@@ -30,13 +77,13 @@ pub trait Display {
 
 /// Shows nothing.
 impl Display for () {
-    fn show(&mut self, _: f64, _: String) {}
+    fn show(&mut self, _: &Status) {}
     fn warn(&mut self, _: String) {}
     fn close(&mut self) {}
 }
 
 /// Counters and clocks of a run.
-pub struct Progress {
+pub struct Progress<'a> {
     begun: Instant,
     /// Training time before that.
     before: Duration,
@@ -61,7 +108,7 @@ pub struct Progress {
     tried: (f64, u64),
     /// When the display was last updated, and the steps and updates by then.
     shown: (Instant, u64, u64),
-    display: Box<dyn Display>,
+    display: Box<dyn Display + 'a>,
     metrics: MetricsFile,
     /// The rows of `metrics` for TensorBoard.
     events: Option<EventsFile>,
@@ -69,9 +116,9 @@ pub struct Progress {
     unwritten: Vec<PathBuf>,
 }
 
-impl Progress {
+impl<'a> Progress<'a> {
     /// Starts the clock.
-    pub fn new(config: &Config, metrics: MetricsFile, display: Box<dyn Display>) -> Progress {
+    pub fn new(config: &Config, metrics: MetricsFile, display: Box<dyn Display + 'a>) -> Progress<'a> {
         Progress {
             begun: Instant::now(),
             before: Duration::ZERO,
@@ -256,25 +303,22 @@ impl Progress {
     fn show(&mut self) {
         let (since, steps, updates) =
             std::mem::replace(&mut self.shown, (Instant::now(), self.env_steps, self.updates));
-        let [steps_rate, update_rate] =
+        let [steps_per_second, updates_per_second] =
             per_second(since.elapsed().as_secs_f64(), [self.env_steps - steps, self.updates - updates]);
         let fraction = self.fraction();
-        let left = if 0.0 < fraction { self.seconds() * (1.0 - fraction) / fraction } else { 0.0 };
-        let success = self.success().map_or_else(|| "-".to_owned(), |success| format!("{:.1} %", 100.0 * success));
-        let validation = self
-            .validation
-            .map(|(last, best)| format!(", validation {:.1} % (best {:.1} %)", 100.0 * last, 100.0 * best));
-        let validation = validation.unwrap_or_default();
-        let line = format!(
-            "{:.2} M steps, {steps_rate:.0} steps/s, {update_rate:.0} updates/s, success {success} of the last {}{validation}, {}:{:02} left",
-            self.env_steps as f64 / 1e6,
-            self.window.count(),
-            left as u64 / 60,
-            left as u64 % 60,
-        );
-        let names = self.unwritten.iter().filter_map(|file| Some(file.file_name()?.to_string_lossy()));
-        let line = names.fold(line, |line, name| format!("{line}, {name} cannot be written"));
-        self.display.show(fraction, line);
+        let names = self.unwritten.iter().filter_map(|file| Some(file.file_name()?.to_string_lossy().into_owned()));
+        let status = Status {
+            fraction,
+            env_steps: self.env_steps,
+            steps_per_second,
+            updates_per_second,
+            success: self.success(),
+            window: self.window.count(),
+            validation: self.validation,
+            seconds_left: if 0.0 < fraction { self.seconds() * (1.0 - fraction) / fraction } else { 0.0 },
+            unwritten: names.collect(),
+        };
+        self.display.show(&status);
     }
 
     /// Adds the counters' columns.

@@ -10,7 +10,7 @@ use super::metrics_file::MetricsFile;
 use super::progress;
 use crate::checkpoint::Stored;
 use crate::config::Config;
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// Most bytes of a report.
 const REPORT_LIMIT: u64 = 64 << 20;
@@ -26,12 +26,15 @@ pub struct Resumed {
     pub metrics: MetricsFile,
     /// The run's last checkpoint; none where it was killed before the first one, so that it starts from the beginning.
     pub stored: Option<Stored>,
+    /// The budget is another one than that of the run's own training file.
+    pub has_new_budget: bool,
 }
 
 impl Resumed {
     /// Reads what a run left in its folder. Nothing is written but a missing `metrics.csv`.
     pub fn open(path: &Path, minutes: Option<f64>, steps: Option<u64>) -> Result<Resumed, Error> {
         let folder = Folder::of(path)?;
+        let has_new_budget = minutes.is_some() || steps.is_some();
         let mut config = Config::read(&folder.config())?;
         if !folder.checkpoint().is_file() && is_evaluated(&folder) {
             let policy = folder.policy();
@@ -45,20 +48,20 @@ impl Resumed {
         let metrics = if file.is_file() { MetricsFile::open(file)? } else { MetricsFile::create(file)? };
         if !folder.checkpoint().is_file() {
             config.override_with(None, minutes, steps, None)?;
-            return Ok(Resumed { folder, config, metrics, stored: None });
+            return Ok(Resumed { folder, config, metrics, stored: None, has_new_budget });
         }
         let stored = Stored::read(&folder.checkpoint())?;
         let written =
             toml::from_str(stored.config()).map_err(|error| stored.error(format!("its training file: {error}")))?;
         if !config.is_same_run(&written) {
             let message = "is not the training file that the checkpoint was written with; only minutes, steps and checkpoint_minutes may differ";
-            return Err(Error::Contents { file: folder.config(), message: message.to_owned() });
+            return Err(Error::contents(&folder.config(), message));
         }
         config.override_with(None, minutes, steps, None)?;
         let (seconds, env_steps) = progress::reached(&stored)?;
         let over = config.minutes.is_some_and(|minutes| 60.0 * minutes <= seconds)
             || config.steps.is_some_and(|steps| steps <= env_steps);
-        if over && (minutes.is_some() || steps.is_some()) {
+        if over && has_new_budget {
             let expected =
                 format!("it was trained for {:.2} min and {env_steps} env steps: more are needed", seconds / 60.0);
             return Err(refused(path, expected));
@@ -69,12 +72,12 @@ impl Resumed {
                     .to_owned();
             return Err(refused(path, expected));
         }
-        Ok(Resumed { folder, config, metrics, stored: Some(stored) })
+        Ok(Resumed { folder, config, metrics, stored: Some(stored), has_new_budget })
     }
 }
 
 fn refused(path: &Path, expected: String) -> Error {
-    Error::Setting { name: "--resume", value: path.display().to_string(), expected }
+    Error::setting("--resume", path.display().to_string(), expected)
 }
 
 /// The final evaluation has been written.

@@ -12,8 +12,8 @@ use serde::Serialize;
 
 use super::progress::ROW_EVERY;
 use crate::checkpoint::{Columns, Stored};
+use crate::error::Error;
 use crate::rollout::RouteEnd;
-use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
 /// Latest episodes of each route that recent success is a fraction of: as many as a number has bits.
@@ -142,7 +142,10 @@ impl RouteCounts {
     /// Writes the file, if there is an episode to count.
     pub fn write(&mut self) -> Result<(), Error> {
         self.written = Some(Instant::now());
-        if self.is_empty() { Ok(()) } else { files::write_whole(&self.file, self.text().as_bytes()) }
+        if !self.is_empty() {
+            files::write_whole(&self.file, self.text().as_bytes())?;
+        }
+        Ok(())
     }
 
     fn is_empty(&self) -> bool {

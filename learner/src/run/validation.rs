@@ -10,10 +10,10 @@ use serde::Serialize;
 
 use crate::checkpoint::{Columns, Stored};
 use crate::config;
+use crate::error::Error;
 use crate::run::changed;
 use offtrack_evaluation::Evaluation;
 use offtrack_evaluation::device::Device;
-use offtrack_evaluation::error::Error;
 use offtrack_evaluation::report::{Summary, wilson};
 
 /// Seed of the start poses, the same in every validation.

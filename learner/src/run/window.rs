@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 
 use crate::checkpoint::{Columns, Stored};
+use crate::error::Error;
 use crate::rollout::Episodes;
-use offtrack_evaluation::error::Error;
 
 /// Episodes that success and mean reward are means over, as many as in the study: the latest, or where a device counts
 /// them in groups, the fewest latest groups that hold so many.

@@ -6,7 +6,7 @@ use super::critics::Twins;
 use super::{Sac, Scalar};
 use crate::checkpoint::{Columns, Stored};
 use crate::columns::{Named, moments, named, network, optimizer};
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// Name of the column with the numbers of steps that the optimizers made.
 const STEPS: &str = "learner, steps";

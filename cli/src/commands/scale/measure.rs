@@ -10,7 +10,7 @@ use offtrack::layout::N_RAYS;
 use offtrack::simulator::Tally;
 use serde::Serialize;
 
-use offtrack_evaluation::error::Error;
+use offtrack_learner::error::Error;
 
 use super::mode::Driven;
 

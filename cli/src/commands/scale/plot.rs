@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::mode::Mode;
 use super::{Measured, Scale};
 use offtrack_drawing::chart::{Chart, Kind, LINES, Line, Panel};
-use offtrack_evaluation::error::Error;
+use offtrack_learner::error::Error;
 
 /// Width of a PNG (px).
 pub(super) const PNG_WIDTH: u32 = 1600;
@@ -16,11 +16,7 @@ pub(super) const PNG_WIDTH: u32 = 1600;
 pub(super) fn check(file: &Path) -> Result<(), Error> {
     match file.extension().and_then(|extension| extension.to_str()) {
         Some("svg" | "png") => Ok(()),
-        _ => Err(Error::Setting {
-            name: "--plot",
-            value: file.display().to_string(),
-            expected: "must end in .svg or .png".into(),
-        }),
+        _ => Err(Error::setting("--plot", file.display().to_string(), "must end in .svg or .png")),
     }
 }
 

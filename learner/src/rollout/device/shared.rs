@@ -9,7 +9,7 @@ use burn::cubecl::wgpu::{AutoCompiler, WgpuServer, WgpuSetup};
 use burn::tensor::{DType, Device, Int, Tensor};
 use offtrack::gpu::{self, Slice};
 
-use offtrack_evaluation::error::Error;
+use crate::error::Error;
 
 /// The device, as either knows it.
 #[derive(Clone)]

@@ -1,6 +1,5 @@
 //! What must agree between the benchmark that a policy is trained on and one that it is chosen or evaluated on: what
-//! the
-//! policy drives, and how it observes.
+//! the policy drives, and how it observes.
 //!
 //! Roads, start errors, reward and ends of episodes may differ, and so may what `[draw]` varies: training begins from
 //! wider errors and with less grip than an evaluation.
@@ -12,14 +11,14 @@ use offtrack::map::Gutter;
 use offtrack::scenario::Scenario;
 
 /// The action table of a benchmark.
-pub fn actions(scenario: &Scenario) -> Vec<Action> {
+fn actions(scenario: &Scenario) -> Vec<Action> {
     scenario.actions(scenario.steer_max.unwrap_or(scenario.vehicle.tractor.steer_max) as f32)
 }
 
 /// What of `other` is not as in `trained`: a key, or words, with both values where they are short. None where a policy
 /// that
 /// was trained in the one drives and observes the same in the other.
-pub fn difference(trained: &Scenario, other: &Scenario) -> Option<String> {
+pub(super) fn difference(trained: &Scenario, other: &Scenario) -> Option<String> {
     let differing = |what: &str, value: fn(&Scenario) -> String| {
         let [value, expected] = [other, trained].map(value);
         (value != expected).then(|| format!("{what} ({value} in place of {expected})"))
@@ -34,7 +33,7 @@ pub fn difference(trained: &Scenario, other: &Scenario) -> Option<String> {
 }
 
 /// The part of [`difference`] without which a policy cannot drive at all.
-pub fn needed(trained: &Scenario, other: &Scenario) -> Option<String> {
+pub(super) fn needed(trained: &Scenario, other: &Scenario) -> Option<String> {
     if actions(other) != actions(trained) {
         return Some("actions and vehicle lock".to_owned());
     }

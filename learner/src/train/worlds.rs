@@ -7,13 +7,19 @@ use std::sync::Arc;
 use offtrack::files::reader::{Error as InputError, Reader};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
-use offtrack_evaluation::error::Error;
-use offtrack_learner::config::Config;
-use offtrack_learner::run::validation::Validation;
+use offtrack_evaluation::device::Device;
+use offtrack_evaluation::recording::Track;
+use offtrack_evaluation::report::Report;
+use offtrack_evaluation::{Evaluation, usual_episodes};
+use offtrack_policy::Policy;
 
 use super::alike;
 use super::also::Also;
-use crate::commands::roads;
+use super::event::{Caller, Event};
+use super::roads::Roads;
+use crate::config::Config;
+use crate::error::Error;
+use crate::run::validation::Validation;
 
 /// Where a benchmark has no training or no validation routes of its own, it is driven on the roads of this one.
 const ROADS: &str = "random2026";
@@ -22,27 +28,26 @@ const ROADS: &str = "random2026";
 const SHORTER: f64 = 5.0;
 
 /// What a run is trained on.
-pub struct Worlds {
+pub(super) struct Worlds {
     /// The benchmark that the policy is evaluated on.
-    pub benchmark: Scenario,
-    pub benchmark_world: Arc<World>,
+    pub(super) benchmark: Scenario,
+    pub(super) benchmark_world: Arc<World>,
     /// The benchmark that it is trained on.
-    pub training: Scenario,
-    pub training_world: Arc<World>,
+    pub(super) training: Scenario,
+    pub(super) training_world: Arc<World>,
     /// The benchmark that the policy is chosen on, with its validation routes; none without validation.
     validation: Option<(Arc<Scenario>, Arc<World>)>,
     /// What else it is evaluated on.
-    pub also: Vec<Also>,
+    pub(super) also: Vec<Also>,
 }
 
 impl Worlds {
     /// The benchmarks of a training file, which `origin` names in errors. None of the routes that the policy is chosen
-    /// or
-    /// evaluated on may be among those it is trained on, and on all of them it drives what it is trained to drive.
-    pub fn read(config: &Config, origin: &Path) -> Result<Worlds, Error> {
+    /// or evaluated on may be among those it is trained on, and on all of them it drives what it is trained to drive.
+    pub(super) fn read(config: &Config, origin: &Path, roads: Roads) -> Result<Worlds, Error> {
         let reader = Reader::of(origin);
-        let own = named(&reader, "benchmark", &config.benchmark)?;
-        let training = training(&reader, config, &own)?;
+        let own = named(&reader, "benchmark", &config.benchmark, roads)?;
+        let training = training(&reader, config, &own, roads)?;
         // The policy is evaluated on the test routes alone; without any it is not evaluated.
         let mut benchmark = own.clone();
         if !benchmark.split(Split::Test).is_empty() {
@@ -61,38 +66,58 @@ impl Worlds {
             );
             return Err(wrong(expected).into());
         }
-        let also = Also::read(config, &reader, &training)?;
+        let also = Also::read(config, &reader, &training, roads)?;
         let validation =
-            config.validation.is_some().then(|| validation(&reader, config, &own, &training)).transpose()?;
-        let baked = |scenario: Scenario| Ok::<_, Error>((roads::world(&scenario)?, Arc::new(scenario)));
+            config.validation.is_some().then(|| validation(&reader, config, &own, &training, roads)).transpose()?;
+        let baked = |scenario: Scenario| Ok::<_, Error>((roads.world(&scenario)?, Arc::new(scenario)));
         let validation = validation.map(baked).transpose()?.map(|(world, scenario)| (scenario, world));
-        let (benchmark_world, training_world) = (roads::world(&benchmark)?, roads::world(&training)?);
+        let (benchmark_world, training_world) = (roads.world(&benchmark)?, roads.world(&training)?);
         Ok(Worlds { benchmark, benchmark_world, training, training_world, validation, also })
     }
 
     /// Validation at its beginning, if the config has it.
-    pub fn validation(&self, config: &Config) -> Option<Validation> {
+    pub(super) fn validation(&self, config: &Config) -> Option<Validation> {
         let (scenario, world) = self.validation.as_ref()?;
         Some(Validation::new(config.validation.clone()?, scenario.clone(), world.clone()))
+    }
+
+    /// The evaluation on `benchmark`, with the episodes that its page shows; none where it has no test routes.
+    pub(super) fn evaluate(&self, policy: &mut Policy, caller: Caller) -> Result<Option<(Report, Vec<Track>)>, Error> {
+        let n_routes = self.benchmark.split(Split::Test).len();
+        if n_routes == 0 {
+            return Ok(None);
+        }
+        let evaluation = Evaluation {
+            scenario: &self.benchmark,
+            world: &self.benchmark_world,
+            split: Split::Test,
+            episodes: usual_episodes(n_routes),
+            seed: 0,
+            record: true,
+            device: &Device::processor(),
+        };
+        let benchmark = &self.benchmark.name;
+        let mut tell = |done, total| caller.tell(Event::Evaluating { benchmark, done, total });
+        Ok(Some(evaluation.report(policy, &mut tell)?))
     }
 }
 
 /// The benchmark that a key names.
-pub fn named(reader: &Reader, key: &str, name: &str) -> Result<Scenario, Error> {
-    roads::benchmark(name).map_err(|error| match error {
+fn named(reader: &Reader, key: &str, name: &str, roads: Roads) -> Result<Scenario, InputError> {
+    roads.benchmark(name).map_err(|error| match error {
         // The benchmark's own file was not found or is none, so the key that names it is what is wrong.
-        Error::Input(
-            error @ (InputError::UnknownName { .. } | InputError::Unreadable { .. } | InputError::NotAFile { .. }),
-        ) => reader.invalid(key, name, error.to_string()).into(),
+        InputError::UnknownName { .. } | InputError::Unreadable { .. } | InputError::NotAFile { .. } => {
+            reader.invalid(key, name, error.to_string())
+        }
         error => error,
     })
 }
 
 /// What is trained on, with its training routes alone and the reward of the training file.
-fn training(reader: &Reader, config: &Config, own: &Scenario) -> Result<Scenario, Error> {
+fn training(reader: &Reader, config: &Config, own: &Scenario, roads: Roads) -> Result<Scenario, Error> {
     let mut training = match &config.training_benchmark {
-        Some(name) => named(reader, "training_benchmark", name)?,
-        None if own.split(Split::Train).is_empty() => on_random_roads(own, Split::Train)?,
+        Some(name) => named(reader, "training_benchmark", name, roads)?,
+        None if own.split(Split::Train).is_empty() => on_random_roads(own, Split::Train, roads)?,
         None => own.clone(),
     };
     if training.split(Split::Train).is_empty() {
@@ -104,11 +129,17 @@ fn training(reader: &Reader, config: &Config, own: &Scenario) -> Result<Scenario
 }
 
 /// What the policy is chosen on, with its validation routes alone.
-fn validation(reader: &Reader, config: &Config, own: &Scenario, training: &Scenario) -> Result<Scenario, Error> {
+fn validation(
+    reader: &Reader,
+    config: &Config,
+    own: &Scenario,
+    training: &Scenario,
+    roads: Roads,
+) -> Result<Scenario, Error> {
     let given = config.validation.as_ref().and_then(|validation| validation.benchmark.as_ref());
     let mut scenario = match given {
-        Some(name) => named(reader, "validation.benchmark", name)?,
-        None if own.split(Split::Validation).is_empty() => on_random_roads(own, Split::Validation)?,
+        Some(name) => named(reader, "validation.benchmark", name, roads)?,
+        None if own.split(Split::Validation).is_empty() => on_random_roads(own, Split::Validation, roads)?,
         None => own.clone(),
     };
     let wrong = |expected: String| {
@@ -134,15 +165,15 @@ fn validation(reader: &Reader, config: &Config, own: &Scenario, training: &Scena
 
 /// A benchmark on the roads of a split of [`ROADS`] in place of its own: vehicle, actions and all else are its own.
 /// Approach and departure are as long as the arms have room for.
-fn on_random_roads(own: &Scenario, split: Split) -> Result<Scenario, Error> {
-    let mut roads = roads::benchmark(ROADS)?;
-    roads.keep(&[split]);
+fn on_random_roads(own: &Scenario, split: Split, roads: Roads) -> Result<Scenario, Error> {
+    let mut on = roads.benchmark(ROADS)?;
+    on.keep(&[split]);
     let mut bare = own.clone();
     bare.keep(&[]);
     bare.name = format!("{} on roads of {ROADS}", own.name);
     loop {
         let mut scenario = bare.clone();
-        match roads.places.iter().try_for_each(|place| scenario.add(place.roundabout.clone(), split)) {
+        match on.places.iter().try_for_each(|place| scenario.add(place.roundabout.clone(), split)) {
             Ok(()) => return Ok(scenario),
             Err(InputError::Invalid { key, .. }) if key == "routes.approach" && 2.0 * SHORTER <= bare.approach => {
                 bare.approach -= SHORTER

@@ -42,8 +42,7 @@ pub fn unreadable(error: &impl Display) -> ! {
 }
 
 /// The outcome of `work` on a device, or an error if a library panicked, with the panic's place. A panic of our own
-/// code
-/// goes on, unless `failed` says that the device has failed, which is then the error.
+/// code goes on, unless `failed` says that the device has failed, which is then the error.
 pub fn caught<T>(work: impl FnOnce() -> Result<T, Error>, failed: impl FnOnce() -> Option<Error>) -> Result<T, Error> {
     CHAINED.call_once(|| {
         let previous = take_hook();
@@ -111,7 +110,7 @@ fn is_own(file: &str) -> bool {
 /// repository.
 fn root() -> String {
     let this = file!().replace('\\', "/");
-    this.strip_suffix("evaluation/src/device/panics.rs").unwrap_or_default().to_owned()
+    this.strip_suffix("learner/src/panics.rs").unwrap_or_default().to_owned()
 }
 
 fn message(panic: &(dyn Any + Send)) -> String {
