@@ -5,7 +5,7 @@ use std::path::Path;
 use offtrack::files::reader::{printable, shown_path};
 use offtrack_learner::config::Config;
 
-/// Time of the default run, as docs/benchmarks has it: two quiet cores, and one core beside other work.
+/// Time of the default run, as docs/results.md has it: two quiet cores, and one core beside other work.
 const DEFAULT_TIME: &str = "three to five minutes on two idle cores, a quarter of an hour on busy ones";
 
 /// A line about `n_runs` runs of a training file.
