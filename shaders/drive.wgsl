@@ -51,26 +51,39 @@ struct Motion {
     trailer_lateral_acceleration: f32,
 }
 
-// The steer angle that was asked for `delay` sub-steps before sub-step `n` of the step, at most two steps ago (rad).
+// The steer angle that was asked for `delay` sub-steps before sub-step `n` of the step, at most three steps ago (rad).
 fn delayed(delay: u32, n: u32, n_substeps: u32, control: Control) -> f32 {
     if delay <= n {
         return control.steering;
     } else if delay <= n + n_substeps {
         return control.steering_before;
+    } else if delay <= n + 2u * n_substeps {
+        return control.steering_earlier;
     }
-    return control.steering_earlier;
+    return control.steering_earliest;
 }
 
 // Motion of a truck.
 fn motion_of(rig: Rig, truck: Truck) -> Motion {
-    let curvature = steered_curvature(rig, truck.steering);
-    return motion(rig, truck.speed, curvature, truck.curvature_lag, truck.acceleration, truck.heading - truck.trailer_heading);
+    let curvature = steered_curvature(rig, truck.steering, truck.speed);
+    let slip = trailer_slip(rig, truck);
+    let articulation = truck.heading - truck.trailer_heading;
+    return motion(rig, truck.speed, curvature, truck.curvature_lag, truck.acceleration, articulation, slip);
 }
 
-// Curvature of the path on which the tractor's wheels roll at a steer angle (rad), without slip (1/m).
-fn steered_curvature(rig: Rig, steering: f32) -> f32 {
+// Curvature of the path that the tractor's wheels lead to at a steer angle (rad) and a speed (m/s), without lag (1/m).
+fn steered_curvature(rig: Rig, steering: f32, speed: f32) -> f32 {
     let steered = sin_cos(steering);
-    return steered.x / (steered.y * rig.wheelbase);
+    // Oversteer ends in a spin, which is not modelled.
+    let wheelbase = max(rig.wheelbase + rig.understeer * (speed * speed), WHEELBASE_MIN * rig.wheelbase);
+    return steered.x / (steered.y * wheelbase);
+}
+
+// Slip of the trailer's tyres, which lose stiffness as its load moves to the outer ones (rad/(m/s^2)).
+fn trailer_slip(rig: Rig, truck: Truck) -> f32 {
+    let roll = vec2<f32>(truck.trailer_roll, truck.trailer_roll_rate);
+    let ratio = load_transfer_ratio(rig.trailer_roll, roll, truck.lateral_acceleration + rig.crossfall);
+    return rig.slip * (1.0 + rig.slip_growth * abs(ratio));
 }
 
 // Strongest drive at a speed (m/s^2).
@@ -79,8 +92,16 @@ fn drive_max(rig: Rig, speed: f32) -> f32 {
 }
 
 // Motion of a truck with this speed (m/s), curvature of the steer angle and deviation from it (1/m), acceleration
-// (m/s^2) and articulation (rad).
-fn motion(rig: Rig, speed: f32, steered_curvature: f32, curvature_lag: f32, acceleration: f32, articulation: f32) -> Motion {
+// (m/s^2), articulation (rad) and slip of the trailer (rad/(m/s^2)).
+fn motion(
+    rig: Rig,
+    speed: f32,
+    steered_curvature: f32,
+    curvature_lag: f32,
+    acceleration: f32,
+    articulation: f32,
+    trailer_slip: f32,
+) -> Motion {
     // The tyres' grip bounds the curvature.
     let grip = rig.lateral_acceleration_max * sqrt(max(1.0 - rig.friction_ellipse * acceleration * acceleration, 0.0));
     let curvature = limited(steered_curvature + curvature_lag, grip / max(speed * speed, SPEED_SQUARED_MIN));
@@ -89,7 +110,7 @@ fn motion(rig: Rig, speed: f32, steered_curvature: f32, curvature_lag: f32, acce
     let hitch_side_speed = side_speed + rig.fifth_wheel * yaw_rate;
     let bent = sin_cos(articulation);
     let trailer_speed = speed * bent.y - hitch_side_speed * bent.x;
-    let lever = rig.trailer_wheelbase - limited(rig.slip * trailer_speed * abs(trailer_speed), rig.slip_lever_max);
+    let lever = rig.trailer_wheelbase - limited(trailer_slip * trailer_speed * abs(trailer_speed), rig.slip_lever_max);
     let trailer_yaw_rate = (speed * bent.x + hitch_side_speed * bent.y) / lever;
     return Motion(steered_curvature, yaw_rate, trailer_yaw_rate, side_speed, speed * yaw_rate, trailer_speed * trailer_yaw_rate);
 }
@@ -123,25 +144,28 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
         speed = 0.0;
     }
 
+    let slip = trailer_slip(rig, truck);
     let half_step = 0.5 * substep;
     let articulation = truck.heading - truck.trailer_heading;
     let middle_speed = truck.speed + mean_acceleration * half_step;
     let middle_articulation = articulation + half_step * (start.motion.yaw_rate - start.motion.trailer_yaw_rate);
-    let middle_curvature = steered_curvature(rig, truck.steering + 0.5 * turn);
+    let middle_curvature = steered_curvature(rig, truck.steering + 0.5 * turn, middle_speed);
     let rise = middle_curvature - start.motion.steered_curvature;
     let middle_lag = lagging(rig, middle_speed, truck.curvature_lag, rise, half_step);
-    let mean = motion(rig, middle_speed, middle_curvature, middle_lag, mean_acceleration, middle_articulation);
+    let mean = motion(rig, middle_speed, middle_curvature, middle_lag, mean_acceleration, middle_articulation, slip);
     let ahead = direction(truck.heading + half_step * start.motion.yaw_rate);
     let velocity = vec2<f32>(middle_speed * ahead.x - mean.side_speed * ahead.y, middle_speed * ahead.y + mean.side_speed * ahead.x);
 
     let heading = wrapped(truck.heading + substep * mean.yaw_rate);
     let trailer_heading = wrapped(truck.trailer_heading + substep * mean.trailer_yaw_rate);
-    let curvature = steered_curvature(rig, steering);
+    let curvature = steered_curvature(rig, steering, speed);
     let curvature_lag = lagging(rig, middle_speed, truck.curvature_lag, curvature - start.motion.steered_curvature, substep);
-    let last = motion(rig, speed, curvature, curvature_lag, acceleration, heading - trailer_heading);
+    let last = motion(rig, speed, curvature, curvature_lag, acceleration, heading - trailer_heading, slip);
     let tractor = rolled(rig.tractor_roll, vec2<f32>(truck.tractor_roll, truck.tractor_roll_rate), mean.lateral_acceleration + rig.crossfall);
     let trailer =
         rolled(rig.trailer_roll, vec2<f32>(truck.trailer_roll, truck.trailer_roll_rate), mean.trailer_lateral_acceleration + rig.crossfall);
+    let tractor_ratio = load_transfer_ratio(rig.tractor_roll, tractor, last.lateral_acceleration + rig.crossfall);
+    let trailer_ratio = load_transfer_ratio(rig.trailer_roll, trailer, last.trailer_lateral_acceleration + rig.crossfall);
     var after = truck;
     after.position = truck.position + substep * velocity;
     after.heading = heading;
@@ -152,8 +176,8 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
     after.tractor_roll_rate = tractor.y;
     after.trailer_roll = trailer.x;
     after.trailer_roll_rate = trailer.y;
-    after.tractor_load_transfer_ratio = load_transfer_ratio(rig.tractor_roll, tractor, last.lateral_acceleration + rig.crossfall);
-    after.trailer_load_transfer_ratio = load_transfer_ratio(rig.trailer_roll, trailer, last.trailer_lateral_acceleration + rig.crossfall);
+    after.tractor_load_transfer_ratio = tractor_ratio + rig.fifth_wheel_load * (trailer_ratio - tractor_ratio);
+    after.trailer_load_transfer_ratio = trailer_ratio;
     after.acceleration = acceleration;
     after.curvature_lag = curvature_lag;
     after.lateral_acceleration = last.trailer_lateral_acceleration;

@@ -8,6 +8,7 @@ fn follow(thread: Thread) {
     if !is_driving(env) { return; }
     let point = reference_point(rigs[truck[env].vehicle].wheelbase, truck[env]);
     progress[env] = followed(routes[truck[env].route], point, progress[env].waypoint, params.stray_distance);
+    if params.disturbances.of_observation == 1u { perceive(env, truck[env].steps + 1u); }
 }
 
 // Middle of the wheelbase (m).

@@ -14,6 +14,9 @@ const N_RAYS: u32 = 29u;
 const N_PREVIEW: u32 = 18u;
 // Values that may be observed beside those.
 const N_EXTRAS: u32 = 12u;
+// Poses of a truck that are kept where what is observed is disturbed: the one that is observed, and those of the
+// last three steps, the latest first.
+const N_POSES: u32 = 4u;
 // Bit of `BeginRow::what`: the truck begins an episode.
 const BEGINS: u32 = 1u;
 // Bit: the episode is the first of the truck's stream, not the next one.
@@ -72,12 +75,24 @@ const ADDEND: u32 = 1013904223u;
 const SPARE_BITS: u32 = 8u;
 // Unit of the bits above them.
 const UNIT: f32 = 1.1920929e-7f;
+// Lowest bits of a word that the sum of four such words has no room for in an f32.
+const SPARE_BITS_OF_FOUR: u32 = 10u;
+// Unit of the sum of the bits above them: four uniform numbers of 0..1 add up to 4.
+const UNIT_OF_FOUR: f32 = 2.3841858e-7f;
+// Standard deviations in a unit of that sum.
+const DEVIATIONS: f32 = 1.7320508f;
 // `Draw::Route`.
 const DRAW_ROUTE: u32 = 0u;
 // `Draw::Pose`.
 const DRAW_POSE: u32 = 1u;
 // `Draw::Vehicle`.
 const DRAW_VEHICLE: u32 = 4294967295u;
+// `Draw::Delays`.
+const DRAW_DELAYS: u32 = 4294967294u;
+// `Draw::Offsets`.
+const DRAW_OFFSETS: u32 = 4294967293u;
+// `Draw::Noise`.
+const DRAW_NOISE: u32 = 4294967292u;
 // `Draw::Action`.
 const DRAW_ACTION: u32 = 2u;
 // Braking at which a truck comes to stand (m/s^2).
@@ -86,6 +101,8 @@ const HOLD_BRAKING: f32 = 0.5f;
 const POWER_SPEED_MIN: f32 = 1.0f;
 // Keeps a quotient finite at a standstill (m^2/s^2).
 const SPEED_SQUARED_MIN: f32 = 0.01f;
+// Least fraction of its wheelbase that a tractor with oversteer steers as if it had.
+const WHEELBASE_MIN: f32 = 0.5f;
 // Samples taken at once.
 const LANES: u32 = 8u;
 // Points of a unit sampled first, at most.
@@ -103,6 +120,11 @@ const FRACTION: f32 = 0.5f;
 // Most undecided spans: at first 11 and 8 of a trailer, then at most 8 more for each of the 8 halvings from 2.5 m
 // to 1 cm.
 const N_SPANS: u32 = 96u;
+// Index of the noise of the position among an episode's and step's, east and then north: those below are the
+// rays'.
+const POSITION_NOISE: u32 = 32u;
+// Index of the noise of the tractor's heading, and behind it of the trailer's.
+const HEADING_NOISE: u32 = 34u;
 // The circles at both ends of a step may lie this far apart (m): a kerb thinner than this along the ray can hide
 // between them.
 const RAY_GAP: f32 = 0.05f;
@@ -204,6 +226,14 @@ struct Control {
     target_speed: f32,
     // Whether the target speed is 0: once the truck stands, the brakes hold it (0 or 1).
     holds: u32,
+    // Steer angle asked for three steps before (rad).
+    steering_earliest: f32,
+    // With a delay of actions: the action of the step before, its index plus 1; 0 before the first.
+    action_before: u32,
+    // The action of the step before that, likewise.
+    action_earlier: u32,
+    // The action of three steps before, likewise.
+    action_earliest: u32,
 }
 
 // One tractor and its trailer.
@@ -248,6 +278,20 @@ struct Truck {
     vehicle: u32,
 }
 
+// Where a truck was at the end of a step.
+struct Pose {
+    // Middle of the drive axle (m).
+    position: vec2<f32>,
+    // Heading of the tractor (rad).
+    heading: f32,
+    // Heading of the trailer (rad).
+    trailer_heading: f32,
+    // Speed of the drive axle along the tractor's heading (m/s).
+    speed: f32,
+    // Index of the next waypoint to pass on the route.
+    waypoint: u32,
+}
+
 // How a truck begins its route: fractions of the largest start errors and of half the range of speeds, each in
 // -1..=1, and its vehicle. Zeros are the first vehicle on the lane centre at the middle of the speeds.
 struct Start {
@@ -276,7 +320,8 @@ struct BeginRow {
     start: Start,
     // Index of the episode's route in the world, where `HAS_ROUTE` is set.
     route: u32,
-    // Bits: `BEGINS`, `IS_FIRST`, `HAS_ROUTE`, `HAS_START`.
+    // Bits: `BEGINS`, `IS_FIRST`, `HAS_ROUTE`,
+    // `HAS_START`.
     what: u32,
 }
 
@@ -416,6 +461,13 @@ struct Rig {
     chassis: u32,
     // Index of vehicle and load, as reports and the clock group them.
     class_index: u32,
+    // Increase of the trailer's slip with its load transfer ratio: slip times `1 + slip_growth |ratio|`.
+    slip_growth: f32,
+    // Understeer: increase of the steer angle that a path needs, per lateral acceleration (rad/(m/s^2)).
+    understeer: f32,
+    // Fraction of the load on the tractor's axles that the trailer puts on the fifth wheel: by it the trailer's
+    // load transfer ratio counts in the tractor's.
+    fifth_wheel_load: f32,
 }
 
 // One entry of the action table.
@@ -440,6 +492,36 @@ struct Reward {
     clearance_limit: f32,
     // Reward when the episode fails.
     failure: f32,
+}
+
+// What the world does to a policy, by the keys of a benchmark's `[disturbances]`. Zeros are nothing.
+struct Disturbances {
+    // Standard deviation of a distance sensor, each step (m).
+    range_noise: f32,
+    // Fraction of the rays that find nothing, each step.
+    dropped_rays: f32,
+    // Largest error of the position in either direction, constant in an episode (m).
+    position_offset: f32,
+    // Largest error of the headings, constant in an episode (rad).
+    heading_offset: f32,
+    // Standard deviation of the position in either direction, each step (m).
+    position_noise: f32,
+    // Standard deviation of each unit's heading, each step (rad).
+    heading_noise: f32,
+    // Largest error of the route's place in either direction, constant in an episode (m).
+    map_offset: f32,
+    // Least age of what is observed (steps).
+    observation_delay: u32,
+    // Number of ages from there on that are drawn from.
+    n_observation_delays: u32,
+    // Least number of steps by which an action comes late.
+    action_delay: u32,
+    // Number of such delays from there on that are drawn from.
+    n_action_delays: u32,
+    // Whether what is observed differs from what is (0 or 1).
+    of_observation: u32,
+    // Whether actions come late (0 or 1).
+    of_action: u32,
 }
 
 // Time and weights, shared by all trucks.
@@ -480,6 +562,8 @@ struct Params {
     rollover_ratio: f32,
     // Weights and limits of the reward.
     reward: Reward,
+    // What the world does to a policy.
+    disturbances: Disturbances,
 }
 
 // One waypoint of one route.
@@ -598,5 +682,7 @@ struct BatchFacts {
 @group(0) @binding(26) var<storage, read_write> extras: array<f32>;
 // What is observed beside the observation after the last action, [n_envs, 12].
 @group(0) @binding(27) var<storage, read_write> next_extras: array<f32>;
+// With disturbances: the pose that is observed, and those of the last three steps; zeros without, [n_envs, 4].
+@group(0) @binding(28) var<storage, read_write> poses: array<Pose>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(28) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(29) var<storage, read_write> tally: array<atomic<u32>>;

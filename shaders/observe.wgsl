@@ -81,10 +81,12 @@ fn observe_extras(env: u32, after_reset: bool) {
 // The 69 values, and those beside them.
 fn observed(env: u32, after_reset: bool) {
     observe_extras(env, after_reset);
-    let truck = truck[env];
+    var as_seen = Seen(truck[env], progress[env]);
+    if params.disturbances.of_observation == 1u { as_seen = seen(env); }
+    let truck = as_seen.truck;
     let route = routes[truck.route];
     let last = route.n_waypoints - 1u;
-    let next = min(progress[env].waypoint, last);
+    let next = min(as_seen.progress.waypoint, last);
     let point = reference_point(rigs[truck.vehicle].wheelbase, truck);
     put(env, after_reset, 0u, clamp(truck.speed / SPEED_SCALE, 0.0, 1.0));
     for (var n = 0u; n < 2u; n++) {
@@ -95,7 +97,7 @@ fn observed(env: u32, after_reset: bool) {
         put(env, after_reset, DISTANCES_AT + n, min(distance(point, waypoint.position) / WAYPOINT_SCALE, 1.0));
         put(env, after_reset, CROSSINGS_AT + n, min(distance_to_segment(point, left, right) / WAYPOINT_SCALE, 1.0));
     }
-    put(env, after_reset, LANE_AT, min(progress[env].lane_distance / LANE_SCALE, 1.0));
+    put(env, after_reset, LANE_AT, min(as_seen.progress.lane_distance / LANE_SCALE, 1.0));
     let behind = waypoints[route.first + max(next, 1u) - 1u].position;
     for (var n = 0u; n < N_LOOK_AHEAD; n++) {
         let index = route.first + min(next + LOOK_AHEAD[n], last);

@@ -65,6 +65,7 @@ fn start(env: u32, begin: BeginRow) {
     truck[env] = after;
     progress[env] = followed(routes[route], reference_point(rigs[start.vehicle].wheelbase, after), 1u, params.stray_distance);
     progress[env].passed = 0u;
+    if params.disturbances.of_observation == 1u { perceive(env, 0u); }
 }
 
 // The route of an episode as the batch chooses it.

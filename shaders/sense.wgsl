@@ -7,8 +7,9 @@
 @compute @workgroup_size(WORKGROUP)
 fn sense(thread: Thread) {
     let ray = index_of(thread);
-    if !is_driving(ray / N_RAYS) { return; }
-    ranges[ray] = range_of(ray / N_RAYS, ray % N_RAYS);
+    let env = ray / N_RAYS;
+    if !is_driving(env) { return; }
+    ranges[ray] = range_of(env, ray % N_RAYS, truck[env].steps + 1u);
 }
 
 // The same for the trucks that began another episode.
@@ -16,12 +17,18 @@ fn sense(thread: Thread) {
 fn sense_after_reset(thread: Thread) {
     let ray = index_of(thread);
     if !has_begun(ray / N_RAYS) { return; }
-    ranges[ray] = range_of(ray / N_RAYS, ray % N_RAYS);
+    ranges[ray] = range_of(ray / N_RAYS, ray % N_RAYS, 0u);
+}
+
+// Distance along a truck's ray to the kerb as its sensor reads it `steps` steps after the start of the episode (m).
+fn range_of(env: u32, index: u32, steps: u32) -> f32 {
+    if params.disturbances.of_observation == 0u { return exact_range(truck[env], index); }
+    let range = exact_range(seen_truck(truck[env], poses[env * N_POSES]), index);
+    return reading(params.disturbances, noise_key(streams[env], truck[env].episode), steps, params.sensor_range, index, range);
 }
 
 // Distance along a truck's ray to the kerb: the sensors' range where none is met before, 0 from inside one (m).
-fn range_of(env: u32, index: u32) -> f32 {
-    let truck = truck[env];
+fn exact_range(truck: Truck, index: u32) -> f32 {
     let ray = rays[rigs[truck.vehicle].chassis * N_RAYS + index];
     var position = truck.position;
     var heading = direction(truck.heading);

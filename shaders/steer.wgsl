@@ -7,8 +7,24 @@ fn steer(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
     let duration = f32(params.n_substeps) * params.substep;
-    let asked = targeted(params, actions[action[env]], control[env]);
-    control[env] = controlled(rigs[truck[env].vehicle], duration, asked, truck[env].speed, control[env]);
+    let before = control[env];
+    var asked = actions[action[env]];
+    if params.disturbances.of_action == 1u { asked = late_action(streams[env], truck[env].episode, action[env], before); }
+    control[env] = controlled(rigs[truck[env].vehicle], duration, targeted(params, asked, before), truck[env].speed, before);
+    if params.disturbances.of_action == 1u {
+        control[env].action_before = action[env] + 1u;
+        control[env].action_earlier = before.action_before;
+        control[env].action_earliest = before.action_earlier;
+    }
+}
+
+// The action that takes effect in this step, where actions come late: before the first one arrives the truck is to go
+// straight on at the speed that it began with.
+fn late_action(stream: Stream, episode: u32, action: u32, before: Control) -> Action {
+    var listed = array<u32, 4>(action + 1u, before.action_before, before.action_earlier, before.action_earliest);
+    let index = listed[action_delay(params.disturbances, stream, episode)];
+    if index == 0u { return Action(0.0, select(before.target_speed, 0.0, params.changes_speed == 1u)); }
+    return actions[index - 1u];
 }
 
 // The action with the target speed that it leads to, from that of the control before.
@@ -42,5 +58,9 @@ fn controlled(rig: Rig, duration: f32, action: Action, speed: f32, before: Contr
         before.steering_before,
         action.speed,
         select(0u, 1u, holds),
+        before.steering_earlier,
+        before.action_before,
+        before.action_earlier,
+        before.action_earliest,
     );
 }

@@ -11,6 +11,7 @@ mod part; // a part of a scenario, or another roundabout in it
 mod check; // a scenario changed in memory
 mod fleet; // vehicles by shares, drawn from ranges
 mod reward; // the keys of its reward
+mod disturbances; // what the world does to a policy
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -23,6 +24,7 @@ use crate::map::route::Route;
 use crate::map::{Gutter, Road};
 use crate::vehicle::Vehicle;
 pub use check::Invalid;
+pub use disturbances::Disturbances;
 pub use fleet::{Class, Drawn, Entry, Fleet, Member, N_VEHICLES, Ranges};
 pub use reward::{REWARD_KEYS, Reward, RewardChanges, RewardKey};
 
@@ -101,6 +103,8 @@ pub struct Scenario {
     pub sensor_range: f64,
     /// What is observed beside the observation.
     pub extras: ObservedExtras,
+    /// What the world does to a policy.
+    pub disturbances: Disturbances,
     /// Largest lateral offset at the start (m).
     pub start_offset: f64,
     /// Largest heading error at the start (rad).

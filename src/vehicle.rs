@@ -212,6 +212,12 @@ impl Vehicle {
         self.tractor.mass + load.mass
     }
 
+    /// Fraction of the load on the tractor's axles that is the trailer's, where the model counts it.
+    fn fifth_wheel_part(&self, load: &Load) -> f64 {
+        let on_fifth_wheel = self.model.fifth_wheel_load * load.mass;
+        on_fifth_wheel / (self.tractor.mass + on_fifth_wheel)
+    }
+
     /// Radius of the circle inside the trailer's axle group when the tractor's outer front corner runs on a circle of
     /// radius `outer` (m); `None` if the combination cannot turn so tightly. Directive 96/53/EC requires 5.30 m at
     /// 12.50 m.
@@ -261,6 +267,9 @@ impl Vehicle {
             rollover_threshold: load.suspension.rollover_threshold() as f32,
             chassis: 0,
             class_index: 0,
+            slip_growth: model.slip_growth as f32,
+            understeer: (model.understeer / GRAVITY) as f32,
+            fifth_wheel_load: self.fifth_wheel_part(load) as f32,
         }
     }
 

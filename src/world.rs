@@ -125,6 +125,7 @@ impl World {
                 jackknife_angle: scenario.jackknife_angle as f32,
                 rollover_ratio: scenario.rollover_ratio as f32,
                 reward: (&scenario.reward).into(),
+                disturbances: (&scenario.disturbances).into(),
             },
             rigs,
             classes,

@@ -7,22 +7,21 @@ use pyo3::prelude::*;
 /// A field of a row: name, type of numpy, number of values (0 for one that is no array).
 type Field = (&'static str, &'static str, usize);
 
-/// Every column with the fields of a row: a single unnamed field where a row is an array of numbers.
+/// Every column with the fields of an element and the number of elements in a row (0 for one that is no array): a
+/// single unnamed field where an element is a number.
 #[pyfunction]
-pub fn column_layouts() -> Vec<(&'static str, Vec<Field>)> {
+pub fn column_layouts() -> Vec<(&'static str, Vec<Field>, usize)> {
     let structs = structs();
-    let fields = |column: &Column| {
+    let layout = |column: &Column| {
         let element = column.element();
-        match structs.iter().find(|found| found.name == element) {
-            Some(found) => found.fields.iter().map(|field| of_field(field.name, &field.wgsl)).collect(),
-            None => {
-                let (_, kind, _) = of_field("", &element);
-                let n = column.width() / size_of::<f32>();
-                vec![("", kind, if n == 1 { 0 } else { n })]
-            }
-        }
+        let (fields, size) = match structs.iter().find(|found| found.name == element) {
+            Some(found) => (found.fields.iter().map(|field| of_field(field.name, &field.wgsl)).collect(), found.size),
+            None => (vec![of_field("", &element)], size_of::<f32>()),
+        };
+        let n = column.width() / size;
+        (Named::name(*column), fields, if n == 1 { 0 } else { n })
     };
-    Column::ALL.iter().map(|column| (Named::name(*column), fields(column))).collect()
+    Column::ALL.iter().map(layout).collect()
 }
 
 fn of_field(name: &'static str, wgsl: &str) -> Field {

@@ -11,6 +11,7 @@ pub mod drive;
 pub mod follow;
 pub mod judge;
 pub mod observe;
+pub mod perceive;
 pub mod reset;
 pub mod sense;
 pub mod steer;

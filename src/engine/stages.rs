@@ -113,7 +113,7 @@ impl Kernel {
 }
 
 /// The shader files in the order in which they make one module.
-pub const SHADERS: [(&str, &str); 17] = [
+pub const SHADERS: [(&str, &str); 18] = [
     ("layout", include_str!("../../shaders/layout.wgsl")),
     ("common/thread", include_str!("../../shaders/common/thread.wgsl")),
     ("common/angle", include_str!("../../shaders/common/angle.wgsl")),
@@ -125,6 +125,7 @@ pub const SHADERS: [(&str, &str); 17] = [
     ("drive", include_str!("../../shaders/drive.wgsl")),
     ("collide", include_str!("../../shaders/collide.wgsl")),
     ("follow", include_str!("../../shaders/follow.wgsl")),
+    ("perceive", include_str!("../../shaders/perceive.wgsl")),
     ("sense", include_str!("../../shaders/sense.wgsl")),
     ("observe", include_str!("../../shaders/observe.wgsl")),
     ("judge", include_str!("../../shaders/judge.wgsl")),

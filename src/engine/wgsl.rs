@@ -22,6 +22,7 @@ pub fn shared() -> String {
         cpu::steer::printed_constants(),
         cpu::drive::printed_constants(),
         cpu::collide::printed_constants(),
+        cpu::perceive::printed_constants(),
         cpu::sense::printed_constants(),
         cpu::observe::printed_constants(),
         tally::printed_constants(),

@@ -4,7 +4,7 @@
 //! makes a batch and a row of it. The buffers on a device, their WGSL declarations and the tests' tables follow from
 //! [`Column`].
 
-use super::{Clearance, Control, N_EXTRAS, N_RAYS, N_VALUES, Progress, RewardTerms, Truck};
+use super::{Clearance, Control, N_EXTRAS, N_POSES, N_RAYS, N_VALUES, Pose, Progress, RewardTerms, Truck};
 use crate::layout::shared::{Named, Shared};
 
 /// Calls `$then` with every column: doc, variant of [`Column`], name, type of a row. The types are those of `layout`.
@@ -37,6 +37,8 @@ macro_rules! columns {
             Extras extras: [f32; N_EXTRAS],
             /// What is observed beside the observation after the last action
             NextExtras next_extras: [f32; N_EXTRAS],
+            /// With disturbances: the pose that is observed, and those of the last three steps; zeros without
+            Poses poses: [Pose; N_POSES],
         }
     };
 }

@@ -14,12 +14,24 @@ constants! {
     const SPARE_BITS: u32 = 8;
     /// Unit of the bits above them.
     const UNIT: f32 = 1.0 / 8_388_608.0;
+    /// Lowest bits of a word that the sum of four such words has no room for in an f32.
+    const SPARE_BITS_OF_FOUR: u32 = 10;
+    /// Unit of the sum of the bits above them: four uniform numbers of 0..1 add up to 4.
+    const UNIT_OF_FOUR: f32 = 1.0 / 4_194_304.0;
+    /// Standard deviations in a unit of that sum.
+    const DEVIATIONS: f32 = 1.732_050_8;
     /// `Draw::Route`.
     const DRAW_ROUTE: u32 = Draw::Route as u32;
     /// `Draw::Pose`.
     const DRAW_POSE: u32 = Draw::Pose as u32;
     /// `Draw::Vehicle`.
     const DRAW_VEHICLE: u32 = Draw::Vehicle as u32;
+    /// `Draw::Delays`.
+    const DRAW_DELAYS: u32 = Draw::Delays as u32;
+    /// `Draw::Offsets`.
+    const DRAW_OFFSETS: u32 = Draw::Offsets as u32;
+    /// `Draw::Noise`.
+    const DRAW_NOISE: u32 = Draw::Noise as u32;
     /// `Draw::Action`.
     const DRAW_ACTION: u32 = Draw::Action as u32;
 }
@@ -36,6 +48,12 @@ pub enum Draw {
     Action,
     /// The vehicle of an episode, and the speed that it begins at.
     Vehicle = u32::MAX,
+    /// The delays of an episode, and the error of its position.
+    Delays = u32::MAX - 1,
+    /// The other constant errors of an episode.
+    Offsets = u32::MAX - 2,
+    /// The key of an episode's noise, whose numbers are drawn from it by step and kind.
+    Noise = u32::MAX - 3,
 }
 
 /// Four random words.
@@ -57,6 +75,13 @@ pub fn words(seed: u32, env: u32, episode: u32, draw: u32) -> [u32; 4] {
 /// A word as a number in [-1, 1): its upper 24 bits, exact in f32.
 pub fn signed_unit(word: u32) -> f32 {
     (word >> SPARE_BITS) as f32 * UNIT - 1.0
+}
+
+/// Four words as a normal number of mean 0 and standard deviation 1: the sum of four uniform ones, at most 3.5 in
+/// magnitude. The sum is exact in f32.
+pub fn normal(words: [u32; 4]) -> f32 {
+    let [a, b, c, d] = words.map(|word| word >> SPARE_BITS_OF_FOUR);
+    ((a + b + c + d) as f32 * UNIT_OF_FOUR - 2.0) * DEVIATIONS
 }
 
 /// A word as an index below `n`, uniform to within 2^-32.
@@ -88,6 +113,18 @@ mod tests {
         let limit = 5.0 / (3.0 * n as f64).sqrt();
         assert!(sums.iter().all(|sum| (sum / n as f64).abs() < limit), "{sums:?}");
         assert!((products / n as f64).abs() < 5.0 / (3.0 * (n as f64).sqrt()), "{products}");
+    }
+
+    #[test]
+    fn a_normal_number_has_mean_0_and_deviation_1_and_is_never_beyond_3_5() {
+        let n = 100_000;
+        let values: Vec<f64> = (0..n).map(|env| f64::from(normal(words(11, env, 3, 5)))).collect();
+        let mean = values.iter().sum::<f64>() / f64::from(n);
+        let variance = values.iter().map(|value| value * value).sum::<f64>() / f64::from(n);
+        // Five deviations of either estimate.
+        assert!(mean.abs() < 5.0 / f64::from(n).sqrt() && (variance - 1.0).abs() < 0.02, "{mean}, {variance}");
+        assert!(values.iter().all(|value| value.abs() < 3.5));
+        assert_eq!((normal([0; 4]), normal([u32::MAX; 4]) <= 3.47), (-2.0 * DEVIATIONS, true));
     }
 
     #[test]

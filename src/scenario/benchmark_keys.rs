@@ -32,6 +32,8 @@ pub(super) struct Written {
     #[serde(default)]
     pub(super) observation: WrittenObservation,
     #[serde(default)]
+    pub(super) disturbances: WrittenDisturbances,
+    #[serde(default)]
     pub(super) start: WrittenStart,
     #[serde(default)]
     pub(super) ending: WrittenEnding,
@@ -106,6 +108,24 @@ pub(super) struct WrittenDraw {
     pub(super) steer_delay: Option<[f64; 2]>,
     pub(super) drive_lag: Option<[f64; 2]>,
     pub(super) brake_lag: Option<[f64; 2]>,
+    pub(super) yaw_lag: Option<[f64; 2]>,
+    pub(super) slip_growth: Option<[f64; 2]>,
+    pub(super) understeer_deg: Option<[f64; 2]>,
+}
+
+/// What the world does to a policy.
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct WrittenDisturbances {
+    pub(super) range_noise: f64,
+    pub(super) dropped_rays: f64,
+    pub(super) position_offset: f64,
+    pub(super) heading_offset_deg: f64,
+    pub(super) position_noise: f64,
+    pub(super) heading_noise_deg: f64,
+    pub(super) map_offset: f64,
+    pub(super) observation_delay: [i64; 2],
+    pub(super) action_delay: [i64; 2],
 }
 
 #[derive(Deserialize)]

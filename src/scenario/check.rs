@@ -28,6 +28,8 @@ const POSITIVE: [f64; 2] = [1e-6, 1e9];
 const NEGATIVE: [f64; 2] = [-1e9, -1e-6];
 /// A steer angle (rad).
 const LOCK: [f64; 2] = [1e-3, 1.5];
+/// Longest steer delay (steps): a truck's control goes back so far.
+pub(super) const MOST_DELAY: f64 = 3.0;
 
 impl Scenario {
     /// An error if the scenario has a value with which no truck could be stepped.
@@ -63,7 +65,8 @@ impl Scenario {
             }
             fleet.extremes().try_for_each(|(_, vehicle)| check_vehicle(&vehicle))?;
         }
-        within("vehicle.model.steer_delay", self.longest_steer_delay(), [0.0, 2.0 * self.step])
+        self.disturbances.check()?;
+        within("vehicle.model.steer_delay", self.longest_steer_delay(), [0.0, MOST_DELAY * self.step])
     }
 
     /// The longest steer delay of its vehicles (s).
@@ -176,7 +179,10 @@ fn check_model(key: &str, model: &Model, trailer_wheelbase: f64) -> Result<(), I
     let times = [("yaw_lag", model.yaw_lag), ("drive_lag", model.drive_lag), ("brake_lag", model.brake_lag)];
     times.into_iter().try_for_each(|(name, value)| within(&format!("{key}.{name}"), value, [0.0, 1e6]))?;
     model.power.map_or(Ok(()), |power| within(&format!("{key}.power"), power, POSITIVE))?;
-    within(&format!("{key}.crossfall"), model.crossfall, [-1.0, 1.0])
+    within(&format!("{key}.crossfall"), model.crossfall, [-1.0, 1.0])?;
+    within(&format!("{key}.slip_growth"), model.slip_growth, [0.0, 1e3])?;
+    within(&format!("{key}.understeer"), model.understeer, [-1.0, 1.0])?;
+    within(&format!("{key}.fifth_wheel_load"), model.fifth_wheel_load, [0.0, 1.0])
 }
 
 fn check_suspension(key: &str, suspension: &Suspension) -> Result<(), Invalid> {
@@ -196,7 +202,7 @@ fn list(key: &str, values: &[f64], range: [f64; 2]) -> Result<(), Invalid> {
 }
 
 /// NaN lies in no range.
-fn within(key: &str, value: f64, [least, most]: [f64; 2]) -> Result<(), Invalid> {
+pub(super) fn within(key: &str, value: f64, [least, most]: [f64; 2]) -> Result<(), Invalid> {
     if (least..=most).contains(&value) {
         Ok(())
     } else {
@@ -204,6 +210,6 @@ fn within(key: &str, value: f64, [least, most]: [f64; 2]) -> Result<(), Invalid>
     }
 }
 
-fn invalid(key: &str, value: impl Display, expected: impl Into<String>) -> Invalid {
+pub(super) fn invalid(key: &str, value: impl Display, expected: impl Into<String>) -> Invalid {
     Invalid { key: key.to_owned(), value: value.to_string(), expected: expected.into() }
 }

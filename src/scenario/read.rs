@@ -1,7 +1,9 @@
 //! Reads a benchmark file and the files it refers to, and checks every value.
 
 use super::Scenario;
-use super::benchmark_keys::{Written, WrittenSpeeds};
+use super::benchmark_keys::{Written, WrittenDisturbances, WrittenSpeeds};
+use super::check::MOST_DELAY;
+use super::disturbances::{Disturbances, LONGEST_DELAY};
 use super::fleet::{self, Fleet};
 use super::roads::{MOST_ROADS, Procedural};
 use crate::files::cache::Loading;
@@ -17,8 +19,8 @@ impl Scenario {
         let vehicles = fleet::vehicles(&reader, source, &written)?;
         let mut scenario = without_routes(&reader, source.stem(), vehicles, &written)?;
         let delay = scenario.longest_steer_delay();
-        if 2.0 * scenario.step < delay {
-            let expected = format!("the vehicle's steer delay is up to {delay} s; two steps at most");
+        if MOST_DELAY * scenario.step < delay {
+            let expected = format!("the vehicle's steer delay is up to {delay} s; three steps at most");
             return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
         }
         // Drawing takes longest: everything else is checked first.
@@ -79,6 +81,7 @@ fn without_routes(
         speed_changes: speed_changes.into_iter().map(|change| change / 3.6).collect(),
         sensor_range: reader.within("sensors.range", sensors.range, 1.0..=50.0, "m")?,
         extras: written.observation.extras,
+        disturbances: disturbances(reader, &written.disturbances)?,
         start_offset: reader.within("start.offset", start.offset, 0.0..=1.0, "m")?,
         start_heading: reader.within("start.heading_deg", start.heading_deg, 0.0..=20.0, "deg")?.to_radians(),
         start_speed: start.speed_kmh.as_ref().map(|written| start_speed(reader, written)).transpose()?,
@@ -93,6 +96,34 @@ fn without_routes(
         spacing: reader.within("routes.spacing", routes.spacing, 0.5..=5.0, "m")?,
         places: Vec::new(),
         splits: Default::default(),
+    })
+}
+
+/// Checks `[disturbances]`.
+fn disturbances(reader: &Reader, written: &WrittenDisturbances) -> Result<Disturbances, Error> {
+    let within = |key: &str, value, most, unit| reader.within(&format!("disturbances.{key}"), value, 0.0..=most, unit);
+    let delays = |key: &str, ends: [i64; 2]| {
+        for (index, end) in ends.into_iter().enumerate() {
+            let key = format!("disturbances.{key}[{index}]");
+            reader.within(&key, end as f64, 0.0..=f64::from(LONGEST_DELAY), "steps")?;
+        }
+        let [least, greatest] = ends.map(|end| end as u32);
+        if greatest < least {
+            let found = format_args!("[{least}, {greatest}]");
+            return Err(reader.invalid(format!("disturbances.{key}"), found, "must be [least, greatest]"));
+        }
+        Ok([least, greatest])
+    };
+    Ok(Disturbances {
+        range_noise: within("range_noise", written.range_noise, 5.0, "m")?,
+        dropped_rays: within("dropped_rays", written.dropped_rays, 1.0, "")?,
+        position_offset: within("position_offset", written.position_offset, 5.0, "m")?,
+        heading_offset: within("heading_offset_deg", written.heading_offset_deg, 20.0, "deg")?.to_radians(),
+        position_noise: within("position_noise", written.position_noise, 5.0, "m")?,
+        heading_noise: within("heading_noise_deg", written.heading_noise_deg, 20.0, "deg")?.to_radians(),
+        map_offset: within("map_offset", written.map_offset, 5.0, "m")?,
+        observation_delay: delays("observation_delay", written.observation_delay)?,
+        action_delay: delays("action_delay", written.action_delay)?,
     })
 }
 

@@ -5,8 +5,10 @@ use std::f32::consts::TAU;
 use std::fmt::Debug;
 use std::ops::RangeInclusive;
 
+use glam::Vec2;
+
 use crate::engine::{Batch, Error};
-use crate::layout::{Column, Control, Ended, Params, Progress, RewardTerms, Truck};
+use crate::layout::{Column, Control, Ended, N_POSES, Params, Pose, Progress, RewardTerms, Truck};
 use crate::world::World;
 
 /// Largest magnitude of a rate, an acceleration and the like, where nothing narrower is known: stages compute with it
@@ -27,7 +29,7 @@ pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
     for env in 0..batch.n_envs() {
         let (truck, progress) = (&batch.truck[env], &batch.progress[env]);
         let n_waypoints = world.routes[truck.route as usize].n_waypoints;
-        check_control(env, &batch.control[env])?;
+        check_control(env, &batch.control[env], world.params.n_actions)?;
         check_truck(world, env, truck, progress)?;
         let clearance = &batch.clearance[env];
         within(Column::Clearance, env, ".tractor", clearance.tractor, -MOST..=MOST)?;
@@ -43,6 +45,7 @@ pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
             (Column::NextExtras, &batch.next_extras[env]),
         ];
         observed.into_iter().try_for_each(|(column, values)| all_within(column, env, values, -OBSERVED..=OBSERVED))?;
+        check_poses(env, &batch.poses[env], next_waypoint(world, truck, progress), n_waypoints)?;
         within(Column::Ended, env, "", batch.ended[env], 0..=Ended::ALL.len() as u32 - 1)?;
         check_terms(env, &batch.terms[env], n_waypoints)?;
         let most = largest_reward(&world.params, n_waypoints);
@@ -51,7 +54,7 @@ pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
     Ok(())
 }
 
-fn check_control(env: usize, control: &Control) -> Result<(), Error> {
+fn check_control(env: usize, control: &Control, n_actions: u32) -> Result<(), Error> {
     let Control {
         steering,
         acceleration,
@@ -60,6 +63,10 @@ fn check_control(env: usize, control: &Control) -> Result<(), Error> {
         steering_earlier,
         target_speed,
         holds,
+        steering_earliest,
+        action_before,
+        action_earlier,
+        action_earliest,
     } = *control;
     for (field, value, most) in [
         (".steering", steering, STEEPEST),
@@ -67,16 +74,46 @@ fn check_control(env: usize, control: &Control) -> Result<(), Error> {
         (".speed_error_integral", speed_error_integral, MOST),
         (".steering_before", steering_before, STEEPEST),
         (".steering_earlier", steering_earlier, STEEPEST),
+        (".steering_earliest", steering_earliest, STEEPEST),
         (".target_speed", target_speed, FASTEST),
     ] {
         within(Column::Control, env, field, value, -most..=most)?;
     }
+    // An action's index plus 1.
+    for (field, action) in
+        [(".action_before", action_before), (".action_earlier", action_earlier), (".action_earliest", action_earliest)]
+    {
+        within(Column::Control, env, field, action, 0..=n_actions)?;
+    }
     within(Column::Control, env, ".holds", holds, 0..=1)
 }
 
-fn check_truck(world: &World, env: usize, truck: &Truck, progress: &Progress) -> Result<(), Error> {
+/// The poses that are kept with disturbances; without, they are zeros.
+fn check_poses(env: usize, poses: &[Pose; N_POSES], next: Vec2, n_waypoints: u32) -> Result<(), Error> {
+    for (index, pose) in poses.iter().enumerate() {
+        let Pose { position, heading, trailer_heading, speed, waypoint } = *pose;
+        for (field, value, range) in [
+            ("position[0]", position.x, next.x - FAR..=next.x + FAR),
+            ("position[1]", position.y, next.y - FAR..=next.y + FAR),
+            ("heading", heading, -TAU..=TAU),
+            ("trailer_heading", trailer_heading, -TAU..=TAU),
+            ("speed", speed, -FASTEST..=FASTEST),
+        ] {
+            within(Column::Poses, env, &format!("[{index}].{field}"), value, range)?;
+        }
+        within(Column::Poses, env, &format!("[{index}].waypoint"), waypoint, 0..=n_waypoints)?;
+    }
+    Ok(())
+}
+
+/// Position of the waypoint that the truck is to pass next (m).
+fn next_waypoint(world: &World, truck: &Truck, progress: &Progress) -> Vec2 {
     let waypoints = world.route_waypoints(truck.route);
-    let next = waypoints[(progress.waypoint as usize).min(waypoints.len() - 1)].position;
+    waypoints[(progress.waypoint as usize).min(waypoints.len() - 1)].position
+}
+
+fn check_truck(world: &World, env: usize, truck: &Truck, progress: &Progress) -> Result<(), Error> {
+    let next = next_waypoint(world, truck, progress);
     // A truck steers up to its lock, but for the rounding of a sum.
     let lock = world.rig(truck).steer_max * OBSERVED;
     for (field, value, range) in [

@@ -29,6 +29,12 @@ pub struct Model {
     pub friction_ellipse: bool,
     /// Fall of the road to the right, as a tangent.
     pub crossfall: f64,
+    /// Increase of the trailer's slip with its load transfer ratio: slip times `1 + slip_growth |ratio|`.
+    pub slip_growth: f64,
+    /// Understeer: increase of the steer angle that a path needs, per lateral acceleration in units of gravity (rad).
+    pub understeer: f64,
+    /// Fraction of the trailer's weight on the fifth wheel that counts in the tractor's load transfer ratio.
+    pub fifth_wheel_load: f64,
 }
 
 impl Default for Model {
@@ -42,6 +48,9 @@ impl Default for Model {
             power: None,
             friction_ellipse: false,
             crossfall: 0.0,
+            slip_growth: 0.0,
+            understeer: 0.0,
+            fifth_wheel_load: 0.0,
         }
     }
 }

@@ -108,13 +108,27 @@ pub(crate) struct WrittenModel {
     power: Option<f64>,
     friction_ellipse: bool,
     crossfall: f64,
+    slip_growth: f64,
+    understeer_deg: f64,
+    fifth_wheel_load: f64,
 }
 
 impl Default for WrittenModel {
     fn default() -> Self {
-        let Model { slip_lever, yaw_lag, drive_lag, brake_lag, steer_delay, power, friction_ellipse, crossfall } =
-            Model::default();
-        WrittenModel { slip_lever, yaw_lag, drive_lag, brake_lag, steer_delay, power, friction_ellipse, crossfall }
+        let model = Model::default();
+        WrittenModel {
+            slip_lever: model.slip_lever,
+            yaw_lag: model.yaw_lag,
+            drive_lag: model.drive_lag,
+            brake_lag: model.brake_lag,
+            steer_delay: model.steer_delay,
+            power: model.power,
+            friction_ellipse: model.friction_ellipse,
+            crossfall: model.crossfall,
+            slip_growth: model.slip_growth,
+            understeer_deg: model.understeer.to_degrees(),
+            fifth_wheel_load: model.fifth_wheel_load,
+        }
     }
 }
 
@@ -229,6 +243,9 @@ pub(crate) fn model(reader: &Reader, key: &str, written: &WrittenModel, trailer:
         power: written.power.map(|power| within("power", power, 1e4..=1e6, "W")).transpose()?,
         friction_ellipse: written.friction_ellipse,
         crossfall: within("crossfall", written.crossfall, -0.1..=0.1, "")?,
+        slip_growth: within("slip_growth", written.slip_growth, 0.0..=5.0, "")?,
+        understeer: within("understeer_deg", written.understeer_deg, -5.0..=10.0, "deg/g")?.to_radians(),
+        fifth_wheel_load: within("fifth_wheel_load", written.fifth_wheel_load, 0.0..=0.6, "")?,
     })
 }
 

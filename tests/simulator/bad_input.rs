@@ -21,7 +21,7 @@ fn scenarios() -> PathBuf {
 }
 
 /// Benchmarks and roundabouts that have no key but those of another one.
-const LIKE_OTHERS: [&str; 18] = [
+const LIKE_OTHERS: [&str; 22] = [
     "laden2026-50-random.toml",
     "laden2026-50-training.toml",
     "laden2026-odd-random.toml",
@@ -40,6 +40,10 @@ const LIKE_OTHERS: [&str; 18] = [
     "20m-maps.toml",
     "32m-maps.toml",
     "40m-maps.toml",
+    "transfer2026-attard2023.toml",
+    "transfer2026-held-out.toml",
+    "transfer2026-random.toml",
+    "transfer2026-training.toml",
 ];
 
 /// Every other scenario file, relative to `scenarios/`.
@@ -55,7 +59,7 @@ fn files() -> Vec<PathBuf> {
         }
     }
     files.sort();
-    assert_eq!(files.len(), 21, "six roundabouts, three vehicles, ten benchmarks, two distributions");
+    assert_eq!(files.len(), 22, "six roundabouts, three vehicles, eleven benchmarks, two distributions");
     files
 }
 

@@ -61,6 +61,16 @@ speed_changes_kmh = [-5.0, 0.0, 5.0]
 range = 20.0
 [observation]
 extras = "mass"
+[disturbances]
+range_noise = 0.05
+dropped_rays = 0.01
+position_offset = 0.1
+heading_offset_deg = 0.5
+position_noise = 0.03
+heading_noise_deg = 0.3
+map_offset = 0.15
+observation_delay = [0, 1]
+action_delay = [0, 2]
 [start]
 offset = 0.2
 heading_deg = 1.0
@@ -100,6 +110,9 @@ steer_delay = 0.1
 power = 330000.0
 friction_ellipse = true
 crossfall = 0.01
+slip_growth = 1.0
+understeer_deg = 1.2
+fifth_wheel_load = 0.26
 [draw]
 n_vehicles = 512
 trailer_wheelbase = [-0.5, 0.4]
@@ -116,6 +129,9 @@ acceleration_max = [0.8, 1.2]
 steer_delay = [0.0, 0.15]
 drive_lag = [0.3, 0.6]
 brake_lag = [0.2, 0.5]
+yaw_lag = [0.8, 1.6]
+slip_growth = [0.0, 1.5]
+understeer_deg = [-0.5, 1.5]
 "#;
 
 const RANDOM_ROADS: &str = r#"
@@ -205,6 +221,9 @@ fn vehicles() -> Kind {
         ("model.power", "3e5"),
         ("model.friction_ellipse", "true"),
         ("model.crossfall", "0.01"),
+        ("model.slip_growth", "1.0"),
+        ("model.understeer_deg", "1.2"),
+        ("model.fifth_wheel_load", "0.26"),
     ];
     Kind {
         documents: Vec::from([with_keys(&text_of("vehicles/daf_xf.toml"), &keys)]),
@@ -260,7 +279,7 @@ fn every_benchmark_has_a_row() {
     let folder = std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(SCENARIOS)).unwrap();
     let mut files: Vec<String> = folder.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
     files.retain(|file| file.ends_with(".toml"));
-    assert!(24 <= files.len(), "{files:?}");
+    assert!(29 <= files.len(), "{files:?}");
     let readme = text_of("README.md");
     files.retain(|file| !readme.contains(&format!("\n| `{file}` | ")));
     assert!(files.is_empty(), "{SCENARIOS}/README.md: add rows to the table of benchmarks for {files:?}");

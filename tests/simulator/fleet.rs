@@ -23,6 +23,7 @@ pub fn all_drawn() -> Fleet {
             power: Some(330_000.0),
             friction_ellipse: true,
             crossfall: 0.01,
+            fifth_wheel_load: 0.26,
             ..Model::default()
         };
         let loads = ["empty", "half", "laden", "laden_high"].map(|load| (load.to_owned(), 1.0)).into();
@@ -40,9 +41,12 @@ pub fn all_drawn() -> Fleet {
         friction: Some([0.6, 1.1]),
         steer_rate: Some([0.75, 1.25]),
         acceleration_max: Some([0.8, 1.2]),
-        steer_delay: Some([0.0, 0.15]),
+        steer_delay: Some([0.0, 0.3]),
         drive_lag: Some([0.3, 0.6]),
         brake_lag: Some([0.2, 0.5]),
+        yaw_lag: Some([0.8, 1.6]),
+        slip_growth: Some([0.0, 1.5]),
+        understeer: Some([-0.01, 0.03]),
     };
     Fleet { members: Vec::from([member("daf_xf", 2.0), member("eu_4x2_13m6", 1.0)]), draw, n_vehicles: 512 }
 }

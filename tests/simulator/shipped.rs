@@ -34,12 +34,12 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
         FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
     assert_eq!(
         (files.len(), FILES.len()),
-        (44, 44),
-        "24 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions"
+        (49, 49),
+        "29 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions"
     );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [24, 10, 3, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [29, 10, 3, 2]);
 }
 
 /// A shipped benchmark's file as it is read as TOML.
@@ -121,10 +121,45 @@ fn the_random_roads_of_laden2026_odd_differ_from_those_of_laden2026_in_its_vehic
 }
 
 #[test]
+fn the_benchmarks_of_transfer2026_differ_in_roads_training_and_disturbances_alone() {
+    let (transfer, laden) = (table("transfer2026"), table("laden2026"));
+    assert_eq!(transfer["roundabout"], laden["roundabout"]);
+    assert_eq!((&transfer["actions"], &transfer["observation"]), (&laden["actions"], &laden["observation"]));
+    let (mut random, mut expected) = (table("transfer2026-random"), transfer.clone());
+    assert_eq!(random.remove("procedural"), table("laden2026-random").remove("procedural"));
+    expected.remove("roundabout");
+    assert_eq!(random, expected);
+    let (mut training, laden) = (table("transfer2026-training"), table("laden2026-training"));
+    for key in ["procedural", "reward", "start", "ending", "actions", "observation"] {
+        assert_eq!(training.remove(key), laden.get(key).cloned(), "{key}");
+    }
+    // Training reaches beyond what is evaluated, and the held-out benchmark lies beyond training or at its worst end.
+    let range = |table: &toml::Table, key: &str| [0, 1].map(|end| table["draw"][key][end].as_float().unwrap());
+    let held_out = table("transfer2026-held-out");
+    for key in ["slip", "slip_growth", "understeer_deg", "yaw_lag"] {
+        let [most, trained, beyond] = [range(&transfer, key)[1], range(&training, key)[1], range(&held_out, key)[0]];
+        assert!(most < trained && trained <= beyond, "{key}");
+    }
+    assert!(range(&held_out, "friction")[1] <= range(&training, "friction")[0]);
+    let disturbance = |table: &toml::Table, key: &str| table["disturbances"][key].as_float().unwrap();
+    for key in transfer["disturbances"].as_table().unwrap().keys() {
+        let [one, two, three] = [&transfer, &training, &held_out].map(|table| disturbance(table, key));
+        assert!(one < two && two < three, "{key}");
+    }
+    // At home it is attard2023 but for the actions, the observation and the clock that go with them.
+    let (mut home, mut attard) = (table("transfer2026-attard2023"), table("attard2023"));
+    for key in ["actions", "observation", "start", "ending"] {
+        assert_eq!(home.remove(key).as_ref(), Some(&transfer[key]), "{key}");
+        attard.remove(key);
+    }
+    assert_eq!(home, attard);
+}
+
+#[test]
 fn every_name_gives_what_its_file_gives() {
     // The two with thousands of roads take minutes; the next test reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 22);
+    assert_eq!(benchmarks.len(), 27);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();

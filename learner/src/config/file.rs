@@ -10,7 +10,7 @@ use crate::error::Error;
 use offtrack_evaluation::error::Error as Evaluation;
 
 /// The training files that come with the program.
-const SHIPPED: [(&str, &str); 10] = [
+const SHIPPED: [(&str, &str); 11] = [
     ("default", include_str!("../../configs/default.toml")),
     ("best", include_str!("../../configs/best.toml")),
     ("lane", include_str!("../../configs/lane.toml")),
@@ -19,6 +19,7 @@ const SHIPPED: [(&str, &str); 10] = [
     ("as-run", include_str!("../../configs/as-run.toml")),
     ("laden", include_str!("../../configs/laden.toml")),
     ("laden-50", include_str!("../../configs/laden-50.toml")),
+    ("transfer", include_str!("../../configs/transfer.toml")),
     ("laden-gpu", include_str!("../../configs/laden-gpu.toml")),
     ("paper", include_str!("../../configs/paper.toml")),
 ];

@@ -17,6 +17,8 @@ constants! {
     const POWER_SPEED_MIN: f32 = 1.0;
     /// Keeps a quotient finite at a standstill (m^2/s^2).
     const SPEED_SQUARED_MIN: f32 = 0.01;
+    /// Least fraction of its wheelbase that a tractor with oversteer steers as if it had.
+    const WHEELBASE_MIN: f32 = 0.5;
 }
 
 /// One step of the truck: its sub-steps, and the largest load transfer ratio of each unit among them.
@@ -65,30 +67,43 @@ pub struct Motion {
     pub trailer_lateral_acceleration: f32,
 }
 
-/// The steer angle that was asked for `delay` sub-steps before sub-step `n` of the step, at most two steps ago (rad).
+/// The steer angle that was asked for `delay` sub-steps before sub-step `n` of the step, at most three steps ago (rad).
 #[inline]
 pub fn delayed(delay: u32, n: u32, n_substeps: u32, control: &Control) -> f32 {
     if delay <= n {
         control.steering
     } else if delay <= n + n_substeps {
         control.steering_before
-    } else {
+    } else if delay <= n + 2 * n_substeps {
         control.steering_earlier
+    } else {
+        control.steering_earliest
     }
 }
 
 /// Motion of a truck.
 #[inline]
 pub fn motion_of(rig: &Rig, truck: &Truck) -> Motion {
-    let curvature = steered_curvature(rig, truck.steering);
-    motion(rig, truck.speed, curvature, truck.curvature_lag, truck.acceleration, truck.heading - truck.trailer_heading)
+    let curvature = steered_curvature(rig, truck.steering, truck.speed);
+    let (slip, articulation) = (trailer_slip(rig, truck), truck.heading - truck.trailer_heading);
+    motion(rig, truck.speed, curvature, truck.curvature_lag, truck.acceleration, articulation, slip)
 }
 
-/// Curvature of the path on which the tractor's wheels roll at a steer angle (rad), without slip (1/m).
+/// Curvature of the path that the tractor's wheels lead to at a steer angle (rad) and a speed (m/s), without lag (1/m).
 #[inline]
-pub fn steered_curvature(rig: &Rig, steering: f32) -> f32 {
+pub fn steered_curvature(rig: &Rig, steering: f32, speed: f32) -> f32 {
     let (sin, cos) = sin_cos(steering);
-    sin / (cos * rig.wheelbase)
+    // Oversteer ends in a spin, which is not modelled.
+    let wheelbase = (rig.wheelbase + rig.understeer * (speed * speed)).max(WHEELBASE_MIN * rig.wheelbase);
+    sin / (cos * wheelbase)
+}
+
+/// Slip of the trailer's tyres, which lose stiffness as its load moves to the outer ones (rad/(m/s^2)).
+#[inline]
+pub fn trailer_slip(rig: &Rig, truck: &Truck) -> f32 {
+    let roll = Vec2::new(truck.trailer_roll, truck.trailer_roll_rate);
+    let ratio = load_transfer_ratio(&rig.trailer_roll, roll, truck.lateral_acceleration + rig.crossfall);
+    rig.slip * (1.0 + rig.slip_growth * ratio.abs())
 }
 
 /// Strongest drive at a speed (m/s^2).
@@ -98,7 +113,7 @@ pub fn drive_max(rig: &Rig, speed: f32) -> f32 {
 }
 
 /// Motion of a truck with this speed (m/s), curvature of the steer angle and deviation from it (1/m), acceleration
-/// (m/s^2) and articulation (rad).
+/// (m/s^2), articulation (rad) and slip of the trailer (rad/(m/s^2)).
 #[inline]
 pub fn motion(
     rig: &Rig,
@@ -107,6 +122,7 @@ pub fn motion(
     curvature_lag: f32,
     acceleration: f32,
     articulation: f32,
+    trailer_slip: f32,
 ) -> Motion {
     // The tyres' grip bounds the curvature.
     let grip =
@@ -117,7 +133,7 @@ pub fn motion(
     let hitch_side_speed = side_speed + rig.fifth_wheel * yaw_rate;
     let (sin, cos) = sin_cos(articulation);
     let trailer_speed = speed * cos - hitch_side_speed * sin;
-    let lever = rig.trailer_wheelbase - limited(rig.slip * trailer_speed * trailer_speed.abs(), rig.slip_lever_max);
+    let lever = rig.trailer_wheelbase - limited(trailer_slip * trailer_speed * trailer_speed.abs(), rig.slip_lever_max);
     let trailer_yaw_rate = (speed * sin + hitch_side_speed * cos) / lever;
     Motion {
         steered_curvature,
@@ -157,24 +173,25 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
         (acceleration, mean_acceleration, speed) = (0.0, -truck.speed / substep, 0.0);
     }
 
+    let slip = trailer_slip(rig, truck);
     let half = 0.5 * substep;
     let articulation = truck.heading - truck.trailer_heading;
     let middle_speed = truck.speed + mean_acceleration * half;
     let middle_articulation = articulation + half * (start.motion.yaw_rate - start.motion.trailer_yaw_rate);
-    let middle_curvature = steered_curvature(rig, truck.steering + 0.5 * turn);
+    let middle_curvature = steered_curvature(rig, truck.steering + 0.5 * turn, middle_speed);
     let rise = middle_curvature - start.motion.steered_curvature;
     let middle_lag = lagging(rig, middle_speed, truck.curvature_lag, rise, half);
-    let middle = motion(rig, middle_speed, middle_curvature, middle_lag, mean_acceleration, middle_articulation);
+    let middle = motion(rig, middle_speed, middle_curvature, middle_lag, mean_acceleration, middle_articulation, slip);
     let (sin, cos) = sin_cos(truck.heading + half * start.motion.yaw_rate);
     let velocity =
         Vec2::new(middle_speed * cos - middle.side_speed * sin, middle_speed * sin + middle.side_speed * cos);
 
     let heading = wrapped(truck.heading + substep * middle.yaw_rate);
     let trailer_heading = wrapped(truck.trailer_heading + substep * middle.trailer_yaw_rate);
-    let curvature = steered_curvature(rig, steering);
+    let curvature = steered_curvature(rig, steering, speed);
     let curvature_lag =
         lagging(rig, middle_speed, truck.curvature_lag, curvature - start.motion.steered_curvature, substep);
-    let end = motion(rig, speed, curvature, curvature_lag, acceleration, heading - trailer_heading);
+    let end = motion(rig, speed, curvature, curvature_lag, acceleration, heading - trailer_heading, slip);
     let tilted = |lateral_acceleration: f32| lateral_acceleration + rig.crossfall;
     let tractor = rolled(
         &rig.tractor_roll,
@@ -186,6 +203,8 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
         Vec2::new(truck.trailer_roll, truck.trailer_roll_rate),
         tilted(middle.trailer_lateral_acceleration),
     );
+    let tractor_ratio = load_transfer_ratio(&rig.tractor_roll, tractor, tilted(end.lateral_acceleration));
+    let trailer_ratio = load_transfer_ratio(&rig.trailer_roll, trailer, tilted(end.trailer_lateral_acceleration));
     Moving {
         truck: Truck {
             position: truck.position + substep * velocity,
@@ -197,16 +216,8 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
             tractor_roll_rate: tractor.y,
             trailer_roll: trailer.x,
             trailer_roll_rate: trailer.y,
-            tractor_load_transfer_ratio: load_transfer_ratio(
-                &rig.tractor_roll,
-                tractor,
-                tilted(end.lateral_acceleration),
-            ),
-            trailer_load_transfer_ratio: load_transfer_ratio(
-                &rig.trailer_roll,
-                trailer,
-                tilted(end.trailer_lateral_acceleration),
-            ),
+            tractor_load_transfer_ratio: tractor_ratio + rig.fifth_wheel_load * (trailer_ratio - tractor_ratio),
+            trailer_load_transfer_ratio: trailer_ratio,
             acceleration,
             curvature_lag,
             lateral_acceleration: end.trailer_lateral_acceleration,

@@ -5,6 +5,7 @@
 use glam::Vec2;
 
 use crate::engine::Row;
+use crate::engine::cpu::perceive;
 use crate::layout::angle::{TINY, direction};
 use crate::layout::{Progress, Truck, WaypointRow};
 use crate::world::World;
@@ -14,6 +15,9 @@ pub fn follow(world: &World, row: &mut Row) {
     let waypoints = world.route_waypoints(row.truck.route);
     let point = reference_point(world.rig(row.truck).wheelbase, row.truck);
     *row.progress = followed(waypoints, point, row.progress.waypoint, world.params.stray_distance);
+    if world.params.disturbances.of_observation == 1 {
+        perceive::perceive(world, row, row.truck.steps + 1);
+    }
 }
 
 /// Middle of the wheelbase (m).

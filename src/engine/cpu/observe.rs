@@ -6,6 +6,7 @@ use glam::Vec2;
 
 use crate::engine::Row;
 use crate::engine::cpu::follow::{distance_to_segment, reference_point};
+use crate::engine::cpu::perceive;
 use crate::layout::angle::{PI, arc_tangent, wrapped};
 use crate::layout::shared::constants;
 use crate::layout::{Control, N_EXTRAS, N_RAYS, N_VALUES, Progress, Truck, first_of};
@@ -68,7 +69,11 @@ pub fn observe(world: &World, row: &mut Row) {
 
 /// The observation of the row's truck.
 pub(super) fn observation_of(world: &World, row: &Row) -> [f32; N_VALUES] {
-    observed(world, row.truck, row.progress, row.ranges)
+    if world.params.disturbances.of_observation == 0 {
+        return observed(world, row.truck, row.progress, row.ranges);
+    }
+    let (truck, progress) = perceive::seen(world, row);
+    observed(world, &truck, &progress, row.ranges)
 }
 
 /// The 69 values.

@@ -3,7 +3,7 @@
 //! Route and pose are functions of (seed, env, episode) alone, where the caller states none.
 
 use crate::engine::cpu::follow::{followed, reference_point};
-use crate::engine::cpu::{observe, sense};
+use crate::engine::cpu::{observe, perceive, sense};
 use crate::engine::{Autoreset, RouteChoice, Row};
 use crate::layout::angle::{direction, wrapped};
 use crate::layout::random::{self, Draw};
@@ -71,7 +71,10 @@ fn start(world: &World, row: &mut Row, begin: &BeginRow) {
     let point = reference_point(rig.wheelbase, row.truck);
     *row.progress = followed(waypoints, point, 1, world.params.stray_distance);
     row.progress.passed = 0;
-    sense::sense(world, row);
+    if world.params.disturbances.of_observation == 1 {
+        perceive::perceive(world, row, 0);
+    }
+    sense::sense_at(world, row, 0);
     *row.observation = observe::observation_of(world, row);
     if 0 < world.params.n_extras {
         *row.extras = observe::extras(world, row.truck, row.control);

@@ -8,6 +8,7 @@
 use multiversion::multiversion;
 
 use crate::engine::Row;
+use crate::engine::cpu::perceive;
 use crate::field::{Field, Purpose, Samples};
 use crate::layout::angle::direction;
 use crate::layout::shared::constants;
@@ -47,12 +48,28 @@ constants! {
     const SAMPLES_MAX: u32 = 128;
 }
 
-/// Fills the row's ranges.
-#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+/// Fills the row's ranges after a step.
 pub fn sense(world: &World, row: &mut Row) {
-    let rig = world.rig(row.truck);
-    *row.ranges =
-        ranges(world.route_field(row.truck.route), rig, world.rays_of(rig), row.truck, world.params.sensor_range);
+    sense_at(world, row, row.truck.steps + 1);
+}
+
+/// Fills the row's ranges as its sensors read them `steps` steps after the start of the episode.
+pub(super) fn sense_at(world: &World, row: &mut Row, steps: u32) {
+    let params = &world.params;
+    if params.disturbances.of_observation == 0 {
+        *row.ranges = ranges_of(world, row.truck);
+        return;
+    }
+    let truck = perceive::seen_truck(row.truck, &row.poses[0]);
+    *row.ranges = ranges_of(world, &truck);
+    perceive::disturb(&params.disturbances, row.stream, truck.episode, steps, params.sensor_range, row.ranges);
+}
+
+/// The ranges of a truck.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn ranges_of(world: &World, truck: &Truck) -> [f32; N_RAYS] {
+    let rig = world.rig(truck);
+    ranges(world.route_field(truck.route), rig, world.rays_of(rig), truck, world.params.sensor_range)
 }
 
 /// Distance along each ray to the kerb: `reach` where none is met before, 0 from inside one (m).

@@ -4,8 +4,9 @@
 
 use crate::engine::Row;
 use crate::engine::cpu::drive::drive_max;
+use crate::engine::cpu::perceive::action_delay;
 use crate::layout::shared::constants;
-use crate::layout::{Action, Control, Params, Rig};
+use crate::layout::{Action, Control, Params, Rig, Stream};
 use crate::world::World;
 
 constants! {
@@ -17,8 +18,32 @@ constants! {
 pub fn steer(world: &World, row: &mut Row) {
     let params = &world.params;
     let step = params.n_substeps as f32 * params.substep;
-    let action = targeted(params, &world.actions[*row.action as usize], row.control);
-    *row.control = controlled(world.rig(row.truck), step, &action, row.truck.speed, row.control);
+    let before = *row.control;
+    let asked = if params.disturbances.of_action == 0 {
+        world.actions[*row.action as usize]
+    } else {
+        late_action(world, row.stream, row.truck.episode, *row.action, &before)
+    };
+    let action = targeted(params, &asked, &before);
+    *row.control = controlled(world.rig(row.truck), step, &action, row.truck.speed, &before);
+    if params.disturbances.of_action == 1 {
+        row.control.action_before = *row.action + 1;
+        row.control.action_earlier = before.action_before;
+        row.control.action_earliest = before.action_earlier;
+    }
+}
+
+/// The action that takes effect in this step, where actions come late: before the first one arrives the truck is to go
+/// straight on at the speed that it began with.
+fn late_action(world: &World, stream: Stream, episode: u32, action: u32, before: &Control) -> Action {
+    let actions = [action + 1, before.action_before, before.action_earlier, before.action_earliest];
+    match actions[action_delay(&world.params.disturbances, stream, episode) as usize] {
+        0 => {
+            let speed = if world.params.changes_speed == 1 { 0.0 } else { before.target_speed };
+            Action { steering: 0.0, speed }
+        }
+        index => world.actions[index as usize - 1],
+    }
 }
 
 /// The action with the target speed that it leads to, from that of the control before.
@@ -54,5 +79,9 @@ pub fn controlled(rig: &Rig, step: f32, action: &Action, speed: f32, before: &Co
         steering_earlier: before.steering_before,
         target_speed: action.speed,
         holds: u32::from(holds),
+        steering_earliest: before.steering_earlier,
+        action_before: before.action_before,
+        action_earlier: before.action_earlier,
+        action_earliest: before.action_earliest,
     }
 }

@@ -37,10 +37,16 @@ pub struct Ranges {
     pub drive_lag: Option<[f64; 2]>,
     /// Time constant of the brakes (s).
     pub brake_lag: Option<[f64; 2]>,
+    /// Time constant of the tractor's yaw, as a multiple of slip times speed.
+    pub yaw_lag: Option<[f64; 2]>,
+    /// Increase of the trailer's slip with its load transfer ratio.
+    pub slip_growth: Option<[f64; 2]>,
+    /// Understeer, per lateral acceleration in units of gravity (rad).
+    pub understeer: Option<[f64; 2]>,
 }
 
 /// Number of ranges.
-const N_RANGES: usize = 14;
+const N_RANGES: usize = 17;
 
 /// Where in each range a vehicle lies, from 0 at its least to 1 at its greatest, in the order of [`Ranges::all`].
 #[derive(Debug, Clone, PartialEq)]
@@ -88,6 +94,9 @@ impl Ranges {
             ("steer_delay", self.steer_delay),
             ("drive_lag", self.drive_lag),
             ("brake_lag", self.brake_lag),
+            ("yaw_lag", self.yaw_lag),
+            ("slip_growth", self.slip_growth),
+            ("understeer", self.understeer),
         ]
     }
 
@@ -121,6 +130,9 @@ impl Ranges {
         model.steer_delay = value(11).unwrap_or(model.steer_delay);
         model.drive_lag = value(12).unwrap_or(model.drive_lag);
         model.brake_lag = value(13).unwrap_or(model.brake_lag);
+        model.yaw_lag = value(14).unwrap_or(model.yaw_lag);
+        model.slip_growth = value(15).unwrap_or(model.slip_growth);
+        model.understeer = value(16).unwrap_or(model.understeer);
         vehicle
     }
 }

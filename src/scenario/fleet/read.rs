@@ -121,6 +121,10 @@ fn drawn(reader: &Reader, members: Vec<Member>, written: &WrittenDraw) -> Result
         steer_delay: range("steer_delay", written.steer_delay, [0.0, 1.0], "s")?,
         drive_lag: range("drive_lag", written.drive_lag, time, "s")?,
         brake_lag: range("brake_lag", written.brake_lag, time, "s")?,
+        yaw_lag: range("yaw_lag", written.yaw_lag, [0.0, 5.0], "")?,
+        slip_growth: range("slip_growth", written.slip_growth, [0.0, 5.0], "")?,
+        understeer: range("understeer_deg", written.understeer_deg, [-5.0, 10.0], "deg/g")?
+            .map(|range| range.map(f64::to_radians)),
     };
     let fleet = Fleet { members, draw, n_vehicles };
     for (member, vehicle) in fleet.extremes() {

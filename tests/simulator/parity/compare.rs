@@ -60,6 +60,8 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("steering_earlier", 1, SAME),
             ("target_speed", 1, SMALL),
             ("holds", 1, SAME),
+            ("steering_earliest", 1, SAME),
+            ("actions_before", 3, SAME),
         ],
         Column::Truck => &[
             ("position", 2, POSITION),
@@ -111,6 +113,18 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
         ],
         Column::Reward => &[("", 1, REWARD)],
         Column::Extras | Column::NextExtras => &[("", N_EXTRAS, SMALL)],
+        Column::Poses => &[
+            ("seen.position", 2, POSITION),
+            ("seen.headings", 2, ANGLE),
+            ("seen.speed", 1, MIDDLING),
+            ("seen.waypoint", 1, SAME),
+            ("before.position", 2, POSITION),
+            ("before.headings", 2, ANGLE),
+            ("before.speed", 1, MIDDLING),
+            ("before.waypoint", 1, SAME),
+            ("earlier", 6, SAME),
+            ("earliest", 6, SAME),
+        ],
     }
 }
 

@@ -91,9 +91,15 @@ fn braking_takes_lateral_grip_by_the_friction_ellipse() {
 #[test]
 fn a_steer_command_takes_effect_after_its_delay() {
     let (step, steps) = (0.1f32, 4);
-    for (delay, expected) in
-        [(0.0, [2, 4, 6, 8]), (0.05, [1, 3, 5, 7]), (0.1, [0, 2, 4, 6]), (0.15, [0, 1, 3, 5]), (0.2, [0, 0, 2, 4])]
-    {
+    for (delay, expected) in [
+        (0.0, [2, 4, 6, 8]),
+        (0.05, [1, 3, 5, 7]),
+        (0.1, [0, 2, 4, 6]),
+        (0.15, [0, 1, 3, 5]),
+        (0.2, [0, 0, 2, 4]),
+        (0.25, [0, 0, 1, 3]),
+        (0.3, [0, 0, 0, 2]),
+    ] {
         let rig = rig(Model { steer_delay: delay, ..Model::default() });
         let (mut control, mut truck) = (Control::default(), Truck { speed: 8.0, ..Truck::default() });
         for expected in expected.into_iter().take(steps) {
@@ -121,4 +127,66 @@ fn a_road_that_falls_to_the_right_loads_the_right_wheels() {
         "{}",
         truck.trailer_load_transfer_ratio
     );
+}
+
+/// A truck that has turned steadily for a minute.
+fn turning(rig: &Rig, speed: f32, steering: f32) -> Truck {
+    let control = Control { steering, ..Control::default() };
+    let truck = driving(rig, &control, Truck { speed, ..Truck::default() }, 60.0);
+    // Its load transfer ratios are then those of the end, and not the largest on the way.
+    driving(rig, &control, truck, SUBSTEP)
+}
+
+#[test]
+fn a_trailers_slip_grows_with_its_load_transfer_ratio() {
+    let (speed, steering) = (6.0f32, 0.2f32);
+    let plain = turning(&rig(Model { slip_lever: 4.0, ..Model::default() }), speed, steering);
+    for growth in [0.5, 1.0, 2.0] {
+        let grown = rig(Model { slip_lever: 4.0, slip_growth: growth, ..Model::default() });
+        let truck = turning(&grown, speed, steering);
+        // The same steady turn as with tyres that slip so much more from the beginning, the trailer's alone: it shortens
+        // the lever about which the trailer turns.
+        let slip = grown.slip * (1.0 + growth as f32 * truck.trailer_load_transfer_ratio.abs());
+        let speed_along =
+            motion_of(&grown, &truck).trailer_lateral_acceleration / motion_of(&grown, &truck).trailer_yaw_rate;
+        let lever = grown.trailer_wheelbase - slip * speed_along * speed_along;
+        let rig = Rig { trailer_wheelbase: lever, slip: 0.0, slip_growth: 0.0, ..grown };
+        let side_speed = -grown.slip * speed * speed * motion_of(&grown, &truck).yaw_rate;
+        let hitch = side_speed + rig.fifth_wheel * motion_of(&grown, &truck).yaw_rate;
+        let (sin, cos) = (truck.heading - truck.trailer_heading).sin_cos();
+        let yaw_rate = (speed * sin + hitch * cos) / lever;
+        let tractor = motion_of(&grown, &truck).yaw_rate;
+        assert!((yaw_rate - tractor).abs() < 1e-4 * tractor, "{growth}: {yaw_rate} {tractor}");
+        let bent = |truck: &Truck| (truck.heading - truck.trailer_heading).abs();
+        assert!(bent(&truck) < bent(&plain) - 0.002 * growth as f32, "{growth}: it cuts in less");
+    }
+}
+
+#[test]
+fn understeer_takes_a_larger_steer_angle_by_the_square_of_the_speed() {
+    let degrees = 1.2f64;
+    let rig = rig(Model { understeer: degrees.to_radians(), ..Model::default() });
+    for speed in [2.0f64, 8.0, 16.0] {
+        let steering = 0.05f64;
+        let motion = motion_of(&rig, &Truck { speed: speed as f32, steering: steering as f32, ..Truck::default() });
+        // The steer angle of a path is that of its curvature, and so many degrees for each g of lateral acceleration.
+        let curvature = f64::from(motion.yaw_rate) / speed;
+        let needed = 3.543 * curvature + degrees.to_radians() * curvature * speed * speed / GRAVITY;
+        assert!((needed - steering.tan()).abs() < 1e-6, "{speed} m/s: {needed}");
+    }
+    // A tractor with oversteer does not turn about itself, whatever its speed.
+    let loose = Model { understeer: -5f64.to_radians(), ..Model::default() };
+    let motion = motion_of(&self::rig(loose), &Truck { speed: 25.0, steering: 0.001, ..Truck::default() });
+    assert!((motion.yaw_rate - 25.0 * 0.001 / (0.5 * 3.543)).abs() < 1e-5, "{}", motion.yaw_rate);
+}
+
+#[test]
+fn the_load_on_the_fifth_wheel_leans_on_the_tractor() {
+    let alone = turning(&rig(Model::default()), 6.0, 0.2);
+    let truck = turning(&rig(Model { fifth_wheel_load: 0.26, ..Model::default() }), 6.0, 0.2);
+    // 7.8 t of tractor, and 0.26 of 32.2 t on its fifth wheel.
+    let (own, trailers) = (alone.tractor_load_transfer_ratio, alone.trailer_load_transfer_ratio);
+    let expected = (7.8 * own + 0.26 * 32.2 * trailers) / (7.8 + 0.26 * 32.2);
+    assert!((truck.tractor_load_transfer_ratio - expected).abs() < 1e-5);
+    assert!(own.abs() < 0.8 * expected.abs() && truck.trailer_load_transfer_ratio == trailers);
 }
