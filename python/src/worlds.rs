@@ -92,6 +92,8 @@ impl Place {
             rays,
             actions,
             fields,
+            // No truck drives by where its road lies in a map.
+            frames: _,
             waypoints,
             previews,
             routes,
