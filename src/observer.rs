@@ -1,8 +1,9 @@
 //! A truck that something else drives: what it observes on a route of a world, whether it touches a kerb, how far along
 //! the route it is, and whether its episode has ended.
 //!
-//! Another simulator or a real truck says where it is, in the frame of the map that the road is from; nothing here moves
-//! it. All that is observed is computed by the CPU engine's own functions, so it is the simulator's to the last bit.
+//! Another simulator or a real truck says where it is, in the frame of the map that the road is from; nothing here
+//! moves it. All that is observed is computed by the CPU engine's own functions, so it is the simulator's to the last
+//! bit.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -145,7 +146,7 @@ impl Observer {
     }
 
     /// Begins an episode at any place along the route, with the wheels straight and the truck's speed as its target, as
-    /// the simulator begins one: the clock begins, what lies behind counts as passed, and the start itself is not judged.
+    /// the simulator begins one: the clock begins, what lies behind counts as passed, and the start is not judged.
     ///
     /// # Errors
     ///

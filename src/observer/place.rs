@@ -19,7 +19,7 @@ pub(super) fn next_waypoint(waypoints: &[WaypointRow], point: Vec2, heading: f32
             (nearest, least) = (index + 1, candidate);
         }
     }
-    // In a bend the lines through the waypoints, which say what was passed, do not bound the points nearest to a segment.
+    // In a bend the lines through the waypoints, which say what was passed, do not bound what is nearest to a segment.
     while 1 < nearest && (point - waypoints[nearest - 1].position).dot(waypoints[nearest - 1].direction) < 0.0 {
         nearest -= 1;
     }
