@@ -16,6 +16,8 @@ impl World {
             rays,
             actions,
             fields,
+            // No truck drives by where its road lies in a map.
+            frames: _,
             waypoints,
             previews,
             routes,
