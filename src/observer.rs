@@ -261,7 +261,7 @@ impl Observer {
     fn placed(&self, pose: &Pose, telemetry: &Telemetry, steps: u32) -> Result<Truck, Error> {
         self.check(pose, telemetry)?;
         Ok(Truck {
-            position: self.frame.from_map(pose.position).as_vec2(),
+            position: self.frame.to_driven(pose.position).as_vec2(),
             heading: checked::heading(self.frame.angle(pose.heading)),
             trailer_heading: checked::heading(self.frame.angle(pose.trailer_heading)),
             speed: pose.speed,

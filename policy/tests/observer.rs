@@ -1,7 +1,5 @@
 //! The shipped policies drive through an observer as they do in the simulator.
 
-#![expect(clippy::unwrap_used, reason = "a helper of tests fails as the test itself does")]
-
 use std::sync::Arc;
 
 use offtrack::layout::{Ended, Truck};

@@ -18,7 +18,7 @@ pub struct Frame {
 impl Frame {
     /// A point of the map in the driven frame (m).
     #[inline]
-    pub fn from_map(&self, p: DVec2) -> DVec2 {
+    pub fn to_driven(&self, p: DVec2) -> DVec2 {
         self.turned(p - self.origin)
     }
 
@@ -48,11 +48,11 @@ mod tests {
         for mirrored in [false, true] {
             let frame = Frame { origin: DVec2::new(694.346_21, 1_744.856_43), mirrored };
             for (p, heading) in [(DVec2::new(640.5, 1_790.25), 3.1), (DVec2::new(-12.0, 7.0), -0.2)] {
-                assert!(frame.to_map(frame.from_map(p)).distance(p) < 1e-9);
+                assert!(frame.to_map(frame.to_driven(p)).distance(p) < 1e-9);
                 assert_eq!(frame.angle(frame.angle(heading)), heading);
             }
             // Left of the centre in the map is to the right in its mirror image.
-            let north = frame.from_map(frame.origin + DVec2::new(0.0, 2.0));
+            let north = frame.to_driven(frame.origin + DVec2::new(0.0, 2.0));
             assert!(north.distance(DVec2::new(0.0, if mirrored { -2.0 } else { 2.0 })) < 1e-9);
         }
     }

@@ -297,14 +297,14 @@ fn kerbs_and_waypoints_in_the_maps_frame_are_those_that_are_driven_between() {
         assert!(frame.mirrored || frame.origin != DVec2::ZERO);
         assert_eq!(lines.len(), kerbs.loops.len());
         for (line, kerb) in lines.iter().zip(&kerbs.loops) {
-            assert!(line.iter().all(|&p| kerb.distance(frame.from_map(p)) < 1e-6));
+            assert!(line.iter().all(|&p| kerb.distance(frame.to_driven(p)) < 1e-6));
             let area = |(a, b): (&DVec2, &DVec2)| 0.5 * a.perp_dot(*b);
             let enclosed: f64 = line.iter().zip(line.iter().cycle().skip(1)).map(area).sum();
             assert!((enclosed - kerb.signed_area()).abs() < 0.01 * enclosed.abs(), "the drivable side is on the left");
         }
         let route = &place.routes[0];
         for ((p, heading), waypoint) in observer.waypoints().zip(&route.waypoints) {
-            assert!(frame.from_map(p).distance(waypoint.position) < 1e-4);
+            assert!(frame.to_driven(p).distance(waypoint.position) < 1e-4);
             assert!((frame.angle(heading) - waypoint.heading).abs() < 1e-6);
         }
         assert_eq!(observer.waypoints().count(), route.waypoints.len());
