@@ -66,9 +66,8 @@ fn delayed(delay: u32, n: u32, n_substeps: u32, control: Control) -> f32 {
 // Motion of a truck.
 fn motion_of(rig: Rig, truck: Truck) -> Motion {
     let curvature = steered_curvature(rig, truck.steering, truck.speed);
-    let slip = trailer_slip(rig, truck);
     let articulation = truck.heading - truck.trailer_heading;
-    return motion(rig, truck.speed, curvature, truck.curvature_lag, truck.acceleration, articulation, slip);
+    return motion(rig, truck, truck.speed, curvature, truck.curvature_lag, truck.acceleration, articulation);
 }
 
 // Curvature of the path that the tractor's wheels lead to at a steer angle (rad) and a speed (m/s), without lag (1/m).
@@ -79,40 +78,65 @@ fn steered_curvature(rig: Rig, steering: f32, speed: f32) -> f32 {
     return steered.x / (steered.y * wheelbase);
 }
 
-// Slip of the trailer's tyres, which lose stiffness as its load moves to the outer ones (rad/(m/s^2)).
-fn trailer_slip(rig: Rig, truck: Truck) -> f32 {
-    let roll = vec2<f32>(truck.trailer_roll, truck.trailer_roll_rate);
-    let ratio = load_transfer_ratio(rig.trailer_roll, roll, truck.lateral_acceleration + rig.crossfall);
-    return rig.slip * (1.0 + rig.slip_growth * abs(ratio));
-}
-
 // Strongest drive at a speed (m/s^2).
 fn drive_max(rig: Rig, speed: f32) -> f32 {
     return min(rig.acceleration_max, rig.power / max(speed, POWER_SPEED_MIN));
 }
 
 // Motion of a truck with this speed (m/s), curvature of the steer angle and deviation from it (1/m), acceleration
-// (m/s^2), articulation (rad) and slip of the trailer (rad/(m/s^2)).
+// (m/s^2) and articulation (rad), where it leans as `leaning` does.
 fn motion(
     rig: Rig,
+    leaning: Truck,
     speed: f32,
     steered_curvature: f32,
     curvature_lag: f32,
     acceleration: f32,
     articulation: f32,
-    trailer_slip: f32,
 ) -> Motion {
     // The tyres' grip bounds the curvature.
     let grip = rig.lateral_acceleration_max * sqrt(max(1.0 - rig.friction_ellipse * acceleration * acceleration, 0.0));
     let curvature = limited(steered_curvature + curvature_lag, grip / max(speed * speed, SPEED_SQUARED_MIN));
     let yaw_rate = speed * curvature;
-    let side_speed = -limited(rig.slip * speed * abs(speed), rig.slip_lever_max) * yaw_rate;
+    let lateral_acceleration = speed * yaw_rate;
+    let slip = slips(rig, leaning, lateral_acceleration);
+    let side_speed = -limited(slip.x * speed * abs(speed), rig.slip_lever_max) * yaw_rate;
     let hitch_side_speed = side_speed + rig.fifth_wheel * yaw_rate;
     let bent = sin_cos(articulation);
     let trailer_speed = speed * bent.y - hitch_side_speed * bent.x;
-    let lever = rig.trailer_wheelbase - limited(trailer_slip * trailer_speed * abs(trailer_speed), rig.slip_lever_max);
+    let lever = rig.trailer_wheelbase - limited(slip.y * trailer_speed * abs(trailer_speed), rig.slip_lever_max);
     let trailer_yaw_rate = (speed * bent.x + hitch_side_speed * bent.y) / lever;
-    return Motion(steered_curvature, yaw_rate, trailer_yaw_rate, side_speed, speed * yaw_rate, trailer_speed * trailer_yaw_rate);
+    return Motion(
+        steered_curvature,
+        yaw_rate,
+        trailer_yaw_rate,
+        side_speed,
+        lateral_acceleration,
+        trailer_speed * trailer_yaw_rate,
+    );
+}
+
+// Slip of both units' tyres, which lose stiffness as load moves to the outer ones (rad/(m/s^2)), at a lateral
+// acceleration of the tractor (m/s^2).
+fn slips(rig: Rig, leaning: Truck, lateral_acceleration: f32) -> vec2<f32> {
+    let tractor = vec2<f32>(leaning.tractor_roll, leaning.tractor_roll_rate);
+    let trailer = vec2<f32>(leaning.trailer_roll, leaning.trailer_roll_rate);
+    let ratios = load_transfer_ratios(rig, tractor, trailer, lateral_acceleration, leaning.lateral_acceleration);
+    return rig.slip * (1.0 + rig.slip_growth * abs(ratios));
+}
+
+// Load transfer ratios of tractor and trailer with these (roll, roll rate) and lateral accelerations (m/s^2). The
+// trailer leans on the tractor by the fifth wheel.
+fn load_transfer_ratios(
+    rig: Rig,
+    tractor: vec2<f32>,
+    trailer: vec2<f32>,
+    lateral_acceleration: f32,
+    trailer_lateral_acceleration: f32,
+) -> vec2<f32> {
+    let own = load_transfer_ratio(rig.tractor_roll, tractor, lateral_acceleration + rig.crossfall);
+    let trailers = load_transfer_ratio(rig.trailer_roll, trailer, trailer_lateral_acceleration + rig.crossfall);
+    return vec2<f32>(own + rig.fifth_wheel_load * (trailers - own), trailers);
 }
 
 // The deviation of the path's curvature from the steer angle's, `duration` seconds after it was `lag`, where the steer
@@ -144,7 +168,6 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
         speed = 0.0;
     }
 
-    let slip = trailer_slip(rig, truck);
     let half_step = 0.5 * substep;
     let articulation = truck.heading - truck.trailer_heading;
     let middle_speed = truck.speed + mean_acceleration * half_step;
@@ -152,7 +175,7 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
     let middle_curvature = steered_curvature(rig, truck.steering + 0.5 * turn, middle_speed);
     let rise = middle_curvature - start.motion.steered_curvature;
     let middle_lag = lagging(rig, middle_speed, truck.curvature_lag, rise, half_step);
-    let mean = motion(rig, middle_speed, middle_curvature, middle_lag, mean_acceleration, middle_articulation, slip);
+    let mean = motion(rig, truck, middle_speed, middle_curvature, middle_lag, mean_acceleration, middle_articulation);
     let ahead = direction(truck.heading + half_step * start.motion.yaw_rate);
     let velocity = vec2<f32>(middle_speed * ahead.x - mean.side_speed * ahead.y, middle_speed * ahead.y + mean.side_speed * ahead.x);
 
@@ -160,12 +183,11 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
     let trailer_heading = wrapped(truck.trailer_heading + substep * mean.trailer_yaw_rate);
     let curvature = steered_curvature(rig, steering, speed);
     let curvature_lag = lagging(rig, middle_speed, truck.curvature_lag, curvature - start.motion.steered_curvature, substep);
-    let last = motion(rig, speed, curvature, curvature_lag, acceleration, heading - trailer_heading, slip);
+    let last = motion(rig, truck, speed, curvature, curvature_lag, acceleration, heading - trailer_heading);
     let tractor = rolled(rig.tractor_roll, vec2<f32>(truck.tractor_roll, truck.tractor_roll_rate), mean.lateral_acceleration + rig.crossfall);
     let trailer =
         rolled(rig.trailer_roll, vec2<f32>(truck.trailer_roll, truck.trailer_roll_rate), mean.trailer_lateral_acceleration + rig.crossfall);
-    let tractor_ratio = load_transfer_ratio(rig.tractor_roll, tractor, last.lateral_acceleration + rig.crossfall);
-    let trailer_ratio = load_transfer_ratio(rig.trailer_roll, trailer, last.trailer_lateral_acceleration + rig.crossfall);
+    let ratios = load_transfer_ratios(rig, tractor, trailer, last.lateral_acceleration, last.trailer_lateral_acceleration);
     var after = truck;
     after.position = truck.position + substep * velocity;
     after.heading = heading;
@@ -176,8 +198,8 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
     after.tractor_roll_rate = tractor.y;
     after.trailer_roll = trailer.x;
     after.trailer_roll_rate = trailer.y;
-    after.tractor_load_transfer_ratio = tractor_ratio + rig.fifth_wheel_load * (trailer_ratio - tractor_ratio);
-    after.trailer_load_transfer_ratio = trailer_ratio;
+    after.tractor_load_transfer_ratio = ratios.x;
+    after.trailer_load_transfer_ratio = ratios.y;
     after.acceleration = acceleration;
     after.curvature_lag = curvature_lag;
     after.lateral_acceleration = last.trailer_lateral_acceleration;

@@ -87,8 +87,7 @@ fn reading(disturbances: Disturbances, key: vec4<u32>, steps: u32, reach: f32, r
     let noisy = range + disturbances.range_noise * noise(key, steps, ray);
     let word = words(key.z, key.w, steps, ray).x;
     let is_dropped = signed_unit(word) < 2.0 * disturbances.dropped_rays - 1.0;
-    // A ray that finds no kerb within its reach has no noise.
-    return select(min(max(noisy, 0.0), reach), reach, is_dropped || reach <= range);
+    return select(min(max(noisy, 0.0), reach), reach, is_dropped);
 }
 
 // The key of an episode's noise.

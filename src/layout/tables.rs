@@ -106,7 +106,7 @@ crate::shared! {
         pub chassis: u32,
         /// Index of vehicle and load, as reports and the clock group them.
         pub class_index: u32,
-        /// Increase of the trailer's slip with its load transfer ratio: slip times `1 + slip_growth |ratio|`.
+        /// Increase of each unit's slip with its load transfer ratio: slip times `1 + slip_growth |ratio|`.
         pub slip_growth: f32,
         /// Understeer: increase of the steer angle that a path needs, per lateral acceleration (rad/(m/s^2)).
         pub understeer: f32,

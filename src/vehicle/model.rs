@@ -29,7 +29,7 @@ pub struct Model {
     pub friction_ellipse: bool,
     /// Fall of the road to the right, as a tangent.
     pub crossfall: f64,
-    /// Increase of the trailer's slip with its load transfer ratio: slip times `1 + slip_growth |ratio|`.
+    /// Increase of each unit's slip with its load transfer ratio: slip times `1 + slip_growth |ratio|`.
     pub slip_growth: f64,
     /// Understeer: increase of the steer angle that a path needs, per lateral acceleration in units of gravity (rad).
     pub understeer: f64,

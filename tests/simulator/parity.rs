@@ -19,7 +19,7 @@ use offtrack::world::World;
 use crate::on_device::engine;
 use crate::{batch_on, engines};
 use compare::{Agreement, agreements};
-use states::{ENOUGH, N_ENVS, fleet_world, on_each_roundabout, put, varied, world};
+use states::{ENOUGH, N_ENVS, disturbed_world, fleet_world, on_each_roundabout, put, varied, world};
 
 /// Columns, and a change of the world.
 type Written = (&'static [Column], Option<fn(&mut World)>);
@@ -38,9 +38,10 @@ fn written(stage: Stage) -> Written {
             &[Column::Clearance],
             Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_body.half_width *= 1.001)),
         ),
-        Stage::Follow => {
-            (&[Column::Progress], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.wheelbase *= 1.001)))
-        }
+        Stage::Follow => (
+            &[Column::Progress, Column::Poses],
+            Some(|world| world.rigs.iter_mut().for_each(|rig| rig.wheelbase *= 1.001)),
+        ),
         Stage::Sense => {
             (&[Column::Ranges], Some(|world| world.rays.iter_mut().flatten().for_each(|ray| ray.origin *= 1.001)))
         }
@@ -54,7 +55,15 @@ fn written(stage: Stage) -> Written {
         Stage::Count => (&[], None),
         Stage::CopyObservation => (&[Column::Observation, Column::Extras], None),
         Stage::Reset => (
-            &[Column::Truck, Column::Control, Column::Progress, Column::Ranges, Column::Observation, Column::Extras],
+            &[
+                Column::Truck,
+                Column::Control,
+                Column::Progress,
+                Column::Poses,
+                Column::Ranges,
+                Column::Observation,
+                Column::Extras,
+            ],
             Some(|world| {
                 world.params.start_offset *= 1.001;
             }),
@@ -97,6 +106,7 @@ fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bo
     // Drive and brakes have lags of their own.
     let asks_for = after.control[env].acceleration;
     at_a_line
+        || is_close_call_as_seen(world, after, env)
         || near(error.abs(), rig.speed_integral_band)
         || near(asked, rig.speed_braking)
         || near(asked, drive_max(rig, before.truck[env].speed))
@@ -109,6 +119,27 @@ fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bo
         )
         || near(wrapped(truck.heading - truck.trailer_heading).abs(), params.jackknife_angle)
         || near(after.progress[env].waypoint_distance, params.stray_distance)
+}
+
+/// Whether the truck as it is observed, on the route as it is taken to lie, was closer than the margin to a line that it
+/// passes.
+fn is_close_call_as_seen(world: &World, after: &Batch, env: usize) -> bool {
+    let disturbances = &world.params.disturbances;
+    if disturbances.of_observation == 0 {
+        return false;
+    }
+    let (pose, truck) = (&after.poses[env][0], &after.truck[env]);
+    let [_, x, y, _] = words(3, env as u32, truck.episode, Draw::Offsets as u32).map(signed_unit);
+    let position = pose.position - disturbances.map_offset * Vec2::new(x, y);
+    let point = reference_point(world.rig(truck).wheelbase, &Truck { position, heading: pose.heading, ..*truck });
+    world.route_waypoints(truck.route).iter().any(|waypoint| {
+        let offset = point - waypoint.position;
+        let distance = offset.length();
+        let is_near = distance < 2.0 * world.params.stray_distance;
+        is_near
+            && (offset.dot(waypoint.direction).abs() < MARGIN
+                || (distance - world.params.stray_distance).abs() < MARGIN)
+    })
 }
 
 /// Which trucks must agree: all but the few with a close call.
@@ -147,7 +178,12 @@ fn assert_untouched(before: &Batch, after: &Batch, written: &[Column]) {
 
 #[test]
 fn every_stage_does_the_same_to_every_value_and_touches_no_other() {
-    let worlds = [(world(Gutter::Drivable), false), (world(Gutter::Solid), true), (fleet_world(), false)];
+    let worlds = [
+        (world(Gutter::Drivable), false),
+        (world(Gutter::Solid), true),
+        (fleet_world(), false),
+        (disturbed_world(), false),
+    ];
     for (world, fixed) in worlds {
         let (choice, mut before) = varied(&world, fixed);
         let counts = on_each_roundabout(&world, &before);
@@ -180,6 +216,45 @@ fn every_stage_does_the_same_to_every_value_and_touches_no_other() {
         let [here, there] = [&cpu, &device].map(|simulator| simulator.tally().unwrap());
         assert_eq!(here, there);
         assert_eq!(here.env_steps() as usize, before.truck.len() - if fixed { N_ENVS / 16 } else { 0 });
+    }
+}
+
+/// Numbers of the world, each with a stage that notices it to be off, as the device computes with it.
+const NOTICED: [(&str, Stage, fn(&mut World)); 14] = [
+    ("slip_growth", Stage::Drive, |world| world.rigs.iter_mut().for_each(|rig| rig.slip_growth *= 1.01)),
+    ("understeer", Stage::Drive, |world| world.rigs.iter_mut().for_each(|rig| rig.understeer *= 1.01)),
+    ("fifth_wheel_load", Stage::Drive, |world| world.rigs.iter_mut().for_each(|rig| rig.fifth_wheel_load *= 1.01)),
+    ("yaw_lag", Stage::Drive, |world| world.rigs.iter_mut().for_each(|rig| rig.yaw_lag *= 1.01)),
+    ("steer_delay", Stage::Drive, |world| {
+        world.rigs.iter_mut().for_each(|rig| rig.steer_delay = rig.steer_delay.max(5) - 1)
+    }),
+    ("position_offset", Stage::Follow, |world| world.params.disturbances.position_offset *= 1.01),
+    ("heading_offset", Stage::Follow, |world| world.params.disturbances.heading_offset *= 1.01),
+    ("position_noise", Stage::Follow, |world| world.params.disturbances.position_noise *= 1.01),
+    ("heading_noise", Stage::Follow, |world| world.params.disturbances.heading_noise *= 1.01),
+    ("observation_delay", Stage::Follow, |world| world.params.disturbances.n_observation_delays -= 1),
+    ("range_noise", Stage::Sense, |world| world.params.disturbances.range_noise *= 1.01),
+    ("dropped_rays", Stage::Sense, |world| world.params.disturbances.dropped_rays *= 1.1),
+    ("map_offset", Stage::Observe, |world| world.params.disturbances.map_offset *= 1.01),
+    ("action_delay", Stage::Steer, |world| world.params.disturbances.n_action_delays -= 1),
+];
+
+#[test]
+fn every_number_of_tyres_delays_and_disturbances_counts_on_the_device() {
+    let world = disturbed_world();
+    let (choice, before) = varied(&world, false);
+    for (key, stage, change) in NOTICED {
+        let [mut cpu, mut device] = simulators(&world, &choice);
+        let mut wrong = wrong_device(&world, &choice, change);
+        for simulator in [&mut cpu, &mut device, &mut wrong] {
+            put(simulator, &before);
+            simulator.run_stage(stage);
+        }
+        let counted = judged(&world, &before, cpu.batch());
+        let (written, _) = written(stage);
+        assert_agreement(key, &compared(cpu.batch(), device.batch(), written, &counted));
+        let wrong = compared(cpu.batch(), wrong.batch(), written, &counted);
+        assert!(wrong.iter().any(|agreement| !agreement.holds()), "{key}: a wrong number would pass");
     }
 }
 

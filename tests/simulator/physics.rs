@@ -8,6 +8,7 @@ mod lags;
 mod properties;
 mod sources;
 mod speed_control;
+mod tyres;
 mod vectors;
 mod vehicles;
 

@@ -85,8 +85,8 @@ pub fn delayed(delay: u32, n: u32, n_substeps: u32, control: &Control) -> f32 {
 #[inline]
 pub fn motion_of(rig: &Rig, truck: &Truck) -> Motion {
     let curvature = steered_curvature(rig, truck.steering, truck.speed);
-    let (slip, articulation) = (trailer_slip(rig, truck), truck.heading - truck.trailer_heading);
-    motion(rig, truck.speed, curvature, truck.curvature_lag, truck.acceleration, articulation, slip)
+    let articulation = truck.heading - truck.trailer_heading;
+    motion(rig, truck, truck.speed, curvature, truck.curvature_lag, truck.acceleration, articulation)
 }
 
 /// Curvature of the path that the tractor's wheels lead to at a steer angle (rad) and a speed (m/s), without lag (1/m).
@@ -98,14 +98,6 @@ pub fn steered_curvature(rig: &Rig, steering: f32, speed: f32) -> f32 {
     sin / (cos * wheelbase)
 }
 
-/// Slip of the trailer's tyres, which lose stiffness as its load moves to the outer ones (rad/(m/s^2)).
-#[inline]
-pub fn trailer_slip(rig: &Rig, truck: &Truck) -> f32 {
-    let roll = Vec2::new(truck.trailer_roll, truck.trailer_roll_rate);
-    let ratio = load_transfer_ratio(&rig.trailer_roll, roll, truck.lateral_acceleration + rig.crossfall);
-    rig.slip * (1.0 + rig.slip_growth * ratio.abs())
-}
-
 /// Strongest drive at a speed (m/s^2).
 #[inline]
 pub fn drive_max(rig: &Rig, speed: f32) -> f32 {
@@ -113,23 +105,25 @@ pub fn drive_max(rig: &Rig, speed: f32) -> f32 {
 }
 
 /// Motion of a truck with this speed (m/s), curvature of the steer angle and deviation from it (1/m), acceleration
-/// (m/s^2), articulation (rad) and slip of the trailer (rad/(m/s^2)).
+/// (m/s^2) and articulation (rad), where it leans as `leaning` does.
 #[inline]
 pub fn motion(
     rig: &Rig,
+    leaning: &Truck,
     speed: f32,
     steered_curvature: f32,
     curvature_lag: f32,
     acceleration: f32,
     articulation: f32,
-    trailer_slip: f32,
 ) -> Motion {
     // The tyres' grip bounds the curvature.
     let grip =
         rig.lateral_acceleration_max * (1.0 - rig.friction_ellipse * acceleration * acceleration).max(0.0).sqrt();
     let curvature = limited(steered_curvature + curvature_lag, grip / (speed * speed).max(SPEED_SQUARED_MIN));
     let yaw_rate = speed * curvature;
-    let side_speed = -limited(rig.slip * speed * speed.abs(), rig.slip_lever_max) * yaw_rate;
+    let lateral_acceleration = speed * yaw_rate;
+    let (slip, trailer_slip) = slips(rig, leaning, lateral_acceleration);
+    let side_speed = -limited(slip * speed * speed.abs(), rig.slip_lever_max) * yaw_rate;
     let hitch_side_speed = side_speed + rig.fifth_wheel * yaw_rate;
     let (sin, cos) = sin_cos(articulation);
     let trailer_speed = speed * cos - hitch_side_speed * sin;
@@ -140,9 +134,36 @@ pub fn motion(
         yaw_rate,
         trailer_yaw_rate,
         side_speed,
-        lateral_acceleration: speed * yaw_rate,
+        lateral_acceleration,
         trailer_lateral_acceleration: trailer_speed * trailer_yaw_rate,
     }
+}
+
+/// Slip of both units' tyres, which lose stiffness as load moves to the outer ones (rad/(m/s^2)), at a lateral
+/// acceleration of the tractor (m/s^2).
+#[inline]
+fn slips(rig: &Rig, leaning: &Truck, lateral_acceleration: f32) -> (f32, f32) {
+    let tractor = Vec2::new(leaning.tractor_roll, leaning.tractor_roll_rate);
+    let trailer = Vec2::new(leaning.trailer_roll, leaning.trailer_roll_rate);
+    let (ratio, trailer_ratio) =
+        load_transfer_ratios(rig, tractor, trailer, lateral_acceleration, leaning.lateral_acceleration);
+    let grown = |ratio: f32| rig.slip * (1.0 + rig.slip_growth * ratio.abs());
+    (grown(ratio), grown(trailer_ratio))
+}
+
+/// Load transfer ratios of tractor and trailer with these (roll, roll rate) and lateral accelerations (m/s^2). The
+/// trailer leans on the tractor by the fifth wheel.
+#[inline]
+fn load_transfer_ratios(
+    rig: &Rig,
+    tractor: Vec2,
+    trailer: Vec2,
+    lateral_acceleration: f32,
+    trailer_lateral_acceleration: f32,
+) -> (f32, f32) {
+    let own = load_transfer_ratio(&rig.tractor_roll, tractor, lateral_acceleration + rig.crossfall);
+    let trailers = load_transfer_ratio(&rig.trailer_roll, trailer, trailer_lateral_acceleration + rig.crossfall);
+    (own + rig.fifth_wheel_load * (trailers - own), trailers)
 }
 
 /// The deviation of the path's curvature from the steer angle's, `duration` seconds after it was `lag`, where the steer
@@ -173,7 +194,6 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
         (acceleration, mean_acceleration, speed) = (0.0, -truck.speed / substep, 0.0);
     }
 
-    let slip = trailer_slip(rig, truck);
     let half = 0.5 * substep;
     let articulation = truck.heading - truck.trailer_heading;
     let middle_speed = truck.speed + mean_acceleration * half;
@@ -181,7 +201,7 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
     let middle_curvature = steered_curvature(rig, truck.steering + 0.5 * turn, middle_speed);
     let rise = middle_curvature - start.motion.steered_curvature;
     let middle_lag = lagging(rig, middle_speed, truck.curvature_lag, rise, half);
-    let middle = motion(rig, middle_speed, middle_curvature, middle_lag, mean_acceleration, middle_articulation, slip);
+    let middle = motion(rig, truck, middle_speed, middle_curvature, middle_lag, mean_acceleration, middle_articulation);
     let (sin, cos) = sin_cos(truck.heading + half * start.motion.yaw_rate);
     let velocity =
         Vec2::new(middle_speed * cos - middle.side_speed * sin, middle_speed * sin + middle.side_speed * cos);
@@ -191,7 +211,7 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
     let curvature = steered_curvature(rig, steering, speed);
     let curvature_lag =
         lagging(rig, middle_speed, truck.curvature_lag, curvature - start.motion.steered_curvature, substep);
-    let end = motion(rig, speed, curvature, curvature_lag, acceleration, heading - trailer_heading, slip);
+    let end = motion(rig, truck, speed, curvature, curvature_lag, acceleration, heading - trailer_heading);
     let tilted = |lateral_acceleration: f32| lateral_acceleration + rig.crossfall;
     let tractor = rolled(
         &rig.tractor_roll,
@@ -203,8 +223,8 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
         Vec2::new(truck.trailer_roll, truck.trailer_roll_rate),
         tilted(middle.trailer_lateral_acceleration),
     );
-    let tractor_ratio = load_transfer_ratio(&rig.tractor_roll, tractor, tilted(end.lateral_acceleration));
-    let trailer_ratio = load_transfer_ratio(&rig.trailer_roll, trailer, tilted(end.trailer_lateral_acceleration));
+    let (tractor_ratio, trailer_ratio) =
+        load_transfer_ratios(rig, tractor, trailer, end.lateral_acceleration, end.trailer_lateral_acceleration);
     Moving {
         truck: Truck {
             position: truck.position + substep * velocity,
@@ -216,7 +236,7 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
             tractor_roll_rate: tractor.y,
             trailer_roll: trailer.x,
             trailer_roll_rate: trailer.y,
-            tractor_load_transfer_ratio: tractor_ratio + rig.fifth_wheel_load * (trailer_ratio - tractor_ratio),
+            tractor_load_transfer_ratio: tractor_ratio,
             trailer_load_transfer_ratio: trailer_ratio,
             acceleration,
             curvature_lag,

@@ -105,8 +105,7 @@ fn reading(disturbances: &Disturbances, key: [u32; 4], steps: u32, reach: f32, r
     let noisy = range + disturbances.range_noise * noise(key, steps, ray);
     let [word, ..] = words(key[2], key[3], steps, ray);
     let is_dropped = signed_unit(word) < 2.0 * disturbances.dropped_rays - 1.0;
-    // A ray that finds no kerb within its reach has no noise.
-    if is_dropped || reach <= range { reach } else { noisy.max(0.0).min(reach) }
+    if is_dropped { reach } else { noisy.max(0.0).min(reach) }
 }
 
 /// The key of an episode's noise.

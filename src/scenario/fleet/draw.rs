@@ -39,7 +39,7 @@ pub struct Ranges {
     pub brake_lag: Option<[f64; 2]>,
     /// Time constant of the tractor's yaw, as a multiple of slip times speed.
     pub yaw_lag: Option<[f64; 2]>,
-    /// Increase of the trailer's slip with its load transfer ratio.
+    /// Increase of each unit's slip with its load transfer ratio.
     pub slip_growth: Option<[f64; 2]>,
     /// Understeer, per lateral acceleration in units of gravity (rad).
     pub understeer: Option<[f64; 2]>,

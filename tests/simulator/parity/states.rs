@@ -5,8 +5,9 @@ use std::sync::{Arc, OnceLock};
 use offtrack::field::Field;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::random::{index_below, signed_unit, words};
-use offtrack::layout::{ObservedExtras, Truck};
+use offtrack::layout::{ObservedExtras, Params, Truck};
 use offtrack::map::Gutter;
+use offtrack::scenario::{Disturbances, Scenario};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 
@@ -15,7 +16,7 @@ use crate::benchmark;
 /// Trucks: with routes drawn uniformly at random every roundabout has more than [`ENOUGH`].
 pub const N_ENVS: usize = 28_672;
 /// States that each roundabout must have.
-pub const ENOUGH: usize = 4096;
+pub const ENOUGH: usize = 4000;
 
 /// Every route of every roundabout, with their gutters drivable or solid.
 pub fn world(gutter: Gutter) -> Arc<World> {
@@ -41,6 +42,20 @@ pub fn fleet_world() -> Arc<World> {
     let world = World { fields: world(Gutter::Drivable).fields.clone(), ..World::bake(&scenario).unwrap() };
     assert!(world.rigs.len() == 512 && world.rays.len() == 512);
     Arc::new(world)
+}
+
+/// The same where noise, errors and delays come between a policy and the truck.
+pub fn disturbed_world() -> Arc<World> {
+    let disturbances = Disturbances {
+        observation_delay: [0, 3],
+        action_delay: [0, 3],
+        // Beyond the difference that engines may have in a sample of a field.
+        range_noise: 1.0,
+        dropped_rays: 0.05,
+        ..Scenario::named("transfer2026").unwrap().disturbances
+    };
+    let (world, disturbances) = (World::clone(&fleet_world()), (&disturbances).into());
+    Arc::new(World { params: Params { disturbances, ..world.params }, ..world })
 }
 
 /// Makes a simulator's columns those of `batch`.
@@ -128,6 +143,13 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
     let [integral, ..] = drawn(env, 3);
     batch.control[env].speed_error_integral = integral;
     (batch.control[env].steering_before, batch.control[env].steering_earlier) = (0.4 * speed, 0.4 * lean);
+    batch.control[env].steering_earliest = 0.4 * bent;
+    if world.params.disturbances.of_action == 1 {
+        // An action's index plus 1, or none yet.
+        let action = |draw: u32| picked(env, draw, world.params.n_actions as usize + 1) as u32;
+        let control = &mut batch.control[env];
+        (control.action_before, control.action_earlier, control.action_earliest) = (action(5), action(6), action(7));
+    }
     batch.control[env].target_speed = 8.0 + 4.0 * speed;
     batch.control[env].holds = u32::from(kind == 6);
     if kind == 6 {

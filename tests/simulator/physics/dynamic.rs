@@ -25,7 +25,7 @@ fn repaired(name: &str, slip_lever: f64, yaw_lag: f64) -> Vehicle {
 }
 
 /// Off-tracking of the simulator's truck in the steady turn with its front axle on a circle of `radius` (m).
-fn off_tracking(rig: &Rig, speed: f64, radius: f64) -> f64 {
+pub fn off_tracking(rig: &Rig, speed: f64, radius: f64) -> f64 {
     let (mut tight, mut wide) = (0.45f32, 0.02f32);
     let mut found = 0.0;
     for _ in 0..25 {

@@ -138,27 +138,29 @@ fn turning(rig: &Rig, speed: f32, steering: f32) -> Truck {
 }
 
 #[test]
-fn a_trailers_slip_grows_with_its_load_transfer_ratio() {
+fn each_units_slip_grows_with_its_load_transfer_ratio() {
     let (speed, steering) = (6.0f32, 0.2f32);
-    let plain = turning(&rig(Model { slip_lever: 4.0, ..Model::default() }), speed, steering);
+    let with = |growth: f64| {
+        let rig = rig(Model { slip_lever: 4.0, slip_growth: growth, fifth_wheel_load: 0.26, ..Model::default() });
+        let truck = turning(&rig, speed, steering);
+        (rig, truck, motion_of(&rig, &truck))
+    };
+    let bent = |truck: &Truck| (truck.heading - truck.trailer_heading).abs();
+    let (_, plain, _) = with(0.0);
     for growth in [0.5, 1.0, 2.0] {
-        let grown = rig(Model { slip_lever: 4.0, slip_growth: growth, ..Model::default() });
-        let truck = turning(&grown, speed, steering);
-        // The same steady turn as with tyres that slip so much more from the beginning, the trailer's alone: it shortens
-        // the lever about which the trailer turns.
-        let slip = grown.slip * (1.0 + growth as f32 * truck.trailer_load_transfer_ratio.abs());
-        let speed_along =
-            motion_of(&grown, &truck).trailer_lateral_acceleration / motion_of(&grown, &truck).trailer_yaw_rate;
-        let lever = grown.trailer_wheelbase - slip * speed_along * speed_along;
-        let rig = Rig { trailer_wheelbase: lever, slip: 0.0, slip_growth: 0.0, ..grown };
-        let side_speed = -grown.slip * speed * speed * motion_of(&grown, &truck).yaw_rate;
-        let hitch = side_speed + rig.fifth_wheel * motion_of(&grown, &truck).yaw_rate;
+        let (rig, truck, motion) = with(growth);
+        let slip = |ratio: f32| rig.slip * (1.0 + growth as f32 * ratio.abs());
+        // Slip shifts the points ahead about which the units turn, each by its own.
+        let lever = slip(truck.tractor_load_transfer_ratio) * speed * speed;
+        assert!((motion.side_speed + lever * motion.yaw_rate).abs() < 1e-4, "{growth}: {}", motion.side_speed);
+        let trailer_speed = motion.trailer_lateral_acceleration / motion.trailer_yaw_rate;
+        let lever = slip(truck.trailer_load_transfer_ratio) * trailer_speed * trailer_speed;
         let (sin, cos) = (truck.heading - truck.trailer_heading).sin_cos();
-        let yaw_rate = (speed * sin + hitch * cos) / lever;
-        let tractor = motion_of(&grown, &truck).yaw_rate;
-        assert!((yaw_rate - tractor).abs() < 1e-4 * tractor, "{growth}: {yaw_rate} {tractor}");
-        let bent = |truck: &Truck| (truck.heading - truck.trailer_heading).abs();
-        assert!(bent(&truck) < bent(&plain) - 0.002 * growth as f32, "{growth}: it cuts in less");
+        let across = speed * sin + (motion.side_speed + rig.fifth_wheel * motion.yaw_rate) * cos;
+        let yaw_rate = across / (rig.trailer_wheelbase - lever);
+        assert!((motion.trailer_yaw_rate - yaw_rate).abs() < 1e-4, "{growth}: {yaw_rate}");
+        assert!((motion.trailer_yaw_rate - motion.yaw_rate).abs() < 1e-4, "{growth}: the turn is not steady");
+        assert!(bent(&truck) < bent(&plain) - 0.001 * growth as f32, "{growth}: it cuts in less");
     }
 }
 

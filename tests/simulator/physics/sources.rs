@@ -6,8 +6,10 @@ use std::path::Path;
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Piece};
-use offtrack::vehicle::Vehicle;
+use offtrack::layout::{Control, Truck};
+use offtrack::physics::{driven, motion_of};
 use offtrack::vehicle::swept::{Pose, swept_path};
+use offtrack::vehicle::{GRAVITY, Model, Vehicle};
 
 use super::vehicle;
 
@@ -122,5 +124,50 @@ fn off_tracking_in_a_steady_turn_is_that_of_sae_j695() {
     for name in super::VEHICLES {
         let [driven, published] = off_tracking(&vehicle(name));
         assert!((driven - published).abs() < 0.005, "{name}: {driven} {published}");
+    }
+}
+
+#[test]
+fn chronos_kraz_turns_and_bends_as_its_lengths_and_1_2_degrees_of_understeer_a_g_say() {
+    // Project Chrono's Kraz 64431 with its trailer, held at 16.463 m/s and 0.03733 rad in its step steer: yaw rate 0.11452
+    // rad/s, articulation 0.05171 rad, roll 0.0461 rad. Lengths by its files: rear axles 4.08 and 5.48 m behind the front
+    // one, fifth wheel 4.64 m behind it, the trailer's middle axle 7.59 m behind the kingpin.
+    let (speed, steering) = (16.463f32, 0.03733f32);
+    let mut kraz = vehicle("daf_xf");
+    (kraz.tractor.wheelbase, kraz.tractor.fifth_wheel, kraz.trailer.wheelbase) = (4.78, 0.14, 7.59);
+    if let Some(laden) = kraz.loads.get_mut("laden") {
+        laden.slip = 0.0187;
+        laden.suspension.roll_gain = 0.0461 / (16.463 * 0.11452 / GRAVITY);
+    }
+    let mut held = |understeer: f64| {
+        let understeer = understeer.to_radians();
+        kraz.model = Model { slip_lever: 4.0, understeer, ..Model::default() };
+        let rig = kraz.rig("laden", 0.05, None);
+        let control = Control { steering, ..Control::default() };
+        let truck = driven(&rig, 0.05, 1200, &control, &Truck { speed, steering, ..Truck::default() });
+        (truck, motion_of(&rig, &truck))
+    };
+    let (truck, motion) = held(1.2);
+    assert!((motion.yaw_rate / 0.11452 - 1.0).abs() < 0.005, "{} rad/s", motion.yaw_rate);
+    let bent = truck.heading - truck.trailer_heading;
+    assert!((bent / 0.05171 - 1.0).abs() < 0.01, "{bent} rad");
+    assert!((truck.trailer_roll / 0.0461 - 1.0).abs() < 0.01, "{} rad", truck.trailer_roll);
+    // Without understeer it would turn a tenth faster.
+    assert!(0.12 < held(0.0).1.yaw_rate);
+}
+
+#[test]
+fn rollover_thresholds_lie_where_tilt_tables_and_regulations_have_them() {
+    let threshold = |name: &str, load: &str| vehicle(name).loads[load].suspension.rollover_threshold();
+    for name in ["daf_xf", "eu_4x2_13m6"] {
+        // Of 17 tankers on a tilt table 7 were below 0.35 g and 14 below 0.40 g (Billing and Patten); a tank, and the worst
+        // of them.
+        assert!((0.35..0.40).contains(&threshold(name, "laden_high")));
+        assert!((0.30..0.35).contains(&threshold(name, "laden_worst")));
+        // Regulations ask for 0.35 g, and for 0.40 g with dangerous goods: a load of ordinary height keeps both.
+        assert!((0.40..0.45).contains(&threshold(name, "laden")));
+        assert!(
+            threshold(name, "laden") < threshold(name, "half") && threshold(name, "half") < threshold(name, "empty")
+        );
     }
 }
