@@ -649,7 +649,7 @@ struct BatchFacts {
 // Steps after which an episode is timed out, [n_routes, n_classes].
 @group(0) @binding(10) var<storage, read> step_limits: array<u32>;
 // Facts that the trucks of a batch share.
-@group(0) @binding(11) var<storage, read> batch: BatchFacts;
+@group(0) @binding(11) var<uniform> batch: BatchFacts;
 // Routes that episodes run on: to be drawn from, or one for each truck.
 @group(0) @binding(12) var<storage, read> choice: array<u32>;
 // The stream of random numbers that each truck draws from, [n_envs].

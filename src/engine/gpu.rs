@@ -140,7 +140,7 @@ impl Device {
 
     /// A buffer of `size` bytes, all 0, that shaders may read and write and that may be copied from and to.
     pub fn empty(&self, label: &str, size: u64) -> Slice {
-        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+        let usage = BufferUsages::STORAGE | BufferUsages::UNIFORM | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let buffer =
             self.device.create_buffer(&BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
         Slice { buffer, offset: 0, size }

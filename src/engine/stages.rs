@@ -1,6 +1,9 @@
 //! One step, in order. Both engines run these stages: the CPU by the function, the device by the kernels of the same
 //! name.
 
+use crate::layout::Column;
+use crate::layout::buffers::{Access, Buffer, Table};
+
 crate::named! {
     /// A stage of a step, in the order of a step.
     pub enum Stage {
@@ -101,7 +104,53 @@ impl Stage {
     }
 }
 
+/// Buffers by name: tables, columns, and the tally.
+macro_rules! buffers {
+    ($($table:ident)*; $($column:ident)* $(; $tally:ident)?) => {
+        &[
+            $(Buffer::Table(Table::$table),)*
+            $(Buffer::Column(Column::$column),)*
+            $(Buffer::$tally,)?
+        ]
+    };
+}
+
 impl Kernel {
+    /// The buffers that it is bound to: all that its shader names, in the order of their bindings.
+    pub const fn buffers(self) -> &'static [Buffer] {
+        match self {
+            Kernel::Draw => buffers![Params Batch Streams; Action Truck],
+            Kernel::Begin => buffers![
+                Params Rigs Waypoints Previews Routes Batch Choice Streams Begins; Control Truck Progress Ended Terms
+                Reward Poses
+            ],
+            Kernel::Steer => buffers![Params Rigs Actions Batch Streams; Action Control Truck],
+            Kernel::Drive => buffers![Params Rigs Batch; Control Truck],
+            Kernel::Collide => buffers![Rigs Fields Cells Corners Routes Batch; Truck Clearance],
+            Kernel::Follow => buffers![Params Rigs Waypoints Routes Batch Streams; Truck Progress Poses],
+            Kernel::Sense | Kernel::SenseAfterReset => buffers![
+                Params Rigs Rays Fields Cells Corners Routes Batch Streams; Truck Ranges Poses
+            ],
+            Kernel::Observe | Kernel::ObserveAfterReset => buffers![
+                Params Rigs Waypoints Previews Routes Batch Streams; Control Truck Progress Ranges Observation
+                NextObservation Extras NextExtras Poses
+            ],
+            Kernel::Judge => buffers![
+                Params Rigs Routes StepLimits Batch; Truck Clearance Progress Ended Terms Reward
+            ],
+            Kernel::Count => buffers![Batch; Truck Ended Reward; Tally],
+            Kernel::CopyObservation => buffers![Batch; Truck Observation NextObservation Extras NextExtras],
+            Kernel::Reset => buffers![
+                Params Rigs Waypoints Previews Routes Batch Choice Streams; Control Truck Progress Ended Terms Reward
+                Poses
+            ],
+            Kernel::ObserveBegun => buffers![
+                Params Rigs Waypoints Previews Routes Batch Streams Begins; Control Truck Progress Ranges Observation
+                NextObservation Extras NextExtras Poses
+            ],
+        }
+    }
+
     /// What a thread works on.
     pub const fn threads(self) -> Threads {
         match self {
@@ -111,6 +160,22 @@ impl Kernel {
         }
     }
 }
+
+/// Storage buffers that a kernel is bound to at most: what a device must offer.
+pub const N_STORAGE_BUFFERS: usize = {
+    let (mut most, mut kernel) = (0, 0);
+    while kernel < Kernel::ALL.len() {
+        let buffers = Kernel::ALL[kernel].buffers();
+        let (mut n, mut index) = (0, 0);
+        while index < buffers.len() {
+            n += !matches!(buffers[index].access(), Access::Uniform) as usize;
+            index += 1;
+        }
+        most = if most < n { n } else { most };
+        kernel += 1;
+    }
+    most
+};
 
 /// The shader files in the order in which they make one module.
 pub const SHADERS: [(&str, &str); 18] = [

@@ -1,4 +1,4 @@
-//! The buffers that the kernels of a step see: one bind group, a binding each, in this order.
+//! The buffers that the kernels of a step see: a binding each, in this order. A kernel is bound to those that it names.
 
 use super::{
     Action, BatchFacts, BeginRow, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, Rig, RouteRow, Stream,
@@ -9,6 +9,8 @@ use crate::layout::shared::{Named, Shared, comment};
 /// What shaders may do to a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {
+    /// Read it, as a uniform: a few values that do not count among the storage buffers.
+    Uniform,
     /// Read it.
     Read,
     /// Read and write it.
@@ -64,9 +66,9 @@ crate::named! {
     }
 }
 
-/// Tables in the bind group.
+/// Tables.
 pub const N_TABLES: usize = Table::ALL.len();
-/// Buffers in the bind group: tables, columns, tally.
+/// Buffers: tables, columns, tally.
 pub const N_BUFFERS: usize = N_TABLES + N_COLUMNS + 1;
 
 /// Every buffer; its index is its binding.
@@ -95,11 +97,21 @@ impl Buffer {
     }
 
     /// What shaders may do.
-    pub fn access(self) -> Access {
+    pub const fn access(self) -> Access {
         match self {
+            Buffer::Table(Table::Batch) => Access::Uniform,
             Buffer::Table(_) => Access::Read,
             Buffer::Column(_) => Access::ReadWrite,
             Buffer::Tally => Access::Count,
+        }
+    }
+
+    /// The buffer's binding: its index in [`BUFFERS`].
+    pub const fn binding(self) -> usize {
+        match self {
+            Buffer::Table(table) => table as usize,
+            Buffer::Column(column) => N_TABLES + column as usize,
+            Buffer::Tally => N_BUFFERS - 1,
         }
     }
 
@@ -155,9 +167,13 @@ pub(crate) fn printed() -> String {
     let mut printed = String::new();
     for (binding, buffer) in BUFFERS.into_iter().enumerate() {
         let (doc, kind) = buffer.declared();
-        let mode = if buffer.access() == Access::Read { "read" } else { "read_write" };
+        let space = match buffer.access() {
+            Access::Uniform => "uniform",
+            Access::Read => "storage, read",
+            Access::ReadWrite | Access::Count => "storage, read_write",
+        };
         printed += &comment("", &[&doc]);
-        printed += &format!("@group(0) @binding({binding}) var<storage, {mode}> {}: {kind};\n", buffer.name());
+        printed += &format!("@group(0) @binding({binding}) var<{space}> {}: {kind};\n", buffer.name());
     }
     printed
 }

@@ -190,11 +190,11 @@ fn in_a_loop_every_variable_has_an_initial_value_since_one_compiler_clears_it_on
 
 #[cfg(feature = "gpu")]
 mod module {
-    use offtrack::engine::stages::{Kernel, SHADERS, STAGES};
+    use offtrack::engine::stages::{Kernel, N_STORAGE_BUFFERS, SHADERS, STAGES};
     use offtrack::layout::shared::Struct;
     use offtrack::layout::structs;
     use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
-    use wgpu::naga::{Module, TypeInner, front::wgsl};
+    use wgpu::naga::{GlobalVariable, Module, TypeInner, front::wgsl};
 
     fn parsed(source: &str) -> Module {
         wgsl::parse_str(source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(source)))
@@ -219,6 +219,34 @@ mod module {
             Kernel::ALL.iter().all(|kernel| beside.contains(kernel) != of_stages.contains(kernel)),
             "a kernel without a stage"
         );
+    }
+
+    /// The buffers that a shader names for each kernel, in the order of their bindings.
+    fn named(module: &Module) -> Vec<(String, Vec<u32>)> {
+        let info = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(module).unwrap();
+        let kernels = module.entry_points.iter().enumerate().map(|(index, entry)| {
+            let used = info.get_entry_point(index);
+            let of = |(handle, variable): (_, &GlobalVariable)| {
+                variable.binding.as_ref().filter(|_| !used[handle].is_empty()).map(|binding| binding.binding)
+            };
+            let mut bindings: Vec<u32> = module.global_variables.iter().filter_map(of).collect();
+            bindings.sort_unstable();
+            (entry.name.clone(), bindings)
+        });
+        kernels.collect()
+    }
+
+    #[test]
+    fn a_kernel_is_bound_to_exactly_the_buffers_that_its_shader_names_and_to_few() {
+        let of_shader = named(&module());
+        for (name, bindings) in &of_shader {
+            let kernel = Kernel::ALL.iter().find(|kernel| kernel.name() == name).unwrap();
+            let declared: Vec<u32> = kernel.buffers().iter().map(|buffer| buffer.binding() as u32).collect();
+            assert_eq!(&declared, bindings, "{name}");
+        }
+        // DirectX 12 has 16 on its smaller devices, Metal 29.
+        assert_eq!(N_STORAGE_BUFFERS, 16);
+        assert!(of_shader.iter().all(|(_, bindings)| bindings.len() <= N_STORAGE_BUFFERS + 1));
     }
 
     /// Differences between the layouts of WGSL and of Rust, struct by struct.

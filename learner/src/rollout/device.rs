@@ -208,23 +208,24 @@ impl<const N: usize> DeviceRollout<N> {
         self.shared.flush()?;
         let output = logits.map(floats).transpose()?;
         let device = &self.shared.gpu.device;
-        let group = self.buffers.group(device, &self.kernels, output.as_ref().map(|output| &output.slice));
+        let chosen_from = output.as_ref().map(|output| &output.slice);
         self.write_now();
         let mut encoder = device.create_command_encoder(&Default::default());
-        let (kernels, facts) = (&self.kernels, &self.facts);
+        let (kernels, facts, buffers) = (&self.kernels, &self.facts, &self.buffers);
+        let group = |kernel: Kernel| buffers.group(device, kernels, kernel, chosen_from);
         let batch =
             self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
         if logits.is_some() {
-            memory_kernels::add(kernels, &mut encoder, &group, Kernel::Choose, facts);
+            memory_kernels::add(kernels, &mut encoder, &group(Kernel::Choose), Kernel::Choose, facts);
         } else {
             batch.add_draw(&mut encoder);
         }
         if remember {
-            memory_kernels::add(kernels, &mut encoder, &group, Kernel::StoreBefore, facts);
+            memory_kernels::add(kernels, &mut encoder, &group(Kernel::StoreBefore), Kernel::StoreBefore, facts);
         }
         batch.add_step(&mut encoder);
         if remember {
-            memory_kernels::add(kernels, &mut encoder, &group, Kernel::StoreAfter, facts);
+            memory_kernels::add(kernels, &mut encoder, &group(Kernel::StoreAfter), Kernel::StoreAfter, facts);
             self.n_appended += 1;
         }
         batch.stepped();
@@ -311,7 +312,7 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
     /// Samples a batch in one shard: the same tensors every time, with other values in them.
     fn sample(&mut self) -> Result<Vec<Transitions>, Error> {
         self.shared.flush()?;
-        let group = self.buffers.group(&self.shared.gpu.device, &self.kernels, None);
+        let group = self.buffers.group(&self.shared.gpu.device, &self.kernels, Kernel::Sample, None);
         self.write_now();
         let mut encoder = self.shared.gpu.device.create_command_encoder(&Default::default());
         memory_kernels::add(&self.kernels, &mut encoder, &group, Kernel::Sample, &self.facts);

@@ -3,8 +3,8 @@
 use wgpu::{Backends, DeviceType, Instance, InstanceDescriptor, Limits};
 
 use super::Error;
+use crate::engine::stages::N_STORAGE_BUFFERS;
 use crate::layout::WORKGROUP;
-use crate::layout::buffers::N_BUFFERS;
 
 /// An adapter as it presents itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -73,7 +73,11 @@ pub fn adapters() -> Vec<Adapter> {
 pub(super) fn check_limits(adapter: &wgpu::Adapter) -> Result<(), Error> {
     let Limits { max_storage_buffers_per_shader_stage, max_compute_invocations_per_workgroup, .. } = adapter.limits();
     let needs = [
-        ("the number of storage buffers a shader may see", max_storage_buffers_per_shader_stage, N_BUFFERS as u32),
+        (
+            "the number of storage buffers a shader may see",
+            max_storage_buffers_per_shader_stage,
+            N_STORAGE_BUFFERS as u32,
+        ),
         ("the number of threads in a workgroup", max_compute_invocations_per_workgroup, WORKGROUP),
     ];
     match needs.into_iter().find(|(_, has, needed)| has < needed) {

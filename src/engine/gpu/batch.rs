@@ -97,9 +97,9 @@ impl Batch {
         timestamp_writes: Option<ComputePassTimestampWrites>,
     ) {
         let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor { label: None, timestamp_writes });
-        pass.set_bind_group(0, &self.buffers.group, &[]);
         for kernel in kernels {
-            self.device.kernels().dispatch(&mut pass, kernel, kernels::threads(kernel, self.n_envs));
+            let (group, threads) = (self.buffers.group(kernel), kernels::threads(kernel, self.n_envs));
+            self.device.kernels().dispatch(&mut pass, kernel, group, threads);
         }
     }
 

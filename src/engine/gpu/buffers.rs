@@ -1,9 +1,10 @@
-//! The buffers of a batch on a device, and the bind group that kernels see them through.
+//! The buffers of a batch on a device, and the bind groups that kernels see them through.
 
 use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buffer, BufferBinding};
 
 use super::tables::Tables;
 use super::{Device, Error};
+use crate::engine::stages::Kernel;
 use crate::engine::tally::N_SUMS;
 use crate::field::Field;
 use crate::layout::buffers::{BUFFERS, Buffer as Shared, N_TABLES, Table};
@@ -31,7 +32,8 @@ pub type Columns = Vec<(Column, Slice)>;
 pub(super) struct Buffers {
     /// Slices in the order of [`BUFFERS`].
     slices: Vec<Slice>,
-    pub(super) group: BindGroup,
+    /// For each kernel those that it names.
+    groups: Vec<BindGroup>,
 }
 
 impl Buffers {
@@ -43,20 +45,34 @@ impl Buffers {
             Shared::Tally => Ok(device.empty(buffer.name(), (2 * N_SUMS * size_of::<u32>()) as u64)),
         });
         let slices: Vec<Slice> = made.collect::<Result<_, Error>>()?;
-        let entries = (0..).zip(&slices).map(|(binding, slice)| BindGroupEntry {
-            binding,
-            resource: BindingResource::Buffer(BufferBinding {
-                buffer: &slice.buffer,
-                offset: slice.offset,
-                size: std::num::NonZero::new(slice.size),
-            }),
-        });
-        let entries: Vec<BindGroupEntry> = entries.collect();
-        let layout = &device.kernels().layout;
-        let group =
-            device.device.create_bind_group(&BindGroupDescriptor { label: Some("batch"), layout, entries: &entries });
+        let group = |&kernel: &Kernel| {
+            let entry = |buffer: &Shared| {
+                let slice = &slices[buffer.binding()];
+                BindGroupEntry {
+                    binding: buffer.binding() as u32,
+                    resource: BindingResource::Buffer(BufferBinding {
+                        buffer: &slice.buffer,
+                        offset: slice.offset,
+                        size: std::num::NonZero::new(slice.size),
+                    }),
+                }
+            };
+            let entries: Vec<BindGroupEntry> = kernel.buffers().iter().map(entry).collect();
+            let layout = device.kernels().layout(kernel);
+            device.device.create_bind_group(&BindGroupDescriptor {
+                label: Some(kernel.name()),
+                layout,
+                entries: &entries,
+            })
+        };
+        let groups = Kernel::ALL.iter().map(group).collect();
         device.check()?;
-        Ok(Buffers { slices, group })
+        Ok(Buffers { slices, groups })
+    }
+
+    /// The buffers that a kernel names.
+    pub(super) fn group(&self, kernel: Kernel) -> &BindGroup {
+        &self.groups[kernel.index()]
     }
 
     pub(super) fn table(&self, table: Table) -> &Slice {

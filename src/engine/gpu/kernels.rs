@@ -1,13 +1,13 @@
-//! Shaders, compiled: a pipeline for each entry point of a module, one bind group layout for all.
+//! Shaders, compiled: a pipeline and a bind group layout for each entry point of a module.
 
 use wgpu::{
-    BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType, ComputePass,
-    ComputePipeline, ComputePipelineDescriptor, PipelineLayoutDescriptor, ShaderModuleDescriptor, ShaderSource,
-    ShaderStages,
+    BindGroup, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType,
+    ComputePass, ComputePipeline, ComputePipelineDescriptor, PipelineLayoutDescriptor, ShaderModuleDescriptor,
+    ShaderSource, ShaderStages,
 };
 
 use crate::engine::stages::{Kernel, SHADERS, Threads};
-use crate::layout::buffers::{Access, BUFFERS};
+use crate::layout::buffers::Access;
 use crate::layout::shared::Named;
 use crate::layout::{N_RAYS, N_VALUES, WORKGROUP};
 
@@ -17,53 +17,59 @@ const ROW: u32 = 65_535;
 /// The kernels of a module, named by `K`.
 #[derive(Debug)]
 pub struct Kernels<K> {
-    /// The kernels' bindings: storage buffers in one bind group.
-    pub layout: BindGroupLayout,
-    /// A pipeline for each of [`Named::ALL`].
-    pipelines: Vec<ComputePipeline>,
+    /// For each of [`Named::ALL`] the buffers that it is bound to, and its pipeline.
+    compiled: Vec<(BindGroupLayout, ComputePipeline)>,
     names: std::marker::PhantomData<K>,
 }
 
 impl<K: Named> Kernels<K> {
-    /// Compiles an entry point of `source` for each of `K`. The bindings are storage buffers with these accesses, in
-    /// their order.
+    /// Compiles an entry point of `source` for each of `K`, with the bindings that the shader names for it, and what it
+    /// may do to them.
     pub fn compile(
         device: &wgpu::Device,
         label: &str,
         source: String,
-        accesses: impl IntoIterator<Item = Access>,
+        bindings: impl Fn(K) -> Vec<(u32, Access)>,
     ) -> Kernels<K> {
         let module = device.create_shader_module(ShaderModuleDescriptor {
             label: Some(label),
             source: ShaderSource::Wgsl(source.into()),
         });
-        let bindings: Vec<BindGroupLayoutEntry> =
-            (0..).zip(accesses).map(|(binding, access)| bound(binding, access)).collect();
-        let layout =
-            device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some(label), entries: &bindings });
-        let pipeline_layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
-            label: Some(label),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipelines = K::ALL.iter().map(|kernel| {
-            device.create_compute_pipeline(&ComputePipelineDescriptor {
-                label: Some(kernel.name()),
+        let compiled = K::ALL.iter().map(|&kernel| {
+            let label = Some(kernel.name());
+            let entries: Vec<BindGroupLayoutEntry> =
+                bindings(kernel).into_iter().map(|(binding, access)| bound(binding, access)).collect();
+            let layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor { label, entries: &entries });
+            let pipeline_layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
+                label,
+                bind_group_layouts: &[Some(&layout)],
+                immediate_size: 0,
+            });
+            let pipeline = device.create_compute_pipeline(&ComputePipelineDescriptor {
+                label,
                 layout: Some(&pipeline_layout),
                 module: &module,
-                entry_point: Some(kernel.name()),
+                entry_point: label,
                 compilation_options: Default::default(),
                 cache: None,
-            })
+            });
+            (layout, pipeline)
         });
-        Kernels { pipelines: pipelines.collect(), layout, names: std::marker::PhantomData }
+        Kernels { compiled: compiled.collect(), names: std::marker::PhantomData }
     }
 
-    /// Adds a kernel to a pass, over so many threads. Their workgroups lie in rows: see `common/thread.wgsl`.
-    pub fn dispatch(&self, pass: &mut ComputePass, kernel: K, threads: u64) {
+    /// The layout of a kernel's bind group.
+    pub fn layout(&self, kernel: K) -> &BindGroupLayout {
+        &self.compiled[kernel.index()].0
+    }
+
+    /// Adds a kernel to a pass, bound to `group`, over so many threads. Their workgroups lie in rows: see
+    /// `common/thread.wgsl`.
+    pub fn dispatch(&self, pass: &mut ComputePass, kernel: K, group: &BindGroup, threads: u64) {
         let groups = threads.div_ceil(WORKGROUP.into()) as u32;
         let columns = groups.min(ROW);
-        pass.set_pipeline(&self.pipelines[kernel.index()]);
+        pass.set_pipeline(&self.compiled[kernel.index()].1);
+        pass.set_bind_group(0, group, &[]);
         pass.dispatch_workgroups(columns, groups.div_ceil(columns), 1);
     }
 }
@@ -71,7 +77,9 @@ impl<K: Named> Kernels<K> {
 /// The kernels of a step and those beside it.
 pub(super) fn of_stages(device: &wgpu::Device) -> Kernels<Kernel> {
     let source = SHADERS.iter().flat_map(|(_, text)| [text, "\n"]).collect();
-    Kernels::compile(device, "offtrack", source, BUFFERS.iter().map(|buffer| buffer.access()))
+    let bindings =
+        |kernel: Kernel| kernel.buffers().iter().map(|buffer| (buffer.binding() as u32, buffer.access())).collect();
+    Kernels::compile(device, "offtrack", source, bindings)
 }
 
 /// Threads that a kernel of a step needs for so many trucks.
@@ -89,7 +97,10 @@ fn bound(binding: u32, access: Access) -> BindGroupLayoutEntry {
         binding,
         visibility: ShaderStages::COMPUTE,
         ty: BindingType::Buffer {
-            ty: BufferBindingType::Storage { read_only: access == Access::Read },
+            ty: match access {
+                Access::Uniform => BufferBindingType::Uniform,
+                _ => BufferBindingType::Storage { read_only: access == Access::Read },
+            },
             has_dynamic_offset: false,
             min_binding_size: None,
         },

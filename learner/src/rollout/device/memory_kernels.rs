@@ -1,4 +1,4 @@
-//! The kernels of the replay buffer on a device: structs and bindings declared once, printed for `memory.wgsl`, and
+//! The kernels of the replay buffer on a device: structs and bindings declared once, printed for `replay_buffer.wgsl`, and
 //! compiled.
 
 use offtrack::engine::stages::SHADERS;
@@ -142,27 +142,30 @@ impl Buffers {
         &self.0[binding as usize].1
     }
 
-    /// A bind group of all of them, with another buffer of logits where one is given.
-    pub(super) fn group(&self, device: &Device, kernels: &Kernels<Kernel>, logits: Option<&Slice>) -> BindGroup {
-        let entry = |(binding, own): &(Binding, Slice)| {
-            let own = if *binding == Binding::logits { logits.unwrap_or(own).clone() } else { own.clone() };
-            (*binding as u32, own)
+    /// A bind group of those that a kernel names, with another buffer of logits where one is given.
+    pub(super) fn group(
+        &self,
+        device: &Device,
+        kernels: &Kernels<Kernel>,
+        kernel: Kernel,
+        logits: Option<&Slice>,
+    ) -> BindGroup {
+        let entry = |&binding: &Binding| {
+            let own = self.slice(binding);
+            let slice = if binding == Binding::logits { logits.unwrap_or(own) } else { own };
+            BindGroupEntry {
+                binding: binding as u32,
+                resource: BindingResource::Buffer(BufferBinding {
+                    buffer: &slice.buffer,
+                    offset: slice.offset,
+                    size: std::num::NonZero::new(slice.size),
+                }),
+            }
         };
-        let slices: Vec<(u32, Slice)> = self.0.iter().map(entry).collect();
-        let entries: Vec<BindGroupEntry> = slices
-            .iter()
-            .map(|(binding, Slice { buffer, offset, size })| {
-                let resource = BindingResource::Buffer(BufferBinding {
-                    buffer,
-                    offset: *offset,
-                    size: std::num::NonZero::new(*size),
-                });
-                BindGroupEntry { binding: *binding, resource }
-            })
-            .collect();
+        let entries: Vec<BindGroupEntry> = kernel.bindings().iter().map(entry).collect();
         device.create_bind_group(&BindGroupDescriptor {
-            label: Some("replay buffer"),
-            layout: &kernels.layout,
+            label: Some(kernel.name()),
+            layout: kernels.layout(kernel),
             entries: &entries,
         })
     }
@@ -183,6 +186,35 @@ offtrack::named! {
 }
 
 impl Kernel {
+    /// The buffers that it is bound to: all that its shader names.
+    fn bindings(self) -> &'static [Binding] {
+        use Binding::*;
+        match self {
+            Kernel::Choose => &[facts, now, action, logits],
+            Kernel::StoreBefore => &[facts, now, action, observation, extras, held_observation, held_action],
+            Kernel::StoreAfter => {
+                &[facts, now, next_observation, next_extras, ended, reward, held_next, held_reward, held_ended]
+            }
+            Kernel::Sample => &[
+                facts,
+                now,
+                normalisation,
+                images,
+                action_images,
+                held_observation,
+                held_next,
+                held_action,
+                held_reward,
+                held_ended,
+                sampled_observation,
+                sampled_action,
+                sampled_reward,
+                sampled_discount,
+                sampled_next,
+            ],
+        }
+    }
+
     /// Threads that it needs: one a truck, or one a value.
     fn threads(self, facts: &Facts) -> u64 {
         let (envs, rows, values) = (u64::from(facts.n_envs), u64::from(facts.n_rows), u64::from(facts.n_values));
@@ -206,11 +238,12 @@ fn source() -> String {
 /// Compiles the kernels. A tensor's buffer is a slice of a page that other tensors use too, and a page is bound either
 /// to be read or to be written, so all bindings may be written.
 pub(super) fn compile(device: &Device) -> Kernels<Kernel> {
-    let access = [Access::ReadWrite; Binding::ALL.len()];
-    Kernels::compile(device, "replay buffer", source(), access)
+    Kernels::compile(device, "replay buffer", source(), |kernel: Kernel| {
+        kernel.bindings().iter().map(|&binding| (binding as u32, Access::ReadWrite)).collect()
+    })
 }
 
-/// Adds a kernel to the commands.
+/// Adds a kernel to the commands, bound to its `group`.
 pub(super) fn add(
     kernels: &Kernels<Kernel>,
     encoder: &mut CommandEncoder,
@@ -219,6 +252,5 @@ pub(super) fn add(
     facts: &Facts,
 ) {
     let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
-    pass.set_bind_group(0, group, &[]);
-    kernels.dispatch(&mut pass, kernel, kernel.threads(facts));
+    kernels.dispatch(&mut pass, kernel, group, kernel.threads(facts));
 }
