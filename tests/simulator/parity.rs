@@ -219,8 +219,11 @@ fn every_stage_does_the_same_to_every_value_and_touches_no_other() {
     }
 }
 
-/// Numbers of the world, each with a stage that notices it to be off, as the device computes with it.
-const NOTICED: [(&str, Stage, fn(&mut World)); 14] = [
+/// A number of the world, a stage that notices it to be off, and a change of it.
+type Noticed = (&'static str, Stage, fn(&mut World));
+
+/// Numbers that a device computes with.
+const NOTICED: [Noticed; 14] = [
     ("slip_growth", Stage::Drive, |world| world.rigs.iter_mut().for_each(|rig| rig.slip_growth *= 1.01)),
     ("understeer", Stage::Drive, |world| world.rigs.iter_mut().for_each(|rig| rig.understeer *= 1.01)),
     ("fifth_wheel_load", Stage::Drive, |world| world.rigs.iter_mut().for_each(|rig| rig.fifth_wheel_load *= 1.01)),
