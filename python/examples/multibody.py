@@ -170,8 +170,8 @@ class Trucks:
         self._force[:, self._slots] = total
 
     def _lateral(self, load: Array, drive: Array) -> Array:
-        """Lateral force of each wheel [N]: a brush model (Fiala) within the circle of friction, which bounds the
-        longitudinal force ``drive`` first."""
+        """Lateral force of each wheel [N] within the circle of friction, which bounds the longitudinal force ``drive``
+        first."""
         if self._linear is not None:
             stiff: Array = self._linear * self._slip
             return stiff
@@ -179,9 +179,7 @@ class Trucks:
         np.clip(drive, -0.95 * grip, 0.95 * grip, out=drive)
         most = np.sqrt(grip * grip - drive * drive) + 1e-9
         stiffness = self.parts.cornering * load / (1 + (load / self._peak_load) ** 2)
-        adhering = 1 - np.minimum(stiffness * np.abs(self._slip) / (3 * most), 1.0)
-        force: Array = np.copysign(most * (1 - adhering**3), self._slip)
-        return force
+        return brush(self._slip, stiffness, most)
 
     def _heading(self, body: int) -> Array:
         heading: Array = np.arctan2(self._xmat[:, body, 3], self._xmat[:, body, 0])
@@ -281,6 +279,14 @@ class SpeedControl:
             keys["gain"] * error + keys["integral_gain"] * self._integral, keys["braking"], self._most
         )
         return found
+
+
+def brush(slip: Array, stiffness: Array, most: Array) -> Array:
+    """Lateral force of a brush model (Fiala) [N]: of a tyre with a cornering stiffness [N/rad] and a largest force
+    [N], which it reaches where all of its contact slides."""
+    adhering = 1 - np.minimum(stiffness * np.abs(slip) / (3 * most), 1.0)
+    force: Array = np.copysign(most * (1 - adhering**3), slip)
+    return force
 
 
 def _column(values: list[float]) -> Any:

@@ -58,6 +58,18 @@ def test_the_model_has_every_body_of_every_truck() -> None:
     assert total == pytest.approx(2 * (7800 + 6800))
 
 
+def test_a_tyre_is_as_stiff_as_stated_and_holds_no_more_than_friction_gives() -> None:
+    pytest.importorskip("mujoco")
+    import numpy as np
+    from multibody import brush
+
+    stiffness, most = np.array(150e3), np.array(20e3)
+    slips = np.array([-1e-6, 1e-6, -0.5, 0.39, 0.5])
+    np.testing.assert_allclose(brush(slips, stiffness, most), [-0.15, 0.15, -20e3, 20e3, 20e3], rtol=1e-3)
+    # All of the contact slides from 3 F / C on.
+    assert brush(np.array(0.39), stiffness, most) < most <= brush(np.array(0.41), stiffness, most)
+
+
 def test_a_truck_at_rest_stays_where_it_is_on_the_loads_of_the_file() -> None:
     pytest.importorskip("mujoco")
     import numpy as np
