@@ -8,6 +8,7 @@ pub(crate) mod autoreset;
 mod batch;
 pub(crate) mod cpu; // the CPU engine: all cores, a truck at a time
 mod error;
+pub(crate) mod limits; // of what the numbers of a truck can be
 #[cfg(feature = "gpu")]
 pub mod gpu; // the engine of compute shaders
 mod memory;

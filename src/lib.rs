@@ -14,6 +14,7 @@ pub mod scenario; // what to drive
 pub mod world; // what trucks share, baked
 pub mod engine; // one step in order, on the two engines
 pub mod simulator; // many trucks, many steps, on either engine
+pub mod observer; // a truck that something else drives
 
 #[cfg(feature = "gpu")]
 pub use engine::gpu;

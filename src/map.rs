@@ -2,6 +2,7 @@
 //!
 //! Each of the three gives a [`ground::Ground`], and all that follows knows that alone.
 
+pub mod frame; // where a road lies in its map
 pub mod route; // lane centre lines -> waypoints
 pub mod ground; // a ring with its arms: kerb faces, lane edges, routes
 pub mod opendrive; // maps -> rings
@@ -10,5 +11,6 @@ mod road; // a name and its ground
 pub mod chosen; // which ring of a map
 pub mod procedural; // random roundabouts, by seed and index
 
+pub use frame::Frame;
 pub use ground::Kerb;
 pub use road::{Gutter, Road};

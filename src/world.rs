@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use crate::field::Field;
 use crate::files::cache::{Loading, Stopped};
 use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, Rig, RouteRow, Truck, WaypointRow};
+use crate::map::Frame;
 use crate::map::route::{Route, Waypoint};
 use crate::scenario::{Class, Clock, Entry, Invalid, Place, Scenario};
 use crate::vehicle::profile::Profile;
@@ -38,6 +39,8 @@ pub struct World {
     pub actions: Vec<Action>,
     /// One field a roundabout.
     pub fields: Vec<Field>,
+    /// Where each roundabout lies in its map, in the same order.
+    pub frames: Vec<Frame>,
     /// Every route's waypoints, one route after the other.
     pub waypoints: Vec<WaypointRow>,
     /// What is observed at each of them, in the same order.
@@ -128,6 +131,7 @@ impl World {
             rays,
             actions,
             fields: fields(scenario, loading)?,
+            frames: scenario.places.iter().map(|place| place.roundabout.ground().frame()).collect(),
             waypoints,
             previews,
             routes,
@@ -177,6 +181,18 @@ impl World {
     pub fn route_previews(&self, route: u32) -> &[PreviewRow] {
         let route = &self.routes[route as usize];
         &self.previews[route.first as usize..][..route.n_waypoints as usize]
+    }
+
+    /// Where the frame that a route is driven in lies in the map that its road is from.
+    #[inline]
+    pub fn frame(&self, route: u32) -> Frame {
+        self.frames[self.routes[route as usize].roundabout as usize]
+    }
+
+    /// Duration of a step (s).
+    #[inline]
+    pub fn step(&self) -> f32 {
+        self.params.n_substeps as f32 * self.params.substep
     }
 
     /// The field that a route runs through.

@@ -4,6 +4,7 @@
 - :class:`Roundabout` is one truck, ``gymnasium.make("offtrack_sim:offtrack/Roundabout-v0")``.
 - :class:`Batch` is the simulator itself, without spaces and infos.
 - :class:`Policy` drives: the policy that comes with the package, or a trained one. :func:`evaluate` counts its success.
+- :class:`Observer` is what a policy observes of trucks that something else drives.
 - :mod:`offtrack_sim.sb3`, :mod:`offtrack_sim.puffer`: the same trucks for Stable-Baselines3 and PufferLib.
 - :mod:`offtrack_sim.export` writes a network of PyTorch as a policy file.
 
@@ -19,6 +20,7 @@ from ._offtrack import ScenarioError, __version__, scenario_names
 from .batch import Batch, Ends, Start
 from .evaluation import Evaluation, evaluate
 from .layout import COLUMNS, EXTRAS, OBSERVATION, Ended, Values
+from .observer import Frame, Observer, Seen, speed_control
 from .policy import Policy
 from .single import Roundabout
 from .vector import RoundaboutVector, make_vec
@@ -31,16 +33,20 @@ __all__ = [
     "Ended",
     "Ends",
     "Evaluation",
+    "Frame",
+    "Observer",
     "Policy",
     "Roundabout",
     "RoundaboutVector",
     "ScenarioError",
+    "Seen",
     "Start",
     "Values",
     "__version__",
     "evaluate",
     "make_vec",
     "scenario_names",
+    "speed_control",
 ]
 
 gymnasium.register(

@@ -8,6 +8,7 @@ __all__ = [
     "__version__",
     "ScenarioError",
     "Batch",
+    "Observer",
     "Network",
     "policy_names",
     "write_policy",
@@ -116,6 +117,62 @@ class Batch:
     def streams(self) -> list[tuple[int, int]]: ...
     def tally(self) -> dict[str, float]: ...
     def picture(self, env: int, size: int) -> npt.NDArray[np.uint8]: ...
+
+@disjoint_base
+class Observer:
+    @property
+    def num_trucks(self) -> int: ...
+    @property
+    def scenario(self) -> str: ...
+    @property
+    def step_seconds(self) -> float: ...
+    @property
+    def extras(self) -> list[str]: ...
+    @property
+    def n_values(self) -> int: ...
+    @property
+    def classes(self) -> list[tuple[str, str]]: ...
+    @property
+    def action_table(self) -> npt.NDArray[np.float32]: ...
+    def __new__(
+        cls,
+        scenario: str,
+        routes: list[str],
+        *,
+        vehicles: list[tuple[str, str]] | None,
+        rows: list[int] | None,
+        num_threads: int,
+    ) -> Self: ...
+    def begin_at(
+        self, trucks: list[int] | None, poses: npt.NDArray[np.float64]
+    ) -> tuple[
+        npt.NDArray[np.float32],
+        npt.NDArray[np.float32],
+        npt.NDArray[np.int64],
+        npt.NDArray[np.float32],
+        npt.NDArray[np.int64],
+    ]: ...
+    def observe_at(
+        self, trucks: list[int] | None, poses: npt.NDArray[np.float64], telemetry: npt.NDArray[np.float32]
+    ) -> tuple[
+        npt.NDArray[np.float32],
+        npt.NDArray[np.float32],
+        npt.NDArray[np.int64],
+        npt.NDArray[np.float32],
+        npt.NDArray[np.int64],
+    ]: ...
+    def commands(
+        self, actions: npt.NDArray[Any], target_speed: npt.NDArray[np.float32]
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...
+    def accelerations(
+        self, speed: npt.NDArray[np.float32], target: npt.NDArray[np.float32]
+    ) -> npt.NDArray[np.float32]: ...
+    def frame_of(self, route: str) -> tuple[tuple[float, float], bool]: ...
+    def waypoints_of(self, route: str) -> npt.NDArray[np.float64]: ...
+    def kerbs_of(self, route: str) -> list[npt.NDArray[np.float64]]: ...
+    def dimensions_of(self, truck: int) -> dict[str, float]: ...
+    def states(self) -> list[tuple[int, int | None, int, float]]: ...
+    def restore_states(self, states: list[tuple[int, int | None, int, float]]) -> None: ...
 
 @final
 class Network:

@@ -13,6 +13,7 @@ from .arguments import file_name
 
 if TYPE_CHECKING:
     from .batch import Batch
+    from .observer import Observer
 
 
 class Policy:
@@ -68,8 +69,8 @@ class Policy:
         """Steer angle [rad] and speed [m/s] of each action, ``[n, 2]``: a batch must have the same table."""
         return self._network.action_table
 
-    def check(self, batch: Batch) -> None:
-        """Checks that it can drive the trucks of this batch.
+    def check(self, batch: Batch | Observer) -> None:
+        """Checks that it can drive the trucks of this batch or observer.
 
         Raises:
             ValueError: Where the batch has other extras or another action table; the message says which.

@@ -2,10 +2,16 @@
 
 use std::fmt::Display;
 
-use numpy::{Element, PyReadonlyArray1, PyUntypedArrayMethods};
+use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods};
 use offtrack::layout::Action;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+
+/// Steer angle and speed of each action, `[n_actions, 2]`.
+pub fn table<'py>(py: Python<'py>, actions: &[Action]) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let rows: Vec<f32> = actions.iter().flat_map(|action| [action.steering, action.speed]).collect();
+    PyArray1::from_vec(py, rows).reshape([actions.len(), 2])
+}
 
 /// The actions of a step, `[n_envs]`.
 ///

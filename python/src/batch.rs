@@ -134,9 +134,7 @@ impl Batch {
 
     #[getter]
     fn action_table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let table: Vec<f32> =
-            self.place.world.actions.iter().flat_map(|action| [action.steering, action.speed]).collect();
-        PyArray1::from_vec(py, table).reshape([self.place.world.actions.len(), 2])
+        actions::table(py, &self.place.world.actions)
     }
 
     /// Indices into `route_names` of the routes that trucks are on, `[num_envs]`.

@@ -7,6 +7,7 @@ mod batch; // the class Batch
 mod errors; // errors of Rust as exceptions of Python
 mod infos; // infos of episodes that ended
 mod layout; // columns as numpy sees them
+mod observer; // the class Observer
 mod observed; // observations with the benchmark's extras
 mod policy; // the class Network
 mod pool; // threads that survive a fork
@@ -19,6 +20,7 @@ fn _offtrack(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("ScenarioError", module.py().get_type::<errors::ScenarioError>())?;
     module.add_class::<batch::Batch>()?;
+    module.add_class::<observer::Observer>()?;
     module.add_class::<policy::Network>()?;
     module.add_function(wrap_pyfunction!(policy::policy_names, module)?)?;
     module.add_function(wrap_pyfunction!(policy::write_policy, module)?)?;

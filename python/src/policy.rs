@@ -12,7 +12,7 @@ use pyo3::types::PyBytes;
 
 use crate::errors::guarded;
 use crate::pool::Pool;
-use crate::{observed, worlds};
+use crate::{actions, observed, worlds};
 
 /// A policy. The class `offtrack_sim.Policy` wraps it and documents it.
 #[pyclass(frozen, module = "offtrack_sim._offtrack")]
@@ -62,8 +62,7 @@ impl Network {
 
     #[getter]
     fn action_table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let table: Vec<f32> = self.policy.actions.iter().flat_map(|action| [action.steering, action.speed]).collect();
-        PyArray1::from_vec(py, table).reshape([self.policy.actions.len(), 2])
+        actions::table(py, &self.policy.actions)
     }
 
     fn logits<'py>(&self, py: Python<'py>, observations: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {

@@ -54,10 +54,20 @@ static BAKED: Mutex<Vec<Place>> = Mutex::new(Vec::new());
 impl Place {
     /// The place that is asked for: from those that were baked last, or baked now, unless `stop` is set on the way.
     pub fn find(asked: &Asked, stop: &AtomicBool) -> PyResult<Place> {
+        Place::of(asked, stop, |scenario| scenario)
+    }
+
+    /// The same with every vehicle as its file has it.
+    pub fn typical(asked: &Asked, stop: &AtomicBool) -> PyResult<Place> {
+        Place::of(asked, stop, |scenario| scenario.typical())
+    }
+
+    fn of(asked: &Asked, stop: &AtomicBool, change: impl FnOnce(Scenario) -> Scenario) -> PyResult<Place> {
         let cache = Cache::of_user();
         let loading = Loading { cache: cache.as_ref(), stop, ..Loading::PLAIN };
         let mut scenario = Scenario::load(asked.scenario, &loading).map_err(|error| errors::of_reader(&error))?;
         routes::narrow(&mut scenario, asked.split, asked.routes)?;
+        let scenario = change(scenario);
         let limit = asked.max_episode_steps;
         // Held while a world is baked, so that two threads do not bake the same one.
         let mut baked = baked(stop).map_err(|stopped| PyValueError::new_err(stopped.to_string()))?;
@@ -92,6 +102,8 @@ impl Place {
             rays,
             actions,
             fields,
+            // No truck drives by where its road lies in a map.
+            frames: _,
             waypoints,
             previews,
             routes,

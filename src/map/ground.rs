@@ -6,6 +6,9 @@
 
 mod outline_file;
 
+use glam::DVec2;
+
+use super::frame::Frame;
 use crate::geometry::{Curve, Outline};
 use crate::map::route::Lane;
 
@@ -75,6 +78,8 @@ pub struct Line {
 pub struct Ground {
     /// Whether the road itself has left-hand traffic: all that follows is its mirror image in the x axis.
     pub mirrored: bool,
+    /// The origin of all that follows, in the frame of the map that the road is from; 0 where it is from none (m).
+    pub origin: DVec2,
     /// Radius of the central island's kerb face; 0 where there is no ring but a junction (m).
     pub island_radius: f64,
     /// Radius of the ring's outer kerb face, or of the circle around the junction; approaches and departures are
@@ -97,6 +102,11 @@ pub struct Ground {
 }
 
 impl Ground {
+    /// Where what is driven lies in the map that the road is from.
+    pub fn frame(&self) -> Frame {
+        Frame { origin: self.origin, mirrored: self.mirrored }
+    }
+
     /// The road as it lies in the world: mirrored back where it has left-hand traffic. Lanes have the names that they
     /// have there; the arms stay in the order of travel, which is clockwise then.
     pub fn seen(&self) -> Ground {

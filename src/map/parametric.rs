@@ -157,6 +157,7 @@ fn ground(ring: &Ring, arms: &[Arm], kerbs: Outline, edges: Edges, lanes: &Lanes
     };
     Ground {
         mirrored: false,
+        origin: DVec2::ZERO,
         island_radius: ring.island_radius,
         outer_radius: ring.outer(),
         lanes: rings.chain(lanes.curves().cloned()).collect(),

@@ -20,6 +20,9 @@ pub enum Gutter {
     Solid,
 }
 
+/// Largest distance of a chord of a kerb from it (m).
+const CHORD: f64 = 0.005;
+
 /// A ring with its arms, or the ways through a junction, checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Road {
@@ -91,6 +94,21 @@ impl Road {
             (Gutter::Solid, Edges::Beside(gutter)) => self.ground.faces.offset(*gutter),
             (Gutter::Solid, Edges::Own(edges)) => edges.clone(),
         }
+    }
+
+    /// The edge of the drivable surface as closed lines in the frame of the map that the road is from, the drivable side
+    /// on their left; chords leave the edge by at most 5 mm, and no line repeats its first point (m).
+    pub fn kerb_lines(&self, gutter: Gutter) -> Vec<Vec<DVec2>> {
+        let frame = self.ground.frame();
+        let line = |curve: &Curve| {
+            let mut points: Vec<DVec2> = curve.polyline(CHORD).into_iter().map(|p| frame.to_map(p)).collect();
+            points.pop();
+            if frame.mirrored {
+                points.reverse();
+            }
+            points
+        };
+        self.kerbs(gutter).loops.iter().map(line).collect()
     }
 
     /// The kerb whose face is nearest to `p`.

@@ -132,6 +132,12 @@ impl Scenario {
         self.fleet.as_ref().map_or_else(one, Fleet::table)
     }
 
+    /// This benchmark with every vehicle as its file has it: none of its dimensions is drawn.
+    pub fn typical(&self) -> Scenario {
+        let undrawn = |fleet: &Fleet| Fleet { draw: Ranges::default(), ..fleet.clone() };
+        Scenario { fleet: self.fleet.as_ref().map(undrawn), ..self.clone() }
+    }
+
     /// Each class as its file has it, in their order.
     pub fn typical_rigs(&self, substep: f32) -> Vec<Rig> {
         let rig = |vehicle: &Vehicle, load: &str| vehicle.rig(load, substep, self.steer_max);

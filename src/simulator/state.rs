@@ -5,19 +5,11 @@ use std::f32::consts::TAU;
 use std::fmt::Debug;
 use std::ops::RangeInclusive;
 
+use crate::engine::limits::{self, FAR, FASTEST, MOST, STEEPEST};
 use crate::engine::{Batch, Error};
 use crate::layout::{Column, Control, Ended, Params, Progress, RewardTerms, Truck};
 use crate::world::World;
 
-/// Largest magnitude of a rate, an acceleration and the like, where nothing narrower is known: stages compute with it
-/// safely, and no truck comes near it.
-const MOST: f32 = 1e6;
-/// Largest magnitude of a speed (m/s): a target is at most 100.
-const FASTEST: f32 = 1e3;
-/// Largest distance of a truck from the next waypoint in each direction (m). It has strayed long before.
-const FAR: f32 = 1e4;
-/// Largest steer angle that an action may ask for (rad): locks are at most 1.5.
-const STEEPEST: f32 = 1.6;
 /// An observed value's largest magnitude: 1, with room for the rounding of either engine.
 const OBSERVED: f32 = 1.001;
 
@@ -124,7 +116,6 @@ fn all_within(column: Column, env: usize, values: &[f32], range: RangeInclusive<
     }
 }
 
-/// NaN lies in no range.
 fn within<T: PartialOrd + Debug>(
     column: Column,
     env: usize,
@@ -132,15 +123,7 @@ fn within<T: PartialOrd + Debug>(
     value: T,
     range: RangeInclusive<T>,
 ) -> Result<(), Error> {
-    if range.contains(&value) {
-        return Ok(());
-    }
-    let expected = format!("{:?}..{:?}", range.start(), range.end());
-    Err(Error::ImpossibleValue {
-        place: format!("{}[{env}]{field}", column.name()),
-        found: format!("{value:?}"),
-        expected,
-    })
+    limits::within(|| format!("{}[{env}]{field}", column.name()), value, range)
 }
 
 /// An error if a truck's route, vehicle, waypoint or action is not in the world: stages use them as indices without a

@@ -16,14 +16,14 @@ use crate::{batch_on, engines};
 const MIRROR: DVec2 = DVec2::new(1.0, -1.0);
 
 /// A shipped roundabout file's text.
-fn text(name: &str) -> String {
+pub(crate) fn text(name: &str) -> String {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/roundabouts").join(name).with_extension("toml");
     fs::read_to_string(file).unwrap()
 }
 
 /// A roundabout file's text with left-hand traffic, as one would write it: other signs of bearings and offsets, and the
 /// lanes' names exchanged.
-fn left_hand(text: &str) -> String {
+pub(crate) fn left_hand(text: &str) -> String {
     let negated = |line: &str, key: &str| match line.split_once(&format!("{key} = ")) {
         Some((before, after)) => match after.strip_prefix('-') {
             Some(after) => format!("{before}{key} = {after}"),
@@ -48,7 +48,7 @@ fn pair(name: &str) -> [Road; 2] {
 }
 
 /// The benchmark of one roundabout, and its world.
-fn world(folder: &Path, roundabout: &str, gutter: &str) -> (Scenario, Arc<World>) {
+pub(crate) fn world(folder: &Path, roundabout: &str, gutter: &str) -> (Scenario, Arc<World>) {
     fs::write(folder.join("road.toml"), roundabout).unwrap();
     let benchmark = format!(
         "vehicle = \"daf_xf\"\nload = \"empty\"\ngutter = \"{gutter}\"\n[actions]\nsteer_levels = [-0.8, -0.4, 0.0, 0.4, 0.8]\n\

@@ -28,6 +28,7 @@ mod map_lanes;
 mod maps;
 mod modules;
 mod observe;
+mod observer;
 #[cfg(feature = "gpu")]
 mod on_device;
 #[cfg(feature = "gpu")]

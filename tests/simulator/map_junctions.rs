@@ -86,6 +86,9 @@ fn shipped_outlines_are_what_their_maps_give() {
             // Curves are fitted within 5 mm, elsewhere perhaps by other pieces.
             assert!(apart(&one, &other).max(apart(&other, &one)) < 0.01, "{outline}");
         }
+        // The shipped files have the origin to a tenth of a millimetre.
+        let [one, other] = [&shipped, &imported].map(|road| road.ground().frame());
+        assert!(one.origin.distance(other.origin) < 1e-4 && one.mirrored == other.mirrored, "{outline}");
         assert_eq!(shipped.arms().collect::<Vec<_>>(), imported.arms().collect::<Vec<_>>());
         let names = |roundabout: &Road| -> Vec<String> {
             let routes = roundabout.routes(40.0, 35.0, 2.0).unwrap();

@@ -97,6 +97,8 @@ fn an_outline_file_gives_what_the_map_gave_and_is_written_as_it_was_read() {
         assert!((one.centre_line.length() - other.centre_line.length()).abs() < 1e-3, "{}", one.name);
     }
     assert!(matches!(read.ground().edges, Edges::Own(_)));
+    assert!(read.ground().frame().origin.distance(roundabout.ground().frame().origin) < 1e-5);
+    assert!(100.0 < read.ground().origin.x);
     // Numbers are as short once rounded, so a second writing changes at most their last digit.
     let again = read.ground().text(&["made for a test".to_owned()]);
     assert_eq!(again.lines().count(), text.lines().count());
@@ -113,6 +115,7 @@ fn a_faulty_outline_file_is_refused_with_its_key() {
         Road::read(&file).unwrap_err().to_string()
     };
     for (from, to, key) in [
+        ("origin = [1", "origin = [1e9, 0] #", "origin[0]: "),
         ("island_radius = ", "island_radius = 1000", "island_radius: "),
         ("name = \"N\"", "name = \"N/W\"", "arm[1].name: \"N/W\""),
         ("of = \"outer\"", "of = \"island\"", "face[0].of: 0 outer loops"),
@@ -149,6 +152,10 @@ fn a_left_hand_map_gives_the_roundabout_of_its_mirror_image() {
     assert_eq!(twin.lines.len(), right.ground().lines.len());
     for (one, other) in twin.lines.iter().zip(&right.ground().lines) {
         assert!(one.line.point_at(30.0).distance(other.line.point_at(30.0)) < 0.01);
+        // And on the map each lies where the other's mirror image does.
+        let [left, right] = [(&twin, one), (right.ground(), other)]
+            .map(|(ground, line)| ground.frame().to_map(line.line.point_at(30.0)));
+        assert!(left.distance(DVec2::new(right.x, -right.y)) < 0.01 && 50.0 < right.y, "{left}, {right}");
     }
 }
 

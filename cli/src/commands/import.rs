@@ -7,10 +7,14 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec2;
 use offtrack::files::reader::{Error as InputError, Reader, shown_path};
 use offtrack::map::chosen::Choice;
+use offtrack::map::ground::Line;
 use offtrack::map::opendrive::{Hand, Imported, Map, Options, RoadLane, Way};
+use serde::Serialize;
 
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
+
+use super::outputs;
 
 /// List the roundabouts or junctions of an OpenDRIVE map, check it, or write one of them as an outline file.
 #[derive(Debug, clap::Args)]
@@ -30,6 +34,9 @@ pub struct Args {
     /// Write one roundabout to this file, NAME.outline.toml: what is driven on, without the map.
     #[arg(short, long, required_unless_present_any = ["list", "junctions", "check"])]
     output: Option<PathBuf>,
+    /// With --output: also write where the roundabout lies in the map, its hand of traffic, arms and routes as JSON.
+    #[arg(long, value_name = "FILE", requires = "output")]
+    json: Option<PathBuf>,
     #[command(flatten)]
     place: PlaceArgs,
     /// Names of the arms, counter-clockwise from east: E,N,W. Without them they are named by compass.
@@ -98,6 +105,37 @@ fn way(text: &str) -> Result<Way, String> {
     ends.map(|(from, to)| Way { from, to }).ok_or_else(|| "must be two lanes, ROAD:LANE,ROAD:LANE".to_owned())
 }
 
+/// What `--json` writes of a place that was imported.
+#[derive(Debug, Serialize)]
+struct Written<'a> {
+    /// The centre in the map's frame, x and y (m).
+    origin: [f64; 2],
+    /// The hand of traffic, `right` or `left`. Left-hand roads are driven as their mirror image in the x axis.
+    hand: &'static str,
+    /// Radius of the central island; none at a junction (m).
+    island_radius: Option<f64>,
+    arms: Vec<&'a str>,
+    routes: Vec<String>,
+    warnings: &'a [String],
+}
+
+impl Written<'_> {
+    fn of(imported: &Imported) -> Written<'_> {
+        let Imported { ground, centre, warnings } = imported;
+        let arm = |index: usize| ground.arms[index].name.as_str();
+        let route =
+            |line: &Line| format!("{}-{}-{}", arm(line.entry), line.lane.seen(ground.mirrored).name(), line.exit);
+        Written {
+            origin: [centre.x, centre.y],
+            hand: if ground.mirrored { "left" } else { "right" },
+            island_radius: (0.0 < ground.island_radius).then_some(ground.island_radius),
+            arms: (0..ground.arms.len()).map(arm).collect(),
+            routes: ground.lines.iter().map(route).collect(),
+            warnings,
+        }
+    }
+}
+
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     let choice = Choice { arms: args.arms.clone(), ..args.place.choice() };
@@ -116,8 +154,12 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let value = output.display().to_string();
         return Err(Error::Setting { name: "--output", value, expected: "must end in .outline.toml".into() });
     }
+    outputs::distinct(&[("--output", Some(output)), ("--json", args.json.as_deref())], &[("MAP", Some(&args.map))])?;
     let imported = choice.imported(&args.map, &map)?;
     files::write_whole(output, text(&args.map, output, &map, &choice, &imported)?.as_bytes())?;
+    if let Some(file) = &args.json {
+        files::write_json(file, &Written::of(&imported))?;
+    }
     let Imported { ground, warnings, .. } = &imported;
     let mut summary = String::new();
     for warning in warnings {
@@ -142,7 +184,7 @@ fn text(file: &Path, output: &Path, map: &Map, choice: &Choice, imported: &Impor
             ways.iter().map(|way| format!(" --way {},{}", way.from, way.to).escape_debug().to_string()).collect(),
         ),
     };
-    let mut origin = vec![
+    let mut comment = vec![
         format!(
             "A {what} of the map {name}: its centre, here the origin, lies at ({:.4}, {:.4}) there.",
             centre.x, centre.y
@@ -150,12 +192,12 @@ fn text(file: &Path, output: &Path, map: &Map, choice: &Choice, imported: &Impor
         format!("Made by: offtrack import {name}{flags} -o NAME.outline.toml"),
     ];
     if map.is_mirrored() {
-        origin.push("The map has left-hand traffic; this is its mirror image in the x axis.".into());
+        comment.push("The map has left-hand traffic; this is its mirror image in the x axis.".into());
     }
-    origin.push(
+    comment.push(
         "A path is a list of [x, y] and [x, y, bulge]: a straight or an arc ends there. Metres; docs/maps.md.".into(),
     );
-    Ok(ground.checked_text(output, &origin)?)
+    Ok(ground.checked_text(output, &comment)?)
 }
 
 /// Prints the rings; a map without one that can be driven is wrong input.
@@ -252,4 +294,27 @@ fn check(file: &Path, map: &Map, choice: &Choice) -> Result<(), Error> {
     }
     let _ = writeln!(text, "{warnings} warnings, {} roundabouts or junctions", places.len());
     files::print(&text)
+}
+
+#[cfg(test)]
+mod tests {
+    use offtrack::map::Road;
+    use offtrack::map::ground::Ground;
+
+    use super::*;
+
+    #[test]
+    fn a_left_hand_import_says_so_and_names_lanes_as_a_driver_there_would() {
+        let right = Road::named("16m").unwrap();
+        let of = |mirrored: bool| {
+            let ground = Ground { mirrored, ..right.ground().clone() };
+            let imported = Imported { ground, centre: DVec2::new(3.0, -4.0), warnings: Vec::new() };
+            serde_json::to_value(Written::of(&imported)).unwrap()
+        };
+        let (right, left) = (of(false), of(true));
+        assert_eq!((&right["hand"], &left["hand"]), (&"right".into(), &"left".into()));
+        assert_eq!(left["origin"], serde_json::json!([3.0, -4.0]));
+        let name = |said: &serde_json::Value| said["routes"][0].as_str().unwrap().to_owned();
+        assert!(name(&right).contains("-left-") && name(&left).contains("-right-"), "{left}");
+    }
 }

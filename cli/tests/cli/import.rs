@@ -89,3 +89,20 @@ fn flags_that_would_do_nothing_are_refused() {
     refused(&["draw", "16m", "--hand", "left", "-o", svg], "--hand: left");
     refused(&["draw", "16m", "--way", "1:-1,2:-1", "-o", svg], "--way: 1:-1,2:-1");
 }
+
+#[test]
+fn json_of_an_import_says_where_the_road_lies_in_the_map_and_its_hand() {
+    let folder = tempfile::tempdir().unwrap();
+    let (outline, json) = (folder.path().join("ring.outline.toml"), folder.path().join("ring.json"));
+    let (outline, json) = (outline.to_str().unwrap(), json.to_str().unwrap());
+    let town = map("Town03.xodr");
+    assert!(offtrack(&["import", town.to_str().unwrap(), "-o", outline, "--json", json]).status.success());
+    let said: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
+    let origin = [0, 1].map(|axis| said["origin"][axis].as_f64().unwrap());
+    assert!((origin[0] + 0.4817).abs() < 1e-4 && (origin[1] + 0.2650).abs() < 1e-4, "{said}");
+    assert!(said["hand"] == "right" && said["arms"][0] == "E" && said["routes"][0] == "E-left-1", "{said}");
+    let text = std::fs::read_to_string(outline).unwrap();
+    assert!(text.contains("\norigin = [-0.48"), "{text:.400}");
+    let refused = offtrack(&["import", town.to_str().unwrap(), "--list", "--json", json]);
+    assert_eq!(refused.status.code(), Some(2));
+}

@@ -21,7 +21,10 @@ fn writers(benchmark: &str) -> Vec<(Vec<&str>, Outputs)> {
         (arguments("draw 16m --size 200"), vec![("-o", "png")]),
         (arguments("draw 16m --route N-left-3"), vec![("-o", "json")]),
         (arguments("generate --count 1"), vec![("--plot", "svg")]),
-        (arguments("import scenarios/maps/sumo_ring22.xodr --ring 140,140"), vec![("-o", "outline.toml")]),
+        (
+            arguments("import scenarios/maps/sumo_ring22.xodr --ring 140,140"),
+            vec![("-o", "outline.toml"), ("--json", "json")],
+        ),
         (arguments("trace tests/data/physics_vectors.json"), vec![("-o", "json")]),
         (on_benchmark("record --policy pursuit --route 20m/E-right-1"), vec![("-o", "json")]),
         (on_benchmark("evaluate --policy pursuit --episodes 1"), vec![("--json", "json"), ("--html", "html")]),
@@ -58,7 +61,7 @@ fn an_output_behind_a_link_is_written_where_the_link_leads_and_stays_private() {
             assert!(0 < written.len() && written.permissions().mode() & 0o777 == 0o600, "{arguments:?}: {written:?}");
         }
     }
-    assert_eq!(n_files, 13);
+    assert_eq!(n_files, 14);
     // And nothing but the files themselves.
     assert_eq!(fs::read_dir(place.file("disk")).unwrap().count(), n_files);
 }

@@ -16,6 +16,8 @@ use crate::map::route::Lane;
 
 /// Largest coordinate (m).
 const FARTHEST: f64 = 2000.0;
+/// Largest coordinate of the road's centre in its map (m).
+const FARTHEST_ORIGIN: f64 = 1e8;
 /// Most points of a path.
 const MOST_POINTS: usize = 20_000;
 /// Most loops of an outline.
@@ -29,6 +31,8 @@ const MOST_ROUTES: usize = 128;
 struct Written {
     #[serde(default)]
     hand: Hand,
+    #[serde(default)]
+    origin: [f64; 2],
     island_radius: f64,
     outer_radius: f64,
     lane_radii: Vec<f64>,
@@ -74,15 +78,18 @@ struct WrittenLane {
 }
 
 impl Ground {
-    /// The text of an outline file; `origin` are lines of comment that say where the ring is from.
-    pub fn text(&self, origin: &[String]) -> String {
+    /// The text of an outline file; `comment` are lines that say where the ring is from.
+    pub fn text(&self, comment: &[String]) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
-        for line in origin {
+        for line in comment {
             let _ = writeln!(text, "# {line}");
         }
         if self.mirrored {
             let _ = writeln!(text, "\nhand = \"left\"");
+        }
+        if self.origin != DVec2::ZERO {
+            let _ = writeln!(text, "\norigin = [{}, {}]", number(self.origin.x, 5), number(self.origin.y, 5));
         }
         let list = |values: &[f64]| values.iter().map(|value| number(*value, 4)).collect::<Vec<_>>().join(", ");
         let (island, outer) = (number(self.island_radius, 5), number(self.outer_radius, 5));
@@ -123,8 +130,8 @@ impl Ground {
     /// # Errors
     ///
     /// What the reader of outline files refuses, such as a lane of half a metre.
-    pub fn checked_text(&self, file: &std::path::Path, origin: &[String]) -> Result<String, Error> {
-        let text = self.text(origin);
+    pub fn checked_text(&self, file: &std::path::Path, comment: &[String]) -> Result<String, Error> {
+        let text = self.text(comment);
         Ground::parse(file, &text).map(|_| text)
     }
 
@@ -158,6 +165,10 @@ impl Ground {
     /// The file and, for a value that makes no sense, its key, the value and what would do.
     pub(crate) fn parse(file: &std::path::Path, text: &str) -> Result<Ground, Error> {
         let (reader, written) = Reader::parse::<Written>(file, text)?;
+        let coordinate = |axis: usize, value| {
+            reader.within(&format!("origin[{axis}]"), value, -FARTHEST_ORIGIN..=FARTHEST_ORIGIN, "m")
+        };
+        let origin = DVec2::new(coordinate(0, written.origin[0])?, coordinate(1, written.origin[1])?);
         let island_radius = reader.within("island_radius", written.island_radius, 0.0..=500.0, "m")?;
         let is_ring = 0.0 < island_radius;
         let outer_radius = reader.within("outer_radius", written.outer_radius, island_radius.max(0.5)..=600.0, "m")?;
@@ -214,6 +225,7 @@ impl Ground {
         let mirrored = written.hand == Hand::Left;
         Ok(Ground {
             mirrored,
+            origin,
             island_radius,
             outer_radius,
             lane_radii: written.lane_radii,

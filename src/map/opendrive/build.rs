@@ -152,8 +152,10 @@ impl Site<'_> {
         let kerbs = faces.loops.iter().map(|curve| kerb(curve, &arms)).collect();
         let (lanes, edges) = (shown(&lines), Edges::Own(edges));
         let (island_radius, lane_radii) = (0.0, Vec::new());
+        let centre = map.outside(origin);
         let ground = Ground {
             mirrored,
+            origin: centre,
             island_radius,
             outer_radius: circle,
             lane_radii,
@@ -164,7 +166,7 @@ impl Site<'_> {
             lanes,
             lines,
         };
-        Ok(Imported { ground, centre: map.outside(origin), warnings })
+        Ok(Imported { ground, centre, warnings })
     }
 }
 

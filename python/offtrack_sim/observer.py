@@ -1,0 +1,321 @@
+"""Trucks that something else drives, and what a policy observes of them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _offtrack
+from .arguments import checked_integer, names_of, scenario_name, within
+
+Floats = npt.NDArray[np.float32]
+Doubles = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+#: One number for all trucks, or one for each.
+Numbers = npt.ArrayLike
+
+
+class Seen(NamedTuple):
+    """What is observed of k trucks."""
+
+    values: Floats
+    """What a policy observes, ``[k, n_values]``: the simulator's values, to the last bit."""
+    lane_distance: Floats
+    """Distance of the middle of the tractor's wheelbase from the lane's centre [m], ``[k]``."""
+    waypoint: Ints
+    """Index of the next waypoint to pass; their number once all are passed, ``[k]``."""
+    clearance: Floats
+    """Distance of tractor and trailer from the nearest kerb, at most 0 where they touch [m], ``[k, 2]``."""
+    ended: Ints
+    """Whether and why the episode has ended, as :class:`Ended`: 0 while it goes on, ``[k]``."""
+
+
+class Frame(NamedTuple):
+    """Where the frame that a road is driven in lies in the map that the road is from."""
+
+    origin: tuple[float, float]
+    """The road's centre in the map's frame [m]."""
+    mirrored: bool
+    """Whether traffic keeps to the left: the road is then driven as its mirror image in the x axis."""
+
+
+class Observer(_offtrack.Observer):
+    """Trucks that another simulator or a real one drives: what a policy observes of them.
+
+    Poses are in the frame of the map that a road is from (an outline file's ``origin``): x east, y north, metres,
+    radians, counter-clockwise, signs as on the map on left-hand roads too. There are no dynamics.
+
+    Args:
+        scenario: Name of a benchmark that comes with the package, or the path of a benchmark file.
+        routes: Name of each truck's route, n of them or one for all trucks.
+        vehicles: What each truck is, n or one for all: names of vehicle and load, as their files have them; or an index
+            in ``Batch.vehicle_classes``, the vehicle that episodes draw. None for the first vehicle, the one vehicle of
+            a benchmark that names one.
+        num_threads: Threads that observe the trucks; None for one a core. No result depends on it.
+
+    Attributes:
+        num_trucks: Number of trucks n.
+        scenario: Name of the benchmark.
+        routes: Name of each truck's route, n of them.
+        vehicles: What each truck is, as it was given, n of them.
+        step_seconds: Time between two observations [s].
+        action_table: Steer angle [rad] and target speed [m/s] of each action, float32 ``[n_actions, 2]``, as the policy
+            learned it: :meth:`command` gives them as they are on the map.
+        extras: Names of the extras that stand behind an observation's 69 values.
+        n_values: Number of an observation's values, extras included.
+        classes: Names of vehicle and load of each class of the benchmark.
+
+    Copies and pickles go on from where the original is, independent of it. One thread at a time may use it.
+
+    Raises:
+        ValueError: For an unknown scenario, route or vehicle; the message names the choices. :class:`ScenarioError` for
+            a file that is refused.
+    """
+
+    def __new__(
+        cls,
+        scenario: str | os.PathLike[str],
+        routes: Iterable[str],
+        vehicles: Sequence[tuple[str, str]] | Sequence[int] | None = None,
+        *,
+        num_threads: int | None = None,
+    ) -> Observer:
+        source, names = scenario_name(scenario), names_of(routes)
+        threads = 0 if num_threads is None else within("num_threads", num_threads, 1, 1025)
+        pairs, rows = _vehicles(vehicles)
+        given: list[Any] | None = pairs if pairs is not None else rows
+        n = max(len(names), 0 if given is None else len(given))
+        for name, values in (("routes", names), ("vehicles", given)):
+            if values is not None and len(values) not in (1, n):
+                raise ValueError(f"{name}: {len(values)} of them; {n} or 1 are needed")
+        names = names * n if len(names) == 1 else names
+        if given is not None:
+            given *= n if len(given) == 1 else 1
+        observer = super().__new__(cls, source, names, vehicles=pairs, rows=rows, num_threads=threads)
+        observer.routes = names
+        observer.vehicles = [observer.classes[0]] * n if given is None else list(given)
+        is_file = source.endswith(".toml") or os.path.isfile(source)
+        observer._arguments = {
+            "scenario": os.path.abspath(source) if is_file else source,
+            "routes": names,
+            "vehicles": given,
+            "num_threads": num_threads,
+        }
+        return observer
+
+    routes: list[str]
+    vehicles: list[Any]
+    _arguments: dict[str, Any]
+    """What makes an observer of the same trucks."""
+
+    def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]:
+        return (), self._arguments
+
+    def __getstate__(self) -> list[tuple[int, int | None, int, float]]:
+        return self.states()
+
+    def __setstate__(self, states: list[tuple[int, int | None, int, float]]) -> None:
+        self.restore_states(states)
+
+    def begin(
+        self,
+        position: npt.ArrayLike,
+        heading: Numbers,
+        trailer_heading: Numbers,
+        speed: Numbers,
+        *,
+        trucks: Sequence[int] | None = None,
+    ) -> Seen:
+        """Begins an episode of each truck at any place along its route: what lies behind counts as passed.
+
+        Wheels are straight and the target speed is the truck's, as where the simulator begins. The start is not judged.
+
+        Args:
+            position: Middle of the drive axle in the map's frame [m], ``[k, 2]``.
+            heading: Heading of the tractor [rad], one number or ``[k]``, as all that follows.
+            trailer_heading: Heading of the trailer [rad].
+            speed: Speed of the drive axle along the tractor's heading [m/s].
+            trucks: Indices of the k trucks that begin; None for all of them.
+
+        Raises:
+            TypeError: For what are no numbers.
+            ValueError: For another shape, and for a number that no truck has, such as NaN; no truck has begun then.
+        """
+        rows = self._rows(trucks)
+        return Seen(*self.begin_at(rows, self._poses(rows, position, heading, trailer_heading, speed)))
+
+    def observe(
+        self,
+        position: npt.ArrayLike,
+        heading: Numbers,
+        trailer_heading: Numbers,
+        speed: Numbers,
+        *,
+        steering: Numbers = 0.0,
+        target_speed: Numbers = 0.0,
+        acceleration: Numbers = 0.0,
+        lateral_acceleration: Numbers = 0.0,
+        trailer_roll: Numbers = 0.0,
+        trailer_roll_rate: Numbers = 0.0,
+        tractor_load_transfer_ratio: Numbers = 0.0,
+        trailer_load_transfer_ratio: Numbers = 0.0,
+        trucks: Sequence[int] | None = None,
+    ) -> Seen:
+        """The trucks a step later, at poses as :meth:`begin` has them. A truck's first pose begins its episode.
+
+        Of the rest extras and rollover alone are computed.
+
+        Args:
+            position: As for :meth:`begin`, and so are the next three and ``trucks``.
+            heading: Heading of the tractor [rad].
+            trailer_heading: Heading of the trailer [rad].
+            speed: Speed [m/s].
+            steering: Steer angle of the front axle, left positive [rad].
+            target_speed: Target speed [m/s].
+            acceleration: Acceleration along the tractor's heading [m/s^2].
+            lateral_acceleration: That of the trailer's axles, to the left [m/s^2].
+            trailer_roll: Roll of the trailer, to the right [rad].
+            trailer_roll_rate: Its rate [rad/s].
+            tractor_load_transfer_ratio: The largest of the step, to the right.
+            trailer_load_transfer_ratio: The same of the trailer.
+            trucks: Indices of the k trucks; None for all of them.
+
+        Raises:
+            TypeError: For what are no numbers.
+            ValueError: As for :meth:`begin`; no truck has gone on then.
+        """
+        rows = self._rows(trucks)
+        poses = self._poses(rows, position, heading, trailer_heading, speed)
+        telemetry = np.empty((len(poses), 8), np.float32)
+        for column, (name, value) in enumerate(
+            {
+                "steering": steering,
+                "target_speed": target_speed,
+                "acceleration": acceleration,
+                "lateral_acceleration": lateral_acceleration,
+                "trailer_roll": trailer_roll,
+                "trailer_roll_rate": trailer_roll_rate,
+                "tractor_load_transfer_ratio": tractor_load_transfer_ratio,
+                "trailer_load_transfer_ratio": trailer_load_transfer_ratio,
+            }.items()
+        ):
+            telemetry[:, column] = _numbers(name, value, (len(poses),))
+        return Seen(*self.observe_at(rows, poses, telemetry))
+
+    def command(self, actions: npt.NDArray[Any], target_speed: Numbers = 0.0) -> tuple[Floats, Floats]:
+        """What actions ask for: steer angle on the map, left positive [rad], and target speed [m/s], ``[n]`` each.
+
+        Args:
+            actions: Index of each truck's action in ``action_table``, integers ``[n]``.
+            target_speed: The last target speed [m/s], which counts where actions change it.
+
+        Raises:
+            TypeError: For anything but an array of integers.
+            ValueError: For another length, and for an action outside the table.
+        """
+        return self.commands(actions, _numbers("target_speed", target_speed, (self.num_trucks,)).astype(np.float32))
+
+    def frame(self, route: str) -> Frame:
+        """Where the road of a route lies in its map."""
+        return Frame(*self.frame_of(route))
+
+    def waypoints(self, route: str) -> Doubles:
+        """Position [m] and heading [rad] of a route's waypoints in the map's frame, ``[n_waypoints, 3]``."""
+        return self.waypoints_of(route)
+
+    def kerbs(self, route: str) -> list[Doubles]:
+        """The kerbs of a route's road in the map's frame: closed lines ``[n, 2]`` [m], drivable on their left."""
+        return self.kerbs_of(route)
+
+    def dimensions(self, vehicle: tuple[str, str] | int | None = None) -> dict[str, float]:
+        """Lengths [m], masses [kg], and limits (SI, rad) of one of ``vehicles``; of the first without a name.
+
+        Ends of the tractor are ahead of its drive axle, those of the trailer ahead of its axle group.
+        """
+        if vehicle is not None and vehicle not in self.vehicles:
+            raise ValueError(f"vehicle: {vehicle!r}; must be one of {sorted(set(self.vehicles))}")
+        return self.dimensions_of(0 if vehicle is None else self.vehicles.index(vehicle))
+
+    def _rows(self, trucks: Sequence[int] | None) -> list[int] | None:
+        """Indices of trucks, none for all."""
+        if trucks is None:
+            return None
+        rows = [within(f"trucks[{row}]", truck, 0, self.num_trucks) for row, truck in enumerate(trucks)]
+        if len(set(rows)) != len(rows):
+            raise ValueError("trucks: one of them stands twice")
+        return rows
+
+    def _poses(
+        self,
+        rows: list[int] | None,
+        position: npt.ArrayLike,
+        heading: Numbers,
+        trailer_heading: Numbers,
+        speed: Numbers,
+    ) -> Doubles:
+        """Poses as rows."""
+        k = self.num_trucks if rows is None else len(rows)
+        poses = np.empty((k, 5))
+        poses[:, :2] = _numbers("position", position, (k, 2))
+        for column, (name, value) in enumerate(
+            {"heading": heading, "trailer_heading": trailer_heading, "speed": speed}.items(), start=2
+        ):
+            poses[:, column] = _numbers(name, value, (k,))
+        return poses
+
+
+def speed_control(observer: Observer, speed: Numbers, target: Numbers) -> Floats:
+    """Acceleration by which the simulator's own controller approaches a target speed: for trucks with pedals.
+
+    A PI controller with the limits of vehicle and load, asked once a step. It keeps an integral of each truck's error
+    until the truck's next episode begins.
+
+    Args:
+        observer: The trucks.
+        speed: Present speed [m/s], one number or ``[n]``.
+        target: Target speed [m/s], as :meth:`Observer.command` gives it.
+
+    Returns:
+        Acceleration of each truck [m/s^2], ``[n]``.
+
+    Raises:
+        ValueError: For a speed that no truck can have; no controller has gone on then.
+    """
+    n = (observer.num_trucks,)
+    speeds = [_numbers(name, value, n).astype(np.float32) for name, value in (("speed", speed), ("target", target))]
+    return observer.accelerations(*speeds)
+
+
+def _vehicles(given: Sequence[tuple[str, str]] | Sequence[int] | None) -> tuple[list[Any] | None, list[Any] | None]:
+    """Vehicles as pairs of names, or as indices; the other is None."""
+    if given is None:
+        return None, None
+    if isinstance(given, str) or not hasattr(given, "__len__"):
+        raise TypeError(f"vehicles: {given!r}; a sequence is needed, one a truck or one for all")
+    if len(given) == 0:
+        raise ValueError("vehicles: empty; give None for the first vehicle")
+    if all(isinstance(vehicle, tuple | list) for vehicle in given):
+        pairs: list[Any] = [tuple(vehicle) for vehicle in given]  # type: ignore[arg-type]
+        for index, pair in enumerate(pairs):
+            if len(pair) != 2 or not all(isinstance(name, str) for name in pair):
+                raise TypeError(f"vehicles[{index}]: {pair!r}; names of vehicle and load are needed")
+        return pairs, None
+    rows = [checked_integer(f"vehicles[{index}]", vehicle) for index, vehicle in enumerate(given)]  # type: ignore[arg-type]
+    return None, [within(f"vehicles[{index}]", row, 0, 2**32) for index, row in enumerate(rows)]
+
+
+def _numbers(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[Any]:
+    """Numbers of this shape: as many as are needed, or one for all."""
+    try:
+        numbers = np.asarray(value)
+        if not (np.issubdtype(numbers.dtype, np.floating) or np.issubdtype(numbers.dtype, np.integer)):
+            raise TypeError
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: {type(value).__name__}; numbers of shape {shape} are needed") from None
+    if numbers.shape == shape or numbers.shape == shape[1:]:
+        return np.broadcast_to(numbers, shape)
+    raise ValueError(f"{name}: shape {numbers.shape}; {shape} is needed")
