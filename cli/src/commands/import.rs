@@ -35,7 +35,7 @@ pub struct Args {
     #[arg(short, long, required_unless_present_any = ["list", "junctions", "check"])]
     output: Option<PathBuf>,
     /// With --output: also write where the roundabout lies in the map, its hand of traffic, arms and routes as JSON.
-    #[arg(long, value_name = "FILE", requires = "output")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["list", "junctions", "check"])]
     json: Option<PathBuf>,
     #[command(flatten)]
     place: PlaceArgs,
