@@ -1,6 +1,6 @@
 """A node of ROS 2 that drives a tractor-semitrailer by a policy. A sketch: no ROS has run it.
 
-    ros2 run --prefix "python3" ... ros2_node.py --ros-args -p benchmark:=own.toml -p route:=site/E-left-2
+    python3 ros2_node.py --ros-args -p benchmark:=own.toml -p route:=site/E-left-2
 
 REP 103 is the package's frame: x ahead, y left, angles counter-clockwise, steer angles positive to the left. What it
 needs of the truck: transforms from ``map``, the frame of the road's map, to ``base_link``, the middle of the drive axle
@@ -27,7 +27,7 @@ import offtrack_sim
 PERIOD = 0.1
 """Time between two actions, the simulator's step [s]."""
 STALE = 0.2
-"""Age of a pose at which the truck brakes [s]: beyond it policies fail, see docs/transfer.md."""
+"""Age of a pose at which the truck brakes [s]: an old pose is a delay, see docs/transfer.md."""
 BRAKING = 2.5
 """Deceleration asked for where the truck must stop [m/s^2]."""
 PARAMETERS = {"benchmark": "laden2026", "policy": "laden2026", "route": "", "vehicle": "daf_xf", "load": "laden"}
