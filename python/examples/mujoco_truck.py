@@ -28,6 +28,8 @@ import offtrack_sim
 from offtrack_sim import Ended
 
 VEHICLES = Path(__file__).resolve().parents[2] / "scenarios" / "vehicles"
+RANGES = slice(30, 59)
+"""Of an observation's values the distances to kerbs, see ``offtrack_sim.OBSERVATION``."""
 OVER = math.radians(29)
 """Roll of the trailer beyond which no truck comes back [rad]."""
 
@@ -45,7 +47,7 @@ class Outcome:
     load_transfer_ratio: Array
     """Largest of the trailer, in magnitude."""
     poses: list[dict[str, Any]] = field(default_factory=list)
-    """The first truck after each step, with the names that a state of the simulator has."""
+    """The first truck after each step, with the names that a state of the simulator has; ranges as observed."""
 
     def add(self, running: npt.NDArray[np.bool_], trucks: Trucks, seen: Any) -> None:
         """A step of those that were running."""
@@ -56,7 +58,8 @@ class Outcome:
         ratio = np.maximum(self.load_transfer_ratio, np.abs(trucks.load_transfer_ratio))
         self.load_transfer_ratio[running] = ratio[running]
         names = "position", "heading", "trailer_heading", "speed", "steering"
-        self.poses.append({name: getattr(trucks, name)[:1].astype(np.float32) for name in names})
+        pose = {name: getattr(trucks, name)[:1].astype(np.float32) for name in names}
+        self.poses.append(pose | {"ranges": seen.values[0, RANGES]})
 
     def summary(self) -> dict[str, Any]:
         """The same for a table and a file."""
@@ -175,6 +178,7 @@ def film(args: argparse.Namespace, policy: offtrack_sim.Policy, starts: Starts, 
     batch = starts.batch
     shown = offtrack_sim.Batch(args.benchmark, 1, split="test", routes=starts.routes[:1], autoreset="disabled")
     state = shown.state()
+    reach = (state["ranges"] / shown.observation()[:, RANGES]).max()
     frames, running = [], True
     left = batch.render(0)
     for pose in poses:
@@ -183,8 +187,9 @@ def film(args: argparse.Namespace, policy: offtrack_sim.Policy, starts: Starts, 
             ends = batch.ended()
             running = ends is None or 0 not in ends.envs
             left = batch.render(0) if running else left
-        for name, value in pose.items():
-            state["truck"][name] = value
+        state["ranges"][0] = reach * pose["ranges"]
+        for name in pose.keys() - {"ranges"}:
+            state["truck"][name] = pose[name]
         shown.restore(state)
         frames.append(Image.fromarray(np.concatenate([left, shown.render(0)], axis=1)).quantize(64))
     frames[0].save(args.film, save_all=True, append_images=frames[1:], duration=100, loop=0)

@@ -16,6 +16,8 @@ pytest.importorskip("mujoco")
 
 import mujoco_truck
 
+import offtrack_sim
+
 
 class Recorded:
     """Trucks that note what they are asked for."""
@@ -55,6 +57,12 @@ def test_laden2026_drives_a_laden_multibody_truck_to_the_end_of_its_routes(
     assert laden["failures"] == {} and 0.2 < laden["load_transfer_ratio_max"] < 0.9
     assert "| laden | 100.0% | 100.0% (4 of 4) |" in capsys.readouterr().out
     assert film.read_bytes()[:6] == b"GIF89a"
+
+
+def test_a_film_draws_the_distances_where_an_observation_has_them() -> None:
+    ranges = [group for group in offtrack_sim.OBSERVATION if group.name.endswith("_range")]
+    places = [place for group in ranges for place in range(group.first, group.first + group.n)]
+    assert places == list(range(69))[mujoco_truck.RANGES]
 
 
 def test_the_same_seed_drives_the_same_and_ice_ends_an_episode(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
