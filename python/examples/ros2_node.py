@@ -1,0 +1,139 @@
+"""A node of ROS 2 that drives a tractor-semitrailer by a policy. A sketch: no ROS has run it.
+
+    python3 ros2_node.py --ros-args -p benchmark:=own.toml -p route:=site/E-left-2
+
+REP 103 is the package's frame: x ahead, y left, angles counter-clockwise, steer angles positive to the left. What it
+needs of the truck: transforms from ``map``, the frame of the road's map, to ``base_link``, the middle of the drive axle
+(Autoware's convention), and to ``trailer_link``, the middle of the trailer's axle group; odometry; the steer angle.
+
+Types are checked against tests/ros, which has what this file uses of ROS, and a test drives it with that.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import rclpy
+import tf2_ros
+from ackermann_msgs.msg import AckermannDriveStamped
+from geometry_msgs.msg import Quaternion, TransformStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.time import Time
+
+import offtrack_sim
+
+PERIOD = 0.1
+"""Time between two actions, the simulator's step [s]."""
+STALE = 0.2
+"""Age of a pose at which the truck brakes [s]: an old pose is a delay, see docs/transfer.md."""
+BRAKING = 2.5
+"""Deceleration asked for where the truck must stop [m/s^2]."""
+PARAMETERS = {"benchmark": "laden2026", "policy": "laden2026", "route": "", "vehicle": "daf_xf", "load": "laden"}
+
+
+class Driver(Node):
+    """Observes ten times a second, and publishes a steer angle and a speed."""
+
+    def __init__(self) -> None:
+        super().__init__("offtrack_driver")
+        given = {name: str(self.declare_parameter(name, default).value) for name, default in PARAMETERS.items()}
+        self.policy = offtrack_sim.Policy.shipped(given["policy"])
+        self.observer = offtrack_sim.Observer(
+            given["benchmark"], routes=[given["route"]], vehicles=[(given["vehicle"], given["load"])]
+        )
+        self.policy.check(self.observer)
+        self.begun = False
+        self.steering = self.speed = self.speed_before = 0.0
+        self.target = np.zeros(1, dtype=np.float32)
+        self.transforms = tf2_ros.Buffer()
+        self.listener = tf2_ros.TransformListener(self.transforms, self)
+        self.create_subscription(Odometry, "odom", self.hear_odometry, 10)
+        self.create_subscription(AckermannDriveStamped, "steering_report", self.hear_steering, 10)
+        self.commands = self.create_publisher(AckermannDriveStamped, "command", 10)
+        self.timer = self.create_timer(PERIOD, self.step)
+
+    def hear_odometry(self, message: Odometry) -> None:
+        """Speed along the heading of ``base_link``."""
+        self.speed = message.twist.twist.linear.x
+
+    def hear_steering(self, message: AckermannDriveStamped) -> None:
+        """Steer angle of the front axle."""
+        self.steering = message.drive.steering_angle
+
+    def pose(self, frame: str) -> TransformStamped:
+        """Where a frame is in the map.
+
+        Raises:
+            tf2_ros.TransformException: For one that is not known, or no longer.
+        """
+        found = self.transforms.lookup_transform("map", frame, Time())
+        age = (self.get_clock().now() - Time.from_msg(found.header.stamp)).nanoseconds * 1e-9
+        if age > STALE:
+            raise tf2_ros.TransformException(f"{frame}: {age:.2f} s old; {STALE} s at most")
+        return found
+
+    def step(self) -> None:
+        """One observation and one command."""
+        try:
+            tractor, trailer = self.pose("base_link"), self.pose("trailer_link")
+        except tf2_ros.TransformException as error:
+            self.get_logger().warning(f"the truck brakes: {error}")
+            self.brake()
+            return
+        place = tractor.transform.translation
+        position = np.array([[place.x, place.y]])
+        heading, trailer_heading = (np.array([yaw(found.transform.rotation)]) for found in (tractor, trailer))
+        speed = np.array([self.speed])
+        if self.begun:
+            seen = self.observer.observe(
+                position,
+                heading,
+                trailer_heading,
+                speed,
+                steering=np.array([self.steering]),
+                target_speed=self.target,
+                acceleration=(speed - self.speed_before) / PERIOD,
+            )
+        else:
+            seen = self.observer.begin(position, heading, trailer_heading, speed)
+            self.target, self.begun = speed.astype(np.float32), True
+        self.speed_before = self.speed
+        if seen.ended[0]:
+            self.get_logger().info(f"the episode has ended: {offtrack_sim.Ended(int(seen.ended[0])).name.lower()}")
+            self.brake()
+            return
+        steering, self.target = self.observer.command(self.policy.act(seen.values), self.target)
+        self.publish(float(steering[0]), float(self.target[0]), 0.0)
+
+    def brake(self) -> None:
+        """Stops with the wheels as they are."""
+        self.publish(self.steering, 0.0, -BRAKING)
+
+    def publish(self, steering: float, speed: float, acceleration: float) -> None:
+        """A command: steer angle [rad], speed [m/s], and acceleration [m/s^2] or 0 for as quick as may be."""
+        message = AckermannDriveStamped()
+        message.header.stamp, message.header.frame_id = self.get_clock().now().to_msg(), "base_link"
+        message.drive.steering_angle, message.drive.speed, message.drive.acceleration = steering, speed, acceleration
+        self.commands.publish(message)
+
+
+def yaw(rotation: Quaternion) -> float:
+    """Heading of a quaternion [rad]."""
+    x, y, z, w = rotation.x, rotation.y, rotation.z, rotation.w
+    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def main() -> None:
+    rclpy.init()
+    node = Driver()
+    try:
+        rclpy.spin(node)
+    finally:
+        node.destroy_node()
+        rclpy.shutdown()
+
+
+if __name__ == "__main__":
+    main()

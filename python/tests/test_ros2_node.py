@@ -1,0 +1,84 @@
+"""The sketch of a node drives: with the few classes of tests/ros in place of ROS."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+import offtrack_sim
+
+if TYPE_CHECKING:
+    from ros2_node import Driver
+
+ROUTE = "20m/N-left-2"
+WHEELBASE = 3.543
+
+
+@pytest.fixture
+def driver(monkeypatch: pytest.MonkeyPatch) -> Driver:
+    monkeypatch.syspath_prepend(Path(__file__).parent / "ros")
+    from rclpy.node import Node
+
+    monkeypatch.setattr(Node, "parameters", {"route": ROUTE})
+    from ros2_node import Driver
+
+    return Driver()
+
+
+def stand(driver: Driver, along: float, seconds: float) -> None:
+    """Puts the truck on the line of the route's first waypoint, and the clock to a time."""
+    from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+    from rclpy.time import Time
+    from std_msgs.msg import Header
+
+    x, y, heading = driver.observer.waypoints(ROUTE)[0].tolist()
+    x, y = x + (along - WHEELBASE / 2) * math.cos(heading), y + (along - WHEELBASE / 2) * math.sin(heading)
+    turned = Quaternion(z=math.sin(heading / 2), w=math.cos(heading / 2))
+    driver.clock.time = Time(round(seconds * 1e9))
+    for frame in ("base_link", "trailer_link"):
+        stamp = Header(driver.clock.time.to_msg(), "map")
+        driver.transforms.found[frame] = TransformStamped(stamp, Transform(Vector3(x, y), turned))
+
+
+def test_it_publishes_what_the_policy_does(driver: Driver) -> None:
+    from nav_msgs.msg import Odometry
+
+    odometry = Odometry()
+    odometry.twist.twist.linear.x = 8.0
+    driver.hear_odometry(odometry)
+    for step in range(3):
+        stand(driver, 0.8 * step, 0.1 * step)
+        driver.step()
+    speeds = [message.drive.speed for message in driver.commands.published]
+    assert len(speeds) == 3 and all(2.0 < speed < 9.0 for speed in speeds)
+    assert all(abs(message.drive.steering_angle) < 0.3 for message in driver.commands.published)
+    assert not driver.logger.lines
+
+
+def test_it_brakes_without_a_pose_with_an_old_one_and_at_the_end_of_an_episode(driver: Driver) -> None:
+    from rclpy.time import Time
+
+    driver.step()
+    assert "base_link: unknown" in driver.logger.lines[-1]
+    stand(driver, 0.0, 5.0)
+    driver.clock.time = Time(round(5.5 * 1e9))
+    driver.step()
+    assert "0.50 s old; 0.2 s at most" in driver.logger.lines[-1]
+    stand(driver, 0.0, 6.0)
+    driver.step()
+    stand(driver, -500.0, 6.1)
+    driver.step()
+    assert "the episode has ended" in driver.logger.lines[-1]
+    braked = [message.drive.acceleration < 0 for message in driver.commands.published]
+    assert braked == [True, True, False, True]
+
+
+def test_a_quaternions_yaw_is_its_heading(driver: Driver) -> None:
+    from geometry_msgs.msg import Quaternion
+    from ros2_node import yaw
+
+    assert yaw(Quaternion(z=math.sin(1.0), w=math.cos(1.0))) == pytest.approx(2.0)
+    assert offtrack_sim.Policy.shipped("laden2026").extras == driver.policy.extras
