@@ -122,8 +122,14 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("before.headings", 2, ANGLE),
             ("before.speed", 1, MIDDLING),
             ("before.waypoint", 1, SAME),
-            ("earlier", 6, SAME),
-            ("earliest", 6, SAME),
+            ("earlier.position", 2, POSITION),
+            ("earlier.headings", 2, ANGLE),
+            ("earlier.speed", 1, MIDDLING),
+            ("earlier.waypoint", 1, SAME),
+            ("earliest.position", 2, POSITION),
+            ("earliest.headings", 2, ANGLE),
+            ("earliest.speed", 1, MIDDLING),
+            ("earliest.waypoint", 1, SAME),
         ],
     }
 }
