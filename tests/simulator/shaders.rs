@@ -194,7 +194,7 @@ mod module {
     use offtrack::layout::shared::Struct;
     use offtrack::layout::structs;
     use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
-    use wgpu::naga::{GlobalVariable, Module, TypeInner, front::wgsl};
+    use wgpu::naga::{GlobalVariable, Handle, Module, TypeInner, front::wgsl};
 
     fn parsed(source: &str) -> Module {
         wgsl::parse_str(source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(source)))
@@ -226,7 +226,7 @@ mod module {
         let info = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(module).unwrap();
         let kernels = module.entry_points.iter().enumerate().map(|(index, entry)| {
             let used = info.get_entry_point(index);
-            let of = |(handle, variable): (_, &GlobalVariable)| {
+            let of = |(handle, variable): (Handle<GlobalVariable>, &GlobalVariable)| {
                 variable.binding.as_ref().filter(|_| !used[handle].is_empty()).map(|binding| binding.binding)
             };
             let mut bindings: Vec<u32> = module.global_variables.iter().filter_map(of).collect();

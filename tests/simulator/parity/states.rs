@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use offtrack::field::Field;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::random::{index_below, signed_unit, words};
-use offtrack::layout::{ObservedExtras, Params, Truck};
+use offtrack::layout::{ObservedExtras, Truck};
 use offtrack::map::Gutter;
 use offtrack::scenario::{Disturbances, Scenario};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
@@ -28,8 +28,9 @@ pub fn world(gutter: Gutter) -> Arc<World> {
             .iter()
             .map(|place| Field::bake(&place.roundabout.kerbs(Gutter::Solid), scenario.cell))
             .collect();
-        let solid = World { fields: solid, ..drivable.clone() };
-        [drivable, solid].map(Arc::new)
+        let mut with_solid = drivable.clone();
+        with_solid.fields = solid;
+        [drivable, with_solid].map(Arc::new)
     });
     worlds[usize::from(gutter == Gutter::Solid)].clone()
 }
@@ -39,9 +40,10 @@ pub fn fleet_world() -> Arc<World> {
     let mut scenario = benchmark("attard2023-full").0;
     scenario.fleet = Some(crate::fleet::all_drawn());
     scenario.extras = ObservedExtras::Oracle;
-    let world = World { fields: world(Gutter::Drivable).fields.clone(), ..World::bake(&scenario).unwrap() };
-    assert!(world.rigs.len() == 512 && world.rays.len() == 512);
-    Arc::new(world)
+    let mut fleet = World::bake(&scenario).unwrap();
+    fleet.fields = world(Gutter::Drivable).fields.clone();
+    assert!(fleet.rigs.len() == 512 && fleet.rays.len() == 512);
+    Arc::new(fleet)
 }
 
 /// The same where noise, errors and delays come between a policy and the truck.
@@ -54,8 +56,9 @@ pub fn disturbed_world() -> Arc<World> {
         dropped_rays: 0.05,
         ..Scenario::named("transfer2026").unwrap().disturbances
     };
-    let (world, disturbances) = (World::clone(&fleet_world()), (&disturbances).into());
-    Arc::new(World { params: Params { disturbances, ..world.params }, ..world })
+    let mut world = World::clone(&fleet_world());
+    world.params.disturbances = (&disturbances).into();
+    Arc::new(world)
 }
 
 /// Makes a simulator's columns those of `batch`.
