@@ -21,7 +21,7 @@ fn scenarios() -> PathBuf {
 }
 
 /// Benchmarks and roundabouts that have no key but those of another one.
-const LIKE_OTHERS: [&str; 22] = [
+const LIKE_OTHERS: [&str; 25] = [
     "laden2026-50-random.toml",
     "laden2026-50-training.toml",
     "laden2026-odd-random.toml",
@@ -40,6 +40,9 @@ const LIKE_OTHERS: [&str; 22] = [
     "20m-maps.toml",
     "32m-maps.toml",
     "40m-maps.toml",
+    "transfer2026-30kmh.toml",
+    "transfer2026-50kmh.toml",
+    "transfer2026-8kmh.toml",
     "transfer2026-attard2023.toml",
     "transfer2026-held-out.toml",
     "transfer2026-random.toml",

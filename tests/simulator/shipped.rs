@@ -34,12 +34,12 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
         FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
     assert_eq!(
         (files.len(), FILES.len()),
-        (49, 49),
-        "29 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions"
+        (52, 52),
+        "32 benchmarks, ten roundabouts, five outlines, three vehicles, two distributions"
     );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [29, 10, 3, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [32, 10, 3, 2]);
 }
 
 /// A shipped benchmark's file as it is read as TOML.
@@ -146,6 +146,21 @@ fn the_benchmarks_of_transfer2026_differ_in_roads_training_and_disturbances_alon
         let [one, two, three] = [&transfer, &training, &held_out].map(|table| disturbance(table, key));
         assert!(one < two && two < three, "{key}");
     }
+    // For the actions of another benchmark all but these is that one's; trucks and disturbances are the same.
+    for (name, other) in [
+        ("transfer2026-8kmh", "attard2023-as-run"),
+        ("transfer2026-30kmh", "attard2023"),
+        ("transfer2026-50kmh", "laden2026-50"),
+    ] {
+        let (mut elsewhere, mut other) = (table(name), table(other));
+        for key in ["draw", "disturbances"] {
+            assert_eq!(elsewhere.remove(key).as_ref(), Some(&transfer[key]), "{name}: {key}");
+        }
+        for key in ["vehicle", "load", "draw"] {
+            (elsewhere.remove(key), other.remove(key));
+        }
+        assert_eq!(elsewhere, other, "{name}");
+    }
     // At home it is attard2023 but for the actions, the observation and the clock that go with them.
     let (mut home, mut attard) = (table("transfer2026-attard2023"), table("attard2023"));
     for key in ["actions", "observation", "start", "ending"] {
@@ -159,7 +174,7 @@ fn the_benchmarks_of_transfer2026_differ_in_roads_training_and_disturbances_alon
 fn every_name_gives_what_its_file_gives() {
     // The two with thousands of roads take minutes; the next test reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 27);
+    assert_eq!(benchmarks.len(), 30);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();
