@@ -37,6 +37,7 @@ impl Choice {
 /// Runs the command.
 #[cfg(feature = "gpu")]
 pub fn run(_: &Args) -> Result<(), Error> {
+    use offtrack::engine::stages::N_STORAGE_BUFFERS;
     use offtrack::gpu;
 
     let adapters = gpu::adapters();
@@ -44,13 +45,16 @@ pub fn run(_: &Args) -> Result<(), Error> {
         // The error names what was tried and what to install.
         device::open(None)?;
     }
-    let mut rows = vec![["", "adapter", "interface", "driver", "kind", "largest buffer"].map(str::to_owned)];
+    let buffers = format!("storage buffers ({N_STORAGE_BUFFERS} needed)");
+    let heads = ["", "adapter", "interface", "driver", "kind", "largest buffer", &buffers];
+    let mut rows = vec![heads.map(str::to_owned)];
     rows.extend(adapters.into_iter().enumerate().map(|(index, adapter)| {
         let mark = if index == 0 { "*" } else { "" };
         let largest = format!("{} MiB", adapter.binding_max >> 20);
-        [mark.to_owned(), adapter.name, adapter.interface, adapter.driver, adapter.kind.to_owned(), largest]
+        let buffers = adapter.storage_buffers_max.to_string();
+        [mark.to_owned(), adapter.name, adapter.interface, adapter.driver, adapter.kind.to_owned(), largest, buffers]
     }));
-    let widths: [usize; 6] =
+    let widths: [usize; 7] =
         std::array::from_fn(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0));
     for row in rows {
         let cells: Vec<String> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:width$}")).collect();

@@ -169,7 +169,9 @@ mod on_a_device {
         let listed = String::from_utf8(output.stdout).unwrap();
         let lines: Vec<&str> = listed.lines().collect();
         assert!(
-            ["adapter", "interface", "driver", "kind", "largest buffer"].iter().all(|head| lines[0].contains(head)),
+            ["adapter", "interface", "driver", "kind", "largest buffer", "storage buffers (16 needed)"]
+                .iter()
+                .all(|head| lines[0].contains(head)),
             "{listed}"
         );
         assert!(lines[1].starts_with("*  ") && lines[1].contains("MiB"), "{listed}");

@@ -19,6 +19,8 @@ pub struct Adapter {
     pub kind: &'static str,
     /// The largest buffer that a shader may see (bytes).
     pub binding_max: u64,
+    /// Storage buffers that a shader may see; [`N_STORAGE_BUFFERS`] are needed.
+    pub storage_buffers_max: u32,
 }
 
 /// The interfaces that are searched for adapters. OpenGL is left out: a machine without a driver would offer it and
@@ -48,6 +50,7 @@ pub(super) fn described(adapter: &wgpu::Adapter) -> Adapter {
             DeviceType::Other => "unknown",
         },
         binding_max: adapter.limits().max_storage_buffer_binding_size,
+        storage_buffers_max: adapter.limits().max_storage_buffers_per_shader_stage,
     }
 }
 
