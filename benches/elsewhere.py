@@ -25,6 +25,7 @@ POLICIES = [
     ("attard2023-as-run", "attard2023-as-run", "transfer2026-8kmh"),
     ("laden2026", "laden2026", "transfer2026"),
     ("laden2026-50", "laden2026-50", "transfer2026-50kmh"),
+    ("transfer2026", "transfer2026-attard2023", "transfer2026"),
 ]
 KEPT = ["episodes", "arrived", "success", "success_low", "success_high", "lane_distance_mean_arrived"]
 

@@ -89,7 +89,7 @@ fn the_shipped_policies_are_written_as_they_were_read_byte_for_byte() {
         assert!(policy.to_bytes() == std::fs::read(folder.join(name).join("policy.safetensors")).unwrap(), "{name}");
     }
     let message = Policy::shipped("mine").unwrap_err().to_string();
-    let names = "attard2023, attard2023-lane, attard2023-as-run, laden2026, laden2026-50";
+    let names = "attard2023, attard2023-lane, attard2023-as-run, laden2026, laden2026-50, transfer2026";
     assert_eq!(message, format!("policy: mine; the program comes with {names}"));
     let world = |benchmark: &str| World::bake(&Scenario::named(benchmark).unwrap()).unwrap();
     for (benchmark, expected) in [
@@ -97,6 +97,7 @@ fn the_shipped_policies_are_written_as_they_were_read_byte_for_byte() {
         ("attard2023-maps-as-run", "attard2023-as-run"),
         ("laden2026-odd", "laden2026"),
         ("laden2026-50", "laden2026-50"),
+        ("transfer2026", "transfer2026"),
     ] {
         assert_eq!(Policy::shipped_for(benchmark, &world(benchmark)).unwrap().name, format!("{expected} (shipped)"));
     }

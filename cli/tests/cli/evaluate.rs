@@ -229,7 +229,7 @@ fn a_closed_standard_output_costs_the_table_and_not_the_report() {
 #[test]
 fn without_a_policy_the_shipped_one_drives_as_its_report_says() {
     let place = Place::new();
-    for benchmark in ["attard2023", "attard2023-as-run", "laden2026", "laden2026-50"] {
+    for benchmark in ["attard2023", "attard2023-as-run", "laden2026", "laden2026-50", "transfer2026"] {
         let shipped = repository().join("policy/shipped").join(benchmark);
         let reported: Value = serde_json::from_slice(&std::fs::read(shipped.join("report.json")).unwrap()).unwrap();
         let reported = &reported["evaluation"];
