@@ -157,7 +157,8 @@ fn the_benchmarks_of_transfer2026_differ_in_roads_training_and_disturbances_alon
             assert_eq!(elsewhere.remove(key).as_ref(), Some(&transfer[key]), "{name}: {key}");
         }
         for key in ["vehicle", "load", "draw"] {
-            (elsewhere.remove(key), other.remove(key));
+            elsewhere.remove(key);
+            other.remove(key);
         }
         assert_eq!(elsewhere, other, "{name}");
     }
