@@ -31,8 +31,8 @@ class Policy:
         """The policy of this name that comes with the package.
 
         A benchmark's name, or ``attard2023-lane``, which drives nearer to its lane's centre on ``attard2023``. These
-        two hold in the simulator's own truck at 30 km/h alone: to another simulator or a truck take ``laden2026``,
-        which chooses its speed.
+        two hold in the simulator's own truck at 30 km/h alone: to another simulator or a truck take
+        ``transfer2026``, which chooses its speed and learned with other tyres, delays and noise.
 
         Raises:
             ValueError: Where there is none; the message names those there are.
