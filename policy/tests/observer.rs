@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use offtrack::layout::{Ended, Truck};
 use offtrack::observer::{Observer, Pose, Telemetry};
-use offtrack::scenario::{Scenario, Split};
+use offtrack::scenario::{Disturbances, Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;
 use offtrack_policy::Policy;
@@ -28,6 +28,8 @@ fn on_every_step_of_the_unseen_routes_an_observer_gives_a_shipped_policy_what_th
         // That of attard2023-lane is attard2023.
         let mut scenario = Scenario::named(name.trim_end_matches("-lane")).unwrap();
         scenario.keep(&[Split::Test]);
+        // An observer tells what is, of the pose that it is given.
+        scenario.disturbances = Disturbances::default();
         let world = Arc::new(World::bake(&scenario).unwrap());
         policy.check(&world).unwrap();
         let n = world.routes.len();

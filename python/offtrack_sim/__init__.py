@@ -22,6 +22,7 @@ from .evaluation import Evaluation, evaluate
 from .layout import COLUMNS, EXTRAS, OBSERVATION, Ended, Values
 from .observer import Frame, Observer, Seen, speed_control
 from .policy import Policy
+from .scenarios import write_scenarios
 from .single import Roundabout
 from .vector import RoundaboutVector, make_vec
 
@@ -47,6 +48,7 @@ __all__ = [
     "make_vec",
     "scenario_names",
     "speed_control",
+    "write_scenarios",
 ]
 
 gymnasium.register(

@@ -31,6 +31,7 @@ fn _offtrack(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(layout::observation_groups, module)?)?;
     module.add_function(wrap_pyfunction!(layout::extra_groups, module)?)?;
     module.add_function(wrap_pyfunction!(layout::end_codes, module)?)?;
+    module.add_function(wrap_pyfunction!(worlds::scenario_files, module)?)?;
     module.add_function(wrap_pyfunction!(worlds::scenario_names, module)?)?;
     Ok(())
 }

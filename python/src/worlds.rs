@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 use std::time::Duration;
 
 use offtrack::files::cache::{Cache, Loading, Stopped};
-use offtrack::files::shipped::Kind;
+use offtrack::files::shipped::{FILES, Kind};
 use offtrack::layout::Action;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::{Error, World};
@@ -113,6 +113,12 @@ fn of_world(error: &Error) -> PyErr {
 #[pyfunction]
 pub fn scenario_names() -> Vec<&'static str> {
     Kind::Benchmark.names().collect()
+}
+
+/// The scenario files that come with the package: each one's path below a folder, and its text.
+#[pyfunction]
+pub fn scenario_files() -> Vec<(&'static str, &'static str)> {
+    FILES.to_vec()
 }
 
 /// A benchmark's name, its action table, and the names of the extras that it observes.
