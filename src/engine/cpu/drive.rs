@@ -143,6 +143,10 @@ pub fn motion(
 /// acceleration of the tractor (m/s^2).
 #[inline]
 fn slips(rig: &Rig, leaning: &Truck, lateral_acceleration: f32) -> (f32, f32) {
+    // The same numbers as below, sooner.
+    if rig.slip_growth == 0.0 {
+        return (rig.slip, rig.slip);
+    }
     let tractor = Vec2::new(leaning.tractor_roll, leaning.tractor_roll_rate);
     let trailer = Vec2::new(leaning.trailer_roll, leaning.trailer_roll_rate);
     let (ratio, trailer_ratio) =
