@@ -119,6 +119,8 @@ fn motion(
 // Slip of both units' tyres, which lose stiffness as load moves to the outer ones (rad/(m/s^2)), at a lateral
 // acceleration of the tractor (m/s^2).
 fn slips(rig: Rig, leaning: Truck, lateral_acceleration: f32) -> vec2<f32> {
+    // The same numbers as below, sooner.
+    if rig.slip_growth == 0.0 { return vec2<f32>(rig.slip); }
     let tractor = vec2<f32>(leaning.tractor_roll, leaning.tractor_roll_rate);
     let trailer = vec2<f32>(leaning.trailer_roll, leaning.trailer_roll_rate);
     let ratios = load_transfer_ratios(rig, tractor, trailer, lateral_acceleration, leaning.lateral_acceleration);

@@ -34,16 +34,15 @@ mod place; // where on a route a pose is
 use std::sync::Arc;
 
 use glam::DVec2;
-use multiversion::multiversion;
 
 use crate::engine::Error;
-use crate::engine::cpu::collide::clearance;
+use crate::engine::cpu::collide::clearance_of;
 use crate::engine::cpu::follow::{followed, reference_point};
 use crate::engine::cpu::judge::ending;
 use crate::engine::cpu::observe::{extras, observed};
-use crate::engine::cpu::sense::ranges;
+use crate::engine::cpu::sense::ranges_of;
 use crate::engine::cpu::steer::{controlled, targeted};
-use crate::layout::{Action, Clearance, Control, Ended, N_EXTRAS, N_RAYS, N_VALUES, Progress, Rig, Truck};
+use crate::layout::{Action, Clearance, Control, Ended, N_EXTRAS, N_VALUES, Progress, Rig, Truck};
 use crate::map::Frame;
 use crate::world::World;
 use place::next_waypoint;
@@ -281,14 +280,14 @@ impl Observer {
 
     /// A signed quantity of the driven frame on the map, or the other way round.
     fn on_map(&self, value: f32) -> f32 {
-        if self.frame.mirrored { -value } else { value }
+        self.frame.angle(value.into()) as f32
     }
 
     /// Observes and judges the truck, and goes on from there.
     fn seen(&mut self, truck: &Truck, target_speed: f32) -> Observed {
         let world = &*self.world;
         let params = &world.params;
-        let (clearance, ranges) = measured(world, truck);
+        let (clearance, ranges) = (clearance_of(world, truck), ranges_of(world, truck));
         let waypoints = world.route_waypoints(truck.route);
         let point = reference_point(self.rig().wheelbase, truck);
         let next = self.state.waypoint.unwrap_or_else(|| next_waypoint(waypoints, point, truck.heading));
@@ -309,11 +308,4 @@ impl Observer {
         self.state = State { steps: truck.steps, waypoint: Some(progress.waypoint), ended, ..self.state };
         Observed { values, extras, progress, clearance, ended }
     }
-}
-
-/// Clearances of a truck, and the ranges of its sensors.
-#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn measured(world: &World, truck: &Truck) -> (Clearance, [f32; N_RAYS]) {
-    let (field, rig) = (world.route_field(truck.route), world.rig(truck));
-    (clearance(field, rig, truck), ranges(field, rig, world.rays_of(rig), truck, world.params.sensor_range))
 }

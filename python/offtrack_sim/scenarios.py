@@ -22,11 +22,11 @@ def write_scenarios(folder: str | os.PathLike[str]) -> list[Path]:
     """
     below = Path(file_name(folder))
     files = [(below / path, text) for path, text in _offtrack.scenario_files()]
-    missing = [(file, text) for file, text in files if not file.exists()]
     for file, text in files:
-        if (file, text) not in missing and file.read_text(encoding="utf-8") != text:
+        if file.exists() and file.read_text(encoding="utf-8") != text:
             raise FileExistsError(f"folder: {file} is there with another text; another folder is needed")
-    for file, text in missing:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text, encoding="utf-8", newline="\n")
+    for file, text in files:
+        if not file.exists():
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text, encoding="utf-8", newline="\n")
     return [file for file, _ in files]

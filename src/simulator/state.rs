@@ -1,5 +1,5 @@
-//! The rows that a batch goes on from, checked: every number is one that a truck of this world can have, so that whatever
-//! is computed from it is finite.
+//! The rows that a batch goes on from, checked: every number is one that a truck of this world can have, so that
+//! whatever is computed from it is finite.
 
 use std::f32::consts::TAU;
 use std::fmt::Debug;
@@ -7,6 +7,7 @@ use std::ops::RangeInclusive;
 
 use glam::Vec2;
 
+use crate::engine::cpu::perceive::pose_of;
 use crate::engine::limits::{self, FAR, FASTEST, MOST, STEEPEST};
 use crate::engine::{Batch, Error};
 use crate::layout::{Column, Control, Ended, N_POSES, Params, Pose, Progress, RewardTerms, Truck};
@@ -83,17 +84,24 @@ fn check_control(env: usize, control: &Control, n_actions: u32) -> Result<(), Er
 /// The poses that are kept with disturbances; without, they are zeros.
 fn check_poses(env: usize, poses: &[Pose; N_POSES], next: Vec2, n_waypoints: u32) -> Result<(), Error> {
     for (index, pose) in poses.iter().enumerate() {
-        let Pose { position, heading, trailer_heading, speed, waypoint } = *pose;
-        for (field, value, range) in [
-            ("position[0]", position.x, next.x - FAR..=next.x + FAR),
-            ("position[1]", position.y, next.y - FAR..=next.y + FAR),
-            ("heading", heading, -TAU..=TAU),
-            ("trailer_heading", trailer_heading, -TAU..=TAU),
-            ("speed", speed, -FASTEST..=FASTEST),
-        ] {
-            within(Column::Poses, env, &format!("[{index}].{field}"), value, range)?;
-        }
-        within(Column::Poses, env, &format!("[{index}].waypoint"), waypoint, 0..=n_waypoints)?;
+        let place = |field: &str| format!("{}[{env}][{index}]{field}", Column::Poses.name());
+        check_pose(place, pose, next)?;
+        limits::within(|| place(".waypoint"), pose.waypoint, 0..=n_waypoints)?;
+    }
+    Ok(())
+}
+
+/// Where a truck is, and how fast, near the waypoint `next` that it is to pass (m). `place` names a field.
+fn check_pose(place: impl Fn(&str) -> String, pose: &Pose, next: Vec2) -> Result<(), Error> {
+    let Pose { position, heading, trailer_heading, speed, waypoint: _ } = *pose;
+    for (field, value, range) in [
+        (".position[0]", position.x, next.x - FAR..=next.x + FAR),
+        (".position[1]", position.y, next.y - FAR..=next.y + FAR),
+        (".heading", heading, -TAU..=TAU),
+        (".trailer_heading", trailer_heading, -TAU..=TAU),
+        (".speed", speed, -FASTEST..=FASTEST),
+    ] {
+        limits::within(|| place(field), value, range)?;
     }
     Ok(())
 }
@@ -105,15 +113,11 @@ fn next_waypoint(world: &World, truck: &Truck, progress: &Progress) -> Vec2 {
 }
 
 fn check_truck(world: &World, env: usize, truck: &Truck, progress: &Progress) -> Result<(), Error> {
-    let next = next_waypoint(world, truck, progress);
+    let place = |field: &str| format!("{}[{env}]{field}", Column::Truck.name());
+    check_pose(place, &pose_of(truck, progress), next_waypoint(world, truck, progress))?;
     // A truck steers up to its lock, but for the rounding of a sum.
     let lock = world.rig(truck).steer_max * OBSERVED;
     for (field, value, range) in [
-        (".position[0]", truck.position.x, next.x - FAR..=next.x + FAR),
-        (".position[1]", truck.position.y, next.y - FAR..=next.y + FAR),
-        (".heading", truck.heading, -TAU..=TAU),
-        (".trailer_heading", truck.trailer_heading, -TAU..=TAU),
-        (".speed", truck.speed, -FASTEST..=FASTEST),
         (".steering", truck.steering, -lock..=lock),
         (".tractor_roll", truck.tractor_roll, -MOST..=MOST),
         (".tractor_roll_rate", truck.tractor_roll_rate, -MOST..=MOST),

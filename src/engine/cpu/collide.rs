@@ -36,9 +36,14 @@ constants! {
 }
 
 /// Fills the row's clearance.
-#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 pub fn collide(world: &World, row: &mut Row) {
-    *row.clearance = clearance(world.route_field(row.truck.route), world.rig(row.truck), row.truck);
+    *row.clearance = clearance_of(world, row.truck);
+}
+
+/// The clearances of a truck.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(crate) fn clearance_of(world: &World, truck: &Truck) -> Clearance {
+    clearance(world.route_field(truck.route), world.rig(truck), truck)
 }
 
 /// Clearance of both units: at least the field's least distance on their rectangles, and at most twice that plus 1 cm.

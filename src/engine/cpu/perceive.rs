@@ -32,7 +32,8 @@ pub(super) fn perceive(world: &World, row: &mut Row, steps: u32) {
     *row.poses = [seen, now, before[0], before[1]];
 }
 
-fn pose_of(truck: &Truck, progress: &Progress) -> Pose {
+/// The pose of a truck.
+pub(crate) fn pose_of(truck: &Truck, progress: &Progress) -> Pose {
     let Truck { position, heading, trailer_heading, speed, .. } = *truck;
     Pose { position, heading, trailer_heading, speed, waypoint: progress.waypoint }
 }

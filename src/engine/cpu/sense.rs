@@ -65,9 +65,9 @@ pub(super) fn sense_at(world: &World, row: &mut Row, steps: u32) {
     perceive::disturb(&params.disturbances, row.stream, truck.episode, steps, params.sensor_range, row.ranges);
 }
 
-/// The ranges of a truck.
+/// The ranges of a truck (m).
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn ranges_of(world: &World, truck: &Truck) -> [f32; N_RAYS] {
+pub(crate) fn ranges_of(world: &World, truck: &Truck) -> [f32; N_RAYS] {
     let rig = world.rig(truck);
     ranges(world.route_field(truck.route), rig, world.rays_of(rig), truck, world.params.sensor_range)
 }

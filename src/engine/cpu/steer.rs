@@ -17,7 +17,6 @@ constants! {
 /// Writes the row's control.
 pub fn steer(world: &World, row: &mut Row) {
     let params = &world.params;
-    let step = params.n_substeps as f32 * params.substep;
     let before = *row.control;
     let asked = if params.disturbances.of_action == 0 {
         world.actions[*row.action as usize]
@@ -25,7 +24,7 @@ pub fn steer(world: &World, row: &mut Row) {
         late_action(world, row.stream, row.truck.episode, *row.action, &before)
     };
     let action = targeted(params, &asked, &before);
-    *row.control = controlled(world.rig(row.truck), step, &action, row.truck.speed, &before);
+    *row.control = controlled(world.rig(row.truck), world.step(), &action, row.truck.speed, &before);
     if params.disturbances.of_action == 1 {
         row.control.action_before = *row.action + 1;
         row.control.action_earlier = before.action_before;
