@@ -62,7 +62,10 @@ fn point_of(body: Body, n_points: u32, index: u32) -> vec2<f32> {
         return vec2<f32>(ends.x + f32(index) * ((ends.y - ends.x) / f32(n_points - 1u)), 0.0);
     }
     let corner = index - n_points;
-    return vec2<f32>(select(body.front, body.rear, corner < 2u), select(-body.half_width, body.half_width, corner % 2u == 0u));
+    return vec2<f32>(
+        select(body.front, body.rear, corner < 2u),
+        select(-body.half_width, body.half_width, corner % 2u == 0u),
+    );
 }
 
 // One of a body's lines: the pieces of its centre line, then two from each corner. These run along the unit's end to
@@ -169,6 +172,9 @@ fn body_clearance(
 
 // Signed distance at a point of a unit's frame (m).
 fn sampled(field: FieldRow, position: vec2<f32>, heading: vec2<f32>, point: vec2<f32>) -> f32 {
-    let p = vec2<f32>(position.x + point.x * heading.x - point.y * heading.y, position.y + point.x * heading.y + point.y * heading.x);
+    let p = vec2<f32>(
+        position.x + point.x * heading.x - point.y * heading.y,
+        position.y + point.x * heading.y + point.y * heading.x,
+    );
     return field_sample(field, true, p).distance;
 }

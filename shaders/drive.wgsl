@@ -179,17 +179,23 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
     let middle_lag = lagging(rig, middle_speed, truck.curvature_lag, rise, half_step);
     let mean = motion(rig, truck, middle_speed, middle_curvature, middle_lag, mean_acceleration, middle_articulation);
     let ahead = direction(truck.heading + half_step * start.motion.yaw_rate);
-    let velocity = vec2<f32>(middle_speed * ahead.x - mean.side_speed * ahead.y, middle_speed * ahead.y + mean.side_speed * ahead.x);
+    let velocity = vec2<f32>(
+        middle_speed * ahead.x - mean.side_speed * ahead.y,
+        middle_speed * ahead.y + mean.side_speed * ahead.x,
+    );
 
     let heading = wrapped(truck.heading + substep * mean.yaw_rate);
     let trailer_heading = wrapped(truck.trailer_heading + substep * mean.trailer_yaw_rate);
     let curvature = steered_curvature(rig, steering, speed);
-    let curvature_lag = lagging(rig, middle_speed, truck.curvature_lag, curvature - start.motion.steered_curvature, substep);
+    let curvature_lag =
+        lagging(rig, middle_speed, truck.curvature_lag, curvature - start.motion.steered_curvature, substep);
     let last = motion(rig, truck, speed, curvature, curvature_lag, acceleration, heading - trailer_heading);
-    let tractor = rolled(rig.tractor_roll, vec2<f32>(truck.tractor_roll, truck.tractor_roll_rate), mean.lateral_acceleration + rig.crossfall);
-    let trailer =
-        rolled(rig.trailer_roll, vec2<f32>(truck.trailer_roll, truck.trailer_roll_rate), mean.trailer_lateral_acceleration + rig.crossfall);
-    let ratios = load_transfer_ratios(rig, tractor, trailer, last.lateral_acceleration, last.trailer_lateral_acceleration);
+    let tractor_state = vec2<f32>(truck.tractor_roll, truck.tractor_roll_rate);
+    let tractor = rolled(rig.tractor_roll, tractor_state, mean.lateral_acceleration + rig.crossfall);
+    let trailer_state = vec2<f32>(truck.trailer_roll, truck.trailer_roll_rate);
+    let trailer = rolled(rig.trailer_roll, trailer_state, mean.trailer_lateral_acceleration + rig.crossfall);
+    let ratios =
+        load_transfer_ratios(rig, tractor, trailer, last.lateral_acceleration, last.trailer_lateral_acceleration);
     var after = truck;
     after.position = truck.position + substep * velocity;
     after.heading = heading;

@@ -16,7 +16,14 @@ fn judge(thread: Thread) {
 }
 
 // Why the episode ended, RUNNING when it did not.
-fn ending(params: Params, route: RouteRow, step_limit: u32, truck: Truck, clearance: Clearance, progress: Progress) -> u32 {
+fn ending(
+    params: Params,
+    route: RouteRow,
+    step_limit: u32,
+    truck: Truck,
+    clearance: Clearance,
+    progress: Progress,
+) -> u32 {
     let articulation = wrapped(truck.heading - truck.trailer_heading);
     let load_transfer_ratio = max(abs(truck.tractor_load_transfer_ratio), abs(truck.trailer_load_transfer_ratio));
     let arrived = route.n_waypoints <= progress.waypoint;

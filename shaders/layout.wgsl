@@ -1,4 +1,5 @@
-// What shaders share with Rust. Printed by src/engine/wgsl.rs from the layout and the constants beside each stage: change those.
+// What shaders share with Rust. Printed by src/engine/wgsl.rs from the layout and the constants beside each
+// stage: change those.
 
 // Threads of a workgroup.
 const WORKGROUP: u32 = 64u;

@@ -42,8 +42,8 @@ fn misplaced(disturbances: Disturbances, stream: Stream, episode: u32, steps: u3
     let others = words(stream.seed, stream.env, episode, DRAW_OFFSETS);
     let key = noise_key(stream, episode);
     let offset = disturbances.position_offset * vec2<f32>(signed_unit(place.z), signed_unit(place.w));
-    let shake =
-        disturbances.position_noise * vec2<f32>(noise(key, steps, POSITION_NOISE), noise(key, steps, POSITION_NOISE + 1u));
+    let shaken = vec2<f32>(noise(key, steps, POSITION_NOISE), noise(key, steps, POSITION_NOISE + 1u));
+    let shake = disturbances.position_noise * shaken;
     let turn = disturbances.heading_offset * signed_unit(others.x);
     var after = pose;
     after.position = pose.position + offset + shake;

@@ -54,7 +54,8 @@ fn start(env: u32, begin: BeginRow) {
     if (begin.what & HAS_START) == 0u {
         let pose = words(stream.seed, stream.env, episode, DRAW_POSE);
         let kind = words(stream.seed, stream.env, episode, DRAW_VEHICLE);
-        start = Start(signed_unit(pose.x), signed_unit(pose.y), signed_unit(kind.y), index_below(kind.x, params.n_vehicles));
+        let vehicle = index_below(kind.x, params.n_vehicles);
+        start = Start(signed_unit(pose.x), signed_unit(pose.y), signed_unit(kind.y), vehicle);
     }
     let first = routes[route].first;
     var after = started(params, rigs[start.vehicle].wheelbase, waypoints[first], previews[first].heading, start);
@@ -63,7 +64,8 @@ fn start(env: u32, begin: BeginRow) {
     control[env] = Control();
     control[env].target_speed = after.speed;
     truck[env] = after;
-    progress[env] = followed(routes[route], reference_point(rigs[start.vehicle].wheelbase, after), 1u, params.stray_distance);
+    let point = reference_point(rigs[start.vehicle].wheelbase, after);
+    progress[env] = followed(routes[route], point, 1u, params.stray_distance);
     progress[env].passed = 0u;
     if params.disturbances.of_observation == 1u { perceive(env, 0u); }
 }

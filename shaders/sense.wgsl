@@ -24,7 +24,8 @@ fn sense_after_reset(thread: Thread) {
 fn range_of(env: u32, index: u32, steps: u32) -> f32 {
     if params.disturbances.of_observation == 0u { return exact_range(truck[env], index); }
     let range = exact_range(seen_truck(truck[env], poses[env * N_POSES]), index);
-    return reading(params.disturbances, noise_key(streams[env], truck[env].episode), steps, params.sensor_range, index, range);
+    let key = noise_key(streams[env], truck[env].episode);
+    return reading(params.disturbances, key, steps, params.sensor_range, index, range);
 }
 
 // Distance along a truck's ray to the kerb: the sensors' range where none is met before, 0 from inside one (m).

@@ -9,8 +9,11 @@ fn steer(thread: Thread) {
     let duration = f32(params.n_substeps) * params.substep;
     let before = control[env];
     var asked = actions[action[env]];
-    if params.disturbances.of_action == 1u { asked = late_action(streams[env], truck[env].episode, action[env], before); }
-    control[env] = controlled(rigs[truck[env].vehicle], duration, targeted(params, asked, before), truck[env].speed, before);
+    if params.disturbances.of_action == 1u {
+        asked = late_action(streams[env], truck[env].episode, action[env], before);
+    }
+    let next = targeted(params, asked, before);
+    control[env] = controlled(rigs[truck[env].vehicle], duration, next, truck[env].speed, before);
     if params.disturbances.of_action == 1u {
         control[env].action_before = action[env] + 1u;
         control[env].action_earlier = before.action_before;

@@ -104,7 +104,8 @@ fn sample(thread: Thread) {
     if is_mirrored { image = images[value]; }
     // The same noise on both, so that their difference stays what it is.
     let noise = normalisation[value].noise * signed_unit(words(facts.sampling_seed, index, now.sample, 1u + value).x);
-    sampled_observation[element] = normalised(image.factor * held_observation[first * facts.n_values + image.index], value) + noise;
+    let held = held_observation[first * facts.n_values + image.index];
+    sampled_observation[element] = normalised(image.factor * held, value) + noise;
     sampled_next[element] = normalised(image.factor * held_next[last * facts.n_values + image.index], value) + noise;
 }
 

@@ -36,7 +36,9 @@ fn field_sample(field: FieldRow, exact: bool, p: vec2<f32>) -> Sample {
 fn cell_index(columns: u32, column: u32, row: u32) -> u32 {
     let tile_column = column / TILE_COLUMNS;
     let tile_row = row / TILE_ROWS;
-    return (tile_row * columns + tile_column * TILE_COLUMNS) * TILE_ROWS + row % TILE_ROWS * TILE_COLUMNS + column % TILE_COLUMNS;
+    return (tile_row * columns + tile_column * TILE_COLUMNS) * TILE_ROWS
+        + row % TILE_ROWS * TILE_COLUMNS
+        + column % TILE_COLUMNS;
 }
 
 // A block of `size` sub-cells a side whose pairs begin at `first`, at fractions of the cell.

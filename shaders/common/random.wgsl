@@ -23,8 +23,8 @@ fn signed_unit(word: u32) -> f32 {
     return f32(word >> SPARE_BITS) * UNIT - 1.0;
 }
 
-// Four words as a normal number of mean 0 and standard deviation 1: the sum of four uniform ones, at most 3.5 in magnitude.
-// The sum is exact in f32.
+// Four words as a normal number of mean 0 and standard deviation 1: the sum of four uniform ones, at most 3.5 in
+// magnitude. The sum is exact in f32.
 fn normal(words: vec4<u32>) -> f32 {
     let parts = words >> vec4<u32>(SPARE_BITS_OF_FOUR);
     return (f32(parts.x + parts.y + parts.z + parts.w) * UNIT_OF_FOUR - 2.0) * DEVIATIONS;

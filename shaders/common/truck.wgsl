@@ -2,7 +2,8 @@
 
 // Middle of the trailer's axle group (m).
 fn trailer_position(rig: Rig, truck: Truck) -> vec2<f32> {
-    return truck.position + rig.fifth_wheel * direction(truck.heading) - rig.trailer_wheelbase * direction(truck.trailer_heading);
+    return truck.position + rig.fifth_wheel * direction(truck.heading)
+        - rig.trailer_wheelbase * direction(truck.trailer_heading);
 }
 
 // Whether there is such a truck and it is not held.

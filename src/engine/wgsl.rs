@@ -13,7 +13,7 @@ pub fn layout() -> String {
 /// Constants and structs alone, for shaders with buffers of their own.
 pub fn shared() -> String {
     [
-        "// What shaders share with Rust. Printed by src/engine/wgsl.rs from the layout and the constants beside each stage: change those.\n\n"
+        "// What shaders share with Rust. Printed by src/engine/wgsl.rs from the layout and the constants beside each\n// stage: change those.\n\n"
             .to_owned(),
         layout::printed_constants(),
         angle::printed_constants(),

@@ -96,8 +96,8 @@ impl Road {
         }
     }
 
-    /// The edge of the drivable surface as closed lines in the frame of the map that the road is from, the drivable side
-    /// on their left; chords leave the edge by at most 5 mm, and no line repeats its first point (m).
+    /// The edge of the drivable surface as closed lines in the frame of the map that the road is from, the drivable
+    /// side on their left; chords leave the edge by at most 5 mm, and no line repeats its first point (m).
     pub fn kerb_lines(&self, gutter: Gutter) -> Vec<Vec<DVec2>> {
         let frame = self.ground.frame();
         let line = |curve: &Curve| {

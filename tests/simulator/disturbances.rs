@@ -1,5 +1,5 @@
-//! What the world does to a policy: what it observes late, misplaced and noisy, and actions that come late. What is stays
-//! what it is.
+//! What the world does to a policy: what it observes late, misplaced and noisy, and actions that come late. What is
+//! stays what it is.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -121,8 +121,8 @@ fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bo
         || near(after.progress[env].waypoint_distance, params.stray_distance)
 }
 
-/// Whether the truck as it is observed, on the route as it is taken to lie, was closer than the margin to a line that it
-/// passes.
+/// Whether the truck as it is observed, on the route as it is taken to lie, was closer than the margin to a line that
+/// it passes.
 fn is_close_call_as_seen(world: &World, after: &Batch, env: usize) -> bool {
     let disturbances = &world.params.disturbances;
     if disturbances.of_observation == 0 {

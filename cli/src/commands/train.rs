@@ -1,5 +1,5 @@
-//! `offtrack train`: trains a policy, then evaluates it on the test routes, as [`offtrack_learner::train`] does: here are
-//! its flags, what it shows, and the signals that stop it.
+//! `offtrack train`: trains a policy, then evaluates it on the test routes, as [`offtrack_learner::train`] does: here
+//! are its flags, what it shows, and the signals that stop it.
 
 mod args;
 mod beginning;

@@ -129,9 +129,9 @@ fn off_tracking_in_a_steady_turn_is_that_of_sae_j695() {
 
 #[test]
 fn chronos_kraz_turns_and_bends_as_its_lengths_and_1_2_degrees_of_understeer_a_g_say() {
-    // Project Chrono's Kraz 64431 with its trailer, held at 16.463 m/s and 0.03733 rad in its step steer: yaw rate 0.11452
-    // rad/s, articulation 0.05171 rad, roll 0.0461 rad. Lengths by its files: rear axles 4.08 and 5.48 m behind the front
-    // one, fifth wheel 4.64 m behind it, the trailer's middle axle 7.59 m behind the kingpin.
+    // Project Chrono's Kraz 64431 with its trailer, held at 16.463 m/s and 0.03733 rad in its step steer: yaw rate
+    // 0.11452 rad/s, articulation 0.05171 rad, roll 0.0461 rad. Lengths by its files: rear axles 4.08 and 5.48 m behind
+    // the front one, fifth wheel 4.64 m behind it, the trailer's middle axle 7.59 m behind the kingpin.
     let (speed, steering) = (16.463f32, 0.03733f32);
     let mut kraz = vehicle("daf_xf");
     (kraz.tractor.wheelbase, kraz.tractor.fifth_wheel, kraz.trailer.wheelbase) = (4.78, 0.14, 7.59);
@@ -160,8 +160,8 @@ fn chronos_kraz_turns_and_bends_as_its_lengths_and_1_2_degrees_of_understeer_a_g
 fn rollover_thresholds_lie_where_tilt_tables_and_regulations_have_them() {
     let threshold = |name: &str, load: &str| vehicle(name).loads[load].suspension.rollover_threshold();
     for name in ["daf_xf", "eu_4x2_13m6"] {
-        // Of 17 tankers on a tilt table 7 were below 0.35 g and 14 below 0.40 g (Billing and Patten); a tank, and the worst
-        // of them.
+        // Of 17 tankers on a tilt table 7 were below 0.35 g and 14 below 0.40 g (Billing and Patten); a tank, and the
+        // worst of them.
         assert!((0.35..0.40).contains(&threshold(name, "laden_high")));
         assert!((0.30..0.35).contains(&threshold(name, "laden_worst")));
         // Regulations ask for 0.35 g, and for 0.40 g with dangerous goods: a load of ordinary height keeps both.

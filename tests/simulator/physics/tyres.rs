@@ -1,5 +1,5 @@
-//! Slip that grows with the load transfer ratio against a truck on brush tyres, which lose stiffness by load transfer and
-//! saturate.
+//! Slip that grows with the load transfer ratio against a truck on brush tyres, which lose stiffness by load transfer
+//! and saturate.
 
 mod brush;
 
@@ -48,8 +48,8 @@ impl Errors {
     }
 }
 
-/// Errors on every circle of 12.5 to 30 m at 5 km/h up to `fastest` that the truck on brush tyres holds, with the growth
-/// and without.
+/// Errors on every circle of 12.5 to 30 m at 5 km/h up to `fastest` that the truck on brush tyres holds, with the
+/// growth and without.
 fn errors(
     name: &str,
     axles: &[f64],
@@ -91,8 +91,8 @@ fn with_slip_growth_a_trailer_cuts_in_as_much_as_on_tyres_that_lose_stiffness_an
                 plain.worst
             );
             assert!(29 <= grown.n, "{case}");
-            // Empty it holds 0.65 g, near the end of its tyres; and the two axles of daf_xf lie so far apart that they scrub
-            // in a tight turn, which a single track does not.
+            // Empty it holds 0.65 g, near the end of its tyres; and the two axles of daf_xf lie so far apart that they
+            // scrub in a tight turn, which a single track does not.
             let (rms, worst) = if load.0 == "empty" { (0.12, 0.33) } else { (0.10, 0.25) };
             assert!(grown.rms() <= rms && grown.worst <= worst, "{case}: {} m, {} m", grown.rms(), grown.worst);
             assert!(2.0 * grown.rms() < plain.rms() && 0.24 < plain.rms(), "{case}: without growth it would pass");

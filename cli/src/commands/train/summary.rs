@@ -77,7 +77,8 @@ fn lines(evaluation: Option<&Report>, also: &[AlsoReport]) -> String {
         let [success, low, high] =
             [summary.success, summary.success_low, summary.success_high].map(|fraction| 100.0 * fraction);
         format!(
-            "{name:width$}  {arrived:>11} arrived, {success:5.1} % ({low:.1} to {high:.1} %), lane distance {lane} ({})\n",
+            "{name:width$}  {arrived:>11} arrived, {success:5.1} % ({low:.1} to {high:.1} %), lane distance {lane} \
+             ({})\n",
             familiarity(*trained_on, report.routes.len())
         )
     };

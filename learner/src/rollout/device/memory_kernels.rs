@@ -1,5 +1,5 @@
-//! The kernels of the replay buffer on a device: structs and bindings declared once, printed for `replay_buffer.wgsl`, and
-//! compiled.
+//! The kernels of the replay buffer on a device: structs and bindings declared once, printed for `replay_buffer.wgsl`,
+//! and compiled.
 
 use offtrack::engine::stages::SHADERS;
 use offtrack::engine::wgsl;

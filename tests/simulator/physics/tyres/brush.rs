@@ -1,9 +1,9 @@
 //! A tractor and its semitrailer on brush tyres, in f64 with RK4.
 //!
-//! Two rigid bodies in the plane, joined at the fifth wheel, by Kane's equations with the speed of the drive axle given.
-//! Each axle has a tyre, or a pair, on either side. A tyre's cornering coefficient falls with its load, so a pair loses
-//! stiffness as load moves from one side to the other, and its force saturates at its friction (brush model of E. Fiala,
-//! 1954). Numbers are a generic truck tyre's: at rest they give the slip of the vehicle files.
+//! Two rigid bodies in the plane, joined at the fifth wheel, by Kane's equations with the speed of the drive axle
+//! given. Each axle has a tyre, or a pair, on either side. A tyre's cornering coefficient falls with its load, so a
+//! pair loses stiffness as load moves from one side to the other, and its force saturates at its friction (brush model
+//! of E. Fiala, 1954). Numbers are a generic truck tyre's: at rest they give the slip of the vehicle files.
 
 use glam::DVec2;
 use offtrack::vehicle::{GRAVITY, Vehicle};
@@ -85,13 +85,13 @@ pub struct Brush {
     on_hitch: f64,
 }
 
-/// Side speed of the drive axle (m/s), yaw rates of tractor and trailer (rad/s), articulation (rad), load transfer ratios
-/// of both, steer angle (rad).
+/// Side speed of the drive axle (m/s), yaw rates of tractor and trailer (rad/s), articulation (rad), load transfer
+/// ratios of both, steer angle (rad).
 type State = [f64; 7];
 
 impl Brush {
-    /// A vehicle's, whose centre of gravity lies `ahead` of the middle of its trailer's axles, which are so far behind the
-    /// kingpin (m). A tractor alone has 65 % of its weight on its front axle.
+    /// The truck of a vehicle's file, whose centre of gravity lies `ahead` of the middle of its trailer's axles, which are so far behind
+    /// the kingpin (m). A tractor alone has 65 % of its weight on its front axle.
     pub fn of(vehicle: &Vehicle, load: &str, ahead: f64, axles: &[f64], tyres: Tyres) -> Brush {
         let (load, tractor, trailer) = (&vehicle.loads[load], &vehicle.tractor, &vehicle.trailer);
         let middle = axles.iter().sum::<f64>() / axles.len() as f64;
