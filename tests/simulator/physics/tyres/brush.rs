@@ -90,8 +90,8 @@ pub struct Brush {
 type State = [f64; 7];
 
 impl Brush {
-    /// The truck of a vehicle's file, whose centre of gravity lies `ahead` of the middle of its trailer's axles, which are so far behind
-    /// the kingpin (m). A tractor alone has 65 % of its weight on its front axle.
+    /// The truck of a vehicle's file, whose centre of gravity lies `ahead` of the middle of its trailer's axles, which
+    /// are so far behind the kingpin (m). A tractor alone has 65 % of its weight on its front axle.
     pub fn of(vehicle: &Vehicle, load: &str, ahead: f64, axles: &[f64], tyres: Tyres) -> Brush {
         let (load, tractor, trailer) = (&vehicle.loads[load], &vehicle.tractor, &vehicle.trailer);
         let middle = axles.iter().sum::<f64>() / axles.len() as f64;
