@@ -8,7 +8,21 @@ var<workgroup> counted: array<atomic<i32>, N_SUMS + 1u>;
 
 @compute @workgroup_size(WORKGROUP)
 fn count(thread: Thread) {
+    count_step(thread.local, index_of(thread));
+}
+
+// Judges the step and counts it at once.
+@compute @workgroup_size(WORKGROUP)
+fn judge_and_count(thread: Thread) {
     let env = index_of(thread);
+    if is_driving(env) { judge_step(env); }
+    count_step(thread.local, env);
+}
+
+// Counts the step of the workgroup's truck `local`, which is truck `env`.
+fn count_step(local: u32, env: u32) {
+    if local <= N_SUMS { atomicStore(&counted[local], 0); }
+    workgroupBarrier();
     if is_driving(env) {
         atomicAdd(&counted[ended[env]], 1);
         let units = i32(round(reward[env] * REWARD_UNITS));
@@ -16,10 +30,10 @@ fn count(thread: Thread) {
         atomicAdd(&counted[N_SUMS], units >> 16u);
     }
     workgroupBarrier();
-    if thread.local < N_SUMS {
-        let amount = atomicLoad(&counted[thread.local]);
-        add(thread.local, u32(amount), u32(amount >> 31u));
-    } else if thread.local == N_SUMS {
+    if local < N_SUMS {
+        let amount = atomicLoad(&counted[local]);
+        add(local, u32(amount), u32(amount >> 31u));
+    } else if local == N_SUMS {
         let amount = atomicLoad(&counted[N_SUMS]);
         add(REWARD_SUM, u32(amount) << 16u, u32(amount >> 16u));
     }

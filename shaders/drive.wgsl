@@ -8,7 +8,7 @@
 fn drive(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
-    truck[env] = driven(rigs[truck[env].vehicle], params.substep, params.n_substeps, control[env], truck[env]);
+    truck[env] = driven(vehicles[truck[env].vehicle].rig, params.substep, params.n_substeps, control[env], truck[env]);
 }
 
 // The truck after `n_substeps` sub-steps of `substep` seconds, for which the rig's roll is discretised.

@@ -6,9 +6,9 @@
 fn follow(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
-    let point = reference_point(rigs[truck[env].vehicle].wheelbase, truck[env]);
-    progress[env] = followed(routes[truck[env].route], point, progress[env].waypoint, params.stray_distance);
-    if params.disturbances.of_observation == 1u { perceive(env, truck[env].steps + 1u); }
+    let point = reference_point(vehicles[truck[env].vehicle].rig.wheelbase, truck[env]);
+    progress[env] = followed(route_at(truck[env].route), point, progress[env].waypoint, params.stray_distance);
+    if disturbances.of_observation == 1u { perceive(env, truck[env].steps + 1u); }
 }
 
 // Middle of the wheelbase (m).
@@ -17,16 +17,16 @@ fn reference_point(wheelbase: f32, truck: Truck) -> vec2<f32> {
 }
 
 // Progress of a truck at `point` that had `next` as its next waypoint.
-fn followed(route: RouteRow, point: vec2<f32>, next: u32, reach: f32) -> Progress {
+fn followed(route: Route, point: vec2<f32>, next: u32, reach: f32) -> Progress {
     var waypoint = next;
-    while waypoint < route.n_waypoints && is_passed(waypoints[route.first + waypoint], point, reach) {
+    while waypoint < route.n_waypoints && is_passed(waypoint_at(route.first + waypoint), point, reach) {
         waypoint++;
     }
     let ahead = route.first + min(waypoint, route.n_waypoints - 1u);
     let behind = max(ahead, route.first + 1u) - 1u;
     return Progress(
-        distance_to_segment(point, waypoints[behind].position, waypoints[ahead].position),
-        distance(point, waypoints[ahead].position),
+        distance_to_segment(point, waypoint_at(behind).position, waypoint_at(ahead).position),
+        distance(point, waypoint_at(ahead).position),
         waypoint,
         waypoint - next,
     );

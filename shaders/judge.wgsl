@@ -5,20 +5,26 @@
 @compute @workgroup_size(WORKGROUP)
 fn judge(thread: Thread) {
     let env = index_of(thread);
-    if !is_driving(env) { return; }
+    if is_driving(env) { judge_step(env); }
+}
+
+// Judges a truck's step.
+fn judge_step(env: u32) {
     truck[env].steps += 1u;
-    let step_limit = step_limits[truck[env].route * params.n_classes + rigs[truck[env].vehicle].class_index];
-    let code = ending(params, routes[truck[env].route], step_limit, truck[env], clearance[env], progress[env]);
-    let amounts = reward_terms(params, clearance[env], progress[env], code);
+    // The route's waypoints, and behind them the steps of each class.
+    let row = params.n_vehicles + truck[env].route * (1u + params.n_classes);
+    let step_limit = limits[row + 1u + limits[truck[env].vehicle]];
+    let code = ending(params, limits[row], step_limit, truck[env], clearance[env], progress[env]);
+    let amounts = reward_terms(weights, clearance[env], progress[env], code);
     ended[env] = code;
     terms[env] = amounts;
-    reward[env] = rewarded(params, amounts);
+    reward[env] = rewarded(weights, amounts);
 }
 
 // Why the episode ended, RUNNING when it did not.
 fn ending(
     params: Params,
-    route: RouteRow,
+    n_waypoints: u32,
     step_limit: u32,
     truck: Truck,
     clearance: Clearance,
@@ -26,7 +32,7 @@ fn ending(
 ) -> u32 {
     let articulation = wrapped(truck.heading - truck.trailer_heading);
     let load_transfer_ratio = max(abs(truck.tractor_load_transfer_ratio), abs(truck.trailer_load_transfer_ratio));
-    let arrived = route.n_waypoints <= progress.waypoint;
+    let arrived = n_waypoints <= progress.waypoint;
     if clearance.tractor <= 0.0 {
         return TRACTOR_COLLIDED;
     } else if clearance.trailer <= 0.0 {
@@ -46,20 +52,20 @@ fn ending(
 }
 
 // The physical amounts that the reward weighs.
-fn reward_terms(params: Params, clearance: Clearance, progress: Progress, code: u32) -> RewardTerms {
+fn reward_terms(weights: Reward, clearance: Clearance, progress: Progress, code: u32) -> RewardTerms {
     let failed = code != RUNNING && code != ARRIVED && code != TIMED_OUT;
     return RewardTerms(
         f32(progress.passed),
-        min(progress.lane_distance / params.reward.lane_distance_limit, 1.0),
-        clamp(1.0 - min(clearance.tractor, clearance.trailer) / params.reward.clearance_limit, 0.0, 1.0),
+        min(progress.lane_distance / weights.lane_distance_limit, 1.0),
+        clamp(1.0 - min(clearance.tractor, clearance.trailer) / weights.clearance_limit, 0.0, 1.0),
         select(0.0, 1.0, failed),
     );
 }
 
 // The weighted sum.
-fn rewarded(params: Params, terms: RewardTerms) -> f32 {
-    return params.reward.waypoint * terms.waypoints
-        + params.reward.lane_distance * terms.lane_distance
-        + params.reward.clearance * terms.clearance
-        + params.reward.failure * terms.failure;
+fn rewarded(weights: Reward, terms: RewardTerms) -> f32 {
+    return weights.waypoint * terms.waypoints
+        + weights.lane_distance * terms.lane_distance
+        + weights.clearance * terms.clearance
+        + weights.failure * terms.failure;
 }

@@ -3,6 +3,8 @@
 
 // Threads of a workgroup.
 const WORKGROUP: u32 = 64u;
+// Trucks whose rays a workgroup shares, at most.
+const TEAM_MAX: u32 = 32u;
 // Values in an observation.
 const N_VALUES: u32 = 69u;
 // Distance sensors on the trailer, left and right alternating, front to rear.
@@ -18,6 +20,10 @@ const N_EXTRAS: u32 = 12u;
 // Poses of a truck that are kept where what is observed is disturbed: the one that is observed, and those of the
 // last three steps, the latest first.
 const N_POSES: u32 = 4u;
+// Rows of four words that a route takes in the table of roads: its own, and its roundabout's field.
+const ROUTE_ROWS: u32 = 4u;
+// Rows of four words that a waypoint's preview takes there.
+const PREVIEW_ROWS: u32 = 5u;
 // Bit of `BeginRow::what`: the truck begins an episode.
 const BEGINS: u32 = 1u;
 // Bit: the episode is the first of the truck's stream, not the next one.
@@ -471,6 +477,14 @@ struct Rig {
     fifth_wheel_load: f32,
 }
 
+// The vehicle with its distance sensors, as a device has them side by side.
+struct VehicleRow {
+    // The distance sensors, trailer's first.
+    rays: array<Ray, 29>,
+    // The vehicle.
+    rig: Rig,
+}
+
 // One entry of the action table.
 struct Action {
     // Steer angle asked for (rad).
@@ -525,7 +539,7 @@ struct Disturbances {
     of_action: u32,
 }
 
-// Time and weights, shared by all trucks.
+// Time and limits, shared by all trucks.
 struct Params {
     // Time of one sub-step (s).
     substep: f32,
@@ -561,10 +575,6 @@ struct Params {
     jackknife_angle: f32,
     // Load transfer ratio from which the truck has rolled over.
     rollover_ratio: f32,
-    // Weights and limits of the reward.
-    reward: Reward,
-    // What the world does to a policy.
-    disturbances: Disturbances,
 }
 
 // One waypoint of one route.
@@ -597,7 +607,7 @@ struct RouteRow {
     crossing_right: f32,
 }
 
-// One roundabout's field among the tables of all fields.
+// One roundabout's field among the cells and blocks of all fields.
 struct FieldRow {
     // South-west corner of the grid (m).
     origin: vec2<f32>,
@@ -625,65 +635,63 @@ struct BatchFacts {
     fixed: u32,
     // What follows the end of an episode: SAME_STEP, NEXT_STEP or DISABLED.
     autoreset: u32,
+    // Trucks whose rays a workgroup shares.
+    team: u32,
 }
 
-// Time and weights.
-@group(0) @binding(0) var<storage, read> params: Params;
-// The vehicles.
-@group(0) @binding(1) var<storage, read> rigs: array<Rig>;
+// Time and limits.
+@group(0) @binding(0) var<uniform> params: Params;
+// What the reward weighs.
+@group(0) @binding(1) var<uniform> weights: Reward;
+// What the world does to a policy.
+@group(0) @binding(2) var<uniform> disturbances: Disturbances;
+// The vehicles with their distance sensors.
+@group(0) @binding(3) var<storage, read> vehicles: array<VehicleRow>;
 // The action table.
-@group(0) @binding(2) var<storage, read> actions: array<Action>;
-// The distance sensors of each chassis, trailer's first.
-@group(0) @binding(3) var<storage, read> rays: array<Ray>;
-// A field for each roundabout.
-@group(0) @binding(4) var<storage, read> fields: array<FieldRow>;
+@group(0) @binding(4) var<storage, read> actions: array<Action>;
+// Every route, all waypoints and what is observed at each of them, as common/road.wgsl reads them.
+@group(0) @binding(5) var<storage, read> roads: array<vec4<u32>>;
 // Cells of all fields, two words each.
-@group(0) @binding(5) var<storage, read> cells: array<vec2<u32>>;
+@group(0) @binding(6) var<storage, read> cells: array<vec2<u32>>;
 // Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of STORED_UNIT.
-@group(0) @binding(6) var<storage, read> corners: array<u32>;
-// Every route's waypoints, one route after the other.
-@group(0) @binding(7) var<storage, read> waypoints: array<WaypointRow>;
-// What is observed at each of them.
-@group(0) @binding(8) var<storage, read> previews: array<PreviewRow>;
-// Every route.
-@group(0) @binding(9) var<storage, read> routes: array<RouteRow>;
-// Steps after which an episode is timed out, [n_routes, n_classes].
-@group(0) @binding(10) var<storage, read> step_limits: array<u32>;
+@group(0) @binding(7) var<storage, read> corners: array<u32>;
+// The class of each vehicle; then of each route its number of waypoints, and for each class the steps after which an episode is timed out.
+@group(0) @binding(8) var<storage, read> limits: array<u32>;
 // Facts that the trucks of a batch share.
-@group(0) @binding(11) var<uniform> batch: BatchFacts;
+@group(0) @binding(9) var<uniform> batch: BatchFacts;
 // Routes that episodes run on: to be drawn from, or one for each truck.
-@group(0) @binding(12) var<storage, read> choice: array<u32>;
+@group(0) @binding(10) var<storage, read> choice: array<u32>;
 // The stream of random numbers that each truck draws from, [n_envs].
-@group(0) @binding(13) var<storage, read> streams: array<Stream>;
+@group(0) @binding(11) var<storage, read> streams: array<Stream>;
 // Which trucks begin an episode when the caller says so, and how, [n_envs].
-@group(0) @binding(14) var<storage, read> begins: array<BeginRow>;
+@group(0) @binding(12) var<storage, read> begins: array<BeginRow>;
 // Index into the action table, [n_envs].
-@group(0) @binding(15) var<storage, read_write> action: array<u32>;
+@group(0) @binding(13) var<storage, read_write> action: array<u32>;
 // Steer angle and acceleration asked of each truck, [n_envs].
-@group(0) @binding(16) var<storage, read_write> control: array<Control>;
+@group(0) @binding(14) var<storage, read_write> control: array<Control>;
 // The trucks, [n_envs].
-@group(0) @binding(17) var<storage, read_write> truck: array<Truck>;
+@group(0) @binding(15) var<storage, read_write> truck: array<Truck>;
 // Distances to the kerbs (m), [n_envs].
-@group(0) @binding(18) var<storage, read_write> clearance: array<Clearance>;
+@group(0) @binding(16) var<storage, read_write> clearance: array<Clearance>;
 // Progress along the routes, [n_envs].
-@group(0) @binding(19) var<storage, read_write> progress: array<Progress>;
+@group(0) @binding(17) var<storage, read_write> progress: array<Progress>;
 // Distance sensors (m), [n_envs, 29].
-@group(0) @binding(20) var<storage, read_write> ranges: array<f32>;
+@group(0) @binding(18) var<storage, read_write> ranges: array<f32>;
 // The observation before the next action, [n_envs, 69].
-@group(0) @binding(21) var<storage, read_write> observation: array<f32>;
+@group(0) @binding(19) var<storage, read_write> observation: array<f32>;
 // The observation after the last action, another one only where an episode ended, [n_envs, 69].
-@group(0) @binding(22) var<storage, read_write> next_observation: array<f32>;
+@group(0) @binding(20) var<storage, read_write> next_observation: array<f32>;
 // Codes of `Ended` for the last step, [n_envs].
-@group(0) @binding(23) var<storage, read_write> ended: array<u32>;
+@group(0) @binding(21) var<storage, read_write> ended: array<u32>;
 // Physical amounts that the reward weighs, [n_envs].
-@group(0) @binding(24) var<storage, read_write> terms: array<RewardTerms>;
+@group(0) @binding(22) var<storage, read_write> terms: array<RewardTerms>;
 // Rewards of the last step, [n_envs].
-@group(0) @binding(25) var<storage, read_write> reward: array<f32>;
+@group(0) @binding(23) var<storage, read_write> reward: array<f32>;
 // What is observed beside the observation before the next action; zeros beyond what the benchmark observes, [n_envs, 12].
-@group(0) @binding(26) var<storage, read_write> extras: array<f32>;
+@group(0) @binding(24) var<storage, read_write> extras: array<f32>;
 // What is observed beside the observation after the last action, [n_envs, 12].
-@group(0) @binding(27) var<storage, read_write> next_extras: array<f32>;
+@group(0) @binding(25) var<storage, read_write> next_extras: array<f32>;
 // With disturbances: the pose that is observed, and those of the last three steps; zeros without, [n_envs, 4].
-@group(0) @binding(28) var<storage, read_write> poses: array<Pose>;
+@group(0) @binding(26) var<storage, read_write> poses: array<Pose>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(29) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(27) var<storage, read_write> tally: array<atomic<u32>>;

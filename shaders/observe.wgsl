@@ -1,122 +1,168 @@
-// Writes the observation after the action: 69 values, see src/layout/observation.rs.
+// Writes the observation after the action: 69 values, see src/layout/observation.rs; and the values beside it.
 //
-// Values that depend on the next waypoint alone are looked up in a table that src/world.rs bakes.
+// A thread computes what is its truck's alone. Then the threads of a workgroup write the rows of its trucks together,
+// neighbouring values by neighbouring threads: ranges and previews come straight from where they are. Values that
+// depend on the next waypoint alone are looked up: src/world.rs bakes them.
+
+// Values that a thread computes: the first ones.
+const N_COMPUTED: u32 = CURVATURES_AT;
+// From one truck's computed values to the next one's: an odd number, so that they lie in different banks of the memory.
+const COMPUTED_STRIDE: u32 = N_COMPUTED | 1u;
+
+// The computed values of the workgroup's trucks, and the row of each one's preview in the table of roads.
+var<workgroup> computed: array<f32, WORKGROUP * COMPUTED_STRIDE>;
+var<workgroup> previewed: array<u32, WORKGROUP>;
+// The trucks that are observed, by their index in the workgroup.
+var<workgroup> listed: array<u32, WORKGROUP>;
+var<workgroup> n_listed: atomic<u32>;
 
 @compute @workgroup_size(WORKGROUP)
 fn observe(thread: Thread) {
     let env = index_of(thread);
-    if !is_driving(env) { return; }
-    observed(env, false);
+    clear_list(thread.local);
+    if is_driving(env) { compute(thread.local, env, as_seen(env)); }
+    let n_values = n_listed_values();
+    for (var n = thread.local; n < n_values; n += WORKGROUP) {
+        let local = listed[n / N_VALUES];
+        let whose = env - thread.local + local;
+        next_observation[whose * N_VALUES + n % N_VALUES] = observed(local, whose, n % N_VALUES);
+    }
 }
 
 // The first observation of the trucks that began another episode.
 @compute @workgroup_size(WORKGROUP)
 fn observe_after_reset(thread: Thread) {
     let env = index_of(thread);
-    if !has_begun(env) { return; }
-    observed(env, true);
-    // With the other modes it describes the step that ended the last episode.
-    if batch.autoreset == NEXT_STEP { copy_first(env); }
+    clear_list(thread.local);
+    if has_begun(env) { compute(thread.local, env, as_seen(env)); }
+    let n_values = n_listed_values();
+    for (var n = thread.local; n < n_values; n += WORKGROUP) {
+        let local = listed[n / N_VALUES];
+        let whose = env - thread.local + local;
+        observation[whose * N_VALUES + n % N_VALUES] = observed(local, whose, n % N_VALUES);
+    }
 }
 
-// The first observation of the trucks that the caller named.
+// The observation after the action, and the same as the one before the next action, where what is observed is what is.
 @compute @workgroup_size(WORKGROUP)
-fn observe_begun(thread: Thread) {
+fn observe_both(thread: Thread) {
     let env = index_of(thread);
-    if !is_to_begin(env) { return; }
-    observed(env, true);
-    copy_first(env);
+    clear_list(thread.local);
+    if is_driving(env) { compute(thread.local, env, Seen(truck[env], progress[env])); }
+    let n_values = n_listed_values();
+    for (var n = thread.local; n < n_values; n += WORKGROUP) {
+        let local = listed[n / N_VALUES];
+        let whose = env - thread.local + local;
+        let value = observed(local, whose, n % N_VALUES);
+        next_observation[whose * N_VALUES + n % N_VALUES] = value;
+        observation[whose * N_VALUES + n % N_VALUES] = value;
+    }
 }
 
-// Makes the first observation of an episode the one after the last action too: there was none.
-fn copy_first(env: u32) {
-    for (var n = 0u; n < N_VALUES; n++) {
-        next_observation[env * N_VALUES + n] = observation[env * N_VALUES + n];
-    }
+// What is observed beside it: the extras.
+@compute @workgroup_size(WORKGROUP)
+fn observe_extras(thread: Thread) {
+    let env = index_of(thread);
+    if !is_driving(env) { return; }
     for (var n = 0u; n < N_EXTRAS; n++) {
-        next_extras[env * N_EXTRAS + n] = extras[env * N_EXTRAS + n];
+        next_extras[env * N_EXTRAS + n] = extra(env, n);
     }
 }
 
-// Writes a value of a truck's observation: to the one before the next action after a reset, otherwise to the one after
-// the last action.
-fn put(env: u32, after_reset: bool, index: u32, value: f32) {
-    if after_reset {
-        observation[env * N_VALUES + index] = value;
-    } else {
-        next_observation[env * N_VALUES + index] = value;
-    }
-}
-
-// The values beside the observation, as src/layout/extras.rs defines them: those that the benchmark observes.
-fn observe_extras(env: u32, after_reset: bool) {
-    if params.n_extras == 0u { return; }
-    let truck = truck[env];
-    let rig = rigs[truck.vehicle];
-    let values = array<f32, N_EXTRAS>(
-        truck.steering / rig.steer_max,
-        control[env].target_speed / SPEED_SCALE,
-        truck.acceleration / ACCELERATION_SCALE,
-        truck.lateral_acceleration / G,
-        rig.trailer_wheelbase / WHEELBASE_SCALE,
-        truck.trailer_roll / ROLL_SCALE,
-        truck.trailer_roll_rate / ROLL_RATE_SCALE,
-        rig.trailer_mass / MASS_SCALE,
-        rig.rollover_threshold,
-        rig.lateral_acceleration_max / G,
-        truck.tractor_load_transfer_ratio,
-        truck.trailer_load_transfer_ratio,
-    );
-    var listed = values;
+// The first extras of the trucks that began another episode.
+@compute @workgroup_size(WORKGROUP)
+fn extras_after_reset(thread: Thread) {
+    let env = index_of(thread);
+    if !has_begun(env) { return; }
     for (var n = 0u; n < N_EXTRAS; n++) {
-        let value = select(0.0, clamp(listed[n], -1.0, 1.0), n < params.n_extras);
-        if after_reset {
-            extras[env * N_EXTRAS + n] = value;
-        } else {
-            next_extras[env * N_EXTRAS + n] = value;
-        }
+        extras[env * N_EXTRAS + n] = extra(env, n);
     }
 }
 
-// The 69 values, and those beside them.
-fn observed(env: u32, after_reset: bool) {
-    observe_extras(env, after_reset);
-    var as_seen = Seen(truck[env], progress[env]);
-    if params.disturbances.of_observation == 1u { as_seen = seen(env); }
+// The extras after the action, and before the next one.
+@compute @workgroup_size(WORKGROUP)
+fn extras_both(thread: Thread) {
+    let env = index_of(thread);
+    if !is_driving(env) { return; }
+    for (var n = 0u; n < N_EXTRAS; n++) {
+        let value = extra(env, n);
+        next_extras[env * N_EXTRAS + n] = value;
+        extras[env * N_EXTRAS + n] = value;
+    }
+}
+
+// Lists none of the workgroup's trucks.
+fn clear_list(local: u32) {
+    if local == 0u { atomicStore(&n_listed, 0u); }
+    workgroupBarrier();
+}
+
+// Values of all trucks that are listed, once every thread has listed its own.
+fn n_listed_values() -> u32 {
+    workgroupBarrier();
+    return atomicLoad(&n_listed) * N_VALUES;
+}
+
+// Value `n` of the observation of the truck with index `local` in the workgroup.
+fn observed(local: u32, env: u32, n: u32) -> f32 {
+    if n < N_COMPUTED { return computed[local * COMPUTED_STRIDE + n]; }
+    if RANGES_AT <= n && n < RADII_AT { return ranges[env * N_RAYS + n - RANGES_AT] / params.sensor_range; }
+    return preview_value(previewed[local], select(n - CURVATURES_AT, n - RADII_AT + N_CURVATURES, RADII_AT <= n));
+}
+
+// Computes the first N_COMPUTED values of a truck, and lists it.
+fn compute(local: u32, env: u32, as_seen: Seen) {
+    listed[atomicAdd(&n_listed, 1u)] = local;
+    let at = local * COMPUTED_STRIDE;
     let truck = as_seen.truck;
-    let route = routes[truck.route];
+    let route = route_at(truck.route);
     let last = route.n_waypoints - 1u;
     let next = min(as_seen.progress.waypoint, last);
-    let point = reference_point(rigs[truck.vehicle].wheelbase, truck);
-    put(env, after_reset, 0u, clamp(truck.speed / SPEED_SCALE, 0.0, 1.0));
+    let point = reference_point(vehicles[truck.vehicle].rig.wheelbase, truck);
+    computed[at] = clamp(truck.speed / SPEED_SCALE, 0.0, 1.0);
     for (var n = 0u; n < 2u; n++) {
-        let waypoint = waypoints[route.first + min(next + n, last)];
+        let waypoint = waypoint_at(route.first + min(next + n, last));
         let normal = perpendicular(waypoint.direction);
         let left = waypoint.position + route.crossing_left * normal;
         let right = waypoint.position - route.crossing_right * normal;
-        put(env, after_reset, DISTANCES_AT + n, min(distance(point, waypoint.position) / WAYPOINT_SCALE, 1.0));
-        put(env, after_reset, CROSSINGS_AT + n, min(distance_to_segment(point, left, right) / WAYPOINT_SCALE, 1.0));
+        computed[at + DISTANCES_AT + n] = min(distance(point, waypoint.position) / WAYPOINT_SCALE, 1.0);
+        computed[at + CROSSINGS_AT + n] = min(distance_to_segment(point, left, right) / WAYPOINT_SCALE, 1.0);
     }
-    put(env, after_reset, LANE_AT, min(as_seen.progress.lane_distance / LANE_SCALE, 1.0));
-    let behind = waypoints[route.first + max(next, 1u) - 1u].position;
+    computed[at + LANE_AT] = min(as_seen.progress.lane_distance / LANE_SCALE, 1.0);
+    let behind = waypoint_at(route.first + max(next, 1u) - 1u).position;
     for (var n = 0u; n < N_LOOK_AHEAD; n++) {
-        let index = route.first + min(next + LOOK_AHEAD[n], last);
-        let heading = previews[index].heading;
-        put(env, after_reset, BEARINGS_AT + n, angle_between(waypoints[index].position - behind, point - behind) / PI);
-        put(env, after_reset, HEADINGS_AT + n, wrapped(truck.heading - heading) / PI);
-        put(env, after_reset, TRAILER_HEADINGS_AT + n, wrapped(truck.trailer_heading - heading) / PI);
+        let index = min(next + LOOK_AHEAD[n], last);
+        let ahead = waypoint_at(route.first + index).position;
+        let heading = lane_heading(route, index);
+        computed[at + BEARINGS_AT + n] = angle_between(ahead - behind, point - behind) / PI;
+        computed[at + HEADINGS_AT + n] = wrapped(truck.heading - heading) / PI;
+        computed[at + TRAILER_HEADINGS_AT + n] = wrapped(truck.trailer_heading - heading) / PI;
     }
-    put(env, after_reset, ARTICULATION_AT, wrapped(truck.heading - truck.trailer_heading) / PI);
-    let preview = route.first + next;
-    for (var n = 0u; n < N_CURVATURES; n++) {
-        put(env, after_reset, CURVATURES_AT + n, previews[preview].values[n]);
+    computed[at + ARTICULATION_AT] = wrapped(truck.heading - truck.trailer_heading) / PI;
+    previewed[local] = preview_row(route, next);
+}
+
+// One of the values beside the observation, as src/layout/extras.rs defines them: 0 where the benchmark observes fewer.
+fn extra(env: u32, n: u32) -> f32 {
+    let truck = truck[env];
+    let rig = vehicles[truck.vehicle].rig;
+    var value = 0.0;
+    switch n {
+        case 0u: { value = truck.steering / rig.steer_max; }
+        case 1u: { value = control[env].target_speed / SPEED_SCALE; }
+        case 2u: { value = truck.acceleration / ACCELERATION_SCALE; }
+        case 3u: { value = truck.lateral_acceleration / G; }
+        case 4u: { value = rig.trailer_wheelbase / WHEELBASE_SCALE; }
+        case 5u: { value = truck.trailer_roll / ROLL_SCALE; }
+        case 6u: { value = truck.trailer_roll_rate / ROLL_RATE_SCALE; }
+        case 7u: { value = rig.trailer_mass / MASS_SCALE; }
+        case 8u: { value = rig.rollover_threshold; }
+        case 9u: { value = rig.lateral_acceleration_max / G; }
+        case 10u: { value = truck.tractor_load_transfer_ratio; }
+        case 11u: { value = truck.trailer_load_transfer_ratio; }
+        default: {}
     }
-    for (var n = 0u; n < N_RAYS; n++) {
-        put(env, after_reset, RANGES_AT + n, ranges[env * N_RAYS + n] / params.sensor_range);
-    }
-    for (var n = N_CURVATURES; n < N_PREVIEW; n++) {
-        put(env, after_reset, RADII_AT + n - N_CURVATURES, previews[preview].values[n]);
-    }
+    return select(0.0, clamp(value, -1.0, 1.0), n < params.n_extras);
 }
 
 // Signed angle from `a` to `b`, left positive (rad).

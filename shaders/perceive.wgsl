@@ -3,6 +3,14 @@
 //
 // Collisions, progress and reward go by what is. Every number is a function of (seed, env, episode, step).
 
+// What the trucks that began another episode are first seen as.
+@compute @workgroup_size(WORKGROUP)
+fn perceive_after_reset(thread: Thread) {
+    let env = index_of(thread);
+    if disturbances.of_observation == 0u || !has_begun(env) { return; }
+    perceive(env, 0u);
+}
+
 // Keeps the pose that the truck has `steps` steps after the start of its episode, and says which one is observed.
 fn perceive(env: u32, steps: u32) {
     let now = pose_of(truck[env], progress[env]);
@@ -13,8 +21,8 @@ fn perceive(env: u32, steps: u32) {
             listed[n] = poses[first + n];
         }
     }
-    let delay = observation_delay(params.disturbances, streams[env], truck[env].episode);
-    poses[first] = misplaced(params.disturbances, streams[env], truck[env].episode, steps, listed[delay]);
+    let delay = observation_delay(disturbances, streams[env], truck[env].episode);
+    poses[first] = misplaced(disturbances, streams[env], truck[env].episode, steps, listed[delay]);
     for (var n = 1u; n < N_POSES; n++) {
         poses[first + n] = listed[n - 1u];
     }
@@ -69,17 +77,23 @@ struct Seen {
     progress: Progress,
 }
 
-// The truck and its progress as they are observed: on a route that lies where the policy takes it to lie.
+// The truck and its progress as they are observed.
+fn as_seen(env: u32) -> Seen {
+    if disturbances.of_observation == 0u { return Seen(truck[env], progress[env]); }
+    return seen(env);
+}
+
+// The same where they differ from what they are: on a route that lies where the policy takes it to lie.
 fn seen(env: u32) -> Seen {
     let others = words(streams[env].seed, streams[env].env, truck[env].episode, DRAW_OFFSETS);
     let pose = poses[env * N_POSES];
     var misled = seen_truck(truck[env], pose);
     misled.position =
-        misled.position - params.disturbances.map_offset * vec2<f32>(signed_unit(others.y), signed_unit(others.z));
-    let point = reference_point(rigs[misled.vehicle].wheelbase, misled);
+        misled.position - disturbances.map_offset * vec2<f32>(signed_unit(others.y), signed_unit(others.z));
+    let point = reference_point(vehicles[misled.vehicle].rig.wheelbase, misled);
     // An error may put it before the waypoint that it has passed last.
     let next = max(pose.waypoint, 2u) - 1u;
-    return Seen(misled, followed(routes[misled.route], point, next, params.stray_distance));
+    return Seen(misled, followed(route_at(misled.route), point, next, params.stray_distance));
 }
 
 // A ray's range as its sensor reads it `steps` steps after the start of an episode (m).

@@ -1,7 +1,7 @@
 // Begins episodes: within the step that ended the last one, in the step after it, or when the caller says so.
 //
-// Route and pose are functions of (seed, env, episode) alone, where the caller states none. Other kernels then sense
-// and observe the trucks that have begun.
+// Route and pose are functions of (seed, env, episode) alone, where the caller states none. Other kernels then perceive,
+// sense and observe the trucks that have begun.
 
 // Begins another episode where one ended, or holds the truck. A truck that was held when the step began begins its next
 // episode with NEXT_STEP.
@@ -10,7 +10,7 @@ fn reset(thread: Thread) {
     let env = index_of(thread);
     if batch.n_envs <= env { return; }
     if truck[env].held == 1u {
-        if batch.autoreset == NEXT_STEP { begun(env, next()); }
+        if batch.autoreset == NEXT_STEP { start(env, next()); }
     } else if ended[env] != RUNNING {
         if batch.autoreset == SAME_STEP {
             start(env, next());
@@ -20,12 +20,41 @@ fn reset(thread: Thread) {
     }
 }
 
-// Begins an episode where the caller says so. It has no last step.
+// Begins an episode where the caller says so.
 @compute @workgroup_size(WORKGROUP)
 fn begin(thread: Thread) {
     let env = index_of(thread);
     if !is_to_begin(env) { return; }
-    begun(env, begins[env]);
+    start(env, begins[env]);
+}
+
+// Takes back what describes the last step of the trucks that the caller named: they have none.
+@compute @workgroup_size(WORKGROUP)
+fn forget(thread: Thread) {
+    let env = index_of(thread);
+    if !is_to_begin(env) { return; }
+    forget_last_step(env);
+}
+
+// The same for the trucks that began another episode, with NEXT_STEP.
+@compute @workgroup_size(WORKGROUP)
+fn forget_after_reset(thread: Thread) {
+    let env = index_of(thread);
+    if !has_begun(env) { return; }
+    forget_last_step(env);
+}
+
+// The first observation of the episode is the one after the last action too.
+fn forget_last_step(env: u32) {
+    ended[env] = RUNNING;
+    terms[env] = RewardTerms();
+    reward[env] = 0.0;
+    for (var n = 0u; n < N_VALUES; n++) {
+        next_observation[env * N_VALUES + n] = observation[env * N_VALUES + n];
+    }
+    for (var n = 0u; n < N_EXTRAS; n++) {
+        next_extras[env * N_EXTRAS + n] = extras[env * N_EXTRAS + n];
+    }
 }
 
 // The next episode, as drawn.
@@ -33,14 +62,6 @@ fn next() -> BeginRow {
     var begin = BeginRow();
     begin.what = BEGINS;
     return begin;
-}
-
-// An episode that has no last step.
-fn begun(env: u32, begin: BeginRow) {
-    start(env, begin);
-    ended[env] = RUNNING;
-    terms[env] = RewardTerms();
-    reward[env] = 0.0;
 }
 
 // Puts the truck at the start of an episode.
@@ -57,17 +78,16 @@ fn start(env: u32, begin: BeginRow) {
         let vehicle = index_below(kind.x, params.n_vehicles);
         start = Start(signed_unit(pose.x), signed_unit(pose.y), signed_unit(kind.y), vehicle);
     }
-    let first = routes[route].first;
-    var after = started(params, rigs[start.vehicle].wheelbase, waypoints[first], previews[first].heading, start);
+    let lane = route_at(route);
+    let wheelbase = vehicles[start.vehicle].rig.wheelbase;
+    var after = started(params, wheelbase, waypoint_at(lane.first), lane_heading(lane, 0u), start);
     after.route = route;
     after.episode = episode;
     control[env] = Control();
     control[env].target_speed = after.speed;
     truck[env] = after;
-    let point = reference_point(rigs[start.vehicle].wheelbase, after);
-    progress[env] = followed(routes[route], point, 1u, params.stray_distance);
+    progress[env] = followed(lane, reference_point(wheelbase, after), 1u, params.stray_distance);
     progress[env].passed = 0u;
-    if params.disturbances.of_observation == 1u { perceive(env, 0u); }
 }
 
 // The route of an episode as the batch chooses it.

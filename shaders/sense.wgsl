@@ -1,54 +1,110 @@
 // Measures the ranges: from each sensor along its ray to the kerb.
 //
-// Over-relaxed sphere tracing of the field (B. Keinert et al., "Enhanced Sphere Tracing", 2014), a thread for each ray:
-// a step is as long as the field's slope along the ray allows, and is taken back unless the free circles at both of its
-// ends overlap.
+// Over-relaxed sphere tracing of the field (B. Keinert et al., "Enhanced Sphere Tracing", 2014): a step is as long as
+// the field's slope along the ray allows, and is taken back unless the free circles at both of its ends overlap.
+//
+// A ray takes 2 to 40 samples, and threads that step together wait for the longest one. So a workgroup shares the rays
+// of a team of trucks: a thread whose ray has ended takes the next one that waits.
+
+// Rays of the largest team.
+const TEAM_RAYS: u32 = TEAM_MAX * N_RAYS;
+
+// Position and direction of each unit of the team's trucks, as they are observed: trailer, tractor.
+var<workgroup> unit_poses: array<vec4<f32>, 2u * TEAM_MAX>;
+// Whether each truck is sensed, its vehicle and its field.
+var<workgroup> is_sensed: array<u32, TEAM_MAX>;
+var<workgroup> team_vehicles: array<u32, TEAM_MAX>;
+var<workgroup> team_fields: array<FieldRow, TEAM_MAX>;
+// Rays that have been taken, and what was found on each.
+var<workgroup> n_taken: atomic<u32>;
+var<workgroup> found: array<f32, TEAM_RAYS>;
 
 @compute @workgroup_size(WORKGROUP)
 fn sense(thread: Thread) {
-    let ray = index_of(thread);
-    let env = ray / N_RAYS;
-    if !is_driving(env) { return; }
-    ranges[ray] = range_of(env, ray % N_RAYS, truck[env].steps + 1u);
+    let first = first_of_team(thread);
+    let env = first + thread.local;
+    place(thread.local, thread.local < batch.team && is_driving(env), env);
+    trace_all(thread.local);
+    for (var n = thread.local; n < batch.team * N_RAYS; n += WORKGROUP) {
+        let whose = n / N_RAYS;
+        if is_sensed[whose] == 1u { ranges[first * N_RAYS + n] = read_off(first + whose, n, truck[first + whose].steps + 1u); }
+    }
 }
 
 // The same for the trucks that began another episode.
 @compute @workgroup_size(WORKGROUP)
 fn sense_after_reset(thread: Thread) {
-    let ray = index_of(thread);
-    if !has_begun(ray / N_RAYS) { return; }
-    ranges[ray] = range_of(ray / N_RAYS, ray % N_RAYS, 0u);
-}
-
-// Distance along a truck's ray to the kerb as its sensor reads it `steps` steps after the start of the episode (m).
-fn range_of(env: u32, index: u32, steps: u32) -> f32 {
-    if params.disturbances.of_observation == 0u { return exact_range(truck[env], index); }
-    let range = exact_range(seen_truck(truck[env], poses[env * N_POSES]), index);
-    let key = noise_key(streams[env], truck[env].episode);
-    return reading(params.disturbances, key, steps, params.sensor_range, index, range);
-}
-
-// Distance along a truck's ray to the kerb: the sensors' range where none is met before, 0 from inside one (m).
-fn exact_range(truck: Truck, index: u32) -> f32 {
-    let ray = rays[rigs[truck.vehicle].chassis * N_RAYS + index];
-    var position = truck.position;
-    var heading = direction(truck.heading);
-    if index < N_TRAILER_RAYS {
-        position = trailer_position(rigs[truck.vehicle], truck);
-        heading = direction(truck.trailer_heading);
+    let first = first_of_team(thread);
+    let env = first + thread.local;
+    place(thread.local, thread.local < batch.team && has_begun(env), env);
+    trace_all(thread.local);
+    for (var n = thread.local; n < batch.team * N_RAYS; n += WORKGROUP) {
+        if is_sensed[n / N_RAYS] == 1u { ranges[first * N_RAYS + n] = read_off(first + n / N_RAYS, n, 0u); }
     }
-    let field = fields[routes[truck.route].roundabout];
-    return traced(field, position + rotated(heading, ray.origin), rotated(heading, ray.direction), params.sensor_range);
 }
 
+// The first truck of the workgroup's team.
+fn first_of_team(thread: Thread) -> u32 {
+    return (thread.group.y * thread.groups.x + thread.group.x) * batch.team;
+}
+
+// Places a truck's units, one truck a thread.
+fn place(local: u32, sensed: bool, env: u32) {
+    if local == 0u { atomicStore(&n_taken, 0u); }
+    if local < batch.team { is_sensed[local] = select(0u, 1u, sensed); }
+    if sensed {
+        var truck = truck[env];
+        if disturbances.of_observation == 1u { truck = seen_truck(truck, poses[env * N_POSES]); }
+        let trailer = trailer_position(vehicles[truck.vehicle].rig, truck);
+        unit_poses[2u * local] = vec4<f32>(trailer, direction(truck.trailer_heading));
+        unit_poses[2u * local + 1u] = vec4<f32>(truck.position, direction(truck.heading));
+        team_vehicles[local] = truck.vehicle;
+        team_fields[local] = field_at(truck.route);
+    }
+    workgroupBarrier();
+}
+
+// What the sensor of ray `n` of the team, of truck `env`, reads `steps` steps after the start of the episode (m).
+fn read_off(env: u32, n: u32, steps: u32) -> f32 {
+    if disturbances.of_observation == 0u { return found[n]; }
+    let key = noise_key(streams[env], truck[env].episode);
+    return reading(disturbances, key, steps, params.sensor_range, n % N_RAYS, found[n]);
+}
+
+// Distance along every ray of the team to the kerb: the sensors' range where none is met before, 0 from inside one (m).
 // Within 2 cm of the exact distance, except for rays that come within 2 cm of a kerb at less than 5 deg to it.
-fn traced(field: FieldRow, origin: vec2<f32>, ahead: vec2<f32>, reach: f32) -> f32 {
-    // Distances along the ray of the next sample and of the start of the last accepted step, and the radius of the free
-    // circle there (m).
+fn trace_all(local: u32) {
+    let n_rays = batch.team * N_RAYS;
+    let reach = params.sensor_range;
+    var ray = n_rays;
+    var field = FieldRow();
+    var origin = vec2<f32>(0.0);
+    var ahead = vec2<f32>(0.0);
+    // Distances along the ray of the next sample and of the start of the last accepted step, the radius of the free
+    // circle there (m), and samples taken.
     var along = 0.0;
     var base = 0.0;
     var free = 0.0;
-    for (var n = 0u; n < SAMPLES_MAX; n++) {
+    var n_samples = 0u;
+    loop {
+        if ray == n_rays {
+            ray = atomicAdd(&n_taken, 1u);
+            if n_rays <= ray { break; }
+            let whose = ray / N_RAYS;
+            if is_sensed[whose] == 0u {
+                ray = n_rays;
+                continue;
+            }
+            let mount = vehicles[team_vehicles[whose]].rays[ray % N_RAYS];
+            let pose = unit_poses[2u * whose + select(1u, 0u, ray % N_RAYS < N_TRAILER_RAYS)];
+            field = team_fields[whose];
+            origin = pose.xy + rotated(pose.zw, mount.origin);
+            ahead = rotated(pose.zw, mount.direction);
+            along = 0.0;
+            base = 0.0;
+            free = 0.0;
+            n_samples = 0u;
+        }
         let sample = field_sample(field, false, origin + along * ahead);
         let distance = sample.distance;
         let radius = abs(distance);
@@ -73,7 +129,11 @@ fn traced(field: FieldRow, origin: vec2<f32>, ahead: vec2<f32>, reach: f32) -> f
         base = select(base, along, accepted);
         free = select(free, radius, accepted);
         along = next;
-        if met || beyond || inside { break; }
+        n_samples++;
+        if met || beyond || inside || n_samples == SAMPLES_MAX {
+            found[ray] = along;
+            ray = n_rays;
+        }
     }
-    return along;
+    workgroupBarrier();
 }

@@ -6,26 +6,30 @@
 fn steer(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
-    let duration = f32(params.n_substeps) * params.substep;
     let before = control[env];
     var asked = actions[action[env]];
-    if params.disturbances.of_action == 1u {
+    if disturbances.of_action == 1u {
         asked = late_action(streams[env], truck[env].episode, action[env], before);
     }
     let next = targeted(params, asked, before);
-    control[env] = controlled(rigs[truck[env].vehicle], duration, next, truck[env].speed, before);
-    if params.disturbances.of_action == 1u {
+    control[env] = controlled(vehicles[truck[env].vehicle].rig, step_duration(), next, truck[env].speed, before);
+    if disturbances.of_action == 1u {
         control[env].action_before = action[env] + 1u;
         control[env].action_earlier = before.action_before;
         control[env].action_earliest = before.action_earlier;
     }
 }
 
+// Duration of a step (s).
+fn step_duration() -> f32 {
+    return f32(params.n_substeps) * params.substep;
+}
+
 // The action that takes effect in this step, where actions come late: before the first one arrives the truck is to go
 // straight on at the speed that it began with.
 fn late_action(stream: Stream, episode: u32, action: u32, before: Control) -> Action {
     var listed = array<u32, 4>(action + 1u, before.action_before, before.action_earlier, before.action_earliest);
-    let index = listed[action_delay(params.disturbances, stream, episode)];
+    let index = listed[action_delay(disturbances, stream, episode)];
     if index == 0u { return Action(0.0, select(before.target_speed, 0.0, params.changes_speed == 1u)); }
     return actions[index - 1u];
 }

@@ -25,12 +25,14 @@ pub use observation::{OBSERVATION, Values};
 pub use rows::{BeginRow, Clearance, Control, Pose, Progress, RewardTerms, Start, Stream, Truck};
 pub use tables::{
     Action, BatchFacts, Body, Disturbances, FieldRow, Lag, Params, PreviewRow, Ray, Reward, Rig, Roll, RouteRow,
-    WaypointRow,
+    VehicleRow, WaypointRow,
 };
 
 constants! {
     /// Threads of a workgroup.
     pub const WORKGROUP: u32 = 64;
+    /// Trucks whose rays a workgroup shares, at most.
+    pub const TEAM_MAX: u32 = 32;
     /// Values in an observation.
     pub const N_VALUES: usize = 69;
     /// Distance sensors on the trailer, left and right alternating, front to rear.
@@ -46,6 +48,10 @@ constants! {
     /// Poses of a truck that are kept where what is observed is disturbed: the one that is observed, and those of the
     /// last three steps, the latest first.
     pub const N_POSES: usize = 4;
+    /// Rows of four words that a route takes in the table of roads: its own, and its roundabout's field.
+    pub const ROUTE_ROWS: usize = 4;
+    /// Rows of four words that a waypoint's preview takes there.
+    pub const PREVIEW_ROWS: usize = (1 + N_PREVIEW).div_ceil(4);
     /// Bit of [`BeginRow::what`]: the truck begins an episode.
     pub const BEGINS: u32 = 1;
     /// Bit: the episode is the first of the truck's stream, not the next one.

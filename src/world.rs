@@ -13,7 +13,9 @@ use rayon::prelude::*;
 
 use crate::field::Field;
 use crate::files::cache::{Loading, Stopped};
-use crate::layout::{Action, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, Rig, RouteRow, Truck, WaypointRow};
+use crate::layout::{
+    Action, Disturbances, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, Reward, Rig, RouteRow, Truck, WaypointRow,
+};
 use crate::map::Frame;
 use crate::map::route::{Route, Waypoint};
 use crate::scenario::{Class, Clock, Entry, Invalid, Place, Scenario};
@@ -30,8 +32,12 @@ const RADIUS_SCALE: f64 = 100.0;
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct World {
-    /// Time and weights.
+    /// Time and limits.
     pub params: Params,
+    /// What the reward weighs.
+    pub reward: Reward,
+    /// What the world does to a policy.
+    pub disturbances: Disturbances,
     /// The vehicles that episodes draw from, at least one.
     pub rigs: Vec<Rig>,
     /// What each `class` of theirs is.
@@ -127,9 +133,9 @@ impl World {
                 stray_distance: scenario.stray_distance as f32,
                 jackknife_angle: scenario.jackknife_angle as f32,
                 rollover_ratio: scenario.rollover_ratio as f32,
-                reward: (&scenario.reward).into(),
-                disturbances: (&scenario.disturbances).into(),
             },
+            reward: (&scenario.reward).into(),
+            disturbances: (&scenario.disturbances).into(),
             rigs,
             classes,
             rays,
@@ -151,7 +157,8 @@ impl World {
             + size_of_val(self.routes.as_slice());
         let routes = routes + size_of_val(self.step_limits.as_slice());
         let vehicles = size_of_val(self.rigs.as_slice()) + size_of_val(self.rays.as_slice());
-        let shared = size_of_val(&self.params) + size_of_val(self.actions.as_slice());
+        let shared = size_of_val(&self.params) + size_of_val(&self.reward) + size_of_val(&self.disturbances);
+        let shared = shared + size_of_val(self.actions.as_slice());
         self.fields.iter().map(Field::bytes).sum::<usize>() + routes + vehicles + shared
     }
 

@@ -45,6 +45,19 @@ pub struct Device {
 impl Device {
     /// Opens the first adapter whose name contains `name`, whatever the case; without a name the first of [`adapters`].
     pub fn open(name: Option<&str>) -> Result<Device, Error> {
+        // Other users of the device may need any of its features and limits.
+        Device::open_with(name, |adapter| {
+            let features = adapter.features() - Features::MAPPABLE_PRIMARY_BUFFERS - Features::all_experimental_mask();
+            (features, adapter.limits())
+        })
+    }
+
+    /// Opens an adapter as [`Device::open`] does, with the features and limits that `asked` names for it: the kernels of
+    /// a step work with no feature and with the limits that every device of WebGPU has, [`wgpu::Limits::default`].
+    pub fn open_with(
+        name: Option<&str>,
+        asked: impl FnOnce(&wgpu::Adapter) -> (Features, wgpu::Limits),
+    ) -> Result<Device, Error> {
         let instance = instance();
         let adapters = found(&instance);
         let names: Vec<String> = adapters.iter().map(|adapter| adapter.get_info().name).collect();
@@ -58,13 +71,11 @@ impl Device {
             });
         };
         check_limits(&adapter)?;
+        let (required_features, required_limits) = asked(&adapter);
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("offtrack"),
-            // Other users of the device may need any of them.
-            required_features: adapter.features()
-                - Features::MAPPABLE_PRIMARY_BUFFERS
-                - Features::all_experimental_mask(),
-            required_limits: adapter.limits(),
+            required_features,
+            required_limits,
             ..Default::default()
         };
         let opened = pollster::block_on(adapter.request_device(&descriptor));

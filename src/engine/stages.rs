@@ -1,8 +1,10 @@
 //! One step, in order. Both engines run these stages: the CPU by the function, the device by the kernels of the same
 //! name.
 
-use crate::layout::Column;
+use crate::engine::Autoreset;
 use crate::layout::buffers::{Access, Buffer, Table};
+use crate::layout::{Column, Disturbances};
+use crate::world::World;
 
 crate::named! {
     /// A stage of a step, in the order of a step.
@@ -37,7 +39,50 @@ pub const N_STAGES: usize = Stage::ALL.len();
 pub const STAGES: [Stage; N_STAGES] = Stage::ALL;
 
 /// The kernels that begin an episode of the trucks that the caller named.
-pub const BEGIN: [Kernel; 3] = [Kernel::Begin, Kernel::SenseAfterReset, Kernel::ObserveBegun];
+pub const BEGIN: [Kernel; 6] = [
+    Kernel::Begin,
+    Kernel::PerceiveAfterReset,
+    Kernel::SenseAfterReset,
+    Kernel::ObserveAfterReset,
+    Kernel::ExtrasAfterReset,
+    Kernel::Forget,
+];
+
+/// The kernels of a step, first to last: each does a stage, or several at once.
+const STEP: [Kernel; 12] = [
+    Kernel::Advance,
+    Kernel::Collide,
+    Kernel::Sense,
+    Kernel::ObserveBoth,
+    Kernel::ExtrasBoth,
+    Kernel::JudgeAndCount,
+    Kernel::Reset,
+    Kernel::PerceiveAfterReset,
+    Kernel::SenseAfterReset,
+    Kernel::ObserveAfterReset,
+    Kernel::ExtrasAfterReset,
+    Kernel::ForgetAfterReset,
+];
+
+/// Those where disturbances come between the truck and the policy. Kernels that did more at once would need more
+/// buffers.
+const DISTURBED_STEP: [Kernel; 15] = [
+    Kernel::Steer,
+    Kernel::Drive,
+    Kernel::Follow,
+    Kernel::Collide,
+    Kernel::Sense,
+    Kernel::Observe,
+    Kernel::ObserveExtras,
+    Kernel::CopyObservation,
+    Kernel::JudgeAndCount,
+    Kernel::Reset,
+    Kernel::PerceiveAfterReset,
+    Kernel::SenseAfterReset,
+    Kernel::ObserveAfterReset,
+    Kernel::ExtrasAfterReset,
+    Kernel::ForgetAfterReset,
+];
 
 crate::named! {
     /// An entry point of the shaders.
@@ -56,8 +101,10 @@ crate::named! {
         Follow = "follow",
         /// [`Stage::Sense`].
         Sense = "sense",
-        /// [`Stage::Observe`].
+        /// [`Stage::Observe`]: the observation.
         Observe = "observe",
+        /// [`Stage::Observe`]: the extras.
+        ObserveExtras = "observe_extras",
         /// [`Stage::Judge`].
         Judge = "judge",
         /// [`Stage::Count`].
@@ -66,12 +113,26 @@ crate::named! {
         CopyObservation = "copy_observation",
         /// [`Stage::Reset`]: route and pose.
         Reset = "reset",
-        /// [`Stage::Reset`]: ranges of the trucks that began another episode.
+        /// [`Stage::Reset`]: poses that are observed of the trucks that began another episode.
+        PerceiveAfterReset = "perceive_after_reset",
+        /// [`Stage::Reset`]: their ranges.
         SenseAfterReset = "sense_after_reset",
-        /// [`Stage::Reset`]: observations of the trucks that began another episode.
+        /// [`Stage::Reset`]: their observations.
         ObserveAfterReset = "observe_after_reset",
-        /// Observes the trucks that the caller named, once they have begun.
-        ObserveBegun = "observe_begun",
+        /// [`Stage::Reset`]: their extras.
+        ExtrasAfterReset = "extras_after_reset",
+        /// [`Stage::Reset`]: that they have no last step, where they begin in a step of their own.
+        ForgetAfterReset = "forget_after_reset",
+        /// That the trucks that the caller named have no last step.
+        Forget = "forget",
+        /// [`Stage::Steer`], [`Stage::Drive`] and [`Stage::Follow`] at once, where what is observed is what is.
+        Advance = "advance",
+        /// [`Stage::Observe`] and [`Stage::CopyObservation`] at once, there: the observation.
+        ObserveBoth = "observe_both",
+        /// The same of the extras.
+        ExtrasBoth = "extras_both",
+        /// [`Stage::Judge`] and [`Stage::Count`] at once.
+        JudgeAndCount = "judge_and_count",
     }
 }
 
@@ -80,10 +141,35 @@ crate::named! {
 pub enum Threads {
     /// A truck.
     Truck,
-    /// One of a truck's rays.
-    Ray,
+    /// What a team of trucks leaves it to: a workgroup for each team.
+    Team,
     /// One of the values of a truck's observation.
     Value,
+}
+
+/// What decides which kernels have anything to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Case {
+    /// What is observed differs from what is, or actions come late.
+    pub disturbed: bool,
+    /// Extras are observed.
+    pub extras: bool,
+    /// What follows the end of an episode.
+    pub autoreset: Autoreset,
+}
+
+impl Case {
+    /// That of a batch in a world.
+    pub fn of(world: &World, autoreset: Autoreset) -> Case {
+        let Disturbances { of_observation, of_action, .. } = world.disturbances;
+        Case { disturbed: of_observation == 1 || of_action == 1, extras: 0 < world.params.n_extras, autoreset }
+    }
+
+    /// The kernels of a step, one after the other.
+    pub fn step(self) -> impl Iterator<Item = Kernel> {
+        let kernels: &[Kernel] = if self.disturbed { &DISTURBED_STEP } else { &STEP };
+        kernels.iter().copied().filter(move |kernel| kernel.works(self))
+    }
 }
 
 impl Stage {
@@ -95,11 +181,18 @@ impl Stage {
             Stage::Collide => &[Kernel::Collide],
             Stage::Follow => &[Kernel::Follow],
             Stage::Sense => &[Kernel::Sense],
-            Stage::Observe => &[Kernel::Observe],
+            Stage::Observe => &[Kernel::Observe, Kernel::ObserveExtras],
             Stage::Judge => &[Kernel::Judge],
             Stage::Count => &[Kernel::Count],
             Stage::CopyObservation => &[Kernel::CopyObservation],
-            Stage::Reset => &[Kernel::Reset, Kernel::SenseAfterReset, Kernel::ObserveAfterReset],
+            Stage::Reset => &[
+                Kernel::Reset,
+                Kernel::PerceiveAfterReset,
+                Kernel::SenseAfterReset,
+                Kernel::ObserveAfterReset,
+                Kernel::ExtrasAfterReset,
+                Kernel::ForgetAfterReset,
+            ],
         }
     }
 }
@@ -121,32 +214,41 @@ impl Kernel {
         match self {
             Kernel::Draw => buffers![Params Batch Streams; Action Truck],
             Kernel::Begin => buffers![
-                Params Rigs Waypoints Previews Routes Batch Choice Streams Begins; Control Truck Progress Ended Terms
-                Reward Poses
+                Params Vehicles Roads Batch Choice Streams Begins; Control Truck Progress
             ],
-            Kernel::Steer => buffers![Params Rigs Actions Batch Streams; Action Control Truck],
-            Kernel::Drive => buffers![Params Rigs Batch; Control Truck],
-            Kernel::Collide => buffers![Rigs Fields Cells Corners Routes Batch; Truck Clearance],
-            Kernel::Follow => buffers![Params Rigs Waypoints Routes Batch Streams; Truck Progress Poses],
+            Kernel::Steer => buffers![Params Disturbances Vehicles Actions Batch Streams; Action Control Truck],
+            Kernel::Drive => buffers![Params Vehicles Batch; Control Truck],
+            Kernel::Collide => buffers![Vehicles Roads Cells Corners Batch; Truck Clearance],
+            Kernel::Follow => buffers![Params Disturbances Vehicles Roads Batch Streams; Truck Progress Poses],
             Kernel::Sense | Kernel::SenseAfterReset => buffers![
-                Params Rigs Rays Fields Cells Corners Routes Batch Streams; Truck Ranges Poses
+                Params Disturbances Vehicles Roads Cells Corners Batch Streams; Truck Ranges Poses
             ],
-            Kernel::Observe | Kernel::ObserveAfterReset => buffers![
-                Params Rigs Waypoints Previews Routes Batch Streams; Control Truck Progress Ranges Observation
-                NextObservation Extras NextExtras Poses
+            Kernel::Observe => buffers![
+                Params Disturbances Vehicles Roads Batch Streams; Truck Progress Ranges NextObservation Poses
             ],
-            Kernel::Judge => buffers![
-                Params Rigs Routes StepLimits Batch; Truck Clearance Progress Ended Terms Reward
+            Kernel::ObserveAfterReset => buffers![
+                Params Disturbances Vehicles Roads Batch Streams; Truck Progress Ranges Observation Poses
             ],
+            Kernel::ObserveExtras => buffers![Params Vehicles Batch; Control Truck NextExtras],
+            Kernel::ExtrasAfterReset => buffers![Params Vehicles Batch; Control Truck Extras],
+            Kernel::Judge => buffers![Params Weights Limits Batch; Truck Clearance Progress Ended Terms Reward],
             Kernel::Count => buffers![Batch; Truck Ended Reward; Tally],
             Kernel::CopyObservation => buffers![Batch; Truck Observation NextObservation Extras NextExtras],
-            Kernel::Reset => buffers![
-                Params Rigs Waypoints Previews Routes Batch Choice Streams; Control Truck Progress Ended Terms Reward
-                Poses
+            Kernel::Reset => buffers![Params Vehicles Roads Batch Choice Streams; Control Truck Progress Ended],
+            Kernel::PerceiveAfterReset => buffers![Disturbances Batch Streams; Truck Progress Poses],
+            Kernel::ForgetAfterReset => buffers![
+                Batch; Truck Observation NextObservation Ended Terms Reward Extras NextExtras
             ],
-            Kernel::ObserveBegun => buffers![
-                Params Rigs Waypoints Previews Routes Batch Streams Begins; Control Truck Progress Ranges Observation
-                NextObservation Extras NextExtras Poses
+            Kernel::Advance => buffers![Params Vehicles Actions Roads Batch; Action Control Truck Progress],
+            Kernel::ObserveBoth => buffers![
+                Params Vehicles Roads Batch; Truck Progress Ranges Observation NextObservation
+            ],
+            Kernel::ExtrasBoth => buffers![Params Vehicles Batch; Control Truck Extras NextExtras],
+            Kernel::JudgeAndCount => buffers![
+                Params Weights Limits Batch; Truck Clearance Progress Ended Terms Reward; Tally
+            ],
+            Kernel::Forget => buffers![
+                Batch Begins; Observation NextObservation Ended Terms Reward Extras NextExtras
             ],
         }
     }
@@ -154,9 +256,19 @@ impl Kernel {
     /// What a thread works on.
     pub const fn threads(self) -> Threads {
         match self {
-            Kernel::Sense | Kernel::SenseAfterReset => Threads::Ray,
+            Kernel::Sense | Kernel::SenseAfterReset => Threads::Team,
             Kernel::CopyObservation => Threads::Value,
             _ => Threads::Truck,
+        }
+    }
+
+    /// Whether it has anything to do.
+    pub const fn works(self, case: Case) -> bool {
+        match self {
+            Kernel::PerceiveAfterReset => case.disturbed,
+            Kernel::ObserveExtras | Kernel::ExtrasAfterReset | Kernel::ExtrasBoth => case.extras,
+            Kernel::ForgetAfterReset => matches!(case.autoreset, Autoreset::NextStep),
+            _ => true,
         }
     }
 }
@@ -177,12 +289,16 @@ pub const N_STORAGE_BUFFERS: usize = {
     most
 };
 
+/// Workgroup memory that a kernel takes at most (bytes): what every device of WebGPU has.
+pub const WORKGROUP_MEMORY: u32 = 16_384;
+
 /// The shader files in the order in which they make one module.
-pub const SHADERS: [(&str, &str); 18] = [
+pub const SHADERS: [(&str, &str); 20] = [
     ("layout", include_str!("../../shaders/layout.wgsl")),
     ("common/thread", include_str!("../../shaders/common/thread.wgsl")),
     ("common/angle", include_str!("../../shaders/common/angle.wgsl")),
     ("common/random", include_str!("../../shaders/common/random.wgsl")),
+    ("common/road", include_str!("../../shaders/common/road.wgsl")),
     ("common/field", include_str!("../../shaders/common/field.wgsl")),
     ("common/truck", include_str!("../../shaders/common/truck.wgsl")),
     ("draw", include_str!("../../shaders/draw.wgsl")),
@@ -197,4 +313,5 @@ pub const SHADERS: [(&str, &str); 18] = [
     ("count", include_str!("../../shaders/count.wgsl")),
     ("copy_observation", include_str!("../../shaders/copy_observation.wgsl")),
     ("reset", include_str!("../../shaders/reset.wgsl")),
+    ("advance", include_str!("../../shaders/advance.wgsl")),
 ];

@@ -1,9 +1,6 @@
 //! The buffers that the kernels of a step see: a binding each, in this order. A kernel is bound to those that it names.
 
-use super::{
-    Action, BatchFacts, BeginRow, Column, FieldRow, N_COLUMNS, Params, PreviewRow, Ray, Rig, RouteRow, Stream,
-    WaypointRow,
-};
+use super::{Action, BatchFacts, BeginRow, Column, Disturbances, N_COLUMNS, Params, Reward, Stream, VehicleRow};
 use crate::layout::shared::{Named, Shared, comment};
 
 /// What shaders may do to a buffer.
@@ -33,28 +30,24 @@ pub enum Buffer {
 crate::named! {
     /// What trucks share: first the world, then what belongs to one batch.
     pub enum Table {
-        /// Time and weights.
+        /// Time and limits.
         Params = "params",
-        /// The vehicles.
-        Rigs = "rigs",
+        /// What the reward weighs.
+        Weights = "weights",
+        /// What the world does to a policy.
+        Disturbances = "disturbances",
+        /// The vehicles with their distance sensors.
+        Vehicles = "vehicles",
         /// The action table.
         Actions = "actions",
-        /// The distance sensors.
-        Rays = "rays",
-        /// A field for each roundabout.
-        Fields = "fields",
+        /// Every route, its waypoints and what is observed there, and where its field lies.
+        Roads = "roads",
         /// Cells of all fields.
         Cells = "cells",
         /// Blocks of distances of all fields.
         Corners = "corners",
-        /// Every route's waypoints.
-        Waypoints = "waypoints",
-        /// What is observed at each of them.
-        Previews = "previews",
-        /// Every route.
-        Routes = "routes",
-        /// When an episode is timed out.
-        StepLimits = "step_limits",
+        /// What ends an episode: waypoints and steps.
+        Limits = "limits",
         /// Facts that the trucks of a batch share.
         Batch = "batch",
         /// Routes that episodes run on.
@@ -99,7 +92,7 @@ impl Buffer {
     /// What shaders may do.
     pub const fn access(self) -> Access {
         match self {
-            Buffer::Table(Table::Batch) => Access::Uniform,
+            Buffer::Table(Table::Params | Table::Weights | Table::Disturbances | Table::Batch) => Access::Uniform,
             Buffer::Table(_) => Access::Read,
             Buffer::Column(_) => Access::ReadWrite,
             Buffer::Tally => Access::Count,
@@ -136,21 +129,26 @@ impl Table {
             format!("array<{}>", T::element())
         }
         let (doc, kind) = match self {
-            Table::Params => ("Time and weights.", Params::wgsl()),
-            Table::Rigs => ("The vehicles.", rows::<Rig>()),
+            Table::Params => ("Time and limits.", Params::wgsl()),
+            Table::Weights => ("What the reward weighs.", Reward::wgsl()),
+            Table::Disturbances => ("What the world does to a policy.", Disturbances::wgsl()),
+            Table::Vehicles => ("The vehicles with their distance sensors.", rows::<VehicleRow>()),
             Table::Actions => ("The action table.", rows::<Action>()),
-            Table::Rays => ("The distance sensors of each chassis, trailer's first.", rows::<Ray>()),
-            Table::Fields => ("A field for each roundabout.", rows::<FieldRow>()),
+            Table::Roads => (
+                "Every route, all waypoints and what is observed at each of them, as common/road.wgsl reads them.",
+                "array<vec4<u32>>".to_owned(),
+            ),
             Table::Cells => ("Cells of all fields, two words each.", "array<vec2<u32>>".to_owned()),
             Table::Corners => (
                 "Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of \
                  STORED_UNIT.",
                 rows::<u32>(),
             ),
-            Table::Waypoints => ("Every route's waypoints, one route after the other.", rows::<WaypointRow>()),
-            Table::Previews => ("What is observed at each of them.", rows::<PreviewRow>()),
-            Table::Routes => ("Every route.", rows::<RouteRow>()),
-            Table::StepLimits => ("Steps after which an episode is timed out, [n_routes, n_classes].", rows::<u32>()),
+            Table::Limits => (
+                "The class of each vehicle; then of each route its number of waypoints, and for each class the steps \
+                 after which an episode is timed out.",
+                rows::<u32>(),
+            ),
             Table::Batch => ("Facts that the trucks of a batch share.", BatchFacts::wgsl()),
             Table::Choice => ("Routes that episodes run on: to be drawn from, or one for each truck.", rows::<u32>()),
             Table::Streams => ("The stream of random numbers that each truck draws from, [n_envs].", rows::<Stream>()),

@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::N_PREVIEW;
+use super::{N_PREVIEW, N_RAYS};
 
 crate::shared! {
     /// One distance sensor, fixed to a unit. A tractor's frame starts at the drive axle, a trailer's at its axle group.
@@ -115,6 +115,14 @@ crate::shared! {
         pub fifth_wheel_load: f32,
     }
 
+    /// The vehicle with its distance sensors, as a device has them side by side.
+    pub struct VehicleRow {
+        /// The distance sensors, trailer's first.
+        pub rays: [Ray; N_RAYS],
+        /// The vehicle.
+        pub rig: Rig,
+    }
+
     /// One entry of the action table.
     pub struct Action {
         /// Steer angle asked for (rad).
@@ -169,7 +177,7 @@ crate::shared! {
         pub of_action: u32,
     }
 
-    /// Time and weights, shared by all trucks.
+    /// Time and limits, shared by all trucks.
     pub struct Params {
         /// Time of one sub-step (s).
         pub substep: f32,
@@ -205,10 +213,6 @@ crate::shared! {
         pub jackknife_angle: f32,
         /// Load transfer ratio from which the truck has rolled over.
         pub rollover_ratio: f32,
-        /// Weights and limits of the reward.
-        pub reward: Reward,
-        /// What the world does to a policy.
-        pub disturbances: Disturbances,
     }
 
     /// One waypoint of one route.
@@ -241,7 +245,7 @@ crate::shared! {
         pub crossing_right: f32,
     }
 
-    /// One roundabout's field among the tables of all fields.
+    /// One roundabout's field among the cells and blocks of all fields.
     pub struct FieldRow {
         /// South-west corner of the grid (m).
         pub origin: Vec2,
@@ -269,5 +273,7 @@ crate::shared! {
         pub fixed: u32,
         /// What follows the end of an episode: SAME_STEP, NEXT_STEP or DISABLED.
         pub autoreset: u32,
+        /// Trucks whose rays a workgroup shares.
+        pub team: u32,
     }
 }

@@ -10,7 +10,7 @@ use glam::Vec2;
 use crate::engine::cpu::perceive::pose_of;
 use crate::engine::limits::{self, FAR, FASTEST, MOST, STEEPEST};
 use crate::engine::{Batch, Error};
-use crate::layout::{Column, Control, Ended, N_POSES, Params, Pose, Progress, RewardTerms, Truck};
+use crate::layout::{Column, Control, Ended, N_POSES, Pose, Progress, Reward, RewardTerms, Truck};
 use crate::world::World;
 
 /// An observed value's largest magnitude: 1, with room for the rounding of either engine.
@@ -41,7 +41,7 @@ pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
         check_poses(env, &batch.poses[env], next_waypoint(world, truck, progress), n_waypoints)?;
         within(Column::Ended, env, "", batch.ended[env], 0..=Ended::ALL.len() as u32 - 1)?;
         check_terms(env, &batch.terms[env], n_waypoints)?;
-        let most = largest_reward(&world.params, n_waypoints);
+        let most = largest_reward(&world.reward, n_waypoints);
         within(Column::Reward, env, "", batch.reward[env], -most..=most)?;
     }
     Ok(())
@@ -145,9 +145,9 @@ fn check_terms(env: usize, terms: &RewardTerms, n_waypoints: u32) -> Result<(), 
 }
 
 /// Most that a step's reward can be, and its negative the least, on a route with so many waypoints.
-fn largest_reward(params: &Params, n_waypoints: u32) -> f32 {
-    let once = params.reward.lane_distance.abs() + params.reward.clearance.abs() + params.reward.failure.abs();
-    (params.reward.waypoint.abs() * n_waypoints as f32 + once) * OBSERVED
+fn largest_reward(weights: &Reward, n_waypoints: u32) -> f32 {
+    let once = weights.lane_distance.abs() + weights.clearance.abs() + weights.failure.abs();
+    (weights.waypoint.abs() * n_waypoints as f32 + once) * OBSERVED
 }
 
 fn all_within(column: Column, env: usize, values: &[f32], range: RangeInclusive<f32>) -> Result<(), Error> {

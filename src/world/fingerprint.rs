@@ -11,6 +11,8 @@ impl World {
     pub fn fingerprint(&self) -> u32 {
         let World {
             params,
+            reward,
+            disturbances,
             rigs,
             classes,
             rays,
@@ -25,8 +27,10 @@ impl World {
             step_limits,
         } = self;
         let mut hasher = crc32fast::Hasher::new();
-        let tables: [&[u8]; 8] = [
+        let tables: [&[u8]; 10] = [
             bytes_of(params),
+            bytes_of(reward),
+            bytes_of(disturbances),
             cast_slice(actions),
             cast_slice(rigs),
             cast_slice(rays),
@@ -66,8 +70,10 @@ mod tests {
     fn a_change_of_any_table_of_a_world_is_another_fingerprint() {
         let world = World::bake(&Scenario::named("attard2023").unwrap()).unwrap();
         let before = world.fingerprint();
-        let changes: [Change; 17] = [
-            ("params", |world| world.params.reward.failure -= 1.0),
+        let changes: [Change; 19] = [
+            ("params", |world| world.params.stray_distance += 1.0),
+            ("reward", |world| world.reward.failure -= 1.0),
+            ("disturbances", |world| world.disturbances.map_offset += 0.1),
             ("rigs", |world| world.rigs[0].slip += 1e-6),
             ("classes, vehicle", |world| world.classes[0].vehicle += "x"),
             ("classes, load", |world| world.classes[0].load += "x"),

@@ -80,6 +80,8 @@ fn what_is_observed_changes_neither_the_trucks_nor_their_progress_clearance_ends
 #[test]
 fn an_observation_that_is_late_is_that_of_some_steps_before_and_at_first_that_of_the_start() {
     for (name, engine) in engines() {
+        // A device may compute the progress of a pose in one kernel otherwise than in another.
+        let bound = if name == "CPU" { 0.0 } else { 1e-6 };
         let plain = states(&engine, Disturbances::default(), 12);
         for delay in 1..=3 {
             let late = states(&engine, Disturbances { observation_delay: [delay; 2], ..Disturbances::default() }, 12);
@@ -87,7 +89,9 @@ fn an_observation_that_is_late_is_that_of_some_steps_before_and_at_first_that_of
                 // A truck that ends in these steps begins another episode.
                 let before = step.saturating_sub(delay as usize);
                 for env in (0..N_ENVS).filter(|&env| plain[step].truck[env].episode == 0) {
-                    assert_eq!(late[step].observation[env], plain[before].observation[env], "{name} {delay} {step}");
+                    let (late, then) = (late[step].observation[env], plain[before].observation[env]);
+                    let apart = late.iter().zip(then).map(|(late, then)| (late - then).abs()).fold(0.0, f32::max);
+                    assert!(apart <= bound, "{name} {delay} {step}: {apart}");
                 }
             }
         }

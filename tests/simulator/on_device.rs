@@ -10,10 +10,13 @@ use offtrack::world::World;
 
 use crate::{batch_on, benchmark};
 
-/// The one device of all tests but the one that loses it.
+/// The one device of all tests but the one that loses it: it offers what every device of WebGPU does, and no more.
 fn device() -> &'static Device {
     static DEVICE: OnceLock<Device> = OnceLock::new();
-    DEVICE.get_or_init(|| Device::open(None).unwrap_or_else(|error| panic!("{error}")))
+    DEVICE.get_or_init(|| {
+        let least = |_: &wgpu::Adapter| (wgpu::Features::empty(), wgpu::Limits::default());
+        Device::open_with(None, least).unwrap_or_else(|error| panic!("{error}"))
+    })
 }
 
 /// The engine on it.

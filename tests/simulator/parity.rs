@@ -50,7 +50,7 @@ fn written(stage: Stage) -> Written {
         }
         Stage::Judge => (
             &[Column::Truck, Column::Ended, Column::Terms, Column::Reward],
-            Some(|world| world.params.reward.lane_distance_limit *= 1.001),
+            Some(|world| world.reward.lane_distance_limit *= 1.001),
         ),
         Stage::Count => (&[], None),
         Stage::CopyObservation => (&[Column::Observation, Column::Extras], None),
@@ -124,7 +124,7 @@ fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bo
 /// Whether the truck as it is observed, on the route as it is taken to lie, was closer than the margin to a line that
 /// it passes.
 fn is_close_call_as_seen(world: &World, after: &Batch, env: usize) -> bool {
-    let disturbances = &world.params.disturbances;
+    let disturbances = &world.disturbances;
     if disturbances.of_observation == 0 {
         return false;
     }
@@ -231,15 +231,15 @@ const NOTICED: [Noticed; 14] = [
     ("steer_delay", Stage::Drive, |world| {
         world.rigs.iter_mut().for_each(|rig| rig.steer_delay = rig.steer_delay.max(5) - 1)
     }),
-    ("position_offset", Stage::Follow, |world| world.params.disturbances.position_offset *= 1.01),
-    ("heading_offset", Stage::Follow, |world| world.params.disturbances.heading_offset *= 1.01),
-    ("position_noise", Stage::Follow, |world| world.params.disturbances.position_noise *= 1.01),
-    ("heading_noise", Stage::Follow, |world| world.params.disturbances.heading_noise *= 1.01),
-    ("observation_delay", Stage::Follow, |world| world.params.disturbances.n_observation_delays -= 1),
-    ("range_noise", Stage::Sense, |world| world.params.disturbances.range_noise *= 1.01),
-    ("dropped_rays", Stage::Sense, |world| world.params.disturbances.dropped_rays *= 1.1),
-    ("map_offset", Stage::Observe, |world| world.params.disturbances.map_offset *= 1.01),
-    ("action_delay", Stage::Steer, |world| world.params.disturbances.n_action_delays -= 1),
+    ("position_offset", Stage::Follow, |world| world.disturbances.position_offset *= 1.01),
+    ("heading_offset", Stage::Follow, |world| world.disturbances.heading_offset *= 1.01),
+    ("position_noise", Stage::Follow, |world| world.disturbances.position_noise *= 1.01),
+    ("heading_noise", Stage::Follow, |world| world.disturbances.heading_noise *= 1.01),
+    ("observation_delay", Stage::Follow, |world| world.disturbances.n_observation_delays -= 1),
+    ("range_noise", Stage::Sense, |world| world.disturbances.range_noise *= 1.01),
+    ("dropped_rays", Stage::Sense, |world| world.disturbances.dropped_rays *= 1.1),
+    ("map_offset", Stage::Observe, |world| world.disturbances.map_offset *= 1.01),
+    ("action_delay", Stage::Steer, |world| world.disturbances.n_action_delays -= 1),
 ];
 
 #[test]
@@ -303,9 +303,9 @@ fn the_largest_rewards_that_a_benchmark_may_give_are_summed_alike() {
     let mut world = World::clone(&world(Gutter::Drivable));
     let (choice, before) = varied(&world.clone().into(), false);
     // Whole numbers, which every engine adds up to the same reward.
-    let params = &mut world.params;
-    (params.reward.waypoint, params.reward.failure) = (1e6, -1e6);
-    (params.reward.lane_distance, params.reward.clearance) = (0.0, 0.0);
+    let weights = &mut world.reward;
+    (weights.waypoint, weights.failure) = (1e6, -1e6);
+    (weights.lane_distance, weights.clearance) = (0.0, 0.0);
     let [here, there] = simulators(&Arc::new(world), &choice).map(|mut simulator| {
         put(&mut simulator, &before);
         simulator.step(&before.action).unwrap();

@@ -204,9 +204,9 @@ impl<const N: usize> Rollout for HostRollout<N> {
     fn collect(&mut self, actor: &Mlp, settings: &Refinement) -> Result<Steps, Error> {
         let (n_envs, n_actions, n_steps) = (self.config.n_envs, self.n_actions(), settings.n_steps);
         let Learning { arrival, reward_scale, .. } = self.config.learning;
-        let limit = self.simulator.world().params.reward.lane_distance_limit;
-        let mut params = self.simulator.world().params;
-        settings.reward.apply_to_world(&mut params.reward);
+        let limit = self.simulator.world().reward.lane_distance_limit;
+        let mut weights = self.simulator.world().reward;
+        settings.reward.apply_to_world(&mut weights);
         let mut steps = Steps { n_envs, n_values: N, ..Steps::default() };
         for step in 0..n_steps {
             self.begin_step();
@@ -222,12 +222,12 @@ impl<const N: usize> Rollout for HostRollout<N> {
             let batch = self.simulator.batch();
             for env in 0..n_envs {
                 let terms = RewardTerms {
-                    lane_distance: (batch.terms[env].lane_distance * limit / params.reward.lane_distance_limit)
-                        .min(1.0),
-                    clearance: physics::closeness(&params, &batch.clearance[env]).powf(settings.clearance_power as f32),
+                    lane_distance: (batch.terms[env].lane_distance * limit / weights.lane_distance_limit).min(1.0),
+                    clearance: physics::closeness(&weights, &batch.clearance[env])
+                        .powf(settings.clearance_power as f32),
                     ..batch.terms[env]
                 };
-                steps.reward.push(physics::rewarded(&params, &terms));
+                steps.reward.push(physics::rewarded(&weights, &terms));
             }
             let reward = &mut steps.reward[step * n_envs..];
             if let Some(arrival) = arrival {

@@ -15,7 +15,7 @@ pub fn follow(world: &World, row: &mut Row) {
     let waypoints = world.route_waypoints(row.truck.route);
     let point = reference_point(world.rig(row.truck).wheelbase, row.truck);
     *row.progress = followed(waypoints, point, row.progress.waypoint, world.params.stray_distance);
-    if world.params.disturbances.of_observation == 1 {
+    if world.disturbances.of_observation == 1 {
         perceive::perceive(world, row, row.truck.steps + 1);
     }
 }

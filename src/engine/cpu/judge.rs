@@ -4,7 +4,7 @@
 
 use crate::engine::Row;
 use crate::layout::angle::wrapped;
-use crate::layout::{Clearance, Ended, Params, Progress, RewardTerms, RouteRow, Truck};
+use crate::layout::{Clearance, Ended, Params, Progress, Reward, RewardTerms, RouteRow, Truck};
 use crate::world::World;
 
 /// Advances the truck's number of steps and writes the end code, the reward's terms and the reward.
@@ -14,8 +14,8 @@ pub fn judge(world: &World, row: &mut Row) {
     let step_limit = world.step_limit(row.truck);
     let ended = ending(&world.params, route, step_limit, row.truck, row.clearance, row.progress);
     *row.ended = ended as u32;
-    *row.terms = reward_terms(&world.params, row.clearance, row.progress, ended);
-    *row.reward = rewarded(&world.params, row.terms);
+    *row.terms = reward_terms(&world.reward, row.clearance, row.progress, ended);
+    *row.reward = rewarded(&world.reward, row.terms);
 }
 
 /// Why the episode ended, [`Ended::Running`] when it did not.
@@ -50,24 +50,24 @@ pub fn ending(
 }
 
 /// The physical amounts that the reward weighs.
-pub fn reward_terms(params: &Params, clearance: &Clearance, progress: &Progress, ended: Ended) -> RewardTerms {
+pub fn reward_terms(weights: &Reward, clearance: &Clearance, progress: &Progress, ended: Ended) -> RewardTerms {
     RewardTerms {
         waypoints: progress.passed as f32,
-        lane_distance: (progress.lane_distance / params.reward.lane_distance_limit).min(1.0),
-        clearance: closeness(params, clearance),
+        lane_distance: (progress.lane_distance / weights.lane_distance_limit).min(1.0),
+        clearance: closeness(weights, clearance),
         failure: if ended.failed() { 1.0 } else { 0.0 },
     }
 }
 
 /// Depth of the nearer unit in the margin kept from kerbs, from 0 outside it to 1 at a kerb.
-pub fn closeness(params: &Params, clearance: &Clearance) -> f32 {
-    (1.0 - clearance.tractor.min(clearance.trailer) / params.reward.clearance_limit).clamp(0.0, 1.0)
+pub fn closeness(weights: &Reward, clearance: &Clearance) -> f32 {
+    (1.0 - clearance.tractor.min(clearance.trailer) / weights.clearance_limit).clamp(0.0, 1.0)
 }
 
 /// The weighted sum.
-pub fn rewarded(params: &Params, terms: &RewardTerms) -> f32 {
-    params.reward.waypoint * terms.waypoints
-        + params.reward.lane_distance * terms.lane_distance
-        + params.reward.clearance * terms.clearance
-        + params.reward.failure * terms.failure
+pub fn rewarded(weights: &Reward, terms: &RewardTerms) -> f32 {
+    weights.waypoint * terms.waypoints
+        + weights.lane_distance * terms.lane_distance
+        + weights.clearance * terms.clearance
+        + weights.failure * terms.failure
 }

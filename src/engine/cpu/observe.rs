@@ -69,7 +69,7 @@ pub fn observe(world: &World, row: &mut Row) {
 
 /// The observation of the row's truck.
 pub(super) fn observation_of(world: &World, row: &Row) -> [f32; N_VALUES] {
-    if world.params.disturbances.of_observation == 0 {
+    if world.disturbances.of_observation == 0 {
         return observed(world, row.truck, row.progress, row.ranges);
     }
     let (truck, progress) = perceive::seen(world, row);

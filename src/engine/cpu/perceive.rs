@@ -25,7 +25,7 @@ constants! {
 pub(super) fn perceive(world: &World, row: &mut Row, steps: u32) {
     let now = pose_of(row.truck, row.progress);
     let before = if steps == 0 { [now; 3] } else { [row.poses[1], row.poses[2], row.poses[3]] };
-    let disturbances = &world.params.disturbances;
+    let disturbances = &world.disturbances;
     let delay = observation_delay(disturbances, row.stream, row.truck.episode);
     let late = [now, before[0], before[1], before[2]][delay as usize];
     let seen = misplaced(disturbances, row.stream, row.truck.episode, steps, &late);
@@ -79,7 +79,7 @@ pub(super) fn seen(world: &World, row: &Row) -> (Truck, Progress) {
     let [_, x, y, _] = words(seed, env, row.truck.episode, Draw::Offsets as u32).map(signed_unit);
     let pose = &row.poses[0];
     let truck = seen_truck(row.truck, pose);
-    let truck = Truck { position: truck.position - world.params.disturbances.map_offset * Vec2::new(x, y), ..truck };
+    let truck = Truck { position: truck.position - world.disturbances.map_offset * Vec2::new(x, y), ..truck };
     let point = reference_point(world.rig(&truck).wheelbase, &truck);
     // An error may put it before the waypoint that it has passed last.
     let next = pose.waypoint.max(2) - 1;

@@ -71,7 +71,7 @@ fn start(world: &World, row: &mut Row, begin: &BeginRow) {
     let point = reference_point(rig.wheelbase, row.truck);
     *row.progress = followed(waypoints, point, 1, world.params.stray_distance);
     row.progress.passed = 0;
-    if world.params.disturbances.of_observation == 1 {
+    if world.disturbances.of_observation == 1 {
         perceive::perceive(world, row, 0);
     }
     sense::sense_at(world, row, 0);

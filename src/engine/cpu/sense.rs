@@ -56,13 +56,13 @@ pub fn sense(world: &World, row: &mut Row) {
 /// Fills the row's ranges as its sensors read them `steps` steps after the start of the episode.
 pub(super) fn sense_at(world: &World, row: &mut Row, steps: u32) {
     let params = &world.params;
-    if params.disturbances.of_observation == 0 {
+    if world.disturbances.of_observation == 0 {
         *row.ranges = ranges_of(world, row.truck);
         return;
     }
     let truck = perceive::seen_truck(row.truck, &row.poses[0]);
     *row.ranges = ranges_of(world, &truck);
-    perceive::disturb(&params.disturbances, row.stream, truck.episode, steps, params.sensor_range, row.ranges);
+    perceive::disturb(&world.disturbances, row.stream, truck.episode, steps, params.sensor_range, row.ranges);
 }
 
 /// The ranges of a truck (m).

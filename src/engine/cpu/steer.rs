@@ -18,14 +18,14 @@ constants! {
 pub fn steer(world: &World, row: &mut Row) {
     let params = &world.params;
     let before = *row.control;
-    let asked = if params.disturbances.of_action == 0 {
+    let asked = if world.disturbances.of_action == 0 {
         world.actions[*row.action as usize]
     } else {
         late_action(world, row.stream, row.truck.episode, *row.action, &before)
     };
     let action = targeted(params, &asked, &before);
     *row.control = controlled(world.rig(row.truck), world.step(), &action, row.truck.speed, &before);
-    if params.disturbances.of_action == 1 {
+    if world.disturbances.of_action == 1 {
         row.control.action_before = *row.action + 1;
         row.control.action_earlier = before.action_before;
         row.control.action_earliest = before.action_earlier;
@@ -36,7 +36,7 @@ pub fn steer(world: &World, row: &mut Row) {
 /// straight on at the speed that it began with.
 fn late_action(world: &World, stream: Stream, episode: u32, action: u32, before: &Control) -> Action {
     let actions = [action + 1, before.action_before, before.action_earlier, before.action_earliest];
-    match actions[action_delay(&world.params.disturbances, stream, episode) as usize] {
+    match actions[action_delay(&world.disturbances, stream, episode) as usize] {
         0 => {
             let speed = if world.params.changes_speed == 1 { 0.0 } else { before.target_speed };
             Action { steering: 0.0, speed }

@@ -3,7 +3,7 @@
 use wgpu::{Backends, DeviceType, Instance, InstanceDescriptor, Limits};
 
 use super::Error;
-use crate::engine::stages::N_STORAGE_BUFFERS;
+use crate::engine::stages::{N_STORAGE_BUFFERS, WORKGROUP_MEMORY};
 use crate::layout::WORKGROUP;
 
 /// An adapter as it presents itself.
@@ -74,7 +74,12 @@ pub fn adapters() -> Vec<Adapter> {
 
 /// An error if the adapter is too small for any batch.
 pub(super) fn check_limits(adapter: &wgpu::Adapter) -> Result<(), Error> {
-    let Limits { max_storage_buffers_per_shader_stage, max_compute_invocations_per_workgroup, .. } = adapter.limits();
+    let Limits {
+        max_storage_buffers_per_shader_stage,
+        max_compute_invocations_per_workgroup,
+        max_compute_workgroup_storage_size,
+        ..
+    } = adapter.limits();
     let needs = [
         (
             "the number of storage buffers a shader may see",
@@ -82,6 +87,7 @@ pub(super) fn check_limits(adapter: &wgpu::Adapter) -> Result<(), Error> {
             N_STORAGE_BUFFERS as u32,
         ),
         ("the number of threads in a workgroup", max_compute_invocations_per_workgroup, WORKGROUP),
+        ("the memory of a workgroup (bytes)", max_compute_workgroup_storage_size, WORKGROUP_MEMORY),
     ];
     match needs.into_iter().find(|(_, has, needed)| has < needed) {
         None => Ok(()),

@@ -11,7 +11,7 @@ use wgpu::{CommandEncoder, ComputePassDescriptor, ComputePassTimestampWrites};
 use super::buffers::{Buffers, check_size, check_world};
 use super::tables::Tables;
 use super::{Columns, Device, Error, Slice, kernels, stage_times};
-use crate::engine::stages::{BEGIN, Kernel, N_STAGES, STAGES, Stage};
+use crate::engine::stages::{BEGIN, Case, Kernel, N_STAGES, Stage};
 use crate::engine::{self, Autoreset, EngineBatch, RouteChoice, Tally};
 use crate::layout::buffers::Table;
 use crate::layout::{BatchFacts, BeginRow, Column, Stream};
@@ -23,6 +23,8 @@ pub struct Batch {
     device: Device,
     n_envs: usize,
     buffers: Buffers,
+    /// Which kernels have anything to do.
+    case: Case,
     /// Whether some columns are external.
     external: bool,
     /// The columns as they are, once the host has read them.
@@ -45,11 +47,13 @@ impl Batch {
         check_world(device, world)?;
         let host = engine::Batch::new(n_envs, seed, choice)?;
         let buffers = Buffers::new(device, &Tables::new(world, &host), n_envs, &columns)?;
+        let case = Case::of(world, host.autoreset());
         let room = Mutex::new(Some(host));
         Ok(Batch {
             device: device.clone(),
             n_envs,
             buffers,
+            case,
             external: !columns.is_empty(),
             seen: OnceLock::new(),
             room,
@@ -69,7 +73,7 @@ impl Batch {
     /// Adds a step with the actions in their column to the caller's commands. The caller submits them and calls
     /// [`Batch::stepped`].
     pub fn add_step(&self, encoder: &mut CommandEncoder) {
-        self.add_stages(encoder, &STAGES);
+        self.add_pass(encoder, self.case.step(), None);
     }
 
     /// Adds the drawing of random actions to the caller's commands.
@@ -97,7 +101,7 @@ impl Batch {
         timestamp_writes: Option<ComputePassTimestampWrites>,
     ) {
         let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor { label: None, timestamp_writes });
-        for kernel in kernels {
+        for kernel in kernels.into_iter().filter(|kernel| kernel.works(self.case)) {
             let (group, threads) = (self.buffers.group(kernel), kernels::threads(kernel, self.n_envs));
             self.device.kernels().dispatch(&mut pass, kernel, group, threads);
         }
@@ -185,6 +189,7 @@ impl EngineBatch for Batch {
     }
 
     fn set_autoreset(&mut self, autoreset: Autoreset) {
+        self.case.autoreset = autoreset;
         if let Some(host) = self.host() {
             host.set_autoreset(autoreset);
             let facts = BatchFacts::of(host);

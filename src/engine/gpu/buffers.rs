@@ -2,11 +2,10 @@
 
 use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buffer, BufferBinding};
 
-use super::tables::Tables;
+use super::tables::{Tables, sizes};
 use super::{Device, Error};
 use crate::engine::stages::Kernel;
 use crate::engine::tally::N_SUMS;
-use crate::field::Field;
 use crate::layout::buffers::{BUFFERS, Buffer as Shared, N_TABLES, Table};
 use crate::layout::shared::Named;
 use crate::layout::{Column, N_COLUMNS};
@@ -112,19 +111,9 @@ fn largest(device: &Device) -> u64 {
 /// An error if a table of the world is larger than that.
 pub(super) fn check_world(device: &Device, world: &World) -> Result<(), Error> {
     let limit = largest(device);
-    let of_fields = |bytes: fn(&Field) -> usize| world.fields.iter().map(bytes).sum::<usize>();
-    let tables = [
-        (Table::Cells, of_fields(|field| size_of_val(field.cells.as_slice()))),
-        (Table::Corners, of_fields(|field| size_of_val(field.values.as_slice()))),
-        (Table::Waypoints, size_of_val(world.waypoints.as_slice())),
-        (Table::Previews, size_of_val(world.previews.as_slice())),
-        (Table::Routes, size_of_val(world.routes.as_slice())),
-        (Table::StepLimits, size_of_val(world.step_limits.as_slice())),
-        (Table::Rigs, size_of_val(world.rigs.as_slice())),
-        (Table::Rays, size_of_val(world.rays.as_slice())),
-    ];
     let n_roundabouts = world.fields.len();
-    match tables.into_iter().map(|(table, n_bytes)| (table, n_bytes as u64)).find(|(_, n_bytes)| limit < *n_bytes) {
+    match sizes(world).into_iter().map(|(table, n_bytes)| (table, n_bytes as u64)).find(|(_, n_bytes)| limit < *n_bytes)
+    {
         None => Ok(()),
         Some((table, n_bytes)) => Err(Error::WorldTooLarge {
             table: table.name(),

@@ -2,14 +2,15 @@
 
 use wgpu::{
     BindGroup, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType,
-    ComputePass, ComputePipeline, ComputePipelineDescriptor, PipelineLayoutDescriptor, ShaderModuleDescriptor,
-    ShaderSource, ShaderStages,
+    ComputePass, ComputePipeline, ComputePipelineDescriptor, PipelineCompilationOptions, PipelineLayoutDescriptor,
+    ShaderModuleDescriptor, ShaderSource, ShaderStages,
 };
 
+use super::tables::team;
 use crate::engine::stages::{Kernel, SHADERS, Threads};
 use crate::layout::buffers::Access;
 use crate::layout::shared::Named;
-use crate::layout::{N_RAYS, N_VALUES, WORKGROUP};
+use crate::layout::{N_VALUES, WORKGROUP};
 
 /// Workgroups in a row of a dispatch: the most that every device takes.
 const ROW: u32 = 65_535;
@@ -50,7 +51,11 @@ impl<K: Named> Kernels<K> {
                 layout: Some(&pipeline_layout),
                 module: &module,
                 entry_point: label,
-                compilation_options: Default::default(),
+                // A kernel writes what it reads of the workgroup's memory.
+                compilation_options: PipelineCompilationOptions {
+                    zero_initialize_workgroup_memory: false,
+                    ..Default::default()
+                },
                 cache: None,
             });
             (layout, pipeline)
@@ -84,12 +89,12 @@ pub(super) fn of_stages(device: &wgpu::Device) -> Kernels<Kernel> {
 
 /// Threads that a kernel of a step needs for so many trucks.
 pub(super) fn threads(kernel: Kernel, n_envs: usize) -> u64 {
-    let width = match kernel.threads() {
-        Threads::Truck => 1,
-        Threads::Ray => N_RAYS,
-        Threads::Value => N_VALUES,
-    };
-    n_envs as u64 * width as u64
+    let n_envs = n_envs as u64;
+    match kernel.threads() {
+        Threads::Truck => n_envs,
+        Threads::Value => n_envs * N_VALUES as u64,
+        Threads::Team => n_envs.div_ceil(team(n_envs as usize).into()) * u64::from(WORKGROUP),
+    }
 }
 
 fn bound(binding: u32, access: Access) -> BindGroupLayoutEntry {

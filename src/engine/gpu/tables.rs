@@ -2,72 +2,135 @@
 
 use std::borrow::Cow;
 
-use bytemuck::{bytes_of, cast_slice};
+use bytemuck::{bytes_of, cast, cast_slice};
 
 use crate::engine::{Batch, RouteChoice};
-use crate::field::STORED_UNIT;
+use crate::field::{Field, STORED_UNIT};
 use crate::layout::buffers::Table;
-use crate::layout::{BatchFacts, BeginRow, FieldRow};
+use crate::layout::{
+    BatchFacts, BeginRow, FieldRow, N_PREVIEW, PREVIEW_ROWS, PreviewRow, ROUTE_ROWS, Rig, TEAM_MAX, VehicleRow,
+    WaypointRow,
+};
 use crate::world::World;
+
+/// Trucks from which on a large device has enough of the largest teams.
+const MANY: usize = 16_384;
+/// Trucks of a team below that.
+const FEW: u32 = 8;
 
 /// The contents of every [`Table`].
 pub(super) struct Tables<'a> {
     world: &'a World,
     batch: &'a Batch,
     facts: BatchFacts,
+    vehicles: Vec<VehicleRow>,
+    roads: Vec<[u32; 4]>,
+    limits: Vec<u32>,
     // All fields, one after the other.
-    fields: Vec<FieldRow>,
     cells: Vec<[u32; 2]>,
     corners: Vec<u32>,
 }
 
 impl<'a> Tables<'a> {
     pub(super) fn new(world: &'a World, batch: &'a Batch) -> Tables<'a> {
-        let mut tables = Tables {
-            world,
-            batch,
-            facts: BatchFacts::of(batch),
-            fields: Vec::new(),
-            cells: Vec::new(),
-            corners: Vec::new(),
-        };
+        let mut fields = Vec::new();
+        let (mut cells, mut corners) = (Vec::new(), Vec::new());
         for field in &world.fields {
-            let first_cell = tables.cells.len() as u32;
-            tables.cells.extend(&field.cells);
-            tables.fields.push(FieldRow {
+            fields.push(FieldRow {
                 origin: field.origin,
                 cells_per_metre: field.cells_per_metre,
                 slope: field.cells_per_metre * STORED_UNIT,
                 columns: field.columns,
                 rows: field.rows,
-                first_cell,
-                first_pair: tables.corners.len() as u32,
+                first_cell: cells.len() as u32,
+                first_pair: corners.len() as u32,
             });
-            tables.corners.extend(&field.values);
+            cells.extend(&field.cells);
+            corners.extend(&field.values);
         }
-        tables
+        let vehicle = |rig: &Rig| VehicleRow { rays: *world.rays_of(rig), rig: *rig };
+        Tables {
+            world,
+            batch,
+            facts: BatchFacts::of(batch),
+            vehicles: world.rigs.iter().map(vehicle).collect(),
+            roads: roads(world, &fields),
+            limits: limits(world),
+            cells,
+            corners,
+        }
     }
 
     /// A table's bytes.
     pub(super) fn bytes(&self, table: Table) -> Cow<'_, [u8]> {
         Cow::Borrowed(match table {
             Table::Params => bytes_of(&self.world.params),
-            Table::Rigs => cast_slice(&self.world.rigs),
+            Table::Weights => bytes_of(&self.world.reward),
+            Table::Disturbances => bytes_of(&self.world.disturbances),
+            Table::Vehicles => cast_slice(&self.vehicles),
             Table::Actions => cast_slice(&self.world.actions),
-            Table::Rays => cast_slice(&self.world.rays),
-            Table::Fields => cast_slice(&self.fields),
+            Table::Roads => cast_slice(&self.roads),
             Table::Cells => cast_slice(&self.cells),
             Table::Corners => cast_slice(&self.corners),
-            Table::Waypoints => cast_slice(&self.world.waypoints),
-            Table::Previews => cast_slice(&self.world.previews),
-            Table::Routes => cast_slice(&self.world.routes),
-            Table::StepLimits => cast_slice(&self.world.step_limits),
+            Table::Limits => cast_slice(&self.limits),
             Table::Batch => bytes_of(&self.facts),
             Table::Choice => cast_slice(self.batch.choice().routes()),
             Table::Streams => cast_slice(self.batch.streams()),
             Table::Begins => return Cow::Owned(vec![0; self.batch.n_envs() * size_of::<BeginRow>()]),
         })
     }
+}
+
+/// Rows of the table of roads: those of the routes, of all waypoints, and of their previews. `common/road.wgsl` reads
+/// them.
+fn roads(world: &World, fields: &[FieldRow]) -> Vec<[u32; 4]> {
+    let (n_routes, n_waypoints) = (world.routes.len(), world.waypoints.len());
+    let first_waypoint = n_routes * ROUTE_ROWS;
+    let first_preview = first_waypoint + n_waypoints;
+    let mut rows = Vec::with_capacity(first_preview + n_waypoints * PREVIEW_ROWS);
+    for route in &world.routes {
+        let (first, crossing) = (route.first as usize, [route.crossing_left, route.crossing_right].map(f32::to_bits));
+        rows.push([(first_waypoint + first) as u32, route.n_waypoints, crossing[0], crossing[1]]);
+        rows.push([(first_preview + first * PREVIEW_ROWS) as u32, 0, 0, 0]);
+        rows.extend(cast::<FieldRow, [[u32; 4]; 2]>(fields[route.roundabout as usize]));
+    }
+    rows.extend(world.waypoints.iter().map(|&waypoint| cast::<WaypointRow, [u32; 4]>(waypoint)));
+    for preview in &world.previews {
+        let mut words = [[0; 4]; PREVIEW_ROWS];
+        words.as_flattened_mut()[..=N_PREVIEW].copy_from_slice(&cast::<PreviewRow, [u32; 1 + N_PREVIEW]>(*preview));
+        rows.extend(words);
+    }
+    rows
+}
+
+/// The class of each vehicle, then what ends an episode on each route.
+fn limits(world: &World) -> Vec<u32> {
+    let mut limits: Vec<u32> = world.rigs.iter().map(|rig| rig.class_index).collect();
+    let of_routes = world.step_limits.chunks_exact(world.params.n_classes as usize);
+    for (route, step_limits) in world.routes.iter().zip(of_routes) {
+        limits.push(route.n_waypoints);
+        limits.extend(step_limits);
+    }
+    limits
+}
+
+/// Bytes of the tables of a world that grow with it.
+pub(super) fn sizes(world: &World) -> [(Table, usize); 5] {
+    let of_fields = |bytes: fn(&Field) -> usize| world.fields.iter().map(bytes).sum::<usize>();
+    let rows = world.routes.len() * ROUTE_ROWS + world.waypoints.len() * (1 + PREVIEW_ROWS);
+    [
+        (Table::Cells, of_fields(|field| size_of_val(field.cells.as_slice()))),
+        (Table::Corners, of_fields(|field| size_of_val(field.values.as_slice()))),
+        (Table::Roads, rows * size_of::<[u32; 4]>()),
+        (Table::Limits, (world.rigs.len() + world.routes.len() + world.step_limits.len()) * size_of::<u32>()),
+        (Table::Vehicles, world.rigs.len() * size_of::<VehicleRow>()),
+    ]
+}
+
+/// Trucks whose rays a workgroup shares. More wait less for each other; with few trucks a large device would have too
+/// few workgroups.
+pub(super) fn team(n_envs: usize) -> u32 {
+    if n_envs < MANY { FEW } else { TEAM_MAX }
 }
 
 impl BatchFacts {
@@ -78,6 +141,7 @@ impl BatchFacts {
             n_routes: batch.choice().routes().len() as u32,
             fixed: matches!(batch.choice(), RouteChoice::Fixed(_)).into(),
             autoreset: batch.autoreset() as u32,
+            team: team(batch.n_envs()),
         }
     }
 }

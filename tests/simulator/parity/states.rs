@@ -57,7 +57,7 @@ pub fn disturbed_world() -> Arc<World> {
         ..Scenario::named("transfer2026").unwrap().disturbances
     };
     let mut world = World::clone(&fleet_world());
-    world.params.disturbances = (&disturbances).into();
+    world.disturbances = (&disturbances).into();
     Arc::new(world)
 }
 
@@ -147,7 +147,7 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
     batch.control[env].speed_error_integral = integral;
     (batch.control[env].steering_before, batch.control[env].steering_earlier) = (0.4 * speed, 0.4 * lean);
     batch.control[env].steering_earliest = 0.4 * bent;
-    if world.params.disturbances.of_action == 1 {
+    if world.disturbances.of_action == 1 {
         // An action's index plus 1, or none yet.
         let action = |draw: u32| picked(env, draw, world.params.n_actions as usize + 1) as u32;
         let control = &mut batch.control[env];
