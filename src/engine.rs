@@ -69,11 +69,15 @@ pub(crate) trait EngineBatch: Any + Debug + Send + Sync {
     /// One step of every truck.
     fn step(&mut self, world: &World, actions: &[u32]) -> Result<(), Error>;
 
-    /// One step of every truck with random actions.
-    fn step_at_random(&mut self, world: &World);
+    /// Steps of every truck with random actions.
+    fn steps_at_random(&mut self, world: &World, n_steps: usize);
 
     /// One step of every truck with random actions, a stage at a time: the time of each stage.
     fn step_at_random_by_stage(&mut self, world: &World) -> Result<[Duration; N_STAGES], Error>;
+
+    /// One step of every truck with random actions, a kernel at a time: the time of each kernel. None on the CPU, which
+    /// has no kernels: no step is made.
+    fn step_at_random_by_kernel(&mut self) -> Result<Vec<(&'static str, Duration)>, Error>;
 
     /// One stage over every truck.
     fn run_stage(&mut self, world: &World, stage: Stage);

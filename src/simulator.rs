@@ -263,13 +263,25 @@ impl Simulator {
 
     /// One step of every truck with an action drawn uniformly at random from (seed, env, episode, step).
     pub fn step_at_random(&mut self) {
-        self.batch.step_at_random(&self.world);
+        self.batch.steps_at_random(&self.world, 1);
+    }
+
+    /// As many such steps, one after the other: on a device they are submitted at once, so that the host does less for
+    /// each.
+    pub fn steps_at_random(&mut self, n_steps: usize) {
+        self.batch.steps_at_random(&self.world, n_steps);
     }
 
     /// [`Simulator::step_at_random`] a stage at a time over the whole batch, for timing: the same result, and the time
     /// of each stage.
     pub fn step_at_random_by_stage(&mut self) -> Result<[Duration; N_STAGES], Error> {
         self.batch.step_at_random_by_stage(&self.world)
+    }
+
+    /// [`Simulator::step_at_random`] a kernel at a time, for timing: the same result, and the kernels of a step on a
+    /// device with the time of each. On the CPU nothing is done and the list is empty.
+    pub fn step_at_random_by_kernel(&mut self) -> Result<Vec<(&'static str, Duration)>, Error> {
+        self.batch.step_at_random_by_kernel()
     }
 
     /// One stage of a step over every truck: for comparing engines a stage at a time.

@@ -66,24 +66,40 @@ fn store_after(thread: Thread) {
     }
 }
 
-// Samples transitions over up to `n_steps` steps, uniformly at random; a thread a value.
-//
-// The sum of rewards is R. Sutton's n-step return ("Learning to Predict by the Methods of Temporal Differences", 1988).
+// Samples transitions, uniformly at random: what was observed and done; a thread a value.
 @compute @workgroup_size(WORKGROUP)
 fn sample(thread: Thread) {
     let element = index_of(thread);
     let index = element / facts.n_values;
     let value = element % facts.n_values;
     if facts.n_rows <= index { return; }
-    let drawn = words(facts.sampling_seed, index, now.sample, 0u);
-    let slot = now.oldest + index_below(drawn.x, now.n_ready);
-    let env = index_below(drawn.y, facts.n_envs);
-    let first = (slot % facts.n_slots) * facts.n_envs + env;
-    var last = first;
+    let drawn = drawn_at(index);
+    let first = (drawn.slot % facts.n_slots) * facts.n_envs + drawn.env;
+    if value == 0u {
+        var taken = held_action[first];
+        if drawn.is_mirrored { taken = action_images[taken]; }
+        sampled_action[index] = i32(taken);
+    }
+    let image = image_of(drawn, value);
+    let held = held_observation[first * facts.n_values + image.index];
+    sampled_observation[element] = normalised(image.factor * held, value) + noise_at(index, value);
+}
+
+// What they led to, over up to `n_steps` steps; a thread a value.
+//
+// The sum of rewards is R. Sutton's n-step return ("Learning to Predict by the Methods of Temporal Differences", 1988).
+@compute @workgroup_size(WORKGROUP)
+fn sample_next(thread: Thread) {
+    let element = index_of(thread);
+    let index = element / facts.n_values;
+    let value = element % facts.n_values;
+    if facts.n_rows <= index { return; }
+    let drawn = drawn_at(index);
+    var last = 0u;
     var sum = 0.0;
     var weight = 1.0;
     for (var n = 0u; n < facts.n_steps; n++) {
-        last = ((slot + n) % facts.n_slots) * facts.n_envs + env;
+        last = ((drawn.slot + n) % facts.n_slots) * facts.n_envs + drawn.env;
         sum += weight * held_reward[last];
         weight *= facts.gamma;
         if held_ended[last] == TIMED_OUT { break; }
@@ -92,21 +108,38 @@ fn sample(thread: Thread) {
             break;
         }
     }
-    let is_mirrored = facts.mirrored == 1u && (drawn.z & 1u) == 1u;
     if value == 0u {
-        var taken = held_action[first];
-        if is_mirrored { taken = action_images[taken]; }
-        sampled_action[index] = i32(taken);
         sampled_reward[index] = sum * facts.reward_scale;
         sampled_discount[index] = weight;
     }
-    var image = Image(value, 1.0);
-    if is_mirrored { image = images[value]; }
-    // The same noise on both, so that their difference stays what it is.
-    let noise = normalisation[value].noise * signed_unit(words(facts.sampling_seed, index, now.sample, 1u + value).x);
-    let held = held_observation[first * facts.n_values + image.index];
-    sampled_observation[element] = normalised(image.factor * held, value) + noise;
-    sampled_next[element] = normalised(image.factor * held_next[last * facts.n_values + image.index], value) + noise;
+    let image = image_of(drawn, value);
+    let held = held_next[last * facts.n_values + image.index];
+    sampled_next[element] = normalised(image.factor * held, value) + noise_at(index, value);
+}
+
+// A transition of the sample.
+struct Drawn {
+    // Where it begins: a slot counted from the oldest of the ring's first round on, and a truck.
+    slot: u32,
+    env: u32,
+    is_mirrored: bool,
+}
+
+fn drawn_at(index: u32) -> Drawn {
+    let drawn = words(facts.sampling_seed, index, now.sample, 0u);
+    let is_mirrored = facts.mirrored == 1u && (drawn.z & 1u) == 1u;
+    return Drawn(now.oldest + index_below(drawn.x, now.n_ready), index_below(drawn.y, facts.n_envs), is_mirrored);
+}
+
+// What a value is the mirror image of; itself where the transition is not mirrored.
+fn image_of(drawn: Drawn, value: u32) -> Image {
+    if drawn.is_mirrored { return images[value]; }
+    return Image(value, 1.0);
+}
+
+// The noise of a value: the same on both observations, so that their difference stays what it is.
+fn noise_at(index: u32, value: u32) -> f32 {
+    return normalisation[value].noise * signed_unit(words(facts.sampling_seed, index, now.sample, 1u + value).x);
 }
 
 // A value, normalised and clipped.

@@ -138,9 +138,11 @@ impl EngineBatch for Batch {
         Ok(())
     }
 
-    fn step_at_random(&mut self, world: &World) {
-        draw_all(world, self);
-        run_all(world, self, &STAGES);
+    fn steps_at_random(&mut self, world: &World, n_steps: usize) {
+        for _ in 0..n_steps {
+            draw_all(world, self);
+            run_all(world, self, &STAGES);
+        }
     }
 
     fn step_at_random_by_stage(&mut self, world: &World) -> Result<[Duration; N_STAGES], Error> {
@@ -150,6 +152,10 @@ impl EngineBatch for Batch {
             self.run_stage(world, stage);
             start.elapsed()
         }))
+    }
+
+    fn step_at_random_by_kernel(&mut self) -> Result<Vec<(&'static str, Duration)>, Error> {
+        Ok(Vec::new())
     }
 
     fn run_stage(&mut self, world: &World, stage: Stage) {

@@ -7,8 +7,8 @@ mod adapter;
 mod batch;
 mod buffers;
 mod error;
+mod kernel_times;
 mod kernels;
-mod stage_times;
 mod tables;
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};

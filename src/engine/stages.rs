@@ -166,7 +166,7 @@ impl Case {
     }
 
     /// The kernels of a step, one after the other.
-    pub fn step(self) -> impl Iterator<Item = Kernel> {
+    pub fn step(self) -> impl Iterator<Item = Kernel> + Clone {
         let kernels: &[Kernel] = if self.disturbed { &DISTURBED_STEP } else { &STEP };
         kernels.iter().copied().filter(move |kernel| kernel.works(self))
     }

@@ -191,9 +191,10 @@ fn in_a_loop_every_variable_has_an_initial_value_since_one_compiler_clears_it_on
 
 #[cfg(feature = "gpu")]
 mod module {
-    use offtrack::engine::stages::{Kernel, N_STORAGE_BUFFERS, SHADERS, STAGES, WORKGROUP_MEMORY};
+    use offtrack::engine::stages::{BEGIN, Case, Kernel, N_STORAGE_BUFFERS, SHADERS, STAGES, WORKGROUP_MEMORY};
     use offtrack::layout::shared::Struct;
     use offtrack::layout::structs;
+    use offtrack::simulator::Autoreset;
     use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
     use wgpu::naga::{GlobalVariable, Handle, Module, TypeInner, front::wgsl};
 
@@ -215,12 +216,23 @@ mod module {
         known.sort_unstable();
         assert_eq!(found, known);
         let of_stages: Vec<Kernel> = STAGES.iter().flat_map(|stage| stage.kernels()).copied().collect();
-        let several = [Kernel::Advance, Kernel::ObserveBoth, Kernel::ExtrasBoth, Kernel::JudgeAndCount];
-        let beside = [[Kernel::Draw, Kernel::Begin, Kernel::Forget].as_slice(), &several].concat();
-        assert!(
-            Kernel::ALL.iter().all(|kernel| beside.contains(kernel) != of_stages.contains(kernel)),
-            "a kernel without a stage"
-        );
+        let of_steps = [false, true].map(|disturbed| {
+            Case { disturbed, extras: true, autoreset: Autoreset::NextStep }.step().collect::<Vec<Kernel>>()
+        });
+        for kernel in Kernel::ALL {
+            let used = [of_stages.as_slice(), &of_steps[0], &of_steps[1], &BEGIN, &[Kernel::Draw]];
+            assert!(used.iter().any(|kernels| kernels.contains(&kernel)), "{kernel:?} is never run");
+        }
+    }
+
+    #[test]
+    fn a_step_takes_few_kernels_and_more_only_where_there_is_more_to_do() {
+        let n = |disturbed, extras, autoreset| Case { disturbed, extras, autoreset }.step().count();
+        assert_eq!(n(false, false, Autoreset::SameStep), 8);
+        assert_eq!(n(false, false, Autoreset::Disabled), 8);
+        assert_eq!(n(false, false, Autoreset::NextStep), 9);
+        assert_eq!(n(false, true, Autoreset::SameStep), 10);
+        assert_eq!(n(true, true, Autoreset::SameStep), 14);
     }
 
     /// The buffers that a shader names for each kernel, in the order of their bindings.

@@ -37,8 +37,8 @@ impl Choice {
 /// Runs the command.
 #[cfg(feature = "gpu")]
 pub fn run(_: &Args) -> Result<(), Error> {
-    use offtrack::engine::stages::N_STORAGE_BUFFERS;
-    use offtrack::gpu;
+    use offtrack::engine::stages::{N_STORAGE_BUFFERS, WORKGROUP_MEMORY};
+    use offtrack::gpu::{self, Adapter};
 
     let adapters = gpu::adapters();
     if adapters.is_empty() {
@@ -46,15 +46,18 @@ pub fn run(_: &Args) -> Result<(), Error> {
         device::open(None)?;
     }
     let buffers = format!("storage buffers ({N_STORAGE_BUFFERS} needed)");
-    let heads = ["", "adapter", "interface", "driver", "kind", "largest buffer", &buffers];
+    let memory = format!("workgroup memory ({} KiB needed)", WORKGROUP_MEMORY >> 10);
+    let heads = ["", "adapter", "interface", "driver", "kind", "largest buffer", &buffers, &memory];
     let mut rows = vec![heads.map(str::to_owned)];
     rows.extend(adapters.into_iter().enumerate().map(|(index, adapter)| {
         let mark = if index == 0 { "*" } else { "" };
         let largest = format!("{} MiB", adapter.binding_max >> 20);
         let buffers = adapter.storage_buffers_max.to_string();
-        [mark.to_owned(), adapter.name, adapter.interface, adapter.driver, adapter.kind.to_owned(), largest, buffers]
+        let memory = format!("{} KiB", adapter.workgroup_memory_max >> 10);
+        let Adapter { name, interface, driver, kind, .. } = adapter;
+        [mark.to_owned(), name, interface, driver, kind.to_owned(), largest, buffers, memory]
     }));
-    let widths: [usize; 7] =
+    let widths: [usize; 8] =
         std::array::from_fn(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0));
     for row in rows {
         let cells: Vec<String> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:width$}")).collect();

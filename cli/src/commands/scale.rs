@@ -44,6 +44,9 @@ pub struct Args {
     /// trucks, and its replay buffer is as small as an update allows.
     #[arg(long)]
     config: Option<PathBuf>,
+    /// With --mode random on a device: steps that are submitted at once.
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    submission: u32,
     /// Time for each number of trucks and each mode (s).
     #[arg(long, default_value_t = 5.0, allow_negative_numbers = true)]
     seconds: f64,
@@ -79,6 +82,8 @@ struct Scale {
     /// Time to read the benchmark and draw its random roads, and to bake its world; a cache makes both shorter.
     seconds_to_read: f64,
     seconds_to_bake: f64,
+    /// Steps that were submitted at once to a device where actions were random.
+    submission: u32,
     runs: Vec<Run>,
 }
 
@@ -194,6 +199,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         routes: world.routes.len(),
         seconds_to_read: drawn.as_secs_f64(),
         seconds_to_bake: baked.as_secs_f64(),
+        submission: args.submission,
         runs: Vec::new(),
     };
     files::print(&heading(&scale, &device))?;
@@ -215,6 +221,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
                 world: &world,
                 routes: &routes,
                 envs,
+                submission: args.submission as usize,
                 learner: learner.as_ref(),
             };
             let work = || measured(&mut mode.driven(setting)?, args.seconds);

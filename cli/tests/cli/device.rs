@@ -39,7 +39,7 @@ fn assert_networks_acted(scale: &Value, envs: u64) {
 }
 
 /// A run that was measured: its counts agree with each other, and its speed lies between its windows.
-fn assert_measured(run: &Value, envs: u64, rays: f64) {
+fn assert_measured(run: &Value, envs: u64, rays: f64, on_device: bool) {
     assert_eq!((&run["envs"], &run["mode"]), (&Value::from(envs), &Value::from("random")), "{run}");
     let count = |key: &str| run[key].as_u64().unwrap_or_else(|| panic!("{key}: {run}"));
     let speed = |key: &str| run[key].as_f64().unwrap_or_else(|| panic!("{key}: {run}"));
@@ -57,6 +57,10 @@ fn assert_measured(run: &Value, envs: u64, rays: f64) {
         stages.values().all(|time| 0.0 <= time.as_f64().unwrap()) && 0.0 < stages["sense"].as_f64().unwrap(),
         "{run}"
     );
+    // A device is timed by the kernels of a step too.
+    let kernels = run.get("kernels").map(|kernels| kernels.as_object().unwrap());
+    assert_eq!(kernels.is_some(), on_device, "{run}");
+    assert!(kernels.is_none_or(|kernels| kernels.len() == 9 && 0.0 < kernels["sense"].as_f64().unwrap()), "{run}");
 }
 
 #[test]
@@ -78,7 +82,7 @@ fn a_scale_on_the_processor_holds_every_size_and_draws_them_whole() {
     let runs = scale["runs"].as_array().unwrap();
     assert_eq!(runs.len(), 4);
     for (run, envs) in runs.iter().zip([3, 16, 64, 70]) {
-        assert_measured(run, envs, 29.0);
+        assert_measured(run, envs, 29.0, false);
     }
     let svg = std::fs::read_to_string(place.file("scale.svg")).unwrap();
     assert!(svg.trim_end().ends_with("</svg>"));
@@ -169,9 +173,17 @@ mod on_a_device {
         let listed = String::from_utf8(output.stdout).unwrap();
         let lines: Vec<&str> = listed.lines().collect();
         assert!(
-            ["adapter", "interface", "driver", "kind", "largest buffer", "storage buffers (16 needed)"]
-                .iter()
-                .all(|head| lines[0].contains(head)),
+            [
+                "adapter",
+                "interface",
+                "driver",
+                "kind",
+                "largest buffer",
+                "storage buffers (8 needed)",
+                "workgroup memory (16 KiB needed)"
+            ]
+            .iter()
+            .all(|head| lines[0].contains(head)),
             "{listed}"
         );
         assert!(lines[1].starts_with("*  ") && lines[1].contains("MiB"), "{listed}");
@@ -183,8 +195,8 @@ mod on_a_device {
         assert!(device.starts_with(name) && scale["engine"] == "gpu", "{device:?}, {name:?}");
         let runs = scale["runs"].as_array().unwrap();
         assert_eq!(runs.len(), 2);
-        assert_measured(&runs[0], 16, 29.0);
-        assert_measured(&runs[1], 50, 29.0);
+        assert_measured(&runs[0], 16, 29.0, true);
+        assert_measured(&runs[1], 50, 29.0, true);
         // Part of the name chooses it, whatever the case.
         let part: String = name.chars().take(4).collect::<String>().to_uppercase();
         assert_eq!(scaled(&place, &["--device", "gpu", "--adapter", &part, "--envs", "1"])["device"], scale["device"]);
@@ -231,9 +243,9 @@ mod on_a_device {
         // A large graphics card holds them; a software adapter allows 128 MiB in a buffer.
         match runs[0]["error"].as_str() {
             Some(error) => assert!(error.contains("n_envs: 4194304") && error.contains("trucks fit"), "{error}"),
-            None => assert_measured(&runs[0], 4_194_304, 29.0),
+            None => assert_measured(&runs[0], 4_194_304, 29.0, true),
         }
-        assert_measured(&runs[1], 16, 29.0);
+        assert_measured(&runs[1], 16, 29.0, true);
     }
 
     #[test]

@@ -312,10 +312,12 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
     /// Samples a batch in one shard: the same tensors every time, with other values in them.
     fn sample(&mut self) -> Result<Vec<Transitions>, Error> {
         self.shared.flush()?;
-        let group = self.buffers.group(&self.shared.gpu.device, &self.kernels, Kernel::Sample, None);
         self.write_now();
         let mut encoder = self.shared.gpu.device.create_command_encoder(&Default::default());
-        memory_kernels::add(&self.kernels, &mut encoder, &group, Kernel::Sample, &self.facts);
+        for kernel in [Kernel::Sample, Kernel::SampleNext] {
+            let group = self.buffers.group(&self.shared.gpu.device, &self.kernels, kernel, None);
+            memory_kernels::add(&self.kernels, &mut encoder, &group, kernel, &self.facts);
+        }
         self.shared.gpu.queue.submit([encoder.finish()]);
         self.n_samples = self.n_samples.wrapping_add(1);
         Ok(vec![Transitions {

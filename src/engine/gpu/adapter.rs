@@ -21,6 +21,8 @@ pub struct Adapter {
     pub binding_max: u64,
     /// Storage buffers that a shader may see; [`N_STORAGE_BUFFERS`] are needed.
     pub storage_buffers_max: u32,
+    /// Memory that a workgroup's threads may share (bytes); [`WORKGROUP_MEMORY`] is needed.
+    pub workgroup_memory_max: u32,
 }
 
 /// The interfaces that are searched for adapters. OpenGL is left out: a machine without a driver would offer it and
@@ -51,6 +53,7 @@ pub(super) fn described(adapter: &wgpu::Adapter) -> Adapter {
         },
         binding_max: adapter.limits().max_storage_buffer_binding_size,
         storage_buffers_max: adapter.limits().max_storage_buffers_per_shader_stage,
+        workgroup_memory_max: adapter.limits().max_compute_workgroup_storage_size,
     }
 }
 

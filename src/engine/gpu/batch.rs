@@ -10,8 +10,8 @@ use wgpu::{CommandEncoder, ComputePassDescriptor, ComputePassTimestampWrites};
 
 use super::buffers::{Buffers, check_size, check_world};
 use super::tables::Tables;
-use super::{Columns, Device, Error, Slice, kernels, stage_times};
-use crate::engine::stages::{BEGIN, Case, Kernel, N_STAGES, Stage};
+use super::{Columns, Device, Error, Slice, kernel_times, kernels};
+use crate::engine::stages::{BEGIN, Case, Kernel, N_STAGES, STAGES, Stage};
 use crate::engine::{self, Autoreset, EngineBatch, RouteChoice, Tally};
 use crate::layout::buffers::Table;
 use crate::layout::{BatchFacts, BeginRow, Column, Stream};
@@ -235,16 +235,25 @@ impl EngineBatch for Batch {
         Ok(())
     }
 
-    fn step_at_random(&mut self, _: &World) {
+    fn steps_at_random(&mut self, _: &World, n_steps: usize) {
         self.submit(|batch, encoder| {
-            batch.add_draw(encoder);
-            batch.add_step(encoder);
+            let kernels = std::iter::once(Kernel::Draw).chain(batch.case.step());
+            batch.add_pass(encoder, std::iter::repeat_n(kernels, n_steps).flatten(), None);
         });
     }
 
     fn step_at_random_by_stage(&mut self, _: &World) -> Result<[Duration; N_STAGES], engine::Error> {
         self.submit(Batch::add_draw);
-        Ok(stage_times::step_by_stage(self)?)
+        let times = kernel_times::lasted(self, &STAGES.map(|stage| stage.kernels().to_vec()))?;
+        let mut times = times.into_iter();
+        Ok(std::array::from_fn(|_| times.next().unwrap_or_default()))
+    }
+
+    fn step_at_random_by_kernel(&mut self) -> Result<Vec<(&'static str, Duration)>, engine::Error> {
+        let kernels: Vec<Kernel> = std::iter::once(Kernel::Draw).chain(self.case.step()).collect();
+        let each: Vec<Vec<Kernel>> = kernels.iter().map(|&kernel| vec![kernel]).collect();
+        let times = kernel_times::lasted(self, &each)?;
+        Ok(kernels.into_iter().map(Kernel::name).zip(times).collect())
     }
 
     fn run_stage(&mut self, _: &World, stage: Stage) {

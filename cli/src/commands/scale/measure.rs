@@ -59,6 +59,9 @@ pub(super) struct Measured {
     /// than the stages.
     #[serde(serialize_with = "as_map")]
     pub stages: Vec<(&'static str, f64)>,
+    /// The same of each kernel of a step on a device, some of which do several stages.
+    #[serde(serialize_with = "as_map", skip_serializing_if = "Vec::is_empty")]
+    pub kernels: Vec<(&'static str, f64)>,
 }
 
 /// Pairs as a map in their own order.
@@ -85,7 +88,8 @@ pub(super) fn measured(driven: &mut Driven, seconds: f64) -> Result<Measured, Er
         steps += done;
     }
     let after = driven.simulator().tally()?;
-    let stages = stage_times(driven, 0.2 * seconds)?;
+    let stages = stage_times(driven, 0.1 * seconds)?;
+    let kernels = kernel_times(driven, 0.1 * seconds)?;
     let since = |count: fn(&Tally) -> u64| count(&after) - count(&before);
     let (env_steps, episodes) = (since(Tally::env_steps), since(Tally::episodes));
     let speed = median(&mut speeds);
@@ -103,6 +107,7 @@ pub(super) fn measured(driven: &mut Driven, seconds: f64) -> Result<Measured, Er
         steps_a_wait,
         bytes_per_truck: driven.simulator().bytes() as f64 / envs as f64,
         stages,
+        kernels,
     })
 }
 
@@ -125,9 +130,7 @@ fn spread_out(driven: &mut Driven, seconds: f64) -> Result<(u64, u64), Error> {
 
 /// A run of steps, done when it returns.
 fn step_and_wait(driven: &mut Driven, steps: u64) -> Result<(), Error> {
-    for _ in 0..steps {
-        driven.step()?;
-    }
+    driven.steps(steps)?;
     driven.wait()
 }
 
@@ -143,6 +146,24 @@ fn stage_times(driven: &mut Driven, seconds: f64) -> Result<Vec<(&'static str, f
         }
     }
     Ok(STAGE_NAMES.into_iter().zip(&mut times).map(|(name, times)| (name, rounded(median(times)))).collect())
+}
+
+/// Median times of the kernels of a step, timed for so many seconds, once at least [ns a truck].
+fn kernel_times(driven: &mut Driven, seconds: f64) -> Result<Vec<(&'static str, f64)>, Error> {
+    let envs = driven.simulator().n_envs() as f64;
+    let mut times: Vec<(&'static str, Vec<f64>)> = Vec::new();
+    let (begun, mut n_samples) = (Instant::now(), 0);
+    while n_samples == 0 || begun.elapsed().as_secs_f64() < seconds && n_samples < STAGE_SAMPLES {
+        let lasted = driven.step_by_kernel()?;
+        if times.is_empty() {
+            times = lasted.iter().map(|&(name, _)| (name, Vec::new())).collect();
+        }
+        for ((_, times), (_, time)) in times.iter_mut().zip(lasted) {
+            times.push(time.as_secs_f64() * 1e9 / envs);
+        }
+        n_samples += 1;
+    }
+    Ok(times.into_iter().map(|(name, mut times)| (name, rounded(median(&mut times)))).collect())
 }
 
 /// The middle value; sorts on the way.

@@ -93,6 +93,8 @@ pub(super) struct Setting<'a> {
     pub routes: &'a [u32],
     /// Number of trucks.
     pub envs: usize,
+    /// Steps that are submitted at once where actions are random.
+    pub submission: usize,
     /// The learner for modes with a network.
     pub learner: Option<&'a Learner>,
 }
@@ -100,7 +102,7 @@ pub(super) struct Setting<'a> {
 /// Trucks that are stepped in a mode.
 pub(super) enum Driven {
     /// See [`Mode::Random`].
-    Random(Simulator),
+    Random { simulator: Simulator, submission: usize },
     /// See [`Mode::Policy`] and [`Mode::LargePolicy`].
     Acting { rollout: Box<dyn Rollout>, actor: Mlp },
     /// See [`Mode::Training`].
@@ -108,10 +110,24 @@ pub(super) enum Driven {
 }
 
 impl Driven {
-    /// Requests one step of every truck. A device may still be at it afterwards.
-    pub(super) fn step(&mut self) -> Result<(), Error> {
+    /// Requests steps of every truck. A device may still be at them afterwards.
+    pub(super) fn steps(&mut self, n_steps: u64) -> Result<(), Error> {
+        if let Driven::Random { simulator, submission } = self {
+            let mut left = n_steps as usize;
+            while 0 < left {
+                let now = left.min(*submission);
+                simulator.steps_at_random(now);
+                left -= now;
+            }
+            return Ok(());
+        }
+        (0..n_steps).try_for_each(|_| self.step())
+    }
+
+    /// Requests one step of every truck.
+    fn step(&mut self) -> Result<(), Error> {
         match self {
-            Driven::Random(simulator) => simulator.step_at_random(),
+            Driven::Random { simulator, .. } => simulator.step_at_random(),
             Driven::Acting { rollout, actor } => rollout.drive(actor)?,
             Driven::Training(training) => {
                 training.act(0)?;
@@ -124,7 +140,7 @@ impl Driven {
     /// Waits until all that was requested is done.
     pub(super) fn wait(&mut self) -> Result<(), Error> {
         match self {
-            Driven::Random(simulator) => Ok(simulator.wait()?),
+            Driven::Random { simulator, .. } => Ok(simulator.wait()?),
             Driven::Acting { rollout, .. } => rollout.wait(),
             Driven::Training(training) => training.rollout().wait(),
         }
@@ -133,15 +149,23 @@ impl Driven {
     /// One step a stage at a time with the time of each; none where a step is more than the stages.
     pub(super) fn step_by_stage(&mut self) -> Result<Option<[Duration; STAGES.len()]>, Error> {
         match self {
-            Driven::Random(simulator) => Ok(Some(simulator.step_at_random_by_stage()?)),
+            Driven::Random { simulator, .. } => Ok(Some(simulator.step_at_random_by_stage()?)),
             _ => Ok(None),
+        }
+    }
+
+    /// One step a kernel at a time with the time of each; none on the processor, and where a step is more than that.
+    pub(super) fn step_by_kernel(&mut self) -> Result<Vec<(&'static str, Duration)>, Error> {
+        match self {
+            Driven::Random { simulator, .. } => Ok(simulator.step_at_random_by_kernel()?),
+            _ => Ok(Vec::new()),
         }
     }
 
     /// The trucks.
     pub(super) fn simulator(&self) -> &Simulator {
         match self {
-            Driven::Random(simulator) => simulator,
+            Driven::Random { simulator, .. } => simulator,
             Driven::Acting { rollout, .. } => rollout.simulator(),
             Driven::Training(training) => training.rollout().simulator(),
         }
@@ -161,10 +185,11 @@ impl Mode {
 
     /// Trucks that are stepped this way, at the start of their first episodes.
     pub(super) fn driven(self, setting: Setting) -> Result<Driven, Error> {
-        let Setting { engine, adapter, backend, world, routes, envs, learner } = setting;
+        let Setting { engine, adapter, backend, world, routes, envs, submission, learner } = setting;
         let Some(learner) = learner.filter(|_| self != Mode::Random) else {
             let choice = RouteChoice::Drawn(routes.to_vec());
-            return Ok(Driven::Random(Simulator::on(engine.clone(), world.clone(), envs, 0, choice)?));
+            let simulator = Simulator::on(engine.clone(), world.clone(), envs, 0, choice)?;
+            return Ok(Driven::Random { simulator, submission });
         };
         let opened = match backend.take() {
             Some(backend) => backend,

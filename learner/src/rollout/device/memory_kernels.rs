@@ -93,7 +93,8 @@ macro_rules! bindings {
                     $(Binding::$name => (stringify!($name), $element, $single, $doc),)*
                 };
                 let kind = if single { element } else { format!("array<{element}>") };
-                format!("// {doc}\n@group(0) @binding({}) var<storage, read_write> {name}: {kind};\n", self as u32)
+                let space = if self.access() == Access::Uniform { "uniform" } else { "storage, read_write" };
+                format!("// {doc}\n@group(0) @binding({}) var<{space}> {name}: {kind};\n", self as u32)
             }
         }
     };
@@ -123,6 +124,14 @@ bindings! {
     sampled_reward: "f32".to_owned(), false, "A sample: rewards, [n_rows].";
     sampled_discount: "f32".to_owned(), false, "A sample: discounts, [n_rows].";
     sampled_next: "f32".to_owned(), false, "A sample: next observations, [n_rows, n_values].";
+}
+
+impl Binding {
+    /// What the kernels may do. A tensor's buffer is a slice of a page that other tensors use too, and a page is bound
+    /// either to be read or to be written, so all but the facts may be written.
+    fn access(self) -> Access {
+        if matches!(self, Binding::facts | Binding::now) { Access::Uniform } else { Access::ReadWrite }
+    }
 }
 
 /// A buffer for every binding.
@@ -180,8 +189,10 @@ offtrack::named! {
         StoreBefore = "store_before",
         /// Stores what the step led to.
         StoreAfter = "store_after",
-        /// Samples transitions.
+        /// Samples transitions: what was observed and done.
         Sample = "sample",
+        /// What that led to.
+        SampleNext = "sample_next",
     }
 }
 
@@ -202,12 +213,18 @@ impl Kernel {
                 images,
                 action_images,
                 held_observation,
-                held_next,
                 held_action,
-                held_reward,
-                held_ended,
                 sampled_observation,
                 sampled_action,
+            ],
+            Kernel::SampleNext => &[
+                facts,
+                now,
+                normalisation,
+                images,
+                held_next,
+                held_reward,
+                held_ended,
                 sampled_reward,
                 sampled_discount,
                 sampled_next,
@@ -221,7 +238,7 @@ impl Kernel {
         match self {
             Kernel::Choose => envs,
             Kernel::StoreBefore | Kernel::StoreAfter => envs * values,
-            Kernel::Sample => rows * values,
+            Kernel::Sample | Kernel::SampleNext => rows * values,
         }
     }
 }
@@ -235,11 +252,10 @@ fn source() -> String {
     own.iter().map(String::as_str).chain(common).chain([include_str!("../../../shaders/replay_buffer.wgsl")]).collect()
 }
 
-/// Compiles the kernels. A tensor's buffer is a slice of a page that other tensors use too, and a page is bound either
-/// to be read or to be written, so all bindings may be written.
+/// Compiles the kernels.
 pub(super) fn compile(device: &Device) -> Kernels<Kernel> {
     Kernels::compile(device, "replay buffer", source(), |kernel: Kernel| {
-        kernel.bindings().iter().map(|&binding| (binding as u32, Access::ReadWrite)).collect()
+        kernel.bindings().iter().map(|&binding| (binding as u32, binding.access())).collect()
     })
 }
 
@@ -253,4 +269,31 @@ pub(super) fn add(
 ) {
     let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
     kernels.dispatch(&mut pass, kernel, group, kernel.threads(facts));
+}
+
+#[cfg(test)]
+mod tests {
+    use wgpu::naga::front::wgsl;
+    use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    use super::*;
+
+    #[test]
+    fn a_kernel_is_bound_to_what_its_shader_names_and_to_no_more_than_every_device_has() {
+        let source = source();
+        let module = wgsl::parse_str(&source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&source)));
+        let info = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).unwrap();
+        for kernel in Kernel::ALL {
+            let index = module.entry_points.iter().position(|entry| entry.name == kernel.name()).unwrap();
+            let used = info.get_entry_point(index);
+            let named = module.global_variables.iter().filter(|(handle, _)| !used[*handle].is_empty());
+            let mut named: Vec<u32> =
+                named.filter_map(|(_, variable)| Some(variable.binding.as_ref()?.binding)).collect();
+            named.sort_unstable();
+            let declared: Vec<u32> = kernel.bindings().iter().map(|&binding| binding as u32).collect();
+            assert_eq!(named, declared, "{kernel:?}");
+            let storage = kernel.bindings().iter().filter(|binding| binding.access() != Access::Uniform).count();
+            assert!(storage <= wgpu::Limits::default().max_storage_buffers_per_shader_stage as usize, "{kernel:?}");
+        }
+    }
 }
