@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
 # Measures and tests everything on a machine with a graphics device, with programs that were built elsewhere, in under
-# eight minutes: the list of devices, the simulator's tests, speed against the number of trucks, and a training run. A
-# part that fails or takes too long is named at the end; the others still run.
+# eight minutes: the list of devices, the simulator's tests, speed against the number of trucks with random actions, a
+# policy and training, one step a submission beside eight, each kernel beside its model, five roads beside 200, and a
+# training run. One file has it all, OUT/on-a-gpu.json. A part that fails or takes too long is named at the end; the
+# others still run.
 #
 #     benches/on-a-gpu.sh OFFTRACK TESTS OUT
 #
@@ -20,7 +22,7 @@
 # FILTER           test name filters separated by spaces, such as `device parity`; without it all tests run
 # TRAINING_OPTIONS more options for the training run, such as `--set replay_buffer.capacity=100000` for an adapter with
 #                  little memory
-# ENVS, MODES, SECONDS_EACH, TRAINING, MINUTES   what is measured, as below
+# ENVS, FEWER_ENVS, MODES, SECONDS_EACH, MANY_ROADS, TRAINING, MINUTES   what is measured, as below
 set -uo pipefail
 if [ $# -ne 3 ]; then
     sed -n '2,/^set /p' "$0" | sed -n 's/^# \{0,1\}//p' >&2
@@ -31,9 +33,11 @@ tests=$(realpath -- "$2") || exit 2
 mkdir -p -- "$3" && out=$(realpath -- "$3") || exit 2
 cd "$(dirname "$0")/.." || exit 2
 repository=$PWD
-envs=${ENVS:-256..1048576}
+envs=${ENVS:-1024..4194304}
+fewer=${FEWER_ENVS:-1024..1048576}
 filter=${FILTER:-}
-modes=${MODES:-random,policy,large-policy,training}
+modes=${MODES:-policy,large-policy,training}
+many=${MANY_ROADS:-random2026-training}
 seconds=${SECONDS_EACH:-2}
 training=${TRAINING:-learner/configs/gpu.toml}
 minutes=${MINUTES:-1}
@@ -90,10 +94,20 @@ if command -v nvidia-smi >/dev/null; then
     nvidia-smi --query-gpu=timestamp,name,driver_version,memory.used,utilization.gpu,power.draw --format=csv -l 1 >"$out/nvidia-smi.csv" 2>&1 &
     smi=$!
 fi
-part scale 190 "$offtrack" scale --device gpu "${adapter[@]}" --mode "$modes" --config "$training" --envs "$envs" --seconds "$seconds" \
-    --json "$out/scale.json" --plot "$out/scale.svg"
+# scale NAME LIMIT ENVS OPTIONS...: speed against the number of trucks, into OUT/NAME.json and a picture.
+scale() {
+    local name=$1 limit=$2 trucks=$3
+    shift 3
+    part "$name" "$limit" "$offtrack" scale --device gpu "${adapter[@]}" --config "$training" --envs "$trucks" \
+        --seconds "$seconds" --json "$out/$name.json" --plot "$out/$name.svg" "$@"
+}
+scale random 45 "$envs"
+scale random-one-a-submission 30 "$fewer" --submission 1
+scale networks 80 "$fewer" --mode "$modes"
+scale many-roads 60 "$fewer" --benchmark "$many"
 part training 100 "$offtrack" train "$training" --minutes "$minutes" --out "$out" --name training "${options[@]}"
 [ -n "$smi" ] && kill "$smi"
+part joined 20 python3 benches/on_a_gpu.py "$out"
 
 echo
 echo "$SECONDS s; everything is in $out"
