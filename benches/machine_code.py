@@ -74,13 +74,14 @@ def main():
         print(f"{chip}: kernel, registers, stack (bytes), shared memory (bytes), instructions")
         for name, kernel in found.items():
             print(f"  {name:20} {kernel['registers']:4} {kernel['stack']:6} {kernel['shared']:6} {sum_of(kernel):6}")
+    driver, amd = radv(args.tests)
     result = {
         "date": datetime.date.today().isoformat(),
         "commit": output(["git", "-C", REPOSITORY, "rev-parse", "--short=12", "HEAD"]).strip(),
         "command": "python3 benches/machine_code.py --cuda cuda --json docs/results/machine_code.json",
-        "compilers": [output([args.naga, "--version"]).strip(), "NVRTC " + version(cuda)],
+        "compilers": [output([args.naga, "--version"]).strip(), "NVRTC " + version(cuda), driver],
         "nvidia": nvidia,
-        "amd": {"RDNA 3": radv(args.tests)},
+        "amd": {"RDNA 3": amd},
         "replay": json.loads(output([args.lanes] if args.lanes else LANES)),
     }
     if args.json:
@@ -231,7 +232,7 @@ def named(parts):
 
 
 def radv(tests):
-    """What RADV made of each kernel, as the tests of machine code print it."""
+    """The driver, and what it made of each kernel, as the tests of machine code print it."""
     printed = output([*([tests] if tests else [*TEST, "--"]), "machine_code::no_kernel", "--nocapture"])
     found = {}
     for line in re.findall(r"^Code \{ (.*) \}$", printed, re.M):
@@ -239,7 +240,7 @@ def radv(tests):
         found[re.search(r'kernel: "(\w+)"', line).group(1)] = {key: int(value) for key, value in numbers.items()}
     if not found:
         sys.exit(f"the tests printed no machine code:\n{printed}")
-    return found
+    return re.search(r"^driver: (.*)$", printed, re.M).group(1), found
 
 
 if __name__ == "__main__":

@@ -32,6 +32,8 @@ const SUBGROUP: u32 = 64;
 const WORKGROUP_MEMORY: u32 = 16_384;
 /// Set in the child process.
 const CHILD: &str = "OFFTRACK_COMPILES_FOR_NO_CARD";
+/// Before the driver's name and version.
+const DRIVER: &str = "driver: ";
 /// Before a kernel's name and its statistics.
 const MARK: &str = "kernel: ";
 
@@ -114,6 +116,7 @@ pub fn codes(test: &str, source: &str, kernels: &[&str]) -> Option<Vec<Code>> {
             return None;
         }
     };
+    printed.lines().filter(|line| line.starts_with(DRIVER)).for_each(|line| println!("{line}"));
     let codes: Vec<Code> = printed.split(MARK).skip(1).map(parsed).collect();
     let names: Vec<&str> = codes.iter().map(|code| code.kernel.as_str()).collect();
     assert_eq!(names, kernels, "{printed}");
@@ -176,8 +179,10 @@ fn compile(source: &str, kernels: &[&str]) -> ! {
     // Sound: the device is open to the end of the process, all that is created is valid, and nothing is submitted.
     unsafe {
         let instance = <Vulkan as Api>::Instance::init(&descriptor).unwrap();
-        let ExposedAdapter { adapter, features, capabilities, .. } = instance.enumerate_adapters(None).remove(0);
+        let ExposedAdapter { adapter, info: driver, features, capabilities } =
+            instance.enumerate_adapters(None).remove(0);
         let features = features - Features::MAPPABLE_PRIMARY_BUFFERS - Features::all_experimental_mask();
+        eprintln!("{DRIVER}{} {}", driver.driver, driver.driver_info);
         let device = adapter.open(features, &capabilities.limits, &MemoryHints::default()).unwrap().device;
         let shader = NagaShader { module: Cow::Owned(module), info, debug_source: None };
         let descriptor = ShaderModuleDescriptor { label: None, runtime_checks: ShaderRuntimeChecks::checked() };
