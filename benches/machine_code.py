@@ -79,13 +79,14 @@ def main():
         "date": datetime.date.today().isoformat(),
         "commit": output(["git", "-C", REPOSITORY, "rev-parse", "--short=12", "HEAD"]).strip(),
         "command": "python3 benches/machine_code.py --cuda cuda --json docs/results/machine_code.json",
-        "compilers": [output([args.naga, "--version"]).strip(), "NVRTC " + version(cuda), driver],
+        "compilers": ["naga " + output([args.naga, "--version"]).split()[-1], "NVRTC " + version(cuda), driver],
         "nvidia": nvidia,
         "amd": {"RDNA 3": amd},
         "replay": json.loads(output([args.lanes] if args.lanes else LANES)),
     }
     if args.json:
-        args.json.write_text(json.dumps(result, indent=1) + "\n")
+        text = re.sub(r"\[\s+(\d+),\s+(\d+)\s+\]", r"[\1, \2]", json.dumps(result, indent=1))
+        args.json.write_text(text + "\n")
 
 
 def sum_of(kernel):
