@@ -102,6 +102,8 @@ HERE uint atomic_fetch_add_explicit(uint* p, uint v, int) { return atomicAdd(p, 
 HERE int atomic_fetch_add_explicit(int* p, int v, int) { return atomicAdd(p, v); }
 HERE int atomic_fetch_min_explicit(int* p, int v, int) { return atomicMin(p, v); }
 HERE uint atomic_fetch_min_explicit(uint* p, uint v, int) { return atomicMin(p, v); }
+HERE uint atomic_exchange_explicit(uint* p, uint v, int) { return atomicExch(p, v); }
+HERE int atomic_exchange_explicit(int* p, int v, int) { return atomicExch(p, v); }
 HERE int atomic_load_explicit(int* p, int) { return *(volatile int*)p; }
 HERE uint atomic_load_explicit(uint* p, int) { return *(volatile uint*)p; }
 HERE void atomic_store_explicit(int* p, int v, int) { *(volatile int*)p = v; }

@@ -43,52 +43,85 @@ CARDS = {
     # Its units take two clocks for a subgroup of 64.
     "7900 XTX": Card(96 * 2 * 2.5 / 2, 0.96, 3.5, 2.5, 96, 64, 96 * 2048),
 }
-# Columns that a kernel reads and writes a truck and step, or bytes where it needs less than the row.
+# Columns that a kernel of a step reads and writes a truck, or bytes where it needs less than the row.
 TOUCHED = {
     "draw": [32, 8, "action"],
     "steer": ["action", "truck", "control", "control"],
     "drive": ["control", "truck", "truck"],
-    "collide": ["truck", "clearance"],
     "follow": ["truck", "progress", "progress"],
+    "advance": ["action", "control", "control", "truck", "truck", "progress", "progress"],
+    "collide": ["truck", "clearance"],
     "sense": ["truck", "ranges"],
     "observe": ["truck", "progress", "ranges", "next_observation"],
+    "copy_observation": [32, "next_observation", "next_extras", "observation", "extras"],
+    "observe_both": ["truck", "progress", "ranges", "next_observation", "observation"],
     "judge": ["truck", "clearance", "progress", "ended", "terms", "reward", 32],
     "count": [32, "ended", "reward"],
-    "copy_observation": [32, "next_observation", "next_extras", "observation", "extras"],
+    "judge_and_count": ["truck", "clearance", "progress", "ended", "terms", "reward", 32],
     "reset": [32, "ended"],
     "sense_after_reset": [32],
     "observe_after_reset": [32],
+}
+# What one kernel does instead of several, where it is there.
+AT_ONCE = {
+    "advance": ("steer", "drive", "follow"),
+    "observe_both": ("observe", "copy_observation"),
+    "judge_and_count": ("judge", "count"),
 }
 # Values that neighbouring threads write to sectors of their own, of 32 bytes; not by way of workgroup memory.
 SCATTERED = {"observe": 69}
 # Trucks of a workgroup where `sense` has workgroup memory: its threads take rays from a queue.
 QUEUE = 32
 # Functions that RULES count on.
-KNOWN = {"sense": "field_sample", "collide": "body_clearance", "drive": "driven", "observe": "observed"}
+KNOWN = {
+    "sense": "field_sample",
+    "collide": "body_clearance|sample_first",
+    "drive": "driven",
+    "advance": "driven",
+    "observe": "observed",
+    "observe_both": "compute",
+}
 # A part runs as often a truck as the first line says that its kernel and its functions match; a line with True is for
 # instructions in loops alone. See `times`.
 RULES = [
     # attard2023 has no disturbances, observes no extras, and an episode follows in the same step.
-    (".*", r"late_action|perceive|\bseen|observe_extras|noise|reading|exact_range 2|begun/|copy_first", False, "never"),
+    (
+        ".*",
+        r"late_action|perceive|\bseen|observe_extras|noise|reading|exact_range 2|begun|copy_first|start 2",
+        False,
+        "never",
+    ),
     ("sense.*", r"block_sample 1", False, "ray block"),
     ("sense.*", r"block_sample 2", False, "ray second block"),
     ("sense.*", r"field_sample/interpolated", False, "ray own cell"),
     ("sense.*", r"rotated", True, "next ray"),
+    ("sense.*", r"^(itself|read_off)", True, "range"),
     ("sense.*", r"", True, "ray sample"),
     ("sense.*", r"", False, "ray"),
-    ("collide", r"sampled 1.*block_sample 1", False, "point block"),
-    ("collide", r"sampled 1.*block_sample 2", False, "point second block"),
-    ("collide", r"sampled 1|body_clearance/point_of", False, "point"),
-    ("collide", r"body_clearance/(is_undecided 1|line_of 1)", False, "line"),
+    # A thread a truck; or its first samples, and then teams.
+    ("collide", r"(sampled 1|sample_first).*block_sample 1", False, "point block"),
+    ("collide", r"(sampled 1|sample_first).*block_sample 2", False, "point second block"),
+    ("collide", r"sampled 1|body_clearance/point_of|sample_first/(sampled|point_of)", False, "point"),
+    (
+        "collide",
+        r"(body_clearance/(is_undecided 1|line_of 1)|sample_first/(is_undecided|line_of|whole_line))",
+        False,
+        "line",
+    ),
     ("collide", r"sampled 2.*block_sample 1", False, "halving block"),
     ("collide", r"sampled 2.*block_sample 2", False, "halving second block"),
     ("collide", r"sampled 2|body_clearance/(is_undecided|line_of|middle)", False, "halving"),
     ("collide", r"body_clearance", False, "in body_clearance"),
+    ("collide", r"halve/(whole_line|is_undecided 1|line_of 1|sums_of 1)", False, "lines of a pass"),
+    ("collide", r"halve/(body_of|field_at)", False, "pass"),
+    ("collide", r"halve", False, "round"),
     ("collide", r"", True, "unit"),
-    ("drive", r"", True, "substep"),
+    ("drive|advance", r"driven", True, "substep"),
     ("observe.*", r"followed", False, "truck"),
-    ("observe", r"", True, "looked ahead"),
-    ("(observe_after_)?reset", r"^(itself|index_of|has_begun)", False, "truck"),
+    ("observe_after_reset", r"^(itself|observed)(/preview_value)?$", True, "value begun"),
+    ("observe_both", r"^(itself|observed)(/preview_value)?$", True, "value"),
+    ("observe|observe_both", r"", True, "looked ahead"),
+    ("(observe_after_)?reset", r"^(itself|index_of|has_begun|clear_list|n_listed_values)", False, "truck"),
     ("observe_after_reset", r"", True, "begun and looked ahead"),
     ("(observe_after_)?reset", r"", False, "begun"),
     ("copy_observation", r"", False, "value"),
@@ -101,6 +134,7 @@ def times(replay, width, is_queued):
     rays = replay["sense"]["subgroups_of"][str(width)][f"queue of {QUEUE} trucks" if is_queued else "a thread a ray"]
     clearances = replay["collide"]["subgroups_of"][str(width)]
     points, halvings = clearances["first_samples"], clearances["halvings"]
+    teams = replay["collide"]["by_teams"]
     begun = replay["trucks_that_have_just_begun"]
 
     def some(n_trucks):
@@ -116,9 +150,11 @@ def times(replay, width, is_queued):
         # Five waypoints ahead; loops over more values are unrolled by four.
         "looked ahead": 5 / width,
         "begun": some(width) / width,
+        "value begun": 69 * begun / width,
         "begun and looked ahead": 5 * some(width) / width,
         "ray": 64 / width / QUEUE if is_queued else 29 / width,
         "next ray": rays["refills"],
+        "range": 29 / width,
         "ray sample": rays["iterations"],
         "ray own cell": rays["own_cells"],
         "ray block": rays["blocks"],
@@ -128,6 +164,10 @@ def times(replay, width, is_queued):
         "point block": points["blocks"],
         "point second block": points["second_blocks"],
         "line": n_lines / width,
+        # All subgroups of a workgroup of 64 go through its passes, over 2 times 8 lines of a tractor or 3 of a trailer.
+        "pass": teams["passes"] * 64 / width,
+        "lines of a pass": teams["passes"] * 2.5 * 64 / width,
+        "round": (teams["passes"] + teams["rounds"]) * 64 / width,
         "halving": halvings["iterations"],
         "halving block": halvings["blocks"],
         "halving second block": halvings["second_blocks"],
@@ -138,7 +178,7 @@ def times(replay, width, is_queued):
 
 def executed(name, kernel, counts):
     """Instructions of a subgroup, a truck."""
-    if name in KNOWN and not any(KNOWN[name] in part for part in kernel["parts"]):
+    if name in KNOWN and not any(re.search(KNOWN[name], part) for part in kernel["parts"]):
         sys.exit(f"{name} has no part {KNOWN[name]}: RULES do not say how often its parts run")
     n = 0
     for part, (n_all, n_in_loops) in kernel["parts"].items():
@@ -174,14 +214,9 @@ def modelled(result, card):
     kernels = list(result["nvidia"].values())[-1]
     found = {}
     for name, kernel in kernels.items():
-        if name in ("begin", "observe_begun"):
+        if name not in TOUCHED or any(name in parts for at_once, parts in AT_ONCE.items() if at_once in kernels):
             continue
-        if name not in TOUCHED:
-            sys.exit(f"{name}: TOUCHED does not say what it reads and writes")
         need = amounts(name, kernel, result["replay"], card)
-        if name == "observe" and "copy_observation" not in kernels:
-            need["memory"] += result["replay"]["row_bytes"]["observation"]
-            need["cache"] += result["replay"]["row_bytes"]["observation"]
         # A TB/s is 1,000 bytes a ns.
         scale = {"memory": 1000, "cache": 1000}
         rates = {what: getattr(CARDS[card], what) * scale.get(what, 1) for what in need}

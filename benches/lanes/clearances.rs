@@ -2,8 +2,8 @@
 
 use glam::Vec2;
 use offtrack::field::Field;
-use offtrack::layout::Body;
 use offtrack::layout::angle::direction;
+use offtrack::layout::{Body, WORKGROUP};
 use offtrack::simulator::Batch;
 use offtrack::world::World;
 use serde_json::{Value, json};
@@ -74,6 +74,25 @@ pub fn in_step(units: &[[Unit; 2]], width: usize) -> Value {
         "halvings": rounds.a_truck(units.len()),
         "rounds": n_rounds as f64 / units.len() as f64,
     })
+}
+
+/// What workgroups do a truck whose threads halve the spans of their trucks' units together: passes over as many units as
+/// there are teams of LANES threads, and rounds until the last of a pass has no spans.
+pub fn by_teams(units: &[[Unit; 2]]) -> Result<Value, String> {
+    let n_teams = WORKGROUP as usize / constant("LANES")? as usize;
+    let (mut n_passes, mut n_rounds) = (0, 0);
+    for trucks in units.chunks(WORKGROUP as usize) {
+        for unit in 0..2 {
+            let undecided: Vec<usize> =
+                trucks.iter().map(|truck| truck[unit].rounds.len()).filter(|&rounds| 0 < rounds).collect();
+            for pass in undecided.chunks(n_teams) {
+                n_passes += 1;
+                n_rounds += pass.iter().max().unwrap_or(&0);
+            }
+        }
+    }
+    let a_truck = |count: usize| count as f64 / units.len() as f64;
+    Ok(json!({ "passes": a_truck(n_passes), "rounds": a_truck(n_rounds) }))
 }
 
 /// A stretch of a unit, in its frame, and what is subtracted from distances on it (m).

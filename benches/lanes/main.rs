@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "trucks_that_have_just_begun": begun as f64 / N_ENVS as f64,
         "row_bytes": row_bytes,
         "sense": sensed(&rays::traces(&world, batch)?),
-        "collide": collided(&clearances::traces(&world, batch)?),
+        "collide": collided(&clearances::traces(&world, batch)?)?,
     });
     let text = serde_json::to_string_pretty(&result)?;
     match std::env::args().nth(1) {
@@ -76,14 +76,15 @@ fn sensed(rays: &[field::Trace]) -> Value {
     })
 }
 
-/// What subgroups do for the clearances of all trucks, a thread a truck.
-fn collided(units: &[[clearances::Unit; 2]]) -> Value {
+/// What subgroups do for the clearances of all trucks: a thread a truck, and with teams for what is undecided.
+fn collided(units: &[[clearances::Unit; 2]]) -> Result<Value, String> {
     let all = || units.iter().flatten();
     let undecided = all().filter(|unit| !unit.rounds.is_empty()).count();
     let by_subgroup = SUBGROUPS.map(|width| (width.to_string(), clearances::in_step(units, width)));
-    json!({
+    Ok(json!({
         "deepest_stack_of_spans": all().map(|unit| unit.deepest).max(),
         "units_with_undecided_spans": undecided as f64 / all().count() as f64,
         "subgroups_of": by_subgroup.into_iter().collect::<Map<_, _>>(),
-    })
+        "by_teams": clearances::by_teams(units)?,
+    }))
 }

@@ -59,6 +59,7 @@ pub struct Code {
 }
 
 /// What a kernel's code may take at most. Nothing may be spilled.
+#[derive(Debug, Clone, Copy)]
 pub struct Stated {
     /// The entry point.
     pub kernel: &'static str,
