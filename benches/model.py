@@ -232,11 +232,44 @@ def speed(found, n_envs):
     return [1000 * n_envs / (n_envs * sum(ns) + wait) for ns, wait in zip(steps, waits)]
 
 
+def three(values, digits):
+    """Low, middle and high, as a document has them."""
+    low, middle, high = (f"{value:.{digits}f}" for value in values)
+    return f"{low}/**{middle}**/{high}"
+
+
+def table(results):
+    """The lines of a document's table: for each file instructions, H100 and 7900 XTX."""
+    found = [{card: modelled(result, card) for card in ("H100", "7900 XTX")} for result in results]
+    kernels = list(dict.fromkeys(name for cards in found for name in cards["H100"]))
+    yield "| kernel |" + " instructions of a warp a truck | H100 | 7900 XTX |" * len(found)
+    yield "|---|" + "---|---|---|" * len(found)
+    for name in kernels:
+        row = [name]
+        for cards in found:
+            if name in cards["H100"]:
+                row.append(f"{cards['H100'][name]['need']['instructions']:,.0f}")
+                row += [three(cards[card][name]["ns"], 2) for card in cards]
+            else:
+                row += ["", "", ""]
+        yield f"| {' | '.join(row)} |"
+    for n_envs in (1 << 20, 1 << 16):
+        row = [f"M env steps/s, {n_envs:,} trucks"]
+        for cards in found:
+            row += ["", *(three(speed(cards[card], n_envs), 0) for card in cards)]
+        yield f"| {' | '.join(row)} |"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("results", nargs="*", type=Path, default=[RESULT], help="files of benches/machine_code.py")
-    for file in parser.parse_args().results:
-        result = json.loads(file.read_text())
+    parser.add_argument("--table", action="store_true", help="print a table for a document")
+    args = parser.parse_args()
+    results = [json.loads(file.read_text()) for file in args.results]
+    if args.table:
+        print("\n".join(table(results)))
+        return
+    for file, result in zip(args.results, results):
         print(f"{file.name}, {result['date']}, {result['commit']}: ns a truck on each card, low / middle / high")
         cards = {card: modelled(result, card) for card in CARDS}
         for name in cards["H100"]:
