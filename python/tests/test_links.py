@@ -90,6 +90,16 @@ def test_the_summaries_are_what_the_archives_give() -> None:
     subprocess.run([sys.executable, str(ROOT / "benches/summaries.py"), "--check"], check=True)
 
 
+def test_the_speeds_that_the_notebook_expects_of_cards_are_the_models() -> None:
+    command = [sys.executable, str(ROOT / "benches/model.py"), "--table"]
+    table = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    rows = [line for line in table.splitlines() if line.startswith("| M env steps/s")]
+    speeds = [speed for row in rows for speed in re.findall(r"\d+/\*\*\d+\*\*/\d+", row)]
+    assert len(speeds) == 4, table
+    notebook = (ROOT / "docs/notebook/gpu.md").read_text()
+    assert [speed for speed in speeds if speed not in notebook] == []
+
+
 def test_every_result_says_when_it_was_made_and_by_which_commit_or_with_which_it_came() -> None:
     """`reported_in` is the commit that brought a result whose program named none."""
     files = tracked("docs/results/*.json")

@@ -20,8 +20,9 @@ mod field;
 mod fit;
 mod fleet;
 mod kinds;
-
 mod left_hand;
+#[cfg(all(feature = "gpu", target_os = "linux"))]
+mod machine_code;
 mod map_bypass;
 mod map_junctions;
 mod map_kinds;

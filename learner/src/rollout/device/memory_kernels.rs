@@ -244,7 +244,7 @@ impl Kernel {
 }
 
 /// The module's text.
-fn source() -> String {
+pub(super) fn source() -> String {
     let common =
         SHADERS.iter().filter(|(name, _)| ["common/thread", "common/random"].contains(name)).map(|(_, text)| *text);
     let bindings: String = Binding::ALL.map(Binding::declaration).concat();

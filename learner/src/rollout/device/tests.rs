@@ -5,6 +5,11 @@ use offtrack::layout::{Ended, ObservedExtras};
 use offtrack::scenario::{Scenario, Split};
 use std::path::Path;
 
+/// The simulator's tests have it too.
+#[cfg(target_os = "linux")]
+#[path = "../../../../tests/simulator/machine_code/null_device.rs"]
+mod null_device;
+
 const MASS: usize = N_VALUES + ObservedExtras::Mass.n_extras();
 
 fn training() -> (Arc<World>, Vec<u32>) {
@@ -232,4 +237,20 @@ fn trucks_take_the_actions_of_the_latest_output() {
         rollout.step_by(Some(&logits), true).unwrap();
         assert!(rollout.simulator().batch().action.iter().all(|&action| action as usize == step % 9), "{step}");
     }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn no_kernel_of_the_replay_buffer_spills_or_takes_more_registers_and_memory_of_a_card_than_stated() {
+    use null_device::{Stated, check, stated};
+    let most: [Stated; Kernel::ALL.len()] = [
+        stated("choose", 48, 0, 0),
+        stated("store_before", 48, 0, 0),
+        stated("store_after", 48, 0, 0),
+        stated("sample", 48, 0, 0),
+    ];
+    assert_eq!(most.each_ref().map(|stated| stated.kernel), Kernel::ALL.map(Kernel::name));
+    let test = "rollout::device::tests::\
+                no_kernel_of_the_replay_buffer_spills_or_takes_more_registers_and_memory_of_a_card_than_stated";
+    check(test, &memory_kernels::source(), &most);
 }
