@@ -10,11 +10,18 @@ use offtrack::engine::stages::{Kernel, SHADERS};
 const USUAL: Stated = stated("", 48, 0, 0);
 
 /// What the others may take.
-const OTHERS: [Stated; 3] = [
+const OTHERS: [Stated; 10] = [
     stated("drive", 96, 0, 0),
-    // Its undecided spans: 96 of 16 bytes.
-    stated("collide", 96, 0, 1536),
-    stated("count", 48, 1024, 0),
+    stated("advance", 96, 0, 0),
+    // Workgroup memory alone lets few subgroups in, so the compiler takes more registers.
+    stated("collide", 96, 16_384, 0),
+    stated("sense", 48, 6_144, 0),
+    stated("sense_after_reset", 48, 6_144, 0),
+    stated("observe", 144, 6_656, 0),
+    stated("observe_after_reset", 144, 6_656, 0),
+    stated("observe_both", 144, 6_656, 0),
+    stated("count", 48, 1_024, 0),
+    stated("judge_and_count", 48, 1_024, 0),
 ];
 
 #[test]
