@@ -5,8 +5,10 @@
 # training run. One file has it all, OUT/on-a-gpu.json. A part that fails or takes too long is named at the end; the
 # others still run.
 #
+#     benches/on-a-gpu.sh ARCHIVE OUT
 #     benches/on-a-gpu.sh OFFTRACK TESTS OUT
 #
+# ARCHIVE   what benches/for-a-gpu.sh packed: the two programs below, and what stands in the first three variables
 # OFFTRACK  the program, from `cargo build --release --features gpu`
 # TESTS     the simulator's test binary, named in the last line of
 #           `cargo test --release --features gpu -p offtrack --test simulator --no-run`
@@ -24,6 +26,15 @@
 #                  little memory
 # ENVS, FEWER_ENVS, MODES, SECONDS_EACH, MANY_ROADS, TRAINING, MINUTES   what is measured, as below
 set -uo pipefail
+packed='' loader=''
+trap 'rm -rf -- ${packed:+"$packed"} ${loader:+"$loader"}' EXIT
+if [ $# -eq 2 ] && [ -f "$1" ]; then
+    packed=$(mktemp -d)
+    tar -C "$packed" -xf "$1" || exit 2
+    export VULKAN_DEBS=${VULKAN_DEBS:-$packed} BUILT_AT=${BUILT_AT:-$(cat "$packed/built-at")}
+    export OFFTRACK_COMMIT=${OFFTRACK_COMMIT:-$(cat "$packed/commit")}
+    set -- "$packed/offtrack" "$packed/simulator" "$2"
+fi
 if [ $# -ne 3 ]; then
     sed -n '2,/^set /p' "$0" | sed -n 's/^# \{0,1\}//p' >&2
     exit 2
@@ -43,7 +54,7 @@ training=${TRAINING:-learner/configs/gpu.toml}
 minutes=${MINUTES:-1}
 read -ra options <<<"${TRAINING_OPTIONS:-}"
 adapter=(${ADAPTER:+--adapter "$ADAPTER"})
-failed=()
+failed=() config=()
 
 # part NAME SECONDS COMMAND...: runs a command with a time limit; its output goes to OUT/NAME.txt.
 part() {
@@ -61,7 +72,6 @@ part() {
 if ! ldconfig -p | grep -q 'libvulkan\.so\.1'; then
     if [ -d "${VULKAN_DEBS:-}" ]; then
         loader=$(mktemp -d)
-        trap 'rm -rf -- "$loader"' EXIT
         for package in "$VULKAN_DEBS"/*.deb; do dpkg -x "$package" "$loader"; done
         for folder in "$loader"/usr/lib/*-linux-gnu "$loader"/lib/*-linux-gnu; do
             [ -d "$folder" ] && export LD_LIBRARY_PATH="$folder${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
@@ -98,12 +108,13 @@ fi
 scale() {
     local name=$1 limit=$2 trucks=$3
     shift 3
-    part "$name" "$limit" "$offtrack" scale --device gpu "${adapter[@]}" --config "$training" --envs "$trucks" \
+    part "$name" "$limit" "$offtrack" scale --device gpu "${adapter[@]}" --envs "$trucks" \
         --seconds "$seconds" --json "$out/$name.json" --plot "$out/$name.svg" "$@"
 }
 scale random 45 "$envs"
 scale random-one-a-submission 30 "$fewer" --submission 1
-scale networks 80 "$fewer" --mode "$modes"
+[[ $modes == *training* ]] && config=(--config "$training")
+scale networks 80 "$fewer" --mode "$modes" "${config[@]}"
 scale many-roads 60 "$fewer" --benchmark "$many"
 part training 100 "$offtrack" train "$training" --minutes "$minutes" --out "$out" --name training "${options[@]}"
 [ -n "$smi" ] && kill "$smi"

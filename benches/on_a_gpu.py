@@ -13,6 +13,9 @@ from pathlib import Path
 
 import model
 
+# What is kept of a training run's report, and of each of its evaluations.
+RUN = ("seed", "seconds", "env_steps", "updates", "device", "validation")
+SET = ("benchmark", "split", "episodes", "arrived", "success", "success_low", "success_high")
 PARTS = ("random", "random-one-a-submission", "networks", "many-roads")
 
 
@@ -73,7 +76,11 @@ def tests(path):
 def training(folder):
     """What the training run came to, of its report."""
     path = folder / "report.json"
-    return json.loads(path.read_text()) if path.is_file() else None
+    if not path.is_file():
+        return None
+    report = json.loads(path.read_text())
+    sets = [{key: row[key] for key in SET} for row in (report["evaluation"], *report.get("also", ()))]
+    return {key: report[key] for key in RUN if key in report} | {"evaluations": sets}
 
 
 def memory(path):
