@@ -10,7 +10,7 @@ use offtrack::map::procedural;
 use offtrack::map::route::Route;
 use offtrack::map::{Gutter, Road};
 use offtrack::scenario::{Scenario, Split};
-use offtrack::simulator::{RouteChoice, Simulator};
+use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 
 use offtrack_drawing::comparison::Comparison;
@@ -129,7 +129,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let mut takes = Vec::new();
     for (scenario, chosen) in scenarios.iter().zip(&chosen) {
         let world = roads::world(scenario)?;
-        let mut policy = args.policy.open(scenario, &world, args.seed)?;
+        let mut policy = args.policy.open(scenario, &world, &Engine::Cpu, args.seed)?;
         let track = driven(args, scenario, &world, chosen, policy.as_mut())?;
         let Chosen { roundabout, route, .. } = *chosen;
         let of = Of { scenario, world: &world, roundabout, route, policy: policy.name(), seed: args.seed };
