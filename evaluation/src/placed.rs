@@ -20,13 +20,21 @@ pub fn placed(policy: Policy, engine: &Engine, world: &World, choice: Choice) ->
     match engine {
         Engine::Cpu => {
             policy.check(world)?;
-            Ok(match choice {
-                Choice::Best => Box::new(policy),
-                Choice::Sampled { seed } => Box::new(Sampling { policy, seed }),
-            })
+            Ok(on_host(policy, choice))
         }
         #[cfg(feature = "gpu")]
-        Engine::Gpu { device, .. } => Ok(Box::new(on_device::OnDevice::new(device, policy, world, choice)?)),
+        Engine::Gpu { device, .. } => {
+            let placed = on_device::DevicePolicy::new(device, &policy, world, choice)?;
+            Ok(Box::new(on_device::OnDevice { placed, host: on_host(policy, choice) }))
+        }
+    }
+}
+
+/// The policy on the processor.
+fn on_host(policy: Policy, choice: Choice) -> Box<dyn Controller> {
+    match choice {
+        Choice::Best => Box::new(policy),
+        Choice::Sampled { seed } => Box::new(Sampling { policy, seed }),
     }
 }
 

@@ -1,40 +1,31 @@
 //! A policy with its numbers on a device.
 
-use offtrack::gpu;
-use offtrack::simulator::{self, Batch, Simulator};
+use offtrack::simulator::{Batch, Error, Simulator};
 use offtrack::world::World;
-use offtrack_policy::device::DevicePolicy;
-use offtrack_policy::{Choice, Policy};
+pub(super) use offtrack_policy::device::DevicePolicy;
 
 use crate::controller::Controller;
-use crate::error::Error;
 
 /// A policy that acts where the trucks of a device are.
 pub(super) struct OnDevice {
-    policy: Policy,
-    placed: DevicePolicy,
-}
-
-impl OnDevice {
-    pub(super) fn new(device: &gpu::Device, policy: Policy, world: &World, choice: Choice) -> Result<OnDevice, Error> {
-        let placed = DevicePolicy::new(device, &policy, world, choice)?;
-        Ok(OnDevice { policy, placed })
-    }
+    pub(super) placed: DevicePolicy,
+    /// The same policy for trucks on the processor.
+    pub(super) host: Box<dyn Controller>,
 }
 
 impl Controller for OnDevice {
     fn name(&self) -> &str {
-        &self.policy.name
+        self.host.name()
     }
 
     fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
-        self.policy.choose(world, batch, actions);
+        self.host.choose(world, batch, actions);
     }
 
-    fn step(&mut self, simulator: &mut Simulator) -> Result<(), simulator::Error> {
+    fn step(&mut self, simulator: &mut Simulator) -> Result<(), Error> {
         match simulator.on_device() {
             Some(batch) => Ok(self.placed.step(batch)?),
-            None => self.policy.step(simulator),
+            None => self.host.step(simulator),
         }
     }
 }

@@ -5,8 +5,10 @@ use offtrack::layout::Column;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{Engine, RouteChoice};
 use offtrack::wgpu::{BufferDescriptor, BufferUsages};
+use offtrack_policy::{Choice, Policy};
 
 use crate::device::{self, Device};
+use crate::error::Error;
 use crate::evaluation::{Driven, Evaluation};
 use crate::placed::placed;
 
@@ -60,6 +62,8 @@ fn actions_sampled_on_a_device_are_those_that_the_processor_samples() {
     let (mut expected, mut best, mut n_others, mut n_sampled) = (Vec::new(), Vec::new(), 0, 0);
     for _ in 0..30 {
         here.choose(&world, simulator.batch(), &mut expected);
+        there.choose(&world, simulator.batch(), &mut best);
+        assert_eq!(expected, best, "asked for trucks on the processor it does as there");
         policy.choose(&world, simulator.batch(), &mut best);
         there.step(&mut simulator).unwrap();
         for ((action, expected), best) in simulator.batch().action.iter().zip(&expected).zip(&best) {
