@@ -1,7 +1,6 @@
 //! How a truck drives through an episode: speed, load transfer, comfort.
 
-use offtrack::layout::Truck;
-use offtrack::simulator::Batch;
+use offtrack::layout::{Control, Truck};
 
 /// Load transfer ratio from which a truck is at its limit.
 const AT_LIMIT: f32 = 0.9;
@@ -43,9 +42,8 @@ impl Driving {
         }
     }
 
-    /// Adds the last step of truck `env`; a step takes `step` seconds.
-    pub fn follow(&mut self, batch: &Batch, env: usize, step: f64) {
-        let (truck, control) = (&batch.truck[env], &batch.control[env]);
+    /// Adds the last step, after which truck and control are these; a step takes `step` seconds.
+    pub fn follow(&mut self, truck: &Truck, control: &Control, step: f64) {
         let ratio = truck.load_transfer_ratio();
         self.speed_sum += f64::from(truck.speed);
         self.steps_at_limit += u32::from(AT_LIMIT <= ratio);

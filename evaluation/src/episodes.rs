@@ -4,8 +4,10 @@
 use std::sync::Arc;
 
 use offtrack::layout::Ended;
-use offtrack::simulator::{Batch, Engine, Error, RouteChoice, Simulator, check_size};
+use offtrack::simulator::{Engine, Error, RouteChoice, Simulator, check_size};
 use offtrack::world::World;
+
+use crate::seen;
 
 /// Episodes under way, one a truck.
 #[derive(Debug)]
@@ -34,8 +36,8 @@ impl Episodes {
     }
 
     /// The trucks at their starts.
-    pub fn batch(&self) -> &Batch {
-        self.simulator.batch()
+    pub fn simulator(&self) -> &Simulator {
+        &self.simulator
     }
 
     /// Calls `step` until every episode has ended, and gives the end of each. `step` chooses an action for each truck
@@ -48,11 +50,12 @@ impl Episodes {
         mut self,
         mut step: impl FnMut(&mut Simulator) -> Result<(), E>,
     ) -> Result<Vec<Ended>, E> {
-        while self.batch().ended.contains(&(Ended::Running as u32)) {
+        while seen::ended(&self.simulator)?.contains(&(Ended::Running as u32)) {
             step(&mut self.simulator)?;
         }
         // A device that failed in the last step reports it here.
         self.simulator.wait()?;
-        Ok(self.batch().ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running)).collect())
+        let codes = seen::ended(&self.simulator)?;
+        Ok(codes.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running)).collect())
     }
 }

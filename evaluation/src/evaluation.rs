@@ -24,6 +24,7 @@ use crate::policies::Controller;
 use crate::possible::Possible;
 use crate::report::{Episode, Report, RouteReport, Summary};
 use crate::running::Running;
+use crate::seen::Seen;
 use crate::shown::shown;
 
 /// Episodes on each of so many routes where nobody says how many: 30, and fewer on more than 100 routes, about 3,000 in
@@ -48,7 +49,7 @@ pub struct Evaluation<'a> {
     pub seed: u32,
     /// Whether every state of the episodes that a page shows is kept.
     pub record: bool,
-    /// What steps the trucks. A learned policy runs on the processor on either.
+    /// What steps the trucks.
     pub device: &'a Device,
 }
 
@@ -81,33 +82,31 @@ impl Evaluation<'_> {
     /// known which failed, and recorded as they are driven again.
     pub fn drive(&self, policy: &mut dyn Controller, progress: &mut dyn FnMut(usize, usize)) -> Result<Driven, Error> {
         let begun = self.begin()?;
-        let (world, n_episodes) = (self.world, begun.batch().n_envs());
+        let (world, n_episodes) = (self.world, begun.simulator().n_envs());
         let lanes: Vec<LaneWidths> =
             self.routes().iter().map(|(_, place, route)| LaneWidths::of(self.scenario, place, route)).collect();
         let mut running: Vec<Running> = {
-            let batch = begun.batch();
+            let seen = Seen::of(begun.simulator())?;
             let has_classes = classes::has_classes(self.scenario);
             let new = |(truck, control): (&Truck, &Control)| {
                 let driving = has_classes.then(|| Driving::new(truck, control.target_speed));
                 Running::new(world.rig(truck), truck, driving, self.scenario.step)
             };
-            batch.truck.iter().zip(&batch.control).map(new).collect()
+            seen.truck.iter().zip(seen.control.iter()).map(new).collect()
         };
         let mut sequences = Sequences(vec![Vec::new(); n_episodes]);
-        let mut actions = Vec::new();
         let mut finished: Vec<Option<Episode>> = vec![None; n_episodes];
         let mut n_finished = 0;
         begun.drive(|simulator| {
             let n_before = n_finished;
-            policy.choose(world, simulator.batch(), &mut actions);
-            sequences.add(&actions, &finished);
-            simulator.step(&actions)?;
-            let batch = simulator.batch();
+            policy.step(simulator)?;
+            let seen = Seen::of(simulator)?;
+            sequences.add(&seen.action, &finished);
             for (env, (running, finished)) in running.iter_mut().zip(&mut finished).enumerate() {
                 if finished.is_none()
-                    && running.follow(world.rig(&batch.truck[env]), &lanes[env / self.episodes], batch, env)
+                    && running.follow(world.rig(&seen.truck[env]), &lanes[env / self.episodes], &seen, env)
                 {
-                    *finished = Some(running.finish(Ended::from_code(batch.ended[env]).unwrap_or(Ended::Running)));
+                    *finished = Some(running.finish(Ended::from_code(seen.ended[env]).unwrap_or(Ended::Running)));
                     n_finished += 1;
                 }
             }

@@ -31,7 +31,10 @@ pub mod error; // what can go wrong
 pub mod files; // results, written whole
 pub mod provenance; // machine and commit of a result
 pub mod device; // what steps the trucks
-pub mod policies; // what chooses the actions: learned, pure pursuit, random
+mod controller; // what chooses the actions
+pub mod placed; // a learned policy where the trucks are
+pub mod policies; // a policy by its name, and the baselines: pure pursuit, random
+mod seen; // what is looked at after a step
 pub mod episodes; // one a truck, until every one has ended
 mod evaluation; // every route, every start, every episode counted
 mod part; // entry, ring and exit of a route

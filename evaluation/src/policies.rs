@@ -6,12 +6,15 @@ use std::path::Path;
 
 use offtrack::layout::random::{self, Draw};
 use offtrack::layout::{Action, Truck, WaypointRow};
-use offtrack::simulator::Batch;
+use offtrack::simulator::{Batch, Engine};
 use offtrack::vehicle::profile::Profile;
 use offtrack::world::World;
+use offtrack_policy::Choice;
 
 use crate::certificate::line::Lines;
+pub use crate::controller::Controller;
 use crate::error::Error;
+use crate::placed::placed;
 
 /// Pure pursuit's default look-ahead distance: the best of 4, 5, 6, 7, 8, 9, 10 and 12 m on the training routes of
 /// attard2023 (m).
@@ -20,25 +23,18 @@ pub const LOOK_AHEAD: f32 = 7.0;
 /// How far ahead pure pursuit looks for a lower speed: the time that the speed control takes to reach it (s).
 const RESPONSE: f64 = 1.5;
 
-/// Chooses an action for every truck of a batch.
-pub trait Controller {
-    /// Name for reports: a policy file, a shipped policy, `pursuit` or `random`.
-    fn name(&self) -> &str;
-
-    /// Writes the index of each truck's action in the world's action table, `[n_envs]`.
-    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>);
-}
-
 /// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its name.
 /// Its
 /// action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where there is none, the
-/// first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random actions.
+/// first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random actions. It drives trucks
+/// on `engine`: a learned policy acts there.
 pub fn find(
     policy: Option<&str>,
     benchmark: &str,
     pursuit: PurePursuit,
     seed: u32,
     world: &World,
+    engine: &Engine,
 ) -> Result<Box<dyn Controller>, Error> {
     let learned = match policy {
         Some("pursuit") => return Ok(Box::new(pursuit)),
@@ -46,8 +42,7 @@ pub fn find(
         Some(name) => learned(name)?,
         None => offtrack_policy::Policy::shipped_for(benchmark, world)?,
     };
-    learned.check(world)?;
-    Ok(Box::new(learned))
+    placed(learned, engine, world, Choice::Best)
 }
 
 /// A learned policy by the path of its file, or a shipped one by its name. A file comes first.
@@ -60,24 +55,6 @@ pub fn learned(name: &str) -> Result<offtrack_policy::Policy, Error> {
         return Ok(offtrack_policy::Policy::shipped(name)?);
     }
     Ok(offtrack_policy::Policy::load(file)?)
-}
-
-impl Controller for offtrack_policy::Policy {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn choose(&mut self, _: &World, batch: &Batch, actions: &mut Vec<u32>) {
-        // A held truck needs no action, and before the last episode ends most are held.
-        let driving: Vec<usize> = (0..batch.truck.len()).filter(|&env| batch.truck[env].held == 0).collect();
-        let observations: Vec<_> = driving.iter().map(|&env| batch.observation[env]).collect();
-        let extras: Vec<_> = driving.iter().map(|&env| batch.extras[env]).collect();
-        actions.clear();
-        actions.resize(batch.truck.len(), 0);
-        for (env, action) in driving.into_iter().zip(self.act_beside(&observations, &extras)) {
-            actions[env] = action;
-        }
-    }
 }
 
 /// Actions drawn uniformly at random.

@@ -8,11 +8,11 @@ use std::collections::VecDeque;
 use glam::Vec2;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Ended, Rig, Truck};
-use offtrack::simulator::Batch;
 
 use super::driving::Driving;
 use super::episode::Episode;
 use super::part::LaneWidths;
+use super::seen::Seen;
 
 /// An episode under way.
 pub(super) struct Running {
@@ -57,12 +57,12 @@ impl Running {
     }
 
     /// Adds the last step; true if it ended the episode. `lane` is that of the truck's route.
-    pub(super) fn follow(&mut self, rig: &Rig, lane: &LaneWidths, batch: &Batch, env: usize) -> bool {
-        let (truck, progress, clearance) = (&batch.truck[env], &batch.progress[env], &batch.clearance[env]);
+    pub(super) fn follow(&mut self, rig: &Rig, lane: &LaneWidths, seen: &Seen, env: usize) -> bool {
+        let (truck, progress, clearance) = (&seen.truck[env], &seen.progress[env], &seen.clearance[env]);
         let raise = |peak: &mut f64, value: f32| *peak = peak.max(f64::from(value));
         let lower = |least: &mut f64, value: f32| *least = least.min(f64::from(value));
         self.episode.steps += 1;
-        self.episode.reward += f64::from(batch.reward[env]);
+        self.episode.reward += f64::from(seen.reward[env]);
         self.lane_distance_sum += f64::from(progress.lane_distance);
         self.outside += u32::from(lane.half_width(progress.waypoint) < progress.lane_distance);
         raise(&mut self.episode.lane_distance_max, progress.lane_distance);
@@ -71,11 +71,11 @@ impl Running {
         raise(&mut self.episode.load_transfer_ratio_peak, truck.load_transfer_ratio());
         raise(&mut self.episode.articulation_peak, wrapped(truck.heading - truck.trailer_heading).abs());
         if let Some(driving) = &mut self.episode.driving {
-            driving.follow(batch, env, self.step);
+            driving.follow(truck, &seen.control[env], self.step);
         }
         self.episode.last = *truck;
         self.off_tracking.push(front_axle(rig, truck), truck.trailer_position(rig));
-        batch.ended[env] != Ended::Running as u32
+        seen.ended[env] != Ended::Running as u32
     }
 
     /// The episode's figures, once it has ended by `ended`.

@@ -140,18 +140,7 @@ pub fn distribution(logits: Tensor<2>) -> (Tensor<2>, Tensor<2>) {
 
 /// An action sampled from the softmax of each row of `logits`, `(rows)`.
 pub fn sampled(logits: &[f32], n_actions: usize, rng: &mut impl Rng) -> Vec<u32> {
-    let mut one = |row: &[f32]| {
-        let most = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        let sum: f32 = row.iter().map(|logit| (logit - most).exp()).sum();
-        let mut left = sum * rng.random::<f32>();
-        let reached = row.iter().position(|logit| {
-            left -= (logit - most).exp();
-            left < 0.0
-        });
-        // Rounding can leave a remainder after the last action.
-        reached.unwrap_or(n_actions - 1) as u32
-    };
-    logits.chunks_exact(n_actions).map(&mut one).collect()
+    offtrack_policy::sampled(logits, n_actions, |_| rng.random())
 }
 
 #[cfg(test)]

@@ -30,6 +30,10 @@ pub enum Error {
         /// The names of those that do.
         known: Vec<&'static str>,
     },
+    /// A device that the policy cannot act on.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Device(#[from] offtrack::gpu::Error),
 }
 
 impl Error {

@@ -19,7 +19,7 @@ const KEY: &str = "offtrack";
 /// Version of the description's meaning.
 const VERSION: u32 = 1;
 /// Most layers of a policy: more than any training file asks for.
-const MOST_LAYERS: usize = 64;
+pub(crate) const MOST_LAYERS: usize = 64;
 
 /// The metadata's entry.
 #[derive(Debug, Serialize, Deserialize)]

@@ -26,6 +26,8 @@
 //! ```
 
 mod bounds;
+#[cfg(feature = "gpu")]
+pub mod device;
 mod error;
 mod file;
 mod network;
@@ -35,4 +37,4 @@ mod policy;
 pub use error::Error;
 pub use network::{Activation, Layer};
 pub use normalisation::{LIMIT, Normalisation};
-pub use policy::{Policy, greedy};
+pub use policy::{Choice, Policy, drawn, greedy, sampled};

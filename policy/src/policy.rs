@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use offtrack::files::reader::{self, shown_path};
-use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES};
+use offtrack::layout::random::{self, Draw};
+use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES, Truck};
 use offtrack::world::World;
 
 use crate::error::Error;
@@ -25,6 +26,18 @@ const SHIPPED: [(&str, &[u8]); 6] = [
     ("laden2026-50", include_bytes!("../shipped/laden2026-50/policy.safetensors")),
     ("transfer2026", include_bytes!("../shipped/transfer2026/policy.safetensors")),
 ];
+
+/// How a policy chooses among its actions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Choice {
+    /// The one with the largest output, of equals the first.
+    Best,
+    /// One sampled from the softmax of the outputs, as a function of (seed, env, episode, step).
+    Sampled {
+        /// Seed.
+        seed: u32,
+    },
+}
 
 /// A network that can drive.
 #[derive(Debug, Clone, PartialEq)]
@@ -174,6 +187,29 @@ impl Policy {
 pub fn greedy(logits: &[f32], n_actions: usize) -> Vec<u32> {
     let best = |row: &[f32]| (1..n_actions).fold(0, |best, action| if row[best] < row[action] { action } else { best });
     logits.chunks_exact(n_actions).map(|row| best(row) as u32).collect()
+}
+
+/// An action sampled from the softmax of each row of `logits`, `(rows)`. `drawn` gives a uniform number of [0, 1) for a
+/// row.
+pub fn sampled(logits: &[f32], n_actions: usize, mut drawn: impl FnMut(usize) -> f32) -> Vec<u32> {
+    let one = |(index, row): (usize, &[f32])| {
+        let most = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let sum: f32 = row.iter().map(|logit| (logit - most).exp()).sum();
+        let mut left = sum * drawn(index);
+        let reached = row.iter().position(|logit| {
+            left -= (logit - most).exp();
+            left < 0.0
+        });
+        // Rounding can leave a remainder after the last action.
+        reached.unwrap_or(n_actions - 1) as u32
+    };
+    logits.chunks_exact(n_actions).enumerate().map(one).collect()
+}
+
+/// The uniform number of [0, 1) that truck `env` samples its next action by: a function of (seed, env, episode, step).
+pub fn drawn(seed: u32, env: u32, truck: &Truck) -> f32 {
+    let [word, ..] = random::words(seed, env, truck.episode, (Draw::Action as u32).wrapping_add(truck.steps));
+    0.5 * (random::signed_unit(word) + 1.0)
 }
 
 /// An action table in a few words.

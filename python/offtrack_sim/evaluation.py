@@ -94,7 +94,8 @@ def evaluate(
     Args:
         policy: A :class:`offtrack_sim.Policy`, or any function from observations ``[n, n_values]`` to actions
             ``[n]``: 69 values, and behind them the benchmark's extras.
-        scenario, split, routes, device: As for :class:`offtrack_sim.Batch`.
+        scenario, split, routes, device: As for :class:`offtrack_sim.Batch`. A :class:`offtrack_sim.Policy` acts on the
+            device, too.
         episodes: Episodes on each route.
         seed: Seed of the starts.
 

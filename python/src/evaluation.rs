@@ -4,8 +4,10 @@ use numpy::{PyArray1, PyArrayMethods};
 use offtrack::layout::{Action, Ended, N_VALUES};
 use offtrack::simulator::Error;
 use offtrack_evaluation::episodes::Episodes;
-use offtrack_evaluation::policies::Controller;
+use offtrack_evaluation::placed::placed;
 use offtrack_evaluation::report;
+use offtrack_policy::Choice;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::batch::{Batch, engine_of};
@@ -48,21 +50,21 @@ pub fn drive<'py>(
         let (world, n_values) = (&place.world, batch.get().n_values());
         let (engine, _) = engine_of(device)?;
         let mut pool = Pool::new(0);
+        let network = policy.cast::<Network>().ok().map(|network| network.get().policy().clone());
+        let network = network.map(|network| placed(network, &engine, world, Choice::Best)).transpose();
+        let mut network = network.map_err(|error| PyValueError::new_err(error.to_string()))?;
         let begun = pool.run(py, || Episodes::begin(engine, world.clone(), &place.routes, episodes, seed))?;
         let begun = begun.map_err(|error| errors::of_simulator(&error))?;
-        let mut network = policy.cast::<Network>().ok().map(|network| network.get().policy().clone());
-        let mut actions = vec![0; begun.batch().n_envs()];
+        let mut actions = vec![0; begun.simulator().n_envs()];
         let ended = begun.drive(|simulator| {
             py.check_signals()?;
-            if network.is_none() {
-                choose(policy, simulator.batch(), n_values, &world.actions, &mut actions)?;
-            }
-            pool.run(py, || {
-                if let Some(network) = &mut network {
-                    network.choose(world, simulator.batch(), &mut actions);
+            match &mut network {
+                Some(network) => pool.run(py, || network.step(simulator))??,
+                None => {
+                    choose(policy, simulator.batch(), n_values, &world.actions, &mut actions)?;
+                    pool.run(py, || simulator.step(&actions))??;
                 }
-                simulator.step(&actions)
-            })??;
+            }
             Ok::<(), Raised>(())
         });
         let ended = ended.map_err(|Raised(exception)| exception)?;

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import offtrack_sim
+import offtrack_sim.export
 
 
 @pytest.fixture(scope="module")
@@ -59,3 +62,19 @@ def test_an_unknown_device_is_refused_with_those_there_are(device: str) -> None:
     with pytest.raises(RuntimeError) as caught:
         offtrack_sim.Batch(device="no such card")
     assert "no such card" in str(caught.value) and device.split(" (")[0] in str(caught.value)
+
+
+@pytest.mark.parametrize("benchmark", ["attard2023", "laden2026"])
+def test_a_policy_on_a_device_ends_every_episode_as_on_the_processor(device: str, benchmark: str) -> None:
+    policy = offtrack_sim.Policy.shipped(benchmark)
+    here, there = (offtrack_sim.evaluate(policy, benchmark, episodes=1, seed=4, device=d) for d in ("cpu", device[:8]))
+    assert (here.ended == there.ended).all() and 20 < here.ended.size
+
+
+def test_a_policy_too_wide_for_a_device_is_refused_by_name(device: str, tmp_path: Path) -> None:
+    wide = tmp_path / "wide.safetensors"
+    weights = [np.zeros((69, 1025), np.float32), np.zeros((1025, 9), np.float32)]
+    offtrack_sim.export.save(wide, [(weight, np.zeros(weight.shape[1], np.float32)) for weight in weights])
+    policy = offtrack_sim.Policy.load(wide)
+    with pytest.raises(ValueError, match=r"wide\.safetensors: is a policy too wide for a device: actor\.0 has 1025"):
+        offtrack_sim.evaluate(policy, episodes=1, device="gpu")

@@ -108,8 +108,8 @@ fn the_feature_gpu_is_named_only_where_an_engine_or_device_is_chosen() {
     let simulator = [("engine/error.rs", 2), ("engine.rs", 1), ("lib.rs", 1), ("simulator.rs", 4)];
     assert_eq!(naming_gpu(files()), expected(&simulator));
     let crates = [
-        // The choice of a device, and its failure.
-        ("evaluation/src", 30, &[("device.rs", 4), ("error.rs", 2)][..]),
+        // The choice of a device, its failure, and a policy there.
+        ("evaluation/src", 30, &[("device.rs", 4), ("error.rs", 2), ("placed.rs", 2)][..]),
         // Backends, and tests on a device.
         (
             "learner/src",
@@ -119,7 +119,8 @@ fn the_feature_gpu_is_named_only_where_an_engine_or_device_is_chosen() {
         // The list of devices, and the default training file.
         ("cli/src", 20, &[("commands/devices.rs", 3), ("commands/train.rs", 1)]),
         ("drawing/src", 15, &[]),
-        ("policy/src", 5, &[]),
+        // The kernel, and its failure.
+        ("policy/src", 5, &[("error.rs", 1), ("lib.rs", 1)]),
         ("reference/src", 3, &[]),
     ];
     for (folder, least, chosen) in crates {

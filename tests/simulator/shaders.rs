@@ -54,11 +54,11 @@ fn every_shader_of_a_stage_has_a_twin_on_the_cpu_and_every_twin_a_shader() {
     assert_eq!(found, known);
 }
 
-/// Every shader file of the simulator and of the learner: its path, and its text.
+/// Every shader file of the simulator, of policies and of the learner: its path, and its text.
 fn shaders() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut shaders = Vec::new();
-    for folder in ["shaders", "shaders/common", "learner/shaders"] {
+    for folder in ["shaders", "shaders/common", "policy/shaders", "learner/shaders"] {
         for entry in fs::read_dir(root.join(folder)).unwrap() {
             let path = entry.unwrap().path();
             if path.extension().is_some_and(|extension| extension == "wgsl") {
@@ -66,7 +66,7 @@ fn shaders() -> Vec<(String, String)> {
             }
         }
     }
-    assert_eq!(shaders.len(), SHADERS.len() + 1);
+    assert_eq!(shaders.len(), SHADERS.len() + 2);
     shaders
 }
 

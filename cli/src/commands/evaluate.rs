@@ -114,7 +114,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     roads::keep(&mut scenario, split, &args.benchmark)?;
     let world = roads::world(&scenario)?;
-    let mut policy = args.policy.open(&scenario, &world, args.seed)?;
+    let mut policy = args.policy.open(&scenario, &world, &device.engine, args.seed)?;
     let n_routes = scenario.split(split).len();
     let episodes = args.episodes.unwrap_or_else(|| usual_episodes(n_routes));
     let (run, metrics) = match &args.run {

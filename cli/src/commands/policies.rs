@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use offtrack::files::reader::{shown, shown_path};
 use offtrack::scenario::Scenario;
+use offtrack::simulator::Engine;
 use offtrack::world::World;
 use offtrack_evaluation::certificate::line;
 use offtrack_evaluation::error::Error;
@@ -32,10 +33,16 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// Opens the policy for a benchmark; `seed` is that of random actions.
-    pub fn open(&self, scenario: &Scenario, world: &Arc<World>, seed: u32) -> Result<Box<dyn Controller>, Error> {
+    /// Opens the policy for a benchmark and for trucks on `engine`; `seed` is that of random actions.
+    pub fn open(
+        &self,
+        scenario: &Scenario,
+        world: &Arc<World>,
+        engine: &Engine,
+        seed: u32,
+    ) -> Result<Box<dyn Controller>, Error> {
         let pursuit = self.pursuit(scenario, world)?;
-        let policy = policies::find(self.policy.as_deref(), &scenario.name, pursuit, seed, world)?;
+        let policy = policies::find(self.policy.as_deref(), &scenario.name, pursuit, seed, world, engine)?;
         if self.policy.is_none() && !offtrack_policy::Policy::shipped_names().contains(&scenario.name.as_str()) {
             let (benchmark, drives) = (&scenario.name, policy.name());
             files::say(&format!(

@@ -10,7 +10,7 @@ use offtrack::map::procedural;
 use offtrack::map::route::Route;
 use offtrack::map::{Gutter, Road};
 use offtrack::scenario::{Scenario, Split};
-use offtrack::simulator::{RouteChoice, Simulator};
+use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 
 use offtrack_drawing::comparison::Comparison;
@@ -22,7 +22,7 @@ use offtrack_evaluation::files;
 use offtrack_evaluation::policies::Controller;
 use offtrack_evaluation::recording::{Of, Recorder, Recording, Track};
 
-use super::{outputs, policies, progress, roads};
+use super::{devices, outputs, policies, progress, roads};
 
 /// Record an episode: as a film, as a picture with the swept paths of both units, or as data.
 #[derive(Debug, clap::Args)]
@@ -62,6 +62,8 @@ pub struct Args {
     /// Width of a film or a PNG (pixels); by default 720 for a film, 1000 for a PNG.
     #[arg(long)]
     size: Option<u32>,
+    #[command(flatten)]
+    device: devices::Choice,
 }
 
 /// The format of the file.
@@ -119,6 +121,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
             expected: "is given twice; each load once".into(),
         });
     }
+    let engine = args.device.open()?.engine;
     let loads: Vec<Option<&str>> =
         if args.load.is_empty() { vec![None] } else { args.load.iter().map(|load| Some(load.as_str())).collect() };
     let each = || args.route.iter().flat_map(|route| loads.iter().map(move |&load| (route, load)));
@@ -129,8 +132,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let mut takes = Vec::new();
     for (scenario, chosen) in scenarios.iter().zip(&chosen) {
         let world = roads::world(scenario)?;
-        let mut policy = args.policy.open(scenario, &world, args.seed)?;
-        let track = driven(args, scenario, &world, chosen, policy.as_mut())?;
+        let mut policy = args.policy.open(scenario, &world, &engine, args.seed)?;
+        let track = driven(args, scenario, &world, &engine, chosen, policy.as_mut())?;
         let Chosen { roundabout, route, .. } = *chosen;
         let of = Of { scenario, world: &world, roundabout, route, policy: policy.name(), seed: args.seed };
         takes.push(recorded(&of, args.episode, args.episodes, track.seen(roundabout)));
@@ -271,23 +274,25 @@ fn driven(
     args: &Args,
     scenario: &Scenario,
     world: &Arc<World>,
+    engine: &Engine,
     chosen: &Chosen,
     policy: &mut dyn Controller,
 ) -> Result<Track, Error> {
     let trucks: Vec<u32> =
         scenario.split(chosen.split).iter().flat_map(|&route| std::iter::repeat_n(route, args.episodes)).collect();
     let env = chosen.in_split * args.episodes + args.episode;
-    let mut simulator = Simulator::new(world.clone(), trucks.len(), args.seed, RouteChoice::Fixed(trucks))?;
+    let (engine, n_envs) = (engine.clone(), trucks.len());
+    let mut simulator = Simulator::on(engine, world.clone(), n_envs, args.seed, RouteChoice::Fixed(trucks))?;
     let mut recorder = Recorder::new(world, simulator.batch(), [env]);
     let limit = world.step_limit(&simulator.batch().truck[env]);
     let bar = progress::Bar::new("driving", "steps", limit as usize);
-    let mut actions = Vec::new();
     while recorder.is_running() {
-        policy.choose(world, simulator.batch(), &mut actions);
-        simulator.step(&actions)?;
+        policy.step(&mut simulator)?;
         recorder.follow(world, simulator.batch());
         bar.advance();
     }
     drop(bar);
+    // A device that failed in the last step reports it here.
+    simulator.wait()?;
     Ok(recorder.finish().remove(0))
 }

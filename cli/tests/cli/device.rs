@@ -277,6 +277,29 @@ mod on_a_device {
     }
 
     #[test]
+    fn an_episode_recorded_on_the_device_is_that_of_the_processor() {
+        let place = Place::new();
+        let recorded = |arguments: &[&str]| {
+            let fixed = ["record", "--route", "20m/E-left-3", "--episodes", "1", "-o", &place.text("episode.json")];
+            succeed(&offtrack(&[&fixed, arguments].concat()));
+            place.json("episode.json")
+        };
+        let (here, there) = (recorded(&[]), recorded(&["--device", "gpu"]));
+        let frames = |recording: &Value| recording["frames"].as_array().unwrap().clone();
+        assert_eq!((&here["ended"], frames(&here).len()), (&there["ended"], frames(&there).len()));
+        for (here, there) in frames(&here).iter().zip(&frames(&there)) {
+            let apart =
+                |axis: usize| here["position"][axis].as_f64().unwrap() - there["position"][axis].as_f64().unwrap();
+            // Lengths are rounded to 1 mm.
+            assert!(apart(0).abs() < 2e-3 && apart(1).abs() < 2e-3, "{here} {there}");
+            assert_eq!(here["action"], there["action"]);
+        }
+        // The device has driven: one that is not there is refused.
+        let refused = ["record", "--route", "20m/E-left-3", "-o", "a.gif", "--device", "gpu", "--adapter", "abacus"];
+        assert!(refusal(&offtrack(&refused), 2).contains("--adapter: abacus; "));
+    }
+
+    #[test]
     fn policies_arrive_as_often_on_every_route_as_on_the_processor() {
         let place = Place::new();
         let arrived = |arguments: &[&str]| {

@@ -8,13 +8,15 @@ use offtrack::engine::stages::STAGES;
 use offtrack::layout::N_VALUES;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
+use offtrack_evaluation::placed::placed;
+use offtrack_evaluation::policies::Controller;
 use offtrack_learner::backend::Backend;
 use offtrack_learner::config::Config;
 use offtrack_learner::error::Error;
 use offtrack_learner::network::Mlp;
 use offtrack_learner::rollout::Rollout;
 use offtrack_learner::session::Session;
-use offtrack_policy::Policy;
+use offtrack_policy::{Choice, Policy};
 use serde::Serialize;
 
 use super::Updates;
@@ -105,6 +107,8 @@ pub(super) enum Driven {
     Random { simulator: Simulator, submission: usize },
     /// See [`Mode::Policy`] and [`Mode::LargePolicy`].
     Acting { rollout: Box<dyn Rollout>, actor: Mlp },
+    /// See [`Mode::Policy`], on a device: the policy is a kernel there.
+    Placed { simulator: Box<Simulator>, policy: Box<dyn Controller> },
     /// See [`Mode::Training`].
     Training(Box<Session>),
 }
@@ -129,6 +133,7 @@ impl Driven {
         match self {
             Driven::Random { simulator, .. } => simulator.step_at_random(),
             Driven::Acting { rollout, actor } => rollout.drive(actor)?,
+            Driven::Placed { simulator, policy } => policy.step(simulator)?,
             Driven::Training(training) => {
                 training.act(0)?;
                 training.learn(1.0)?;
@@ -142,6 +147,7 @@ impl Driven {
         match self {
             Driven::Random { simulator, .. } => Ok(simulator.wait()?),
             Driven::Acting { rollout, .. } => rollout.wait(),
+            Driven::Placed { simulator, .. } => Ok(simulator.wait()?),
             Driven::Training(training) => training.rollout().wait(),
         }
     }
@@ -167,6 +173,7 @@ impl Driven {
         match self {
             Driven::Random { simulator, .. } => simulator,
             Driven::Acting { rollout, .. } => rollout.simulator(),
+            Driven::Placed { simulator, .. } => simulator,
             Driven::Training(training) => training.rollout().simulator(),
         }
     }
@@ -191,6 +198,13 @@ impl Mode {
             let simulator = Simulator::on(engine.clone(), world.clone(), envs, 0, choice)?;
             return Ok(Driven::Random { simulator, submission });
         };
+        // A wide network reads its weights too often in the kernel: the tensor library is faster.
+        if self == Mode::Policy && !matches!(engine, Engine::Cpu) {
+            let policy = placed(learner.policy.clone(), engine, world, Choice::Sampled { seed: 0 })?;
+            let choice = RouteChoice::Drawn(routes.to_vec());
+            let simulator = Simulator::on(engine.clone(), world.clone(), envs, 0, choice)?;
+            return Ok(Driven::Placed { simulator: Box::new(simulator), policy });
+        }
         let opened = match backend.take() {
             Some(backend) => backend,
             None if matches!(engine, Engine::Cpu) => Backend::Host,

@@ -1,0 +1,63 @@
+//! What an evaluation looks at after a step. From a device these columns alone are read: no observation leaves it.
+
+use std::borrow::Cow;
+
+use bytemuck::{AnyBitPattern, NoUninit};
+use offtrack::layout::{Clearance, Column, Control, Progress, Truck};
+use offtrack::simulator::{Error, Simulator};
+
+const COLUMNS: [Column; 7] = [
+    Column::Action,
+    Column::Control,
+    Column::Truck,
+    Column::Clearance,
+    Column::Progress,
+    Column::Ended,
+    Column::Reward,
+];
+
+/// Columns of a batch, `[n_envs]` rows each.
+#[derive(Debug)]
+pub(crate) struct Seen<'a> {
+    pub(crate) action: Cow<'a, [u32]>,
+    pub(crate) control: Cow<'a, [Control]>,
+    pub(crate) truck: Cow<'a, [Truck]>,
+    pub(crate) clearance: Cow<'a, [Clearance]>,
+    pub(crate) progress: Cow<'a, [Progress]>,
+    pub(crate) ended: Cow<'a, [u32]>,
+    pub(crate) reward: Cow<'a, [f32]>,
+}
+
+impl<'a> Seen<'a> {
+    /// Reads them.
+    pub(crate) fn of(simulator: &'a Simulator) -> Result<Seen<'a>, Error> {
+        let mut read = simulator.read(&COLUMNS)?.into_iter();
+        // As many as were asked for, in their order.
+        let mut next = || read.next().unwrap_or_default();
+        Ok(Seen {
+            action: rows(next()),
+            control: rows(next()),
+            truck: rows(next()),
+            clearance: rows(next()),
+            progress: rows(next()),
+            ended: rows(next()),
+            reward: rows(next()),
+        })
+    }
+}
+
+/// The codes of how the last step ended each truck's episode.
+pub(crate) fn ended(simulator: &Simulator) -> Result<Cow<'_, [u32]>, Error> {
+    Ok(rows(simulator.read(&[Column::Ended])?.pop().unwrap_or_default()))
+}
+
+/// Bytes as rows. Those read from a device need not be aligned.
+fn rows<T: AnyBitPattern + NoUninit>(bytes: Cow<'_, [u8]>) -> Cow<'_, [T]> {
+    match bytes {
+        Cow::Borrowed(bytes) => match bytemuck::try_cast_slice(bytes) {
+            Ok(rows) => Cow::Borrowed(rows),
+            Err(_) => Cow::Owned(bytemuck::pod_collect_to_vec(bytes)),
+        },
+        Cow::Owned(bytes) => Cow::Owned(bytemuck::pod_collect_to_vec(&bytes)),
+    }
+}
