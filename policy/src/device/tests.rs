@@ -13,6 +13,11 @@ use offtrack::wgpu::naga::{AddressSpace, front::wgsl as parser};
 use super::*;
 use crate::Normalisation;
 
+/// The simulator's tests have it too.
+#[cfg(target_os = "linux")]
+#[path = "../../../tests/simulator/machine_code/null_device.rs"]
+mod null_device;
+
 /// Outputs that lie nearer together than this may fall otherwise: some devices do not fuse multiply-adds.
 const TIE: f32 = 1e-4;
 
@@ -218,4 +223,29 @@ fn the_kernel_keeps_within_what_every_device_offers() {
         assert_eq!(module.entry_points[0].workgroup_size, [shape.threads(), 1, 1]);
     }
     assert_eq!(size_of::<LayerRow>() % 16, 0, "a row of a uniform table");
+}
+
+/// Checks the machine code of a shape for a card; `test` is the name of the test that asks.
+#[cfg(target_os = "linux")]
+fn check_machine_code(test: &str, shape: Shape) {
+    let stated = [null_device::stated("act", 96, shape.memory(), 0)];
+    null_device::check(&format!("device::tests::{test}"), &source(shape), &stated);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_kernel_of_narrow_networks_spills_nothing_on_a_card() {
+    check_machine_code("the_kernel_of_narrow_networks_spills_nothing_on_a_card", SHAPES[0]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_kernel_of_wide_networks_spills_nothing_on_a_card() {
+    check_machine_code("the_kernel_of_wide_networks_spills_nothing_on_a_card", SHAPES[1]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_kernel_of_the_widest_networks_spills_nothing_on_a_card() {
+    check_machine_code("the_kernel_of_the_widest_networks_spills_nothing_on_a_card", SHAPES[2]);
 }

@@ -248,6 +248,7 @@ fn no_kernel_of_the_replay_buffer_spills_or_takes_more_registers_and_memory_of_a
         stated("store_before", 48, 0, 0),
         stated("store_after", 48, 0, 0),
         stated("sample", 48, 0, 0),
+        stated("sample_next", 48, 0, 0),
     ];
     assert_eq!(most.each_ref().map(|stated| stated.kernel), Kernel::ALL.map(Kernel::name));
     let test = "rollout::device::tests::\
