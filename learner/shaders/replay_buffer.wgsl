@@ -61,7 +61,7 @@ fn store_after(thread: Thread) {
         held_next[row * facts.n_values + value] = next_extras[env * N_EXTRAS + value - N_VALUES];
     }
     if value == 0u {
-        held_reward[row] = reward[env];
+        held_reward[row] = reward[env] + select(0.0, facts.arrival, ended[env] == ARRIVED);
         held_ended[row] = ended[env];
     }
 }

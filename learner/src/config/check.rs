@@ -68,7 +68,6 @@ impl Config {
                 ("level_replay", self.level_replay.is_some()),
                 ("refinement", self.refinement.is_some()),
                 ("replay_buffer.priority", replay_buffer.priority.is_some()),
-                ("learning.arrival", learning.arrival.is_some()),
             ];
             if let Some((key, _)) = without.into_iter().find(|(_, given)| *given) {
                 return Err(reader

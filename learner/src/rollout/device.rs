@@ -115,6 +115,7 @@ impl<const N: usize> DeviceRollout<N> {
             sampling_seed: seeds[1],
             mirrored: mirror.is_some().into(),
             gamma: config.learning.gamma as f32,
+            arrival: config.learning.arrival.unwrap_or(0.0) as f32,
             reward_scale: config.learning.reward_scale as f32,
             clip: LIMIT,
         };

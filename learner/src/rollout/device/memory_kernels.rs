@@ -34,6 +34,8 @@ offtrack::shared! {
         pub mirrored: u32,
         /// Discount factor.
         pub gamma: f32,
+        /// Added to the reward of a step that arrives.
+        pub arrival: f32,
         /// Factor of the rewards.
         pub reward_scale: f32,
         /// Where normalised values are clipped.
