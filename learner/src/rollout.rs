@@ -76,7 +76,7 @@ pub trait Rollout {
     fn sample(&mut self) -> Result<Vec<Transitions>, Error>;
 
     /// Sets priorities from the absolute TD errors of the latest sample, `[B, 1]` a shard.
-    fn set_td_errors(&mut self, errors: Vec<Tensor<2>>);
+    fn set_td_errors(&mut self, errors: Vec<Tensor<2>>) -> Result<(), Error>;
 
     /// The episodes that ended since this was last called. Where counting them means waiting for a device, none unless
     /// `wait`.

@@ -67,7 +67,6 @@ impl Config {
                 ("exploration", self.exploration.is_some()),
                 ("level_replay", self.level_replay.is_some()),
                 ("refinement", self.refinement.is_some()),
-                ("replay_buffer.priority", replay_buffer.priority.is_some()),
             ];
             if let Some((key, _)) = without.into_iter().find(|(_, given)| *given) {
                 return Err(reader

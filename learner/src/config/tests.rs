@@ -159,16 +159,10 @@ fn a_key_that_works_on_the_processor_alone_is_refused_for_a_device() {
     let with_arrival = on_device.replace("\n[learning.entropy]", "arrival = 1500.0\n[learning.entropy]");
     assert_eq!(read(&with_arrival).unwrap().learning.arrival, Some(1500.0));
     let exploration = "[exploration]\ninitial_fraction = 1.0\nfinal_fraction = 0.1\nsteps = 1000\n";
-    let priority = "[replay_buffer.priority]\nexponent = 0.6\ncorrection = 0.4\n";
     let level_replay = "[level_replay]\nfraction = 0.5\nrate = 0.2\n";
     let lane = std::fs::read_to_string(files::repository().join("learner/configs/lane.toml")).unwrap();
     let refinement = &lane[lane.find("\n[refinement]").unwrap()..];
-    let tables = [
-        ("exploration", exploration),
-        ("level_replay", level_replay),
-        ("replay_buffer.priority", priority),
-        ("refinement", refinement),
-    ];
+    let tables = [("exploration", exploration), ("level_replay", level_replay), ("refinement", refinement)];
     let with_tables = tables.map(|(key, table)| (key, format!("{plain}\n{table}")));
     for (key, text) in with_tables {
         assert!(read(&text).is_ok(), "{key}");

@@ -6,6 +6,8 @@ use offtrack::scenario::{Scenario, Split};
 use offtrack_policy::Policy;
 use std::path::Path;
 
+mod priorities;
+
 /// The simulator's tests have it too.
 #[cfg(target_os = "linux")]
 #[path = "../../../../tests/simulator/machine_code/null_device.rs"]
@@ -24,7 +26,13 @@ fn training_of(benchmark: &str) -> (Arc<World>, Vec<u32>) {
 
 fn config(settings: &[&str]) -> Config {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/gpu.toml");
-    let common = ["n_envs=64", "replay_buffer.capacity=2000", "replay_buffer.warmup=100", "learning.batch=500"];
+    let common = [
+        "n_envs=64",
+        "replay_buffer.capacity=2000",
+        "replay_buffer.warmup=100",
+        "replay_buffer.priority=",
+        "learning.batch=500",
+    ];
     let settings: Vec<String> = common.iter().chain(settings).map(|setting| (*setting).to_owned()).collect();
     Config::read_with(&file, &settings).unwrap()
 }
@@ -280,6 +288,13 @@ fn no_kernel_of_the_replay_buffer_spills_or_takes_more_registers_and_memory_of_a
         stated("choose", 48, 0, 0),
         stated("store_before", 48, 0, 0),
         stated("store_after", 48, 0, 0),
+        stated("admit", 48, 0, 0),
+        stated("sum_blocks", 48, 0, 0),
+        stated("add_up", 48, 512, 0),
+        stated("pick", 48, 0, 0),
+        stated("pick_by_priority", 48, 0, 0),
+        stated("weigh", 48, 512, 0),
+        stated("set_priorities", 48, 0, 0),
         stated("sample", 48, 0, 0),
         stated("sample_next", 48, 0, 0),
     ];
