@@ -44,6 +44,8 @@ fn store_before(thread: Thread) {
     }
     if value == 0u {
         held_action[row] = action[env];
+        // A truck whose episode ends in the step is on another route after it.
+        driven[env] = truck[env].route;
     }
 }
 
@@ -64,6 +66,14 @@ fn store_after(thread: Thread) {
         held_reward[row] = reward[env] + select(0.0, facts.arrival, ended[env] == ARRIVED);
         held_ended[row] = ended[env];
     }
+}
+
+// Counts the episodes that the step ended.
+@compute @workgroup_size(WORKGROUP)
+fn count_ends(thread: Thread) {
+    let env = index_of(thread);
+    if facts.n_envs <= env || ended[env] == RUNNING { return; }
+    atomicAdd(&route_ends[driven[env] * N_ENDS + ended[env]], 1u);
 }
 
 // Draws the rows of a sample uniformly at random; a thread a row.

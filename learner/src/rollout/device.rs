@@ -5,6 +5,7 @@
 //! before it submits it, so it is flushed before every submission of ours, and nothing waits.
 
 mod buffers;
+mod levels;
 mod memory_kernels;
 mod shared;
 
@@ -21,10 +22,11 @@ use offtrack::world::World;
 use offtrack_policy::{LIMIT, Normalisation};
 use wgpu::{PollType, SubmissionIndex};
 
-use super::{Episodes, Rollout};
+use super::{Episodes, Rollout, RouteEnd};
 use crate::checkpoint::{Columns, Stored};
 use crate::config::{Config, Refinement};
 use crate::error::Error;
+use crate::level_replay::LevelReplay;
 use crate::mirror::Mirror;
 use crate::network::Mlp;
 use crate::ppo::steps::Steps;
@@ -63,6 +65,11 @@ pub struct DeviceRollout<const N: usize> {
     queued: VecDeque<SubmissionIndex>,
     /// The tally when it was last read.
     counted: Tally,
+    /// None where routes are drawn uniformly: episodes are then not counted by route.
+    level_replay: Option<LevelReplay>,
+    /// The counts of episodes by route and end code when they were last read, and the episodes since then.
+    counted_ends: Vec<u32>,
+    route_ends: Vec<RouteEnd>,
 }
 
 impl<const N: usize> DeviceRollout<N> {
@@ -105,7 +112,9 @@ impl<const N: usize> DeviceRollout<N> {
         let (observed, beside) = (floats(&observation)?, floats(&extras)?);
         let columns = vec![(Column::Observation, observed.slice.clone()), (Column::Extras, beside.slice.clone())];
         let engine = Engine::Gpu { device: shared.gpu.clone(), columns };
-        let simulator = Simulator::on(engine, world.clone(), n_envs, config.seed, RouteChoice::Drawn(routes.clone()))?;
+        let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
+        let drawn = level_replay.as_ref().map_or_else(|| routes.clone(), |replay| replay.list().to_vec());
+        let simulator = Simulator::on(engine, world.clone(), n_envs, config.seed, RouteChoice::Drawn(drawn))?;
         let priority = config.replay_buffer.priority;
         let facts = Facts {
             n_envs: n_envs as u32,
@@ -145,6 +154,9 @@ impl<const N: usize> DeviceRollout<N> {
             n_samples: 0,
             queued: VecDeque::with_capacity(MAX_QUEUED_STEPS),
             counted: Tally::default(),
+            level_replay,
+            counted_ends: vec![0; world.routes.len() * Ended::ALL.len()],
+            route_ends: Vec::new(),
         };
         rollout.buffers = rollout.make_buffers()?;
         rollout.set_normalisation(&Normalisation::none(N));
@@ -166,17 +178,6 @@ impl<const N: usize> DeviceRollout<N> {
         self.config.replay_buffer.priority.is_some()
     }
 
-    /// Submits kernels, one after the other, with another buffer for one binding where one is given.
-    fn submit(&self, each: &[Kernel], other: Option<(Binding, &Slice)>) {
-        let device = &self.shared.gpu.device;
-        let mut encoder = device.create_command_encoder(&Default::default());
-        for &kernel in each {
-            let group = self.buffers.group(device, &self.kernels, kernel, other);
-            memory_kernels::add(&self.kernels, &mut encoder, &group, kernel, &self.facts);
-        }
-        self.shared.gpu.queue.submit([encoder.finish()]);
-    }
-
     /// One step of every truck: by the actor's output, or with random actions where there is none.
     fn step_by(&mut self, logits: Option<&Tensor<2>>, remember: bool) -> Result<(), Error> {
         self.shared.flush()?;
@@ -184,7 +185,7 @@ impl<const N: usize> DeviceRollout<N> {
         let device = &self.shared.gpu.device;
         let chosen_from = output.as_ref().map(|output| (Binding::logits, &output.slice));
         self.write_now();
-        let has_priorities = self.has_priorities();
+        let (has_priorities, counts_ends) = (self.has_priorities(), self.level_replay.is_some());
         let mut encoder = device.create_command_encoder(&Default::default());
         let (kernels, facts, buffers) = (&self.kernels, &self.facts, &self.buffers);
         let group = |kernel: Kernel| buffers.group(device, kernels, kernel, chosen_from);
@@ -204,6 +205,9 @@ impl<const N: usize> DeviceRollout<N> {
             if has_priorities {
                 memory_kernels::add(kernels, &mut encoder, &group(Kernel::Admit), Kernel::Admit, facts);
             }
+            if counts_ends {
+                memory_kernels::add(kernels, &mut encoder, &group(Kernel::CountEnds), Kernel::CountEnds, facts);
+            }
             self.n_appended += 1;
         }
         batch.stepped();
@@ -213,7 +217,7 @@ impl<const N: usize> DeviceRollout<N> {
             waited.map_err(|error| Error::Device(error.to_string()))?;
         }
         self.queued.push_back(self.shared.gpu.queue.submit([encoder.finish()]));
-        Ok(())
+        if remember { self.replay_levels() } else { Ok(()) }
     }
 
     fn slots_held(&self) -> u32 {
@@ -342,6 +346,10 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
         Ok(Vec::from_iter((0 < episodes.count).then_some(episodes)))
     }
 
+    fn take_route_ends(&mut self) -> Vec<RouteEnd> {
+        std::mem::take(&mut self.route_ends)
+    }
+
     fn wait(&self) -> Result<(), Error> {
         self.shared.wait()
     }
@@ -350,9 +358,11 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
         self.shared.check()
     }
 
-    fn save<'a>(&'a self, _: &mut Columns<'a>) {}
+    fn save<'a>(&'a self, columns: &mut Columns<'a>) {
+        self.level_replay.iter().for_each(|replay| replay.save(columns));
+    }
 
-    fn restore(&mut self, _: &Stored, n_updates: u64) -> Result<(), Error> {
+    fn restore(&mut self, stored: &Stored, n_updates: u64) -> Result<(), Error> {
         // Other actions and samples than the first time.
         let seeds = seeds(self.config.seed, n_updates as u32);
         let world = self.simulator.world().clone();
@@ -364,6 +374,10 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
             self.mirror.clone(),
             seeds,
         )?;
+        if let Some(replay) = &mut self.level_replay {
+            replay.restore(stored)?;
+            self.simulator.draw_from(replay.list())?;
+        }
         Ok(())
     }
 }

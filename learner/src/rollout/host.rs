@@ -158,6 +158,7 @@ impl<const N: usize> HostRollout<N> {
         if let Some(replay) = &mut self.level_replay
             && replay.stepped()
         {
+            replay.renew();
             self.simulator.draw_from(replay.list())?;
         }
         Ok(())

@@ -6,7 +6,7 @@ use offtrack::layout::Column;
 use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, BufferBinding, Device};
 
 use super::DeviceRollout;
-use super::memory_kernels::{Binding, Kernel, Now, Value};
+use super::memory_kernels::{Binding, Kernel, Now, Value, add};
 use super::shared::{Shared, floats, integers};
 use crate::config::Config;
 use crate::error::Error;
@@ -58,6 +58,17 @@ impl Buffers {
 }
 
 impl<const N: usize> DeviceRollout<N> {
+    /// Submits kernels, one after the other, with another buffer for one binding where one is given.
+    pub(super) fn submit(&self, each: &[Kernel], other: Option<(Binding, &Slice)>) {
+        let device = &self.shared.gpu.device;
+        let mut encoder = device.create_command_encoder(&Default::default());
+        for &kernel in each {
+            let group = self.buffers.group(device, &self.kernels, kernel, other);
+            add(&self.kernels, &mut encoder, &group, kernel, &self.facts);
+        }
+        self.shared.gpu.queue.submit([encoder.finish()]);
+    }
+
     /// A buffer for every binding of the kernels.
     pub(super) fn make_buffers(&mut self) -> Result<Buffers, Error> {
         let gpu = self.shared.gpu.clone();
@@ -84,12 +95,15 @@ impl<const N: usize> DeviceRollout<N> {
             (Binding::values, empty(N * size_of::<Value>())),
             (Binding::action_images, filled(cast_slice(&actions))),
             (Binding::action, column(Column::Action)),
+            (Binding::truck, column(Column::Truck)),
             (Binding::observation, column(Column::Observation)),
             (Binding::next_observation, column(Column::NextObservation)),
             (Binding::extras, column(Column::Extras)),
             (Binding::next_extras, column(Column::NextExtras)),
             (Binding::ended, column(Column::Ended)),
             (Binding::reward, column(Column::Reward)),
+            (Binding::driven, empty(self.config.n_envs * 4)),
+            (Binding::route_ends, empty(self.counted_ends.len() * 4)),
             (Binding::held_observation, empty(held * row_bytes)),
             (Binding::held_next, empty(held * row_bytes)),
             (Binding::held_action, empty(held * 4)),

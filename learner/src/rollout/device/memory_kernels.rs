@@ -4,9 +4,9 @@
 use offtrack::engine::stages::SHADERS;
 use offtrack::engine::wgsl;
 use offtrack::gpu::Kernels;
-use offtrack::layout::WORKGROUP;
 use offtrack::layout::buffers::Access;
 use offtrack::layout::shared::Shared as _;
+use offtrack::layout::{Ended, Truck, WORKGROUP};
 use wgpu::{BindGroup, CommandEncoder, ComputePassDescriptor, Device};
 
 use crate::replay_buffer::LEAST_ERROR;
@@ -117,6 +117,7 @@ bindings! {
     values: Value::wgsl(), false, "Normalisation, noise and mirror image of each value, [n_values].";
     action_images: "u32".to_owned(), false, "Mirror image of each action, [n_actions].";
     action: "u32".to_owned(), false, "The simulator's column of actions, [n_envs].";
+    truck: Truck::wgsl(), false, "The simulator's column of trucks, [n_envs].";
     observation: "f32".to_owned(), false, "The simulator's column of observations, [n_envs, N_VALUES].";
     next_observation: "f32".to_owned(), false, "The simulator's column of next observations, [n_envs, N_VALUES].";
     extras: "f32".to_owned(), false, "The simulator's column of extras, [n_envs, N_EXTRAS].";
@@ -128,6 +129,8 @@ bindings! {
     held_action: "u32".to_owned(), false, "The ring: actions, [n_slots, n_envs].";
     held_reward: "f32".to_owned(), false, "The ring: rewards, [n_slots, n_envs].";
     held_ended: "u32".to_owned(), false, "The ring: end codes, [n_slots, n_envs].";
+    driven: "u32".to_owned(), false, "Routes of the step in hand, [n_envs].";
+    route_ends: "atomic<u32>".to_owned(), false, "Episodes that ended, by route and end code, [n_routes, N_ENDS].";
     logits: "f32".to_owned(), false, "The actor's output, [n_envs, n_actions].";
     sampled_row: "u32".to_owned(), false, "A sample: where in the ring its transitions begin, [n_rows].";
     sampled_weight: "f32".to_owned(), false, "A sample: importance-sampling weights, [n_rows].";
@@ -160,6 +163,8 @@ offtrack::named! {
         StoreBefore = "store_before",
         /// Stores what the step led to.
         StoreAfter = "store_after",
+        /// Counts the episodes that ended.
+        CountEnds = "count_ends",
         /// Lets the transitions that enough steps follow be sampled by priority.
         Admit = "admit",
         /// Sums the priorities of each block.
@@ -187,7 +192,10 @@ impl Kernel {
         use Binding::*;
         match self {
             Kernel::Choose => &[facts, now, action, logits],
-            Kernel::StoreBefore => &[facts, now, action, observation, extras, held_observation, held_action],
+            Kernel::StoreBefore => {
+                &[facts, now, action, truck, observation, extras, held_observation, held_action, driven]
+            }
+            Kernel::CountEnds => &[facts, ended, driven, route_ends],
             Kernel::StoreAfter => {
                 &[facts, now, next_observation, next_extras, ended, reward, held_next, held_reward, held_ended]
             }
@@ -228,7 +236,7 @@ impl Kernel {
     fn threads(self, facts: &Facts) -> u64 {
         let (envs, rows, values) = (u64::from(facts.n_envs), u64::from(facts.n_rows), u64::from(facts.n_values));
         match self {
-            Kernel::Choose | Kernel::Admit => envs,
+            Kernel::Choose | Kernel::CountEnds | Kernel::Admit => envs,
             Kernel::StoreBefore | Kernel::StoreAfter => envs * values,
             Kernel::SumBlocks => facts.n_blocks.into(),
             Kernel::AddUp | Kernel::Weigh => WORKGROUP.into(),
@@ -244,8 +252,10 @@ pub(super) fn source() -> String {
         SHADERS.iter().filter(|(name, _)| ["common/thread", "common/random"].contains(name)).map(|(_, text)| *text);
     let bindings: String = Binding::ALL.map(Binding::declaration).concat();
     let constants = format!(
-        "const BLOCK: u32 = {BLOCK}u;\nconst LEAST_ERROR: f32 = {LEAST_ERROR:?}f;\nconst INFINITE: u32 = {}u;\n",
-        f32::INFINITY.to_bits()
+        "const BLOCK: u32 = {BLOCK}u;\nconst LEAST_ERROR: f32 = {LEAST_ERROR:?}f;\nconst INFINITE: u32 = {}u;\n\
+         const N_ENDS: u32 = {}u;\n",
+        f32::INFINITY.to_bits(),
+        Ended::ALL.len()
     );
     let own = [wgsl::shared(), constants, printed_structs(), bindings];
     let kernels =

@@ -6,6 +6,7 @@ use offtrack::scenario::{Scenario, Split};
 use offtrack_policy::Policy;
 use std::path::Path;
 
+mod level_replay;
 mod priorities;
 
 /// The simulator's tests have it too.
@@ -31,6 +32,7 @@ fn config(settings: &[&str]) -> Config {
         "replay_buffer.capacity=2000",
         "replay_buffer.warmup=100",
         "replay_buffer.priority=",
+        "level_replay=",
         "learning.batch=500",
     ];
     let settings: Vec<String> = common.iter().chain(settings).map(|setting| (*setting).to_owned()).collect();
@@ -288,6 +290,7 @@ fn no_kernel_of_the_replay_buffer_spills_or_takes_more_registers_and_memory_of_a
         stated("choose", 48, 0, 0),
         stated("store_before", 48, 0, 0),
         stated("store_after", 48, 0, 0),
+        stated("count_ends", 48, 0, 0),
         stated("admit", 48, 0, 0),
         stated("sum_blocks", 48, 0, 0),
         stated("add_up", 48, 512, 0),
