@@ -44,6 +44,8 @@ fn store_before(thread: Thread) {
     }
     if value == 0u {
         held_action[row] = action[env];
+        // A truck whose episode ends in the step is on another route after it.
+        driven[env] = truck[env].route;
     }
 }
 
@@ -61,12 +63,30 @@ fn store_after(thread: Thread) {
         held_next[row * facts.n_values + value] = next_extras[env * N_EXTRAS + value - N_VALUES];
     }
     if value == 0u {
-        held_reward[row] = reward[env];
+        held_reward[row] = reward[env] + select(0.0, facts.arrival, ended[env] == ARRIVED);
         held_ended[row] = ended[env];
     }
 }
 
-// Samples transitions, uniformly at random: what was observed and done; a thread a value.
+// Counts the episodes that the step ended.
+@compute @workgroup_size(WORKGROUP)
+fn count_ends(thread: Thread) {
+    let env = index_of(thread);
+    if facts.n_envs <= env || ended[env] == RUNNING { return; }
+    atomicAdd(&route_ends[driven[env] * N_ENDS + ended[env]], 1u);
+}
+
+// Draws the rows of a sample uniformly at random; a thread a row.
+@compute @workgroup_size(WORKGROUP)
+fn pick(thread: Thread) {
+    let index = index_of(thread);
+    if facts.n_rows <= index { return; }
+    let drawn = words(facts.sampling_seed, index, now.sample, 0u);
+    let slot = (now.oldest + index_below(drawn.x, now.n_ready)) % facts.n_slots;
+    sampled_row[index] = slot * facts.n_envs + index_below(drawn.y, facts.n_envs);
+}
+
+// Samples the transitions at those rows: what was observed and done; a thread a value.
 @compute @workgroup_size(WORKGROUP)
 fn sample(thread: Thread) {
     let element = index_of(thread);
@@ -74,7 +94,7 @@ fn sample(thread: Thread) {
     let value = element % facts.n_values;
     if facts.n_rows <= index { return; }
     let drawn = drawn_at(index);
-    let first = (drawn.slot % facts.n_slots) * facts.n_envs + drawn.env;
+    let first = sampled_row[index];
     if value == 0u {
         var taken = held_action[first];
         if drawn.is_mirrored { taken = action_images[taken]; }
@@ -119,31 +139,37 @@ fn sample_next(thread: Thread) {
 
 // A transition of the sample.
 struct Drawn {
-    // Where it begins: a slot counted from the oldest of the ring's first round on, and a truck.
+    // Where it begins.
     slot: u32,
     env: u32,
     is_mirrored: bool,
 }
 
 fn drawn_at(index: u32) -> Drawn {
-    let drawn = words(facts.sampling_seed, index, now.sample, 0u);
-    let is_mirrored = facts.mirrored == 1u && (drawn.z & 1u) == 1u;
-    return Drawn(now.oldest + index_below(drawn.x, now.n_ready), index_below(drawn.y, facts.n_envs), is_mirrored);
+    let row = sampled_row[index];
+    let is_mirrored = facts.mirrored == 1u && (words(facts.sampling_seed, index, now.sample, 0u).z & 1u) == 1u;
+    return Drawn(row / facts.n_envs, row % facts.n_envs, is_mirrored);
 }
 
-// What a value is the mirror image of; itself where the transition is not mirrored.
+// What a value is the mirror image of, and the factor of it.
+struct Image {
+    index: u32,
+    factor: f32,
+}
+
+// Itself where the transition is not mirrored.
 fn image_of(drawn: Drawn, value: u32) -> Image {
-    if drawn.is_mirrored { return images[value]; }
+    if drawn.is_mirrored { return Image(values[value].image, values[value].image_factor); }
     return Image(value, 1.0);
 }
 
 // The noise of a value: the same on both observations, so that their difference stays what it is.
 fn noise_at(index: u32, value: u32) -> f32 {
-    return normalisation[value].noise * signed_unit(words(facts.sampling_seed, index, now.sample, 1u + value).x);
+    return values[value].noise * signed_unit(words(facts.sampling_seed, index, now.sample, 1u + value).x);
 }
 
 // A value, normalised and clipped.
 fn normalised(value: f32, index: u32) -> f32 {
-    let normal = normalisation[index];
+    let normal = values[index];
     return clamp((value - normal.mean) * normal.factor, -facts.clip, facts.clip);
 }

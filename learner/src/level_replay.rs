@@ -52,7 +52,7 @@ impl LevelReplay {
             list: Vec::new(),
             n_steps: 0,
         };
-        replay.fill();
+        replay.renew();
         replay
     }
 
@@ -69,19 +69,27 @@ impl LevelReplay {
         *failures += self.settings.rate as f32 * (failed - *failures);
     }
 
-    /// Counts a step of all trucks; true when there is a new list.
+    /// Counts episodes on one route whose order is not known: as they count on average over all orders.
+    #[cfg(feature = "gpu")]
+    pub fn count_unordered(&mut self, route: u32, ends: &[RouteEnd]) {
+        let Some(index) = self.indices.get(route as usize).copied().flatten().filter(|_| !ends.is_empty()) else {
+            return;
+        };
+        let n_failed = ends.iter().filter(|end| end.ended != Ended::Arrived).count();
+        let kept = (1.0 - self.settings.rate as f32).powi(ends.len() as i32);
+        let failures = &mut self.failures[index];
+        *failures = kept * *failures + (1.0 - kept) * n_failed as f32 / ends.len() as f32;
+    }
+
+    /// Counts a step of all trucks; true when it is time for a new list.
     pub fn stepped(&mut self) -> bool {
         self.n_steps += 1;
-        let due = self.n_steps.is_multiple_of(INTERVAL);
-        if due {
-            self.fill();
-        }
-        due
+        self.n_steps.is_multiple_of(INTERVAL)
     }
 
     /// Makes the list anew. Its second part is systematic: a route stands in it as often as its score says, rounded up
     /// or down.
-    fn fill(&mut self) {
+    pub fn renew(&mut self) {
         let fraction = self.settings.fraction;
         let n_replayed = (self.routes.len() as f64 * fraction / (1.0 - fraction)).round() as usize;
         let score = |failures: f32| LEAST_SCORE + f64::from(failures);
@@ -153,6 +161,7 @@ mod tests {
         }
         let renewed: Vec<bool> = (0..INTERVAL).map(|_| replay.stepped()).collect();
         assert_eq!(renewed.iter().position(|&new| new), Some(INTERVAL as usize - 1));
+        replay.renew();
         // Of the 12 further places one that always fails has about twice as many as one that fails half of the time.
         assert_eq!([2, 3, 5, 7].map(|route| times(&replay, route)), [1, 9, 5, 1]);
     }
@@ -164,8 +173,27 @@ mod tests {
         assert_eq!(length, 6);
         for (n, route) in [2, 3, 5, 7, 11].into_iter().cycle().take(997).enumerate() {
             replay.count(RouteEnd { route, ended: if n % 3 == 0 { Ended::Arrived } else { Ended::Strayed } });
-            replay.stepped();
+            replay.renew();
             assert_eq!(replay.list().len(), length);
         }
+    }
+    #[cfg(feature = "gpu")]
+    #[test]
+    fn episodes_of_unknown_order_count_as_they_do_on_average_over_all_orders() {
+        let end = |ended: Ended| RouteEnd { route: 5, ended };
+        let (arrived, failed) = (end(Ended::Arrived), end(Ended::Strayed));
+        let orders = [[failed, arrived, arrived], [arrived, failed, arrived], [arrived, arrived, failed]];
+        let counted = orders.map(|order| {
+            let mut replay = replay(0.5);
+            order.into_iter().for_each(|end| replay.count(end));
+            replay.failures[2]
+        });
+        let mut unordered = replay(0.5);
+        unordered.count_unordered(5, &orders[0]);
+        unordered.count_unordered(3, &[]);
+        // A route that is not trained on.
+        unordered.count_unordered(4, &[failed]);
+        assert!((unordered.failures[2] - counted.iter().sum::<f32>() / 3.0).abs() < 1e-6, "{counted:?}");
+        assert_eq!(unordered.failures[1], UNKNOWN);
     }
 }

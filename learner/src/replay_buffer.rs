@@ -12,6 +12,8 @@ use offtrack::layout::Ended;
 use rand::Rng;
 
 use crate::config;
+#[cfg(feature = "gpu")]
+pub(crate) use priorities::LEAST_ERROR;
 use priorities::Priorities;
 
 /// One step of every truck, as the simulator's columns have it. All are `[n_envs]`.

@@ -76,16 +76,15 @@ pub trait Rollout {
     fn sample(&mut self) -> Result<Vec<Transitions>, Error>;
 
     /// Sets priorities from the absolute TD errors of the latest sample, `[B, 1]` a shard.
-    fn set_td_errors(&mut self, errors: Vec<Tensor<2>>);
+    fn set_td_errors(&mut self, errors: Vec<Tensor<2>>) -> Result<(), Error>;
 
     /// The episodes that ended since this was last called. Where counting them means waiting for a device, none unless
     /// `wait`.
     fn take_episodes(&mut self, wait: bool) -> Result<Vec<Episodes>, Error>;
 
-    /// The episodes that ended since this was last called, one by one; none where a device counts all trucks together.
-    fn take_route_ends(&mut self) -> Vec<RouteEnd> {
-        Vec::new()
-    }
+    /// The episodes that ended since this was last called, one by one. A device has them with level replay alone, and
+    /// only up to its latest list of routes.
+    fn take_route_ends(&mut self) -> Vec<RouteEnd>;
 
     /// Waits until all that was asked for is done.
     fn wait(&self) -> Result<(), Error>;
@@ -93,7 +92,7 @@ pub trait Rollout {
     /// An error if the device failed.
     fn check(&self) -> Result<(), Error>;
 
-    /// Adds what continues bit for bit; on a device, nothing.
+    /// Adds what continues bit for bit; on a device, the scores of level replay alone.
     fn save<'a>(&'a self, columns: &mut Columns<'a>);
 
     /// Continues after `n_updates` from what [`Rollout::save`] added; on a device with an empty replay buffer and new

@@ -173,14 +173,13 @@ impl Session {
     /// One update on a new sample.
     pub fn update(&mut self, rate_factor: f64) -> Result<(), Error> {
         let sample = self.rollout.sample()?;
-        self.update_on(sample, rate_factor);
-        Ok(())
+        self.update_on(sample, rate_factor)
     }
 
     /// One update on the latest sample.
-    pub fn update_on(&mut self, sample: Vec<Transitions>, rate_factor: f64) {
+    pub fn update_on(&mut self, sample: Vec<Transitions>, rate_factor: f64) -> Result<(), Error> {
         let errors = self.sac.update(sample, rate_factor);
-        self.rollout.set_td_errors(errors);
+        self.rollout.set_td_errors(errors)
     }
 
     /// Values that the networks observe.

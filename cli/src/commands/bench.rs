@@ -189,7 +189,7 @@ impl Learner {
         let batches = batches?;
         let begun = Instant::now();
         for batch in batches {
-            self.training.update_on(batch, 1.0);
+            self.training.update_on(batch, 1.0)?;
         }
         Ok(begun.elapsed().as_secs_f64() / n as f64)
     }

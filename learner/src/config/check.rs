@@ -63,13 +63,7 @@ impl Config {
             return Err(reader.invalid("adapter", "given", "works with device = \"gpu\" alone: leave it out").into());
         }
         if self.device == Device::Gpu {
-            let without = [
-                ("exploration", self.exploration.is_some()),
-                ("level_replay", self.level_replay.is_some()),
-                ("refinement", self.refinement.is_some()),
-                ("replay_buffer.priority", replay_buffer.priority.is_some()),
-                ("learning.arrival", learning.arrival.is_some()),
-            ];
+            let without = [("exploration", self.exploration.is_some()), ("refinement", self.refinement.is_some())];
             if let Some((key, _)) = without.into_iter().find(|(_, given)| *given) {
                 return Err(reader
                     .invalid(key, "given", "works with device = \"cpu\" alone: leave one of them out")

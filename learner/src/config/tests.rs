@@ -144,37 +144,30 @@ fn the_command_line_replaces_keys_and_a_budget_there_replaces_both() {
 
 #[test]
 fn a_key_that_works_on_the_processor_alone_is_refused_for_a_device() {
-    // The default file has two of them.
-    let own = [
-        "[replay_buffer.priority]\n",
-        "\nexponent = 0.6",
-        "\ncorrection = 0.4",
-        "[level_replay]\n",
-        "\nfraction = 0.5",
-        "\nrate = 0.2",
-    ];
-    let plain = own.iter().fold(default_file(), |text, part| text.replace(part, ""));
+    let plain = default_file();
     let on_device = format!("device = \"gpu\"\n{plain}");
     assert_eq!(read(&on_device).unwrap().device, Device::Gpu);
     let exploration = "[exploration]\ninitial_fraction = 1.0\nfinal_fraction = 0.1\nsteps = 1000\n";
-    let priority = "[replay_buffer.priority]\nexponent = 0.6\ncorrection = 0.4\n";
-    let level_replay = "[level_replay]\nfraction = 0.5\nrate = 0.2\n";
     let lane = std::fs::read_to_string(files::repository().join("learner/configs/lane.toml")).unwrap();
     let refinement = &lane[lane.find("\n[refinement]").unwrap()..];
-    let tables = [
-        ("exploration", exploration),
-        ("level_replay", level_replay),
-        ("replay_buffer.priority", priority),
-        ("refinement", refinement),
-    ];
+    let tables = [("exploration", exploration), ("refinement", refinement)];
     let with_tables = tables.map(|(key, table)| (key, format!("{plain}\n{table}")));
-    let with_arrival =
-        ("learning.arrival", plain.replace("\n[learning.entropy]", "arrival = 1500.0\n[learning.entropy]"));
-    for (key, text) in with_tables.into_iter().chain([with_arrival]) {
+    for (key, text) in with_tables {
         assert!(read(&text).is_ok(), "{key}");
         let message = read(&format!("device = \"gpu\"\n{text}")).unwrap_err().to_string();
         assert!(message.contains(&format!("{key}: given; works with device = \"cpu\" alone")), "{message}");
     }
+}
+
+#[test]
+fn the_training_file_for_a_device_has_what_the_default_one_has_but_for_its_sizes() {
+    let gpu = Config::read(Path::new("gpu")).unwrap();
+    let default = Config::read(Path::new("default")).unwrap();
+    let mut expected = Config { device: Device::Gpu, n_envs: gpu.n_envs, ..default };
+    expected.replay_buffer.capacity = gpu.replay_buffer.capacity;
+    expected.replay_buffer.warmup = gpu.replay_buffer.warmup;
+    expected.learning.updates_per_step = gpu.learning.updates_per_step;
+    assert_eq!(gpu, expected);
 }
 
 #[test]

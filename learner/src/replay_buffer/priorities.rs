@@ -1,13 +1,13 @@
 //! Prioritised sampling: rows are sampled in proportion to their priorities, by a sum tree.
 //!
-//! T. Schaul and others, "Prioritized Experience Replay" (2016).
+//! T. Schaul and others, "Prioritized Experience Replay" (2016). Its twin on a device is learner/shaders/priorities.wgsl.
 
 use rand::Rng;
 
 use crate::config::Priority;
 
 /// Added to a TD error, so that a row without one can still be sampled.
-const LEAST_ERROR: f32 = 1e-6;
+pub(crate) const LEAST_ERROR: f32 = 1e-6;
 
 /// Priorities of rows, and their sums in a binary tree.
 #[derive(Debug, Clone)]

@@ -4,6 +4,8 @@
 //! and write samples into buffers of other tensors. Both sides submit to one queue. The tensor library queues its work
 //! before it submits it, so it is flushed before every submission of ours, and nothing waits.
 
+mod buffers;
+mod levels;
 mod memory_kernels;
 mod shared;
 
@@ -20,17 +22,19 @@ use offtrack::world::World;
 use offtrack_policy::{LIMIT, Normalisation};
 use wgpu::{PollType, SubmissionIndex};
 
-use super::{Episodes, Rollout};
+use super::{Episodes, Rollout, RouteEnd};
 use crate::checkpoint::{Columns, Stored};
 use crate::config::{Config, Refinement};
 use crate::error::Error;
+use crate::level_replay::LevelReplay;
 use crate::mirror::Mirror;
 use crate::network::Mlp;
 use crate::ppo::steps::Steps;
 use crate::sac::Transitions;
-use memory_kernels::{Binding, Buffers, Facts, Image, Kernel, Normal, Now};
+use buffers::{Buffers, check_capacity};
+use memory_kernels::{BLOCK, Binding, Facts, Kernel, Now, Value};
 pub use shared::Shared;
-use shared::{Owned, floats, integers};
+use shared::{Owned, floats};
 
 /// Maximum number of steps queued ahead of the device. Queued work holds memory.
 const MAX_QUEUED_STEPS: usize = 16;
@@ -61,6 +65,11 @@ pub struct DeviceRollout<const N: usize> {
     queued: VecDeque<SubmissionIndex>,
     /// The tally when it was last read.
     counted: Tally,
+    /// None where routes are drawn uniformly: episodes are then not counted by route.
+    level_replay: Option<LevelReplay>,
+    /// The counts of episodes by route and end code when they were last read, and the episodes since then.
+    counted_ends: Vec<u32>,
+    route_ends: Vec<RouteEnd>,
 }
 
 impl<const N: usize> DeviceRollout<N> {
@@ -103,7 +112,10 @@ impl<const N: usize> DeviceRollout<N> {
         let (observed, beside) = (floats(&observation)?, floats(&extras)?);
         let columns = vec![(Column::Observation, observed.slice.clone()), (Column::Extras, beside.slice.clone())];
         let engine = Engine::Gpu { device: shared.gpu.clone(), columns };
-        let simulator = Simulator::on(engine, world.clone(), n_envs, config.seed, RouteChoice::Drawn(routes.clone()))?;
+        let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
+        let drawn = level_replay.as_ref().map_or_else(|| routes.clone(), |replay| replay.list().to_vec());
+        let simulator = Simulator::on(engine, world.clone(), n_envs, config.seed, RouteChoice::Drawn(drawn))?;
+        let priority = config.replay_buffer.priority;
         let facts = Facts {
             n_envs: n_envs as u32,
             n_slots: n_slots as u32,
@@ -113,10 +125,15 @@ impl<const N: usize> DeviceRollout<N> {
             n_steps: config.learning.n_steps as u32,
             acting_seed: seeds[0],
             sampling_seed: seeds[1],
+            n_blocks: ((n_slots * n_envs) as u32).div_ceil(BLOCK),
             mirrored: mirror.is_some().into(),
             gamma: config.learning.gamma as f32,
+            arrival: config.learning.arrival.unwrap_or(0.0) as f32,
             reward_scale: config.learning.reward_scale as f32,
             clip: LIMIT,
+            stratum: 1.0 / n_rows as f32,
+            exponent: priority.map_or(0.0, |priority| priority.exponent as f32),
+            correction: priority.map_or(0.0, |priority| priority.correction as f32),
         };
         let mut rollout = DeviceRollout {
             kernels: memory_kernels::compile(&shared.gpu.device),
@@ -137,60 +154,14 @@ impl<const N: usize> DeviceRollout<N> {
             n_samples: 0,
             queued: VecDeque::with_capacity(MAX_QUEUED_STEPS),
             counted: Tally::default(),
+            level_replay,
+            counted_ends: vec![0; world.routes.len() * Ended::ALL.len()],
+            route_ends: Vec::new(),
         };
         rollout.buffers = rollout.make_buffers()?;
         rollout.set_normalisation(&Normalisation::none(N));
         shared.check()?;
         Ok(rollout)
-    }
-
-    /// A buffer for every binding of the kernels.
-    fn make_buffers(&mut self) -> Result<Buffers, Error> {
-        let gpu = self.shared.gpu.clone();
-        let filled = |contents: &[u8]| gpu.filled("replay buffer", contents);
-        let empty = |size: usize| gpu.empty("replay buffer", size as u64);
-        let (values, actions) = match &self.mirror {
-            Some(mirror) => mirror.images(),
-            None => ((0..N).map(|index| (index, 1.0)).collect(), (0..self.facts.n_actions).collect()),
-        };
-        let image = |(index, factor)| Image { index: index as u32, factor };
-        let images: Vec<Image> = values.into_iter().map(image).collect();
-        let (observation, action) = (floats(&self.sample.observation)?, integers(&self.sample.action)?);
-        let (reward, discount, next) =
-            (floats(&self.sample.reward)?, floats(&self.sample.discount)?, floats(&self.sample.next_observation)?);
-        let batch =
-            self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
-        let column = |column: Column| batch.column(column).clone();
-        let held = (self.facts.n_slots * self.facts.n_envs) as usize;
-        let row_bytes = N * size_of::<f32>();
-        let buffers = Buffers::new(vec![
-            (Binding::facts, filled(bytes_of(&self.facts))),
-            (Binding::now, empty(size_of::<Now>())),
-            (Binding::normalisation, empty(N * size_of::<Normal>())),
-            (Binding::images, filled(cast_slice(&images))),
-            (Binding::action_images, filled(cast_slice(&actions))),
-            (Binding::action, column(Column::Action)),
-            (Binding::observation, column(Column::Observation)),
-            (Binding::next_observation, column(Column::NextObservation)),
-            (Binding::extras, column(Column::Extras)),
-            (Binding::next_extras, column(Column::NextExtras)),
-            (Binding::ended, column(Column::Ended)),
-            (Binding::reward, column(Column::Reward)),
-            (Binding::held_observation, empty(held * row_bytes)),
-            (Binding::held_next, empty(held * row_bytes)),
-            (Binding::held_action, empty(held * 4)),
-            (Binding::held_reward, empty(held * 4)),
-            (Binding::held_ended, empty(held * 4)),
-            // The actor's output is another buffer in every step; before the first one any will do.
-            (Binding::logits, empty(4)),
-            (Binding::sampled_observation, observation.slice.clone()),
-            (Binding::sampled_action, action.slice.clone()),
-            (Binding::sampled_reward, reward.slice.clone()),
-            (Binding::sampled_discount, discount.slice.clone()),
-            (Binding::sampled_next, next.slice.clone()),
-        ]);
-        self._owned.extend([observation, action, reward, discount, next]);
-        Ok(buffers)
     }
 
     /// The trucks' observations with the first extras behind them, normalised, `[n_envs, N]`.
@@ -203,13 +174,18 @@ impl<const N: usize> DeviceRollout<N> {
         ((observed - mean) * factor).clamp(-LIMIT, LIMIT)
     }
 
+    fn has_priorities(&self) -> bool {
+        self.config.replay_buffer.priority.is_some()
+    }
+
     /// One step of every truck: by the actor's output, or with random actions where there is none.
     fn step_by(&mut self, logits: Option<&Tensor<2>>, remember: bool) -> Result<(), Error> {
         self.shared.flush()?;
         let output = logits.map(floats).transpose()?;
         let device = &self.shared.gpu.device;
-        let chosen_from = output.as_ref().map(|output| &output.slice);
+        let chosen_from = output.as_ref().map(|output| (Binding::logits, &output.slice));
         self.write_now();
+        let (has_priorities, counts_ends) = (self.has_priorities(), self.level_replay.is_some());
         let mut encoder = device.create_command_encoder(&Default::default());
         let (kernels, facts, buffers) = (&self.kernels, &self.facts, &self.buffers);
         let group = |kernel: Kernel| buffers.group(device, kernels, kernel, chosen_from);
@@ -226,6 +202,12 @@ impl<const N: usize> DeviceRollout<N> {
         batch.add_step(&mut encoder);
         if remember {
             memory_kernels::add(kernels, &mut encoder, &group(Kernel::StoreAfter), Kernel::StoreAfter, facts);
+            if has_priorities {
+                memory_kernels::add(kernels, &mut encoder, &group(Kernel::Admit), Kernel::Admit, facts);
+            }
+            if counts_ends {
+                memory_kernels::add(kernels, &mut encoder, &group(Kernel::CountEnds), Kernel::CountEnds, facts);
+            }
             self.n_appended += 1;
         }
         batch.stepped();
@@ -235,7 +217,7 @@ impl<const N: usize> DeviceRollout<N> {
             waited.map_err(|error| Error::Device(error.to_string()))?;
         }
         self.queued.push_back(self.shared.gpu.queue.submit([encoder.finish()]));
-        Ok(())
+        if remember { self.replay_levels() } else { Ok(()) }
     }
 
     fn slots_held(&self) -> u32 {
@@ -248,6 +230,7 @@ impl<const N: usize> DeviceRollout<N> {
             slot: (self.n_appended % n_slots) as u32,
             oldest: ((self.n_appended - u64::from(held)) % n_slots) as u32,
             n_ready: held.saturating_sub(self.facts.n_steps),
+            has_ready: (self.facts.n_steps <= held).into(),
             step: self.n_steps,
             sample: self.n_samples,
         };
@@ -280,9 +263,20 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
 
     fn set_normalisation(&mut self, normalisation: &Normalisation) {
         let noise = self.config.learning.observation_noise as f32;
-        let rows = normalisation.mean.iter().zip(&normalisation.factor);
-        let rows: Vec<Normal> = rows.map(|(&mean, &factor)| Normal { mean, factor, noise }).collect();
-        self.shared.gpu.queue.write_buffer(&self.buffers.slice(Binding::normalisation).buffer, 0, cast_slice(&rows));
+        let images: Vec<(usize, f32)> = match &self.mirror {
+            Some(mirror) => mirror.images().0,
+            None => (0..N).map(|index| (index, 1.0)).collect(),
+        };
+        let rows = normalisation.mean.iter().zip(&normalisation.factor).zip(images);
+        let value = |((&mean, &factor), (image, image_factor)): ((&f32, &f32), (usize, f32))| Value {
+            mean,
+            factor,
+            noise,
+            image: image as u32,
+            image_factor,
+        };
+        let rows: Vec<Value> = rows.map(value).collect();
+        self.shared.gpu.queue.write_buffer(&self.buffers.slice(Binding::values).buffer, 0, cast_slice(&rows));
         let row = |values: &[f32]| {
             Tensor::from_data(TensorData::new(values.to_vec(), [1, values.len()]), &self.shared.tensors)
         };
@@ -313,12 +307,11 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
     fn sample(&mut self) -> Result<Vec<Transitions>, Error> {
         self.shared.flush()?;
         self.write_now();
-        let mut encoder = self.shared.gpu.device.create_command_encoder(&Default::default());
-        for kernel in [Kernel::Sample, Kernel::SampleNext] {
-            let group = self.buffers.group(&self.shared.gpu.device, &self.kernels, kernel, None);
-            memory_kernels::add(&self.kernels, &mut encoder, &group, kernel, &self.facts);
-        }
-        self.shared.gpu.queue.submit([encoder.finish()]);
+        let drawn: &[Kernel] = match self.has_priorities() {
+            true => &[Kernel::SumBlocks, Kernel::AddUp, Kernel::PickByPriority, Kernel::Weigh],
+            false => &[Kernel::Pick],
+        };
+        self.submit(&[drawn, &[Kernel::Sample, Kernel::SampleNext]].concat(), None);
         self.n_samples = self.n_samples.wrapping_add(1);
         Ok(vec![Transitions {
             observation: self.sample.observation.clone(),
@@ -330,8 +323,15 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
         }])
     }
 
-    fn set_td_errors(&mut self, _: Vec<Tensor<2>>) {
-        // A training file with priorities is refused for a device.
+    fn set_td_errors(&mut self, errors: Vec<Tensor<2>>) -> Result<(), Error> {
+        if self.has_priorities() {
+            self.shared.flush()?;
+            // A sample is one shard.
+            for errors in &errors {
+                self.submit(&[Kernel::SetPriorities], Some((Binding::td_error, &floats(errors)?.slice)));
+            }
+        }
+        Ok(())
     }
 
     fn take_episodes(&mut self, wait: bool) -> Result<Vec<Episodes>, Error> {
@@ -346,6 +346,10 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
         Ok(Vec::from_iter((0 < episodes.count).then_some(episodes)))
     }
 
+    fn take_route_ends(&mut self) -> Vec<RouteEnd> {
+        std::mem::take(&mut self.route_ends)
+    }
+
     fn wait(&self) -> Result<(), Error> {
         self.shared.wait()
     }
@@ -354,9 +358,11 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
         self.shared.check()
     }
 
-    fn save<'a>(&'a self, _: &mut Columns<'a>) {}
+    fn save<'a>(&'a self, columns: &mut Columns<'a>) {
+        self.level_replay.iter().for_each(|replay| replay.save(columns));
+    }
 
-    fn restore(&mut self, _: &Stored, n_updates: u64) -> Result<(), Error> {
+    fn restore(&mut self, stored: &Stored, n_updates: u64) -> Result<(), Error> {
         // Other actions and samples than the first time.
         let seeds = seeds(self.config.seed, n_updates as u32);
         let world = self.simulator.world().clone();
@@ -368,6 +374,10 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
             self.mirror.clone(),
             seeds,
         )?;
+        if let Some(replay) = &mut self.level_replay {
+            replay.restore(stored)?;
+            self.simulator.draw_from(replay.list())?;
+        }
         Ok(())
     }
 }
@@ -375,20 +385,6 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
 /// Seeds of actions and samples, after so many updates.
 fn seeds(seed: u32, n_updates: u32) -> [u32; 2] {
     [1, 2].map(|purpose| random::words(seed, purpose, n_updates, u32::MAX)[0])
-}
-
-/// The observations must fit into one buffer of the device.
-fn check_capacity<const N: usize>(shared: &Shared, config: &Config, n_transitions: usize) -> Result<(), Error> {
-    let row_bytes = (N * size_of::<f32>()) as u64;
-    let limit = shared.gpu.device.limits().max_storage_buffer_binding_size.min(u64::from(u32::MAX) * 4);
-    let needed = n_transitions as u64 * row_bytes;
-    if needed <= limit {
-        return Ok(());
-    }
-    let (name, most) = (shared.gpu.name(), limit / row_bytes);
-    let expected =
-        format!("its observations take {needed} bytes where {name} allows {limit} in a buffer: at most {most}");
-    Err(Error::setting("replay_buffer.capacity", config.replay_buffer.capacity.to_string(), expected))
 }
 
 #[cfg(test)]

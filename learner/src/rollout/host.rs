@@ -158,6 +158,7 @@ impl<const N: usize> HostRollout<N> {
         if let Some(replay) = &mut self.level_replay
             && replay.stepped()
         {
+            replay.renew();
             self.simulator.draw_from(replay.list())?;
         }
         Ok(())
@@ -261,13 +262,14 @@ impl<const N: usize> Rollout for HostRollout<N> {
         Ok(shards(&sample, &self.normalisation, learning, &mut self.sampling))
     }
 
-    fn set_td_errors(&mut self, errors: Vec<Tensor<2>>) {
+    fn set_td_errors(&mut self, errors: Vec<Tensor<2>>) -> Result<(), Error> {
         if self.replay_buffer.has_priorities() {
             let read =
                 |errors: Tensor<2>| errors.into_data().try_to_vec::<f32>().expect("TD errors of f32 critics are f32");
             let errors: Vec<f32> = errors.into_iter().flat_map(read).collect();
             self.replay_buffer.set_td_errors(&self.sampled_rows, &errors);
         }
+        Ok(())
     }
 
     fn take_episodes(&mut self, _: bool) -> Result<Vec<Episodes>, Error> {

@@ -1,15 +1,15 @@
-//! The kernels of the replay buffer on a device: structs and bindings declared once, printed for `replay_buffer.wgsl`,
-//! and compiled.
+//! The kernels of the replay buffer on a device: structs and bindings declared once, printed for their shaders, and
+//! compiled.
 
 use offtrack::engine::stages::SHADERS;
 use offtrack::engine::wgsl;
-use offtrack::gpu::{Kernels, Slice};
+use offtrack::gpu::Kernels;
 use offtrack::layout::buffers::Access;
 use offtrack::layout::shared::Shared as _;
-use wgpu::{
-    BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, BufferBinding, CommandEncoder,
-    ComputePassDescriptor, Device,
-};
+use offtrack::layout::{Ended, Truck, WORKGROUP};
+use wgpu::{BindGroup, CommandEncoder, ComputePassDescriptor, Device};
+
+use crate::replay_buffer::LEAST_ERROR;
 
 offtrack::shared! {
     /// What does not change in a run.
@@ -30,14 +30,24 @@ offtrack::shared! {
         pub acting_seed: u32,
         /// Seed of samples, noise and mirroring.
         pub sampling_seed: u32,
+        /// Blocks of transitions whose priorities are summed.
+        pub n_blocks: u32,
         /// Half of the transitions are mirrored (0 or 1).
         pub mirrored: u32,
         /// Discount factor.
         pub gamma: f32,
+        /// Added to the reward of a step that arrives.
+        pub arrival: f32,
         /// Factor of the rewards.
         pub reward_scale: f32,
         /// Where normalised values are clipped.
         pub clip: f32,
+        /// Fraction of the sum of priorities that one transition of a sample is drawn from.
+        pub stratum: f32,
+        /// Power of the TD error that makes a priority.
+        pub exponent: f32,
+        /// Power of the importance-sampling weights.
+        pub correction: f32,
     }
 
     /// What changes from one dispatch to the next.
@@ -48,30 +58,31 @@ offtrack::shared! {
         pub oldest: u32,
         /// Slots that enough others follow, from the oldest on.
         pub n_ready: u32,
+        /// Another slot is followed by enough once this step is stored (0 or 1).
+        pub has_ready: u32,
         /// Steps so far: another one gives other random actions.
         pub step: u32,
         /// Samples so far.
         pub sample: u32,
     }
 
-    /// Normalisation of a value, and the uniform noise added to it.
-    pub struct Normal {
+    /// What a sample makes of a value.
+    pub struct Value {
         /// Subtracted.
         pub mean: f32,
         /// Multiplied by then.
         pub factor: f32,
-        /// Largest noise added then.
+        /// Largest noise added then, uniform.
         pub noise: f32,
-    }
-
-    /// The mirror image of a value.
-    pub struct Image {
-        /// Index of the value that it is mirrored from.
-        pub index: u32,
-        /// Factor of the mirrored value.
-        pub factor: f32,
+        /// Index of the value that its mirror image is made from.
+        pub image: u32,
+        /// Factor of that one.
+        pub image_factor: f32,
     }
 }
+
+/// Transitions whose priorities are summed in one block.
+pub(super) const BLOCK: u32 = 128;
 
 /// Declares the bindings in order: name, element in WGSL, one element or an array, and what it holds.
 macro_rules! bindings {
@@ -103,10 +114,10 @@ macro_rules! bindings {
 bindings! {
     facts: Facts::wgsl(), true, "What does not change in a run.";
     now: Now::wgsl(), true, "What changes from one dispatch to the next.";
-    normalisation: Normal::wgsl(), false, "Normalisation and noise of each value, [n_values].";
-    images: Image::wgsl(), false, "Mirror image of each value, [n_values].";
+    values: Value::wgsl(), false, "Normalisation, noise and mirror image of each value, [n_values].";
     action_images: "u32".to_owned(), false, "Mirror image of each action, [n_actions].";
     action: "u32".to_owned(), false, "The simulator's column of actions, [n_envs].";
+    truck: Truck::wgsl(), false, "The simulator's column of trucks, [n_envs].";
     observation: "f32".to_owned(), false, "The simulator's column of observations, [n_envs, N_VALUES].";
     next_observation: "f32".to_owned(), false, "The simulator's column of next observations, [n_envs, N_VALUES].";
     extras: "f32".to_owned(), false, "The simulator's column of extras, [n_envs, N_EXTRAS].";
@@ -118,65 +129,28 @@ bindings! {
     held_action: "u32".to_owned(), false, "The ring: actions, [n_slots, n_envs].";
     held_reward: "f32".to_owned(), false, "The ring: rewards, [n_slots, n_envs].";
     held_ended: "u32".to_owned(), false, "The ring: end codes, [n_slots, n_envs].";
+    driven: "u32".to_owned(), false, "Routes of the step in hand, [n_envs].";
+    route_ends: "atomic<u32>".to_owned(), false, "Episodes that ended, by route and end code, [n_routes, N_ENDS].";
     logits: "f32".to_owned(), false, "The actor's output, [n_envs, n_actions].";
+    sampled_row: "u32".to_owned(), false, "A sample: where in the ring its transitions begin, [n_rows].";
+    sampled_weight: "f32".to_owned(), false, "A sample: importance-sampling weights, [n_rows].";
     sampled_observation: "f32".to_owned(), false, "A sample: observations, [n_rows, n_values].";
     sampled_action: "i32".to_owned(), false, "A sample: actions, [n_rows].";
     sampled_reward: "f32".to_owned(), false, "A sample: rewards, [n_rows].";
     sampled_discount: "f32".to_owned(), false, "A sample: discounts, [n_rows].";
     sampled_next: "f32".to_owned(), false, "A sample: next observations, [n_rows, n_values].";
+    td_error: "f32".to_owned(), false, "Absolute TD errors of the latest sample, [n_rows].";
+    priority: "f32".to_owned(), false, "Priorities, 0 where nothing can be sampled, [n_slots, n_envs].";
+    block_sum: "f32".to_owned(), false, "Sums of the priorities of each block, [n_blocks].";
+    reached: "f32".to_owned(), false, "Sums of a block and all before it, [n_blocks].";
+    largest: "atomic<u32>".to_owned(), true, "Bits of the largest priority that there ever was.";
 }
 
 impl Binding {
     /// What the kernels may do. A tensor's buffer is a slice of a page that other tensors use too, and a page is bound
-    /// either to be read or to be written, so all but the facts may be written.
+    /// either to be read or to be written, so all but the uniforms may be written.
     fn access(self) -> Access {
         if matches!(self, Binding::facts | Binding::now) { Access::Uniform } else { Access::ReadWrite }
-    }
-}
-
-/// A buffer for every binding.
-#[derive(Debug, Default)]
-pub(super) struct Buffers(Vec<(Binding, Slice)>);
-
-impl Buffers {
-    /// The bindings in any order, each once.
-    pub(super) fn new(mut slices: Vec<(Binding, Slice)>) -> Buffers {
-        slices.sort_by_key(|(binding, _)| *binding as u32);
-        assert!(slices.iter().map(|(binding, _)| *binding).eq(Binding::ALL), "every binding has one buffer");
-        Buffers(slices)
-    }
-
-    /// The buffer of a binding.
-    pub(super) fn slice(&self, binding: Binding) -> &Slice {
-        &self.0[binding as usize].1
-    }
-
-    /// A bind group of those that a kernel names, with another buffer of logits where one is given.
-    pub(super) fn group(
-        &self,
-        device: &Device,
-        kernels: &Kernels<Kernel>,
-        kernel: Kernel,
-        logits: Option<&Slice>,
-    ) -> BindGroup {
-        let entry = |&binding: &Binding| {
-            let own = self.slice(binding);
-            let slice = if binding == Binding::logits { logits.unwrap_or(own) } else { own };
-            BindGroupEntry {
-                binding: binding as u32,
-                resource: BindingResource::Buffer(BufferBinding {
-                    buffer: &slice.buffer,
-                    offset: slice.offset,
-                    size: std::num::NonZero::new(slice.size),
-                }),
-            }
-        };
-        let entries: Vec<BindGroupEntry> = kernel.bindings().iter().map(entry).collect();
-        device.create_bind_group(&BindGroupDescriptor {
-            label: Some(kernel.name()),
-            layout: kernels.layout(kernel),
-            entries: &entries,
-        })
     }
 }
 
@@ -189,6 +163,22 @@ offtrack::named! {
         StoreBefore = "store_before",
         /// Stores what the step led to.
         StoreAfter = "store_after",
+        /// Counts the episodes that ended.
+        CountEnds = "count_ends",
+        /// Lets the transitions that enough steps follow be sampled by priority.
+        Admit = "admit",
+        /// Sums the priorities of each block.
+        SumBlocks = "sum_blocks",
+        /// Adds up the blocks.
+        AddUp = "add_up",
+        /// Draws the rows of a sample uniformly.
+        Pick = "pick",
+        /// Draws them by priority.
+        PickByPriority = "pick_by_priority",
+        /// Weighs what was drawn by priority.
+        Weigh = "weigh",
+        /// Sets priorities from TD errors.
+        SetPriorities = "set_priorities",
         /// Samples transitions: what was observed and done.
         Sample = "sample",
         /// What that led to.
@@ -198,33 +188,43 @@ offtrack::named! {
 
 impl Kernel {
     /// The buffers that it is bound to: all that its shader names.
-    fn bindings(self) -> &'static [Binding] {
+    pub(super) fn bindings(self) -> &'static [Binding] {
         use Binding::*;
         match self {
             Kernel::Choose => &[facts, now, action, logits],
-            Kernel::StoreBefore => &[facts, now, action, observation, extras, held_observation, held_action],
+            Kernel::StoreBefore => {
+                &[facts, now, action, truck, observation, extras, held_observation, held_action, driven]
+            }
+            Kernel::CountEnds => &[facts, ended, driven, route_ends],
             Kernel::StoreAfter => {
                 &[facts, now, next_observation, next_extras, ended, reward, held_next, held_reward, held_ended]
             }
+            Kernel::Admit => &[facts, now, priority, largest],
+            Kernel::SumBlocks => &[facts, priority, block_sum],
+            Kernel::AddUp => &[facts, block_sum, reached],
+            Kernel::Pick => &[facts, now, sampled_row],
+            Kernel::PickByPriority => &[facts, now, sampled_row, priority, block_sum, reached],
+            Kernel::Weigh => &[facts, sampled_row, sampled_weight, priority],
+            Kernel::SetPriorities => &[facts, sampled_row, td_error, priority, largest],
             Kernel::Sample => &[
                 facts,
                 now,
-                normalisation,
-                images,
+                values,
                 action_images,
                 held_observation,
                 held_action,
+                sampled_row,
                 sampled_observation,
                 sampled_action,
             ],
             Kernel::SampleNext => &[
                 facts,
                 now,
-                normalisation,
-                images,
+                values,
                 held_next,
                 held_reward,
                 held_ended,
+                sampled_row,
                 sampled_reward,
                 sampled_discount,
                 sampled_next,
@@ -232,12 +232,15 @@ impl Kernel {
         }
     }
 
-    /// Threads that it needs: one a truck, or one a value.
+    /// Threads that it needs: one a truck, a value, a transition or a block, or one workgroup.
     fn threads(self, facts: &Facts) -> u64 {
         let (envs, rows, values) = (u64::from(facts.n_envs), u64::from(facts.n_rows), u64::from(facts.n_values));
         match self {
-            Kernel::Choose => envs,
+            Kernel::Choose | Kernel::CountEnds | Kernel::Admit => envs,
             Kernel::StoreBefore | Kernel::StoreAfter => envs * values,
+            Kernel::SumBlocks => facts.n_blocks.into(),
+            Kernel::AddUp | Kernel::Weigh => WORKGROUP.into(),
+            Kernel::Pick | Kernel::PickByPriority | Kernel::SetPriorities => rows,
             Kernel::Sample | Kernel::SampleNext => rows * values,
         }
     }
@@ -248,8 +251,16 @@ pub(super) fn source() -> String {
     let common =
         SHADERS.iter().filter(|(name, _)| ["common/thread", "common/random"].contains(name)).map(|(_, text)| *text);
     let bindings: String = Binding::ALL.map(Binding::declaration).concat();
-    let own = [wgsl::shared(), printed_structs(), bindings];
-    own.iter().map(String::as_str).chain(common).chain([include_str!("../../../shaders/replay_buffer.wgsl")]).collect()
+    let constants = format!(
+        "const BLOCK: u32 = {BLOCK}u;\nconst LEAST_ERROR: f32 = {LEAST_ERROR:?}f;\nconst INFINITE: u32 = {}u;\n\
+         const N_ENDS: u32 = {}u;\n",
+        f32::INFINITY.to_bits(),
+        Ended::ALL.len()
+    );
+    let own = [wgsl::shared(), constants, printed_structs(), bindings];
+    let kernels =
+        [include_str!("../../../shaders/replay_buffer.wgsl"), include_str!("../../../shaders/priorities.wgsl")];
+    own.iter().map(String::as_str).chain(common).chain(kernels).collect()
 }
 
 /// Compiles the kernels.

@@ -3,7 +3,11 @@ use crate::rollout::host::observed;
 use offtrack::layout::random::{index_below, signed_unit, words};
 use offtrack::layout::{Ended, ObservedExtras};
 use offtrack::scenario::{Scenario, Split};
+use offtrack_policy::Policy;
 use std::path::Path;
+
+mod level_replay;
+mod priorities;
 
 /// The simulator's tests have it too.
 #[cfg(target_os = "linux")]
@@ -23,7 +27,14 @@ fn training_of(benchmark: &str) -> (Arc<World>, Vec<u32>) {
 
 fn config(settings: &[&str]) -> Config {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/gpu.toml");
-    let common = ["n_envs=64", "replay_buffer.capacity=2000", "replay_buffer.warmup=100", "learning.batch=500"];
+    let common = [
+        "n_envs=64",
+        "replay_buffer.capacity=2000",
+        "replay_buffer.warmup=100",
+        "replay_buffer.priority=",
+        "level_replay=",
+        "learning.batch=500",
+    ];
     let settings: Vec<String> = common.iter().chain(settings).map(|setting| (*setting).to_owned()).collect();
     Config::read_with(&file, &settings).unwrap()
 }
@@ -44,6 +55,12 @@ struct Step<const N: usize> {
 
 fn host<const D: usize>(tensor: &Tensor<D>) -> Vec<f32> {
     tensor.clone().into_data().try_to_vec().unwrap()
+}
+
+/// A buffer of the replay buffer, read.
+fn held<T: bytemuck::AnyBitPattern>(rollout: &DeviceRollout<N_VALUES>, binding: Binding) -> Vec<T> {
+    let bytes = rollout.shared.gpu.read(std::slice::from_ref(rollout.buffers.slice(binding))).unwrap();
+    bytes[0].chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect()
 }
 
 #[test]
@@ -154,6 +171,32 @@ fn check_samples<const N: usize>(benchmark: &str) {
 }
 
 #[test]
+fn the_replay_buffer_has_the_simulators_rewards_and_more_for_an_arrival_where_that_is_asked_for() {
+    let (world, routes) = training();
+    let shared = Shared::open(None).unwrap();
+    let policy = Policy::shipped("attard2023").unwrap();
+    let actor = Mlp::of(&policy.layers, &shared.tensors);
+    for (setting, arrival) in [("seed=0", 0.0), ("learning.arrival=1500", 1500.0)] {
+        let config = config(&["n_envs=16", "replay_buffer.capacity=4000", setting]);
+        let mut rollout =
+            DeviceRollout::<N_VALUES>::with_seeds(&shared, &config, &world, routes.clone(), None, [7, 8]).unwrap();
+        rollout.set_normalisation(&policy.normalisation);
+        let (mut expected, mut arrivals) = (Vec::new(), 0);
+        for _ in 0..250 {
+            rollout.step(&actor, 0).unwrap();
+            let batch = rollout.simulator().batch();
+            expected.extend(batch.reward.iter().zip(&batch.ended).map(|(&reward, &code)| {
+                let arrived = code == Ended::Arrived as u32;
+                arrivals += u32::from(arrived);
+                if arrived { reward + arrival } else { reward }
+            }));
+        }
+        assert_eq!(held::<f32>(&rollout, Binding::held_reward), expected);
+        assert!(0 < arrivals, "no truck arrived");
+    }
+}
+
+#[test]
 fn actions_follow_the_actors_distribution() {
     let (world, routes) = training();
     let shared = Shared::open(None).unwrap();
@@ -247,6 +290,14 @@ fn no_kernel_of_the_replay_buffer_spills_or_takes_more_registers_and_memory_of_a
         stated("choose", 48, 0, 0),
         stated("store_before", 48, 0, 0),
         stated("store_after", 48, 0, 0),
+        stated("count_ends", 48, 0, 0),
+        stated("admit", 48, 0, 0),
+        stated("sum_blocks", 48, 0, 0),
+        stated("add_up", 48, 512, 0),
+        stated("pick", 48, 0, 0),
+        stated("pick_by_priority", 48, 0, 0),
+        stated("weigh", 48, 512, 0),
+        stated("set_priorities", 48, 0, 0),
         stated("sample", 48, 0, 0),
         stated("sample_next", 48, 0, 0),
     ];

@@ -1,0 +1,148 @@
+//! The buffers that the replay buffer's kernels are bound to: its own, the simulator's columns and those of tensors.
+
+use bytemuck::{bytes_of, cast_slice};
+use offtrack::gpu::{Kernels, Slice};
+use offtrack::layout::Column;
+use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, BufferBinding, Device};
+
+use super::DeviceRollout;
+use super::memory_kernels::{Binding, Kernel, Now, Value, add};
+use super::shared::{Shared, floats, integers};
+use crate::config::Config;
+use crate::error::Error;
+
+/// A buffer for every binding.
+#[derive(Debug, Default)]
+pub(super) struct Buffers(Vec<(Binding, Slice)>);
+
+impl Buffers {
+    /// The bindings in any order, each once.
+    pub(super) fn new(mut slices: Vec<(Binding, Slice)>) -> Buffers {
+        slices.sort_by_key(|(binding, _)| *binding as u32);
+        assert!(slices.iter().map(|(binding, _)| *binding).eq(Binding::ALL), "every binding has one buffer");
+        Buffers(slices)
+    }
+
+    /// The buffer of a binding.
+    pub(super) fn slice(&self, binding: Binding) -> &Slice {
+        &self.0[binding as usize].1
+    }
+
+    /// A bind group of those that a kernel names, with the `other` buffer for one of them where one is given.
+    pub(super) fn group(
+        &self,
+        device: &Device,
+        kernels: &Kernels<Kernel>,
+        kernel: Kernel,
+        other: Option<(Binding, &Slice)>,
+    ) -> BindGroup {
+        let entry = |&binding: &Binding| {
+            let own = self.slice(binding);
+            let slice = other.filter(|(replaced, _)| *replaced == binding).map_or(own, |(_, slice)| slice);
+            BindGroupEntry {
+                binding: binding as u32,
+                resource: BindingResource::Buffer(BufferBinding {
+                    buffer: &slice.buffer,
+                    offset: slice.offset,
+                    size: std::num::NonZero::new(slice.size),
+                }),
+            }
+        };
+        let entries: Vec<BindGroupEntry> = kernel.bindings().iter().map(entry).collect();
+        device.create_bind_group(&BindGroupDescriptor {
+            label: Some(kernel.name()),
+            layout: kernels.layout(kernel),
+            entries: &entries,
+        })
+    }
+}
+
+impl<const N: usize> DeviceRollout<N> {
+    /// Submits kernels, one after the other, with another buffer for one binding where one is given.
+    pub(super) fn submit(&self, each: &[Kernel], other: Option<(Binding, &Slice)>) {
+        let device = &self.shared.gpu.device;
+        let mut encoder = device.create_command_encoder(&Default::default());
+        for &kernel in each {
+            let group = self.buffers.group(device, &self.kernels, kernel, other);
+            add(&self.kernels, &mut encoder, &group, kernel, &self.facts);
+        }
+        self.shared.gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// A buffer for every binding of the kernels.
+    pub(super) fn make_buffers(&mut self) -> Result<Buffers, Error> {
+        let gpu = self.shared.gpu.clone();
+        let filled = |contents: &[u8]| gpu.filled("replay buffer", contents);
+        let empty = |size: usize| gpu.empty("replay buffer", size as u64);
+        let actions = match &self.mirror {
+            Some(mirror) => mirror.images().1,
+            None => (0..self.facts.n_actions).collect(),
+        };
+        let (observation, action) = (floats(&self.sample.observation)?, integers(&self.sample.action)?);
+        let (reward, discount, next) =
+            (floats(&self.sample.reward)?, floats(&self.sample.discount)?, floats(&self.sample.next_observation)?);
+        let weight = floats(&self.sample.weight)?;
+        let held = (self.facts.n_slots * self.facts.n_envs) as usize;
+        // What priorities alone need is small without them.
+        let (ranked, n_blocks) = if self.has_priorities() { (held, self.facts.n_blocks as usize) } else { (1, 1) };
+        let batch =
+            self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
+        let column = |column: Column| batch.column(column).clone();
+        let row_bytes = N * size_of::<f32>();
+        let buffers = Buffers::new(vec![
+            (Binding::facts, filled(bytes_of(&self.facts))),
+            (Binding::now, empty(size_of::<Now>())),
+            (Binding::values, empty(N * size_of::<Value>())),
+            (Binding::action_images, filled(cast_slice(&actions))),
+            (Binding::action, column(Column::Action)),
+            (Binding::truck, column(Column::Truck)),
+            (Binding::observation, column(Column::Observation)),
+            (Binding::next_observation, column(Column::NextObservation)),
+            (Binding::extras, column(Column::Extras)),
+            (Binding::next_extras, column(Column::NextExtras)),
+            (Binding::ended, column(Column::Ended)),
+            (Binding::reward, column(Column::Reward)),
+            (Binding::driven, empty(self.config.n_envs * 4)),
+            (Binding::route_ends, empty(self.counted_ends.len() * 4)),
+            (Binding::held_observation, empty(held * row_bytes)),
+            (Binding::held_next, empty(held * row_bytes)),
+            (Binding::held_action, empty(held * 4)),
+            (Binding::held_reward, empty(held * 4)),
+            (Binding::held_ended, empty(held * 4)),
+            // These two are others in every step and every update; before the first one any will do.
+            (Binding::logits, empty(4)),
+            (Binding::td_error, empty(4)),
+            (Binding::priority, empty(ranked * 4)),
+            (Binding::block_sum, empty(n_blocks * 4)),
+            (Binding::reached, empty(n_blocks * 4)),
+            (Binding::largest, filled(bytes_of(&1.0f32))),
+            (Binding::sampled_row, empty(self.facts.n_rows as usize * 4)),
+            (Binding::sampled_weight, weight.slice.clone()),
+            (Binding::sampled_observation, observation.slice.clone()),
+            (Binding::sampled_action, action.slice.clone()),
+            (Binding::sampled_reward, reward.slice.clone()),
+            (Binding::sampled_discount, discount.slice.clone()),
+            (Binding::sampled_next, next.slice.clone()),
+        ]);
+        self._owned.extend([observation, action, reward, discount, next, weight]);
+        Ok(buffers)
+    }
+}
+
+/// The observations must fit into one buffer of the device.
+pub(super) fn check_capacity<const N: usize>(
+    shared: &Shared,
+    config: &Config,
+    n_transitions: usize,
+) -> Result<(), Error> {
+    let row_bytes = (N * size_of::<f32>()) as u64;
+    let limit = shared.gpu.device.limits().max_storage_buffer_binding_size.min(u64::from(u32::MAX) * 4);
+    let needed = n_transitions as u64 * row_bytes;
+    if needed <= limit {
+        return Ok(());
+    }
+    let (name, most) = (shared.gpu.name(), limit / row_bytes);
+    let expected =
+        format!("its observations take {needed} bytes where {name} allows {limit} in a buffer: at most {most}");
+    Err(Error::setting("replay_buffer.capacity", config.replay_buffer.capacity.to_string(), expected))
+}
