@@ -16,9 +16,9 @@ use crate::map::route::Lane;
 /// Ends of lines nearer than this are joined (m).
 const GAP: f64 = 0.02;
 /// Turn between two pieces of a way that is taken for smooth (rad).
-const SMOOTH: f64 = 1e-3;
+const SMOOTH: f64 = 5e-3;
 /// Tolerance of a smooth line through a way with corners (m).
-const FITTED: f64 = 0.02;
+const FITTED: f64 = 0.004;
 /// Ends of ways nearer than this are of one lane (m), and in directions nearer than this of one arm (rad).
 const ONE_LANE: f64 = 1.0;
 const ONE_ARM: f64 = 0.35;
