@@ -23,6 +23,7 @@ mod kinds;
 
 mod left_hand;
 mod map_bypass;
+mod map_drawing;
 mod map_junctions;
 mod map_kinds;
 mod map_lanes;
