@@ -1,11 +1,12 @@
-//! Roads: a ring with its arms, kerbs, lanes and routes, from parameters, from a map, or drawn at random.
+//! Roads: a ring with its arms, kerbs, lanes and routes, from parameters, from a map, from a drawing, or at random.
 //!
-//! Each of the three gives a [`ground::Ground`], and all that follows knows that alone.
+//! Each of them gives a [`ground::Ground`], and all that follows knows that alone.
 
 pub mod frame; // where a road lies in its map
 pub mod route; // lane centre lines -> waypoints
 pub mod ground; // a ring with its arms: kerb faces, lane edges, routes
 pub mod opendrive; // maps -> rings
+pub mod dxf; // drawings -> rings
 pub mod parametric; // parameters -> kerbs and lanes
 mod road; // a name and its ground
 pub mod chosen; // which ring of a map

@@ -131,7 +131,7 @@ impl Vehicle {
         Vehicle::from_source(&Source::Disk(path.to_owned()))
     }
 
-    /// A vehicle that comes with the library: `daf_xf`, `eu_4x2_13m6` or `us_wb62`.
+    /// A vehicle that comes with the library: `daf_xf`, `eu_4x2_13m6`, `us_wb40`, `us_wb62` or `us_wb67`.
     ///
     /// # Errors
     ///
@@ -191,6 +191,12 @@ impl Vehicle {
             length * turn.cos() + half_width * turn.sin()
         };
         (turned(0.5 * wheelbase + behind_axle), turned(ahead_of_axle - 0.5 * wheelbase))
+    }
+
+    /// Length of the straight truck, from end to end (m).
+    pub fn length(&self) -> f64 {
+        let (behind, ahead) = self.reach(0.0);
+        behind + ahead
     }
 
     /// Moves the trailer's axle group back by `length` (m), and its rear end and the sensors there with it.

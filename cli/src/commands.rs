@@ -6,6 +6,7 @@ pub mod deviations;
 pub mod devices;
 pub mod draw;
 pub mod evaluate;
+pub mod fits;
 pub mod generate;
 pub mod import;
 mod outputs; // files to write: each its own
@@ -17,3 +18,4 @@ pub mod scale;
 mod terminal; // how wide a table may be
 pub mod trace;
 pub mod train;
+pub mod vehicles;

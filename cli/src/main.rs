@@ -10,7 +10,9 @@ use offtrack::files::reader::shortened;
 use offtrack_evaluation::{files, provenance};
 use offtrack_learner::error::Error;
 
-use commands::{bench, certify, deviations, devices, draw, evaluate, generate, import, record, scale, trace, train};
+use commands::{
+    bench, certify, deviations, devices, draw, evaluate, fits, generate, import, record, scale, trace, train, vehicles,
+};
 
 /// Batches of tensors are allocated thousands of times a second; the system's allocator takes a third of an update's
 /// time.
@@ -29,7 +31,7 @@ Without a command `offtrack` trains, as `offtrack train` does.
 
 Exit codes:
   0    done; training that Ctrl-C stopped once, with everything written
-  1    failed on valid input: device, disk, learner, or a certificate that does not hold
+  1    failed on valid input: device, disk, learner, a certificate that does not hold, a vehicle that does not fit
   2    wrong input: arguments or files
   130  interrupted: by Ctrl-C, in training by a second one";
 
@@ -50,8 +52,10 @@ enum Command {
     Devices(devices::Args),
     Certify(certify::Args),
     Draw(draw::Args),
+    Fits(fits::Args),
     Generate(generate::Args),
     Import(import::Args),
+    Vehicles(vehicles::Args),
     Record(record::Args),
     Trace(trace::Args),
     Deviations(deviations::Args),
@@ -70,6 +74,7 @@ fn main() -> ExitCode {
             std::process::exit(INTERRUPTED);
         });
     }
+    let mut is_refuted = false;
     let done = start_threads().and_then(|()| match &command {
         Command::Train(args) => train::run(args),
         Command::Evaluate(args) => Ok(evaluate::run(args)?),
@@ -78,13 +83,16 @@ fn main() -> ExitCode {
         Command::Devices(args) => Ok(devices::run(args)?),
         Command::Certify(args) => Ok(certify::run(args)?),
         Command::Draw(args) => Ok(draw::run(args)?),
+        Command::Fits(args) => Ok(fits::run(args).map(|all_fit| is_refuted = !all_fit)?),
         Command::Generate(args) => Ok(generate::run(args)?),
+        Command::Vehicles(args) => Ok(vehicles::run(args)?),
         Command::Import(args) => Ok(import::run(args)?),
         Command::Record(args) => Ok(record::run(args)?),
         Command::Trace(args) => Ok(trace::run(args)?),
         Command::Deviations(args) => Ok(deviations::run(args)?),
     });
     match done {
+        Ok(()) if is_refuted => ExitCode::from(FAILED),
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             // With standard error closed, the exit code is all that is left.

@@ -8,14 +8,14 @@ use offtrack::layout::Ended;
 use offtrack::map::route::Route;
 use offtrack::map::{Gutter, Road};
 use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
-use offtrack::vehicle::swept::corners;
+use offtrack::vehicle::swept::{corners, nearest};
 use svg::node::element::{Circle, Definitions, Group, Path};
 
 use crate::Error;
 use crate::legend::{Entry, Swatch};
 use crate::lettering::{Align, Lettering};
 use crate::road::RoadLayers;
-use crate::sweep::{nearest, swept_area};
+use crate::sweep::swept_area;
 use crate::view::{Straights, View, colour, number};
 use offtrack_evaluation::recording::{Frame, Recording};
 

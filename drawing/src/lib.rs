@@ -9,6 +9,7 @@
 //! - [`sheet::drawn`] draws many roundabouts side by side, [`histograms::Histograms`] how their dimensions are
 //!   distributed.
 //! - [`chart::Chart`] draws measurements over logarithmic axes.
+//! - [`fits::sheet`] shows at scale which vehicles fit through a road, [`fits::pdf`] is the same as PDF.
 //! - [`rasterised`] makes a PNG of any of these SVGs. Text is drawn as outlines, so that pictures are equal on every
 //!   machine.
 //!
@@ -32,6 +33,7 @@ pub mod comparison; // episodes on one route beside each other
 pub mod episode; // a recorded episode, still or moving
 pub mod figure; // a map with axes, title and legend
 pub mod film; // a recorded episode as GIF
+pub mod fits; // sheets at scale for road designers
 pub mod histograms; // how often values are drawn
 pub mod json; // a road for other programs
 mod isolines; // lines of equal distance

@@ -7,7 +7,9 @@ use offtrack::geometry::Outline;
 use offtrack::layout::Rig;
 use offtrack::map::route::Route;
 use offtrack::vehicle::Vehicle;
-use offtrack::vehicle::swept::{Demand, Limit, Pose, demands, own_lane_suffices, swept_path};
+use offtrack::vehicle::swept::{
+    Demand, Limit, Pose, UnitClearance, demands, front_path, hull, own_lane_suffices, swept_path,
+};
 use serde::Serialize;
 use svg::node::element::{Circle, Definitions, Group, Path, Use};
 
@@ -20,8 +22,6 @@ use crate::view::{View, colour, number};
 const SPACING: f64 = 0.25;
 /// Distance between the trucks that are drawn (m).
 const BETWEEN_TRUCKS: f64 = 22.0;
-/// Distance between the points of an outline at which clearance is computed (m).
-const BETWEEN_POINTS: f64 = 0.05;
 
 /// A truck's swept path along a route.
 pub struct Sweep<'a> {
@@ -66,10 +66,7 @@ struct Unit {
     colour: &'static str,
     light: &'static str,
     corners: Vec<[DVec2; 4]>,
-    /// Least signed distance of the outline from the kerbs (m).
-    clearance: f64,
-    /// For each section on which the unit overlaps solid ground: its deepest point, and the depth (m).
-    overlaps: Vec<(DVec2, f64)>,
+    clearance: UnitClearance,
 }
 
 impl<'a> Sweep<'a> {
@@ -143,7 +140,7 @@ impl<'a> Sweep<'a> {
 
     pub(crate) fn written(&self) -> Written<'_> {
         let [tractor, trailer] = &self.units;
-        let rounded = |unit: &Unit| (unit.clearance * 1e4).round() / 1e4;
+        let rounded = |unit: &Unit| (unit.clearance.least * 1e4).round() / 1e4;
         Written {
             driven: &self.driven,
             own_lane_suffices: self.own_lane_suffices(),
@@ -157,10 +154,10 @@ impl<'a> Sweep<'a> {
     /// The least clearance of both units, or how far each overlaps a kerb, in words.
     pub fn summary(&self) -> String {
         let [tractor, trailer] = self.units.each_ref().map(|unit| {
-            if unit.overlaps.is_empty() {
-                format!("{} clear by {:.2} m", unit.name, unit.clearance)
+            if unit.clearance.overlaps.is_empty() {
+                format!("{} clear by {:.2} m", unit.name, unit.clearance.least)
             } else {
-                format!("{} {:.2} m over a kerb", unit.name, -unit.clearance.min(0.0))
+                format!("{} {:.2} m over a kerb", unit.name, -unit.clearance.least.min(0.0))
             }
         });
         format!("{tractor}, {trailer}")
@@ -199,7 +196,6 @@ impl<'a> Sweep<'a> {
                 group = group.add(body.set("stroke", unit.colour).set("stroke-width", 1.5));
             }
         }
-        let front = |pose: &Pose| pose.position + f64::from(self.rig.wheelbase) * DVec2::from_angle(pose.heading);
         let drive = |pose: &Pose| pose.position;
         let trailer = |pose: &Pose| pose.trailer_position;
         let line = |points: Vec<DVec2>, colour: &str, dashes: &str| {
@@ -212,10 +208,10 @@ impl<'a> Sweep<'a> {
         };
         group = group.add(line(self.poses.iter().map(trailer).collect(), colour::TRAILER_AXLES, ""));
         group = group.add(line(self.poses.iter().map(drive).collect(), colour::DRIVE_AXLE, DASHES));
-        let front: Vec<DVec2> = self.poses.iter().map(front).collect();
+        let front = front_path(&self.rig, &self.poses);
         group = group.add(limits::lines(view, &self.needs, &front)).add(line(front, colour::INK, ""));
         for (unit, below) in self.units.iter().zip([false, true]) {
-            for &(deepest, depth) in &unit.overlaps {
+            for &(deepest, depth) in &unit.clearance.overlaps {
                 let at = view.point(deepest);
                 let ring =
                     Circle::new().set("cx", number(at.x)).set("cy", number(at.y)).set("r", 11).set("fill", "none");
@@ -255,24 +251,7 @@ impl Unit {
         corners: Vec<[DVec2; 4]>,
         kerbs: &Outline,
     ) -> Unit {
-        let mut unit = Unit { name, colour, light, corners, clearance: f64::INFINITY, overlaps: Vec::new() };
-        let mut overlapping = false;
-        for corners in &unit.corners {
-            let (deepest, distance) = nearest(corners, kerbs);
-            unit.clearance = unit.clearance.min(distance);
-            // A narrow nose may lie between two points of the outline: the overlap is decided exactly.
-            let overlaps = kerbs.intersects_rectangle(corners);
-            if overlaps {
-                let depth = -distance.min(0.0);
-                match unit.overlaps.last_mut().filter(|_| overlapping) {
-                    Some(section) if depth <= section.1 => {}
-                    Some(section) => *section = (deepest, depth),
-                    None => unit.overlaps.push((deepest, depth)),
-                }
-            }
-            overlapping = overlaps;
-        }
-        unit
+        Unit { name, colour, light, clearance: UnitClearance::of(&corners, kerbs), corners }
     }
 
     fn area(&self, colour: &str) -> Use {
@@ -285,67 +264,4 @@ pub(crate) fn swept_area(view: &View, corners: &[[DVec2; 4]]) -> String {
     // Hulls of neighbouring poses leave no teeth where a corner swings out. All have one orientation: the non-zero fill
     // is their union.
     corners.windows(2).map(|pair| view.polygon(&hull(pair.concat()))).collect()
-}
-
-/// The point of a rectangle's outline with the least signed distance from the kerbs, and that distance (m).
-pub(crate) fn nearest(corners: &[DVec2; 4], kerbs: &Outline) -> (DVec2, f64) {
-    let centre = (corners[0] + corners[2]) / 2.0;
-    let nearby = kerbs.near(centre, corners[0].distance(centre));
-    let points = (0..4).flat_map(|side| {
-        let (from, to) = (corners[side], corners[(side + 1) % 4]);
-        let n = (from.distance(to) / BETWEEN_POINTS).ceil();
-        (0..n as usize).map(move |step| from.lerp(to, step as f64 / n))
-    });
-    points
-        .map(|p| (p, nearby.signed_distance(p)))
-        .fold((centre, f64::INFINITY), |least, here| if here.1 < least.1 { here } else { least })
-}
-
-/// The corners of the convex hull, counter-clockwise (A. M. Andrew, "Another efficient algorithm for convex hulls in
-/// two dimensions", 1979).
-fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
-    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    let chain = |points: &mut dyn Iterator<Item = DVec2>| {
-        let mut kept: Vec<DVec2> = Vec::new();
-        for p in points {
-            while let [.., a, b] = kept[..]
-                && (b - a).perp_dot(p - b) <= 0.0
-            {
-                kept.pop();
-            }
-            kept.push(p);
-        }
-        // The chain's last point is the other chain's first.
-        kept.pop();
-        kept
-    };
-    let mut hull = chain(&mut points.iter().copied());
-    hull.extend(chain(&mut points.iter().rev().copied()));
-    hull
-}
-
-#[cfg(test)]
-mod tests {
-    use offtrack::geometry::Curve;
-
-    use super::*;
-
-    #[test]
-    fn a_hull_of_two_squares_has_their_outer_corners_counter_clockwise() {
-        let square = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
-        let shifted = square.map(|p| p + DVec2::new(1.0, 0.5));
-        let expected =
-            [(0.0, 0.0), (2.0, 0.0), (3.0, 0.5), (3.0, 2.5), (1.0, 2.5), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
-        assert_eq!(hull([square, shifted].concat()), expected);
-    }
-
-    #[test]
-    fn the_point_of_a_body_nearest_to_a_kerb_may_lie_on_a_side() {
-        let kerb = Outline::new(vec![Curve::circle(DVec2::ZERO, 50.0), Curve::circle(DVec2::new(0.0, -3.0), 2.0)]);
-        let body = [(6.0, 1.2), (-6.0, 1.2), (-6.0, -1.2), (6.0, -1.2)].map(|(x, y)| DVec2::new(x, y));
-        let (at, depth) = nearest(&body, &kerb);
-        // The circle reaches up to y = -1, 0.2 m into the body; its nearest point to the side's middle lies straight
-        // below.
-        assert!((depth + 0.2).abs() < 1e-9 && at.distance(DVec2::new(0.0, -1.2)) < 1e-9, "{at} {depth}");
-    }
 }

@@ -44,6 +44,7 @@ pub mod episode; // the figures of an episode, and of several
 pub mod classes; // how trucks drive, by vehicle and load
 pub mod failures; // why episodes did not arrive
 pub mod certificate; // routes shown to be possible
+pub mod fits; // whether a truck fits through a road
 pub mod possible; // success over the starts that are shown to be possible
 pub mod groups; // routes that have something in common
 pub mod report; // figures of an evaluation

@@ -67,7 +67,9 @@ pub const FILES: &[(&str, &str)] = embedded![
     "transfer2026-training.toml",
     "vehicles/daf_xf.toml",
     "vehicles/eu_4x2_13m6.toml",
+    "vehicles/us_wb40.toml",
     "vehicles/us_wb62.toml",
+    "vehicles/us_wb67.toml",
 ];
 
 /// What a scenario file describes. Each kind has a folder of its own.

@@ -37,10 +37,12 @@ use glam::DVec2;
 
 use crate::files::reader::{Error, Reader, read_bytes};
 pub use build::{Imported, Options};
+pub(in crate::map) use build::{kerb_of, outer_radius, ring_radius};
 use graph::Graph;
 pub use junction::{Junction, RoadLane, Way};
 use lanes::Strip;
 use records::Records;
+pub(in crate::map) use rings::fitted_circle;
 pub use rings::{Refused, Ring};
 
 /// Which hand of traffic a map has.

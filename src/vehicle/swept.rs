@@ -5,13 +5,17 @@
 //! sharply as the line does. Whether lock, steer rate, tyres and load allow that, [`demands`] says. Pictures and
 //! reports use both.
 
+mod clearance;
 mod demand;
+mod extent;
 
 use glam::DVec2;
 
 use crate::geometry::{Curve, Outline};
 use crate::layout::{Body, Rig};
+pub use clearance::{UnitClearance, hull, nearest, swept_area};
 pub use demand::{Demand, Limit, demands, steer_angle_max};
+pub use extent::{Section, beside, front_path, off_tracking, sections};
 
 /// Pose of both units.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -24,6 +24,7 @@ mod left_hand;
 #[cfg(all(feature = "gpu", target_os = "linux"))]
 mod machine_code;
 mod map_bypass;
+mod map_drawing;
 mod map_junctions;
 mod map_kinds;
 mod map_lanes;

@@ -6,7 +6,6 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use offtrack::files::reader::shown;
 use offtrack::files::shipped::{Kind, Source};
 use offtrack::map::chosen::is_map;
-use offtrack::map::procedural;
 use offtrack::map::route::Route;
 use offtrack::map::{Gutter, Road};
 use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
@@ -19,6 +18,7 @@ use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
 use super::import::PlaceArgs;
+use super::roads;
 
 /// Draw a roundabout, or a truck's swept path on one of its routes.
 #[derive(Debug, clap::Args)]
@@ -93,23 +93,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = if format == Format::Png { "must lie in 200..8000 pixels" } else { "is for .png: leave it out" };
         return Err(Error::Setting { name: "--size", value: size.to_string(), expected: expected.into() });
     }
-    if !(1.0..=90.0).contains(&args.speed_kmh) {
-        return Err(Error::Setting {
-            name: "--speed-kmh",
-            value: format!("{} km/h", shown(args.speed_kmh)),
-            expected: "must lie in 1..90 km/h".into(),
-        });
-    }
+    check_speed(args.speed_kmh)?;
     length("--approach", args.approach)?;
     length("--departure", args.departure)?;
-    let file = Path::new(&args.roundabout);
-    let roundabout = if is_map(file) {
-        Road::from_map(file, &args.place.choice())?
-    } else {
+    if !is_map(Path::new(&args.roundabout)) {
         args.place.check_absent()?;
-        procedural::find(&args.roundabout)?
-    };
-    let roundabout = roundabout.seen();
+    }
+    let roundabout = roads::road(&args.roundabout, &args.place)?.seen();
     let routes = roundabout.routes(args.approach, args.departure, WAYPOINT_SPACING).map_err(|leaves| {
         let (flag, value) =
             if leaves.part == "approach" { ("--approach", args.approach) } else { ("--departure", args.departure) };
@@ -144,11 +134,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 
 fn sweep<'a>(args: &Args, roundabout: &Road, route: &'a Route) -> Result<Sweep<'a>, Error> {
     let vehicle = Vehicle::find(&args.vehicle)?;
-    if !vehicle.loads.contains_key(&args.load) {
-        let loads: Vec<&str> = vehicle.loads.keys().map(String::as_str).collect();
-        let expected = format!("the vehicle has {}", loads.join(", "));
-        return Err(Error::Setting { name: "--load", value: args.load.clone(), expected });
-    }
+    check_load(&vehicle, &args.load)?;
     let name = Source::find(Kind::Vehicle, &args.vehicle)?.stem();
     let driven = Driven { vehicle: name, load: args.load.clone(), speed_kmh: args.speed_kmh };
     Ok(Sweep::new(&vehicle, driven, &roundabout.kerbs_beyond_ends(args.gutter), route))
@@ -166,7 +152,30 @@ fn format(output: &Path) -> Result<Format, Error> {
     }
 }
 
-fn gutter(word: String) -> Gutter {
+/// The constant speed of a path must be one that a truck drives.
+pub fn check_speed(speed_kmh: f64) -> Result<(), Error> {
+    if (1.0..=90.0).contains(&speed_kmh) {
+        return Ok(());
+    }
+    Err(Error::Setting {
+        name: "--speed-kmh",
+        value: format!("{} km/h", shown(speed_kmh)),
+        expected: "must lie in 1..90 km/h".into(),
+    })
+}
+
+/// The load must be one of the vehicle's.
+pub fn check_load(vehicle: &Vehicle, load: &str) -> Result<(), Error> {
+    if vehicle.loads.contains_key(load) {
+        return Ok(());
+    }
+    let loads: Vec<&str> = vehicle.loads.keys().map(String::as_str).collect();
+    let expected = format!("the vehicle has {}", loads.join(", "));
+    Err(Error::Setting { name: "--load", value: load.to_owned(), expected })
+}
+
+/// Whether a gutter may be driven on, as a flag says it.
+pub fn gutter(word: String) -> Gutter {
     if word == "solid" { Gutter::Solid } else { Gutter::Drivable }
 }
 

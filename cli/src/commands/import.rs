@@ -1,4 +1,7 @@
-//! Lists the roundabouts or junctions of an OpenDRIVE map, checks it, or writes one of them as an outline file.
+//! Lists the roundabouts or junctions of an OpenDRIVE map, checks it, or writes one of them, or that of a drawing, as an
+//! outline file.
+
+mod drawing; // a DXF file
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -7,6 +10,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec2;
 use offtrack::files::reader::{Error as InputError, Reader, shown_path};
 use offtrack::map::chosen::Choice;
+use offtrack::map::dxf::is_drawing;
 use offtrack::map::ground::Line;
 use offtrack::map::opendrive::{Hand, Imported, Map, Options, RoadLane, Way};
 use serde::Serialize;
@@ -15,13 +19,16 @@ use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
 use super::outputs;
+use drawing::DrawingArgs;
 
 /// List the roundabouts or junctions of an OpenDRIVE map, check it, or write one of them as an outline file.
 #[derive(Debug, clap::Args)]
 #[command(group(clap::ArgGroup::new("action").args(["list", "junctions", "check", "output"]).required(true)))]
 pub struct Args {
-    /// The map: a .xodr file.
+    /// The map, a .xodr file, or a drawing, a .dxf file.
     map: PathBuf,
+    #[command(flatten)]
+    drawing: DrawingArgs,
     /// Print the roundabouts found, and how many islands and blocks are none.
     #[arg(long, conflicts_with_all = ["ring", "ways", "arms", "junctions", "check", "output"])]
     list: bool,
@@ -138,6 +145,10 @@ impl Written<'_> {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
+    if is_drawing(&args.map) {
+        return drawing::run(args);
+    }
+    args.drawing.check_absent()?;
     let choice = Choice { arms: args.arms.clone(), ..args.place.choice() };
     let map = Map::read(&args.map, choice.hand)?;
     if args.list {
@@ -150,26 +161,35 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return check(&args.map, &map, &choice);
     }
     let Some(output) = &args.output else { return Ok(()) };
-    if !output.to_string_lossy().ends_with(".outline.toml") {
-        let value = output.display().to_string();
-        return Err(Error::Setting { name: "--output", value, expected: "must end in .outline.toml".into() });
-    }
-    outputs::distinct(&[("--output", Some(output)), ("--json", args.json.as_deref())], &[("MAP", Some(&args.map))])?;
+    check_output(args, output)?;
     let imported = choice.imported(&args.map, &map)?;
     files::write_whole(output, text(&args.map, output, &map, &choice, &imported)?.as_bytes())?;
     if let Some(file) = &args.json {
         files::write_json(file, &Written::of(&imported))?;
     }
-    let Imported { ground, warnings, .. } = &imported;
+    files::print(&summary(output, &imported, "warning"))
+}
+
+/// The files written must be outline files, and each its own.
+fn check_output(args: &Args, output: &Path) -> Result<(), Error> {
+    if !output.to_string_lossy().ends_with(".outline.toml") {
+        let value = output.display().to_string();
+        return Err(Error::Setting { name: "--output", value, expected: "must end in .outline.toml".into() });
+    }
+    outputs::distinct(&[("--output", Some(output)), ("--json", args.json.as_deref())], &[("MAP", Some(&args.map))])
+}
+
+/// What was written, after what is odd about it.
+fn summary(output: &Path, Imported { ground, warnings, .. }: &Imported, word: &str) -> String {
     let mut summary = String::new();
     for warning in warnings {
-        let _ = writeln!(summary, "warning: {warning}");
+        let _ = writeln!(summary, "{word}: {warning}");
     }
     let (arms, routes) = (ground.arms.len(), ground.lines.len());
     let island =
         if 0.0 < ground.island_radius { format!(", island {:.2} m", ground.island_radius) } else { String::new() };
     let _ = writeln!(summary, "written: {}: {arms} arms, {routes} routes{island}", shown_path(output));
-    files::print(&summary)
+    summary
 }
 
 /// The outline file, with where it is from; an error where its own reader would refuse it.

@@ -1,17 +1,20 @@
 //! Benchmarks and roads by name, as commands take them: with a cache, a bar, and single routes in place of a split.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::files::cache::{Cache, Loading, Progress};
 use offtrack::files::reader::shortened;
 use offtrack::files::shipped::Kind;
 use offtrack::map::Road;
+use offtrack::map::chosen::is_map;
 use offtrack::map::procedural;
 use offtrack::scenario::{Place, Scenario, Split};
 use offtrack::world::World;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
+use super::import::PlaceArgs;
 use super::progress::Bar;
 
 /// Roads that take no progress bar.
@@ -22,6 +25,12 @@ const LONGEST_LIST: usize = 600;
 /// A benchmark by its name or path. What is known of random roads is kept in the user's cache.
 pub fn benchmark(name: &str) -> Result<Scenario, Error> {
     Ok(loading("drawing", |loading| Scenario::load(name, loading))?)
+}
+
+/// A road by its name, the path of its file or of a map, of which the flags choose a place; or a random road.
+pub fn road(name: &str, place: &PlaceArgs) -> Result<Road, Error> {
+    let file = Path::new(name);
+    Ok(if is_map(file) { Road::from_map(file, &place.choice())? } else { procedural::find(name)? })
 }
 
 /// The benchmark's world, with the fields of its roundabouts from the user's cache.

@@ -12,6 +12,7 @@ mod device;
 mod documented_flags;
 mod draw;
 mod evaluate;
+mod fits;
 mod flags;
 mod generate;
 mod import;

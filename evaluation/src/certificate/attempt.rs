@@ -71,14 +71,15 @@ pub fn attempt(
     })
 }
 
-/// The results of [`attempt`] from many starts, each on its route, in their order. `done` is called after each.
+/// The results of [`attempt`] from many starts, each on its route, in their order. `done` is given each as it is found,
+/// with its index, from any thread.
 ///
 /// Every core makes searches of its own: the batch of a narrow search is too small to be divided among them.
 pub fn attempts(
     world: &Arc<World>,
     starts: &[(u32, Start)],
     passes: &[Pass],
-    done: &(dyn Fn() + Sync),
+    done: &(dyn Fn(usize, &Found) + Sync),
 ) -> Result<Vec<Found>, Error> {
     let next = AtomicUsize::new(0);
     let searches = || -> Result<Vec<(usize, Found)>, Error> {
@@ -88,8 +89,9 @@ pub fn attempts(
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
                 let Some((route, start)) = starts.get(index) else { return Ok(found) };
-                found.push((index, attempt(world, *route, start, passes, None)?));
-                done();
+                let one = attempt(world, *route, start, passes, None)?;
+                done(index, &one);
+                found.push((index, one));
             }
         })
     };

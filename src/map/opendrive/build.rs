@@ -150,7 +150,7 @@ impl Site<'_> {
         routes.warnings.extend(tilt(map, network).map(|tilt| format!("{}: {tilt}", refused.place)));
         let Lines { mut lines, warnings, .. } = routes;
         lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
-        let kerbs = faces.loops.iter().map(|curve| kerb(curve, &arms)).collect();
+        let kerbs = faces.loops.iter().map(|curve| kerb_of(curve, &arms)).collect();
         let (lanes, edges) = (shown(&lines), Edges::Own(edges));
         let (island_radius, lane_radii) = (0.0, Vec::new());
         let centre = map.outside(origin);
@@ -291,7 +291,7 @@ fn drop_passing_lanes(crossings: &mut Vec<Crossing>, network: &Network, reach: f
 }
 
 /// Radius of the ring's outer kerb: the island's and what is free beyond it between the arms.
-fn outer_radius(faces: &Outline, island_radius: f64) -> f64 {
+pub(in crate::map) fn outer_radius(faces: &Outline, island_radius: f64) -> f64 {
     let mut free: Vec<f64> = (0..180)
         .map(|i| {
             let out = DVec2::from_angle(f64::from(i) * TAU / 180.0);
@@ -306,7 +306,7 @@ fn outer_radius(faces: &Outline, island_radius: f64) -> f64 {
 }
 
 /// Radius at which a line follows the ring: the middle of its distances from the centre (m).
-fn ring_radius(line: &[DVec2], island_radius: f64, outer_radius: f64) -> f64 {
+pub(in crate::map) fn ring_radius(line: &[DVec2], island_radius: f64, outer_radius: f64) -> f64 {
     let mut radii: Vec<f64> = Vec::new();
     for pair in line.windows(2) {
         let middle = (pair[0] + pair[1]) / 2.0;
@@ -320,7 +320,7 @@ fn ring_radius(line: &[DVec2], island_radius: f64, outer_radius: f64) -> f64 {
 }
 
 /// What a loop of the kerb faces belongs to.
-fn kerb(curve: &Curve, arms: &[Arm]) -> Kerb {
+pub(in crate::map) fn kerb_of(curve: &Curve, arms: &[Arm]) -> Kerb {
     let contour: Vec<[f64; 2]> = curve.polyline(0.01).into_iter().map(DVec2::into).collect();
     if 0.0 < signed_area(&contour) {
         return Kerb::Outer;

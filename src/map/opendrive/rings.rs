@@ -49,7 +49,7 @@ pub struct Refused {
 }
 
 /// A circle through points as well as may be: centre, radius, largest distance of a point from it (m).
-pub(super) fn fitted_circle(points: &[DVec2]) -> Option<(DVec2, f64, f64)> {
+pub(in crate::map) fn fitted_circle(points: &[DVec2]) -> Option<(DVec2, f64, f64)> {
     let n = points.len() as f64;
     let mean = points.iter().sum::<DVec2>() / n;
     let (mut uu, mut uv, mut vv, mut uz, mut vz, mut zz) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);

@@ -66,7 +66,8 @@ proptest! {
         truck in trucks(-5.0..25.0, PI),
         controls in controls(4.0, 30.0, 200),
     ) {
-        let mut truck = truck;
+        // Some vehicles have less lock than the trucks are drawn with.
+        let mut truck = Truck { steering: truck.steering.clamp(-rig.steer_max, rig.steer_max), ..truck };
         for control in controls {
             truck = driven(&rig, SUBSTEP, 2, &control, &truck);
             let Truck { position, heading, trailer_heading, speed, steering, .. } = truck;

@@ -33,13 +33,18 @@ fn length(vehicle: &Vehicle) -> f64 {
     tractor.front_overhang + tractor.wheelbase - tractor.fifth_wheel + trailer.kingpin_to_rear
 }
 
+/// AASHTO's design vehicles, with their overall length, the trailer's length, the radius of the front axle's middle in
+/// the minimum turn, and the inside radius there (ft).
+const AASHTO: [(&str, [f64; 4]); 3] =
+    [("us_wb40", [45.5, 33.0, 36.0, 19.3]), ("us_wb67", [73.5, 53.0, 41.0, 1.9]), ("us_wb62", [69.0, 48.0, 41.0, 7.4])];
+
 /// Least distance of the trailer's inner rear wheels from the centre of AASHTO's minimum turn: half a turn, the front
-/// axle on 41 ft (m).
-fn inside_radius(vehicle: &Vehicle) -> f64 {
+/// axle on this radius (m).
+fn inside_radius(vehicle: &Vehicle, radius: f64) -> f64 {
     let wheel = |pose: &Pose| {
         (pose.trailer_position + 0.5 * vehicle.trailer.width * DVec2::from_angle(pose.trailer_heading).perp()).length()
     };
-    turned(vehicle, 41.0 * FOOT, PI).iter().map(wheel).fold(f64::INFINITY, f64::min)
+    turned(vehicle, radius, PI).iter().map(wheel).fold(f64::INFINITY, f64::min)
 }
 
 /// Off-tracking once it is steady, the front axle on 20 m: by driving on, and by SAE J695 from the sum of squares (m).
@@ -65,17 +70,20 @@ fn rows() -> Vec<[String; 4]> {
     let row = |cells: [&str; 3], ours: String| [cells[0].to_owned(), cells[1].to_owned(), cells[2].to_owned(), ours];
     let feet = |value: f64| format!("{:.1} ft, {value:.2} m", value / FOOT);
     let circle = |vehicle: &Vehicle| metres(vehicle.turning_circle_inner_radius(12.5).unwrap());
-    let mut rows = vec![
-        row(["`us_wb62`", "overall length", "69.0 ft"], feet(length(&us))),
-        row(
-            ["`us_wb62`", "length of the trailer", "48.0 ft"],
-            feet(us.trailer.kingpin_to_front + us.trailer.kingpin_to_rear),
-        ),
-        row(
-            ["`us_wb62`", "radius of the front axle at the lock", "41.0 ft"],
-            feet(us.tractor.wheelbase / us.tractor.steer_max.sin()),
-        ),
-        row(["`us_wb62`", "inside radius of half a turn on it", "7.4 ft"], feet(inside_radius(&us))),
+    let of_aashto = |(name, [whole, trailer, radius, inside]): (&str, [f64; 4])| {
+        let us = vehicle(name);
+        let row = |what: &str, published: f64, ours: f64| {
+            [format!("`{name}`"), what.to_owned(), format!("{published:.1} ft"), feet(ours)]
+        };
+        [
+            row("overall length", whole, length(&us)),
+            row("length of the trailer", trailer, us.trailer.kingpin_to_front + us.trailer.kingpin_to_rear),
+            row("radius of the front axle at the lock", radius, us.tractor.wheelbase / us.tractor.steer_max.sin()),
+            row("inside radius of half a turn on it", inside, inside_radius(&us, radius * FOOT)),
+        ]
+    };
+    let mut rows: Vec<[String; 4]> = AASHTO.into_iter().flat_map(of_aashto).collect();
+    rows.extend([
         row(["`eu_4x2_13m6`", "overall length", "at most 16.50 m"], metres(length(&eu))),
         row(["`eu_4x2_13m6`", "kingpin to the trailer's rear", "at most 12.00 m"], metres(eu.trailer.kingpin_to_rear)),
         row(
@@ -85,7 +93,7 @@ fn rows() -> Vec<[String; 4]> {
         row(["`eu_4x2_13m6`", "wheelbase of the trailer", "at most 8.135 m"], metres(eu.trailer.wheelbase)),
         row(["`eu_4x2_13m6`", "inner circle, the outer one of 12.50 m", "at least 5.30 m"], circle(&eu)),
         row(["`daf_xf`", "the same", "at least 5.30 m"], circle(&daf)),
-    ];
+    ]);
     for (name, vehicle) in [("`us_wb62`", &us), ("`eu_4x2_13m6`", &eu), ("`daf_xf`", &daf)] {
         let [driven, published] = off_tracking(vehicle).map(metres);
         rows.push([name.to_owned(), "steady off-tracking, the front axle on 20 m".to_owned(), published, driven]);
@@ -103,20 +111,27 @@ fn the_readme_has_the_vehicles_beside_their_sources_as_they_are_computed() {
 }
 
 #[test]
-fn a_wb62_is_as_long_as_aashtos_and_not_by_a_whole_trailer_behind_its_kingpin() {
-    let us = vehicle("us_wb62");
-    // Lengths are to the centimetre.
-    assert!((length(&us) - 69.0 * FOOT).abs() < 0.01, "{}", length(&us));
-    assert!((us.trailer.kingpin_to_rear - 45.5 * FOOT).abs() < 0.005);
-    assert!((us.trailer.kingpin_to_front + us.trailer.kingpin_to_rear - 48.0 * FOOT).abs() < 0.01);
+fn aashtos_vehicles_are_as_long_as_published_and_not_by_a_whole_trailer_behind_the_kingpin() {
+    for (name, [whole, trailer, ..]) in AASHTO {
+        let us = vehicle(name);
+        // Lengths are to the centimetre, and there are four of them.
+        assert!((length(&us) - whole * FOOT).abs() < 0.02, "{name}: {}", length(&us));
+        let behind = us.trailer.kingpin_to_rear - us.trailer.wheelbase;
+        assert!((behind - 4.5 * FOOT).abs() < 0.01, "{name}: {behind}");
+        let length = us.trailer.kingpin_to_front + us.trailer.kingpin_to_rear;
+        assert!((length - trailer * FOOT).abs() < 0.01, "{name}: {length}");
+    }
 }
 
 #[test]
-fn a_wb62_turns_inside_the_radius_that_aashto_publishes() {
-    let us = vehicle("us_wb62");
-    // AASHTO rounds to a tenth of a foot, the file to a centimetre.
-    assert!((inside_radius(&us) / FOOT - 7.4).abs() < 0.08, "{}", inside_radius(&us) / FOOT);
-    assert!((us.tractor.wheelbase / us.tractor.steer_max.sin() / FOOT - 41.0).abs() < 0.1);
+fn aashtos_vehicles_turn_inside_the_radius_that_is_published() {
+    for (name, [.., radius, inside]) in AASHTO {
+        let us = vehicle(name);
+        let found = inside_radius(&us, radius * FOOT) / FOOT;
+        // AASHTO rounds to a tenth of a foot, the file to a centimetre.
+        assert!((found - inside).abs() < 0.1, "{name}: {found}");
+        assert!((us.tractor.wheelbase / us.tractor.steer_max.sin() / FOOT - radius).abs() < 0.1, "{name}");
+    }
 }
 
 #[test]

@@ -1,0 +1,98 @@
+//! A roundabout from a drawing, a DXF file, as an outline file.
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use offtrack::map::dxf::{self, Drawn, Layers, Unit};
+use offtrack::map::opendrive::{Hand, Imported};
+
+use offtrack_evaluation::error::Error;
+use offtrack_evaluation::files;
+
+use super::{Args, Written, check_output, summary};
+
+/// Width of lanes where nobody says it (m).
+const LANE_WIDTH: f64 = 3.5;
+
+/// How a drawing is read. Nothing is given of a map.
+#[derive(Debug, Clone, clap::Args)]
+pub struct DrawingArgs {
+    /// Of a drawing: the layer of the kerbs' closed outlines \[default: KERB\].
+    #[arg(long, value_name = "LAYER")]
+    kerb_layer: Option<String>,
+    /// Of a drawing: the layer of the lanes' centre lines, one for each way from an arm's end to another's, in the
+    /// direction of travel \[default: LANE\].
+    #[arg(long, value_name = "LAYER")]
+    lane_layer: Option<String>,
+    /// Of a drawing: the unit of its coordinates, where it does not say it.
+    #[arg(long, value_parser = PossibleValuesParser::new(["m", "mm", "cm", "ft", "in"]).map(unit))]
+    unit: Option<Unit>,
+    /// Of a drawing: the width of all lanes (m) \[default: 3.5\].
+    #[arg(long, value_name = "M")]
+    lane_width: Option<f64>,
+}
+
+fn unit(word: String) -> Unit {
+    Unit::NAMED.into_iter().find(|(name, _)| *name == word).map_or(Unit::Metre, |(_, unit)| unit)
+}
+
+impl DrawingArgs {
+    /// An error if one of the flags is given for a map.
+    pub fn check_absent(&self) -> Result<(), Error> {
+        let given = [
+            ("--kerb-layer", self.kerb_layer.clone()),
+            ("--lane-layer", self.lane_layer.clone()),
+            ("--unit", self.unit.map(|unit| format!("{unit:?}").to_lowercase())),
+            ("--lane-width", self.lane_width.map(|width| format!("{width} m"))),
+        ];
+        let Some((name, Some(value))) = given.into_iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
+        Err(Error::Setting { name, value, expected: "is for a drawing, a file that ends in .dxf; leave it out".into() })
+    }
+}
+
+/// Writes the roundabout of a drawing.
+pub fn run(args: &Args) -> Result<(), Error> {
+    let flags = [
+        ("--list", args.list.then(|| "given".to_owned())),
+        ("--junctions", args.junctions.then(|| "given".to_owned())),
+        ("--check", args.check.then(|| "given".to_owned())),
+        ("--way", args.place.ways.first().map(|way| format!("{},{}", way.from, way.to))),
+        ("--hand", (args.place.hand != Hand::Map).then(|| format!("{:?}", args.place.hand).to_lowercase())),
+    ];
+    if let Some((name, Some(value))) = flags.into_iter().find(|(_, value)| value.is_some()) {
+        return Err(Error::Setting {
+            name,
+            value,
+            expected: "is for an OpenDRIVE map; of a drawing -o NAME.outline.toml writes the roundabout".into(),
+        });
+    }
+    let Some(output) = &args.output else { return Ok(()) };
+    check_output(args, output)?;
+    let lane_width = args.drawing.lane_width.unwrap_or(LANE_WIDTH);
+    if !(1.0..=20.0).contains(&lane_width) {
+        return Err(Error::Setting {
+            name: "--lane-width",
+            value: format!("{lane_width} m"),
+            expected: "must lie in 1..20 m".into(),
+        });
+    }
+    let layer = |given: &Option<String>, usual: &str| given.clone().unwrap_or_else(|| usual.to_owned());
+    let layers = Layers {
+        kerbs: layer(&args.drawing.kerb_layer, "KERB"),
+        lanes: layer(&args.drawing.lane_layer, "LANE"),
+        unit: args.drawing.unit,
+        lane_width,
+        ring: args.place.ring,
+        arms: args.arms.clone(),
+    };
+    let Drawn { ground, notes } = dxf::read(&args.map, &layers)?;
+    let name = args.map.file_name().map(|name| name.to_string_lossy().escape_debug().to_string()).unwrap_or_default();
+    let comment = [
+        format!("A roundabout of the drawing {name}: its centre, here the origin, lies at `origin` there."),
+        "A path is a list of [x, y] and [x, y, bulge]: a straight or an arc ends there. Metres; docs/maps.md.".into(),
+    ];
+    files::write_whole(output, ground.checked_text(output, &comment)?.as_bytes())?;
+    let imported = Imported { centre: ground.origin, ground, warnings: notes };
+    if let Some(file) = &args.json {
+        files::write_json(file, &Written::of(&imported))?;
+    }
+    files::print(&summary(output, &imported, "note"))
+}

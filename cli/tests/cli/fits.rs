@@ -1,0 +1,180 @@
+//! `offtrack fits`: verdicts and exit codes, files with what they promise, resumption, and what is refused.
+
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+use crate::place::{Place, offtrack, program, refusal, repository, succeed};
+
+/// `fits` on one route of 16m with a narrow search.
+fn fits(place: &Place, arguments: &[&str]) -> Output {
+    command(place, arguments).output().unwrap()
+}
+
+fn command(place: &Place, arguments: &[&str]) -> Command {
+    let mut command = program();
+    let folder = place.text("fits");
+    command.current_dir(repository()).args(["fits", "16m", "--widths", "64", "-o", &folder]).args(arguments);
+    command
+}
+
+const EASY: [&str; 4] = ["--vehicle", "eu_4x2_13m6", "--route", "E-right-2"];
+const HARD: [&str; 4] = ["--vehicle", "us_wb67", "--route", "E-right-1"];
+
+fn text(place: &Place, name: &str) -> String {
+    std::fs::read_to_string(place.file("fits").join(name)).unwrap()
+}
+
+#[test]
+fn a_truck_that_fits_is_exit_code_0_with_table_json_csv_sheet_pdf_and_drawing() {
+    let place = Place::new();
+    let output = fits(&place, &EASY);
+    succeed(&output);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains("16m/E-right-2") && said.contains("1 of 1 fit: empty, 15 km/h"), "{said}");
+    let json = place.json("fits/fits.json");
+    for key in ["version", "program", "commit", "date", "machine", "asked", "assumptions", "inputs"] {
+        assert!(!json[key].is_null(), "{key}: {json}");
+    }
+    let row = &json["rows"][0];
+    assert_eq!(
+        (&row["route"], &row["vehicle"], &row["fits"]),
+        (&"16m/E-right-2".into(), &"eu_4x2_13m6".into(), &true.into())
+    );
+    for way in ["lane_centre", "way"] {
+        assert!(2.5 < row[way]["swept_width"].as_f64().unwrap(), "{row}");
+        assert!(row[way]["tractor"]["clearance"].is_f64() && row[way]["steer_angle_deg"].is_f64(), "{row}");
+    }
+    assert!((5.0..90.0).contains(&row["fastest_kmh"].as_f64().unwrap()));
+    let csv = text(&place, "fits.csv");
+    assert!(csv.starts_with("route,vehicle,fits,fastest_kmh,lane_centre_fits") && csv.lines().count() == 2, "{csv}");
+    let pdf = std::fs::read(place.file("fits/16m.pdf")).unwrap();
+    assert!(pdf.starts_with(b"%PDF-"));
+    let dxf = text(&place, "16m-eu_4x2_13m6.dxf");
+    assert!(dxf.contains("E-RIGHT-2_SWEPT_TRAILER") && dxf.ends_with("EOF\n"));
+}
+
+#[test]
+fn a_truck_that_does_not_fit_is_exit_code_1_and_says_where() {
+    let place = Place::new();
+    let output = fits(&place, &HARD);
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains("does not fit") && said.contains("0 of 1 fit"), "{said}");
+    let row = &place.json("fits/fits.json")["rows"][0];
+    assert!(row["fits"] == false && row["lane_centre"]["trailer"]["clearance"].as_f64().unwrap() < 0.0, "{row}");
+    assert!(text(&place, "16m.svg").contains("does not fit"));
+}
+
+#[test]
+fn a_clearance_that_no_way_keeps_makes_a_truck_not_fit_that_fits_without() {
+    let place = Place::new();
+    let output = fits(&place, &[&EASY[..], &["--clearance", "2"]].concat());
+    assert_eq!(output.status.code(), Some(1));
+    let row = &place.json("fits/fits.json")["rows"][0];
+    let clearance = row["way"]["trailer"]["clearance"].as_f64().unwrap();
+    assert!(0.0 <= clearance && clearance < 2.0 && row["searched_clearance"] == 0.0, "{row}");
+}
+
+#[test]
+fn the_same_command_keeps_what_is_there_and_answers_the_rest() {
+    let place = Place::new();
+    let both = [&EASY[..], &["--vehicle", "daf_xf"]].concat();
+    succeed(&fits(&place, &both));
+    let whole = place.json("fits/fits.json");
+    // A row that was marked stays as it is, one that is missing comes back.
+    let mut part = whole.clone();
+    part["rows"][0]["fastest_kmh"] = 77.0.into();
+    part["rows"].as_array_mut().unwrap().truncate(1);
+    std::fs::write(place.file("fits/fits.json"), part.to_string()).unwrap();
+    std::fs::remove_file(place.file("fits/16m.svg")).unwrap();
+    succeed(&fits(&place, &both));
+    let again = place.json("fits/fits.json");
+    assert_eq!((&again["rows"][0]["fastest_kmh"], &again["rows"][1]), (&77.0.into(), &whole["rows"][1]));
+    assert!(text(&place, "16m.svg").contains("daf_xf"));
+    let said = refusal(&fits(&place, &[&both[..], &["--clearance", "0.1"]].concat()), 2);
+    assert!(said.contains("fits.json") && said.contains("clearance: 0 there, 0.1 here"), "{said}");
+    std::fs::write(place.file("fits/fits.json"), "{}").unwrap();
+    assert!(refusal(&fits(&place, &both), 2).contains("is not a file of `offtrack fits`"));
+}
+
+#[test]
+fn a_sheet_is_at_the_scale_that_it_states() {
+    let place = Place::new();
+    succeed(&fits(&place, &EASY));
+    let svg = text(&place, "16m.svg");
+    let scale = [250.0f64, 500.0, 1000.0].into_iter().find(|scale| svg.contains(&format!("Scale 1:{scale} on A3")));
+    // The bar of 10 m, in pixels of 1/96 inch; the page is as wide in millimetres as it says.
+    let bar = 10_000.0 / scale.unwrap() * 96.0 / 25.4;
+    let bar = format!("v6h{}v-6", (bar * 100.0).round() / 100.0);
+    assert!(svg.contains(&bar), "{bar}");
+    assert!(svg.contains("width=\"420mm\"") && svg.contains("viewBox=\"0 0 1587.4 1122.52\""), "{}", &svg[..400]);
+    for words in ["Assumed", "Designed", "1 of 1 fit with 0 m clearance", "offtrack 0."] {
+        assert!(svg.contains(words), "{words}");
+    }
+}
+
+#[test]
+fn the_table_is_no_wider_than_the_terminal_and_has_feet_on_request() {
+    let place = Place::new();
+    for columns in ["40", "120"] {
+        let output = command(&place, &EASY).env("COLUMNS", columns).output().unwrap();
+        let said = String::from_utf8(output.stdout).unwrap();
+        let table: Vec<&str> = said.lines().take(3).collect();
+        assert!(table.iter().all(|line| line.chars().count() <= columns.parse().unwrap()), "{said}");
+    }
+    let said = String::from_utf8(fits(&place, &[&EASY[..], &["--feet"]].concat()).stdout).unwrap();
+    assert!(said.contains(" ft") && said.contains("mph"), "{said}");
+}
+
+#[test]
+fn wrong_input_is_refused_by_flag_and_value() {
+    let place = Place::new();
+    for (arguments, expected) in [
+        (&["--vehicle", "no_such"][..], "vehicle: no_such"),
+        (&["--vehicle", "daf_xf", "--load", "wood"], "--load: wood; the vehicle has empty"),
+        (&["--vehicle", "daf_xf", "--speed-kmh", "0"], "--speed-kmh: 0 km/h"),
+        (&["--vehicle", "daf_xf", "--clearance=-1"], "--clearance: -1 m"),
+        (&["--vehicle", "daf_xf", "--clearance", "nan"], "--clearance"),
+        (&["--vehicle", "daf_xf", "--route", "N-left-9"], "--route: N-left-9; the roads have 16m/E-left-2"),
+        (&["--vehicle", "daf_xf", "--vehicle", "daf_xf"], "--vehicle: daf_xf; is named twice"),
+        (&["--vehicle", "daf_xf", "--ring", "1,2"], "--ring: 1,2; is for an OpenDRIVE map"),
+        (&["16m", "--vehicle", "daf_xf"], "ROAD: 16m; is named twice"),
+    ] {
+        let said = refusal(&fits(&place, arguments), 2);
+        assert!(said.contains(expected), "{expected}: {said}");
+    }
+    assert!(refusal(&fits(&place, &["--vehicle", "daf_xf", "--widths", "0"]), 2).contains("--widths"));
+    let none = offtrack(&["fits", "16m", "-o", &place.text("none")]);
+    assert!(refusal(&none, 2).contains("--vehicle"));
+    assert!(!place.file("none").exists());
+}
+
+#[test]
+fn a_drawing_becomes_a_road_through_which_trucks_are_driven_at_its_place_in_the_drawing() {
+    let place = Place::new();
+    // What one program writes: kerbs and lanes of 16m.
+    succeed(&fits(&place, &EASY));
+    let (drawing, road) = (place.text("fits/16m-eu_4x2_13m6.dxf"), place.text("site.outline.toml"));
+    let said = refusal(&offtrack(&["import", &drawing, "-o", &road]), 2);
+    assert!(said.contains("--unit m, mm, cm, ft or in"), "{said}");
+    let output = offtrack(&["import", &drawing, "--unit", "m", "-o", &road]);
+    succeed(&output);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains("4 arms, 20 routes") && said.contains("note: "), "{said}");
+    let again = place.text("again");
+    let arguments = ["fits", &road, "--widths", "64", "-o", &again];
+    succeed(&offtrack(&[&arguments[..], &EASY].concat()));
+    let clearance = |json: &Value| json["rows"][0]["lane_centre"]["trailer"]["clearance"].as_f64().unwrap();
+    let (one, other) = (place.json("fits/fits.json"), place.json("again/fits.json"));
+    assert!((clearance(&one) - clearance(&other)).abs() < 2e-3, "{one} {other}");
+    for (arguments, expected) in [
+        (&[drawing.as_str(), "--list"][..], "--list"),
+        (&["scenarios/maps/sumo_ring22.xodr", "--unit", "m", "--list"], "is for a drawing"),
+        (&[drawing.as_str(), "--unit", "m", "--lane-width", "0", "-o", road.as_str()], "--lane-width: 0 m"),
+        (&[drawing.as_str(), "--unit", "m", "--kerb-layer", "CURB", "-o", road.as_str()], "layer CURB"),
+    ] {
+        let said = refusal(&offtrack(&[&["import"], arguments].concat()), 2);
+        assert!(said.contains(expected), "{expected}: {said}");
+    }
+}

@@ -1,0 +1,252 @@
+//! The polylines, lines and arcs of a drawing on the layers that are asked for, in metres.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use glam::DVec2;
+
+use super::Layers;
+use super::pairs::{Pair, pairs};
+use crate::files::reader::{Error, Reader};
+use crate::geometry::{Curve, Piece, arc_of_height};
+
+/// Points nearer than this are one (m).
+const SAME: f64 = 1e-6;
+/// Most entities of a drawing.
+const MOST_ENTITIES: usize = 1_000_000;
+
+/// The unit of a drawing's coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Unit {
+    /// Metres.
+    Metre,
+    /// Millimetres.
+    Millimetre,
+    /// Centimetres.
+    Centimetre,
+    /// Feet of 0.3048 m.
+    Foot,
+    /// Inches.
+    Inch,
+}
+
+impl Unit {
+    /// The units by the words of a flag.
+    pub const NAMED: [(&'static str, Unit); 5] = [
+        ("m", Unit::Metre),
+        ("mm", Unit::Millimetre),
+        ("cm", Unit::Centimetre),
+        ("ft", Unit::Foot),
+        ("in", Unit::Inch),
+    ];
+
+    /// The unit's length (m).
+    pub fn metres(self) -> f64 {
+        match self {
+            Unit::Metre => 1.0,
+            Unit::Millimetre => 1e-3,
+            Unit::Centimetre => 1e-2,
+            Unit::Foot => 0.3048,
+            Unit::Inch => 0.0254,
+        }
+    }
+
+    /// By the value of `$INSUNITS`.
+    fn of_code(code: &str) -> Option<Unit> {
+        match code {
+            "1" => Some(Unit::Inch),
+            "2" => Some(Unit::Foot),
+            "4" => Some(Unit::Millimetre),
+            "5" => Some(Unit::Centimetre),
+            "6" => Some(Unit::Metre),
+            _ => None,
+        }
+    }
+}
+
+/// A curve on one of the layers.
+#[derive(Debug, Clone)]
+pub(super) struct Drawn {
+    pub(super) curve: Curve,
+    pub(super) is_closed: bool,
+    /// The line where it begins.
+    pub(super) line: usize,
+}
+
+/// What is drawn on the layers.
+#[derive(Debug, Clone)]
+pub(super) struct Drawing {
+    pub(super) kerbs: Vec<Drawn>,
+    pub(super) lanes: Vec<Drawn>,
+    /// What was left out or done, in words.
+    pub(super) notes: Vec<String>,
+}
+
+impl Drawing {
+    pub(super) fn parse(file: &Path, text: &str, layers: &Layers) -> Result<Drawing, Error> {
+        let pairs = pairs(file, text)?;
+        let unit = unit(file, &pairs, layers)?;
+        let entities = entities(&pairs);
+        let reader = Reader::of(file);
+        reader.count("entities", entities.len(), 0..=MOST_ENTITIES)?;
+        let mut drawing = Drawing { kerbs: Vec::new(), lanes: Vec::new(), notes: Vec::new() };
+        let mut others: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut index = 0;
+        while index < entities.len() {
+            let entity = entities[index];
+            index += 1;
+            let mut vertices: &[&[Pair]] = &[];
+            if entity[0].value == "POLYLINE" {
+                let n = entities[index..].iter().take_while(|other| other[0].value == "VERTEX").count();
+                vertices = &entities[index..index + n];
+                index += n;
+            }
+            let layer = text_of(entity, 8).unwrap_or_default();
+            let target = if layer.eq_ignore_ascii_case(&layers.kerbs) {
+                &mut drawing.kerbs
+            } else if layer.eq_ignore_ascii_case(&layers.lanes) {
+                &mut drawing.lanes
+            } else {
+                if !matches!(entity[0].value, "VERTEX" | "SEQEND") {
+                    *others.entry(layer).or_default() += 1;
+                }
+                continue;
+            };
+            if let Some(drawn) = curve(file, entity, vertices, unit.metres())? {
+                target.push(drawn);
+            }
+        }
+        for (layer, kind) in [(&layers.kerbs, &drawing.kerbs), (&layers.lanes, &drawing.lanes)] {
+            if kind.is_empty() {
+                let known: Vec<String> = others.iter().map(|(layer, n)| format!("{layer} ({n})")).collect();
+                let has = if known.is_empty() { "nothing".into() } else { known.join(", ") };
+                return Err(reader.invalid(format!("layer {layer}"), "empty", format!("the drawing has {has}")));
+            }
+        }
+        let n_others: usize = others.values().sum();
+        if 0 < n_others {
+            drawing.notes.push(format!("{n_others} entities on {} other layers are left out", others.len()));
+        }
+        Ok(drawing)
+    }
+}
+
+/// The unit that is asked for, else that of the header.
+fn unit(file: &Path, pairs: &[Pair], layers: &Layers) -> Result<Unit, Error> {
+    if let Some(unit) = layers.unit {
+        return Ok(unit);
+    }
+    let stated = pairs.windows(2).find(|pair| pair[0].code == 9 && pair[0].value == "$INSUNITS").map(|pair| pair[1]);
+    stated.and_then(|pair| Unit::of_code(pair.value)).ok_or_else(|| {
+        let (key, value) = stated.map_or(("$INSUNITS".to_owned(), "missing"), |pair| (pair.key(), pair.value));
+        Reader::of(file).invalid(key, value, "the drawing does not say its unit: give --unit m, mm, cm, ft or in")
+    })
+}
+
+/// The entities of the section ENTITIES, each from its code 0 on. Blocks are not looked into.
+fn entities<'a, 'b>(pairs: &'b [Pair<'a>]) -> Vec<&'b [Pair<'a>]> {
+    let begin = pairs.windows(2).position(|pair| {
+        (pair[0].code, pair[0].value) == (0, "SECTION") && (pair[1].code, pair[1].value) == (2, "ENTITIES")
+    });
+    let Some(begin) = begin else { return Vec::new() };
+    let section = &pairs[begin + 2..];
+    let end = section.iter().position(|pair| pair.code == 0 && pair.value == "ENDSEC").unwrap_or(section.len());
+    let section = &section[..end];
+    let starts: Vec<usize> = (0..end).filter(|&index| section[index].code == 0).collect();
+    let ends = starts.iter().skip(1).copied().chain([end]);
+    starts.iter().zip(ends).map(|(&start, end)| &section[start..end]).collect()
+}
+
+fn text_of<'a>(entity: &[Pair<'a>], code: i32) -> Option<&'a str> {
+    entity.iter().find(|pair| pair.code == code).map(|pair| pair.value)
+}
+
+/// The curve of an entity on one of the layers; `None` for what has no extent, such as a text.
+fn curve(file: &Path, entity: &[Pair], vertices: &[&[Pair]], metres: f64) -> Result<Option<Drawn>, Error> {
+    let number = |pairs: &[Pair], code: i32| -> Result<Option<f64>, Error> {
+        pairs.iter().find(|pair| pair.code == code).map(|pair| pair.number(file)).transpose()
+    };
+    let length = |code: i32| Ok::<f64, Error>(number(entity, code)?.unwrap_or(0.0) * metres);
+    let point = |x: i32, y: i32| Ok::<DVec2, Error>(DVec2::new(length(x)?, length(y)?));
+    let (kind, line) = (entity[0].value, entity[0].line);
+    let refused = |expected: &str| Reader::of(file).invalid(format!("line {line}"), kind, expected);
+    let flags = number(entity, 70)?.unwrap_or(0.0) as u32;
+    // An extrusion downwards mirrors what is drawn.
+    if number(entity, 230)?.is_some_and(|z| z < 0.0) {
+        return Err(refused("is drawn from below (extrusion 0, 0, -1): flatten it"));
+    }
+    let (curve, is_closed) = match kind {
+        "LINE" => {
+            let (from, to) = (point(10, 20)?, point(11, 21)?);
+            (Curve { pieces: vec![Piece::Segment { from, to }] }, false)
+        }
+        "ARC" | "CIRCLE" => {
+            let (centre, radius) = (point(10, 20)?, length(40)?);
+            if radius <= SAME {
+                return Err(refused("its radius must be positive"));
+            }
+            let angle = |code: i32| Ok::<f64, Error>(number(entity, code)?.unwrap_or(0.0).to_radians());
+            let (from, to) = if kind == "ARC" { (angle(50)?, angle(51)?) } else { (0.0, 0.0) };
+            let sweep = (to - from).rem_euclid(TAU);
+            let sweep = if sweep == 0.0 { TAU } else { sweep };
+            (Curve { pieces: vec![Piece::Arc { centre, radius, from, sweep }] }, kind == "CIRCLE")
+        }
+        "LWPOLYLINE" => {
+            let mut points: Vec<(DVec2, f64)> = Vec::new();
+            for pair in entity {
+                match (pair.code, points.last_mut()) {
+                    (10, _) => points.push((DVec2::new(pair.number(file)? * metres, 0.0), 0.0)),
+                    (20, Some(point)) => point.0.y = pair.number(file)? * metres,
+                    (42, Some(point)) => point.1 = pair.number(file)?,
+                    _ => {}
+                }
+            }
+            (joined(&points, flags & 1 == 1), flags & 1 == 1)
+        }
+        "POLYLINE" => {
+            if flags & (2 | 4 | 8 | 16 | 64) != 0 {
+                return Err(refused(
+                    "is a spline, a mesh or drawn in space: make it a plane polyline of lines and arcs",
+                ));
+            }
+            let mut points = Vec::new();
+            for vertex in vertices {
+                let of = |code: i32| Ok::<f64, Error>(number(vertex, code)?.unwrap_or(0.0));
+                points.push((DVec2::new(of(10)?, of(20)?) * metres, of(42)?));
+            }
+            (joined(&points, flags & 1 == 1), flags & 1 == 1)
+        }
+        "SPLINE" | "ELLIPSE" => return Err(refused("is neither a line nor an arc: convert it to a polyline")),
+        "INSERT" => return Err(refused("is a block: explode it")),
+        _ => return Ok(None),
+    };
+    if curve.pieces.is_empty() {
+        return Err(refused("has no length: delete it"));
+    }
+    Ok(Some(Drawn { curve, is_closed, line }))
+}
+
+/// The curve through vertices, each with the bulge of the arc to the next: the tangent of a quarter of its angle.
+fn joined(points: &[(DVec2, f64)], is_closed: bool) -> Curve {
+    let n = points.len();
+    let mut pieces = Vec::new();
+    for index in 0..if is_closed { n } else { n.saturating_sub(1) } {
+        let ((from, bulge), (to, _)) = (points[index], points[(index + 1) % n]);
+        if from.distance(to) <= SAME {
+            continue;
+        }
+        if bulge.abs() <= 1.0 {
+            let arc = arc_of_height(from, to, bulge * from.distance(to) / 2.0);
+            pieces.push(arc.unwrap_or(Piece::Segment { from, to }));
+        } else {
+            // More than half a circle: its middle is where the bisector leaves it.
+            let middle = (from + to) / 2.0 - bulge * (to - from).perp() / 2.0;
+            let half = (bulge.atan() / 2.0).tan();
+            for (from, to) in [(from, middle), (middle, to)] {
+                pieces.extend(arc_of_height(from, to, half * from.distance(to) / 2.0));
+            }
+        }
+    }
+    Curve { pieces }
+}

@@ -1,0 +1,257 @@
+//! What is drawn as a road: outlines from chains of lines, arms from the ends of the ways, the ring's centre.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use glam::DVec2;
+
+use super::Layers;
+use super::entities::{self, Drawing};
+use crate::files::reader::{Error, Reader};
+use crate::geometry::{Curve, Outline, Piece, fitted_line, wrapped};
+use crate::map::ground::{Arm, Edges, Ground, Kerb, Line};
+use crate::map::opendrive::{fitted_circle, kerb_of, outer_radius, ring_radius};
+use crate::map::route::Lane;
+
+/// Ends of lines nearer than this are joined (m).
+const GAP: f64 = 0.02;
+/// Turn between two pieces of a way that is taken for smooth (rad).
+const SMOOTH: f64 = 5e-3;
+/// Tolerance of a smooth line through a way with corners (m).
+const FITTED: f64 = 0.004;
+/// Ends of ways nearer than this are of one lane (m), and in directions nearer than this of one arm (rad).
+const ONE_LANE: f64 = 1.0;
+const ONE_ARM: f64 = 0.35;
+/// Farthest that an island may be from a circle, as a fraction of its radius.
+const ROUND: f64 = 0.3;
+
+/// A road from a drawing.
+#[derive(Debug, Clone)]
+pub struct Drawn {
+    /// What is driven on.
+    pub ground: Ground,
+    /// What was left out, joined or fitted, in words.
+    pub notes: Vec<String>,
+}
+
+/// The road of a drawing.
+pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Drawn, Error> {
+    let reader = Reader::of(file);
+    let Drawing { kerbs, lanes, mut notes } = drawing;
+    let loops = closed(&reader, kerbs, layers, &mut notes)?;
+    let (centre, radius) = island(&reader, &loops, layers)?;
+    let place = |curve: &Curve| moved(curve, -centre);
+    let loops: Vec<Curve> = loops.iter().map(place).collect();
+    let ways: Vec<Curve> = lanes.iter().map(|lane| place(&smooth(lane, &mut notes))).collect();
+    let turned: f64 = ways.iter().map(turn_about_centre).sum();
+    let mirrored = turned < 0.0;
+    let seen = |curve: &Curve| if mirrored { curve.mirrored() } else { curve.clone() };
+    let faces = Outline::new(loops.iter().map(seen).collect());
+    let ways: Vec<Curve> = ways.iter().map(seen).collect();
+    if mirrored {
+        notes.push("the ways lead clockwise around the island: left-hand traffic".into());
+    }
+    let arms = arms(&reader, &ways, layers, mirrored)?;
+    let outer = outer_radius(&faces, radius);
+    let mut lines = lines(&reader, &lanes, &ways, &arms, (radius, outer), layers.lane_width)?;
+    lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
+    let mut lane_radii: Vec<f64> =
+        lines.iter().map(|line| ring_radius(&line.line.polyline(0.01), radius, outer)).collect();
+    lane_radii.sort_by(f64::total_cmp);
+    lane_radii.dedup_by(|after, before| *after - *before < ONE_LANE);
+    let kerbs: Vec<Kerb> = faces.loops.iter().map(|curve| kerb_of(curve, &arms)).collect();
+    let ground = Ground {
+        mirrored,
+        origin: centre,
+        island_radius: radius,
+        outer_radius: outer,
+        lane_radii,
+        arms,
+        edges: Edges::Own(faces.clone()),
+        faces,
+        kerbs,
+        lanes: ways,
+        lines,
+    };
+    Ok(Drawn { ground, notes })
+}
+
+/// The closed outlines: those drawn as such, and chains of open pieces whose ends meet.
+fn closed(
+    reader: &Reader,
+    drawn: Vec<entities::Drawn>,
+    layers: &Layers,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Curve>, Error> {
+    let meets = |a: DVec2, b: DVec2| a.distance(b) <= GAP;
+    let ends = |curve: &Curve| (curve.point_at(0.0), curve.point_at(curve.length()));
+    let (mut loops, mut open) = (Vec::new(), Vec::new());
+    for one in drawn {
+        let (start, end) = ends(&one.curve);
+        if one.is_closed || meets(start, end) { loops.push(one.curve) } else { open.push(one) }
+    }
+    let n_open = open.len();
+    while let Some(entities::Drawn { mut curve, line, .. }) = open.pop() {
+        loop {
+            let (start, end) = ends(&curve);
+            if meets(start, end) {
+                break;
+            }
+            let next = open.iter().position(|other| {
+                let (from, to) = ends(&other.curve);
+                meets(end, from) || meets(end, to)
+            });
+            let Some(next) = next else {
+                let expected = format!(
+                    "the outline is open at ({:.3}, {:.3}) m: kerbs on layer {} must be closed within {GAP} m",
+                    end.x, end.y, layers.kerbs
+                );
+                return Err(reader.invalid(format!("line {line}"), "open", expected));
+            };
+            let other = open.swap_remove(next).curve;
+            let other = if meets(end, ends(&other).0) { other } else { other.reversed() };
+            curve.pieces.extend(other.pieces);
+        }
+        loops.push(curve);
+    }
+    if 0 < n_open {
+        notes.push(format!("{n_open} open lines of kerbs are joined to closed outlines"));
+    }
+    Ok(loops)
+}
+
+/// The centre and the radius of the central island.
+fn island(reader: &Reader, loops: &[Curve], layers: &Layers) -> Result<(DVec2, f64), Error> {
+    let outer = (0..loops.len()).max_by(|&a, &b| loops[a].signed_area().abs().total_cmp(&loops[b].signed_area().abs()));
+    let circle = |curve: &Curve| fitted_circle(&curve.polyline(0.002));
+    let islands = loops.iter().enumerate().filter(|(index, _)| Some(*index) != outer);
+    let round = islands.filter_map(|(_, curve)| circle(curve)).filter(|(_, radius, off)| *off < ROUND * radius);
+    let nearest = |one: &(DVec2, f64, f64)| layers.ring.map_or(-one.1, |ring| ring.distance(one.0));
+    let found = round.min_by(|one, other| nearest(one).total_cmp(&nearest(other)));
+    let found = found.map(|(centre, radius, _)| (centre, radius));
+    found.ok_or_else(|| {
+        let expected = format!("a round island among the {} outlines on layer {} is needed", loops.len(), layers.kerbs);
+        reader.invalid("ring", "none", expected)
+    })
+}
+
+/// A way without corners.
+fn smooth(lane: &entities::Drawn, notes: &mut Vec<String>) -> Curve {
+    let corner = |pair: &[Piece]| wrapped(pair[1].heading_at(0.0) - pair[0].heading_at(pair[0].length())).abs();
+    let sharpest = lane.curve.pieces.windows(2).map(corner).fold(0.0, f64::max);
+    if sharpest <= SMOOTH {
+        return lane.curve.clone();
+    }
+    notes.push(format!(
+        "line {}: the way has corners of up to {:.1} deg; a smooth line within {FITTED} m takes its place",
+        lane.line,
+        sharpest.to_degrees()
+    ));
+    fitted_line(&lane.curve.polyline(0.001), FITTED)
+}
+
+fn moved(curve: &Curve, by: DVec2) -> Curve {
+    let piece = |piece: &Piece| match *piece {
+        Piece::Segment { from, to } => Piece::Segment { from: from + by, to: to + by },
+        Piece::Arc { centre, radius, from, sweep } => Piece::Arc { centre: centre + by, radius, from, sweep },
+    };
+    Curve { pieces: curve.pieces.iter().map(piece).collect() }
+}
+
+/// How far a way turns about the centre, counter-clockwise positive (rad).
+fn turn_about_centre(way: &Curve) -> f64 {
+    way.polyline(0.05).windows(2).map(|pair| wrapped(pair[1].to_angle() - pair[0].to_angle())).sum()
+}
+
+/// The arms that the ends of the ways form, counter-clockwise from east in the world that is seen.
+fn arms(reader: &Reader, ways: &[Curve], layers: &Layers, mirrored: bool) -> Result<Vec<Arm>, Error> {
+    let ends = ways.iter().flat_map(|way| [way.point_at(0.0), way.point_at(way.length())]);
+    let mut bearings: Vec<f64> = ends.map(|end| end.to_angle().rem_euclid(TAU)).collect();
+    bearings.sort_by(f64::total_cmp);
+    let n = bearings.len();
+    let gap = |index: usize| (bearings[(index + 1) % n] - bearings[index]).rem_euclid(TAU);
+    let cuts: Vec<usize> = (0..n).filter(|&index| ONE_ARM < gap(index)).collect();
+    if cuts.is_empty() {
+        return Err(reader.invalid(
+            format!("layer {}", layers.lanes),
+            "no arms",
+            "the ways must begin and end on arms",
+        ));
+    }
+    let mut middles: Vec<f64> = cuts
+        .iter()
+        .enumerate()
+        .map(|(index, &cut)| {
+            let first = (cut + 1) % n;
+            let last = cuts[(index + 1) % cuts.len()];
+            let span = (bearings[last] - bearings[first]).rem_euclid(TAU);
+            (bearings[first] + 0.5 * span).rem_euclid(TAU)
+        })
+        .collect();
+    middles.sort_by(f64::total_cmp);
+    let seen = |bearing: f64| if mirrored { -bearing } else { bearing };
+    let compass = |bearing: f64| {
+        let point = (seen(bearing) / TAU * 8.0).round().rem_euclid(8.0) as usize % 8;
+        ["E", "NE", "N", "NW", "W", "SW", "S", "SE"][point].to_owned()
+    };
+    let mut names = layers.arms.clone();
+    if names.is_empty() {
+        for &bearing in &middles {
+            let name = compass(bearing);
+            let same =
+                names.iter().filter(|other| other.trim_end_matches(|c: char| c.is_ascii_digit()) == name).count();
+            names.push(if same == 0 { name } else { format!("{name}{}", same + 1) });
+        }
+    }
+    if names.len() != middles.len() {
+        let list: Vec<String> = middles.iter().map(|bearing| format!("{:.0}", bearing.to_degrees())).collect();
+        let expected = format!("the drawing has {} arms, at {} deg", middles.len(), list.join(", "));
+        return Err(reader.invalid("arms", format!("{:?}", layers.arms), expected));
+    }
+    Ok(names.into_iter().zip(middles).map(|(name, bearing)| Arm { name, bearing }).collect())
+}
+
+/// The routes along the ways.
+fn lines(
+    reader: &Reader,
+    drawn: &[entities::Drawn],
+    ways: &[Curve],
+    arms: &[Arm],
+    (island, outer): (f64, f64),
+    width: f64,
+) -> Result<Vec<Line>, Error> {
+    let arm_of = |end: DVec2| {
+        let apart = |arm: &Arm| wrapped(end.to_angle() - arm.bearing).abs();
+        (0..arms.len()).min_by(|&a, &b| apart(&arms[a]).total_cmp(&apart(&arms[b]))).unwrap_or(0)
+    };
+    let start = |way: &Curve| way.point_at(0.0);
+    let mut lines: Vec<Line> = Vec::new();
+    for (way, drawn) in ways.iter().zip(drawn) {
+        let refused = |found: String, expected: &str| reader.invalid(format!("line {}", drawn.line), found, expected);
+        let (entry, exit_arm) = (arm_of(start(way)), arm_of(way.point_at(way.length())));
+        let inwards = -DVec2::from_angle(arms[entry].bearing);
+        // Places of the lanes of this arm across the direction of travel, the rightmost first.
+        let aside = |way: &Curve| inwards.perp().dot(start(way));
+        let mut lanes: Vec<f64> = ways.iter().filter(|other| arm_of(start(other)) == entry).map(aside).collect();
+        lanes.sort_by(f64::total_cmp);
+        lanes.dedup_by(|after, before| *after - *before < ONE_LANE);
+        let own = lanes.iter().filter(|&&lane| lane < aside(way) - ONE_LANE).count();
+        let lane = match own {
+            0 => Lane::Right,
+            1 => Lane::Left,
+            _ => return Err(refused(format!("{} entry lanes", lanes.len()), "at most two lanes of an arm are driven")),
+        };
+        let leaves = |arm: usize| ways.iter().any(|other| arm_of(other.point_at(other.length())) == arm);
+        let turns = (exit_arm + arms.len() - entry - 1) % arms.len() + 1;
+        let exit = (1..=turns).filter(|turn| leaves((entry + turn) % arms.len())).count() as u32;
+        if lines.iter().any(|line| (line.entry, line.lane, line.exit) == (entry, lane, exit)) {
+            let found = format!("a second way from {} to {}", arms[entry].name, arms[exit_arm].name);
+            return Err(refused(found, "draw one line for each way"));
+        }
+        let middle = ring_radius(&way.polyline(0.01), island, outer);
+        let crossing = ((middle - island).max(width / 2.0), (outer - middle).max(width / 2.0));
+        let widths = [width; 3];
+        lines.push(Line { entry, lane, exit, exit_arm, line: way.clone(), crossing, widths, ends: [None, None] });
+    }
+    Ok(lines)
+}

@@ -1,0 +1,176 @@
+//! Drawings as other programs write them, and drawings that are refused.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use glam::DVec2;
+
+use super::*;
+use crate::geometry::{Curve, Piece};
+use crate::map::Road;
+
+const HEADER: &str = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n6\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n";
+const END: &str = "0\nENDSEC\n0\nEOF\n";
+
+fn layers() -> Layers {
+    Layers { kerbs: "KERB".into(), lanes: "LANE".into(), unit: None, lane_width: 4.0, ring: None, arms: Vec::new() }
+}
+
+fn read(entities: &str, layers: &Layers) -> Result<Drawn, String> {
+    parse(Path::new("site.dxf"), &format!("{HEADER}{entities}{END}"), layers).map_err(|error| error.to_string())
+}
+
+/// Where the road of these drawings lies (m).
+const AT: DVec2 = DVec2::new(3000.0, -500.0);
+
+/// A curve as a light polyline with bulges, its coordinates divided by `unit`.
+fn polyline(layer: &str, curve: &Curve, is_closed: bool, unit: f64) -> String {
+    let mut text = format!("0\nLWPOLYLINE\n8\n{layer}\n90\n0\n70\n{}\n", u8::from(is_closed));
+    let mut vertex = |p: DVec2, bulge: f64| {
+        let p = (AT + p) / unit;
+        let _ = write!(text, "10\n{}\n20\n{}\n42\n{bulge}\n", p.x, p.y);
+    };
+    for piece in &curve.pieces {
+        match *piece {
+            Piece::Segment { from, .. } => vertex(from, 0.0),
+            Piece::Arc { sweep, .. } => {
+                // Three parts of a whole circle have bulges below 1.
+                for part in 0..3 {
+                    vertex(piece.point_at(piece.length() * f64::from(part) / 3.0), (sweep / 12.0).tan());
+                }
+            }
+        }
+    }
+    if let Some(last) = curve.pieces.last().filter(|_| !is_closed) {
+        vertex(last.end(), 0.0);
+    }
+    text
+}
+
+/// The drawing of a road.
+fn drawn(road: &Road, unit: f64) -> String {
+    let ground = road.ground();
+    let kerbs = ground.faces.loops.iter().map(|curve| polyline("KERB", curve, true, unit));
+    let lanes = ground.lines.iter().map(|line| polyline("Lane", &line.line, false, unit));
+    kerbs.chain(lanes).collect()
+}
+
+#[test]
+fn a_drawing_of_a_road_is_that_road_within_a_millimetre_at_its_place() {
+    for name in ["16m", "20m", "50m"] {
+        let road = Road::named(name).unwrap();
+        let Drawn { ground, notes } = read(&drawn(&road, 1.0), &layers()).unwrap();
+        let own = road.ground();
+        assert_eq!(notes, Vec::<String>::new());
+        assert!(ground.origin.distance(AT) < 1e-3 && !ground.mirrored, "{name}: {}", ground.origin);
+        assert!((ground.island_radius - own.island_radius).abs() < 1e-3);
+        // The ring's outer kerb is looked for between the mouths of the arms, which reach into it.
+        assert!((ground.outer_radius - own.outer_radius).abs() < 3.0, "{name}: {}", ground.outer_radius);
+        let names = |ground: &crate::map::ground::Ground| {
+            let name = |line: &crate::map::ground::Line| {
+                format!("{}-{}-{}-{}", line.entry, line.lane.name(), line.exit, line.exit_arm)
+            };
+            ground.lines.iter().map(name).collect::<Vec<_>>()
+        };
+        assert_eq!(names(&ground).len(), names(own).len());
+        for face in &ground.faces.loops {
+            for p in face.polyline(0.01) {
+                assert!(own.faces.distance(p) < 1e-3, "{name}: {p}");
+            }
+        }
+        for line in &ground.lines {
+            assert!(own.lines.iter().any(|other| {
+                line.line.polyline(0.5).into_iter().all(|p| other.line.distance(p) < 1e-3)
+                    && (line.lane, line.exit) == (other.lane, other.exit)
+            }));
+        }
+        // The outline form keeps it.
+        ground.checked_text(Path::new("site.outline.toml"), &[]).unwrap();
+    }
+}
+
+#[test]
+fn feet_are_metres_and_a_drawing_that_does_not_say_its_unit_is_refused_with_the_flag() {
+    let road = Road::named("16m").unwrap();
+    let feet = Layers { unit: Some(Unit::Foot), ..layers() };
+    let Drawn { ground, .. } = read(&drawn(&road, 0.3048), &feet).unwrap();
+    assert!((ground.island_radius - road.island_radius()).abs() < 1e-3 && ground.origin.distance(AT) < 1e-3);
+    let unknown = HEADER.replace("70\n6\n", "70\n0\n") + &drawn(&road, 1.0) + END;
+    let said = parse(Path::new("site.dxf"), &unknown, &layers()).unwrap_err().to_string();
+    assert!(said.contains("line 8") && said.contains("--unit m, mm, cm, ft or in"), "{said}");
+}
+
+#[test]
+fn the_mirror_image_of_a_drawing_has_left_hand_traffic_and_is_driven_as_the_road() {
+    let road = Road::named("20m").unwrap();
+    let mirrored = Road::on("m".into(), crate::map::ground::Ground { mirrored: true, ..road.ground().clone() }).seen();
+    let Drawn { ground, notes } = read(&drawn(&mirrored, 1.0), &layers()).unwrap();
+    assert!(ground.mirrored && notes.iter().any(|note| note.contains("left-hand")), "{notes:?}");
+    assert!(ground.lines.iter().all(|line| {
+        road.ground()
+            .lines
+            .iter()
+            .any(|other| line.line.polyline(0.5).into_iter().all(|p| other.line.distance(p) < 1e-3))
+    }));
+}
+
+#[test]
+fn lines_and_arcs_whose_ends_meet_are_joined_and_those_that_do_not_are_refused_by_place() {
+    let road = Road::named("16m").unwrap();
+    let whole = drawn(&road, 1.0);
+    let island = road.ground().island_radius;
+    let n = whole.matches("LWPOLYLINE\n8\nKERB").count();
+    let parts: Vec<&str> = whole.split("0\nLWPOLYLINE").collect();
+    let index = road.ground().faces.loops.iter().position(|curve| {
+        curve.pieces.iter().all(|piece| matches!(piece, Piece::Arc { radius, .. } if (radius - island).abs() < 1e-6))
+    });
+    let without: String = parts
+        .iter()
+        .enumerate()
+        .filter(|(part, _)| Some(part.wrapping_sub(1)) != index)
+        .map(|(part, text)| if part == 0 { (*text).to_owned() } else { format!("0\nLWPOLYLINE{text}") })
+        .collect();
+    assert_eq!(without.matches("LWPOLYLINE\n8\nKERB").count(), n - 1);
+    let arc = |from: f64, to: f64| {
+        format!("0\nARC\n8\nKERB\n10\n{}\n20\n{}\n40\n{island}\n50\n{from}\n51\n{to}\n", AT.x, AT.y)
+    };
+    let halves = without.clone() + &arc(10.0, 190.0) + &arc(190.0, 10.0);
+    let Drawn { ground, notes } = read(&halves, &layers()).unwrap();
+    assert!((ground.island_radius - island).abs() < 1e-3 && notes[0].starts_with("2 open lines"), "{notes:?}");
+    let said = read(&(without + &arc(10.0, 180.0)), &layers()).unwrap_err();
+    assert!(said.contains("open at (") && said.contains("layer KERB"), "{said}");
+}
+
+#[test]
+fn what_is_neither_a_line_nor_an_arc_is_refused_by_its_line_and_other_layers_are_left_out() {
+    let road = drawn(&Road::named("16m").unwrap(), 1.0);
+    for (entity, expected) in [
+        ("0\nSPLINE\n8\nKERB\n", "convert it to a polyline"),
+        ("0\nINSERT\n8\nLANE\n2\nTREE\n", "explode it"),
+        ("0\nPOLYLINE\n8\nKERB\n66\n1\n70\n8\n0\nSEQEND\n8\nKERB\n", "plane polyline"),
+        ("0\nLINE\n8\nKERB\n10\n1\n20\n1\n11\n1\n21\n1\n230\n-1\n", "extrusion"),
+        ("0\nLINE\n8\nKERB\n10\nnan\n20\n1\n11\n1\n21\n1\n", "finite number"),
+        ("0\nCIRCLE\n8\nKERB\n10\n0\n20\n0\n40\n0\n", "must be positive"),
+    ] {
+        let said = read(&(road.clone() + entity), &layers()).unwrap_err();
+        assert!(said.contains(expected) && said.contains("line "), "{said}");
+        let other = entity.replace("8\nKERB", "8\nTREES").replace("8\nLANE", "8\nTREES");
+        let Drawn { notes, .. } = read(&(road.clone() + &other), &layers()).unwrap();
+        assert!(notes[0].contains("on 1 other layers"), "{notes:?}");
+    }
+    let said = read(&road, &Layers { kerbs: "CURB".into(), ..layers() }).unwrap_err();
+    assert!(said.contains("layer CURB") && said.contains("KERB ("), "{said}");
+    let without_lanes: String = road.replace("8\nLane", "8\nElsewhere");
+    assert!(read(&without_lanes, &layers()).unwrap_err().contains("layer LANE: empty"));
+}
+
+#[test]
+fn a_text_cut_anywhere_is_an_error_or_a_road_and_never_a_panic() {
+    let text = format!("{HEADER}{}{END}", drawn(&Road::named("16m").unwrap(), 1.0));
+    for at in (0..text.len()).step_by(997) {
+        let _ = parse(Path::new("site.dxf"), &text[..at], &layers());
+    }
+    for wrong in ["", "AutoCAD Binary DXF\r\n", "PK\u{3}\u{4}", "1\n2\n", "0\nSECTION\n2\n"] {
+        assert!(parse(Path::new("site.dxf"), wrong, &layers()).is_err(), "{wrong}");
+    }
+}
