@@ -1,6 +1,6 @@
 //! Success on each training route while the policy learns, and `routes.csv`, the file of it.
 //!
-//! Episodes are counted on the host alone: a device sums over all trucks. Without a counted episode there is no file.
+//! A device counts them with level replay alone. Without a counted episode there is no file.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
