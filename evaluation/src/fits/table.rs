@@ -24,11 +24,12 @@ pub enum Units {
 }
 
 impl Units {
-    /// A length with its digits (m).
+    /// A length with its digits; a zero has no sign (m).
     pub fn length(self, metres: f64) -> String {
+        let rounded = |value: f64, parts: f64| (value * parts).round() / parts + 0.0;
         match self {
-            Units::Metric => format!("{metres:.2}"),
-            Units::Feet => format!("{:.1}", metres / FOOT),
+            Units::Metric => format!("{:.2}", rounded(metres, 100.0)),
+            Units::Feet => format!("{:.1}", rounded(metres / FOOT, 10.0)),
         }
     }
 
@@ -246,6 +247,7 @@ mod tests {
         }
         let wide = table(&rows[..1], 120, Units::Metric);
         assert!(wide.contains("-0.25") && wide.contains("3.05") && wide.contains("0.10"), "{wide}");
+        assert_eq!(["0.00", "-0.01"], [-0.0004, -0.006].map(|metres| Units::Metric.length(metres)));
         let feet = table(&rows[..1], 120, Units::Feet);
         assert!(feet.contains("10.0") && feet.contains(" ft") && feet.contains("20") && feet.contains("mph"), "{feet}");
     }

@@ -22,6 +22,9 @@ const FITTED: f64 = 0.004;
 /// Ends of ways nearer than this are of one lane (m), and in directions nearer than this of one arm (rad).
 const ONE_LANE: f64 = 1.0;
 const ONE_ARM: f64 = 0.35;
+/// Most lines of kerbs, each of which is compared with every other, and most ways.
+const MOST_KERBS: usize = 5000;
+const MOST_WAYS: usize = 128;
 /// Farthest that an island may be from a circle, as a fraction of its radius.
 const ROUND: f64 = 0.3;
 
@@ -38,6 +41,8 @@ pub struct Drawn {
 pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Drawn, Error> {
     let reader = Reader::of(file);
     let Drawing { kerbs, lanes, mut notes } = drawing;
+    reader.count(&format!("lines on layer {}", layers.kerbs), kerbs.len(), 1..=MOST_KERBS)?;
+    reader.count(&format!("lines on layer {}", layers.lanes), lanes.len(), 1..=MOST_WAYS)?;
     let loops = closed(&reader, kerbs, layers, &mut notes)?;
     let (centre, radius) = island(&reader, &loops, layers)?;
     let place = |curve: &Curve| moved(curve, -centre);

@@ -160,6 +160,9 @@ fn what_is_neither_a_line_nor_an_arc_is_refused_by_its_line_and_other_layers_are
     }
     let said = read(&road, &Layers { kerbs: "CURB".into(), ..layers() }).unwrap_err();
     assert!(said.contains("layer CURB") && said.contains("KERB ("), "{said}");
+    let line = "0\nLINE\n8\nKERB\n10\n1\n20\n1\n11\n2\n21\n1\n";
+    let said = read(&(road.clone() + &line.repeat(5000)), &layers()).unwrap_err();
+    assert!(said.contains("lines on layer KERB: 5006; must lie in 1..5000"), "{said}");
     let without_lanes: String = road.replace("8\nLane", "8\nElsewhere");
     assert!(read(&without_lanes, &layers()).unwrap_err().contains("layer LANE: empty"));
 }
