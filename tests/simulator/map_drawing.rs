@@ -1,6 +1,5 @@
 //! A drawing that another program wrote, ezdxf 1.4: light and old polylines, lines and arcs in millimetres, on layers of
 //! its own, beside a text and a block.
-#![expect(clippy::unwrap_used, reason = "a test that cannot read its file must fail")]
 
 use std::path::Path;
 

@@ -73,7 +73,7 @@ fn a_clearance_that_no_way_keeps_makes_a_truck_not_fit_that_fits_without() {
     assert_eq!(output.status.code(), Some(1));
     let row = &place.json("fits/fits.json")["rows"][0];
     let clearance = row["way"]["trailer"]["clearance"].as_f64().unwrap();
-    assert!(0.0 <= clearance && clearance < 2.0 && row["searched_clearance"] == 0.0, "{row}");
+    assert!((0.0..2.0).contains(&clearance) && row["searched_clearance"] == 0.0, "{row}");
 }
 
 #[test]
