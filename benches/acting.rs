@@ -9,7 +9,7 @@
 use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 
 use offtrack::gpu::Columns;
 use offtrack::layout::N_VALUES;
@@ -123,6 +123,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "device": backend.name(),
         "machine": provenance::machine(),
         "commit": provenance::commit(),
+        "date": humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
         "trucks": n_envs,
         "rounds": n_rounds,
         "runs": runs,
