@@ -29,7 +29,7 @@ fn run(folder: &Path, settings: &[&str]) -> (Run<'static>, Folder, Shared) {
     let scenario = Scenario::named("attard2023").unwrap();
     let (world, routes) = (Arc::new(World::bake(&scenario).unwrap()), scenario.split(Split::Train).to_vec());
     let progress = Progress::new(&config, MetricsFile::create(folder.metrics()).unwrap(), Box::new(()));
-    let shared = Shared::open(None).unwrap();
+    let shared = Shared::least().unwrap();
     let backend = Backend::Device(Box::new(shared.clone()));
     let training = Session::new(&backend, &config, world.clone(), routes).unwrap();
     let routes = RouteCounts::new(&scenario, folder.routes());

@@ -37,7 +37,7 @@ fn devices() -> Vec<Device> {
     Vec::from([
         Device::flex(),
         #[cfg(feature = "gpu")]
-        crate::rollout::device::Shared::open(None).unwrap().tensors,
+        crate::rollout::device::Shared::least().unwrap().tensors,
     ])
 }
 

@@ -26,7 +26,22 @@ pub struct Shared {
 impl Shared {
     /// Opens the first adapter whose name contains `adapter`, and gives it to the tensor library too.
     pub fn open(adapter: Option<&str>) -> Result<Shared, Error> {
-        let gpu = gpu::Device::open(adapter).map_err(offtrack::simulator::Error::from)?;
+        Shared::of(gpu::Device::open(adapter).map_err(offtrack::simulator::Error::from)?)
+    }
+
+    /// The first adapter with the limits that every device of WebGPU has.
+    #[cfg(test)]
+    pub fn least() -> Result<Shared, Error> {
+        let asked = |adapter: &wgpu::Adapter| {
+            // The tensor library asks the adapter for its features, not the device.
+            let left_out = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS | wgpu::Features::all_experimental_mask();
+            (adapter.features() - left_out, wgpu::Limits::default())
+        };
+        Shared::of(gpu::Device::open_with(None, asked).map_err(offtrack::simulator::Error::from)?)
+    }
+
+    /// Gives an open device to the tensor library too.
+    fn of(gpu: gpu::Device) -> Result<Shared, Error> {
         let setup = WgpuSetup {
             instance: gpu.instance.clone(),
             adapter: gpu.adapter.clone(),

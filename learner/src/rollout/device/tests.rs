@@ -76,7 +76,7 @@ fn samples_have_the_extras_that_a_benchmark_observes() {
 /// Compares samples of a benchmark whose networks observe `N` values with the steps that were made.
 fn check_samples<const N: usize>(benchmark: &str) {
     let (world, routes) = training_of(benchmark);
-    let shared = Shared::open(None).unwrap();
+    let shared = Shared::least().unwrap();
     let mirror = Mirror::of(&world).unwrap();
     for settings in [
         ["learning.mirror_augmentation=true", "learning.observation_noise=0.2"],
@@ -173,7 +173,7 @@ fn check_samples<const N: usize>(benchmark: &str) {
 #[test]
 fn the_replay_buffer_has_the_simulators_rewards_and_more_for_an_arrival_where_that_is_asked_for() {
     let (world, routes) = training();
-    let shared = Shared::open(None).unwrap();
+    let shared = Shared::least().unwrap();
     let policy = Policy::shipped("attard2023").unwrap();
     let actor = Mlp::of(&policy.layers, &shared.tensors);
     for (setting, arrival) in [("seed=0", 0.0), ("learning.arrival=1500", 1500.0)] {
@@ -199,7 +199,7 @@ fn the_replay_buffer_has_the_simulators_rewards_and_more_for_an_arrival_where_th
 #[test]
 fn actions_follow_the_actors_distribution() {
     let (world, routes) = training();
-    let shared = Shared::open(None).unwrap();
+    let shared = Shared::least().unwrap();
     let config = config(&["n_envs=4096", "replay_buffer.capacity=100000"]);
     let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(&shared, &config, &world, routes, None, [7, 8]).unwrap();
     // Probabilities of 1/45, 2/45, ... 9/45.
@@ -224,7 +224,7 @@ fn actions_follow_the_actors_distribution() {
 /// Rewards of 40 samples, each requested before the next sample is drawn and computed when the device gets to it.
 fn rewards(skips_flush: bool) -> Vec<Vec<f32>> {
     let (world, routes) = training();
-    let mut shared = Shared::open(None).unwrap();
+    let mut shared = Shared::least().unwrap();
     shared.skips_flush = skips_flush;
     let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(
         &shared,
@@ -260,7 +260,7 @@ fn a_sample_is_read_before_the_next_one_overwrites_it_and_only_because_of_the_fl
 #[test]
 fn trucks_take_the_actions_of_the_latest_output() {
     let (world, routes) = training();
-    let shared = Shared::open(None).unwrap();
+    let shared = Shared::least().unwrap();
     let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(
         &shared,
         &config(&["learning.mirror_augmentation=false"]),

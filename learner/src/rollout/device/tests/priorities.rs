@@ -7,7 +7,7 @@ fn rollout(exponent: f64, n_steps: usize, settings: &[&str]) -> DeviceRollout<N_
     let (world, routes) = training();
     let exponent = format!("replay_buffer.priority.exponent={exponent}");
     let settings = [&[exponent.as_str(), "replay_buffer.priority.correction=0.4"], settings].concat();
-    let shared = Shared::open(None).unwrap();
+    let shared = Shared::least().unwrap();
     let mut rollout = DeviceRollout::with_seeds(&shared, &config(&settings), &world, routes, None, [7, 8]).unwrap();
     (0..n_steps).for_each(|_| rollout.step_at_random().unwrap());
     rollout
