@@ -62,7 +62,7 @@ fn files() -> Vec<PathBuf> {
         }
     }
     files.sort();
-    assert_eq!(files.len(), 22, "six roundabouts, three vehicles, eleven benchmarks, two distributions");
+    assert_eq!(files.len(), 24, "six roundabouts, five vehicles, eleven benchmarks, two distributions");
     files
 }
 

@@ -110,11 +110,18 @@ fn the_feature_gpu_is_named_only_where_an_engine_or_device_is_chosen() {
     let crates = [
         // The choice of a device, its failure, and a policy there.
         ("evaluation/src", 30, &[("device.rs", 4), ("error.rs", 2), ("placed.rs", 2)][..]),
-        // Backends, and tests on a device.
+        // Backends, what a device alone counts and shares, and tests there.
         (
             "learner/src",
             50,
-            &[("backend.rs", 9), ("rollout.rs", 1), ("run/lost_device_tests.rs", 1), ("sac/device_tests.rs", 1)],
+            &[
+                ("backend.rs", 9),
+                ("level_replay.rs", 2),
+                ("replay_buffer.rs", 1),
+                ("rollout.rs", 1),
+                ("run/lost_device_tests.rs", 1),
+                ("sac/device_tests.rs", 1),
+            ],
         ),
         // The list of devices, and the default training file.
         ("cli/src", 20, &[("commands/devices.rs", 3), ("commands/train.rs", 1)]),

@@ -66,7 +66,7 @@ fn shaders() -> Vec<(String, String)> {
             }
         }
     }
-    assert_eq!(shaders.len(), SHADERS.len() + 2);
+    assert_eq!(shaders.len(), SHADERS.len() + 3);
     shaders
 }
 
