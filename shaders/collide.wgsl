@@ -4,7 +4,6 @@
 // of the stretch are sampled for the capsule, so that a solid that lies wholly under the unit is found too, and the
 // corners themselves. The distance is 1-Lipschitz, so two samples bound it between them; the middle is sampled only
 // where the bound is not tight enough.
-
 //
 // A thread samples the first points of its truck's unit. Few units then have spans to halve: the workgroup's threads do
 // that together, a team of LANES threads for each such unit, one sample a thread.
@@ -128,7 +127,8 @@ fn middle(line: Line, part: u32) -> vec2<f32> {
 
 // Lower bound of the clearance on a span, as the distance is 1-Lipschitz (m).
 fn bound(line: Line, span: Span) -> f32 {
-    return 0.5 * (span.at_begin + span.at_end - width(span.line_and_part >> PART_SHIFT) * distance(line.begin, line.end)) - line.radius;
+    let length = width(span.line_and_part >> PART_SHIFT) * distance(line.begin, line.end);
+    return 0.5 * (span.at_begin + span.at_end - length) - line.radius;
 }
 
 // Whether the clearance on a span may be much less than the least found.

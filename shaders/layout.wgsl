@@ -655,7 +655,7 @@ struct BatchFacts {
 @group(0) @binding(6) var<storage, read> cells: array<vec2<u32>>;
 // Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of STORED_UNIT.
 @group(0) @binding(7) var<storage, read> corners: array<u32>;
-// The class of each vehicle; then of each route its number of waypoints, and for each class the steps after which an episode is timed out.
+// Each vehicle's class; then each route's number of waypoints, and each class's steps until it times out.
 @group(0) @binding(8) var<storage, read> limits: array<u32>;
 // Facts that the trucks of a batch share.
 @group(0) @binding(9) var<uniform> batch: BatchFacts;

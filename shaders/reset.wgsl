@@ -1,7 +1,7 @@
 // Begins episodes: within the step that ended the last one, in the step after it, or when the caller says so.
 //
-// Route and pose are functions of (seed, env, episode) alone, where the caller states none. Other kernels then perceive,
-// sense and observe the trucks that have begun.
+// Route and pose are functions of (seed, env, episode) alone, where the caller states none. Other kernels then
+// perceive, sense and observe the trucks that have begun.
 
 // Begins another episode where one ended, or holds the truck. A truck that was held when the step began begins its next
 // episode with NEXT_STEP.

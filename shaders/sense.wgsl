@@ -26,8 +26,8 @@ fn sense(thread: Thread) {
     place(thread.local, thread.local < batch.team && is_driving(env), env);
     trace_all(thread.local);
     for (var n = thread.local; n < batch.team * N_RAYS; n += WORKGROUP) {
-        let whose = n / N_RAYS;
-        if is_sensed[whose] == 1u { ranges[first * N_RAYS + n] = read_off(first + whose, n, truck[first + whose].steps + 1u); }
+        let whose = first + n / N_RAYS;
+        if is_sensed[n / N_RAYS] == 1u { ranges[first * N_RAYS + n] = read_off(whose, n, truck[whose].steps + 1u); }
     }
 }
 

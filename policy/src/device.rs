@@ -7,9 +7,7 @@ mod kernel;
 
 use offtrack::gpu::{self, Kernels, Slice};
 use offtrack::layout::{Column, WORKGROUP};
-use offtrack::wgpu::{
-    BindGroupDescriptor, BindGroupEntry, BindingResource, BufferBinding, CommandEncoder, ComputePassDescriptor,
-};
+use offtrack::wgpu::{CommandEncoder, ComputePassDescriptor};
 use offtrack::world::World;
 
 use crate::error::Error;
@@ -93,22 +91,8 @@ impl DevicePolicy {
     pub fn add(&self, encoder: &mut CommandEncoder, batch: &gpu::Batch) {
         let columns = [Column::Observation, Column::Extras, Column::Truck, Column::Action];
         let columns = columns.map(|column| batch.column(column));
-        let entries: Vec<BindGroupEntry> = (0..)
-            .zip(self.own.iter().chain(columns))
-            .map(|(binding, slice)| BindGroupEntry {
-                binding,
-                resource: BindingResource::Buffer(BufferBinding {
-                    buffer: &slice.buffer,
-                    offset: slice.offset,
-                    size: std::num::NonZero::new(slice.size),
-                }),
-            })
-            .collect();
-        let group = self.device.device.create_bind_group(&BindGroupDescriptor {
-            label: Some(Kernel::Act.name()),
-            layout: self.kernels.layout(Kernel::Act),
-            entries: &entries,
-        });
+        let slices = (0..).zip(self.own.iter().chain(columns));
+        let group = self.kernels.bind(&self.device.device, Kernel::Act, slices);
         let n_envs = columns[3].size / size_of::<u32>() as u64;
         let n_groups = n_envs.div_ceil(self.shape.tile().into());
         let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());

@@ -52,8 +52,8 @@ impl Device {
         })
     }
 
-    /// Opens an adapter as [`Device::open`] does, with the features and limits that `asked` names for it: the kernels of
-    /// a step work with no feature and with the limits that every device of WebGPU has, [`wgpu::Limits::default`].
+    /// Opens an adapter as [`Device::open`] does, with the features and limits that `asked` names for it: the kernels
+    /// of a step work with no feature and with the limits that every device of WebGPU has, [`wgpu::Limits::default`].
     pub fn open_with(
         name: Option<&str>,
         asked: impl FnOnce(&wgpu::Adapter) -> (Features, wgpu::Limits),

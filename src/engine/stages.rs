@@ -48,25 +48,13 @@ pub const BEGIN: [Kernel; 6] = [
     Kernel::Forget,
 ];
 
-/// The kernels of a step, first to last: each does a stage, or several at once.
-const STEP: [Kernel; 12] = [
-    Kernel::Advance,
-    Kernel::Collide,
-    Kernel::Sense,
-    Kernel::ObserveBoth,
-    Kernel::ExtrasBoth,
-    Kernel::JudgeAndCount,
-    Kernel::Reset,
-    Kernel::PerceiveAfterReset,
-    Kernel::SenseAfterReset,
-    Kernel::ObserveAfterReset,
-    Kernel::ExtrasAfterReset,
-    Kernel::ForgetAfterReset,
-];
+/// The kernels of a step before those of [`Stage::Reset`]: each does a stage, or several at once.
+const STEP: [Kernel; 6] =
+    [Kernel::Advance, Kernel::Collide, Kernel::Sense, Kernel::ObserveBoth, Kernel::ExtrasBoth, Kernel::JudgeAndCount];
 
 /// Those where disturbances come between the truck and the policy. Kernels that did more at once would need more
 /// buffers.
-const DISTURBED_STEP: [Kernel; 15] = [
+const DISTURBED_STEP: [Kernel; 9] = [
     Kernel::Steer,
     Kernel::Drive,
     Kernel::Follow,
@@ -76,12 +64,6 @@ const DISTURBED_STEP: [Kernel; 15] = [
     Kernel::ObserveExtras,
     Kernel::CopyObservation,
     Kernel::JudgeAndCount,
-    Kernel::Reset,
-    Kernel::PerceiveAfterReset,
-    Kernel::SenseAfterReset,
-    Kernel::ObserveAfterReset,
-    Kernel::ExtrasAfterReset,
-    Kernel::ForgetAfterReset,
 ];
 
 crate::named! {
@@ -168,7 +150,15 @@ impl Case {
     /// The kernels of a step, one after the other.
     pub fn step(self) -> impl Iterator<Item = Kernel> + Clone {
         let kernels: &[Kernel] = if self.disturbed { &DISTURBED_STEP } else { &STEP };
-        kernels.iter().copied().filter(move |kernel| kernel.works(self))
+        self.working(kernels.iter().chain(Stage::Reset.kernels()))
+    }
+
+    /// Those of some kernels that have anything to do.
+    pub fn working<'a>(
+        self,
+        kernels: impl Iterator<Item = &'a Kernel> + Clone,
+    ) -> impl Iterator<Item = Kernel> + Clone {
+        kernels.copied().filter(move |kernel| kernel.works(self))
     }
 }
 
@@ -263,7 +253,7 @@ impl Kernel {
     }
 
     /// Whether it has anything to do.
-    pub const fn works(self, case: Case) -> bool {
+    const fn works(self, case: Case) -> bool {
         match self {
             Kernel::PerceiveAfterReset => case.disturbed,
             Kernel::ObserveExtras | Kernel::ExtrasAfterReset | Kernel::ExtrasBoth => case.extras,

@@ -145,8 +145,7 @@ impl Table {
                 rows::<u32>(),
             ),
             Table::Limits => (
-                "The class of each vehicle; then of each route its number of waypoints, and for each class the steps \
-                 after which an episode is timed out.",
+                "Each vehicle's class; then each route's number of waypoints, and each class's steps until it times out.",
                 rows::<u32>(),
             ),
             Table::Batch => ("Facts that the trucks of a batch share.", BatchFacts::wgsl()),

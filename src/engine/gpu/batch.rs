@@ -90,7 +90,12 @@ impl Batch {
 
     /// Adds stages in one pass.
     fn add_stages(&self, encoder: &mut CommandEncoder, stages: &[Stage]) {
-        self.add_pass(encoder, stages.iter().flat_map(|stage| stage.kernels()).copied(), None);
+        self.add_pass(encoder, self.case.working(stages.iter().flat_map(|stage| stage.kernels())), None);
+    }
+
+    /// The kernels of a step with random actions.
+    fn random_step(&self) -> impl Iterator<Item = Kernel> + Clone + use<> {
+        std::iter::once(Kernel::Draw).chain(self.case.step())
     }
 
     /// Adds a pass of kernels, one after the other.
@@ -101,7 +106,7 @@ impl Batch {
         timestamp_writes: Option<ComputePassTimestampWrites>,
     ) {
         let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor { label: None, timestamp_writes });
-        for kernel in kernels.into_iter().filter(|kernel| kernel.works(self.case)) {
+        for kernel in kernels {
             let (group, threads) = (self.buffers.group(kernel), kernels::threads(kernel, self.n_envs));
             self.device.kernels().dispatch(&mut pass, kernel, group, threads);
         }
@@ -184,7 +189,7 @@ impl EngineBatch for Batch {
             self.host().into_iter().for_each(|batch| batch.set_streams(streams));
         }
         self.write(self.buffers.table(Table::Begins), cast_slice(begins));
-        self.submit(|batch, encoder| batch.add_pass(encoder, BEGIN, None));
+        self.submit(|batch, encoder| batch.add_pass(encoder, batch.case.working(BEGIN.iter()), None));
         Ok(self.device.check()?)
     }
 
@@ -237,20 +242,20 @@ impl EngineBatch for Batch {
 
     fn steps_at_random(&mut self, _: &World, n_steps: usize) {
         self.submit(|batch, encoder| {
-            let kernels = std::iter::once(Kernel::Draw).chain(batch.case.step());
-            batch.add_pass(encoder, std::iter::repeat_n(kernels, n_steps).flatten(), None);
+            batch.add_pass(encoder, std::iter::repeat_n(batch.random_step(), n_steps).flatten(), None);
         });
     }
 
     fn step_at_random_by_stage(&mut self, _: &World) -> Result<[Duration; N_STAGES], engine::Error> {
         self.submit(Batch::add_draw);
-        let times = kernel_times::lasted(self, &STAGES.map(|stage| stage.kernels().to_vec()))?;
+        let case = self.case;
+        let times = kernel_times::lasted(self, &STAGES.map(|stage| case.working(stage.kernels().iter()).collect()))?;
         let mut times = times.into_iter();
         Ok(std::array::from_fn(|_| times.next().unwrap_or_default()))
     }
 
     fn step_at_random_by_kernel(&mut self) -> Result<Vec<(&'static str, Duration)>, engine::Error> {
-        let kernels: Vec<Kernel> = std::iter::once(Kernel::Draw).chain(self.case.step()).collect();
+        let kernels: Vec<Kernel> = self.random_step().collect();
         let each: Vec<Vec<Kernel>> = kernels.iter().map(|&kernel| vec![kernel]).collect();
         let times = kernel_times::lasted(self, &each)?;
         Ok(kernels.into_iter().map(Kernel::name).zip(times).collect())

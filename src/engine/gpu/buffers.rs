@@ -1,6 +1,6 @@
 //! The buffers of a batch on a device, and the bind groups that kernels see them through.
 
-use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, Buffer, BufferBinding};
+use wgpu::{BindGroup, Buffer};
 
 use super::tables::{Tables, sizes};
 use super::{Device, Error};
@@ -45,24 +45,8 @@ impl Buffers {
         });
         let slices: Vec<Slice> = made.collect::<Result<_, Error>>()?;
         let group = |&kernel: &Kernel| {
-            let entry = |buffer: &Shared| {
-                let slice = &slices[buffer.binding()];
-                BindGroupEntry {
-                    binding: buffer.binding() as u32,
-                    resource: BindingResource::Buffer(BufferBinding {
-                        buffer: &slice.buffer,
-                        offset: slice.offset,
-                        size: std::num::NonZero::new(slice.size),
-                    }),
-                }
-            };
-            let entries: Vec<BindGroupEntry> = kernel.buffers().iter().map(entry).collect();
-            let layout = device.kernels().layout(kernel);
-            device.device.create_bind_group(&BindGroupDescriptor {
-                label: Some(kernel.name()),
-                layout,
-                entries: &entries,
-            })
+            let named = kernel.buffers().iter().map(|buffer| (buffer.binding() as u32, &slices[buffer.binding()]));
+            device.kernels().bind(&device.device, kernel, named)
         };
         let groups = Kernel::ALL.iter().map(group).collect();
         device.check()?;

@@ -1,11 +1,15 @@
 //! Shaders, compiled: a pipeline and a bind group layout for each entry point of a module.
 
+use std::num::NonZero;
+
 use wgpu::{
-    BindGroup, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType,
-    ComputePass, ComputePipeline, ComputePipelineDescriptor, PipelineCompilationOptions, PipelineLayoutDescriptor,
-    ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry,
+    BindingResource, BindingType, BufferBinding, BufferBindingType, ComputePass, ComputePipeline,
+    ComputePipelineDescriptor, PipelineCompilationOptions, PipelineLayoutDescriptor, ShaderModuleDescriptor,
+    ShaderSource, ShaderStages,
 };
 
+use super::Slice;
 use super::tables::team;
 use crate::engine::stages::{Kernel, SHADERS, Threads};
 use crate::layout::buffers::Access;
@@ -63,9 +67,26 @@ impl<K: Named> Kernels<K> {
         Kernels { compiled: compiled.collect(), names: std::marker::PhantomData }
     }
 
-    /// The layout of a kernel's bind group.
-    pub fn layout(&self, kernel: K) -> &BindGroupLayout {
-        &self.compiled[kernel.index()].0
+    /// Binds a kernel to the buffers that it names, each with its binding.
+    pub fn bind<'a>(
+        &self,
+        device: &wgpu::Device,
+        kernel: K,
+        slices: impl IntoIterator<Item = (u32, &'a Slice)>,
+    ) -> BindGroup {
+        let entries = slices.into_iter().map(|(binding, slice)| BindGroupEntry {
+            binding,
+            resource: BindingResource::Buffer(BufferBinding {
+                buffer: &slice.buffer,
+                offset: slice.offset,
+                size: NonZero::new(slice.size),
+            }),
+        });
+        device.create_bind_group(&BindGroupDescriptor {
+            label: Some(kernel.name()),
+            layout: &self.compiled[kernel.index()].0,
+            entries: &entries.collect::<Vec<_>>(),
+        })
     }
 
     /// Adds a kernel to a pass, bound to `group`, over so many threads. Their workgroups lie in rows: see

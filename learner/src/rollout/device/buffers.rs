@@ -3,7 +3,7 @@
 use bytemuck::{bytes_of, cast_slice};
 use offtrack::gpu::{Kernels, Slice};
 use offtrack::layout::Column;
-use wgpu::{BindGroup, BindGroupDescriptor, BindGroupEntry, BindingResource, BufferBinding, Device};
+use wgpu::{BindGroup, Device};
 
 use super::DeviceRollout;
 use super::memory_kernels::{Binding, Kernel, Now, Value, add};
@@ -36,24 +36,11 @@ impl Buffers {
         kernel: Kernel,
         other: Option<(Binding, &Slice)>,
     ) -> BindGroup {
-        let entry = |&binding: &Binding| {
-            let own = self.slice(binding);
-            let slice = other.filter(|(replaced, _)| *replaced == binding).map_or(own, |(_, slice)| slice);
-            BindGroupEntry {
-                binding: binding as u32,
-                resource: BindingResource::Buffer(BufferBinding {
-                    buffer: &slice.buffer,
-                    offset: slice.offset,
-                    size: std::num::NonZero::new(slice.size),
-                }),
-            }
-        };
-        let entries: Vec<BindGroupEntry> = kernel.bindings().iter().map(entry).collect();
-        device.create_bind_group(&BindGroupDescriptor {
-            label: Some(kernel.name()),
-            layout: kernels.layout(kernel),
-            entries: &entries,
-        })
+        let named = kernel.bindings().iter().map(|&binding| {
+            let replaced = other.filter(|(replaced, _)| *replaced == binding);
+            (binding as u32, replaced.map_or(self.slice(binding), |(_, slice)| slice))
+        });
+        kernels.bind(device, kernel, named)
     }
 }
 
