@@ -44,10 +44,10 @@ pub struct Args {
     #[arg(long, default_value = "empty")]
     load: String,
     /// Speed of the vehicle, from its start on (km/h).
-    #[arg(long, default_value_t = 15.0)]
+    #[arg(long, default_value_t = 15.0, allow_negative_numbers = true)]
     speed_kmh: f64,
     /// Distance that tractor and trailer must keep from every kerb (m).
-    #[arg(long, default_value_t = 0.0, value_name = "M")]
+    #[arg(long, default_value_t = 0.0, value_name = "M", allow_negative_numbers = true)]
     clearance: f64,
     /// Only this route of each road, N-left-3, or of one, 16m/N-left-3; repeatable. All without it.
     #[arg(long)]
@@ -65,8 +65,8 @@ pub struct Args {
     /// Print feet and mph in place of metres and km/h; the files have metres.
     #[arg(long)]
     feet: bool,
-    /// The folder to write: fits.json, fits.csv, of each road a sheet at scale, ROAD.svg and ROAD.pdf, and the swept paths
-    /// of each vehicle, ROAD-VEHICLE.dxf.
+    /// The folder to write: fits.json, fits.csv, of each road a sheet at scale, ROAD.svg and ROAD.pdf, and the swept
+    /// paths of each vehicle, ROAD-VEHICLE.dxf.
     #[arg(short, long)]
     output: PathBuf,
 }

@@ -134,7 +134,7 @@ fn wrong_input_is_refused_by_flag_and_value() {
         (&["--vehicle", "no_such"][..], "vehicle: no_such"),
         (&["--vehicle", "daf_xf", "--load", "wood"], "--load: wood; the vehicle has empty"),
         (&["--vehicle", "daf_xf", "--speed-kmh", "0"], "--speed-kmh: 0 km/h"),
-        (&["--vehicle", "daf_xf", "--clearance=-1"], "--clearance: -1 m"),
+        (&["--vehicle", "daf_xf", "--clearance", "-1"], "--clearance: -1 m"),
         (&["--vehicle", "daf_xf", "--clearance", "nan"], "--clearance"),
         (&["--vehicle", "daf_xf", "--route", "N-left-9"], "--route: N-left-9; the roads have 16m/E-left-2"),
         (&["--vehicle", "daf_xf", "--vehicle", "daf_xf"], "--vehicle: daf_xf; is named twice"),
