@@ -21,6 +21,7 @@ from pathlib import Path
 
 import gymnasium
 import numpy
+
 import offtrack_sim
 
 REPOSITORY = Path(__file__).resolve().parents[1]

@@ -182,6 +182,36 @@ impl Scenario {
         Scenario::from_source(&Source::find(Kind::Benchmark, name_or_path)?, loading)
     }
 
+    /// Reads the text of a benchmark that is in no file. What it refers to lies relative to `folder`; without one it is a
+    /// file that comes with the library, `vehicles/daf_xf.toml`, or lies relative to the process's folder.
+    ///
+    /// ```
+    /// use offtrack::files::cache::Loading;
+    /// use offtrack::scenario::Scenario;
+    ///
+    /// let slow = Scenario::text_of("attard2023")?.replace("speeds_kmh = [30.0]", "speeds_kmh = [20.0]");
+    /// let scenario = Scenario::parse("slow", &slow, None, &Loading::PLAIN)?;
+    /// assert_eq!(scenario.cruising_speed(), 20.0 / 3.6);
+    /// # Ok::<(), offtrack::files::reader::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Scenario::load`], which name the text `slow (a text)`.
+    pub fn parse(name: &str, text: &str, folder: Option<&Path>, loading: &Loading) -> Result<Scenario, Error> {
+        let source = Source::Text { name: name.to_owned(), text: text.to_owned(), folder: folder.map(Path::to_owned) };
+        Scenario::from_source(&source, loading)
+    }
+
+    /// The text of a benchmark's file, found as by [`Scenario::find`].
+    ///
+    /// # Errors
+    ///
+    /// A name that is not known, and a file that cannot be read.
+    pub fn text_of(name_or_path: &str) -> Result<String, Error> {
+        Source::find(Kind::Benchmark, name_or_path)?.text()
+    }
+
     /// Indices of a split's routes in the world's table.
     pub fn split(&self, split: Split) -> &[u32] {
         &self.splits[split as usize]

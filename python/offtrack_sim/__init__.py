@@ -3,6 +3,7 @@
 - :func:`make_vec` makes a vector environment of Gymnasium: many trucks, stepped together by the simulator.
 - :class:`Roundabout` is one truck, ``gymnasium.make("offtrack_sim:offtrack/Roundabout-v0")``.
 - :class:`Batch` is the simulator itself, without spaces and infos.
+- :func:`benchmark` reads a benchmark; :class:`Benchmark` is one in memory, changed or your own.
 - :class:`Policy` drives: the policy that comes with the package, or a trained one. :func:`evaluate` counts its success.
 - :class:`Observer` is what a policy observes of trucks that something else drives.
 - :mod:`offtrack_sim.sb3`, :mod:`offtrack_sim.puffer`: the same trucks for Stable-Baselines3 and PufferLib.
@@ -17,26 +18,31 @@ from __future__ import annotations
 import gymnasium
 
 from ._offtrack import ScenarioError, __version__, scenario_names
-from .batch import Batch, Ends, Start
+from .batch import Batch
+from .episodes import Ends, Start
 from .evaluation import Evaluation, evaluate
-from .layout import COLUMNS, EXTRAS, OBSERVATION, Ended, Values
+from .geometry import Road
+from .layout import COLUMN_DOCS, COLUMNS, EXTRAS, OBSERVATION, Ended, Values
 from .observer import Frame, Observer, Seen, speed_control
 from .policy import Policy
-from .scenarios import write_scenarios
+from .scenarios import Benchmark, benchmark, write_scenarios
 from .single import Roundabout
 from .vector import RoundaboutVector, make_vec
 
 __all__ = [
     "COLUMNS",
+    "COLUMN_DOCS",
     "EXTRAS",
     "OBSERVATION",
     "Batch",
+    "Benchmark",
     "Ended",
     "Ends",
     "Evaluation",
     "Frame",
     "Observer",
     "Policy",
+    "Road",
     "Roundabout",
     "RoundaboutVector",
     "ScenarioError",
@@ -44,6 +50,7 @@ __all__ = [
     "Start",
     "Values",
     "__version__",
+    "benchmark",
     "evaluate",
     "make_vec",
     "scenario_names",

@@ -1,5 +1,5 @@
 from collections.abc import Callable
-from typing import Any, final
+from typing import Any, TypeAlias, final
 
 import numpy as np
 import numpy.typing as npt
@@ -20,10 +20,16 @@ __all__ = [
     "extra_groups",
     "end_codes",
     "scenario_files",
+    "scenario_keys",
     "scenario_names",
+    "scenario_of_keys",
+    "scenario_text",
 ]
 
 __version__: str
+
+# The name or path of a benchmark, or its name, its text and the folder that its paths are relative to.
+_Given: TypeAlias = str | tuple[str, str, str | None]
 
 class ScenarioError(ValueError): ...
 
@@ -55,7 +61,7 @@ class Batch:
     def action_table(self) -> npt.NDArray[np.float32]: ...
     def __new__(
         cls,
-        scenario: str,
+        scenario: _Given,
         num_envs: int,
         *,
         split: str,
@@ -65,6 +71,7 @@ class Batch:
         num_threads: int,
         device: str,
         max_episode_steps: int | None,
+        weights: list[tuple[str, float]] | None,
     ) -> Self: ...
     def step(
         self, actions: npt.NDArray[Any]
@@ -120,6 +127,14 @@ class Batch:
     ) -> None: ...
     def streams(self) -> list[tuple[int, int]]: ...
     def tally(self) -> dict[str, float]: ...
+    def geometry_of(
+        self, route: str
+    ) -> tuple[
+        npt.NDArray[np.float64], npt.NDArray[np.float64], list[npt.NDArray[np.float64]], list[npt.NDArray[np.float64]]
+    ]: ...
+    def kerb_distances(self, route: str, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]: ...
+    def dimensions_of(self, vehicle: int) -> dict[str, float]: ...
+    def weigh_routes(self, weights: list[tuple[str, float]]) -> None: ...
     def picture(self, env: int, size: int) -> npt.NDArray[np.uint8]: ...
 
 @disjoint_base
@@ -140,7 +155,7 @@ class Observer:
     def action_table(self) -> npt.NDArray[np.float32]: ...
     def __new__(
         cls,
-        scenario: str,
+        scenario: _Given,
         routes: list[str],
         *,
         vehicles: list[tuple[str, str]] | None,
@@ -205,16 +220,19 @@ def drive(
     device: str,
 ) -> npt.NDArray[np.int64]: ...
 def wilson(successes: int, trials: int) -> tuple[float, float]: ...
-def column_layouts() -> list[tuple[str, list[tuple[str, str, int]], int]]: ...
+def column_layouts() -> list[tuple[str, list[tuple[str, str, int, str]], int, str]]: ...
 def observation_groups() -> list[tuple[str, int, int, float, str]]: ...
 def extra_groups() -> list[tuple[str, int, int, float, str]]: ...
 def end_codes() -> list[str]: ...
 def scenario_files() -> list[tuple[str, str]]: ...
+def scenario_keys(name: str, text: str) -> str: ...
 def scenario_names() -> list[str]: ...
+def scenario_of_keys(keys: str) -> str: ...
+def scenario_text(name_or_path: str) -> str: ...
 def policy_names() -> list[str]: ...
 def write_policy(
     file: str,
-    scenario: str,
+    scenario: _Given,
     layers: list[tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]],
     activation: str,
     normalisation: tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]] | None,

@@ -6,8 +6,10 @@ import enum
 import itertools
 import operator
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
+
+import numpy as np
 
 #: Most names of routes that a batch takes: more than any benchmark has routes.
 MOST_NAMES = 10_000_000
@@ -29,14 +31,6 @@ def file_name(file: str | os.PathLike[str]) -> str:
         return text("file", os.fspath(file))
     except TypeError:
         raise TypeError(f"file: {file!r}; the path of a file is needed") from None
-
-
-def scenario_name(scenario: str | os.PathLike[str]) -> str:
-    """A benchmark's name or path as text."""
-    try:
-        return text("scenario", os.fspath(scenario))
-    except TypeError:
-        raise TypeError(f"scenario: {scenario!r}; the name of a benchmark or the path of its file is needed") from None
 
 
 def checked_integer(name: str, value: int) -> int:
@@ -97,3 +91,15 @@ def stream_of(name: str, given: tuple[int, int] | None) -> tuple[int, int] | Non
     except (TypeError, ValueError):
         raise TypeError(f"{name}: {given!r}; a pair of seed and index is needed") from None
     return within(f"{name}[0]", seed, 0, 2**32), within(f"{name}[1]", env, 0, 2**32)
+
+
+def weights_of(weights: Mapping[str, float]) -> list[tuple[str, float]]:
+    """Weights as the native part takes them."""
+    if not isinstance(weights, Mapping):
+        raise TypeError(f"weights: {weights!r}; a dict of numbers by name of route or roundabout is needed")
+    pairs = []
+    for name, weight in weights.items():
+        if not isinstance(weight, int | float | np.integer | np.floating):
+            raise TypeError(f"weights[{name!r}]: {weight!r}; a number is needed")
+        pairs.append((text("weights", name), float(weight)))
+    return pairs

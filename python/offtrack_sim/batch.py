@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import enum
 import itertools
-import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,53 +17,26 @@ from .arguments import (
     checked_seed,
     mode_name,
     names_of,
-    scenario_name,
     stream_of,
     text,
+    weights_of,
     within,
 )
+from .episodes import Ends, Floats, Ints, Start
+from .geometry import Road
 from .layout import COLUMNS
+from .scenarios import Scenario, given, kept
 
 Array = npt.NDArray[Any]
-Floats = npt.NDArray[np.float32]
 Bools = npt.NDArray[np.bool_]
-Ints = npt.NDArray[np.int64]
-
-
-class Ends(NamedTuple):
-    """The episodes that the last step ended, k of them."""
-
-    envs: Ints
-    """Index of each truck, ``[k]``."""
-    codes: Ints
-    """Why, as :class:`Ended`, ``[k]``."""
-    routes: Ints
-    """Index of its route in ``Batch.route_names``, ``[k]``."""
-    observations: Floats
-    """The observation after the last action, ``[k, n_values]``."""
-    vehicles: Ints
-    """Index of its vehicle in ``Batch.vehicle_classes``, ``[k]``."""
-
-
-class Start(NamedTuple):
-    """How a truck begins its route; the zeros are the first vehicle on the lane's centre line."""
-
-    offset: float = 0.0
-    """Lateral offset as a fraction of the benchmark's largest, in ``-1..1``, left positive."""
-    heading: float = 0.0
-    """Heading error as a fraction of the benchmark's largest, in ``-1..1``, counter-clockwise positive."""
-    speed: float = 0.0
-    """Where in the benchmark's range of speeds at the start: -1 the lowest, 0 the middle, 1 the highest."""
-    vehicle: int | tuple[str, str] = 0
-    """Index of the vehicle in ``Batch.vehicle_classes``, or its class, one of ``Batch.classes``: that class's first."""
 
 
 class Batch(_offtrack.Batch):
     """Many trucks in one world.
 
     Args:
-        scenario: Name of a benchmark that comes with the package, see :func:`offtrack_sim.scenario_names`, or the path
-            of a benchmark file.
+        scenario: Name of a benchmark that comes with the package, see :func:`offtrack_sim.scenario_names`; the path of
+            a benchmark file; a :class:`offtrack_sim.Benchmark`; or a dict of a benchmark's keys.
         num_envs: Number of trucks.
         split: Routes that episodes are drawn from: ``"train"``, ``"validation"`` or ``"test"``.
         routes: Names of routes (``"16m/N-left-3"``) or of roundabouts (``"16m"``) of any split, in place of a split;
@@ -75,6 +47,9 @@ class Batch(_offtrack.Batch):
         num_threads: Threads that step the trucks; None for one a core. No result depends on it.
         device: ``"cpu"``, ``"gpu"`` for the first graphics device, or a part of a graphics device's name.
         max_episode_steps: Steps after which an episode is timed out in any case; None for the benchmark's limit alone.
+        weights: How often routes are drawn: 0 to 1e6 by the name of a route or a roundabout, 1 for those that it does
+            not name, kept to 1 in 4,096; ``{}`` for equal ones that :meth:`weigh` may change. Without it each is
+            as likely, by other random numbers.
 
     Attributes:
         num_envs: Number of trucks.
@@ -108,7 +83,7 @@ class Batch(_offtrack.Batch):
 
     def __new__(
         cls,
-        scenario: str | os.PathLike[str] = "attard2023",
+        scenario: Scenario = "attard2023",
         num_envs: int = 1,
         *,
         split: str = "train",
@@ -118,14 +93,15 @@ class Batch(_offtrack.Batch):
         num_threads: int | None = None,
         device: str = "cpu",
         max_episode_steps: int | None = None,
+        weights: Mapping[str, float] | None = None,
     ) -> Batch:
         threads = 0 if num_threads is None else within("num_threads", num_threads, 1, 1025)
         # Gymnasium's -1 is no limit.
         limit = None if max_episode_steps in (None, -1) else within("max_episode_steps", max_episode_steps, 1, 2**32)
-        source, names = scenario_name(scenario), None if routes is None else names_of(routes)
+        names = None if routes is None else names_of(routes)
         batch = super().__new__(
             cls,
-            source,
+            given(scenario),
             min(checked_integer("num_envs", num_envs), 2**62),
             split=text("split", split),
             routes=names,
@@ -134,16 +110,15 @@ class Batch(_offtrack.Batch):
             num_threads=threads,
             device=text("device", device),
             max_episode_steps=limit,
+            weights=None if weights is None else weights_of(weights),
         )
         known = {"route": batch.route_names}
         if len(batch.classes) > 1:
             known["vehicle"], known["load"] = ([pair[i] for pair in batch.classes] for i in (0, 1))
         batch._names = {key: np.array(values, dtype=object) for key, values in known.items()}
         batch._rows = batch.vehicle_classes
-        # A relative path is found from another folder too.
-        is_file = source.endswith(".toml") or os.path.isfile(source)
         batch._arguments = {
-            "scenario": os.path.abspath(source) if is_file else source,
+            "scenario": kept(scenario),
             "num_envs": batch.num_envs,
             "split": split,
             "routes": names,
@@ -151,6 +126,7 @@ class Batch(_offtrack.Batch):
             "num_threads": num_threads,
             "device": device,
             "max_episode_steps": limit,
+            "weights": None if weights is None else dict(weights),
         }
         return batch
 
@@ -271,8 +247,8 @@ class Batch(_offtrack.Batch):
             raise ValueError(f"envs: {outside}; the batch has trucks 0..{self.num_envs}")
         if seeds is not None and streams is not None:
             raise ValueError("seeds, streams: give one of them")
-        for name, given in {"seeds": seeds, "streams": streams, "routes": routes, "starts": starts}.items():
-            check_length(name, given, len(indices))
+        for name, values in {"seeds": seeds, "streams": streams, "routes": routes, "starts": starts}.items():
+            check_length(name, values, len(indices))
         checked: list[tuple[int, int] | None] | None = None
         if seeds is not None:
             checked = [
@@ -285,6 +261,42 @@ class Batch(_offtrack.Batch):
             routes = [None if name is None else text(f"routes[{index}]", name) for index, name in enumerate(routes)]
         stated = None if starts is None else [self._start(index, start) for index, start in enumerate(starts)]
         self.begin_episodes(indices, checked, routes, stated)
+
+    def weigh(self, weights: Mapping[str, float]) -> None:
+        """Draws the routes of later episodes by these weights, as ``weights`` of the batch; those under way go on.
+
+        Copies and pickles keep them.
+
+        Raises:
+            TypeError, ValueError: For a name that the batch does not draw, a weight outside 0..1e6, weights of 0 alone,
+                and a batch that was made without ``weights``; nothing has changed then.
+        """
+        if self._arguments["weights"] is None:
+            raise ValueError("weights: the batch was made without; make it with weights={}")
+        self.weigh_routes(weights_of(weights))
+        self._arguments = {**self._arguments, "weights": dict(weights)}
+
+    def road(self, route: str) -> Road:
+        """A route, its lanes and kerbs as arrays, in the frame of ``columns("truck")``, see :class:`Road`."""
+        return Road(*self.geometry_of(text("route", route)))
+
+    def kerb_distance(self, route: str, points: npt.ArrayLike) -> Floats:
+        """Distance of points ``[n, 2]`` from the nearest kerb of a route's road [m], negative off the road, ``[n]``.
+
+        It is exact on the road near a kerb; at most the rays' accuracy beyond some metres, and a lower bound off the
+        map. The frame is that of :meth:`road`.
+        """
+        found = np.asarray(points, dtype=np.float64)
+        if found.ndim != 2 or found.shape[1] != 2 or not np.isfinite(found).all():
+            raise ValueError(f"points: {found.dtype} of shape {found.shape}; finite numbers of shape (n, 2) are needed")
+        return self.kerb_distances(text("route", route), found)
+
+    def dimensions(self, vehicle: int | tuple[str, str] = 0) -> dict[str, float]:
+        """Lengths [m], masses [kg] and limits (SI, rad) of a vehicle, which is given as in :class:`Start`.
+
+        Ends of the tractor are ahead of its drive axle, those of the trailer ahead of its axle group.
+        """
+        return self.dimensions_of(self._vehicle("vehicle", vehicle))
 
     def _indices(self, envs: Iterable[int]) -> list[int]:
         """Trucks that a caller names: no more than there are, however long what was given is."""

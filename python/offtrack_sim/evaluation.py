@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from .arguments import checked_integer, checked_seed, text
 from .batch import Batch
 from .layout import Ended
 from .policy import Policy
+from .scenarios import Scenario
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Evaluation:
 
 def evaluate(
     policy: Policy | Callable[[npt.NDArray[np.float32]], Any],
-    scenario: str | os.PathLike[str] = "attard2023",
+    scenario: Scenario = "attard2023",
     *,
     split: str = "test",
     routes: Iterable[str] | None = None,

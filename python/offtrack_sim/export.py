@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
-from .arguments import file_name, scenario_name
-from .batch import Floats
+from .arguments import file_name
+from .episodes import Floats
+from .scenarios import Scenario, given
 
 #: A normalised observation is clamped to this, see docs/policies.md.
 CLIP = 10.0
@@ -26,7 +27,7 @@ def save(
     file: str | os.PathLike[str],
     model: Any,
     *,
-    scenario: str = "attard2023",
+    scenario: Scenario = "attard2023",
     mean: npt.ArrayLike | None = None,
     variance: npt.ArrayLike | None = None,
     epsilon: float = 1e-8,
@@ -74,7 +75,7 @@ def save(
         if not (spread > 0).all():
             raise ValueError("variance: every value plus epsilon must be greater than 0")
         normalisation = _vector("mean", mean), _vector("variance", 1 / np.sqrt(spread))
-    _offtrack.write_policy(file_name(file), scenario_name(scenario), layers, activation, normalisation)
+    _offtrack.write_policy(file_name(file), given(scenario), layers, activation, normalisation)
 
 
 def _layers(model: Any) -> tuple[Layers, str]:

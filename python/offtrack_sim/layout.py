@@ -48,15 +48,22 @@ EXTRAS: tuple[Values, ...] = tuple(Values(*values) for values in _offtrack.extra
 """What may stand behind these values, a value each: a benchmark with extras has the first so many, ``Batch.extras``."""
 
 
-def _dtype(fields: list[tuple[str, str, int]], n: int) -> np.dtype[Any]:
+def _dtype(fields: list[tuple[str, str, int, str]], n: int) -> np.dtype[Any]:
     def typed(kind: str, length: int) -> np.dtype[Any]:
         return np.dtype((kind, (length,))) if length else np.dtype(kind)
 
     if len(fields) == 1 and not fields[0][0]:
         return typed(fields[0][1], n)
-    record = np.dtype([(name, typed(kind, length)) for name, kind, length in fields])
+    record = np.dtype([(name, typed(kind, length)) for name, kind, length, _ in fields])
     return np.dtype((record, (n,))) if n else record
 
 
-COLUMNS: dict[str, np.dtype[Any]] = {name: _dtype(fields, n) for name, fields, n in _offtrack.column_layouts()}
+COLUMNS: dict[str, np.dtype[Any]] = {name: _dtype(fields, n) for name, fields, n, _ in _offtrack.column_layouts()}
 """Every column of a batch and the type of a row: a number, an array of numbers, or a record with named fields."""
+
+COLUMN_DOCS: dict[str, str] = {
+    place: doc
+    for column, fields, _, about in _offtrack.column_layouts()
+    for place, doc in [(column, about), *((f"{column}.{field}", doc) for field, _, _, doc in fields if field)]
+}
+"""What each column and each field of a record is, with its unit: ``COLUMN_DOCS["truck.speed"]``."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -10,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
-from .arguments import checked_integer, names_of, scenario_name, within
+from .arguments import checked_integer, names_of, within
+from .scenarios import Scenario, given, kept
 
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
@@ -50,7 +50,7 @@ class Observer(_offtrack.Observer):
     radians, counter-clockwise, signs as on the map on left-hand roads too. There are no dynamics.
 
     Args:
-        scenario: Name of a benchmark that comes with the package, or the path of a benchmark file.
+        scenario: Benchmark, as for :class:`offtrack_sim.Batch`.
         routes: Name of each truck's route, n of them or one for all trucks.
         vehicles: What each truck is, n or one for all: names of vehicle and load, as their files have them; or an index
             in ``Batch.vehicle_classes``, the vehicle that episodes draw. None for the first vehicle, the one vehicle of
@@ -78,31 +78,30 @@ class Observer(_offtrack.Observer):
 
     def __new__(
         cls,
-        scenario: str | os.PathLike[str],
+        scenario: Scenario,
         routes: Iterable[str],
         vehicles: Sequence[tuple[str, str]] | Sequence[int] | None = None,
         *,
         num_threads: int | None = None,
     ) -> Observer:
-        source, names = scenario_name(scenario), names_of(routes)
+        names = names_of(routes)
         threads = 0 if num_threads is None else within("num_threads", num_threads, 1, 1025)
         pairs, rows = _vehicles(vehicles)
-        given: list[Any] | None = pairs if pairs is not None else rows
-        n = max(len(names), 0 if given is None else len(given))
-        for name, values in (("routes", names), ("vehicles", given)):
+        stated: list[Any] | None = pairs if pairs is not None else rows
+        n = max(len(names), 0 if stated is None else len(stated))
+        for name, values in (("routes", names), ("vehicles", stated)):
             if values is not None and len(values) not in (1, n):
                 raise ValueError(f"{name}: {len(values)} of them; {n} or 1 are needed")
         names = names * n if len(names) == 1 else names
-        if given is not None:
-            given *= n if len(given) == 1 else 1
-        observer = super().__new__(cls, source, names, vehicles=pairs, rows=rows, num_threads=threads)
+        if stated is not None:
+            stated *= n if len(stated) == 1 else 1
+        observer = super().__new__(cls, given(scenario), names, vehicles=pairs, rows=rows, num_threads=threads)
         observer.routes = names
-        observer.vehicles = [observer.classes[0]] * n if given is None else list(given)
-        is_file = source.endswith(".toml") or os.path.isfile(source)
+        observer.vehicles = [observer.classes[0]] * n if stated is None else list(stated)
         observer._arguments = {
-            "scenario": os.path.abspath(source) if is_file else source,
+            "scenario": kept(scenario),
             "routes": names,
-            "vehicles": given,
+            "vehicles": stated,
             "num_threads": num_threads,
         }
         return observer

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import os
 from collections.abc import Iterable
 from typing import Any
 
@@ -13,8 +12,10 @@ import numpy.typing as npt
 import pufferlib
 
 from .arguments import checked_seed
-from .batch import Batch, Bools, Floats
+from .batch import Batch, Bools
+from .episodes import Floats
 from .layout import Ended
+from .scenarios import Scenario
 from .single import observation_space
 
 Buffers = tuple[Floats, Floats, Bools, Bools, list[dict[str, list[float]]]]
@@ -37,7 +38,7 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
     in processes of their own, 1,024 trucks each.
 
     Args:
-        scenario: Name of a benchmark or path of a file, as for :class:`offtrack_sim.Batch`.
+        scenario: Benchmark, as for :class:`offtrack_sim.Batch`.
         num_envs: Number of trucks.
         split: Routes that episodes are drawn from.
         routes: Names of routes or roundabouts in place of a split.
@@ -50,7 +51,7 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
 
     def __init__(
         self,
-        scenario: str | os.PathLike[str] = "attard2023",
+        scenario: Scenario = "attard2023",
         num_envs: int = 1024,
         *,
         split: str = "train",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import os
 import warnings
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -14,8 +13,10 @@ import numpy.typing as npt
 from stable_baselines3.common.vec_env import VecEnv
 
 from .arguments import checked_seed
-from .batch import Batch, Bools, Floats
+from .batch import Batch, Bools
+from .episodes import Floats
 from .layout import Ended
+from .scenarios import Scenario
 from .single import check_render_mode, checked_options, observation_space
 
 Indices = int | Iterable[int] | None
@@ -36,7 +37,7 @@ class RoundaboutVecEnv(VecEnv):
     benchmark's are -500 to +100.
 
     Args:
-        scenario: Name of a benchmark or path of a file, as for :class:`offtrack_sim.Batch`.
+        scenario: Benchmark, as for :class:`offtrack_sim.Batch`.
         num_envs: Number of trucks.
         split: Routes that episodes are drawn from.
         routes: Names of routes or roundabouts in place of a split.
@@ -48,7 +49,7 @@ class RoundaboutVecEnv(VecEnv):
 
     def __init__(
         self,
-        scenario: str | os.PathLike[str] = "attard2023",
+        scenario: Scenario = "attard2023",
         num_envs: int = 1,
         *,
         split: str = "train",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import operator
-import os
 from collections.abc import Iterable
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy.typing as npt
 from .arguments import checked_seed
 from .batch import Batch
 from .layout import EXTRAS, OBSERVATION, Ended
+from .scenarios import Scenario
 
 
 def observation_space(n_extras: int = 0) -> gymnasium.spaces.Box:
@@ -37,7 +37,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
       ends an episode: these with ``ended`` (:class:`offtrack_sim.Ended`) and ``is_success``. Otherwise empty.
 
     Args:
-        scenario: Name of a benchmark or path of a file, as for :class:`offtrack_sim.Batch`.
+        scenario: Benchmark, as for :class:`offtrack_sim.Batch`.
         split: Routes that episodes are drawn from.
         routes: Names of routes or roundabouts in place of a split.
         render_mode: None, or ``"rgb_array"`` for pictures of ``render_size`` pixels a side.
@@ -56,7 +56,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
 
     def __init__(
         self,
-        scenario: str | os.PathLike[str] = "attard2023",
+        scenario: Scenario = "attard2023",
         *,
         split: str = "train",
         routes: Iterable[str] | None = None,

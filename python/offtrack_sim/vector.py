@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import copy as copies
-import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -13,6 +12,7 @@ import numpy.typing as npt
 
 from .arguments import checked_seed, mode_name
 from .batch import Batch
+from .scenarios import Scenario
 from .single import check_render_mode, checked_options, frames_per_second, observation_space
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class RoundaboutVector(Base):
 
     def __init__(
         self,
-        scenario: str | os.PathLike[str] = "attard2023",
+        scenario: Scenario = "attard2023",
         num_envs: int = 1,
         *,
         split: str = "train",
@@ -66,6 +66,7 @@ class RoundaboutVector(Base):
         render_size: int = 480,
         numeric_infos: bool = False,
         max_episode_steps: int | None = None,
+        weights: Mapping[str, float] | None = None,
     ) -> None:
         if not HAS_MODES:
             message = (
@@ -86,6 +87,7 @@ class RoundaboutVector(Base):
             num_threads=num_threads,
             device=device,
             max_episode_steps=max_episode_steps,
+            weights=weights,
         )
         self.num_envs = num_envs = self.batch.num_envs
         self.single_observation_space = observation_space(len(self.batch.extras))
@@ -208,7 +210,7 @@ class RoundaboutVector(Base):
 
 
 def make_vec(
-    scenario: str | os.PathLike[str] = "attard2023",
+    scenario: Scenario = "attard2023",
     num_envs: int = 1,
     *,
     split: str = "train",
@@ -222,12 +224,12 @@ def make_vec(
     render_size: int = 480,
     numeric_infos: bool = False,
     max_episode_steps: int | None = None,
+    weights: Mapping[str, float] | None = None,
 ) -> RoundaboutVector:
     """Many trucks as a vector environment of Gymnasium (1.1 or later).
 
     Args:
-        scenario: Name of a benchmark that comes with the package, see :func:`offtrack_sim.scenario_names`, or the path
-            of a benchmark file.
+        scenario: Benchmark: its name, its file, a :class:`offtrack_sim.Benchmark` or a dict of its keys.
         num_envs: Number of trucks.
         split: Routes that episodes are drawn from: ``"train"``, ``"validation"`` or ``"test"``.
         routes: Names of routes (``"16m/N-left-3"``) or of roundabouts (``"16m"``) of any split, in place of a split.
@@ -243,6 +245,7 @@ def make_vec(
             them: ``route`` is the index in ``batch.route_names``, ``vehicle`` that in ``batch.vehicle_classes``, 0
             where there is none, and ``final_obs`` is float32 ``[num_envs, n_values]``.
         max_episode_steps: Steps after which an episode is truncated in any case; None for the benchmark's limit alone.
+        weights: How often routes are drawn, as for :class:`offtrack_sim.Batch`; ``batch.weigh`` changes it.
 
     Raises:
         ValueError, MemoryError, RuntimeError: As :class:`offtrack_sim.Batch` says.
@@ -262,6 +265,7 @@ def make_vec(
         render_size=render_size,
         numeric_infos=numeric_infos,
         max_episode_steps=max_episode_steps,
+        weights=weights,
     )
 
 

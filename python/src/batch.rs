@@ -1,27 +1,30 @@
 //! A batch of trucks: the simulator as Python sees it.
 
 mod arguments;
+mod made;
 mod picture;
 mod requests;
 mod state;
 mod stored;
+mod weights;
 
-use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::sync::Mutex;
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray2, PyUntypedArrayMethods};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray2,
+    PyUntypedArrayMethods,
+};
 use offtrack::layout::{Column, Ended, N_VALUES};
-use offtrack::simulator::{Autoreset, RouteChoice, Simulator, Tally};
-use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyValueError};
+use offtrack::simulator::Autoreset;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::infos::{End, Infos, Names};
 use crate::observed::{self, Read};
-use crate::pool::Pool;
-use crate::worlds::{Asked, Place};
-use crate::{actions, errors};
+use crate::worlds::{Asked, Given, Place};
+use crate::{actions, errors, geometry};
 pub use arguments::engine_of;
-use arguments::{autoreset_of, name_of, unfit, writable};
+use arguments::{name_of, unfit, writable};
 use errors::guarded;
 use requests::GivenStart;
 use state::State;
@@ -55,11 +58,11 @@ pub struct Batch {
 #[pymethods]
 impl Batch {
     #[new]
-    #[pyo3(signature = (scenario, num_envs, *, split, routes, seed, autoreset, num_threads, device, max_episode_steps))]
+    #[pyo3(signature = (scenario, num_envs, *, split, routes, seed, autoreset, num_threads, device, max_episode_steps, weights))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(
         py: Python,
-        scenario: &str,
+        scenario: Given,
         num_envs: i64,
         split: &str,
         routes: Option<Vec<String>>,
@@ -68,9 +71,10 @@ impl Batch {
         num_threads: usize,
         device: &str,
         max_episode_steps: Option<u32>,
+        weights: Option<Vec<(String, f64)>>,
     ) -> PyResult<Batch> {
-        let asked = Asked { scenario, split, routes: routes.as_deref(), max_episode_steps };
-        guarded(|| Batch::made(py, &asked, num_envs, seed, autoreset, num_threads, device))
+        let asked = Asked { scenario: &scenario, split, routes: routes.as_deref(), max_episode_steps };
+        guarded(|| Batch::made(py, &asked, num_envs, seed, autoreset, num_threads, device, weights.as_deref()))
     }
 
     #[getter]
@@ -319,67 +323,39 @@ impl Batch {
         Ok(dict)
     }
 
+    /// A route's waypoints `[n, 3]`, the lane's width at each `[n]`, and as lines `[m, 2]` the centres of all lanes of
+    /// its road and the kerbs: in the frame of the batch's columns.
+    fn geometry_of<'py>(&self, py: Python<'py>, route: &str) -> PyResult<geometry::Lines<'py>> {
+        guarded(|| geometry::lines(py, &self.place, self.route(route)?))
+    }
+
+    /// Distance of points from the nearest kerb of a route's road, negative off the road, `[n]`.
+    fn kerb_distances<'py>(
+        &self,
+        py: Python<'py>,
+        route: &str,
+        points: PyReadonlyArray2<f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        guarded(|| Ok(geometry::kerb_distances(py, &self.place, self.route(route)?, &points)))
+    }
+
+    /// Lengths and limits of a vehicle by its index.
+    fn dimensions_of<'py>(&self, py: Python<'py>, vehicle: usize) -> PyResult<Bound<'py, PyDict>> {
+        guarded(|| geometry::dimensions(py, &self.place.world.rigs[vehicle]))
+    }
+
+    /// Draws the routes of later episodes by other weights, of a batch that has some.
+    fn weigh_routes(&self, weights: Vec<(String, f64)>) -> PyResult<()> {
+        guarded(|| {
+            let table = weights::table(&self.place, &weights)?;
+            let mut state = self.state()?;
+            state.check_process(&self.device)?;
+            state.simulator.draw_from(&table).map_err(|error| errors::of_simulator(&error))
+        })
+    }
+
     fn picture<'py>(&self, py: Python<'py>, env: usize, size: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
         guarded(|| self.drawn(py, env, size))
-    }
-}
-
-impl Batch {
-    /// What its trucks drive in.
-    pub fn place(&self) -> &Place {
-        &self.place
-    }
-
-    /// A batch, with its threads and, where one is named, its device.
-    fn made(
-        py: Python,
-        asked: &Asked,
-        num_envs: i64,
-        seed: u32,
-        autoreset: &str,
-        num_threads: usize,
-        device: &str,
-    ) -> PyResult<Batch> {
-        let n_envs = match usize::try_from(num_envs) {
-            Ok(n_envs) if 0 < n_envs => n_envs,
-            _ => return Err(PyValueError::new_err(format!("num_envs: {num_envs}; must be at least 1"))),
-        };
-        if u32::try_from(n_envs).is_err() {
-            return Err(PyMemoryError::new_err(format!("num_envs: {num_envs}; a batch holds fewer than 2^32 trucks")));
-        }
-        let autoreset = autoreset_of(autoreset)?;
-        let mut pool = Pool::new(num_threads);
-        let place = pool.run_until_signal(py, |stop| Place::find(asked, stop))??;
-        let (engine, device) = engine_of(device)?;
-        let choice = RouteChoice::Drawn(place.routes.clone());
-        let world = place.world.clone();
-        let made = pool.run(py, || Simulator::on(engine, world, n_envs, seed, choice))?;
-        let mut simulator = made.map_err(|error| errors::of_simulator(&error))?;
-        simulator.set_autoreset(autoreset);
-        let mut state = State {
-            simulator,
-            pool,
-            camera: None,
-            episodes: Vec::new(),
-            held: Vec::new(),
-            ends: Vec::new(),
-            earlier: Tally::default(),
-        };
-        state.look()?;
-        let n_extras = place.world.params.n_extras as usize;
-        let (names, read) = (Names::new(py, &place.world), observed::columns_of_step(autoreset, n_extras));
-        Ok(Batch { place, names, n_envs, n_extras, read, device, autoreset, state: Mutex::new(state) })
-    }
-
-    /// The state, unless another thread has it.
-    fn state(&self) -> PyResult<MutexGuard<'_, State>> {
-        match self.state.try_lock() {
-            Ok(state) => Ok(state),
-            Err(TryLockError::Poisoned(_)) => Err(PyRuntimeError::new_err("this batch failed before; make another")),
-            Err(TryLockError::WouldBlock) => Err(PyRuntimeError::new_err(
-                "this batch is in use by another thread; give each thread a batch of its own",
-            )),
-        }
     }
 }
 

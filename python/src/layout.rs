@@ -1,34 +1,42 @@
 //! The layout of columns and observations, so that Python declares nothing twice.
 
-use offtrack::layout::shared::Named;
+use offtrack::layout::shared::{self, Named, sentence};
 use offtrack::layout::{Column, EXTRAS, Ended, N_VALUES, OBSERVATION, structs};
 use pyo3::prelude::*;
 
-/// A field of a row: name, type of numpy, number of values (0 for one that is no array).
-type Field = (&'static str, &'static str, usize);
+/// A field of a row: name, type of numpy, number of values (0 for one that is no array), what it is.
+type Field = (&'static str, &'static str, usize, String);
 
 /// Every column with the fields of an element and the number of elements in a row (0 for one that is no array): a
-/// single unnamed field where an element is a number.
+/// single unnamed field where an element is a number. At the end what the column is.
 #[pyfunction]
-pub fn column_layouts() -> Vec<(&'static str, Vec<Field>, usize)> {
+pub fn column_layouts() -> Vec<(&'static str, Vec<Field>, usize, String)> {
     let structs = structs();
     let layout = |column: &Column| {
         let element = column.element();
         let (fields, size) = match structs.iter().find(|found| found.name == element) {
-            Some(found) => (found.fields.iter().map(|field| of_field(field.name, &field.wgsl)).collect(), found.size),
-            None => (vec![of_field("", &element)], size_of::<f32>()),
+            Some(found) => (found.fields.iter().map(of_field).collect(), found.size),
+            None => {
+                let (kind, length) = numpy_type(&element);
+                (vec![("", kind, length, String::new())], size_of::<f32>())
+            }
         };
         let n = column.width() / size;
-        (Named::name(*column), fields, if n == 1 { 0 } else { n })
+        (Named::name(*column), fields, if n == 1 { 0 } else { n }, sentence(&[column.doc()]))
     };
     Column::ALL.iter().map(layout).collect()
 }
 
-fn of_field(name: &'static str, wgsl: &str) -> Field {
+fn of_field(field: &shared::Field) -> Field {
+    let (kind, length) = numpy_type(&field.wgsl);
+    (field.name, kind, length, field.doc.clone())
+}
+
+fn numpy_type(wgsl: &str) -> (&'static str, usize) {
     match wgsl {
-        "u32" => (name, "<u4", 0),
-        "vec2<f32>" => (name, "<f4", 2),
-        _ => (name, "<f4", 0),
+        "u32" => ("<u4", 0),
+        "vec2<f32>" => ("<f4", 2),
+        _ => ("<f4", 0),
     }
 }
 

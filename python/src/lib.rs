@@ -6,6 +6,7 @@ mod actions; // arrays of actions
 mod batch; // the class Batch
 mod errors; // errors of Rust as exceptions of Python
 mod evaluation; // episodes driven and counted
+mod geometry; // routes, kerbs and vehicles as arrays
 mod infos; // infos of episodes that ended
 mod layout; // columns as numpy sees them
 mod observer; // the class Observer
@@ -32,6 +33,9 @@ fn _offtrack(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(layout::extra_groups, module)?)?;
     module.add_function(wrap_pyfunction!(layout::end_codes, module)?)?;
     module.add_function(wrap_pyfunction!(worlds::scenario_files, module)?)?;
+    module.add_function(wrap_pyfunction!(worlds::scenario_keys, module)?)?;
     module.add_function(wrap_pyfunction!(worlds::scenario_names, module)?)?;
+    module.add_function(wrap_pyfunction!(worlds::scenario_of_keys, module)?)?;
+    module.add_function(wrap_pyfunction!(worlds::scenario_text, module)?)?;
     Ok(())
 }

@@ -14,12 +14,11 @@ use pyo3::types::PyDict;
 
 use crate::errors::guarded;
 use crate::pool::Pool;
-use crate::worlds::{Asked, Place};
-use crate::{actions, errors, observed};
+use crate::worlds::{Asked, Given, Place};
+use crate::{actions, errors, geometry, observed};
+use geometry::Points;
 use rows::{Rows, Seen, pose_of, telemetry_of};
 
-/// Positions and headings of a route's waypoints or kerbs, a row each.
-type Points<'py> = Bound<'py, PyArray2<f64>>;
 /// One number for each truck.
 type Numbers<'py> = Bound<'py, PyArray1<f32>>;
 /// Steps, next waypoint, code of the end, and integral of the speed control of an observer.
@@ -49,7 +48,7 @@ impl Observer {
     #[pyo3(signature = (scenario, routes, *, vehicles, rows, num_threads))]
     fn new(
         py: Python,
-        scenario: &str,
+        scenario: Given,
         routes: Vec<String>,
         vehicles: Option<Vec<(String, String)>>,
         rows: Option<Vec<u32>>,
@@ -59,7 +58,7 @@ impl Observer {
             let mut names = routes.clone();
             names.sort_unstable();
             names.dedup();
-            let asked = Asked { scenario, split: "", routes: Some(&names), max_episode_steps: None };
+            let asked = Asked { scenario: &scenario, split: "", routes: Some(&names), max_episode_steps: None };
             let mut pool = Pool::new(num_threads);
             let find = if rows.is_some() { Place::find } else { Place::typical };
             let place = pool.run_until_signal(py, |stop| find(&asked, stop))??;
@@ -211,31 +210,7 @@ impl Observer {
 
     /// Lengths and limits of a truck by name.
     fn dimensions_of<'py>(&self, py: Python<'py>, truck: usize) -> PyResult<Bound<'py, PyDict>> {
-        guarded(|| {
-            let held = self.held()?;
-            let rig = held.observers[truck].rig();
-            let (tractor, trailer) = (&rig.tractor_body, &rig.trailer_body);
-            let dict = PyDict::new(py);
-            for (name, value) in [
-                ("wheelbase", rig.wheelbase),
-                ("fifth_wheel", rig.fifth_wheel),
-                ("trailer_wheelbase", rig.trailer_wheelbase),
-                ("tractor_front", tractor.front),
-                ("tractor_rear", tractor.rear),
-                ("tractor_width", 2.0 * tractor.half_width),
-                ("trailer_front", trailer.front),
-                ("trailer_rear", trailer.rear),
-                ("trailer_width", 2.0 * trailer.half_width),
-                ("steer_max", rig.steer_max),
-                ("steer_rate", rig.steer_rate),
-                ("acceleration_min", rig.acceleration_min),
-                ("acceleration_max", rig.acceleration_max),
-                ("trailer_mass", rig.trailer_mass),
-            ] {
-                dict.set_item(name, value)?;
-            }
-            Ok(dict)
-        })
+        guarded(|| geometry::dimensions(py, self.held()?.observers[truck].rig()))
     }
 
     /// How far each observer has come.

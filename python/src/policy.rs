@@ -12,6 +12,7 @@ use pyo3::types::PyBytes;
 
 use crate::errors::guarded;
 use crate::pool::Pool;
+use crate::worlds::Given;
 use crate::{actions, observed, worlds};
 
 /// A policy. The class `offtrack_sim.Policy` wraps it and documents it.
@@ -153,7 +154,7 @@ pub fn policy_names() -> Vec<&'static str> {
 pub fn write_policy(
     py: Python,
     file: &str,
-    scenario: &str,
+    scenario: Given,
     layers: Vec<(PyReadonlyArray2<f32>, PyReadonlyArray1<f32>)>,
     activation: &str,
     normalisation: Option<(PyReadonlyArray1<f32>, PyReadonlyArray1<f32>)>,
@@ -164,7 +165,7 @@ pub fn write_policy(
             return Err(PyValueError::new_err(format!("activation: {activation:?}; must be one of {known}")));
         };
         let (name, actions, extras) =
-            Pool::new(0).run_until_signal(py, |stop| worlds::policy_table(scenario, stop))??;
+            Pool::new(0).run_until_signal(py, |stop| worlds::policy_table(&scenario, stop))??;
         let n_values = N_VALUES + extras.len();
         check_layers(&layers, n_values)?;
         let vector = |array: &PyReadonlyArray1<f32>| array.as_array().to_vec();

@@ -2,11 +2,13 @@
 
 mod routes; // those that are to be driven
 
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 use std::time::Duration;
 
 use offtrack::files::cache::{Cache, Loading, Stopped};
+use offtrack::files::reader::Reader;
 use offtrack::files::shipped::{FILES, Kind};
 use offtrack::layout::Action;
 use offtrack::scenario::{Scenario, Split};
@@ -15,6 +17,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::errors;
+pub use routes::is_of;
 
 /// Most worlds that are kept for the next batch.
 const KEPT: usize = 8;
@@ -34,11 +37,30 @@ pub struct Place {
     pub max_episode_steps: Option<u32>,
 }
 
+/// A benchmark as Python gives it.
+#[derive(Debug, Clone, FromPyObject)]
+pub enum Given {
+    /// Its name, or the path of its file.
+    Named(String),
+    /// Its name, its text, and the folder that paths in it are relative to.
+    Text((String, String, Option<PathBuf>)),
+}
+
+impl Given {
+    fn load(&self, loading: &Loading) -> PyResult<Scenario> {
+        let loaded = match self {
+            Given::Named(name) => Scenario::load(name, loading),
+            Given::Text((name, text, folder)) => Scenario::parse(name, text, folder.as_deref(), loading),
+        };
+        loaded.map_err(|error| errors::of_reader(&error))
+    }
+}
+
 /// What a caller asks for.
 #[derive(Debug, Clone, Copy)]
 pub struct Asked<'a> {
-    /// Name or path of the benchmark.
-    pub scenario: &'a str,
+    /// The benchmark.
+    pub scenario: &'a Given,
     /// Name of the split.
     pub split: &'a str,
     /// Names of routes, or of roundabouts, in place of a split.
@@ -64,7 +86,7 @@ impl Place {
     fn of(asked: &Asked, stop: &AtomicBool, change: impl FnOnce(Scenario) -> Scenario) -> PyResult<Place> {
         let cache = Cache::of_user();
         let loading = Loading { cache: cache.as_ref(), stop, ..Loading::PLAIN };
-        let mut scenario = Scenario::load(asked.scenario, &loading).map_err(|error| errors::of_reader(&error))?;
+        let mut scenario = asked.scenario.load(&loading)?;
         routes::narrow(&mut scenario, asked.split, asked.routes)?;
         let scenario = change(scenario);
         let limit = asked.max_episode_steps;
@@ -121,11 +143,33 @@ pub fn scenario_files() -> Vec<(&'static str, &'static str)> {
     FILES.to_vec()
 }
 
+/// The text of a benchmark by its name or the path of its file.
+#[pyfunction]
+pub fn scenario_text(name_or_path: &str) -> PyResult<String> {
+    Scenario::text_of(name_or_path).map_err(|error| errors::of_reader(&error))
+}
+
+/// A benchmark's keys as JSON.
+#[pyfunction]
+pub fn scenario_keys(name: &str, text: &str) -> PyResult<String> {
+    let file = PathBuf::from(format!("{name} (a text)"));
+    let (_, keys) = Reader::parse::<toml::Table>(&file, text).map_err(|error| errors::of_reader(&error))?;
+    serde_json::to_string(&keys).map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
+}
+
+/// The text of a benchmark whose keys are given as JSON.
+#[pyfunction]
+pub fn scenario_of_keys(keys: &str) -> PyResult<String> {
+    let wrong = |error: &dyn std::fmt::Display| PyValueError::new_err(format!("benchmark: {error}"));
+    let keys: toml::Table = serde_json::from_str(keys).map_err(|error| wrong(&error))?;
+    toml::to_string(&keys).map_err(|error| wrong(&error))
+}
+
 /// A benchmark's name, its action table, and the names of the extras that it observes.
-pub fn policy_table(scenario: &str, stop: &AtomicBool) -> PyResult<(String, Vec<Action>, Vec<&'static str>)> {
+pub fn policy_table(scenario: &Given, stop: &AtomicBool) -> PyResult<(String, Vec<Action>, Vec<&'static str>)> {
     let cache = Cache::of_user();
     let loading = Loading { cache: cache.as_ref(), stop, ..Loading::PLAIN };
-    let scenario = Scenario::load(scenario, &loading).map_err(|error| errors::of_reader(&error))?;
+    let scenario = scenario.load(&loading)?;
     let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
     let rig = scenario.vehicle.rig(&scenario.load, substep, scenario.steer_max);
     Ok((scenario.name.clone(), scenario.actions(rig.steer_max), scenario.extras.names()))

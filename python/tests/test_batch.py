@@ -154,7 +154,11 @@ def test_a_state_is_restored_bit_for_bit_with_its_streams() -> None:
         ({"routes": [3]}, TypeError, "routes: 3; names of routes or roundabouts are needed"),
         ({"num_envs": 0}, ValueError, "num_envs: 0; must be at least 1"),
         ({"num_envs": -5}, ValueError, "num_envs: -5; must be at least 1"),
-        ({"scenario": 5}, TypeError, "scenario: 5; the name of a benchmark or the path of its file is needed"),
+        (
+            {"scenario": 5},
+            TypeError,
+            "scenario: 5; the name of a benchmark, the path of its file, a Benchmark or a dict of its keys is needed",
+        ),
         ({"num_envs": "3"}, TypeError, "num_envs: '3'; an integer is needed"),
         ({"num_envs": 2.0}, TypeError, "num_envs: 2.0; an integer is needed"),
         ({"num_envs": 10**12}, MemoryError, "num_envs: 1000000000000"),

@@ -1,14 +1,17 @@
 """The benchmarks of the package as files."""
 
+import pickle
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import offtrack_sim
+from offtrack_sim import export
+from offtrack_sim.scenarios import Scenario
 
 
-def stepped(scenario: str | Path) -> np.ndarray:
+def stepped(scenario: Scenario) -> np.ndarray:
     batch = offtrack_sim.Batch(scenario, 32, seed=3)
     for _ in range(20):
         batch.step(np.arange(32) % len(batch.action_table))
@@ -36,3 +39,143 @@ def test_files_that_are_there_are_left_alone_or_refused_before_anything_is_writt
     assert changed.read_text() == "mine" and not gone.exists()
     with pytest.raises(TypeError, match="file: 3; the path of a file is needed"):
         offtrack_sim.write_scenarios(3)  # type: ignore[arg-type]
+
+
+def test_a_benchmark_in_memory_is_driven_as_its_file_and_with_changes_as_the_changed_one(tmp_path: Path) -> None:
+    shipped = offtrack_sim.benchmark("attard2023")
+    assert shipped.name == "attard2023" and (stepped(shipped) == stepped("attard2023")).all()
+    assert shipped.keys["actions"]["speeds_kmh"] == [30.0] and shipped.keys["roundabout"][1]["train"][0] == "E-left-3"
+    # Keys written anew, in another order, are the same benchmark.
+    assert (stepped(shipped.changed({})) == stepped(shipped)).all()
+    assert (stepped(dict(reversed(shipped.keys.items()))) == stepped(shipped)).all()
+    slow = shipped.changed({"actions.speeds_kmh": np.array([15.0]), "reward.clearance": -2}, name="slow")
+    assert offtrack_sim.Batch(slow).scenario == "slow" and slow.keys["reward"]["clearance"] == -2
+    offtrack_sim.write_scenarios(tmp_path)
+    slow.write(tmp_path / "slow.toml")
+    assert (stepped(slow) == stepped(tmp_path / "slow.toml")).all()
+    assert not (stepped(slow) == stepped(shipped)).all()
+    # A file's paths are relative to it, and stay so.
+    (tmp_path / "roundabouts" / "mine.toml").write_text((tmp_path / "roundabouts" / "32m.toml").read_text())
+    mine = offtrack_sim.benchmark(tmp_path / "slow.toml").changed(
+        {"roundabout": [{"file": "roundabouts/mine.toml", "train": "all"}]}, name="mine"
+    )
+    assert offtrack_sim.Batch(mine).route_names[0].startswith("mine/")
+    assert (
+        shipped.changed({"reward.clearance_limit": 0.4}).changed({"reward.clearance_limit": None}).keys == shipped.keys
+    )
+
+
+def test_wherever_a_benchmarks_name_stands_one_in_memory_may_stand(tmp_path: Path) -> None:
+    keys = offtrack_sim.benchmark("attard2023").keys
+    keys["roundabout"] = [{"file": "16m", "train": ["N-left-3"], "test": ["E-left-2"]}]
+    own = offtrack_sim.Benchmark(keys, "mine")
+    batch = offtrack_sim.Batch(own, 4)
+    for _ in range(3):
+        batch.step(np.zeros(4, np.int64))
+    copy = pickle.loads(pickle.dumps(batch))
+    assert copy.scenario == "mine" and (copy.observation() == batch.observation()).all()
+    assert offtrack_sim.evaluate(offtrack_sim.Policy.shipped(), keys, episodes=2).routes == ["16m/E-left-2"]
+    assert offtrack_sim.Observer(own, ["16m/N-left-3"]).num_trucks == 1
+    assert offtrack_sim.make_vec(own, 2).reset(seed=1)[0].shape == (2, 69)
+    layers = [(np.ones((69, 9), np.float32), np.zeros(9, np.float32))]
+    export.save(tmp_path / "own.safetensors", layers, scenario=own)
+    assert offtrack_sim.Policy.load(tmp_path / "own.safetensors").benchmark == "mine"
+
+
+def test_a_wrong_benchmark_names_key_value_and_what_would_do() -> None:
+    shipped = offtrack_sim.benchmark("attard2023")
+    for changes, said in {
+        "reward.clearence": (1.0, r"mine \(a text\).*unknown field `clearence`"),
+        "time.step": (7.0, r"mine \(a text\): time\.step: 7 s; must lie in 0\.01\.\.1"),
+        "vehicle": ("vehicles/nothing.toml", r"mine \(a text\): vehicle: .*nothing"),
+    }.items():
+        with pytest.raises(offtrack_sim.ScenarioError, match=said[1]):
+            offtrack_sim.Batch(shipped.changed({changes: said[0]}, name="mine"))
+    with pytest.raises(ValueError, match="attard2024; must be"):
+        offtrack_sim.benchmark("attard2024")
+    with pytest.raises(ValueError, match=r"reward\.waypoint: None; leave the key out"):
+        offtrack_sim.Benchmark({"reward": {"waypoint": None}})
+    with pytest.raises(ValueError, match=r"actions\.steer_levels\[1\]: inf; must be finite"):
+        offtrack_sim.Benchmark({"actions": {"steer_levels": [0.0, float("inf")]}})
+    with pytest.raises(TypeError, match="vehicle: .1.; a number, a text, a list or a table"):
+        offtrack_sim.Benchmark({"vehicle": {1}})
+    for key in ("roundabout[9].train", "vehicle.file", "a..b", ""):
+        with pytest.raises(KeyError, match="there is no such table|names with dots"):
+            shipped.changed({key: 1})
+    with pytest.raises(TypeError, match="scenario: 3; the name of a benchmark"):
+        offtrack_sim.Batch(3)  # type: ignore[arg-type]
+
+
+def test_routes_are_drawn_by_their_weights_and_by_others_from_then_on() -> None:
+    def shares(batch: offtrack_sim.Batch) -> dict[str, float]:
+        batch.begin()
+        names = np.array(batch.route_names)[batch.routes()]
+        return {name: float((names == name).mean()) for name in np.unique(names)}
+
+    routes = ["16m/N-left-3", "16m/E-left-2", "32m/N-left-2", "32m/S-left-2"]
+    make = dict(routes=routes, seed=5, weights={"16m": 0.0, "16m/E-left-2": 6.0, "32m/S-left-2": 3.0})
+    batch = offtrack_sim.Batch("attard2023", 20_000, **make)  # type: ignore[arg-type]
+    found = shares(batch)
+    assert found.keys() == {"16m/E-left-2", "32m/N-left-2", "32m/S-left-2"}
+    for name, weight in {"16m/E-left-2": 0.6, "32m/N-left-2": 0.1, "32m/S-left-2": 0.3}.items():
+        assert abs(found[name] - weight) < 0.02
+    batch.weigh({"32m": 0.0})
+    assert shares(batch).keys() == {"16m/N-left-3", "16m/E-left-2"}
+    other = pickle.loads(pickle.dumps(batch))
+    assert shares(other).keys() == {"16m/N-left-3", "16m/E-left-2"} and (other.routes() != batch.routes()).sum() >= 0
+    batch.begin()
+    for weights, said in (
+        ({"32m": -1.0}, r'weights\["32m"\]: -1; must lie in 0\.\.1e6'),
+        ({"50m": 1.0}, 'weights: "50m"; the batch draws from 16m/'),
+        ({name: 0.0 for name in routes}, "weights: 0 for every route; one must be greater"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            batch.weigh(weights)
+    with pytest.raises(TypeError, match=r"weights\['16m'\]: 'a'; a number is needed"):
+        batch.weigh({"16m": "a"})  # type: ignore[dict-item]
+    with pytest.raises(ValueError, match="weights: the batch was made without"):
+        offtrack_sim.Batch().weigh({})
+    with pytest.raises(TypeError, match="weights: 3; a dict"):
+        offtrack_sim.Batch(weights=3)  # type: ignore[arg-type]
+
+
+def test_roads_kerbs_and_vehicles_are_there_as_arrays_that_fit_each_other() -> None:
+    batch = offtrack_sim.Batch("attard2023", 64, seed=3)
+    for name in ("16m/N-left-3", "32m/E-left-3"):
+        road = batch.road(name)
+        assert road.waypoints.shape == (len(road.widths), 3)
+        on_lane = batch.kerb_distance(name, road.waypoints[:, :2])
+        assert (on_lane > 1.5).all()
+        # Both edges lie half a lane's width from the centre, and on the road.
+        for edge in road.edges():
+            apart = np.linalg.norm(edge - road.waypoints[:, :2], axis=1)
+            np.testing.assert_allclose(apart, road.widths / 2)
+            assert (batch.kerb_distance(name, edge) > -0.05).all()
+        for kerb in road.kerbs:
+            assert np.abs(batch.kerb_distance(name, kerb)).max() < 0.06
+            # The road is on a kerb's left.
+            along = np.diff(kerb, axis=0)
+            side = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
+            middle = 0.5 * (kerb[1:] + kerb[:-1]) + 0.3 * side
+            assert (batch.kerb_distance(name, middle) > 0).mean() > 0.98
+        assert len(road.lanes) >= 4
+    # Trucks stand on the lanes: the frame is that of the columns.
+    trucks = batch.columns("truck")["truck"]
+    for env in range(8):
+        route = batch.route_names[batch.routes()[env]]
+        assert batch.kerb_distance(route, trucks["position"][env : env + 1].astype(float))[0] > 0.5
+    observer = offtrack_sim.Observer("attard2023", ["16m/N-left-3"])
+    assert batch.dimensions() == observer.dimensions()
+    for points in (np.zeros(2), np.full((1, 2), np.nan), np.zeros((2, 3))):
+        with pytest.raises(ValueError, match="points: "):
+            batch.kerb_distance("16m/N-left-3", points)
+    with pytest.raises(ValueError, match='routes: "20m/N-left-4"; the batch drives'):
+        batch.road("20m/N-left-4")
+
+
+def test_every_column_and_field_says_what_it_is_and_in_which_unit() -> None:
+    docs = offtrack_sim.COLUMN_DOCS
+    fields = {f"{name}.{field}" for name, dtype in offtrack_sim.COLUMNS.items() for field in dtype.base.names or ()}
+    assert docs.keys() == fields | offtrack_sim.COLUMNS.keys()
+    assert all(doc.strip() and "`[" not in doc for doc in docs.values())
+    assert "m/s" in docs["truck.speed"] and "limit" in docs["terms.lane_distance"]

@@ -121,6 +121,16 @@ pub enum Source {
     Disk(PathBuf),
     /// An embedded file, by its path below `scenarios/`.
     Embedded(PathBuf),
+    /// A text in memory.
+    Text {
+        /// What stands in place of a file's stem.
+        name: String,
+        /// The text.
+        text: String,
+        /// The folder on disk that its paths are relative to; without one they are those of embedded files below
+        /// `scenarios/`, and else relative to the process's folder.
+        folder: Option<PathBuf>,
+    },
 }
 
 impl Source {
@@ -151,29 +161,29 @@ impl Source {
     }
 
     /// The file that this one refers to by `path`, relative to its own folder: on disk from a file on disk, embedded
-    /// from an embedded one.
+    /// from an embedded one, and from a text as its folder says.
     pub fn relative(&self, path: &Path) -> Source {
         let folder = |file: &Path| file.parent().unwrap_or(Path::new("")).to_owned();
         match self {
             Source::Disk(file) => Source::Disk(folder(file).join(path)),
-            Source::Embedded(file) => {
-                let mut resolved = folder(file);
-                for component in path.components() {
-                    match component {
-                        Component::ParentDir => drop(resolved.pop()),
-                        Component::CurDir => {}
-                        component => resolved.push(component),
-                    }
-                }
-                Source::Embedded(resolved)
+            Source::Embedded(file) => Source::Embedded(resolved(folder(file), path)),
+            Source::Text { folder: Some(folder), .. } => Source::Disk(folder.join(path)),
+            Source::Text { folder: None, .. } => {
+                let embedded = resolved(PathBuf::new(), path);
+                let is_embedded = FILES.iter().any(|(known, _)| Path::new(known) == embedded);
+                if is_embedded { Source::Embedded(embedded) } else { Source::Disk(path.to_owned()) }
             }
         }
     }
 
     /// The file's name without its extension, as results and messages show it.
     pub fn stem(&self) -> String {
-        let (Source::Disk(file) | Source::Embedded(file)) = self;
-        file.file_stem().map(|stem| printable(&stem.to_string_lossy()).into_owned()).unwrap_or_default()
+        match self {
+            Source::Disk(file) | Source::Embedded(file) => {
+                file.file_stem().map(|stem| printable(&stem.to_string_lossy()).into_owned()).unwrap_or_default()
+            }
+            Source::Text { name, .. } => printable(name).into_owned(),
+        }
     }
 
     /// The file's text.
@@ -188,6 +198,10 @@ impl Source {
                 Some((_, text)) => Ok((*text).to_owned()),
                 None => Err(Error::Unreadable { file: self.shown(), source: std::io::ErrorKind::NotFound.into() }),
             },
+            Source::Text { text, .. } if TEXT_LIMIT < text.len() as u64 => {
+                Err(Error::TooLarge { file: self.shown(), limit: TEXT_LIMIT })
+            }
+            Source::Text { text, .. } => Ok(text.clone()),
         }
     }
 
@@ -195,7 +209,7 @@ impl Source {
     pub fn shown(&self) -> PathBuf {
         match self {
             Source::Disk(file) => file.clone(),
-            Source::Embedded(_) => self.to_string().into(),
+            Source::Embedded(_) | Source::Text { .. } => self.to_string().into(),
         }
     }
 }
@@ -205,6 +219,19 @@ impl fmt::Display for Source {
         match self {
             Source::Disk(file) => file.display().fmt(f),
             Source::Embedded(file) => write!(f, "scenarios/{} (built in)", file.display()),
+            Source::Text { name, .. } => write!(f, "{} (a text)", printable(name)),
         }
     }
+}
+
+/// The path of `path` from `folder`, without a link followed.
+fn resolved(mut folder: PathBuf, path: &Path) -> PathBuf {
+    for component in path.components() {
+        match component {
+            Component::ParentDir => drop(folder.pop()),
+            Component::CurDir => {}
+            component => folder.push(component),
+        }
+    }
+    folder
 }

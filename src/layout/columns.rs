@@ -68,8 +68,8 @@ macro_rules! column_names {
                 }
             }
 
-            /// What its rows hold.
-            pub(super) const fn doc(self) -> &'static str {
+            /// What its rows hold, with the unit.
+            pub const fn doc(self) -> &'static str {
                 match self {
                     $(Column::$variant => concat!($($doc),*),)*
                 }

@@ -71,6 +71,8 @@ pub struct Field {
     pub offset: usize,
     /// The field's type in WGSL: `f32`, `u32`, `vec2<f32>`, another struct or an array.
     pub wgsl: String,
+    /// What it is, with its unit.
+    pub doc: String,
 }
 
 /// A value that can be written as a WGSL literal.
@@ -125,6 +127,11 @@ impl<T: Literal, const N: usize> Literal for [T; N] {
 /// Prints the lines of a doc comment as a WGSL comment, indented by `depth`.
 pub fn comment(depth: &str, lines: &[&str]) -> String {
     lines.iter().map(|line| format!("{depth}// {}", plain(line.trim())).trim_end().to_owned() + "\n").collect()
+}
+
+/// The lines of a doc comment as plain text on one line.
+pub fn sentence(lines: &[&str]) -> String {
+    lines.iter().map(|line| plain(line.trim())).collect::<Vec<String>>().join(" ").trim_end_matches('.').to_owned()
 }
 
 /// A line of a doc comment as plain text: a link is its text, a path from `crate` on is its last name, and a unit's
@@ -225,6 +232,7 @@ macro_rules! shared {
                     name: stringify!($field),
                     offset: std::mem::offset_of!($name, $field),
                     wgsl: <$type as $crate::layout::shared::Shared>::wgsl(),
+                    doc: $crate::layout::shared::sentence(&[$($field_doc),*]),
                 },)*],
             },)*]
         }

@@ -55,7 +55,7 @@ impl Batch {
     }
 
     /// Index of a route by its name.
-    fn route(&self, name: &str) -> PyResult<u32> {
+    pub(super) fn route(&self, name: &str) -> PyResult<u32> {
         let names = &self.place.world.route_names;
         let found = names.iter().position(|known| known == name);
         found.map(|index| index as u32).ok_or_else(|| {

@@ -77,7 +77,7 @@ fn known(scenario: &Scenario) -> Vec<String> {
 }
 
 /// Whether `name` is this route or its roundabout.
-fn is_of(route: &str, name: &str) -> bool {
+pub fn is_of(route: &str, name: &str) -> bool {
     route == name || route.strip_prefix(name).is_some_and(|rest| rest.starts_with('/'))
 }
 

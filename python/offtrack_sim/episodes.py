@@ -1,0 +1,39 @@
+"""How episodes begin and end."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+
+
+class Ends(NamedTuple):
+    """The episodes that the last step ended, k of them."""
+
+    envs: Ints
+    """Index of each truck, ``[k]``."""
+    codes: Ints
+    """Why, as :class:`Ended`, ``[k]``."""
+    routes: Ints
+    """Index of its route in ``Batch.route_names``, ``[k]``."""
+    observations: Floats
+    """The observation after the last action, ``[k, n_values]``."""
+    vehicles: Ints
+    """Index of its vehicle in ``Batch.vehicle_classes``, ``[k]``."""
+
+
+class Start(NamedTuple):
+    """How a truck begins its route; the zeros are the first vehicle on the lane's centre line."""
+
+    offset: float = 0.0
+    """Lateral offset as a fraction of the benchmark's largest, in ``-1..1``, left positive."""
+    heading: float = 0.0
+    """Heading error as a fraction of the benchmark's largest, in ``-1..1``, counter-clockwise positive."""
+    speed: float = 0.0
+    """Where in the benchmark's range of speeds at the start: -1 the lowest, 0 the middle, 1 the highest."""
+    vehicle: int | tuple[str, str] = 0
+    """Index of the vehicle in ``Batch.vehicle_classes``, or its class, one of ``Batch.classes``: that class's first."""

@@ -1,0 +1,48 @@
+//! Weights of routes: how often each is drawn.
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::worlds::{Place, is_of};
+
+/// Least entries of a table of routes: weights count to one in so many.
+const ENTRIES: usize = 4096;
+
+/// A table in which each of a place's routes stands as often as its weight says, the place's order kept. A route has the
+/// weight of its own name, else that of its road, else 1; the table is as long for any weights.
+pub(super) fn table(place: &Place, weights: &[(String, f64)]) -> PyResult<Vec<u32>> {
+    let names: Vec<&str> = place.routes.iter().map(|&route| place.world.route_names[route as usize].as_str()).collect();
+    for (name, weight) in weights {
+        if !(weight.is_finite() && 0.0 <= *weight && *weight <= 1e6) {
+            return Err(PyValueError::new_err(format!("weights[{name:?}]: {weight}; must lie in 0..1e6")));
+        }
+        if !names.iter().any(|route| is_of(route, name)) {
+            let list = offtrack::files::reader::shortened(&names.join(", "), 600);
+            return Err(PyValueError::new_err(format!("weights: {name:?}; the batch draws from {list}")));
+        }
+    }
+    let weight = |route: &&str| {
+        let own = weights.iter().find(|(name, _)| name == route);
+        own.or_else(|| weights.iter().find(|(name, _)| is_of(route, name))).map_or(1.0, |(_, weight)| *weight)
+    };
+    let shares: Vec<f64> = names.iter().map(weight).collect();
+    let sum: f64 = shares.iter().sum();
+    if sum <= 0.0 {
+        return Err(PyValueError::new_err("weights: 0 for every route; one must be greater"));
+    }
+    // Each route that has a weight stands there once, and where the rest of the entries fall in the sum of the shares.
+    let mut table: Vec<u32> =
+        place.routes.iter().zip(&shares).filter(|(_, share)| 0.0 < **share).map(|(&route, _)| route).collect();
+    let rest = (ENTRIES.max(4 * names.len())) - table.len();
+    let (mut index, mut reached) = (0, shares[0]);
+    for entry in 0..rest {
+        let place_in_sum = (entry as f64 + 0.5) / rest as f64 * sum;
+        while reached <= place_in_sum && index + 1 < shares.len() {
+            index += 1;
+            reached += shares[index];
+        }
+        table.push(place.routes[index]);
+    }
+    table.sort_unstable();
+    Ok(table)
+}
