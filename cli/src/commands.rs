@@ -1,21 +1,5 @@
-//! The commands, one file each, and what several of them share.
+//! The commands that learn, or that measure learning, a file each; the others are the crate `offtrack-commands`.
 
 pub mod bench;
-pub mod certify;
-pub mod deviations;
-pub mod devices;
-pub mod draw;
-pub mod evaluate;
-pub mod fits;
-pub mod generate;
-pub mod import;
-mod outputs; // files to write: each its own
-mod policies; // flags: which policy
-mod progress; // the bar on a terminal
-pub mod record;
-mod roads; // benchmarks and roads by name
 pub mod scale;
-mod terminal; // how wide a table may be
-pub mod trace;
 pub mod train;
-pub mod vehicles;

@@ -4,6 +4,7 @@
 
 mod actions; // arrays of actions
 mod batch; // the class Batch
+mod command; // the command line
 mod errors; // errors of Rust as exceptions of Python
 mod evaluation; // episodes driven and counted
 mod geometry; // routes, kerbs and vehicles as arrays
@@ -24,6 +25,7 @@ fn _offtrack(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_class::<batch::Batch>()?;
     module.add_class::<observer::Observer>()?;
     module.add_class::<policy::Network>()?;
+    module.add_function(wrap_pyfunction!(command::command, module)?)?;
     module.add_function(wrap_pyfunction!(policy::policy_names, module)?)?;
     module.add_function(wrap_pyfunction!(policy::write_policy, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::drive, module)?)?;

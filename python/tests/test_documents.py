@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from importlib import metadata
 from pathlib import Path
@@ -15,14 +16,17 @@ ELSEWHERE = "<!-- needs "
 
 
 def snippets(document: str) -> list[str]:
-    """The Python blocks of a document that need no other library."""
+    """The Python blocks of a document, or the cells of a notebook, that need no other library."""
     text = (DOCUMENTS / document).read_text()
+    if document.endswith(".ipynb"):
+        cells = [cell for cell in json.loads(text)["cells"] if cell["cell_type"] == "code"]
+        return ["".join(cell["source"]) for cell in cells if not cell["metadata"].get("tags")]
     parts = re.split(r"^```python\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
     before, blocks = parts[0::2], parts[1::2]
     return [block for text, block in zip(before, blocks) if not text.rstrip().split("\n")[-1].startswith(ELSEWHERE)]
 
 
-@pytest.mark.parametrize(("document", "n"), [("README.md", 7), ("TUTORIAL.md", 5)])
+@pytest.mark.parametrize(("document", "n"), [("README.md", 7), ("TUTORIAL.ipynb", 5)])
 def test_the_snippets_run(
     document: str, n: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -33,12 +37,22 @@ def test_the_snippets_run(
     for block in found:
         exec(compile(block, document, "exec"), names)
     printed = capsys.readouterr().out
-    if document == "TUTORIAL.md":
+    if document == "TUTORIAL.ipynb":
         assert "15 routes, the first is village/E-left-1" in printed
         assert "own test: 100.0% (60/60); arrived 60" in printed and "'is_success': True" in printed
         assert list(tmp_path.glob("films/*.mp4"))
     else:
         assert "attard2023 test: 100.0% (46/46); arrived 46" in printed
+
+
+def test_the_notebook_is_one_that_jupyter_opens_without_what_a_run_left() -> None:
+    notebook = json.loads((DOCUMENTS / "TUTORIAL.ipynb").read_text())
+    assert (notebook["nbformat"], notebook["metadata"]["kernelspec"]["name"]) == (4, "python3")
+    names = [cell["id"] for cell in notebook["cells"]]
+    assert len(set(names)) == len(names) and {cell["cell_type"] for cell in notebook["cells"]} == {"markdown", "code"}
+    code = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
+    assert {tag for cell in code for tag in cell["metadata"].get("tags", [])} == {"needs-stable-baselines3"}
 
 
 def test_the_wheel_has_the_licence_of_everything_in_it() -> None:

@@ -47,7 +47,7 @@ def broken(document: Path, target: str) -> str | None:
 
 
 def test_every_relative_link_leads_to_a_file_and_a_heading() -> None:
-    checked = [(document, target) for document in tracked("*.md") for target in links(document)]
+    checked = [(document, target) for document in tracked("*.md", "*.ipynb") for target in links(document)]
     assert 20 <= len(tracked("*.md")) and 150 <= len(checked), len(checked)
     wrong = {f"{document.relative_to(ROOT)}: {target}": broken(document, target) for document, target in checked}
     assert {name: reason for name, reason in wrong.items() if reason} == {}

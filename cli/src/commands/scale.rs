@@ -15,10 +15,10 @@ use offtrack::layout::{N_RAYS, N_VALUES};
 use offtrack::scenario::Split;
 use serde::Serialize;
 
-use super::{devices as device, outputs, roads};
 pub(crate) use measure::median;
 use measure::{Measured, measured};
 use mode::{Learner, Mode, Setting};
+use offtrack_commands::{devices as device, outputs, roads};
 use offtrack_evaluation::files;
 use offtrack_evaluation::provenance;
 use offtrack_learner::error::Error;

@@ -2,6 +2,7 @@
 //! are its flags, what it shows, and the signals that stop it.
 
 mod args;
+mod bar;
 mod beginning;
 mod display;
 mod seeds;

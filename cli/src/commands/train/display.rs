@@ -5,13 +5,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use offtrack::files::cache::Progress;
 use offtrack::files::reader::shown_path;
+use offtrack_commands::progress::Bar;
+use offtrack_commands::roads::FEW;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_learner::train::{Begun, Event};
 
+use super::bar::TrainingDisplay;
 use super::summary;
-use crate::commands::progress::{Bar, TrainingDisplay};
-use crate::commands::roads::FEW;
 
 /// Shows events as they come. Training goes on when nobody reads its lines; a result that cannot be printed is an error
 /// at the end.

@@ -1,12 +1,11 @@
 //! What is printed of a run that has ended.
 
 use offtrack::files::reader::shown_path;
+use offtrack_commands::terminal;
 use offtrack_evaluation::report::Report;
 use offtrack_learner::run::folder::Folder;
 use offtrack_learner::run::route_counts::WorstRoutes;
 use offtrack_learner::train::{AlsoReport, Outcome};
-
-use crate::commands::terminal;
 
 /// Training routes named at the end.
 const N_WORST: usize = 5;

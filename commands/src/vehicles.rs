@@ -8,7 +8,7 @@ use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::fits::table::Units;
 
-use super::terminal;
+use crate::terminal;
 
 /// Radius of the outer circle whose inner one is listed, that of Directive 96/53/EC (m).
 const OUTER: f64 = 12.5;

@@ -12,7 +12,7 @@ use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::policies::{self, Controller, LOOK_AHEAD, PurePursuit};
 
-use super::outputs;
+use crate::outputs;
 
 /// Which policy drives.
 #[derive(Debug, clap::Args)]

@@ -19,7 +19,7 @@ use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::policies;
 
-use super::{outputs, progress, roads};
+use crate::{outputs, progress, roads};
 
 /// On the lane centre, and the four corners of the largest start errors.
 const STARTS: [Start; 5] = [start(0.0, 0.0), start(1.0, 1.0), start(1.0, -1.0), start(-1.0, 1.0), start(-1.0, -1.0)];

@@ -12,7 +12,7 @@ use serde_json::Value;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
-use super::outputs;
+use crate::outputs;
 
 /// Drive the trajectory cases of a file of reference vectors and print the truck's state at the times they ask for.
 ///

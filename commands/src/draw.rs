@@ -17,8 +17,8 @@ use offtrack_drawing::{json, rasterised};
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
-use super::import::PlaceArgs;
-use super::roads;
+use crate::import::PlaceArgs;
+use crate::roads;
 
 /// Draw a roundabout, or a truck's swept path on one of its routes.
 #[derive(Debug, clap::Args)]

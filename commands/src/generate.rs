@@ -13,7 +13,7 @@ use offtrack_drawing::{rasterised, sheet};
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
-use super::roads;
+use crate::roads;
 
 /// Roads drawn at most.
 const MOST: u32 = 100_000;

@@ -17,7 +17,7 @@ use offtrack_evaluation::{files, provenance};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::{devices, outputs, policies, progress, record, roads, terminal};
+use crate::{devices, outputs, policies, progress, record, roads, terminal};
 
 /// Most bytes of a run's report and of its figures.
 const RUN_LIMIT: u64 = 64 << 20;

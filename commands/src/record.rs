@@ -22,7 +22,7 @@ use offtrack_evaluation::files;
 use offtrack_evaluation::policies::Controller;
 use offtrack_evaluation::recording::{Of, Recorder, Recording, Track};
 
-use super::{devices, outputs, policies, progress, roads};
+use crate::{devices, outputs, policies, progress, roads};
 
 /// Record an episode: as a film, as a picture with the swept paths of both units, or as data.
 #[derive(Debug, clap::Args)]

@@ -19,9 +19,9 @@ use offtrack_evaluation::fits::table::{Units, csv, table};
 use offtrack_evaluation::fits::{Asked, Case, Results, Row, case};
 use rayon::prelude::*;
 
-use super::import::PlaceArgs;
-use super::progress::Bar;
-use super::{draw, roads, terminal};
+use crate::import::PlaceArgs;
+use crate::progress::Bar;
+use crate::{draw, roads, terminal};
 
 /// Time between two writes of results that come quickly.
 const WRITE_EVERY: Duration = Duration::from_secs(2);

@@ -18,7 +18,7 @@ use serde::Serialize;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
-use super::outputs;
+use crate::outputs;
 use drawing::DrawingArgs;
 
 /// List the roundabouts or junctions of an OpenDRIVE map, check it, or write one of them as an outline file.

@@ -14,8 +14,8 @@ use offtrack::world::World;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
-use super::import::PlaceArgs;
-use super::progress::Bar;
+use crate::import::PlaceArgs;
+use crate::progress::Bar;
 
 /// Roads that take no progress bar.
 pub const FEW: usize = 20;

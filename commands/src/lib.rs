@@ -1,0 +1,20 @@
+//! The commands of `offtrack` that need no learner, one file each, and what several of them share. The program adds
+//! those that train and measure; the Python package has these alone.
+
+pub mod certify;
+pub mod deviations;
+pub mod devices;
+pub mod draw;
+pub mod evaluate;
+pub mod fits;
+pub mod generate;
+pub mod import;
+pub mod outputs; // files to write: each its own
+mod policies; // flags: which policy
+pub mod program; // arguments read, a command run, its exit code
+pub mod progress; // the bar on a terminal
+pub mod record;
+pub mod roads; // benchmarks and roads by name
+pub mod terminal; // how wide a table may be
+pub mod trace;
+pub mod vehicles;

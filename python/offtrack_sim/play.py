@@ -1,0 +1,182 @@
+"""Drive a truck by keys: ``python -m offtrack_sim.play``, with pygame (``pip install offtrack_sim[play]``).
+
+Left and right steer, up and down change the speed where a benchmark lets one choose, space hands over to the policy that
+comes with the package and back, R begins again, N takes the next route, P pauses, Escape ends.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable
+
+import numpy as np
+
+from . import _offtrack
+from .batch import Batch
+from .layout import Ended
+from .policy import Policy
+
+#: Side of the window [pixels].
+SIDE = 720
+
+
+class Game:
+    """One truck, a driver of flesh and blood or the policy, and what is said of it.
+
+    Args:
+        scenario, split, seed: As for :class:`offtrack_sim.Batch`.
+        routes: Names of routes or roundabouts to drive in turn; None for those of the split.
+        policy: Who drives while the player does not; None for the policy that comes with the package for the
+            benchmark.
+
+    Raises:
+        ValueError: As :class:`offtrack_sim.Batch` says; and for a policy that cannot drive there.
+    """
+
+    def __init__(
+        self,
+        scenario: str = "attard2023",
+        *,
+        split: str = "test",
+        routes: Iterable[str] | None = None,
+        seed: int = 0,
+        policy: Policy | None = None,
+    ) -> None:
+        self.batch = Batch(scenario, 1, split=split, routes=routes, seed=seed, autoreset="disabled")
+        self.policy = _shipped(self.batch) if policy is None else policy
+        self.policy.check(self.batch)
+        # The steer angles of each target speed, or change of it, stand together.
+        table = self.batch.action_table
+        self.levels = np.unique(table[:, 0])
+        self.speeds = np.unique(table[:, 1])
+        self.route = 0
+        self.is_player = True
+        self.begin()
+
+    def begin(self, route_after: int = 0) -> None:
+        """Begins an episode on the same route, or on one that stands so many places after it."""
+        names = self.batch.split_routes
+        self.route = (self.route + route_after) % len(names)
+        self.batch.begin([0], routes=[names[self.route]])
+        self.level = int(np.abs(self.levels).argmin())
+        self.speed = len(self.speeds) - 1
+        self.ended = Ended.RUNNING
+
+    def turn(self, levels: int) -> None:
+        """Steers by so many levels more, left positive."""
+        self.level = int(np.clip(self.level + levels, 0, len(self.levels) - 1))
+
+    def straighten(self) -> None:
+        """Steers one level nearer to straight ahead."""
+        self.turn(int(np.sign(int(np.abs(self.levels).argmin()) - self.level)))
+
+    def accelerate(self, levels: int) -> None:
+        """Chooses a higher or lower target speed, or change of it."""
+        self.speed = int(np.clip(self.speed + levels, 0, len(self.speeds) - 1))
+
+    def action(self) -> int:
+        """Index of the action that the player or the policy chooses."""
+        if not self.is_player:
+            return int(self.policy.act(self.batch.observation())[0])
+        wanted = self.levels[self.level], self.speeds[self.speed]
+        return int(np.flatnonzero((self.batch.action_table == wanted).all(axis=1))[0])
+
+    def step(self) -> None:
+        """A step of the truck, unless its episode has ended."""
+        if self.ended is Ended.RUNNING:
+            self.batch.step(np.array([self.action()]))
+            ended = self.batch.ended()
+            self.ended = Ended.RUNNING if ended is None else Ended(int(ended.codes[0]))
+
+    def says(self) -> list[str]:
+        """What stands in the window, line by line."""
+        columns = self.batch.columns("truck", "clearance", "terms")
+        truck, clearance = columns["truck"][0], columns["clearance"][0]
+        nearest = min(float(value) for value in clearance.tolist())
+        driver = "you drive" if self.is_player else "the policy drives"
+        lines = [
+            f"{self.batch.split_routes[self.route]}: {driver}",
+            f"{3.6 * truck['speed']:.0f} km/h, steer angle {np.degrees(truck['steering']):+.0f} deg, "
+            f"{max(nearest, 0.0):.2f} m to the kerb",
+        ]
+        if self.ended is not Ended.RUNNING:
+            lines.append(f"{self.ended.name.lower().replace('_', ' ')}: R again, N next route")
+        return lines
+
+
+def _shipped(batch: Batch) -> Policy:
+    """The policy that comes with the package for the batch's benchmark, or else one that can drive there."""
+    names = _offtrack.policy_names()
+    for name in [batch.scenario] if batch.scenario in names else names:
+        policy = Policy.shipped(name)
+        if policy.extras == batch.extras and policy.action_table.shape == batch.action_table.shape:
+            return policy
+    raise ValueError(f"policy: none comes with the package for {batch.scenario}; give one")
+
+
+def play(game: Game, *, side: int = SIDE) -> None:
+    """Opens a window and drives until it is closed.
+
+    Raises:
+        ImportError: Without pygame.
+    """
+    try:
+        import pygame
+    except ImportError:
+        raise ImportError("play: pygame is needed; pip install offtrack_sim[play]") from None
+    pygame.init()
+    try:
+        screen = pygame.display.set_mode((side, side))
+        pygame.display.set_caption("offtrack")
+        font, clock = pygame.font.Font(None, 26), pygame.time.Clock()
+        is_paused = False
+        while True:
+            for event in pygame.event.get():
+                if event.type == pygame.QUIT or (event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE):
+                    return
+                if event.type != pygame.KEYDOWN:
+                    continue
+                if event.key == pygame.K_SPACE:
+                    game.is_player = not game.is_player
+                elif event.key == pygame.K_p:
+                    is_paused = not is_paused
+                elif event.key in (pygame.K_r, pygame.K_n):
+                    game.begin(int(event.key == pygame.K_n))
+                elif event.key in (pygame.K_UP, pygame.K_DOWN):
+                    game.accelerate(1 if event.key == pygame.K_UP else -1)
+            held = pygame.key.get_pressed()
+            if held[pygame.K_LEFT] != held[pygame.K_RIGHT]:
+                game.turn(1 if held[pygame.K_LEFT] else -1)
+            elif game.is_player:
+                game.straighten()
+            if not is_paused:
+                game.step()
+            picture = game.batch.render(0, side)
+            screen.blit(pygame.surfarray.make_surface(picture.swapaxes(0, 1)), (0, 0))
+            for index, line in enumerate(game.says()):
+                screen.blit(font.render(line, True, (20, 20, 20), (255, 255, 255)), (12, 12 + 28 * index))
+            pygame.display.flip()
+            clock.tick(1 / game.batch.step_seconds)
+    finally:
+        pygame.quit()
+
+
+def main() -> None:
+    """The command line."""
+    parser = argparse.ArgumentParser(prog="python -m offtrack_sim.play", description=__doc__)
+    parser.add_argument("--benchmark", default="attard2023", help="a benchmark's name, or the path of its file")
+    parser.add_argument("--split", default="test", choices=["train", "validation", "test"])
+    parser.add_argument("--route", action="append", help="a route, 20m/N-left-4, or a road, wide/7/12; repeatable")
+    parser.add_argument("--policy", help="a policy file, which drives after the space key")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the starts")
+    given = parser.parse_args()
+    try:
+        policy = None if given.policy is None else Policy.load(given.policy)
+        play(Game(given.benchmark, split=given.split, routes=given.route, seed=given.seed, policy=policy))
+    except (ImportError, ValueError) as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,89 @@
+"""The game: a truck driven by keys."""
+
+import os
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+import offtrack_sim
+from offtrack_sim import play
+from offtrack_sim.play import Game
+
+
+def test_the_player_steers_by_levels_chooses_speeds_and_hands_over_to_the_policy() -> None:
+    game = Game("laden2026", routes=["20m/N-left-4"])
+    assert game.batch.action_table[game.action()][0] == 0
+    before = game.speed
+    for _ in range(3):
+        game.turn(1)
+    game.accelerate(-1)
+    assert game.batch.action_table[game.action()].tolist() == [game.levels[game.level], game.speeds[before - 1]]
+    assert game.levels[game.level] > 0
+    game.turn(99)
+    assert game.levels[game.level] == game.levels.max()
+    for _ in range(99):
+        game.straighten()
+    assert game.levels[game.level] == 0
+    # Straight on a U-turn ends on a kerb; the policy arrives.
+    while game.ended is offtrack_sim.Ended.RUNNING:
+        game.step()
+    assert game.ended is not offtrack_sim.Ended.ARRIVED and "R again" in game.says()[-1]
+    game.begin()
+    game.is_player = False
+    while game.ended is offtrack_sim.Ended.RUNNING:
+        game.step()
+    assert game.ended is offtrack_sim.Ended.ARRIVED
+    game.begin(1)
+    assert game.says()[0] == "20m/N-left-4: the policy drives"
+
+
+def test_the_window_drives_by_keys_and_closes(monkeypatch: pytest.MonkeyPatch) -> None:
+    pygame = pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    game = Game(routes=["20m/N-left-4", "20m/E-left-2"])
+    steps: list[float] = []
+    frames: list[np.ndarray] = []
+
+    class Clock:
+        """No waiting; keys by the number of the step."""
+
+        def tick(self, rate: float) -> None:
+            assert rate == 10
+            steps.append(float(game.batch.columns("truck")["truck"]["steering"][0]))
+            frames.append(pygame.surfarray.array3d(pygame.display.get_surface()).copy())
+            keys = {3: pygame.K_SPACE, 6: pygame.K_p, 8: pygame.K_n, 10: pygame.K_ESCAPE}
+            if len(steps) in keys:
+                pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=keys[len(steps)]))
+
+    class Held(dict[int, bool]):
+        def __missing__(self, key: int) -> bool:
+            return key == pygame.K_LEFT and len(steps) < 3
+
+    monkeypatch.setattr(pygame.time, "Clock", Clock)
+    monkeypatch.setattr(pygame.key, "get_pressed", Held)
+    play.play(game, side=240)
+    assert len(steps) == 10 and steps[2] > steps[0] > 0
+    assert not game.is_player and game.route == 1
+    assert (frames[0] != frames[2]).any() and frames[0].std() > 10
+
+
+def test_without_pygame_or_with_a_wrong_route_the_game_says_what_is_needed() -> None:
+    def ran(*arguments: str, **environment: str) -> Any:
+        command = [sys.executable, "-m", "offtrack_sim.play", *arguments]
+        return subprocess.run(command, capture_output=True, text=True, env={**os.environ, **environment})
+
+    wrong = ran("--route", "nowhere")
+    assert wrong.returncode == 1 and 'routes: "nowhere"; attard2023 has' in wrong.stderr
+    without = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import sys; sys.modules['pygame'] = None; from offtrack_sim import play; play.play(play.Game())",
+        ],
+        capture_output=True,
+        text=True,
+    )
+    assert "play: pygame is needed; pip install offtrack_sim[play]" in without.stderr
