@@ -1,7 +1,7 @@
 """Drive a truck by keys: ``python -m offtrack_sim.play``, with pygame (``pip install offtrack_sim[play]``).
 
-Left and right steer, up and down change the speed where a benchmark lets one choose, space hands over to the policy that
-comes with the package and back, R begins again, N takes the next route, P pauses, Escape ends.
+Left and right steer, up and down change the speed where a benchmark lets one choose, space hands over to the policy
+that comes with the package and back, R begins again, N takes the next route, P pauses, Escape ends.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ def test_it_draws_films_generates_certifies_and_says_which_trucks_fit(tmp_path: 
     for arguments, file in (
         (["draw", "20m", "--route", "N-left-4", "-o", "road.svg"], "road.svg"),
         (["record", "--route", "20m/N-right-1", "-o", "film.gif"], "film.gif"),
-        (["generate", "wide", "--seed", "7", "--count", "2", "-o", "roads"], "roads"),
+        (["generate", "--distribution", "wide", "--seed", "7", "--count", "2", "-o", "roads"], "roads"),
         (["vehicles"], None),
     ):
         command = [sys.executable, "-m", "offtrack_sim.command", *arguments]

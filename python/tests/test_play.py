@@ -8,9 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-import offtrack_sim
 from offtrack_sim import play
 from offtrack_sim.play import Game
+
+
+def driven(game: Game) -> str:
+    """Why the episode ended."""
+    while game.ended == 0:
+        game.step()
+    return game.ended.name
 
 
 def test_the_player_steers_by_levels_chooses_speeds_and_hands_over_to_the_policy() -> None:
@@ -28,14 +34,10 @@ def test_the_player_steers_by_levels_chooses_speeds_and_hands_over_to_the_policy
         game.straighten()
     assert game.levels[game.level] == 0
     # Straight on a U-turn ends on a kerb; the policy arrives.
-    while game.ended is offtrack_sim.Ended.RUNNING:
-        game.step()
-    assert game.ended is not offtrack_sim.Ended.ARRIVED and "R again" in game.says()[-1]
+    assert driven(game) != "ARRIVED" and "R again" in game.says()[-1]
     game.begin()
     game.is_player = False
-    while game.ended is offtrack_sim.Ended.RUNNING:
-        game.step()
-    assert game.ended is offtrack_sim.Ended.ARRIVED
+    assert driven(game) == "ARRIVED"
     game.begin(1)
     assert game.says()[0] == "20m/N-left-4: the policy drives"
 

@@ -124,7 +124,8 @@ fn the_feature_gpu_is_named_only_where_an_engine_or_device_is_chosen() {
             ],
         ),
         // The list of devices, and the default training file.
-        ("cli/src", 20, &[("commands/devices.rs", 3), ("commands/train.rs", 1)]),
+        ("cli/src", 8, &[("commands/train.rs", 1)]),
+        ("commands/src", 15, &[("devices.rs", 3)]),
         ("drawing/src", 15, &[]),
         // The kernel, and its failure.
         ("policy/src", 5, &[("error.rs", 1), ("lib.rs", 1)]),
