@@ -204,7 +204,7 @@ fn interval(values: &[f64]) -> Option<(f64, f64)> {
 
 /// Quantile 0.975 of Student's t distribution, by the degrees of freedom: exact to three decimals. Above 20 it is
 /// formula 26.7.5 of M. Abramowitz and I. Stegun, "Handbook of Mathematical Functions" (1964).
-fn student_t(freedom: usize) -> f64 {
+pub(crate) fn student_t(freedom: usize) -> f64 {
     const TABLE: [f64; 20] = [
         12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131,
         2.120, 2.110, 2.101, 2.093, 2.086,
