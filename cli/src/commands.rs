@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod certify;
+pub mod compare;
 pub mod deviations;
 pub mod devices;
 pub mod draw;

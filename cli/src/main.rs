@@ -11,7 +11,8 @@ use offtrack_evaluation::{files, provenance};
 use offtrack_learner::error::Error;
 
 use commands::{
-    bench, certify, deviations, devices, draw, evaluate, fits, generate, import, record, scale, trace, train, vehicles,
+    bench, certify, compare, deviations, devices, draw, evaluate, fits, generate, import, record, scale, trace, train,
+    vehicles,
 };
 
 /// Batches of tensors are allocated thousands of times a second; the system's allocator takes a third of an update's
@@ -47,6 +48,7 @@ struct Cli {
 enum Command {
     Train(train::Args),
     Evaluate(evaluate::Args),
+    Compare(compare::Args),
     Scale(scale::Args),
     Bench(bench::Args),
     Devices(devices::Args),
@@ -78,6 +80,7 @@ fn main() -> ExitCode {
     let done = start_threads().and_then(|()| match &command {
         Command::Train(args) => train::run(args),
         Command::Evaluate(args) => Ok(evaluate::run(args)?),
+        Command::Compare(args) => Ok(compare::run(args)?),
         Command::Scale(args) => scale::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Devices(args) => Ok(devices::run(args)?),

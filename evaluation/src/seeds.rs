@@ -1,9 +1,9 @@
 //! What several seeds of one training file came to: each, their mean, the worst, and how well so few determine the
 //! mean.
 
-use std::fmt::Write;
-
 use serde::{Deserialize, Serialize};
+
+use crate::tabular::markdown;
 
 /// A seed's run, as far as its `report.json` is needed here.
 #[derive(Debug, Clone, Deserialize)]
@@ -218,25 +218,6 @@ pub(crate) fn student_t(freedom: usize) -> f64 {
     ];
     let series = || Z + terms.iter().zip(1..).map(|(term, power)| term / n.powi(power)).sum::<f64>();
     freedom.checked_sub(1).and_then(|index| TABLE.get(index).copied()).unwrap_or_else(series)
-}
-
-/// Rows of equally many cells as a Markdown table with aligned columns; the first row is its head.
-fn markdown(rows: &[Vec<String>]) -> String {
-    let n_columns = rows.first().map_or(0, Vec::len);
-    let widths: Vec<usize> =
-        (0..n_columns).map(|column| rows.iter().map(|row| row[column].len()).max().unwrap_or(0)).collect();
-    let mut text = String::new();
-    for (index, row) in rows.iter().enumerate() {
-        for (cell, width) in row.iter().zip(&widths) {
-            let _ = write!(text, "| {cell:width$} ");
-        }
-        text += "|\n";
-        if index == 0 {
-            text.extend(widths.iter().map(|width| format!("|{}", "-".repeat(width + 2))));
-            text += "|\n";
-        }
-    }
-    text
 }
 
 #[cfg(test)]
