@@ -6,8 +6,10 @@ use offtrack::files::reader;
 use offtrack::scenario::Split;
 use offtrack_evaluation::certificate::attempt::{HOLD, passes};
 use offtrack_evaluation::certificate::certified;
+use offtrack_evaluation::comparison::Asked;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::failures::Example;
+use offtrack_evaluation::outcomes::Outcomes;
 use offtrack_evaluation::page::Page;
 use offtrack_evaluation::possible::to_search;
 use offtrack_evaluation::recording::Of;
@@ -50,7 +52,7 @@ pub struct Args {
     /// Seed of the start poses and of random actions.
     #[arg(long, default_value_t = 0)]
     seed: u32,
-    /// Write the report to this file as JSON.
+    /// Write the report to this file as JSON, with each episode's outcome, for `offtrack compare`.
     #[arg(long)]
     json: Option<PathBuf>,
     /// Write a page to this file, for a browser, that shows the report and every episode; of more than 4000 episodes
@@ -89,6 +91,20 @@ struct Written<'a> {
     device: &'a str,
     /// The commit that the program was built from.
     commit: String,
+    /// What was asked, to be asked again.
+    asked: &'a Asked,
+}
+
+impl Written<'_> {
+    /// Writes it with the outcomes, which have a line for each route.
+    fn write(&self, file: &Path, outcomes: &Outcomes) -> Result<(), Error> {
+        let text = || -> serde_json::Result<String> {
+            let head = serde_json::to_string_pretty(self)?;
+            let head = head.strip_suffix("\n}").unwrap_or(&head);
+            Ok(format!("{head},\n  \"outcomes\": {}\n}}\n", outcomes.json()?))
+        };
+        files::write_whole(file, text().map_err(|error| Error::write(file)(error.into()))?.as_bytes())
+    }
 }
 
 /// Runs the command.
@@ -108,11 +124,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     )?;
     let device = args.device.open()?;
     let split = Split::ALL.into_iter().find(|split| split.name() == args.split).unwrap_or(Split::Test);
-    let mut scenario = roads::with_load(roads::benchmark(&args.benchmark)?, args.load.as_deref())?;
-    if !args.route.is_empty() {
-        roads::narrow(&mut scenario, &args.route, &[split])?;
-    }
-    roads::keep(&mut scenario, split, &args.benchmark)?;
+    let asked = args.policy.asked(&args.benchmark, args.load.as_deref(), &args.route);
+    let scenario = roads::asked(&asked, split)?;
     let world = roads::world(&scenario)?;
     let mut policy = args.policy.open(&scenario, &world, &device.engine, args.seed)?;
     let n_routes = scenario.split(split).len();
@@ -149,7 +162,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     });
     if let Some(file) = &args.json {
         let (machine, commit) = (provenance::machine(), provenance::commit());
-        files::write_json(file, &Written { report: &report, machine, device: &device.name, commit })?;
+        let written = Written { report: &report, machine, device: &device.name, commit, asked: &asked };
+        written.write(file, &evaluation.outcomes(&finished))?;
     }
     if let Some(file) = &args.html {
         Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run, metrics }.write(file)?;

@@ -2,6 +2,7 @@
 //! those that train and measure; the Python package has these alone.
 
 pub mod certify;
+pub mod compare;
 pub mod deviations;
 pub mod devices;
 pub mod draw;

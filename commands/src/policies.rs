@@ -8,6 +8,7 @@ use offtrack::scenario::Scenario;
 use offtrack::simulator::Engine;
 use offtrack::world::World;
 use offtrack_evaluation::certificate::line;
+use offtrack_evaluation::comparison::Asked;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::policies::{self, Controller, LOOK_AHEAD, PurePursuit};
@@ -15,7 +16,7 @@ use offtrack_evaluation::policies::{self, Controller, LOOK_AHEAD, PurePursuit};
 use crate::outputs;
 
 /// Which policy drives.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, Default, clap::Args)]
 // A group of flags is named after its type, and a command may not have two of the same name.
 #[group(skip)]
 pub struct Choice {
@@ -50,6 +51,19 @@ impl Choice {
             ));
         }
         Ok(policy)
+    }
+
+    /// The policy of an evaluation that was asked this.
+    pub fn of(asked: &Asked) -> Choice {
+        let Asked { policy, look_ahead, line, .. } = asked.clone();
+        Choice { policy, look_ahead, line }
+    }
+
+    /// What is asked of `benchmark`, whose split is narrowed to a load and to routes.
+    pub fn asked(&self, benchmark: &str, load: Option<&str>, route: &[String]) -> Asked {
+        let Choice { policy, look_ahead, line } = self.clone();
+        let (benchmark, load, route) = (benchmark.to_owned(), load.map(str::to_owned), route.to_vec());
+        Asked { benchmark, policy, look_ahead, line, load, route }
     }
 
     /// The files that these flags name, if they are files.

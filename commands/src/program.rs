@@ -9,7 +9,7 @@ use offtrack::files::reader::shortened;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
-use crate::{certify, deviations, devices, draw, evaluate, fits, generate, import, record, trace, vehicles};
+use crate::{certify, compare, deviations, devices, draw, evaluate, fits, generate, import, record, trace, vehicles};
 
 /// Exit code of a failure on valid input.
 pub const FAILED: u8 = 1;
@@ -26,6 +26,7 @@ const LONGEST_ARGUMENT: usize = 200;
 #[expect(missing_docs, reason = "each is documented where its arguments are")]
 pub enum Command {
     Evaluate(evaluate::Args),
+    Compare(compare::Args),
     Record(record::Args),
     Certify(certify::Args),
     Fits(fits::Args),
@@ -47,6 +48,7 @@ impl Command {
     pub fn run(&self) -> Result<bool, Error> {
         match self {
             Command::Evaluate(args) => evaluate::run(args),
+            Command::Compare(args) => compare::run(args),
             Command::Record(args) => record::run(args),
             Command::Certify(args) => certify::run(args),
             Command::Fits(args) => return fits::run(args),

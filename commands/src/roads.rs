@@ -11,6 +11,7 @@ use offtrack::map::chosen::is_map;
 use offtrack::map::procedural;
 use offtrack::scenario::{Place, Scenario, Split};
 use offtrack::world::World;
+use offtrack_evaluation::comparison::Asked;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
@@ -25,6 +26,16 @@ const LONGEST_LIST: usize = 600;
 /// A benchmark by its name or path. What is known of random roads is kept in the user's cache.
 pub fn benchmark(name: &str) -> Result<Scenario, Error> {
     Ok(loading("drawing", |loading| Scenario::load(name, loading))?)
+}
+
+/// The benchmark that an evaluation was asked for, with the routes of its split alone.
+pub fn asked(asked: &Asked, split: Split) -> Result<Scenario, Error> {
+    let mut scenario = with_load(benchmark(&asked.benchmark)?, asked.load.as_deref())?;
+    if !asked.route.is_empty() {
+        narrow(&mut scenario, &asked.route, &[split])?;
+    }
+    keep(&mut scenario, split, &asked.benchmark)?;
+    Ok(scenario)
 }
 
 /// A road by its name, the path of its file or of a map, of which the flags choose a place; or a random road.

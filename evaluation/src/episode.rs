@@ -6,6 +6,7 @@ use offtrack::layout::{Ended, Truck};
 use serde::Serialize;
 
 use super::driving::Driving;
+use super::interval::Cells;
 
 /// The figures of one episode.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,6 +52,12 @@ pub struct Summary {
     pub success_low: f64,
     /// Upper end of the 95 % Wilson interval of `success`.
     pub success_high: f64,
+    /// Lower end of the 95 % [interval over routes](crate::interval) of `success`; `None` on one route alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub success_low_over_routes: Option<f64>,
+    /// Upper end of the same.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub success_high_over_routes: Option<f64>,
     /// Episodes by end code.
     pub ends: BTreeMap<&'static str, usize>,
     /// Episodes that failed in their first step: the truck starts on or against a kerb, and no action helps.
@@ -98,6 +105,9 @@ impl Summary {
         let arrived = episodes.clone().filter(|episode| episode.ended == Ended::Arrived);
         let n_arrived = arrived.clone().count();
         let (success_low, success_high) = wilson(n_arrived, count);
+        let by_route =
+            episodes.clone().map(|episode| (episode.last.route, f64::from(u8::from(episode.ended == Ended::Arrived))));
+        let over_routes = Cells::of_routes(by_route).interval();
         let most = |value: fn(&Episode) -> f64| episodes.clone().map(value).fold(f64::NEG_INFINITY, f64::max);
         let least = |value: fn(&Episode) -> f64| episodes.clone().map(value).fold(f64::INFINITY, f64::min);
         let mean = |value: fn(&Episode) -> f64| episodes.clone().map(value).sum::<f64>() / count as f64;
@@ -115,6 +125,8 @@ impl Summary {
             success: n_arrived as f64 / count as f64,
             success_low,
             success_high,
+            success_low_over_routes: over_routes.map(|(low, _)| low),
+            success_high_over_routes: over_routes.map(|(_, high)| high),
             ends,
             lost_at_start: episodes.clone().filter(|episode| episode.lost_at_start()).count(),
             lane_distance_mean: mean(|episode| episode.lane_distance_mean),
@@ -165,6 +177,22 @@ pub(super) mod tests {
             driving: Some(Driving::new(&Truck::default(), 0.0)),
             last: Truck::default(),
         }
+    }
+
+    #[test]
+    fn the_interval_over_routes_is_of_the_routes_that_episodes_were_driven_on() {
+        let on = |route: u32, ended: Ended| {
+            let one = episode(ended);
+            Episode { last: Truck { route, ..one.last }, ..one }
+        };
+        // Of ten routes two fail whole.
+        let ends = |route: u32| if route < 2 { Ended::TimedOut } else { Ended::Arrived };
+        let episodes: Vec<Episode> = (0..300).map(|index| on(index / 30, ends(index / 30))).collect();
+        let summary = Summary::of(episodes.iter(), 0.1).unwrap();
+        let (low, high) = (summary.success_low_over_routes.unwrap(), summary.success_high_over_routes.unwrap());
+        assert!(low < 0.6 && 0.95 < high && low < summary.success_low && summary.success_high < high, "{low} {high}");
+        let one_route = Summary::of(episodes[..30].iter(), 0.1).unwrap();
+        assert_eq!((one_route.success_low_over_routes, one_route.success_high_over_routes), (None, None));
     }
 
     #[test]

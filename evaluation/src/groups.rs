@@ -78,11 +78,11 @@ pub(super) fn lane((_, place, route): &Evaluated) -> (usize, String) {
     (0, route.lane.seen(place.roundabout.is_mirrored()).name().to_owned())
 }
 
-fn exit((_, _, route): &Evaluated) -> (usize, String) {
+pub(super) fn exit((_, _, route): &Evaluated) -> (usize, String) {
     (route.exit as usize, route.exit.to_string())
 }
 
-fn roundabout(&(index, place, _): &Evaluated) -> (usize, String) {
+pub(super) fn roundabout(&(index, place, _): &Evaluated) -> (usize, String) {
     (index, place.roundabout.name.clone())
 }
 

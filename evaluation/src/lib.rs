@@ -39,6 +39,9 @@ pub mod episodes; // one a truck, until every one has ended
 mod evaluation; // every route, every start, every episode counted
 mod part; // entry, ring and exit of a route
 mod running; // an episode under way
+mod tabular; // rows as Markdown, LaTeX, CSV
+pub mod seeds; // figures of several seeds
+pub mod interval; // intervals over routes, by bootstrap
 pub mod driving; // how a truck drives through an episode
 pub mod episode; // the figures of an episode, and of several
 pub mod classes; // how trucks drive, by vehicle and load
@@ -49,9 +52,10 @@ pub mod possible; // success over the starts that are shown to be possible
 pub mod groups; // routes that have something in common
 pub mod report; // figures of an evaluation
 mod table; // a report as text
-pub mod seeds; // figures of several seeds
 pub mod polygons; // curves as points
 pub mod recording; // the states of an episode
+pub mod outcomes; // how each episode ended
+pub mod comparison; // evaluations in pairs
 pub mod shown; // which episodes a page shows
 pub mod page; // a report as an HTML page
 

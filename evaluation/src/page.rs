@@ -3,6 +3,7 @@
 //! It holds the whole report, so that every figure can be checked, and the episodes that it shows as gzipped columns of
 //! differences. Roundabouts and routes without such an episode are left out.
 
+pub mod comparison;
 mod ground;
 mod tracks;
 
@@ -16,7 +17,8 @@ use crate::error::Error;
 use crate::files;
 use crate::recording::Track;
 use crate::report::Report;
-use ground::Ground;
+use crate::tabular::html_text;
+use ground::{Ground, Shown};
 
 const TEMPLATE: &str = include_str!("page/report.html");
 const STYLE: &str = include_str!("page/style.css");
@@ -60,7 +62,11 @@ impl Page<'_> {
     /// Writes the page to `file`.
     pub fn write(mut self, file: &Path) -> Result<(), Error> {
         let columns = tracks::columns(self.world.params.sensor_range);
-        let mut ground = Ground::of(&self, &columns);
+        let routes: Vec<&str> = self.evaluation.routes.iter().map(|route| route.name.as_str()).collect();
+        let per_route = (self.evaluation.summary.episodes / routes.len().max(1)).max(1);
+        let Page { scenario, world, tracks, .. } = self;
+        let shown = Shown { scenario, world, routes, per_route, tracks };
+        let mut ground = Ground::of(&shown, &columns);
         let mut evaluation = json!(self.evaluation);
         if self.evaluation.has_many_routes() {
             // Gzipped with the ground: of thousands of routes this is most of the report.
@@ -87,21 +93,24 @@ impl Page<'_> {
         let (ground, tracks) = (ground.map_err(Error::write(file))?, tracks.map_err(Error::write(file))?);
         let summary = &self.evaluation.summary;
         let (benchmark, split) = (&self.evaluation.benchmark, self.evaluation.split);
-        let title = escaped(&format!(
+        let title = html_text(&format!(
             "{:.1} % of {} episodes arrived, {benchmark} {split} routes",
             100.0 * summary.success,
             summary.episodes
         ));
-        let page = filled(&[
-            ("title", &title),
-            ("heading", &escaped(&format!("Evaluation on {benchmark}, {split} routes"))),
-            ("style", STYLE),
-            ("report", &script_json(&self.run)),
-            ("ground", &ground),
-            ("metrics", &script_json(&json!(self.metrics))),
-            ("tracks", &tracks),
-            ("script", &SCRIPTS.concat()),
-        ]);
+        let page = filled(
+            TEMPLATE,
+            &[
+                ("title", &title),
+                ("heading", &html_text(&format!("Evaluation on {benchmark}, {split} routes"))),
+                ("style", STYLE),
+                ("report", &script_json(&self.run)),
+                ("ground", &ground),
+                ("metrics", &script_json(&json!(self.metrics))),
+                ("tracks", &tracks),
+                ("script", &SCRIPTS.concat()),
+            ],
+        );
         files::write_whole(file, page.as_bytes())
     }
 }
@@ -118,10 +127,10 @@ fn rounded(value: Value) -> Value {
     }
 }
 
-/// The template with each `{{name}}` replaced by its value. Values are not searched for names.
-fn filled(values: &[(&str, &str)]) -> String {
+/// A template with each `{{name}}` replaced by its value. Values are not searched for names.
+fn filled(template: &str, values: &[(&str, &str)]) -> String {
     let mut page = String::new();
-    let mut rest = TEMPLATE;
+    let mut rest = template;
     while let Some((before, (name, after))) =
         rest.split_once("{{").and_then(|(before, tail)| Some((before, tail.split_once("}}")?)))
     {
@@ -137,11 +146,6 @@ fn script_json(value: &Value) -> String {
     value.to_string().replace('<', "\\u003c")
 }
 
-/// Text that can stand in HTML.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,7 +153,7 @@ mod tests {
     #[test]
     fn every_name_of_the_template_is_replaced_and_values_stay_as_they_are() {
         let names = ["title", "heading", "style", "report", "ground", "metrics", "tracks", "script"];
-        let page = filled(&names.map(|name| (name, "{{title}}<kept>")));
+        let page = filled(TEMPLATE, &names.map(|name| (name, "{{title}}<kept>")));
         assert_eq!(page.matches("{{title}}<kept>").count(), names.len());
         assert_eq!(page.matches("{{").count(), page.matches("<kept>").count());
     }

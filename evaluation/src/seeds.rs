@@ -1,9 +1,9 @@
 //! What several seeds of one training file came to: each, their mean, the worst, and how well so few determine the
 //! mean.
 
-use std::fmt::Write;
-
 use serde::{Deserialize, Serialize};
+
+use crate::tabular::markdown;
 
 /// A seed's run, as far as its `report.json` is needed here.
 #[derive(Debug, Clone, Deserialize)]
@@ -204,7 +204,7 @@ fn interval(values: &[f64]) -> Option<(f64, f64)> {
 
 /// Quantile 0.975 of Student's t distribution, by the degrees of freedom: exact to three decimals. Above 20 it is
 /// formula 26.7.5 of M. Abramowitz and I. Stegun, "Handbook of Mathematical Functions" (1964).
-fn student_t(freedom: usize) -> f64 {
+pub(crate) fn student_t(freedom: usize) -> f64 {
     const TABLE: [f64; 20] = [
         12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131,
         2.120, 2.110, 2.101, 2.093, 2.086,
@@ -218,25 +218,6 @@ fn student_t(freedom: usize) -> f64 {
     ];
     let series = || Z + terms.iter().zip(1..).map(|(term, power)| term / n.powi(power)).sum::<f64>();
     freedom.checked_sub(1).and_then(|index| TABLE.get(index).copied()).unwrap_or_else(series)
-}
-
-/// Rows of equally many cells as a Markdown table with aligned columns; the first row is its head.
-fn markdown(rows: &[Vec<String>]) -> String {
-    let n_columns = rows.first().map_or(0, Vec::len);
-    let widths: Vec<usize> =
-        (0..n_columns).map(|column| rows.iter().map(|row| row[column].len()).max().unwrap_or(0)).collect();
-    let mut text = String::new();
-    for (index, row) in rows.iter().enumerate() {
-        for (cell, width) in row.iter().zip(&widths) {
-            let _ = write!(text, "| {cell:width$} ");
-        }
-        text += "|\n";
-        if index == 0 {
-            text.extend(widths.iter().map(|width| format!("|{}", "-".repeat(width + 2))));
-            text += "|\n";
-        }
-    }
-    text
 }
 
 #[cfg(test)]

@@ -17,10 +17,14 @@ const WORST: usize = 20;
 const CAUSES: usize = 8;
 
 /// What each column of the table says.
-const COLUMNS: [(&str, &str); 10] = [
+const COLUMNS: [(&str, &str); 11] = [
     ("arrived", "episodes that arrived, of all"),
     ("success", "the same as a percentage"),
-    ("95 % interval", "Wilson interval of the success"),
+    ("95 % interval", "Wilson interval of the success, which takes all episodes as independent"),
+    (
+        "95 % over routes",
+        "interval of the success by bootstrap, whole routes drawn with replacement: episodes of one route end alike",
+    ),
     (
         "lane",
         "own: a truck whose front axle follows the lane's centre touches no kerb, and its lock allows that; wide: it \
@@ -113,6 +117,7 @@ impl Report {
             let _ = writeln!(text, "{rule}");
             for line in lines {
                 push(&mut text, &columns, |column| (column.text)(line));
+                push_interval(&mut text, line.summary, width);
                 push_failures(&mut text, line.summary, width);
             }
             if let Some(note) = note {
@@ -248,6 +253,14 @@ fn push(text: &mut String, columns: &[(&Column, usize)], cell: impl Fn(&Column) 
     }
     text.push_str(line.trim_end());
     text.push('\n');
+}
+
+/// Appends the interval over routes, on a line of its own; nothing of one route, or where every route is alike.
+fn push_interval(text: &mut String, summary: &Summary, width: usize) {
+    let ends = summary.success_low_over_routes.zip(summary.success_high_over_routes);
+    if let Some((low, high)) = ends.filter(|(low, high)| low < high) {
+        push_wrapped(text, &format!("  95 % over routes: {:.1}..{:.1}", 100.0 * low, 100.0 * high), width);
+    }
 }
 
 /// Appends how the episodes that did not arrive ended, on a line of its own; nothing where all arrived.

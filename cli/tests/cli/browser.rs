@@ -116,9 +116,9 @@ fn a_page_of_an_evaluation_alone_passes_its_own_checks_and_one_with_a_wrong_figu
     ];
     succeed(&place.evaluate(&arguments));
     let text = read(&page);
-    // The page has machine and commit elsewhere.
+    // The page has machine and commit elsewhere, and every step of the episodes.
     let mut report = place.json("report.json");
-    for key in ["machine", "device", "commit"] {
+    for key in ["machine", "device", "commit", "asked", "outcomes"] {
         assert!(report.as_object_mut().unwrap().remove(key).is_some(), "{key}");
     }
     assert_eq!(serde_json::from_str::<Value>(block(&text, "report")).unwrap()["evaluation"], report);
@@ -273,4 +273,25 @@ fn a_page_is_as_wide_as_its_window_on_a_telephone_and_on_a_desk() {
         }
     }
     assert!(opened(&place.file("runs/run/report.html")).contains(&format!("{road}/E-right-1")));
+}
+
+#[test]
+fn the_page_of_a_comparison_plays_pairs_from_the_same_start_of_which_one_side_arrives() {
+    let place = Place::new();
+    let [a, b, page] = ["a.json", "b.json", "page.html"].map(|name| place.text(name));
+    for (policy, file) in [("attard2023", &a), ("pursuit", &b)] {
+        let routes = ["--route", "20m/N-left-2", "--route", "40m/NW-left-3", "--episodes", "3"];
+        succeed(&offtrack(&[&["evaluate", "--policy", policy, "--json", file], &routes[..]].concat()));
+    }
+    succeed(&offtrack(&["compare", &a, &b, "--html", &page]));
+    let outcome = selftest(page.as_ref());
+    assert!(outcome.starts_with("selftest passed\n"), "{outcome}");
+    // A pair whose second half is another start's.
+    let text = read(page.as_ref());
+    let pairs: Value = serde_json::from_str(block(&text, "pairs")).unwrap();
+    assert!(2 <= pairs["names"].as_array().unwrap().len(), "{pairs}");
+    let wrong = text.replace("2 * index, 2 * index + 2", "2 * index + 1, 2 * index + 3");
+    assert_ne!(wrong, text);
+    std::fs::write(&page, wrong).unwrap();
+    assert!(selftest(page.as_ref()).starts_with("selftest failed"));
 }

@@ -6,6 +6,7 @@ use offtrack::files::reader::shortened;
 
 use super::row::Row;
 use super::way::Way;
+use crate::tabular::quoted;
 
 /// Metres in a foot.
 const FOOT: f64 = 0.3048;
@@ -184,11 +185,6 @@ pub fn csv(rows: &[Row]) -> String {
         text += &(cells.join(",") + "\n");
     }
     text
-}
-
-/// A name as a CSV cell (RFC 4180).
-fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
 }
 
 #[cfg(test)]

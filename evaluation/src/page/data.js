@@ -75,12 +75,9 @@ function shownOf(evaluation, episodes) {
   return { failed, ofFailed: evaluation.episodes - evaluation.arrived, arrived: episodes.length - failed, ofArrived: evaluation.arrived };
 }
 
-/** All data of the page. */
-async function readPage() {
-  const report = JSON.parse(block("report"));
+/** The roundabouts, and the recorded episodes with their columns. */
+async function readEpisodes() {
   const ground = JSON.parse(new TextDecoder().decode(await inflated(block("ground"))));
-  // Of thousands of routes the reports stand in the gzipped block.
-  report.evaluation.routes ??= ground.route_reports;
   const columns = decoded(await inflated(block("tracks")), ground.columns, ground.episodes.map((episode) => episode.n_frames));
   let first = 0;
   const episodes = ground.episodes.map((episode) => {
@@ -89,6 +86,14 @@ async function readPage() {
     first += episode.n_frames;
     return whole;
   });
+  return { ground, columns, episodes };
+}
+
+/** All data of the page. */
+async function readPage() {
+  const report = JSON.parse(block("report")), { ground, columns, episodes } = await readEpisodes();
+  // Of thousands of routes the reports stand in the gzipped block.
+  report.evaluation.routes ??= ground.route_reports;
   const { evaluation } = report;
   return { report, evaluation, ground, columns, episodes, shown: shownOf(evaluation, episodes), metrics: columnsOf(JSON.parse(block("metrics"))) };
 }

@@ -2,13 +2,13 @@
 
 use std::collections::HashMap;
 
-use crate::recording::{self, Class, Measures};
+use crate::recording::{self, Class, Measures, Track};
 use offtrack::map::route::Route;
+use offtrack::scenario::Scenario;
 use offtrack::world::World;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::Page;
 use super::tracks::Column;
 use crate::provenance;
 
@@ -74,11 +74,22 @@ struct Episode {
     n_frames: usize,
 }
 
+/// The episodes that a page shows.
+pub(super) struct Shown<'a> {
+    pub(super) scenario: &'a Scenario,
+    pub(super) world: &'a World,
+    /// Name of each route of the evaluation.
+    pub(super) routes: Vec<&'a str>,
+    /// Episodes of the evaluation on each.
+    pub(super) per_route: usize,
+    /// Those shown; `env` is the index of an episode among all.
+    pub(super) tracks: &'a [Track],
+}
+
 impl<'a> Ground<'a> {
     /// Of the episodes that a page shows.
-    pub(super) fn of(page: &Page<'a>, columns: &'a [Column]) -> Ground<'a> {
-        let evaluated = &page.evaluation.routes;
-        let per_route = (page.evaluation.summary.episodes / evaluated.len().max(1)).max(1);
+    pub(super) fn of(page: &Shown<'a>, columns: &'a [Column]) -> Ground<'a> {
+        let per_route = page.per_route;
         let by_name: HashMap<&str, (usize, &Route)> =
             page.scenario.routes().map(|(place, route)| (route.name.as_str(), (place, route))).collect();
         // Places and routes in the order of their first episodes.
@@ -87,7 +98,7 @@ impl<'a> Ground<'a> {
         let mut fleet = Fleet::default();
         for track in page.tracks {
             let index = track.env / per_route;
-            let (place, route) = by_name[evaluated[index].name.as_str()];
+            let (place, route) = by_name[page.routes[index]];
             if shown.last() != Some(&index) {
                 shown.push(index);
                 if places.last() != Some(&place) {

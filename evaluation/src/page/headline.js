@@ -11,9 +11,14 @@ const ROUTES = { test: "unseen routes", train: "training routes" };
 /** A 95 % interval as text. */
 const interval = (low, high) => `${decimal(100 * low, 1)}\u2060\u2013\u2060${percent(high)}`;
 
-function fraction({ arrived, episodes }) {
-  const [low, high] = wilson(arrived, episodes);
-  return html("td", {}, percent(arrived / episodes), html("span", { class: "muted" }, ` ${whole(arrived)}/${whole(episodes)}, ${interval(low, high)}`));
+/** The interval over routes as text; empty where there is none, or it has no width. */
+function overRoutes({ success_low_over_routes: low, success_high_over_routes: high }) {
+  return low < high ? `; over routes ${interval(low, high)}` : "";
+}
+
+function fraction(summary) {
+  const { arrived, episodes } = summary, [low, high] = wilson(arrived, episodes);
+  return html("td", {}, percent(arrived / episodes), html("span", { class: "muted" }, ` ${whole(arrived)}/${whole(episodes)}, ${interval(low, high)}${overRoutes(summary)}`));
 }
 
 /** Whether the benchmark's routes are the study's. */
@@ -29,7 +34,7 @@ function showHeadline(page) {
   byId("verdict").replaceChildren(
     html("p", { class: "big" }, percent(evaluation.success)),
     html("p", {}, `of all episodes on ${evaluation.routes.length} ${routes} arrived`),
-    html("p", { class: "muted" }, `${whole(evaluation.arrived)} of ${whole(evaluation.episodes)}; 95${GAP}% Wilson interval ${interval(evaluation.success_low, evaluation.success_high)}`));
+    html("p", { class: "muted" }, `${whole(evaluation.arrived)} of ${whole(evaluation.episodes)}; 95${GAP}% Wilson interval ${interval(evaluation.success_low, evaluation.success_high)}${overRoutes(evaluation)}`));
   const bars = [["This policy", evaluation.success, evaluation.success_low, evaluation.success_high, "var(--good)"]];
   const { certified } = evaluation;
   if (certified) bars.push(["This policy, certified routes", certified.success, certified.success_low, certified.success_high, "var(--good)"]);

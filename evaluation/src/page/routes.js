@@ -57,9 +57,11 @@ function cells(summary, scales) {
   ends.title = failures.words || "all arrived";
   // Of many episodes a whole per cent is many, and their numbers are wide.
   const many = 1000 <= summary.episodes;
+  const success = figure("success", fractionBar(summary.success, summary.success_low, summary.success_high, "var(--good)", 16),
+      `${summary.arrived}/${summary.episodes}  ${decimal(100 * summary.success, many ? 1 : 0)}${GAP}%`, many ? 132 : 92);
+  if (summary.success_low_over_routes < summary.success_high_over_routes) success.title = overRoutes(summary).slice(2);
   return [
-    figure("success", fractionBar(summary.success, summary.success_low, summary.success_high, "var(--good)", 16),
-      `${summary.arrived}/${summary.episodes}  ${decimal(100 * summary.success, many ? 1 : 0)}${GAP}%`, many ? 132 : 92),
+    success,
     ends,
     figure("lane", lengthBar(summary.lane_distance_mean, scales.lane, { mark: summary.lane_distance_max }), metres(summary.lane_distance_mean), 50),
     figure("transfer", lengthBar(summary.load_transfer_ratio_peak, scales.transfer, { limit: 1 }), decimal(summary.load_transfer_ratio_peak, 2), 34),

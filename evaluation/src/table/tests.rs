@@ -106,6 +106,16 @@ fn failures_are_counted_below_their_line() {
 }
 
 #[test]
+fn the_interval_over_routes_stands_below_a_line_of_several_routes() {
+    let mut report = report();
+    (report.summary.success_low_over_routes, report.summary.success_high_over_routes) = (Some(0.567), Some(0.861));
+    let table = report.table(100);
+    assert_eq!(table.matches("  95 % over routes: 56.7..86.1\n").count(), 1, "{table}");
+    (report.summary.success_low_over_routes, report.summary.success_high_over_routes) = (Some(1.0), Some(1.0));
+    assert!(!report.table(100).contains("  95 % over routes"));
+}
+
+#[test]
 fn the_commonest_causes_of_failures_are_told_and_the_others_counted() {
     let table = report().table(1000);
     assert!(
