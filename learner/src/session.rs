@@ -5,7 +5,7 @@ use std::sync::Arc;
 use burn::tensor::Device;
 use offtrack::layout::{EXTRAS, N_VALUES};
 use offtrack::world::World;
-use offtrack_policy::{Activation, Layer, Normalisation, Policy};
+use offtrack_policy::{Activation, Frames, Head, Layer, Normalisation, Policy};
 
 use super::backend::Backend;
 use super::checkpoint::{Columns, Stored};
@@ -209,6 +209,10 @@ impl Session {
                 .plain_layers(),
             extras: EXTRAS[..self.world.params.n_extras as usize].iter().map(|extra| extra.name.to_owned()).collect(),
             activation: Activation::Relu,
+            head: Head::Levels,
+            values: None,
+            frames: Frames::default(),
+            recurrent: None,
         })
     }
 
