@@ -61,6 +61,11 @@ impl Session {
         let Some(from) = &self.config.from else { return Ok(()) };
         let policy = policies::learned(from)?;
         policy.check(&self.world)?;
+        if !policy.is_plain() {
+            let expected = "has a memory, values of its own or commands: the learner continues with a perceptron of all \
+                            values and an output an action alone";
+            return Err(Error::setting("from", from, expected.to_owned()));
+        }
         if policy.activation != Activation::Relu {
             let expected =
                 format!("has the activation {}: the learner continues with relu alone", policy.activation.name());
