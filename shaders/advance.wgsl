@@ -6,8 +6,8 @@ fn advance(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
     let before = control[env];
-    let asked = targeted(params, actions[action[env]], before);
-    let next = controlled(vehicles[truck[env].vehicle].rig, step_duration(), asked, truck[env].speed, before);
+    let wanted = targeted(params, asked(env), before);
+    let next = controlled(vehicles[truck[env].vehicle].rig, step_duration(), wanted, truck[env].speed, before);
     control[env] = next;
     let after = driven(vehicles[truck[env].vehicle].rig, params.substep, params.n_substeps, next, truck[env]);
     truck[env] = after;

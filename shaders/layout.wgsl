@@ -104,6 +104,12 @@ const DRAW_NOISE: u32 = 4294967292u;
 const DRAW_ACTION: u32 = 2u;
 // Braking at which a truck comes to stand (m/s^2).
 const HOLD_BRAKING: f32 = 0.5f;
+// Parts of a command's half range in a word.
+const HALF_RANGE: f32 = 32767.0f;
+// One of them.
+const RANGE_PART: f32 = 3.051851e-5f;
+// A command of 0 in a word.
+const MIDDLE: f32 = 32768.0f;
 // Lowest speed that the engine's power is divided by (m/s).
 const POWER_SPEED_MIN: f32 = 1.0f;
 // Keeps a quotient finite at a standstill (m^2/s^2).
@@ -235,12 +241,21 @@ struct Control {
     holds: u32,
     // Steer angle asked for three steps before (rad).
     steering_earliest: f32,
-    // With a delay of actions: the action of the step before, its index plus 1; 0 before the first.
+    // With a delay of actions: the action of the step before, its index plus 1 or its command in a word; 0 before
+    // the first.
     action_before: u32,
     // The action of the step before that, likewise.
     action_earlier: u32,
     // The action of three steps before, likewise.
     action_earliest: u32,
+}
+
+// What is asked of a truck for a step where a benchmark's actions are continuous: each in -1..=1.
+struct Command {
+    // Steer angle over the lock, left positive.
+    steering: f32,
+    // Where the target speed, or its change, lies from the benchmark's lowest, at -1, to its highest.
+    speed: f32,
 }
 
 // One tractor and its trailer.
@@ -545,7 +560,7 @@ struct Params {
     substep: f32,
     // Sub-steps in a step.
     n_substeps: u32,
-    // Entries of the action table.
+    // Entries of the action table; 0 where actions are continuous, whose table is the ends of their ranges.
     n_actions: u32,
     // Vehicles that an episode draws from.
     n_vehicles: u32,
@@ -693,5 +708,7 @@ struct BatchFacts {
 @group(0) @binding(25) var<storage, read_write> next_extras: array<f32>;
 // With disturbances: the pose that is observed, and those of the last three steps; zeros without, [n_envs, 4].
 @group(0) @binding(26) var<storage, read_write> poses: array<Pose>;
+// Commands, where actions are continuous; zeros where they are indices, [n_envs].
+@group(0) @binding(27) var<storage, read_write> command: array<Command>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(27) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(28) var<storage, read_write> tally: array<atomic<u32>>;

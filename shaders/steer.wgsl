@@ -7,14 +7,14 @@ fn steer(thread: Thread) {
     let env = index_of(thread);
     if !is_driving(env) { return; }
     let before = control[env];
-    var asked = actions[action[env]];
+    var next = asked(env);
     if disturbances.of_action == 1u {
-        asked = late_action(streams[env], truck[env].episode, action[env], before);
+        next = late_action(streams[env], truck[env].episode, asked_word(env), before);
     }
-    let next = targeted(params, asked, before);
+    next = targeted(params, next, before);
     control[env] = controlled(vehicles[truck[env].vehicle].rig, step_duration(), next, truck[env].speed, before);
     if disturbances.of_action == 1u {
-        control[env].action_before = action[env] + 1u;
+        control[env].action_before = asked_word(env);
         control[env].action_earlier = before.action_before;
         control[env].action_earliest = before.action_earlier;
     }
@@ -25,13 +25,51 @@ fn step_duration() -> f32 {
     return f32(params.n_substeps) * params.substep;
 }
 
-// The action that takes effect in this step, where actions come late: before the first one arrives the truck is to go
-// straight on at the speed that it began with.
-fn late_action(stream: Stream, episode: u32, action: u32, before: Control) -> Action {
-    var listed = array<u32, 4>(action + 1u, before.action_before, before.action_earlier, before.action_earliest);
-    let index = listed[action_delay(disturbances, stream, episode)];
-    if index == 0u { return Action(0.0, select(before.target_speed, 0.0, params.changes_speed == 1u)); }
-    return actions[index - 1u];
+// Whether an action is a command, and no index.
+fn is_continuous() -> bool {
+    return params.n_actions == 0u;
+}
+
+// What is asked of a truck.
+fn asked(env: u32) -> Action {
+    if is_continuous() { return commanded(actions[0], actions[1], command[env]); }
+    return actions[action[env]];
+}
+
+// What a command asks for, between what -1 and 1 do.
+fn commanded(lowest: Action, highest: Action, command: Command) -> Action {
+    let speed = lowest.speed + 0.5 * (command.speed + 1.0) * (highest.speed - lowest.speed);
+    return Action(command.steering * highest.steering, min(speed, highest.speed));
+}
+
+// What is asked of a truck, in a word that is not 0.
+fn asked_word(env: u32) -> u32 {
+    if is_continuous() { return command_word(command[env]); }
+    return action[env] + 1u;
+}
+
+// A command in a word: 16 bits each, rounded to a part in 32767. None of them is 0.
+fn command_word(command: Command) -> u32 {
+    let steering = u32(round(command.steering * HALF_RANGE) + MIDDLE);
+    let speed = u32(round(command.speed * HALF_RANGE) + MIDDLE);
+    return steering | (speed << 16u);
+}
+
+// The command in a word.
+fn command_of(word: u32) -> Command {
+    let steering = f32(word & 0xffffu) - MIDDLE;
+    let speed = f32(word >> 16u) - MIDDLE;
+    return Command(steering * RANGE_PART, speed * RANGE_PART);
+}
+
+// What takes effect in this step of what is asked, in a word, where actions come late: before the first one arrives the
+// truck is to go straight on at the speed that it began with.
+fn late_action(stream: Stream, episode: u32, asked: u32, before: Control) -> Action {
+    var listed = array<u32, 4>(asked, before.action_before, before.action_earlier, before.action_earliest);
+    let late = listed[action_delay(disturbances, stream, episode)];
+    if late == 0u { return Action(0.0, select(before.target_speed, 0.0, params.changes_speed == 1u)); }
+    if is_continuous() { return commanded(actions[0], actions[1], command_of(late)); }
+    return actions[late - 1u];
 }
 
 // The action with the target speed that it leads to, from that of the control before.

@@ -21,7 +21,7 @@ use std::fmt::Debug;
 use std::time::Duration;
 
 use crate::engine::stages::{N_STAGES, Stage};
-use crate::layout::{BeginRow, Column, Stream};
+use crate::layout::{BeginRow, Column, Command, Stream};
 use crate::world::World;
 pub use autoreset::Autoreset;
 pub(crate) use batch::Row;
@@ -68,6 +68,9 @@ pub(crate) trait EngineBatch: Any + Debug + Send + Sync {
 
     /// One step of every truck.
     fn step(&mut self, world: &World, actions: &[u32]) -> Result<(), Error>;
+
+    /// One step of every truck, by commands.
+    fn step_with(&mut self, world: &World, commands: &[Command]) -> Result<(), Error>;
 
     /// Steps of every truck with random actions.
     fn steps_at_random(&mut self, world: &World, n_steps: usize);

@@ -22,7 +22,7 @@ pub(crate) use ended::printed_codes;
 pub use extras::{EXTRAS, Extra, ObservedExtras};
 pub(crate) use observation::first_of;
 pub use observation::{OBSERVATION, Values};
-pub use rows::{BeginRow, Clearance, Control, Pose, Progress, RewardTerms, Start, Stream, Truck};
+pub use rows::{BeginRow, Clearance, Command, Control, Pose, Progress, RewardTerms, Start, Stream, Truck};
 pub use tables::{
     Action, BatchFacts, Body, Disturbances, FieldRow, Lag, Params, PreviewRow, Ray, Reward, Rig, Roll, RouteRow,
     VehicleRow, WaypointRow,

@@ -22,20 +22,21 @@ pub use {engine::gpu, wgpu};
 
 /// What a program that steps trucks names: `use offtrack::prelude::*`.
 pub mod prelude {
-    pub use crate::layout::{Ended, Start, Stream};
+    pub use crate::layout::{Command, Ended, Start, Stream};
     pub use crate::scenario::{Scenario, Split};
-    pub use crate::simulator::{Autoreset, Begin, Engine, RouteChoice, Simulator};
+    pub use crate::simulator::{Actions, Autoreset, Begin, Engine, RouteChoice, Simulator};
     pub use crate::world::World;
 }
 
 /// The formulas of a step, each for one truck, as the CPU engine computes them.
 pub mod physics {
     pub use crate::engine::cpu::collide::clearance;
+    pub use crate::engine::cpu::draw::{drawn as drawn_action, drawn_command};
     pub use crate::engine::cpu::drive::{Motion, Moving, drive_max, driven, load_transfer_ratio, motion_of, moved};
     pub use crate::engine::cpu::follow::{distance_to_segment, reference_point};
     pub use crate::engine::cpu::judge::{closeness, rewarded};
     pub use crate::engine::cpu::observe::observed;
     pub use crate::engine::cpu::reset::drawn_start;
     pub use crate::engine::cpu::sense::ranges;
-    pub use crate::engine::cpu::steer::controlled;
+    pub use crate::engine::cpu::steer::{commanded, controlled};
 }

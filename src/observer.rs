@@ -41,8 +41,9 @@ use crate::engine::cpu::follow::{followed, reference_point};
 use crate::engine::cpu::judge::ending;
 use crate::engine::cpu::observe::{extras, observed};
 use crate::engine::cpu::sense::ranges_of;
-use crate::engine::cpu::steer::{controlled, targeted};
-use crate::layout::{Action, Clearance, Control, Ended, N_EXTRAS, N_VALUES, Progress, Rig, Truck};
+use crate::engine::cpu::steer::{commanded, controlled, targeted};
+use crate::engine::limits::check_command;
+use crate::layout::{Action, Clearance, Command, Control, Ended, N_EXTRAS, N_VALUES, Progress, Rig, Truck};
 use crate::map::Frame;
 use crate::world::World;
 use place::next_waypoint;
@@ -184,15 +185,36 @@ impl Observer {
     ///
     /// # Errors
     ///
-    /// [`Error::UnknownAction`].
+    /// [`Error::UnknownAction`], and [`Error::NeedsCommands`] where actions are continuous.
     pub fn command(&self, action: u32, target_speed: f32) -> Result<Action, Error> {
-        let params = &self.world.params;
+        if self.world.is_continuous() {
+            return Err(Error::NeedsCommands);
+        }
         let Some(asked) = self.world.actions.get(action as usize) else {
-            return Err(Error::UnknownAction { env: 0, action, limit: params.n_actions });
+            return Err(Error::UnknownAction { env: 0, action, limit: self.world.params.n_actions });
         };
+        Ok(self.targeted(asked, target_speed))
+    }
+
+    /// What a command asks for, where actions are continuous; as [`Observer::command`].
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NeedsIndices`] and [`Error::UnknownCommand`].
+    pub fn commanded(&self, command: &Command, target_speed: f32) -> Result<Action, Error> {
+        if !self.world.is_continuous() {
+            return Err(Error::NeedsIndices);
+        }
+        check_command(0, command)?;
+        let asked = commanded(&self.world.actions[0], &self.world.actions[1], command);
+        Ok(self.targeted(&asked, target_speed))
+    }
+
+    /// What is asked for on the map where the last target speed was `target_speed` (m/s).
+    fn targeted(&self, asked: &Action, target_speed: f32) -> Action {
         let before = Control { target_speed, ..Control::default() };
-        let Action { steering, speed } = targeted(params, asked, &before);
-        Ok(Action { steering: self.on_map(steering), speed })
+        let Action { steering, speed } = targeted(&self.world.params, asked, &before);
+        Action { steering: self.on_map(steering), speed }
     }
 
     /// The acceleration by which the simulator's speed control approaches a target from the present speed, both m/s, in

@@ -48,6 +48,17 @@ pub enum Clock {
     Feasible,
 }
 
+/// What an action is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ActionKind {
+    /// An index into a table of steer levels and speeds.
+    #[default]
+    Levels,
+    /// A steer angle and a speed: a [`Command`](crate::layout::Command).
+    Continuous,
+}
+
 crate::named! {
     /// The three disjoint sets of a benchmark's routes, by their keys in a benchmark file.
     pub enum Split {
@@ -93,9 +104,12 @@ pub struct Scenario {
     pub n_substeps: u32,
     /// Width of the distance field's cells (m).
     pub cell: f64,
-    /// Steer levels as fractions of the lock, left positive.
+    /// What an action is.
+    pub action_kind: ActionKind,
+    /// Steer levels as fractions of the lock, left positive; empty where actions are continuous.
     pub steer_levels: Vec<f64>,
-    /// Target speeds; with `speed_changes` the lowest and highest of them bound the target (m/s).
+    /// Target speeds; where actions are continuous, and with `speed_changes`, the lowest and highest of them bound the
+    /// target (m/s).
     pub speeds: Vec<f64>,
     /// By how much an action may change the target speed; empty where an action states the target itself (m/s).
     pub speed_changes: Vec<f64>,
@@ -235,16 +249,20 @@ impl Scenario {
     }
 
     /// The action table for a lock (rad): pairs of a steer angle and a target speed or a change of it, the speed
-    /// varying slowest.
+    /// varying slowest. Where actions are continuous it is what commands of -1 and of 1 ask for.
     pub fn actions(&self, lock: f32) -> Vec<Action> {
         let pair = |speed: f64, level: f64| Action { steering: level as f32 * lock, speed: speed as f32 };
         let speeds = if self.speed_changes.is_empty() { &self.speeds } else { &self.speed_changes };
+        if self.action_kind == ActionKind::Continuous {
+            let [lowest, highest] = ends(speeds);
+            return vec![pair(lowest, -1.0), pair(highest, 1.0)];
+        }
         speeds.iter().flat_map(|&speed| self.steer_levels.iter().map(move |&level| pair(speed, level))).collect()
     }
 
     /// The lowest and the highest target speed (m/s).
     pub fn speed_range(&self) -> [f64; 2] {
-        [self.speeds.iter().copied().fold(f64::INFINITY, f64::min), self.cruising_speed()]
+        ends(&self.speeds)
     }
 
     /// The highest target speed: trucks start with it, and time limits are computed with it, where the benchmark does
@@ -252,4 +270,10 @@ impl Scenario {
     pub fn cruising_speed(&self) -> f64 {
         self.speeds.iter().copied().fold(0.0, f64::max)
     }
+}
+
+/// The lowest and the highest of some numbers.
+fn ends(values: &[f64]) -> [f64; 2] {
+    let values = || values.iter().copied();
+    [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
 }

@@ -1,5 +1,6 @@
 //! Many trucks, many steps, on the engine that the caller chooses: the only module that knows both.
 
+mod actions; // what trucks are asked for
 mod check; // what a caller asks of a batch
 mod state; // the rows that a batch goes on from
 
@@ -10,10 +11,12 @@ use std::time::Duration;
 use crate::engine::EngineBatch;
 #[cfg(feature = "gpu")]
 use crate::engine::gpu;
+use crate::engine::limits::check_command;
 use crate::engine::stages::{N_STAGES, Stage};
 pub use crate::engine::{Autoreset, Batch, Error, RouteChoice, Tally, available_memory, check_size};
-use crate::layout::{BEGINS, BeginRow, Column, HAS_ROUTE, HAS_START, IS_FIRST, Start, Stream};
+use crate::layout::{BEGINS, BeginRow, Column, Command, HAS_ROUTE, HAS_START, IS_FIRST, Start, Stream};
 use crate::world::World;
+pub use actions::Actions;
 use check::{check_known, check_routes, check_start};
 use state::check_state;
 
@@ -251,6 +254,9 @@ impl Simulator {
     /// as it was.
     pub fn step(&mut self, actions: &[u32]) -> Result<(), Error> {
         let n_envs = self.n_envs();
+        if self.world.is_continuous() {
+            return Err(Error::NeedsCommands);
+        }
         if actions.len() != n_envs {
             return Err(Error::ActionCount { n_actions: actions.len(), n_envs });
         }
@@ -259,6 +265,22 @@ impl Simulator {
             return Err(Error::UnknownAction { env, action, limit });
         }
         self.batch.step(&self.world, actions)
+    }
+
+    /// One step of every truck by commands, `[n_envs]`, where actions are continuous. The driven frame's left is
+    /// positive, on a left-hand road the map's right. Wrong commands leave the batch as it was.
+    ///
+    /// Fails where actions are indices, and for the first value outside -1..=1, by truck: none is clipped.
+    pub fn step_with(&mut self, commands: &[Command]) -> Result<(), Error> {
+        let n_envs = self.n_envs();
+        if !self.world.is_continuous() {
+            return Err(Error::NeedsIndices);
+        }
+        if commands.len() != n_envs {
+            return Err(Error::CommandCount { n_commands: commands.len(), n_envs });
+        }
+        commands.iter().enumerate().try_for_each(|(env, command)| check_command(env, command))?;
+        self.batch.step_with(&self.world, commands)
     }
 
     /// One step of every truck with an action drawn uniformly at random from (seed, env, episode, step).

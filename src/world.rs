@@ -18,7 +18,7 @@ use crate::layout::{
 };
 use crate::map::Frame;
 use crate::map::route::{Route, Waypoint};
-use crate::scenario::{Class, Clock, Entry, Invalid, Place, Scenario};
+use crate::scenario::{ActionKind, Class, Clock, Entry, Invalid, Place, Scenario};
 use crate::vehicle::profile::Profile;
 
 /// Waypoints to the corner of each observed curvature.
@@ -118,7 +118,7 @@ impl World {
             params: Params {
                 substep,
                 n_substeps: scenario.n_substeps,
-                n_actions: actions.len() as u32,
+                n_actions: if scenario.action_kind == ActionKind::Continuous { 0 } else { actions.len() as u32 },
                 n_vehicles: rigs.len() as u32,
                 sensor_range: scenario.sensor_range as f32,
                 start_offset: scenario.start_offset as f32,
@@ -160,6 +160,19 @@ impl World {
         let shared = size_of_val(&self.params) + size_of_val(&self.reward) + size_of_val(&self.disturbances);
         let shared = shared + size_of_val(self.actions.as_slice());
         self.fields.iter().map(Field::bytes).sum::<usize>() + routes + vehicles + shared
+    }
+
+    /// Whether an action is a command, and no index into the action table: the table then has two entries, what
+    /// commands of -1 and of 1 ask for.
+    #[inline]
+    pub fn is_continuous(&self) -> bool {
+        self.params.n_actions == 0
+    }
+
+    /// Values of a command that count: the steer angle, and the speed where there are several. 0 where actions are
+    /// indices.
+    pub fn n_commands(&self) -> usize {
+        if self.is_continuous() { 1 + usize::from(self.actions[0].speed != self.actions[1].speed) } else { 0 }
     }
 
     /// The vehicle of a truck of this world.

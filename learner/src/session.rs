@@ -5,7 +5,7 @@ use std::sync::Arc;
 use burn::tensor::Device;
 use offtrack::layout::{EXTRAS, N_VALUES};
 use offtrack::world::World;
-use offtrack_policy::{Activation, Layer, Normalisation, Policy};
+use offtrack_policy::{Activation, Frames, Head, Layer, Normalisation, Policy};
 
 use super::backend::Backend;
 use super::checkpoint::{Columns, Stored};
@@ -61,6 +61,11 @@ impl Session {
         let Some(from) = &self.config.from else { return Ok(()) };
         let policy = policies::learned(from)?;
         policy.check(&self.world)?;
+        if !policy.is_plain() {
+            let expected = "has a memory, values of its own or commands: the learner continues with a perceptron of all \
+                            values and an output an action alone";
+            return Err(Error::setting("from", from, expected.to_owned()));
+        }
         if policy.activation != Activation::Relu {
             let expected =
                 format!("has the activation {}: the learner continues with relu alone", policy.activation.name());
@@ -209,6 +214,10 @@ impl Session {
                 .plain_layers(),
             extras: EXTRAS[..self.world.params.n_extras as usize].iter().map(|extra| extra.name.to_owned()).collect(),
             activation: Activation::Relu,
+            head: Head::Levels,
+            values: None,
+            frames: Frames::default(),
+            recurrent: None,
         })
     }
 

@@ -31,10 +31,11 @@ impl DevicePolicy {
     ///
     /// # Errors
     ///
-    /// A policy that cannot drive in `world`, whose layers do not fit each other, that a file could not hold, or that
-    /// is too wide for a workgroup; a device whose workgroups are too small.
+    /// A policy that cannot drive in `world`, that is not [plain](Policy::is_plain), whose layers do not fit each other,
+    /// that a file could not hold, or that is too wide for a workgroup; a device whose workgroups are too small.
     pub fn new(device: &gpu::Device, policy: &Policy, world: &World, choice: Choice) -> Result<DevicePolicy, Error> {
         policy.check(world)?;
+        check_plain(policy)?;
         check_whole(policy)?;
         let shape = fitting(policy)?;
         check_limits(device, shape)?;
@@ -113,6 +114,16 @@ impl DevicePolicy {
         self.device.queue.submit([encoder.finish()]);
         Ok(())
     }
+}
+
+/// An error for a policy that is more than the kernel acts by.
+fn check_plain(policy: &Policy) -> Result<(), Error> {
+    if policy.is_plain() {
+        return Ok(());
+    }
+    let message = "is a policy with a memory, values of its own or commands: a device acts by none of these; let it \
+                   drive on the processor";
+    Err(Error::contents(&policy.name, message))
 }
 
 /// An error for a policy that no file could hold: one whose layers do not fit each other, or with numbers that are not

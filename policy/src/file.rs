@@ -1,23 +1,25 @@
 //! A policy file's bytes: safetensors, with a description and a checksum in its metadata. `docs/policies.md` describes
 //! it for programs that write one.
 
+mod checked;
+
 use std::collections::HashMap;
 
-use offtrack::layout::{Action, EXTRAS, N_VALUES};
 use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
-use crate::bounds::overflowing;
 use crate::error::Error;
-use crate::network::{Activation, Layer};
-use crate::normalisation::Normalisation;
+use crate::frames::{Frames, Padding};
+use crate::head::Head;
+use crate::network::Activation;
 use crate::policy::Policy;
+use crate::recurrent::Recurrent;
 
 /// Key of the metadata's one entry.
 const KEY: &str = "offtrack";
-/// Version of the description's meaning.
-const VERSION: u32 = 1;
+/// Version of the description's meaning, and that of one with any of the keys that came with it.
+const VERSIONS: [u32; 2] = [1, 2];
 /// Most layers of a policy: more than any training file asks for.
 pub(crate) const MOST_LAYERS: usize = 64;
 
@@ -36,8 +38,84 @@ struct Description {
     /// A rectifier where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     activation: Option<String>,
+    /// Values of actions where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    head: Option<String>,
+    /// How outputs become commands, where they are those.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    squash: Option<String>,
+    /// Names of the values that it reads; all where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    values: Option<Vec<String>>,
+    /// 1 where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    frames: Option<usize>,
+    /// What stands before an episode's first frame, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    padding: Option<String>,
+    /// No recurrent layers where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    recurrent: Option<RecurrentDescription>,
     /// CRC-32 of the description's text with a 0 here, followed by the tensors' bytes in the order of reading.
     checksum: u32,
+}
+
+/// What the description says of recurrent layers.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RecurrentDescription {
+    gates: String,
+    layers: usize,
+    /// Layers of the actor before them.
+    #[serde(default)]
+    after: usize,
+}
+
+impl Description {
+    /// The first key that version 1 has not.
+    fn newer_key(&self) -> Option<&'static str> {
+        let keys = [
+            ("head", self.head.is_some()),
+            ("squash", self.squash.is_some()),
+            ("values", self.values.is_some()),
+            ("frames", self.frames.is_some()),
+            ("padding", self.padding.is_some()),
+            ("recurrent", self.recurrent.is_some()),
+        ];
+        keys.into_iter().find_map(|(key, is_there)| is_there.then_some(key))
+    }
+
+    /// The policy's own, without its checksum.
+    fn of(policy: &Policy) -> Description {
+        let Frames { n, padding } = policy.frames;
+        let squash = match policy.head {
+            Head::Levels => None,
+            Head::Continuous { squash } => Some(squash.name().to_owned()),
+        };
+        let mut description = Description {
+            version: VERSIONS[0],
+            benchmark: policy.benchmark.clone(),
+            actions: policy.actions.iter().map(|action| [action.steering, action.speed]).collect(),
+            layers: policy.layers.len(),
+            extras: policy.extras.clone(),
+            activation: (policy.activation != Activation::Relu).then(|| policy.activation.name().to_owned()),
+            head: squash.is_some().then(|| policy.head.name().to_owned()),
+            squash,
+            values: policy.values.as_ref().map(|values| values.names().to_vec()),
+            frames: (n != 1).then_some(n),
+            padding: (n != 1 && padding != Padding::Zero).then(|| padding.name().to_owned()),
+            recurrent: policy.recurrent.as_ref().map(|Recurrent { gates, after, cells }| RecurrentDescription {
+                gates: gates.name().to_owned(),
+                layers: cells.len(),
+                after: *after,
+            }),
+            checksum: 0,
+        };
+        if description.newer_key().is_some() {
+            description.version = VERSIONS[1];
+        }
+        description
+    }
 }
 
 impl Policy {
@@ -49,15 +127,7 @@ impl Policy {
     /// each other are written; reading them is an error.
     pub fn to_bytes(&self) -> Vec<u8> {
         let tensors = self.tensors();
-        let mut description = Description {
-            version: VERSION,
-            benchmark: self.benchmark.clone(),
-            actions: self.actions.iter().map(|action| [action.steering, action.speed]).collect(),
-            layers: self.layers.len(),
-            extras: self.extras.clone(),
-            activation: (self.activation != Activation::Relu).then(|| self.activation.name().to_owned()),
-            checksum: 0,
-        };
+        let mut description = Description::of(self);
         let text = |description: &Description| {
             serde_json::to_string(description).expect("numbers and words can be written as JSON")
         };
@@ -81,17 +151,30 @@ impl Policy {
 
     /// Every tensor in the order of [`names`].
     fn tensors(&self) -> Vec<Named> {
-        let vectors = [&self.normalisation.mean, &self.normalisation.factor].map(|values| (vec![values.len()], values));
-        let layers = self.layers.iter().flat_map(|layer| {
-            let outputs = layer.n_outputs();
-            [(vec![layer.n_inputs(), outputs], &layer.weights), (vec![outputs], &layer.biases)]
-        });
-        let named = |(name, (shape, values)): (String, (Vec<usize>, &Vec<f32>))| Named {
+        let named = |name: String, shape: Vec<usize>, values: &[f32]| Named {
             name,
             shape,
             bytes: values.iter().flat_map(|value| value.to_le_bytes()).collect(),
         };
-        names(self.layers.len()).zip(vectors.into_iter().chain(layers)).map(named).collect()
+        let [mean, factor] = [&self.normalisation.mean, &self.normalisation.factor];
+        let mut tensors = vec![
+            named("observation.mean".to_owned(), vec![mean.len()], mean),
+            named("observation.factor".to_owned(), vec![factor.len()], factor),
+        ];
+        for (index, layer) in self.layers.iter().enumerate() {
+            let (n_inputs, n_outputs) = (layer.n_inputs(), layer.n_outputs());
+            tensors.push(named(format!("actor.{index}.weight"), vec![n_inputs, n_outputs], &layer.weights));
+            tensors.push(named(format!("actor.{index}.bias"), vec![n_outputs], &layer.biases));
+        }
+        for (index, cell) in self.recurrent.iter().flat_map(|recurrent| recurrent.cells.iter().enumerate()) {
+            for (part, layer) in [("ih", &cell.input), ("hh", &cell.hidden)] {
+                let (n_inputs, n_outputs) = (layer.n_inputs(), layer.n_outputs());
+                let weights = transposed(&layer.weights, n_outputs);
+                tensors.push(named(format!("recurrent.{index}.weight_{part}"), vec![n_outputs, n_inputs], &weights));
+                tensors.push(named(format!("recurrent.{index}.bias_{part}"), vec![n_outputs], &layer.biases));
+            }
+        }
+        tensors
     }
 }
 
@@ -109,17 +192,21 @@ fn read(name: &str, bytes: &[u8]) -> Result<Policy, String> {
     })?;
     let description: Description = serde_json::from_str(text)
         .map_err(|error| format!("is not a policy file, or is damaged: its description: {error}; {AGAIN}"))?;
-    if description.version != VERSION {
-        return Err(format!(
-            "is a policy file of version {}; this program reads version {VERSION}",
-            description.version
-        ));
+    let Description { version, layers, .. } = description;
+    if !VERSIONS.contains(&version) {
+        let known = VERSIONS.map(|version| version.to_string()).join(" and ");
+        return Err(format!("is a policy file of version {version}; this program reads versions {known}"));
     }
-    if !(1..=MOST_LAYERS).contains(&description.layers) || description.actions.is_empty() {
+    if let Some(key) = description.newer_key().filter(|_| version == VERSIONS[0]) {
+        return Err(format!("is a policy file of version 1 with the key `{key}`; its version must be 2"));
+    }
+    let n_recurrent = description.recurrent.as_ref().map(|recurrent| recurrent.layers);
+    let is_usual = |n: &usize| (1..=MOST_LAYERS).contains(n);
+    if !is_usual(&layers) || !n_recurrent.iter().all(is_usual) || description.actions.is_empty() {
         return Err(format!("is a damaged policy file: it has no layers, far too many, or no actions; {AGAIN}"));
     }
     let mut read = Vec::new();
-    for name in names(description.layers) {
+    for name in names(layers, n_recurrent.unwrap_or_default()) {
         let tensor = tensors.tensor(&name).map_err(|error| format!("is a damaged policy file: {error}; {AGAIN}"))?;
         if tensor.dtype() != Dtype::F32 {
             return Err(format!("is a damaged policy file: {name} must hold 32-bit floats; {AGAIN}"));
@@ -131,90 +218,7 @@ fn read(name: &str, bytes: &[u8]) -> Result<Policy, String> {
     if found != expected {
         return Err(format!("is damaged: its checksum is {found:08x} and its contents give {expected:08x}; {AGAIN}"));
     }
-    checked(name, description, &read)
-}
-
-/// The policy of a file whose checksum is right. Shapes may still be those of another observation or action table, and
-/// values may not be finite.
-fn checked(name: &str, description: Description, tensors: &[(String, TensorView)]) -> Result<Policy, String> {
-    let activation = match &description.activation {
-        None => Activation::Relu,
-        Some(word) => Activation::ALL.into_iter().find(|activation| activation.name() == word).ok_or_else(|| {
-            let known = Activation::ALL.map(Activation::name).join(" or ");
-            format!("is a policy with the activation {word:?}; must be {known}")
-        })?,
-    };
-    for (name, tensor) in tensors {
-        if let Some((index, value)) = floats(tensor).into_iter().enumerate().find(|(_, value)| !value.is_finite()) {
-            return Err(format!(
-                "is a policy that cannot drive: {name}[{index}] is {value}; every number must be finite; train it again"
-            ));
-        }
-    }
-    if !description
-        .extras
-        .iter()
-        .map(String::as_str)
-        .eq(EXTRAS.iter().map(|extra| extra.name).take(description.extras.len()))
-    {
-        let known: Vec<&str> = EXTRAS.iter().map(|extra| extra.name).collect();
-        return Err(format!(
-            "is a policy with the extras {:?}; must be the first of {}",
-            description.extras,
-            known.join(", ")
-        ));
-    }
-    let n_values = N_VALUES + description.extras.len();
-    let (statistics, layers) = tensors.split_at(2);
-    for (name, tensor) in statistics {
-        if tensor.shape() != [n_values] {
-            return Err(format!(
-                "is a policy of another shape: {name} is {:?}; an observation has {n_values} values",
-                tensor.shape()
-            ));
-        }
-    }
-    let mut n_inputs = n_values;
-    for pair in layers.chunks_exact(2) {
-        let [(weight_name, weight), (bias_name, bias)] = [&pair[0], &pair[1]];
-        let &[n_outputs] = bias.shape() else {
-            return Err(format!(
-                "is a policy of another shape: {bias_name} is {:?}; one number an output is needed",
-                bias.shape()
-            ));
-        };
-        if n_outputs == 0 || weight.shape() != [n_inputs, n_outputs] {
-            return Err(format!(
-                "is a policy of another shape: {weight_name} is {:?}; [{n_inputs}, {n_outputs}] is needed, inputs \
-                 before outputs",
-                weight.shape()
-            ));
-        }
-        n_inputs = n_outputs;
-    }
-    if n_inputs != description.actions.len() {
-        return Err(format!(
-            "is a policy of another shape: its last layer has {n_inputs} outputs, and its action table {} actions",
-            description.actions.len()
-        ));
-    }
-    let layers: Vec<Layer> =
-        layers.chunks_exact(2).map(|pair| Layer { weights: floats(&pair[0].1), biases: floats(&pair[1].1) }).collect();
-    if let Some((index, most)) = overflowing(&layers, activation) {
-        return Err(format!(
-            "is a policy that cannot drive: the outputs of actor.{index} may reach {most:.0e}, beyond 32-bit floats; \
-             train it again"
-        ));
-    }
-    Ok(Policy {
-        name: name.to_owned(),
-        benchmark: description.benchmark,
-        actions: description.actions.iter().map(|&[steering, speed]| Action { steering, speed }).collect(),
-        extras: description.extras,
-        normalisation: Normalisation { mean: floats(&statistics[0].1), factor: floats(&statistics[1].1) },
-        layers,
-        activation,
-    })
+    checked::policy(name, description, &read)
 }
 
 /// A tensor to be written.
@@ -225,10 +229,17 @@ struct Named {
 }
 
 /// Names of a policy's tensors in the order of reading.
-fn names(n_layers: usize) -> impl Iterator<Item = String> {
+fn names(n_layers: usize, n_recurrent: usize) -> impl Iterator<Item = String> {
     let normalisation = ["observation.mean", "observation.factor"].map(str::to_owned);
     let layers = (0..n_layers).flat_map(|index| ["weight", "bias"].map(|part| format!("actor.{index}.{part}")));
-    normalisation.into_iter().chain(layers)
+    let parts = ["weight_ih", "bias_ih", "weight_hh", "bias_hh"];
+    let recurrent = (0..n_recurrent).flat_map(move |index| parts.map(|part| format!("recurrent.{index}.{part}")));
+    normalisation.into_iter().chain(layers).chain(recurrent)
+}
+
+/// A matrix `[rows * columns]` as `[columns * rows]`.
+fn transposed(values: &[f32], n_columns: usize) -> Vec<f32> {
+    (0..n_columns).flat_map(|column| values.iter().skip(column).step_by(n_columns)).copied().collect()
 }
 
 fn floats(tensor: &TensorView) -> Vec<f32> {

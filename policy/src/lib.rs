@@ -26,15 +26,26 @@
 //! ```
 
 mod bounds;
+mod check;
 #[cfg(feature = "gpu")]
 pub mod device;
+mod driver;
 mod error;
 mod file;
+mod frames;
+mod head;
 mod network;
 mod normalisation;
 mod policy;
+mod recurrent;
+mod selection;
 
+pub use driver::Driver;
 pub use error::Error;
+pub use frames::{Frames, Padding};
+pub use head::{Head, Squash};
 pub use network::{Activation, Layer};
 pub use normalisation::{LIMIT, Normalisation};
 pub use policy::{Choice, Policy, drawn, greedy, sampled};
+pub use recurrent::{Cell, Gates, Recurrent};
+pub use selection::Selection;

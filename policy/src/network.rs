@@ -9,10 +9,10 @@ use rayon::prelude::*;
 use crate::normalisation::Normalisation;
 
 /// Rows, and outputs of each, whose sums are made at a time: they fit into the registers.
-const ROWS: usize = 6;
+pub(crate) const ROWS: usize = 6;
 const OUTPUTS: usize = 16;
 /// Rows that one thread takes through all layers at a time: a slice of the weights serves them from the nearest cache.
-const BLOCK: usize = 8 * ROWS;
+pub(crate) const BLOCK: usize = 8 * ROWS;
 
 offtrack::named! {
     /// What stands after each layer but the last.
@@ -56,41 +56,53 @@ impl Layer {
     }
 }
 
-/// The last layer's outputs for each observation of `[rows * values]`, `[rows * outputs]`.
-pub(crate) fn forward(
-    normalisation: &Normalisation,
-    layers: &[Layer],
-    activation: Activation,
-    observations: &[f32],
-) -> Vec<f32> {
-    let (n_values, n_outputs) = (normalisation.mean.len(), layers.last().map_or(0, Layer::n_outputs));
-    let mut logits = vec![0.0; observations.len() / n_values * n_outputs];
-    let block = |(observations, logits): (&[f32], &mut [f32])| {
-        let mut values = grouped(&normalisation.apply_rows(observations), n_values);
-        for (index, layer) in layers.iter().enumerate() {
-            let mut outputs = vec![[0.0; ROWS]; values.len() / layer.n_inputs() * layer.n_outputs()];
-            linear(layer, &values, &mut outputs);
-            if index + 1 < layers.len() {
-                activation.apply(outputs.as_flattened_mut());
+/// Neighbouring layers, and what stands before and behind them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pass<'a> {
+    /// What happens to a row before the first layer; `None` where it was normalised before or came from a layer.
+    pub(crate) normalisation: Option<&'a Normalisation>,
+    pub(crate) layers: &'a [Layer],
+    pub(crate) activation: Activation,
+    /// Whether the activation follows the last layer, too.
+    pub(crate) activates_last: bool,
+}
+
+impl Pass<'_> {
+    /// The last layer's outputs for each row of `[rows * values]`, `[rows * outputs]`; the rows themselves, normalised,
+    /// without a layer.
+    pub(crate) fn outputs(&self, rows: &[f32]) -> Vec<f32> {
+        let Pass { normalisation, layers, activation, activates_last } = *self;
+        let normalised = |rows: &[f32]| normalisation.map_or_else(|| rows.to_vec(), |found| found.apply_rows(rows));
+        let (Some(first), Some(last)) = (layers.first(), layers.last()) else { return normalised(rows) };
+        let (n_values, n_outputs) = (first.n_inputs(), last.n_outputs());
+        let mut outputs = vec![0.0; rows.len() / n_values * n_outputs];
+        let block = |(rows, outputs): (&[f32], &mut [f32])| {
+            let mut values = grouped(&normalised(rows), n_values);
+            for (index, layer) in layers.iter().enumerate() {
+                let mut sums = vec![[0.0; ROWS]; values.len() / layer.n_inputs() * layer.n_outputs()];
+                linear(layer, &values, &mut sums);
+                if index + 1 < layers.len() || activates_last {
+                    activation.apply(sums.as_flattened_mut());
+                }
+                values = sums;
             }
-            values = outputs;
+            for (row, outputs) in outputs.chunks_exact_mut(n_outputs).enumerate() {
+                let group = &values[row / ROWS * n_outputs..];
+                outputs.iter_mut().zip(group).for_each(|(output, values)| *output = values[row % ROWS]);
+            }
+        };
+        if BLOCK * n_values < rows.len() {
+            rows.par_chunks(BLOCK * n_values).zip(outputs.par_chunks_mut(BLOCK * n_outputs)).for_each(block);
+        } else {
+            block((rows, &mut outputs));
         }
-        for (row, logits) in logits.chunks_exact_mut(n_outputs).enumerate() {
-            let group = &values[row / ROWS * n_outputs..];
-            logits.iter_mut().zip(group).for_each(|(logit, values)| *logit = values[row % ROWS]);
-        }
-    };
-    if BLOCK * n_values < observations.len() {
-        observations.par_chunks(BLOCK * n_values).zip(logits.par_chunks_mut(BLOCK * n_outputs)).for_each(block);
-    } else {
-        block((observations, &mut logits));
+        outputs
     }
-    logits
 }
 
 /// Rows of values in groups of [`ROWS`], in each the same value of all rows side by side, `[groups * values]`. The last
 /// group is filled with zeros.
-fn grouped(values: &[f32], n_values: usize) -> Vec<[f32; ROWS]> {
+pub(crate) fn grouped(values: &[f32], n_values: usize) -> Vec<[f32; ROWS]> {
     let groups = values.chunks(ROWS * n_values);
     let value = |group: &[f32], index: usize| {
         std::array::from_fn(|row| group.get(row * n_values + index).copied().unwrap_or_default())
@@ -100,7 +112,7 @@ fn grouped(values: &[f32], n_values: usize) -> Vec<[f32; ROWS]> {
 
 /// A layer's outputs `[groups * outputs]` for its inputs `[groups * inputs]`.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
-fn linear(layer: &Layer, inputs: &[[f32; ROWS]], outputs: &mut [[f32; ROWS]]) {
+pub(crate) fn linear(layer: &Layer, inputs: &[[f32; ROWS]], outputs: &mut [[f32; ROWS]]) {
     let (n_inputs, n_outputs) = (layer.n_inputs(), layer.n_outputs());
     for first in (0..n_outputs).step_by(OUTPUTS) {
         let width = OUTPUTS.min(n_outputs - first);

@@ -4,15 +4,18 @@ use std::path::Path;
 
 use offtrack::files::reader::{self, shown_path};
 use offtrack::layout::random::{self, Draw};
-use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES, Truck};
+use offtrack::layout::{Action, N_EXTRAS, N_VALUES, Truck};
 use offtrack::world::World;
 
+use crate::driver::Driver;
 use crate::error::Error;
-use crate::network::{self, Activation, Layer};
+use crate::frames::Frames;
+use crate::head::Head;
+use crate::network::{Activation, Layer, Pass};
 use crate::normalisation::Normalisation;
+use crate::recurrent::Recurrent;
+use crate::selection::Selection;
 
-/// Largest relative difference of two entries of an action table that count as equal: f32 rounds at 6e-8.
-const SAME_ACTION: f32 = 1e-5;
 /// Most bytes of a policy file: two hundred times the shipped ones.
 const FILE_LIMIT: u64 = 64 << 20;
 
@@ -46,17 +49,28 @@ pub struct Policy {
     pub name: String,
     /// The benchmark it learned on.
     pub benchmark: String,
-    /// The action table that its output refers to.
+    /// The action table that its outputs refer to. Where they are commands it has two actions: what -1 and what 1 of
+    /// each command asks for.
     pub actions: Vec<Action>,
-    /// How observations are normalised for it.
-    pub normalisation: Normalisation,
-    /// Names of the extras that it observes beside the 69 values, in the order of [`EXTRAS`]: its first ones.
+    /// What its outputs are.
+    pub head: Head,
+    /// The values that it reads; with `None` all 69 and, behind them, `extras`.
+    pub values: Option<Selection>,
+    /// Names of the extras that it observes beside the 69 values, the first of [`offtrack::layout::EXTRAS`]. None for a
+    /// policy that names its values.
     pub extras: Vec<String>,
-    /// The layers, from the observation on: the first has an input for each of the [`N_VALUES`] and the extras, the
-    /// last an output an action.
+    /// How many steps' values it sees at once.
+    pub frames: Frames,
+    /// How observations are normalised for it: each frame by itself or, where it has numbers for the values of all
+    /// frames, the frames side by side.
+    pub normalisation: Normalisation,
+    /// The layers, from the observation on: the first has an input for each value of each frame, the last an output an
+    /// action or a command.
     pub layers: Vec<Layer>,
     /// What stands after each layer but the last.
     pub activation: Activation,
+    /// Layers that remember, before, between or behind the others but before the last.
+    pub recurrent: Option<Recurrent>,
 }
 
 impl Policy {
@@ -105,40 +119,41 @@ impl Policy {
         SHIPPED.map(|(name, _)| name)
     }
 
-    /// One value an action for each observation, `[n_envs * n_actions]`, of a policy without extras. Those of an
-    /// observation do not depend on the others, on its place among them, or on the number of threads, to the last bit.
+    /// One value an action for each observation, `[n_envs * n_actions]`, of a policy without extras: the last layer's
+    /// outputs. Those of an observation do not depend on the others, on its place among them, or on the number of
+    /// threads, to the last bit.
     ///
     /// # Panics
     ///
-    /// Where the layers do not fit each other; those of a policy that was read do. And where it has extras.
+    /// Where the layers do not fit each other; those of a policy that was read do. And where it reads extras or has a
+    /// memory: a [`Driver`] keeps that.
     pub fn logits(&self, observations: &[[f32; N_VALUES]]) -> Vec<f32> {
-        assert!(self.extras.is_empty(), "the policy observes extras: they must be given");
-        network::forward(&self.normalisation, &self.layers, self.activation, observations.as_flattened())
+        assert!(self.n_extras() == 0, "the policy observes extras: they must be given");
+        self.logits_beside(observations, &[])
     }
 
     /// One value an action for each observation, `[n_envs * n_actions]`, with the extras beside each observation, of
-    /// which the policy takes the first, `[n_envs]` each.
+    /// which the policy takes those that it reads, `[n_envs]` each.
     ///
     /// # Panics
     ///
-    /// Where the layers do not fit each other; those of a policy that was read do.
+    /// Where the layers do not fit each other; those of a policy that was read do. And where it has a memory.
     pub fn logits_beside(&self, observations: &[[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Vec<f32> {
-        if self.extras.is_empty() {
-            return self.logits(observations);
+        assert!(!self.has_memory(), "the policy has a memory: a Driver keeps it");
+        let pass = self.pass(&self.layers);
+        if self.values.is_none() && self.extras.is_empty() {
+            return pass.outputs(observations.as_flattened());
         }
-        let rows = observations
-            .iter()
-            .zip(extras)
-            .flat_map(|(values, extras)| values.iter().chain(&extras[..self.extras.len()]));
-        network::forward(&self.normalisation, &self.layers, self.activation, &rows.copied().collect::<Vec<f32>>())
+        pass.outputs(&self.read(observations, extras))
     }
 
     /// The index of the most probable action for each observation, `[n_envs]`.
     ///
     /// # Panics
     ///
-    /// As [`Policy::logits`].
+    /// As [`Policy::logits`], and where the outputs are commands.
     pub fn act(&self, observations: &[[f32; N_VALUES]]) -> Vec<u32> {
+        self.assert_levels();
         greedy(&self.logits(observations), self.actions.len())
     }
 
@@ -146,40 +161,113 @@ impl Policy {
     ///
     /// # Panics
     ///
-    /// As [`Policy::logits_beside`].
+    /// As [`Policy::logits_beside`], and where the outputs are commands.
     pub fn act_beside(&self, observations: &[[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Vec<u32> {
+        self.assert_levels();
         greedy(&self.logits_beside(observations, extras), self.actions.len())
     }
 
-    /// Whether the policy can drive in `world`.
+    /// The commands for each observation, `[n_envs * n_commands]`, each in -1..=1, of a policy whose outputs are those.
     ///
-    /// # Errors
+    /// # Panics
     ///
-    /// Other extras than the world's, or another action table.
-    pub fn check(&self, world: &World) -> Result<(), Error> {
-        let observed = EXTRAS[..world.params.n_extras as usize].iter().map(|extra| extra.name);
-        if !observed.clone().eq(self.extras.iter().map(String::as_str)) {
-            let listed = |names: Vec<&str>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-            let message = format!(
-                "learned with other extras beside the observation: {} here, {} in the benchmark; the key \
-                 observation.extras must be equal",
-                listed(self.extras.iter().map(String::as_str).collect()),
-                listed(observed.collect()),
-            );
-            return Err(Error::contents(&self.name, &message));
+    /// As [`Policy::logits`], and where the outputs are values of actions.
+    pub fn commands(&self, observations: &[[f32; N_VALUES]]) -> Vec<f32> {
+        self.assert_continuous();
+        self.head.commands(self.logits(observations))
+    }
+
+    /// The commands for each observation with the extras beside it, `[n_envs * n_commands]`, each in -1..=1.
+    ///
+    /// # Panics
+    ///
+    /// As [`Policy::logits_beside`], and where the outputs are values of actions.
+    pub fn commands_beside(&self, observations: &[[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Vec<f32> {
+        self.assert_continuous();
+        self.head.commands(self.logits_beside(observations, extras))
+    }
+
+    /// Whether what it does depends on earlier observations: then a [`Driver`] drives.
+    pub fn has_memory(&self) -> bool {
+        self.frames.n != 1 || self.recurrent.is_some()
+    }
+
+    /// Whether it is a perceptron of all values of one step, with a value an action: what a kernel on a device acts by,
+    /// and what `offtrack train` writes and continues with.
+    pub fn is_plain(&self) -> bool {
+        !self.has_memory() && self.values.is_none() && self.head == Head::Levels
+    }
+
+    /// The policy at the wheel of `n_envs` trucks.
+    pub fn driver(self, n_envs: usize) -> Driver {
+        Driver::new(self, n_envs)
+    }
+
+    /// Number of the policy's outputs: its actions, or its commands.
+    pub fn n_outputs(&self) -> usize {
+        match self.head {
+            Head::Levels => self.actions.len(),
+            // A speed is chosen where the two actions differ in it.
+            Head::Continuous { .. } => 1 + usize::from(self.actions.windows(2).any(|two| two[0].speed != two[1].speed)),
         }
-        let near = |a: f32, b: f32| (a - b).abs() <= SAME_ACTION * a.abs().max(1.0);
-        let same = |(a, b): (&Action, &Action)| near(a.steering, b.steering) && near(a.speed, b.speed);
-        if self.actions.len() == world.actions.len() && self.actions.iter().zip(&world.actions).all(same) {
-            return Ok(());
+    }
+
+    /// Values that it reads of a step.
+    pub(crate) fn n_values(&self) -> usize {
+        self.values.as_ref().map_or(N_VALUES + self.extras.len(), |values| values.indices().len())
+    }
+
+    /// Values of all frames that it sees.
+    pub(crate) fn n_stacked(&self) -> usize {
+        self.frames.n * self.n_values()
+    }
+
+    /// Whether each frame is normalised before it is stacked.
+    pub(crate) fn normalises_frames(&self) -> bool {
+        self.normalisation.mean.len() == self.n_values()
+    }
+
+    /// The values that it reads of each observation, `[n_envs * values]`.
+    pub(crate) fn read(&self, observations: &[[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Vec<f32> {
+        let mut rows = Vec::with_capacity(observations.len() * self.n_values());
+        match &self.values {
+            None if self.extras.is_empty() => rows.extend_from_slice(observations.as_flattened()),
+            None => {
+                for (values, extras) in observations.iter().zip(extras) {
+                    rows.extend_from_slice(values);
+                    rows.extend_from_slice(&extras[..self.extras.len()]);
+                }
+            }
+            Some(selection) => {
+                for (row, values) in observations.iter().enumerate() {
+                    let value = |&index: &usize| {
+                        index.checked_sub(N_VALUES).map_or_else(|| values[index], |extra| extras[row][extra])
+                    };
+                    rows.extend(selection.indices().iter().map(value));
+                }
+            }
         }
-        let message = format!(
-            "learned with another action table: {} here, {} in the benchmark; {}",
-            described(&self.actions),
-            described(&world.actions),
-            "a policy that learned with the same actions and the same vehicle lock is needed"
-        );
-        Err(Error::contents(&self.name, &message))
+        rows
+    }
+
+    /// A pass through some of its layers, with the normalisation unless frames were normalised before.
+    pub(crate) fn pass<'a>(&'a self, layers: &'a [Layer]) -> Pass<'a> {
+        let was_normalised = self.frames.n != 1 && self.normalises_frames();
+        let normalisation = (!was_normalised).then_some(&self.normalisation);
+        Pass { normalisation, layers, activation: self.activation, activates_last: false }
+    }
+
+    /// Number of the extras that it reads.
+    fn n_extras(&self) -> usize {
+        self.values.as_ref().map_or(self.extras.len(), |values| values.extras().count())
+    }
+
+    pub(crate) fn assert_levels(&self) {
+        assert!(self.head == Head::Levels, "the policy's outputs are commands: it chooses none of the actions");
+    }
+
+    pub(crate) fn assert_continuous(&self) {
+        assert!(self.head != Head::Levels, "the policy's outputs are values of actions: it gives no commands");
     }
 }
 
@@ -210,15 +298,4 @@ pub fn sampled(logits: &[f32], n_actions: usize, mut drawn: impl FnMut(usize) ->
 pub fn drawn(seed: u32, env: u32, truck: &Truck) -> f32 {
     let [word, ..] = random::words(seed, env, truck.episode, (Draw::Action as u32).wrapping_add(truck.steps));
     0.5 * (random::signed_unit(word) + 1.0)
-}
-
-/// An action table in a few words.
-fn described(actions: &[Action]) -> String {
-    let range = |value: fn(&Action) -> f32| {
-        let values = actions.iter().map(value);
-        (values.clone().fold(f32::INFINITY, f32::min), values.fold(f32::NEG_INFINITY, f32::max))
-    };
-    let (right, left) = range(|action| action.steering.to_degrees());
-    let (slow, fast) = range(|action| action.speed * 3.6);
-    format!("{} actions, {right:.1}..{left:.1} deg, {slow:.1}..{fast:.1} km/h", actions.len())
 }

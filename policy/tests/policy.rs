@@ -2,8 +2,12 @@
 
 #![expect(clippy::unwrap_used, reason = "a failure of a test's helper fails the test")]
 
+#[path = "policy/commands.rs"]
+mod commands;
 #[path = "policy/extras.rs"]
 mod extras;
+#[path = "policy/memory.rs"]
+mod memory;
 
 use std::path::Path;
 
@@ -11,7 +15,7 @@ use offtrack::layout::random;
 use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES, ObservedExtras};
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
-use offtrack_policy::{Activation, Layer, Normalisation, Policy, greedy};
+use offtrack_policy::{Activation, Frames, Head, Layer, Normalisation, Policy, greedy};
 use proptest::prelude::*;
 
 /// A number in -1..1 of two counters.
@@ -40,6 +44,10 @@ fn policy(hidden: &[usize], n_actions: usize) -> Policy {
         layers: sizes.windows(2).enumerate().map(layer).collect(),
         extras: Vec::new(),
         activation: Activation::Relu,
+        head: Head::Levels,
+        values: None,
+        frames: Frames::default(),
+        recurrent: None,
     }
 }
 
@@ -67,9 +75,12 @@ fn described(policy: &Policy, change: impl Fn(&str) -> String) -> Vec<u8> {
     let text = change(&format!("{before}\"checksum\":@}}"));
     let layers =
         (0..policy.layers.len()).flat_map(|layer| ["weight", "bias"].map(|part| format!("actor.{layer}.{part}")));
+    let n_cells = policy.recurrent.as_ref().map_or(0, |recurrent| recurrent.cells.len());
+    let parts = ["weight_ih", "bias_ih", "weight_hh", "bias_hh"];
+    let cells = (0..n_cells).flat_map(|cell| parts.map(|part| format!("recurrent.{cell}.{part}")));
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(text.replace('@', "0").as_bytes());
-    for name in ["observation.mean", "observation.factor"].map(str::to_owned).into_iter().chain(layers) {
+    for name in ["observation.mean", "observation.factor"].map(str::to_owned).into_iter().chain(layers).chain(cells) {
         hasher.update(tensors.tensor(&name).unwrap().data());
     }
     let text = text.replace('@', &hasher.finalize().to_string());
@@ -309,7 +320,7 @@ fn an_unknown_activation_key_or_version_is_refused_by_its_word() {
         "is a policy with the activation \"gelu\"; must be relu or tanh",
     );
     refused(layers, "\"layers\":2,\"activaton\":\"tanh\"", "unknown field `activaton`");
-    refused("\"version\":1", "\"version\":2", "is a policy file of version 2; this program reads version 1");
+    refused("\"version\":1", "\"version\":3", "is a policy file of version 3; this program reads versions 1 and 2");
     refused(layers, "\"layers\":0", "it has no layers, far too many, or no actions");
     refused(layers, "\"layers\":3", "actor.2.weight");
 }

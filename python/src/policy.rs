@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use offtrack::layout::{N_EXTRAS, N_VALUES};
-use offtrack_policy::{Activation, Error, Layer, Normalisation, Policy};
+use offtrack_policy::{Activation, Error, Frames, Head, Layer, Normalisation, Policy};
 use pyo3::exceptions::{PyOSError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -197,6 +197,10 @@ pub fn write_policy(
             normalisation,
             layers: layers.iter().map(layer).collect(),
             activation,
+            head: Head::Levels,
+            values: None,
+            frames: Frames::default(),
+            recurrent: None,
         };
         let bytes = policy.to_bytes();
         // What is written can be read: sizes that do not fit the benchmark and values that cannot be are found here.

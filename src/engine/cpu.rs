@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 use super::{Autoreset, Batch, EngineBatch, Error, Row, Tally};
 use crate::engine::stages::{N_STAGES, STAGES, Stage};
-use crate::layout::{BeginRow, Column, Stream};
+use crate::layout::{BeginRow, Column, Command, Stream};
 use crate::world::World;
 
 /// Does a stage to one truck.
@@ -134,6 +134,12 @@ impl EngineBatch for Batch {
 
     fn step(&mut self, world: &World, actions: &[u32]) -> Result<(), Error> {
         self.action.copy_from_slice(actions);
+        run_all(world, self, &STAGES);
+        Ok(())
+    }
+
+    fn step_with(&mut self, world: &World, commands: &[Command]) -> Result<(), Error> {
+        self.command.copy_from_slice(commands);
         run_all(world, self, &STAGES);
         Ok(())
     }

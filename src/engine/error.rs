@@ -113,6 +113,30 @@ pub enum Error {
         /// Entries of the action table.
         limit: u32,
     },
+    /// Indices for a world whose actions are continuous.
+    #[error("actions: indices; this benchmark's are continuous (actions.kind): commands are needed")]
+    NeedsCommands,
+    /// Commands for a world whose actions are indices.
+    #[error("commands: this benchmark's actions are levels (actions.kind): indices are needed")]
+    NeedsIndices,
+    /// Commands must be one for each truck.
+    #[error("commands: {n_commands} for {n_envs} trucks; one each is needed")]
+    CommandCount {
+        /// Commands given.
+        n_commands: usize,
+        /// Trucks in the batch.
+        n_envs: usize,
+    },
+    /// A command outside its range, or none.
+    #[error("commands[{env}].{field}: {value}; must lie in -1..1")]
+    UnknownCommand {
+        /// Index of its truck.
+        env: usize,
+        /// Which of its values.
+        field: &'static str,
+        /// The value.
+        value: String,
+    },
     /// A stored column that does not fit the batch.
     #[error(
         "{column}: {}; a batch of {n_envs} trucks needs {n_bytes} bytes",

@@ -5,6 +5,7 @@ use std::fmt::Debug;
 use std::ops::RangeInclusive;
 
 use super::Error;
+use crate::layout::Command;
 
 /// Largest magnitude of a rate, an acceleration and the like, where nothing narrower is known: stages compute with it
 /// safely, and no truck comes near it.
@@ -15,6 +16,13 @@ pub(crate) const FASTEST: f32 = 1e3;
 pub(crate) const FAR: f32 = 1e4;
 /// Largest steer angle that an action may ask for (rad): locks are at most 1.5.
 pub(crate) const STEEPEST: f32 = 1.6;
+
+/// An error for a command outside -1..=1. NaN lies in no range.
+pub(crate) fn check_command(env: usize, command: &Command) -> Result<(), Error> {
+    let values = [("steering", command.steering), ("speed", command.speed)];
+    let outside = values.into_iter().find(|(_, value)| !(-1.0..=1.0).contains(value));
+    outside.map_or(Ok(()), |(field, value)| Err(Error::UnknownCommand { env, field, value: value.to_string() }))
+}
 
 /// An error, which names the value's place, unless the value lies in its range. NaN lies in none.
 pub(crate) fn within<T: PartialOrd + Debug>(

@@ -202,11 +202,13 @@ impl Kernel {
     /// The buffers that it is bound to: all that its shader names, in the order of their bindings.
     pub const fn buffers(self) -> &'static [Buffer] {
         match self {
-            Kernel::Draw => buffers![Params Batch Streams; Action Truck],
+            Kernel::Draw => buffers![Params Batch Streams; Action Truck Command],
             Kernel::Begin => buffers![
                 Params Vehicles Roads Batch Choice Streams Begins; Control Truck Progress
             ],
-            Kernel::Steer => buffers![Params Disturbances Vehicles Actions Batch Streams; Action Control Truck],
+            Kernel::Steer => buffers![
+                Params Disturbances Vehicles Actions Batch Streams; Action Control Truck Command
+            ],
             Kernel::Drive => buffers![Params Vehicles Batch; Control Truck],
             Kernel::Collide => buffers![Vehicles Roads Cells Corners Batch; Truck Clearance],
             Kernel::Follow => buffers![Params Disturbances Vehicles Roads Batch Streams; Truck Progress Poses],
@@ -229,7 +231,9 @@ impl Kernel {
             Kernel::ForgetAfterReset => buffers![
                 Batch; Truck Observation NextObservation Ended Terms Reward Extras NextExtras
             ],
-            Kernel::Advance => buffers![Params Vehicles Actions Roads Batch; Action Control Truck Progress],
+            Kernel::Advance => buffers![
+                Params Vehicles Actions Roads Batch; Action Control Truck Progress Command
+            ],
             Kernel::ObserveBoth => buffers![
                 Params Vehicles Roads Batch; Truck Progress Ranges Observation NextObservation
             ],

@@ -4,7 +4,7 @@
 //! makes a batch and a row of it. The buffers on a device, their WGSL declarations and the tests' tables follow from
 //! [`Column`].
 
-use super::{Clearance, Control, N_EXTRAS, N_POSES, N_RAYS, N_VALUES, Pose, Progress, RewardTerms, Truck};
+use super::{Clearance, Command, Control, N_EXTRAS, N_POSES, N_RAYS, N_VALUES, Pose, Progress, RewardTerms, Truck};
 use crate::layout::shared::{Named, Shared};
 
 /// Calls `$then` with every column: doc, variant of [`Column`], name, type of a row. The types are those of `layout`.
@@ -39,6 +39,8 @@ macro_rules! columns {
             NextExtras next_extras: [f32; N_EXTRAS],
             /// With disturbances: the pose that is observed, and those of the last three steps; zeros without
             Poses poses: [Pose; N_POSES],
+            /// Commands, where actions are continuous; zeros where they are indices
+            Command command: Command,
         }
     };
 }

@@ -21,12 +21,21 @@ crate::shared! {
         pub holds: u32,
         /// Steer angle asked for three steps before (rad).
         pub steering_earliest: f32,
-        /// With a delay of actions: the action of the step before, its index plus 1; 0 before the first.
+        /// With a delay of actions: the action of the step before, its index plus 1 or its command in a word; 0 before
+        /// the first.
         pub action_before: u32,
         /// The action of the step before that, likewise.
         pub action_earlier: u32,
         /// The action of three steps before, likewise.
         pub action_earliest: u32,
+    }
+
+    /// What is asked of a truck for a step where a benchmark's actions are continuous: each in -1..=1.
+    pub struct Command {
+        /// Steer angle over the lock, left positive.
+        pub steering: f32,
+        /// Where the target speed, or its change, lies from the benchmark's lowest, at -1, to its highest.
+        pub speed: f32,
     }
 
     /// One tractor and its trailer.

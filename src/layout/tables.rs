@@ -183,7 +183,7 @@ crate::shared! {
         pub substep: f32,
         /// Sub-steps in a step.
         pub n_substeps: u32,
-        /// Entries of the action table.
+        /// Entries of the action table; 0 where actions are continuous, whose table is the ends of their ranges.
         pub n_actions: u32,
         /// Vehicles that an episode draws from.
         pub n_vehicles: u32,

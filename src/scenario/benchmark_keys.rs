@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 
-use super::{Clock, Reward};
+use super::{ActionKind, Clock, Reward};
 use crate::layout::ObservedExtras;
 use crate::map::Gutter;
 use crate::map::opendrive::{Hand, RoadLane};
@@ -156,7 +156,9 @@ impl Default for WrittenField {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct WrittenActions {
-    pub(super) steer_levels: Vec<f64>,
+    #[serde(default)]
+    pub(super) kind: ActionKind,
+    pub(super) steer_levels: Option<Vec<f64>>,
     pub(super) speeds_kmh: Vec<f64>,
     #[serde(default)]
     pub(super) speed_changes_kmh: Vec<f64>,

@@ -5,7 +5,7 @@
 
 use std::fmt::Display;
 
-use super::{REWARD_KEYS, Scenario};
+use super::{ActionKind, REWARD_KEYS, Scenario};
 use crate::vehicle::{Model, Suspension, Vehicle};
 
 /// A value with which no truck could be stepped.
@@ -45,7 +45,14 @@ impl Scenario {
             ));
         }
         self.check_numbers()?;
-        list("steer_levels", &self.steer_levels, [-1.0, 1.0])?;
+        match self.action_kind {
+            ActionKind::Levels => list("steer_levels", &self.steer_levels, [-1.0, 1.0])?,
+            ActionKind::Continuous if self.steer_levels.is_empty() => (),
+            ActionKind::Continuous => {
+                let found = format_args!("{} values", self.steer_levels.len());
+                return Err(invalid("steer_levels", found, "continuous actions have none"));
+            }
+        }
         list("speeds", &self.speeds, [0.0, 100.0])?;
         within("speeds", self.cruising_speed(), [0.01, 100.0])?;
         if !self.speed_changes.is_empty() {

@@ -1,11 +1,11 @@
 //! Reads a benchmark file and the files it refers to, and checks every value.
 
-use super::Scenario;
-use super::benchmark_keys::{Written, WrittenDisturbances, WrittenSpeeds};
+use super::benchmark_keys::{Written, WrittenActions, WrittenDisturbances, WrittenSpeeds};
 use super::check::MOST_DELAY;
 use super::disturbances::{Disturbances, LONGEST_DELAY};
 use super::fleet::{self, Fleet};
 use super::roads::{MOST_ROADS, Procedural};
+use super::{ActionKind, Scenario};
 use crate::files::cache::Loading;
 use crate::files::reader::{Error, Reader};
 use crate::files::shipped::Source;
@@ -76,7 +76,8 @@ fn without_routes(
         step: reader.within("time.step", time.step, 0.01..=1.0, "s")?,
         n_substeps: reader.count("time.substeps", time.substeps, 1..=100)? as u32,
         cell: reader.within("field.cell", field.cell, 0.1..=1.0, "m")?,
-        steer_levels: numbers(reader, "actions.steer_levels", &actions.steer_levels, 1.0, -1.0, "")?,
+        action_kind: actions.kind,
+        steer_levels: steer_levels(reader, actions)?,
         speeds: speeds.into_iter().map(|speed| speed / 3.6).collect(),
         speed_changes: speed_changes.into_iter().map(|change| change / 3.6).collect(),
         sensor_range: reader.within("sensors.range", sensors.range, 1.0..=50.0, "m")?,
@@ -97,6 +98,22 @@ fn without_routes(
         places: Vec::new(),
         splits: Default::default(),
     })
+}
+
+/// The steer levels, which actions have that are not continuous.
+fn steer_levels(reader: &Reader, actions: &WrittenActions) -> Result<Vec<f64>, Error> {
+    const KEY: &str = "actions.steer_levels";
+    match (actions.kind, &actions.steer_levels) {
+        (ActionKind::Levels, Some(levels)) => numbers(reader, KEY, levels, 1.0, -1.0, ""),
+        (ActionKind::Levels, None) => {
+            Err(reader.invalid(KEY, "missing", "it is needed unless actions.kind is \"continuous\""))
+        }
+        (ActionKind::Continuous, Some(levels)) => {
+            let expected = "actions.kind is \"continuous\", which has none: leave it out";
+            Err(reader.invalid(KEY, format_args!("{} values", levels.len()), expected))
+        }
+        (ActionKind::Continuous, None) => Ok(Vec::new()),
+    }
 }
 
 /// Checks `[disturbances]`.

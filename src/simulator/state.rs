@@ -22,7 +22,7 @@ pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
     for env in 0..batch.n_envs() {
         let (truck, progress) = (&batch.truck[env], &batch.progress[env]);
         let n_waypoints = world.routes[truck.route as usize].n_waypoints;
-        check_control(env, &batch.control[env], world.params.n_actions)?;
+        check_control(world, env, &batch.control[env])?;
         check_truck(world, env, truck, progress)?;
         let clearance = &batch.clearance[env];
         within(Column::Clearance, env, ".tractor", clearance.tractor, -MOST..=MOST)?;
@@ -43,11 +43,13 @@ pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
         check_terms(env, &batch.terms[env], n_waypoints)?;
         let most = largest_reward(&world.reward, n_waypoints);
         within(Column::Reward, env, "", batch.reward[env], -most..=most)?;
+        within(Column::Command, env, ".steering", batch.command[env].steering, -1.0..=1.0)?;
+        within(Column::Command, env, ".speed", batch.command[env].speed, -1.0..=1.0)?;
     }
     Ok(())
 }
 
-fn check_control(env: usize, control: &Control, n_actions: u32) -> Result<(), Error> {
+fn check_control(world: &World, env: usize, control: &Control) -> Result<(), Error> {
     let Control {
         steering,
         acceleration,
@@ -72,11 +74,17 @@ fn check_control(env: usize, control: &Control, n_actions: u32) -> Result<(), Er
     ] {
         within(Column::Control, env, field, value, -most..=most)?;
     }
-    // An action's index plus 1.
     for (field, action) in
         [(".action_before", action_before), (".action_earlier", action_earlier), (".action_earliest", action_earliest)]
     {
-        within(Column::Control, env, field, action, 0..=n_actions)?;
+        if !world.is_continuous() {
+            // An action's index plus 1.
+            within(Column::Control, env, field, action, 0..=world.params.n_actions)?;
+        } else if action != 0 {
+            // A command's halves, none of which is 0.
+            within(Column::Control, env, field, action & 0xffff, 1..=0xffff)?;
+            within(Column::Control, env, field, action >> 16, 1..=0xffff)?;
+        }
     }
     within(Column::Control, env, ".holds", holds, 0..=1)
 }
@@ -170,9 +178,10 @@ fn within<T: PartialOrd + Debug>(
 /// An error if a truck's route, vehicle, waypoint or action is not in the world: stages use them as indices without a
 /// check.
 fn check_indices(world: &World, batch: &Batch) -> Result<(), Error> {
-    if let Some((env, &found)) = batch.action.iter().enumerate().find(|&(_, &action)| world.params.n_actions <= action)
-    {
-        let limit = format!("actions 0..{}", world.params.n_actions);
+    // Where actions are continuous the column is not used: zeros.
+    let n_actions = world.params.n_actions.max(1);
+    if let Some((env, &found)) = batch.action.iter().enumerate().find(|&(_, &action)| n_actions <= action) {
+        let limit = format!("actions 0..{n_actions}");
         return Err(Error::OutsideWorld { column: Column::Action.name(), env, found, limit });
     }
     for (env, (truck, progress)) in batch.truck.iter().zip(&batch.progress).enumerate() {

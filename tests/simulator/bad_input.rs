@@ -21,9 +21,10 @@ fn scenarios() -> PathBuf {
 }
 
 /// Benchmarks and roundabouts that have no key but those of another one.
-const LIKE_OTHERS: [&str; 25] = [
+const LIKE_OTHERS: [&str; 26] = [
     "laden2026-50-random.toml",
     "laden2026-50-training.toml",
+    "laden2026-continuous.toml",
     "laden2026-odd-random.toml",
     "laden2026-random.toml",
     "laden2026-training.toml",
@@ -62,7 +63,7 @@ fn files() -> Vec<PathBuf> {
         }
     }
     files.sort();
-    assert_eq!(files.len(), 24, "six roundabouts, five vehicles, eleven benchmarks, two distributions");
+    assert_eq!(files.len(), 25, "six roundabouts, five vehicles, twelve benchmarks, two distributions");
     files
 }
 

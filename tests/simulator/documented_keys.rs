@@ -54,6 +54,7 @@ substeps = 2
 [field]
 cell = 1.0
 [actions]
+kind = "levels"
 steer_levels = [-0.5, 0.0, 0.5]
 speeds_kmh = [10.0, 20.0, 30.0]
 speed_changes_kmh = [-5.0, 0.0, 5.0]

@@ -12,6 +12,7 @@ use offtrack::world::World;
 mod autoreset;
 mod bad_input;
 mod collide;
+mod continuous;
 mod disturbances;
 mod documented_keys;
 mod episodes;

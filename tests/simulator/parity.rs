@@ -19,7 +19,10 @@ use offtrack::world::World;
 use crate::on_device::engine;
 use crate::{batch_on, engines};
 use compare::{Agreement, agreements};
-use states::{ENOUGH, N_ENVS, disturbed_world, fleet_world, on_each_roundabout, put, varied, world};
+use states::{
+    ENOUGH, N_ENVS, continuous_world, disturbed_world, fleet_world, late_continuous_world, on_each_roundabout, put,
+    varied, world,
+};
 
 /// Columns, and a change of the world.
 type Written = (&'static [Column], Option<fn(&mut World)>);
@@ -101,7 +104,8 @@ fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bo
         let offset = point - waypoint.position;
         near(offset.dot(waypoint.direction), 0.0) || near(offset.length(), params.stray_distance)
     });
-    let error = world.actions[before.action[env] as usize].speed - before.truck[env].speed;
+    // By what has been asked for, which may be a command and late.
+    let error = after.control[env].target_speed - before.truck[env].speed;
     let asked = rig.speed_gain * error;
     // Drive and brakes have lags of their own.
     let asks_for = after.control[env].acceleration;
@@ -183,6 +187,7 @@ fn every_stage_does_the_same_to_every_value_and_touches_no_other() {
         (world(Gutter::Solid), true),
         (fleet_world(), false),
         (disturbed_world(), false),
+        (continuous_world(), false),
     ];
     for (world, fixed) in worlds {
         let (choice, mut before) = varied(&world, fixed);
@@ -258,6 +263,36 @@ fn every_number_of_tyres_delays_and_disturbances_counts_on_the_device() {
         assert_agreement(key, &compared(cpu.batch(), device.batch(), written, &counted));
         let wrong = compared(cpu.batch(), wrong.batch(), written, &counted);
         assert!(wrong.iter().any(|agreement| !agreement.holds()), "{key}: a wrong number would pass");
+    }
+}
+
+/// Numbers of commands, and of late ones, that a device computes with.
+const OF_COMMANDS: [Noticed; 5] = [
+    ("lock", Stage::Steer, |world| world.actions[1].steering *= 1.001),
+    ("lowest speed", Stage::Steer, |world| world.actions[0].speed *= 1.001),
+    ("highest speed", Stage::Steer, |world| world.actions[1].speed *= 1.001),
+    ("action_delay", Stage::Steer, |world| world.disturbances.n_action_delays = 3),
+    ("kind", Stage::Steer, |world| world.params.n_actions = 2),
+];
+
+#[test]
+fn every_number_of_a_command_counts_on_the_device_whether_it_comes_late_or_not() {
+    // A late command is no state of a world with indices.
+    for (world, cases) in [(continuous_world(), [0, 1, 2, 4]), (late_continuous_world(), [0, 1, 2, 3])] {
+        let (choice, before) = varied(&world, false);
+        for (key, stage, change) in cases.map(|case| OF_COMMANDS[case]) {
+            let [mut cpu, mut device] = simulators(&world, &choice);
+            let mut wrong = wrong_device(&world, &choice, change);
+            for simulator in [&mut cpu, &mut device, &mut wrong] {
+                put(simulator, &before);
+                simulator.run_stage(stage);
+            }
+            let counted = judged(&world, &before, cpu.batch());
+            let (written, _) = written(stage);
+            assert_agreement(key, &compared(cpu.batch(), device.batch(), written, &counted));
+            let wrong = compared(cpu.batch(), wrong.batch(), written, &counted);
+            assert!(wrong.iter().any(|agreement| !agreement.holds()), "{key}: a wrong number would pass");
+        }
     }
 }
 

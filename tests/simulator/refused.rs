@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use offtrack::layout::Column;
 use offtrack::layout::shared::Named;
-use offtrack::scenario::Scenario;
+use offtrack::scenario::{ActionKind, Scenario};
 use offtrack::simulator::{Error, RouteChoice, Simulator};
 use offtrack::world::World;
 
@@ -61,6 +61,8 @@ fn a_scenario_changed_in_memory_is_checked_before_it_is_baked() {
     );
     assert_eq!(refused(|scenario| scenario.speeds.clear()), "speeds: empty; at least one value is needed");
     assert_eq!(refused(|scenario| scenario.steer_levels.clear()), "steer_levels: empty; at least one value is needed");
+    let continuous = refused(|scenario| scenario.action_kind = ActionKind::Continuous);
+    assert_eq!(continuous, "steer_levels: 9 values; continuous actions have none");
     assert_eq!(refused(|scenario| scenario.speeds[0] = f64::NAN), "speeds[0]: NaN; must lie in 0..100");
     assert!(refused(|scenario| scenario.places.clear()).starts_with("places: no routes; "));
     assert!(refused(|scenario| scenario.places[0].routes[0].waypoints.truncate(1)).contains("1 waypoints; at least 2"));

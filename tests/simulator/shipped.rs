@@ -34,12 +34,12 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
         FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
     assert_eq!(
         (files.len(), FILES.len()),
-        (54, 54),
-        "32 benchmarks, ten roundabouts, five outlines, five vehicles, two distributions"
+        (56, 56),
+        "34 benchmarks, ten roundabouts, five outlines, five vehicles, two distributions"
     );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [32, 10, 5, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [34, 10, 5, 2]);
 }
 
 /// A shipped benchmark's file as it is read as TOML.
@@ -172,10 +172,25 @@ fn the_benchmarks_of_transfer2026_differ_in_roads_training_and_disturbances_alon
 }
 
 #[test]
+fn the_continuous_benchmarks_differ_from_those_with_levels_in_their_actions_alone() {
+    for (name, levels) in [("attard2023-continuous", "attard2023"), ("laden2026-continuous", "laden2026")] {
+        let (mut continuous, mut levels) = (table(name), table(levels));
+        let [actions, listed] = [&mut continuous, &mut levels].map(|table| table.remove("actions").unwrap());
+        assert_eq!(continuous, levels, "{name}");
+        assert_eq!(actions["kind"].as_str(), Some("continuous"));
+        let ends = |actions: &toml::Value| {
+            let speeds = actions["speeds_kmh"].as_array().unwrap().clone();
+            (speeds.first().cloned(), speeds.last().cloned())
+        };
+        assert_eq!(ends(&actions), ends(&listed), "{name}");
+    }
+}
+
+#[test]
 fn every_name_gives_what_its_file_gives() {
     // The two with thousands of roads take minutes; the next test reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 30);
+    assert_eq!(benchmarks.len(), 32);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();

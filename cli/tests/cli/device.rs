@@ -50,7 +50,7 @@ fn assert_measured(run: &Value, envs: u64, rays: f64, on_device: bool) {
     let rays_a_step = rays * (1.0 + count("episodes") as f64 / count("env_steps") as f64);
     // Both speeds are whole numbers.
     assert!((speed("rays_per_second") / median - rays_a_step).abs() < 0.01, "{run}");
-    assert_eq!(speed("bytes_per_truck"), 1036.0);
+    assert_eq!(speed("bytes_per_truck"), 1044.0);
     let stages = run["stages"].as_object().unwrap();
     assert!(stages.len() == STAGES.len() && STAGES.iter().all(|stage| stages.contains_key(stage.name())), "{run}");
     assert!(

@@ -5,7 +5,7 @@ use std::process::Stdio;
 use offtrack::layout::N_VALUES;
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
-use offtrack_policy::{Activation, Layer, Normalisation, Policy};
+use offtrack_policy::{Activation, Frames, Head, Layer, Normalisation, Policy};
 use serde_json::Value;
 
 use crate::place::{Place, offtrack, program, refusal, repository, succeed};
@@ -190,6 +190,10 @@ fn a_network_of_tanh_layers_that_was_trained_elsewhere_is_evaluated_with_the_sam
             normalisation: Normalisation::none(N_VALUES),
             layers: vec![layer(N_VALUES, 64), layer(64, 64), layer(64, 5)],
             activation,
+            head: Head::Levels,
+            values: None,
+            frames: Frames::default(),
+            recurrent: None,
         };
         std::fs::write(place.file("elsewhere.safetensors"), policy.to_bytes()).unwrap();
         let file = place.text("elsewhere.safetensors");

@@ -2,6 +2,9 @@
 
 use std::io::Cursor;
 
+use offtrack::scenario::Scenario;
+use offtrack::world::World;
+use offtrack_policy::{Cell, Frames, Gates, Layer, Normalisation, Padding, Policy, Recurrent, Selection};
 use serde_json::Value;
 
 use crate::place::{Place, offtrack, refusal, succeed};
@@ -24,44 +27,60 @@ fn recording(place: &Place, output: &str, arguments: &[&str]) -> Vec<String> {
     all
 }
 
+/// A file of a policy that remembers: recurrent layers behind two frames of the tractor's rays.
+fn remembering(place: &Place) -> String {
+    let layer = |inputs: usize, outputs: usize| Layer {
+        weights: (0..inputs * outputs).map(|index| ((index * 37 % 101) as f32 - 50.0) / 25.0).collect(),
+        biases: vec![0.0; outputs],
+    };
+    let policy = Policy {
+        actions: World::bake(&Scenario::read(&place.file("short.toml")).unwrap()).unwrap().actions,
+        values: Some(Selection::of(&["tractor_range".to_owned()]).unwrap()),
+        frames: Frames { n: 2, padding: Padding::Zero },
+        normalisation: Normalisation::none(13),
+        layers: vec![layer(8, 5)],
+        recurrent: Some(Recurrent {
+            gates: Gates::Gru,
+            after: 0,
+            cells: vec![Cell { input: layer(26, 24), hidden: layer(8, 24) }],
+        }),
+        ..Policy::shipped("attard2023").unwrap()
+    };
+    std::fs::write(place.file("remembering.safetensors"), policy.to_bytes()).unwrap();
+    place.text("remembering.safetensors")
+}
+
 #[test]
-fn the_episodes_recorded_are_those_that_the_evaluation_counts() {
+fn the_episodes_recorded_are_those_that_the_evaluation_counts_by_a_policy_with_a_memory_too() {
     let place = Place::new();
-    succeed(&place.evaluate(&[
-        "--policy",
-        "random",
-        "--episodes",
-        "3",
-        "--seed",
-        "7",
-        "--json",
-        &place.text("report.json"),
-    ]));
-    let report = place.json("report.json");
-    let counted = report["routes"].as_array().unwrap().iter().find(|route| route["name"] == ROUTE).unwrap();
-    let mut reward = 0.0;
-    let mut steps = 0;
-    for episode in ["0", "1", "2"] {
-        let flags = ["--policy", "random", "--seed", "7", "--episodes", "3", "--episode", episode];
-        record(&place, "episode.json", &flags);
-        let recording = place.json("episode.json");
-        let frames = recording["frames"].as_array().unwrap();
-        assert_eq!(
-            (&recording["route"], &recording["episode"]),
-            (&Value::from(ROUTE), &Value::from(episode.parse::<u32>().unwrap()))
+    for policy in ["random", &remembering(&place)] {
+        let of_all = ["--policy", policy, "--seed", "7", "--episodes", "3"];
+        succeed(&place.evaluate(&[&of_all[..], &["--json", &place.text("report.json")]].concat()));
+        let report = place.json("report.json");
+        let counted = report["routes"].as_array().unwrap().iter().find(|route| route["name"] == ROUTE).unwrap();
+        let mut reward = 0.0;
+        let mut steps = 0;
+        for episode in ["0", "1", "2"] {
+            record(&place, "episode.json", &[&of_all[..], &["--episode", episode]].concat());
+            let recording = place.json("episode.json");
+            let frames = recording["frames"].as_array().unwrap();
+            assert_eq!(
+                (&recording["route"], &recording["episode"]),
+                (&Value::from(ROUTE), &Value::from(episode.parse::<u32>().unwrap()))
+            );
+            assert!(0 < counted["ends"][recording["ended"].as_str().unwrap()].as_u64().unwrap());
+            assert!(frames[0]["action"].is_null() && frames[1..].iter().all(|frame| frame["action"].is_u64()));
+            assert!(frames.iter().all(|frame| frame["ranges"].as_array().unwrap().len() == 29));
+            steps += frames.len() - 1;
+            reward += frames.iter().map(|frame| frame["reward"].as_f64().unwrap()).sum::<f64>();
+        }
+        assert!(
+            (0.1 * steps as f64 / 3.0 - counted["time_mean"].as_f64().unwrap()).abs() < 1e-9,
+            "a frame a step, and the start"
         );
-        assert!(0 < counted["ends"][recording["ended"].as_str().unwrap()].as_u64().unwrap());
-        assert!(frames[0]["action"].is_null() && frames[1..].iter().all(|frame| frame["action"].is_u64()));
-        assert!(frames.iter().all(|frame| frame["ranges"].as_array().unwrap().len() == 29));
-        steps += frames.len() - 1;
-        reward += frames.iter().map(|frame| frame["reward"].as_f64().unwrap()).sum::<f64>();
+        // Rewards are written to a thousandth; an episode has fewer than a thousand steps.
+        assert!((reward / 3.0 - counted["reward_mean"].as_f64().unwrap()).abs() < 1.0);
     }
-    assert!(
-        (0.1 * steps as f64 / 3.0 - counted["time_mean"].as_f64().unwrap()).abs() < 1e-9,
-        "a frame a step, and the start"
-    );
-    // Rewards are written to a thousandth; an episode has fewer than a thousand steps.
-    assert!((reward / 3.0 - counted["reward_mean"].as_f64().unwrap()).abs() < 1.0);
 }
 
 #[test]

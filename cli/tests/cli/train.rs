@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use offtrack_policy::{Activation, Policy};
+use offtrack_policy::{Activation, Frames, Policy};
 
 use crate::place::{Place, offtrack, refusal, succeed};
 
@@ -206,6 +206,11 @@ fn a_run_that_begins_with_a_policy_keeps_it_until_the_actor_learns() {
     let tanh = place.text("tanh.safetensors");
     let policy = Policy { activation: Activation::Tanh, ..Policy::load(Path::new(&first)).unwrap() };
     std::fs::write(&tanh, policy.to_bytes()).unwrap();
+    let frames = place.text("frames.safetensors");
+    let mut policy =
+        Policy { frames: Frames { n: 2, ..Frames::default() }, ..Policy::load(Path::new(&first)).unwrap() };
+    policy.layers[0].weights = policy.layers[0].weights.repeat(2);
+    std::fs::write(&frames, policy.to_bytes()).unwrap();
     for (arguments, expected) in [
         (
             vec!["--from", &first, "--set", "learning.hidden=[8]"],
@@ -213,6 +218,10 @@ fn a_run_that_begins_with_a_policy_keeps_it_until_the_actor_learns() {
         ),
         (vec!["--from", "attard2023"], "learned with another action table"),
         (vec!["--from", "nowhere.safetensors"], "nowhere.safetensors"),
+        (
+            vec!["--from", &frames],
+            "has a memory, values of its own or commands: the learner continues with a perceptron",
+        ),
         (vec!["--from", &tanh], "has the activation tanh: the learner continues with relu alone"),
     ] {
         let message = refusal(&place.train(&[&["--name", "refused"], &arguments[..]].concat()), 2);

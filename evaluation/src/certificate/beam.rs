@@ -11,7 +11,7 @@ use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Ended, Params, Rig, Start, Truck};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
-use offtrack_policy::Policy;
+use offtrack_policy::{Driver, Policy};
 
 use crate::error::Error;
 
@@ -98,6 +98,8 @@ pub fn search(
 ) -> Result<Outcome, Error> {
     let mut simulator = Simulator::new(world.clone(), 1, 0, RouteChoice::Fixed(vec![route]))?;
     simulator.reset_from(&[*start])?;
+    // One candidate alone follows the policy, from the start on.
+    let mut driver = policy.map(|policy| policy.clone().driver(1));
     let mut segments: Vec<Segment> = Vec::new();
     let straight = nearest_to_straight(world);
     let mut beam =
@@ -107,7 +109,7 @@ pub fn search(
         let (rows, mut children) = branched(world, simulator.batch(), &beam, straight, pass.hold);
         simulator.gather(&rows)?;
         for _ in 0..pass.hold {
-            let actions = chosen(policy, simulator.batch(), &children, straight);
+            let actions = chosen(driver.as_mut(), simulator.batch(), &children, straight);
             outcome.env_steps += simulator.batch().truck.iter().filter(|truck| truck.held == 0).count() as u64;
             simulator.step(&actions)?;
             for (env, child) in children.iter_mut().enumerate() {
@@ -192,13 +194,15 @@ fn distinct(world: &World, rig: &Rig, steering: f32, last: u32, hold: usize) -> 
 }
 
 /// Each child's action for the next step: the held one, or the policy's for its observation.
-fn chosen(policy: Option<&Policy>, batch: &Batch, children: &[Candidate], straight: u32) -> Vec<u32> {
-    let own = |env: usize| {
-        policy.and_then(|policy| {
-            policy.act_beside(&batch.observation[env..=env], &batch.extras[env..=env]).first().copied()
-        })
-    };
-    children.iter().enumerate().map(|(env, child)| child.held.or_else(|| own(env)).unwrap_or(straight)).collect()
+fn chosen(driver: Option<&mut Driver>, batch: &Batch, children: &[Candidate], straight: u32) -> Vec<u32> {
+    let mut actions: Vec<u32> = children.iter().map(|child| child.held.unwrap_or(straight)).collect();
+    if let Some(driver) = driver
+        && let Some(env) = children.iter().position(|child| child.held.is_none())
+        && let [action] = driver.act(&[0], &batch.observation[env..=env], &batch.extras[env..=env])[..]
+    {
+        actions[env] = action;
+    }
+    actions
 }
 
 /// The cost of a candidate's last step.

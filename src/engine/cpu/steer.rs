@@ -6,42 +6,84 @@ use crate::engine::Row;
 use crate::engine::cpu::drive::drive_max;
 use crate::engine::cpu::perceive::action_delay;
 use crate::layout::shared::constants;
-use crate::layout::{Action, Control, Params, Rig, Stream};
+use crate::layout::{Action, Command, Control, Params, Rig, Stream};
 use crate::world::World;
 
 constants! {
     /// Braking at which a truck comes to stand (m/s^2).
     const HOLD_BRAKING: f32 = 0.5;
+    /// Parts of a command's half range in a word.
+    const HALF_RANGE: f32 = 32_767.0;
+    /// One of them.
+    const RANGE_PART: f32 = 1.0 / 32_767.0;
+    /// A command of 0 in a word.
+    const MIDDLE: f32 = 32_768.0;
 }
 
 /// Writes the row's control.
 pub fn steer(world: &World, row: &mut Row) {
     let params = &world.params;
     let before = *row.control;
-    let asked = if world.disturbances.of_action == 0 {
-        world.actions[*row.action as usize]
+    let next = if world.disturbances.of_action == 0 {
+        asked(world, *row.action, row.command)
     } else {
-        late_action(world, row.stream, row.truck.episode, *row.action, &before)
+        late_action(world, row.stream, row.truck.episode, asked_word(world, *row.action, row.command), &before)
     };
-    let action = targeted(params, &asked, &before);
-    *row.control = controlled(world.rig(row.truck), world.step(), &action, row.truck.speed, &before);
+    let next = targeted(params, &next, &before);
+    *row.control = controlled(world.rig(row.truck), world.step(), &next, row.truck.speed, &before);
     if world.disturbances.of_action == 1 {
-        row.control.action_before = *row.action + 1;
+        row.control.action_before = asked_word(world, *row.action, row.command);
         row.control.action_earlier = before.action_before;
         row.control.action_earliest = before.action_earlier;
     }
 }
 
-/// The action that takes effect in this step, where actions come late: before the first one arrives the truck is to go
-/// straight on at the speed that it began with.
-fn late_action(world: &World, stream: Stream, episode: u32, action: u32, before: &Control) -> Action {
-    let actions = [action + 1, before.action_before, before.action_earlier, before.action_earliest];
-    match actions[action_delay(&world.disturbances, stream, episode) as usize] {
+/// What is asked of a truck.
+#[inline]
+fn asked(world: &World, action: u32, command: &Command) -> Action {
+    if world.is_continuous() {
+        commanded(&world.actions[0], &world.actions[1], command)
+    } else {
+        world.actions[action as usize]
+    }
+}
+
+/// What a command asks for, between what -1 and 1 do.
+#[inline]
+pub fn commanded(lowest: &Action, highest: &Action, command: &Command) -> Action {
+    let speed = lowest.speed + 0.5 * (command.speed + 1.0) * (highest.speed - lowest.speed);
+    Action { steering: command.steering * highest.steering, speed: speed.min(highest.speed) }
+}
+
+/// What is asked of a truck, in a word that is not 0.
+fn asked_word(world: &World, action: u32, command: &Command) -> u32 {
+    if world.is_continuous() { command_word(command) } else { action + 1 }
+}
+
+/// A command in a word: 16 bits each, rounded to a part in 32767. None of them is 0.
+fn command_word(command: &Command) -> u32 {
+    let [steering, speed] =
+        [command.steering, command.speed].map(|value| ((value * HALF_RANGE).round_ties_even() + MIDDLE) as u32);
+    steering | (speed << 16)
+}
+
+/// The command in a word.
+fn command_of(word: u32) -> Command {
+    let [steering, speed] = [word & 0xffff, word >> 16].map(|half| (half as f32 - MIDDLE) * RANGE_PART);
+    Command { steering, speed }
+}
+
+/// What takes effect in this step of what is asked, in a word, where actions come late: before the first one arrives
+/// the truck is to go straight on at the speed that it began with.
+fn late_action(world: &World, stream: Stream, episode: u32, asked: u32, before: &Control) -> Action {
+    let listed = [asked, before.action_before, before.action_earlier, before.action_earliest];
+    match listed[action_delay(&world.disturbances, stream, episode) as usize] {
         0 => {
             let speed = if world.params.changes_speed == 1 { 0.0 } else { before.target_speed };
             Action { steering: 0.0, speed }
         }
-        index => world.actions[index as usize - 1],
+        late if world.is_continuous() => commanded(&world.actions[0], &world.actions[1], &command_of(late)),
+        late => world.actions[late as usize - 1],
     }
 }
 

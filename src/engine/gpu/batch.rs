@@ -14,7 +14,7 @@ use super::{Columns, Device, Error, Slice, kernel_times, kernels};
 use crate::engine::stages::{BEGIN, Case, Kernel, N_STAGES, STAGES, Stage};
 use crate::engine::{self, Autoreset, EngineBatch, RouteChoice, Tally};
 use crate::layout::buffers::Table;
-use crate::layout::{BatchFacts, BeginRow, Column, Stream};
+use crate::layout::{BatchFacts, BeginRow, Column, Command, Stream};
 use crate::world::World;
 
 /// A batch of trucks on a device.
@@ -70,7 +70,7 @@ impl Batch {
         self.buffers.column(column)
     }
 
-    /// Adds a step with the actions in their column to the caller's commands. The caller submits them and calls
+    /// Adds a step with the actions or commands in their column to the caller's commands. The caller submits them and calls
     /// [`Batch::stepped`].
     pub fn add_step(&self, encoder: &mut CommandEncoder) {
         self.add_pass(encoder, self.case.step(), None);
@@ -236,6 +236,13 @@ impl EngineBatch for Batch {
     fn step(&mut self, _: &World, actions: &[u32]) -> Result<(), engine::Error> {
         self.device.check()?;
         self.write(self.column(Column::Action), cast_slice(actions));
+        self.submit(Batch::add_step);
+        Ok(())
+    }
+
+    fn step_with(&mut self, _: &World, commands: &[Command]) -> Result<(), engine::Error> {
+        self.device.check()?;
+        self.write(self.column(Column::Command), cast_slice(commands));
         self.submit(Batch::add_step);
         Ok(())
     }

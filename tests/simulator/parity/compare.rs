@@ -131,6 +131,7 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("earliest.speed", 1, MIDDLING),
             ("earliest.waypoint", 1, SAME),
         ],
+        Column::Command => &[("", 2, SAME)],
     }
 }
 

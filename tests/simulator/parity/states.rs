@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use offtrack::field::Field;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::random::{index_below, signed_unit, words};
-use offtrack::layout::{ObservedExtras, Truck};
+use offtrack::layout::{Action, Command, ObservedExtras, Truck};
 use offtrack::map::Gutter;
 use offtrack::scenario::{Disturbances, Scenario};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
@@ -44,6 +44,22 @@ pub fn fleet_world() -> Arc<World> {
     fleet.fields = world(Gutter::Drivable).fields.clone();
     assert!(fleet.rigs.len() == 512 && fleet.rays.len() == 512);
     Arc::new(fleet)
+}
+
+/// The same where actions are commands of steer angle and speed.
+pub fn continuous_world() -> Arc<World> {
+    let mut world = World::clone(&fleet_world());
+    world.params.n_actions = 0;
+    let lock = world.rigs[0].steer_max;
+    world.actions = vec![Action { steering: -lock, speed: 2.0 }, Action { steering: lock, speed: 15.0 }];
+    Arc::new(world)
+}
+
+/// That where commands come late.
+pub fn late_continuous_world() -> Arc<World> {
+    let mut world = World::clone(&continuous_world());
+    world.disturbances = disturbed_world().disturbances;
+    Arc::new(world)
 }
 
 /// The same where noise, errors and delays come between a policy and the truck.
@@ -87,7 +103,12 @@ pub fn varied(world: &Arc<World>, fixed: bool) -> (RouteChoice, Batch) {
     (0..40).for_each(|_| simulator.step_at_random());
     let mut batch = simulator.batch().clone();
     for env in 0..N_ENVS {
-        batch.action[env] = picked(env, 0, world.params.n_actions as usize) as u32;
+        if world.is_continuous() {
+            let [steering, speed, ..] = drawn(env, 8);
+            batch.command[env] = Command { steering, speed };
+        } else {
+            batch.action[env] = picked(env, 0, world.params.n_actions as usize) as u32;
+        }
         if env % 4 != 0 {
             put_anywhere(world, &mut batch, env);
         }
@@ -148,8 +169,11 @@ fn put_anywhere(world: &World, batch: &mut Batch, env: usize) {
     (batch.control[env].steering_before, batch.control[env].steering_earlier) = (0.4 * speed, 0.4 * lean);
     batch.control[env].steering_earliest = 0.4 * bent;
     if world.disturbances.of_action == 1 {
-        // An action's index plus 1, or none yet.
-        let action = |draw: u32| picked(env, draw, world.params.n_actions as usize + 1) as u32;
+        // An action's index plus 1 or a command's halves, or none yet.
+        let action = |draw: u32| match picked(env, draw, world.params.n_actions as usize + 1) as u32 {
+            0 if world.is_continuous() && env % 8 != 1 => 0x0001_0001 | words(SEED, env as u32, 1, draw)[1],
+            action => action,
+        };
         let control = &mut batch.control[env];
         (control.action_before, control.action_earlier, control.action_earliest) = (action(5), action(6), action(7));
     }
