@@ -10,6 +10,8 @@ import pytest
 sys.path.append(str(Path(__file__).parents[2] / "examples"))
 
 
+# Minari warns where a data set has no address of its code.
+@pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize("name", ["attard2023", "laden2026"])
 def test_episodes_are_written_and_read_back_by_minari_itself(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
