@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from . import _offtrack, trained
+from . import _offtrack, onnx_graph, trained
 from .arguments import checked_integer, file_name, names_of_values, scenario_name, text
 from .batch import Floats
 from .network import Network
@@ -52,7 +52,7 @@ def save(
               ``Tanh`` between, and ``GRU`` or ``LSTM`` before, between or behind them, but before the last. CleanRL's
               ``agent.actor`` of PPO and ``q_network.network`` of DQN; with ``squash`` its ``agent.actor_mean``;
             - a list of ``(weights, biases)``, arrays ``[inputs, outputs]`` and ``[outputs]``, with ``ReLU`` between;
-            - a :class:`Network`, as :func:`network` gives it.
+            - a :class:`Network`, as :func:`from_onnx` and :func:`network` give it.
         scenario: The benchmark it was trained on, a name or a file: the file keeps its table of actions and, unless
             ``values`` says what it reads, the names of the extras that it observes.
         mean: Mean of each observation's value, ``[n_values]``, extras included, where the network was trained with
@@ -105,4 +105,36 @@ def network(policy: Policy) -> Network:
     return Network(**policy._network.parts())
 
 
-__all__ = ["CLIP", "Floats", "Network", "network", "save"]
+def to_onnx(policy: Policy, file: str | os.PathLike[str]) -> None:
+    """Writes a policy's network as an ONNX graph; needs the package ``onnx``, as of ``offtrack-sim[onnx]``.
+
+    Its input ``observation`` is ``[n, frames * values]``: what the policy reads, before any normalisation, oldest frame
+    first. Before an episode's first frame stands the padding, which is the mean in place of zeros where each frame is
+    normalised by itself. Its output ``output`` is ``[n, outputs]``: a value an action, or commands. A recurrent layer
+    ``N`` has the input ``hidden_N``, ``[1, n, units]``, zeros at an episode's start, and the output ``next_hidden_N``;
+    an LSTM ``cell_N`` and ``next_cell_N`` too.
+
+    Raises:
+        ImportError: Without the package ``onnx``.
+        OSError: Where the file cannot be written.
+    """
+    onnx_graph.write(network(policy), file_name(file), policy.name)
+
+
+def from_onnx(file: str | os.PathLike[str]) -> Network:
+    """The network of an ONNX graph, for :func:`save`; needs the package ``onnx``, as of ``offtrack-sim[onnx]``.
+
+    The graph is a chain from an input to its first output: ``Gemm``, or ``MatMul`` and ``Add``, with all ``Relu`` or
+    all ``Tanh`` between; ``GRU`` (with ``linear_before_reset``) and ``LSTM`` of one direction; before them ``Sub``,
+    ``Mul`` or ``Div``, and ``Clip`` to -10..10, which normalise; behind them ``ArgMax``, or ``Tanh`` or ``Clip`` to
+    -1..1 of commands. Nodes that only change shapes are passed over.
+
+    Raises:
+        ImportError: Without the package ``onnx``.
+        TypeError: For another node; the message names it.
+        ValueError: For a file that is no ONNX graph.
+    """
+    return onnx_graph.read(file_name(file))
+
+
+__all__ = ["CLIP", "Floats", "Network", "from_onnx", "network", "save", "to_onnx"]
