@@ -42,6 +42,7 @@ mod running; // an episode under way
 mod tabular; // rows as Markdown, LaTeX, CSV
 pub mod seeds; // figures of several seeds
 pub mod interval; // intervals over routes, by bootstrap
+pub mod figures; // the figures of several, to their ends
 pub mod driving; // how a truck drives through an episode
 pub mod episode; // the figures of an episode, and of several
 pub mod classes; // how trucks drive, by vehicle and load
