@@ -21,7 +21,8 @@ Without a command `offtrack` trains, as `offtrack train` does.
 
 Exit codes:
   0    done; training that Ctrl-C stopped once, with everything written
-  1    failed on valid input: device, disk, learner, a certificate that does not hold, a vehicle that does not fit
+  1    failed on valid input: device, disk, learner, a certificate or an entry of the board that does not hold, a
+       vehicle that does not fit
   2    wrong input: arguments or files
   130  interrupted: by Ctrl-C, in training by a second one";
 

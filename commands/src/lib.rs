@@ -1,6 +1,7 @@
 //! The commands of `offtrack` that need no learner, one file each, and what several of them share. The program adds
 //! those that train and measure; the Python package has these alone.
 
+pub mod board;
 pub mod certify;
 pub mod compare;
 pub mod deviations;

@@ -9,7 +9,9 @@ use offtrack::files::reader::shortened;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
-use crate::{certify, compare, deviations, devices, draw, evaluate, fits, generate, import, record, trace, vehicles};
+use crate::{
+    board, certify, compare, deviations, devices, draw, evaluate, fits, generate, import, record, trace, vehicles,
+};
 
 /// Exit code of a failure on valid input.
 pub const FAILED: u8 = 1;
@@ -27,6 +29,7 @@ const LONGEST_ARGUMENT: usize = 200;
 pub enum Command {
     Evaluate(evaluate::Args),
     Compare(compare::Args),
+    Board(board::Args),
     Record(record::Args),
     Certify(certify::Args),
     Fits(fits::Args),
@@ -40,7 +43,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// Runs the command. The result is whether what was asked holds: only `fits` may deny it.
+    /// Runs the command. The result is whether what was asked holds: only `fits` and `board` may deny it.
     ///
     /// # Errors
     ///
@@ -51,6 +54,7 @@ impl Command {
             Command::Compare(args) => compare::run(args),
             Command::Record(args) => record::run(args),
             Command::Certify(args) => certify::run(args),
+            Command::Board(args) => return board::run(args),
             Command::Fits(args) => return fits::run(args),
             Command::Draw(args) => draw::run(args),
             Command::Generate(args) => generate::run(args),
@@ -75,7 +79,8 @@ struct Program {
 const AFTER_HELP: &str = "\
 Exit codes:
   0    done
-  1    failed on valid input: device, disk, a certificate that does not hold, a vehicle that does not fit
+  1    failed on valid input: device, disk, a certificate or an entry of the board that does not hold, a
+       vehicle that does not fit
   2    wrong input: arguments or files
   130  interrupted
 
