@@ -25,6 +25,7 @@ use crate::possible::Possible;
 use crate::report::{Episode, Report, RouteReport, Summary};
 use crate::running::Running;
 use crate::seen::Seen;
+use crate::sequences::Sequences;
 use crate::shown::shown;
 
 /// Episodes on each of so many routes where nobody says how many: 30, and fewer on more than 100 routes, about 3,000 in
@@ -94,14 +95,14 @@ impl Evaluation<'_> {
             };
             seen.truck.iter().zip(seen.control.iter()).map(new).collect()
         };
-        let mut sequences = Sequences(vec![Vec::new(); n_episodes]);
+        let mut sequences = Sequences::new(world, n_episodes);
         let mut finished: Vec<Option<Episode>> = vec![None; n_episodes];
         let mut n_finished = 0;
         begun.drive(|simulator| {
             let n_before = n_finished;
             policy.step(simulator)?;
             let seen = Seen::of(simulator)?;
-            sequences.add(&seen.action, &finished);
+            sequences.add(&seen, &finished);
             for (env, (running, finished)) in running.iter_mut().zip(&mut finished).enumerate() {
                 if finished.is_none()
                     && running.follow(world.rig(&seen.truck[env]), &lanes[env / self.episodes], &seen, env)
@@ -151,7 +152,7 @@ impl Evaluation<'_> {
             if !recorder.is_running() {
                 break;
             }
-            simulator.step(&sequences.at(step, indices))?;
+            simulator.step_any(&sequences.at(step, indices))?;
             recorder.follow(self.world, simulator.batch());
         }
         simulator.wait()?;
@@ -251,24 +252,4 @@ fn widest(rigs: &[Rig]) -> &Rig {
 fn stiffest(rigs: &[Rig]) -> &Rig {
     let radius = |rig: &Rig| rig.wheelbase / rig.steer_max.sin();
     rigs.iter().max_by(|a, b| radius(a).total_cmp(&radius(b))).expect("a world has a truck")
-}
-
-/// The actions of each episode, `[episodes][steps]`.
-#[derive(Debug)]
-pub struct Sequences(Vec<Vec<u32>>);
-
-impl Sequences {
-    /// Adds the next action of the episodes that have not finished.
-    fn add(&mut self, actions: &[u32], finished: &[Option<Episode>]) {
-        for ((sequence, &action), finished) in self.0.iter_mut().zip(actions).zip(finished) {
-            if finished.is_none() {
-                sequence.push(action);
-            }
-        }
-    }
-
-    /// The action at `step` of each of these episodes; of one that has ended, any.
-    fn at(&self, step: usize, indices: &[usize]) -> Vec<u32> {
-        indices.iter().map(|&index| self.0[index].get(step).copied().unwrap_or(0)).collect()
-    }
 }

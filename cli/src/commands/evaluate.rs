@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use offtrack::files::reader;
 use offtrack::scenario::Split;
 use offtrack_evaluation::certificate::attempt::{HOLD, passes};
-use offtrack_evaluation::certificate::certified;
+use offtrack_evaluation::certificate::{certified, check_levels};
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::failures::Example;
 use offtrack_evaluation::page::Page;
@@ -114,6 +114,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     roads::keep(&mut scenario, split, &args.benchmark)?;
     let world = roads::world(&scenario)?;
+    if args.certify {
+        check_levels(&world)?;
+    }
     let mut policy = args.policy.open(&scenario, &world, &device.engine, args.seed)?;
     let n_routes = scenario.split(split).len();
     let episodes = args.episodes.unwrap_or_else(|| usual_episodes(n_routes));

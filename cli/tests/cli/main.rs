@@ -8,6 +8,7 @@ mod benchmark;
 mod browser;
 mod certify;
 mod checkpoint;
+mod continuous;
 mod device;
 mod documented_flags;
 mod draw;
