@@ -93,14 +93,14 @@ def evaluate(
 
     Args:
         policy: A :class:`offtrack_sim.Policy`, or any function from observations ``[n, n_values]`` to actions
-            ``[n]``: 69 values, and behind them the benchmark's extras.
+            ``[n]``, of continuous ones ``[n, n_commands]``: 69 values, and behind them the benchmark's extras.
         scenario, split, routes, device: As for :class:`offtrack_sim.Batch`. A :class:`offtrack_sim.Policy` acts on the
             device, too.
         episodes: Episodes on each route.
         seed: Seed of the starts.
 
     Raises:
-        TypeError: For a function that gives anything but integers, one for each observation.
+        TypeError: For a function that gives anything but integers, or commands, one for each observation.
         ValueError: As :class:`offtrack_sim.Batch` says, and for a policy with another action table or other extras
             than the benchmark's.
     """
@@ -113,22 +113,31 @@ def evaluate(
     batch = Batch(scenario, 1, split=split, routes=routes)
     if isinstance(policy, Policy):
         policy.check(batch)
-    ended = _offtrack.drive(batch, _chooser(policy), min(per_route, 2**62), seed, text("device", device))
+    chooser = _chooser(policy, batch.n_commands)
+    ended = _offtrack.drive(batch, chooser, min(per_route, 2**62), seed, text("device", device))
     names = batch.split_routes
     return Evaluation(batch.scenario, split, seed, names, ended.reshape(len(names), per_route))
 
 
-def _chooser(policy: Policy | Callable[[npt.NDArray[np.float32]], Any]) -> _offtrack.Network | Callable[..., Any]:
+def _chooser(
+    policy: Policy | Callable[[npt.NDArray[np.float32]], Any], n_commands: int
+) -> _offtrack.Network | Callable[..., Any]:
     """What drives: a policy's network itself, unless a class that extends `Policy` acts otherwise."""
     if type(policy) is Policy:
         return policy._network
     act = policy.act if isinstance(policy, Policy) else policy
-    return lambda observations: _checked(act(observations), len(observations))
+    return lambda observations: _checked(act(observations), len(observations), n_commands)
 
 
-def _checked(actions: Any, n: int) -> npt.NDArray[Any]:
-    """What a policy gave for ``n`` observations: numbers with a fraction would lose it where they are stored."""
+def _checked(actions: Any, n: int, n_commands: int) -> npt.NDArray[Any]:
+    """What a policy gave for ``n`` observations: as indices, numbers with a fraction would lose it where they are
+    stored."""
     found = np.asarray(actions)
+    if n_commands:
+        if found.dtype.kind != "f" or found.shape != (n, n_commands):
+            needed = f"float32 of shape ({n}, {n_commands}) is needed"
+            raise TypeError(f"policy: gave {found.dtype} of shape {found.shape}; {needed}")
+        return found.astype(np.float32, copy=False)
     if found.dtype.kind not in "iu" or found.shape != (n,):
         raise TypeError(f"policy: gave {found.dtype} of shape {found.shape}; integers of shape ({n},) are needed")
     return found

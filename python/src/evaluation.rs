@@ -1,8 +1,9 @@
 //! Evaluations: episodes are driven and counted as on the command line, by a policy or by a function of Python.
 
 use numpy::{PyArray1, PyArrayMethods};
-use offtrack::layout::{Action, Ended, N_VALUES};
-use offtrack::simulator::Error;
+use offtrack::layout::{Ended, N_VALUES};
+use offtrack::simulator::{Actions, Error};
+use offtrack::world::World;
 use offtrack_evaluation::episodes::Episodes;
 use offtrack_evaluation::placed::placed;
 use offtrack_evaluation::report;
@@ -35,7 +36,7 @@ impl From<Error> for Raised {
 /// Drives `episodes` episodes on each route of a batch, on a device, and gives the end of each, route by route.
 ///
 /// `policy` is a `Network`, or a function from the observations of the trucks that drive, `[n, n_values]`, to their
-/// actions, `[n]`. It is called on the caller's own thread; the GIL is released while trucks are stepped.
+/// actions, `[n]` or `[n, n_commands]`. It is called on the caller's own thread; the GIL is released while trucks are stepped.
 #[pyfunction]
 pub fn drive<'py>(
     py: Python<'py>,
@@ -55,14 +56,13 @@ pub fn drive<'py>(
         let mut network = network.map_err(|error| PyValueError::new_err(error.to_string()))?;
         let begun = pool.run(py, || Episodes::begin(engine, world.clone(), &place.routes, episodes, seed))?;
         let begun = begun.map_err(|error| errors::of_simulator(&error))?;
-        let mut actions = vec![0; begun.simulator().n_envs()];
         let ended = begun.drive(|simulator| {
             py.check_signals()?;
             match &mut network {
                 Some(network) => pool.run(py, || network.step(simulator))??,
                 None => {
-                    choose(policy, simulator.batch(), n_values, &world.actions, &mut actions)?;
-                    pool.run(py, || simulator.step(&actions))??;
+                    let actions = choose(policy, simulator.batch(), n_values, world)?;
+                    pool.run(py, || simulator.step_any(&actions))??;
                 }
             }
             Ok::<(), Raised>(())
@@ -72,23 +72,19 @@ pub fn drive<'py>(
     })
 }
 
-/// Writes the actions that a function of Python chooses for the trucks that drive.
+/// The actions that a function of Python chooses for the trucks that drive, and any for the others.
 fn choose<'py>(
     function: &Bound<'py, PyAny>,
     batch: &offtrack::simulator::Batch,
     n_values: usize,
-    table: &[Action],
-    actions: &mut [u32],
-) -> PyResult<()> {
+    world: &World,
+) -> PyResult<Actions> {
     let driving: Vec<usize> = (0..batch.n_envs()).filter(|&env| batch.ended[env] == Ended::Running as u32).collect();
     let observed = Observed::of(batch, n_values - N_VALUES);
     let rows: Vec<f32> = driving.iter().flat_map(|&env| observed.row(env).into_iter().take(n_values)).collect();
     let rows = PyArray1::from_vec(function.py(), rows).reshape([driving.len(), n_values])?;
-    let chosen = actions::of_array(&function.call1((rows,))?, driving.len(), table)?;
-    for (env, action) in driving.into_iter().zip(chosen) {
-        actions[env] = action;
-    }
-    Ok(())
+    let chosen = actions::of_array(&function.call1((rows,))?, driving.len(), world)?;
+    Ok(chosen.spread(&driving, batch.n_envs()))
 }
 
 /// Wilson's 95 % interval of the fraction `successes / trials`.
