@@ -13,6 +13,7 @@ use offtrack::map::procedural;
 use offtrack::scenario::Split;
 
 use offtrack_evaluation::certificate::attempt::{HOLD, attempt, passes};
+use offtrack_evaluation::certificate::check_levels;
 use offtrack_evaluation::certificate::file::{Certificate, CertifiedRoute, Found};
 use offtrack_evaluation::certificate::verify;
 use offtrack_evaluation::error::Error;
@@ -107,6 +108,7 @@ fn certify(args: &Args) -> Result<(), Error> {
         roads::narrow(&mut scenario, &args.route, &splits)?;
     }
     let world = roads::world(&scenario)?;
+    check_levels(&world)?;
     let policy = args.policy.as_deref().map(policies::learned).transpose()?;
     if let Some(policy) = &policy {
         policy.check(&world)?;

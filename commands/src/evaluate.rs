@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use offtrack::files::reader;
 use offtrack::scenario::Split;
+use offtrack_evaluation::actions;
 use offtrack_evaluation::certificate::attempt::{HOLD, passes};
-use offtrack_evaluation::certificate::certified;
+use offtrack_evaluation::certificate::{certified, check_levels};
 use offtrack_evaluation::comparison::Asked;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::failures::Example;
@@ -130,6 +131,12 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let asked = args.policy.asked(&args.benchmark, args.load.as_deref(), &args.route);
     let scenario = roads::asked(&asked, split)?;
     let world = roads::world(&scenario)?;
+    if args.certify {
+        check_levels(&world)?;
+    }
+    if args.actions.is_some() {
+        actions::check_levels(&world)?;
+    }
     let mut policy = args.policy.open(&scenario, &world, &device.engine, args.seed)?;
     let n_routes = scenario.split(split).len();
     let episodes = args.episodes.unwrap_or_else(|| usual_episodes(n_routes));

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use offtrack::files::reader;
-use offtrack::simulator::Batch;
+use offtrack::simulator::{Actions, Batch};
 use offtrack::world::World;
 use serde::{Deserialize, Serialize};
 
@@ -42,8 +42,9 @@ impl Recorded {
     ///
     /// # Errors
     ///
-    /// A file that is none of these, or is one of other episodes or actions.
+    /// A file that is none of these, or is one of other episodes or actions; a world whose actions are continuous.
     pub fn read(file: &Path, world: &World, n_episodes: usize) -> Result<Recorded, Error> {
+        check_levels(world)?;
         let wrong =
             |message: String| Error::contents(file, format!("{message}; `evaluate --actions` writes such files"));
         let text = reader::read_text(file, FILE_LIMIT)?;
@@ -71,11 +72,19 @@ impl Controller for Recorded {
         &self.name
     }
 
-    fn choose(&mut self, _: &World, batch: &Batch, actions: &mut Vec<u32>) {
+    fn choose(&mut self, _: &World, batch: &Batch) -> Actions {
         let at = |(sequence, step): (&Vec<u32>, u32)| sequence.get(step as usize).copied().unwrap_or(0);
-        actions.clear();
-        actions.extend(self.sequences.iter().zip(batch.truck.iter().map(|truck| truck.steps)).map(at));
+        Actions::Indices(self.sequences.iter().zip(batch.truck.iter().map(|truck| truck.steps)).map(at).collect())
     }
+}
+
+/// An error for a world whose actions are continuous: a file holds indices.
+pub fn check_levels(world: &World) -> Result<(), Error> {
+    if !world.is_continuous() {
+        return Ok(());
+    }
+    let expected = "files of actions hold indices: the same benchmark with actions.steer_levels is needed".to_owned();
+    Err(Error::Setting { name: "actions.kind", value: "continuous".to_owned(), expected })
 }
 
 /// Writes the sequences of an evaluation's episodes, a line each.

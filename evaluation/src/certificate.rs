@@ -18,6 +18,15 @@ use crate::error::Error;
 use file::Certificate;
 use verify::Sequence;
 
+/// An error for a world whose actions are continuous: a search tries every action of a table.
+pub fn check_levels(world: &World) -> Result<(), Error> {
+    if !world.is_continuous() {
+        return Ok(());
+    }
+    let expected = "a search tries levels: the same benchmark with actions.steer_levels is needed".to_owned();
+    Err(Error::Setting { name: "actions.kind", value: "continuous".to_owned(), expected })
+}
+
 /// The certified ones among `routes`, as indices of the world: those completed from every start. Their sequences are
 /// driven again first.
 pub fn certified(path: &Path, scenario: &Scenario, world: &Arc<World>, routes: &[u32]) -> Result<Vec<u32>, Error> {

@@ -1,6 +1,5 @@
 //! Evaluates a policy: a number of episodes on every route of a split, every one counted.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use crate::recording::{Recorder, Track};
@@ -14,7 +13,6 @@ use offtrack::world::World;
 
 use rayon::prelude::*;
 
-use crate::actions;
 use crate::classes;
 use crate::device::Device;
 use crate::episodes::Episodes;
@@ -25,6 +23,7 @@ use crate::policies::Controller;
 use crate::possible::Possible;
 use crate::report::{Episode, Report, RouteReport, Summary};
 use crate::seen::Seen;
+use crate::sequences::Sequences;
 use crate::shown::shown;
 
 /// Episodes on each of so many routes where nobody says how many: 30, and fewer on more than 100 routes, about 3,000 in
@@ -85,12 +84,12 @@ impl Evaluation<'_> {
         let n_episodes = begun.simulator().n_envs();
         let routes = self.scenario.split(self.split);
         let mut figures = Figures::begin(self.scenario, self.world, routes, self.episodes, begun.simulator())?;
-        let mut sequences = Sequences(vec![Vec::new(); n_episodes]);
+        let mut sequences = Sequences::new(self.world, n_episodes);
         let mut n_finished = 0;
         begun.drive(|simulator| {
             policy.step(simulator)?;
             let seen = Seen::of(simulator)?;
-            sequences.add(&seen.action, figures.finished());
+            sequences.add(&seen, figures.finished());
             let n_ended = figures.add(&seen);
             n_finished += n_ended;
             if 0 < n_ended {
@@ -134,7 +133,7 @@ impl Evaluation<'_> {
             if !recorder.is_running() {
                 break;
             }
-            simulator.step(&sequences.at(step, indices))?;
+            simulator.step_any(&sequences.at(step, indices))?;
             recorder.follow(self.world, simulator.batch());
         }
         simulator.wait()?;
@@ -237,33 +236,4 @@ fn widest(rigs: &[Rig]) -> &Rig {
 fn stiffest(rigs: &[Rig]) -> &Rig {
     let radius = |rig: &Rig| rig.wheelbase / rig.steer_max.sin();
     rigs.iter().max_by(|a, b| radius(a).total_cmp(&radius(b))).expect("a world has a truck")
-}
-
-/// The actions of each episode, `[episodes][steps]`.
-#[derive(Debug)]
-pub struct Sequences(Vec<Vec<u32>>);
-
-impl Sequences {
-    /// Writes them to `file`, to be [driven again](crate::actions) in `world`.
-    ///
-    /// # Errors
-    ///
-    /// A disk that is full, or a folder that may not be written.
-    pub fn write(&self, file: &Path, world: &World) -> Result<(), Error> {
-        actions::write(file, world, &self.0)
-    }
-
-    /// Adds the next action of the episodes that have not finished.
-    fn add(&mut self, actions: &[u32], finished: &[Option<Episode>]) {
-        for ((sequence, &action), finished) in self.0.iter_mut().zip(actions).zip(finished) {
-            if finished.is_none() {
-                sequence.push(action);
-            }
-        }
-    }
-
-    /// The action at `step` of each of these episodes; of one that has ended, any.
-    fn at(&self, step: usize, indices: &[usize]) -> Vec<u32> {
-        indices.iter().map(|&index| self.0[index].get(step).copied().unwrap_or(0)).collect()
-    }
 }

@@ -36,6 +36,7 @@ pub mod placed; // a learned policy where the trucks are
 pub mod policies; // a policy by its name, and the baselines: pure pursuit, random
 mod seen; // what is looked at after a step
 pub mod episodes; // one a truck, until every one has ended
+mod sequences; // the actions of episodes
 mod evaluation; // every route, every start, every episode counted
 mod part; // entry, ring and exit of a route
 mod running; // an episode under way
@@ -63,6 +64,7 @@ pub mod shown; // which episodes a page shows
 pub mod page; // a report as an HTML page
 
 pub use evaluation::*;
+pub use sequences::Sequences;
 pub use table::legend;
 
 /// The library's examples, compiled and run as tests.

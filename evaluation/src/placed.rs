@@ -1,14 +1,14 @@
 //! A learned policy where the trucks are: on the processor, or on their device by its kernel. Then no observation
-//! leaves the device. One that the kernel does not act by, with a memory or values of its own, drives trucks of a device
-//! from the processor.
+//! leaves the device. One that the kernel does not act by, with a memory, values or commands of its own, drives trucks of
+//! a device from the processor.
 
 #[cfg(feature = "gpu")]
 mod on_device;
 
-use offtrack::layout::{N_EXTRAS, N_VALUES};
-use offtrack::simulator::{Batch, Engine};
+use offtrack::layout::{Command, N_EXTRAS, N_VALUES};
+use offtrack::simulator::{Actions, Batch, Engine};
 use offtrack::world::World;
-use offtrack_policy::{Choice, Driver, Policy, drawn, greedy, sampled};
+use offtrack_policy::{Choice, Driver, Head, Policy, drawn, greedy, sampled};
 
 use crate::controller::Controller;
 use crate::error::Error;
@@ -38,11 +38,11 @@ impl Controller for Policy {
         &self.name
     }
 
-    fn choose(&mut self, _: &World, batch: &Batch, actions: &mut Vec<u32>) {
+    fn choose(&mut self, _: &World, batch: &Batch) -> Actions {
         let driving = driving(batch);
         let (observations, extras) = observed(batch, &driving);
-        let logits = self.logits_beside(&observations, &extras);
-        spread(&driving, &greedy(&logits, self.actions.len()), batch, actions);
+        let outputs = self.logits_beside(&observations, &extras);
+        best(self, outputs).spread(&driving, batch.n_envs())
     }
 }
 
@@ -64,7 +64,7 @@ impl Controller for OnHost {
         &self.driver.policy().name
     }
 
-    fn choose(&mut self, _: &World, batch: &Batch, actions: &mut Vec<u32>) {
+    fn choose(&mut self, _: &World, batch: &Batch) -> Actions {
         if self.driver.n_envs() != batch.n_envs() {
             self.driver = self.driver.policy().clone().driver(batch.n_envs());
         }
@@ -72,15 +72,16 @@ impl Controller for OnHost {
         driving.iter().filter(|&&env| batch.truck[env].steps == 0).for_each(|&env| self.driver.begin(env));
         let (observations, extras) = observed(batch, &driving);
         let outputs = self.driver.outputs(&driving, &observations, &extras);
-        let n_actions = self.driver.policy().actions.len();
-        let chosen = match self.choice {
-            Choice::Best => greedy(&outputs, n_actions),
-            Choice::Sampled { seed } => {
+        let policy = self.driver.policy();
+        let chosen = match (self.choice, policy.head) {
+            (Choice::Sampled { seed }, Head::Levels) => {
                 let drawn = |index: usize| drawn(seed, driving[index] as u32, &batch.truck[driving[index]]);
-                sampled(&outputs, n_actions, drawn)
+                Actions::Indices(sampled(&outputs, policy.actions.len(), drawn))
             }
+            // A file has the means of commands alone.
+            _ => best(policy, outputs),
         };
-        spread(&driving, &chosen, batch, actions);
+        chosen.spread(&driving, batch.n_envs())
     }
 }
 
@@ -94,12 +95,16 @@ fn observed(batch: &Batch, driving: &[usize]) -> (Vec<[f32; N_VALUES]>, Vec<[f32
     driving.iter().map(|&env| (batch.observation[env], batch.extras[env])).unzip()
 }
 
-/// The actions of all trucks: what was chosen for those that drive.
-fn spread(driving: &[usize], chosen: &[u32], batch: &Batch, actions: &mut Vec<u32>) {
-    actions.clear();
-    actions.resize(batch.n_envs(), 0);
-    for (&env, &action) in driving.iter().zip(chosen) {
-        actions[env] = action;
+/// The best actions by a policy's outputs: the indices of the largest, or the commands.
+fn best(policy: &Policy, outputs: Vec<f32>) -> Actions {
+    match policy.head {
+        Head::Levels => Actions::Indices(greedy(&outputs, policy.actions.len())),
+        Head::Continuous { .. } => {
+            let commands = policy.head.commands(outputs);
+            // Of one speed there is no second value.
+            let command = |row: &[f32]| Command { steering: row[0], speed: row.get(1).copied().unwrap_or_default() };
+            Actions::Commands(commands.chunks_exact(policy.n_outputs()).map(command).collect())
+        }
     }
 }
 

@@ -4,9 +4,9 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use offtrack::layout::random::{self, Draw};
-use offtrack::layout::{Action, Truck, WaypointRow};
-use offtrack::simulator::{Batch, Engine};
+use offtrack::layout::{Action, Command, Stream, Truck, WaypointRow};
+use offtrack::physics::{drawn_action, drawn_command};
+use offtrack::simulator::{Actions, Batch, Engine};
 use offtrack::vehicle::profile::Profile;
 use offtrack::world::World;
 use offtrack_policy::Choice;
@@ -69,13 +69,16 @@ impl Controller for UniformRandom {
         "random"
     }
 
-    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
-        actions.clear();
-        actions.extend(batch.truck.iter().enumerate().map(|(env, truck)| {
-            let [word, ..] =
-                random::words(self.seed, env as u32, truck.episode, (Draw::Action as u32).wrapping_add(truck.steps));
-            random::index_below(word, world.params.n_actions)
-        }));
+    fn choose(&mut self, world: &World, batch: &Batch) -> Actions {
+        let trucks = (0..).zip(&batch.truck);
+        let drawn = trucks.map(|(env, truck)| (Stream { seed: self.seed, env }, truck.episode, truck.steps));
+        if world.is_continuous() {
+            Actions::Commands(drawn.map(|(stream, episode, steps)| drawn_command(stream, episode, steps)).collect())
+        } else {
+            let n_actions = world.params.n_actions;
+            let index = |(stream, episode, steps)| drawn_action(stream, episode, steps, n_actions);
+            Actions::Indices(drawn.map(index).collect())
+        }
     }
 }
 
@@ -100,20 +103,19 @@ impl Controller for PurePursuit {
         &self.name
     }
 
-    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
-        actions.clear();
-        actions.extend(batch.truck.iter().zip(&batch.progress).zip(&batch.control).map(
-            |((truck, progress), control)| {
-                let (waypoints, next) = (line(&self.lines, world, truck.route), progress.waypoint as usize);
-                let steering = self.steering(world.rig(truck).wheelbase, truck, waypoints, next);
-                let speed = self.speed(world, truck, next);
-                nearest(
-                    world,
-                    steering,
-                    if world.params.changes_speed == 1 { speed - control.target_speed } else { speed },
-                )
-            },
-        ));
+    fn choose(&mut self, world: &World, batch: &Batch) -> Actions {
+        let wanted = batch.truck.iter().zip(&batch.progress).zip(&batch.control).map(|((truck, progress), control)| {
+            let (waypoints, next) = (line(&self.lines, world, truck.route), progress.waypoint as usize);
+            let steering = self.steering(world.rig(truck).wheelbase, truck, waypoints, next);
+            let speed = self.speed(world, truck, next);
+            let speed = if world.params.changes_speed == 1 { speed - control.target_speed } else { speed };
+            Action { steering, speed }
+        });
+        if world.is_continuous() {
+            Actions::Commands(wanted.map(|wanted| command_for(world, wanted)).collect())
+        } else {
+            Actions::Indices(wanted.map(|wanted| nearest(world, wanted.steering, wanted.speed)).collect())
+        }
     }
 }
 
@@ -162,6 +164,15 @@ impl PurePursuit {
 /// The line that pure pursuit follows on a route: a row for each waypoint.
 fn line<'a>(lines: &'a Lines, world: &'a World, route: u32) -> &'a [WaypointRow] {
     lines.get(&route).map_or_else(|| world.route_waypoints(route), Vec::as_slice)
+}
+
+/// The command that asks for this, or for what is nearest to it within the ranges of commands.
+fn command_for(world: &World, wanted: Action) -> Command {
+    let [lowest, highest] = [&world.actions[0], &world.actions[1]];
+    let half = 0.5 * (highest.speed - lowest.speed);
+    let speed = if half == 0.0 { 0.0 } else { (wanted.speed - lowest.speed) / half - 1.0 };
+    let within = |value: f32| value.clamp(-1.0, 1.0);
+    Command { steering: within(wanted.steering / highest.steering), speed: within(speed) }
 }
 
 /// The action with the highest speed or change that is at most `speed`, the lowest if there is none; among those the

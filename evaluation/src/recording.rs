@@ -8,7 +8,7 @@
 mod measures;
 
 use offtrack::layout::angle::wrapped;
-use offtrack::layout::{Clearance, Ended, N_RAYS, N_TRAILER_RAYS};
+use offtrack::layout::{Clearance, Command, Ended, N_RAYS, N_TRAILER_RAYS};
 use offtrack::map::route::Route;
 use offtrack::map::{Gutter, Road};
 use offtrack::physics;
@@ -42,8 +42,11 @@ pub struct Frame {
     pub steering: f32,
     /// Speed of the drive axle (m/s).
     pub speed: f32,
-    /// Index of the last action in the action table; `None` at the start.
+    /// Index of the last action in the action table; `None` at the start, and where actions are continuous.
     pub action: Option<u32>,
+    /// The last command, steer angle over the lock and speed, where actions are continuous; `None` at the start.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub command: Option<[f32; 2]>,
     /// Distance from the reference point to the lane centre (m).
     pub lane_distance: f32,
     /// Distance from the tractor's outline to the nearest kerb, negative where they overlap (m).
@@ -64,8 +67,11 @@ pub struct Frame {
 impl Frame {
     /// Truck `env` after the last step.
     fn after_step(world: &World, batch: &Batch, env: usize) -> Frame {
+        let Command { steering, speed } = batch.command[env];
+        let is_continuous = world.is_continuous();
         Frame {
-            action: Some(batch.action[env]),
+            action: (!is_continuous).then_some(batch.action[env]),
+            command: is_continuous.then_some([steering, speed]),
             reward: to(MILLI, batch.reward[env]),
             ..Frame::new(world, batch, env, batch.clearance[env])
         }
@@ -88,6 +94,7 @@ impl Frame {
             steering: to(ANGLE, truck.steering),
             speed: to(MILLI, truck.speed),
             action: None,
+            command: None,
             lane_distance: to(MILLI, batch.progress[env].lane_distance),
             tractor_clearance: to(MILLI, clearance.tractor),
             trailer_clearance: to(MILLI, clearance.trailer),
@@ -121,6 +128,7 @@ impl Frame {
             trailer_heading: negated(self.trailer_heading),
             articulation: negated(self.articulation),
             steering: negated(self.steering),
+            command: self.command.map(|[steering, speed]| [negated(steering), speed]),
             tractor_load_transfer_ratio: negated(self.tractor_load_transfer_ratio),
             trailer_load_transfer_ratio: negated(self.trailer_load_transfer_ratio),
             ranges,
@@ -241,7 +249,8 @@ pub struct Recording {
     pub class: Option<Class>,
     /// The truck.
     pub vehicle: Measures,
-    /// The action table: steer angle, left positive (rad), and speed asked for (m/s).
+    /// The action table: steer angle, left positive (rad), and speed asked for (m/s); where actions are continuous what
+    /// commands of -1 and of 1 ask for.
     pub actions: Vec<[f32; 2]>,
     /// The roundabout.
     pub map: Map,
@@ -273,7 +282,9 @@ impl Of<'_, '_> {
     /// evaluation has on this route.
     pub fn recording(&self, episode: usize, episodes: usize, track: Track) -> Recording {
         let Of { scenario, world, roundabout, route, policy, seed } = *self;
-        let steering = |angle: f32| if roundabout.is_mirrored() { 0.0 - angle } else { angle };
+        // In a mirror an index stays and its angle changes its sign; a command changes its own.
+        let turns = roundabout.is_mirrored() && !world.is_continuous();
+        let steering = |angle: f32| if turns { 0.0 - angle } else { angle };
         Recording {
             benchmark: scenario.name.clone(),
             route: route.name.clone(),

@@ -3,11 +3,12 @@
 use std::borrow::Cow;
 
 use bytemuck::{AnyBitPattern, NoUninit};
-use offtrack::layout::{Clearance, Column, Control, Progress, RewardTerms, Truck};
+use offtrack::layout::{Clearance, Column, Command, Control, Progress, RewardTerms, Truck};
 use offtrack::simulator::{Error, Simulator};
 
-const COLUMNS: [Column; 8] = [
+const COLUMNS: [Column; 9] = [
     Column::Action,
+    Column::Command,
     Column::Control,
     Column::Truck,
     Column::Clearance,
@@ -21,6 +22,7 @@ const COLUMNS: [Column; 8] = [
 #[derive(Debug)]
 pub(crate) struct Seen<'a> {
     pub(crate) action: Cow<'a, [u32]>,
+    pub(crate) command: Cow<'a, [Command]>,
     pub(crate) control: Cow<'a, [Control]>,
     pub(crate) truck: Cow<'a, [Truck]>,
     pub(crate) clearance: Cow<'a, [Clearance]>,
@@ -38,6 +40,7 @@ impl<'a> Seen<'a> {
         let mut next = || read.next().unwrap_or_default();
         Ok(Seen {
             action: rows(next()),
+            command: rows(next()),
             control: rows(next()),
             truck: rows(next()),
             clearance: rows(next()),

@@ -52,7 +52,14 @@ impl Policy {
     }
 
     fn check_actions(&self, world: &World) -> Result<(), String> {
-        if self.head != Head::Levels {
+        if world.is_continuous() && self.head == Head::Levels {
+            return Err(format!(
+                "chooses among {} actions, and the benchmark takes commands (actions.kind = \"continuous\"); a policy \
+                 whose head is continuous is needed",
+                self.actions.len(),
+            ));
+        }
+        if !world.is_continuous() && self.head != Head::Levels {
             return Err(format!(
                 "gives commands between -1 and 1, and the benchmark has a table of {} actions; a policy with the head \
                  {:?} is needed",

@@ -46,6 +46,11 @@ class Agent(nn.Module):
         action = torch.multinomial(log_probs.exp(), 1)  # [B, 1]
         return action.squeeze(-1), log_probs.gather(1, action).squeeze(-1)
 
+    def judge(self, observation: torch.Tensor, action: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Logarithm of each action's probability, and the entropy of its distribution."""
+        log_probs = torch.log_softmax(self.actor(observation), dim=-1)  # [M, A]
+        return log_probs.gather(1, action[:, None]).squeeze(-1), -(log_probs * log_probs.exp()).sum(-1)  # [M] each
+
     @torch.no_grad()
     def greedy(self, observation: np.ndarray) -> np.ndarray:
         return self.actor(torch.from_numpy(observation)).argmax(-1).numpy()
@@ -62,9 +67,11 @@ def network(inputs: int, hidden: int, outputs: int, gain: float) -> nn.Sequentia
 class Fragment:
     """Some steps of all trucks, ``[T, N, ...]``, in order."""
 
-    def __init__(self, n_steps: int, n_envs: int, n_values: int) -> None:
+    def __init__(self, n_steps: int, n_envs: int, n_values: int, n_commands: int = 0) -> None:
         self.observation = np.zeros((n_steps + 1, n_envs, n_values), np.float32)  # the last one follows the last step
         self.action = np.zeros((n_steps, n_envs), np.int64)
+        if n_commands:
+            self.action = np.zeros((n_steps, n_envs, n_commands), np.float32)
         self.log_prob = np.zeros((n_steps, n_envs), np.float32)
         self.reward = np.zeros((n_steps, n_envs), np.float32)
         self.terminated = np.zeros((n_steps, n_envs), np.bool_)
@@ -104,23 +111,22 @@ def update(
     observation = torch.cat(
         [torch.from_numpy(fragment.observation[:-1]).flatten(0, 1) for fragment in fragments]
     )  # [B, n_values]
-    action = torch.cat([torch.from_numpy(fragment.action).flatten() for fragment in fragments])  # [B]
+    action = torch.cat([torch.from_numpy(fragment.action).flatten(0, 1) for fragment in fragments])  # [B, ...]
     log_prob = torch.cat([torch.from_numpy(fragment.log_prob).flatten() for fragment in fragments])  # [B]
     entropies = []
     for _ in range(args.epochs):
         for rows in torch.randperm(len(action)).split(args.minibatch):
-            log_probs = torch.log_softmax(agent.actor(observation[rows]), dim=-1)  # [M, A]
-            ratio = (log_probs.gather(1, action[rows, None]).squeeze(-1) - log_prob[rows]).exp()  # [M]
+            new_log_prob, entropy = agent.judge(observation[rows], action[rows])  # [M] each
+            ratio = (new_log_prob - log_prob[rows]).exp()  # [M]
             gain = (advantage[rows] - advantage[rows].mean()) / (advantage[rows].std() + 1e-8)  # [M]
             policy_loss = -torch.min(gain * ratio, gain * ratio.clamp(1 - args.clip, 1 + args.clip)).mean()
             value_loss = (agent.value(observation[rows]) - target[rows]).square().mean()
-            entropy = -(log_probs * log_probs.exp()).sum(-1).mean()
-            loss = policy_loss + 0.5 * value_loss - args.entropy * entropy
+            loss = policy_loss + 0.5 * value_loss - args.entropy * entropy.mean()
             optimizer.zero_grad()
             loss.backward()
             nn.utils.clip_grad_norm_(agent.parameters(), 0.5)
             optimizer.step()
-            entropies.append(float(entropy.detach()))
+            entropies.append(float(entropy.detach().mean()))
     return float(np.mean(entropies))
 
 
@@ -188,12 +194,14 @@ class Progress:
             print("  ".join(f"{name} {value:,}" for name, value in row.items()), flush=True)
             self._successes, self._last = [], (now, self.env_steps)
 
-    def finish(self, agent: Agent, kind: str, *packages: str, extra: dict[str, object] | None = None) -> None:
+    def finish(
+        self, agent: Agent, kind: str, *packages: str, extra: dict[str, object] | None = None, **export_as: str
+    ) -> None:
         """Writes the policy file, evaluates the policy once, and writes the results."""
         args = self.args
         seconds = time.perf_counter() - self.start
         file = args.out.with_suffix(".safetensors")
-        export.save(file, agent.actor, scenario=args.scenario)
+        export.save(file, agent.actor, scenario=args.scenario, **export_as)
         policy = offtrack_sim.Policy.load(file)
         result = {
             "example": kind,
@@ -219,22 +227,29 @@ def main() -> None:
     torch.set_num_threads(1)
     torch.manual_seed(args.seed)
     envs = offtrack_sim.make_vec(args.scenario, args.envs, seed=args.seed, autoreset_mode="same_step", copy=False)
-    n_values = envs.single_observation_space.shape[0]
-    agent = Agent(n_values, int(envs.single_action_space.n), args.hidden)
+    agent = Agent(envs.single_observation_space.shape[0], int(envs.single_action_space.n), args.hidden)
+    train(args, envs, agent).finish(agent, "cleanrl_ppo", "gymnasium")
+
+
+def train(args: argparse.Namespace, envs: offtrack_sim.RoundaboutVector, agent: Agent) -> Progress:
+    """Drives and learns in turns until the steps or the minutes are over."""
+    n_values, n_commands = envs.batch.n_values, envs.batch.n_commands
     optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
     observation, _ = envs.reset(seed=args.seed)
     progress = Progress(args)
     try:
         while progress.left() > 0:
             optimizer.param_groups[0]["lr"] = args.learning_rate * progress.left()
-            fragment = Fragment(args.fragment, args.envs, n_values)
+            fragment = Fragment(args.fragment, args.envs, n_values, n_commands)
             successes: list[float] = []
             for step in range(args.fragment):
                 fragment.observation[step] = observation
                 with torch.no_grad():
                     action, log_prob = agent.act(torch.from_numpy(fragment.observation[step]))
                 fragment.action[step], fragment.log_prob[step] = action, log_prob
-                observation, reward, terminated, truncated, infos = envs.step(fragment.action[step])
+                # Of a command the simulator takes what lies in its range.
+                given = fragment.action[step].clip(-1, 1) if n_commands else fragment.action[step]
+                observation, reward, terminated, truncated, infos = envs.step(given)
                 fragment.reward[step] = reward * args.reward_scale
                 fragment.terminated[step], fragment.truncated[step] = terminated, truncated
                 if "final_info" in infos:
@@ -245,10 +260,10 @@ def main() -> None:
                     ]
             fragment.observation[-1] = observation
             entropy = update(agent, optimizer, [fragment], args)
-            progress.add(fragment.action.size, successes, entropy)
+            progress.add(fragment.reward.size, successes, entropy)
     except KeyboardInterrupt:
         print("interrupted: what was learned is kept", flush=True)
-    progress.finish(agent, "cleanrl_ppo", "gymnasium")
+    return progress
 
 
 if __name__ == "__main__":

@@ -131,7 +131,7 @@ def main() -> None:
             waited = time.perf_counter()
             entropy = update(agent, optimizer, [each.fragment for each in driven], args)
             successes = [success for each in driven for success in each.successes]
-            progress.add(sum(each.fragment.action.size for each in driven), successes, entropy)
+            progress.add(sum(each.fragment.reward.size for each in driven), successes, entropy)
             times["stepping"].append(float(np.mean([each.stepping for each in driven])))
             times["driving"].append(float(np.mean([each.driving for each in driven])))
             times["waiting"].append(waited - start)

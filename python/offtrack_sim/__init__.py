@@ -11,7 +11,8 @@
 - :mod:`offtrack_sim.export` writes a network of PyTorch, or of an ONNX graph, as a policy file.
 
 An observation is 69 values of float32 in ``[-1, 1]``, see :data:`OBSERVATION`, and behind them the extras that a
-benchmark may observe, see :data:`EXTRAS`; an action is an index into ``Batch.action_table``. A step is 0.1 s.
+benchmark may observe, see :data:`EXTRAS`; an action is an index into ``Batch.action_table`` or, where a
+benchmark's actions are continuous, one or two numbers in ``[-1, 1]``. A step is 0.1 s.
 """
 
 from __future__ import annotations

@@ -57,7 +57,10 @@ class Batch(_offtrack.Batch):
         device: ``"cpu"``, or the graphics device with its interface and driver.
         autoreset: ``"same_step"``, ``"next_step"`` or ``"disabled"``.
         step_seconds: Time of a step [s].
-        action_table: Steer angle [rad] and target speed [m/s] of each action, float32 ``[n_actions, 2]``.
+        action_table: Steer angle [rad] and target speed [m/s] of each action, float32 ``[n_actions, 2]``; where actions
+            are continuous, what commands of -1 and of 1 ask for.
+        n_commands: Numbers of a command where actions are continuous: 1, the steer angle over the lock, or 2, with the
+            target speed from the lowest (-1) to the highest (1); 0 where an action is an index.
         route_names: Names of the routes, in the order of the indices that columns have.
         extras: Names of the extras that stand behind an observation's 69 values, see :data:`offtrack_sim.EXTRAS`.
         n_values: Number of an observation's values, extras included.
@@ -159,7 +162,9 @@ class Batch(_offtrack.Batch):
         """One step of every truck: 0.1 s.
 
         Args:
-            actions: Index of each truck's action in ``action_table``, integers ``[num_envs]``.
+            actions: Index of each truck's action in ``action_table``, integers ``[num_envs]``. Where actions are
+                continuous each truck's command, float32 ``[num_envs, n_commands]``, in -1..1: left is positive, on a
+                left-hand road right. None is clipped: ``gymnasium.wrappers.ClipAction`` does that.
 
         Returns:
             Observation ``[num_envs, n_values]``, reward, terminated and truncated, ``[num_envs]`` each. Where an
@@ -167,8 +172,8 @@ class Batch(_offtrack.Batch):
             the last one.
 
         Raises:
-            TypeError: For anything but an array of integers.
-            ValueError: For another length, and for an action outside the table.
+            TypeError: For anything but an array of integers, or of numbers.
+            ValueError: For another shape, for an action outside the table, and a number outside -1..1.
             gymnasium.error.ResetNeeded: Where ``autoreset`` is ``"disabled"`` and an episode has ended.
             RuntimeError: Where another thread uses the batch.
         """

@@ -110,7 +110,8 @@ def evaluate(
 
     Args:
         policy: A :class:`offtrack_sim.Policy`, or any function from observations ``[n, n_values]`` to actions
-            ``[n]``: 69 values, and behind them the benchmark's extras. Rows are those of the trucks that still drive.
+            ``[n]``, of continuous ones ``[n, n_commands]``: 69 values, and behind them the benchmark's extras. Rows are
+            those of the trucks that still drive.
         scenario, split, routes, device: As for :class:`offtrack_sim.Batch`. A :class:`offtrack_sim.Policy` acts on the
             device, too.
         episodes: Episodes on each route.
@@ -120,7 +121,7 @@ def evaluate(
             all trucks at each step, in one order. What it gives for one whose episode has ended has no effect.
 
     Raises:
-        TypeError: For a function that gives anything but integers, one for each observation.
+        TypeError: For a function that gives anything but integers, or commands, one for each observation.
         ValueError: As :class:`offtrack_sim.Batch` says, and for a policy with another action table or other extras
             than the benchmark's.
     """
@@ -135,7 +136,7 @@ def evaluate(
         policy.check(batch)
     if begins and isinstance(policy, Policy):
         raise ValueError("begins: True; a Policy remembers by itself: leave it out")
-    chooser = _chooser(policy)
+    chooser = _chooser(policy, batch.n_commands)
     columns = dict(_offtrack.drive(batch, chooser, min(per_route, 2**62), seed, text("device", device), bool(begins)))
     names = batch.split_routes
     ended = columns["ended"].reshape(len(names), per_route)
@@ -155,17 +156,23 @@ def _table(routes: list[str], per_route: int, columns: dict[str, npt.NDArray[Any
     return table
 
 
-def _chooser(policy: Policy | Callable[..., Any]) -> _offtrack.Network | Callable[..., Any]:
+def _chooser(policy: Policy | Callable[..., Any], n_commands: int) -> _offtrack.Network | Callable[..., Any]:
     """What drives: a policy's network itself, unless a class that extends `Policy` acts otherwise."""
     if type(policy) is Policy:
         return policy._network
     act = policy.act if isinstance(policy, Policy) else policy
-    return lambda observations, *begins: _checked(act(observations, *begins), len(observations))
+    return lambda observations, *begins: _checked(act(observations, *begins), len(observations), n_commands)
 
 
-def _checked(actions: Any, n: int) -> npt.NDArray[Any]:
-    """What a policy gave for ``n`` observations: numbers with a fraction would lose it where they are stored."""
+def _checked(actions: Any, n: int, n_commands: int) -> npt.NDArray[Any]:
+    """What a policy gave for ``n`` observations: as indices, numbers with a fraction would lose it where they are
+    stored."""
     found = np.asarray(actions)
+    if n_commands:
+        if found.dtype.kind != "f" or found.shape != (n, n_commands):
+            needed = f"float32 of shape ({n}, {n_commands}) is needed"
+            raise TypeError(f"policy: gave {found.dtype} of shape {found.shape}; {needed}")
+        return found.astype(np.float32, copy=False)
     if found.dtype.kind not in "iu" or found.shape != (n,):
         raise TypeError(f"policy: gave {found.dtype} of shape {found.shape}; integers of shape ({n},) are needed")
     return found

@@ -209,12 +209,13 @@ class Observer(_offtrack.Observer):
         """What actions ask for: steer angle on the map, left positive [rad], and target speed [m/s], ``[n]`` each.
 
         Args:
-            actions: Index of each truck's action in ``action_table``, integers ``[n]``.
+            actions: Index of each truck's action in ``action_table``, integers ``[n]``; where actions are continuous
+                each truck's command, float32 ``[n, n_commands]`` in -1..1, see :class:`offtrack_sim.Batch`.
             target_speed: The last target speed [m/s], which counts where actions change it.
 
         Raises:
-            TypeError: For anything but an array of integers.
-            ValueError: For another length, and for an action outside the table.
+            TypeError: For anything but an array of integers, or of numbers.
+            ValueError: For another shape, for an action outside the table, and a number outside -1..1.
         """
         return self.commands(actions, _numbers("target_speed", target_speed, (self.num_trucks,)).astype(np.float32))
 

@@ -6,7 +6,6 @@ import copy
 from collections.abc import Iterable
 from typing import Any
 
-import gymnasium
 import numpy as np
 import numpy.typing as npt
 import pufferlib
@@ -16,7 +15,7 @@ from .batch import Batch, Bools
 from .episodes import Floats
 from .layout import Ended
 from .scenarios import Scenario
-from .single import observation_space
+from .single import action_space, observation_space
 
 Buffers = tuple[Floats, Floats, Bools, Bools, list[dict[str, list[float]]]]
 
@@ -24,8 +23,9 @@ Buffers = tuple[Floats, Floats, Bools, Bools, list[dict[str, list[float]]]]
 class RoundaboutPuffer(pufferlib.PufferEnv):
     """Trucks that are stepped together, with the interface of ``pufferlib.PufferEnv`` of PufferLib 3.
 
-    - Observations ``[num_envs, n_values]`` float32, 69 and the benchmark's extras; actions ``[num_envs]`` integers; a
-      truck whose episode ends begins the next one in the same step.
+    - Observations ``[num_envs, n_values]`` float32, 69 and the benchmark's extras; actions ``[num_envs]`` integers or,
+      where they are continuous, ``[num_envs, n_commands]`` float32; a truck whose episode ends begins the next one in
+      the same step.
     - Rewards ``[num_envs]`` float32 are the benchmark's times ``reward_scale``: PufferLib's trainer clamps rewards to
       -1..1, and the benchmark's are -500 to +100.
     - PufferLib 3.0's trainer cuts the future at ``terminals`` alone: an episode that the time limit ends runs on, for
@@ -67,7 +67,7 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
             scenario, num_envs, split=split, routes=routes, seed=seed, num_threads=threads, device=device
         )
         self.single_observation_space = observation_space(len(self.batch.extras))
-        self.single_action_space = gymnasium.spaces.Discrete(len(self.batch.action_table))
+        self.single_action_space = action_space(self.batch)
         self.num_agents = num_envs
         self.render_mode = "rgb_array"
         self.reward_scale = reward_scale

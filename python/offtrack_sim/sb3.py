@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import gymnasium
 import numpy as np
 import numpy.typing as npt
 from stable_baselines3.common.vec_env import VecEnv
@@ -17,7 +16,7 @@ from .batch import Batch, Bools
 from .episodes import Floats
 from .layout import Ended
 from .scenarios import Scenario
-from .single import check_render_mode, checked_options, observation_space
+from .single import action_space, check_render_mode, checked_options, observation_space
 
 Indices = int | Iterable[int] | None
 
@@ -25,8 +24,8 @@ Indices = int | Iterable[int] | None
 class RoundaboutVecEnv(VecEnv):
     """Trucks that are stepped together, with the interface of ``stable_baselines3.common.vec_env.VecEnv``.
 
-    - Observations ``[num_envs, n_values]`` float32, 69 and the benchmark's extras; actions ``[num_envs]`` integers,
-      rewards ``[num_envs]`` float32.
+    - Observations ``[num_envs, n_values]`` float32, 69 and the benchmark's extras; actions ``[num_envs]`` integers or,
+      where they are continuous, ``[num_envs, n_commands]`` float32; rewards ``[num_envs]`` float32.
     - A truck whose episode ends begins the next one in the same step. Its info then has ``terminal_observation``,
       ``TimeLimit.truncated``, ``is_success``, ``ended`` (:class:`offtrack_sim.Ended`), ``route``, and ``vehicle`` and
       ``load`` where the benchmark has several; all others are empty.
@@ -71,7 +70,7 @@ class RoundaboutVecEnv(VecEnv):
         self.render_size = render_size
         self._streams: list[tuple[int, int] | None] = [(seed, env) for env in range(num_envs)]
         space = observation_space(len(self.batch.extras))
-        super().__init__(num_envs, space, gymnasium.spaces.Discrete(len(self.batch.action_table)))
+        super().__init__(num_envs, space, action_space(self.batch))
 
     def __copy__(self) -> RoundaboutVecEnv:
         # A step of a copy that shared the batch would move this one's trucks.

@@ -24,13 +24,21 @@ def observation_space(n_extras: int = 0) -> gymnasium.spaces.Box:
     return gymnasium.spaces.Box(low, np.ones_like(low), dtype=np.float32)
 
 
-class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
+def action_space(batch: Batch) -> gymnasium.spaces.Discrete | gymnasium.spaces.Box:
+    """An index into the batch's action table or, where actions are continuous, a command: float32 in -1..1."""
+    if batch.n_commands:
+        return gymnasium.spaces.Box(-1.0, 1.0, (batch.n_commands,), np.float32)
+    return gymnasium.spaces.Discrete(len(batch.action_table))
+
+
+class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
     """A tractor-trailer on a route through a roundabout; a step is 0.1 s.
 
     ``gymnasium.make("offtrack_sim:offtrack/Roundabout-v0", scenario=..., split=...)`` makes one.
 
     - Observation: :func:`observation_space`, see ``offtrack_sim.OBSERVATION`` and ``offtrack_sim.EXTRAS``.
-    - Action: index into ``env.unwrapped.batch.action_table``, pairs of steer angle [rad] and speed [m/s].
+    - Action: index into ``env.unwrapped.batch.action_table``, pairs of steer angle [rad] and speed [m/s]; where actions
+      are continuous a command, float32 ``[n_commands]`` in -1..1, see :meth:`offtrack_sim.Batch.step`.
     - Reward: the benchmark's weighted sum; for attard2023 +100 a waypoint, up to -1.5 a step for the distance to the
       lane's centre, -500 for a failure. Wrap it in ``gymnasium.wrappers.NormalizeReward`` where a learner wants less.
     - Info after a reset: ``route``, and where the benchmark has several ``vehicle`` and ``load``. After the step that
@@ -68,8 +76,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
         check_render_mode(render_mode)
         self.batch = Batch(scenario, 1, split=split, routes=routes, autoreset="disabled", num_threads=1, device=device)
         self.observation_space = observation_space(len(self.batch.extras))  # type: ignore[assignment]
-        self._n_actions = len(self.batch.action_table)
-        self.action_space = gymnasium.spaces.Discrete(self._n_actions)
+        self.action_space = action_space(self.batch)
         self.metadata = {**self.metadata, "render_fps": frames_per_second(self.batch)}
         self.render_mode = render_mode
         self.render_size = render_size
@@ -100,16 +107,10 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
         self._needs_reset = False
         return self.batch.observation()[0], self._named(self.batch.routes()[0], self.batch.vehicles()[0])
 
-    def step(self, action: np.int64) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         if self._needs_reset:
             raise gymnasium.error.ResetNeeded("call reset() before the first step and after the end of an episode")
-        try:
-            index = operator.index(action)
-        except TypeError:
-            raise TypeError(f"action: {action!r}; an integer is needed") from None
-        if not 0 <= index < self._n_actions:
-            raise ValueError(f"action: {index}; must lie in 0..{self._n_actions}")
-        observation, reward, terminated, truncated = self.batch.step(np.array([index]))
+        observation, reward, terminated, truncated = self.batch.step(self._row_of(action))
         info: dict[str, Any] = {}
         ended = self.batch.ended()
         if ended is not None:
@@ -118,6 +119,28 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], np.int64]):
             info = {"ended": int(code), "is_success": code == Ended.ARRIVED}
             info |= self._named(ended.routes[0], ended.vehicles[0])
         return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
+
+    def _row_of(self, action: Any) -> npt.NDArray[Any]:
+        """The action as those of a batch of one truck."""
+        if isinstance(self.action_space, gymnasium.spaces.Box):
+            command = np.asarray(action)
+            if command.dtype.kind != "f":
+                raise TypeError(f"action: {action!r}; float32 of shape {self.action_space.shape} is needed")
+            if command.shape != self.action_space.shape:
+                raise ValueError(f"action: shape {command.shape}; {self.action_space.shape} is needed")
+            outside = ~(abs(command) <= 1)
+            if outside.any():
+                index = int(np.flatnonzero(outside)[0])
+                raise ValueError(f"action[{index}]: {command[index]}; must lie in -1..1")
+            return command[None].astype(np.float32)
+        try:
+            index = operator.index(action)
+        except TypeError:
+            raise TypeError(f"action: {action!r}; an integer is needed") from None
+        n_actions = len(self.batch.action_table)
+        if not 0 <= index < n_actions:
+            raise ValueError(f"action: {index}; must lie in 0..{n_actions}")
+        return np.array([index])
 
     def _named(self, route: np.int64, vehicle: np.int64) -> dict[str, Any]:
         if self.numeric_infos:

@@ -13,13 +13,13 @@ import numpy.typing as npt
 from .arguments import checked_seed, mode_name
 from .batch import Batch
 from .scenarios import Scenario
-from .single import check_render_mode, checked_options, frames_per_second, observation_space
+from .single import action_space, check_render_mode, checked_options, frames_per_second, observation_space
 
 if TYPE_CHECKING:
     from gymnasium.vector import AutoresetMode, VectorEnv
     from gymnasium.vector.utils import batch_space
 
-    Base = VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.int64], npt.NDArray[Any]]
+    Base = VectorEnv[npt.NDArray[np.float32], npt.NDArray[Any], npt.NDArray[Any]]
     HAS_MODES = True
 else:
     try:
@@ -35,8 +35,8 @@ else:
 class RoundaboutVector(Base):
     """Trucks that are stepped together, with the interface of ``gymnasium.vector.VectorEnv``; see :func:`make_vec`.
 
-    - Observations ``[num_envs, n_values]`` float32, 69 and the benchmark's extras; actions ``[num_envs]`` integers,
-      rewards ``[num_envs]`` float32.
+    - Observations ``[num_envs, n_values]`` float32, 69 and the benchmark's extras; actions ``[num_envs]`` integers or,
+      where they are continuous, ``[num_envs, n_commands]`` float32; rewards ``[num_envs]`` float32.
     - ``batch`` is the simulator, with all its columns.
     - Infos have the form of Gymnasium's ``SyncVectorEnv``: an array ``key`` and a mask ``_key`` for ``route`` where an
       episode began and for ``ended``, ``is_success`` and ``route`` where one ended, and nothing where neither did. With
@@ -92,7 +92,7 @@ class RoundaboutVector(Base):
         self.num_envs = num_envs = self.batch.num_envs
         self.single_observation_space = observation_space(len(self.batch.extras))
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.single_action_space = gymnasium.spaces.Discrete(len(self.batch.action_table))
+        self.single_action_space = action_space(self.batch)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.autoreset_mode = AutoresetMode[mode.upper()]
         fps = frames_per_second(self.batch)
@@ -159,7 +159,7 @@ class RoundaboutVector(Base):
         return self._observation(), infos
 
     def step(
-        self, actions: npt.NDArray[np.int64]
+        self, actions: npt.NDArray[Any]
     ) -> tuple[npt.NDArray[np.float32], npt.NDArray[Any], npt.NDArray[np.bool_], npt.NDArray[np.bool_], dict[str, Any]]:
         """One step of every truck, 0.1 s; see the class for what it returns.
 

@@ -113,6 +113,12 @@ impl Batch {
         self.place.routes.iter().map(|&route| self.place.world.route_names[route as usize].as_str()).collect()
     }
 
+    /// Numbers of a command; 0 where an action is an index.
+    #[getter]
+    fn n_commands(&self) -> usize {
+        self.place.world.n_commands()
+    }
+
     /// Names of the extras that stand behind an observation's values.
     #[getter]
     fn extras(&self) -> Vec<&'static str> {
@@ -172,7 +178,7 @@ impl Batch {
 
     fn step<'py>(&self, py: Python<'py>, actions: &Bound<'py, PyAny>) -> PyResult<Step<'py>> {
         guarded(|| {
-            let actions = actions::of_array(actions, self.n_envs, &self.place.world.actions)?;
+            let actions = actions::of_array(actions, self.n_envs, &self.place.world)?;
             let mut state = self.state()?;
             let (observation, reward, terminated, truncated) =
                 state.step(py, self, &actions, |observation, reward, codes| {
@@ -196,7 +202,7 @@ impl Batch {
         truncated: &Bound<PyAny>,
     ) -> PyResult<()> {
         guarded(|| {
-            let actions = actions::of_array(actions, self.n_envs, &self.place.world.actions)?;
+            let actions = actions::of_array(actions, self.n_envs, &self.place.world)?;
             let (n_envs, n_values) = (self.n_envs, self.n_values());
             let shape = format!("float32 of shape ({n_envs}, {n_values})");
             let mut observation: PyReadwriteArray2<f32> =

@@ -1,9 +1,10 @@
 //! Evaluations: episodes are driven and counted as on the command line, by a policy or by a function of Python.
 
 use numpy::{PyArray1, PyArrayMethods};
-use offtrack::layout::{Action, Ended, N_VALUES, Start};
+use offtrack::layout::{Ended, N_VALUES, Start};
 use offtrack::physics::drawn_start;
-use offtrack::simulator::Error;
+use offtrack::simulator::{Actions, Error};
+use offtrack::world::World;
 use offtrack_evaluation::episode::Episode;
 use offtrack_evaluation::episodes::Episodes;
 use offtrack_evaluation::figures::Figures;
@@ -39,8 +40,8 @@ impl From<Error> for Raised {
 /// names and columns.
 ///
 /// `policy` is a `Network`, or a function from the observations of the trucks that drive, `[n, n_values]`, to their
-/// actions, `[n]`; with `begins` from those of all trucks and whether an episode of each begins, `[n]`. It is called on
-/// the caller's own thread; the GIL is released while trucks are stepped.
+/// actions, `[n]` or `[n, n_commands]`; with `begins` from those of all trucks and whether an episode of each begins,
+/// `[n]`. It is called on the caller's own thread; the GIL is released while trucks are stepped.
 #[pyfunction]
 pub fn drive<'py>(
     py: Python<'py>,
@@ -64,17 +65,18 @@ pub fn drive<'py>(
         let figures = Figures::begin(&place.scenario, world, &place.routes, episodes, begun.simulator());
         let mut figures = figures.map_err(|error| errors::of_simulator(&error))?;
         let n_envs = begun.simulator().n_envs();
-        let mut function =
-            Function { function: policy, n_values, begins: begins.then_some(true), actions: vec![0; n_envs] };
+        let mut function = Function { function: policy, n_values, begins: begins.then_some(true) };
         let driven = begun.drive(|simulator| {
             py.check_signals()?;
-            if network.is_none() {
-                function.choose(simulator.batch(), &world.actions)?;
-            }
+            let chosen = match &network {
+                Some(_) => None,
+                None => Some(function.choose(simulator.batch(), world)?),
+            };
             pool.run(py, || {
-                match &mut network {
-                    Some(network) => network.step(simulator)?,
-                    None => simulator.step(&function.actions)?,
+                match (&mut network, &chosen) {
+                    (Some(network), _) => network.step(simulator)?,
+                    (None, Some(actions)) => simulator.step_any(actions)?,
+                    (None, None) => {}
                 }
                 figures.follow(simulator)
             })??;
@@ -138,13 +140,11 @@ struct Function<'a, 'py> {
     n_values: usize,
     /// Whether every episode begins; `None` for a function that is not told.
     begins: Option<bool>,
-    /// What it chose, one a truck.
-    actions: Vec<u32>,
 }
 
 impl Function<'_, '_> {
-    /// Lets the function choose for the trucks that drive.
-    fn choose(&mut self, batch: &offtrack::simulator::Batch, table: &[Action]) -> PyResult<()> {
+    /// The actions that the function chooses for the trucks that drive, and any for the others.
+    fn choose(&mut self, batch: &offtrack::simulator::Batch, world: &World) -> PyResult<Actions> {
         let py = self.function.py();
         let is_asked = |&env: &usize| self.begins.is_some() || batch.ended[env] == Ended::Running as u32;
         let asked: Vec<usize> = (0..batch.n_envs()).filter(is_asked).collect();
@@ -157,11 +157,7 @@ impl Function<'_, '_> {
         };
         // One episode a truck: after the first step none begins.
         self.begins = self.begins.map(|_| false);
-        let chosen = actions::of_array(&given, asked.len(), table)?;
-        for (env, action) in asked.into_iter().zip(chosen) {
-            self.actions[env] = action;
-        }
-        Ok(())
+        Ok(actions::of_array(&given, asked.len(), world)?.spread(&asked, batch.n_envs()))
     }
 }
 

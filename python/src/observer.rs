@@ -7,7 +7,7 @@ use std::sync::{Mutex, MutexGuard, TryLockError};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use offtrack::layout::Ended;
 use offtrack::observer::{self, State};
-use offtrack::simulator::Error;
+use offtrack::simulator::{Actions, Error};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -141,10 +141,14 @@ impl Observer {
     ) -> PyResult<(Numbers<'py>, Numbers<'py>)> {
         guarded(|| {
             let held = self.held()?;
-            let actions = actions::of_array(actions, self.n_trucks, &self.place.world.actions)?;
+            let actions = actions::of_array(actions, self.n_trucks, &self.place.world)?;
             let targets = target_speed.as_array();
             let command = |(truck, observer): (usize, &observer::Observer)| {
-                observer.command(actions[truck], targets[truck]).map_err(|error| errors::of_simulator(&error))
+                let asked = match &actions {
+                    Actions::Indices(indices) => observer.command(indices[truck], targets[truck]),
+                    Actions::Commands(commands) => observer.commanded(&commands[truck], targets[truck]),
+                };
+                asked.map_err(|error| errors::of_simulator(&error))
             };
             let commands = held.observers.iter().enumerate().map(command).collect::<PyResult<Vec<_>>>()?;
             Ok((

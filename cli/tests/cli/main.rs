@@ -10,6 +10,7 @@ mod browser;
 mod certify;
 mod checkpoint;
 mod compare;
+mod continuous;
 mod device;
 mod documented_flags;
 mod draw;

@@ -79,6 +79,24 @@ fn a_run_that_cannot_be_is_refused_before_a_folder_is_made() {
 }
 
 #[test]
+fn training_with_continuous_actions_is_refused_by_key_before_a_folder_is_made() {
+    let place = Place::new();
+    let benchmark = std::fs::read_to_string(place.file("short.toml")).unwrap();
+    let levels = "steer_levels = [-0.8, -0.4, 0.0, 0.4, 0.8]";
+    assert!(benchmark.contains(levels));
+    let continuous = benchmark.replace(levels, "kind = \"continuous\"");
+    std::fs::write(place.file("training.toml"), &continuous).unwrap();
+    let training = format!("training_benchmark={}", place.text("training.toml"));
+    let expected = "its actions.kind is \"continuous\", and training learns to choose among levels";
+    let message = refusal(&place.train(&["--set", &training]), 2);
+    assert!(message.contains("training_benchmark: training;") && message.contains(expected), "{message}");
+    std::fs::write(place.file("short.toml"), &continuous).unwrap();
+    let message = refusal(&place.train(&[]), 2);
+    assert!(message.contains(": benchmark: short;") && message.contains(expected), "{message}");
+    assert!(!place.file("runs").exists());
+}
+
+#[test]
 fn training_on_a_test_route_or_with_other_actions_is_refused_before_a_folder_is_made() {
     let place = Place::new();
     let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();

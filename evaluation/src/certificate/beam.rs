@@ -13,6 +13,7 @@ use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 use offtrack_policy::{Driver, Policy};
 
+use super::check_levels;
 use crate::error::Error;
 
 /// Discount of a candidate's cost with each step: what lies long ago says little about what follows.
@@ -96,6 +97,7 @@ pub fn search(
     pass: Pass,
     policy: Option<&Policy>,
 ) -> Result<Outcome, Error> {
+    check_levels(world)?;
     let mut simulator = Simulator::new(world.clone(), 1, 0, RouteChoice::Fixed(vec![route]))?;
     simulator.reset_from(&[*start])?;
     // One candidate alone follows the policy, from the start on.

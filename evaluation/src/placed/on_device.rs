@@ -1,6 +1,6 @@
 //! A policy with its numbers on a device.
 
-use offtrack::simulator::{Batch, Error, Simulator};
+use offtrack::simulator::{Actions, Batch, Error, Simulator};
 use offtrack::world::World;
 pub(super) use offtrack_policy::device::DevicePolicy;
 
@@ -18,8 +18,8 @@ impl Controller for OnDevice {
         self.host.name()
     }
 
-    fn choose(&mut self, world: &World, batch: &Batch, actions: &mut Vec<u32>) {
-        self.host.choose(world, batch, actions);
+    fn choose(&mut self, world: &World, batch: &Batch) -> Actions {
+        self.host.choose(world, batch)
     }
 
     fn step(&mut self, simulator: &mut Simulator) -> Result<(), Error> {

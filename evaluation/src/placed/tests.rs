@@ -81,9 +81,9 @@ fn what_is_remembered_of_a_truck_ends_with_its_episode_wherever_it_stands_in_the
     let mut controller = placed(policy.clone(), &Engine::Cpu, &world, Choice::Best).unwrap();
     // Each truck by itself, from the observations of its episode alone.
     let mut seen: Vec<(u32, Driver)> = vec![(u32::MAX, policy.clone().driver(1)); 40];
-    let (mut actions, mut n_begun, mut n_remembered) = (Vec::new(), 0, 0);
+    let (mut n_begun, mut n_remembered) = (0, 0);
     for _ in 0..150 {
-        controller.choose(&world, simulator.batch(), &mut actions);
+        let Actions::Indices(actions) = controller.choose(&world, simulator.batch()) else { panic!("commands") };
         let batch = simulator.batch();
         for (env, (episode, driver)) in seen.iter_mut().enumerate() {
             if *episode != batch.truck[env].episode {

@@ -34,7 +34,7 @@ pub(super) fn difference(trained: &Scenario, other: &Scenario) -> Option<String>
 
 /// The part of [`difference`] without which a policy cannot drive at all.
 pub(super) fn needed(trained: &Scenario, other: &Scenario) -> Option<String> {
-    if actions(other) != actions(trained) {
+    if other.action_kind != trained.action_kind || actions(other) != actions(trained) {
         return Some("actions and vehicle lock".to_owned());
     }
     (other.extras != trained.extras).then(|| "observation.extras".to_owned())

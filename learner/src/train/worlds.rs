@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::files::reader::{Error as InputError, Reader};
-use offtrack::scenario::{Scenario, Split};
+use offtrack::scenario::{ActionKind, Scenario, Split};
 use offtrack::world::World;
 use offtrack_evaluation::device::Device;
 use offtrack_evaluation::recording::Track;
@@ -41,13 +41,27 @@ pub(super) struct Worlds {
     pub(super) also: Vec<Also>,
 }
 
+/// An error for a benchmark whose actions are continuous: what learns here chooses among levels.
+fn check_levels(reader: &Reader, key: &str, scenario: &Scenario) -> Result<(), Error> {
+    match scenario.action_kind {
+        ActionKind::Levels => Ok(()),
+        ActionKind::Continuous => {
+            let expected = "its actions.kind is \"continuous\", and training learns to choose among levels: one with \
+                            actions.steer_levels is needed";
+            Err(reader.invalid(key, &scenario.name, expected).into())
+        }
+    }
+}
+
 impl Worlds {
     /// The benchmarks of a training file, which `origin` names in errors. None of the routes that the policy is chosen
     /// or evaluated on may be among those it is trained on, and on all of them it drives what it is trained to drive.
     pub(super) fn read(config: &Config, origin: &Path, roads: Roads) -> Result<Worlds, Error> {
         let reader = Reader::of(origin);
         let own = named(&reader, "benchmark", &config.benchmark, roads)?;
+        check_levels(&reader, "benchmark", &own)?;
         let training = training(&reader, config, &own, roads)?;
+        check_levels(&reader, "training_benchmark", &training)?;
         // The policy is evaluated on the test routes alone; without any it is not evaluated.
         let mut benchmark = own.clone();
         if !benchmark.split(Split::Test).is_empty() {

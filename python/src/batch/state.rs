@@ -1,7 +1,7 @@
 //! What a step of a batch changes, and the step.
 
 use offtrack::layout::{Column, Ended, Truck};
-use offtrack::simulator::{Autoreset, Simulator, Tally};
+use offtrack::simulator::{Actions, Autoreset, Simulator, Tally};
 use offtrack_drawing::camera::Camera;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -35,7 +35,7 @@ impl State {
         &mut self,
         py: Python,
         batch: &Batch,
-        actions: &[u32],
+        actions: &Actions,
         deliver: impl FnOnce(&Observed, &[f32], &[u32]) -> T + Send,
     ) -> PyResult<T> {
         self.check_process(&batch.device)?;
@@ -49,7 +49,7 @@ impl State {
             ));
         }
         let stepped = pool.run(py, || {
-            simulator.step(actions)?;
+            simulator.step_any(actions)?;
             let read = Read::of(simulator, &batch.read)?;
             let (codes, trucks) = (read.rows::<u32>(Column::Ended), read.rows::<Truck>(Column::Truck));
             let last = read.observed_last(batch.n_extras);

@@ -33,11 +33,16 @@ class Consumer(NamedTuple):
     environment: str
     n_envs: int
     arguments: list[str]
+    example: str | None = None
+    """The example's name, where it is not the consumer's."""
 
 
 CONSUMERS = [
     Consumer("sb3_ppo", "sb3", 256, []),
     Consumer("cleanrl_ppo", "sb3", 256, []),
+    Consumer("cleanrl_ppo_continuous", "sb3", 256, []),
+    Consumer("sb3_sac", "sb3", 64, ["--algorithm", "sac"]),
+    Consumer("sb3_td3", "sb3", 64, ["--algorithm", "td3"], "sb3_sac"),
     Consumer("puffer_ppo", "puffer", 256, []),
     Consumer("ray_actors", "ray", 256, ["--actors", "2", "--envs", "128"]),
     Consumer("rllib_ppo", "ray", 128, ["--runners", "2", "--envs", "64", "--steps", "3000000"]),
@@ -133,7 +138,7 @@ def run(consumer: Consumer, args: argparse.Namespace, folder: Path) -> dict[str,
     before = native(python, consumer.n_envs, 3.0)
     command: list[str | Path] = [
         python,
-        PYTHON / "examples" / f"{consumer.name}.py",
+        PYTHON / "examples" / f"{consumer.example or consumer.name}.py",
         "--minutes",
         str(args.minutes),
         "--out",
@@ -156,7 +161,12 @@ def run(consumer: Consumer, args: argparse.Namespace, folder: Path) -> dict[str,
         report = folder / "report.json"
         policy = out.with_suffix(".safetensors")
         subprocess.run(
-            [args.offtrack, "evaluate", "--policy", policy, "--json", report], check=True, capture_output=True
+            [
+                *(args.offtrack, "evaluate", "--benchmark", result["settings"]["benchmark"]),
+                *("--policy", policy, "--json", report),
+            ],
+            check=True,
+            capture_output=True,
         )
         theirs = json.loads(report.read_text())
         result["offtrack_evaluate_agrees"] = theirs["ends"] == result["evaluation"]["ends"]

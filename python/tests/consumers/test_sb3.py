@@ -19,7 +19,7 @@ from offtrack_sim.sb3 import RoundaboutVecEnv
 N = 12
 
 
-@pytest.mark.parametrize("scenario", ["attard2023", "laden2026"])
+@pytest.mark.parametrize("scenario", ["attard2023", "laden2026", "attard2023-continuous", "laden2026-continuous"])
 def test_every_value_is_that_of_dummy_vec_env(scenario: str) -> None:
     ours = RoundaboutVecEnv(scenario, num_envs=N, num_threads=1)
     theirs = DummyVecEnv([lambda: offtrack_sim.Roundabout(scenario)] * N)
@@ -29,7 +29,11 @@ def test_every_value_is_that_of_dummy_vec_env(scenario: str) -> None:
     actions = np.random.default_rng(0)
     n_ends = 0
     for _ in range(300):
-        action = actions.integers(0, ours.action_space.n, N)
+        action: np.ndarray
+        if ours.batch.n_commands:
+            action = actions.uniform(-1, 1, (N, ours.batch.n_commands)).astype(np.float32)
+        else:
+            action = actions.integers(0, ours.action_space.n, N)
         observation, reward, done, infos = ours.step(action)
         expected, expected_reward, expected_done, expected_infos = theirs.step(action)
         assert np.array_equal(observation, expected)

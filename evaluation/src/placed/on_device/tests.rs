@@ -59,12 +59,16 @@ fn actions_sampled_on_a_device_are_those_that_the_processor_samples() {
     let [mut here, mut there] = [&Engine::Cpu, &engine]
         .map(|engine| placed(policy.clone(), engine, &world, Choice::Sampled { seed: 5 }).unwrap());
     let mut simulator = Simulator::on(engine, world.clone(), 200, 0, RouteChoice::Drawn(routes)).unwrap();
-    let (mut expected, mut best, mut n_others, mut n_sampled) = (Vec::new(), Vec::new(), 0, 0);
+    let indices = |actions: Actions| if let Actions::Indices(indices) = actions { indices } else { Vec::new() };
+    let (mut n_others, mut n_sampled) = (0, 0);
     for _ in 0..30 {
-        here.choose(&world, simulator.batch(), &mut expected);
-        there.choose(&world, simulator.batch(), &mut best);
-        assert_eq!(expected, best, "asked for trucks on the processor it does as there");
-        policy.choose(&world, simulator.batch(), &mut best);
+        let expected = indices(here.choose(&world, simulator.batch()));
+        assert_eq!(
+            expected,
+            indices(there.choose(&world, simulator.batch())),
+            "asked for trucks on the processor it does as there"
+        );
+        let best = indices(policy.choose(&world, simulator.batch()));
         there.step(&mut simulator).unwrap();
         for ((action, expected), best) in simulator.batch().action.iter().zip(&expected).zip(&best) {
             n_others += u32::from(action != expected);
