@@ -9,8 +9,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _offtrack
 from .batch import Batch
@@ -27,8 +29,7 @@ class Game:
     Args:
         scenario, split, seed: As for :class:`offtrack_sim.Batch`.
         routes: Names of routes or roundabouts to drive in turn; None for those of the split.
-        policy: Who drives while the player does not; None for the policy that comes with the package for the
-            benchmark.
+        policy: Who drives while the player does not; None for one that comes with the package and can, if there is.
 
     Raises:
         ValueError: As :class:`offtrack_sim.Batch` says; and for a policy that cannot drive there.
@@ -45,9 +46,10 @@ class Game:
     ) -> None:
         self.batch = Batch(scenario, 1, split=split, routes=routes, seed=seed, autoreset="disabled")
         self.policy = _shipped(self.batch) if policy is None else policy
-        self.policy.check(self.batch)
-        # The steer angles of each target speed, or change of it, stand together.
-        table = self.batch.action_table
+        if self.policy is not None:
+            self.policy.check(self.batch)
+        # Of continuous actions some are chosen from: fractions of their ranges.
+        table = self.batch.action_table if self.batch.n_commands == 0 else np.linspace([-1, -1], [1, 1], 17)
         self.levels = np.unique(table[:, 0])
         self.speeds = np.unique(table[:, 1])
         self.route = 0
@@ -61,7 +63,12 @@ class Game:
         self.batch.begin([0], routes=[names[self.route]])
         self.level = int(np.abs(self.levels).argmin())
         self.speed = len(self.speeds) - 1
+        self.driver = None if self.policy is None else self.policy.driver(1)
         self.ended = Ended.RUNNING
+
+    def hand_over(self) -> None:
+        """Lets the policy drive, or the player again; without a policy the player stays."""
+        self.is_player = self.driver is None or not self.is_player
 
     def turn(self, levels: int) -> None:
         """Steers by so many levels more, left positive."""
@@ -75,17 +82,20 @@ class Game:
         """Chooses a higher or lower target speed, or change of it."""
         self.speed = int(np.clip(self.speed + levels, 0, len(self.speeds) - 1))
 
-    def action(self) -> int:
-        """Index of the action that the player or the policy chooses."""
-        if not self.is_player:
-            return int(self.policy.act(self.batch.observation())[0])
-        wanted = self.levels[self.level], self.speeds[self.speed]
-        return int(np.flatnonzero((self.batch.action_table == wanted).all(axis=1))[0])
+    def actions(self) -> npt.NDArray[Any]:
+        """What the player or the policy chooses, as :meth:`offtrack_sim.Batch.step` takes it."""
+        chosen = None if self.driver is None else self.driver.act(self.batch.observation())
+        if chosen is not None and not self.is_player:
+            return chosen
+        wanted = np.array([self.levels[self.level], self.speeds[self.speed]], np.float32)
+        if self.batch.n_commands:
+            return wanted[None, : self.batch.n_commands]
+        return np.flatnonzero((self.batch.action_table == wanted).all(axis=1))[:1]
 
     def step(self) -> None:
         """A step of the truck, unless its episode has ended."""
         if self.ended is Ended.RUNNING:
-            self.batch.step(np.array([self.action()]))
+            self.batch.step(self.actions())
             ended = self.batch.ended()
             self.ended = Ended.RUNNING if ended is None else Ended(int(ended.codes[0]))
 
@@ -105,14 +115,17 @@ class Game:
         return lines
 
 
-def _shipped(batch: Batch) -> Policy:
-    """The policy that comes with the package for the batch's benchmark, or else one that can drive there."""
+def _shipped(batch: Batch) -> Policy | None:
+    """The policy that comes with the package for the batch's benchmark, or else one that can drive there, if any."""
     names = _offtrack.policy_names()
     for name in [batch.scenario] if batch.scenario in names else names:
         policy = Policy.shipped(name)
-        if policy.extras == batch.extras and policy.action_table.shape == batch.action_table.shape:
-            return policy
-    raise ValueError(f"policy: none comes with the package for {batch.scenario}; give one")
+        try:
+            policy.check(batch)
+        except ValueError:
+            continue
+        return policy
+    return None
 
 
 def play(game: Game, *, side: int = SIDE) -> None:
@@ -138,7 +151,7 @@ def play(game: Game, *, side: int = SIDE) -> None:
                 if event.type != pygame.KEYDOWN:
                     continue
                 if event.key == pygame.K_SPACE:
-                    game.is_player = not game.is_player
+                    game.hand_over()
                 elif event.key == pygame.K_p:
                     is_paused = not is_paused
                 elif event.key in (pygame.K_r, pygame.K_n):

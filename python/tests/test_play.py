@@ -21,12 +21,12 @@ def driven(game: Game) -> str:
 
 def test_the_player_steers_by_levels_chooses_speeds_and_hands_over_to_the_policy() -> None:
     game = Game("laden2026", routes=["20m/N-left-4"])
-    assert game.batch.action_table[game.action()][0] == 0
+    assert game.batch.action_table[game.actions()[0]][0] == 0
     before = game.speed
     for _ in range(3):
         game.turn(1)
     game.accelerate(-1)
-    assert game.batch.action_table[game.action()].tolist() == [game.levels[game.level], game.speeds[before - 1]]
+    assert game.batch.action_table[game.actions()[0]].tolist() == [game.levels[game.level], game.speeds[before - 1]]
     assert game.levels[game.level] > 0
     game.turn(99)
     assert game.levels[game.level] == game.levels.max()
@@ -36,10 +36,20 @@ def test_the_player_steers_by_levels_chooses_speeds_and_hands_over_to_the_policy
     # Straight on a U-turn ends on a kerb; the policy arrives.
     assert driven(game) != "ARRIVED" and "R again" in game.says()[-1]
     game.begin()
-    game.is_player = False
+    game.hand_over()
     assert driven(game) == "ARRIVED"
     game.begin(1)
     assert game.says()[0] == "20m/N-left-4: the policy drives"
+
+
+def test_continuous_actions_are_driven_without_a_policy_too() -> None:
+    game = Game("laden2026-continuous", routes=["20m/N-left-4"])
+    game.hand_over()
+    assert game.is_player and game.policy is None
+    game.turn(4)
+    np.testing.assert_array_equal(game.actions(), np.array([[0.5, 1.0]], np.float32))
+    game.step()
+    assert game.batch.columns("truck")["truck"]["steering"][0] > 0
 
 
 def test_the_window_drives_by_keys_and_closes(monkeypatch: pytest.MonkeyPatch) -> None:
