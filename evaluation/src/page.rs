@@ -19,7 +19,7 @@ use crate::report::Report;
 use ground::Ground;
 
 const TEMPLATE: &str = include_str!("page/report.html");
-const STYLE: &str = include_str!("page/style.css");
+const STYLE: &str = concat!(include_str!("page/theme.css"), include_str!("page/style.css"));
 /// Scripts in the order of the page; the last one starts the others.
 const SCRIPTS: [&str; 14] = [
     include_str!("page/elements.js"),
