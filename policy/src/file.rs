@@ -14,12 +14,12 @@ use crate::network::{Activation, Layer};
 use crate::normalisation::Normalisation;
 use crate::policy::Policy;
 
-/// Key of the metadata's one entry.
-const KEY: &str = "offtrack";
-/// Version of the description's meaning.
-const VERSION: u32 = 1;
+/// Key of a policy file's one entry in its metadata.
+pub const KEY: &str = "offtrack";
+/// Version of what that entry means.
+pub const VERSION: u32 = 1;
 /// Most layers of a policy: more than any training file asks for.
-pub(crate) const MOST_LAYERS: usize = 64;
+pub const MOST_LAYERS: usize = 64;
 
 /// The metadata's entry.
 #[derive(Debug, Serialize, Deserialize)]

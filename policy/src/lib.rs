@@ -30,11 +30,13 @@ mod bounds;
 pub mod device;
 mod error;
 mod file;
+pub mod kernel;
 mod network;
 mod normalisation;
 mod policy;
 
 pub use error::Error;
+pub use file::{KEY, MOST_LAYERS, VERSION};
 pub use network::{Activation, Layer};
 pub use normalisation::{LIMIT, Normalisation};
-pub use policy::{Choice, Policy, drawn, greedy, sampled};
+pub use policy::{Choice, Policy, SAME_ACTION, drawn, greedy, sampled};

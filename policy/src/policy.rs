@@ -12,7 +12,7 @@ use crate::network::{self, Activation, Layer};
 use crate::normalisation::Normalisation;
 
 /// Largest relative difference of two entries of an action table that count as equal: f32 rounds at 6e-8.
-const SAME_ACTION: f32 = 1e-5;
+pub const SAME_ACTION: f32 = 1e-5;
 /// Most bytes of a policy file: two hundred times the shipped ones.
 const FILE_LIMIT: u64 = 64 << 20;
 

@@ -67,6 +67,8 @@ pub struct Struct {
 pub struct Field {
     /// The field's name.
     pub name: &'static str,
+    /// What the field is, with its unit in parentheses.
+    pub doc: &'static str,
     /// The field's offset in the struct (bytes).
     pub offset: usize,
     /// The field's type in WGSL: `f32`, `u32`, `vec2<f32>`, another struct or an array.
@@ -223,6 +225,7 @@ macro_rules! shared {
                 size: size_of::<$name>(),
                 fields: vec![$($crate::layout::shared::Field {
                     name: stringify!($field),
+                    doc: concat!($($field_doc),*),
                     offset: std::mem::offset_of!($name, $field),
                     wgsl: <$type as $crate::layout::shared::Shared>::wgsl(),
                 },)*],
