@@ -1,0 +1,68 @@
+// Files that are dropped on the page or chosen: a policy drives the crowd, a world file is a benchmark more.
+
+/** Files that are something else, by the end of their names, and what would do. */
+const NOT_HERE = [
+  [/\.(toml|xodr|osm|net\.xml)$/i, "describes a road or a benchmark; `offtrack web --world` makes a world file of it"],
+  [/\.(pt|pth|onnx|zip|npz|h5)$/i, "is a network of another program; `offtrack` writes policies as .safetensors"],
+];
+/** The first bytes of a file as text. */
+const beginning = (bytes, length) => new TextDecoder("latin1").decode(bytes.subarray(0, length));
+
+/** Whether a file's header is that of a world: `data.js` reads both kinds as safetensors. */
+const isWorldFile = (bytes) => /offtrack[ _-]world|"world"/.test(beginning(bytes, 4096));
+
+/** Takes a file: a promise of what to say. The errors of those that read it are sentences. */
+async function takeFile(app, name, bytes) {
+  const other = NOT_HERE.find(([ending]) => ending.test(name));
+  if (other) throw new Error(`${name} ${other[1]}.`);
+  if (bytes.length === 0) throw new Error(`${name} is empty.`);
+  if (isWorldFile(bytes)) {
+    const index = await app.live.addWorld(name, bytes);
+    await app.choose({ world: index });
+    return `${name}: trucks now drive on ${app.live.facts.worlds[index].name}.`;
+  }
+  const policy = policyOf(app.live, name, bytes);
+  const fits = await app.worldFor(policy);
+  await app.addPolicy(policy, fits);
+  return `${name} drives now, on ${app.live.facts.worlds[fits].name}.`;
+}
+
+/** A policy file's policy. What is wrong with it is said of the file. */
+function policyOf(live, name, bytes) {
+  try {
+    return Policy.read(live, name, bytes);
+  } catch (error) {
+    throw new Error(`${name} ${error.message}.`);
+  }
+}
+
+/** Listens to drags over the page and to the file dialogue. */
+function listenToFiles(app) {
+  const hint = byId("drop-here");
+  const taken = async (file) => app.dropFile(file.name, new Uint8Array(await file.arrayBuffer()));
+  let depth = 0;
+  const show = (more) => {
+    depth = Math.max(depth + more, 0);
+    hint.hidden = depth === 0;
+  };
+  const hasFiles = (event) => [...(event.dataTransfer?.types ?? [])].includes("Files");
+  window.addEventListener("dragenter", (event) => hasFiles(event) && show(1));
+  window.addEventListener("dragleave", (event) => hasFiles(event) && show(-1));
+  window.addEventListener("dragover", (event) => {
+    // Otherwise the browser would open the file instead.
+    if (hasFiles(event)) event.preventDefault();
+  });
+  window.addEventListener("drop", async (event) => {
+    if (!hasFiles(event)) return;
+    event.preventDefault();
+    depth = 0;
+    show(0);
+    for (const file of event.dataTransfer.files) await taken(file);
+  });
+  byId("open-file").addEventListener("click", () => byId("file").click());
+  byId("file").addEventListener("change", async () => {
+    const [file] = byId("file").files;
+    if (file) await taken(file);
+    byId("file").value = "";
+  });
+}
