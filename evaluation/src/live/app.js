@@ -44,6 +44,7 @@ class App {
   /** Opens the device and begins. `options` override what is chosen. */
   async start(options = {}) {
     byId("missing").hidden = true;
+    this.say("Compiling the shaders of the simulator for this device.");
     try {
       this.gpu = await openDevice(this.live);
       this.gpu.lost.then((message) => this.sayMissing("lost", message));
@@ -54,6 +55,7 @@ class App {
       this.stage = new Stage(this.gpu, this.picture);
       if (isSoftware(this.gpu)) this.chosen.n = Math.min(this.chosen.n, FEW);
       await this.choose(options);
+      byId("said").hidden = true;
       this.isReady(this);
       this.loop();
     } catch (error) {

@@ -103,7 +103,10 @@ function listenToChoices(app) {
   listen("nearer", "click", () => app.visit.zoom(1.4));
   listen("farther", "click", () => app.visit.zoom(1 / 1.4));
   on("all", "click", () => app.visit.leave());
-  on("pick", "click", () => app.visit.pickNext(1));
+  on("pick", "click", () => {
+    const { focus, again } = app.visit;
+    return focus === null || again !== null ? app.visit.pickNext(1) : app.visit.toggleWheel();
+  });
   on("wheel", "click", () => app.visit.toggleWheel());
   on("leave", "click", () => app.visit.leave());
   listen("let-go", "click", () => app.visit.giveBack());

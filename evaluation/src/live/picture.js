@@ -127,7 +127,7 @@ class BatchPicture {
     layer("crosses", 6, MOST_FAILURES);
     layer("trucks", 18, n);
     if (!isFollowed) return;
-    layer("paths", 6, 2 * this.nPoints);
+    if (1 < this.nPoints) layer("paths", 6, 2 * (this.nPoints - 1));
     if (rays) layer("rays", 12, code.n_rays);
     layer("followed", 18, 1);
     layer("wheels", 6, N_WHEELS);

@@ -53,7 +53,7 @@ function showEnds(live, crowds, reported) {
     html("tbody", {}, ...rows));
   const [{ batch: { begun, n } }] = crowds, out = begun < n ? `${whole(begun)} of ${whole(n)} trucks have set out. ` : "";
   const ended = counted.map(({ episodes }) => whole(episodes)).join(" and ");
-  byId("ends-note").textContent = `${out}${ended} episodes have ended.`;
+  byId("ends-note").textContent = `${out}Episodes that have ended: ${ended}.`;
 }
 
 /** Shows failures, each a button that calls `open`. The list is made anew only where it has changed. */

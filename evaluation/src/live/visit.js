@@ -72,6 +72,7 @@ class Visit {
     if (asked) this.driving.set(asked);
     this.showState();
     byId("picture").focus({ preventScroll: true });
+    byId("stage").scrollIntoView({ block: "nearest" });
   }
 
   giveBack() {
@@ -99,6 +100,8 @@ class Visit {
     const again = await Crowd.open({ picture, gpu, world, sites, options, policy: crowd.policy });
     Object.assign(again, { from: crowd, failure });
     again.batch.begin([{ env: 0, seed, of: env, episode }]);
+    // It has set out: its first episode is not to begin in the next step.
+    again.batch.begun = 1;
     await again.follow(0);
     this.again = again;
     this.open(again);
@@ -160,14 +163,17 @@ class Visit {
   showState() {
     const { focus, again, driving } = this, on = driving.isOn;
     byId("stage").classList.toggle("steering", on);
-    byId("wheel").textContent = on ? "Let go" : "Take the wheel";
+    const wheel = on ? "Let go" : "Take the wheel";
+    byId("wheel").textContent = wheel;
     byId("wheel").setAttribute("aria-pressed", String(on));
     byId("wheel").hidden = again !== null;
+    byId("pick").textContent = focus === null || again !== null ? "Follow a truck" : wheel;
     byId("hud").hidden = !on;
     if (focus === null) return;
     const byPolicy = again ? this.endWords() : `Driven by ${policyWords(focus.policy)}${this.lastWords()}`;
     const text = on ? "You drive: A D or drag to steer, W S for speed" : byPolicy;
-    if (byId("truck-state").textContent !== text) byId("truck-state").textContent = text;
+    const sentence = text[0].toUpperCase() + text.slice(1);
+    if (byId("truck-state").textContent !== sentence) byId("truck-state").textContent = sentence;
   }
 
   /** How the truck's episode before this one ended. */
@@ -199,7 +205,7 @@ class Visit {
     const word = this.app.live.facts.code.ended[focus.last.ended];
     if (!this.driving.isOn) return;
     const isBad = word !== "arrived";
-    this.app.say(`${isBad ? `Ended: ${endWords(word)}` : "You arrived"}. Another route begins.`, isBad);
+    this.app.say(`${isBad ? `The episode ended: ${endWords(word)}` : "You arrived"}. Another route begins.`, isBad);
   }
 
   /** A pointer is on the picture (pixels), or no more. */
