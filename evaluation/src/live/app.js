@@ -45,10 +45,12 @@ class App {
   async start(options = {}) {
     byId("missing").hidden = true;
     this.say("Compiling the shaders of the simulator for this device.");
+    clearTimeout(this.silence);
     try {
-      this.gpu = await openDevice(this.live);
-      this.gpu.lost.then((message) => this.sayMissing("lost", message));
-      this.gpu.failed.then((message) => this.sayMissing("failed", message));
+      const gpu = (this.gpu = await openDevice(this.live));
+      const stop = (kind) => (message) => this.gpu === gpu && this.sayMissing(kind, message);
+      gpu.lost.then(stop("lost"));
+      gpu.failed.then(stop("failed"));
       this.crowds = [];
       Object.assign(this.visit, { again: null, focus: null });
       this.picture = new Picture(this.live, this.gpu);
@@ -70,6 +72,7 @@ class App {
     byId("missing-title").textContent = title;
     byId("missing-words").textContent = kind === "webgpu" ? words : `${words} (${message})`;
     byId("missing").dataset.kind = kind;
+    byId("said").hidden = true;
     byId("missing").hidden = false;
   }
 
@@ -305,6 +308,7 @@ class App {
 
   /** The pixel of the page's canvas at a point of a road. */
   screenOf(road, x, y) {
+    this.draw();
     return this.stage.pixelOf(this.sites.places.find(({ index }) => index === road), x, y);
   }
 
