@@ -115,6 +115,9 @@ function listenToChoices(app) {
   on("load", "input", () => app.visit.setLoad(Number(value("load"))));
   listen("help", "click", () => byId("keys").showModal());
   listen("again", "click", () => app.start());
+  // A browser may refuse it, as in a frame of another page; then the picture stays as it is.
+  listen("whole", "click", () => byId("stage").requestFullscreen().catch((error) => app.say(error.message, true)));
+  byId("whole").hidden = !document.fullscreenEnabled;
   byId("keys-list").replaceChildren(...KEYS.flatMap(([keys, words]) => [
     html("dt", {}, ...keys.split(" ").flatMap((key) => [html("kbd", {}, key), " "])), html("dd", {}, words),
   ]));

@@ -5,18 +5,19 @@ const NOT_HERE = [
   [/\.(toml|xodr|osm|net\.xml)$/i, "describes a road or a benchmark; `offtrack web --world` makes a world file of it"],
   [/\.(pt|pth|onnx|zip|npz|h5)$/i, "is a network of another program; `offtrack` writes policies as .safetensors"],
 ];
-/** The first bytes of a file as text. */
-const beginning = (bytes, length) => new TextDecoder("latin1").decode(bytes.subarray(0, length));
 
-/** Whether a file's header is that of a world: `data.js` reads both kinds as safetensors. */
-const isWorldFile = (bytes) => /offtrack[ _-]world|"world"/.test(beginning(bytes, 4096));
+/** Whether a file begins as a world file does, of any version. */
+function isWorldFile(live, bytes) {
+  const [word] = live.facts.world_file.split(" ");
+  return new TextDecoder().decode(bytes.subarray(0, word.length)) === word;
+}
 
 /** Takes a file: a promise of what to say. The errors of those that read it are sentences. */
 async function takeFile(app, name, bytes) {
   const other = NOT_HERE.find(([ending]) => ending.test(name));
   if (other) throw new Error(`${name} ${other[1]}.`);
   if (bytes.length === 0) throw new Error(`${name} is empty.`);
-  if (isWorldFile(bytes)) {
+  if (isWorldFile(app.live, bytes)) {
     const index = await app.live.addWorld(name, bytes);
     await app.choose({ world: index });
     return `${name}: trucks now drive on ${app.live.facts.worlds[index].name}.`;

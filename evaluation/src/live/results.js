@@ -21,11 +21,10 @@ const successWords = (success, episodes) =>
 
 /** Shows the figures of one or two crowds. */
 function showResults(live, crowds, split) {
-  const speeds = crowds.map((crowd) => crowd.speed).filter((speed) => !Number.isNaN(speed));
-  const total = speeds.reduce((sum, speed) => sum + speed, 0);
-  byId("speed").textContent = speeds.length === 0 ? "–" : short(total);
-  const steps = crowds[0].world.facts.step;
-  byId("speed-note").textContent = speeds.length === 0 ? "" : `${short(total * steps)} × real time`;
+  const speed = crowds.reduce((sum, crowd) => sum + (crowd.speed || 0), 0), { step } = crowds[0].world.facts;
+  // Nothing moves while the page is paused.
+  byId("speed").textContent = speed === 0 ? "–" : short(speed);
+  byId("speed-note").textContent = speed === 0 ? "" : `${short(speed * step)} × real time`;
   const [{ tally, policy, world }] = crowds, reported = reportedOf(policy, world, split);
   const successes = crowds.map((crowd) => successWords(crowd.tally?.success, crowd.tally?.episodes ?? 0));
   byId("success").textContent = successes.join(" | ");
