@@ -32,6 +32,9 @@ function fillSelect(id, pairs, chosen) {
   byId(id).replaceChildren(...pairs.map(([value, text]) => option(value, text, String(value) === String(chosen))));
 }
 
+/** The name of a benchmark, with the file that it came by. */
+const worldWords = ({ name, file }) => (file ? `${name} of ${file}` : name);
+
 /** Roads to choose from: all, each split that has roads of its own, each road. The value is a split or an index. */
 function roadChoices(world) {
   const roadsOf = (routes) => [...new Set(routes.map((route) => world.routes[route].road))];
@@ -52,7 +55,7 @@ function chosenRoutes(world, choice) {
 /** Shows what is chosen. */
 function showChoices(app) {
   const { live, gpu, chosen } = app, world = live.facts.worlds[chosen.world];
-  fillSelect("benchmark", live.facts.worlds.map(({ name }, index) => [index, name]), chosen.world);
+  fillSelect("benchmark", live.facts.worlds.map((one, index) => [index, worldWords(one)]), chosen.world);
   fillSelect("road", roadChoices(world), chosen.road);
   const all = app.policies.map((policy, index) => [index, policyWords(policy)]);
   const policies = [...all.filter(([index]) => app.canDrive(index, chosen.world)), [-1, policyWords(null)]];

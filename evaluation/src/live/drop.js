@@ -19,13 +19,14 @@ async function takeFile(app, name, bytes) {
   if (bytes.length === 0) throw new Error(`${name} is empty.`);
   if (isWorldFile(app.live, bytes)) {
     const index = await app.live.addWorld(name, bytes);
+    app.live.facts.worlds[index].file = name;
     await app.choose({ world: index });
-    return `${name}: trucks now drive on ${app.live.facts.worlds[index].name}.`;
+    return `Trucks drive on ${name} now.`;
   }
   const policy = policyOf(app.live, name, bytes);
   const fits = await app.worldFor(policy);
   await app.addPolicy(policy, fits);
-  return `${name} drives now, on ${app.live.facts.worlds[fits].name}.`;
+  return `${name} drives now, on ${worldWords(app.live.facts.worlds[fits])}.`;
 }
 
 /** A policy file's policy. What is wrong with it is said of the file. */
