@@ -4,14 +4,16 @@
 
 /** Figures are read this often (ms); work of a frame that is aimed at (ms), and most of it that time may ask for. */
 const COUNT_EVERY = 500, FRAME_WORK = 20, MOST_WORK = 120;
+/** Trucks that the page begins with. */
+const MANY = 4096;
 /** Reach of a click (pixels); how long something stays said (ms). */
 const REACH = 14, SAID_FOR = 6000;
 
 /** Why the page cannot run, by the kind of a `NoDevice`, and what would do. */
 const MISSING = {
   webgpu: ["This page needs WebGPU", "Browsers that have it: Chrome and Edge from version 113 on (Android: 121), " +
-    "Safari from 26 on, Firefox from 141 on Windows and from 145 on macOS. On Linux Chrome may need its flag “Unsafe WebGPU " +
-    "Support”."],
+    "Safari from 26 on, Firefox from 141 on Windows and from 145 on macOS. On Linux Chrome may need its flag “Unsafe " +
+    "WebGPU Support”."],
   adapter: ["No graphics adapter was found", "Turn on graphics acceleration in the browser's settings, update the " +
     "graphics driver, or try another browser: Chrome, Edge, Safari and Firefox of today have WebGPU."],
   device: ["The graphics adapter does not open", "Close other pages that use it, or start the browser again."],
@@ -20,7 +22,8 @@ const MISSING = {
 };
 
 /** Whether a device is a program on the processor: it has no speed for thousands of trucks. */
-const isSoftware = ({ name, adapter }) => adapter.info?.isFallbackAdapter || /swiftshader|llvmpipe|software/i.test(name);
+const isSoftware = ({ name, adapter }) =>
+  adapter.info?.isFallbackAdapter || /swiftshader|llvmpipe|software/i.test(name);
 
 class App {
   constructor(live) {
@@ -31,7 +34,8 @@ class App {
     this.frames = Promise.resolve();
     this.visit = new Visit(this);
     this.failures = new FailureList((crowd, failure) => this.attempt(() => this.visit.driveAgain(crowd, failure)));
-    this.chosen = { world: 0, road: "", policy: this.firstPolicy(0), second: null, n: 4096, seed: live.facts.seed ?? 0 };
+    const { seed } = live.facts;
+    this.chosen = { world: 0, road: "", policy: this.firstPolicy(0), second: null, n: MANY, seed };
     this.ready = new Promise((done) => (this.isReady = done));
     listenToChoices(this);
     listenToKeys(this);

@@ -13,7 +13,8 @@ const COLOURINGS = [
 const KEYS = [
   ["Space", "pause, go on"], ["← ↑ → ↓", "move the picture; with the wheel taken, steer and change the speed"],
   ["+ −", "zoom"], ["0", "all roads"], ["N P", "follow the next truck, the one before"],
-  ["T", "take the wheel, let it go"], ["A D W S", "steer left and right, faster, slower"], ["Esc", "let go; back to all"],
+  ["T", "take the wheel, let it go"], ["A D W S", "steer left and right, faster, slower"],
+  ["Esc", "let go; back to all"],
   ["C", "colours"], ["R", "sensors"], ["F", "the latest failure again"], ["?", "these keys"],
 ];
 

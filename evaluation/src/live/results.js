@@ -52,7 +52,8 @@ function showEnds(live, crowds, reported) {
   byId("ends").replaceChildren(
     html("thead", {}, html("tr", {}, html("th", {}), ...heads, reported && html("th", { scope: "col" }, "reported"))),
     html("tbody", {}, ...rows));
-  const [{ batch: { begun, n } }] = crowds, out = begun < n ? `${whole(begun)} of ${whole(n)} trucks have set out. ` : "";
+  const [{ batch: { begun, n } }] = crowds;
+  const out = begun < n ? `${whole(begun)} of ${whole(n)} trucks have set out. ` : "";
   const ended = counted.map(({ episodes }) => whole(episodes)).join(" and ");
   byId("ends-note").textContent = `${out}Episodes that have ended: ${ended}.`;
 }
@@ -74,9 +75,10 @@ class FailureList {
     byId("failures").replaceChildren(...all.map(({ crowd, failure }) => {
       const { ended, route, env, episode } = failure, { name } = crowd.world.facts.routes[route];
       const onclick = () => this.open(crowd, failure);
+      const driver = crowd.driven.has(`${env}/${episode}`) ? "you" : `truck ${env}`;
       return html("li", {}, html("button", { type: "button", style: `--end: var(--end-${ended})`, onclick },
         html("b", { "aria-hidden": "true" }, "×"), html("span", {}, endWords(ended)),
-        html("span", { class: "muted" }, `${name}, ${crowd.driven.has(`${env}/${episode}`) ? "you" : `truck ${env}`}`)));
+        html("span", { class: "muted" }, `${name}, ${driver}`)));
     }));
   }
 }
