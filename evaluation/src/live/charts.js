@@ -49,17 +49,16 @@ class OutputCells {
     this.node = html("div", { class: name, style, role: "img" }, ...this.cells);
   }
 
-  /** Shows outputs, and which action is taken: by the policy, or by the visitor (-1). */
-  show(outputs, taken) {
-    const high = Math.max(...outputs), low = Math.min(...outputs);
+  /** Shows outputs, the largest of which is what the policy chooses. */
+  show(outputs) {
+    const high = Math.max(...outputs), low = Math.min(...outputs), best = outputs.indexOf(high);
     this.cells.forEach((cell, index) => {
       const fraction = (outputs[index] - low) / (high - low || 1);
       cell.firstChild.style.height = this.isOneRow ? `${4 + 96 * fraction}%` : "100%";
       cell.firstChild.style.opacity = this.isOneRow ? 1 : fraction ** 2;
-      cell.classList.toggle("taken", index === taken);
+      cell.classList.toggle("taken", index === best);
       cell.title = `${this.words[index]}: ${decimal(outputs[index], 2)}`;
     });
-    const best = outputs.indexOf(high);
     this.node.setAttribute("aria-label", `Largest output: ${this.words[best]}`);
     return this.words[best];
   }

@@ -69,8 +69,9 @@ class Followed {
     const seen = [...row.observation, ...[...row.extras].slice(0, world.facts.extras.length)];
     this.values.show(seen);
     if (this.outputs) {
-      const best = this.outputs.show(crowd.policy.outputs(row.observation, row.extras), row.action);
-      byId("outputs-words").textContent = `chooses ${best}`;
+      const best = this.outputs.show(crowd.policy.outputs(row.observation, row.extras));
+      // Behind the table's actions stands that of a visitor who drives.
+      byId("outputs-words").textContent = `${row.action < world.facts.n_actions ? "chooses" : "would choose"} ${best}`;
     }
   }
 
