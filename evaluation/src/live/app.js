@@ -73,6 +73,8 @@ class App {
   sayMissing(kind, message) {
     const [title, words] = MISSING[kind];
     this.run = null;
+    // With fewer trucks it may go on.
+    if (kind === "failed") this.chosen.n = Math.max(COUNTS[0], Math.floor(this.chosen.n / 4));
     byId("missing-title").textContent = title;
     byId("missing-words").textContent = kind === "webgpu" ? words : `${words} (${message})`;
     byId("missing").dataset.kind = kind;
@@ -125,8 +127,15 @@ class App {
       if (chosen.second !== null && !this.canDrive(chosen.second, chosen.world)) chosen.second = null;
     }
     this.chosen = chosen;
-    await this.open();
-    showChoices(this);
+    try {
+      await this.open();
+    } catch (error) {
+      // What drove before goes on.
+      this.chosen = before;
+      throw error;
+    } finally {
+      showChoices(this);
+    }
   }
 
   /** Opens the crowds of what is chosen. Those before go when these are there. */
@@ -138,11 +147,19 @@ class App {
     const { clientWidth, clientHeight } = byId("picture");
     const sites = sitesOf(world.facts, roads, clientWidth / shown.length / Math.max(clientHeight, 1));
     const options = { n: chosen.n, seed: chosen.seed, routes };
-    const made = await Promise.all(shown.map((index) =>
-      Crowd.open({ picture, gpu, world, sites, options, policy: this.policies[index] ?? null })));
+    const made = [];
+    try {
+      for (const index of shown) {
+        made.push(await Crowd.open({ picture, gpu, world, sites, options, policy: this.policies[index] ?? null }));
+      }
+    } catch (error) {
+      made.forEach((crowd) => crowd.close());
+      throw error;
+    }
     await this.visit.leave();
     const old = this.crowds;
-    Object.assign(this, { crowds: made, world, sites, routes, split, debt: 0 });
+    Object.assign(this, { crowds: made, world, sites, routes, split });
+    this.forgetWork();
     old.forEach((crowd) => crowd.close());
     this.stage.show(made);
     this.stage.fit();
@@ -170,6 +187,12 @@ class App {
     return Math.max(steps, 0);
   }
 
+  /** Other trucks move from now on: what a step took tells nothing of theirs. */
+  forgetWork() {
+    this.debt = 0;
+    this.stepWork = undefined;
+  }
+
   /** Whether trucks are still to set out while nobody looks at a single one. */
   get isFilling() {
     return this.visit.focus === null && this.crowds.some(({ batch }) => batch.begun < batch.n);
@@ -184,6 +207,7 @@ class App {
   /** Makes steps of everything that moves. */
   async steps(count) {
     const begun = performance.now(), { moving } = this;
+    if (moving.length === 0) return;
     await Promise.all(moving.map((crowd) => crowd.advance(count)));
     const work = (performance.now() - begun) / count;
     this.stepWork = this.stepWork === undefined ? work : 0.8 * this.stepWork + 0.2 * work;
@@ -275,7 +299,13 @@ class App {
   /** Adds a policy to those to choose from, and drives by it. */
   async addPolicy(policy, world) {
     this.policies.push(policy);
-    await this.choose({ world, policy: this.policies.length - 1 });
+    try {
+      await this.choose({ world, policy: this.policies.length - 1 });
+    } catch (error) {
+      this.policies.pop();
+      showChoices(this);
+      throw error;
+    }
   }
 
   /** Takes a file that was dropped or chosen; what is said on the page. */
@@ -303,9 +333,13 @@ class App {
     this.visit.giveBack();
   }
 
+  placeOf(road) {
+    return this.sites.places.find(({ index }) => index === road);
+  }
+
   /** Shows a point of a road in the middle, the canvas so many metres wide. */
   lookAt(road, x, y, width) {
-    const { camera } = this.stage, { offset } = this.sites.places.find(({ index }) => index === road);
+    const { camera } = this.stage, { offset } = this.placeOf(road);
     camera.stay();
     camera.centre = [offset[0] + x, offset[1] + y];
     camera.pixel = width / camera.size[0];
@@ -315,7 +349,7 @@ class App {
   /** The pixel of the page's canvas at a point of a road. */
   screenOf(road, x, y) {
     this.draw();
-    return this.stage.pixelOf(this.sites.places.find(({ index }) => index === road), x, y);
+    return this.stage.pixelOf(this.placeOf(road), x, y);
   }
 
   /** The colour at a pixel of the page's canvas (0 to 255). */

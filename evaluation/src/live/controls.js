@@ -84,6 +84,8 @@ function showLegend(app) {
     ] : [
       html("li", {}, cross("tractor_collided"), "tractor hit a kerb"),
       html("li", {}, cross("trailer_collided"), "trailer did"),
+      // Only loads that are drawn can stand high enough.
+      ...(1 < app.live.facts.worlds[app.chosen.world].classes.length ? [html("li", {}, cross("rolled_over"), "rolled over")] : []),
     ]));
 }
 

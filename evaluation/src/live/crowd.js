@@ -10,7 +10,9 @@ class Crowd {
   static async open({ picture, gpu, world, sites, options, policy }) {
     const made = new Crowd(), batch = await Batch.open(gpu, world, options);
     try {
-      await batch.setPolicy(policy);
+      await batch.setPolicy(policy).catch((error) => {
+        throw new Error(`${policy.name} ${error.message}.`);
+      });
       Object.assign(made, { batch, world, policy, followed: null, row: null, steps: [] });
       // Episodes that the visitor drove, at least in part: "truck/episode".
       Object.assign(made, { driven: new Set(), rigs: new Map() });
@@ -27,18 +29,6 @@ class Crowd {
     this.closed = true;
     this.picture.close();
     this.batch.close();
-  }
-
-  /** Drives by another policy from the next step on. */
-  async setPolicy(policy) {
-    await this.batch.setPolicy(policy);
-    this.policy = policy;
-  }
-
-  restart(seed) {
-    this.batch.restart({ seed });
-    Object.assign(this, { failures: [], moments: [], driven: new Set() });
-    this.forgetSteps();
   }
 
   /** Follows a truck, or none. */

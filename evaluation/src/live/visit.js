@@ -104,6 +104,7 @@ class Visit {
     again.batch.begun = 1;
     await again.follow(0);
     this.again = again;
+    app.forgetWork();
     this.open(again);
     this.stage.camera.follow();
     app.play(true);
@@ -116,8 +117,10 @@ class Visit {
   }
 
   endAgain() {
-    this.again?.close();
+    if (this.again === null) return;
+    this.again.close();
     this.again = null;
+    this.app.forgetWork();
   }
 
   /** The loads of the followed truck's vehicle, in the order of the benchmark. */
@@ -170,7 +173,7 @@ class Visit {
     byId("pick").textContent = focus === null || again !== null ? "Follow a truck" : wheel;
     byId("hud").hidden = !on;
     if (focus === null) return;
-    const byPolicy = again ? this.endWords() : `Driven by ${policyWords(focus.policy)}${this.lastWords()}`;
+    const byPolicy = again ? this.againWords() : `Driven by ${policyWords(focus.policy)}${this.lastWords()}`;
     const text = on ? "You drive: A D or drag to steer, W S for speed" : byPolicy;
     const sentence = text[0].toUpperCase() + text.slice(1);
     if (byId("truck-state").textContent !== sentence) byId("truck-state").textContent = sentence;
@@ -183,7 +186,7 @@ class Visit {
   }
 
   /** What has become of a failure that is driven again. */
-  endWords() {
+  againWords() {
     const { failure, from, row, world } = this.again, code = this.app.live.facts.code.ended[row.ended];
     const seconds = (steps) => `${decimal(steps * world.facts.step, 1)}${GAP}s`;
     const yours = from.driven.has(`${failure.env}/${failure.episode}`), name = policyWords(from.policy);
