@@ -19,3 +19,4 @@ mod terminal; // how wide a table may be
 pub mod trace;
 pub mod train;
 pub mod vehicles;
+pub mod web;

@@ -12,6 +12,7 @@ use offtrack_learner::error::Error;
 
 use commands::{
     bench, certify, deviations, devices, draw, evaluate, fits, generate, import, record, scale, trace, train, vehicles,
+    web,
 };
 
 /// Batches of tensors are allocated thousands of times a second; the system's allocator takes a third of an update's
@@ -59,6 +60,7 @@ enum Command {
     Record(record::Args),
     Trace(trace::Args),
     Deviations(deviations::Args),
+    Web(web::Args),
 }
 
 fn main() -> ExitCode {
@@ -90,6 +92,7 @@ fn main() -> ExitCode {
         Command::Record(args) => Ok(record::run(args)?),
         Command::Trace(args) => Ok(trace::run(args)?),
         Command::Deviations(args) => Ok(deviations::run(args)?),
+        Command::Web(args) => Ok(web::run(args)?),
     });
     match done {
         Ok(()) if is_refuted => ExitCode::from(FAILED),

@@ -54,6 +54,7 @@ pub mod polygons; // curves as points
 pub mod recording; // the states of an episode
 pub mod shown; // which episodes a page shows
 pub mod page; // a report as an HTML page
+pub mod live; // trucks that drive in a browser, as an HTML page
 
 pub use evaluation::*;
 pub use table::legend;

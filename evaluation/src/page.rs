@@ -17,6 +17,7 @@ use crate::files;
 use crate::recording::Track;
 use crate::report::Report;
 use ground::Ground;
+pub(crate) use tracks::packed;
 
 const TEMPLATE: &str = include_str!("page/report.html");
 const STYLE: &str = concat!(include_str!("page/theme.css"), include_str!("page/style.css"));
@@ -92,8 +93,8 @@ impl Page<'_> {
             100.0 * summary.success,
             summary.episodes
         ));
-        let page = filled(&[
-            ("title", &title),
+        let values = [
+            ("title", title.as_str()),
             ("heading", &escaped(&format!("Evaluation on {benchmark}, {split} routes"))),
             ("style", STYLE),
             ("report", &script_json(&self.run)),
@@ -101,7 +102,8 @@ impl Page<'_> {
             ("metrics", &script_json(&json!(self.metrics))),
             ("tracks", &tracks),
             ("script", &SCRIPTS.concat()),
-        ]);
+        ];
+        let page = filled(TEMPLATE, &values);
         files::write_whole(file, page.as_bytes())
     }
 }
@@ -118,10 +120,10 @@ fn rounded(value: Value) -> Value {
     }
 }
 
-/// The template with each `{{name}}` replaced by its value. Values are not searched for names.
-fn filled(values: &[(&str, &str)]) -> String {
+/// A template with each `{{name}}` replaced by its value. Values are not searched for names.
+pub(crate) fn filled(template: &str, values: &[(&str, &str)]) -> String {
     let mut page = String::new();
-    let mut rest = TEMPLATE;
+    let mut rest = template;
     while let Some((before, (name, after))) =
         rest.split_once("{{").and_then(|(before, tail)| Some((before, tail.split_once("}}")?)))
     {
@@ -133,12 +135,12 @@ fn filled(values: &[(&str, &str)]) -> String {
 }
 
 /// JSON that can stand in a script element: no `<`, so that no text in it ends the element.
-fn script_json(value: &Value) -> String {
+pub(crate) fn script_json(value: &Value) -> String {
     value.to_string().replace('<', "\\u003c")
 }
 
 /// Text that can stand in HTML.
-fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
@@ -149,7 +151,7 @@ mod tests {
     #[test]
     fn every_name_of_the_template_is_replaced_and_values_stay_as_they_are() {
         let names = ["title", "heading", "style", "report", "ground", "metrics", "tracks", "script"];
-        let page = filled(&names.map(|name| (name, "{{title}}<kept>")));
+        let page = filled(TEMPLATE, &names.map(|name| (name, "{{title}}<kept>")));
         assert_eq!(page.matches("{{title}}<kept>").count(), names.len());
         assert_eq!(page.matches("{{").count(), page.matches("<kept>").count());
     }

@@ -110,7 +110,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let split = Split::ALL.into_iter().find(|split| split.name() == args.split).unwrap_or(Split::Test);
     let mut scenario = roads::with_load(roads::benchmark(&args.benchmark)?, args.load.as_deref())?;
     if !args.route.is_empty() {
-        roads::narrow(&mut scenario, &args.route, &[split])?;
+        roads::narrow(&mut scenario, "--route", &args.route, &[split])?;
     }
     roads::keep(&mut scenario, split, &args.benchmark)?;
     let world = roads::world(&scenario)?;

@@ -18,6 +18,8 @@ mod generate;
 mod import;
 mod input;
 mod interruption;
+#[cfg(feature = "browser")]
+mod live;
 mod output;
 mod page;
 mod pictures;
@@ -28,3 +30,7 @@ mod seeds;
 mod tensorboard;
 mod threads;
 mod train;
+
+// The states of the simulator's tests look for them here.
+#[cfg(feature = "browser")]
+use live::{benchmark, fleet};
