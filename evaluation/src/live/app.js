@@ -227,7 +227,8 @@ class App {
         before = now;
         const count = this.playing ? this.stepsOf(seconds) : 0;
         if (this.playing) this.visit.update(seconds);
-        const isDue = COUNT_EVERY < now - counted;
+        // While nothing moves no figure changes.
+        const isDue = 0 < count && COUNT_EVERY < now - counted;
         if (isDue) counted = now;
         await this.between(() => this.frame(count, isDue));
       }

@@ -123,10 +123,10 @@ class BatchPicture {
     };
     const isFollowed = followed !== null;
     if (ground) layer("ground", 6, this.sites.places.length);
-    if (isFollowed) layer("route", 6, this.sites.mostWaypoints);
-    layer("crosses", 6, MOST_FAILURES);
     layer("trucks", 18, n);
+    layer("crosses", 6, MOST_FAILURES);
     if (!isFollowed) return;
+    layer("route", 6, this.sites.mostWaypoints);
     if (1 < this.nPoints) layer("paths", 6, 2 * (this.nPoints - 1));
     if (rays) layer("rays", 12, code.n_rays);
     layer("followed", 18, 1);

@@ -1,7 +1,8 @@
 // The canvas: one pane for each crowd, side by side, with the same camera; and what stands over it in plain text.
 
-/** How opaque trucks are: in the crowd, around one that is followed, behind a failure that is driven again. */
-const CROWD = 0.85, AROUND = 0.35, BEHIND = 0.1;
+/** How opaque trucks are: in the crowd, around one that is followed, behind a failure that is driven again; and the
+ * number on a road from which on those around one are paler. */
+const CROWD = 0.85, AROUND = 0.35, BEHIND = 0.1, FEW_ON_ROAD = 100;
 /** Room for the names of panes and for the legend (pixels), most pixels of the canvas for a pixel of the page, and
  * lengths of the scale (m). */
 const LABEL_ROOM = 40, LEGEND_ROOM = 44, MOST_DENSITY = 2, SCALES = [1, 2, 5, 10, 20, 50, 100, 200, 500];
@@ -62,8 +63,10 @@ class Stage {
       const over = again?.from === crowd ? again : null, shown = over ?? crowd;
       const centre = this.centreOf(crowd, shown, since);
       const view = { centre, half: camera.half, pixel: camera.pixel, since, colouring, followed: crowd.followed };
+      const onRoad = crowd.batch.n / crowd.picture.sites.places.length;
+      const around = AROUND * Math.min(1, Math.sqrt(FEW_ON_ROAD / onRoad));
       const isNear = crowd.followed !== null && camera.goesAlong;
-      crowd.picture.write({ ...view, since: over ? 0 : since, crowd: over ? BEHIND : isNear ? AROUND : CROWD });
+      crowd.picture.write({ ...view, since: over ? 0 : since, crowd: over ? BEHIND : isNear ? around : CROWD });
       over?.picture.write({ ...view, followed: 0, crowd: 1 });
       crowd.centre = centre;
       return { crowd, over };
