@@ -4,6 +4,7 @@
 
 pub mod stages; // one step, in order
 pub mod wgsl; // what shaders share with Rust, printed
+pub mod tables; // what trucks share, as the bytes that shaders read
 pub(crate) mod autoreset;
 mod batch;
 pub(crate) mod cpu; // the CPU engine: all cores, a truck at a time

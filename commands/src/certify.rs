@@ -86,7 +86,7 @@ fn again(path: &Path, benchmark: Option<&str>, load: Option<&str>) -> Result<(),
     let is_random = |name: &String| name.rsplit_once('/').is_some_and(|(road, _)| procedural::address(road).is_some());
     let names: Vec<String> = certificate.routes.iter().map(|route| route.name.clone()).collect();
     if names.iter().any(is_random) {
-        roads::narrow(&mut scenario, &names, &Split::ALL)?;
+        roads::narrow(&mut scenario, "--route", &names, &Split::ALL)?;
     }
     let world = roads::world(&scenario)?;
     certificate.check(&scenario, &world, path)?;
@@ -105,7 +105,7 @@ fn certify(args: &Args) -> Result<(), Error> {
     let splits: Vec<Split> =
         Split::ALL.into_iter().filter(|split| args.split == "all" || args.split == split.name()).collect();
     if !args.route.is_empty() {
-        roads::narrow(&mut scenario, &args.route, &splits)?;
+        roads::narrow(&mut scenario, "--route", &args.route, &splits)?;
     }
     let world = roads::world(&scenario)?;
     check_levels(&world)?;

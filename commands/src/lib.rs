@@ -20,3 +20,4 @@ pub mod roads; // benchmarks and roads by name
 pub mod terminal; // how wide a table may be
 pub mod trace;
 pub mod vehicles;
+pub mod web;

@@ -10,7 +10,7 @@ use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
 use crate::{
-    board, certify, compare, deviations, devices, draw, evaluate, fits, generate, import, record, trace, vehicles,
+    board, certify, compare, deviations, devices, draw, evaluate, fits, generate, import, record, trace, vehicles, web,
 };
 
 /// Exit code of a failure on valid input.
@@ -31,6 +31,7 @@ pub enum Command {
     Compare(compare::Args),
     Board(board::Args),
     Record(record::Args),
+    Web(web::Args),
     Certify(certify::Args),
     Fits(fits::Args),
     Draw(draw::Args),
@@ -53,6 +54,7 @@ impl Command {
             Command::Evaluate(args) => evaluate::run(args),
             Command::Compare(args) => compare::run(args),
             Command::Record(args) => record::run(args),
+            Command::Web(args) => web::run(args),
             Command::Certify(args) => certify::run(args),
             Command::Board(args) => return board::run(args),
             Command::Fits(args) => return fits::run(args),

@@ -241,7 +241,7 @@ impl<'a> Chosen<'a> {
         let Some((index, (roundabout, route))) =
             scenario.routes().enumerate().find(|(_, (_, route))| route.name == name)
         else {
-            return Err(roads::unknown(scenario, name));
+            return Err(roads::unknown(scenario, "--route", name));
         };
         let within =
             |split: Split| Some((split, scenario.split(split).iter().position(|&other| other as usize == index)?));
@@ -261,10 +261,10 @@ fn scenario(args: &Args, route: &str, load: Option<&str>) -> Result<Scenario, Er
         return Ok(scenario);
     }
     let Some((road, _)) = route.rsplit_once('/').filter(|(road, _)| procedural::address(road).is_some()) else {
-        return Err(roads::unknown(&scenario, route));
+        return Err(roads::unknown(&scenario, "--route", route));
     };
     if scenario.places.iter().any(|place| place.roundabout.name == road) {
-        return Err(roads::unknown(&scenario, route));
+        return Err(roads::unknown(&scenario, "--route", route));
     }
     Ok(scenario.on(procedural::find(road)?)?)
 }

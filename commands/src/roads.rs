@@ -32,7 +32,7 @@ pub fn benchmark(name: &str) -> Result<Scenario, Error> {
 pub fn asked(asked: &Asked, split: Split) -> Result<Scenario, Error> {
     let mut scenario = with_load(benchmark(&asked.benchmark)?, asked.load.as_deref())?;
     if !asked.route.is_empty() {
-        narrow(&mut scenario, &asked.route, &[split])?;
+        narrow(&mut scenario, "--route", &asked.route, &[split])?;
     }
     keep(&mut scenario, split, &asked.benchmark)?;
     Ok(scenario)
@@ -67,9 +67,9 @@ pub fn loading<T>(action: &str, work: impl FnOnce(&Loading) -> T) -> T {
     done
 }
 
-/// Leaves the benchmark the routes that `--route` names: each a route, or all routes of a roundabout. Those of the
+/// Leaves the benchmark the routes that `flag` names: each a route, or all routes of a roundabout. Those of the
 /// benchmark must be in one of `splits`. A road that the benchmark does not have is added to the last of them.
-pub fn narrow(scenario: &mut Scenario, names: &[String], splits: &[Split]) -> Result<(), Error> {
+pub fn narrow(scenario: &mut Scenario, flag: &'static str, names: &[String], splits: &[Split]) -> Result<(), Error> {
     let mut added: Vec<(String, Road)> = Vec::new();
     for name in names {
         let of = |split: Split| scenario.split_names(split).iter().any(|route| is_of(route, name));
@@ -78,11 +78,11 @@ pub fn narrow(scenario: &mut Scenario, names: &[String], splits: &[Split]) -> Re
         }
         if let Some(split) = Split::ALL.into_iter().find(|&split| of(split)) {
             let expected = format!("is not in the split asked for: give --split {}", split.name());
-            return Err(Error::Setting { name: "--route", value: name.clone(), expected });
+            return Err(Error::Setting { name: flag, value: name.clone(), expected });
         }
-        let (road, route) = road_of(name).ok_or_else(|| unknown(scenario, name))?;
+        let (road, route) = road_of(name).ok_or_else(|| unknown(scenario, flag, name))?;
         if scenario.places.iter().any(|place| place.roundabout.name == road) {
-            return Err(unknown(scenario, name));
+            return Err(unknown(scenario, flag, name));
         }
         let found = match added.iter().position(|(known, _)| known == road) {
             Some(found) => found,
@@ -95,7 +95,7 @@ pub fn narrow(scenario: &mut Scenario, names: &[String], splits: &[Split]) -> Re
         if let Some(route) = route {
             let alone = scenario.on(added[found].1.clone())?;
             if !alone.routes().any(|(_, other)| short(&other.name) == route) {
-                return Err(unknown(&alone, name));
+                return Err(unknown(&alone, flag, name));
             }
         }
     }
@@ -155,7 +155,7 @@ fn road_of(name: &str) -> Option<(&str, Option<&str>)> {
 
 /// The error for a name that no route has. It lists the routes of the roundabout that the name begins with, or one of
 /// each roundabout.
-pub fn unknown(scenario: &Scenario, name: &str) -> Error {
+pub fn unknown(scenario: &Scenario, flag: &'static str, name: &str) -> Error {
     let of = |place: &Place| place.routes.iter().map(|route| route.name.clone()).collect::<Vec<_>>();
     let begins = |place: &&Place| {
         name.strip_prefix(&place.roundabout.name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
@@ -170,7 +170,7 @@ pub fn unknown(scenario: &Scenario, name: &str) -> Error {
             "a route of the benchmark {from} is needed, such as {list}, or one of a random road, such as wide/7/12"
         ),
     };
-    Error::Setting { name: "--route", value: name.to_owned(), expected }
+    Error::Setting { name: flag, value: name.to_owned(), expected }
 }
 
 /// The benchmark with the trucks of this load alone; the whole of it where none is named.

@@ -62,6 +62,7 @@ pub mod comparison; // evaluations in pairs
 pub mod board; // entries that are simulated again
 pub mod shown; // which episodes a page shows
 pub mod page; // a report as an HTML page
+pub mod live; // trucks that drive in a browser, as an HTML page
 
 pub use evaluation::*;
 pub use sequences::Sequences;

@@ -19,9 +19,10 @@ use crate::recording::Track;
 use crate::report::Report;
 use crate::tabular::html_text;
 use ground::{Ground, Shown};
+pub(crate) use tracks::packed;
 
 const TEMPLATE: &str = include_str!("page/report.html");
-const STYLE: &str = include_str!("page/style.css");
+const STYLE: &str = concat!(include_str!("page/theme.css"), include_str!("page/style.css"));
 /// Scripts in the order of the page; the last one starts the others.
 const SCRIPTS: [&str; 14] = [
     include_str!("page/elements.js"),
@@ -98,19 +99,17 @@ impl Page<'_> {
             100.0 * summary.success,
             summary.episodes
         ));
-        let page = filled(
-            TEMPLATE,
-            &[
-                ("title", &title),
-                ("heading", &html_text(&format!("Evaluation on {benchmark}, {split} routes"))),
-                ("style", STYLE),
-                ("report", &script_json(&self.run)),
-                ("ground", &ground),
-                ("metrics", &script_json(&json!(self.metrics))),
-                ("tracks", &tracks),
-                ("script", &SCRIPTS.concat()),
-            ],
-        );
+        let values = [
+            ("title", title.as_str()),
+            ("heading", &html_text(&format!("Evaluation on {benchmark}, {split} routes"))),
+            ("style", STYLE),
+            ("report", &script_json(&self.run)),
+            ("ground", &ground),
+            ("metrics", &script_json(&json!(self.metrics))),
+            ("tracks", &tracks),
+            ("script", &SCRIPTS.concat()),
+        ];
+        let page = filled(TEMPLATE, &values);
         files::write_whole(file, page.as_bytes())
     }
 }
@@ -128,7 +127,7 @@ fn rounded(value: Value) -> Value {
 }
 
 /// A template with each `{{name}}` replaced by its value. Values are not searched for names.
-fn filled(template: &str, values: &[(&str, &str)]) -> String {
+pub(crate) fn filled(template: &str, values: &[(&str, &str)]) -> String {
     let mut page = String::new();
     let mut rest = template;
     while let Some((before, (name, after))) =
@@ -142,7 +141,7 @@ fn filled(template: &str, values: &[(&str, &str)]) -> String {
 }
 
 /// JSON that can stand in a script element: no `<`, so that no text in it ends the element.
-fn script_json(value: &Value) -> String {
+pub(crate) fn script_json(value: &Value) -> String {
     value.to_string().replace('<', "\\u003c")
 }
 

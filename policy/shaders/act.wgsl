@@ -6,7 +6,7 @@
 // twice TRUCKS, so that a read of four weights serves them all; the teams read them at about the same time. A sum over
 // inputs is a chain of fused multiply-adds in their order, for each truck by itself, so it does not depend on the tile.
 // Inputs are padded with zeros to a multiple of four. Constants, structs and bindings are printed from
-// policy/src/device/kernel.rs.
+// policy/src/kernel.rs.
 
 // The inputs of a layer, in their place then its outputs: for each team and value twice TRUCKS trucks.
 var<workgroup> values: array<Trucks, 2u * TEAMS * WIDTH>;

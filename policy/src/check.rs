@@ -8,7 +8,7 @@ use crate::head::Head;
 use crate::policy::Policy;
 
 /// Largest relative difference of two entries of an action table that count as equal: f32 rounds at 6e-8.
-const SAME_ACTION: f32 = 1e-5;
+pub const SAME_ACTION: f32 = 1e-5;
 
 impl Policy {
     /// Whether the policy can drive in `world`.

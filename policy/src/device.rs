@@ -3,8 +3,6 @@
 //! The widest network of a training file, 1,024 outputs, fits into the 16 KB of workgroup memory that every device has.
 //! A wider one is refused: it acts on the processor.
 
-mod kernel;
-
 use offtrack::gpu::{self, Kernels, Slice};
 use offtrack::layout::{Column, WORKGROUP};
 use offtrack::wgpu::{CommandEncoder, ComputePassDescriptor};
@@ -12,9 +10,9 @@ use offtrack::world::World;
 
 use crate::error::Error;
 use crate::file::MOST_LAYERS;
+use crate::kernel::{BUFFERS, Facts, Kernel, LayerRow, SHAPES, Shape, source};
 use crate::network::{Activation, Layer};
 use crate::policy::{Choice, Policy};
-use kernel::{BUFFERS, Facts, Kernel, LayerRow, SHAPES, Shape, source};
 
 /// A policy whose numbers lie on a device.
 #[derive(Debug)]

@@ -16,12 +16,14 @@ use crate::network::Activation;
 use crate::policy::Policy;
 use crate::recurrent::Recurrent;
 
-/// Key of the metadata's one entry.
-const KEY: &str = "offtrack";
-/// Version of the description's meaning, and that of one with any of the keys that came with it.
-const VERSIONS: [u32; 2] = [1, 2];
+/// Key of a policy file's one entry in its metadata.
+pub const KEY: &str = "offtrack";
+/// Version of what that entry means.
+pub const VERSION: u32 = 1;
+/// The same, and that of one with any of the keys that came with the second.
+const VERSIONS: [u32; 2] = [VERSION, 2];
 /// Most layers of a policy: more than any training file asks for.
-pub(crate) const MOST_LAYERS: usize = 64;
+pub const MOST_LAYERS: usize = 64;
 
 /// The metadata's entry.
 #[derive(Debug, Serialize, Deserialize)]

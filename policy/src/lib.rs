@@ -34,14 +34,17 @@ mod error;
 mod file;
 mod frames;
 mod head;
+pub mod kernel;
 mod network;
 mod normalisation;
 mod policy;
 mod recurrent;
 mod selection;
 
+pub use check::SAME_ACTION;
 pub use driver::Driver;
 pub use error::Error;
+pub use file::{KEY, MOST_LAYERS, VERSION};
 pub use frames::{Frames, Padding};
 pub use head::{Head, Squash};
 pub use network::{Activation, Layer};

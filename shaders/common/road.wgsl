@@ -1,5 +1,5 @@
 // Routes, their waypoints and what is observed there, from the table of roads: rows of four words. See
-// src/engine/gpu/tables.rs.
+// src/engine/tables.rs.
 
 // A route.
 struct Route {

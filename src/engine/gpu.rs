@@ -9,7 +9,6 @@ mod buffers;
 mod error;
 mod kernel_times;
 mod kernels;
-mod tables;
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;

@@ -286,6 +286,11 @@ pub const N_STORAGE_BUFFERS: usize = {
 /// Workgroup memory that a kernel takes at most (bytes): what every device of WebGPU has.
 pub const WORKGROUP_MEMORY: u32 = 16_384;
 
+/// The shaders of a step as one module.
+pub fn module() -> String {
+    SHADERS.iter().flat_map(|(_, text)| [text, "\n"]).collect()
+}
+
 /// The shader files in the order in which they make one module.
 pub const SHADERS: [(&str, &str); 20] = [
     ("layout", include_str!("../../shaders/layout.wgsl")),

@@ -1,5 +1,6 @@
 //! What shaders share with Rust, printed as WGSL.
 
+use crate::engine::stages::SHADERS;
 use crate::engine::{autoreset, cpu, tally};
 use crate::field;
 use crate::layout::{self, buffers};
@@ -8,6 +9,13 @@ use crate::layout::{angle, random};
 /// `shaders/layout.wgsl`: constants, structs and the buffers of a step.
 pub fn layout() -> String {
     [shared(), buffers::printed()].concat()
+}
+
+/// What shaders of a picture know of a batch: constants, structs, tables and columns by the bindings that they have in a
+/// step, to be read alone, and the functions that a step's shaders share.
+pub fn picture() -> String {
+    let common = SHADERS.iter().filter(|(name, _)| name.starts_with("common/"));
+    [shared(), buffers::printed_to_read()].into_iter().chain(common.map(|(_, text)| format!("\n{text}"))).collect()
 }
 
 /// Constants and structs alone, for shaders with buffers of their own.

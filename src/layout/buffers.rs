@@ -161,16 +161,27 @@ impl Table {
 
 /// The declarations in WGSL.
 pub(crate) fn printed() -> String {
-    let mut printed = String::new();
-    for (binding, buffer) in BUFFERS.into_iter().enumerate() {
-        let (doc, kind) = buffer.declared();
-        let space = match buffer.access() {
-            Access::Uniform => "uniform",
-            Access::Read => "storage, read",
-            Access::ReadWrite | Access::Count => "storage, read_write",
-        };
-        printed += &comment("", &[&doc]);
-        printed += &format!("@group(0) @binding({binding}) var<{space}> {}: {kind};\n", buffer.name());
-    }
-    printed
+    BUFFERS.into_iter().map(|buffer| declaration(buffer, buffer.access())).collect()
+}
+
+/// Those of a picture, whose shaders read tables and columns and write none.
+pub(crate) fn printed_to_read() -> String {
+    let read = |buffer: Buffer| match buffer.access() {
+        Access::Uniform => Some(declaration(buffer, Access::Uniform)),
+        Access::Read | Access::ReadWrite => Some(declaration(buffer, Access::Read)),
+        Access::Count => None,
+    };
+    BUFFERS.into_iter().filter_map(read).collect()
+}
+
+/// A buffer's declaration, with what shaders may do to it.
+fn declaration(buffer: Buffer, access: Access) -> String {
+    let (doc, kind) = buffer.declared();
+    let space = match access {
+        Access::Uniform => "uniform",
+        Access::Read => "storage, read",
+        Access::ReadWrite | Access::Count => "storage, read_write",
+    };
+    let (binding, name) = (buffer.binding(), buffer.name());
+    comment("", &[&doc]) + &format!("@group(0) @binding({binding}) var<{space}> {name}: {kind};\n")
 }

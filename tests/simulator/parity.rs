@@ -18,61 +18,11 @@ use offtrack::world::World;
 
 use crate::on_device::engine;
 use crate::{batch_on, engines};
-use compare::{Agreement, agreements};
+use compare::{Agreement, agreements, written};
 use states::{
     ENOUGH, N_ENVS, continuous_world, disturbed_world, fleet_world, late_continuous_world, on_each_roundabout, put,
     varied, world,
 };
-
-/// Columns, and a change of the world.
-type Written = (&'static [Column], Option<fn(&mut World)>);
-
-/// What a stage writes, and one number of the world that it notices to be off by a thousandth. Two stages use no number
-/// of the world.
-fn written(stage: Stage) -> Written {
-    match stage {
-        Stage::Steer => {
-            (&[Column::Control], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.speed_gain *= 1.001)))
-        }
-        Stage::Drive => {
-            (&[Column::Truck], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_wheelbase *= 1.001)))
-        }
-        Stage::Collide => (
-            &[Column::Clearance],
-            Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_body.half_width *= 1.001)),
-        ),
-        Stage::Follow => (
-            &[Column::Progress, Column::Poses],
-            Some(|world| world.rigs.iter_mut().for_each(|rig| rig.wheelbase *= 1.001)),
-        ),
-        Stage::Sense => {
-            (&[Column::Ranges], Some(|world| world.rays.iter_mut().flatten().for_each(|ray| ray.origin *= 1.001)))
-        }
-        Stage::Observe => {
-            (&[Column::NextObservation, Column::NextExtras], Some(|world| world.params.sensor_range *= 1.001))
-        }
-        Stage::Judge => (
-            &[Column::Truck, Column::Ended, Column::Terms, Column::Reward],
-            Some(|world| world.reward.lane_distance_limit *= 1.001),
-        ),
-        Stage::Count => (&[], None),
-        Stage::CopyObservation => (&[Column::Observation, Column::Extras], None),
-        Stage::Reset => (
-            &[
-                Column::Truck,
-                Column::Control,
-                Column::Progress,
-                Column::Poses,
-                Column::Ranges,
-                Column::Observation,
-                Column::Extras,
-            ],
-            Some(|world| {
-                world.params.start_offset *= 1.001;
-            }),
-        ),
-    }
-}
 
 /// A quantity this near to a threshold may fall on either side of it within the engines' bounds.
 const MARGIN: f32 = 1e-4;

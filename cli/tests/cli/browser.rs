@@ -9,7 +9,7 @@ use crate::page::{block, read};
 use crate::place::{Place, offtrack, repository, succeed};
 
 /// A Chromium, whatever its name.
-fn browser() -> PathBuf {
+pub fn browser() -> PathBuf {
     let folders: Vec<PathBuf> = std::env::var_os("PATH").iter().flat_map(std::env::split_paths).collect();
     let names = ["chromium", "chromium-browser", "google-chrome"];
     let found =
@@ -44,7 +44,7 @@ fn opened(page: &Path) -> String {
 
 /// How wide the page's contents are where the window has so many pixels. A headless window is never narrower than 500
 /// pixels; a frame is.
-fn widths(page: &Path, window: u32) -> (u32, u32) {
+pub fn widths(page: &Path, window: u32) -> (u32, u32) {
     let report = "<script>addEventListener('load', () => setTimeout(() => { const page = document.documentElement; \
                   parent.postMessage(`${page.clientWidth} ${page.scrollWidth}`, '*') }, 1000))</script></body>";
     let [framed, frame] = ["framed.html", "frame.html"].map(|name| page.with_file_name(name));

@@ -21,6 +21,8 @@ mod generate;
 mod import;
 mod input;
 mod interruption;
+#[cfg(feature = "browser")]
+mod live;
 mod output;
 mod page;
 mod pictures;
@@ -31,3 +33,7 @@ mod seeds;
 mod tensorboard;
 mod threads;
 mod train;
+
+// The states of the simulator's tests look for them here.
+#[cfg(feature = "browser")]
+use live::{benchmark, fleet};

@@ -69,6 +69,23 @@ function fractionBar(fraction, low, high, colour, height) {
     whisker(low, high, middle, middle), whisker(low, low, middle - 4, middle + 4), whisker(high, high, middle - 4, middle + 4));
 }
 
+/** The colours of the page's light or dark theme, by name. */
+function colours() {
+  const style = getComputedStyle(document.documentElement);
+  return (name) => style.getPropertyValue("--" + name).trim();
+}
+
+/** A value over the episode with a line at the current frame. */
+function sparkline(values) {
+  const low = Math.min(...values, 0), high = Math.max(...values, low + 1e-3), last = Math.max(values.length - 1, 1);
+  const y = (value) => 21 - (20 * (value - low)) / (high - low);
+  const path = values.map((value, frame) => `${frame === 0 ? "M" : "L"}${((100 * frame) / last).toFixed(2)} ${y(value).toFixed(2)}`).join("");
+  return svg("svg", { viewBox: "0 0 100 22", preserveAspectRatio: "none", "aria-hidden": "true" },
+    svg("line", { class: "grid", x1: 0, x2: 100, y1: y(0), y2: y(0), "vector-effect": "non-scaling-stroke" }),
+    svg("path", { class: "curve", d: path, "vector-effect": "non-scaling-stroke" }),
+    svg("line", { class: "cursor", y1: 0, y2: 22, "vector-effect": "non-scaling-stroke" }));
+}
+
 /** Marks one button of a group as the pressed one. */
 function press(group, pressed) {
   for (const button of group.querySelectorAll("button")) button.setAttribute("aria-pressed", String(button === pressed));

@@ -5,12 +5,6 @@
 /** Margin around the map, and width of a close-up [m]. */
 const MARGIN = 9, CLOSE_UP = 46;
 
-/** The colours of the page's light or dark theme, by name. */
-function colours() {
-  const style = getComputedStyle(document.documentElement);
-  return (name) => style.getPropertyValue("--" + name).trim();
-}
-
 const lineOf = (points, closed) => {
   const path = new Path2D();
   points.forEach(([x, y], index) => (index === 0 ? path.moveTo(x, y) : path.lineTo(x, y)));

@@ -61,7 +61,7 @@ pub(super) fn columns(sensor_range: f32) -> Vec<Column> {
 }
 
 /// Bytes as gzip in base64.
-pub(super) fn packed(bytes: &[u8]) -> std::io::Result<String> {
+pub(crate) fn packed(bytes: &[u8]) -> std::io::Result<String> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(bytes)?;
     Ok(BASE64_STANDARD.encode(encoder.finish()?))

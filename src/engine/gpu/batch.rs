@@ -9,7 +9,6 @@ use bytemuck::{bytes_of, cast_slice};
 use wgpu::{CommandEncoder, ComputePassDescriptor, ComputePassTimestampWrites};
 
 use super::buffers::{Buffers, check_size, check_world};
-use super::tables::Tables;
 use super::{Columns, Device, Error, Slice, kernel_times, kernels};
 use crate::engine::stages::{BEGIN, Case, Kernel, N_STAGES, STAGES, Stage};
 use crate::engine::{self, Autoreset, EngineBatch, RouteChoice, Tally};
@@ -46,7 +45,7 @@ impl Batch {
         check_size(device, n_envs)?;
         check_world(device, world)?;
         let host = engine::Batch::new(n_envs, seed, choice)?;
-        let buffers = Buffers::new(device, &Tables::new(world, &host), n_envs, &columns)?;
+        let buffers = Buffers::new(device, world, &host, &columns)?;
         let case = Case::of(world, host.autoreset());
         let room = Mutex::new(Some(host));
         Ok(Batch {

@@ -1,14 +1,16 @@
 //! The buffers of a batch on a device, and the bind groups that kernels see them through.
 
+use bytemuck::{bytes_of, cast_slice};
 use wgpu::{BindGroup, Buffer};
 
-use super::tables::{Tables, sizes};
 use super::{Device, Error};
+use crate::engine;
 use crate::engine::stages::Kernel;
+use crate::engine::tables::{Tables, sizes};
 use crate::engine::tally::N_SUMS;
 use crate::layout::buffers::{BUFFERS, Buffer as Shared, N_TABLES, Table};
 use crate::layout::shared::Named;
-use crate::layout::{Column, N_COLUMNS};
+use crate::layout::{BatchFacts, BeginRow, Column, N_COLUMNS};
 use crate::world::World;
 
 /// Part of a buffer.
@@ -37,9 +39,22 @@ pub(super) struct Buffers {
 
 impl Buffers {
     /// Uploads the tables and makes the columns that are not external.
-    pub(super) fn new(device: &Device, tables: &Tables, n_envs: usize, external: &Columns) -> Result<Buffers, Error> {
+    pub(super) fn new(
+        device: &Device,
+        world: &World,
+        batch: &engine::Batch,
+        external: &Columns,
+    ) -> Result<Buffers, Error> {
+        let n_envs = batch.n_envs();
+        let tables = Tables::new(world);
         let made = BUFFERS.into_iter().map(|buffer| match buffer {
-            Shared::Table(table) => Ok(device.filled(table.name(), &tables.bytes(table))),
+            Shared::Table(Table::Batch) => Ok(device.filled(buffer.name(), bytes_of(&BatchFacts::of(batch)))),
+            Shared::Table(Table::Choice) => Ok(device.filled(buffer.name(), cast_slice(batch.choice().routes()))),
+            Shared::Table(Table::Streams) => Ok(device.filled(buffer.name(), cast_slice(batch.streams()))),
+            Shared::Table(table) => Ok(match tables.bytes(table) {
+                Some(bytes) => device.filled(table.name(), bytes),
+                None => device.empty(table.name(), (n_envs * size_of::<BeginRow>()) as u64),
+            }),
             Shared::Column(column) => column_slice(device, column, n_envs, external),
             Shared::Tally => Ok(device.empty(buffer.name(), (2 * N_SUMS * size_of::<u32>()) as u64)),
         });

@@ -10,14 +10,11 @@ use wgpu::{
 };
 
 use super::Slice;
-use super::tables::team;
-use crate::engine::stages::{Kernel, SHADERS, Threads};
+use crate::engine::stages::{Kernel, Threads, module};
+use crate::engine::tables::{ROW, team};
 use crate::layout::buffers::Access;
 use crate::layout::shared::Named;
 use crate::layout::{N_VALUES, WORKGROUP};
-
-/// Workgroups in a row of a dispatch: the most that every device takes.
-const ROW: u32 = 65_535;
 
 /// The kernels of a module, named by `K`.
 #[derive(Debug)]
@@ -102,10 +99,9 @@ impl<K: Named> Kernels<K> {
 
 /// The kernels of a step and those beside it.
 pub(super) fn of_stages(device: &wgpu::Device) -> Kernels<Kernel> {
-    let source = SHADERS.iter().flat_map(|(_, text)| [text, "\n"]).collect();
     let bindings =
         |kernel: Kernel| kernel.buffers().iter().map(|buffer| (buffer.binding() as u32, buffer.access())).collect();
-    Kernels::compile(device, "offtrack", source, bindings)
+    Kernels::compile(device, "offtrack", module(), bindings)
 }
 
 /// Threads that a kernel of a step needs for so many trucks.

@@ -3,7 +3,9 @@
 use std::fmt;
 
 use bytemuck::cast_slice;
+use offtrack::engine::stages::Stage;
 use offtrack::layout::{Column, N_EXTRAS, N_RAYS};
+use offtrack::world::World;
 
 /// Bound of the difference between two engines in a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -205,4 +207,54 @@ pub fn agreements(column: Column, here: &[u8], there: &[u8], counted: &[bool]) -
         agreement
     });
     compared.collect()
+}
+
+/// Columns, and a change of the world.
+pub type Written = (&'static [Column], Option<fn(&mut World)>);
+
+/// What a stage writes, and one number of the world that it notices to be off by a thousandth. Two stages use no number
+/// of the world.
+pub fn written(stage: Stage) -> Written {
+    match stage {
+        Stage::Steer => {
+            (&[Column::Control], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.speed_gain *= 1.001)))
+        }
+        Stage::Drive => {
+            (&[Column::Truck], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_wheelbase *= 1.001)))
+        }
+        Stage::Collide => (
+            &[Column::Clearance],
+            Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_body.half_width *= 1.001)),
+        ),
+        Stage::Follow => (
+            &[Column::Progress, Column::Poses],
+            Some(|world| world.rigs.iter_mut().for_each(|rig| rig.wheelbase *= 1.001)),
+        ),
+        Stage::Sense => {
+            (&[Column::Ranges], Some(|world| world.rays.iter_mut().flatten().for_each(|ray| ray.origin *= 1.001)))
+        }
+        Stage::Observe => {
+            (&[Column::NextObservation, Column::NextExtras], Some(|world| world.params.sensor_range *= 1.001))
+        }
+        Stage::Judge => (
+            &[Column::Truck, Column::Ended, Column::Terms, Column::Reward],
+            Some(|world| world.reward.lane_distance_limit *= 1.001),
+        ),
+        Stage::Count => (&[], None),
+        Stage::CopyObservation => (&[Column::Observation, Column::Extras], None),
+        Stage::Reset => (
+            &[
+                Column::Truck,
+                Column::Control,
+                Column::Progress,
+                Column::Poses,
+                Column::Ranges,
+                Column::Observation,
+                Column::Extras,
+            ],
+            Some(|world| {
+                world.params.start_offset *= 1.001;
+            }),
+        ),
+    }
 }

@@ -1,6 +1,5 @@
-//! What trucks share, as the bytes that shaders read.
-
-use std::borrow::Cow;
+//! What trucks share, as the bytes that shaders read: for the engine on a device, and for a page that steps trucks in a
+//! browser.
 
 use bytemuck::{bytes_of, cast, cast_slice};
 
@@ -8,21 +7,21 @@ use crate::engine::{Batch, RouteChoice};
 use crate::field::{Field, STORED_UNIT};
 use crate::layout::buffers::Table;
 use crate::layout::{
-    BatchFacts, BeginRow, FieldRow, N_PREVIEW, PREVIEW_ROWS, PreviewRow, ROUTE_ROWS, Rig, TEAM_MAX, VehicleRow,
-    WaypointRow,
+    BatchFacts, FieldRow, N_PREVIEW, PREVIEW_ROWS, PreviewRow, ROUTE_ROWS, Rig, TEAM_MAX, VehicleRow, WaypointRow,
 };
 use crate::world::World;
 
+/// Workgroups in a row of a dispatch: the most that every device takes.
+pub const ROW: u32 = 65_535;
 /// Trucks from which on a large device has enough of the largest teams.
-const MANY: usize = 16_384;
+pub const MANY: usize = 16_384;
 /// Trucks of a team below that.
 const FEW: u32 = 8;
 
-/// The contents of every [`Table`].
-pub(super) struct Tables<'a> {
+/// The contents of the tables of a world.
+#[derive(Debug)]
+pub struct Tables<'a> {
     world: &'a World,
-    batch: &'a Batch,
-    facts: BatchFacts,
     vehicles: Vec<VehicleRow>,
     roads: Vec<[u32; 4]>,
     limits: Vec<u32>,
@@ -32,7 +31,8 @@ pub(super) struct Tables<'a> {
 }
 
 impl<'a> Tables<'a> {
-    pub(super) fn new(world: &'a World, batch: &'a Batch) -> Tables<'a> {
+    /// The tables of `world`.
+    pub fn new(world: &'a World) -> Tables<'a> {
         let mut fields = Vec::new();
         let (mut cells, mut corners) = (Vec::new(), Vec::new());
         for field in &world.fields {
@@ -51,8 +51,6 @@ impl<'a> Tables<'a> {
         let vehicle = |rig: &Rig| VehicleRow { rays: *world.rays_of(rig), rig: *rig };
         Tables {
             world,
-            batch,
-            facts: BatchFacts::of(batch),
             vehicles: world.rigs.iter().map(vehicle).collect(),
             roads: roads(world, &fields),
             limits: limits(world),
@@ -61,9 +59,9 @@ impl<'a> Tables<'a> {
         }
     }
 
-    /// A table's bytes.
-    pub(super) fn bytes(&self, table: Table) -> Cow<'_, [u8]> {
-        Cow::Borrowed(match table {
+    /// A table's bytes; `None` of those that belong to a batch.
+    pub fn bytes(&self, table: Table) -> Option<&[u8]> {
+        Some(match table {
             Table::Params => bytes_of(&self.world.params),
             Table::Weights => bytes_of(&self.world.reward),
             Table::Disturbances => bytes_of(&self.world.disturbances),
@@ -73,10 +71,7 @@ impl<'a> Tables<'a> {
             Table::Cells => cast_slice(&self.cells),
             Table::Corners => cast_slice(&self.corners),
             Table::Limits => cast_slice(&self.limits),
-            Table::Batch => bytes_of(&self.facts),
-            Table::Choice => cast_slice(self.batch.choice().routes()),
-            Table::Streams => cast_slice(self.batch.streams()),
-            Table::Begins => return Cow::Owned(vec![0; self.batch.n_envs() * size_of::<BeginRow>()]),
+            Table::Batch | Table::Choice | Table::Streams | Table::Begins => return None,
         })
     }
 }
@@ -115,7 +110,7 @@ fn limits(world: &World) -> Vec<u32> {
 }
 
 /// Bytes of the tables of a world that grow with it.
-pub(super) fn sizes(world: &World) -> [(Table, usize); 5] {
+pub fn sizes(world: &World) -> [(Table, usize); 5] {
     let of_fields = |bytes: fn(&Field) -> usize| world.fields.iter().map(bytes).sum::<usize>();
     let rows = world.routes.len() * ROUTE_ROWS + world.waypoints.len() * (1 + PREVIEW_ROWS);
     [
@@ -129,13 +124,13 @@ pub(super) fn sizes(world: &World) -> [(Table, usize); 5] {
 
 /// Trucks whose rays a workgroup shares. More wait less for each other; with few trucks a large device would have too
 /// few workgroups.
-pub(super) fn team(n_envs: usize) -> u32 {
+pub fn team(n_envs: usize) -> u32 {
     if n_envs < MANY { FEW } else { TEAM_MAX }
 }
 
 impl BatchFacts {
     /// Facts of a batch.
-    pub(super) fn of(batch: &Batch) -> BatchFacts {
+    pub fn of(batch: &Batch) -> BatchFacts {
         BatchFacts {
             n_envs: batch.n_envs() as u32,
             n_routes: batch.choice().routes().len() as u32,

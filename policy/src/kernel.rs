@@ -1,4 +1,5 @@
-//! The kernel that acts: its structs, buffers and shapes, declared once and printed for `act.wgsl`.
+//! The kernel that acts: its structs, buffers and shapes, declared once and printed for `act.wgsl`. It runs on a device,
+//! and in a browser.
 
 use offtrack::engine::stages::SHADERS;
 use offtrack::engine::wgsl;
@@ -136,5 +137,5 @@ pub fn source(shape: Shape) -> String {
         shape.printed(),
     ];
     let common = SHADERS.iter().filter(|(name, _)| *name == "common/random").map(|(_, text)| *text);
-    own.iter().map(String::as_str).chain(common).chain([include_str!("../../shaders/act.wgsl")]).collect()
+    own.iter().map(String::as_str).chain(common).chain([include_str!("../shaders/act.wgsl")]).collect()
 }

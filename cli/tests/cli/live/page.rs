@@ -1,0 +1,56 @@
+//! Pages to open, with the test's script in place of the last one.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use offtrack::engine::stages::{N_STORAGE_BUFFERS, WORKGROUP_MEMORY};
+use offtrack::layout::{Column, shared::Named};
+use offtrack::scenario::Scenario;
+use offtrack::world::World;
+use offtrack_evaluation::live::{Ground, Live};
+use offtrack_policy::Policy;
+use serde_json::Value;
+
+use super::served::{Given, given_by};
+use crate::page::read;
+use crate::place::repository;
+
+/// Does on a page what `jobs` ask for, with the files that they name, and gives what came of it.
+pub fn done(page: &str, jobs: &[Value], mut files: HashMap<String, Vec<u8>>) -> Given {
+    files.insert("plan".to_owned(), Value::from(jobs).to_string().into_bytes());
+    let main = read(&repository().join("evaluation/src/live/main.js"));
+    assert!(!main.is_empty() && page.contains(&main), "the page has another last script");
+    let given = given_by(&page.replace(&main, include_str!("selftest.js")), files, false);
+    // The device was opened with the limits that every device of WebGPU has.
+    let limits: Value = serde_json::from_slice(&given["limits"]).unwrap();
+    assert_eq!(limits["buffers"], N_STORAGE_BUFFERS);
+    assert_eq!(limits["memory"], WORKGROUP_MEMORY);
+    given
+}
+
+/// A benchmark as pages have it, baked.
+pub fn ground(benchmark: &str) -> Ground {
+    let scenario = Ground::of(Scenario::named(benchmark).unwrap());
+    let world = Arc::new(World::bake(&scenario).unwrap());
+    Ground { scenario, world }
+}
+
+/// The text of a page of these benchmarks and policies.
+pub fn written(grounds: Vec<Ground>, policies: Vec<Policy>, file: &Path) -> String {
+    Live { grounds, policies, seed: 0 }.write(file).unwrap();
+    read(file)
+}
+
+/// The columns of `n_envs` trucks that lie one after the other.
+pub fn columns(bytes: &[u8], n_envs: usize) -> HashMap<Column, &[u8]> {
+    let mut rest = bytes;
+    let each = Column::ALL.iter().map(|&column| {
+        let (own, others) = rest.split_at(n_envs * column.width());
+        rest = others;
+        (column, own)
+    });
+    let all = each.collect();
+    assert!(rest.is_empty(), "{} bytes more", rest.len());
+    all
+}

@@ -1,0 +1,114 @@
+// Stands in place of the page's last script: does what a test's plan says, and gives the test what came of it.
+
+const asked = async (name) => new Uint8Array(await (await fetch(name)).arrayBuffer());
+const give = (name, body) => fetch(name, { method: "POST", body });
+
+const opened = async (gpu, job) => Batch.open(gpu, await gpu.world(job.world), job);
+
+/** Whole runs: trucks, actions and ends after every step, all columns before the first and after the last. */
+async function run(live, gpu, job) {
+  const batch = await opened(gpu, job);
+  if (job.policy !== null) await batch.setPolicy(Policy.shipped(live, job.policy));
+  const all = () => Promise.all(batch.columns.map((name) => batch.column(name)));
+  batch.beginAll();
+  const first = await all();
+  const steps = [];
+  for (let step = 0; step < job.steps; step++) {
+    await batch.advance(1);
+    const read = ["truck", "action", "ended"].map((name) => [
+      batch.buffers[name],
+      0,
+      job.n * live.facts.code.columns[name].bytes,
+    ]);
+    steps.push(...(await gpu.read(read)));
+  }
+  const { sums } = await batch.tally();
+  await give(`${job.name}.first`, new Blob(first));
+  await give(`${job.name}.steps`, new Blob(steps));
+  await give(`${job.name}.last`, new Blob(await all()));
+  await give(`${job.name}.tally`, JSON.stringify(sums));
+  batch.close();
+}
+
+/** Stage by stage: each from the columns that the test has of the one before. */
+async function stages(live, gpu, job) {
+  const batch = await opened(gpu, job);
+  const kernels = await gpu.kernels(job.stages.flatMap((stage) => stage.kernels));
+  for (const [name, kernel] of Object.entries(kernels)) batch.kernels[name] = batch.bound(name, kernel);
+  for (const { name, kernels: names, from } of job.stages) {
+    const before = await asked(from);
+    let at = 0;
+    for (const column of batch.columns) {
+      const size = job.n * live.facts.code.columns[column].bytes;
+      gpu.device.queue.writeBuffer(batch.buffers[column], 0, before, at, size);
+      at += size;
+    }
+    const encoder = gpu.device.createCommandEncoder();
+    const pass = encoder.beginComputePass();
+    batch.dispatch(pass, names);
+    pass.end();
+    gpu.device.queue.submit([encoder.finish()]);
+    await give(`${job.name}.${name}`, new Blob(await Promise.all(batch.columns.map((column) => batch.column(column)))));
+  }
+  batch.close();
+}
+
+/** A policy of a file acts for observations of the test. */
+async function act(live, gpu, job) {
+  const batch = await opened(gpu, job);
+  const policy = Policy.read(live, job.file, await asked(job.file));
+  await batch.setPolicy(policy);
+  const { queue } = gpu.device;
+  for (const column of ["observation", "extras"])
+    queue.writeBuffer(batch.buffers[column], 0, await asked(`${job.name}.${column}`));
+  const encoder = gpu.device.createCommandEncoder();
+  // Held trucks need no action.
+  encoder.clearBuffer(batch.buffers.truck);
+  const pass = encoder.beginComputePass();
+  batch.acting.dispatch(pass);
+  pass.end();
+  queue.submit([encoder.finish()]);
+  await give(`${job.name}.action`, await batch.column("action"));
+  const { n_values: width, n_extras: beside } = live.facts.code;
+  const [seen, extras] = await Promise.all(
+    ["observation", "extras"].map(async (name) => new Float32Array(await batch.column(name))),
+  );
+  const rows = Array.from({ length: Math.min(64, job.n) }, (_, row) =>
+    policy.outputs(seen.slice(row * width, (row + 1) * width), extras.slice(row * beside, (row + 1) * beside)),
+  );
+  await give(`${job.name}.outputs`, new Blob(rows));
+  batch.close();
+}
+
+/** What the page says to a file that is dropped on it as a policy. */
+async function refuse(live, gpu, job) {
+  const batch = await opened(gpu, job);
+  const said = await asked(job.file)
+    .then((bytes) => batch.setPolicy(Policy.read(live, job.file, bytes)))
+    .then(
+      () => "it drives",
+      (error) => error.message,
+    );
+  await give(`${job.name}.said`, said);
+  batch.close();
+}
+
+const JOBS = { run, stages, act, refuse };
+
+try {
+  const live = await readLive();
+  const gpu = await openDevice(live);
+  gpu.failed.then((message) => give("failed", message));
+  gpu.lost.then((message) => give("failed", `the device was lost: ${message}`));
+  await give(
+    "limits",
+    JSON.stringify({
+      buffers: gpu.limits.maxStorageBuffersPerShaderStage,
+      memory: gpu.limits.maxComputeWorkgroupStorageSize,
+    }),
+  );
+  for (const job of JSON.parse(new TextDecoder().decode(await asked("plan")))) await JOBS[job.kind](live, gpu, job);
+  await give("done", "");
+} catch (error) {
+  await give("failed", `${error.stack}`);
+}

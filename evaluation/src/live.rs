@@ -1,0 +1,176 @@
+//! The live page: one HTML file in which thousands of trucks drive by the simulator's own shaders, in a browser.
+//!
+//! Shaders go in as text. What a host must know of them (kernels and their order, buffers, layouts, tables) is printed
+//! here, so that no script repeats it. Tables and policies are gzipped; the page loads no other file.
+
+mod code;
+mod journal;
+mod packed;
+mod reported;
+mod worlds;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use offtrack::scenario::{Scenario, Split};
+use offtrack::world::World;
+use offtrack_policy::Policy;
+use serde_json::json;
+
+use crate::error::Error;
+use crate::page::{filled, script_json};
+use crate::tabular::html_text;
+use crate::{files, provenance};
+use packed::Packed;
+
+const TEMPLATE: &str = include_str!("live/live.html");
+/// What the page shares with that of a report, and its own.
+const STYLES: &[&str] = &[include_str!("page/theme.css"), include_str!("live/style.css")];
+/// The shaders of the picture.
+const VIEW: &str = include_str!("live/view.wgsl");
+/// Scripts in the order of the page; the last one starts the others.
+const SCRIPTS: &[&str] = &[
+    include_str!("page/elements.js"),
+    include_str!("live/data.js"),
+    include_str!("live/device.js"),
+    include_str!("live/world.js"),
+    include_str!("live/batch.js"),
+    include_str!("live/rows.js"),
+    include_str!("live/safetensors.js"),
+    include_str!("live/policy.js"),
+    // What is seen.
+    include_str!("live/picture.js"),
+    include_str!("live/sites.js"),
+    include_str!("live/camera.js"),
+    include_str!("live/stage.js"),
+    include_str!("live/charts.js"),
+    include_str!("live/crowd.js"),
+    include_str!("live/followed.js"),
+    include_str!("live/driving.js"),
+    include_str!("live/visit.js"),
+    include_str!("live/results.js"),
+    include_str!("live/controls.js"),
+    include_str!("live/drop.js"),
+    include_str!("live/app.js"),
+    include_str!("live/main.js"),
+];
+
+/// Rows of a benchmark's table of vehicles on the page: with all of them it would be three times as large.
+pub const N_VEHICLES: usize = 256;
+
+/// A benchmark to drive on.
+#[derive(Debug)]
+pub struct Ground {
+    /// The benchmark.
+    pub scenario: Scenario,
+    /// The benchmark, baked.
+    pub world: Arc<World>,
+}
+
+impl Ground {
+    /// A benchmark as the page has it before it is baked: with fewer vehicles.
+    pub fn of(mut scenario: Scenario) -> Scenario {
+        if let Some(fleet) = &mut scenario.fleet {
+            fleet.n_vehicles = fleet.n_vehicles.min(N_VEHICLES);
+        }
+        scenario
+    }
+}
+
+/// The contents of a page.
+#[derive(Debug)]
+pub struct Live {
+    /// The benchmarks, the first one shown first.
+    pub grounds: Vec<Ground>,
+    /// The policies to choose from, in this order.
+    pub policies: Vec<Policy>,
+    /// The seed that the page begins with.
+    pub seed: u32,
+}
+
+/// A part of a page and its length (bytes).
+pub type Part = (&'static str, usize);
+
+impl Live {
+    /// Writes the page to `file`, and says what its parts weigh.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be written.
+    pub fn write(&self, file: &Path) -> Result<Vec<Part>, Error> {
+        let mut packed = Packed::default();
+        let code = code::printed(&mut packed);
+        let worlds: Vec<_> =
+            self.grounds.iter().map(|ground| worlds::printed(ground, &self.policies, &mut packed)).collect();
+        let policies: Vec<_> = self
+            .policies
+            .iter()
+            .map(|policy| {
+                json!({
+                    "name": policy.name,
+                    "benchmark": policy.benchmark,
+                    "section": packed.add("policies", &policy.to_bytes()),
+                    "reported": reported::of(&policy.name),
+                })
+            })
+            .collect();
+        let facts = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "commit": provenance::commit(),
+            "seed": self.seed,
+            "layout": code::fingerprint(&code),
+            "world_file": WORLD_FILE,
+            "code": code,
+            "worlds": worlds,
+            "policies": policies,
+            "sections": packed.sections(),
+        });
+        let (facts, script, style) = (script_json(&facts), SCRIPTS.concat(), STYLES.concat());
+        let names: Vec<&str> = self.grounds.iter().map(|ground| ground.scenario.name.as_str()).collect();
+        let (tables, mut parts) = packed.written().map_err(Error::write(file))?;
+        let page = filled(
+            TEMPLATE,
+            &[
+                ("title", &html_text(&format!("trucks on {}", names.join(", ")))),
+                ("style", &style),
+                ("facts", &facts),
+                ("packed", &tables),
+                ("view", VIEW),
+                ("script", &script),
+            ],
+        );
+        files::write_whole(file, page.as_bytes())?;
+        parts.extend([("facts", facts.len()), ("scripts and styles", script.len() + style.len() + VIEW.len())]);
+        parts.push(("in all", page.len()));
+        Ok(parts)
+    }
+}
+
+/// First line of a world file, before the line of facts and those of sections. The number is that of its form.
+const WORLD_FILE: &str = "offtrack-world 1";
+
+impl Ground {
+    /// Writes the benchmark to `file`, to be dropped on a page, and says what its parts weigh.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be written.
+    pub fn write(&self, file: &Path) -> Result<Vec<Part>, Error> {
+        let code = code::printed(&mut Packed::default());
+        let mut packed = Packed::default();
+        let world = worlds::printed(self, &[], &mut packed);
+        let layout = code::fingerprint(&code);
+        let version = env!("CARGO_PKG_VERSION");
+        let facts = json!({ "version": version, "layout": layout, "world": world, "sections": packed.sections() });
+        let facts = format!("{WORLD_FILE}\n{facts}\n");
+        let (tables, mut parts) = packed.written().map_err(Error::write(file))?;
+        files::write_whole(file, [facts.as_bytes(), tables.as_bytes()].concat().as_slice())?;
+        parts.extend([("facts", facts.len()), ("in all", facts.len() + tables.len())]);
+        Ok(parts)
+    }
+}
+
+/// The splits that have routes, each with the indices of its routes.
+fn splits(scenario: &Scenario) -> impl Iterator<Item = (Split, &[u32])> {
+    Split::ALL.into_iter().map(|split| (split, scenario.split(split))).filter(|(_, routes)| !routes.is_empty())
+}

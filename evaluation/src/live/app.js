@@ -1,0 +1,365 @@
+// The page: what is chosen, which crowds there are, and the loop that steps and draws them.
+//
+// A frame's work is submitted when that of the frame before is done, so that nothing queues up on a slow device.
+
+/** Figures are read this often (ms); work of a frame that is aimed at (ms), and most of it that time may ask for. */
+const COUNT_EVERY = 500, FRAME_WORK = 20, MOST_WORK = 120;
+/** Trucks that the page begins with. */
+const MANY = 4096;
+/** Reach of a click (pixels); how long something stays said (ms). */
+const REACH = 14, SAID_FOR = 6000;
+
+/** Why the page cannot run, by the kind of a `NoDevice`, and what would do. */
+const MISSING = {
+  webgpu: ["This page needs WebGPU", "Browsers that have it: Chrome and Edge from version 113 on (Android: 121), " +
+    "Safari from 26 on, Firefox from 141 on Windows and from 145 on macOS. On Linux Chrome may need its flag “Unsafe " +
+    "WebGPU Support”."],
+  adapter: ["No graphics adapter was found", "Turn on graphics acceleration in the browser's settings, update the " +
+    "graphics driver, or try another browser: Chrome, Edge, Safari and Firefox of today have WebGPU."],
+  device: ["The graphics adapter does not open", "Close other pages that use it, or start the browser again."],
+  lost: ["The graphics device was lost", "The driver was reset, or the computer slept. Nothing is damaged."],
+  failed: ["The graphics device reported an error", "The page stopped. Fewer trucks may do."],
+};
+
+/** Whether a device is a program on the processor: it has no speed for thousands of trucks. */
+const isSoftware = ({ name, adapter }) =>
+  adapter.info?.isFallbackAdapter || /swiftshader|llvmpipe|software/i.test(name);
+
+class App {
+  constructor(live) {
+    this.live = live;
+    this.policies = live.facts.policies.map(({ reported }, index) =>
+      Object.assign(Policy.shipped(live, index), { reported }));
+    Object.assign(this, { crowds: [], playing: true, rate: 2, debt: 0, colouring: 0 });
+    this.frames = Promise.resolve();
+    this.visit = new Visit(this);
+    this.failures = new FailureList((crowd, failure) => this.attempt(() => this.visit.driveAgain(crowd, failure)));
+    const { seed } = live.facts;
+    this.chosen = { world: 0, road: "", policy: this.firstPolicy(0), second: null, n: MANY, seed };
+    this.ready = new Promise((done) => (this.isReady = done));
+    listenToChoices(this);
+    listenToKeys(this);
+    listenToFiles(this);
+    listenToPointers(byId("picture"), this.visit);
+    window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.picture?.paint());
+    new ResizeObserver(() => this.resized()).observe(byId("picture"));
+  }
+
+  /** Opens the device and begins. `options` override what is chosen. */
+  async start(options = {}) {
+    byId("missing").hidden = true;
+    this.say("Compiling the shaders of the simulator for this device.");
+    clearTimeout(this.silence);
+    try {
+      const gpu = (this.gpu = await openDevice(this.live));
+      const stop = (kind) => (message) => this.gpu === gpu && this.sayMissing(kind, message);
+      gpu.lost.then(stop("lost"));
+      gpu.failed.then(stop("failed"));
+      this.crowds = [];
+      Object.assign(this.visit, { again: null, focus: null });
+      this.picture = new Picture(this.live, this.gpu);
+      this.stage = new Stage(this.gpu, this.picture);
+      if (isSoftware(this.gpu)) this.chosen.n = Math.min(this.chosen.n, FEW);
+      await this.choose(options);
+      byId("said").hidden = true;
+      this.isReady(this);
+      this.loop();
+    } catch (error) {
+      this.sayMissing(error instanceof NoDevice ? error.kind : "failed", error.message);
+    }
+  }
+
+  /** Says why nothing runs. */
+  sayMissing(kind, message) {
+    const [title, words] = MISSING[kind];
+    this.run = null;
+    // With fewer trucks it may go on.
+    if (kind === "failed") this.chosen.n = Math.max(COUNTS[0], Math.floor(this.chosen.n / 4));
+    byId("missing-title").textContent = title;
+    byId("missing-words").textContent = kind === "webgpu" ? words : `${words} (${message})`;
+    byId("missing").dataset.kind = kind;
+    byId("said").hidden = true;
+    byId("missing").hidden = false;
+  }
+
+  /** Says something for a while. */
+  say(text, isBad = false) {
+    const node = byId("said");
+    node.textContent = text;
+    node.className = isBad ? "bad" : "";
+    node.hidden = false;
+    clearTimeout(this.silence);
+    this.silence = setTimeout(() => (node.hidden = true), SAID_FOR);
+    return text;
+  }
+
+  /** Does something between two frames: no step is under way then. */
+  between(act) {
+    const done = this.frames.then(act);
+    this.frames = done.catch(() => {});
+    return done;
+  }
+
+  /** Does something that a visitor asked for, between two frames. What goes wrong is said. */
+  async attempt(act) {
+    try {
+      return await this.between(act);
+    } catch (error) {
+      return this.say(error.message, true);
+    }
+  }
+
+  /** The index of the first policy that can drive on a world; -1, random actions, without one. */
+  firstPolicy(world) {
+    return this.policies.findIndex((_, index) => this.canDrive(index, world));
+  }
+
+  canDrive(policy, world) {
+    return policy === -1 || this.policies[policy].check({ facts: this.live.facts.worlds[world] }) === null;
+  }
+
+  /** Takes a choice and begins with it. */
+  async choose(change) {
+    const before = this.chosen, chosen = { ...before, ...change };
+    if (chosen.world !== before.world) {
+      chosen.road = change.road ?? "";
+      if (!this.canDrive(chosen.policy, chosen.world)) chosen.policy = this.firstPolicy(chosen.world);
+      if (chosen.second !== null && !this.canDrive(chosen.second, chosen.world)) chosen.second = null;
+    }
+    this.chosen = chosen;
+    try {
+      await this.open();
+    } catch (error) {
+      // What drove before goes on.
+      this.chosen = before;
+      throw error;
+    } finally {
+      showChoices(this);
+    }
+  }
+
+  /** Opens the crowds of what is chosen. Those before go when these are there. */
+  async open() {
+    const { chosen, gpu, picture } = this, world = await gpu.world(chosen.world);
+    const { routes, roads, split } = chosenRoutes(world.facts, chosen.road);
+    const shown = [chosen.policy, ...(chosen.second === null ? [] : [chosen.second])];
+    this.stage.measure();
+    const { clientWidth, clientHeight } = byId("picture");
+    const sites = sitesOf(world.facts, roads, clientWidth / shown.length / Math.max(clientHeight, 1));
+    const options = { n: chosen.n, seed: chosen.seed, routes };
+    const made = [];
+    try {
+      for (const index of shown) {
+        made.push(await Crowd.open({ picture, gpu, world, sites, options, policy: this.policies[index] ?? null }));
+      }
+    } catch (error) {
+      made.forEach((crowd) => crowd.close());
+      throw error;
+    }
+    await this.visit.leave();
+    const old = this.crowds;
+    Object.assign(this, { crowds: made, world, sites, routes, split });
+    this.forgetWork();
+    old.forEach((crowd) => crowd.close());
+    this.stage.show(made);
+    this.stage.fit();
+    this.name();
+  }
+
+  /** The heading says how many trucks there are. */
+  name() {
+    const { crowds, chosen } = this, n = crowds.reduce((sum, { batch }) => sum + batch.n, 0);
+    byId("heading").textContent = `${whole(n)} trucks with trailers drive through roundabouts, live in this page`;
+    const one = chosen.policy === -1 ? "random actions" : "the same learned policy";
+    const by = chosen.second === null ? one : "one of two policies, the same start on both sides";
+    byId("sentence").textContent = `Each drives alone, by ${by}. Click one and take the wheel.`;
+  }
+
+  /** Steps that `seconds` of the page are. */
+  stepsOf(seconds) {
+    const most = (work) => Math.min(Math.max(Math.floor(work / (this.stepWork ?? MOST_WORK)), 1), 64);
+    // Until all trucks have set out, time runs as fast as it can.
+    if (this.rate === 0 || this.isFilling) return most(FRAME_WORK);
+    this.debt += (seconds * this.rate) / this.world.facts.step;
+    const steps = Math.min(Math.floor(this.debt), most(MOST_WORK));
+    // Time that the device cannot make up for is dropped.
+    this.debt = Math.min(this.debt - steps, 1);
+    return Math.max(steps, 0);
+  }
+
+  /** Other trucks move from now on: what a step took tells nothing of theirs. */
+  forgetWork() {
+    this.debt = 0;
+    this.stepWork = undefined;
+  }
+
+  /** Whether trucks are still to set out while nobody looks at a single one. */
+  get isFilling() {
+    return this.visit.focus === null && this.crowds.some(({ batch }) => batch.begun < batch.n);
+  }
+
+  /** The crowds that move: a failure that is driven again stops the others. */
+  get moving() {
+    const { again } = this.visit;
+    return again === null ? this.crowds : [again].filter(({ row }) => row.ended === 0);
+  }
+
+  /** Makes steps of everything that moves. */
+  async steps(count) {
+    const begun = performance.now(), { moving } = this;
+    if (moving.length === 0) return;
+    await Promise.all(moving.map((crowd) => crowd.advance(count)));
+    const work = (performance.now() - begun) / count;
+    this.stepWork = this.stepWork === undefined ? work : 0.8 * this.stepWork + 0.2 * work;
+    this.visit.notice();
+  }
+
+  /** Runs until another loop begins or the device is lost. */
+  async loop() {
+    const run = (this.run = {});
+    let before = performance.now(), counted = 0;
+    const frame = () => new Promise((next) => requestAnimationFrame(next));
+    try {
+      for (;;) {
+        await frame();
+        if (this.run !== run) return;
+        const now = performance.now(), seconds = Math.min((now - before) / 1000, 0.25);
+        before = now;
+        const count = this.playing ? this.stepsOf(seconds) : 0;
+        if (this.playing) this.visit.update(seconds);
+        // While nothing moves no figure changes.
+        const isDue = 0 < count && COUNT_EVERY < now - counted;
+        if (isDue) counted = now;
+        await this.between(() => this.frame(count, isDue));
+      }
+    } catch (error) {
+      if (this.run === run) this.sayMissing("failed", error.message);
+    }
+  }
+
+  /** Some steps, a picture, and now and then the figures. */
+  async frame(steps, isDue) {
+    if (0 < steps) await this.steps(steps);
+    this.draw();
+    this.visit.panel.show();
+    if (isDue) await this.count();
+    await this.gpu.device.queue.onSubmittedWorkDone();
+  }
+
+  async count() {
+    const { crowds } = this;
+    for (const crowd of crowds) await crowd.count();
+    showResults(this.live, crowds, this.split);
+    this.failures.show(crowds);
+  }
+
+  get scene() {
+    const since = this.rate === 0 || this.isFilling ? 0 : Math.min(this.debt, 1) * this.world.facts.step;
+    return { again: this.visit.again, since, colouring: this.colouring, rays: byId("rays").checked };
+  }
+
+  draw() {
+    this.stage.draw(this.scene);
+  }
+
+  resized() {
+    if (!this.stage || this.crowds.length === 0) return;
+    const { isFitted } = this.stage.camera;
+    this.stage.measure();
+    if (isFitted) this.stage.fit();
+  }
+
+  play(playing) {
+    this.playing = playing;
+    byId("play").textContent = playing ? "❚❚" : "▶";
+    byId("play").setAttribute("aria-label", playing ? "Pause" : "Go on");
+  }
+
+  setRate(rate) {
+    this.rate = rate;
+    this.debt = 0;
+    byId("rate").value = rate;
+  }
+
+  setColouring(colouring) {
+    this.colouring = colouring;
+    byId("colouring").value = colouring;
+    showLegend(this);
+  }
+
+  /** The index of a world that a policy can drive on, this one before all others. An error says why there is none. */
+  worldFor(policy) {
+    const { worlds } = this.live.facts, order = [this.chosen.world, ...worlds.keys()];
+    const found = order.find((index) => policy.check({ facts: worlds[index] }) === null);
+    if (found !== undefined) return found;
+    // A benchmark with the same extras says best what is different.
+    const nearest = worlds.find(({ extras }) => extras.join() === policy.extras.join()) ?? worlds[order[0]];
+    throw new Error(`${policy.name} ${policy.check({ facts: nearest })}.`);
+  }
+
+  /** Adds a policy to those to choose from, and drives by it. */
+  async addPolicy(policy, world) {
+    this.policies.push(policy);
+    try {
+      await this.choose({ world, policy: this.policies.length - 1 });
+    } catch (error) {
+      this.policies.pop();
+      showChoices(this);
+      throw error;
+    }
+  }
+
+  /** Takes a file that was dropped or chosen; what is said on the page. */
+  async dropFile(name, bytes) {
+    return this.attempt(async () => this.say(await takeFile(this, name, bytes)));
+  }
+
+  // What tests of the page ask.
+
+  /** Follows a truck of the first crowd. */
+  pickTruck(env) {
+    return this.between(() => this.visit.pick(env));
+  }
+
+  /** Makes steps of everything that moves, and draws. */
+  stepBy(count) {
+    return this.between(() => this.frame(count, true));
+  }
+
+  takeOver(asked) {
+    this.visit.takeOver(asked);
+  }
+
+  giveBack() {
+    this.visit.giveBack();
+  }
+
+  placeOf(road) {
+    return this.sites.places.find(({ index }) => index === road);
+  }
+
+  /** Shows a point of a road in the middle, the canvas so many metres wide. */
+  lookAt(road, x, y, width) {
+    const { camera } = this.stage, { offset } = this.placeOf(road);
+    camera.stay();
+    camera.centre = [offset[0] + x, offset[1] + y];
+    camera.pixel = width / camera.size[0];
+    this.draw();
+  }
+
+  /** The pixel of the page's canvas at a point of a road. */
+  screenOf(road, x, y) {
+    this.draw();
+    return this.stage.pixelOf(this.placeOf(road), x, y);
+  }
+
+  /** The colour at a pixel of the page's canvas (0 to 255). */
+  pixelAt(x, y) {
+    return this.stage.colourAt([x, y], this.scene);
+  }
+
+  /** A colour of the theme (0 to 255). */
+  colour(name) {
+    return numbersOf(colours()(name)).map((part) => Math.round(255 * part));
+  }
+}

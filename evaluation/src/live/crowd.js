@@ -1,0 +1,150 @@
+// A batch of trucks with what the page knows of it: its figures, the truck that is followed and how it drove.
+
+/** Steps of the followed truck that are kept. */
+const MOST_STEPS = 1024;
+/** Time over which a speed is averaged (ms). */
+const AVERAGED = 3000;
+
+class Crowd {
+  /** A crowd on `world` driven by `policy`; `routes` are those that trucks draw from. */
+  static async open({ picture, gpu, world, sites, options, policy }) {
+    const made = new Crowd(), batch = await Batch.open(gpu, world, options);
+    try {
+      await batch.setPolicy(policy).catch((error) => {
+        throw new Error(`${policy.name} ${error.message}.`);
+      });
+      Object.assign(made, { batch, world, policy, followed: null, row: null, steps: [] });
+      // Episodes that the visitor drove, at least in part: "truck/episode".
+      Object.assign(made, { driven: new Set(), rigs: new Map() });
+      Object.assign(made, { tally: null, failures: [], moments: [] });
+      made.picture = await BatchPicture.open(picture, batch, sites);
+    } catch (error) {
+      batch.close();
+      throw error;
+    }
+    return made;
+  }
+
+  close() {
+    this.closed = true;
+    this.picture.close();
+    this.batch.close();
+  }
+
+  /** Follows a truck, or none. */
+  async follow(env) {
+    this.followed = env;
+    this.batch.watch(env === null ? [] : [env]);
+    this.forgetSteps();
+    this.row = env === null ? null : await this.batch.row(env);
+    if (this.row) this.add(this.row);
+  }
+
+  forgetSteps() {
+    this.steps = [];
+    this.last = null;
+    this.picture.setPath([]);
+  }
+
+  /** Makes `count` steps. */
+  async advance(count) {
+    const { rows } = await this.batch.advance(count);
+    if (this.closed) return;
+    const own = rows.filter((row) => row.env === this.followed);
+    for (const row of own) {
+      this.add(row);
+      this.row = row;
+      if (row.ended !== 0) this.last = { ended: row.ended };
+    }
+    if (0 < own.length) this.picture.setPath(this.steps.map((step) => step.points));
+  }
+
+  /** Keeps a step of the followed truck. */
+  add(row) {
+    const before = this.steps.at(-1);
+    if (before && before.episode !== row.truck.episode) this.steps = [];
+    const points = [...row.truck.position, ...this.trailerOf(row.truck)];
+    this.steps.push({ row, episode: row.truck.episode, points });
+    this.steps.at(-1).offTracking = offTrackingAt(this.steps);
+    if (MOST_STEPS < this.steps.length) this.steps.shift();
+  }
+
+  /** Middle of the trailer's axles (m). */
+  trailerOf(truck) {
+    const { fifth_wheel, trailer_wheelbase } = this.rigOf(truck);
+    return truck.position.map((at, axis) => {
+      const along = (angle) => (axis === 0 ? Math.cos(angle) : Math.sin(angle));
+      return at + fifth_wheel * along(truck.heading) - trailer_wheelbase * along(truck.trailer_heading);
+    });
+  }
+
+  rigOf({ vehicle }) {
+    if (!this.rigs.has(vehicle)) this.rigs.set(vehicle, this.world.vehicle(vehicle).rig);
+    return this.rigs.get(vehicle);
+  }
+
+  /** Where the followed truck is in the picture (m), moved on by `since` seconds as view.wgsl does it. */
+  middle(since) {
+    const { truck } = this.row, rig = this.rigOf(truck), offset = this.picture.sites.offsetOf(truck.route);
+    const way = truck.held ? 0 : truck.speed * since, turn = (way * Math.tan(truck.steering)) / rig.wheelbase;
+    const along = truck.heading + turn / 2, position = [way * Math.cos(along), way * Math.sin(along)]
+      .map((moved, axis) => truck.position[axis] + moved);
+    const trailer_heading = truck.trailer_heading +
+      (way * Math.sin(truck.heading - truck.trailer_heading)) / rig.trailer_wheelbase;
+    const trailer = this.trailerOf({ ...truck, position, heading: truck.heading + turn, trailer_heading });
+    return position.map((at, axis) => offset[axis] + 0.6 * at + 0.4 * trailer[axis]);
+  }
+
+  /** Reads the sums and the failures. */
+  async count() {
+    const [tally, failures] = [await this.batch.tally(), await this.batch.failures()];
+    if (this.closed) return;
+    Object.assign(this, { tally, failures });
+    this.moments.push([performance.now(), tally.env_steps]);
+    while (2 < this.moments.length && AVERAGED < this.moments.at(-1)[0] - this.moments[0][0]) this.moments.shift();
+  }
+
+  /** Env steps a second over the last seconds. */
+  get speed() {
+    if (this.moments.length < 2) return NaN;
+    const [[t0, n0], [t1, n1]] = [this.moments[0], this.moments.at(-1)];
+    return (1000 * (n1 - n0)) / (t1 - t0);
+  }
+
+  /** Index of the truck nearest to a point of the picture, within `reach`; null where there is none. All (m). */
+  async nearest(point, reach) {
+    const { offsetOf } = this.picture.sites, { fields, size } = this.picture.picture.live.facts.code.structs.Truck;
+    const bytes = new DataView(await this.batch.column("truck"));
+    let found = null, least = reach;
+    for (let env = 0; env < this.batch.n; env++) {
+      const float = (name, more = 0) => bytes.getFloat32(env * size + fields[name].at + more, true);
+      const word = (name) => bytes.getUint32(env * size + fields[name].at, true);
+      if (word("held") === 1) continue;
+      const offset = offsetOf(word("route"));
+      // Also a click on the trailer finds the truck.
+      const [x, y] = [offset[0] + float("position"), offset[1] + float("position", 4)];
+      const heading = float("trailer_heading");
+      for (const back of [0, 4, 8]) {
+        const away = Math.hypot(x - back * Math.cos(heading) - point[0], y - back * Math.sin(heading) - point[1]);
+        if (away < least) [found, least] = [env, away];
+      }
+    }
+    return found;
+  }
+}
+
+/** How far the trailer's axles are from the path of the tractor's drive axle, over the steps so far (m). */
+function offTrackingAt(steps) {
+  const [, , x, y] = steps.at(-1).points;
+  // A trailer follows some 15 m behind at most: the last steps hold its way.
+  const path = steps.slice(-120).map(({ points }) => points);
+  let least = Infinity, isStart = false;
+  for (let n = 1; n < path.length; n++) {
+    const [ax, ay] = path[n - 1], [bx, by] = path[n], [dx, dy] = [bx - ax, by - ay];
+    const at = Math.min(Math.max(((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy || 1e-9), 0), 1);
+    const away = Math.hypot(ax + at * dx - x, ay + at * dy - y);
+    if (away < least) [least, isStart] = [away, n === 1 && at === 0];
+  }
+  // Until the trailer has come to where the path begins there is none beside it.
+  return isStart || least === Infinity ? 0 : least;
+}

@@ -1,0 +1,94 @@
+// The panel of the truck that is followed: how it drives, what it observes, and what its policy makes of that.
+
+const inDegrees = (angle) => (180 * angle) / Math.PI;
+/** Largest of the two units' load transfer ratios. */
+const transferOf = ({ truck }) =>
+  Math.max(Math.abs(truck.tractor_load_transfer_ratio), Math.abs(truck.trailer_load_transfer_ratio));
+const articulationOf = ({ truck }) => {
+  const angle = truck.heading - truck.trailer_heading;
+  return Math.atan2(Math.sin(angle), Math.cos(angle));
+};
+
+/** A steer angle in words (deg). */
+const turnWords = (angle) => `${degrees(Math.abs(angle), 1)} ${angle < 0 ? "right" : "left"}`;
+
+/** The readings: name, value of a step, text. Each is also a small curve over the episode. */
+const LIVE_READINGS = [
+  ["Speed", ({ row }) => 3.6 * row.truck.speed, (value) => `${decimal(value, 1)}${GAP}km/h`, "tall"],
+  ["Load transfer ratio", ({ row }) => transferOf(row), (value) => decimal(value, 2), "tall"],
+  ["Off-tracking", ({ offTracking }) => offTracking, metres],
+  ["Steering", ({ row }) => inDegrees(row.truck.steering), turnWords],
+  ["Articulation", ({ row }) => inDegrees(articulationOf(row)), (value) => degrees(value, 1)],
+  ["Nearest kerb", ({ row }) => Math.min(row.clearance.tractor, row.clearance.trailer), metres],
+  ["Lane's centre", ({ row }) => row.progress.lane_distance, metres],
+];
+/** Points of a small curve, and pictures of the panel a second. */
+const MOST_SPARKS = 120, PANEL_RATE = 8;
+
+class Followed {
+  constructor(live) {
+    this.live = live;
+    this.crowd = null;
+    this.shownAt = 0;
+    byId("readings").replaceChildren(...LIVE_READINGS.map(([name, , , kind]) =>
+      html("div", { class: kind }, html("dt", {}, name), html("dd", {}), sparkline([0, 0]))));
+  }
+
+  /** Shows the truck that a crowd follows; none with null. */
+  open(crowd) {
+    this.crowd = crowd;
+    byId("truck").hidden = crowd === null;
+    if (crowd === null) return;
+    const { world, policy } = crowd, facts = this.live.facts.code, { extras, actions } = world.facts;
+    const observed = facts.observation.concat(extras.map((name, n) => {
+      const { doc } = facts.extras.find((extra) => extra.name === name);
+      return { name, doc, n: 1, low: -1, first: facts.n_values + n };
+    }));
+    byId("values-summary").textContent = `The ${facts.n_values + extras.length} values that it observes`;
+    this.values = new ValueBars(observed);
+    byId("values").replaceChildren(this.values.node);
+    byId("policy-part").hidden = policy === null;
+    this.outputs = policy && new OutputCells(actions);
+    if (policy) byId("outputs").replaceChildren(this.outputs.node);
+    this.show(true);
+  }
+
+  /** Shows the latest step, some times a second. */
+  show(atOnce = false) {
+    const { crowd } = this, now = performance.now();
+    if (crowd === null || crowd.row === null || (!atOnce && now - this.shownAt < 1000 / PANEL_RATE)) return;
+    this.shownAt = now;
+    const { row, steps, world } = crowd, { truck } = row;
+    this.name(row);
+    LIVE_READINGS.forEach(([, value, words], index) => {
+      const node = byId("readings").children[index], values = thinned(steps.map(value), MOST_SPARKS);
+      if (values.length === 0) return;
+      node.querySelector("dd").textContent = words(values.at(-1));
+      node.querySelector("svg").replaceWith(sparkline(values));
+    });
+    const seen = [...row.observation, ...[...row.extras].slice(0, world.facts.extras.length)];
+    this.values.show(seen);
+    if (this.outputs) {
+      const best = this.outputs.show(crowd.policy.outputs(row.observation, row.extras));
+      // Behind the table's actions stands that of a visitor who drives.
+      byId("outputs-words").textContent = `${row.action < world.facts.n_actions ? "chooses" : "would choose"} ${best}`;
+    }
+  }
+
+  /** Which truck it is, and which load it carries. */
+  name({ truck }) {
+    const { world, failure, followed } = this.crowd, { facts } = world, env = failure?.env ?? followed;
+    byId("truck-title").textContent = `Truck ${whole(env)}`;
+    byId("truck-route").textContent = `${facts.routes[truck.route].name}, episode ${truck.episode}`;
+    byId("truck-load").textContent = truckWords(facts, truck.vehicle);
+  }
+}
+
+/** Words for the names of vehicles and loads in `scenarios/vehicles/`. */
+const loadWords = (load) => (load === "half" ? "half laden" : load.replaceAll("_", " "));
+
+/** Vehicle and load of a row of the table of vehicles. */
+function truckWords(facts, index) {
+  const { vehicle, load } = facts.classes[facts.vehicles[index]];
+  return [vehicle.replaceAll("_", " "), `trailer ${loadWords(load)}`].filter(Boolean).join(", ");
+}

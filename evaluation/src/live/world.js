@@ -1,0 +1,52 @@
+// A benchmark: its names, and its tables as buffers and as numbers.
+
+class World {
+  constructor(gpu, facts) {
+    Object.assign(this, { gpu, facts, live: gpu.live });
+    const uniform = new Set(
+      this.live.facts.code.buffers.filter(({ access }) => access === "uniform").map(({ name }) => name),
+    );
+    this.kept = new Map();
+    this.tables = {};
+    for (const name of Object.keys(facts.tables)) {
+      const bytes = this.bytes(name);
+      this.tables[name] = gpu.buffer(
+        name,
+        bytes.length,
+        bytes,
+        uniform.has(name) ? GPUBufferUsage.UNIFORM : GPUBufferUsage.STORAGE,
+      );
+    }
+  }
+
+  /** A table's bytes. */
+  bytes(table) {
+    return this.live.sections(this.facts.tables[table]);
+  }
+
+  /** A row of the table of vehicles: the fields of its rig, and its distance sensors. */
+  vehicle(index) {
+    this.vehicles ??= this.bytes("vehicles");
+    const { size } = this.live.facts.code.structs.VehicleRow;
+    return readStruct(this.live, "VehicleRow", this.vehicles, index * size);
+  }
+
+  /** Position and direction of each waypoint of a route. */
+  waypoints(route) {
+    if (!this.kept.has(route)) {
+      this.roads ??= this.bytes("roads");
+      const view = new DataView(this.roads.buffer, this.roads.byteOffset);
+      const { route_rows: rows, row_bytes: width } = this.live.facts.code.roads;
+      const [first, n] = [0, 4].map((offset) => view.getUint32(route * rows * width + offset, true));
+      const waypoint = (_, index) => readStruct(this.live, "WaypointRow", this.roads, (first + index) * width);
+      this.kept.set(route, Array.from({ length: n }, waypoint));
+    }
+    return this.kept.get(route);
+  }
+
+  /** Index of the action nearest to a steer angle (rad) and a speed, or change of the target speed (m/s). */
+  nearestAction(steering, speed) {
+    const far = ([angle, other]) => Math.abs(angle - steering) + Math.abs(other - speed);
+    return this.facts.actions.reduce((best, action, index, all) => (far(action) < far(all[best]) ? index : best), 0);
+  }
+}
