@@ -48,7 +48,8 @@ def test_continuous_actions_are_driven_without_a_policy_too() -> None:
     assert game.is_player and game.policy is None
     game.turn(4)
     np.testing.assert_array_equal(game.actions(), np.array([[0.5, 1.0]], np.float32))
-    game.step()
+    for _ in range(8):
+        game.step()
     assert game.batch.columns("truck")["truck"]["steering"][0] > 0
 
 
