@@ -24,6 +24,25 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! One that sees several steps or has recurrent layers remembers. A [`Driver`] keeps what it remembers of each truck:
+//!
+//! ```
+//! use offtrack::layout::{N_EXTRAS, N_VALUES};
+//! use offtrack_policy::{Frames, Padding, Policy};
+//!
+//! # fn main() -> Result<(), offtrack_policy::Error> {
+//! let mut policy = Policy::shipped("attard2023")?;
+//! policy.frames = Frames { n: 2, padding: Padding::Zero };
+//! policy.layers[0].weights = policy.layers[0].weights.repeat(2); // for the last step's values and the one's before
+//! let mut driver = policy.driver(3);
+//! let observations = [[0.5; N_VALUES]; 3];
+//! let actions = driver.act(&[0, 1, 2], &observations, &[[0.0; N_EXTRAS]; 3]);
+//! driver.begin(2); // its next observation is the first one of an episode
+//! # assert_eq!(actions.len(), 3);
+//! # Ok(())
+//! # }
+//! ```
 
 mod bounds;
 mod check;

@@ -189,7 +189,7 @@ def read(file: str) -> Network:
 def _passed(reader: _Reader, node: Any) -> tuple[str, tuple[str, Any] | None]:
     """The input that flows into a node, and what the node is: its kind and numbers, ``None`` where it changes none."""
     kind = node.op_type
-    if kind in SHAPES or kind == "ArgMax":
+    if kind in SHAPES or kind == "ArgMax" or (kind == "Gather" and _is_one_step(reader.constant(node.input[1]))):
         return node.input[0], None
     if kind in ("Relu", "Tanh"):
         return node.input[0], (kind, None)
@@ -212,6 +212,11 @@ def _passed(reader: _Reader, node: Any) -> tuple[str, tuple[str, Any] | None]:
     raise TypeError(
         f"{_named(node)}: a policy file has no place for it; Gemm, MatMul, Add, Relu, Tanh, GRU and LSTM are read"
     )
+
+
+def _is_one_step(index: Any) -> bool:
+    """Whether a Gather takes the first or last of an axis, which is that of time: a policy sees one step at a time."""
+    return index is not None and np.ndim(index) == 0 and int(index) in (0, -1)
 
 
 def _gemm(reader: _Reader, node: Any) -> Layer:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,16 @@ def test_recurrent_layers_do_what_pytorch_documents_and_begin_anew_where_an_epis
         taken.update(actions.tolist())
         last = rays
     assert len(taken) > 2
+
+
+def test_a_copy_of_a_policy_with_a_memory_drives_as_it_does(tmp_path: Path) -> None:
+    policy, _ = remembering(tmp_path, GRU)
+    copy = pickle.loads(pickle.dumps(policy))
+    drivers = policy.driver(9), copy.driver(9)
+    for observation in observed(6, 9):
+        one, other = (driver.act(observation) for driver in drivers)
+        assert (one == other).all()
+    assert copy.values == RAYS and copy.frames == 2
 
 
 def test_a_policy_with_a_memory_drives_by_a_driver_alone(tmp_path: Path) -> None:

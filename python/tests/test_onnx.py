@@ -112,6 +112,31 @@ def test_a_graph_as_other_exporters_write_it_is_read(tmp_path: Path) -> None:
     assert equal(export.from_onnx(file), export.network(saved(tmp_path, LAYERS["perceptron"])))
 
 
+def test_a_recurrent_graph_over_time_is_read_as_one_of_a_step(tmp_path: Path) -> None:
+    policy = saved(tmp_path, [GRU(69, 7, 1), Linear(7, 9, 2)])
+    file, node = tmp_path / "other.onnx", onnx.helper.make_node
+    export.to_onnx(policy, file)
+    written = onnx.load(str(file)).graph
+    weights = {tensor.name: onnx.numpy_helper.to_array(tensor) for tensor in written.initializer}
+    weights = {name: value for name, value in weights.items() if value.dtype == np.float32}
+    of = {one.op_type: list(one.input) for one in written.node}
+    (w, r, b), (head, biases) = of["GRU"][1:4], of["Gemm"][1:3]
+    model = graph(
+        node("Unsqueeze", ["x", "zero"], ["steps"]),
+        node("GRU", ["steps", w, r, b], ["all"], hidden_size=7, linear_before_reset=1),
+        node("Squeeze", ["all", "one"], ["hidden"]),
+        node("Gather", ["hidden", "last"], ["now"], axis=0),
+        node("Gemm", ["now", head, biases], ["y"]),
+        constants=weights,
+    )
+    integers = {"zero": [0], "one": [1], "last": -1}
+    model.graph.initializer.extend(
+        onnx.numpy_helper.from_array(np.array(value, np.int64), name) for name, value in integers.items()
+    )
+    onnx.save(model, str(file))
+    assert equal(export.from_onnx(file), export.network(policy))
+
+
 @pytest.mark.parametrize(
     ("kind", "inputs", "more", "message"),
     [

@@ -38,7 +38,7 @@ fn remembering(like: &Policy) -> Policy {
 }
 
 /// The policy with frames of which it reads the last one alone.
-fn stacked(policy: &Policy, n: usize) -> Policy {
+pub(super) fn stacked(policy: &Policy, n: usize) -> Policy {
     let mut stacked = policy.clone();
     let n_unread = (n - 1) * N_VALUES * policy.layers[0].n_outputs();
     stacked.layers[0].weights = [vec![0.0; n_unread], policy.layers[0].weights.clone()].concat();

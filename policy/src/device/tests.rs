@@ -186,7 +186,8 @@ fn a_policy_that_is_too_wide_or_cannot_drive_is_refused_by_name() {
         change(&mut policy);
         refusal(&policy, "attard2023")
     };
-    let cases: [(Change, &str); 6] = [
+    let cases: [(Change, &str); 7] = [
+        (|policy| policy.frames.n = 2, "(shipped): is a policy with a memory, values of its own or commands: a device"),
         (|policy| policy.layers[1].weights[7] = f32::NAN, "actor.1.weight[7] is NaN; every number must be finite"),
         (|policy| policy.normalisation.mean[2] = f32::INFINITY, "observation.mean[2] is inf"),
         (|policy| policy.layers[0].weights.fill(3e38), "the outputs of actor.0 may reach"),

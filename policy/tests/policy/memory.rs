@@ -273,3 +273,31 @@ fn a_policy_that_reads_some_values_drives_wherever_these_are_observed() {
     let message = check(ObservedExtras::None, &["friction"]).unwrap_err();
     assert!(message.contains("it has the extras none; one with the key observation.extras = \"oracle\""), "{message}");
 }
+
+proptest! {
+    #[test]
+    fn bytes_changed_at_random_never_panic_and_never_give_another_policy_with_a_memory(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+        number in any::<u64>(),
+        key in prop::sample::select(vec!["frames", "layers", "after"]),
+    ) {
+        let policy = remembering(Gates::Lstm, Padding::Zero);
+        let bytes = policy.to_bytes();
+        let mut changed = bytes.clone();
+        for (index, value) in &changes {
+            changed[index.index(bytes.len())] = *value;
+        }
+        if let Ok(policy) = Policy::from_bytes("changed", &changed) {
+            prop_assert_eq!(policy.to_bytes(), bytes.clone());
+        }
+        // Any number in a description whose checksum is right.
+        let key = format!("\"{key}\":");
+        let described = described(&policy, |text| {
+            let (before, rest) = text.rsplit_once(&key).unwrap();
+            format!("{before}{key}{number}{}", rest.trim_start_matches(|letter: char| letter.is_ascii_digit()))
+        });
+        if let Ok(policy) = Policy::from_bytes("described", &described) {
+            prop_assert_eq!(policy.to_bytes(), bytes);
+        }
+    }
+}

@@ -11,6 +11,7 @@ use crate::device::{self, Device};
 use crate::error::Error;
 use crate::evaluation::{Driven, Evaluation};
 use crate::placed::placed;
+use crate::placed::tests::stacked;
 
 use super::*;
 
@@ -47,6 +48,22 @@ fn an_evaluation_on_a_device_counts_the_processors_episodes_and_copies_no_observ
             assert!(apart(|episode| episode.reward) < 1e-2 && apart(|episode| episode.lane_distance_mean) < 1e-3);
         }
         assert!(driven(&scenario, &world, &mut policy, &device).is_err(), "observations for the processor are copied");
+    }
+}
+
+#[test]
+fn a_policy_with_a_memory_drives_the_trucks_of_a_device_from_the_processor() {
+    let mut scenario = Scenario::named("attard2023").unwrap();
+    scenario.keep(&[Split::Test]);
+    let world = Arc::new(World::bake(&scenario).unwrap());
+    let mut policy = Policy::shipped("attard2023").unwrap();
+    let device = device::open(None).unwrap();
+    // It heeds the last of its frames: on the processor it drives as the policy that sees one.
+    let mut framed = placed(stacked(&policy, 2), &device.engine, &world, Choice::Best).unwrap();
+    let here = driven(&scenario, &world, &mut policy, &Device::processor()).unwrap();
+    let there = driven(&scenario, &world, framed.as_mut(), &device).unwrap();
+    for (here, there) in here.episodes.iter().zip(&there.episodes) {
+        assert_eq!((here.ended, here.steps), (there.ended, there.steps));
     }
 }
 
