@@ -2,10 +2,33 @@
 
 use std::collections::BTreeMap;
 
-use offtrack::layout::{Ended, Truck};
+use offtrack::layout::{Ended, RewardTerms, Truck};
 use serde::Serialize;
 
 use super::driving::Driving;
+
+/// Sums over an episode's steps of the physical amounts that the reward weighs, as [`RewardTerms`] describes them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Terms {
+    /// Waypoints passed.
+    pub waypoints: f64,
+    /// Scaled distances to the lane centre.
+    pub lane_distance: f64,
+    /// Depths in the margin kept from kerbs.
+    pub clearance: f64,
+    /// 1 for an episode that failed.
+    pub failure: f64,
+}
+
+impl Terms {
+    /// Adds those of a step.
+    pub(super) fn add(&mut self, terms: &RewardTerms) {
+        self.waypoints += f64::from(terms.waypoints);
+        self.lane_distance += f64::from(terms.lane_distance);
+        self.clearance += f64::from(terms.clearance);
+        self.failure += f64::from(terms.failure);
+    }
+}
 
 /// The figures of one episode.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +39,8 @@ pub struct Episode {
     pub steps: u32,
     /// Sum of the rewards.
     pub reward: f64,
+    /// Sums of what the reward weighs.
+    pub terms: Terms,
     /// Mean distance to the lane centre (m).
     pub lane_distance_mean: f64,
     /// Largest distance to the lane centre (m).
@@ -154,6 +179,7 @@ pub(super) mod tests {
             ended,
             steps: 999,
             reward: -500.0,
+            terms: Terms::default(),
             lane_distance_mean: 10.25,
             lane_distance_max: 19.25,
             outside_lane: 0.25,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::recording::{Recorder, Track};
-use offtrack::layout::{Control, Ended, Rig, Start, Truck};
+use offtrack::layout::{Rig, Start};
 use offtrack::map::route::Route;
 use offtrack::physics::drawn_start;
 use offtrack::scenario::{Scenario, Split};
@@ -15,15 +15,13 @@ use rayon::prelude::*;
 
 use crate::classes;
 use crate::device::Device;
-use crate::driving::Driving;
 use crate::episodes::Episodes;
 use crate::error::Error;
+use crate::figures::Figures;
 use crate::groups::{Evaluated, Groups};
-use crate::part::LaneWidths;
 use crate::policies::Controller;
 use crate::possible::Possible;
 use crate::report::{Episode, Report, RouteReport, Summary};
-use crate::running::Running;
 use crate::seen::Seen;
 use crate::sequences::Sequences;
 use crate::shown::shown;
@@ -83,40 +81,23 @@ impl Evaluation<'_> {
     /// known which failed, and recorded as they are driven again.
     pub fn drive(&self, policy: &mut dyn Controller, progress: &mut dyn FnMut(usize, usize)) -> Result<Driven, Error> {
         let begun = self.begin()?;
-        let (world, n_episodes) = (self.world, begun.simulator().n_envs());
-        let lanes: Vec<LaneWidths> =
-            self.routes().iter().map(|(_, place, route)| LaneWidths::of(self.scenario, place, route)).collect();
-        let mut running: Vec<Running> = {
-            let seen = Seen::of(begun.simulator())?;
-            let has_classes = classes::has_classes(self.scenario);
-            let new = |(truck, control): (&Truck, &Control)| {
-                let driving = has_classes.then(|| Driving::new(truck, control.target_speed));
-                Running::new(world.rig(truck), truck, driving, self.scenario.step)
-            };
-            seen.truck.iter().zip(seen.control.iter()).map(new).collect()
-        };
-        let mut sequences = Sequences::new(world, n_episodes);
-        let mut finished: Vec<Option<Episode>> = vec![None; n_episodes];
+        let n_episodes = begun.simulator().n_envs();
+        let routes = self.scenario.split(self.split);
+        let mut figures = Figures::begin(self.scenario, self.world, routes, self.episodes, begun.simulator())?;
+        let mut sequences = Sequences::new(self.world, n_episodes);
         let mut n_finished = 0;
         begun.drive(|simulator| {
-            let n_before = n_finished;
             policy.step(simulator)?;
             let seen = Seen::of(simulator)?;
-            sequences.add(&seen, &finished);
-            for (env, (running, finished)) in running.iter_mut().zip(&mut finished).enumerate() {
-                if finished.is_none()
-                    && running.follow(world.rig(&seen.truck[env]), &lanes[env / self.episodes], &seen, env)
-                {
-                    *finished = Some(running.finish(Ended::from_code(seen.ended[env]).unwrap_or(Ended::Running)));
-                    n_finished += 1;
-                }
-            }
-            if n_before < n_finished {
+            sequences.add(&seen, figures.finished());
+            let n_ended = figures.add(&seen);
+            n_finished += n_ended;
+            if 0 < n_ended {
                 progress(n_finished, n_episodes);
             }
             Ok::<(), Error>(())
         })?;
-        let episodes: Vec<Episode> = finished.into_iter().flatten().collect();
+        let episodes = figures.finish();
         let tracks = if self.record { self.repeated(&sequences, &shown(&episodes))? } else { Vec::new() };
         Ok(Driven { episodes, tracks, sequences })
     }
@@ -207,10 +188,7 @@ impl Evaluation<'_> {
 
     /// The routes of the split, in its order.
     pub(crate) fn routes(&self) -> Vec<Evaluated<'_>> {
-        let Evaluation { scenario, split, .. } = *self;
-        let all: Vec<Evaluated> =
-            scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
-        scenario.split(split).iter().map(|&route| all[route as usize]).collect()
+        routes_of(self.scenario, self.scenario.split(self.split))
     }
 
     /// The route of an episode as an index of the world, and its start.
@@ -239,6 +217,12 @@ impl Evaluation<'_> {
         };
         of_one_place.par_iter().flat_map_iter(suffices).collect()
     }
+}
+
+/// The routes of these indices, in their order.
+pub(crate) fn routes_of<'a>(scenario: &'a Scenario, routes: &[u32]) -> Vec<Evaluated<'a>> {
+    let all: Vec<Evaluated> = scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
+    routes.iter().map(|&route| all[route as usize]).collect()
 }
 
 /// The truck whose trailer's axle cuts a circle of the front axle most: their squared radii differ by the sum of the

@@ -40,6 +40,7 @@ mod sequences; // the actions of episodes
 mod evaluation; // every route, every start, every episode counted
 mod part; // entry, ring and exit of a route
 mod running; // an episode under way
+pub mod figures; // the figures of several, to their ends
 pub mod driving; // how a truck drives through an episode
 pub mod episode; // the figures of an episode, and of several
 pub mod classes; // how trucks drive, by vehicle and load

@@ -10,7 +10,7 @@ use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Ended, Rig, Truck};
 
 use super::driving::Driving;
-use super::episode::Episode;
+use super::episode::{Episode, Terms};
 use super::part::LaneWidths;
 use super::seen::Seen;
 
@@ -39,6 +39,7 @@ impl Running {
                 ended: Ended::Running,
                 steps: 0,
                 reward: 0.0,
+                terms: Terms::default(),
                 lane_distance_mean: 0.0,
                 lane_distance_max: 0.0,
                 outside_lane: 0.0,
@@ -63,6 +64,7 @@ impl Running {
         let lower = |least: &mut f64, value: f32| *least = least.min(f64::from(value));
         self.episode.steps += 1;
         self.episode.reward += f64::from(seen.reward[env]);
+        self.episode.terms.add(&seen.terms[env]);
         self.lane_distance_sum += f64::from(progress.lane_distance);
         self.outside += u32::from(lane.half_width(progress.waypoint) < progress.lane_distance);
         raise(&mut self.episode.lane_distance_max, progress.lane_distance);

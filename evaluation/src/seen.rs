@@ -3,10 +3,10 @@
 use std::borrow::Cow;
 
 use bytemuck::{AnyBitPattern, NoUninit};
-use offtrack::layout::{Clearance, Column, Command, Control, Progress, Truck};
+use offtrack::layout::{Clearance, Column, Command, Control, Progress, RewardTerms, Truck};
 use offtrack::simulator::{Error, Simulator};
 
-const COLUMNS: [Column; 8] = [
+const COLUMNS: [Column; 9] = [
     Column::Action,
     Column::Command,
     Column::Control,
@@ -15,6 +15,7 @@ const COLUMNS: [Column; 8] = [
     Column::Progress,
     Column::Ended,
     Column::Reward,
+    Column::Terms,
 ];
 
 /// Columns of a batch, `[n_envs]` rows each.
@@ -28,6 +29,7 @@ pub(crate) struct Seen<'a> {
     pub(crate) progress: Cow<'a, [Progress]>,
     pub(crate) ended: Cow<'a, [u32]>,
     pub(crate) reward: Cow<'a, [f32]>,
+    pub(crate) terms: Cow<'a, [RewardTerms]>,
 }
 
 impl<'a> Seen<'a> {
@@ -45,6 +47,7 @@ impl<'a> Seen<'a> {
             progress: rows(next()),
             ended: rows(next()),
             reward: rows(next()),
+            terms: rows(next()),
         })
     }
 }

@@ -4,6 +4,7 @@ use offtrack::layout::{N_EXTRAS, N_VALUES};
 
 use crate::network::Pass;
 use crate::policy::{Policy, greedy};
+use crate::recurrent::Recurrent;
 
 /// A policy that drives `n_envs` trucks. Of one without a memory it remembers nothing.
 ///
@@ -27,8 +28,8 @@ impl Driver {
     ///
     /// As [`Policy::logits`], where it acts.
     pub fn new(policy: Policy, n_envs: usize) -> Driver {
-        let n_stack = if policy.frames.n == 1 { 0 } else { policy.n_stacked() };
-        let n_kept = policy.recurrent.as_ref().map_or(0, |recurrent| recurrent.n_kept());
+        let n_kept = policy.recurrent.as_ref().map_or(0, Recurrent::n_kept);
+        let n_stack = policy.n_remembered() - n_kept;
         Driver {
             policy,
             begins: vec![true; n_envs],

@@ -212,6 +212,12 @@ impl Policy {
         }
     }
 
+    /// Numbers that a [`Driver`] remembers of each truck.
+    pub fn n_remembered(&self) -> usize {
+        let n_stack = if self.frames.n == 1 { 0 } else { self.n_stacked() };
+        n_stack + self.recurrent.as_ref().map_or(0, Recurrent::n_kept)
+    }
+
     /// Values that it reads of a step.
     pub(crate) fn n_values(&self) -> usize {
         self.values.as_ref().map_or(N_VALUES + self.extras.len(), |values| values.indices().len())

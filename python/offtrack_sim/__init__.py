@@ -4,9 +4,10 @@
 - :class:`Roundabout` is one truck, ``gymnasium.make("offtrack_sim:offtrack/Roundabout-v0")``.
 - :class:`Batch` is the simulator itself, without spaces and infos.
 - :class:`Policy` drives: the policy that comes with the package, or a trained one. :func:`evaluate` counts its success.
+  A :class:`Driver` is one that remembers.
 - :class:`Observer` is what a policy observes of trucks that something else drives.
 - :mod:`offtrack_sim.sb3`, :mod:`offtrack_sim.puffer`: the same trucks for Stable-Baselines3 and PufferLib.
-- :mod:`offtrack_sim.export` writes a network of PyTorch as a policy file.
+- :mod:`offtrack_sim.export` writes a network of PyTorch, or of an ONNX graph, as a policy file.
 
 An observation is 69 values of float32 in ``[-1, 1]``, see :data:`OBSERVATION`, and behind them the extras that a
 benchmark may observe, see :data:`EXTRAS`; an action is an index into ``Batch.action_table`` or, where a
@@ -22,7 +23,7 @@ from .batch import Batch, Ends, Start
 from .evaluation import Evaluation, evaluate
 from .layout import COLUMNS, EXTRAS, OBSERVATION, Ended, Values
 from .observer import Frame, Observer, Seen, speed_control
-from .policy import Policy
+from .policy import Driver, Policy
 from .scenarios import write_scenarios
 from .single import Roundabout
 from .vector import RoundaboutVector, make_vec
@@ -32,6 +33,7 @@ __all__ = [
     "EXTRAS",
     "OBSERVATION",
     "Batch",
+    "Driver",
     "Ended",
     "Ends",
     "Evaluation",

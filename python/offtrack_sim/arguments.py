@@ -11,6 +11,8 @@ from typing import Any
 
 #: Most names of routes that a batch takes: more than any benchmark has routes.
 MOST_NAMES = 10_000_000
+#: Most names of values that a policy reads: more than there are.
+MOST_VALUES = 1000
 
 
 def mode_name(mode: str | enum.Enum) -> str:
@@ -69,6 +71,14 @@ def names_of(routes: Iterable[str]) -> list[str]:
     if wrong is not None:
         raise TypeError(f"routes: {wrong!r}; names of routes or roundabouts are needed")
     return names
+
+
+def names_of_values(values: Iterable[str]) -> list[str]:
+    """Names of values as a list."""
+    names = [values] if isinstance(values, str) else list(itertools.islice(values, MOST_VALUES + 1))
+    if len(names) > MOST_VALUES:
+        raise ValueError(f"values: more than {MOST_VALUES} names")
+    return [text("values", name) for name in names]
 
 
 def text(name: str, value: object) -> str:

@@ -32,6 +32,22 @@ class Evaluation:
     """Names of the routes, n of them."""
     ended: npt.NDArray[np.int64]
     """Why each episode ended, as :class:`offtrack_sim.Ended`, ``[n, episodes]``."""
+    table: npt.NDArray[np.void]
+    """A row an episode, route by route, ``[n * episodes]``, with the fields
+
+    - ``route``, ``episode``: the route's name, and the episode's index among those of its route;
+    - ``start_offset``, ``start_heading``, ``start_speed``, ``vehicle``: the start, as :class:`offtrack_sim.Start`;
+    - ``ended``, ``steps``: why it ended, as :class:`offtrack_sim.Ended`, and its steps of 0.1 s;
+    - ``reward``, and what the reward weighs, each summed over the steps: ``term_waypoints``, waypoints passed;
+      ``term_lane_distance``, distances as fractions of their limit; ``term_clearance``, depths in the margin kept from
+      kerbs, 0..1; ``term_failure``, 1 for a failure;
+    - ``lane_distance_mean``, ``lane_distance_max`` [m]; ``outside_lane``, a fraction of the steps;
+    - ``tractor_clearance_min``, ``trailer_clearance_min`` [m], negative beyond a kerb;
+    - ``load_transfer_ratio_peak``, 1 where wheels lift; ``articulation_peak`` [rad]; ``off_tracking_peak`` [m].
+
+    ``pandas.DataFrame(table)`` takes it, and ``np.savetxt(file, table, "%s", ",", header=",".join(table.dtype.names),
+    comments="")`` writes it.
+    """
 
     @property
     def success(self) -> float:
@@ -78,7 +94,7 @@ class Evaluation:
 
 
 def evaluate(
-    policy: Policy | Callable[[npt.NDArray[np.float32]], Any],
+    policy: Policy | Callable[..., Any],
     scenario: str | os.PathLike[str] = "attard2023",
     *,
     split: str = "test",
@@ -86,6 +102,7 @@ def evaluate(
     episodes: int = 30,
     seed: int = 0,
     device: str = "cpu",
+    begins: bool = False,
 ) -> Evaluation:
     """Drives every route of a split ``episodes`` times and counts how the episodes ended.
 
@@ -93,11 +110,15 @@ def evaluate(
 
     Args:
         policy: A :class:`offtrack_sim.Policy`, or any function from observations ``[n, n_values]`` to actions
-            ``[n]``, of continuous ones ``[n, n_commands]``: 69 values, and behind them the benchmark's extras.
+            ``[n]``, of continuous ones ``[n, n_commands]``: 69 values, and behind them the benchmark's extras. Rows are
+            those of the trucks that still drive.
         scenario, split, routes, device: As for :class:`offtrack_sim.Batch`. A :class:`offtrack_sim.Policy` acts on the
             device, too.
         episodes: Episodes on each route.
         seed: Seed of the starts.
+        begins: Whether the function remembers: then it is called with observations and a mask ``[n]`` of the trucks
+            whose episode begins, as of ``episode_start`` in Stable-Baselines3's ``predict``, and the rows are those of
+            all trucks at each step, in one order. What it gives for one whose episode has ended has no effect.
 
     Raises:
         TypeError: For a function that gives anything but integers, or commands, one for each observation.
@@ -113,20 +134,34 @@ def evaluate(
     batch = Batch(scenario, 1, split=split, routes=routes)
     if isinstance(policy, Policy):
         policy.check(batch)
+    if begins and isinstance(policy, Policy):
+        raise ValueError("begins: True; a Policy remembers by itself: leave it out")
     chooser = _chooser(policy, batch.n_commands)
-    ended = _offtrack.drive(batch, chooser, min(per_route, 2**62), seed, text("device", device))
+    columns = dict(_offtrack.drive(batch, chooser, min(per_route, 2**62), seed, text("device", device), bool(begins)))
     names = batch.split_routes
-    return Evaluation(batch.scenario, split, seed, names, ended.reshape(len(names), per_route))
+    ended = columns["ended"].reshape(len(names), per_route)
+    return Evaluation(batch.scenario, split, seed, names, ended, _table(names, per_route, columns))
 
 
-def _chooser(
-    policy: Policy | Callable[[npt.NDArray[np.float32]], Any], n_commands: int
-) -> _offtrack.Network | Callable[..., Any]:
+def _table(routes: list[str], per_route: int, columns: dict[str, npt.NDArray[Any]]) -> npt.NDArray[np.void]:
+    """The columns of episodes as rows."""
+    columns = {
+        "route": np.repeat(np.array(routes, np.str_), per_route),
+        "episode": np.tile(np.arange(per_route), len(routes)),
+        **columns,
+    }
+    table = np.empty(len(columns["route"]), [(name, column.dtype) for name, column in columns.items()])
+    for name, column in columns.items():
+        table[name] = column
+    return table
+
+
+def _chooser(policy: Policy | Callable[..., Any], n_commands: int) -> _offtrack.Network | Callable[..., Any]:
     """What drives: a policy's network itself, unless a class that extends `Policy` acts otherwise."""
     if type(policy) is Policy:
         return policy._network
     act = policy.act if isinstance(policy, Policy) else policy
-    return lambda observations: _checked(act(observations), len(observations), n_commands)
+    return lambda observations, *begins: _checked(act(observations, *begins), len(observations), n_commands)
 
 
 def _checked(actions: Any, n: int, n_commands: int) -> npt.NDArray[Any]:

@@ -6,20 +6,20 @@ Nothing of PyTorch or of a learning library is imported: their objects are known
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
-from . import _offtrack
-from .arguments import file_name, scenario_name
+from . import _offtrack, onnx_graph, trained
+from .arguments import checked_integer, file_name, names_of_values, scenario_name, text
 from .batch import Floats
+from .network import Network
+from .policy import Policy
 
 #: A normalised observation is clamped to this, see docs/policies.md.
-CLIP = 10.0
-
-Layers = list[tuple[Floats, Floats]]
+CLIP = trained.CLIP
 
 
 def save(
@@ -30,170 +30,111 @@ def save(
     mean: npt.ArrayLike | None = None,
     variance: npt.ArrayLike | None = None,
     epsilon: float = 1e-8,
+    values: Iterable[str] | None = None,
+    frames: int | None = None,
+    padding: str | None = None,
+    squash: str | None = None,
 ) -> None:
     """Writes a policy file: the greedy policy of a network.
 
-    The file's policy takes the action with the largest output, as ``predict(observation, deterministic=True)`` of
-    Stable-Baselines3 does. Where two outputs differ by less than the rounding of 32-bit floats, it may take the other.
+    The file's policy takes the action with the largest output, or gives the means as commands, as
+    ``predict(observation, deterministic=True)`` of Stable-Baselines3 does. Where two outputs differ by less than the
+    rounding of 32-bit floats, it may take the other.
 
     Args:
         file: Where to; an existing file is replaced, whole or not at all.
         model: One of
 
-            - PPO or A2C of Stable-Baselines3 with ``MlpPolicy``: the layers up to ``action_net``;
-            - DQN of Stable-Baselines3 with ``MlpPolicy``: ``q_net``;
-            - a ``torch.nn.Sequential`` of ``Linear`` with all ``ReLU`` or all ``Tanh`` between, none behind the last:
-              CleanRL's ``agent.actor`` of PPO and ``q_network.network`` of DQN;
-            - a list of ``(weights, biases)``, arrays ``[inputs, outputs]`` and ``[outputs]``, with ``ReLU`` between.
-        scenario: The benchmark it was trained on, a name or a file: the file keeps its table of actions and the names
-            of the extras that it observes.
+            - PPO, A2C, DQN, SAC, TD3 or DDPG of Stable-Baselines3 with ``MlpPolicy``, and RecurrentPPO of sb3-contrib
+              with ``MlpLstmPolicy``;
+            - an RLModule of RLlib with an MLP, and an LSTM behind it if it has one;
+            - a ``torch.nn.Sequential``, or a list of modules in their order: ``Linear`` with all ``ReLU`` or all
+              ``Tanh`` between, and ``GRU`` or ``LSTM`` before, between or behind them, but before the last. CleanRL's
+              ``agent.actor`` of PPO and ``q_network.network`` of DQN; with ``squash`` its ``agent.actor_mean``;
+            - a list of ``(weights, biases)``, arrays ``[inputs, outputs]`` and ``[outputs]``, with ``ReLU`` between;
+            - a :class:`Network`, as :func:`from_onnx` and :func:`network` give it.
+        scenario: The benchmark it was trained on, a name or a file: the file keeps its table of actions and, unless
+            ``values`` says what it reads, the names of the extras that it observes.
         mean: Mean of each observation's value, ``[n_values]``, extras included, where the network was trained with
-            normalised ones; a model of Stable-Baselines3 with ``VecNormalize`` brings its own.
+            normalised ones; a model of Stable-Baselines3 with ``VecNormalize`` brings its own. ``[frames * n_values]``
+            where stacks of frames were normalised.
         variance: Their variance, ``[n_values]``: a value becomes ``(value - mean) / sqrt(variance + epsilon)``, clamped
             to -10..10.
         epsilon: Added to the variance.
+        values: Names of the values that it reads, in its order, for a network that was trained on some of them: groups
+            of :data:`offtrack_sim.OBSERVATION` (``"tractor_range"``), single values (``"bearing[2]"``), extras.
+        frames: Number of steps' values that it sees side by side, oldest first. A model of Stable-Baselines3 with
+            ``VecFrameStack`` brings its own.
+        padding: What stands before an episode's first frame: ``"zero"``, as of ``VecFrameStack``, or ``"reset"``, the
+            first one again, as of Gymnasium's ``FrameStackObservation``.
+        squash: For a network whose outputs are means of commands: ``"tanh"``, or ``"clip"`` to -1..1. A model of
+            Stable-Baselines3 brings its own.
 
     Raises:
         TypeError: For a model or layer that a policy file cannot hold; the message names it.
         ValueError: For sizes that do not fit each other or the benchmark, numbers so large that outputs may not be
             finite, a mean without a variance, a ``VecNormalize`` that clips
-            elsewhere than at 10, and numbers that are not finite.
+            elsewhere than at 10, what a model brings itself, and numbers that are not finite.
         OSError: Where the file cannot be written.
     """
-    layers, activation = _layers(model)
+    found = trained.network_of(model, None if squash is None else text("squash", squash))
+    if frames is not None:
+        n = checked_integer("frames", frames)
+        if found.frames not in (1, n):
+            raise ValueError(f"frames: {n}; the model has a VecFrameStack of {found.frames}: leave it out")
+        if not 1 <= n <= 1024:
+            raise ValueError(f"frames: {n}; must lie in 1..1024")
+        found = replace(found, frames=n)
+    if padding is not None:
+        if found.frames == 1:
+            raise ValueError(f"padding: {padding!r}; there is one frame: give frames, or leave it out")
+        found = replace(found, padding=text("padding", padding))
+    if values is not None:
+        found = replace(found, values=names_of_values(values))
     if (mean is None) != (variance is None):
         raise ValueError("mean, variance: only one of them is given; both are needed")
-    found = _normalisation(model)
-    if found is not None:
-        if mean is not None:
-            raise ValueError("mean, variance: the model has those of its VecNormalize; leave them out")
-        mean, variance, epsilon = found
-    normalisation = None
     if mean is not None and variance is not None:
-        spread = _numbers("variance", variance) + _numbers("epsilon", epsilon)
-        if not (spread > 0).all():
-            raise ValueError("variance: every value plus epsilon must be greater than 0")
-        normalisation = _vector("mean", mean), _vector("variance", 1 / np.sqrt(spread))
-    _offtrack.write_policy(file_name(file), scenario_name(scenario), layers, activation, normalisation)
+        if found.normalisation is not None:
+            raise ValueError("mean, variance: the model has those of its VecNormalize; leave them out")
+        found = replace(found, normalisation=trained.normalisation(mean, variance, epsilon))
+    _offtrack.write_policy(file_name(file), scenario_name(scenario), found)
 
 
-def _layers(model: Any) -> tuple[Layers, str]:
-    """The layers of any model that is known, and the activation between them."""
-    if isinstance(model, list):
-        return [_given(index, layer) for index, layer in enumerate(model)], "relu"
-    if _is("Sequential", model):
-        return _of_modules(list(_flat(model)))
-    policy = getattr(model, "policy", None)
-    if policy is None:
-        raise TypeError(
-            f"model: {_kind(model)}; PPO, A2C or DQN of Stable-Baselines3 or a torch.nn.Sequential is needed "
-            "(of a network of your own give its Sequential, for CleanRL `agent.actor` or `q_network.network`)"
-        )
-    if hasattr(policy, "q_net"):
-        _check_extractor(policy.q_net.features_extractor)
-        return _of_modules(list(_flat(policy.q_net.q_net)))
-    if hasattr(policy, "mlp_extractor") and hasattr(policy, "action_net"):
-        if getattr(policy, "lstm_actor", None) is not None:
-            raise TypeError("policy.lstm_actor: a policy file holds no recurrent layers")
-        _check_extractor(policy.pi_features_extractor)
-        if not _is("MlpExtractor", policy.mlp_extractor):
-            raise TypeError(f"policy.mlp_extractor: {_kind(policy.mlp_extractor)}; MlpExtractor is needed")
-        if not _is("CategoricalDistribution", policy.action_dist):
-            raise TypeError(
-                f"policy.action_dist: {_kind(policy.action_dist)}; CategoricalDistribution is needed: discrete actions"
-            )
-        return _of_modules([*_flat(policy.mlp_extractor.policy_net), policy.action_net])
-    raise TypeError(f"model: {_kind(model)}; of Stable-Baselines3 only PPO, A2C and DQN can be written")
+def network(policy: Policy) -> Network:
+    """The network of a policy, as arrays."""
+    return Network(**policy._network.parts())
 
 
-def _given(index: int, layer: Any) -> tuple[Floats, Floats]:
-    """A layer of a list."""
-    try:
-        weights, biases = (_array(part) for part in layer)
-    except (TypeError, ValueError):
-        raise TypeError(f"layers[{index}]: {_kind(layer)}; a pair of arrays, weights and biases, is needed") from None
-    if (weights.ndim, biases.ndim) != (2, 1):
-        needed = "[inputs, outputs] and [outputs] are needed"
-        raise ValueError(f"layers[{index}]: shapes {weights.shape} and {biases.shape}; {needed}")
-    return weights, biases
+def to_onnx(policy: Policy, file: str | os.PathLike[str]) -> None:
+    """Writes a policy's network as an ONNX graph; needs the package ``onnx``, as of ``offtrack-sim[onnx]``.
+
+    Its input ``observation`` is ``[n, frames * values]``: what the policy reads, before any normalisation, oldest frame
+    first. Before an episode's first frame stands the padding, which is the mean in place of zeros where each frame is
+    normalised by itself. Its output ``output`` is ``[n, outputs]``: a value an action, or commands. A recurrent layer
+    ``N`` has the input ``hidden_N``, ``[1, n, units]``, zeros at an episode's start, and the output ``next_hidden_N``;
+    an LSTM ``cell_N`` and ``next_cell_N`` too.
+
+    Raises:
+        ImportError: Without the package ``onnx``.
+        OSError: Where the file cannot be written.
+    """
+    onnx_graph.write(network(policy), file_name(file), policy.name)
 
 
-def _check_extractor(extractor: Any) -> None:
-    if not _is("FlattenExtractor", extractor):
-        raise TypeError(
-            f"policy.features_extractor: {_kind(extractor)}; FlattenExtractor is needed, which MlpPolicy has"
-        )
+def from_onnx(file: str | os.PathLike[str]) -> Network:
+    """The network of an ONNX graph, for :func:`save`; needs the package ``onnx``, as of ``offtrack-sim[onnx]``.
+
+    The graph is a chain from an input to its first output: ``Gemm``, or ``MatMul`` and ``Add``, with all ``Relu`` or
+    all ``Tanh`` between; ``GRU`` (with ``linear_before_reset``) and ``LSTM`` of one direction; before them ``Sub``,
+    ``Mul`` or ``Div``, and ``Clip`` to -10..10, which normalise; behind them ``ArgMax``, or ``Tanh`` or ``Clip`` to
+    -1..1 of commands. Nodes that only change shapes are passed over.
+
+    Raises:
+        ImportError: Without the package ``onnx``.
+        TypeError: For another node; the message names it.
+        ValueError: For a file that is no ONNX graph.
+    """
+    return onnx_graph.read(file_name(file))
 
 
-def _flat(module: Any) -> Iterator[Any]:
-    """The layers of a Sequential, of those in it too."""
-    if _is("Sequential", module):
-        for child in module:
-            yield from _flat(child)
-    elif not _is("Identity", module):
-        yield module
-
-
-def _of_modules(modules: list[Any]) -> tuple[Layers, str]:
-    """Linear, activation, Linear, ..., Linear."""
-    names = {"ReLU": "relu", "Tanh": "tanh"}
-    layers: Layers = []
-    activations: set[str] = set()
-    for index, module in enumerate(modules):
-        kind = type(module).__name__
-        is_linear_due = index % 2 == 0
-        if is_linear_due and _is("Linear", module):
-            weights = _array(module.weight).T
-            biases = np.zeros(weights.shape[1], np.float32) if module.bias is None else _array(module.bias)
-            layers.append((np.ascontiguousarray(weights), biases))
-        elif not is_linear_due and kind in names:
-            activations.add(names[kind])
-        else:
-            needed = "Linear is needed here" if is_linear_due else "ReLU or Tanh is needed here"
-            raise TypeError(f"layer {index}: {_kind(module)}; {needed}")
-    if len(modules) % 2 == 0:
-        last = _kind(modules[-1]) if modules else "none"
-        raise TypeError(f"last layer: {last}; Linear is needed, whose outputs are the actions' values")
-    if len(activations) > 1:
-        raise TypeError("layers: ReLU and Tanh; a policy file has one activation for all of its layers")
-    return layers, activations.pop() if activations else "relu"
-
-
-def _normalisation(model: Any) -> tuple[npt.ArrayLike, npt.ArrayLike, float] | None:
-    """Mean, variance and epsilon of the VecNormalize that a model of Stable-Baselines3 was trained with."""
-    normalize = getattr(model, "get_vec_normalize_env", lambda: None)()
-    if normalize is None or not normalize.norm_obs:
-        return None
-    if normalize.clip_obs != CLIP:
-        raise ValueError(f"VecNormalize: clip_obs is {normalize.clip_obs:g}; a policy file clips at {CLIP:g}")
-    return normalize.obs_rms.mean, normalize.obs_rms.var, float(normalize.epsilon)
-
-
-def _array(tensor: Any) -> Floats:
-    """A tensor of any device, or an array."""
-    if hasattr(tensor, "detach"):
-        tensor = tensor.detach().cpu().float().numpy()
-    return np.asarray(tensor, np.float32)
-
-
-def _vector(name: str, values: npt.ArrayLike) -> Floats:
-    vector = np.ascontiguousarray(_numbers(name, values), np.float32)
-    if vector.ndim != 1:
-        raise ValueError(f"{name}: shape {vector.shape}; one dimension is needed, a number for each value")
-    return vector
-
-
-def _numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    try:
-        return np.asarray(values, np.float64)
-    except (TypeError, ValueError):
-        raise TypeError(f"{name}: {_kind(values)}; numbers are needed") from None
-
-
-def _is(name: str, thing: Any) -> bool:
-    """Whether a class of this name is among the thing's classes."""
-    return any(known.__name__ == name for known in type(thing).__mro__)
-
-
-def _kind(thing: Any) -> str:
-    return f"{type(thing).__module__}.{type(thing).__qualname__}"
+__all__ = ["CLIP", "Floats", "Network", "from_onnx", "network", "save", "to_onnx"]

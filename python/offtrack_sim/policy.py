@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
-from .arguments import file_name
+from .arguments import checked_integer, file_name
+from .layout import EXTRAS
 
 if TYPE_CHECKING:
     from .batch import Batch
@@ -67,30 +68,68 @@ class Policy:
         return self._network.extras
 
     @property
+    def values(self) -> list[str] | None:
+        """Names of the values that it reads, in its order; ``None`` where it reads all 69 and ``extras``."""
+        return self._network.values
+
+    @property
+    def frames(self) -> int:
+        """Number of steps whose values it sees at once."""
+        return self._network.frames
+
+    @property
+    def has_memory(self) -> bool:
+        """Whether what it does depends on earlier observations: then a :meth:`driver` drives."""
+        return self._network.has_memory
+
+    @property
+    def head(self) -> str:
+        """What it gives: ``"levels"``, indices of actions, or ``"continuous"``, commands in -1..1."""
+        return self._network.head
+
+    @property
     def action_table(self) -> npt.NDArray[np.float32]:
-        """Steer angle [rad] and speed [m/s] of each action, ``[n, 2]``: a batch must have the same table."""
+        """Steer angle [rad] and speed [m/s] of each action, ``[n, 2]``: a batch must have the same table.
+
+        Of a policy that gives commands what -1 and what 1 asks for.
+        """
         return self._network.action_table
 
     def check(self, batch: Batch | Observer) -> None:
         """Checks that it can drive the trucks of this batch or observer.
 
         Raises:
-            ValueError: Where the batch has other extras or another action table; the message says which.
+            ValueError: Where the batch has other extras or another action table, or takes commands where the policy
+                chooses among actions; the message says which.
         """
-        if self.extras != batch.extras:
+        if self.head != "levels" and not batch.n_commands:
+            raise ValueError(f"{self.name}: gives commands; {batch.scenario} has a table of actions")
+        if self.head == "levels" and batch.n_commands:
+            raise ValueError(
+                f"{self.name}: chooses among {len(self.action_table)} actions; {batch.scenario} takes commands"
+            )
+        if self.values is not None:
+            known = {values.name for values in EXTRAS} - set(batch.extras)
+            missing = [name for name in self.values if name in known]
+            if missing:
+                lacks = ", ".join(missing)
+                raise ValueError(f"{self.name}: reads {lacks}, which {batch.scenario} does not observe")
+        elif self.extras != batch.extras:
             its, needed = (", ".join(extras) or "none" for extras in (self.extras, batch.extras))
             raise ValueError(f"{self.name}: observes other extras than {batch.scenario}: {its}; {needed} are needed")
         tables = self.action_table, batch.action_table
         if tables[0].shape != tables[1].shape or not np.allclose(*tables, atol=1e-5):
             raise ValueError(f"{self.name}: has another action table than {batch.scenario}; see action_table of both")
 
-    def act(self, observations: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    def act(self, observations: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """The most probable action for each observation: ``[n, n_values]`` gives ``[n]``, ``[n_values]`` a number.
+
+        A policy that gives commands has a row of them in place of a number, ``[n, n_commands]``.
 
         Raises:
             TypeError: For what is no array of numbers.
-            ValueError: For another number of values than 69 and one for each of ``extras``, and for one that is not
-                finite; the message names them.
+            ValueError: For another number of values than 69 and one for each of ``extras``, for one that is not finite,
+                and for a policy with a memory; the message names them.
         """
         rows = _rows(observations)
         if rows.ndim == 1:
@@ -100,15 +139,54 @@ class Policy:
     def logits(self, observations: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
         """The network's output for each observation, ``[n, n_values]`` to ``[n, n_actions]``.
 
-        Their softmax gives probabilities.
+        Their softmax gives probabilities. Of a policy that gives commands they are the means, before these are squashed
+        or clipped.
 
         Raises:
             ValueError: As for :meth:`act`.
         """
         return self._network.logits(_rows(observations))
 
+    def driver(self, n: int) -> Driver:
+        """The policy with a memory for each of ``n`` trucks."""
+        count = checked_integer("n", n)
+        if count < 1:
+            raise ValueError(f"n: {count}; must be at least 1")
+        return Driver(self, self._network.driver(min(count, 2**62)), count)
+
     def __repr__(self) -> str:
         return f"Policy({self.name!r})"
+
+
+class Driver:
+    """A policy that drives some trucks and remembers what each has observed; :meth:`Policy.driver` makes one.
+
+    What it gives for a truck depends on what that truck observed since its episode began, and on nothing else.
+    """
+
+    def __init__(self, policy: Policy, native: _offtrack.Driver, n: int) -> None:
+        self.policy = policy
+        """What drives."""
+        self.n = n
+        """Number of trucks."""
+        self._native = native
+
+    def act(self, observations: npt.NDArray[Any], begins: npt.NDArray[np.bool_] | None = None) -> npt.NDArray[Any]:
+        """The most probable action of each truck for what it observes now, or its commands, as :meth:`Policy.act`.
+
+        Args:
+            observations: What each truck observes, ``[n, n_values]``; one step after those of the last call.
+            begins: Which of them are the first of an episode, ``[n]``: a truck's memory is empty then, as it is at
+                the first call. With ``autoreset="same_step"`` what ended in the last step. None without.
+
+        Raises:
+            TypeError: For what is no array of numbers, and for ``begins`` that are no array of bool, one a truck.
+            ValueError: For another number of rows or values, and for a value that is not finite.
+        """
+        return self._native.act(_rows(observations), begins)
+
+    def __repr__(self) -> str:
+        return f"Driver({self.policy.name!r}, {self.n})"
 
 
 def _rows(observations: npt.NDArray[Any]) -> npt.NDArray[np.float32]:

@@ -23,6 +23,7 @@ fn _offtrack(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_class::<batch::Batch>()?;
     module.add_class::<observer::Observer>()?;
     module.add_class::<policy::Network>()?;
+    module.add_class::<policy::Driver>()?;
     module.add_function(wrap_pyfunction!(policy::policy_names, module)?)?;
     module.add_function(wrap_pyfunction!(policy::write_policy, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::drive, module)?)?;

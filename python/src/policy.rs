@@ -1,18 +1,23 @@
 //! Policies: networks that drive, read from files or shipped, and written for networks that were trained in Python.
 
+mod driver; // the class Driver
+mod written; // networks trained in Python, as files
+
 use std::path::Path;
 use std::sync::Mutex;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
-use offtrack::layout::{N_EXTRAS, N_VALUES};
-use offtrack_policy::{Activation, Error, Frames, Head, Layer, Normalisation, Policy};
-use pyo3::exceptions::{PyOSError, PyTypeError, PyValueError};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use offtrack::layout::{EXTRAS, N_EXTRAS, N_VALUES};
+use offtrack_policy::{Error, Head, Policy};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::errors::guarded;
 use crate::pool::Pool;
-use crate::{actions, observed, worlds};
+use crate::{actions, observed};
+pub use driver::Driver;
+pub use written::write_policy;
 
 /// A policy. The class `offtrack_sim.Policy` wraps it and documents it.
 #[pyclass(frozen, module = "offtrack_sim._offtrack")]
@@ -65,20 +70,57 @@ impl Network {
         actions::table(py, &self.policy.actions)
     }
 
+    /// Names of the values that it reads, none where it reads all.
+    #[getter]
+    fn values(&self) -> Option<&[String]> {
+        self.policy.values.as_ref().map(offtrack_policy::Selection::names)
+    }
+
+    /// Number of steps that it sees at once.
+    #[getter]
+    fn frames(&self) -> usize {
+        self.policy.frames.n
+    }
+
+    /// Whether what it does depends on earlier observations.
+    #[getter]
+    fn has_memory(&self) -> bool {
+        self.policy.has_memory()
+    }
+
+    /// What its outputs are, by the name that policy files have for it.
+    #[getter]
+    fn head(&self) -> &'static str {
+        self.policy.head.name()
+    }
+
     fn logits<'py>(&self, py: Python<'py>, observations: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         guarded(|| {
-            let (values, extras) = self.split(observations)?;
+            self.check_no_memory()?;
+            let (values, extras) = split(&self.policy, observations)?;
             let logits = self.run(py, || self.policy.logits_beside(&values, &extras))?;
-            PyArray1::from_vec(py, logits).reshape([values.len(), self.policy.actions.len()])
+            PyArray1::from_vec(py, logits).reshape([values.len(), self.policy.n_outputs()])
         })
     }
 
-    fn act<'py>(&self, py: Python<'py>, observations: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<i64>>> {
+    /// Actions, `[n]`, or commands, `[n, n_commands]`.
+    fn act<'py>(&self, py: Python<'py>, observations: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         guarded(|| {
-            let (values, extras) = self.split(observations)?;
-            let actions = self.run(py, || self.policy.act_beside(&values, &extras))?;
-            Ok(PyArray1::from_iter(py, actions.into_iter().map(i64::from)))
+            self.check_no_memory()?;
+            let (values, extras) = split(&self.policy, observations)?;
+            let outputs = self.run(py, || self.policy.logits_beside(&values, &extras))?;
+            chosen(py, &self.policy, outputs)
         })
+    }
+
+    /// Its network as arrays, by the fields of `offtrack_sim.export.Network`.
+    fn parts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        guarded(|| written::parts(py, &self.policy))
+    }
+
+    /// The policy with a memory for each of `n` trucks.
+    fn driver(&self, n: usize) -> PyResult<Driver> {
+        guarded(|| Driver::of(&self.policy, n))
     }
 }
 
@@ -100,38 +142,62 @@ impl Network {
         pool.run(py, work)
     }
 
-    /// An array of observations, `[n, 69 + extras]`: the values and, where the policy observes some, the extras.
-    fn split(&self, observations: &Bound<PyAny>) -> PyResult<Split> {
-        let n_extras = self.policy.extras.len();
-        let n_values = N_VALUES + n_extras;
-        let needed = || {
-            PyTypeError::new_err(format!("observations: a numpy array of float32 and shape (n, {n_values}) is needed"))
-        };
-        let array: PyReadonlyArray2<f32> = observations.extract().map_err(|_| needed())?;
-        let found = array.shape()[1];
-        if found != n_values {
-            let extras = observed::described(self.policy.extras.iter().map(String::as_str));
-            return Err(PyValueError::new_err(format!(
-                "observations: {found} values each; {n_values} are needed{extras}"
-            )));
+    fn check_no_memory(&self) -> PyResult<()> {
+        if !self.policy.has_memory() {
+            return Ok(());
         }
-        let values = array.as_slice().map_err(|_| needed())?;
-        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-            let (row, column, value) = (at / n_values, at % n_values, values[at]);
-            return Err(PyValueError::new_err(format!(
-                "observations[{row}, {column}]: {value}; every value must be finite"
-            )));
-        }
-        if n_extras == 0 {
-            return Ok((values.as_chunks().0.to_vec(), Vec::new()));
-        }
-        let split = |row: &[f32]| {
-            let (values, extras) = row.split_at(N_VALUES);
-            let padded = |index: usize| extras.get(index).copied().unwrap_or_default();
-            (std::array::from_fn(|index| values[index]), std::array::from_fn(padded))
-        };
-        Ok(values.chunks_exact(n_values).map(split).unzip())
+        Err(PyValueError::new_err(format!(
+            "{}: remembers earlier observations; policy.driver(n) keeps them for n trucks, and its act drives",
+            self.policy.name
+        )))
     }
+}
+
+/// What a policy does by its outputs: actions, `[n]`, or commands, `[n, n_commands]`.
+fn chosen<'py>(py: Python<'py>, policy: &Policy, outputs: Vec<f32>) -> PyResult<Bound<'py, PyAny>> {
+    match policy.head {
+        Head::Levels => {
+            let actions = offtrack_policy::greedy(&outputs, policy.actions.len());
+            Ok(PyArray1::from_iter(py, actions.into_iter().map(i64::from)).into_any())
+        }
+        Head::Continuous { .. } => {
+            let (n, n_commands) = (outputs.len() / policy.n_outputs(), policy.n_outputs());
+            Ok(PyArray1::from_vec(py, policy.head.commands(outputs)).reshape([n, n_commands])?.into_any())
+        }
+    }
+}
+
+/// An array of observations, `[n, 69 + extras]`: the values and, where the policy observes some, the extras. A policy
+/// that names its values takes those of any benchmark that observes them.
+fn split(policy: &Policy, observations: &Bound<PyAny>) -> PyResult<Split> {
+    let n_least = match &policy.values {
+        None => N_VALUES + policy.extras.len(),
+        Some(values) => values.indices().iter().map(|index| index + 1).max().unwrap_or_default().max(N_VALUES),
+    };
+    let needed =
+        || PyTypeError::new_err(format!("observations: a numpy array of float32 and shape (n, {n_least}) is needed"));
+    let array: PyReadonlyArray2<f32> = observations.extract().map_err(|_| needed())?;
+    let n_values = array.shape()[1];
+    let n_most = if policy.values.is_none() { n_least } else { N_VALUES + N_EXTRAS };
+    if !(n_least..=n_most).contains(&n_values) {
+        let extras = observed::described(EXTRAS[..n_least - N_VALUES].iter().map(|extra| extra.name));
+        return Err(PyValueError::new_err(format!(
+            "observations: {n_values} values each; {n_least} are needed{extras}"
+        )));
+    }
+    let values = array.as_slice().map_err(|_| needed())?;
+    if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+        let (row, column, value) = (at / n_values, at % n_values, values[at]);
+        return Err(PyValueError::new_err(format!(
+            "observations[{row}, {column}]: {value}; every value must be finite"
+        )));
+    }
+    let split = |row: &[f32]| {
+        let (values, extras) = row.split_at(N_VALUES);
+        let padded = |index: usize| extras.get(index).copied().unwrap_or_default();
+        (std::array::from_fn(|index| values[index]), std::array::from_fn(padded))
+    };
+    Ok(values.chunks_exact(n_values).map(split).unzip())
 }
 
 /// Values of observations, and the extras beside them.
@@ -145,109 +211,4 @@ fn refused(error: Error) -> PyErr {
 #[pyfunction]
 pub fn policy_names() -> Vec<&'static str> {
     Policy::shipped_names().to_vec()
-}
-
-/// Writes a network as a policy file for a benchmark's action table and extras: weights `[inputs, outputs]` and biases
-/// of each layer, and the observation's mean and factor, none for a network without normalisation.
-#[pyfunction]
-pub fn write_policy(
-    py: Python,
-    file: &str,
-    scenario: &str,
-    layers: Vec<(PyReadonlyArray2<f32>, PyReadonlyArray1<f32>)>,
-    activation: &str,
-    normalisation: Option<(PyReadonlyArray1<f32>, PyReadonlyArray1<f32>)>,
-) -> PyResult<()> {
-    guarded(|| {
-        let Some(activation) = Activation::ALL.into_iter().find(|known| known.name() == activation) else {
-            let known = Activation::ALL.map(Activation::name).join(", ");
-            return Err(PyValueError::new_err(format!("activation: {activation:?}; must be one of {known}")));
-        };
-        let (name, actions, extras) =
-            Pool::new(0).run_until_signal(py, |stop| worlds::policy_table(scenario, stop))??;
-        let n_values = N_VALUES + extras.len();
-        check_layers(&layers, n_values)?;
-        let vector = |array: &PyReadonlyArray1<f32>| array.as_array().to_vec();
-        let layer = |(weights, biases): &(PyReadonlyArray2<f32>, PyReadonlyArray1<f32>)| Layer {
-            weights: weights.as_array().iter().copied().collect(),
-            biases: vector(biases),
-        };
-        // The factor is that of a variance.
-        let described = observed::described(extras.iter().copied());
-        for (name, given) in [
-            ("mean", normalisation.as_ref().map(|given| &given.0)),
-            ("variance", normalisation.as_ref().map(|given| &given.1)),
-        ] {
-            if let Some(found) = given.map(|given| given.len()).filter(|&found| found != n_values) {
-                return Err(PyValueError::new_err(format!(
-                    "{name}: shape ({found},); ({n_values},) is needed{described}"
-                )));
-            }
-        }
-        let normalisation = match &normalisation {
-            None => Normalisation::none(n_values),
-            Some((mean, factor)) => Normalisation { mean: vector(mean), factor: vector(factor) },
-        };
-        let policy = Policy {
-            name: file.to_owned(),
-            benchmark: name,
-            actions,
-            extras: extras.into_iter().map(str::to_owned).collect(),
-            normalisation,
-            layers: layers.iter().map(layer).collect(),
-            activation,
-            head: Head::Levels,
-            values: None,
-            frames: Frames::default(),
-            recurrent: None,
-        };
-        let bytes = policy.to_bytes();
-        // What is written can be read: sizes that do not fit the benchmark and values that cannot be are found here.
-        Policy::from_bytes(file, &bytes).map_err(refused)?;
-        write(file, &bytes)
-    })
-}
-
-/// An error for layers whose shapes do not fit each other, before any of them is copied.
-fn check_layers(layers: &[(PyReadonlyArray2<f32>, PyReadonlyArray1<f32>)], n_values: usize) -> PyResult<()> {
-    let refused = |message: String| Err(PyValueError::new_err(message));
-    if layers.is_empty() {
-        return refused("layers: none; at least one is needed".to_owned());
-    }
-    let (mut n_inputs, mut n_numbers) = (n_values, 0usize);
-    for (index, (weights, biases)) in layers.iter().enumerate() {
-        let (shape, n_outputs) = (weights.shape(), biases.len());
-        if shape[1] != n_outputs {
-            return refused(format!(
-                "layers[{index}]: biases of shape ({n_outputs},) beside weights of shape ({}, {}); ({},) is needed, \
-                 one an output",
-                shape[0], shape[1], shape[1]
-            ));
-        }
-        if n_outputs == 0 || shape[0] != n_inputs {
-            let last = if index == 0 { "an observation has" } else { "the layer before has" };
-            return refused(format!(
-                "layers[{index}]: weights of shape ({}, {n_outputs}); ({n_inputs}, {n_outputs}) is needed, inputs \
-                 before outputs: {last} {n_inputs}",
-                shape[0]
-            ));
-        }
-        n_numbers = n_numbers.saturating_add(n_outputs.saturating_mul(n_inputs + 1));
-        if MOST_NUMBERS < n_numbers {
-            return refused(format!(
-                "layers: {n_numbers} numbers up to layers[{index}]; a policy file has at most {MOST_NUMBERS}"
-            ));
-        }
-        n_inputs = n_outputs;
-    }
-    Ok(())
-}
-
-/// Most weights and biases: those of the largest file that is read.
-const MOST_NUMBERS: usize = (64 << 20) / size_of::<f32>();
-
-/// Writes a file, whole or not at all.
-fn write(file: &str, bytes: &[u8]) -> PyResult<()> {
-    let failed = |error: std::io::Error| PyOSError::new_err(format!("{file}: cannot be written: {error}"));
-    offtrack::files::writer::write_whole(Path::new(file), bytes).map_err(failed)
 }

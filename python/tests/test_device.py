@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -78,3 +79,17 @@ def test_a_policy_too_wide_for_a_device_is_refused_by_name(device: str, tmp_path
     policy = offtrack_sim.Policy.load(wide)
     with pytest.raises(ValueError, match=r"wide\.safetensors: is a policy too wide for a device: actor\.0 has 1025"):
         offtrack_sim.evaluate(policy, episodes=1, device="gpu")
+
+
+def test_a_policy_with_a_memory_drives_the_trucks_of_a_device_from_the_processor(device: str, tmp_path: Path) -> None:
+    shipped = offtrack_sim.Policy.shipped()
+    network = offtrack_sim.export.network(shipped)
+    weights, biases = network.layers[0]
+    # Of two frames it heeds the last.
+    first = np.concatenate([np.zeros_like(weights), weights]), biases
+    offtrack_sim.export.save(tmp_path / "two", replace(network, layers=[first, *network.layers[1:]], frames=2))
+    two = offtrack_sim.Policy.load(tmp_path / "two")
+    here = offtrack_sim.evaluate(shipped, episodes=1, seed=4)
+    there = offtrack_sim.evaluate(two, episodes=1, seed=4, device="gpu")
+    assert two.has_memory and (here.table["steps"] == there.table["steps"]).all()
+    assert np.allclose(here.table["lane_distance_mean"], there.table["lane_distance_mean"], atol=1e-3)

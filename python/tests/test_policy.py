@@ -106,7 +106,7 @@ def test_ctrl_c_while_trucks_drive_is_answered_at_once() -> None:
 def test_the_interval_of_a_success_is_wilsons_as_published_and_has_the_fraction_in_it() -> None:
     def interval(arrived: int, episodes: int) -> tuple[float, float]:
         ended = np.where(np.arange(episodes) < arrived, 1, 2).reshape(1, -1)
-        return Evaluation("attard2023", "test", 0, ["16m/N-left-3"], ended).success_interval
+        return Evaluation("attard2023", "test", 0, ["16m/N-left-3"], ended, np.empty(0, [])).success_interval
 
     # The study's own result.
     assert interval(506, 690) == pytest.approx((0.6991, 0.7650), abs=5e-4)

@@ -35,8 +35,11 @@ fn remembering(gates: Gates, padding: Padding) -> Policy {
     }
 }
 
-/// What `n` trucks observe at each of 6 steps, `[steps][trucks]`.
-fn observed(n: u32) -> Vec<(Vec<[f32; N_VALUES]>, Vec<[f32; N_EXTRAS]>)> {
+/// What trucks observe at a step, and the extras beside it.
+type Observed = (Vec<[f32; N_VALUES]>, Vec<[f32; N_EXTRAS]>);
+
+/// What `n` trucks observe at each of 6 steps.
+fn observed(n: u32) -> Vec<Observed> {
     let at = |step: u32, row: u32, index: usize| number(100 * row + step, index as u32);
     let step = |step: u32| {
         let values = (0..n).map(|row| std::array::from_fn(|index| at(step, row, index)));

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 import torch
-from stable_baselines3 import A2C, DQN, PPO
-from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
+from stable_baselines3 import A2C, DQN, PPO, SAC, TD3
+from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack, VecMonitor, VecNormalize
 
 import offtrack_sim
 from offtrack_sim import export
@@ -122,6 +124,104 @@ def test_a_policy_file_acts_as_the_model_that_it_was_written_from(
     assert (logits[:, -1] - logits[:, -2] < 1e-5 * np.abs(logits).max(initial=1.0)).all()
     assert differs.sum() < 5
     assert len(rows) == 3904 and len(np.unique(expected)) > 2
+
+
+class Rays(gymnasium.Env[np.ndarray, np.ndarray]):
+    """Random rays and commands: spaces for algorithms whose actions are no levels."""
+
+    observation_space = gymnasium.spaces.Box(-1.0, 1.0, (29,), np.float32)
+    action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float32)
+
+    def reset(self, **given: Any) -> tuple[np.ndarray, dict[str, Any]]:
+        super().reset(**given)
+        self.steps = 0
+        return self.observation_space.sample(), {}
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        self.steps += 1
+        return self.observation_space.sample(), float(action[0]), self.steps == 7, False, {}
+
+
+# Algorithms with a replay buffer take no VecNormalize within a VecFrameStack.
+@pytest.mark.parametrize(
+    ("algorithm", "normalised"), [(PPO, "each frame"), (PPO, "the stack"), (SAC, "the stack"), (TD3, "the stack")]
+)
+def test_commands_of_a_file_are_those_of_the_model_by_the_frames_of_its_environments(
+    algorithm: type, normalised: str, tmp_path: Path
+) -> None:
+    env: Any = DummyVecEnv([Rays] * 4)
+    if normalised == "each frame":
+        normalize = VecNormalize(env)
+        env = VecFrameStack(normalize, 3)
+    else:
+        env = normalize = VecNormalize(VecFrameStack(env, 3))
+    settings = {"n_steps": 16} if algorithm is PPO else {"learning_starts": 64}
+    model = algorithm("MlpPolicy", env, seed=0, device="cpu", policy_kwargs={"net_arch": [32, 32]}, **settings)
+    model.learn(256)
+    torch.manual_seed(0)
+    for weights in model.policy.parameters():
+        weights.data += 0.2 * torch.randn_like(weights)
+    rays = [values for values in offtrack_sim.OBSERVATION if values.name.endswith("_range")]
+    export.save(tmp_path / "policy.safetensors", model, values=[values.name for values in rays])
+    driver = offtrack_sim.Policy.load(tmp_path / "policy.safetensors").driver(4)
+    normalize.training = False
+    seen, begins = env.reset(), np.ones(4, bool)
+    for _ in range(30):
+        # What the environment observed last, before it was stacked or normalised.
+        rows = np.zeros((4, 69), np.float32)
+        rows[:, 30:59] = raw(env)
+        expected = model.predict(seen, deterministic=True)[0]
+        assert driver.act(rows, begins) == pytest.approx(expected, abs=1e-4)
+        seen, _, begins, _ = env.step(expected)
+
+
+def raw(env: Any) -> np.ndarray:
+    """What the innermost vector environment observed last."""
+    while hasattr(env, "venv"):
+        env = env.venv
+    return np.asarray(env.buf_obs[None])
+
+
+def test_a_file_of_recurrent_ppo_remembers_what_the_model_does(tmp_path: Path) -> None:
+    from sb3_contrib import RecurrentPPO
+
+    env = RoundaboutVecEnv(num_envs=8, seed=1)
+    kwargs = {"net_arch": [32], "lstm_hidden_size": 24, "n_lstm_layers": 2}
+    model = RecurrentPPO("MlpLstmPolicy", env, n_steps=16, seed=0, device="cpu", policy_kwargs=kwargs)
+    model.learn(256)
+    torch.manual_seed(0)
+    for weights in model.policy.parameters():
+        weights.data += 0.3 * torch.randn_like(weights)
+    export.save(tmp_path / "policy.safetensors", model)
+    driver = offtrack_sim.Policy.load(tmp_path / "policy.safetensors").driver(8)
+    seen, begins, state, taken, n_begun = env.reset(), np.ones(8, bool), None, set(), 0
+    for _ in range(120):
+        expected, state = model.predict(seen, state, episode_start=begins, deterministic=True)
+        assert (driver.act(seen, begins) == expected).all()
+        taken.update(expected.tolist())
+        seen, _, begins, _ = env.step(expected)
+        n_begun += int(begins.sum())
+    assert len(taken) > 2 and n_begun > 8
+
+
+def test_modules_of_pytorch_with_a_gru_or_lstm_drive_as_they_do_there(tmp_path: Path) -> None:
+    from torch import nn
+
+    for kind in (nn.GRU, nn.LSTM):
+        torch.manual_seed(1)
+        encoder = nn.Sequential(nn.Linear(69, 32), nn.Tanh())
+        recurrent, head = kind(32, 24, num_layers=2), nn.Linear(24, 9)
+        for weights in [*encoder.parameters(), *recurrent.parameters(), *head.parameters()]:
+            weights.data *= 3
+        export.save(tmp_path / "policy.safetensors", [encoder, recurrent, head])
+        driver = offtrack_sim.Policy.load(tmp_path / "policy.safetensors").driver(64)
+        rows = observations().reshape(61, 64, 69)
+        with torch.no_grad():
+            outputs = head(recurrent(encoder(torch.as_tensor(rows)))[0]).numpy()
+        for seen, expected in zip(rows, outputs):
+            chosen = np.take_along_axis(expected, driver.act(seen)[:, None], 1)[:, 0]
+            assert (expected.max(1) - chosen < 1e-3).all()
+        assert len(np.unique(outputs.argmax(2))) > 2
 
 
 def test_what_a_policy_file_cannot_hold_is_named() -> None:

@@ -1,0 +1,87 @@
+//! The figures of episodes under way, one a truck, from their starts to their ends.
+
+use offtrack::layout::{Control, Ended, Truck};
+use offtrack::scenario::Scenario;
+use offtrack::simulator::{Error, Simulator};
+use offtrack::world::World;
+
+use crate::classes;
+use crate::driving::Driving;
+use crate::episode::Episode;
+use crate::evaluation::routes_of;
+use crate::part::LaneWidths;
+use crate::running::Running;
+use crate::seen::Seen;
+
+/// The figures of each episode so far.
+pub struct Figures<'a> {
+    world: &'a World,
+    /// Of each route.
+    lanes: Vec<LaneWidths>,
+    per_route: usize,
+    running: Vec<Running>,
+    finished: Vec<Option<Episode>>,
+}
+
+impl<'a> Figures<'a> {
+    /// Of trucks at their starts, `per_route` on each of these routes, route by route.
+    ///
+    /// # Errors
+    ///
+    /// That of a device that failed.
+    pub fn begin(
+        scenario: &Scenario,
+        world: &'a World,
+        routes: &[u32],
+        per_route: usize,
+        simulator: &Simulator,
+    ) -> Result<Figures<'a>, Error> {
+        let lane = |(_, place, route)| LaneWidths::of(scenario, place, route);
+        let seen = Seen::of(simulator)?;
+        let has_classes = classes::has_classes(scenario);
+        let new = |(truck, control): (&Truck, &Control)| {
+            let driving = has_classes.then(|| Driving::new(truck, control.target_speed));
+            Running::new(world.rig(truck), truck, driving, scenario.step)
+        };
+        Ok(Figures {
+            world,
+            lanes: routes_of(scenario, routes).into_iter().map(lane).collect(),
+            per_route,
+            running: seen.truck.iter().zip(seen.control.iter()).map(new).collect(),
+            finished: vec![None; simulator.n_envs()],
+        })
+    }
+
+    /// Adds the last step.
+    ///
+    /// # Errors
+    ///
+    /// That of a device that failed.
+    pub fn follow(&mut self, simulator: &Simulator) -> Result<(), Error> {
+        self.add(&Seen::of(simulator)?);
+        Ok(())
+    }
+
+    /// Adds the last step, after which this was seen, and gives the number of episodes that it ended.
+    pub(crate) fn add(&mut self, seen: &Seen) -> usize {
+        let mut n_ended = 0;
+        for (env, (running, finished)) in self.running.iter_mut().zip(&mut self.finished).enumerate() {
+            let (rig, lane) = (self.world.rig(&seen.truck[env]), &self.lanes[env / self.per_route]);
+            if finished.is_none() && running.follow(rig, lane, seen, env) {
+                *finished = Some(running.finish(Ended::from_code(seen.ended[env]).unwrap_or(Ended::Running)));
+                n_ended += 1;
+            }
+        }
+        n_ended
+    }
+
+    /// The episodes that have ended, `None` for the others.
+    pub(crate) fn finished(&self) -> &[Option<Episode>] {
+        &self.finished
+    }
+
+    /// The figures of the episodes, all of which have ended.
+    pub fn finish(self) -> Vec<Episode> {
+        self.finished.into_iter().flatten().collect()
+    }
+}
