@@ -170,15 +170,17 @@ def test_a_policy_file_of_commands_is_evaluated_as_the_function_that_it_is(
     batch = Batch(scenario, 2)
     rng = np.random.default_rng(3)
     weights = rng.normal(0, 0.3, (batch.n_values, n_commands)).astype(np.float32)
-    export.save(tmp_path / "own.safetensors", [(weights, np.zeros(n_commands, np.float32))], scenario, squash="clip")
-    policy = offtrack_sim.Policy.load(tmp_path / "own.safetensors")
+    file = tmp_path / "own.safetensors"
+    export.save(file, [(weights, np.zeros(n_commands, np.float32))], scenario=scenario, squash="clip")
+    policy = offtrack_sim.Policy.load(file)
     assert policy.head == "continuous" and (policy.action_table == batch.action_table).all()
     rows = batch.observation()
     assert np.allclose(policy.act(rows), (rows @ weights).clip(-1, 1), atol=1e-5)
     found = offtrack_sim.evaluate(policy, scenario, episodes=2)
     again = offtrack_sim.evaluate(policy.act, scenario, episodes=2)
     assert (found.ended == again.ended).all()
-    with pytest.raises(ValueError, match="gives commands; attard2023 has a table of actions"):
-        offtrack_sim.evaluate(policy, "attard2023")
+    levels = scenario.removesuffix("-continuous")
+    with pytest.raises(ValueError, match=f"gives commands, with other ends than {levels}"):
+        offtrack_sim.evaluate(policy, levels)
     with pytest.raises(ValueError, match=f"chooses among 9 actions; {scenario} takes commands"):
         offtrack_sim.evaluate(offtrack_sim.Policy.shipped(), scenario)
