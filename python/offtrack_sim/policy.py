@@ -102,6 +102,8 @@ class Policy:
             ValueError: Where the batch has other extras or another action table, or takes commands where the policy
                 chooses among actions; the message says which.
         """
+        if self.head != "levels" and not batch.n_commands:
+            raise ValueError(f"{self.name}: gives commands; {batch.scenario} has a table of actions")
         if self.head == "levels" and batch.n_commands:
             raise ValueError(
                 f"{self.name}: chooses among {len(self.action_table)} actions; {batch.scenario} takes commands"
@@ -117,8 +119,7 @@ class Policy:
             raise ValueError(f"{self.name}: observes other extras than {batch.scenario}: {its}; {needed} are needed")
         tables = self.action_table, batch.action_table
         if tables[0].shape != tables[1].shape or not np.allclose(*tables, atol=1e-5):
-            what = "has another action table" if self.head == "levels" else "gives commands, with other ends"
-            raise ValueError(f"{self.name}: {what} than {batch.scenario}; see action_table of both")
+            raise ValueError(f"{self.name}: has another action table than {batch.scenario}; see action_table of both")
 
     def act(self, observations: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """The most probable action for each observation: ``[n, n_values]`` gives ``[n]``, ``[n_values]`` a number.

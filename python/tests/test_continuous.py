@@ -180,7 +180,7 @@ def test_a_policy_file_of_commands_is_evaluated_as_the_function_that_it_is(
     again = offtrack_sim.evaluate(policy.act, scenario, episodes=2)
     assert (found.ended == again.ended).all()
     levels = scenario.removesuffix("-continuous")
-    with pytest.raises(ValueError, match=f"gives commands, with other ends than {levels}"):
+    with pytest.raises(ValueError, match=f"gives commands; {levels} has a table of actions"):
         offtrack_sim.evaluate(policy, levels)
     with pytest.raises(ValueError, match=f"chooses among 9 actions; {scenario} takes commands"):
         offtrack_sim.evaluate(offtrack_sim.Policy.shipped(), scenario)
