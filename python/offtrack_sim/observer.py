@@ -65,6 +65,7 @@ class Observer(_offtrack.Observer):
         step_seconds: Time between two observations [s].
         action_table: Steer angle [rad] and target speed [m/s] of each action, float32 ``[n_actions, 2]``, as the policy
             learned it: :meth:`command` gives them as they are on the map.
+        n_commands: Numbers of a command where actions are continuous; 0 where an action is an index.
         extras: Names of the extras that stand behind an observation's 69 values.
         n_values: Number of an observation's values, extras included.
         classes: Names of vehicle and load of each class of the benchmark.

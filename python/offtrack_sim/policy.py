@@ -99,10 +99,15 @@ class Policy:
         """Checks that it can drive the trucks of this batch or observer.
 
         Raises:
-            ValueError: Where the batch has other extras or another action table; the message says which.
+            ValueError: Where the batch has other extras or another action table, or takes commands where the policy
+                chooses among actions; the message says which.
         """
-        if self.head != "levels":
+        if self.head != "levels" and not batch.n_commands:
             raise ValueError(f"{self.name}: gives commands; {batch.scenario} has a table of actions")
+        if self.head == "levels" and batch.n_commands:
+            raise ValueError(
+                f"{self.name}: chooses among {len(self.action_table)} actions; {batch.scenario} takes commands"
+            )
         if self.values is not None:
             known = {values.name for values in EXTRAS} - set(batch.extras)
             missing = [name for name in self.values if name in known]

@@ -9,6 +9,7 @@ use offtrack_evaluation::episode::Episode;
 use offtrack_evaluation::episodes::Episodes;
 use offtrack_evaluation::figures::Figures;
 use offtrack_evaluation::placed::placed;
+use offtrack_evaluation::policies::Controller;
 use offtrack_evaluation::report;
 use offtrack_policy::Choice;
 use pyo3::exceptions::PyValueError;
@@ -68,15 +69,14 @@ pub fn drive<'py>(
         let mut function = Function { function: policy, n_values, begins: begins.then_some(true) };
         let driven = begun.drive(|simulator| {
             py.check_signals()?;
-            let chosen = match &network {
-                Some(_) => None,
-                None => Some(function.choose(simulator.batch(), world)?),
+            let mut chooser = match &mut network {
+                Some(network) => Chooser::Network(network.as_mut()),
+                None => Chooser::Chosen(function.choose(simulator.batch(), world)?),
             };
             pool.run(py, || {
-                match (&mut network, &chosen) {
-                    (Some(network), _) => network.step(simulator)?,
-                    (None, Some(actions)) => simulator.step_any(actions)?,
-                    (None, None) => {}
+                match &mut chooser {
+                    Chooser::Network(network) => network.step(simulator)?,
+                    Chooser::Chosen(actions) => simulator.step_any(actions)?,
                 }
                 figures.follow(simulator)
             })??;
@@ -140,6 +140,13 @@ struct Function<'a, 'py> {
     n_values: usize,
     /// Whether every episode begins; `None` for a function that is not told.
     begins: Option<bool>,
+}
+
+/// What makes a step.
+enum Chooser<'a> {
+    Network(&'a mut dyn Controller),
+    /// The actions that a function of Python chose, which it does before the GIL is released.
+    Chosen(Actions),
 }
 
 impl Function<'_, '_> {

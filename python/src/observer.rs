@@ -106,6 +106,12 @@ impl Observer {
         self.place.world.classes.iter().map(|class| (class.vehicle.as_str(), class.load.as_str())).collect()
     }
 
+    /// Numbers of a command; 0 where an action is an index.
+    #[getter]
+    fn n_commands(&self) -> usize {
+        self.place.world.n_commands()
+    }
+
     #[getter]
     fn action_table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         actions::table(py, &self.place.world.actions)

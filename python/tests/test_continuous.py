@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import offtrack_sim
-from offtrack_sim import Batch
+from offtrack_sim import Batch, export
 
 N = 16
 #: Any numbers: float32 in -1..1.
@@ -160,3 +161,26 @@ def test_an_observer_says_what_a_command_asks_for_on_the_map() -> None:
     assert np.allclose(np.degrees(steering), [20, -40]) and np.allclose(target * 3.6, [10, 30])
     with pytest.raises(ValueError, match=r"actions\[1, 0\]: 1.1; must lie in -1..1"):
         observer.command(np.array([[0, 0], [1.1, 0]]))
+
+
+@pytest.mark.parametrize(("scenario", "n_commands"), [("attard2023-continuous", 1), ("laden2026-continuous", 2)])
+def test_a_policy_file_of_commands_is_evaluated_as_the_function_that_it_is(
+    scenario: str, n_commands: int, tmp_path: Path
+) -> None:
+    batch = Batch(scenario, 2)
+    rng = np.random.default_rng(3)
+    weights = rng.normal(0, 0.3, (batch.n_values, n_commands)).astype(np.float32)
+    file = tmp_path / "own.safetensors"
+    export.save(file, [(weights, np.zeros(n_commands, np.float32))], scenario=scenario, squash="clip")
+    policy = offtrack_sim.Policy.load(file)
+    assert policy.head == "continuous" and (policy.action_table == batch.action_table).all()
+    rows = batch.observation()
+    assert np.allclose(policy.act(rows), (rows @ weights).clip(-1, 1), atol=1e-5)
+    found = offtrack_sim.evaluate(policy, scenario, episodes=2)
+    again = offtrack_sim.evaluate(policy.act, scenario, episodes=2)
+    assert (found.ended == again.ended).all()
+    levels = scenario.removesuffix("-continuous")
+    with pytest.raises(ValueError, match=f"gives commands; {levels} has a table of actions"):
+        offtrack_sim.evaluate(policy, levels)
+    with pytest.raises(ValueError, match=f"chooses among 9 actions; {scenario} takes commands"):
+        offtrack_sim.evaluate(offtrack_sim.Policy.shipped(), scenario)
