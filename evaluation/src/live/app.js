@@ -168,7 +168,7 @@ class App {
   /** The heading says how many trucks there are. */
   name() {
     const { crowds, chosen } = this, n = crowds.reduce((sum, { batch }) => sum + batch.n, 0);
-    byId("heading").textContent = `${whole(n)} trucks with trailers drive through roundabouts, live in this page`;
+    byId("heading").textContent = `${whole(n)} tractor-trailers drive roundabouts, live in this page`;
     const one = chosen.policy === -1 ? "random actions" : "the same learned policy";
     const by = chosen.second === null ? one : "one of two policies, the same start on both sides";
     byId("sentence").textContent = `Each drives alone, by ${by}. Click one and take the wheel.`;
