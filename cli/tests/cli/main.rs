@@ -33,6 +33,7 @@ mod seeds;
 mod tensorboard;
 mod threads;
 mod train;
+mod web;
 
 // The states of the simulator's tests look for them here.
 #[cfg(feature = "browser")]

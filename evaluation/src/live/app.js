@@ -11,9 +11,8 @@ const REACH = 14, SAID_FOR = 6000;
 
 /** Why the page cannot run, by the kind of a `NoDevice`, and what would do. */
 const MISSING = {
-  webgpu: ["This page needs WebGPU", "Browsers that have it: Chrome and Edge from version 113 on (Android: 121), " +
-    "Safari from 26 on, Firefox from 141 on Windows and from 145 on macOS. On Linux Chrome may need its flag “Unsafe " +
-    "WebGPU Support”."],
+  webgpu: ["This page needs WebGPU", "Browsers that have it: Chrome and Edge from version 113 on (on Linux from 144 on, " +
+    "with some graphics cards), Safari from 26 on, Firefox from 141 on Windows and from 145 on macOS."],
   adapter: ["No graphics adapter was found", "Turn on graphics acceleration in the browser's settings, update the " +
     "graphics driver, or try another browser: Chrome, Edge, Safari and Firefox of today have WebGPU."],
   device: ["The graphics adapter does not open", "Close other pages that use it, or start the browser again."],
@@ -169,7 +168,7 @@ class App {
   /** The heading says how many trucks there are. */
   name() {
     const { crowds, chosen } = this, n = crowds.reduce((sum, { batch }) => sum + batch.n, 0);
-    byId("heading").textContent = `${whole(n)} trucks with trailers drive through roundabouts, live in this page`;
+    byId("heading").textContent = `${whole(n)} tractor-trailers drive roundabouts, live in this page`;
     const one = chosen.policy === -1 ? "random actions" : "the same learned policy";
     const by = chosen.second === null ? one : "one of two policies, the same start on both sides";
     byId("sentence").textContent = `Each drives alone, by ${by}. Click one and take the wheel.`;

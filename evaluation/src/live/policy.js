@@ -4,6 +4,15 @@
 class Policy {
   /** Reads a policy file's bytes. What is wrong with it is an error in words. */
   static read(live, name, bytes) {
+    try {
+      return Policy.parsed(live, name, bytes);
+    } catch (error) {
+      if (!(error instanceof TypeError || error instanceof RangeError)) throw error;
+      throw new Error("is a damaged policy file: its description is of another form");
+    }
+  }
+
+  static parsed(live, name, bytes) {
     const { policy: file, act, n_values: nValues, extras: known } = live.facts.code;
     if (file.most_bytes < bytes.length) throw new Error("is larger than any policy file");
     const { metadata, tensor } = readTensors(bytes);

@@ -123,7 +123,13 @@ fn a_file_that_is_no_policy_for_the_benchmark_is_refused_in_words() {
     cut.layers.remove(0);
     let mut endless = plain.clone();
     endless.layers[0].biases[3] = f32::INFINITY;
-    let cases: [(&str, Vec<u8>, &str); 11] = [
+    // A word of the header is another one of the same length.
+    let reworded = |from: &str, to: &str| {
+        let at = whole.windows(from.len()).position(|bytes| bytes == from.as_bytes()).unwrap();
+        assert_eq!(from.len(), to.len());
+        [&whole[..at], to.as_bytes(), &whole[at + from.len()..]].concat()
+    };
+    let cases: [(&str, Vec<u8>, &str); 16] = [
         ("whole", whole.clone(), "it drives"),
         ("empty", Vec::new(), "is not a policy file, or is damaged: it is too short"),
         ("text", b"policy = \"mine\"\n".to_vec(), "is not a policy file, or is damaged"),
@@ -137,6 +143,11 @@ fn a_file_that_is_no_policy_for_the_benchmark_is_refused_in_words() {
             "learned with another action table: 8 actions",
         ),
         ("layers", cut.to_bytes(), "is of another shape"),
+        ("version", reworded(r#"\"version\":1"#, r#"\"version\":2"#), "is a policy file of version 2"),
+        ("type", reworded(r#""F32""#, r#""F16""#), "must hold 32-bit floats"),
+        ("header", reworded(r#""shape":[69]"#, r#""shape":{69}"#), "its header is no JSON"),
+        ("nameless", reworded(r#"\"actions\""#, r#"\"actionz\""#), "no layers, far too many, or no actions"),
+        ("description", reworded(r#"\"actions\":[["#, r#"\"actions\":7["#), "its description is no JSON"),
         ("endless", endless.to_bytes(), "is not finite"),
         (
             "wide",

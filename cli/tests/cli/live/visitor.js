@@ -1,0 +1,186 @@
+// Stands in place of the page's last script: visits the page as the test's plan says, and gives what it saw.
+
+const asked = async (name) => new Uint8Array(await (await fetch(name)).arrayBuffer());
+const give = (name, body) => fetch(name, { method: "POST", body });
+const said = () => ({ words: byId("said").textContent, isBad: byId("said").className === "bad" });
+const missing = () =>
+  ({ kind: byId("missing").hidden ? null : byId("missing").dataset.kind, words: byId("missing").innerText });
+
+/** The page with held trucks: nothing but roads is drawn. */
+async function opened(live, choice) {
+  const page = new App(live);
+  await page.start(choice);
+  page.play(false);
+  return page;
+}
+
+/** Colours where the road, an island and a kerb are; and the theme's. */
+async function pixels(live) {
+  const page = await opened(live, { n: 8 }), [crowd] = page.crowds, seen = [];
+  // What the page began with has not set out again.
+  await page.between(() => crowd.batch.restart({ seed: 0 }));
+  const at = async (road, point, width) => {
+    page.lookAt(road, ...point, width);
+    return (await page.pixelAt(...page.screenOf(road, ...point))).slice(0, 3);
+  };
+  for (const [road, { routes }] of page.world.facts.roads.entries()) {
+    // The eighth waypoint lies on the approach, far from the kerbs.
+    const { position } = page.world.waypoints(routes[0])[8];
+    seen.push({ road: await at(road, position, 150), island: await at(road, [0, 0], 150) });
+  }
+  await page.stepBy(2);
+  await page.pickTruck(0);
+  const { truck, ranges } = crowd.row, { rays } = page.world.vehicle(truck.vehicle);
+  const { n_trailer_rays: first } = live.facts.code, range = page.world.facts.sensor_range;
+  const n = ranges.findIndex((reach, index) => first <= index && reach < 0.9 * range);
+  const [c, s] = [Math.cos(truck.heading), Math.sin(truck.heading)];
+  const turned = ([x, y]) => [c * x - s * y, s * x + c * y];
+  const [mount, along] = [turned(rays[n].origin), turned(rays[n].direction)];
+  const end = truck.position.map((part, axis) => part + mount[axis] + ranges[n] * along[axis]);
+  const { road } = page.world.facts.routes[truck.route];
+  await page.between(() => page.visit.leave());
+  const kerb = await at(road, end, 150);
+  await page.pickTruck(0);
+  const middle = page.screenOf(road, ...crowd.trailerOf(truck));
+  const trailer = (await page.pixelAt(...middle)).slice(0, 3);
+  const colours = Object.fromEntries(["road", "solid", "kerb", "trailer"].map((name) => [name, page.colour(name)]));
+  await give("pixels", JSON.stringify({ seen, kerb, trailer, colours }));
+  page.gpu.destroy();
+}
+
+/** A truck that is taken over: steer angles of its steps, asked for beyond the lock; and after it is given back. */
+async function wheel(live) {
+  const page = await opened(live, { n: 8 }), [crowd] = page.crowds;
+  await page.stepBy(4);
+  await page.pickTruck(1);
+  const { steer_max: lock, steer_rate: rate } = crowd.rigOf(crowd.row.truck);
+  const { step, n_actions: nActions } = page.world.facts;
+  // It stops, so that it hits nothing while its wheels turn.
+  page.takeOver({ steering: 0, speed: 0 });
+  page.play(false);
+  await page.stepBy(50);
+  const before = crowd.row.truck.steering, angles = [], actions = [];
+  page.takeOver({ steering: 3, speed: 0 });
+  const state = byId("truck-state").textContent;
+  for (let n = 0; n < 26; n++) {
+    await page.stepBy(1);
+    angles.push(crowd.row.truck.steering);
+    actions.push(crowd.row.action);
+  }
+  const { speed } = crowd.row.truck;
+  page.giveBack();
+  await page.stepBy(1);
+  const after = { state: byId("truck-state").textContent, action: crowd.row.action };
+  const most = rate * step;
+  await give("wheel", JSON.stringify({ before, angles, actions, lock, most, nActions, speed, state, after }));
+  page.gpu.destroy();
+}
+
+/** What each key does, pressed one after the other. */
+async function keys(live) {
+  const page = await opened(live, { n: 8 }), { visit } = page, all = {};
+  await page.stepBy(4);
+  const press = async (key, type = "keydown") => {
+    document.body.dispatchEvent(new KeyboardEvent(type, { key, bubbles: true }));
+    // What a key asks for is done between two frames.
+    await page.between(() => {});
+  };
+  await press(" ");
+  all.plays = page.playing;
+  await press(" ");
+  all.playsAgain = page.playing;
+  await press("n");
+  await press("n");
+  all.followed = visit.focus.followed;
+  await press("t");
+  page.play(false);
+  all.driving = visit.driving.isOn;
+  await press("a");
+  visit.update(0.5);
+  all.left = visit.driving.steering;
+  await press("a", "keyup");
+  await press("d");
+  visit.update(1);
+  all.right = visit.driving.steering;
+  await press("d", "keyup");
+  await press("s");
+  const before = visit.driving.speed;
+  visit.update(0.5);
+  all.slower = before - visit.driving.speed;
+  await press("s", "keyup");
+  await press("Escape");
+  all.drivingAfter = visit.driving.isOn;
+  await press("Escape");
+  all.focusAfter = visit.focus;
+  await press("c");
+  all.colouring = page.colouring;
+  const { pixel } = page.stage.camera;
+  await press("+");
+  all.nearer = pixel / page.stage.camera.pixel;
+  await press("?");
+  all.help = byId("keys").open;
+  await give("keys", JSON.stringify(all));
+  page.gpu.destroy();
+}
+
+/** What the page says to each file, and by which policy and where trucks then drive. */
+async function files(live, { names }) {
+  const page = await opened(live, { n: 8 }), all = [];
+  for (const name of names) {
+    await page.dropFile(name, await asked(name));
+    const [{ policy, world, batch }] = page.crowds;
+    await page.stepBy(2);
+    all.push({ name, ...said(), policy: policy?.name ?? null, roads: world.facts.roads.length, begun: batch.begun });
+  }
+  await give("files", JSON.stringify(all));
+  page.gpu.destroy();
+}
+
+/** A failure of random actions, driven again. */
+async function again(live) {
+  const page = await opened(live, { n: 8, policy: -1 }), [crowd] = page.crowds;
+  // One of a later episode than a truck's first.
+  const isLater = ({ episode }) => 0 < episode;
+  while (!crowd.failures.some(isLater)) await page.stepBy(10);
+  const failure = crowd.failures.find(isLater);
+  await page.between(() => page.visit.driveAgain(crowd, failure));
+  page.play(false);
+  while (page.visit.again.row.ended === 0) await page.stepBy(1);
+  const { truck: { steps, position } } = page.visit.again.row, state = byId("truck-state").textContent;
+  await give("again", JSON.stringify({ state, failure, steps, position }));
+  page.gpu.destroy();
+}
+
+/** A device that is lost, and the page that begins again. */
+async function lost(live) {
+  let lose;
+  const losing = new Promise((done) => (lose = () => done({ reason: "unknown", message: "told by the test" })));
+  Object.defineProperty(GPUDevice.prototype, "lost", { configurable: true, get: () => losing });
+  const page = await opened(live, { n: 8 });
+  const before = missing();
+  lose();
+  await new Promise((next) => setTimeout(next, 100));
+  const during = missing();
+  Object.defineProperty(GPUDevice.prototype, "lost", { configurable: true, get: () => new Promise(() => {}) });
+  await page.start();
+  await page.stepBy(2);
+  await give("lost", JSON.stringify({ before, during, after: missing(), steps: page.crowds[0].batch.steps }));
+}
+
+/** A browser without WebGPU, or without an adapter. */
+async function without(live, { hasApi }) {
+  if (!hasApi) Object.defineProperty(navigator, "gpu", { configurable: true, value: undefined });
+  await new App(live).start();
+  await give("without", JSON.stringify(missing()));
+}
+
+const VISITS = { pixels, wheel, keys, files, again, lost, without };
+
+try {
+  const plan = JSON.parse(new TextDecoder().decode(await asked("plan")));
+  const live = await readLive();
+  await VISITS[plan.visit](live, plan);
+  await give("done", "");
+} catch (error) {
+  await give("failed", `${error.stack}`);
+}

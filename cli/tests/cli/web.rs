@@ -1,0 +1,80 @@
+//! `offtrack web`: what it writes and what it refuses; `live.rs` opens the page.
+
+use serde_json::Value;
+
+use crate::page::{block, read};
+use crate::place::{Place, offtrack, refusal, succeed};
+
+/// Most bytes of the page that comes without any flag.
+const MOST: usize = 3_200_000;
+
+fn facts(page: &str) -> Value {
+    serde_json::from_str(block(page, "facts")).unwrap()
+}
+
+fn names(of: &Value) -> Vec<&str> {
+    of.as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap()).collect()
+}
+
+#[test]
+fn the_default_page_is_one_small_file_without_an_address_and_its_parts_are_said() {
+    let place = Place::new();
+    let output = offtrack(&["web", "-o", &place.text("trucks.html")]);
+    succeed(&output);
+    let page = read(&place.file("trucks.html"));
+    assert!(page.len() < MOST, "{}", page.len());
+    // The only address is the name space of SVG: the page loads no other file.
+    let addresses = page.matches("http://").count() + page.matches("https://").count();
+    assert_eq!(addresses, page.matches("\"http://www.w3.org/2000/svg\"").count());
+    assert!(page.contains("default-src 'none';"));
+    let said = String::from_utf8(output.stdout).unwrap();
+    let weights = said.lines().map(|line| line.split_whitespace().rev().nth(1).unwrap().parse::<f64>().unwrap());
+    let weights: Vec<f64> = weights.collect();
+    let (all, parts) = weights.split_last().unwrap();
+    // What is not listed are the page's own elements.
+    assert!((1e3 * all - page.len() as f64).abs() < 100.0 && (all - parts.iter().sum::<f64>()).abs() < 30.0, "{said}");
+    let facts = facts(&page);
+    assert_eq!(names(&facts["worlds"]), ["attard2023", "laden2026"]);
+    let policies = ["attard2023 (shipped)", "attard2023-lane (shipped)", "laden2026 (shipped)"];
+    assert_eq!(names(&facts["policies"]), policies);
+    let able: Vec<&Value> = facts["worlds"].as_array().unwrap().iter().map(|world| &world["policies"]).collect();
+    assert_eq!(able, [&serde_json::json!([0, 1]), &serde_json::json!([2])]);
+}
+
+#[test]
+fn a_page_has_the_roads_and_routes_that_are_asked_for_and_random_ones_by_name() {
+    let place = Place::new();
+    let file = place.text("trucks.html");
+    let web = |flags: &[&str]| {
+        succeed(&offtrack(&[&["web", "--benchmark", "attard2023", "-o", &file], flags].concat()));
+        facts(&read(&place.file("trucks.html")))
+    };
+    let all = web(&["--road", "wide/7/12", "--road", "20m/N-left-4", "--policy", "attard2023", "--seed", "9"]);
+    let world = &all["worlds"][0];
+    assert_eq!(names(&world["roads"]), ["20m", "wide/7/12"]);
+    assert_eq!(names(&world["routes"])[0], "20m/N-left-4");
+    assert!(names(&world["routes"])[1..].iter().all(|name| name.starts_with("wide/7/12/")), "{world}");
+    assert_eq!((&all["seed"], names(&all["policies"])), (&Value::from(9), vec!["attard2023 (shipped)"]));
+    let test = web(&["--split", "test"]);
+    assert_eq!(names(&test["worlds"][0]["roads"]), ["20m", "40m"]);
+    assert_eq!(test["worlds"][0]["splits"].as_object().unwrap().keys().collect::<Vec<_>>(), ["test"]);
+}
+
+#[test]
+fn what_no_page_can_show_is_refused() {
+    let place = Place::new();
+    let file = place.text("trucks.html");
+    let refused = |flags: &[&str], words: &[&str]| {
+        let said = refusal(&offtrack(&[&["web", "-o", &file], flags].concat()), 2);
+        assert!(words.iter().all(|word| said.contains(word)), "{flags:?}: {said}");
+        assert!(!place.file("trucks.html").exists(), "{flags:?}");
+    };
+    let one = ["--benchmark", "attard2023"];
+    refused(&["--policy", "attard2023-as-run"], &["attard2023-as-run (shipped)", "another action table"]);
+    refused(&["--policy", "pursuit"], &["pursuit", "the program comes with attard2023"]);
+    refused(&[&one[..], &["--road", "20m/N-left-9"]].concat(), &["--road", "20m/N-left-9", "N-left-4"]);
+    refused(&[&one[..], &["--split", "validation"]].concat(), &["--split", "validation"]);
+    refused(&["--world"], &["--benchmark", "attard2023, laden2026", "name one"]);
+    refused(&[&one[..], &["--world", "--seed", "1"]].concat(), &["--world", "--seed"]);
+    refused(&["--benchmark", &file], &["--output", "is the file of --benchmark too"]);
+}
