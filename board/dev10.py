@@ -24,8 +24,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 STRONG = ["attard2023", "attard2023-lane", str(ROOT / "docs/data/best-71.safetensors")]
 HEAD = """\
-# Ten routes of ten validation roads of random2026, hard and of low variance, for ablations: dev10.py chose them, and says
-# how. Otherwise as random2026.toml; policies are trained on its training roads.
+# Ten routes of ten validation roads of random2026, hard and of low variance, for ablations: dev10.py chose them, and
+# says how. Otherwise as random2026.toml; policies are trained on its training roads.
 vehicle = "../scenarios/vehicles/daf_xf.toml"
 load = "empty"
 gutter = "drivable"
@@ -52,7 +52,8 @@ def arrivals(offtrack, policy, seed):
         command = [offtrack, "evaluate", "--benchmark", "random2026", "--split", "validation", "--policy", policy]
         command += ["--episodes", "30", "--seed", str(seed), "--json", str(file)]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        return {route["name"]: route["ended"].count(".") for route in json.loads(file.read_text())["outcomes"]["routes"]}
+        routes = json.loads(file.read_text())["outcomes"]["routes"]
+        return {route["name"]: route["ended"].count(".") for route in routes}
 
 
 def chosen(offtrack, weak):
@@ -88,7 +89,8 @@ def main():
             command = [args.offtrack, "generate", "--seed", seed, "--first", index, "--count", "1", "-o", drawn]
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
             shutil.copy(Path(drawn) / file, folder / file)
-        text += f'\n# The weak policy: {one} and {other} of 30.\n[[roundabout]]\nfile = "dev10/{file}"\ntest = ["{route}"]\n'
+        text += f"\n# The weak policy: {one} and {other} of 30.\n"
+        text += f'[[roundabout]]\nfile = "dev10/{file}"\ntest = ["{route}"]\n'
     (ROOT / "board/dev10.toml").write_text(text)
 
 

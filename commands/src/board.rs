@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use offtrack::files::reader::{self, TEXT_LIMIT, shown_path};
+use offtrack::files::reader::shown_path;
 use offtrack::map::procedural;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
@@ -102,8 +102,7 @@ fn row(args: &Args, file: &Path, entry: &Entry) -> Result<Row, Error> {
         files::say(&format!("{}: {what}", shown_path(file)));
     }
     if !claims.is_empty() {
-        let text = reader::read_text(file, TEXT_LIMIT)?;
-        files::write_whole(file, (text.trim_end().to_owned() + "\n" + &claims).as_bytes())?;
+        Entry::add(file, &claims)?;
     }
     let fresh = match args.roads_seed.filter(|_| entry.policy.is_some()) {
         Some(seed) => {

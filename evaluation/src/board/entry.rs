@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use offtrack::files::reader::Reader;
+use offtrack::files::reader::{self, Reader};
 use serde::Deserialize;
 
 use crate::comparison::Asked;
 use crate::error::Error;
+use crate::files;
 use crate::outcomes::{Outcomes, end_of};
 
 /// An entry, as its file has it.
@@ -71,8 +72,6 @@ fn test() -> String {
 #[serde(deny_unknown_fields)]
 pub struct Claim {
     /// As in [`Outcomes`].
-    pub world: String,
-    /// As in [`Outcomes`].
     pub digest: String,
     /// Episodes that arrived.
     pub arrived: usize,
@@ -121,6 +120,21 @@ impl Entry {
             }
         }
         Ok(entry)
+    }
+
+    /// Adds claims, as [`Claim::toml`] gives them, to the entry in `file`.
+    ///
+    /// # Errors
+    ///
+    /// A file to whose tables nothing can be added at its end, or that cannot be written.
+    pub fn add(file: &Path, claims: &str) -> Result<(), Error> {
+        let text = reader::read_text(file, reader::TEXT_LIMIT)?;
+        let text = format!("{}\n{claims}", text.trim_end());
+        if let Err(error) = toml::from_str::<Entry>(&text) {
+            let message = format!("no claim can be added: {error}; write `home` and `elsewhere` as [tables]");
+            return Err(Error::contents(file, message));
+        }
+        files::write_whole(file, text.as_bytes())
     }
 
     /// The file of the policy or of the actions, if it is a file: beside `file`, that of the entry.
@@ -174,18 +188,17 @@ impl Claim {
                 return Some(format!("ends, {}, episode {n}: {claimed} claimed, {simulated} simulated", route.name));
             }
         }
-        let keys = [("world", &self.world, &outcomes.world), ("digest", &self.digest, &outcomes.digest)];
-        let (key, claimed, simulated) = keys.into_iter().find(|(_, claimed, simulated)| claimed != simulated)?;
-        Some(format!("{key}: {claimed} claimed, {simulated} simulated: the ends are equal, and not every bit"))
+        let (claimed, simulated) = (&self.digest, &outcomes.digest);
+        let other =
+            || format!("digest: {claimed} claimed, {simulated} simulated: the ends are equal, and not every bit");
+        (claimed != simulated).then(other)
     }
 
     /// The claim of an evaluation as TOML, under a key.
     pub fn toml(key: &str, outcomes: &Outcomes) -> String {
-        let Outcomes { world, digest, routes, .. } = outcomes;
+        let Outcomes { digest, routes, .. } = outcomes;
         let arrived = outcomes.arrived();
-        let mut text = format!(
-            "\n[{key}.claim]\nworld = \"{world}\"\ndigest = \"{digest}\"\narrived = {arrived}\n\n[{key}.claim.ends]\n"
-        );
+        let mut text = format!("\n[{key}.claim]\ndigest = \"{digest}\"\narrived = {arrived}\n\n[{key}.claim.ends]\n");
         // Names and letters need no escapes: a name is quoted as TOML has it.
         text.extend(
             routes.iter().map(|route| format!("{} = \"{}\"\n", toml::Value::from(route.name.as_str()), route.ended)),
@@ -225,9 +238,19 @@ pub(super) mod tests {
             "ends, 16/N-left-1, episode 0: arrived claimed, trailer_collided simulated"
         );
         assert!(differs(|other| other.digest = "0".into()).starts_with("digest: 01234567 claimed, 0 simulated"));
-        assert!(differs(|other| other.world = "0".into()).starts_with("world: 0badcafe claimed, 0 simulated"));
         assert!(differs(|other| other.routes[1].name = "c".into()).contains("c, episode 0: no episode claimed"));
         assert!(differs(|other| other.routes.truncate(1)).starts_with("arrived: 3 claimed, 1"));
+    }
+
+    #[test]
+    fn a_claim_that_an_entry_cannot_hold_is_refused_and_the_file_is_left_as_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("entry.toml");
+        let inline = "name = \"a\"\npolicy = \"pursuit\"\nhome = { benchmark = \"b\", episodes = 2 }\n";
+        std::fs::write(&file, inline).unwrap();
+        let said = Entry::add(&file, &Claim::toml("home", &outcomes(&[".t"]))).unwrap_err().to_string();
+        assert!(said.contains("entry.toml: no claim can be added") && said.contains("as [tables]"), "{said}");
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), inline);
     }
 
     #[test]
@@ -242,7 +265,7 @@ pub(super) mod tests {
         refused(&ENTRY.replace("episodes = 2", "episodes = 0"), "home.episodes: 0; must lie in 1..100000");
         refused(&(ENTRY.to_owned() + "split = \"all\"\n"), "home.split: all; must be `train`");
         refused(&(ENTRY.to_owned() + "stars = 5\n"), "stars");
-        let claim = "[home.claim]\nworld = \"\"\ndigest = \"\"\narrived = 0\nends = { a = \"x\" }\n";
+        let claim = "[home.claim]\ndigest = \"\"\narrived = 0\nends = { a = \"x\" }\n";
         refused(&(ENTRY.to_owned() + claim), "home.claim.ends.a: x; must be letters");
         let training = "[training]\nenv_steps = 1\nminutes = -1.0\ncores = 1\n";
         refused(&(ENTRY.to_owned() + training), "training.minutes");
