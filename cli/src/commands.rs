@@ -1,6 +1,7 @@
 //! The commands, one file each, and what several of them share.
 
 pub mod bench;
+pub mod board;
 pub mod certify;
 pub mod compare;
 pub mod deviations;

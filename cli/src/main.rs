@@ -11,8 +11,8 @@ use offtrack_evaluation::{files, provenance};
 use offtrack_learner::error::Error;
 
 use commands::{
-    bench, certify, compare, deviations, devices, draw, evaluate, fits, generate, import, record, scale, trace, train,
-    vehicles,
+    bench, board, certify, compare, deviations, devices, draw, evaluate, fits, generate, import, record, scale, trace,
+    train, vehicles,
 };
 
 /// Batches of tensors are allocated thousands of times a second; the system's allocator takes a third of an update's
@@ -32,7 +32,8 @@ Without a command `offtrack` trains, as `offtrack train` does.
 
 Exit codes:
   0    done; training that Ctrl-C stopped once, with everything written
-  1    failed on valid input: device, disk, learner, a certificate that does not hold, a vehicle that does not fit
+  1    failed on valid input: device, disk, learner, a certificate or an entry of the board that does not hold, a
+       vehicle that does not fit
   2    wrong input: arguments or files
   130  interrupted: by Ctrl-C, in training by a second one";
 
@@ -49,6 +50,7 @@ enum Command {
     Train(train::Args),
     Evaluate(evaluate::Args),
     Compare(compare::Args),
+    Board(board::Args),
     Scale(scale::Args),
     Bench(bench::Args),
     Devices(devices::Args),
@@ -81,6 +83,7 @@ fn main() -> ExitCode {
         Command::Train(args) => train::run(args),
         Command::Evaluate(args) => Ok(evaluate::run(args)?),
         Command::Compare(args) => Ok(compare::run(args)?),
+        Command::Board(args) => Ok(board::run(args).map(|all_hold| is_refuted = !all_hold)?),
         Command::Scale(args) => scale::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Devices(args) => Ok(devices::run(args)?),

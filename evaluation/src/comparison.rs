@@ -10,6 +10,7 @@ mod tables;
 use offtrack::layout::Ended;
 use serde::Serialize;
 
+use crate::episode::wilson;
 use crate::interval::Cells;
 use crate::outcomes::{Outcomes, RouteOutcomes};
 pub use side::{Asked, Evaluated, Side};
@@ -38,6 +39,23 @@ pub struct Estimate {
 impl Estimate {
     fn new(mean: f64, interval: Option<(f64, f64)>) -> Estimate {
         Estimate { mean, low: interval.map(|(low, _)| low), high: interval.map(|(_, high)| high) }
+    }
+
+    /// The ends of the interval of a fraction as text. One without width, where all routes end alike, says nothing: then
+    /// those of Wilson's.
+    pub(crate) fn ends_or_wilson(&self, arrived: usize, episodes: usize, shown: impl Fn(f64) -> String) -> String {
+        match self.low.zip(self.high) {
+            Some((low, high)) if low < high => format!("{} to {}", shown(low), shown(high)),
+            _ => {
+                let (low, high) = wilson(arrived, episodes);
+                format!("{} to {} (Wilson)", shown(low), shown(high))
+            }
+        }
+    }
+
+    /// Of the mean of these episodes; `None` without one.
+    pub(crate) fn of(cells: &Cells) -> Option<Estimate> {
+        Some(Estimate::new(cells.mean()?, cells.interval()))
     }
 }
 
@@ -206,7 +224,7 @@ fn alone(side: &Side) -> SideFigures {
     let all: Vec<usize> = (0..side.outcomes(0).routes.len()).collect();
     let figures = Figures::each(|figure| {
         let cells = side.cells(figure, &all, |file, start| figure == Figure::Success || side.arrived[file][start]);
-        Some(Estimate::new(cells.mean()?, cells.interval()))
+        Estimate::of(&cells)
     });
     let arrived = |file: &Vec<bool>| file.iter().filter(|&&arrived| arrived).count();
     SideFigures {
@@ -227,12 +245,7 @@ fn difference(first: &Side, own: &Side) -> Difference {
     let everywhere = |start: usize| first.arrived.iter().chain(&own.arrived).all(|file| file[start]);
     let common: Vec<bool> = (0..n_starts).map(everywhere).collect();
     let cells = |side: &Side, figure| side.cells(figure, &all, |_, start| figure == Figure::Success || common[start]);
-    let alone = |side: &Side| {
-        Figures::each(|figure| {
-            let cells = cells(side, figure);
-            Some(Estimate::new(cells.mean()?, cells.interval()))
-        })
-    };
+    let alone = |side: &Side| Figures::each(|figure| Estimate::of(&cells(side, figure)));
     let difference = Figures::each(|figure| subtracted(&cells(own, figure), &cells(first, figure)));
     let fraction = |side: &Side, start: usize| {
         side.arrived.iter().filter(|file| file[start]).count() as f64 / side.arrived.len() as f64

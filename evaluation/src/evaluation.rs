@@ -1,5 +1,6 @@
 //! Evaluates a policy: a number of episodes on every route of a split, every one counted.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use crate::recording::{Recorder, Track};
@@ -13,6 +14,7 @@ use offtrack::world::World;
 
 use rayon::prelude::*;
 
+use crate::actions;
 use crate::classes;
 use crate::device::Device;
 use crate::driving::Driving;
@@ -258,6 +260,15 @@ fn stiffest(rigs: &[Rig]) -> &Rig {
 pub struct Sequences(Vec<Vec<u32>>);
 
 impl Sequences {
+    /// Writes them to `file`, to be [driven again](crate::actions) in `world`.
+    ///
+    /// # Errors
+    ///
+    /// A disk that is full, or a folder that may not be written.
+    pub fn write(&self, file: &Path, world: &World) -> Result<(), Error> {
+        actions::write(file, world, &self.0)
+    }
+
     /// Adds the next action of the episodes that have not finished.
     fn add(&mut self, actions: &[u32], finished: &[Option<Episode>]) {
         for ((sequence, &action), finished) in self.0.iter_mut().zip(actions).zip(finished) {

@@ -47,6 +47,7 @@ pub mod episode; // the figures of an episode, and of several
 pub mod classes; // how trucks drive, by vehicle and load
 pub mod failures; // why episodes did not arrive
 pub mod certificate; // routes shown to be possible
+pub mod actions; // an evaluation's, in a file
 pub mod fits; // whether a truck fits through a road
 pub mod possible; // success over the starts that are shown to be possible
 pub mod groups; // routes that have something in common
@@ -56,6 +57,7 @@ pub mod polygons; // curves as points
 pub mod recording; // the states of an episode
 pub mod outcomes; // how each episode ended
 pub mod comparison; // evaluations in pairs
+pub mod board; // entries that are simulated again
 pub mod shown; // which episodes a page shows
 pub mod page; // a report as an HTML page
 

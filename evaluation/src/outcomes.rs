@@ -69,6 +69,11 @@ pub struct RouteOutcomes {
 }
 
 impl Outcomes {
+    /// Episodes that arrived.
+    pub fn arrived(&self) -> usize {
+        self.routes.iter().flat_map(RouteOutcomes::each_end).filter(|&ended| ended == Ended::Arrived).count()
+    }
+
     /// As JSON: a line for each route.
     pub fn json(&self) -> serde_json::Result<String> {
         let head = serde_json::to_string(&Outcomes { routes: Vec::new(), ..self.clone() })?;

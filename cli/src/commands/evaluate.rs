@@ -55,6 +55,9 @@ pub struct Args {
     /// Write the report to this file as JSON, with each episode's outcome, for `offtrack compare`.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// Write the actions of every episode to this file, with which an entry of `offtrack board` is driven again.
+    #[arg(long)]
+    actions: Option<PathBuf>,
     /// Write a page to this file, for a browser, that shows the report and every episode; of more than 4000 episodes
     /// those that failed and a sample of the others.
     #[arg(long)]
@@ -119,7 +122,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let passes = passes(&args.widths, HOLD)?;
     let read = [("--certified", args.certified.as_deref()), ("--benchmark", Some(Path::new(&args.benchmark)))];
     outputs::distinct(
-        &[("--json", args.json.as_deref()), ("--html", args.html.as_deref())],
+        &[("--json", args.json.as_deref()), ("--actions", args.actions.as_deref()), ("--html", args.html.as_deref())],
         &[&args.policy.files()[..], &read].concat(),
     )?;
     let device = args.device.open()?;
@@ -164,6 +167,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let (machine, commit) = (provenance::machine(), provenance::commit());
         let written = Written { report: &report, machine, device: &device.name, commit, asked: &asked };
         written.write(file, &evaluation.outcomes(&finished))?;
+    }
+    if let Some(file) = &args.actions {
+        sequences.write(file, &world)?;
     }
     if let Some(file) = &args.html {
         Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run, metrics }.write(file)?;

@@ -4,6 +4,7 @@
 
 mod bench;
 mod benchmark;
+mod board;
 #[cfg(feature = "browser")]
 mod browser;
 mod certify;

@@ -138,6 +138,6 @@ pub fn refusal(output: &Output, code: i32) -> String {
     said
 }
 
-fn said(output: &Output) -> String {
+pub fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }

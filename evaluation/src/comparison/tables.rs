@@ -173,7 +173,9 @@ impl Comparison {
             }
             row.push(format!("{}/{}", side.arrived, side.episodes));
             row.push(Figure::Success.mean(&side.figures));
-            row.push(side.figures.success.map_or_else(|| "-".into(), |success| Figure::Success.interval(&success)));
+            let shown = |value: f64| Figure::Success.shown(value);
+            let ends = |success: Estimate| success.ends_or_wilson(side.arrived, side.episodes, shown);
+            row.push(side.figures.success.map_or_else(|| "-".into(), ends));
             if several {
                 row.push(Figure::Success.shown(side.worst));
             }

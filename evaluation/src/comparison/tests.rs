@@ -37,6 +37,9 @@ fn episodes_are_paired_by_route_and_number_and_those_that_differ_are_listed_gain
     let [first, own] = [&difference.first, &difference.own].map(|side| side.lane_distance.unwrap().mean);
     assert_eq!((first, own, difference.difference.lane_distance.unwrap().mean), (0.5, 0.5, 0.0));
     assert_eq!(difference.difference.success.unwrap().mean, 0.0);
+    // Of 12 episodes that all arrive Wilson's interval is 75.8 to 100 %; that over routes has no width.
+    let all = || side("all", &[&["....", "....", "...."]]);
+    assert!(Comparison::of(&[all(), all()]).text().contains("| 75.8 to 100.0 (Wilson) |"));
     let of = |kind: &str, name: &str| {
         difference.groups.iter().find(|group| group.kind == kind && group.name == name).unwrap().clone()
     };

@@ -76,9 +76,13 @@ fn lines(evaluation: Option<&Report>, also: &[AlsoReport]) -> String {
         let arrived = format!("{}/{}", summary.arrived, summary.episodes);
         let [success, low, high] =
             [summary.success, summary.success_low, summary.success_high].map(|fraction| 100.0 * fraction);
+        let over_routes = summary.success_low_over_routes.zip(summary.success_high_over_routes);
+        let over_routes = over_routes.filter(|(low, high)| low < high).map_or_else(String::new, |(low, high)| {
+            format!("; over routes {:.1} to {:.1} %", 100.0 * low, 100.0 * high)
+        });
         format!(
-            "{name:width$}  {arrived:>11} arrived, {success:5.1} % ({low:.1} to {high:.1} %), lane distance {lane} \
-             ({})\n",
+            "{name:width$}  {arrived:>11} arrived, {success:5.1} % ({low:.1} to {high:.1} %{over_routes}), lane \
+             distance {lane} ({})\n",
             familiarity(*trained_on, report.routes.len())
         )
     };
