@@ -41,8 +41,8 @@ impl Estimate {
         Estimate { mean, low: interval.map(|(low, _)| low), high: interval.map(|(_, high)| high) }
     }
 
-    /// The ends of the interval of a fraction as text. One without width, where all routes end alike, says nothing: then
-    /// those of Wilson's.
+    /// The ends of the interval of a fraction as text. One without width, where all routes end alike, says nothing:
+    /// then those of Wilson's.
     pub(crate) fn ends_or_wilson(&self, arrived: usize, episodes: usize, shown: impl Fn(f64) -> String) -> String {
         match self.low.zip(self.high) {
             Some((low, high)) if low < high => format!("{} to {}", shown(low), shown(high)),
@@ -333,6 +333,9 @@ fn groups(outcomes: &Outcomes) -> Vec<Group> {
             groups[group].routes.push(index);
         }
     }
+    // Exits by their number; what has none keeps its order.
+    groups
+        .sort_by_key(|group| (KINDS.iter().position(|(kind, _)| *kind == group.kind), group.name.parse::<u32>().ok()));
     let of_class = |(class, name): (usize, &crate::recording::Class)| Group {
         kind: "class",
         name: name.to_string(),
