@@ -10,7 +10,7 @@ use offtrack::world::World;
 use serde::Serialize;
 
 use super::driving::{Driving, JERK_BIN, LATERAL_BIN, N_BINS};
-use super::episode::{Episode, wilson};
+use super::episode::{Episode, success_over_routes, wilson};
 
 /// The episodes of a vehicle with a load.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -25,6 +25,12 @@ pub struct ClassReport {
     pub arrived: usize,
     /// Fraction that arrived.
     pub success: f64,
+    /// Lower end of the 95 % [interval over routes](crate::interval) of `success`; `None` on one route alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub success_low_over_routes: Option<f64>,
+    /// Upper end of the same.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub success_high_over_routes: Option<f64>,
     /// Episodes whose own start is shown to be possible; `None` where nobody asked for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub possible: Option<usize>,
@@ -108,6 +114,7 @@ fn class_report(
     let n = episodes.len();
     let ended = |code: Ended| episodes.iter().filter(move |episode| episode.ended == code);
     let (arrived, rolled_over) = (ended(Ended::Arrived).count(), ended(Ended::RolledOver).count());
+    let over_routes = success_over_routes(episodes.iter().copied());
     let ratios: Vec<Option<f64>> = ended(Ended::Arrived)
         .map(|episode| Some(f64::from(episode.steps) * scenario.step / feasible(&episode.last)))
         .collect();
@@ -128,6 +135,8 @@ fn class_report(
         episodes: n,
         arrived,
         success: arrived as f64 / n as f64,
+        success_low_over_routes: over_routes.map(|(low, _)| low),
+        success_high_over_routes: over_routes.map(|(_, high)| high),
         possible: None,
         rolled_over,
         rolled_over_fraction: rolled_over as f64 / n as f64,
@@ -239,6 +248,14 @@ mod tests {
         // 999 steps on a route that takes some 16 s at 30 km/h.
         assert!((4.0..9.0).contains(&found[0].time_over_feasible_mean.unwrap()), "{found:?}");
         assert_eq!(found[0].possible, None);
+        // All on one route.
+        assert_eq!(found[0].success_low_over_routes, None);
+        let mut on_two = episodes.clone();
+        on_two[1].last.route = 1;
+        on_two[2].last.route = 1;
+        let found = classes(&scenario, &world, &on_two, None).remove(0);
+        assert_eq!((found.success_low_over_routes, found.success_high_over_routes), (Some(0.0), Some(1.0)));
+        let found = classes(&scenario, &world, &episodes, None);
         assert_eq!(classes(&scenario, &world, &episodes, Some(&[true, false, true, true]))[0].possible, Some(3));
         assert_eq!(lines(&found).len(), 3);
         assert!(lines(&[]).is_empty());

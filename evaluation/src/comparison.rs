@@ -333,6 +333,9 @@ fn groups(outcomes: &Outcomes) -> Vec<Group> {
             groups[group].routes.push(index);
         }
     }
+    // Exits by their number; what has none keeps its order.
+    groups
+        .sort_by_key(|group| (KINDS.iter().position(|(kind, _)| *kind == group.kind), group.name.parse::<u32>().ok()));
     let of_class = |(class, name): (usize, &crate::recording::Class)| Group {
         kind: "class",
         name: name.to_string(),

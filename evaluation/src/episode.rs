@@ -105,9 +105,7 @@ impl Summary {
         let arrived = episodes.clone().filter(|episode| episode.ended == Ended::Arrived);
         let n_arrived = arrived.clone().count();
         let (success_low, success_high) = wilson(n_arrived, count);
-        let by_route =
-            episodes.clone().map(|episode| (episode.last.route, f64::from(u8::from(episode.ended == Ended::Arrived))));
-        let over_routes = Cells::of_routes(by_route).interval();
+        let over_routes = success_over_routes(episodes.clone());
         let most = |value: fn(&Episode) -> f64| episodes.clone().map(value).fold(f64::NEG_INFINITY, f64::max);
         let least = |value: fn(&Episode) -> f64| episodes.clone().map(value).fold(f64::INFINITY, f64::min);
         let mean = |value: fn(&Episode) -> f64| episodes.clone().map(value).sum::<f64>() / count as f64;
@@ -143,6 +141,12 @@ impl Summary {
             reward_mean: mean(|episode| episode.reward),
         })
     }
+}
+
+/// The 95 % [interval over routes](crate::interval) of the fraction that arrived; `None` on one route alone.
+pub(super) fn success_over_routes<'a>(episodes: impl Iterator<Item = &'a Episode>) -> Option<(f64, f64)> {
+    let arrived = |episode: &Episode| f64::from(u8::from(episode.ended == Ended::Arrived));
+    Cells::of_routes(episodes.map(|episode| (episode.last.route, arrived(episode)))).interval()
 }
 
 /// The 95 % Wilson interval of the fraction `successes / trials` (E. Wilson, "Probable Inference, the Law of

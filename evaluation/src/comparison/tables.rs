@@ -256,5 +256,8 @@ impl Difference {
 }
 
 fn words(name: &str) -> String {
-    name.replace('_', " ")
+    match name {
+        "class" => "vehicle, load".to_owned(),
+        _ => name.replace('_', " "),
+    }
 }

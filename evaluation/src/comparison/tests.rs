@@ -84,6 +84,24 @@ fn success_is_compared_by_vehicle_and_load_where_there_are_several() {
         .map(|group| (group.name.as_str(), group.starts, group.own))
         .collect();
     assert_eq!(classes, [("daf, empty", 4, 1.0), ("daf, laden", 4, 0.5)]);
+    assert!(comparison.text().contains("| vehicle, load | daf, laden "), "{}", comparison.text());
+}
+
+#[test]
+fn exits_stand_by_their_number_whatever_the_order_of_routes() {
+    let turned = |letters: &str| {
+        let mut side = side("s", &[&[letters, "..", ".."]]);
+        for (route, exit) in side.files[0].1.outcomes.routes.iter_mut().zip(["3", "1", "2"]) {
+            route.exit = exit.into();
+        }
+        side
+    };
+    let difference = Comparison::of(&[turned(".."), turned(".t")]).differences.remove(0);
+    let of_kind = |kind: &str| -> Vec<String> {
+        difference.groups.iter().filter(|group| group.kind == kind).map(|group| group.name.clone()).collect()
+    };
+    assert_eq!(of_kind("exit"), ["1", "2", "3"]);
+    assert_eq!(of_kind("route"), ["16/N-left-1", "16/N-left-2", "17/N-left-3"]);
 }
 
 #[test]

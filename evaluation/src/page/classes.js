@@ -13,7 +13,7 @@ const loadOf = ({ evaluation }, episode) => episode.load ?? evaluation.classes[0
 const CLASS_COLUMNS = [
   ["Arrived", (one) => {
     const [low, high] = wilson(one.arrived, one.episodes);
-    return html("div", { class: "cell" }, fractionBar(one.success, low, high, "var(--good)", 16), html("span", {}, `${whole(one.arrived)}/${whole(one.episodes)}  ${percent(one.success)}`));
+    return html("div", { class: "cell", title: overRoutes(one).slice(2) || undefined }, fractionBar(one.success, low, high, "var(--good)", 16), html("span", {}, `${whole(one.arrived)}/${whole(one.episodes)}  ${percent(one.success)}`));
   }],
   ["Rolled over", (one) => [whole(one.rolled_over), html("span", { class: "muted" }, ` to ${percent(one.rolled_over_high)}`)]],
   ["Peak LTR", (one) => [one.load_transfer_ratio_p50, one.load_transfer_ratio_p90, one.load_transfer_ratio_p99].map((ratio) => decimal(ratio, 2)).join(" | ")],

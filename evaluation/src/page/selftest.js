@@ -153,6 +153,13 @@ const CHECKS = {
       close(speeds.reduce((time, speed) => time + 3.6 / speed, 0), episode.seconds, 0.1 * episode.seconds, `episode ${episode.number}: time along the route`);
     }
   },
+  "the interval over routes stands beside Wilson's where routes differ": ({ page }) => {
+    const { evaluation } = page, words = overRoutes(evaluation);
+    const differ = new Set(evaluation.routes.map(({ success }) => success)).size !== 1;
+    same(words !== "", differ, "an interval over routes");
+    holds(byId("verdict").textContent.endsWith(`${interval(evaluation.success_low, evaluation.success_high)}${words}`), "in the headline");
+    holds(!differ || words.includes(percent(evaluation.success_high_over_routes)), words);
+  },
   "failed episodes are listed first": ({ page, replay }) => {
     for (const route of page.ground.routes.keys()) {
       if (!page.episodes.some((episode) => episode.route === route)) continue;

@@ -61,6 +61,14 @@ fn familiarity(trained_on: usize, n_routes: usize) -> String {
     }
 }
 
+/// The interval over routes, after Wilson's; nothing where it has no width.
+fn over_routes(ends: Option<(f64, f64)>) -> String {
+    match ends {
+        Some((low, high)) if low < high => format!("; over routes {:.1} to {:.1} %", 100.0 * low, 100.0 * high),
+        _ => String::new(),
+    }
+}
+
 /// A line for each evaluation, that on `benchmark` first.
 fn lines(evaluation: Option<&Report>, also: &[AlsoReport]) -> String {
     // No test route is trained on.
@@ -76,10 +84,7 @@ fn lines(evaluation: Option<&Report>, also: &[AlsoReport]) -> String {
         let arrived = format!("{}/{}", summary.arrived, summary.episodes);
         let [success, low, high] =
             [summary.success, summary.success_low, summary.success_high].map(|fraction| 100.0 * fraction);
-        let over_routes = summary.success_low_over_routes.zip(summary.success_high_over_routes);
-        let over_routes = over_routes.filter(|(low, high)| low < high).map_or_else(String::new, |(low, high)| {
-            format!("; over routes {:.1} to {:.1} %", 100.0 * low, 100.0 * high)
-        });
+        let over_routes = over_routes(summary.success_low_over_routes.zip(summary.success_high_over_routes));
         format!(
             "{name:width$}  {arrived:>11} arrived, {success:5.1} % ({low:.1} to {high:.1} %{over_routes}), lane \
              distance {lane} ({})\n",
@@ -94,12 +99,18 @@ fn lines(evaluation: Option<&Report>, also: &[AlsoReport]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::familiarity;
+    use super::{familiarity, over_routes};
 
     #[test]
     fn an_evaluation_is_zero_shot_where_no_route_was_trained_on() {
         assert_eq!(familiarity(0, 5), "zero-shot");
         assert_eq!(familiarity(5, 5), "trained on");
         assert_eq!(familiarity(2, 5), "2 of 5 routes trained on");
+    }
+
+    #[test]
+    fn an_interval_over_routes_is_told_where_routes_differ() {
+        assert_eq!(over_routes(Some((0.567, 0.861))), "; over routes 56.7 to 86.1 %");
+        assert_eq!([over_routes(Some((1.0, 1.0))), over_routes(None)], [String::new(), String::new()]);
     }
 }
