@@ -41,8 +41,8 @@ impl Estimate {
         Estimate { mean, low: interval.map(|(low, _)| low), high: interval.map(|(_, high)| high) }
     }
 
-    /// The ends of the interval of a fraction as text. One without width, where all routes end alike, says nothing: then
-    /// those of Wilson's.
+    /// The ends of the interval of a fraction as text. One without width, where all routes end alike, says nothing:
+    /// then those of Wilson's.
     pub(crate) fn ends_or_wilson(&self, arrived: usize, episodes: usize, shown: impl Fn(f64) -> String) -> String {
         match self.low.zip(self.high) {
             Some((low, high)) if low < high => format!("{} to {}", shown(low), shown(high)),
