@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Chooses the ten routes of dev10 from the 40 validation roads of random2026, and writes board/dev10.toml.
+"""Chooses the ten routes of dev10 from the 40 validation roads of random2026, and writes board/dev10/.
 
     offtrack train --seed 1 --steps 800000 --name dev10      # a weak policy, which ablations look like
     python3 board/dev10.py --offtrack target/release/offtrack --weak runs/dev10/policy.safetensors
@@ -26,7 +26,7 @@ STRONG = ["attard2023", "attard2023-lane", str(ROOT / "docs/data/best-71.safeten
 HEAD = """\
 # Ten routes of ten validation roads of random2026, hard and of low variance, for ablations: dev10.py chose them, and
 # says how. Otherwise as random2026.toml; policies are trained on its training roads.
-vehicle = "../scenarios/vehicles/daf_xf.toml"
+vehicle = "../../scenarios/vehicles/daf_xf.toml"
 load = "empty"
 gutter = "drivable"
 
@@ -90,8 +90,8 @@ def main():
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
             shutil.copy(Path(drawn) / file, folder / file)
         text += f"\n# The weak policy: {one} and {other} of 30.\n"
-        text += f'[[roundabout]]\nfile = "dev10/{file}"\ntest = ["{route}"]\n'
-    (ROOT / "board/dev10.toml").write_text(text)
+        text += f'[[roundabout]]\nfile = "{file}"\ntest = ["{route}"]\n'
+    (folder / "dev10.toml").write_text(text)
 
 
 if __name__ == "__main__":

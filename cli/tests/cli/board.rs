@@ -20,8 +20,6 @@ fn every_entry_of_the_board_comes_to_what_it_claims_to_the_last_bit() {
     let files = std::fs::read_dir(repository().join("board")).unwrap().map(|entry| entry.unwrap().path());
     let mut files: Vec<PathBuf> =
         files.filter(|file| file.extension().is_some_and(|ending| ending == "toml")).collect();
-    // A benchmark, no entry.
-    files.retain(|file| !file.ends_with("dev10.toml"));
     files.sort();
     let names: Vec<&str> = files.iter().map(|file| file.to_str().unwrap()).collect();
     let json = place.text("board.json");
@@ -104,7 +102,7 @@ fn recorded_actions_are_an_entry_without_a_policy_and_a_policy_drives_on_roads_t
 #[test]
 fn dev10_is_ten_validation_roads_of_random2026_with_a_route_each_that_a_shipped_policy_completes() {
     let place = Place::new();
-    let benchmark = repository().join("board/dev10.toml");
+    let benchmark = repository().join("board/dev10/dev10.toml");
     let command = ["evaluate", "--benchmark", benchmark.to_str().unwrap(), "--policy", "attard2023", "--episodes", "5"];
     succeed(&offtrack(&[&command[..], &["--json", &place.text("report.json")]].concat()));
     let report = place.json("report.json");
