@@ -29,8 +29,8 @@ impl DevicePolicy {
     ///
     /// # Errors
     ///
-    /// A policy that cannot drive in `world`, that is not [plain](Policy::is_plain), whose layers do not fit each other,
-    /// that a file could not hold, or that is too wide for a workgroup; a device whose workgroups are too small.
+    /// A policy that cannot drive in `world`, that is not [plain](Policy::is_plain), whose layers do not fit each
+    /// other, that a file could not hold, or that is too wide for a workgroup; a device whose workgroups are too small.
     pub fn new(device: &gpu::Device, policy: &Policy, world: &World, choice: Choice) -> Result<DevicePolicy, Error> {
         policy.check(world)?;
         check_plain(policy)?;
