@@ -31,6 +31,8 @@ class Gpu {
     this.lost = new Promise((lose) => device.lost.then(({ message }) => this.isGivenBack || lose(message)));
     /** The message of the first error of the device that nobody caught. */
     this.failed = new Promise((fail) => device.addEventListener("uncapturederror", ({ error }) => fail(error.message)));
+    /** What its compiler says of the shaders. */
+    this.messages = [];
     this.modules = new Map();
     this.pipelines = new Map();
     this.worlds = [];
@@ -51,7 +53,7 @@ class Gpu {
     return buffer;
   }
 
-  /** A module of shaders. What the compiler says against it is an error. */
+  /** A module of shaders. One that does not compile is an error; what else a compiler says is kept. */
   async module(label, code) {
     if (!this.modules.has(label)) this.modules.set(label, this.compiled(label, code));
     return this.modules.get(label);
@@ -60,8 +62,10 @@ class Gpu {
   async compiled(label, code) {
     const module = this.device.createShaderModule({ label, code });
     const { messages } = await module.getCompilationInfo();
-    const said = messages.map(({ type, lineNum, message }) => `${type} in line ${lineNum}: ${message}`);
-    if (said.length > 0) throw new Error(`The shaders ${label} do not compile here: ${said.join("; ")}`);
+    const words = ({ type, lineNum, message }) => `${label}, line ${lineNum}: ${type}: ${message}`;
+    this.messages.push(...messages.map(words));
+    const error = messages.find(({ type }) => type === "error");
+    if (error !== undefined) throw new Error(`The shaders do not compile here: ${words(error)}`);
     return module;
   }
 

@@ -24,10 +24,8 @@ const numbersOf = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2),
 /** Pipelines and the colours, shared by all worlds of a device. */
 class Picture {
   constructor(live, gpu) {
-    this.live = live;
-    this.device = gpu.device;
+    Object.assign(this, { live, gpu, device: gpu.device });
     this.format = navigator.gpu.getPreferredCanvasFormat();
-    this.module = this.device.createShaderModule({ label: "view", code: live.code.picture + live.code.view });
     const usage = GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST, { VERTEX, FRAGMENT } = GPUShaderStage;
     this.theme = this.device.createBuffer({ label: "theme", size: THEME_BYTES, usage });
     const uniform = { visibility: VERTEX | FRAGMENT, buffer: {} };
@@ -51,11 +49,12 @@ class Picture {
   async pipeline(name, layout) {
     if (!this.pipelines.has(name)) {
       const [vertex, fragment] = LAYERS[name], factors = { srcFactor: "one", dstFactor: "one-minus-src-alpha" };
+      const { code } = this.live, module = await this.gpu.module("view", code.picture + code.view);
       this.pipelines.set(name, this.device.createRenderPipelineAsync({
         label: name, layout: this.device.createPipelineLayout({ bindGroupLayouts: [layout, this.own] }),
-        vertex: { module: this.module, entryPoint: vertex },
+        vertex: { module, entryPoint: vertex },
         fragment: {
-          module: this.module, entryPoint: fragment,
+          module, entryPoint: fragment,
           targets: [{ format: this.format, blend: { color: factors, alpha: factors } }],
         },
         primitive: { topology: "triangle-list" },

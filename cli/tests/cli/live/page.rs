@@ -16,7 +16,8 @@ use super::served::{Given, given_by};
 use crate::page::read;
 use crate::place::repository;
 
-/// Does on a page what `jobs` ask for, with the files that they name, and gives what came of it.
+/// Does on a page what `jobs` ask for, with the files that they name, and gives what came of it. No compiler says
+/// anything of a shader.
 pub fn done(page: &str, jobs: &[Value], mut files: HashMap<String, Vec<u8>>) -> Given {
     files.insert("plan".to_owned(), Value::from(jobs).to_string().into_bytes());
     let main = read(&repository().join("evaluation/src/live/main.js"));
@@ -26,6 +27,7 @@ pub fn done(page: &str, jobs: &[Value], mut files: HashMap<String, Vec<u8>>) -> 
     let limits: Value = serde_json::from_slice(&given["limits"]).unwrap();
     assert_eq!(limits["buffers"], N_STORAGE_BUFFERS);
     assert_eq!(limits["memory"], WORKGROUP_MEMORY);
+    assert_eq!(String::from_utf8_lossy(&given["messages"]), "[]", "the compiler says something of the shaders");
     given
 }
 

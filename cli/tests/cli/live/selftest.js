@@ -107,7 +107,10 @@ try {
       memory: gpu.limits.maxComputeWorkgroupStorageSize,
     }),
   );
+  await Promise.all(live.code.act.map((code, index) => gpu.module(`act ${index}`, code)));
+  await gpu.module("view", live.code.picture + live.code.view);
   for (const job of JSON.parse(new TextDecoder().decode(await asked("plan")))) await JOBS[job.kind](live, gpu, job);
+  await give("messages", JSON.stringify(gpu.messages));
   await give("done", "");
 } catch (error) {
   await give("failed", `${error.stack}`);
