@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use offtrack::scenario::{Scenario, Split};
+use offtrack::scenario::Split;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
-use offtrack_evaluation::live::{Ground, Live, Part};
+use offtrack_evaluation::live::{self, Ground, Live, Part};
 use offtrack_evaluation::policies;
 use offtrack_policy::Policy;
 
@@ -79,7 +79,7 @@ fn ground(name: &str, args: &Args) -> Result<Ground, Error> {
     if let Some(split) = split {
         roads::keep(&mut scenario, split, name)?;
     }
-    let scenario: Scenario = Ground::of(scenario);
+    let scenario = live::shown(scenario);
     let world = roads::world(&scenario)?;
     if world.is_continuous() {
         let expected = "a page steers by levels: the same benchmark with actions.steer_levels is needed".to_owned();

@@ -11,8 +11,8 @@ const REACH = 14, SAID_FOR = 6000;
 
 /** Why the page cannot run, by the kind of a `NoDevice`, and what would do. */
 const MISSING = {
-  webgpu: ["This page needs WebGPU", "Browsers that have it: Chrome and Edge from version 113 on (on Linux from 144 on, " +
-    "with some graphics cards), Safari from 26 on, Firefox from 141 on Windows and from 145 on macOS."],
+  webgpu: ["This page needs WebGPU", "Browsers that have it: Chrome and Edge from version 113 on (on Linux from 144 " +
+    "on, with some graphics cards), Safari from 26 on, Firefox from 141 on Windows and from 145 on macOS."],
   adapter: ["No graphics adapter was found", "Turn on graphics acceleration in the browser's settings, update the " +
     "graphics driver, or try another browser: Chrome, Edge, Safari and Firefox of today have WebGPU."],
   device: ["The graphics adapter does not open", "Close other pages that use it, or start the browser again."],

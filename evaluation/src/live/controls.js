@@ -72,6 +72,7 @@ function showChoices(app) {
 /** Says what the colours mean. */
 function showLegend(app) {
   const [names, from, to] = COLOURINGS[app.colouring];
+  const hasLoads = 1 < app.live.facts.worlds[app.chosen.world].classes.length;
   const ramp = names.map((name, n) => `--${"abc"[n]}: var(--${name})`).join("; ");
   const cross = (name) => html("i", { class: "cross", style: `--swatch: var(--end-${name})` }, "×");
   byId("legend").replaceChildren(
@@ -85,7 +86,7 @@ function showLegend(app) {
       html("li", {}, cross("tractor_collided"), "tractor hit a kerb"),
       html("li", {}, cross("trailer_collided"), "trailer did"),
       // Only loads that are drawn can stand high enough.
-      ...(1 < app.live.facts.worlds[app.chosen.world].classes.length ? [html("li", {}, cross("rolled_over"), "rolled over")] : []),
+      ...(hasLoads ? [html("li", {}, cross("rolled_over"), "rolled over")] : []),
     ]));
 }
 

@@ -143,6 +143,8 @@ class Visit {
 
   /** The followed truck begins its route again with another load, on the lane's centre. */
   async setLoad(at) {
+    // The visitor may have gone back before the frame was done.
+    if (this.focus === null) return;
     const { focus } = this, { world, row, followed } = focus, { vehicles } = world.facts;
     const wanted = this.loads().own[at].index, now = focus.rigOf(row.truck);
     const unlike = (vehicle) => {

@@ -8,7 +8,7 @@ use offtrack::engine::stages::{N_STORAGE_BUFFERS, WORKGROUP_MEMORY};
 use offtrack::layout::{Column, shared::Named};
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
-use offtrack_evaluation::live::{Ground, Live};
+use offtrack_evaluation::live::{Ground, Live, shown};
 use offtrack_policy::Policy;
 use serde_json::Value;
 
@@ -33,7 +33,7 @@ pub fn done(page: &str, jobs: &[Value], mut files: HashMap<String, Vec<u8>>) -> 
 
 /// A benchmark as pages have it, baked.
 pub fn ground(benchmark: &str) -> Ground {
-    let scenario = Ground::of(Scenario::named(benchmark).unwrap());
+    let scenario = shown(Scenario::named(benchmark).unwrap());
     let world = Arc::new(World::bake(&scenario).unwrap());
     Ground { scenario, world }
 }
