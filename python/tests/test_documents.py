@@ -22,7 +22,7 @@ def snippets(document: str) -> list[str]:
     return [block for text, block in zip(before, blocks) if not text.rstrip().split("\n")[-1].startswith(ELSEWHERE)]
 
 
-@pytest.mark.parametrize(("document", "n"), [("README.md", 7), ("TUTORIAL.md", 5)])
+@pytest.mark.parametrize(("document", "n"), [("README.md", 8), ("TUTORIAL.md", 5)])
 def test_the_snippets_run(
     document: str, n: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
