@@ -17,4 +17,5 @@ pub mod record;
 pub mod roads; // benchmarks and roads by name
 pub mod terminal; // how wide a table may be
 pub mod trace;
+pub mod traffic;
 pub mod vehicles;

@@ -9,7 +9,7 @@ use offtrack::files::reader::shortened;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
-use crate::{certify, deviations, devices, draw, evaluate, fits, generate, import, record, trace, vehicles};
+use crate::{certify, deviations, devices, draw, evaluate, fits, generate, import, record, trace, traffic, vehicles};
 
 /// Exit code of a failure on valid input.
 pub const FAILED: u8 = 1;
@@ -30,6 +30,7 @@ pub enum Command {
     Certify(certify::Args),
     Fits(fits::Args),
     Draw(draw::Args),
+    Traffic(traffic::Args),
     Generate(generate::Args),
     Import(import::Args),
     Vehicles(vehicles::Args),
@@ -51,6 +52,7 @@ impl Command {
             Command::Certify(args) => certify::run(args),
             Command::Fits(args) => return fits::run(args),
             Command::Draw(args) => draw::run(args),
+            Command::Traffic(args) => traffic::run(args),
             Command::Generate(args) => generate::run(args),
             Command::Import(args) => import::run(args),
             Command::Vehicles(args) => vehicles::run(args),
