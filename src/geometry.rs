@@ -294,6 +294,15 @@ impl Curve {
         best.1
     }
 
+    /// The whole curve in numbers, for keys of what is computed from it.
+    pub(crate) fn numbers(&self) -> Vec<f64> {
+        let piece = |piece: &Piece| match *piece {
+            Piece::Segment { from, to } => vec![0.0, from.x, from.y, to.x, to.y],
+            Piece::Arc { centre, radius, from, sweep } => vec![1.0, centre.x, centre.y, radius, from, sweep],
+        };
+        std::iter::once(self.pieces.len() as f64).chain(self.pieces.iter().flat_map(piece)).collect()
+    }
+
     /// The area enclosed by a closed curve, positive counter-clockwise (m²).
     pub fn signed_area(&self) -> f64 {
         let area = |piece: &Piece| match *piece {

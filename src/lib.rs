@@ -8,6 +8,7 @@ pub mod files; // what is read: errors with file, key and value; the cache; ship
 pub mod layout; // rows, constants, columns and buffers; what Rust and WGSL share
 pub mod geometry; // arcs, segments, outlines; exact distances
 pub mod map; // roads: routes on a ring with arms, from parameters, maps or at random
+pub mod traffic; // cars: their paths, where these meet, who goes first
 pub mod field; // the signed distance to the kerbs, baked
 pub mod vehicle; // tractor, trailer, load; how fast and over which ground they can drive
 pub mod scenario; // what to drive

@@ -9,7 +9,9 @@ use offtrack::map::chosen::is_map;
 use offtrack::map::route::Route;
 use offtrack::map::{Gutter, Road};
 use offtrack::scenario::{APPROACH, DEPARTURE, WAYPOINT_SPACING};
+use offtrack::traffic::Network;
 use offtrack::vehicle::Vehicle;
+use offtrack_drawing::conflicts;
 use offtrack_drawing::figure::{self, Straights};
 use offtrack_drawing::sweep::{Driven, Sweep};
 use offtrack_drawing::{json, rasterised};
@@ -51,6 +53,9 @@ pub struct Args {
     /// tyres and rollover are compared with what the path needs, and printed.
     #[arg(long)]
     route: Option<String>,
+    /// Draw the paths of cars and where those from different arms meet, as `traffic` drives them; not as JSON.
+    #[arg(long, conflicts_with = "route")]
+    traffic: bool,
     /// With --route: a vehicle's name, or the path of its file.
     #[arg(long, default_value = "daf_xf", requires = "route")]
     vehicle: String,
@@ -99,7 +104,12 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if !is_map(Path::new(&args.roundabout)) {
         args.place.check_absent()?;
     }
-    let roundabout = roads::road(&args.roundabout, &args.place)?.seen();
+    if args.traffic && format == Format::Json {
+        let expected = "must end in .svg or .png with --traffic".into();
+        return Err(Error::Setting { name: "--output", value: args.output.display().to_string(), expected });
+    }
+    let driven = roads::road(&args.roundabout, &args.place)?;
+    let roundabout = driven.seen();
     let routes = roundabout.routes(args.approach, args.departure, WAYPOINT_SPACING).map_err(|leaves| {
         let (flag, value) =
             if leaves.part == "approach" { ("--approach", args.approach) } else { ("--departure", args.departure) };
@@ -114,6 +124,14 @@ pub fn run(args: &Args) -> Result<(), Error> {
     } else {
         let straights = Straights { approach: args.approach, departure: args.departure };
         let page = match &sweep {
+            None if args.traffic => {
+                let network = Network::bake(&driven).map_err(|error| Error::Setting {
+                    name: "ROUNDABOUT",
+                    value: args.roundabout.clone(),
+                    expected: error.to_string(),
+                })?;
+                conflicts::drawn(&driven, &network, &routes, straights, args.gutter)
+            }
             None => figure::roundabout(&roundabout, &routes, straights, args.gutter),
             Some(sweep) => figure::swept_path(&roundabout, &routes, straights, args.gutter, sweep),
         };

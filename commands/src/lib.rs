@@ -19,5 +19,6 @@ pub mod record;
 pub mod roads; // benchmarks and roads by name
 pub mod terminal; // how wide a table may be
 pub mod trace;
+pub mod traffic;
 pub mod vehicles;
 pub mod web;

@@ -10,7 +10,8 @@ use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
 use crate::{
-    board, certify, compare, deviations, devices, draw, evaluate, fits, generate, import, record, trace, vehicles, web,
+    board, certify, compare, deviations, devices, draw, evaluate, fits, generate, import, record, trace, traffic,
+    vehicles, web,
 };
 
 /// Exit code of a failure on valid input.
@@ -35,6 +36,7 @@ pub enum Command {
     Certify(certify::Args),
     Fits(fits::Args),
     Draw(draw::Args),
+    Traffic(traffic::Args),
     Generate(generate::Args),
     Import(import::Args),
     Vehicles(vehicles::Args),
@@ -59,6 +61,7 @@ impl Command {
             Command::Board(args) => return board::run(args),
             Command::Fits(args) => return fits::run(args),
             Command::Draw(args) => draw::run(args),
+            Command::Traffic(args) => traffic::run(args),
             Command::Generate(args) => generate::run(args),
             Command::Import(args) => import::run(args),
             Command::Vehicles(args) => vehicles::run(args),

@@ -1,4 +1,4 @@
-//! A chart: panels side by side, each with lines over two logarithmic axes and its legend below.
+//! A chart: panels side by side, each with lines over two axes and its legend below.
 
 mod axis;
 
@@ -47,8 +47,19 @@ pub struct Panel {
     pub x: &'static str,
     /// Title of the vertical axis, with its unit.
     pub y: &'static str,
+    /// How values lie along both axes.
+    pub scales: Scales,
     /// Lines in the order of the legend.
     pub lines: Vec<Line>,
+}
+
+/// How values lie along the axes of a panel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scales {
+    /// A factor has the same length everywhere.
+    Logarithmic,
+    /// A difference has; from 0 on.
+    Linear,
 }
 
 /// A line of a panel.
@@ -59,7 +70,7 @@ pub struct Line {
     pub colour: &'static str,
     /// Measured, or for comparison.
     pub kind: Kind,
-    /// Points from left to right, in the units of the axes. Both coordinates are positive.
+    /// Points from left to right, in the units of the axes. Over logarithmic ones both coordinates are positive.
     pub points: Vec<DVec2>,
 }
 
@@ -120,12 +131,9 @@ impl Panel {
             Kind::Measured(spread) => spread.as_slice(),
             Kind::Curve | Kind::Reference => &[],
         });
-        let x = Axis::logarithmic(points().map(|p| p.x), corner.x, end.x);
-        let y = Axis::logarithmic(
-            points().map(|p| p.y).chain(spreads.flat_map(|&(low, high)| [low, high])),
-            end.y,
-            corner.y,
-        );
+        let x = self.scales.axis(points().map(|p| p.x), corner.x, end.x);
+        let values = points().map(|p| p.y).chain(spreads.flat_map(|&(low, high)| [low, high]));
+        let y = self.scales.axis(values, end.y, corner.y);
         let mut group = Group::new().add(axes(lettering, &x, &y));
         let middle = DVec2::new(corner.x + 0.5 * PLOT.x, end.y + 44.0);
         group = group.add(lettering.text(self.x, middle, 15.0, Align::Middle, colour::INK));
@@ -162,6 +170,15 @@ impl Panel {
         let entries: Vec<Entry> = entries.collect();
         let (legend, height) = legend::drawn(lettering, &entries, DVec2::new(corner.x, end.y + AXIS), PLOT.x);
         (group.add(legend), end.y + AXIS + height)
+    }
+}
+
+impl Scales {
+    fn axis(self, values: impl Iterator<Item = f64>, from: f64, to: f64) -> Axis {
+        match self {
+            Scales::Logarithmic => Axis::logarithmic(values, from, to),
+            Scales::Linear => Axis::linear_to_ticks(0.0, values.fold(0.0, f64::max), from, to),
+        }
     }
 }
 

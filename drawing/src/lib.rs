@@ -8,7 +8,8 @@
 //! - [`camera::Camera`] draws a truck as it is now, in RGB pixels, while it is stepped.
 //! - [`sheet::drawn`] draws many roundabouts side by side, [`histograms::Histograms`] how their dimensions are
 //!   distributed.
-//! - [`chart::Chart`] draws measurements over logarithmic axes.
+//! - [`conflicts::drawn`] draws where the paths of cars meet.
+//! - [`chart::Chart`] draws measurements over two axes.
 //! - [`fits::sheet`] shows at scale which vehicles fit through a road, [`fits::pdf`] is the same as PDF.
 //! - [`rasterised`] makes a PNG of any of these SVGs. Text is drawn as outlines, so that pictures are equal on every
 //!   machine.
@@ -30,6 +31,7 @@
 pub mod camera; // a truck as it is now, in pixels
 pub mod chart; // measurements as lines
 pub mod comparison; // episodes on one route beside each other
+pub mod conflicts; // where paths of cars meet
 pub mod episode; // a recorded episode, still or moving
 pub mod figure; // a map with axes, title and legend
 pub mod film; // a recorded episode as GIF

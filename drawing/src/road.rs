@@ -203,7 +203,7 @@ impl<'a> RoadLayers<'a> {
     }
 }
 
-fn lane_colour(lane: Lane) -> &'static str {
+pub(crate) fn lane_colour(lane: Lane) -> &'static str {
     match lane {
         Lane::Left => colour::LEFT,
         Lane::Right => colour::RIGHT,

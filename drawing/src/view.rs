@@ -27,6 +27,9 @@ pub(crate) mod colour {
     pub const OVERLAP: &str = "#c2003a";
     pub const ROUTE: &str = "#228833";
     pub const RAY: &str = "#aa3377";
+    pub const FOLLOWED: &str = "#96d2c3";
+    pub const CROSSED: &str = "#e1695a";
+    pub const BESIDE: &str = "#aa3377";
 }
 
 /// Width of the page (px).

@@ -5,7 +5,7 @@ use glam::Vec2;
 
 use super::Field;
 use crate::files::cache::Cache;
-use crate::geometry::{Outline, Piece};
+use crate::geometry::Outline;
 
 /// Counted up whenever the same outline gives another field, so that older entries are not used.
 const FORM: u32 = 1;
@@ -51,15 +51,7 @@ fn key(outline: &Outline, cell: f64) -> Vec<u8> {
     let mut key = bytes_of(&FORM).to_vec();
     let mut add = |numbers: &[f64]| key.extend_from_slice(cast_slice(numbers));
     add(&[cell]);
-    for curve in &outline.loops {
-        add(&[curve.pieces.len() as f64]);
-        for piece in &curve.pieces {
-            match *piece {
-                Piece::Segment { from, to } => add(&[0.0, from.x, from.y, to.x, to.y]),
-                Piece::Arc { centre, radius, from, sweep } => add(&[1.0, centre.x, centre.y, radius, from, sweep]),
-            }
-        }
-    }
+    outline.loops.iter().for_each(|curve| add(&curve.numbers()));
     key
 }
 

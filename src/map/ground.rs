@@ -9,6 +9,7 @@ mod outline_file;
 use glam::DVec2;
 
 use super::frame::Frame;
+use super::parametric::lane::ring_stations;
 use crate::geometry::{Curve, Outline};
 use crate::map::route::Lane;
 
@@ -105,6 +106,12 @@ impl Ground {
     /// Where what is driven lies in the map that the road is from.
     pub fn frame(&self) -> Frame {
         Frame { origin: self.origin, mirrored: self.mirrored }
+    }
+
+    /// Stations at which a line enters and leaves the circle of the outer kerb; where it passes outside, twice that of
+    /// its point nearest to the centre (m).
+    pub fn ring_stations(&self, line: &Curve) -> (f64, f64) {
+        ring_stations(line, self.outer_radius)
     }
 
     /// The road as it lies in the world: mirrored back where it has left-hand traffic. Lanes have the names that they

@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use super::mode::Mode;
 use super::{Measured, Scale};
-use offtrack_drawing::chart::{Chart, Kind, LINES, Line, Panel};
+use offtrack_drawing::chart::{Chart, Kind, LINES, Line, Panel, Scales};
 use offtrack_learner::error::Error;
 
 /// Width of a PNG (px).
@@ -52,6 +52,7 @@ pub(super) fn drawn(scale: &Scale, device: &str) -> Result<String, offtrack_draw
         title: "Speed: median, slowest and fastest window",
         x: "trucks",
         y: "env steps / s",
+        scales: Scales::Logarithmic,
         lines: speeds,
     }];
     if !stages.is_empty() {
@@ -59,6 +60,7 @@ pub(super) fn drawn(scale: &Scale, device: &str) -> Result<String, offtrack_draw
             title: "Time of each stage, random actions",
             x: "trucks",
             y: "time a truck and step [ns]",
+            scales: Scales::Logarithmic,
             lines: stages,
         });
     }

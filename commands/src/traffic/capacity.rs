@@ -1,0 +1,210 @@
+//! Capacities of entry lanes beside circulating flows, and their plot.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use glam::DVec2;
+use offtrack::layout::Stream;
+use offtrack::traffic::hcm::Lane;
+use offtrack::traffic::survey::{Counts, Saturated};
+use offtrack::traffic::{Mix, Rules, Survey};
+use offtrack_drawing::chart::{Chart, Kind, LINES, Line, Panel, Scales};
+use offtrack_drawing::rasterised;
+use offtrack_evaluation::error::Error;
+use offtrack_evaluation::files;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{Args, Place, STEPS_A_MINUTE, bar, rounded, setting, table, write_json};
+
+/// Circulating flows (veh/h).
+const FLOWS: [f64; 5] = [0.0, 300.0, 600.0, 900.0, 1200.0];
+/// Width of a PNG (pixels).
+const WIDTH: u32 = 1200;
+
+/// What was found of an entry lane beside one flow; cars an hour.
+#[derive(Serialize)]
+struct Point {
+    road: String,
+    arm: String,
+    lane: &'static str,
+    /// Lanes of the entry and of the ring, in the manual's words.
+    lanes: &'static str,
+    circulating: f64,
+    capacity: f64,
+    hcm: f64,
+}
+
+/// A queue without end at one arm, beside one flow.
+struct Case<'a> {
+    place: &'a Place,
+    survey: &'a Survey<'a>,
+    saturated: Saturated,
+}
+
+pub(super) fn check_plot(plot: &Path) -> Result<(), Error> {
+    let is_picture = plot.extension().is_some_and(|extension| extension == "svg" || extension == "png");
+    let value = plot.display().to_string();
+    if is_picture { Ok(()) } else { Err(setting("--plot", &value, "must end in .svg or .png")) }
+}
+
+/// Runs the command with --capacity.
+pub(super) fn run(args: &Args, places: &[Place], mix: Mix) -> Result<(), Error> {
+    if let Some(place) = places.iter().find(|place| !place.network.has_ring) {
+        let expected = "has no ring, and the manual's capacities are those of roundabouts: leave it out";
+        return Err(setting("--capacity", &place.road.name, expected));
+    }
+    let rules = Rules::FITTED;
+    let surveys = places.iter().map(|place| place.survey(&rules)).collect::<Result<Vec<Survey>, Error>>()?;
+    let mut cases = Vec::new();
+    for (place, survey) in places.iter().zip(&surveys) {
+        for arm in 0..place.network.n_arms {
+            for circulating in FLOWS {
+                let saturated = survey.saturated(arm, circulating, mix);
+                let saturated = saturated.map_err(|error| setting("ROAD", &place.road.name, &error.to_string()))?;
+                cases.extend(saturated.map(|saturated| Case { place, survey, saturated }));
+            }
+        }
+    }
+    let bar = bar(cases.len() * args.runs as usize);
+    let found = cases.par_iter().map(|case| {
+        let counted = |run: u32| {
+            let counts = case.survey.saturated_counts(
+                &case.saturated,
+                args.minutes * STEPS_A_MINUTE,
+                Stream { seed: args.seed, env: run },
+            );
+            bar.advance();
+            counts
+        };
+        let runs = (0..args.runs).into_par_iter().map(counted).collect::<Vec<Vec<Counts>>>();
+        case.points(&runs, f64::from(args.runs) * f64::from(args.minutes) / 60.0)
+    });
+    let points: Vec<(Lane, Point)> = found.collect::<Vec<_>>().into_iter().flatten().collect();
+    drop(bar);
+    files::print(&text(&points))?;
+    if let Some(plot) = &args.plot {
+        let drawn = chart(args, &points).drawn().and_then(|svg| {
+            let is_png = plot.extension().is_some_and(|extension| extension == "png");
+            if is_png { rasterised(&svg, WIDTH) } else { Ok(svg.into_bytes()) }
+        });
+        let bytes = drawn.map_err(|error| Error::write(plot)(std::io::Error::other(error)))?;
+        files::write_whole(plot, &bytes)?;
+    }
+    write_json(args, &points.iter().map(|(_, point)| point).collect::<Vec<_>>())
+}
+
+impl Case<'_> {
+    /// The capacity of each lane of the arm.
+    fn points(&self, runs: &[Vec<Counts>], hours: f64) -> Vec<(Lane, Point)> {
+        let of = |(index, &source): (usize, &usize)| {
+            let (arm, lane) = self.place.source_name(source);
+            let kind = self.survey.lane(source);
+            let sum = |count: fn(&Counts) -> u64| runs.iter().map(|counts| count(&counts[index])).sum::<u64>() as f64;
+            let [capacity, circulating] =
+                [sum(|counts| counts.served), sum(|counts| counts.circulating)].map(|n| n / hours);
+            let point = Point {
+                road: self.place.road.name.clone(),
+                arm,
+                lane,
+                lanes: kind.name(self.place.road.is_mirrored()),
+                circulating,
+                capacity,
+                hcm: kind.capacity(circulating),
+            };
+            (kind, point)
+        };
+        self.saturated.sources.iter().enumerate().map(of).collect()
+    }
+}
+
+/// Means over all lanes of a kind, flow by flow: of the flow, of the capacity with its least and greatest, of the
+/// manual's.
+struct Mean {
+    circulating: f64,
+    capacity: f64,
+    least: f64,
+    most: f64,
+    hcm: f64,
+}
+
+/// The kinds of lanes and their means, flow by flow: a lane has as many points as there are flows, in their order.
+fn means(points: &[(Lane, Point)]) -> BTreeMap<Lane, (&'static str, Vec<Mean>)> {
+    let mut kinds: BTreeMap<Lane, (&'static str, Vec<Vec<&Point>>)> = BTreeMap::new();
+    let mut seen: BTreeMap<(&str, &str, &str), usize> = BTreeMap::new();
+    for (kind, point) in points {
+        let index = seen.entry((&point.road, &point.arm, point.lane)).or_default();
+        let (_, flows) = kinds.entry(*kind).or_insert_with(|| (point.lanes, FLOWS.map(|_| Vec::new()).to_vec()));
+        flows[*index].push(point);
+        *index += 1;
+    }
+    let mean = |points: Vec<&Point>| {
+        let of = |value: fn(&Point) -> f64| points.iter().map(|point| value(point)).sum::<f64>() / points.len() as f64;
+        let capacities = || points.iter().map(|point| point.capacity);
+        let (least, most) = (capacities().fold(f64::INFINITY, f64::min), capacities().fold(0.0, f64::max));
+        let [circulating, capacity, hcm] =
+            [of(|point| point.circulating), of(|point| point.capacity), of(|point| point.hcm)];
+        Mean { circulating, capacity, least, most, hcm }
+    };
+    let of_kind = |(kind, (name, flows)): (Lane, (_, Vec<Vec<&Point>>))| {
+        (kind, (name, flows.into_iter().filter(|points| !points.is_empty()).map(mean).collect()))
+    };
+    kinds.into_iter().map(of_kind).collect()
+}
+
+fn deviation(found: f64, hcm: f64) -> String {
+    format!("{:+.0} %", 100.0 * (found / hcm - 1.0))
+}
+
+fn text(points: &[(Lane, Point)]) -> String {
+    let mut rows = vec![
+        ["road", "entry", "lane", "lanes", "circulating", "capacity", "HCM", "deviation"].map(str::to_owned).to_vec(),
+    ];
+    for (_, point) in points {
+        let mut row = vec![point.road.clone(), point.arm.clone(), point.lane.to_owned(), point.lanes.to_owned()];
+        row.extend([point.circulating, point.capacity, point.hcm].map(|flow| rounded(flow, 0)));
+        row.push(deviation(point.capacity, point.hcm));
+        rows.push(row);
+    }
+    let mut sums = vec![
+        ["lanes", "", "circulating", "capacity", "HCM", "deviation", "least", "greatest"].map(str::to_owned).to_vec(),
+    ];
+    for (name, means) in means(points).into_values() {
+        for mean in means {
+            let mut row = vec![name.to_owned(), String::new()];
+            row.extend([mean.circulating, mean.capacity, mean.hcm].map(|flow| rounded(flow, 0)));
+            row.push(deviation(mean.capacity, mean.hcm));
+            row.extend([mean.least, mean.most].map(|flow| rounded(flow, 0)));
+            sums.push(row);
+        }
+    }
+    format!("{}\nmeans over all lanes of a kind\n{}", table(&rows), table(&sums))
+}
+
+/// The means with the least and greatest of each, and the manual's curves.
+fn chart(args: &Args, points: &[(Lane, Point)]) -> Chart {
+    let mut lines = Vec::new();
+    for ((kind, (name, means)), colour) in means(points).into_iter().zip(LINES) {
+        let curve = (0..=26).map(|step| f64::from(step) * 50.0).map(|flow| DVec2::new(flow, kind.capacity(flow)));
+        lines.push(Line { name: None, colour, kind: Kind::Reference, points: curve.collect() });
+        let spread = means.iter().map(|mean| (mean.least, mean.most)).collect();
+        let points = means.iter().map(|mean| DVec2::new(mean.circulating, mean.capacity)).collect();
+        lines.push(Line { name: Some(name), colour, kind: Kind::Measured(spread), points });
+    }
+    let roads = args.roads.len();
+    let on = if roads == 1 { format!("on {}", args.roads[0]) } else { format!("on {roads} roads") };
+    Chart {
+        title: format!("Capacity of entry lanes {on}"),
+        subtitles: vec![
+            "Means over lanes of a kind, with the least and the greatest.".to_owned(),
+            "Dashed: Highway Capacity Manual, equations 22-1 to 22-5.".to_owned(),
+        ],
+        panels: vec![Panel {
+            title: "Lanes of the entry into lanes of the ring",
+            x: "Circulating flow [veh/h]",
+            y: "Capacity [veh/h]",
+            scales: Scales::Linear,
+            lines,
+        }],
+    }
+}

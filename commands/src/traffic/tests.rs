@@ -1,0 +1,98 @@
+//! The command writes what it prints, and refuses what no road can have.
+
+use clap::Parser;
+use offtrack::traffic::Mix;
+use serde_json::Value;
+
+use super::{Args, mix, run, table};
+
+#[derive(Parser)]
+struct Program {
+    #[command(flatten)]
+    args: Args,
+}
+
+fn args(words: &[&str]) -> Args {
+    Program::try_parse_from([&["traffic"], words].concat()).unwrap().args
+}
+
+/// What the command writes as JSON.
+fn json(words: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("found.json");
+    run(&args(&[words, &["--json", file.to_str().unwrap()]].concat())).unwrap();
+    serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap()
+}
+
+#[test]
+fn every_entry_lane_has_its_flows_its_delay_and_the_manuals() {
+    let found = json(&["16m", "--demand", "1200", "--minutes", "10", "--runs", "2", "--share", "vans=0.2"]);
+    let entries = found[0]["entries"].as_array().unwrap();
+    assert_eq!(entries.len(), 8);
+    let sum = |key: &str| entries.iter().map(|entry| entry[key].as_f64().unwrap()).sum::<f64>();
+    assert!((sum("demand") - 1200.0).abs() < 1e-6);
+    // 400 cars in two runs, within five deviations of the count.
+    assert!((sum("served") - 1200.0).abs() < 5.0 * 3.0 * 20.0, "{}", sum("served"));
+    for entry in entries {
+        let (delay, hcm) = (entry["delay"].as_f64().unwrap(), &entry["hcm"]);
+        let capacity = hcm["capacity"].as_f64().unwrap();
+        assert!((0.0..60.0).contains(&delay) && (800.0..1420.0).contains(&capacity), "{entry}");
+        assert!(hcm["lanes"].as_str().unwrap().starts_with("2 into 2"), "{entry}");
+    }
+    // The same again: nothing depends on threads.
+    assert_eq!(found, json(&["16m", "--demand", "1200", "--minutes", "10", "--runs", "2", "--share", "vans=0.2"]));
+}
+
+#[test]
+fn capacities_fall_with_the_circulating_flow_and_are_plotted_beside_the_manuals() {
+    let folder = tempfile::tempdir().unwrap();
+    let plot = folder.path().join("plot.svg");
+    let words = ["20m", "--capacity", "--minutes", "5", "--runs", "1", "--plot", plot.to_str().unwrap()];
+    let found = json(&words);
+    let points = found.as_array().unwrap();
+    // Five flows beside each of the two lanes of four arms.
+    assert_eq!(points.len(), 40);
+    let of = |key: &str, index: usize| points[index][key].as_f64().unwrap();
+    for index in (0..40).step_by(10) {
+        assert!(of("circulating", index) == 0.0 && 1_100.0 < of("capacity", index), "{}", points[index]);
+        assert!(of("capacity", index + 8) < 0.7 * of("capacity", index), "{}", points[index + 8]);
+    }
+    let drawn = std::fs::read_to_string(plot).unwrap();
+    assert!(drawn.starts_with("<svg ") && drawn.contains("Capacity of entry lanes on 20m"));
+}
+
+#[test]
+fn a_setting_that_no_run_can_have_is_refused_by_flag_and_value() {
+    let crossing = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenarios/maps/town03-crossing.outline.toml");
+    let cases: [(&[&str], &str); 6] = [
+        (&["16m", "--minutes", "0"], "--minutes: 0; must lie in 1..1440"),
+        (&["16m", "--runs", "2000"], "--runs: 2000; must lie in 1..1000"),
+        (&["16m", "--demand", "0"], "--demand: 0; nobody drives"),
+        (&["16m", "--capacity", "--plot", "a.pdf"], "--plot: a.pdf; must end in .svg or .png"),
+        (&[crossing, "--demand", "1500"], "--demand: 1500; town03-crossing: 1500 veh/h on a road without a ring"),
+        (&[crossing, "--capacity"], "--capacity: town03-crossing; has no ring"),
+    ];
+    for (words, expected) in cases {
+        let message = run(&args(words)).unwrap_err().to_string();
+        assert!(message.starts_with(expected), "{message}");
+    }
+}
+
+#[test]
+fn kinds_of_cars_are_fractions_of_known_kinds() {
+    let of = |shares: &[&str]| mix(&shares.iter().map(|&share| share.to_owned()).collect::<Vec<_>>());
+    assert_eq!(of(&["vans=0.25", "rude=0.1"]).unwrap(), Mix { vans: 0.25, rude: 0.1 });
+    for wrong in ["vans", "vans=", "vans=1.5", "vans=-0.1", "vans=NaN", "buses=0.1"] {
+        let message = of(&[wrong]).unwrap_err().to_string();
+        assert_eq!(message, format!("--share: {wrong}; must be vans=F or rude=F with F in 0..1"));
+    }
+}
+
+#[test]
+fn columns_are_as_wide_as_their_widest_cell() {
+    let rows = [
+        vec!["N".to_owned(), "left".to_owned(), "1".to_owned()],
+        vec!["E".to_owned(), "x".to_owned(), "200".to_owned()],
+    ];
+    assert_eq!(table(&rows), "N  left    1\nE  x     200\n");
+}

@@ -1,0 +1,80 @@
+//! How many cars want to go where, and which kinds of them.
+
+use super::network::Network;
+use super::{Error, STEP};
+
+/// Largest flow of a road without a ring (veh/h).
+pub const MOST_WITHOUT_RING: f64 = 900.0;
+/// Largest flow: at most one car arrives in a step (veh/h).
+pub const MOST: f64 = 3600.0 / STEP as f64;
+/// Weight of a U-turn among the exits, where nothing else is said.
+const U_TURN: f64 = 0.1;
+
+/// The kinds of cars, by their fractions.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Mix {
+    /// Fraction of vans, 7 m long and 2.1 m wide.
+    pub vans: f32,
+    /// Fraction of rude drivers, who let nobody in.
+    pub rude: f32,
+}
+
+/// Arrivals at a road.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Demand {
+    /// Of every source the sum of its probability of an arrival in a step and those of the sources before it.
+    pub(super) arrivals: Vec<f32>,
+    /// Of every path the fraction of its source's cars that take it or one before it.
+    pub(super) shares: Vec<f32>,
+    /// The kinds of cars.
+    pub(super) mix: Mix,
+}
+
+impl Demand {
+    /// Arrivals by path (veh/h).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Flow`] for a flow that is negative or larger than one car a step in all; [`Error::NoRing`] where the
+    /// road has no ring and more cars arrive than [`MOST_WITHOUT_RING`].
+    pub fn new(network: &Network, flows: &[f64], mix: Mix) -> Result<Demand, Error> {
+        let total: f64 = flows.iter().sum();
+        let wrong = flows.iter().copied().find(|flow| !(0.0..=MOST).contains(flow));
+        if let Some(flow) = wrong.or((MOST < total).then_some(total)) {
+            return Err(Error::Flow { flow, most: MOST });
+        }
+        if !network.has_ring && MOST_WITHOUT_RING < total {
+            return Err(Error::NoRing { flow: total, most: MOST_WITHOUT_RING });
+        }
+        let mut demand = Demand { arrivals: Vec::new(), shares: vec![1.0; flows.len()], mix };
+        let mut sum = 0.0;
+        for source in 0..network.sources.len() {
+            let paths = network.paths_of(source);
+            let of_source: f64 = flows[paths.clone()].iter().sum();
+            sum += of_source / MOST;
+            demand.arrivals.push(sum as f32);
+            let mut share = 0.0;
+            for path in paths {
+                share += flows[path];
+                demand.shares[path] = (share / of_source.max(f64::MIN_POSITIVE)) as f32;
+            }
+        }
+        Ok(demand)
+    }
+
+    /// The same flow from every source, to all exits alike but for U-turns, of which there are a tenth (veh/h by path).
+    pub fn even(network: &Network, total: f64) -> Vec<f64> {
+        let each = total / network.sources.len() as f64;
+        (0..network.paths.len()).map(|path| each * share(network, path)).collect()
+    }
+}
+
+/// Fraction of its source's cars that take a path where nothing else is said.
+pub fn share(network: &Network, path: usize) -> f64 {
+    let weight = |path: usize| {
+        let is_u_turn = network.paths[path].exit_arm == network.source_of(path).entry;
+        if is_u_turn { U_TURN } else { 1.0 }
+    };
+    let all: f64 = network.paths_of(network.paths[path].source as usize).map(weight).sum();
+    weight(path) / all
+}

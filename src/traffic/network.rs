@@ -1,0 +1,263 @@
+//! The tables of a road: plain data of u32 words, as a buffer of a device holds them.
+
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable, cast_slice, pod_collect_to_vec};
+use glam::Vec2;
+
+/// Distance between samples of a path (m).
+pub const SPACING: f32 = 2.0;
+/// Unit of the stations of zones (m).
+pub(super) const UNIT: f32 = 1.0 / 64.0;
+/// Unit of the stations of pairs (m).
+pub(super) const CELL: f32 = 2.0;
+/// Most paths of a road: a car names its path in ten bits, of which one value means that there is no car.
+pub const MOST_PATHS: usize = 1023;
+/// Most sources of a road: each has four bits of the backlog.
+pub const MOST_SOURCES: usize = 16;
+
+/// A route as cars drive it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Path {
+    /// Index of its first sample.
+    pub first: u32,
+    /// Number of its samples.
+    pub n: u32,
+    /// Its length (m).
+    pub length: f32,
+    /// Station of the front of a car that waits to enter (m).
+    pub line: f32,
+    /// Station of the rear of a car that has left the last lane which it crosses on its way in; 0 where it crosses none
+    /// (m).
+    pub clear: f32,
+    /// Index of its source.
+    pub source: u32,
+    /// Exit number, counted from the entry.
+    pub exit: u32,
+    /// Index of the exit arm.
+    pub exit_arm: u32,
+}
+
+/// A point of a path.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Sample {
+    /// On the centre line (m).
+    pub position: Vec2,
+    /// Unit vector along the path.
+    pub direction: Vec2,
+    /// Speed of a car that nothing hinders (m/s).
+    pub limit: f32,
+}
+
+/// How two paths meet.
+#[repr(u16)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// They run together, or cross at a small angle: cars follow each other.
+    Follow,
+    /// They cross: one car at a time.
+    Cross,
+    /// They stay apart, but who enters yields.
+    Soft,
+    /// They stay apart; only a vehicle that may need the lanes beside its own yields.
+    Wide,
+}
+
+impl Kind {
+    /// Every kind, in the order of their codes.
+    pub const ALL: [Kind; 4] = [Kind::Follow, Kind::Cross, Kind::Soft, Kind::Wide];
+}
+
+/// Where path a meets path b.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct Zone {
+    /// Where the zone begins and ends on a (1/64 m).
+    pub a: [u16; 2],
+    /// Where it begins and ends on b (1/64 m).
+    pub b: [u16; 2],
+    /// In a zone that is followed: station on b less that on a (1/64 m).
+    pub delta: i16,
+    /// Code of its [`Kind`].
+    pub kind: u16,
+}
+
+/// A zone in metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stretch {
+    /// Where it begins on a (m).
+    pub a_in: f32,
+    /// Where it ends on a (m).
+    pub a_out: f32,
+    /// Where it begins on b (m).
+    pub b_in: f32,
+    /// Where it ends on b (m).
+    pub b_out: f32,
+    /// Station on b less that on a (m).
+    pub delta: f32,
+    /// How the paths meet.
+    pub kind: Kind,
+}
+
+impl Zone {
+    /// The zone in metres.
+    pub fn stretch(&self) -> Stretch {
+        let [a_in, a_out, b_in, b_out] = [self.a[0], self.a[1], self.b[0], self.b[1]].map(|s| f32::from(s) * UNIT);
+        let kind = Kind::ALL[usize::from(self.kind & 3)];
+        Stretch { a_in, a_out, b_in, b_out, delta: f32::from(self.delta) * UNIT, kind }
+    }
+}
+
+/// The zones of an ordered pair of paths.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct Pair {
+    /// Index of the first.
+    pub first: u16,
+    /// How many of them are for cars.
+    pub n: u8,
+    /// How many there are with those of the kind [`Kind::Wide`], which stand last.
+    pub n_all: u8,
+    /// Where the first begins and the last ends on a (2 m, outwards).
+    pub a: [u8; 2],
+    /// The same on b.
+    pub b: [u8; 2],
+}
+
+/// A lane of an arm, from which cars come.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct Source {
+    /// Index of the arm.
+    pub entry: u32,
+    /// The lane, counted from the kerb.
+    pub lane: u32,
+    /// Index of the first of its paths, which stand together.
+    pub first: u32,
+    /// Number of its paths.
+    pub n: u32,
+}
+
+/// A road's tables.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Network {
+    /// Whether its lanes go round a central island.
+    pub has_ring: bool,
+    /// Number of arms.
+    pub n_arms: usize,
+    /// In the order of the road's routes.
+    pub paths: Vec<Path>,
+    /// Those of one path after those of the path before it.
+    pub samples: Vec<Sample>,
+    /// Of paths a and b at index a n + b.
+    pub pairs: Vec<Pair>,
+    /// Those of one pair after those of the pair before it.
+    pub zones: Vec<Zone>,
+    /// In the order of their paths.
+    pub sources: Vec<Source>,
+}
+
+impl Network {
+    /// Position and direction of travel at a station of a path: cubic between samples (m).
+    pub fn pose(&self, path: usize, station: f32) -> (Vec2, Vec2) {
+        let (k, t) = self.between(path, station);
+        let (from, to) = (&self.samples[k], &self.samples[k + 1]);
+        let (t2, t3) = (t * t, t * t * t);
+        let position = (2.0 * t3 - 3.0 * t2 + 1.0) * from.position
+            + (t3 - 2.0 * t2 + t) * SPACING * from.direction
+            + (3.0 * t2 - 2.0 * t3) * to.position
+            + (t3 - t2) * SPACING * to.direction;
+        (position, (from.direction + t * (to.direction - from.direction)).normalize_or_zero())
+    }
+
+    /// Speed of a car that nothing hinders, at a station of a path (m/s).
+    pub fn limit(&self, path: usize, station: f32) -> f32 {
+        let (k, t) = self.between(path, station);
+        let (from, to) = (self.samples[k].limit, self.samples[k + 1].limit);
+        from + t * (to - from)
+    }
+
+    /// Index of the sample before a station, and how far the station is on the way to the next.
+    fn between(&self, path: usize, station: f32) -> (usize, f32) {
+        let Path { first, n, .. } = self.paths[path];
+        let along = (station / SPACING).clamp(0.0, n as f32 - 1.001);
+        (first as usize + along as usize, along.fract())
+    }
+
+    /// The zones of an ordered pair of paths, those for a truck alone among them.
+    pub fn zones_of(&self, a: usize, b: usize) -> &[Zone] {
+        let Pair { first, n_all, .. } = self.pairs[a * self.paths.len() + b];
+        &self.zones[usize::from(first)..][..usize::from(n_all)]
+    }
+
+    /// The source of a path.
+    pub fn source_of(&self, path: usize) -> &Source {
+        &self.sources[self.paths[path].source as usize]
+    }
+
+    /// Indices of the paths of a source.
+    pub fn paths_of(&self, source: usize) -> Range<usize> {
+        let Source { first, n, .. } = self.sources[source];
+        first as usize..(first + n) as usize
+    }
+
+    /// The tables as one buffer of words: how much there is of each, then paths, samples, pairs, zones and sources.
+    pub fn words(&self) -> Vec<u32> {
+        let counts = [self.paths.len(), self.samples.len(), self.zones.len(), self.sources.len(), self.n_arms];
+        let head = counts.map(|count| count as u32);
+        let tables = [
+            &[u32::from(self.has_ring)],
+            &head[..],
+            cast_slice(&self.paths),
+            cast_slice(&self.samples),
+            &pod_collect_to_vec::<Pair, u32>(&self.pairs),
+            &pod_collect_to_vec::<Zone, u32>(&self.zones),
+            cast_slice(&self.sources),
+        ];
+        tables.concat()
+    }
+
+    /// The tables that these words are; `None` if they are none.
+    pub(super) fn parsed(words: &[u32]) -> Option<Network> {
+        let (head, mut rest) = words.split_at_checked(6)?;
+        let [has_ring, n_paths, n_samples, n_zones, n_sources, n_arms] = head else { return None };
+        let n_paths = *n_paths as usize;
+        if MOST_PATHS < n_paths || 1 < *has_ring {
+            return None;
+        }
+        let network = Network {
+            has_ring: *has_ring == 1,
+            n_arms: *n_arms as usize,
+            paths: taken(&mut rest, n_paths)?,
+            samples: taken(&mut rest, *n_samples as usize)?,
+            pairs: taken(&mut rest, n_paths * n_paths)?,
+            zones: taken(&mut rest, *n_zones as usize)?,
+            sources: taken(&mut rest, *n_sources as usize)?,
+        };
+        (rest.is_empty() && network.is_whole()).then_some(network)
+    }
+
+    /// Whether every index lies in its table.
+    fn is_whole(&self) -> bool {
+        let (n_samples, n_zones, n_sources) = (self.samples.len(), self.zones.len(), self.sources.len());
+        let within = |first: u32, n: u32, of: usize| first as usize + n as usize <= of;
+        self.paths.iter().all(|path| 2 <= path.n && within(path.first, path.n, n_samples))
+            && self.paths.iter().all(|path| (path.source as usize) < n_sources)
+            && self
+                .pairs
+                .iter()
+                .all(|pair| pair.n <= pair.n_all && within(pair.first.into(), pair.n_all.into(), n_zones))
+            && self.sources.iter().all(|source| within(source.first, source.n, self.paths.len()))
+            && n_sources <= MOST_SOURCES
+    }
+}
+
+/// The next `n` values of a table, of which `words` then has the rest.
+fn taken<T: Pod>(words: &mut &[u32], n: usize) -> Option<Vec<T>> {
+    let n_words = n.checked_mul(size_of::<T>())?.checked_div(4)?;
+    let (table, rest) = words.split_at_checked(n_words)?;
+    *words = rest;
+    Some(pod_collect_to_vec(table))
+}

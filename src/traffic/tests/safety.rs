@@ -1,0 +1,88 @@
+//! Nobody overlaps, leaves his path, stands for ever or is no number.
+
+use super::{even, map};
+use crate::layout::Stream;
+use crate::map::{Road, procedural};
+use crate::traffic::{Car, Network, Rules, Run};
+
+/// Steps of each run.
+const STEPS: u32 = 2_000;
+/// Nobody stands so long (steps).
+const FOR_EVER: u32 = 600;
+
+/// What must not be, over a run: steps with overlapping cars, the longest standing, cars that are no numbers or beyond
+/// the ends of their path; and how many cars there were.
+#[derive(Debug, Default)]
+struct Seen {
+    overlaps: u32,
+    standing: u32,
+    off: u32,
+    cars: usize,
+}
+
+fn driven(network: &Network, total: f64, seed: u32) -> Seen {
+    let (rules, demand) = (Rules::FITTED, even(network, total));
+    let mut run = Run::new(network, &rules, &demand, 24, Stream { seed, env: 0 });
+    let mut seen = Seen::default();
+    for _ in 0..STEPS {
+        run.step(|_, _| {});
+        seen.overlaps += u32::from(0 < run.overlaps());
+        for car in run.cars.iter().filter(|car| car.is_there()) {
+            let is_on = |car: &Car| (0.0..=network.paths[car.path()].length).contains(&car.station);
+            let is_finite = car.speed.is_finite() && car.acceleration.is_finite();
+            seen.off += u32::from(!is_on(car) || !is_finite);
+            seen.standing = seen.standing.max(car.standing());
+            seen.cars += 1;
+        }
+    }
+    seen
+}
+
+#[test]
+fn no_car_overlaps_another_leaves_its_path_or_stands_for_ever_at_any_demand() {
+    let mut roads: Vec<Road> = ["16m", "20m"].map(|name| Road::named(name).unwrap()).into();
+    roads.extend(["zala8", "town03", "town03-crossing"].map(map));
+    roads.extend((0..10).map(|index| procedural::find(&format!("mixed/2026/{index}")).unwrap()));
+    let mut steps = 0;
+    for (seed, road) in roads.iter().enumerate() {
+        let network = Network::bake(road).unwrap();
+        for total in [300.0, 900.0, 1500.0, 2100.0] {
+            if 900.0 < total && !network.has_ring {
+                continue;
+            }
+            let seen = driven(&network, total, seed as u32);
+            let name = &road.name;
+            assert!(seen.overlaps == 0 && seen.off == 0 && seen.standing < FOR_EVER, "{name} {total}: {seen:?}");
+            // There were cars, and more at a higher demand.
+            assert!(total * 0.002 * f64::from(STEPS) < seen.cars as f64, "{name} {total}: {seen:?}");
+            steps += STEPS;
+        }
+    }
+    assert!(100_000 < steps, "{steps}");
+}
+
+#[test]
+fn cars_overlap_where_zones_are_shifted_by_a_car_length() {
+    let network = baked_with_shifted_zones("20m");
+    let seen = driven(&network, 1500.0, 1);
+    assert!(0 < seen.overlaps, "{seen:?}");
+}
+
+/// The tables of a road of which every zone of two paths of different sources lies 5 m later on the first.
+fn baked_with_shifted_zones(name: &str) -> Network {
+    let mut network = super::baked(name);
+    let n = network.paths.len();
+    for a in 0..n {
+        for b in 0..n {
+            if network.paths[a].source == network.paths[b].source {
+                continue;
+            }
+            let pair = network.pairs[a * n + b];
+            for zone in &mut network.zones[usize::from(pair.first)..][..usize::from(pair.n)] {
+                zone.a = zone.a.map(|s| s + 320);
+                zone.delta -= 320;
+            }
+        }
+    }
+    network
+}
