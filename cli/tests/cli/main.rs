@@ -23,6 +23,7 @@ mod input;
 mod interruption;
 #[cfg(feature = "browser")]
 mod live;
+mod memory;
 mod output;
 mod page;
 mod pictures;
