@@ -1,5 +1,5 @@
-//! Where the paths of cars meet: the stretches on which those from different arms follow or cross, the ring traffic that
-//! is yielded to beside an entry, and the lines before which cars wait.
+//! Where the paths of cars meet: the stretches on which those from different arms follow or cross, the ring traffic
+//! that is yielded to beside an entry, and the lines before which cars wait.
 
 use std::collections::BTreeMap;
 

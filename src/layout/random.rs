@@ -44,8 +44,8 @@ pub enum Draw {
     Route,
     /// The pose at the start of an episode: lateral offset and heading.
     Pose,
-    /// A random action; the step is added to it, so that numbers above it are free only at the other end. Cars draw from
-    /// 2^31 on.
+    /// A random action; the step is added to it, so that numbers above it are free only at the other end. Cars draw
+    /// from 2^31 on.
     Action,
     /// The vehicle of an episode, and the speed that it begins at.
     Vehicle = u32::MAX,

@@ -30,7 +30,7 @@ pub enum Event {
 
 /// The number of cars that wait outside at a source.
 pub(super) fn waiting(backlog: u64, source: usize) -> u64 {
-    backlog >> (BACKLOG_BITS * source as u32) & MOST_WAITING
+    (backlog >> (BACKLOG_BITS * source as u32)) & MOST_WAITING
 }
 
 fn one(source: usize) -> u64 {
@@ -39,7 +39,7 @@ fn one(source: usize) -> u64 {
 
 /// Sources with a full backlog have it whatever enters.
 pub(super) fn filled(backlog: u64, source: usize) -> u64 {
-    backlog | MOST_WAITING * one(source)
+    backlog | (MOST_WAITING * one(source))
 }
 
 /// Takes out cars at the ends of their paths, and lets in those that come. Slots are filled in their order.

@@ -54,7 +54,7 @@ impl Car {
 
     /// A car of some style at the beginning of its path.
     pub(super) fn entering(path: usize, style: u32, speed: f32) -> Car {
-        Car { station: length(style), speed, what: path as u32 | style << STYLE, acceleration: 0.0 }
+        Car { station: length(style), speed, what: path as u32 | (style << STYLE), acceleration: 0.0 }
     }
 
     /// Whether there is a car in this slot.
@@ -96,7 +96,7 @@ impl Car {
         self.style() & RUDE == RUDE
     }
 
-    /// The car after a step with its acceleration, which it has held: the ballistic update of M. Treiber and A. Kesting,
+    /// The car after a step with its acceleration, which it held: the ballistic update of M. Treiber and A. Kesting,
     /// "Traffic Flow Dynamics" (2013), section 10.2, which stops exactly where the speed reaches 0.
     pub(super) fn moved(&self) -> Car {
         let speed = self.speed + self.acceleration * STEP;
@@ -106,11 +106,11 @@ impl Car {
             (0.5 * (self.speed + speed) * STEP, speed)
         };
         let standing = if speed < STANDS { (self.standing() + 1).min(MOST_STANDING) } else { 0 };
-        let what = self.what & ((1 << STANDING) - 1) | standing << STANDING;
+        let what = (self.what & ((1 << STANDING) - 1)) | (standing << STANDING);
         Car { station: self.station + way, speed, what, ..*self }
     }
 
-    /// The ground that it covers: both axles are on the path, so that in bends its ends swing out and its middle cuts in.
+    /// The ground that it covers: both axles are on the path, so in bends its ends swing out and its middle cuts in.
     pub fn outline(&self, network: &Network) -> Outline {
         let length = self.length();
         let axle = |overhang: f32| network.pose(self.path(), self.station - overhang * length).0;
@@ -129,7 +129,7 @@ pub(super) fn style(words: [u32; 2], mix: &Mix) -> u32 {
     let [kind, driver] = words;
     let flag = |word: u32, probability: f32, flag: u32| if falls_below(word, probability) { flag } else { 0 };
     // Upper bits tell the kind, lower ones length and temperament.
-    kind & (VAN - 1) | flag(kind, mix.vans, VAN) | flag(driver, mix.rude, RUDE)
+    (kind & (VAN - 1)) | flag(kind, mix.vans, VAN) | flag(driver, mix.rude, RUDE)
 }
 
 /// A rectangle on the ground.

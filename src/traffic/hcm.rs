@@ -72,21 +72,23 @@ mod tests {
 
     /// Example problem 2 of chapter 33: entries of two lanes and of one around a ring of one and two lanes, peak hour
     /// factor 0.95, 5 % heavy vehicles from east and west and 2 % from north and south, each counted as two cars.
-    /// Published: circulating flow and entry flow (pc/h), capacity (veh/h), delay (s), level of service.
-    const PUBLISHED: [(&str, usize, usize, usize, f64, f64, f64, f64, f64, char); 7] = [
-        ("NB", 1, 2, 0, 976.0, 247.0, 0.02, 607.0, 11.8, 'B'),
-        ("SB left", 2, 2, 1, 772.0, 322.0, 0.02, 651.0, 13.0, 'B'),
-        ("SB right", 2, 2, 0, 772.0, 429.0, 0.02, 723.0, 14.6, 'B'),
-        ("EB left", 2, 1, 1, 764.0, 379.0, 0.05, 675.0, 14.0, 'B'),
-        ("EB right", 2, 1, 0, 764.0, 427.0, 0.05, 675.0, 16.1, 'C'),
-        ("WB left", 2, 1, 1, 372.0, 442.0, 0.05, 964.0, 8.8, 'A'),
-        ("WB right", 2, 1, 0, 372.0, 376.0, 0.05, 964.0, 7.8, 'A'),
+    /// Lanes of the entry, of the ring, which; circulating flow and entry flow (pc/h), fraction of heavy vehicles;
+    /// published: capacity (veh/h), delay (s), level of service.
+    const PUBLISHED: [(&str, [usize; 3], [f64; 5], char); 7] = [
+        ("NB", [1, 2, 0], [976.0, 247.0, 0.02, 607.0, 11.8], 'B'),
+        ("SB left", [2, 2, 1], [772.0, 322.0, 0.02, 651.0, 13.0], 'B'),
+        ("SB right", [2, 2, 0], [772.0, 429.0, 0.02, 723.0, 14.6], 'B'),
+        ("EB left", [2, 1, 1], [764.0, 379.0, 0.05, 675.0, 14.0], 'B'),
+        ("EB right", [2, 1, 0], [764.0, 427.0, 0.05, 675.0, 16.1], 'C'),
+        ("WB left", [2, 1, 1], [372.0, 442.0, 0.05, 964.0, 8.8], 'A'),
+        ("WB right", [2, 1, 0], [372.0, 376.0, 0.05, 964.0, 7.8], 'A'),
     ];
 
     #[test]
     fn capacities_delays_and_levels_of_the_manuals_example_are_the_published_ones() {
         let (mut delays, mut flows) = (0.0, 0.0);
-        for (name, entry_lanes, ring_lanes, lane, circulating, entering, heavy, capacity, delay, level) in PUBLISHED {
+        for (name, [entry_lanes, ring_lanes, lane], flows_and_delay, level) in PUBLISHED {
+            let [circulating, entering, heavy, capacity, delay] = flows_and_delay;
             let cars = 1.0 / (1.0 + heavy);
             let found = cars * Lane { entry_lanes, ring_lanes, lane }.capacity(circulating);
             assert!((found - capacity).abs() < 1.5, "{name}: {found} veh/h");

@@ -57,7 +57,7 @@ impl Place {
     fn unknown(&self, text: &str, item: &str) -> Error {
         let arms: Vec<&str> = self.road.arms().collect();
         let expected = format!(
-            "`{item}` of {} must be a number of cars an hour, or ARM=V or ARM-ARM=V where a route leads; its arms are {}",
+            "`{item}` of {} must be cars an hour, or ARM=V or ARM-ARM=V where a route leads; its arms are {}",
             self.road.name,
             arms.join(", ")
         );

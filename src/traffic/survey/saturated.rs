@@ -15,9 +15,9 @@ pub struct Saturated {
 }
 
 impl Survey<'_> {
-    /// A queue without end at `arm` beside a flow of `circulating` (veh/h). Cars of the flow pass the arm and leave; the
-    /// arm's own leave before they come to an arm that feeds the flow, each lane's by exits of its own where there are
-    /// such: where two lanes leave by one, the exit is the limit.
+    /// A queue without end at `arm` beside a flow of `circulating` (veh/h). Cars of the flow pass the arm and leave.
+    /// The arm's own leave before they come to an arm that feeds the flow, each lane's by exits of its own where there
+    /// are such: where two lanes leave by one, the exit is the limit.
     ///
     /// `None` where no car can pass the arm, or none of its own can leave so early.
     ///
