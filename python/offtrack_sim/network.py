@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .batch import Floats
+from .episodes import Floats
 
 #: Weights ``[inputs, outputs]`` and biases ``[outputs]`` of a layer.
 Layer = tuple[Floats, Floats]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .batch import Floats
+from .episodes import Floats
 from .network import Layer, Network
 from .trained import CLIP
 

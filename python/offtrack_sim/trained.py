@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .batch import Floats
+from .episodes import Floats
 from .network import Layer, Network
 
 #: Where a normalised observation is clamped.
