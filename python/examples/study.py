@@ -96,6 +96,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3, help="seeds of each learner")
     parser.add_argument("--steps", type=int, default=2_000_000, help="env steps of each training")
     parser.add_argument("--minutes", type=float, default=2.0, help="time after which a training ends earlier [min]")
+    parser.add_argument("--film", default="40m/SW-right-1", help="route of the film")
     parser.add_argument("--out", type=Path, default=Path("study"), help="folder of all that is written")
     args = parser.parse_args()
     torch.set_num_threads(1)
@@ -104,8 +105,9 @@ def main() -> None:
     table = args.out / "table.tex"
     sides = [args.out / name for name in LEARNERS]
     offtrack("compare", *sides, "--latex", table, "--json", args.out / "comparison.json")
-    best = args.out / "sac" / "0.safetensors"
-    offtrack("record", "--benchmark", args.benchmark, "--policy", best, "-o", args.out / "film.gif")
+    first = args.out / "ppo" / "0.safetensors"
+    film = ["--benchmark", args.benchmark, "--policy", first, "--route", args.film, "-o", args.out / "film.gif"]
+    offtrack("record", *film)
     about_it = about("numpy", "torch", "gymnasium", "stable-baselines3")
     settings = {name: str(value) for name, value in vars(args).items()}
     write_json(args.out / "study.json", {**about_it, "settings": settings, "env_steps": steps})

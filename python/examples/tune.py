@@ -93,7 +93,7 @@ def main() -> None:
         sys.exit(f"{len(failed)} of {len(results)} trials failed: {failed[0]}")
     print(f"{len(results)} trials on {nodes} Ray nodes", flush=True)
     entries = sorted(args.out.glob("rate-*.toml"))
-    command = [sys.executable, "-m", "offtrack_sim.command", "board", *map(str, entries)]
+    command = [sys.executable, "-m", "offtrack_sim.command", "board", "--claim", *map(str, entries)]
     subprocess.run([*command, "--markdown", str(args.out / "table.md")], check=True)
 
 

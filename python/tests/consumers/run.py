@@ -48,7 +48,7 @@ CONSUMERS = [
     Consumer("rllib_ppo", "ray", 128, ["--runners", "2", "--envs", "64", "--steps", "3000000"]),
 ]
 PACKAGES = {
-    "sb3": ["stable-baselines3", "sb3-contrib", "matplotlib", "moviepy", "pytest"],
+    "sb3": ["stable-baselines3", "minari[arrow]", "pillow", "sb3-contrib", "matplotlib", "moviepy", "pytest"],
     "ray": ["ray[rllib]", "gymnasium==1.2.2"],
     # All that PufferLib 3.0.0 names, besides torch.
     "puffer": [
