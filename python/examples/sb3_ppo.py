@@ -15,11 +15,13 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 from results import about, write_json
 from stable_baselines3 import PPO
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
@@ -57,42 +59,34 @@ class Curve(BaseCallback):
         self.successes, self.last = [], (now, self.num_timesteps)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description="PPO of Stable-Baselines3", formatter_class=argparse.ArgumentDefaultsHelpFormatter
-    )
+def arguments(description: str, *, benchmark: str, steps: int, envs: int, out: str) -> argparse.ArgumentParser:
+    """What the examples of this library have in common, with these defaults."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.ArgumentDefaultsHelpFormatter)
     parser.add_argument(
-        "--scenario", default="attard2023", help="benchmark to train on; its actions are those of --benchmark"
+        "--scenario", default=benchmark, help="benchmark to train on; its actions are those of --benchmark"
     )
-    parser.add_argument(
-        "--benchmark", default="attard2023", help="benchmark whose test routes the policy is evaluated on"
-    )
-    parser.add_argument("--steps", type=int, default=3_000_000, help="env steps of all trucks together")
+    parser.add_argument("--benchmark", default=benchmark, help="benchmark whose test routes the policy is evaluated on")
+    parser.add_argument("--steps", type=int, default=steps, help="env steps of all trucks together")
     parser.add_argument("--minutes", type=float, default=1e9, help="time after which training ends earlier [min]")
-    parser.add_argument("--envs", type=int, default=256, help="number of trucks")
+    parser.add_argument("--envs", type=int, default=envs, help="number of trucks")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(
         "--split", default="test", help="routes of the evaluation at the end: test, or train while choosing settings"
     )
-    parser.add_argument("--out", type=Path, default=Path("sb3"), help="files to write, without their endings")
-    args = parser.parse_args()
+    parser.add_argument("--out", type=Path, default=Path(out), help="files to write, without their endings")
+    return parser
 
+
+def trucks(args: argparse.Namespace, gamma: float) -> VecNormalize:
+    """The trucks to learn on, with rewards that a critic can fit."""
     # Networks this small gain little from more threads, and wait for them on a busy machine.
     torch.set_num_threads(1)
-    settings = {
-        "n_steps": 64,
-        "batch_size": 2048,
-        "n_epochs": 4,
-        "gamma": 0.97,
-        "gae_lambda": 0.95,
-        "ent_coef": 0.005,
-        "policy_kwargs": {"net_arch": [128, 128]},
-    }
     env = VecMonitor(RoundaboutVecEnv(args.scenario, args.envs, seed=args.seed))
-    env = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=settings["gamma"])
-    # The learning rate falls to zero linearly.
-    model = PPO("MlpPolicy", env, learning_rate=lambda left: 1e-3 * left, seed=args.seed, device="cpu", **settings)
-    curve = Curve(args.minutes)
+    return VecNormalize(env, norm_obs=False, norm_reward=True, gamma=gamma)
+
+
+def learn(example: str, model: BaseAlgorithm, curve: Curve, args: argparse.Namespace, settings: dict[str, Any]) -> None:
+    """Trains, writes the model and the policy file, evaluates the policy once, and writes the results."""
     try:
         model.learn(args.steps, callback=curve)
     except KeyboardInterrupt:
@@ -103,7 +97,7 @@ def main() -> None:
     model.save(args.out.with_suffix(".zip"))
     export.save(file, model, scenario=args.scenario)
     result = {
-        "example": "sb3_ppo",
+        "example": example,
         **about("numpy", "torch", "gymnasium", "stable-baselines3"),
         "settings": {name: str(value) if isinstance(value, Path) else value for name, value in vars(args).items()}
         | settings,
@@ -118,6 +112,25 @@ def main() -> None:
     found = result["evaluation"]
     print(f"{args.split} routes: {found['arrived']} of {found['episodes']} arrived, {found['success']:.1%}")
     print(f"wrote {file}, {args.out.with_suffix('.zip')} and {args.out.with_suffix('.json')}")
+
+
+def main() -> None:
+    args = arguments(
+        "PPO of Stable-Baselines3", benchmark="attard2023", steps=3_000_000, envs=256, out="sb3"
+    ).parse_args()
+    settings = {
+        "n_steps": 64,
+        "batch_size": 2048,
+        "n_epochs": 4,
+        "gamma": 0.97,
+        "gae_lambda": 0.95,
+        "ent_coef": 0.005,
+        "policy_kwargs": {"net_arch": [128, 128]},
+    }
+    env = trucks(args, settings["gamma"])
+    # The learning rate falls to zero linearly.
+    model = PPO("MlpPolicy", env, learning_rate=lambda left: 1e-3 * left, seed=args.seed, device="cpu", **settings)
+    learn("sb3_ppo", model, Curve(args.minutes), args, settings)
 
 
 if __name__ == "__main__":
