@@ -23,7 +23,7 @@ use crate::tabular::html_text;
 use crate::{files, provenance};
 use packed::Packed;
 
-const TEMPLATE: &str = include_str!("live/live.html");
+const TEMPLATE: &str = concat!(include_str!("page/head.html"), include_str!("live/live.html"));
 /// What the page shares with that of a report, and its own.
 const STYLES: &[&str] = &[include_str!("page/theme.css"), include_str!("live/style.css")];
 /// The shaders of the picture.

@@ -21,7 +21,7 @@ use crate::tabular::html_text;
 use ground::{Ground, Shown};
 pub(crate) use tracks::packed;
 
-const TEMPLATE: &str = include_str!("page/report.html");
+const TEMPLATE: &str = concat!(include_str!("page/head.html"), include_str!("page/report.html"));
 const STYLE: &str = concat!(include_str!("page/theme.css"), include_str!("page/style.css"));
 /// Scripts in the order of the page; the last one starts the others.
 const SCRIPTS: [&str; 14] = [

@@ -8,14 +8,15 @@ use offtrack::world::World;
 use serde_json::json;
 
 use super::ground::{Ground, Shown};
-use super::{STYLE, filled, script_json, tracks};
+use super::{filled, script_json, tracks};
 use crate::comparison::Comparison;
 use crate::error::Error;
 use crate::files;
 use crate::recording::Track;
 use crate::tabular::html_text;
 
-const TEMPLATE: &str = include_str!("comparison.html");
+const TEMPLATE: &str = concat!(include_str!("head.html"), include_str!("comparison.html"));
+const STYLE: &str = concat!(include_str!("theme.css"), include_str!("style.css"), include_str!("comparison.css"));
 const SCRIPTS: [&str; 4] =
     [include_str!("elements.js"), include_str!("data.js"), include_str!("scene.js"), include_str!("comparison.js")];
 
@@ -64,10 +65,12 @@ impl ComparisonPage<'_> {
         let differing = comparison.differences.iter().flat_map(|difference| &difference.episodes);
         let differing = differing.filter(|episode| episode.is_pair()).count();
         let first = comparison.sides.first().map(|side| side.name.as_str());
+        let heading = html_text(&comparison.heading());
         let page = filled(
             TEMPLATE,
             &[
-                ("heading", &html_text(&comparison.heading())),
+                ("title", &heading),
+                ("heading", &heading),
                 ("style", STYLE),
                 ("tables", &comparison.html()),
                 ("pairs", &script_json(&json!({ "first": first, "names": names, "differing": differing }))),
@@ -87,10 +90,9 @@ mod tests {
 
     #[test]
     fn every_name_of_the_template_is_replaced() {
-        let names = ["heading", "style", "tables", "pairs", "comparison", "ground", "tracks", "script"];
+        let names = ["title", "heading", "style", "tables", "pairs", "comparison", "ground", "tracks", "script"];
         let page = filled(TEMPLATE, &names.map(|name| (name, "<kept>")));
-        // The heading is the title, too.
-        assert_eq!(page.matches("<kept>").count(), names.len() + 1);
+        assert_eq!(page.matches("<kept>").count(), names.len());
         assert!(!page.contains("{{"));
     }
 }
