@@ -82,12 +82,12 @@ impl<'a> Crowd<'a> {
         crowd
     }
 
-    fn other(&self, k: usize) -> Other {
-        let slot = self.slot[k];
-        let car = &self.cars[slot as usize];
-        let line = self.network.paths[usize::from(self.path[k])].line;
+    /// The car in a slot, as it is weighed.
+    fn seen(&self, slot: usize) -> Other {
+        let car = &self.cars[slot];
+        let line = self.network.paths[car.path()].line;
         Other {
-            slot,
+            slot: slot as u32,
             station: car.station,
             speed: car.speed,
             length: car.length(),
@@ -120,7 +120,7 @@ impl<'a> Crowd<'a> {
         for &k in &near[..n_near] {
             let k = usize::from(k);
             let pair = &pairs[usize::from(self.path[k])];
-            let other = self.other(k);
+            let other = self.seen(self.slot[k] as usize);
             let zones = &self.network.zones[usize::from(pair.first)..][..usize::from(pair.n)];
             zones.iter().for_each(|zone| driver.consider(&zone.stretch(), &other));
         }
@@ -146,18 +146,7 @@ struct Driver<'a> {
 impl<'a> Driver<'a> {
     fn new(crowd: &'a Crowd, slot: usize) -> Driver<'a> {
         let car = &crowd.cars[slot];
-        let path = car.path();
-        let line = crowd.network.paths[path].line;
-        let me = Other {
-            slot: slot as u32,
-            station: car.station,
-            speed: car.speed,
-            length: car.length(),
-            line,
-            standing: car.standing(),
-            waits: can_wait(car.station, car.speed, line),
-            is_rude: car.is_rude(),
-        };
+        let (me, path) = (crowd.seen(slot), car.path());
         let temperament = car.temperament();
         let headway = crowd.rules.headway * (1.0 - HEADWAY_SPREAD * temperament);
         Driver { crowd, me, path, temperament, headway, ratio: 0.0, stops: false, leader: (f32::INFINITY, 0.0) }
