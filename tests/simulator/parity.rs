@@ -197,22 +197,27 @@ const NOTICED: [Noticed; 14] = [
     ("action_delay", Stage::Steer, |world| world.disturbances.n_action_delays -= 1),
 ];
 
+/// Asserts that a stage on the device agrees with the CPU engine's from these states, and does not with the number off.
+fn assert_noticed(world: &Arc<World>, choice: &RouteChoice, before: &Batch, (key, stage, change): Noticed) {
+    let [mut cpu, mut device] = simulators(world, choice);
+    let mut wrong = wrong_device(world, choice, change);
+    for simulator in [&mut cpu, &mut device, &mut wrong] {
+        put(simulator, before);
+        simulator.run_stage(stage);
+    }
+    let counted = judged(world, before, cpu.batch());
+    let (written, _) = written(stage);
+    assert_agreement(key, &compared(cpu.batch(), device.batch(), written, &counted));
+    let wrong = compared(cpu.batch(), wrong.batch(), written, &counted);
+    assert!(wrong.iter().any(|agreement| !agreement.holds()), "{key}: a wrong number would pass");
+}
+
 #[test]
 fn every_number_of_tyres_delays_and_disturbances_counts_on_the_device() {
     let world = disturbed_world();
     let (choice, before) = varied(&world, false);
-    for (key, stage, change) in NOTICED {
-        let [mut cpu, mut device] = simulators(&world, &choice);
-        let mut wrong = wrong_device(&world, &choice, change);
-        for simulator in [&mut cpu, &mut device, &mut wrong] {
-            put(simulator, &before);
-            simulator.run_stage(stage);
-        }
-        let counted = judged(&world, &before, cpu.batch());
-        let (written, _) = written(stage);
-        assert_agreement(key, &compared(cpu.batch(), device.batch(), written, &counted));
-        let wrong = compared(cpu.batch(), wrong.batch(), written, &counted);
-        assert!(wrong.iter().any(|agreement| !agreement.holds()), "{key}: a wrong number would pass");
+    for noticed in NOTICED {
+        assert_noticed(&world, &choice, &before, noticed);
     }
 }
 
@@ -230,18 +235,8 @@ fn every_number_of_a_command_counts_on_the_device_whether_it_comes_late_or_not()
     // A late command is no state of a world with indices.
     for (world, cases) in [(continuous_world(), [0, 1, 2, 4]), (late_continuous_world(), [0, 1, 2, 3])] {
         let (choice, before) = varied(&world, false);
-        for (key, stage, change) in cases.map(|case| OF_COMMANDS[case]) {
-            let [mut cpu, mut device] = simulators(&world, &choice);
-            let mut wrong = wrong_device(&world, &choice, change);
-            for simulator in [&mut cpu, &mut device, &mut wrong] {
-                put(simulator, &before);
-                simulator.run_stage(stage);
-            }
-            let counted = judged(&world, &before, cpu.batch());
-            let (written, _) = written(stage);
-            assert_agreement(key, &compared(cpu.batch(), device.batch(), written, &counted));
-            let wrong = compared(cpu.batch(), wrong.batch(), written, &counted);
-            assert!(wrong.iter().any(|agreement| !agreement.holds()), "{key}: a wrong number would pass");
+        for noticed in cases.map(|case| OF_COMMANDS[case]) {
+            assert_noticed(&world, &choice, &before, noticed);
         }
     }
 }
