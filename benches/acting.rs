@@ -1,10 +1,10 @@
 //! Times how a policy acts on a graphics device: by its kernel, and by the launches of the tensor library.
 //!
 //! `cargo run --release --features gpu --example acting -- [ROUNDS] [TRUCKS]`: 21 rounds of 1024 trucks unless stated.
-//! Policies are the shipped one of attard2023, and an untrained network with hidden layers of 512, 512 and 1024; actions
-//! are sampled. What is compared drives in turns within one process, and so do random actions: load from other programs
-//! changes more slowly than the rounds. Printed as JSON are times of a step, the median and the fastest of the rounds,
-//! and the median of the rounds' ratios.
+//! Policies are the shipped one of attard2023, and an untrained network with hidden layers of 512, 512 and 1024;
+//! actions are sampled. What is compared drives in turns within one process, and so do random actions: load from other
+//! programs changes more slowly than the rounds. Printed as JSON are times of a step, the median and the fastest of the
+//! rounds, and the median of the rounds' ratios.
 
 use std::error::Error;
 use std::path::Path;

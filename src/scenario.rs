@@ -196,8 +196,8 @@ impl Scenario {
         Scenario::from_source(&Source::find(Kind::Benchmark, name_or_path)?, loading)
     }
 
-    /// Reads the text of a benchmark that is in no file. What it refers to lies relative to `folder`; without one it is a
-    /// file that comes with the library, `vehicles/daf_xf.toml`, or lies relative to the process's folder.
+    /// Reads the text of a benchmark that is in no file. What it refers to lies relative to `folder`; without one it is
+    /// a file that comes with the library, `vehicles/daf_xf.toml`, or lies relative to the process's folder.
     ///
     /// ```
     /// use offtrack::files::cache::Loading;

@@ -76,8 +76,8 @@ pub fn in_step(units: &[[Unit; 2]], width: usize) -> Value {
     })
 }
 
-/// What workgroups do a truck whose threads halve the spans of their trucks' units together: passes over as many units as
-/// there are teams of LANES threads, and rounds until the last of a pass has no spans.
+/// What workgroups do a truck whose threads halve the spans of their trucks' units together: passes over as many units
+/// as there are teams of LANES threads, and rounds until the last of a pass has no spans.
 pub fn by_teams(units: &[[Unit; 2]]) -> Result<Value, String> {
     let n_teams = WORKGROUP as usize / constant("LANES")? as usize;
     let (mut n_passes, mut n_rounds) = (0, 0);

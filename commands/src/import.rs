@@ -1,5 +1,5 @@
-//! Lists the roundabouts or junctions of an OpenDRIVE map, checks it, or writes one of them, or that of a drawing, as an
-//! outline file.
+//! Lists the roundabouts or junctions of an OpenDRIVE map, checks it, or writes one of them, or that of a drawing, as
+//! an outline file.
 
 mod drawing; // a DXF file
 

@@ -99,7 +99,8 @@ const LEARNING: [&str; 3] = ["train", "scale", "bench"];
 pub fn main(arguments: &[OsString]) -> u8 {
     if let Some(name) = LEARNING.into_iter().find(|name| arguments.get(1).is_some_and(|given| given == name)) {
         files::say(&format!(
-            "{name}: this program has no learner; the one that is built from source has: cargo install --locked --path cli"
+            "{name}: this program has no learner; the one that is built from source has: cargo install --locked \
+             --path cli"
         ));
         return WRONG_INPUT;
     }

@@ -1,5 +1,5 @@
-//! The kernel that acts: its structs, buffers and shapes, declared once and printed for `act.wgsl`. It runs on a device,
-//! and in a browser.
+//! The kernel that acts: its structs, buffers and shapes, declared once and printed for `act.wgsl`. It runs on a
+//! device, and in a browser.
 
 use offtrack::engine::stages::SHADERS;
 use offtrack::engine::wgsl;

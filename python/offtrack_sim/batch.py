@@ -288,8 +288,8 @@ class Batch(_offtrack.Batch):
     def kerb_distance(self, route: str, points: npt.ArrayLike) -> Floats:
         """Distance of points ``[n, 2]`` from the nearest kerb of a route's road [m], negative off the road, ``[n]``.
 
-        It is exact on the road near a kerb; at most the rays' accuracy beyond some metres, and a lower bound off the
-        map. The frame is that of :meth:`road`.
+        Up to 5 m from a kerb it is within 1 cm, or 3 cm where two kerbs are equally near; beyond 7.5 m inside a solid
+        and 15.9 m from all kerbs it stays. Off the road's field everything is solid. The frame is that of :meth:`road`.
         """
         found = np.asarray(points, dtype=np.float64)
         if found.ndim != 2 or found.shape[1] != 2 or not np.isfinite(found).all():

@@ -11,8 +11,8 @@ pub fn layout() -> String {
     [shared(), buffers::printed()].concat()
 }
 
-/// What shaders of a picture know of a batch: constants, structs, tables and columns by the bindings that they have in a
-/// step, to be read alone, and the functions that a step's shaders share.
+/// What shaders of a picture know of a batch: constants, structs, tables and columns by the bindings that they have in
+/// a step, to be read alone, and the functions that a step's shaders share.
 pub fn picture() -> String {
     let common = SHADERS.iter().filter(|(name, _)| name.starts_with("common/"));
     [shared(), buffers::printed_to_read()].into_iter().chain(common.map(|(_, text)| format!("\n{text}"))).collect()

@@ -5,8 +5,8 @@ pub mod null_device;
 use null_device::{Stated, check, codes, stated};
 use offtrack::engine::stages::{Kernel, SHADERS};
 
-/// What a kernel may take that is not listed. Up to 48 registers leave room for the most subgroups that a unit of RDNA 3
-/// holds at a time, 96 for half of them.
+/// What a kernel may take that is not listed. Up to 48 registers leave room for the most subgroups that a unit of RDNA
+/// 3 holds at a time, 96 for half of them.
 const USUAL: Stated = stated("", 48, 0, 0);
 
 /// What the others may take.

@@ -1,5 +1,5 @@
-//! A drawing that another program wrote, ezdxf 1.4: light and old polylines, lines and arcs in millimetres, on layers of
-//! its own, beside a text and a block.
+//! A drawing that another program wrote, ezdxf 1.4: light and old polylines, lines and arcs in millimetres, on layers
+//! of its own, beside a text and a block.
 
 use std::path::Path;
 

@@ -19,7 +19,8 @@ fn a_run_that_does_not_fit_into_memory_is_refused_before_a_folder_is_made() {
         // Four gigabytes of address space; a batch of so many transitions takes a little less on its own.
         let hidden = if setting.starts_with("learning.batch") { "--set 'learning.hidden=[256, 256]'" } else { "" };
         let line = format!(
-            "ulimit -v 4000000; exec {program} train {training} --out {runs} --steps 1000000000 {hidden} --set '{setting}'"
+            "ulimit -v 4000000; \
+             exec {program} train {training} --out {runs} --steps 1000000000 {hidden} --set '{setting}'"
         );
         let output = std::process::Command::new("sh")
             .env("OFFTRACK_CACHE", crate::place::CACHE)

@@ -1,6 +1,7 @@
 //! Prioritised sampling: rows are sampled in proportion to their priorities, by a sum tree.
 //!
-//! T. Schaul and others, "Prioritized Experience Replay" (2016). Its twin on a device is learner/shaders/priorities.wgsl.
+//! T. Schaul and others, "Prioritized Experience Replay" (2016). Its twin on a device is
+//! learner/shaders/priorities.wgsl.
 
 use rand::Rng;
 

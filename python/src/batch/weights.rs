@@ -8,8 +8,8 @@ use crate::worlds::{Place, is_of};
 /// Least entries of a table of routes: weights count to one in so many.
 const ENTRIES: usize = 4096;
 
-/// A table in which each of a place's routes stands as often as its weight says, the place's order kept. A route has the
-/// weight of its own name, else that of its road, else 1; the table is as long for any weights.
+/// A table in which each of a place's routes stands as often as its weight says, the place's order kept. A route has
+/// the weight of its own name, else that of its road, else 1; the table is as long for any weights.
 pub(super) fn table(place: &Place, weights: &[(String, f64)]) -> PyResult<Vec<u32>> {
     let names: Vec<&str> = place.routes.iter().map(|&route| place.world.route_names[route as usize].as_str()).collect();
     for (name, weight) in weights {

@@ -150,7 +150,8 @@ impl Shapes {
         let (shape, n_outputs, n_inputs) = (weights.shape(), biases.len(), self.n_inputs);
         if shape[1] != n_outputs {
             return refused(format!(
-                "{name}: biases of shape ({n_outputs},) beside weights of shape ({}, {}); ({},) is needed, one an output",
+                "{name}: biases of shape ({n_outputs},) beside weights of shape ({}, {}); ({},) is needed, one an \
+                 output",
                 shape[0], shape[1], shape[1]
             ));
         }

@@ -69,8 +69,8 @@ impl Batch {
         self.buffers.column(column)
     }
 
-    /// Adds a step with the actions or commands in their column to the caller's commands. The caller submits them and calls
-    /// [`Batch::stepped`].
+    /// Adds a step with the actions or commands in their column to the caller's commands. The caller submits them and
+    /// calls [`Batch::stepped`].
     pub fn add_step(&self, encoder: &mut CommandEncoder) {
         self.add_pass(encoder, self.case.step(), None);
     }
