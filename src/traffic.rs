@@ -12,7 +12,7 @@
 mod arrivals; // cars come, wait outside, and leave
 mod bake; // a road's tables
 pub mod car; // the state of one car, and its outline
-mod clock; // random numbers by step and purpose
+pub mod clock; // random numbers by step and purpose
 mod decide; // the acceleration of each car
 pub mod demand; // how many cars want to go where
 pub mod hcm; // the Highway Capacity Manual's equations
@@ -21,7 +21,9 @@ mod meetings; // where two lines are near each other
 mod network; // the tables
 mod paths; // lines that cars drive, and how fast
 pub mod rules; // the numbers of the driver model
+mod row; // a truck's row of the column of cars
 mod run; // cars alone on a road
+mod snapshots; // states that episodes begin in
 pub mod survey; // what passes the entries
 #[cfg(test)]
 mod tests;
@@ -30,9 +32,11 @@ pub use arrivals::Event;
 pub use car::Car;
 pub use demand::{Demand, Mix};
 pub use network::{Kind, Network, Pair, Path, Sample, Source, Stretch, Zone};
-pub use paths::speed_limit;
+pub use paths::{begins, speed_limit};
+pub use row::Row;
 pub use rules::Rules;
-pub use run::Run;
+pub use run::{Run, step};
+pub use snapshots::{N_SNAPSHOTS, Snapshots};
 pub use survey::Survey;
 
 use crate::files::reader::shown;

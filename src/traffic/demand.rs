@@ -31,6 +31,12 @@ pub struct Demand {
 }
 
 impl Demand {
+    /// The numbers as words.
+    pub(crate) fn words(&self) -> Vec<u32> {
+        let Demand { arrivals, shares, mix: Mix { vans, rude } } = self;
+        arrivals.iter().chain(shares).chain([vans, rude]).map(|number| number.to_bits()).collect()
+    }
+
     /// Arrivals by path (veh/h).
     ///
     /// # Errors

@@ -36,6 +36,12 @@ pub struct Rules {
 }
 
 impl Rules {
+    /// The numbers as words, to tell other ones from them.
+    pub(crate) fn words(&self) -> Vec<u32> {
+        let Rules { headway, gap, lags, soft_lags, courtesy } = *self;
+        [headway, gap, lags[0], lags[1], soft_lags[0], soft_lags[1], courtesy].map(f32::to_bits).to_vec()
+    }
+
     /// The fitted numbers.
     pub const FITTED: Rules = Rules { headway: 1.1, gap: 1.5, lags: [1.2, 1.1], soft_lags: [2.2, 1.0], courtesy: 0.3 };
 }

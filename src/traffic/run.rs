@@ -36,18 +36,14 @@ impl<'a> Run<'a> {
     }
 
     /// One step: cars decide, all move, some leave and some come. `tell` hears of the latter.
-    pub fn step(&mut self, mut tell: impl FnMut(Event, &[Car])) {
-        let crowd = Crowd::new(self.network, self.rules, self.clock, &self.cars);
-        let decides = |slot: usize| (slot as u32 + self.clock.step).is_multiple_of(DECIDES_EVERY);
-        let mut next = [Car::NONE; MOST_CARS];
-        for (slot, car) in self.cars.iter().enumerate().filter(|(_, car)| car.is_there()) {
-            let acceleration = if decides(slot) { crowd.decided(slot) } else { car.acceleration };
-            next[slot] = Car { acceleration, ..*car }.moved();
-        }
-        let n_slots = self.cars.len();
-        self.cars.copy_from_slice(&next[..n_slots]);
-        exchange(self.network, self.rules, self.demand, self.clock, &mut self.cars, &mut self.backlog, &mut tell);
+    pub fn step(&mut self, tell: impl FnMut(Event, &[Car])) {
+        step(self.network, self.rules, self.demand, self.clock, &mut self.cars, &mut self.backlog, tell);
         self.clock.step += 1;
+    }
+
+    /// Cars that wait outside: four bits a source.
+    pub fn backlog(&self) -> [u32; 2] {
+        [self.backlog as u32, (self.backlog >> 32) as u32]
     }
 
     /// Number of pairs of cars that overlap: 0 where the model holds.
@@ -67,4 +63,26 @@ impl<'a> Run<'a> {
     pub fn fill(&mut self, source: usize) {
         self.backlog = arrivals::filled(self.backlog, source);
     }
+}
+
+/// One step of a row of cars: they decide, all move, some leave and some come. `tell` hears of the latter.
+pub fn step(
+    network: &Network,
+    rules: &Rules,
+    demand: &Demand,
+    clock: Clock,
+    cars: &mut [Car],
+    backlog: &mut u64,
+    mut tell: impl FnMut(Event, &[Car]),
+) {
+    let crowd = Crowd::new(network, rules, clock, cars);
+    let decides = |slot: usize| (slot as u32 + clock.step).is_multiple_of(DECIDES_EVERY);
+    let mut next = [Car::NONE; MOST_CARS];
+    for (slot, car) in cars.iter().enumerate().filter(|(_, car)| car.is_there()) {
+        let acceleration = if decides(slot) { crowd.decided(slot) } else { car.acceleration };
+        next[slot] = Car { acceleration, ..*car }.moved();
+    }
+    let n_slots = cars.len();
+    cars.copy_from_slice(&next[..n_slots]);
+    exchange(network, rules, demand, clock, cars, backlog, &mut tell);
 }
