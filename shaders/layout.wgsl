@@ -20,6 +20,10 @@ const N_EXTRAS: u32 = 12u;
 // Poses of a truck that are kept where what is observed is disturbed: the one that is observed, and those of the
 // last three steps, the latest first.
 const N_POSES: u32 = 4u;
+// Cars on a truck's road, at most: slots of a row.
+const N_CARS: u32 = 24u;
+// Words of the column of cars: four a slot, and what is counted of them all.
+const N_CAR_WORDS: u32 = 102u;
 // Rows of four words that a route takes in the table of roads: its own, and its roundabout's field.
 const ROUTE_ROWS: u32 = 4u;
 // Rows of four words that a waypoint's preview takes there.
@@ -100,6 +104,8 @@ const DRAW_DELAYS: u32 = 4294967294u;
 const DRAW_OFFSETS: u32 = 4294967293u;
 // `Draw::Noise`.
 const DRAW_NOISE: u32 = 4294967292u;
+// `Draw::Traffic`.
+const DRAW_TRAFFIC: u32 = 4294967291u;
 // `Draw::Action`.
 const DRAW_ACTION: u32 = 2u;
 // Braking at which a truck comes to stand (m/s^2).
@@ -201,9 +207,9 @@ const ROLL_RATE_SCALE: f32 = 0.3f;
 // Mass that is observed as 1 (kg).
 const MASS_SCALE: f32 = 40000.0f;
 // Sums in a tally: steps by their end code, then the rewards.
-const N_SUMS: u32 = 9u;
+const N_SUMS: u32 = 11u;
 // Index of the sum of the rewards.
-const REWARD_SUM: u32 = 8u;
+const REWARD_SUM: u32 = 10u;
 // Units that a reward of 1 is counted in.
 const REWARD_UNITS: f32 = 256.0f;
 // `Autoreset::SameStep`.
@@ -222,6 +228,8 @@ const ROLLED_OVER: u32 = 4u;
 const JACKKNIFED: u32 = 5u;
 const STRAYED: u32 = 6u;
 const TIMED_OUT: u32 = 7u;
+const MET_VEHICLE: u32 = 8u;
+const WAS_MET: u32 = 9u;
 
 // What the steer stage asks of a truck for a step: a steer angle and an acceleration.
 struct Control {
@@ -710,5 +718,7 @@ struct BatchFacts {
 @group(0) @binding(26) var<storage, read_write> poses: array<Pose>;
 // Commands, where actions are continuous; zeros where they are indices, [n_envs].
 @group(0) @binding(27) var<storage, read_write> command: array<Command>;
+// The cars on the road of each truck, and what is counted of them: words of a `traffic::Row`, [n_envs, 102].
+@group(0) @binding(28) var<storage, read_write> cars: array<u32>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(28) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(29) var<storage, read_write> tally: array<atomic<u32>>;

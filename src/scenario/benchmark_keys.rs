@@ -138,9 +138,14 @@ pub(super) struct WrittenTraffic {
     pub(super) vans: f64,
     #[serde(default)]
     pub(super) rude: Option<WrittenRange>,
-    pub(super) courtesy: Option<f64>,
+    #[serde(default = "courtesy")]
+    pub(super) courtesy: f64,
     #[serde(default = "waiting")]
     pub(super) waiting: f64,
+}
+
+fn courtesy() -> f64 {
+    0.3
 }
 
 fn waiting() -> f64 {

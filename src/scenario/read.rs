@@ -10,7 +10,6 @@ use super::{ActionKind, Scenario, Traffic};
 use crate::files::cache::Loading;
 use crate::files::reader::{Error, Reader};
 use crate::files::shipped::Source;
-use crate::traffic::Rules;
 use crate::vehicle::Vehicle;
 
 impl Scenario {
@@ -159,9 +158,7 @@ fn of_traffic(reader: &Reader, written: &WrittenTraffic) -> Result<Traffic, Erro
         demand: numbers(reader, "traffic.demand", demand, traffic::MOST_DEMAND, 0.0, "veh/h")?,
         vans: reader.within("traffic.vans", *vans, 0.0..=1.0, "")?,
         rude: rude.transpose()?.unwrap_or_default(),
-        courtesy: courtesy.map_or(Ok(Rules::FITTED.courtesy.into()), |courtesy| {
-            reader.within("traffic.courtesy", courtesy, 0.0..=1.0, "")
-        })?,
+        courtesy: reader.within("traffic.courtesy", *courtesy, 0.0..=1.0, "")?,
         waiting: reader.within("traffic.waiting", *waiting, 0.0..=600.0, "s")?,
     })
 }

@@ -72,6 +72,12 @@ heading_noise_deg = 0.3
 map_offset = 0.15
 observation_delay = [0, 1]
 action_delay = [0, 2]
+[traffic]
+demand = [300.0, 900.0]
+vans = 0.1
+rude = [0.0, 0.1]
+courtesy = 0.3
+waiting = 60.0
 [start]
 offset = 0.2
 heading_deg = 1.0

@@ -5,7 +5,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::layout::Column;
-use offtrack::layout::shared::Named;
 use offtrack::scenario::{ActionKind, Scenario};
 use offtrack::simulator::{Error, RouteChoice, Simulator};
 use offtrack::world::World;

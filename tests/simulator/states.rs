@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use offtrack::layout::shared::Named;
 use offtrack::layout::{Column, Truck};
 use offtrack::simulator::{Autoreset, RouteChoice, Simulator};
 use offtrack::world::World;
