@@ -48,6 +48,10 @@ constants! {
     /// Poses of a truck that are kept where what is observed is disturbed: the one that is observed, and those of the
     /// last three steps, the latest first.
     pub const N_POSES: usize = 4;
+    /// Cars on a truck's road, at most: slots of a row.
+    pub const N_CARS: usize = 24;
+    /// Words of the column of cars: four a slot, and what is counted of them all.
+    pub const N_CAR_WORDS: usize = 4 * N_CARS + 6;
     /// Rows of four words that a route takes in the table of roads: its own, and its roundabout's field.
     pub const ROUTE_ROWS: usize = 4;
     /// Rows of four words that a waypoint's preview takes there.

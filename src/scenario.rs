@@ -12,6 +12,7 @@ mod check; // a scenario changed in memory
 mod fleet; // vehicles by shares, drawn from ranges
 mod reward; // the keys of its reward
 mod disturbances; // what the world does to a policy
+mod traffic; // other vehicles on its roads
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -27,6 +28,7 @@ pub use check::Invalid;
 pub use disturbances::Disturbances;
 pub use fleet::{Class, Drawn, Entry, Fleet, Member, N_VEHICLES, Ranges};
 pub use reward::{REWARD_KEYS, Reward, RewardChanges, RewardKey};
+pub use traffic::Traffic;
 
 /// Default length of a route before the ring (m).
 pub const APPROACH: f64 = 40.0;
@@ -119,6 +121,8 @@ pub struct Scenario {
     pub extras: ObservedExtras,
     /// What the world does to a policy.
     pub disturbances: Disturbances,
+    /// Other vehicles on its roads.
+    pub traffic: Option<Traffic>,
     /// Largest lateral offset at the start (m).
     pub start_offset: f64,
     /// Largest heading error at the start (rad).

@@ -78,7 +78,7 @@ impl Simulator {
         check_routes(&world, n_envs, &choice)?;
         let drawn = matches!(choice, RouteChoice::Drawn(_)).then_some(choice.routes().len());
         let batch: Box<dyn EngineBatch> = match engine {
-            Engine::Cpu => Box::new(Batch::new(n_envs, seed, choice)?),
+            Engine::Cpu => Box::new(Batch::new(n_envs, seed, choice, world.traffic.is_some())?),
             #[cfg(feature = "gpu")]
             Engine::Gpu { device, columns } => {
                 Box::new(gpu::Batch::new(&device, &world, n_envs, seed, choice, columns)?)

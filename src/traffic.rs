@@ -23,7 +23,9 @@ mod network; // the tables
 mod others; // what cars mind besides each other
 mod paths; // lines that cars drive, and how fast
 pub mod rules; // the numbers of the driver model
+mod row; // a truck's row of the column of cars
 mod run; // cars alone on a road
+mod snapshots; // states that episodes begin in
 mod step; // a step of a row of cars
 pub mod survey; // what passes the entries
 pub mod units; // the integers that cars are counted in
@@ -37,9 +39,11 @@ pub use decide::Driver;
 pub use demand::{Demand, Mix};
 pub use network::{Kind, Network, Pair, Path, Sample, Source, Stretch, Zone};
 pub use others::{Nobody, Others};
-pub use paths::speed_limit;
+pub use paths::{begins, speed_limit};
+pub use row::Row;
 pub use rules::Rules;
 pub use run::Run;
+pub use snapshots::{N_SNAPSHOTS, Snapshots};
 pub use step::{Setting, advance, decide, step};
 pub use survey::Survey;
 

@@ -4,6 +4,7 @@
 //! tables are public, to be read and to be changed by who compares what a change does; a change is not checked.
 
 mod fingerprint;
+mod traffic;
 
 use std::f64::consts::PI;
 use std::sync::atomic::AtomicU64;
@@ -20,6 +21,7 @@ use crate::map::Frame;
 use crate::map::route::{Route, Waypoint};
 use crate::scenario::{ActionKind, Class, Clock, Entry, Invalid, Place, Scenario};
 use crate::vehicle::profile::Profile;
+pub use traffic::{Level, Traffic, TrafficRoad};
 
 /// Waypoints to the corner of each observed curvature.
 const CURVATURE_STEPS: [usize; 4] = [5, 7, 10, 12];
@@ -54,6 +56,8 @@ pub struct World {
     pub waypoints: Vec<WaypointRow>,
     /// What is observed at each of them, in the same order.
     pub previews: Vec<PreviewRow>,
+    /// Other vehicles.
+    pub traffic: Option<Traffic>,
     /// Every route, in the order of `route_names`.
     pub routes: Vec<RouteRow>,
     /// `20m/N-left-3` and the like.
@@ -144,6 +148,7 @@ impl World {
             frames: scenario.places.iter().map(|place| place.roundabout.ground().frame()).collect(),
             waypoints,
             previews,
+            traffic: Traffic::baked(scenario, loading)?,
             routes,
             route_names,
             step_limits,
@@ -270,7 +275,9 @@ fn step_limits(
     routes: &[RouteRow],
     loading: &Loading,
 ) -> Result<Vec<u32>, Stopped> {
-    let steps = |time: f64| (scenario.time_limit * time / scenario.step).ceil() as u32;
+    let waiting = scenario.traffic.as_ref().map_or(0.0, |traffic| traffic.waiting);
+    let waiting = (waiting / scenario.step).ceil() as u32;
+    let steps = |time: f64| (scenario.time_limit * time / scenario.step).ceil() as u32 + waiting;
     match scenario.clock {
         Clock::HighestSpeed => {
             let n_classes = scenario.classes().len();
@@ -278,6 +285,7 @@ fn step_limits(
             // In this order of operations for as long as there have been benchmarks.
             let limit = |route| {
                 (scenario.time_limit * length(route) / (scenario.cruising_speed() * scenario.step)).ceil() as u32
+                    + waiting
             };
             Ok(scenario.routes().flat_map(|(_, route)| std::iter::repeat_n(limit(route), n_classes)).collect())
         }

@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let batch = simulator.batch();
     let begun = batch.truck.iter().filter(|truck| truck.steps == 0).count();
     let row_bytes: Map<String, Value> =
-        Column::ALL.iter().map(|column| (column.name().to_owned(), column.width().into())).collect();
+        Column::of_trucks().map(|column| (column.name().to_owned(), column.width().into())).collect();
     let result = json!({
         "benchmark": BENCHMARK,
         "trucks": N_ENVS,

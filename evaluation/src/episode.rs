@@ -137,8 +137,11 @@ impl Summary {
         let mean_arrived = |value: fn(&Episode) -> f64| {
             (0 < n_arrived).then(|| arrived.clone().map(value).sum::<f64>() / n_arrived as f64)
         };
-        let mut ends: BTreeMap<&'static str, usize> =
-            Ended::ALL.into_iter().filter(|&ended| ended != Ended::Running).map(|ended| (ended.name(), 0)).collect();
+        let mut ends: BTreeMap<&'static str, usize> = Ended::WITHOUT_VEHICLES
+            .into_iter()
+            .filter(|&ended| ended != Ended::Running)
+            .map(|ended| (ended.name(), 0))
+            .collect();
         for episode in episodes.clone() {
             *ends.entry(episode.ended.name()).or_default() += 1;
         }

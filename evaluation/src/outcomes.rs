@@ -13,7 +13,7 @@ use crate::recording::Class;
 pub const VERSION: u32 = 1;
 
 /// A letter for each end, in the order of [`Ended::ALL`]: trailer and timed out have their third and fifth.
-const LETTERS: [char; Ended::ALL.len()] = ['-', '.', 't', 'a', 'r', 'j', 's', 'd'];
+const LETTERS: [char; Ended::ALL.len()] = ['-', '.', 't', 'a', 'r', 'j', 's', 'd', 'm', 'w'];
 
 /// The outcomes of an evaluation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

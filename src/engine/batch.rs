@@ -1,14 +1,15 @@
 //! The columns of a batch on the host, and one truck's row of them.
 
 use bytemuck::{cast_slice, cast_slice_mut};
+use rayon::iter::{Either, repeat_n};
 use rayon::prelude::*;
 
 use super::order::{Order, Place};
 use super::{Autoreset, Error, Tally, memory};
 use crate::layout::columns::{columns, row_bytes};
 use crate::layout::{
-    Clearance, Column, Command, Control, N_COLUMNS, N_EXTRAS, N_POSES, N_RAYS, N_VALUES, Pose, Progress, RewardTerms,
-    Stream, Truck,
+    Clearance, Column, Command, Control, N_CAR_WORDS, N_COLUMNS, N_EXTRAS, N_POSES, N_RAYS, N_VALUES, Pose, Progress,
+    RewardTerms, Stream, Truck,
 };
 use crate::world::World;
 
@@ -54,8 +55,20 @@ macro_rules! nested {
     ($name:ident $($rest:ident)+) => { ($name, nested!($($rest)+)) };
 }
 
+/// Blocks of the rows of a column that may have none: then empty ones.
+fn blocks_of<T: Send>(rows: &mut [T], n: usize, n_envs: usize) -> impl IndexedParallelIterator<Item = &mut [T]> {
+    if rows.is_empty() {
+        Either::Right(repeat_n((), n_envs.div_ceil(n)).map(|()| [].as_mut_slice()))
+    } else {
+        Either::Left(rows.par_chunks_mut(n))
+    }
+}
+
 macro_rules! batch {
-    ($($(#[doc = $doc:literal])* $variant:ident $name:ident: $type:ty,)*) => {
+    (
+        $($(#[doc = $doc:literal])* $variant:ident $name:ident: $type:ty,)*;
+        $($(#[doc = $doc_of:literal])* $variant_of:ident $name_of:ident: $type_of:ty,)*
+    ) => {
         /// One truck's row of the columns while a stage works on it.
         #[derive(Debug)]
         pub struct Row<'a> {
@@ -70,6 +83,7 @@ macro_rules! batch {
             /// What this truck adds to the batch's tally.
             pub tally: Tally,
             $($(#[doc = $doc])* pub $name: &'a mut $type,)*
+            $($(#[doc = $doc_of])* pub $name_of: Option<&'a mut $type_of>,)*
         }
 
         /// Neighbouring rows of the columns, for one thread to work on.
@@ -83,6 +97,7 @@ macro_rules! batch {
             choice: &'a RouteChoice,
             autoreset: Autoreset,
             $($(#[doc = $doc])* pub $name: &'a mut [$type],)*
+            $($(#[doc = $doc_of])* pub $name_of: &'a mut [$type_of],)*
         }
 
         impl Block<'_> {
@@ -96,11 +111,12 @@ macro_rules! batch {
                     choice: self.choice,
                     tally: Tally::default(),
                     $($name: &mut self.$name[index],)*
+                    $($name_of: self.$name_of.get_mut(index),)*
                 }
             }
         }
 
-        /// The columns of a batch: `n_envs` rows each.
+        /// The columns of a batch: `n_envs` rows each, of those of vehicles none where there are no vehicles.
         #[derive(Debug, Clone)]
         pub struct Batch {
             seed: u32,
@@ -108,19 +124,36 @@ macro_rules! batch {
             autoreset: Autoreset,
             streams: Vec<Stream>,
             order: Order,
+            has_vehicles: bool,
             /// Sums since the batch was made.
             pub(crate) tally: Tally,
             $($(#[doc = $doc])* pub $name: Vec<$type>,)*
+            $($(#[doc = $doc_of])* pub $name_of: Vec<$type_of>,)*
         }
 
         impl Batch {
-            /// `n_envs` trucks that have yet to be reset.
-            pub(crate) fn new(n_envs: usize, seed: u32, choice: RouteChoice) -> Result<Batch, Error> {
-                check_size(n_envs)?;
+            /// `n_envs` trucks that have yet to be reset, among other vehicles or not.
+            pub(crate) fn new(
+                n_envs: usize,
+                seed: u32,
+                choice: RouteChoice,
+                has_vehicles: bool,
+            ) -> Result<Batch, Error> {
+                check_fits(n_envs, has_vehicles)?;
                 let mut streams: Vec<Stream> = zeros(n_envs)?;
                 (0..).zip(&mut streams).for_each(|(env, stream)| *stream = Stream { seed, env });
                 let order = Order::new(zeros(n_envs)?);
-                Ok(Batch { seed, autoreset: choice.autoreset(), choice, streams, order, tally: Tally::default(), $($name: zeros(n_envs)?,)* })
+                Ok(Batch {
+                    seed,
+                    autoreset: choice.autoreset(),
+                    choice,
+                    streams,
+                    order,
+                    tally: Tally::default(),
+                    has_vehicles,
+                    $($name: zeros(n_envs)?,)*
+                    $($name_of: zeros(Column::$variant_of.n_rows(n_envs, has_vehicles))?,)*
+                })
             }
 
             /// The rows `indices` of this batch, in that order and as often as they are named: row `i` goes on as row
@@ -130,10 +163,15 @@ macro_rules! batch {
                     RouteChoice::Fixed(routes) => RouteChoice::Fixed(indices.iter().map(|&index| routes[index as usize]).collect()),
                     RouteChoice::Drawn(routes) => RouteChoice::Drawn(routes.clone()),
                 };
-                let mut batch = Batch { tally: self.tally, autoreset: self.autoreset, ..Batch::new(indices.len(), self.seed, choice)? };
+                let mut batch = Batch { tally: self.tally, autoreset: self.autoreset, ..Batch::new(indices.len(), self.seed, choice, self.has_vehicles)? };
                 $(
                     for (row, &index) in batch.$name.iter_mut().zip(indices) {
                         *row = self.$name[index as usize];
+                    }
+                )*
+                $(
+                    for (row, &index) in batch.$name_of.iter_mut().zip(indices) {
+                        *row = self.$name_of[index as usize];
                     }
                 )*
                 Ok(batch)
@@ -142,12 +180,15 @@ macro_rules! batch {
             /// Every column as its bytes: with them a batch goes on where it was, see
             /// [`crate::simulator::Simulator::restore`].
             pub fn columns(&self) -> [(Column, &[u8]); N_COLUMNS] {
-                [$((Column::$variant, cast_slice(&self.$name)),)*]
+                [$((Column::$variant, cast_slice(&self.$name)),)* $((Column::$variant_of, cast_slice(&self.$name_of)),)*]
             }
 
             /// Every column's bytes, to be written to.
             pub(crate) fn columns_mut(&mut self) -> [(Column, &mut [u8]); N_COLUMNS] {
-                [$((Column::$variant, cast_slice_mut(&mut self.$name)),)*]
+                [
+                    $((Column::$variant, cast_slice_mut(&mut self.$name)),)*
+                    $((Column::$variant_of, cast_slice_mut(&mut self.$name_of)),)*
+                ]
             }
 
             /// Every row, in blocks that are divided among all cores; in each the rows are in the order of the trucks'
@@ -155,14 +196,17 @@ macro_rules! batch {
             pub(crate) fn blocks(&mut self, world: &World) -> impl ParallelIterator<Item = Block<'_>> {
                 let n = self.order.renewed(world, &self.truck);
                 let (streams, choice, autoreset, order) = (&self.streams, &self.choice, self.autoreset, &mut self.order);
-                let blocks = order.blocks().zip(zipped!(self, n; $($name)*)).enumerate();
-                blocks.map(move |(block, (places, nested!($($name)*)))| Block {
+                let n_envs = streams.len();
+                let of_vehicles = ($(blocks_of(&mut self.$name_of, n, n_envs),)*).into_par_iter();
+                let blocks = order.blocks().zip(zipped!(self, n; $($name)*)).zip(of_vehicles).enumerate();
+                blocks.map(move |(block, ((places, nested!($($name)*)), ($($name_of,)*)))| Block {
                     first: block * n,
                     places,
                     streams,
                     choice,
                     autoreset,
                     $($name,)*
+                    $($name_of,)*
                 })
             }
         }
@@ -222,7 +266,7 @@ impl Batch {
 
     /// A batch of as many trucks with the same streams, routes and tally as this one, and all columns zero.
     pub(crate) fn blank(&self) -> Result<Batch, Error> {
-        let batch = Batch::new(self.n_envs(), self.seed, self.choice.clone())?;
+        let batch = Batch::new(self.n_envs(), self.seed, self.choice.clone(), self.has_vehicles)?;
         Ok(Batch { tally: self.tally, autoreset: self.autoreset, streams: self.streams.clone(), ..batch })
     }
 
@@ -232,9 +276,14 @@ impl Batch {
     }
 }
 
-/// An error if the columns of so many trucks do not fit into the host's memory. More than a `u32` counts never fit.
+/// An error if the columns of so many trucks, without other vehicles, do not fit into the host's memory. More than a
+/// `u32` counts never fit.
 pub fn check_size(n_envs: usize) -> Result<(), Error> {
-    let width = row_bytes();
+    check_fits(n_envs, false)
+}
+
+fn check_fits(n_envs: usize, has_vehicles: bool) -> Result<(), Error> {
+    let width = row_bytes(has_vehicles);
     let available = memory::available().unwrap_or(u64::MAX);
     let fitting = (available / width as u64).min(u32::MAX.into());
     if n_envs as u64 <= fitting {
@@ -247,6 +296,6 @@ pub fn check_size(n_envs: usize) -> Result<(), Error> {
 /// A column of zeros, whose memory is taken page by page when it is first written to.
 fn zeros<T: bytemuck::Zeroable>(n_envs: usize) -> Result<Vec<T>, Error> {
     // The system refuses although it said that so much was free.
-    let refused = |()| Error::BatchTooLarge { n_envs, n_bytes: n_envs as u128 * row_bytes() as u128, fitting: 0 };
+    let refused = |()| Error::BatchTooLarge { n_envs, n_bytes: n_envs as u128 * row_bytes(false) as u128, fitting: 0 };
     bytemuck::allocation::try_zeroed_vec(n_envs).map_err(refused)
 }

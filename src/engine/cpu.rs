@@ -15,6 +15,7 @@ pub mod perceive;
 pub mod reset;
 pub mod sense;
 pub mod steer;
+pub mod traffic;
 
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
@@ -34,6 +35,7 @@ fn entry(stage: Stage) -> Entry {
     match stage {
         Stage::Steer => steer::steer,
         Stage::Drive => drive::drive,
+        Stage::Traffic => traffic::traffic,
         Stage::Collide => collide::collide,
         Stage::Follow => follow::follow,
         Stage::Sense => sense::sense,

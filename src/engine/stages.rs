@@ -13,6 +13,8 @@ crate::named! {
         Steer = "steer",
         /// Moves the truck.
         Drive = "drive",
+        /// Moves the other vehicles.
+        Traffic = "traffic",
         /// Measures the clearances.
         Collide = "collide",
         /// Follows the route.
@@ -168,6 +170,8 @@ impl Stage {
         match self {
             Stage::Steer => &[Kernel::Steer],
             Stage::Drive => &[Kernel::Drive],
+            // A device refuses worlds with vehicles.
+            Stage::Traffic => &[],
             Stage::Collide => &[Kernel::Collide],
             Stage::Follow => &[Kernel::Follow],
             Stage::Sense => &[Kernel::Sense],

@@ -4,10 +4,13 @@
 //! makes a batch and a row of it. The buffers on a device, their WGSL declarations and the tests' tables follow from
 //! [`Column`].
 
-use super::{Clearance, Command, Control, N_EXTRAS, N_POSES, N_RAYS, N_VALUES, Pose, Progress, RewardTerms, Truck};
+use super::{
+    Clearance, Command, Control, N_CAR_WORDS, N_EXTRAS, N_POSES, N_RAYS, N_VALUES, Pose, Progress, RewardTerms, Truck,
+};
 use crate::layout::shared::{Named, Shared};
 
 /// Calls `$then` with every column: doc, variant of [`Column`], name, type of a row. The types are those of `layout`.
+/// Behind the semicolon stand those that have rows only where a benchmark has other vehicles.
 macro_rules! columns {
     ($then:ident) => {
         $then! {
@@ -41,6 +44,9 @@ macro_rules! columns {
             Poses poses: [Pose; N_POSES],
             /// Commands, where actions are continuous; zeros where they are indices
             Command command: Command,
+            ;
+            /// The cars on the road of each truck, and what is counted of them: words of a `traffic::Row`
+            Cars cars: [u32; N_CAR_WORDS],
         }
     };
 }
@@ -48,7 +54,22 @@ macro_rules! columns {
 pub(crate) use columns;
 
 macro_rules! column_names {
-    ($($(#[doc = $doc:literal])* $variant:ident $name:ident: $type:ty,)*) => {
+    (
+        $($(#[doc = $doc:literal])* $variant:ident $name:ident: $type:ty,)*;
+        $($(#[doc = $doc_of:literal])* $variant_of:ident $name_of:ident: $type_of:ty,)*
+    ) => {
+        column_names! {
+            @all $($(#[doc = $doc])* $variant $name: $type,)* $($(#[doc = $doc_of])* $variant_of $name_of: $type_of,)*
+        }
+
+        impl Column {
+            /// Whether it has rows only where a benchmark has other vehicles.
+            pub const fn is_of_vehicles(self) -> bool {
+                matches!(self, $(Column::$variant_of)|*)
+            }
+        }
+    };
+    (@all $($(#[doc = $doc:literal])* $variant:ident $name:ident: $type:ty,)*) => {
         /// A column of a batch.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub enum Column {
@@ -111,7 +132,19 @@ columns!(column_names);
 /// Columns of a batch.
 pub const N_COLUMNS: usize = Column::ALL.len();
 
+impl Column {
+    /// Those that every batch has rows of.
+    pub fn of_trucks() -> impl Iterator<Item = Column> {
+        Column::ALL.iter().copied().filter(|column| !column.is_of_vehicles())
+    }
+
+    /// Its rows in a batch of so many trucks: none where it is one of the vehicles that the batch does not have.
+    pub const fn n_rows(self, n_envs: usize, has_vehicles: bool) -> usize {
+        if has_vehicles || !self.is_of_vehicles() { n_envs } else { 0 }
+    }
+}
+
 /// Bytes of all columns for each truck.
-pub(crate) fn row_bytes() -> usize {
-    Column::ALL.iter().map(|column| column.width()).sum()
+pub(crate) fn row_bytes(has_vehicles: bool) -> usize {
+    Column::ALL.iter().map(|column| column.n_rows(column.width(), has_vehicles)).sum()
 }

@@ -21,10 +21,26 @@ crate::named! {
         Strayed = "strayed",
         /// The time limit was reached.
         TimedOut = "timed_out",
+        /// The truck drove into another vehicle.
+        MetVehicle = "met_vehicle",
+        /// Another vehicle drove into the truck.
+        WasMet = "was_met",
     }
 }
 
 impl Ended {
+    /// The ends of episodes on roads without other vehicles.
+    pub const WITHOUT_VEHICLES: [Ended; 8] = [
+        Ended::Running,
+        Ended::Arrived,
+        Ended::TractorCollided,
+        Ended::TrailerCollided,
+        Ended::RolledOver,
+        Ended::Jackknifed,
+        Ended::Strayed,
+        Ended::TimedOut,
+    ];
+
     /// The code with this number in an `ended` column.
     pub fn from_code(code: u32) -> Option<Ended> {
         Ended::ALL.get(code as usize).copied()
@@ -40,9 +56,9 @@ impl Ended {
         self == Ended::TimedOut
     }
 
-    /// The episode ended by anything but arrival and the time limit.
+    /// The truck's driver failed: the episode ended by anything but arrival, the time limit and another's fault.
     pub fn failed(self) -> bool {
-        self.terminated() && self != Ended::Arrived
+        self.terminated() && !matches!(self, Ended::Arrived | Ended::WasMet)
     }
 }
 

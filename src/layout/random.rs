@@ -32,6 +32,8 @@ constants! {
     const DRAW_OFFSETS: u32 = Draw::Offsets as u32;
     /// `Draw::Noise`.
     const DRAW_NOISE: u32 = Draw::Noise as u32;
+    /// `Draw::Traffic`.
+    const DRAW_TRAFFIC: u32 = Draw::Traffic as u32;
     /// `Draw::Action`.
     const DRAW_ACTION: u32 = Draw::Action as u32;
 }
@@ -55,6 +57,8 @@ pub enum Draw {
     Offsets = u32::MAX - 2,
     /// The key of an episode's noise, whose numbers are drawn from it by step and kind.
     Noise = u32::MAX - 3,
+    /// The traffic that an episode begins in: how many vehicles come, which snapshot, and how many are rude.
+    Traffic = u32::MAX - 4,
 }
 
 /// Four random words.

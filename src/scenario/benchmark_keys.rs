@@ -33,6 +33,7 @@ pub(super) struct Written {
     pub(super) observation: WrittenObservation,
     #[serde(default)]
     pub(super) disturbances: WrittenDisturbances,
+    pub(super) traffic: Option<WrittenTraffic>,
     #[serde(default)]
     pub(super) start: WrittenStart,
     #[serde(default)]
@@ -128,6 +129,24 @@ pub(super) struct WrittenDisturbances {
     pub(super) action_delay: [i64; 2],
 }
 
+/// Other vehicles on the roads.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WrittenTraffic {
+    pub(super) demand: Vec<f64>,
+    #[serde(default)]
+    pub(super) vans: f64,
+    #[serde(default)]
+    pub(super) rude: Option<WrittenRange>,
+    pub(super) courtesy: Option<f64>,
+    #[serde(default = "waiting")]
+    pub(super) waiting: f64,
+}
+
+fn waiting() -> f64 {
+    90.0
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct WrittenTime {
@@ -181,15 +200,25 @@ pub(super) struct WrittenObservation {
 pub(super) struct WrittenStart {
     pub(super) offset: f64,
     pub(super) heading_deg: f64,
-    pub(super) speed_kmh: Option<WrittenSpeeds>,
+    pub(super) speed_kmh: Option<WrittenRange>,
 }
 
-/// A speed, or `[least, greatest]`.
+/// A number, or `[least, greatest]`.
 #[derive(Deserialize)]
 #[serde(untagged)]
-pub(super) enum WrittenSpeeds {
+pub(super) enum WrittenRange {
     One(f64),
     Range([f64; 2]),
+}
+
+impl WrittenRange {
+    /// Least and greatest.
+    pub(super) fn ends(&self) -> [f64; 2] {
+        match *self {
+            WrittenRange::One(value) => [value; 2],
+            WrittenRange::Range(range) => range,
+        }
+    }
 }
 
 impl Default for WrittenStart {

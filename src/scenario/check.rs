@@ -5,7 +5,7 @@
 
 use std::fmt::Display;
 
-use super::{ActionKind, REWARD_KEYS, Scenario};
+use super::{ActionKind, REWARD_KEYS, Scenario, Traffic};
 use crate::vehicle::{Model, Suspension, Vehicle};
 
 /// A value with which no truck could be stepped.
@@ -73,6 +73,7 @@ impl Scenario {
             fleet.extremes().try_for_each(|(_, vehicle)| check_vehicle(&vehicle))?;
         }
         self.disturbances.check()?;
+        self.traffic.iter().try_for_each(Traffic::check)?;
         within("vehicle.model.steer_delay", self.longest_steer_delay(), [0.0, MOST_DELAY * self.step])
     }
 
@@ -201,7 +202,7 @@ fn check_suspension(key: &str, suspension: &Suspension) -> Result<(), Invalid> {
     within(&format!("{key}.roll_damping"), suspension.roll_damping, [0.0, 0.9999])
 }
 
-fn list(key: &str, values: &[f64], range: [f64; 2]) -> Result<(), Invalid> {
+pub(super) fn list(key: &str, values: &[f64], range: [f64; 2]) -> Result<(), Invalid> {
     if values.is_empty() {
         return Err(invalid(key, "empty", "at least one value is needed"));
     }

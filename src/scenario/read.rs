@@ -1,14 +1,16 @@
 //! Reads a benchmark file and the files it refers to, and checks every value.
 
-use super::benchmark_keys::{Written, WrittenActions, WrittenDisturbances, WrittenSpeeds};
+use super::benchmark_keys::{Written, WrittenActions, WrittenDisturbances, WrittenRange, WrittenTraffic};
 use super::check::MOST_DELAY;
 use super::disturbances::{Disturbances, LONGEST_DELAY};
 use super::fleet::{self, Fleet};
 use super::roads::{MOST_ROADS, Procedural};
-use super::{ActionKind, Scenario};
+use super::traffic;
+use super::{ActionKind, Scenario, Traffic};
 use crate::files::cache::Loading;
 use crate::files::reader::{Error, Reader};
 use crate::files::shipped::Source;
+use crate::traffic::Rules;
 use crate::vehicle::Vehicle;
 
 impl Scenario {
@@ -21,6 +23,10 @@ impl Scenario {
         let delay = scenario.longest_steer_delay();
         if MOST_DELAY * scenario.step < delay {
             let expected = format!("the vehicle's steer delay is up to {delay} s; three steps at most");
+            return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
+        }
+        if scenario.traffic.is_some() && scenario.step as f32 != crate::traffic::STEP {
+            let expected = format!("with [traffic] {} s", crate::traffic::STEP);
             return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
         }
         // Drawing takes longest: everything else is checked first.
@@ -83,6 +89,7 @@ fn without_routes(
         sensor_range: reader.within("sensors.range", sensors.range, 1.0..=50.0, "m")?,
         extras: written.observation.extras,
         disturbances: disturbances(reader, &written.disturbances)?,
+        traffic: written.traffic.as_ref().map(|written| of_traffic(reader, written)).transpose()?,
         start_offset: reader.within("start.offset", start.offset, 0.0..=1.0, "m")?,
         start_heading: reader.within("start.heading_deg", start.heading_deg, 0.0..=20.0, "deg")?.to_radians(),
         start_speed: start.speed_kmh.as_ref().map(|written| start_speed(reader, written)).transpose()?,
@@ -144,22 +151,36 @@ fn disturbances(reader: &Reader, written: &WrittenDisturbances) -> Result<Distur
     })
 }
 
+/// Checks `[traffic]`.
+fn of_traffic(reader: &Reader, written: &WrittenTraffic) -> Result<Traffic, Error> {
+    let WrittenTraffic { demand, vans, rude, courtesy, waiting } = written;
+    let rude = rude.as_ref().map(|written| range(reader, "traffic.rude", written, 1.0, ""));
+    Ok(Traffic {
+        demand: numbers(reader, "traffic.demand", demand, traffic::MOST_DEMAND, 0.0, "veh/h")?,
+        vans: reader.within("traffic.vans", *vans, 0.0..=1.0, "")?,
+        rude: rude.transpose()?.unwrap_or_default(),
+        courtesy: courtesy.map_or(Ok(Rules::FITTED.courtesy.into()), |courtesy| {
+            reader.within("traffic.courtesy", courtesy, 0.0..=1.0, "")
+        })?,
+        waiting: reader.within("traffic.waiting", *waiting, 0.0..=600.0, "s")?,
+    })
+}
+
 /// Least and greatest speed at the start (m/s).
-fn start_speed(reader: &Reader, written: &WrittenSpeeds) -> Result<[f64; 2], Error> {
-    let [least, greatest] = match *written {
-        WrittenSpeeds::One(speed) => [speed; 2],
-        WrittenSpeeds::Range(range) => range,
-    };
-    reader.within("start.speed_kmh", least, 0.0..=90.0, "km/h")?;
-    reader.within("start.speed_kmh", greatest, 0.0..=90.0, "km/h")?;
+fn start_speed(reader: &Reader, written: &WrittenRange) -> Result<[f64; 2], Error> {
+    Ok(range(reader, "start.speed_kmh", written, 90.0, "km/h")?.map(|speed| speed / 3.6))
+}
+
+/// Least and greatest of a range from 0 on.
+fn range(reader: &Reader, key: &str, written: &WrittenRange, most: f64, unit: &str) -> Result<[f64; 2], Error> {
+    let [least, greatest] = written.ends();
+    reader.within(key, least, 0.0..=most, unit)?;
+    reader.within(key, greatest, 0.0..=most, unit)?;
     if greatest < least {
-        return Err(reader.invalid(
-            "start.speed_kmh",
-            format_args!("[{least}, {greatest}]"),
-            "must be a speed or [least, greatest]",
-        ));
+        let found = format_args!("[{least}, {greatest}]");
+        return Err(reader.invalid(key, found, "must be a number or [least, greatest]"));
     }
-    Ok([least / 3.6, greatest / 3.6])
+    Ok([least, greatest])
 }
 
 /// A non-empty list of finite numbers within a range.

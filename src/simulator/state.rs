@@ -10,7 +10,8 @@ use glam::Vec2;
 use crate::engine::cpu::perceive::pose_of;
 use crate::engine::limits::{self, FAR, FASTEST, MOST, STEEPEST};
 use crate::engine::{Batch, Error};
-use crate::layout::{Column, Control, Ended, N_POSES, Pose, Progress, Reward, RewardTerms, Truck};
+use crate::layout::{Column, Control, Ended, N_CARS, N_POSES, Pose, Progress, Reward, RewardTerms, Truck};
+use crate::traffic::{Car, Row};
 use crate::world::World;
 
 /// An observed value's largest magnitude: 1, with room for the rounding of either engine.
@@ -45,6 +46,7 @@ pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
         within(Column::Reward, env, "", batch.reward[env], -most..=most)?;
         within(Column::Command, env, ".steering", batch.command[env].steering, -1.0..=1.0)?;
         within(Column::Command, env, ".speed", batch.command[env].speed, -1.0..=1.0)?;
+        batch.cars.get(env).map_or(Ok(()), |words| check_cars(world, env, truck, Row::of(words)))?;
     }
     Ok(())
 }
@@ -87,6 +89,23 @@ fn check_control(world: &World, env: usize, control: &Control) -> Result<(), Err
         }
     }
     within(Column::Control, env, ".holds", holds, 0..=1)
+}
+
+/// The vehicles around a truck.
+fn check_cars(world: &World, env: usize, truck: &Truck, row: &Row) -> Result<(), Error> {
+    let Some(traffic) = &world.traffic else { return Ok(()) };
+    let road = &traffic.roads[world.routes[truck.route as usize].roundabout as usize];
+    within(Column::Cars, env, ".level", row.level as usize, 0..=road.levels.len() - 1)?;
+    within(Column::Cars, env, ".met", row.met & 63, 0..=N_CARS as u32)?;
+    for (slot, car) in row.cars.iter().enumerate().filter(|(_, car)| car.is_there()) {
+        let field = |name: &str| format!("[{slot}].{name}");
+        within(Column::Cars, env, &field("path"), car.path(), 0..=road.network.paths.len() - 1)?;
+        let length = road.network.paths[car.path()].length();
+        within(Column::Cars, env, &field("station"), car.station(), 0.0..=length)?;
+        within(Column::Cars, env, &field("speed"), car.speed(), 0.0..=Car::FASTEST)?;
+        within(Column::Cars, env, &field("acceleration"), car.acceleration(), -Car::HARDEST..=Car::HARDEST)?;
+    }
+    Ok(())
 }
 
 /// The poses that are kept with disturbances; without, they are zeros.

@@ -54,6 +54,11 @@ impl Car {
     /// A slot without a car.
     pub const NONE: Car = Car { station: 0, speed: 0, what: NO_PATH, acceleration: 0 };
 
+    /// No car is faster, and no speed that one decides about (m/s).
+    pub const FASTEST: f32 = 12.5;
+    /// None brakes or speeds up harder (m/s²).
+    pub const HARDEST: f32 = 8.0;
+
     /// A car of some style at the beginning of its path, at a speed (2^-14 m a step).
     pub(super) fn entering(path: usize, style: u32, pace: i32) -> Car {
         Car {

@@ -34,6 +34,12 @@ pub struct Demand {
 }
 
 impl Demand {
+    /// The numbers as words: those of sources, of paths, of vans and of rude drivers.
+    pub(crate) fn words(&self) -> Vec<u32> {
+        let Demand { arrivals, shares, vans, rude } = self;
+        arrivals.iter().chain(shares).chain([vans, rude]).copied().collect()
+    }
+
     /// Arrivals by path (veh/h).
     ///
     /// # Errors

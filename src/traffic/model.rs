@@ -4,10 +4,11 @@
 //! squares are compared wherever the model compares ratios, so that no root is needed. Every product fits in 32 bits for
 //! speeds in 0..[`FASTEST`], distances below [`FAR`](super::units::FAR) and headways below 3.5 s; the tests try the ends.
 
+use super::Car;
 use super::units::{length, speed};
 
-/// No car and no truck is faster than this, 12.5 m/s (2^-14 m a step).
-pub(super) const FASTEST: i32 = speed(12.5);
+/// No car and no truck that one minds is faster.
+pub(super) const FASTEST: i32 = speed(Car::FASTEST);
 /// An interaction of 1, and a ratio of gaps of 1.
 pub(super) const ONE: i32 = 1 << 16;
 const RATIO_BITS: u32 = 14;

@@ -37,15 +37,25 @@ pub(super) struct Course {
     pub exit_arm: usize,
 }
 
+/// Of every path the station at which a route with so long an approach begins; negative before the path's beginning (m).
+pub fn begins(ground: &Ground, approach: f64) -> Vec<f64> {
+    let of = |line: &Line| ground.ring_stations(&line.line).0 - approach - first(ground, line);
+    ground.lines.iter().map(of).collect()
+}
+
+/// Where the path of a line begins on it: at the same place as those of its entry lane (m).
+fn first(ground: &Ground, line: &Line) -> f64 {
+    let of_lane = ground.lines.iter().filter(|other| (other.entry, other.lane) == (line.entry, line.lane));
+    of_lane.map(|line| ground.ring_stations(&line.line).0 - APPROACH).fold(f64::INFINITY, f64::min).max(0.0)
+}
+
 /// All lines of a road, in the order of its routes. Those of one entry lane begin at the same place: where cars come
 /// from there is room for all of them or for none.
 pub(super) fn courses(ground: &Ground) -> Vec<Course> {
-    let begins = |line: &Line| ground.ring_stations(&line.line).0 - APPROACH;
     let course = |line: &Line| {
-        let of_lane = ground.lines.iter().filter(|other| (other.entry, other.lane) == (line.entry, line.lane));
         let leaves = ground.ring_stations(&line.line).1;
         Course {
-            line: line.line.part(of_lane.map(begins).fold(f64::INFINITY, f64::min), leaves + DEPARTURE),
+            line: line.line.part(first(ground, line), leaves + DEPARTURE),
             entry: line.entry,
             lane: line.lane.index(),
             exit: line.exit,

@@ -12,6 +12,9 @@ pub(super) const SPEED_PARTS: i32 = 150;
 /// How far it changes headway and lags (1/100 of them for each of its 15 units).
 pub(super) const TIME_PARTS: i32 = 100;
 
+/// Numbers of [`Rules`].
+const N_RULES: usize = 7;
+
 /// What the model's fit may change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rules {
@@ -29,6 +32,14 @@ pub struct Rules {
 }
 
 impl Rules {
+    /// The numbers as words.
+    pub(crate) fn words(&self) -> [u32; N_RULES] {
+        let Rules { headway, gap, lags: [joins, crosses], soft_lags: [right, left], courtesy } = *self;
+        let [headway, gap, joins, crosses, right, left] =
+            [headway, gap, joins, crosses, right, left].map(i32::cast_unsigned);
+        [headway, gap, joins, crosses, right, left, courtesy]
+    }
+
     /// The fitted numbers.
     pub const FITTED: Rules = Rules {
         headway: time(1.1),

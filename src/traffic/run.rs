@@ -36,6 +36,11 @@ impl<'a> Run<'a> {
         self.clock.step += 1;
     }
 
+    /// Cars that wait outside.
+    pub fn backlog(&self) -> Backlog {
+        self.backlog
+    }
+
     /// Number of pairs of cars that overlap: 0 where the model holds.
     pub fn overlaps(&self) -> usize {
         let outlines = self.cars.iter().filter(|car| car.is_there()).map(|car| car.outline(self.setting.network));

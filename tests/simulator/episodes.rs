@@ -38,7 +38,12 @@ pub(crate) fn rows(batch: &Batch) -> Vec<Vec<u8>> {
     let n_envs = batch.n_envs();
     let columns = batch.columns().into_iter().filter(|(column, _)| *column != Column::Action).collect::<Vec<_>>();
     let row = |env: usize| -> Vec<u8> {
-        columns.iter().flat_map(|(_, bytes)| bytes.chunks(bytes.len() / n_envs).nth(env)).flatten().copied().collect()
+        columns
+            .iter()
+            .flat_map(|(_, bytes)| bytes.chunks((bytes.len() / n_envs).max(1)).nth(env))
+            .flatten()
+            .copied()
+            .collect()
     };
     (0..n_envs).map(row).collect()
 }

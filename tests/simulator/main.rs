@@ -48,6 +48,7 @@ mod shaders;
 mod shipped;
 mod speeds;
 mod states;
+mod traffic;
 
 /// A benchmark of the repository, read and baked.
 fn benchmark(name: &str) -> (Scenario, World) {

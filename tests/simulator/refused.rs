@@ -15,7 +15,7 @@ use crate::benchmark;
 #[test]
 fn a_batch_too_large_for_the_memory_is_refused_with_its_size_and_what_would_fit() {
     let world = Arc::new(benchmark("attard2023").1);
-    let width: usize = Column::ALL.iter().map(|column| column.width()).sum();
+    let width: usize = Column::of_trucks().map(|column| column.width()).sum();
     let new = |n_envs| Simulator::new(world.clone(), n_envs, 0, RouteChoice::Drawn(vec![0]));
     for n_envs in [1 << 40, 1 << 62, usize::MAX] {
         let error = new(n_envs).unwrap_err();

@@ -191,7 +191,7 @@ fn the_unit_that_failed_has_the_warning_colour_and_an_end_is_told_in_words() {
             Ended::Running | Ended::Arrived | Ended::TimedOut => [false, false],
             Ended::TractorCollided => [true, false],
             Ended::TrailerCollided => [false, true],
-            Ended::RolledOver | Ended::Jackknifed | Ended::Strayed => [true, true],
+            Ended::RolledOver | Ended::Jackknifed | Ended::Strayed | Ended::MetVehicle | Ended::WasMet => [true, true],
         };
         assert_eq!(warned, expected, "{ended:?}");
         assert_eq!(picture[..caption] == running[..caption], ended == Ended::Running, "{ended:?}");

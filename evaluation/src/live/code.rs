@@ -49,8 +49,7 @@ pub(super) fn printed(packed: &mut Packed) -> Value {
             .map(|of| json!({ "name": of.name, "first": of.first, "n": of.n, "low": of.low, "doc": of.doc })),
         "extras": EXTRAS.map(|extra| json!({ "name": extra.name, "doc": extra.doc })),
         "structs": structs(&[layout::structs(), act::structs(), journal::structs()].concat()),
-        "columns": Column::ALL
-            .iter()
+        "columns": Column::of_trucks()
             .map(|column| (column.name().to_owned(), json!({ "bytes": column.width(), "element": column.element() })))
             .collect::<Map<_, _>>(),
         "buffers": BUFFERS.map(buffer),

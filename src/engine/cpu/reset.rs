@@ -3,6 +3,7 @@
 //! Route and pose are functions of (seed, env, episode) alone, where the caller states none.
 
 use crate::engine::cpu::follow::{followed, reference_point};
+use crate::engine::cpu::traffic::surrounded;
 use crate::engine::cpu::{observe, perceive, sense};
 use crate::engine::{Autoreset, RouteChoice, Row};
 use crate::layout::angle::{direction, wrapped};
@@ -11,6 +12,7 @@ use crate::layout::{
     BEGINS, BeginRow, Control, Ended, HAS_ROUTE, HAS_START, IS_FIRST, Params, RewardTerms, Rig, Start, Stream, Truck,
     WaypointRow,
 };
+use crate::traffic;
 use crate::world::World;
 
 /// The next episode, as drawn.
@@ -67,6 +69,9 @@ fn start(world: &World, row: &mut Row, begin: &BeginRow) {
     let rig = &world.rigs[start.vehicle as usize];
     let at_start = started(&world.params, rig, &waypoints[0], world.route_previews(route)[0].heading, &start);
     *row.truck = Truck { route, episode, ..at_start };
+    if let (Some(shared), Some(cars)) = (&world.traffic, &mut row.cars) {
+        *traffic::Row::of_mut(cars) = surrounded(world, shared, row.stream, row.truck);
+    }
     *row.control = Control { target_speed: at_start.speed, ..Control::default() };
     let point = reference_point(rig.wheelbase, row.truck);
     *row.progress = followed(waypoints, point, 1, world.params.stray_distance);

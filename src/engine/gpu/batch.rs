@@ -42,9 +42,9 @@ impl Batch {
         choice: RouteChoice,
         columns: Columns,
     ) -> Result<Batch, engine::Error> {
-        check_size(device, n_envs)?;
         check_world(device, world)?;
-        let host = engine::Batch::new(n_envs, seed, choice)?;
+        check_size(device, n_envs)?;
+        let host = engine::Batch::new(n_envs, seed, choice, world.traffic.is_some())?;
         let buffers = Buffers::new(device, world, &host, &columns)?;
         let case = Case::of(world, host.autoreset());
         let room = Mutex::new(Some(host));

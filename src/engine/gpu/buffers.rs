@@ -93,7 +93,8 @@ impl Buffers {
 
 /// The caller's slice for a column, or a buffer of zeros.
 fn column_slice(device: &Device, column: Column, n_envs: usize, external: &Columns) -> Result<Slice, Error> {
-    let needed = (n_envs * column.width()) as u64;
+    // A device has no vehicles.
+    let needed = column.n_rows(n_envs * column.width(), false) as u64;
     match external.iter().find(|(known, _)| *known == column) {
         None => Ok(device.empty(column.name(), needed)),
         Some((_, slice)) if needed <= slice.size => Ok(Slice { size: needed, ..slice.clone() }),
@@ -109,6 +110,9 @@ fn largest(device: &Device) -> u64 {
 
 /// An error if a table of the world is larger than that.
 pub(super) fn check_world(device: &Device, world: &World) -> Result<(), Error> {
+    if world.traffic.is_some() {
+        return Err(Error::Vehicles);
+    }
     let limit = largest(device);
     let n_roundabouts = world.fields.len();
     match sizes(world).into_iter().map(|(table, n_bytes)| (table, n_bytes as u64)).find(|(_, n_bytes)| limit < *n_bytes)
@@ -128,7 +132,7 @@ pub(super) fn check_world(device: &Device, world: &World) -> Result<(), Error> {
 /// An error if a column of so many trucks is larger than the adapter's largest buffer.
 pub(super) fn check_size(device: &Device, n_envs: usize) -> Result<(), Error> {
     let limit = largest(device);
-    for column in Column::ALL {
+    for column in Column::of_trucks() {
         let n_bytes = (n_envs as u64).saturating_mul(column.width() as u64);
         if limit < n_bytes {
             let (adapter, fitting) = (device.adapter.get_info().name, limit / column.width() as u64);

@@ -47,7 +47,7 @@ pub fn written(grounds: Vec<Ground>, policies: Vec<Policy>, file: &Path) -> Stri
 /// The columns of `n_envs` trucks that lie one after the other.
 pub fn columns(bytes: &[u8], n_envs: usize) -> HashMap<Column, &[u8]> {
     let mut rest = bytes;
-    let each = Column::ALL.iter().map(|&column| {
+    let each = Column::of_trucks().map(|column| {
         let (own, others) = rest.split_at(n_envs * column.width());
         rest = others;
         (column, own)

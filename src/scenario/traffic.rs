@@ -1,0 +1,37 @@
+//! Other vehicles on the roads of a benchmark: how many, and what their drivers are like.
+
+use super::check::{Invalid, list, within};
+
+/// Largest demand (veh/h).
+pub(super) const MOST_DEMAND: f64 = 3000.0;
+
+/// Other vehicles on the roads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Traffic {
+    /// How many come to a road, from all arms together: each episode draws one of these, all alike (veh/h).
+    pub demand: Vec<f64>,
+    /// Fraction of vans, 7 m long.
+    pub vans: f64,
+    /// Least and greatest fraction of rude drivers, who let nobody in and do not yield to a truck that needs the lanes
+    /// beside its own; drawn for each episode.
+    pub rude: [f64; 2],
+    /// Probability with which a driver in the ring lets in one that waits, where that takes gentle braking.
+    pub courtesy: f64,
+    /// Time to wait, which an episode's time limit has in addition (s).
+    pub waiting: f64,
+}
+
+impl Traffic {
+    /// An error if a value would make no sense.
+    pub(super) fn check(&self) -> Result<(), Invalid> {
+        list("traffic.demand", &self.demand, [0.0, MOST_DEMAND])?;
+        let [least, greatest] = self.rude;
+        for (key, value) in
+            [("vans", self.vans), ("rude[0]", least), ("rude[1]", greatest), ("courtesy", self.courtesy)]
+        {
+            within(&format!("traffic.{key}"), value, [0.0, 1.0])?;
+        }
+        within("traffic.rude[1]", greatest, [least, 1.0])?;
+        within("traffic.waiting", self.waiting, [0.0, 1e6])
+    }
+}

@@ -1,0 +1,40 @@
+//! The vehicles around one truck: a row of the column of a batch.
+
+use bytemuck::{Pod, Zeroable, cast_mut, cast_ref};
+
+use super::Car;
+use crate::layout::{N_CAR_WORDS, N_CARS};
+
+/// The vehicles on one truck's road, and what is counted of them.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Row {
+    /// The slots, of which some have a car.
+    pub cars: [Car; N_CARS],
+    /// Cars that wait outside: four bits a source.
+    pub backlog: [u32; 2],
+    /// Which of the benchmark's demands the episode has.
+    pub level: u32,
+    /// The step of the episode in which the truck entered, plus 1; 0 before.
+    pub entered: u32,
+    /// Slot, plus 1, of the car that the truck met, 64 more where the truck is at fault; 0 if it met none.
+    pub met: u32,
+    /// A bit for each slot whose car brakes for the truck more than for anything else.
+    pub hindered: u32,
+}
+
+impl Row {
+    /// A road without cars.
+    pub const EMPTY: Row =
+        Row { cars: [Car::NONE; N_CARS], backlog: [0; 2], level: 0, entered: 0, met: 0, hindered: 0 };
+
+    /// The row of a column's words.
+    pub fn of(words: &[u32; N_CAR_WORDS]) -> &Row {
+        cast_ref(words)
+    }
+
+    /// The same, to be written to.
+    pub fn of_mut(words: &mut [u32; N_CAR_WORDS]) -> &mut Row {
+        cast_mut(words)
+    }
+}

@@ -1,0 +1,126 @@
+//! Other vehicles as all trucks share them: each road's paths, how many come, and the states that episodes begin in.
+
+use std::sync::atomic::AtomicU64;
+
+use bytemuck::cast_slice;
+use rayon::prelude::*;
+
+use super::Error;
+use crate::files::cache::Loading;
+use crate::map::route::Route;
+use crate::scenario::{Invalid, Place, Scenario};
+use crate::traffic::units::probability;
+use crate::traffic::{self, Demand, Mix, Network, Row, Rules, Snapshots};
+
+/// What all trucks share of other vehicles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Traffic {
+    /// The driver model's numbers.
+    pub rules: Rules,
+    /// Least and greatest fraction of rude drivers; each episode draws one.
+    pub rude: [f32; 2],
+    /// Every road, in the order of the world's fields.
+    pub roads: Vec<TrafficRoad>,
+    /// Where each of the world's routes runs.
+    pub routes: Vec<TrafficRoute>,
+}
+
+/// Other vehicles on one road.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrafficRoad {
+    /// The road's paths, and where they meet.
+    pub network: Network,
+    /// By the demand that an episode draws.
+    pub levels: Vec<Level>,
+}
+
+/// Other vehicles on one road at one demand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Level {
+    /// How many come, and where they want to go.
+    pub demand: Demand,
+    /// What is on the road when an episode begins: each draws one.
+    pub snapshots: Vec<Row>,
+}
+
+/// A truck's route as other vehicles see it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrafficRoute {
+    /// Index of its path.
+    pub path: u32,
+    /// Station of its beginning there (m).
+    pub begins: f32,
+}
+
+impl Traffic {
+    /// Every table as words, one road after the other.
+    pub(super) fn words(&self) -> impl Iterator<Item = Vec<u32>> {
+        let Traffic { rules, rude, roads, routes } = self;
+        let shared = [&rules.words()[..], &rude.map(f32::to_bits)].concat();
+        let routes = routes.iter().flat_map(|&TrafficRoute { path, begins }| [path, begins.to_bits()]).collect();
+        let of_road = |TrafficRoad { network, levels }: &TrafficRoad| {
+            let level = |Level { demand, snapshots }: &Level| [&demand.words(), cast_slice(snapshots)].concat();
+            [network.words(), levels.iter().flat_map(level).collect()].concat()
+        };
+        [shared, routes].into_iter().chain(roads.iter().map(of_road))
+    }
+
+    /// What a scenario's trucks share; none where its roads are empty.
+    pub(super) fn baked(scenario: &Scenario, loading: &Loading) -> Result<Option<Traffic>, Error> {
+        let Some(of) = &scenario.traffic else { return Ok(None) };
+        let rules = Rules { courtesy: probability(of.courtesy), ..Rules::FITTED };
+        // Whether a driver is rude is drawn when an episode begins, and when a car comes.
+        let mix = Mix { vans: of.vans as f32, rude: 0.0 };
+        let done = AtomicU64::new(0);
+        let road = |place: &Place| {
+            loading.check()?;
+            let road = TrafficRoad::baked(place, &of.demand, mix, &rules, loading)?;
+            loading.count("baking traffic", &done, scenario.places.len());
+            Ok(road)
+        };
+        let roads = scenario.places.par_iter().map(road).collect::<Result<_, Error>>()?;
+        let routes = scenario.places.iter().flat_map(|place| {
+            let begins = traffic::begins(place.roundabout.ground(), scenario.approach);
+            place.routes.iter().map(move |route| {
+                let path = path_of(place, route);
+                TrafficRoute { path: path as u32, begins: begins[path] as f32 }
+            })
+        });
+        Ok(Some(Traffic { rules, rude: of.rude.map(|rude| rude as f32), roads, routes: routes.collect() }))
+    }
+}
+
+/// Index of a route among all of its road, which have a path each.
+fn path_of(place: &Place, route: &Route) -> usize {
+    let lines = &place.roundabout.ground().lines;
+    let same =
+        lines.iter().position(|line| (line.entry, line.lane, line.exit) == (route.entry, route.lane, route.exit));
+    same.unwrap_or_default()
+}
+
+impl TrafficRoad {
+    fn baked(place: &Place, demand: &[f64], mix: Mix, rules: &Rules, loading: &Loading) -> Result<TrafficRoad, Error> {
+        let invalid = |error: traffic::Error| {
+            let expected = "leave [traffic] out, or the road, or demand less".to_owned();
+            Error::Invalid(Invalid {
+                key: format!("traffic.demand on {}", place.roundabout.name),
+                value: error.to_string(),
+                expected,
+            })
+        };
+        let network = match loading.cache {
+            Some(cache) => Network::cached(&place.roundabout, cache),
+            None => Network::bake(&place.roundabout),
+        };
+        let network = network.map_err(invalid)?;
+        let level = |&total: &f64| {
+            loading.check()?;
+            let demand = Demand::new(&network, &Demand::even(&network, total), mix).map_err(invalid)?;
+            let of = Snapshots { network: &network, rules, demand: &demand };
+            let snapshots = loading.cache.map_or_else(|| of.baked(), |cache| of.cached(cache));
+            Ok(Level { demand, snapshots })
+        };
+        let levels = demand.iter().map(level).collect::<Result<_, Error>>()?;
+        Ok(TrafficRoad { network, levels })
+    }
+}
