@@ -23,7 +23,7 @@ struct Seen {
     steps: u64,
     steps_with_overlaps: u64,
     longest_standing: u32,
-    not_finite: u64,
+    off: u64,
     cars: u64,
     came: u64,
     stayed: u64,
@@ -36,7 +36,7 @@ impl Seen {
         self.steps += other.steps;
         self.steps_with_overlaps += other.steps_with_overlaps;
         self.longest_standing = self.longest_standing.max(other.longest_standing);
-        self.not_finite += other.not_finite;
+        self.off += other.off;
         self.cars += other.cars;
         self.came += other.came;
         self.stayed += other.stayed;
@@ -47,12 +47,12 @@ impl Seen {
     fn line(&self, name: &str, demand: f64) -> String {
         let steps = self.steps as f64;
         format!(
-            "{name:16} {demand:5} veh/h: {:9} steps, {} with overlaps, longest standing {:.0} s, {} not finite, \
+            "{name:16} {demand:5} veh/h: {:9} steps, {} with overlaps, longest standing {:.0} s, {} off their path, \
              {:.1} cars, served {:.0} veh/h, stayed away {:.2} %, {:.2} us a step",
             self.steps,
             self.steps_with_overlaps,
             f64::from(self.longest_standing) * 0.1,
-            self.not_finite,
+            self.off,
             self.cars as f64 / steps,
             self.left as f64 * 36_000.0 / steps,
             100.0 * self.stayed as f64 / self.came.max(1) as f64,
@@ -78,8 +78,8 @@ fn driven(network: &Network, demand: &Demand, steps: u64, seed: u32) -> Seen {
         seen.steps_with_overlaps += u64::from(0 < run.overlaps());
         seen.cars += there.clone().count() as u64;
         seen.longest_standing = there.clone().map(Car::standing).fold(seen.longest_standing, u32::max);
-        let is_finite = |car: &Car| (car.station + car.speed + car.acceleration).is_finite();
-        seen.not_finite += there.filter(|car| !is_finite(car)).count() as u64;
+        let is_on = |car: &Car| (0.0..=network.paths[car.path()].length()).contains(&car.station());
+        seen.off += there.filter(|car| !is_on(car)).count() as u64;
     }
     seen
 }

@@ -13,30 +13,38 @@ mod arrivals; // cars come, wait outside, and leave
 mod bake; // a road's tables
 pub mod car; // the state of one car, and its outline
 pub mod clock; // random numbers by step and purpose
-mod decide; // the acceleration of each car
+pub mod decide; // the acceleration of each car
 pub mod demand; // how many cars want to go where
 pub mod hcm; // the Highway Capacity Manual's equations
 mod kept; // tables from the cache
 mod meetings; // where two lines are near each other
+mod model; // the intelligent driver model in integers
 mod network; // the tables
+mod others; // what cars mind besides each other
 mod paths; // lines that cars drive, and how fast
 pub mod rules; // the numbers of the driver model
 mod row; // a truck's row of the column of cars
 mod run; // cars alone on a road
 mod snapshots; // states that episodes begin in
+mod step; // a step of a row of cars
 pub mod survey; // what passes the entries
+pub mod units; // the integers that cars are counted in
 #[cfg(test)]
 mod tests;
 
-pub use arrivals::Event;
+pub use arrivals::{Backlog, Event, arrive};
 pub use car::Car;
+pub use clock::Clock;
+pub use decide::Driver;
 pub use demand::{Demand, Mix};
 pub use network::{Kind, Network, Pair, Path, Sample, Source, Stretch, Zone};
+pub use others::{Nobody, Others};
 pub use paths::{begins, speed_limit};
 pub use row::Row;
 pub use rules::Rules;
-pub use run::{Run, step};
+pub use run::Run;
 pub use snapshots::{N_SNAPSHOTS, Snapshots};
+pub use step::{Setting, advance, decide, step};
 pub use survey::Survey;
 
 use crate::files::reader::shown;

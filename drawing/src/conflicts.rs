@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 use offtrack::map::route::{Lane, Route};
 use offtrack::map::{Gutter, Road};
+use offtrack::traffic::units::metres;
 use offtrack::traffic::{Kind, Network};
 use svg::node::element::{Definitions, Group, Path};
 
@@ -98,7 +99,7 @@ impl Zones<'_> {
                 // Who enters yields to what is on the other path.
                 let (path, part) =
                     if kind == Kind::Soft { (b, [zone.b_in, zone.b_out]) } else { (a, [zone.a_in, zone.a_out]) };
-                found.entry(path).or_default().push(part);
+                found.entry(path).or_default().push(part.map(metres));
             }
         }
         let data: String = found
@@ -113,7 +114,7 @@ impl Zones<'_> {
     /// The paths.
     fn paths(&self) -> Group {
         let path = |group: Group, path: usize| {
-            let data = self.part(path, 0.0, self.network.paths[path].length);
+            let data = self.part(path, 0.0, self.network.paths[path].length());
             let line = Path::new().set("d", data).set("fill", "none").set("stroke", lane_colour(self.lane(path)));
             group.add(line.set("stroke-width", 1.0))
         };
@@ -123,7 +124,7 @@ impl Zones<'_> {
     /// The lines before which cars wait, across their paths.
     fn lines(&self) -> Group {
         let line = |(index, path): (usize, &offtrack::traffic::Path)| {
-            let (place, along) = self.network.pose(index, path.line);
+            let (place, along) = self.network.pose(index, path.line());
             let side = HALF_LINE * along.perp();
             self.view.line(&[(place - side).as_dvec2(), (place + side).as_dvec2()])
         };

@@ -11,7 +11,7 @@ use crate::engine::cpu::perceive::pose_of;
 use crate::engine::limits::{self, FAR, FASTEST, MOST, STEEPEST};
 use crate::engine::{Batch, Error};
 use crate::layout::{Column, Control, Ended, N_CARS, N_POSES, Pose, Progress, Reward, RewardTerms, Truck};
-use crate::traffic::Row;
+use crate::traffic::{Car, Row};
 use crate::world::World;
 
 /// An observed value's largest magnitude: 1, with room for the rounding of either engine.
@@ -100,9 +100,10 @@ fn check_cars(world: &World, env: usize, truck: &Truck, row: &Row) -> Result<(),
     for (slot, car) in row.cars.iter().enumerate().filter(|(_, car)| car.is_there()) {
         let field = |name: &str| format!("[{slot}].{name}");
         within(Column::Cars, env, &field("path"), car.path(), 0..=road.network.paths.len() - 1)?;
-        within(Column::Cars, env, &field("station"), car.station, 0.0..=MOST)?;
-        within(Column::Cars, env, &field("speed"), car.speed, 0.0..=FASTEST)?;
-        within(Column::Cars, env, &field("acceleration"), car.acceleration, -MOST..=MOST)?;
+        let length = road.network.paths[car.path()].length();
+        within(Column::Cars, env, &field("station"), car.station(), 0.0..=length)?;
+        within(Column::Cars, env, &field("speed"), car.speed(), 0.0..=Car::FASTEST)?;
+        within(Column::Cars, env, &field("acceleration"), car.acceleration(), -Car::HARDEST..=Car::HARDEST)?;
     }
     Ok(())
 }

@@ -1,19 +1,23 @@
 //! Cars come, wait outside until there is room, and leave at the end of their path.
 
 use super::car::style;
-use super::clock::{Clock, unit};
-use super::rules::Rules;
-use super::{Car, Demand, Network};
+use super::clock::Clock;
+use super::model::{FASTEST, square};
+use super::units::{FAR, FINER_SPEED, falls_below, length};
+use super::{Car, Network, Others, Setting};
 
-/// Bits of the backlog for each source: so many cars wait outside at most, and further ones stay away.
-const BACKLOG_BITS: u32 = 4;
-const MOST_WAITING: u64 = (1 << BACKLOG_BITS) - 1;
-/// A car enters with at least so much room before it (m).
-const ROOM: f32 = 3.0;
+/// Bits of the backlog for each source, and the sources of a word: so many cars wait outside at most, and further ones
+/// stay away.
+const BACKLOG_BITS: usize = 4;
+const SOURCES: usize = u32::BITS as usize / BACKLOG_BITS;
+const MOST_WAITING: u32 = (1 << BACKLOG_BITS) - 1;
+/// A car enters with at least so much room before it.
+const ROOM: i32 = length(3.0);
 /// Twice the braking with which it could stop behind the one before it (m/s²).
-const STOPS_WITH: f32 = 3.0;
-/// Its time headway at least (s).
-const HEADWAY: f32 = 0.8;
+const STOPS_WITH: i32 = 3;
+
+/// Cars that wait outside: four bits a source.
+pub type Backlog = [u32; 2];
 
 /// What happened outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,78 +32,87 @@ pub enum Event {
     Left(usize),
 }
 
+/// Word and lowest bit of a source in the backlog.
+fn place(source: usize) -> (usize, usize) {
+    (source / SOURCES, BACKLOG_BITS * (source % SOURCES))
+}
+
 /// The number of cars that wait outside at a source.
-pub(super) fn waiting(backlog: u64, source: usize) -> u64 {
-    (backlog >> (BACKLOG_BITS * source as u32)) & MOST_WAITING
+pub(super) fn waiting(backlog: &Backlog, source: usize) -> u32 {
+    let (word, bit) = place(source);
+    (backlog[word] >> bit) & MOST_WAITING
 }
 
-fn one(source: usize) -> u64 {
-    1 << (BACKLOG_BITS * source as u32)
+/// Has as many cars wait at a source as can.
+pub(super) fn fill(backlog: &mut Backlog, source: usize) {
+    let (word, bit) = place(source);
+    backlog[word] |= MOST_WAITING << bit;
 }
 
-/// Sources with a full backlog have it whatever enters.
-pub(super) fn filled(backlog: u64, source: usize) -> u64 {
-    backlog | (MOST_WAITING * one(source))
-}
-
-/// Takes out cars at the ends of their paths, and lets in those that come. Slots are filled in their order.
-pub(super) fn exchange(
-    network: &Network,
-    rules: &Rules,
-    demand: &Demand,
+/// Cars at the ends of their paths leave, and those that come enter where there is room, in the order of the sources,
+/// into the first free slots. `tell` hears of all.
+pub fn arrive(
+    setting: Setting,
     clock: Clock,
     cars: &mut [Car],
-    backlog: &mut u64,
+    backlog: &mut Backlog,
+    others: &impl Others,
     tell: &mut impl FnMut(Event, &[Car]),
 ) {
+    let Setting { network, demand, .. } = setting;
     for slot in 0..cars.len() {
         let car = cars[slot];
-        if car.is_there() && network.paths[car.path()].length <= car.station {
+        if car.is_there() && network.paths[car.path()].length <= car.front() {
             tell(Event::Left(slot), cars);
             cars[slot] = Car::NONE;
         }
     }
     // One draw for all sources: their rates are exact, and at most one car comes in a step.
-    let drawn = unit(clock.arrival());
-    if let Some(source) = demand.arrivals.iter().position(|&until| drawn < until) {
-        let has_room = waiting(*backlog, source) < MOST_WAITING;
-        *backlog += if has_room { one(source) } else { 0 };
+    let drawn = clock.arrival();
+    if let Some(source) = demand.arrivals.iter().position(|&until| falls_below(drawn, until)) {
+        let has_room = waiting(backlog, source) < MOST_WAITING;
+        let (word, bit) = place(source);
+        backlog[word] += u32::from(has_room) << bit;
         tell(if has_room { Event::Came(source) } else { Event::Stayed(source) }, cars);
     }
     for source in 0..network.sources.len() {
-        if waiting(*backlog, source) == 0 {
+        if waiting(backlog, source) == 0 {
             continue;
         }
         let Some(slot) = cars.iter().position(|car| !car.is_there()) else { return };
-        let Some(car) = entering(network, rules, demand, clock, cars, source) else { continue };
+        let Some(car) = entering(setting, clock, cars, source, others) else { continue };
         cars[slot] = car;
-        *backlog -= one(source);
+        let (word, bit) = place(source);
+        backlog[word] -= 1 << bit;
         tell(Event::Entered(source, slot), cars);
     }
 }
 
 /// The next car of a source, if there is room for it.
-fn entering(
-    network: &Network,
-    rules: &Rules,
-    demand: &Demand,
-    clock: Clock,
-    cars: &[Car],
-    source: usize,
-) -> Option<Car> {
+fn entering(setting: Setting, clock: Clock, cars: &[Car], source: usize, others: &impl Others) -> Option<Car> {
+    let Setting { network, rules, demand } = setting;
     let [drawn, kind, driver, _] = clock.entering(source);
     let paths = network.paths_of(source);
     let last = paths.end - 1;
-    let path = paths.clone().find(|&path| unit(drawn) < demand.shares[path]).unwrap_or(last);
-    let car = Car::entering(path, style([kind, driver], &demand.mix), 0.0);
-    let ahead = cars.iter().filter(|other| other.is_there() && paths.contains(&other.path()));
-    let (room, speed) = ahead
-        .map(|other| (other.station - other.length() - car.station, other.speed))
-        .fold((f32::INFINITY, 0.0), |nearest, other| if other.0 < nearest.0 { other } else { nearest });
+    let path = paths.clone().find(|&path| falls_below(drawn, demand.shares[path])).unwrap_or(last);
+    let car = Car::entering(path, style([kind, driver], demand), 0);
+    let of_source = cars.iter().filter(|other| other.is_there() && paths.contains(&other.path()));
+    let ahead = of_source.map(|other| (other.rear(), other.pace())).chain(others.ahead(&car));
+    let (rear, pace) = ahead.fold((FAR, 0), |nearest, other| if other.0 < nearest.0 { other } else { nearest });
+    let room = rear - car.front();
     if room < ROOM {
         return None;
     }
-    let room = room - rules.gap;
-    let limit = network.limit(path, car.station);
-    Some(Car { speed: limit.min((speed * speed + STOPS_WITH * room).sqrt()).min(room / HEADWAY), ..car })
+    let pace = entry_pace(network, &car, (room - rules.gap).max(0), pace);
+    Some(Car { speed: pace << FINER_SPEED, ..car })
+}
+
+/// Speed of a car that enters behind another one with this room to stop: that it can, and is 0.8 s behind (2^-14 m a
+/// step, 2^-10 m).
+fn entry_pace(network: &Network, car: &Car, room: i32, pace: i32) -> i32 {
+    let stops = (square(pace) + STOPS_WITH * room).min(square(FASTEST)) as u32;
+    // The root is in 2^-10 m/s, of which 8/5 units of a pace.
+    let stops = (stops << 10).isqrt() as i32 * 8 / 5;
+    // 2^-10 m in 8 steps are 2 units of a pace.
+    network.limit(car.path(), car.station).min(stops).min(2 * room)
 }

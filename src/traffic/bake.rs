@@ -4,6 +4,7 @@ use super::Error;
 use super::meetings::{FINE, Part, Points, parts};
 use super::network::{CELL, Kind, MOST_PATHS, MOST_SOURCES, Network, Pair, Path, Sample, Source, UNIT, Zone};
 use super::paths::{Course, courses};
+use super::units::length;
 use crate::map::Road;
 use crate::map::ground::Ground;
 
@@ -187,9 +188,9 @@ fn tables(
             paths.push(Path {
                 first: samples.len() as u32,
                 n: own.len() as u32,
-                length: course.line.length() as f32,
-                line: lines[index] as f32,
-                clear: clears[index] as f32,
+                length: length(course.line.length() as f32),
+                line: length(lines[index] as f32),
+                clear: length(clears[index] as f32),
                 source: source as u32,
                 exit: course.exit,
                 exit_arm: course.exit_arm as u32,

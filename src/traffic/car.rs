@@ -5,9 +5,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 
-use super::clock::falls_below;
-use super::demand::Mix;
-use super::{Network, STEP};
+use super::units::{FINER_SPEED, FINER_STATION, falls_below, length as in_units, metres};
+use super::{Demand, Network, STEP};
 
 /// Path of a slot without a car.
 const NO_PATH: u32 = 1023;
@@ -21,40 +20,88 @@ const TEMPERAMENT: u32 = 15;
 const LENGTH: u32 = 4;
 const VAN: u32 = 1 << 6;
 const RUDE: u32 = 1 << 7;
-/// Length of the shortest car, and from one to the next longer (m).
-const SHORTEST: f32 = 4.2;
-const LONGER: f32 = 0.3;
-/// Length of a van (m).
-const VAN_LENGTH: f32 = 7.0;
+/// Length of the shortest car, and from one to the next longer.
+const SHORTEST: i32 = in_units(4.2);
+const LONGER: i32 = in_units(0.3);
+/// Length of a van.
+const VAN_LENGTH: i32 = in_units(7.0);
 /// Half the width of a car and of a van (m).
 const HALF_WIDTH: f32 = 0.9;
 const VAN_HALF_WIDTH: f32 = 1.05;
 /// Part of the length before the front axle, and behind the rear one.
 const OVERHANG: f32 = 0.2;
-/// Below this speed a car stands (m/s).
-const STANDS: f32 = 0.1;
+/// Units of a state in a metre, and in a metre a step.
+const METRE: f32 = 1_048_576.0;
+const METRE_A_STEP: f32 = 524_288.0;
+/// Below this speed a car stands: 0.1 m/s (2^-19 m a step).
+const STANDS: i32 = 5243;
 
-/// A car, or a slot without one.
+/// A car, or a slot without one: integers, in which a step of motion is exact.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct Car {
-    /// Station of its front on its path (m).
-    pub station: f32,
-    /// Its speed (m/s).
-    pub speed: f32,
+    /// Station of its front on its path (2^-20 m).
+    pub station: i32,
+    /// Its speed (2^-19 m a step).
+    pub speed: i32,
     /// Path in 10 bits, style in 10, steps for which it has been standing in 12.
     pub what: u32,
-    /// What it decided last (m/s²).
-    pub acceleration: f32,
+    /// What it decided last (2^-19 m a step²).
+    pub acceleration: i32,
 }
 
 impl Car {
     /// A slot without a car.
-    pub const NONE: Car = Car { station: 0.0, speed: 0.0, what: NO_PATH, acceleration: 0.0 };
+    pub const NONE: Car = Car { station: 0, speed: 0, what: NO_PATH, acceleration: 0 };
 
-    /// A car of some style at the beginning of its path.
-    pub(super) fn entering(path: usize, style: u32, speed: f32) -> Car {
-        Car { station: length(style), speed, what: path as u32 | (style << STYLE), acceleration: 0.0 }
+    /// No car is faster, and no speed that one decides about (m/s).
+    pub const FASTEST: f32 = 12.5;
+    /// None brakes or speeds up harder (m/s²).
+    pub const HARDEST: f32 = 8.0;
+
+    /// A car of some style at the beginning of its path, at a speed (2^-14 m a step).
+    pub(super) fn entering(path: usize, style: u32, pace: i32) -> Car {
+        Car {
+            station: extent(style) << FINER_STATION,
+            speed: pace << FINER_SPEED,
+            what: path as u32 | (style << STYLE),
+            acceleration: 0,
+        }
+    }
+
+    /// Station of its front on its path (m).
+    pub fn station(&self) -> f32 {
+        self.station as f32 / METRE
+    }
+
+    /// Its speed (m/s).
+    pub fn speed(&self) -> f32 {
+        self.speed as f32 / (METRE_A_STEP * STEP)
+    }
+
+    /// What it decided last (m/s²).
+    pub fn acceleration(&self) -> f32 {
+        self.acceleration as f32 / (METRE_A_STEP * STEP * STEP)
+    }
+
+    /// Station of its front, as decisions read it (2^-10 m).
+    pub(super) fn front(&self) -> i32 {
+        self.station >> FINER_STATION
+    }
+
+    /// Station of its rear, as decisions read it (2^-10 m).
+    pub(super) fn rear(&self) -> i32 {
+        self.front() - self.extent()
+    }
+
+    /// Its length, as decisions read it (2^-10 m).
+    pub(super) fn extent(&self) -> i32 {
+        extent(self.style())
+    }
+
+    /// Its speed, as decisions read it (2^-14 m a step).
+    pub(super) fn pace(&self) -> i32 {
+        self.speed >> FINER_SPEED
     }
 
     /// Whether there is a car in this slot.
@@ -78,7 +125,7 @@ impl Car {
 
     /// Its length (m).
     pub fn length(&self) -> f32 {
-        length(self.style())
+        metres(self.extent())
     }
 
     /// Half its width (m).
@@ -86,9 +133,9 @@ impl Car {
         if self.style() & VAN == VAN { VAN_HALF_WIDTH } else { HALF_WIDTH }
     }
 
-    /// From -1, who drives slowly and keeps his distance, to 1.
-    pub fn temperament(&self) -> f32 {
-        ((self.style() & TEMPERAMENT) as f32 - 7.5) * (1.0 / 7.5)
+    /// From -15, who drives slowly and keeps his distance, to 15, in steps of 2.
+    pub fn temperament(&self) -> i32 {
+        2 * (self.style() & TEMPERAMENT) as i32 - TEMPERAMENT as i32
     }
 
     /// Whether the driver lets nobody in.
@@ -97,14 +144,12 @@ impl Car {
     }
 
     /// The car after a step with its acceleration, which it held: the ballistic update of M. Treiber and A. Kesting,
-    /// "Traffic Flow Dynamics" (2013), section 10.2, which stops exactly where the speed reaches 0.
+    /// "Traffic Flow Dynamics" (2013), section 10.2, which stops where the speed reaches 0.
     pub(super) fn moved(&self) -> Car {
-        let speed = self.speed + self.acceleration * STEP;
-        let (way, speed) = if speed < 0.0 {
-            (0.5 * self.speed * self.speed / -self.acceleration, 0.0)
-        } else {
-            (0.5 * (self.speed + speed) * STEP, speed)
-        };
+        let speed = self.speed + self.acceleration;
+        // What stops within the step is slower than its braking in a step: the square fits.
+        let (way, speed) =
+            if speed < 0 { (self.speed * self.speed / -self.acceleration, 0) } else { (self.speed + speed, speed) };
         let standing = if speed < STANDS { (self.standing() + 1).min(MOST_STANDING) } else { 0 };
         let what = (self.what & ((1 << STANDING) - 1)) | (standing << STANDING);
         Car { station: self.station + way, speed, what, ..*self }
@@ -113,23 +158,23 @@ impl Car {
     /// The ground that it covers: both axles are on the path, so in bends its ends swing out and its middle cuts in.
     pub fn outline(&self, network: &Network) -> Outline {
         let length = self.length();
-        let axle = |overhang: f32| network.pose(self.path(), self.station - overhang * length).0;
+        let axle = |overhang: f32| network.pose(self.path(), self.station() - overhang * length).0;
         let [front, rear] = [axle(OVERHANG), axle(1.0 - OVERHANG)];
         let (middle, along) = (0.5 * (front + rear), (front - rear).normalize_or_zero());
         Outline { middle, along, half_length: 0.5 * length, half_width: self.half_width() }
     }
 }
 
-fn length(style: u32) -> f32 {
-    if style & VAN == VAN { VAN_LENGTH } else { SHORTEST + LONGER * ((style >> LENGTH) & 3) as f32 }
+fn extent(style: u32) -> i32 {
+    if style & VAN == VAN { VAN_LENGTH } else { SHORTEST + LONGER * ((style >> LENGTH) & 3) as i32 }
 }
 
 /// A style drawn from random words.
-pub(super) fn style(words: [u32; 2], mix: &Mix) -> u32 {
+pub(super) fn style(words: [u32; 2], demand: &Demand) -> u32 {
     let [kind, driver] = words;
-    let flag = |word: u32, probability: f32, flag: u32| if falls_below(word, probability) { flag } else { 0 };
+    let flag = |word: u32, probability: u32, flag: u32| if falls_below(word, probability) { flag } else { 0 };
     // Upper bits tell the kind, lower ones length and temperament.
-    (kind & (VAN - 1)) | flag(kind, mix.vans, VAN) | flag(driver, mix.rude, RUDE)
+    (kind & (VAN - 1)) | flag(kind, demand.vans, VAN) | flag(driver, demand.rude, RUDE)
 }
 
 /// A rectangle on the ground.
@@ -157,5 +202,41 @@ impl Outline {
         [self.along, self.along.perp(), other.along, other.along.perp()]
             .into_iter()
             .all(|axis| between.dot(axis).abs() < self.reach(axis) + other.reach(axis))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::units::speed as pace;
+    use super::*;
+
+    fn moved(metres: i32, metres_per_second: f32, acceleration: i32) -> Car {
+        Car { station: metres << 20, acceleration, ..Car::entering(3, 7, pace(metres_per_second)) }.moved()
+    }
+
+    #[test]
+    fn a_step_of_motion_is_exact_at_both_ends_of_a_road_and_of_the_accelerations() {
+        for (station, v, a) in [(0, 0.0, 10_486), (508, 12.5, -41_943), (1000, 12.5, 10_486), (7, 1.0, -41_943)] {
+            let before = pace(v) << FINER_SPEED;
+            let car = moved(station, v, a);
+            let speed = i64::from(before) + i64::from(a);
+            let way = i64::from(before) + speed;
+            assert_eq!((i64::from(car.station), i64::from(car.speed)), ((i64::from(station) << 20) + way, speed));
+        }
+        // 1 m/s for 0.1 s, and half of 2 m/s² in its square.
+        assert!((moved(0, 1.0, 10_486).station() - 0.11).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_car_that_stops_within_a_step_stands_after_its_braking_distance_and_is_counted_as_standing() {
+        let hardest = -41_943;
+        // The fastest that still stops: its square is the largest that is formed.
+        for (v, a) in [(0.79f32, hardest), (0.05, hardest), (0.05, -10_000), (0.0, -1)] {
+            let car = moved(9, v, a);
+            let way = v * v / (2.0 * -Car { acceleration: a, ..Car::NONE }.acceleration());
+            assert!((car.station() - 9.0 - way).abs() < 1e-4, "{v} m/s: {} m", car.station() - 9.0);
+            assert_eq!((car.speed, car.standing(), car.moved().standing()), (0, 1, 2));
+        }
+        assert_eq!(moved(9, 5.0, 0).standing(), 0);
     }
 }

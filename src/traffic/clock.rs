@@ -57,13 +57,3 @@ impl Clock {
         self.draw(COURTESY.wrapping_add((self.step / COURTESY_PERIOD) * SLOTS * SLOTS + pair))[0]
     }
 }
-
-/// Whether a random word falls below a probability.
-pub(super) fn falls_below(word: u32, probability: f32) -> bool {
-    unit(word) < probability
-}
-
-/// A word as a number in [0, 1): its upper 24 bits, exact in f32.
-pub(super) fn unit(word: u32) -> f32 {
-    (word >> 8) as f32 * (1.0 / 16_777_216.0)
-}

@@ -7,34 +7,36 @@
 mod entry;
 
 use super::clock::Clock;
-use super::network::{CELL, Kind, Stretch};
-use super::rules::{ACCELERATION, BRAKING, HARDEST, HEADWAY_SPREAD, PER_SPEEDS, SLOWING, SPEED_SPREAD};
-use super::{Car, Network, Rules, STEP};
+use super::model::{ONE, acceleration, braking_of, following, square, stopping, time};
+use super::network::{Kind, Stretch, cell};
+use super::rules::{SPEED_PARTS, TIME_PARTS};
+use super::units::{FAR, length, speed};
+use super::{Car, Network, Others, Rules};
 
 /// Most slots of a row.
 pub(super) const MOST_CARS: usize = 64;
-/// Nothing farther ahead of a car is looked at (m).
-const SIGHT: f32 = 32.0;
-/// The same of a car that may come to meet it (m).
-const SIGHT_OF_OTHERS: f32 = 45.0;
-/// A zone is left once the rear is so far behind it (m).
-const LEFT: f32 = 0.3;
-/// Two cars that have it before them agree on who is first from this distance on (m).
-const AGREED: f32 = 35.0;
-/// Twice the braking at which a car would still stop before its line (m/s²).
-const STOPS_WITH: f32 = 8.0;
+/// Nothing farther ahead of a car is looked at.
+const SIGHT: i32 = length(32.0);
+/// The same of a car that may come to meet it.
+const SIGHT_OF_OTHERS: i32 = length(45.0);
+/// What may matter of a car begins so far behind its rear.
+const BEHIND: i32 = length(0.5);
+/// A zone is left once the rear is so far behind it.
+const LEFT: i32 = length(0.3);
+/// Two cars that have it before them agree on who is first from this distance on.
+const AGREED: i32 = length(35.0);
+/// A car can still stop before its line at 4 m/s²: within an eighth of its squared speed.
+const STOPS_WITHIN: u32 = 3;
 /// Twice the braking above which a car does not stop for another that is about as near (m/s²).
-const GOES_ABOVE: f32 = 7.0;
-/// Distance by which a car that cannot stop any more is nearer in the order of who goes first (m).
-const BOUND: f32 = 1000.0;
-/// Least speed in a time to a zone (m/s).
-const LEAST_SPEED: f32 = 4.0;
+const GOES_ABOVE: i32 = 7;
+/// Least speed in a time to a zone.
+const LEAST_SPEED: i32 = speed(4.0);
+/// Least wished speed.
+const LEAST_WISHED: i32 = speed(0.5);
 /// Steps after which one that has been standing goes by the coin.
 const PATIENT: u32 = 20;
-/// A car that stands is this far before what it stops at (m).
-const STANDS_BEFORE: f32 = 0.2;
-/// Ratio of the wished gap to the gap for a car that must let another out of a crossing.
-const LETS_OUT: f32 = 3.0;
+/// Interaction of a car that must let another out of a crossing: it wishes three times the gap.
+const LETS_OUT: i32 = 9 * ONE;
 
 /// All cars of a row as deciding needs them, side by side.
 pub(super) struct Crowd<'a> {
@@ -50,18 +52,27 @@ pub(super) struct Crowd<'a> {
     front: [u8; MOST_CARS],
 }
 
-/// A car that another one decides about.
-#[derive(Clone, Copy)]
-struct Other {
-    slot: u32,
-    station: f32,
-    speed: f32,
-    length: f32,
-    line: f32,
-    standing: u32,
+/// A vehicle as another one weighs it, in the units of decisions.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen {
+    /// Its slot; of two that are alike, the lower one is first.
+    pub slot: u32,
+    /// Station of its front (2^-10 m).
+    pub station: i32,
+    /// Its speed (2^-14 m a step).
+    pub speed: i32,
+    /// Square of its speed (2^-10 m²/s²).
+    pub square: i32,
+    /// Its length (2^-10 m).
+    pub length: i32,
+    /// Station of its line (2^-10 m).
+    pub line: i32,
+    /// Steps for which it has been standing.
+    pub standing: u32,
     /// Whether it can still stop before its line.
-    waits: bool,
-    is_rude: bool,
+    pub waits: bool,
+    /// Whether its driver lets nobody in.
+    pub is_rude: bool,
 }
 
 impl<'a> Crowd<'a> {
@@ -74,35 +85,37 @@ impl<'a> Crowd<'a> {
             let k = crowd.n;
             crowd.slot[k] = index as u32;
             crowd.path[k] = car.path() as u16;
-            // Conversions saturate.
-            crowd.rear[k] = ((car.station - car.length() - 0.5) / CELL) as u8;
-            crowd.front[k] = ((car.station + SIGHT_OF_OTHERS) / CELL) as u8;
+            crowd.rear[k] = cell(car.rear() - BEHIND);
+            crowd.front[k] = cell(car.front() + SIGHT_OF_OTHERS);
             crowd.n += 1;
         }
         crowd
     }
 
     /// The car in a slot, as it is weighed.
-    fn seen(&self, slot: usize) -> Other {
+    fn seen(&self, slot: usize) -> Seen {
         let car = &self.cars[slot];
         let line = self.network.paths[car.path()].line;
-        Other {
+        let (station, speed, square) = (car.front(), car.pace(), square(car.pace()));
+        Seen {
             slot: slot as u32,
-            station: car.station,
-            speed: car.speed,
-            length: car.length(),
+            station,
+            speed,
+            square,
+            length: car.extent(),
             line,
             standing: car.standing(),
-            waits: can_wait(car.station, car.speed, line),
+            // A car that cannot stop before its line any more has entered.
+            waits: station + (square >> STOPS_WITHIN) <= line,
             is_rude: car.is_rude(),
         }
     }
 
-    /// The acceleration that the car in a slot decides (m/s²).
-    pub(super) fn decided(&self, slot: usize) -> f32 {
+    /// The acceleration that the car in a slot decides (2^-19 m a step²).
+    pub(super) fn decided(&self, slot: usize, others: &impl Others) -> i32 {
         let mut driver = Driver::new(self, slot);
-        let ahead = ((driver.me.station + SIGHT) / CELL) as u8;
-        let behind = ((driver.me.station - driver.me.length - 0.5) / CELL) as u8;
+        let ahead = cell(driver.me.station + SIGHT);
+        let behind = cell(driver.me.station - driver.me.length - BEHIND);
         let pairs = &self.network.pairs[driver.path * self.network.paths.len()..][..self.network.paths.len()];
         // Most cars are near no zone that this one is near: they are sorted out without a branch.
         let (mut near, mut n_near) = ([0u8; MOST_CARS], 0);
@@ -124,36 +137,38 @@ impl<'a> Crowd<'a> {
             let zones = &self.network.zones[usize::from(pair.first)..][..usize::from(pair.n)];
             zones.iter().for_each(|zone| driver.consider(&zone.stretch(), &other));
         }
+        others.hinder(&mut driver);
         driver.decided()
     }
 }
 
 /// A car that decides.
-struct Driver<'a> {
+pub struct Driver<'a> {
     crowd: &'a Crowd<'a>,
-    me: Other,
+    /// The car as others weigh it.
+    pub me: Seen,
     path: usize,
-    temperament: f32,
-    headway: f32,
-    /// The largest ratio of a wished gap to the gap that there is.
-    ratio: f32,
+    temperament: i32,
+    /// Its time headway (1/256 step).
+    headway: i32,
+    /// The largest interaction.
+    interaction: i32,
     /// Whether it stops before its line.
     stops: bool,
-    /// The nearest car that it follows: station of its rear, and its speed.
-    leader: (f32, f32),
+    /// The nearest car that it follows: station of its rear, and its speed (2^-10 m, 2^-14 m a step).
+    leader: (i32, i32),
 }
 
 impl<'a> Driver<'a> {
     fn new(crowd: &'a Crowd, slot: usize) -> Driver<'a> {
         let car = &crowd.cars[slot];
-        let (me, path) = (crowd.seen(slot), car.path());
-        let temperament = car.temperament();
-        let headway = crowd.rules.headway * (1.0 - HEADWAY_SPREAD * temperament);
-        Driver { crowd, me, path, temperament, headway, ratio: 0.0, stops: false, leader: (f32::INFINITY, 0.0) }
+        let (me, path, temperament) = (crowd.seen(slot), car.path(), car.temperament());
+        let headway = crowd.rules.headway * (TIME_PARTS - temperament) / TIME_PARTS;
+        Driver { crowd, me, path, temperament, headway, interaction: 0, stops: false, leader: (FAR, 0) }
     }
 
     /// Takes another car in a zone of both paths into account.
-    fn consider(&mut self, zone: &Stretch, other: &Other) {
+    fn consider(&mut self, zone: &Stretch, other: &Seen) {
         let me = self.me;
         let out_of_sight = SIGHT < zone.a_in - me.station || SIGHT_OF_OTHERS < zone.b_in - other.station;
         let left = zone.a_out + LEFT < me.station - me.length || zone.b_out + LEFT < other.station - other.length;
@@ -172,37 +187,36 @@ impl<'a> Driver<'a> {
                 // Who has less to go is first.
                 let [mine, its] = [zone.a_out - me.station, zone.b_out - other.station];
                 if its < mine || (its == mine && other.slot < me.slot) {
-                    self.ratio = self.ratio.max(LETS_OUT);
+                    self.heed(LETS_OUT);
                 }
             }
             ([true, false], _) => {}
             ([false, true], Kind::Follow) => {
                 let gap = other.station - zone.delta - other.length - me.station;
-                let behind = self.behind(gap, other.speed);
-                self.ratio = self.ratio.max(behind.min(stopping(zone.a_in - me.station, me.speed)));
+                self.stop_or_follow(zone.a_in - me.station, gap, other.speed);
             }
-            ([false, true], Kind::Cross) => self.ratio = self.ratio.max(stopping(zone.a_in - me.station, me.speed)),
+            ([false, true], Kind::Cross) => self.stop_before(zone.a_in - me.station),
             ([false, false], _) => self.consider_before_both(zone, other),
         }
     }
 
     /// Both are where paths run together: who is ahead leads.
-    fn follow_inside(&mut self, zone: &Stretch, other: &Other) {
+    fn follow_inside(&mut self, zone: &Stretch, other: &Seen) {
         let ahead = other.station - zone.delta;
         if self.me.station < ahead || (ahead == self.me.station && other.slot < self.me.slot) {
             let rear = ahead - other.length;
-            self.ratio = self.ratio.max(self.behind(rear - self.me.station, other.speed));
+            self.follow(rear - self.me.station, other.speed);
             self.note_leader(rear, other.speed);
         }
     }
 
     /// Both have the zone before them, and it is not that of this car's entry.
-    fn consider_before_both(&mut self, zone: &Stretch, other: &Other) {
+    fn consider_before_both(&mut self, zone: &Stretch, other: &Seen) {
         let me = self.me;
         let [mine, its] = [zone.a_in - me.station, zone.b_in - other.station];
         let enters_there = other.waits && other.line < zone.b_in;
         if !me.waits && enters_there && self.lets_in(&me, mine, other) {
-            self.ratio = self.ratio.max(stopping(mine, me.speed));
+            self.stop_before(mine);
             return;
         }
         // What waits before its line, or before that of both, hinders nobody yet.
@@ -210,66 +224,93 @@ impl<'a> Driver<'a> {
             return;
         }
         if self.goes_first(zone, other) {
-            let length = if zone.kind == Kind::Cross { zone.b_out - zone.b_in } else { 0.0 };
-            let behind = self.behind(mine - its - other.length - length, other.speed);
-            self.ratio = self.ratio.max(behind.min(stopping(mine, me.speed)));
+            let length = if zone.kind == Kind::Cross { zone.b_out - zone.b_in } else { 0 };
+            self.stop_or_follow(mine, mine - its - other.length - length, other.speed);
         }
     }
 
     /// Whether the other goes first through a zone that both have before them. Both find the same: what cannot stop any
     /// more is first, then who is there sooner; of two that have been standing, a coin decides.
-    fn goes_first(&self, zone: &Stretch, other: &Other) -> bool {
+    fn goes_first(&self, zone: &Stretch, other: &Seen) -> bool {
         let me = &self.me;
         let other_is_lower = other.slot < me.slot;
         if PATIENT < me.standing && PATIENT < other.standing {
             return self.crowd.clock.lower_goes_first(me.slot, other.slot) == other_is_lower;
         }
-        let [mine, its] = [rank(zone.a_in - me.station, me.speed), rank(zone.b_in - other.station, other.speed)];
+        let [mine, its] = [rank(zone.a_in - me.station, me), rank(zone.b_in - other.station, other)];
         its < mine || (its == mine && other_is_lower)
     }
 
-    /// Ratio of the wished gap to a gap behind something with a speed; the interaction of the intelligent driver model
-    /// is its square.
-    fn behind(&self, gap: f32, speed: f32) -> f32 {
-        let v = self.me.speed;
-        let wished = self.crowd.rules.gap + (v * self.headway + v * (v - speed) * PER_SPEEDS).max(0.0);
-        wished / gap.max(0.1)
+    /// The car that decides.
+    pub fn car(&self) -> &Car {
+        &self.crowd.cars[self.me.slot as usize]
     }
 
-    fn note_leader(&mut self, rear: f32, speed: f32) {
+    /// The road's tables.
+    pub fn network(&self) -> &Network {
+        self.crowd.network
+    }
+
+    /// Minds an interaction (2^-16).
+    pub fn heed(&mut self, interaction: i32) {
+        self.interaction = self.interaction.max(interaction);
+    }
+
+    /// The interaction with something that has a speed behind a gap (2^-16, 2^-10 m, 2^-14 m a step).
+    pub fn behind(&self, gap: i32, speed: i32) -> i32 {
+        following(gap, self.me.speed, speed, self.headway, self.crowd.rules.gap)
+    }
+
+    /// Follows something with a speed behind a gap (2^-10 m, 2^-14 m a step).
+    pub fn follow(&mut self, gap: i32, speed: i32) {
+        self.heed(self.behind(gap, speed));
+    }
+
+    /// Stops before something at a distance (2^-10 m).
+    pub fn stop_before(&mut self, distance: i32) {
+        self.heed(stopping(distance, self.me.square));
+    }
+
+    /// Stops at a distance, or follows something with a speed behind a gap, whichever is milder (2^-10 m, 2^-14 m a
+    /// step).
+    pub fn stop_or_follow(&mut self, distance: i32, gap: i32, speed: i32) {
+        self.heed(self.behind(gap, speed).min(stopping(distance, self.me.square)));
+    }
+
+    /// Brakes at least so hard (1/256 m/s²).
+    pub fn brake(&mut self, deceleration: i32) {
+        self.heed(braking_of(deceleration));
+    }
+
+    /// Waits at its line, if it still can.
+    pub fn wait_at_line(&mut self) {
+        self.stops = true;
+    }
+
+    /// Keeps off the lanes that it crosses while what it follows leaves it no room behind them: station of its rear, and
+    /// its speed (2^-10 m, 2^-14 m a step).
+    pub fn note_leader(&mut self, rear: i32, speed: i32) {
         if rear < self.leader.0 {
             self.leader = (rear, speed);
         }
     }
 
-    /// The acceleration of the intelligent driver model (m/s²).
-    fn decided(&mut self) -> f32 {
+    /// The car's acceleration (2^-19 m a step²).
+    fn decided(&mut self) -> i32 {
         self.keep_crossed_lanes_clear();
-        let me = &self.me;
-        if me.waits && self.stops {
-            self.ratio = self.ratio.max(stopping(me.line - me.station, me.speed));
+        if self.me.waits && self.stops {
+            self.stop_before(self.me.line - self.me.station);
         }
-        let ahead = me.station + 0.5 * me.speed * STEP;
-        let wished = self.crowd.network.limit(self.path, ahead).max(0.5) * (1.0 + SPEED_SPREAD * self.temperament);
-        let part = (me.speed / wished) * (me.speed / wished);
-        let free = (1.0 - part * part).max(-SLOWING);
-        (ACCELERATION * (free - self.ratio * self.ratio)).clamp(-HARDEST, ACCELERATION)
+        let car = self.car();
+        // Half a step ahead: a speed's unit is the way of half a step.
+        let limit = self.network().limit(self.path, car.station + car.speed);
+        let wished = limit.max(LEAST_WISHED) * (SPEED_PARTS + self.temperament) / SPEED_PARTS;
+        acceleration(self.me.speed, wished, self.interaction)
     }
 }
 
-/// Whether a car has not entered yet: it is before its line and can still stop there.
-fn can_wait(station: f32, speed: f32, line: f32) -> bool {
-    station + speed * speed * (1.0 / STOPS_WITH) <= line
-}
-
-/// The order of who goes first through a zone at this distance: the smaller.
-fn rank(distance: f32, speed: f32) -> f32 {
-    if GOES_ABOVE * distance < speed * speed { distance - BOUND } else { distance / speed.max(LEAST_SPEED) }
-}
-
-/// The ratio of gaps that stops a car before a line, never later than kinematics needs.
-fn stopping(distance: f32, speed: f32) -> f32 {
-    let ratio = (STANDS_BEFORE + speed * speed * PER_SPEEDS) / distance.max(0.05);
-    let needed = 0.5 * speed * speed / (distance - 0.5 * STANDS_BEFORE).max(0.03);
-    if BRAKING < needed { ratio.max((1.0 + needed / ACCELERATION).sqrt()) } else { ratio }
+/// The order of who goes first through a zone at this distance: the smaller. Of those that cannot stop any more the
+/// nearer one, before all others; of these the one that is there sooner.
+fn rank(distance: i32, car: &Seen) -> i32 {
+    if GOES_ABOVE * distance < car.square { distance - FAR } else { time(distance, car.speed.max(LEAST_SPEED)) }
 }

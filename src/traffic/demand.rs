@@ -1,6 +1,7 @@
 //! How many cars want to go where, and which kinds of them.
 
 use super::network::Network;
+use super::units::probability;
 use super::{Error, STEP};
 
 /// Largest flow of a road without a ring (veh/h).
@@ -20,21 +21,23 @@ pub struct Mix {
 }
 
 /// Arrivals at a road.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Demand {
-    /// Of every source the sum of its probability of an arrival in a step and those of the sources before it.
-    pub(super) arrivals: Vec<f32>,
-    /// Of every path the fraction of its source's cars that take it or one before it.
-    pub(super) shares: Vec<f32>,
-    /// The kinds of cars.
-    pub(super) mix: Mix,
+    /// Of every source the sum of its probability of an arrival in a step and those of the sources before it (2^-24).
+    pub(super) arrivals: Vec<u32>,
+    /// Of every path the fraction of its source's cars that take it or one before it (2^-24).
+    pub(super) shares: Vec<u32>,
+    /// Fraction of vans (2^-24).
+    pub(super) vans: u32,
+    /// Fraction of rude drivers (2^-24).
+    pub(super) rude: u32,
 }
 
 impl Demand {
-    /// The numbers as words.
+    /// The numbers as words: those of sources, of paths, of vans and of rude drivers.
     pub(crate) fn words(&self) -> Vec<u32> {
-        let Demand { arrivals, shares, mix: Mix { vans, rude } } = self;
-        arrivals.iter().chain(shares).chain([vans, rude]).map(|number| number.to_bits()).collect()
+        let Demand { arrivals, shares, vans, rude } = self;
+        arrivals.iter().chain(shares).chain([vans, rude]).copied().collect()
     }
 
     /// Arrivals by path (veh/h).
@@ -52,17 +55,18 @@ impl Demand {
         if !network.has_ring && MOST_WITHOUT_RING < total {
             return Err(Error::NoRing { flow: total, most: MOST_WITHOUT_RING });
         }
-        let mut demand = Demand { arrivals: Vec::new(), shares: vec![1.0; flows.len()], mix };
+        let [vans, rude] = [mix.vans, mix.rude].map(|fraction| probability(fraction.into()));
+        let mut demand = Demand { arrivals: Vec::new(), shares: vec![0; flows.len()], vans, rude };
         let mut sum = 0.0;
         for source in 0..network.sources.len() {
             let paths = network.paths_of(source);
             let of_source: f64 = flows[paths.clone()].iter().sum();
             sum += of_source / MOST;
-            demand.arrivals.push(sum as f32);
+            demand.arrivals.push(probability(sum));
             let mut share = 0.0;
             for path in paths {
                 share += flows[path];
-                demand.shares[path] = (share / of_source.max(f64::MIN_POSITIVE)) as f32;
+                demand.shares[path] = probability(share / of_source.max(f64::MIN_POSITIVE));
             }
         }
         Ok(demand)

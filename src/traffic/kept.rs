@@ -7,7 +7,7 @@ use crate::files::cache::Cache;
 use crate::map::Road;
 
 /// Counted up whenever the same lines give other tables, so that older entries are not used.
-const FORM: u32 = 1;
+const FORM: u32 = 2;
 
 impl Network {
     /// What [`Network::bake`] gives, from the cache if it was kept there before; else it is kept now.

@@ -5,12 +5,18 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable, cast_slice, pod_collect_to_vec};
 use glam::Vec2;
 
+use super::units::{FINER_STATION, metres};
+
 /// Distance between samples of a path (m).
 pub const SPACING: f32 = 2.0;
-/// Unit of the stations of zones (m).
+/// Bits of a state's station below the spacing.
+const SPACING_BITS: u32 = 21;
+/// Unit of the stations of zones (m), and its bits above that of decisions.
 pub(super) const UNIT: f32 = 1.0 / 64.0;
-/// Unit of the stations of pairs (m).
+const UNIT_BITS: u32 = 4;
+/// Unit of the stations of pairs (m), and its bits above that of decisions.
 pub(super) const CELL: f32 = 2.0;
+const CELL_BITS: u32 = 11;
 /// Most paths of a road: a car names its path in ten bits, of which one value means that there is no car.
 pub const MOST_PATHS: usize = 1023;
 /// Most sources of a road: each has four bits of the backlog.
@@ -24,19 +30,31 @@ pub struct Path {
     pub first: u32,
     /// Number of its samples.
     pub n: u32,
-    /// Its length (m).
-    pub length: f32,
-    /// Station of the front of a car that waits to enter (m).
-    pub line: f32,
+    /// Its length (2^-10 m).
+    pub length: i32,
+    /// Station of the front of a car that waits to enter (2^-10 m).
+    pub line: i32,
     /// Station of the rear of a car that has left the last lane which it crosses on its way in; 0 where it crosses none
-    /// (m).
-    pub clear: f32,
+    /// (2^-10 m).
+    pub clear: i32,
     /// Index of its source.
     pub source: u32,
     /// Exit number, counted from the entry.
     pub exit: u32,
     /// Index of the exit arm.
     pub exit_arm: u32,
+}
+
+impl Path {
+    /// Its length (m).
+    pub fn length(&self) -> f32 {
+        metres(self.length)
+    }
+
+    /// Station of the front of a car that waits to enter (m).
+    pub fn line(&self) -> f32 {
+        metres(self.line)
+    }
 }
 
 /// A point of a path.
@@ -47,8 +65,8 @@ pub struct Sample {
     pub position: Vec2,
     /// Unit vector along the path.
     pub direction: Vec2,
-    /// Speed of a car that nothing hinders (m/s).
-    pub limit: f32,
+    /// Speed of a car that nothing hinders (2^-14 m a step).
+    pub limit: i32,
 }
 
 /// How two paths meet.
@@ -84,30 +102,36 @@ pub struct Zone {
     pub kind: u16,
 }
 
-/// A zone in metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A zone in the units of decisions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stretch {
-    /// Where it begins on a (m).
-    pub a_in: f32,
-    /// Where it ends on a (m).
-    pub a_out: f32,
-    /// Where it begins on b (m).
-    pub b_in: f32,
-    /// Where it ends on b (m).
-    pub b_out: f32,
-    /// Station on b less that on a (m).
-    pub delta: f32,
+    /// Where it begins on a (2^-10 m).
+    pub a_in: i32,
+    /// Where it ends on a (2^-10 m).
+    pub a_out: i32,
+    /// Where it begins on b (2^-10 m).
+    pub b_in: i32,
+    /// Where it ends on b (2^-10 m).
+    pub b_out: i32,
+    /// Station on b less that on a (2^-10 m).
+    pub delta: i32,
     /// How the paths meet.
     pub kind: Kind,
 }
 
 impl Zone {
-    /// The zone in metres.
+    /// The zone in the units of decisions.
     pub fn stretch(&self) -> Stretch {
-        let [a_in, a_out, b_in, b_out] = [self.a[0], self.a[1], self.b[0], self.b[1]].map(|s| f32::from(s) * UNIT);
+        let [a_in, a_out, b_in, b_out] =
+            [self.a[0], self.a[1], self.b[0], self.b[1]].map(|s| i32::from(s) << UNIT_BITS);
         let kind = Kind::ALL[usize::from(self.kind & 3)];
-        Stretch { a_in, a_out, b_in, b_out, delta: f32::from(self.delta) * UNIT, kind }
+        Stretch { a_in, a_out, b_in, b_out, delta: i32::from(self.delta) << UNIT_BITS, kind }
     }
+}
+
+/// The cell of a pair's ends that a station lies in, or the first or last one (2^-10 m).
+pub(super) fn cell(station: i32) -> u8 {
+    (station >> CELL_BITS).clamp(0, 255) as u8
 }
 
 /// The zones of an ordered pair of paths.
@@ -162,7 +186,9 @@ pub struct Network {
 impl Network {
     /// Position and direction of travel at a station of a path: cubic between samples (m).
     pub fn pose(&self, path: usize, station: f32) -> (Vec2, Vec2) {
-        let (k, t) = self.between(path, station);
+        let Path { first, n, .. } = self.paths[path];
+        let along = (station / SPACING).clamp(0.0, n as f32 - 1.001);
+        let (k, t) = (first as usize + along as usize, along.fract());
         let (from, to) = (&self.samples[k], &self.samples[k + 1]);
         let (t2, t3) = (t * t, t * t * t);
         let position = (2.0 * t3 - 3.0 * t2 + 1.0) * from.position
@@ -172,18 +198,14 @@ impl Network {
         (position, (from.direction + t * (to.direction - from.direction)).normalize_or_zero())
     }
 
-    /// Speed of a car that nothing hinders, at a station of a path (m/s).
-    pub fn limit(&self, path: usize, station: f32) -> f32 {
-        let (k, t) = self.between(path, station);
-        let (from, to) = (self.samples[k].limit, self.samples[k + 1].limit);
-        from + t * (to - from)
-    }
-
-    /// Index of the sample before a station, and how far the station is on the way to the next.
-    fn between(&self, path: usize, station: f32) -> (usize, f32) {
+    /// Speed of a car that nothing hinders, at a station of a path: linear between samples (2^-14 m a step, 2^-20 m).
+    pub fn limit(&self, path: usize, station: i32) -> i32 {
         let Path { first, n, .. } = self.paths[path];
-        let along = (station / SPACING).clamp(0.0, n as f32 - 1.001);
-        (first as usize + along as usize, along.fract())
+        let k = (station >> SPACING_BITS).clamp(0, n as i32 - 2);
+        let whole = 1 << CELL_BITS;
+        let t = ((station - (k << SPACING_BITS)) >> FINER_STATION).clamp(0, whole);
+        let k = first as usize + k as usize;
+        (self.samples[k].limit * (whole - t) + self.samples[k + 1].limit * t) >> CELL_BITS
     }
 
     /// The zones of an ordered pair of paths, those for a truck alone among them.

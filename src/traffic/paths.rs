@@ -5,6 +5,7 @@
 use glam::Vec2;
 
 use super::network::{SPACING, Sample};
+use super::units::speed;
 use crate::geometry::{Curve, wrapped};
 use crate::map::ground::{Ground, Line};
 
@@ -98,7 +99,7 @@ impl Course {
             let direction = glam::DVec2::from_angle(heading(s));
             // Beyond its end the line goes straight on.
             let position = self.line.point_at(s.min(length)) + (s - length).max(0.0) * direction;
-            Sample { position: vec2(position), direction: vec2(direction), limit: limit as f32 }
+            Sample { position: vec2(position), direction: vec2(direction), limit: speed(limit as f32) }
         };
         limits.into_iter().enumerate().map(sample).collect()
     }

@@ -9,6 +9,7 @@ use super::bake::ENTRY;
 use super::decide::MOST_CARS;
 use super::hcm::Lane;
 use super::network::{Kind, Network};
+use super::units::{FAR, FINER_SPEED, length, speed};
 use super::{Car, Demand, Error, Mix, Rules, Run, STEP};
 use crate::layout::Stream;
 
@@ -16,18 +17,18 @@ pub use saturated::Saturated;
 
 /// Steps before the counts begin: cars spread over an empty road.
 const WARM_UP: u32 = 1_200;
-/// Behind the line a car has lost all the time that the entry costs it, speeding up again included (m).
-const UP_TO_SPEED: f32 = 20.0;
-/// A car on its arm below this speed is queued (m/s).
-const QUEUED: f32 = 2.0;
+/// Behind the line a car has lost all the time that the entry costs it, speeding up again included.
+const UP_TO_SPEED: i32 = length(20.0);
+/// A car on its arm below this speed is queued.
+const QUEUED: i32 = speed(2.0);
 
 /// A road with its entries, to be counted at.
 pub struct Survey<'a> {
     network: &'a Network,
     rules: &'a Rules,
-    /// Station at which a path passes the entry of an arm, of path p and arm a at index p n_arms + a; infinite where it
-    /// does not (m).
-    passes: Vec<f32>,
+    /// Station at which a path passes the entry of an arm, of path p and arm a at index p n_arms + a; [`FAR`] where it
+    /// does not (2^-10 m).
+    passes: Vec<i32>,
     nobody: Demand,
 }
 
@@ -103,7 +104,7 @@ impl<'a> Survey<'a> {
         let own = &self.network.sources[source];
         let entry_lanes = self.network.sources.iter().filter(|other| other.entry == own.entry).count();
         let mut passing: Vec<u32> = (0..self.network.paths.len())
-            .filter(|&path| self.passes[path * self.network.n_arms + own.entry as usize] < f32::INFINITY)
+            .filter(|&path| self.passes[path * self.network.n_arms + own.entry as usize] < FAR)
             .map(|path| self.network.source_of(path).lane)
             .collect();
         passing.sort_unstable();
@@ -132,23 +133,23 @@ impl<'a> Survey<'a> {
         run.cars[0] = entered;
         let end = self.end_of_entry(entered.path());
         let mut steps = 0;
-        while run.cars[0].is_there() && run.cars[0].station < end {
+        while run.cars[0].is_there() && run.cars[0].front() < end {
             run.step(|_, _| {});
             steps += 1;
         }
         steps
     }
 
-    fn end_of_entry(&self, path: usize) -> f32 {
+    fn end_of_entry(&self, path: usize) -> i32 {
         let path = &self.network.paths[path];
         (path.line + UP_TO_SPEED).min(path.length)
     }
 }
 
 /// Where every path passes every arm's entry: where its first zone with a path of this entry begins.
-fn passes(network: &Network) -> Vec<f32> {
+fn passes(network: &Network) -> Vec<i32> {
     let (n, n_arms) = (network.paths.len(), network.n_arms);
-    let mut passes = vec![f32::INFINITY; n * n_arms];
+    let mut passes = vec![FAR; n * n_arms];
     for a in 0..n {
         let arm = network.source_of(a).entry;
         let line = network.paths[a].line;
@@ -156,10 +157,10 @@ fn passes(network: &Network) -> Vec<f32> {
             let zones = network.zones_of(a, b).iter().map(|zone| zone.stretch());
             let of_entry = zones.filter(|zone| {
                 let is_behind_both = line <= zone.a_in && network.paths[b].line < zone.b_in;
-                zone.kind != Kind::Wide && is_behind_both && zone.a_in <= line + ENTRY as f32
+                zone.kind != Kind::Wide && is_behind_both && zone.a_in <= line + length(ENTRY as f32)
             });
             let at = &mut passes[b * n_arms + arm as usize];
-            *at = of_entry.map(|zone| zone.b_in).fold(*at, f32::min);
+            *at = of_entry.map(|zone| zone.b_in).fold(*at, i32::min);
         }
     }
     passes
@@ -208,7 +209,8 @@ impl<'a> Observer<'a> {
                 Event::Entered(source, slot) => {
                     changed[slot] = true;
                     let car = run.cars[slot];
-                    let unhindered = Car { speed: self.survey.network.limit(car.path(), car.station), ..car };
+                    let limit = self.survey.network.limit(car.path(), car.station);
+                    let unhindered = Car { speed: limit << FINER_SPEED, ..car };
                     let free = *self.free.entry(car.what).or_insert_with(|| self.survey.free_time(unhindered));
                     self.known[slot] = self.outside[source].pop_front().map(|came| Known { came, free });
                 }
@@ -222,10 +224,10 @@ impl<'a> Observer<'a> {
         for (slot, car) in run.cars.iter().enumerate().filter(|(slot, car)| car.is_there() && !changed[*slot]) {
             let network = self.survey.network;
             let path = &network.paths[car.path()];
-            let passed = |station: f32| before[slot].station <= station && station < car.station;
+            let passed = |station: i32| before[slot].front() <= station && station < car.front();
             let own = path.source as usize;
             self.counts[own].served += u64::from(passed(path.line));
-            queued[own] += usize::from(car.station <= path.line && car.speed < QUEUED);
+            queued[own] += usize::from(car.front() <= path.line && car.pace() < QUEUED);
             for (source, of) in network.sources.iter().enumerate() {
                 let at = self.survey.passes[car.path() * network.n_arms + of.entry as usize];
                 self.counts[source].circulating += u64::from(passed(at));

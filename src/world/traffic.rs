@@ -9,6 +9,7 @@ use super::Error;
 use crate::files::cache::Loading;
 use crate::map::route::Route;
 use crate::scenario::{Invalid, Place, Scenario};
+use crate::traffic::units::probability;
 use crate::traffic::{self, Demand, Mix, Network, Row, Rules, Snapshots};
 
 /// What all trucks share of other vehicles.
@@ -55,7 +56,7 @@ impl Traffic {
     /// Every table as words, one road after the other.
     pub(super) fn words(&self) -> impl Iterator<Item = Vec<u32>> {
         let Traffic { rules, rude, roads, routes } = self;
-        let shared = [rules.words(), rude.map(f32::to_bits).to_vec()].concat();
+        let shared = [&rules.words()[..], &rude.map(f32::to_bits)].concat();
         let routes = routes.iter().flat_map(|&TrafficRoute { path, begins }| [path, begins.to_bits()]).collect();
         let of_road = |TrafficRoad { network, levels }: &TrafficRoad| {
             let level = |Level { demand, snapshots }: &Level| [&demand.words(), cast_slice(snapshots)].concat();
@@ -67,7 +68,7 @@ impl Traffic {
     /// What a scenario's trucks share; none where its roads are empty.
     pub(super) fn baked(scenario: &Scenario, loading: &Loading) -> Result<Option<Traffic>, Error> {
         let Some(of) = &scenario.traffic else { return Ok(None) };
-        let rules = Rules { courtesy: of.courtesy as f32, ..Rules::FITTED };
+        let rules = Rules { courtesy: probability(of.courtesy), ..Rules::FITTED };
         // Whether a driver is rude is drawn when an episode begins, and when a car comes.
         let mix = Mix { vans: of.vans as f32, rude: 0.0 };
         let done = AtomicU64::new(0);

@@ -7,8 +7,7 @@ use crate::layout::angle::direction;
 use crate::layout::random::{self, Draw};
 use crate::layout::{Body, Rig, Stream, Truck};
 use crate::traffic::car::Outline;
-use crate::traffic::clock::Clock;
-use crate::traffic::{self, Car};
+use crate::traffic::{self, Car, Clock, Nobody, Setting};
 use crate::world::{Level, Traffic, TrafficRoad, World};
 
 /// Room to other vehicles, along each unit and beside it, that a truck begins with (m).
@@ -22,9 +21,8 @@ pub fn traffic(world: &World, row: &mut Row) {
     let Level { demand, .. } = &levels[around.level as usize];
     let Stream { seed, env } = row.stream;
     let clock = Clock { seed, env, episode: row.truck.episode, step: row.truck.steps };
-    let mut backlog = u64::from(around.backlog[0]) | u64::from(around.backlog[1]) << 32;
-    traffic::step(network, &shared.rules, demand, clock, &mut around.cars, &mut backlog, |_, _| ());
-    around.backlog = [backlog as u32, (backlog >> 32) as u32];
+    let setting = Setting { network, rules: &shared.rules, demand };
+    traffic::step(setting, clock, &mut around.cars, &mut around.backlog, &Nobody, &mut |_, _| ());
 }
 
 fn road_of<'a>(world: &World, shared: &'a Traffic, route: u32) -> &'a TrafficRoad {

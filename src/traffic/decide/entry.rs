@@ -1,39 +1,41 @@
 //! What a car does before its line: it waits for a gap in what has entered, and is let in at times.
 
-use super::{Driver, LEAST_SPEED, Other, can_wait, stopping};
-use crate::traffic::STEP;
+use super::{Driver, LEAST_SPEED, Seen};
 use crate::traffic::bake::ENTRY;
-use crate::traffic::clock::falls_below;
+use crate::traffic::model::{time, way_of_a_second};
 use crate::traffic::network::{Kind, Stretch};
-use crate::traffic::rules::HEADWAY_SPREAD;
+use crate::traffic::rules::TIME_PARTS;
+use crate::traffic::units::{falls_below, length, speed, time as ticks};
 
-/// Least speed in the time to the line (m/s).
-const LEAST_APPROACH: f32 = 3.0;
-/// Standing time after which a lag would be 0 (s), and the least part of it that is left.
-const IMPATIENCE: f32 = 10.0;
-const LEAST_PATIENCE: f32 = 0.3;
-/// Time by which a car that crosses ahead must be gone before this one is there (s).
-const GONE_BEFORE: f32 = 0.5;
-/// How far a car foresees that one which passes moves away (s).
-const ANTICIPATION: f32 = 1.0;
-/// A car that follows one slower than this stays off the lanes that it crosses (m/s).
-const SLOW: f32 = 3.0;
-/// A car is let in within this distance of its line (m), below this speed (m/s).
-const LET_IN_WITHIN: f32 = 4.0;
-const LET_IN_BELOW: f32 = 4.0;
-/// Twice the braking with which a car lets another in (m/s²), so far before the zone (m).
-const LETS_IN_WITH: f32 = 3.0;
-const LETS_IN_BEFORE: f32 = 1.5;
+/// Zones that begin up to here behind the line are those of the entry.
+const OF_ENTRY: i32 = length(ENTRY as f32);
+/// Least speed in the time to the line.
+const LEAST_APPROACH: i32 = speed(3.0);
+/// Least speed in the time until a crossing is free.
+const LEAST_CROSSING: i32 = speed(1.0);
+/// Steps of standing after which a lag would be 0, and how many are left of them at least.
+const IMPATIENCE: i32 = 100;
+const LEAST_PATIENCE: i32 = 30;
+/// Time by which a car that crosses ahead must be gone before this one is there.
+const GONE_BEFORE: i32 = ticks(0.5);
+/// A car that follows one slower than this stays off the lanes that it crosses.
+const SLOW: i32 = speed(3.0);
+/// A car is let in within this distance of its line, below this speed.
+const LET_IN_WITHIN: i32 = length(4.0);
+const LET_IN_BELOW: i32 = speed(4.0);
+/// Twice the braking with which a car lets another in (m/s²), so far before the zone.
+const LETS_IN_WITH: i32 = 3;
+const LETS_IN_BEFORE: i32 = length(1.5);
 
 impl Driver<'_> {
     /// Whether a zone is one of this car's entry.
-    pub(super) fn is_of_entry(&self, zone: &Stretch) -> bool {
+    pub fn is_of_entry(&self, zone: &Stretch) -> bool {
         let line = self.me.line;
-        zone.a_in <= line + ENTRY as f32 && (zone.kind == Kind::Soft || line < zone.a_in)
+        zone.a_in <= line + OF_ENTRY && (zone.kind == Kind::Soft || line < zone.a_in)
     }
 
     /// This car can still wait, and the zone is one of its entry.
-    pub(super) fn consider_at_line(&mut self, zone: &Stretch, other: &Other) {
+    pub(super) fn consider_at_line(&mut self, zone: &Stretch, other: &Seen) {
         let me = self.me;
         if other.waits {
             // Both wait, or arrive: only where paths cross must one be first.
@@ -42,48 +44,53 @@ impl Driver<'_> {
                 return;
             }
         }
-        let to_line = (me.line - me.station) / me.speed.max(LEAST_APPROACH);
+        let to_line = self.time_to_line();
         if other.station < zone.b_in {
             let distance = zone.b_in - other.station;
             let is_let_in = zone.kind != Kind::Soft && self.lets_in(other, distance, &me);
             let speed = other.speed.max(LEAST_SPEED);
-            let comes = distance / speed;
-            let gone = comes + (zone.b_out - zone.b_in + other.length) / speed;
-            self.stops |= !is_let_in && comes < self.lag(zone) + to_line && to_line < gone;
+            let comes = time(distance, speed);
+            let gone = comes + time(zone.b_out - zone.b_in + other.length, speed);
+            self.stops |= !is_let_in && comes < self.lag(zone.kind) + to_line && to_line < gone;
             return;
         }
         match zone.kind {
             // What passes beside is in nobody's way.
             Kind::Soft | Kind::Wide => {}
             Kind::Cross => {
-                let gone = (zone.b_out + other.length - other.station) / other.speed.max(1.0);
-                self.stops |= to_line + GONE_BEFORE < gone;
+                let left = (zone.b_out + other.length - other.station).max(0);
+                self.stops |= to_line + GONE_BEFORE < time(left, other.speed.max(LEAST_CROSSING));
             }
             Kind::Follow => {
                 let rear = other.station - zone.delta - other.length;
-                let soon = rear - me.station + ANTICIPATION * (other.speed - me.speed).max(0.0);
-                let behind = self.behind(soon, other.speed);
-                self.ratio = self.ratio.max(behind.min(stopping(me.line - me.station, me.speed)));
+                // It foresees how far one that passes moves away.
+                let soon = rear - me.station + way_of_a_second((other.speed - me.speed).max(0));
+                self.stop_or_follow(me.line - me.station, soon, other.speed);
                 self.note_leader(rear, other.speed);
             }
         }
     }
 
-    /// Time that this car leaves between itself and ring traffic that comes (s).
-    fn lag(&self, zone: &Stretch) -> f32 {
+    /// Time to its line, of a car that waits (1/256 step).
+    pub fn time_to_line(&self) -> i32 {
+        time((self.me.line - self.me.station).max(0), self.me.speed.max(LEAST_APPROACH))
+    }
+
+    /// Time that this car leaves between itself and ring traffic that comes (1/256 step).
+    pub fn lag(&self, kind: Kind) -> i32 {
         let rules = self.crowd.rules;
-        let crosses = 0.0 < self.crowd.network.paths[self.path].clear;
+        let crosses = 0 < self.crowd.network.paths[self.path].clear;
         let lane = self.crowd.network.source_of(self.path).lane.min(1) as usize;
-        let lag = if zone.kind == Kind::Soft { rules.soft_lags[lane] } else { rules.lags[usize::from(crosses)] };
-        let patience = (1.0 - self.me.standing as f32 * (STEP / IMPATIENCE)).max(LEAST_PATIENCE);
-        lag * (1.0 - HEADWAY_SPREAD * self.temperament) * patience
+        let lag = if kind == Kind::Soft { rules.soft_lags[lane] } else { rules.lags[usize::from(crosses)] };
+        let patience = (IMPATIENCE - self.me.standing as i32).max(LEAST_PATIENCE);
+        lag * (TIME_PARTS - self.temperament) * patience / (TIME_PARTS * IMPATIENCE)
     }
 
     /// Whether the car `inside` the ring, at this distance before the zone, lets in the one that waits. Both find the
     /// same.
-    pub(super) fn lets_in(&self, inside: &Other, distance: f32, waiting: &Other) -> bool {
+    pub(super) fn lets_in(&self, inside: &Seen, distance: i32, waiting: &Seen) -> bool {
         let is_at_line = waiting.line - waiting.station <= LET_IN_WITHIN && waiting.speed <= LET_IN_BELOW;
-        let brakes_gently = inside.speed * inside.speed <= LETS_IN_WITH * (distance - LETS_IN_BEFORE);
+        let brakes_gently = inside.square <= LETS_IN_WITH * (distance - LETS_IN_BEFORE);
         let courtesy = self.crowd.rules.courtesy;
         is_at_line
             && brakes_gently
@@ -96,6 +103,6 @@ impl Driver<'_> {
         let (me, (rear, speed)) = (&self.me, self.leader);
         let path = &self.crowd.network.paths[self.path];
         let would_block = rear - self.crowd.rules.gap - me.length < path.clear && me.line < rear;
-        self.stops |= can_wait(me.station, me.speed, me.line) && would_block && speed < SLOW;
+        self.stops |= me.waits && would_block && speed < SLOW;
     }
 }

@@ -49,7 +49,7 @@ fn largest_deviation(network: &Network, rules: &Rules, lane: Lane, flows: &[f64]
 /// The rules with lags twice as long.
 fn hesitant() -> Rules {
     let Rules { lags, soft_lags, .. } = Rules::FITTED;
-    Rules { lags: lags.map(|lag| 2.0 * lag), soft_lags: soft_lags.map(|lag| 2.0 * lag), ..Rules::FITTED }
+    Rules { lags: lags.map(|lag| 2 * lag), soft_lags: soft_lags.map(|lag| 2 * lag), ..Rules::FITTED }
 }
 
 #[test]
@@ -71,7 +71,7 @@ fn capacities_of_one_lane_into_one_are_the_manuals_within_15_percent_and_not_wit
     let lane = Lane { entry_lanes: 1, ring_lanes: 1, lane: 0 };
     let largest = largest_deviation(&network, &Rules::FITTED, lane, &[0.0, 300.0, 700.0]);
     assert!(largest < 0.15, "{largest}");
-    let sleepy = Rules { headway: 2.0 * Rules::FITTED.headway, ..Rules::FITTED };
+    let sleepy = Rules { headway: 2 * Rules::FITTED.headway, ..Rules::FITTED };
     let largest = largest_deviation(&network, &sleepy, lane, &[0.0]);
     assert!(0.15 < largest, "{largest}");
 }

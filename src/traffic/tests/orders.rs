@@ -4,10 +4,9 @@ use rayon::prelude::*;
 
 use super::{baked, even};
 use crate::layout::Stream;
-use crate::traffic::arrivals::exchange;
 use crate::traffic::clock::Clock;
 use crate::traffic::decide::Crowd;
-use crate::traffic::{Car, Rules, Run, Survey};
+use crate::traffic::{Backlog, Car, Nobody, Rules, Run, Setting, Survey, arrive};
 
 const STEPS: u32 = 3_000;
 
@@ -20,7 +19,8 @@ fn bits(cars: &[Car]) -> Vec<u32> {
 fn in_order(order: impl Fn(usize, u32) -> usize, sees_moved: bool) -> Vec<u32> {
     let (network, rules) = (baked("16m"), Rules::FITTED);
     let demand = even(&network, 1800.0);
-    let (mut cars, mut backlog) = (vec![Car::NONE; 24], 0);
+    let setting = Setting { network: &network, rules: &rules, demand: &demand };
+    let (mut cars, mut backlog) = (vec![Car::NONE; 24], Backlog::default());
     for step in 0..STEPS {
         let clock = Clock { seed: 3, env: 0, episode: 0, step };
         let before = cars.clone();
@@ -33,10 +33,10 @@ fn in_order(order: impl Fn(usize, u32) -> usize, sees_moved: bool) -> Vec<u32> {
             let seen = if sees_moved { cars.clone() } else { before.clone() };
             let crowd = Crowd::new(&network, &rules, clock, &seen);
             let decides = (slot as u32 + step).is_multiple_of(2);
-            let acceleration = if decides { crowd.decided(slot) } else { car.acceleration };
+            let acceleration = if decides { crowd.decided(slot, &Nobody) } else { car.acceleration };
             cars[slot] = Car { acceleration, ..car }.moved();
         }
-        exchange(&network, &rules, &demand, clock, &mut cars, &mut backlog, &mut |_, _| {});
+        arrive(setting, clock, &mut cars, &mut backlog, &Nobody, &mut |_, _| {});
     }
     bits(&cars)
 }

@@ -4,6 +4,7 @@ use super::{baked, even, map};
 use crate::layout::Stream;
 use crate::map::Road;
 use crate::map::ground::Ground;
+use crate::traffic::units::{metres, speed};
 use crate::traffic::{Car, Demand, Error, Event, Kind, Mix, Network, Rules, Run, demand, speed_limit};
 
 /// Numbers of zones by kind.
@@ -27,10 +28,10 @@ fn the_zones_of_a_study_ring_a_map_and_a_junction_are_those_that_their_lanes_mak
     // crosses nothing; a left lane crosses the outer lane of the ring, 7 to 20 m behind the line.
     let network = baked("16m");
     for (index, path) in network.paths.iter().enumerate() {
-        assert!((47.0..50.0).contains(&path.line), "{path:?}");
-        let crossed = path.clear - path.line;
+        assert!((47.0..50.0).contains(&path.line()), "{path:?}");
+        let crossed = metres(path.clear) - path.line();
         match (network.source_of(index).lane, path.exit) {
-            (0, 1) => assert_eq!(path.clear, 0.0, "{path:?}"),
+            (0, 1) => assert_eq!(path.clear, 0, "{path:?}"),
             (1, _) => assert!((7.0..20.0).contains(&crossed), "{path:?}"),
             _ => {}
         }
@@ -93,11 +94,11 @@ fn speed_in_ring(network: &Network, lane: u32, exit: u32, radius: f64) -> f64 {
         }
         let rules = Rules::FITTED;
         let mut run = Run::new(network, &rules, &nobody, 1, Stream::default());
-        run.cars[0] = Car::entering(index, 7, 8.0);
+        run.cars[0] = Car::entering(index, 7, speed(8.0));
         while run.cars[0].is_there() {
-            let (place, _) = network.pose(index, run.cars[0].station);
+            let (place, _) = network.pose(index, run.cars[0].station());
             if (f64::from(place.length()) - radius).abs() < 0.1 {
-                speeds.push(3.6 * f64::from(run.cars[0].speed));
+                speeds.push(3.6 * f64::from(run.cars[0].speed()));
             }
             run.step(|_, _| {});
         }

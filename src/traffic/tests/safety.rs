@@ -1,17 +1,18 @@
-//! Nobody overlaps, leaves his path, stands for ever or is no number.
+//! Nobody overlaps, leaves his path, stands for ever or is faster than anybody may be.
 
 use super::{even, map};
 use crate::layout::Stream;
 use crate::map::{Road, procedural};
-use crate::traffic::{Car, Network, Rules, Run};
+use crate::traffic::model::FASTEST;
+use crate::traffic::{Network, Rules, Run};
 
 /// Steps of each run.
 const STEPS: u32 = 2_000;
 /// Nobody stands so long (steps).
 const FOR_EVER: u32 = 600;
 
-/// What must not be, over a run: steps with overlapping cars, the longest standing, cars that are no numbers or beyond
-/// the ends of their path; and how many cars there were.
+/// What must not be, over a run: steps with overlapping cars, the longest standing, cars beyond the ends of their path or
+/// at speeds and accelerations that nothing decides; and how many cars there were.
 #[derive(Debug, Default)]
 struct Seen {
     overlaps: u32,
@@ -28,9 +29,9 @@ fn driven(network: &Network, total: f64, seed: u32) -> Seen {
         run.step(|_, _| {});
         seen.overlaps += u32::from(0 < run.overlaps());
         for car in run.cars.iter().filter(|car| car.is_there()) {
-            let is_on = |car: &Car| (0.0..=network.paths[car.path()].length).contains(&car.station);
-            let is_finite = car.speed.is_finite() && car.acceleration.is_finite();
-            seen.off += u32::from(!is_on(car) || !is_finite);
+            let is_on = (0.0..=network.paths[car.path()].length()).contains(&car.station());
+            let is_able = (0..=FASTEST).contains(&car.pace()) && (-8.001..=2.001).contains(&car.acceleration());
+            seen.off += u32::from(!is_on || !is_able);
             seen.standing = seen.standing.max(car.standing());
             seen.cars += 1;
         }
