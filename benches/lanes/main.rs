@@ -15,7 +15,6 @@ use std::error::Error;
 use std::sync::Arc;
 
 use offtrack::layout::Column;
-use offtrack::layout::shared::Named;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;

@@ -4,7 +4,7 @@ use offtrack::engine::stages::{Kernel, Threads, module};
 use offtrack::engine::tables::{MANY, ROW, team};
 use offtrack::engine::{Autoreset, wgsl};
 use offtrack::layout::buffers::{Access, BUFFERS, Buffer};
-use offtrack::layout::shared::{Field, Named, Struct};
+use offtrack::layout::shared::{Field, Struct};
 use offtrack::layout::{
     self, BEGINS, Column, EXTRAS, Ended, HAS_ROUTE, HAS_START, IS_FIRST, N_EXTRAS, N_RAYS, N_TRAILER_RAYS, N_VALUES,
     OBSERVATION, ROUTE_ROWS, TEAM_MAX, WORKGROUP,

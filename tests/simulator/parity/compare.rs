@@ -4,7 +4,7 @@ use std::fmt;
 
 use bytemuck::cast_slice;
 use offtrack::engine::stages::Stage;
-use offtrack::layout::{Column, N_EXTRAS, N_RAYS};
+use offtrack::layout::{Column, N_CAR_WORDS, N_EXTRAS, N_RAYS};
 use offtrack::world::World;
 
 /// Bound of the difference between two engines in a value.
@@ -54,6 +54,7 @@ const fn within(bound: f32) -> Bound {
 pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
     match column {
         Column::Action | Column::Ended => &[("", 1, SAME)],
+        Column::Cars => &[("words", N_CAR_WORDS, SAME)],
         Column::Control => &[
             ("steering", 1, SAME),
             ("acceleration", 1, MIDDLING),
@@ -212,7 +213,7 @@ pub fn agreements(column: Column, here: &[u8], there: &[u8], counted: &[bool]) -
 /// Columns, and a change of the world.
 pub type Written = (&'static [Column], Option<fn(&mut World)>);
 
-/// What a stage writes, and one number of the world that it notices to be off by a thousandth. Two stages use no number
+/// What a stage writes, and one number of the world that it notices to be off by a thousandth. Three stages use no number
 /// of the world.
 pub fn written(stage: Stage) -> Written {
     match stage {
@@ -222,6 +223,8 @@ pub fn written(stage: Stage) -> Written {
         Stage::Drive => {
             (&[Column::Truck], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_wheelbase *= 1.001)))
         }
+        // A device has no vehicles.
+        Stage::Traffic => (&[], None),
         Stage::Collide => (
             &[Column::Clearance],
             Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_body.half_width *= 1.001)),

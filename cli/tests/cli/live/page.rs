@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::engine::stages::{N_STORAGE_BUFFERS, WORKGROUP_MEMORY};
-use offtrack::layout::{Column, shared::Named};
+use offtrack::layout::Column;
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
 use offtrack_evaluation::live::{Ground, Live, shown};

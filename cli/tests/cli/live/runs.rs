@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use offtrack::layout::shared::Named;
 use offtrack::layout::{Column, Truck};
 use offtrack::simulator::{Autoreset, RouteChoice, Simulator};
 use offtrack::world::World;

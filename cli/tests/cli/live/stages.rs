@@ -6,7 +6,6 @@ use std::sync::Arc;
 use offtrack::engine::Autoreset;
 use offtrack::engine::stages::{Case, Kernel, STAGES, Stage};
 use offtrack::layout::Column;
-use offtrack::layout::shared::Named;
 use offtrack::map::Gutter;
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
