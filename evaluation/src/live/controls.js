@@ -59,7 +59,9 @@ function showChoices(app) {
   fillSelect("benchmark", live.facts.worlds.map((one, index) => [index, worldWords(one)]), chosen.world);
   fillSelect("road", roadChoices(world), chosen.road);
   const all = app.policies.map((policy, index) => [index, policyWords(policy)]);
-  const policies = [...all.filter(([index]) => app.canDrive(index, chosen.world)), [-1, policyWords(null)]];
+  app.learned.show();
+  const isOffered = ([index]) => app.canDrive(index, chosen.world) && !app.learned.hides(index);
+  const policies = [...all.filter(isOffered), [-1, policyWords(null)]];
   fillSelect("policy", policies, chosen.policy);
   fillSelect("second", [["", "nothing"], ...policies], chosen.second ?? "");
   const counts = [...new Set([...COUNTS, chosen.n])].sort((a, b) => a - b).filter((n) => hasRoom(live, gpu, n));
