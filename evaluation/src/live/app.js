@@ -6,8 +6,8 @@
 const COUNT_EVERY = 500, FRAME_WORK = 20, MOST_WORK = 120;
 /** Trucks that the page begins with. */
 const MANY = 4096;
-/** Reach of a click (pixels); how long something stays said (ms). */
-const REACH = 14, SAID_FOR = 6000;
+/** Reach of a click and of a finger (pixels); how long something stays said (ms). */
+const REACH = 14, FINGER_REACH = 26, SAID_FOR = 6000;
 
 /** Why the page cannot run, by the kind of a `NoDevice`, and what would do. */
 const MISSING = {
