@@ -279,7 +279,7 @@ impl<'a> Run<'a> {
         self.progress.restore(stored)?;
         self.routes.restore(stored)?;
         if let Some(validation) = &mut self.validation {
-            validation.restore(stored)?;
+            validation.restore(stored, self.progress.fraction())?;
             if let (Some(last), Some(best)) = (validation.last(), validation.best()) {
                 self.progress.show_validation(last.success, best.success);
             }

@@ -254,6 +254,18 @@ fn a_finished_run_goes_on_only_with_a_larger_budget() {
 }
 
 #[test]
+fn a_finished_run_that_goes_on_is_validated_again_and_keeps_further_policies() {
+    let place = place();
+    succeed(&place.train(&["--name", "run", "--steps", "800"]));
+    let (earlier, _) = kept(&place, "run");
+    succeed(&resume(&place, "run", &["--steps", "1600"]));
+    let validation = place.json("runs/run/report.json")["validation"].clone();
+    assert_eq!((&validation["times"], &validation["last"]["env_steps"]), (&20.into(), &1600.into()), "{validation}");
+    let (later, list) = kept(&place, "run");
+    assert!(earlier.len() < later.len() && later.starts_with(&earlier), "{list}");
+}
+
+#[test]
 fn a_run_that_cannot_go_on_is_refused_with_the_file_and_what_would_do() {
     let place = place();
     succeed(&place.train(&["--name", "run", "--steps", "800"]));
