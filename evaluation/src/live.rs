@@ -32,6 +32,8 @@ const VIEW: &str = include_str!("live/view.wgsl");
 /// Scripts in the order of the page; the last one starts the others.
 const SCRIPTS: &[&str] = &[
     include_str!("page/elements.js"),
+    include_str!("page/packed.js"),
+    include_str!("page/truck.js"),
     include_str!("live/data.js"),
     include_str!("live/device.js"),
     include_str!("live/world.js"),

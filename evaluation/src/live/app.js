@@ -291,8 +291,7 @@ class App {
 
   play(playing) {
     this.playing = playing;
-    byId("play").textContent = playing ? "❚❚" : "▶";
-    byId("play").setAttribute("aria-label", playing ? "Pause" : "Go on");
+    showPlaying(byId("play"), playing);
   }
 
   setRate(rate) {

@@ -80,10 +80,8 @@ function showLegend(app) {
   byId("legend").replaceChildren(
     html("li", {}, from, html("i", { class: "ramp", style: ramp }), to),
     ...(app.visit.focus ? [
-      html("li", {}, html("i", { class: "thin", style: "--swatch: var(--tractor)" }), "path of the tractor"),
-      html("li", {}, html("i", { class: "thin", style: "--swatch: var(--trailer)" }), "of the trailer"),
-      html("li", {}, html("i", { class: "thin", style: "--swatch: var(--route)" }), "route"),
-      html("li", {}, html("i", { class: "thin", style: "--swatch: var(--ray)" }), "distance sensors"),
+      ...lineKeys([["tractor", "path of the tractor"], ["trailer", "of the trailer"], ["route", "route"],
+        ["ray", "distance sensors"]]),
     ] : [
       html("li", {}, cross("tractor_collided"), "tractor hit a kerb"),
       html("li", {}, cross("trailer_collided"), "trailer did"),

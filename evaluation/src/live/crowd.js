@@ -82,11 +82,7 @@ class Crowd {
 
   /** Middle of the trailer's axles (m). */
   trailerOf(truck) {
-    const { fifth_wheel, trailer_wheelbase } = this.rigOf(truck);
-    return truck.position.map((at, axis) => {
-      const along = (angle) => (axis === 0 ? Math.cos(angle) : Math.sin(angle));
-      return at + fifth_wheel * along(truck.heading) - trailer_wheelbase * along(truck.trailer_heading);
-    });
+    return trailerMiddle(this.rigOf(truck), truck.position, truck.heading, truck.trailer_heading);
   }
 
   rigOf({ vehicle }) {
