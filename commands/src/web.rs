@@ -106,7 +106,8 @@ fn training_run(folder: &Path) -> Result<TrainingRun, Error> {
     let kept = kept::read(folder)?;
     let load = |kept: &Kept| Ok((*kept, Policy::load(&kept.file(folder))?));
     let kept = kept.iter().map(load).collect::<Result<Vec<_>, Error>>()?;
-    Ok(TrainingRun { name: shown_path(folder), kept, left: Policy::load(&left)? })
+    let name = folder.file_name().map_or_else(|| shown_path(folder), |name| name.to_string_lossy().into_owned());
+    Ok(TrainingRun { name, kept, left: Policy::load(&left)? })
 }
 
 /// What the parts of the file weigh.

@@ -1,8 +1,8 @@
 //! The policies that a run keeps on its way: from its first update on, whenever its env steps have grown by a factor of
 //! about 1.4.
 //!
-//! When depends on env steps alone, so that another budget changes nothing of it. The first one is kept for ever, and
-//! of the others the latest: they reach back over a hundredth of the run and more.
+//! So a large budget needs few of them. The first one is kept for ever, and of the others the latest, which begin at
+//! about a hundredth of the run.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;

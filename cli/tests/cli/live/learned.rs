@@ -18,9 +18,9 @@ use crate::place::{Place, offtrack, succeed};
 fn a_slider_through_a_training_run_lets_the_crowd_drive_by_the_policy_that_it_points_at_and_says_when_that_was() {
     let place = Place::new();
     place.validate(4, 2);
-    succeed(&place.train(&["--name", "run", "--steps", "3200"]));
-    succeed(&offtrack(&["web", "--run", &place.text("runs/run"), "-o", &place.text("page.html")]));
-    let folder = place.file("runs/run");
+    succeed(&place.train(&["--name", "mine", "--steps", "3200"]));
+    succeed(&offtrack(&["web", "--run", &place.text("runs/mine"), "-o", &place.text("page.html")]));
+    let folder = place.file("runs/mine");
     let kept = kept::read(&folder).unwrap();
     let files = kept.iter().map(|kept| kept.file(&folder)).chain([folder.join("policy.safetensors")]);
     let policies: Vec<Policy> = files.map(|file| Policy::load(&file).unwrap()).collect();
@@ -52,7 +52,7 @@ fn a_slider_through_a_training_run_lets_the_crowd_drive_by_the_policy_that_it_po
         assert!(found["words"].as_str().unwrap().starts_with(words), "{found}: {words}");
         assert_eq!((&found["spoken"], &found["max"]), (&found["words"], &json!(last)), "{found}");
         assert_eq!(found["words"].as_str().unwrap().ends_with(&success), place == last - 1, "{found}");
-        assert!(found["chosen"].as_str().unwrap().contains("runs/run"), "{found}");
+        assert!(found["chosen"].as_str().unwrap().starts_with("mine"), "{found}");
         // The list has the policy that drives and random actions; all trucks begin again, and the view stays.
         assert_eq!(
             (&found["options"], &found["begun"], &found["zoomed"]),
@@ -61,4 +61,11 @@ fn a_slider_through_a_training_run_lets_the_crowd_drive_by_the_policy_that_it_po
         );
         assert_eq!(found["isShown"], true, "{found}");
     }
+    // Also where a truck is followed, beside another policy.
+    let beside: Value = serde_json::from_slice(&given["drag.beside"]).unwrap();
+    let first = format!("mine, {beginning} steps");
+    assert_eq!(beside["before"], json!([2, 2]), "{beside}");
+    assert_eq!((&beside["begun"], &beside["followed"]), (&json!([0, 0]), &json!([1, 1])), "{beside}");
+    assert_eq!(beside["names"], json!([first, "random actions"]), "{beside}");
+    assert_eq!(beside["state"], json!(format!("Driven by {first}")), "{beside}");
 }

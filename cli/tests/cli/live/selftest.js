@@ -56,6 +56,17 @@ async function slider(live, _, job) {
     await page.between(() => recorded(live, page.gpu, crowd.batch, { ...job, name }));
   }
   await give(`${job.name}.seen`, JSON.stringify(seen));
+  await page.attempt(() => page.choose({ second: -1 }));
+  await page.stepBy(2);
+  await page.pickTruck(1);
+  const of = (what) => page.crowds.map(what), before = of(({ batch }) => batch.begun);
+  range.value = 0;
+  range.dispatchEvent(new Event("input"));
+  await page.between(() => {});
+  const [begun, followed] = [of(({ batch }) => batch.begun), of((one) => one.followed)];
+  const names = [...byId("pane-labels").querySelectorAll("span")].map(({ textContent }) => textContent);
+  const state = byId("truck-state").textContent;
+  await give(`${job.name}.beside`, JSON.stringify({ before, begun, followed, names, state }));
   page.gpu.destroy();
 }
 
