@@ -34,6 +34,7 @@ mod seeds;
 mod tensorboard;
 mod threads;
 mod train;
+mod unwritten;
 mod web;
 
 // The states of the simulator's tests look for them here.
