@@ -5,13 +5,18 @@ use glam::Vec2;
 use crate::engine::Row;
 use crate::layout::angle::direction;
 use crate::layout::random::{self, Draw};
+use crate::layout::shared::constants;
 use crate::layout::{Body, Rig, Stream, Truck};
 use crate::traffic::car::Outline;
 use crate::traffic::{self, Car, Clock, Nobody, Setting};
 use crate::world::{Level, Traffic, TrafficRoad, World};
 
-/// Room to other vehicles, along each unit and beside it, that a truck begins with (m).
-const ROOM: Vec2 = Vec2::new(7.0, 1.0);
+constants! {
+    /// Room to other vehicles before and behind each unit that a truck begins with (m).
+    const ROOM_ALONG: f32 = 7.0;
+    /// Room beside each unit (m).
+    const ROOM_BESIDE: f32 = 1.0;
+}
 
 /// Moves the vehicles around the row's truck, if the world has any.
 pub fn traffic(world: &World, row: &mut Row) {
@@ -39,8 +44,8 @@ pub fn surrounded(world: &World, shared: &Traffic, stream: Stream, truck: &Truck
     let mut row = snapshots[random::index_below(snapshot, snapshots.len() as u32) as usize];
     row.level = level;
     let grown = |unit: Outline| Outline {
-        half_length: unit.half_length + ROOM.x,
-        half_width: unit.half_width + ROOM.y,
+        half_length: unit.half_length + ROOM_ALONG,
+        half_width: unit.half_width + ROOM_BESIDE,
         ..unit
     };
     let units = units(world.rig(truck), truck).map(grown);
