@@ -1,29 +1,36 @@
 //! `offtrack web`: one HTML file in which trucks drive live in a browser, by the simulator's own shaders.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use offtrack::files::reader::shown_path;
 use offtrack::scenario::Split;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
-use offtrack_evaluation::live::{self, Ground, Live, Part};
+use offtrack_evaluation::kept::{self, Kept};
+use offtrack_evaluation::live::{self, Ground, Live, Part, TrainingRun};
 use offtrack_evaluation::policies;
 use offtrack_policy::Policy;
 
 use crate::{outputs, roads};
 
+/// The benchmarks of a page of which nothing else is asked.
+const BENCHMARKS: [&str; 2] = ["attard2023", "laden2026"];
 /// The word that stands for every split.
 const ALL: &str = "all";
 
 /// Write a page on which thousands of trucks drive live, for a browser with WebGPU.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A benchmark's name, or the path of its file; repeatable.
-    #[arg(long, default_values = ["attard2023", "laden2026"])]
+    /// A benchmark's name, or the path of its file; repeatable [default: attard2023 laden2026; with --run the run's].
+    #[arg(long)]
     benchmark: Vec<String>,
-    /// A policy file, or the name of a shipped policy; repeatable. Without it the shipped policies for the
-    /// benchmarks.
+    /// A policy file, or the name of a shipped policy; repeatable. Without it, and without --run, the shipped policies
+    /// for the benchmarks.
     #[arg(long)]
     policy: Vec<String>,
+    /// The folder of a training run: a slider goes through the policies that it kept on its way.
+    #[arg(long)]
+    run: Option<PathBuf>,
     /// Only this road, 20m, or this route, 20m/N-left-3; repeatable. A random road need not be in a benchmark:
     /// wide/7/12.
     #[arg(long)]
@@ -35,7 +42,7 @@ pub struct Args {
     #[arg(long, default_value_t = 0)]
     seed: u32,
     /// Write the benchmark alone, as a file to drop on such a page.
-    #[arg(long, conflicts_with_all = ["policy", "seed"])]
+    #[arg(long, conflicts_with_all = ["policy", "run", "seed"])]
     world: bool,
     /// The file to write.
     #[arg(short, long)]
@@ -44,22 +51,63 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
+    let run = args.run.as_deref().map(training_run).transpose()?;
+    let benchmarks: Vec<String> = match (args.benchmark.as_slice(), &run) {
+        ([], Some(run)) => vec![run.left.benchmark.clone()],
+        ([], None) => BENCHMARKS.map(str::to_owned).into(),
+        (asked, _) => asked.to_vec(),
+    };
     let files_of = |flag: &'static str, names: &[String]| -> Vec<(&'static str, Option<PathBuf>)> {
         names.iter().map(|name| (flag, Some(PathBuf::from(name)))).collect()
     };
-    let read = [files_of("--benchmark", &args.benchmark), files_of("--policy", &args.policy)].concat();
+    let of_run = run.iter().flat_map(TrainingRun::policies).map(|(_, policy)| policy.name.clone());
+    let of_run = files_of("--run", &of_run.collect::<Vec<_>>());
+    let read = [files_of("--benchmark", &benchmarks), files_of("--policy", &args.policy), of_run].concat();
     let read: Vec<outputs::Named> = read.iter().map(|(flag, file)| (*flag, file.as_deref())).collect();
     outputs::distinct(&[("--output", Some(&args.output))], &read)?;
-    if let (true, [_, _, ..]) = (args.world, args.benchmark.as_slice()) {
-        let (value, expected) = (args.benchmark.join(", "), "a world file holds one benchmark: name one".to_owned());
+    if let (true, [_, _, ..]) = (args.world, benchmarks.as_slice()) {
+        let (value, expected) = (benchmarks.join(", "), "a world file holds one benchmark: name one".to_owned());
         return Err(Error::Setting { name: "--benchmark", value, expected });
     }
-    let grounds = args.benchmark.iter().map(|name| ground(name, args)).collect::<Result<Vec<Ground>, Error>>()?;
+    let grounds = benchmarks.iter().map(|name| ground(name, args)).collect::<Result<Vec<Ground>, Error>>()?;
     if let (true, [ground]) = (args.world, grounds.as_slice()) {
         return printed(&ground.write(&args.output)?);
     }
-    let policies = if args.policy.is_empty() { shipped(&grounds)? } else { named(&args.policy, &grounds)? };
-    printed(&Live { grounds, policies, seed: args.seed }.write(&args.output)?)
+    let policies = match (args.policy.as_slice(), &run) {
+        ([], None) => shipped(&grounds)?,
+        (names, _) => named(names, &grounds)?,
+    };
+    for (_, policy) in run.iter().flat_map(TrainingRun::policies) {
+        check(policy, &policy.name, "--run", &grounds).map_err(|error| match args.benchmark.as_slice() {
+            [] => error,
+            _ => Error::Setting {
+                name: "--benchmark",
+                value: benchmarks.join(", "),
+                expected: format!("{error}; without it the page has the run's own, {}", policy.benchmark),
+            },
+        })?;
+    }
+    printed(&Live { grounds, policies, run, seed: args.seed }.write(&args.output)?)
+}
+
+/// The policies of the training run in a folder, each named by its file.
+fn training_run(folder: &Path) -> Result<TrainingRun, Error> {
+    let wrong = |expected: String| Error::Setting { name: "--run", value: folder.display().to_string(), expected };
+    if !folder.join("config.toml").is_file() {
+        return Err(wrong("the folder of a run is needed, with the config.toml that it left".to_owned()));
+    }
+    let left = folder.join("policy.safetensors");
+    if !kept::list(folder).is_file() {
+        return Err(wrong(format!(
+            "it keeps no policies, as a run does from its first update on: --policy {} shows the one that it left",
+            left.display()
+        )));
+    }
+    let kept = kept::read(folder)?;
+    let load = |kept: &Kept| Ok((*kept, Policy::load(&kept.file(folder))?));
+    let kept = kept.iter().map(load).collect::<Result<Vec<_>, Error>>()?;
+    let name = folder.file_name().map_or_else(|| shown_path(folder), |name| name.to_string_lossy().into_owned());
+    Ok(TrainingRun { name, kept, left: Policy::load(&left)? })
 }
 
 /// What the parts of the file weigh.
@@ -103,22 +151,26 @@ fn shipped(grounds: &[Ground]) -> Result<Vec<Policy>, Error> {
     Ok(policies.into_iter().zip(is_chosen).filter_map(|(policy, is_chosen)| is_chosen.then_some(policy)).collect())
 }
 
-/// The policies that the flags name. Each must be able to drive somewhere on the page.
+/// The policies that the flags name.
 fn named(names: &[String], grounds: &[Ground]) -> Result<Vec<Policy>, Error> {
     let named = |name: &String| {
         let policy = policies::learned(name)?;
-        if !policy.is_plain() {
-            let expected =
-                "a page drives by layers over the values of one step, with an output an action: this policy \
-                            has a memory, reads some of the values or gives commands"
-                    .to_owned();
-            return Err(Error::Setting { name: "--policy", value: name.clone(), expected });
-        }
-        let mut checks = grounds.iter().map(|ground| policy.check(&ground.world));
-        match checks.next() {
-            Some(Err(error)) if checks.all(|check| check.is_err()) => Err(error.into()),
-            _ => Ok(policy),
-        }
+        check(&policy, name, "--policy", grounds).map(|()| policy)
     };
     names.iter().map(named).collect()
+}
+
+/// An error unless a policy, which `flag` has named by `value`, can drive somewhere on the page.
+fn check(policy: &Policy, value: &str, flag: &'static str, grounds: &[Ground]) -> Result<(), Error> {
+    if !policy.is_plain() {
+        let expected = "a page drives by layers over the values of one step, with an output an action: this policy \
+                        has a memory, reads some of the values or gives commands"
+            .to_owned();
+        return Err(Error::Setting { name: flag, value: value.to_owned(), expected });
+    }
+    let mut checks = grounds.iter().map(|ground| policy.check(&ground.world));
+    match checks.next() {
+        Some(Err(error)) if checks.all(|check| check.is_err()) => Err(error.into()),
+        _ => Ok(()),
+    }
 }

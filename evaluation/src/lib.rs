@@ -60,6 +60,7 @@ pub mod recording; // the states of an episode
 pub mod outcomes; // how each episode ended
 pub mod comparison; // evaluations in pairs
 pub mod board; // entries that are simulated again
+pub mod kept; // the policies that a training run keeps on its way
 pub mod shown; // which episodes a page shows
 pub mod page; // a report as an HTML page
 pub mod live; // trucks that drive in a browser, as an HTML page

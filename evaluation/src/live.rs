@@ -18,6 +18,7 @@ use offtrack_policy::Policy;
 use serde_json::json;
 
 use crate::error::Error;
+use crate::kept::Kept;
 use crate::page::{filled, script_json};
 use crate::tabular::html_text;
 use crate::{files, provenance};
@@ -31,6 +32,8 @@ const VIEW: &str = include_str!("live/view.wgsl");
 /// Scripts in the order of the page; the last one starts the others.
 const SCRIPTS: &[&str] = &[
     include_str!("page/elements.js"),
+    include_str!("page/packed.js"),
+    include_str!("page/truck.js"),
     include_str!("live/data.js"),
     include_str!("live/device.js"),
     include_str!("live/world.js"),
@@ -51,6 +54,7 @@ const SCRIPTS: &[&str] = &[
     include_str!("live/results.js"),
     include_str!("live/controls.js"),
     include_str!("live/drop.js"),
+    include_str!("live/learned.js"),
     include_str!("live/app.js"),
     include_str!("live/main.js"),
 ];
@@ -82,8 +86,29 @@ pub struct Live {
     pub grounds: Vec<Ground>,
     /// The policies to choose from, in this order.
     pub policies: Vec<Policy>,
+    /// A training run whose policies a slider goes through.
+    pub run: Option<TrainingRun>,
     /// The seed that the page begins with.
     pub seed: u32,
+}
+
+/// A training run as a page shows it.
+#[derive(Debug)]
+pub struct TrainingRun {
+    /// The run's name.
+    pub name: String,
+    /// The policies that it kept, in their order.
+    pub kept: Vec<(Kept, Policy)>,
+    /// The policy that it left.
+    pub left: Policy,
+}
+
+impl TrainingRun {
+    /// Its policies from first to last: when each was kept, and nothing of the one that it left.
+    pub fn policies(&self) -> impl Iterator<Item = (Option<Kept>, &Policy)> {
+        let kept = self.kept.iter().map(|(kept, policy)| (Some(*kept), policy));
+        kept.chain([(None, &self.left)])
+    }
 }
 
 /// A part of a page and its length (bytes).
@@ -98,20 +123,26 @@ impl Live {
     pub fn write(&self, file: &Path) -> Result<Vec<Part>, Error> {
         let mut packed = Packed::default();
         let code = code::printed(&mut packed);
-        let worlds: Vec<_> =
-            self.grounds.iter().map(|ground| worlds::printed(ground, &self.policies, &mut packed)).collect();
-        let policies: Vec<_> = self
-            .policies
-            .iter()
-            .map(|policy| {
-                json!({
-                    "name": policy.name,
-                    "benchmark": policy.benchmark,
-                    "section": packed.add("policies", &policy.to_bytes()),
-                    "reported": reported::of(&policy.name),
-                })
+        let of_run: Vec<(Option<Kept>, &Policy)> = self.run.iter().flat_map(TrainingRun::policies).collect();
+        let others = self.policies.iter().map(|policy| ("policies", policy));
+        let kinds: Vec<(&'static str, &Policy)> =
+            others.chain(of_run.iter().map(|&(_, policy)| ("run", policy))).collect();
+        let all: Vec<&Policy> = kinds.iter().map(|&(_, policy)| policy).collect();
+        let worlds: Vec<_> = self.grounds.iter().map(|ground| worlds::printed(ground, &all, &mut packed)).collect();
+        let mut described = |(kind, policy): &(&'static str, &Policy)| {
+            json!({
+                "name": policy.name,
+                "benchmark": policy.benchmark,
+                "section": packed.add(kind, &policy.to_bytes()),
+                "reported": reported::of(&policy.name),
             })
-            .collect();
+        };
+        let policies: Vec<_> = kinds.iter().map(&mut described).collect();
+        let run = self.run.as_ref().map(|run| {
+            let each = (self.policies.len()..).zip(&of_run);
+            let policies = each.map(|(index, (kept, _))| json!({ "policy": index, "kept": kept }));
+            json!({ "name": run.name, "policies": policies.collect::<Vec<_>>() })
+        });
         let facts = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "commit": provenance::commit(),
@@ -121,6 +152,7 @@ impl Live {
             "code": code,
             "worlds": worlds,
             "policies": policies,
+            "run": run,
             "sections": packed.sections(),
         });
         let (facts, script, style) = (script_json(&facts), SCRIPTS.concat(), STYLES.concat());

@@ -24,8 +24,10 @@ pub(crate) use tracks::packed;
 const TEMPLATE: &str = concat!(include_str!("page/head.html"), include_str!("page/report.html"));
 const STYLE: &str = concat!(include_str!("page/theme.css"), include_str!("page/style.css"));
 /// Scripts in the order of the page; the last one starts the others.
-const SCRIPTS: [&str; 14] = [
+const SCRIPTS: [&str; 16] = [
     include_str!("page/elements.js"),
+    include_str!("page/packed.js"),
+    include_str!("page/truck.js"),
     include_str!("page/data.js"),
     include_str!("page/headline.js"),
     include_str!("page/routes.js"),

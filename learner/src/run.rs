@@ -6,6 +6,7 @@
 pub mod checkpointer;
 pub mod events_file;
 pub mod folder;
+pub mod kept_policies;
 #[cfg(test)]
 mod lost_device_tests;
 pub mod metrics_file;
@@ -16,6 +17,7 @@ pub mod validation;
 mod window;
 
 use offtrack::world::World;
+use offtrack_evaluation::kept::Kept;
 use offtrack_policy::Policy;
 
 use crate::backend::Backend;
@@ -26,6 +28,7 @@ use crate::sac::not_finite;
 use crate::session::Session;
 use checkpointer::{Checkpointer, Written};
 use folder::Folder;
+use kept_policies::KeptPolicies;
 use progress::Progress;
 use route_counts::RouteCounts;
 use validation::Validation;
@@ -44,6 +47,7 @@ pub struct Run<'a> {
     /// None without validation.
     pub validation: Option<Validation>,
     checkpointer: Checkpointer,
+    kept: KeptPolicies,
 }
 
 impl<'a> Run<'a> {
@@ -64,6 +68,7 @@ impl<'a> Run<'a> {
             training,
             progress,
             checkpointer: Checkpointer::new(folder, config.checkpoint_minutes),
+            kept: KeptPolicies::new(folder),
             config: config.clone(),
             backend,
         }
@@ -108,6 +113,7 @@ impl<'a> Run<'a> {
                     return Err(self.diverged(what, value));
                 }
                 let validated = self.validate_if_due()?;
+                self.keep_if_due(validated)?;
                 if validated || self.progress.is_row_due() {
                     self.write_row()?;
                 }
@@ -117,6 +123,7 @@ impl<'a> Run<'a> {
         }
         // With a budget of time the clock may have ended the loop just before the last one.
         if self.validate_if_due()? {
+            self.keep_if_due(true)?;
             self.write_row()?;
         }
         self.count_episodes(true)
@@ -140,6 +147,7 @@ impl<'a> Run<'a> {
         self.progress.updated(n_updates);
         self.count_episodes(false)?;
         let validated = self.validate_if_due()?;
+        self.keep_if_due(validated)?;
         if validated || self.progress.is_row_due() {
             self.write_row()?;
         }
@@ -161,6 +169,20 @@ impl<'a> Run<'a> {
         )?;
         self.progress.validated(validated.success, validation.best().map_or(validated.success, |best| best.success));
         Ok(true)
+    }
+
+    /// Keeps the policy as it is when it is time to. From the first validation on, only one that has just been
+    /// `validated` is kept: its success is known.
+    fn keep_if_due(&mut self, validated: bool) -> Result<(), Error> {
+        let (env_steps, last) = (self.progress.env_steps(), self.validation.as_ref().and_then(Validation::last));
+        if (last.is_some() && !validated) || !self.kept.is_due(env_steps) {
+            return Ok(());
+        }
+        let validation = last.map(|validated| validated.success);
+        let kept = Kept { env_steps, seconds: self.progress.seconds(), validation };
+        let written = self.kept.keep(kept, &self.training.policy()?.to_bytes());
+        self.progress.note(&self.kept.file(), written);
+        Ok(())
     }
 
     /// The linear learning-rate schedule.
@@ -257,12 +279,17 @@ impl<'a> Run<'a> {
         self.progress.restore(stored)?;
         self.routes.restore(stored)?;
         if let Some(validation) = &mut self.validation {
-            validation.restore(stored)?;
+            validation.restore(stored, self.progress.fraction())?;
             if let (Some(last), Some(best)) = (validation.last(), validation.best()) {
                 self.progress.show_validation(last.success, best.success);
             }
         }
         self.training.restore(stored, self.progress.updates())
+    }
+
+    /// Lets go of policies that were kept after the point from which the run goes on.
+    pub fn continue_kept(&mut self) -> Result<(), Error> {
+        self.kept.continue_from(self.progress.env_steps())
     }
 
     /// Fails where a number of the learner is not finite. A checkpoint holds only finite numbers.

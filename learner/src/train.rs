@@ -46,8 +46,8 @@ use worlds::Worlds;
 const METRICS_LIMIT: u64 = 64 << 20;
 
 /// Trains as `config` says and evaluates the policy. `folder`, which is made and must be new, then has the config
-/// (`config.toml`), `metrics.csv`, `routes.csv`, `policy.safetensors`, `checkpoint.safetensors`, `report.json` and
-/// `report.html`.
+/// (`config.toml`), `metrics.csv`, `routes.csv`, `policy.safetensors`, `policies/`, `checkpoint.safetensors`,
+/// `report.json` and `report.html`.
 ///
 /// `watcher` is told how it goes. With `stop` set training ends after the step in hand, everything is written, and
 /// [`resume`] continues; the outcome then says `interrupted` and has no evaluation. Set while roads are still read, it
@@ -187,6 +187,7 @@ impl Training {
             let _ = std::fs::remove_file(folder.page());
             resumed = Some((run.progress.env_steps(), run.progress.seconds()));
         }
+        run.continue_kept()?;
         if has_new_budget {
             folder.write_config(config)?;
         }

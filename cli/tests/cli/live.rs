@@ -2,6 +2,8 @@
 
 #[path = "../../../tests/simulator/parity/compare.rs"]
 mod compare;
+mod devtools;
+mod learned;
 mod page;
 mod policies;
 mod runs;

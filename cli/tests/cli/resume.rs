@@ -4,6 +4,8 @@
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
+use serde_json::Value;
+
 use crate::place::{CACHE, Place, offtrack, program, refusal, succeed};
 
 pub const ENDLESS: [&str; 2] = ["--steps", "1000000000"];
@@ -59,6 +61,21 @@ fn metrics(place: &Place, run: &str) -> Vec<Vec<String>> {
             .collect()
     };
     text.lines().map(timeless).collect()
+}
+
+/// Files and bytes of the policies that a run kept, and its list of them without the time.
+fn kept(place: &Place, run: &str) -> (Vec<(String, Vec<u8>)>, Value) {
+    let folder = place.file(&format!("runs/{run}/policies"));
+    let names = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    let mut list = place.json(&format!("runs/{run}/policies/policies.json"));
+    for kept in list.as_array_mut().unwrap() {
+        assert!(kept.as_object_mut().unwrap().remove("seconds").is_some_and(|seconds| seconds.is_f64()), "{kept}");
+    }
+    let policies = names.iter().filter(|name| name.ends_with(".safetensors"));
+    let files = policies.map(|name| (name.clone(), std::fs::read(folder.join(name)).unwrap())).collect();
+    (files, list)
 }
 
 /// The env steps after which a run said it continues.
@@ -153,6 +170,20 @@ fn a_run_killed_and_stopped_on_the_way_equals_one_never_stopped_bit_for_bit() {
     let (parts, whole) = (metrics(&place, "parts"), metrics(&place, "whole"));
     assert!(100 < whole.len(), "{}", whole.len());
     assert_eq!(parts, whole);
+    let (policies, list) = kept(&place, "whole");
+    let steps: Vec<u64> = list.as_array().unwrap().iter().map(|kept| kept["env_steps"].as_u64().unwrap()).collect();
+    let names: Vec<String> = steps.iter().map(|steps| format!("{steps:012}.safetensors")).collect();
+    assert_eq!(policies.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>(), names);
+    assert!((8..=16).contains(&steps.len()) && steps[0] < 500 && 20_000 < *steps.last().unwrap(), "{steps:?}");
+    // Of those after the first validation, at a twentieth of the run, success is known.
+    assert!(
+        list.as_array()
+            .unwrap()
+            .iter()
+            .all(|kept| (kept["validation"].is_f64()) == (2000 <= kept["env_steps"].as_u64().unwrap())),
+        "{list}"
+    );
+    assert!(kept(&place, "parts") == (policies, list), "{stops:?}");
     let validated = whole.iter().skip(1).filter(|row| row.last().is_some_and(|success| !success.is_empty())).count();
     assert_eq!(validated, 20);
     let validation = |run: &str| place.json(&format!("runs/{run}/report.json"))["validation"].clone();
@@ -223,6 +254,18 @@ fn a_finished_run_goes_on_only_with_a_larger_budget() {
 }
 
 #[test]
+fn a_finished_run_that_goes_on_is_validated_again_and_keeps_further_policies() {
+    let place = place();
+    succeed(&place.train(&["--name", "run", "--steps", "800"]));
+    let (earlier, _) = kept(&place, "run");
+    succeed(&resume(&place, "run", &["--steps", "1600"]));
+    let validation = place.json("runs/run/report.json")["validation"].clone();
+    assert_eq!((&validation["times"], &validation["last"]["env_steps"]), (&20.into(), &1600.into()), "{validation}");
+    let (later, list) = kept(&place, "run");
+    assert!(earlier.len() < later.len() && later.starts_with(&earlier), "{list}");
+}
+
+#[test]
 fn a_run_that_cannot_go_on_is_refused_with_the_file_and_what_would_do() {
     let place = place();
     succeed(&place.train(&["--name", "run", "--steps", "800"]));
@@ -248,6 +291,8 @@ fn a_run_that_cannot_go_on_is_refused_with_the_file_and_what_would_do() {
         other.as_bytes(),
         &["runs/run/config.toml", "is not the training file that the checkpoint"],
     );
+    let list = "runs/run/policies/policies.json";
+    refused(list, b"[{", &[list, "is not the list of a run's policies", "put a copy of it back"]);
     refused("runs/run/metrics.csv", b"seconds,env_steps\n", &["runs/run/metrics.csv", "columns"]);
     let benchmark = String::from_utf8(bytes(&place, "short.toml")).unwrap();
     refused(
@@ -341,6 +386,10 @@ fn what_cannot_be_written_is_reported_once_and_written_once_it_can_be() {
     // A folder where the next checkpoint is to be written.
     let (part, checkpoint) = (place.file("runs/run/checkpoint.part"), "runs/run/checkpoint.safetensors");
     std::fs::create_dir(&part).unwrap();
+    // A file where the folder of kept policies was.
+    let policies = place.file("runs/run/policies");
+    std::fs::remove_dir_all(&policies).unwrap();
+    std::fs::write(&policies, "").unwrap();
     let before = bytes(&place, checkpoint);
     let run = begun(resumed(&place, "run", &ENDLESS));
     let policy = bytes(&place, "runs/run/policy.safetensors");
@@ -348,10 +397,13 @@ fn what_cannot_be_written_is_reported_once_and_written_once_it_can_be() {
     assert!(bytes(&place, checkpoint) == before);
     std::fs::remove_dir(&part).unwrap();
     wait_until("another checkpoint", || bytes(&place, checkpoint) != before);
+    std::fs::remove_file(&policies).unwrap();
+    wait_until("a kept policy", || policies.join("policies.json").is_file());
     let output = interrupted(run);
     succeed(&output);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(said.matches("checkpoint.safetensors: cannot be written").count(), 1, "{said}");
+    assert_eq!(said.matches("policies: cannot be written").count(), 1, "{said}");
 }
 
 #[test]

@@ -61,6 +61,67 @@ fn a_page_has_the_roads_and_routes_that_are_asked_for_and_random_ones_by_name() 
 }
 
 #[test]
+fn a_page_of_a_training_run_has_its_benchmark_and_its_policies_in_their_order_and_with_them_what_is_asked_for() {
+    let place = Place::new();
+    succeed(&place.train(&["--name", "run"]));
+    let (run, file) = (place.text("runs/run"), place.text("trucks.html"));
+    let web = |flags: &[&str]| {
+        let output = offtrack(&[&["web", "--run", &run, "-o", &file], flags].concat());
+        succeed(&output);
+        (String::from_utf8(output.stdout).unwrap(), facts(&read(&place.file("trucks.html"))))
+    };
+    let (said, alone) = web(&[]);
+    assert!(said.lines().any(|line| line.starts_with("run ")) && !said.contains("policies"), "{said}");
+    assert_eq!(names(&alone["worlds"]), ["short"]);
+    let list = place.json("runs/run/policies/policies.json");
+    let list = list.as_array().unwrap();
+    let shown = alone["run"]["policies"].as_array().unwrap();
+    assert!(4 < list.len() && shown.len() == list.len() + 1, "{list:?}");
+    for (index, (shown, kept)) in shown.iter().zip(list.iter().chain([&Value::Null])).enumerate() {
+        assert_eq!((&shown["policy"], &shown["kept"]), (&index.into(), kept));
+    }
+    let files = names(&alone["policies"]);
+    assert!(
+        files[0].ends_with("000000000408.safetensors") && files.last().unwrap().ends_with("run/policy.safetensors")
+    );
+    // Beside the others of its benchmark, or of one that has its actions.
+    let (said, more) = web(&["--policy", &place.text("runs/run/policy.safetensors"), "--road", "20m"]);
+    assert!(said.contains("policies"), "{said}");
+    assert_eq!(more["run"]["policies"][0]["policy"], 1);
+    assert_eq!(names(&more["worlds"][0]["roads"]), ["20m"]);
+}
+
+#[test]
+fn a_folder_that_is_no_run_or_has_no_policies_for_the_benchmark_is_refused_with_what_would_do() {
+    let place = Place::new();
+    succeed(&place.train(&["--name", "run", "--steps", "800"]));
+    let (run, file) = (place.text("runs/run"), place.text("trucks.html"));
+    let refused = |flags: &[&str], words: &[&str]| {
+        let said = refusal(&offtrack(&[&["web"], flags].concat()), 2);
+        assert!(said.lines().count() == 1 && words.iter().all(|word| said.contains(word)), "{flags:?}: {said}");
+        assert!(!place.file("trucks.html").exists(), "{flags:?}");
+    };
+    let to = ["-o", file.as_str()];
+    refused(&[&["--run", &place.text("runs")], &to[..]].concat(), &["--run", "the folder of a run is needed"]);
+    let other = ["--run", &run, "--benchmark", "attard2023", "--benchmark", "laden2026"];
+    refused(
+        &[&other, &to[..]].concat(),
+        &["--benchmark: attard2023, laden2026; ", "another action table", "without it the page has the run's own"],
+    );
+    // The first update follows on a step more than the warmup.
+    let first = place.text("runs/run/policies/000000000408.safetensors");
+    refused(&["--run", &run, "-o", &first], &["--output", "is the file of --run too"]);
+    std::fs::remove_file(&first).unwrap();
+    refused(&[&["--run", &run], &to[..]].concat(), &[&first, "cannot be read"]);
+    let list = place.text("runs/run/policies/policies.json");
+    std::fs::write(&list, "[{}]").unwrap();
+    refused(&[&["--run", &run], &to[..]].concat(), &[&list, "is not the list of a run's policies", "missing field"]);
+    std::fs::remove_dir_all(place.file("runs/run/policies")).unwrap();
+    let left = place.text("runs/run/policy.safetensors");
+    refused(&[&["--run", &run], &to[..]].concat(), &["--run", "keeps no policies", &format!("--policy {left}")]);
+}
+
+#[test]
 fn what_no_page_can_show_is_refused() {
     let place = Place::new();
     let file = place.text("trucks.html");
@@ -76,5 +137,6 @@ fn what_no_page_can_show_is_refused() {
     refused(&[&one[..], &["--split", "validation"]].concat(), &["--split", "validation"]);
     refused(&["--world"], &["--benchmark", "attard2023, laden2026", "name one"]);
     refused(&[&one[..], &["--world", "--seed", "1"]].concat(), &["--world", "--seed"]);
+    refused(&[&one[..], &["--world", "--run", "runs/mine"]].concat(), &["--world", "--run"]);
     refused(&["--benchmark", &file], &["--output", "is the file of --benchmark too"]);
 }

@@ -6,8 +6,8 @@
 const COUNT_EVERY = 500, FRAME_WORK = 20, MOST_WORK = 120;
 /** Trucks that the page begins with. */
 const MANY = 4096;
-/** Reach of a click (pixels); how long something stays said (ms). */
-const REACH = 14, SAID_FOR = 6000;
+/** Reach of a click and of a finger (pixels); how long something stays said (ms). */
+const REACH = 14, FINGER_REACH = 26, SAID_FOR = 6000;
 
 /** Why the page cannot run, by the kind of a `NoDevice`, and what would do. */
 const MISSING = {
@@ -31,10 +31,12 @@ class App {
       Object.assign(Policy.shipped(live, index), { reported }));
     Object.assign(this, { crowds: [], playing: true, rate: 2, debt: 0, colouring: 0 });
     this.frames = Promise.resolve();
+    this.learned = new Learned(this);
     this.visit = new Visit(this);
     this.failures = new FailureList((crowd, failure) => this.attempt(() => this.visit.driveAgain(crowd, failure)));
     const { seed } = live.facts;
-    this.chosen = { world: 0, road: "", policy: this.firstPolicy(0), second: null, n: MANY, seed };
+    const world = Math.max(live.facts.worlds.findIndex((_, index) => this.canDrive(this.learned.last ?? -1, index)), 0);
+    this.chosen = { world, road: "", policy: this.firstPolicy(world), second: null, n: MANY, seed };
     this.ready = new Promise((done) => (this.isReady = done));
     listenToChoices(this);
     listenToKeys(this);
@@ -108,8 +110,11 @@ class App {
     }
   }
 
-  /** The index of the first policy that can drive on a world; -1, random actions, without one. */
+  /** The index of the policy that drives first on a world: that of a training run, else the first that can; -1, random
+   * actions, without one. */
   firstPolicy(world) {
+    const { last } = this.learned;
+    if (last !== null && this.canDrive(last, world)) return last;
     return this.policies.findIndex((_, index) => this.canDrive(index, world));
   }
 
@@ -163,6 +168,22 @@ class App {
     this.stage.show(made);
     this.stage.fit();
     this.name();
+  }
+
+  /** The first crowd drives by another policy, and all trucks begin again from the same seed. The view stays. */
+  async driveBy(index) {
+    const { crowds, policies, visit } = this, [first, ...others] = crowds;
+    if (index === this.chosen.policy) return;
+    if (visit.again !== null) await visit.leave();
+    visit.giveBack();
+    await first.driveBy(policies[index]);
+    for (const crowd of others) await crowd.driveBy(crowd.policy);
+    this.chosen = { ...this.chosen, policy: index };
+    this.forgetWork();
+    this.stage.show(crowds);
+    visit.open(visit.focus);
+    this.name();
+    showChoices(this);
   }
 
   /** The heading says how many trucks there are. */
@@ -270,8 +291,7 @@ class App {
 
   play(playing) {
     this.playing = playing;
-    byId("play").textContent = playing ? "❚❚" : "▶";
-    byId("play").setAttribute("aria-label", playing ? "Pause" : "Go on");
+    showPlaying(byId("play"), playing);
   }
 
   setRate(rate) {

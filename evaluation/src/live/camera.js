@@ -64,10 +64,13 @@ class Camera {
   }
 }
 
+/** A pointer that goes no farther than this from where it came down clicks (pixels): a finger is no mouse. */
+const slackOf = ({ pointerType }) => (pointerType === "touch" ? 12 : 4);
+
 /** Listens to pointers and the wheel on the picture. `visit` says what a click and a drag mean. */
 function listenToPointers(canvas, visit) {
   const held = new Map();
-  let travelled = 0, apart = 0;
+  let begun = null, isDrag = false, apart = 0;
   const at = (event) => [event.offsetX, event.offsetY];
   const distance = () => {
     const [a, b] = [...held.values()];
@@ -76,7 +79,8 @@ function listenToPointers(canvas, visit) {
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     held.set(event.pointerId, at(event));
-    travelled = 0;
+    // Two fingers click nothing, also when one is lifted before the other.
+    [begun, isDrag] = [at(event), 1 < held.size];
     if (held.size === 2) apart = distance();
     visit.pointAt(at(event), held.size);
   });
@@ -85,21 +89,24 @@ function listenToPointers(canvas, visit) {
     if (!before) return;
     const now = at(event), [right, down] = [now[0] - before[0], now[1] - before[1]];
     held.set(event.pointerId, now);
-    travelled += Math.abs(right) + Math.abs(down);
+    isDrag ||= slackOf(event) < Math.hypot(now[0] - begun[0], now[1] - begun[1]);
     if (held.size === 2) {
       const wide = distance(), [a, b] = [...held.values()];
       if (0 < apart) visit.zoom(wide / apart, visit.inPane([(a[0] + b[0]) / 2, (a[1] + b[1]) / 2]).at);
       apart = wide;
+      // The middle between them moves half as far as one of them.
+      visit.pan(right / 2, down / 2);
     } else if (visit.isSteering()) {
       visit.pointAt(now, 1);
-    } else if (4 < travelled) {
+    } else if (isDrag) {
       visit.pan(right, down);
     }
   });
   const release = (event) => {
     if (!held.delete(event.pointerId)) return;
     visit.pointAt(null, 0);
-    if (event.type === "pointerup" && travelled <= 4 && held.size === 0 && !visit.isSteering()) visit.click(at(event));
+    const isClick = event.type === "pointerup" && !isDrag && held.size === 0 && !visit.isSteering();
+    if (isClick) visit.click(at(event), event.pointerType === "touch" ? FINGER_REACH : REACH);
   };
   for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, release);
   canvas.addEventListener("wheel", (event) => {

@@ -40,7 +40,7 @@ class OutputCells {
       return html("div", { style: place, class: "cell" }, html("i"));
     });
     this.words = actions.map(([steering, speed]) => {
-      const angle = (180 * Math.abs(steering)) / Math.PI;
+      const angle = toDegrees(Math.abs(steering));
       const turn = angle < 0.05 ? "straight" : `${degrees(angle)} ${steering < 0 ? "right" : "left"}`;
       return this.isOneRow ? turn : `${turn}, ${decimal(3.6 * speed, 0)}${GAP}km/h`;
     });

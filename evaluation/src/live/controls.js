@@ -59,7 +59,9 @@ function showChoices(app) {
   fillSelect("benchmark", live.facts.worlds.map((one, index) => [index, worldWords(one)]), chosen.world);
   fillSelect("road", roadChoices(world), chosen.road);
   const all = app.policies.map((policy, index) => [index, policyWords(policy)]);
-  const policies = [...all.filter(([index]) => app.canDrive(index, chosen.world)), [-1, policyWords(null)]];
+  app.learned.show();
+  const isOffered = ([index]) => app.canDrive(index, chosen.world) && !app.learned.hides(index);
+  const policies = [...all.filter(isOffered), [-1, policyWords(null)]];
   fillSelect("policy", policies, chosen.policy);
   fillSelect("second", [["", "nothing"], ...policies], chosen.second ?? "");
   const counts = [...new Set([...COUNTS, chosen.n])].sort((a, b) => a - b).filter((n) => hasRoom(live, gpu, n));
@@ -78,10 +80,8 @@ function showLegend(app) {
   byId("legend").replaceChildren(
     html("li", {}, from, html("i", { class: "ramp", style: ramp }), to),
     ...(app.visit.focus ? [
-      html("li", {}, html("i", { class: "thin", style: "--swatch: var(--tractor)" }), "path of the tractor"),
-      html("li", {}, html("i", { class: "thin", style: "--swatch: var(--trailer)" }), "of the trailer"),
-      html("li", {}, html("i", { class: "thin", style: "--swatch: var(--route)" }), "route"),
-      html("li", {}, html("i", { class: "thin", style: "--swatch: var(--ray)" }), "distance sensors"),
+      ...lineKeys([["tractor", "path of the tractor"], ["trailer", "of the trailer"], ["route", "route"],
+        ["ray", "distance sensors"]]),
     ] : [
       html("li", {}, cross("tractor_collided"), "tractor hit a kerb"),
       html("li", {}, cross("trailer_collided"), "trailer did"),

@@ -10,19 +10,30 @@ class Crowd {
   static async open({ picture, gpu, world, sites, options, policy }) {
     const made = new Crowd(), batch = await Batch.open(gpu, world, options);
     try {
-      await batch.setPolicy(policy).catch((error) => {
-        throw new Error(`${policy.name} ${error.message}.`);
-      });
-      Object.assign(made, { batch, world, policy, followed: null, row: null, steps: [] });
-      // Episodes that the visitor drove, at least in part: "truck/episode".
-      Object.assign(made, { driven: new Set(), rigs: new Map() });
-      Object.assign(made, { tally: null, failures: [], moments: [] });
+      Object.assign(made, { batch, world, followed: null, row: null, steps: [], rigs: new Map() });
+      await made.take(policy);
       made.picture = await BatchPicture.open(picture, batch, sites);
     } catch (error) {
       batch.close();
       throw error;
     }
     return made;
+  }
+
+  /** Takes a policy, without any figures of its own yet. */
+  async take(policy) {
+    await this.batch.setPolicy(policy).catch((error) => {
+      throw new Error(`${policy.name} ${error.message}.`);
+    });
+    // Episodes that the visitor drove, at least in part: "truck/episode".
+    Object.assign(this, { policy, driven: new Set(), tally: null, failures: [], moments: [] });
+  }
+
+  /** All trucks begin again by this policy, from the same seed. */
+  async driveBy(policy) {
+    await this.take(policy);
+    this.batch.restart();
+    await this.follow(this.followed);
   }
 
   close() {
@@ -71,11 +82,7 @@ class Crowd {
 
   /** Middle of the trailer's axles (m). */
   trailerOf(truck) {
-    const { fifth_wheel, trailer_wheelbase } = this.rigOf(truck);
-    return truck.position.map((at, axis) => {
-      const along = (angle) => (axis === 0 ? Math.cos(angle) : Math.sin(angle));
-      return at + fifth_wheel * along(truck.heading) - trailer_wheelbase * along(truck.trailer_heading);
-    });
+    return trailerMiddle(this.rigOf(truck), truck.position, truck.heading, truck.trailer_heading);
   }
 
   rigOf({ vehicle }) {

@@ -91,8 +91,7 @@ class Driving {
     const offset = this.crowd.picture.sites.offsetOf(truck.route);
     const front = [Math.cos(truck.heading), Math.sin(truck.heading)].map((part, axis) =>
       offset[axis] + truck.position[axis] + wheelbase * part);
-    const angle = Math.atan2(point[1] - front[1], point[0] - front[0]) - truck.heading;
-    return Math.atan2(Math.sin(angle), Math.cos(angle));
+    return wrapped(Math.atan2(point[1] - front[1], point[0] - front[0]) - truck.heading);
   }
 
   ask() {

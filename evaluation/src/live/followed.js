@@ -1,24 +1,17 @@
 // The panel of the truck that is followed: how it drives, what it observes, and what its policy makes of that.
 
-const inDegrees = (angle) => (180 * angle) / Math.PI;
 /** Largest of the two units' load transfer ratios. */
 const transferOf = ({ truck }) =>
   Math.max(Math.abs(truck.tractor_load_transfer_ratio), Math.abs(truck.trailer_load_transfer_ratio));
-const articulationOf = ({ truck }) => {
-  const angle = truck.heading - truck.trailer_heading;
-  return Math.atan2(Math.sin(angle), Math.cos(angle));
-};
-
-/** A steer angle in words (deg). */
-const turnWords = (angle) => `${degrees(Math.abs(angle), 1)} ${angle < 0 ? "right" : "left"}`;
+const articulationOf = ({ truck }) => wrapped(truck.heading - truck.trailer_heading);
 
 /** The readings: name, value of a step, text. Each is also a small curve over the episode. */
 const LIVE_READINGS = [
   ["Speed", ({ row }) => 3.6 * row.truck.speed, (value) => `${decimal(value, 1)}${GAP}km/h`, "tall"],
   ["Load transfer ratio", ({ row }) => transferOf(row), (value) => decimal(value, 2), "tall"],
   ["Off-tracking", ({ offTracking }) => offTracking, metres],
-  ["Steering", ({ row }) => inDegrees(row.truck.steering), turnWords],
-  ["Articulation", ({ row }) => inDegrees(articulationOf(row)), (value) => degrees(value, 1)],
+  ["Steering", ({ row }) => toDegrees(row.truck.steering), turnWords],
+  ["Articulation", ({ row }) => toDegrees(articulationOf(row)), (value) => degrees(value, 1)],
   ["Nearest kerb", ({ row }) => Math.min(row.clearance.tractor, row.clearance.trailer), metres],
   ["Lane's centre", ({ row }) => row.progress.lane_distance, metres],
 ];

@@ -234,11 +234,11 @@ class Visit {
     this.stage.camera.zoom(factor, at);
   }
 
-  /** A click follows the truck under it. */
-  async click(at) {
+  /** A click follows the truck within reach of it (pixels). */
+  async click(at, reach) {
     await this.app.attempt(async () => {
       const { crowd, at: pixel } = this.inPane(at);
-      const env = await crowd.nearest(this.stage.pointAt(crowd, pixel), Math.max(REACH * this.stage.camera.pixel, 3));
+      const env = await crowd.nearest(this.stage.pointAt(crowd, pixel), Math.max(reach * this.stage.camera.pixel, 3));
       if (env !== null) await this.pick(env, crowd);
     });
   }

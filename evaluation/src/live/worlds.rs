@@ -15,7 +15,7 @@ use super::packed::Packed;
 use super::{Ground, journal, splits};
 
 /// The facts, with the tables as sections.
-pub(super) fn printed(ground: &Ground, policies: &[Policy], packed: &mut Packed) -> Value {
+pub(super) fn printed(ground: &Ground, policies: &[&Policy], packed: &mut Packed) -> Value {
     let Ground { scenario, world } = ground;
     let routes: Vec<(usize, &Route)> = scenario.routes().collect();
     let roads = scenario.places.iter().zip(&world.fields).enumerate().map(|(index, (place, field))| {

@@ -57,8 +57,7 @@ class Pairs {
   play(playing) {
     if (playing && this.last <= this.frame) this.seek(0);
     this.playing = playing;
-    byId("play").textContent = playing ? "❚❚" : "▶";
-    byId("play").setAttribute("aria-label", playing ? "Pause" : "Play");
+    showPlaying(byId("play"), playing);
     let before = performance.now();
     const tick = () => {
       if (!this.playing) return;

@@ -17,8 +17,14 @@ use crate::tabular::html_text;
 
 const TEMPLATE: &str = concat!(include_str!("head.html"), include_str!("comparison.html"));
 const STYLE: &str = concat!(include_str!("theme.css"), include_str!("style.css"), include_str!("comparison.css"));
-const SCRIPTS: [&str; 4] =
-    [include_str!("elements.js"), include_str!("data.js"), include_str!("scene.js"), include_str!("comparison.js")];
+const SCRIPTS: [&str; 6] = [
+    include_str!("elements.js"),
+    include_str!("packed.js"),
+    include_str!("truck.js"),
+    include_str!("data.js"),
+    include_str!("scene.js"),
+    include_str!("comparison.js"),
+];
 
 /// Most pairs of episodes that a page shows: about 2 MB.
 pub const MOST_PAIRS: usize = 200;

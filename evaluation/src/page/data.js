@@ -3,9 +3,6 @@
 // Episodes lie column by column: for each column and episode the difference to the frame before, as zigzag varint, all
 // of it gzipped.
 
-/** The text of a data block. */
-const block = (id) => byId(id).textContent.trim();
-
 /** Rows of a CSV file as one array of numbers a column; a cell without a number is NaN. Null without a file or rows. */
 function columnsOf(csv) {
   if (csv === null) return null;
@@ -19,17 +16,6 @@ function columnsOf(csv) {
   const complete = rows.filter((row) => row.length === names.length);
   names.forEach((name, index) => { columns[name.trim()] = complete.map((row) => number(row[index])); });
   return complete.length === 0 ? null : columns;
-}
-
-/** The bytes of a base64 text that holds a gzip file. */
-async function inflated(text) {
-  const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  const { readable, writable } = new DecompressionStream("gzip");
-  const writer = writable.getWriter();
-  // The reading end reports an error in the bytes.
-  const written = writer.write(packed).then(() => writer.close()).catch(() => {});
-  const [bytes] = await Promise.all([new Response(readable).arrayBuffer(), written]);
-  return new Uint8Array(bytes);
 }
 
 /** One array of numbers a column, all episodes one after the other, `columns` as [name, unit of the integers]. */
@@ -98,9 +84,6 @@ async function readPage() {
   return { report, evaluation, ground, columns, episodes, shown: shownOf(evaluation, episodes), metrics: columnsOf(JSON.parse(block("metrics"))) };
 }
 
-/** Difference of two headings, in [-pi, pi]. */
-const wrapped = (angle) => Math.atan2(Math.sin(angle), Math.cos(angle));
-
 /** The state of an episode at `frame`: linear interpolation between two frames. */
 function instant(page, episode, frame) {
   const { columns, ground } = page, { rig } = episode;
@@ -115,10 +98,10 @@ function instant(page, episode, frame) {
     // A ray that jumps to another kerb is not interpolated.
     return Math.abs(b - a) < 3 ? a + part * (b - a) : part < 0.5 ? a : b;
   });
+  const [trailerX, trailerY] = trailerMiddle(rig, [x, y], heading, trailerHeading);
   return {
     x, y, heading, trailerHeading, ranges,
-    trailerX: x + rig.fifth_wheel * Math.cos(heading) - rig.trailer_wheelbase * Math.cos(trailerHeading),
-    trailerY: y + rig.fifth_wheel * Math.sin(heading) - rig.trailer_wheelbase * Math.sin(trailerHeading),
+    trailerX, trailerY,
     time: at * ground.step,
     steering: between("steering"), speed: between("speed"), laneDistance: between("lane_distance"),
     articulation: wrapped(heading - trailerHeading),

@@ -90,3 +90,13 @@ function sparkline(values) {
 function press(group, pressed) {
   for (const button of group.querySelectorAll("button")) button.setAttribute("aria-pressed", String(button === pressed));
 }
+
+/** Entries of a legend: lines in colours of the theme, each with what it is. */
+const lineKeys = (pairs) => pairs.map(([colour, words]) =>
+  html("li", {}, html("i", { class: "thin", style: `--swatch: var(--${colour})` }), words));
+
+/** Shows on the button of time whether it runs. */
+function showPlaying(button, playing) {
+  button.textContent = playing ? "❚❚" : "▶";
+  button.setAttribute("aria-label", playing ? "Pause" : "Play");
+}

@@ -1,12 +1,10 @@
 // The replay of one episode, with the figures of the current frame. A link ending in #20m/W-left-3/4/7.5 opens the
 // fifth episode of that route at 7.5 s.
 
-const toDegrees = (angle) => (180 * angle) / Math.PI;
-
 /** The figures of a frame: name, value, text. Each is also a small curve over the episode. */
 const READINGS = [
   ["Speed", (now) => 3.6 * now.speed, (value) => `${decimal(value, 1)}${GAP}km/h`],
-  ["Steer angle", (now) => toDegrees(now.steering), (value) => `${degrees(Math.abs(value), 1)} ${value < 0 ? "right" : "left"}`],
+  ["Steer angle", (now) => toDegrees(now.steering), turnWords],
   ["Articulation", (now) => toDegrees(now.articulation), (value) => degrees(value, 1)],
   ["LTR, tractor", (now) => now.tractorTransfer, (value) => decimal(value, 2)],
   ["LTR, trailer", (now) => now.trailerTransfer, (value) => decimal(value, 2)],
@@ -133,8 +131,7 @@ class Replay {
     // At the end, playing starts again.
     if (playing && this.frame >= this.episode.n_frames - 1) this.seek(0);
     this.playing = playing;
-    byId("play").textContent = playing ? "❚❚" : "▶";
-    byId("play").setAttribute("aria-label", playing ? "Pause" : "Play");
+    showPlaying(byId("play"), playing);
     if (!playing) return;
     let before = performance.now();
     const tick = () => {
@@ -188,7 +185,6 @@ class Replay {
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.show());
     new ResizeObserver(() => this.show()).observe(this.canvas);
     const legend = [["kerb", "kerb"], ["route", "route's lane centre"], ["tractor", "tractor, path of its drive axle"], ["trailer", "trailer, path of its axles"], ["ray", "distance sensors"]];
-    byId("scene-legend").replaceChildren(...legend.map(([colour, words]) =>
-      html("li", {}, html("i", { class: "thin", style: `--swatch: var(--${colour})` }), words)));
+    byId("scene-legend").replaceChildren(...lineKeys(legend));
   }
 }

@@ -80,8 +80,12 @@ impl Validation {
 
     /// Whether it is time for the next one, with this fraction of the budget spent.
     pub fn is_due(&self, fraction: f64) -> bool {
-        let times = self.settings.times as u64;
-        self.n_made < times && self.n_made < (fraction * times as f64 + 1e-9) as u64
+        self.n_made < self.n_due(fraction)
+    }
+
+    /// Validations that a run makes until this fraction of its budget is spent.
+    fn n_due(&self, fraction: f64) -> u64 {
+        (fraction.min(1.0) * self.settings.times as f64 + 1e-9) as u64
     }
 
     /// Lets the policy drive. It becomes the best one unless an earlier one arrived more often. A refined one
@@ -112,7 +116,7 @@ impl Validation {
         let Summary { arrived, success, lane_distance_mean_arrived, .. } = summary;
         let arrived = arrived as u64;
         let validated = Validated { env_steps, arrived, success, lane_distance_mean_arrived };
-        self.n_made = (fraction * self.settings.times as f64 + 1e-9) as u64;
+        self.n_made = self.n_due(fraction);
         self.last = Some(validated);
         if is_refined || self.best.as_ref().is_none_or(|(best, _)| best.arrived <= arrived) {
             self.best = Some((validated, bytes));
@@ -163,8 +167,8 @@ impl Validation {
         columns.put(BEST, &policy[..]);
     }
 
-    /// Continues from what [`Validation::save`] added.
-    pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
+    /// Continues from what [`Validation::save`] added, with this fraction of the budget spent.
+    pub fn restore(&mut self, stored: &Stored, fraction: f64) -> Result<(), Error> {
         if stored.bytes(COUNTS).is_none() {
             return Ok(());
         }
@@ -190,7 +194,8 @@ impl Validation {
         let policy: Vec<u8> = stored.column(BEST)?;
         Policy::from_bytes(&format!("its column `{BEST}`"), &policy)
             .map_err(|error| stored.error(error.to_string()))?;
-        self.n_made = n_made;
+        // Of a larger budget than before a smaller part is spent: more are to come.
+        self.n_made = n_made.min(self.n_due(fraction));
         self.last = Some(validated(last_steps, last_arrived, last_distance));
         self.best = Some((validated(best_steps, best_arrived, best_distance), policy));
         Ok(())

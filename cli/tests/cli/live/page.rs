@@ -40,7 +40,7 @@ pub fn ground(benchmark: &str) -> Ground {
 
 /// The text of a page of these benchmarks and policies.
 pub fn written(grounds: Vec<Ground>, policies: Vec<Policy>, file: &Path) -> String {
-    Live { grounds, policies, seed: 0 }.write(file).unwrap();
+    Live { grounds, policies, run: None, seed: 0 }.write(file).unwrap();
     read(file)
 }
 

@@ -16,20 +16,20 @@ use super::served::Given;
 use crate::page::read;
 use crate::place::{Place, offtrack, succeed};
 
-const N_ENVS: usize = 64;
-const N_STEPS: usize = 300;
-const SEED: u32 = 3;
+pub const N_ENVS: usize = 64;
+pub const N_STEPS: usize = 300;
+pub const SEED: u32 = 3;
 
 /// A run: the index of its benchmark and its policy on the page, what follows an end.
 #[derive(Clone, Copy)]
-struct Run {
-    world: usize,
-    policy: Option<usize>,
-    autoreset: Autoreset,
+pub struct Run {
+    pub world: usize,
+    pub policy: Option<usize>,
+    pub autoreset: Autoreset,
 }
 
 impl Run {
-    fn name(&self) -> String {
+    pub fn name(&self) -> String {
         format!("{}-{:?}-{:?}", self.world, self.policy, self.autoreset)
     }
 
@@ -47,7 +47,7 @@ impl Run {
     }
 
     /// Where the page's run is another one than that of the CPU engine.
-    fn difference(&self, world: &Arc<World>, policies: &[Policy], given: &Given) -> Result<(), String> {
+    pub fn difference(&self, world: &Arc<World>, policies: &[Policy], given: &Given) -> Result<(), String> {
         let routes = (0..world.routes.len() as u32).collect();
         let mut simulator = Simulator::new(world.clone(), N_ENVS, SEED, RouteChoice::Drawn(routes)).unwrap();
         simulator.set_autoreset(self.autoreset);

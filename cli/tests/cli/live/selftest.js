@@ -5,10 +5,8 @@ const give = (name, body) => fetch(name, { method: "POST", body });
 
 const opened = async (gpu, job) => Batch.open(gpu, await gpu.world(job.world), job);
 
-/** Whole runs: trucks, actions and ends after every step, all columns before the first and after the last. */
-async function run(live, gpu, job) {
-  const batch = await opened(gpu, job);
-  if (job.policy !== null) await batch.setPolicy(Policy.shipped(live, job.policy));
+/** A whole run of a batch: trucks, actions and ends after every step, all columns before the first and after the last. */
+async function recorded(live, gpu, batch, job) {
   const all = () => Promise.all(batch.columns.map((name) => batch.column(name)));
   batch.beginAll();
   const first = await all();
@@ -27,7 +25,49 @@ async function run(live, gpu, job) {
   await give(`${job.name}.steps`, new Blob(steps));
   await give(`${job.name}.last`, new Blob(await all()));
   await give(`${job.name}.tally`, JSON.stringify(sums));
+}
+
+async function run(live, gpu, job) {
+  const batch = await opened(gpu, job);
+  if (job.policy !== null) await batch.setPolicy(Policy.shipped(live, job.policy));
+  await recorded(live, gpu, batch, job);
   batch.close();
+}
+
+/** A slider that is dragged to some places: what the page says then, and a run of its crowd. */
+async function slider(live, _, job) {
+  const page = new App(live), range = byId("learned");
+  await page.start({ n: job.n, seed: job.seed });
+  page.play(false);
+  page.visit.zoom(2);
+  const [crowd] = page.crowds, seen = [], { pixel } = page.stage.camera;
+  for (const { name, place } of job.runs) {
+    // A drag passes by other places.
+    for (const value of [0, range.max, place]) {
+      range.value = value;
+      range.dispatchEvent(new Event("input"));
+    }
+    await page.between(() => {});
+    const { begun } = crowd.batch, zoomed = page.stage.camera.pixel / pixel;
+    const [chosen] = byId("policy").selectedOptions, options = byId("policy").length;
+    const words = byId("learned-words").textContent, spoken = range.getAttribute("aria-valuetext");
+    const isShown = range.checkVisibility();
+    seen.push({ max: Number(range.max), words, spoken, chosen: chosen.textContent, options, begun, zoomed, isShown });
+    await page.between(() => recorded(live, page.gpu, crowd.batch, { ...job, name }));
+  }
+  await give(`${job.name}.seen`, JSON.stringify(seen));
+  await page.attempt(() => page.choose({ second: -1 }));
+  await page.stepBy(2);
+  await page.pickTruck(1);
+  const of = (what) => page.crowds.map(what), before = of(({ batch }) => batch.begun);
+  range.value = 0;
+  range.dispatchEvent(new Event("input"));
+  await page.between(() => {});
+  const [begun, followed] = [of(({ batch }) => batch.begun), of((one) => one.followed)];
+  const names = [...byId("pane-labels").querySelectorAll("span")].map(({ textContent }) => textContent);
+  const state = byId("truck-state").textContent;
+  await give(`${job.name}.beside`, JSON.stringify({ before, begun, followed, names, state }));
+  page.gpu.destroy();
 }
 
 /** Stage by stage: each from the columns that the test has of the one before. */
@@ -93,7 +133,7 @@ async function refuse(live, gpu, job) {
   batch.close();
 }
 
-const JOBS = { run, stages, act, refuse };
+const JOBS = { run, slider, stages, act, refuse };
 
 try {
   const live = await readLive();

@@ -5,11 +5,12 @@
 use std::collections::HashMap;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::sync::Arc;
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::{Sender, SyncSender, channel, sync_channel};
 use std::time::{Duration, Instant};
 
+use super::devtools::Pipes;
 use crate::browser::browser;
 
 /// Longest time that a page may take.
@@ -37,6 +38,9 @@ const ALLOWS: &str = "default-src 'none'; connect-src 'self'; form-action 'self'
 const DONE: &str = "done";
 const FAILED: &str = "failed";
 
+/// Where a page says what the browser's developer tools are to do.
+const DEVTOOLS: &str = "devtools";
+
 /// What a page gave, by the name that it gave it.
 pub type Given = HashMap<String, Vec<u8>>;
 
@@ -57,9 +61,11 @@ pub fn given_by(page: &str, files: HashMap<String, Vec<u8>>, without_gpu: bool) 
         }
     });
     let profile = tempfile::tempdir().unwrap();
+    let pipes = Pipes::new(profile.path());
     let flags = FLAGS.iter().filter(|flag| !without_gpu || !flag.contains("webgpu"));
     let _browser = Running(
-        Command::new(browser())
+        pipes
+            .command(&browser())
             .args(flags)
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .arg(format!("http://127.0.0.1:{port}/page.html"))
@@ -68,17 +74,29 @@ pub fn given_by(page: &str, files: HashMap<String, Vec<u8>>, without_gpu: bool) 
             .spawn()
             .unwrap(),
     );
+    let mut devtools = pipes.open();
     let (started, mut all) = (Instant::now(), Given::new());
     loop {
         let left = PATIENCE.saturating_sub(started.elapsed());
-        let (name, body): (String, Vec<u8>) =
+        let Post { name, body, .. } =
             given.recv_timeout(left).unwrap_or_else(|_| panic!("the page is not done; it gave {:?}", all.keys()));
         assert!(name != FAILED, "the page failed: {}", String::from_utf8_lossy(&body));
         if name == DONE {
             return all;
         }
-        all.insert(name, body);
+        if name == DEVTOOLS {
+            devtools.on_page(&body);
+        } else {
+            all.insert(name, body);
+        }
     }
+}
+
+/// What a page posts. It is answered when the test is done with it and drops `_taken`.
+struct Post {
+    name: String,
+    body: Vec<u8>,
+    _taken: SyncSender<()>,
 }
 
 /// A browser that is ended with the test.
@@ -92,7 +110,7 @@ impl Drop for Running {
 }
 
 /// Answers one request of a page.
-fn answer(connection: TcpStream, files: &HashMap<String, Vec<u8>>, sender: &Sender<(String, Vec<u8>)>) {
+fn answer(connection: TcpStream, files: &HashMap<String, Vec<u8>>, sender: &Sender<Post>) {
     let _ = connection.set_read_timeout(Some(SILENCE));
     let mut reader = BufReader::new(&connection);
     let mut line = String::new();
@@ -119,7 +137,9 @@ fn answer(connection: TcpStream, files: &HashMap<String, Vec<u8>>, sender: &Send
     let name = path.trim_start_matches('/');
     let (status, contents): (&str, &[u8]) = match (method, files.get(name)) {
         ("POST", _) => {
-            let _ = sender.send((name.to_owned(), body));
+            let (_taken, wait) = sync_channel(0);
+            let _ = sender.send(Post { name: name.to_owned(), body, _taken });
+            let _ = wait.recv();
             ("200 OK", b"")
         }
         (_, Some(contents)) => ("200 OK", contents),

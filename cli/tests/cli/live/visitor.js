@@ -123,6 +123,65 @@ async function keys(live) {
   page.gpu.destroy();
 }
 
+/** What fingers do on the picture. The touches are the browser's own; between them the page goes on. */
+async function touch(live) {
+  const page = await opened(live, { n: 8 }), { camera } = page.stage, [crowd] = page.crowds, all = {};
+  // As many steps have been made whenever the page was paused.
+  await page.between(() => crowd.batch.restart({ seed: 0 }));
+  await page.stepBy(8);
+  const { width, height } = byId("picture").getBoundingClientRect();
+  const devtools = (method, params) => give("devtools", JSON.stringify({ method, params }));
+  // What the picture hears of them, which comes some time after the browser has taken them.
+  const HEARD = { touchStart: "pointerdown", touchEnd: "pointerup" };
+  const fingers = async (type, points = [], heard = HEARD[type]) => {
+    const { left, top } = byId("picture").getBoundingClientRect();
+    const touchPoints = points.map(([x, y], id) => ({ x: left + x, y: top + y, id }));
+    const come = new Promise((next) =>
+      heard ? byId("picture").addEventListener(heard, next, { once: true }) : requestAnimationFrame(next));
+    await devtools("Input.dispatchTouchEvent", { type, touchPoints });
+    await come;
+  };
+  await devtools("Emulation.setTouchEmulationEnabled", { enabled: true, maxTouchPoints: 5 });
+  const [x, y] = [Math.round(width / 2), Math.round(height / 2)];
+  // One finger, up by 100 pixels: the page would scroll.
+  const before = [...camera.centre], { pixel } = camera;
+  await fingers("touchStart", [[x, y]]);
+  for (let way = 10; way <= 100; way += 10) await fingers("touchMove", [[x, y - way]]);
+  await fingers("touchEnd");
+  all.moved = camera.centre.map((centre, axis) => (centre - before[axis]) / pixel);
+  all.scrolled = document.scrollingElement.scrollTop;
+  all.canScroll = document.scrollingElement.scrollHeight - document.scrollingElement.clientHeight;
+  all.followedAfterDrag = crowd.followed;
+  // Two fingers, apart from 80 to 240 pixels; one is lifted before the other.
+  await fingers("touchStart", [[x - 40, y]]);
+  await fingers("touchStart", [[x - 40, y], [x + 40, y]]);
+  for (let way = 50; way <= 120; way += 10) await fingers("touchMove", [[x - way, y], [x + way, y]]);
+  await fingers("touchMove", [[x - 120, y]], "pointerup");
+  await fingers("touchEnd");
+  all.nearer = pixel / camera.pixel;
+  all.pageZoom = window.visualViewport.scale;
+  all.followedAfterPinch = crowd.followed;
+  // A finger beside a truck, out of reach of a mouse.
+  const bytes = new DataView(await crowd.batch.column("truck")), { size, fields } = live.facts.code.structs.Truck;
+  const route = bytes.getUint32(3 * size + fields.route.at, true);
+  const position = [0, 4].map((more) => bytes.getFloat32(3 * size + fields.position.at + more, true));
+  page.lookAt(page.world.facts.routes[route].road, ...position, 400);
+  await fingers("touchStart", [[x, y - 20]]);
+  await fingers("touchEnd");
+  await page.between(() => {});
+  all.followed = crowd.followed;
+  // With the wheel taken a finger steers, to its side.
+  page.takeOver();
+  page.play(false);
+  const { truck } = crowd.row, side = truck.heading + Math.PI / 2;
+  await fingers("touchStart", [[x + 50 * Math.cos(side), y - 50 * Math.sin(side)]]);
+  page.visit.update(0.5);
+  all.steering = page.visit.driving.steering;
+  await fingers("touchEnd");
+  await give("touch", JSON.stringify(all));
+  page.gpu.destroy();
+}
+
 /** What the page says to each file, and by which policy and where trucks then drive. */
 async function files(live, { names }) {
   const page = await opened(live, { n: 8 }), all = [];
@@ -174,7 +233,7 @@ async function without(live, { hasApi }) {
   await give("without", JSON.stringify(missing()));
 }
 
-const VISITS = { pixels, wheel, keys, files, again, lost, without };
+const VISITS = { pixels, wheel, keys, touch, files, again, lost, without };
 
 try {
   const plan = JSON.parse(new TextDecoder().decode(await asked("plan")));

@@ -95,6 +95,24 @@ fn every_key_of_the_page_does_what_its_list_says() {
 }
 
 #[test]
+fn one_finger_moves_the_picture_two_zoom_it_and_a_tap_beside_a_truck_follows_it_while_the_page_stays_where_it_is() {
+    let place = Place::new();
+    let found = visited(&page(&place), &json!({ "visit": "touch" }), HashMap::new(), false);
+    let number = |name: &str| found[name].as_f64().unwrap();
+    let moved = |axis: usize| found["moved"][axis].as_f64().unwrap();
+    // Up by 100 pixels, less what tells a drag from a tap.
+    assert!(moved(0).abs() < 1.0 && -101.0 < moved(1) && moved(1) < -70.0, "{found}");
+    assert!(100.0 < number("canScroll"), "{found}");
+    assert_eq!((&found["scrolled"], &found["pageZoom"]), (&json!(0), &json!(1)), "{found}");
+    assert!(2.0 < number("nearer") && number("nearer") < 3.1, "{found}");
+    for followed in ["followedAfterDrag", "followedAfterPinch"] {
+        assert_eq!(found[followed], Value::Null, "{found}");
+    }
+    assert_eq!(found["followed"], 3, "{found}");
+    assert!(0.05 < number("steering"), "{found}");
+}
+
+#[test]
 fn the_live_page_is_as_wide_as_its_window_on_a_telephone_and_on_a_desk() {
     let place = Place::new();
     page(&place);
