@@ -40,4 +40,5 @@ pub mod physics {
     pub use crate::engine::cpu::reset::drawn_start;
     pub use crate::engine::cpu::sense::ranges;
     pub use crate::engine::cpu::steer::{commanded, controlled};
+    pub use crate::engine::cpu::traffic::seen_by_vehicles;
 }

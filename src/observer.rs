@@ -321,7 +321,7 @@ impl Observer {
                 Ended::Running
             }
             State { ended: Ended::Running, .. } => {
-                ending(params, route, world.step_limit(truck), truck, &clearance, &progress)
+                ending(params, route, world.step_limit(truck), truck, &clearance, &progress, None)
             }
             State { ended, .. } => ended,
         };

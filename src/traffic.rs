@@ -28,6 +28,7 @@ mod run; // cars alone on a road
 mod snapshots; // states that episodes begin in
 mod step; // a step of a row of cars
 pub mod survey; // what passes the entries
+mod truck; // a truck among the cars
 pub mod units; // the integers that cars are counted in
 #[cfg(test)]
 mod tests;
@@ -46,6 +47,7 @@ pub use run::Run;
 pub use snapshots::{N_SNAPSHOTS, Snapshots};
 pub use step::{Setting, advance, decide, step};
 pub use survey::Survey;
+pub use truck::{Contact, Entry, Trucks, View, outlines, touched};
 
 use crate::files::reader::shown;
 

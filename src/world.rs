@@ -21,7 +21,7 @@ use crate::map::Frame;
 use crate::map::route::{Route, Waypoint};
 use crate::scenario::{ActionKind, Class, Clock, Entry, Invalid, Place, Scenario};
 use crate::vehicle::profile::Profile;
-pub use traffic::{Level, Traffic, TrafficRoad};
+pub use traffic::{Level, Traffic, TrafficRoad, TrafficRoute};
 
 /// Waypoints to the corner of each observed curvature.
 const CURVATURE_STEPS: [usize; 4] = [5, 7, 10, 12];

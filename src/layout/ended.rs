@@ -1,8 +1,8 @@
 //! Why an episode ended.
 
 crate::named! {
-    /// Why an episode ended, by the number and the name that reports have. Failure wins over arrival, everything wins
-    /// over the time limit.
+    /// Why an episode ended, by the number and the name that reports have. Failure wins over a vehicle that drove into
+    /// the truck, that over arrival, everything over the time limit.
     #[repr(u32)]
     pub enum Ended {
         /// The episode goes on.
@@ -21,9 +21,9 @@ crate::named! {
         Strayed = "strayed",
         /// The time limit was reached.
         TimedOut = "timed_out",
-        /// The truck drove into another vehicle.
+        /// The truck touched another vehicle, and is at fault.
         MetVehicle = "met_vehicle",
-        /// Another vehicle drove into the truck.
+        /// The truck touched another vehicle that is at fault.
         WasMet = "was_met",
     }
 }

@@ -96,7 +96,9 @@ fn check_cars(world: &World, env: usize, truck: &Truck, row: &Row) -> Result<(),
     let Some(traffic) = &world.traffic else { return Ok(()) };
     let road = &traffic.roads[world.routes[truck.route as usize].roundabout as usize];
     within(Column::Cars, env, ".level", row.level as usize, 0..=road.levels.len() - 1)?;
-    within(Column::Cars, env, ".met", row.met & 63, 0..=N_CARS as u32)?;
+    within(Column::Cars, env, ".entered", row.entered, 0..=truck.steps)?;
+    within(Column::Cars, env, ".met", row.met % 64, 0..=N_CARS as u32)?;
+    within(Column::Cars, env, ".hindered", row.hindered, 0..=(1 << N_CARS) - 1)?;
     for (slot, car) in row.cars.iter().enumerate().filter(|(_, car)| car.is_there()) {
         let field = |name: &str| format!("[{slot}].{name}");
         within(Column::Cars, env, &field("path"), car.path(), 0..=road.network.paths.len() - 1)?;

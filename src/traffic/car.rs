@@ -154,6 +154,12 @@ impl Car {
         self.style() & RUDE == RUDE
     }
 
+    /// The car with a rude driver, or with a polite one.
+    pub fn driven(self, is_rude: bool) -> Car {
+        let rude = RUDE << STYLE;
+        Car { what: if is_rude { self.what | rude } else { self.what & !rude }, ..self }
+    }
+
     /// The car after a step with its acceleration, which it held: the ballistic update of M. Treiber and A. Kesting,
     /// "Traffic Flow Dynamics" (2013), section 10.2, which stops where the speed reaches 0.
     pub(super) fn moved(&self) -> Car {
@@ -207,6 +213,14 @@ impl Outline {
         self.half_length * self.along.dot(direction).abs() + self.half_width * self.along.perp_dot(direction).abs()
     }
 
+    /// Square of the distance of a point from it, 0 inside (m²).
+    pub fn distance_squared(&self, point: Vec2) -> f32 {
+        let from = point - self.middle;
+        let ahead = (from.dot(self.along).abs() - self.half_length).max(0.0);
+        let aside = (from.perp_dot(self.along).abs() - self.half_width).max(0.0);
+        ahead * ahead + aside * aside
+    }
+
     /// Whether two rectangles overlap: none of their sides' directions separates them.
     pub fn overlaps(&self, other: &Outline) -> bool {
         let between = other.middle - self.middle;
@@ -236,6 +250,23 @@ mod tests {
         }
         // 1 m/s for 0.1 s, and half of 2 m/s² in its square.
         assert!((moved(0, 1.0, 10_486).station() - 0.11).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_point_is_as_far_from_a_rectangle_as_from_its_nearest_side_or_corner() {
+        let along = Vec2::new(0.6, 0.8);
+        let outline = Outline { middle: Vec2::new(5.0, 2.0), along, half_length: 2.0, half_width: 1.0 };
+        let at = |ahead: f32, left: f32| outline.middle + ahead * along + left * along.perp();
+        for (ahead, left, squared) in [(5.0, 0.5, 9.0), (-1.0, -3.0, 4.0), (-5.0, 5.0, 25.0), (1.9, 0.9, 0.0)] {
+            assert!((outline.distance_squared(at(ahead, left)) - squared).abs() < 1e-4, "{ahead} {left}");
+        }
+    }
+
+    #[test]
+    fn who_drives_a_car_changes_nothing_else_of_it() {
+        let car = moved(3, 4.0, 0);
+        assert_eq!([true, false].map(|is_rude| car.driven(is_rude).is_rude()), [true, false]);
+        assert_eq!(car.driven(true).driven(false), car);
     }
 
     #[test]

@@ -251,8 +251,13 @@ impl<'a> Driver<'a> {
     }
 
     /// The road's tables.
-    pub fn network(&self) -> &Network {
+    pub fn network(&self) -> &'a Network {
         self.crowd.network
+    }
+
+    /// The largest interaction that it minds so far (2^-16).
+    pub fn interaction(&self) -> i32 {
+        self.interaction
     }
 
     /// Minds an interaction (2^-16).

@@ -17,8 +17,10 @@ use crate::traffic::{self, Demand, Mix, Network, Row, Rules, Snapshots};
 pub struct Traffic {
     /// The driver model's numbers.
     pub rules: Rules,
-    /// Least and greatest fraction of rude drivers; each episode draws one.
-    pub rude: [f32; 2],
+    /// Least and greatest fraction of rude drivers; each episode draws one (2^-16).
+    pub rude: [u32; 2],
+    /// Distance between the waypoints of a route (m).
+    pub spacing: f32,
     /// Every road, in the order of the world's fields.
     pub roads: Vec<TrafficRoad>,
     /// Where each of the world's routes runs.
@@ -55,8 +57,8 @@ pub struct TrafficRoute {
 impl Traffic {
     /// Every table as words, one road after the other.
     pub(super) fn words(&self) -> impl Iterator<Item = Vec<u32>> {
-        let Traffic { rules, rude, roads, routes } = self;
-        let shared = [&rules.words()[..], &rude.map(f32::to_bits)].concat();
+        let Traffic { rules, rude, spacing, roads, routes } = self;
+        let shared = [&rules.words()[..], rude, &[spacing.to_bits()]].concat();
         let routes = routes.iter().flat_map(|&TrafficRoute { path, begins }| [path, begins.to_bits()]).collect();
         [shared, routes].into_iter().chain(roads.iter().map(TrafficRoad::words))
     }
@@ -82,7 +84,8 @@ impl Traffic {
                 TrafficRoute { path: path as u32, begins: begins[path] as f32 }
             })
         });
-        Ok(Some(Traffic { rules, rude: of.rude.map(|rude| rude as f32), roads, routes: routes.collect() }))
+        let rude = of.rude.map(|rude| (rude * f64::from(1 << 16)).round() as u32);
+        Ok(Some(Traffic { rules, rude, spacing: scenario.spacing as f32, roads, routes: routes.collect() }))
     }
 }
 

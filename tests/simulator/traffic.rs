@@ -1,13 +1,16 @@
 //! Other vehicles around the trucks of a batch.
 
+use std::fs;
 use std::sync::Arc;
 
 use offtrack::files::cache::Loading;
-use offtrack::layout::Column;
+use offtrack::layout::{Column, Ended};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
-use offtrack::traffic::Row;
+use offtrack::traffic::{Car, Contact, Row};
 use offtrack::world::World;
+
+use crate::left_hand;
 
 /// The world of `attard2023` with a table `[traffic]`.
 pub fn with_traffic(keys: &str) -> (Scenario, Arc<World>) {
@@ -54,6 +57,126 @@ fn vehicles_drive_alike_whatever_the_batch_and_the_threads_and_restored_ones_go_
     again.restore(of).unwrap();
     again.steps_at_random(50);
     assert_eq!(rows(&again), rows(&many));
+}
+
+#[test]
+fn in_a_million_steps_at_random_every_number_stays_finite_and_who_is_at_fault_decides_the_end() {
+    let (scenario, world) = with_traffic("demand = [1500, 2100]\nvans = 0.25\nrude = [0.0, 0.3]\n");
+    let routes = scenario.split(Split::Train).to_vec();
+    let mut simulator = Simulator::new(world.clone(), 512, 5, RouteChoice::Drawn(routes)).unwrap();
+    let (mut met, mut was_met) = (0, 0);
+    for step in 0..2000 {
+        simulator.steps_at_random(1);
+        let batch = simulator.batch();
+        for env in 0..512 {
+            let ended = Ended::from_code(batch.ended[env]).unwrap();
+            let failure = batch.terms[env].failure;
+            match ended {
+                Ended::MetVehicle => (met, _) = (met + 1, assert_eq!(failure, 1.0)),
+                Ended::WasMet => (was_met, _) = (was_met + 1, assert_eq!(failure, 0.0)),
+                _ => {}
+            }
+            let row = Row::of(&batch.cars[env]);
+            let entered = row.entered <= batch.truck[env].steps;
+            assert!(entered && row.hindered >> row.cars.len() == 0, "truck {env}, step {step}");
+            // A contact that ended nothing would go on.
+            assert!(ended != Ended::Running || row.met == 0, "truck {env}, step {step}");
+        }
+        if step % 100 == 0 {
+            let is_finite = batch.observation.iter().flatten().chain(&batch.reward).all(|value| value.is_finite());
+            assert!(is_finite, "step {step}");
+        }
+    }
+    assert!(20 < met && 2 < was_met, "{met} {was_met}");
+}
+
+#[test]
+fn an_episode_has_rude_drivers_by_its_own_fraction_among_those_who_are_there_and_those_who_come() {
+    let fractions = |keys: &str| {
+        let (scenario, world) = with_traffic(keys);
+        let choice = RouteChoice::Fixed(scenario.split(Split::Train).repeat(12));
+        let n = choice.routes().len();
+        let mut simulator = Simulator::new(world, n, 3, choice).unwrap();
+        let of = |simulator: &Simulator| -> Vec<f64> {
+            let fraction = |row: &Row| {
+                let there = row.cars.iter().filter(|car| car.is_there());
+                let n_rude = there.clone().filter(|car| car.is_rude()).count();
+                (3 < there.clone().count()).then(|| n_rude as f64 / there.count() as f64)
+            };
+            rows(simulator).iter().filter_map(fraction).collect()
+        };
+        let first = of(&simulator);
+        simulator.steps_at_random(200);
+        [first, of(&simulator)]
+    };
+    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+    for [first, later] in
+        [fractions("demand = [1500]\nrude = 0.3\n"), fractions("demand = [1500]\nrude = [0.0, 0.6]\n")]
+    {
+        assert!(
+            (mean(&first) - 0.3).abs() < 0.04 && (mean(&later) - 0.3).abs() < 0.05,
+            "{} {}",
+            mean(&first),
+            mean(&later)
+        );
+    }
+    let [none, nor_later] = fractions("demand = [1500]\n");
+    assert_eq!((mean(&none), mean(&nor_later)), (0.0, 0.0));
+    let [all, also_later] = fractions("demand = [1500]\nrude = 1.0\n");
+    assert_eq!((mean(&all), mean(&also_later)), (1.0, 1.0));
+}
+
+#[test]
+fn vehicles_around_a_truck_on_a_left_hand_road_are_those_of_its_mirror_image_to_the_last_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let driven = [left_hand::text("16m-maps"), left_hand::left_hand(&left_hand::text("16m-maps"))].map(|text| {
+        left_hand::world(folder.path(), &text, "drivable");
+        let file = folder.path().join("benchmark.toml");
+        let benchmark = fs::read_to_string(&file).unwrap() + "[traffic]\ndemand = [1200]\nrude = [0.0, 0.3]\n";
+        fs::write(&file, benchmark).unwrap();
+        let scenario = Scenario::read(&file).unwrap();
+        let world = Arc::new(World::bake(&scenario).unwrap());
+        let choice = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
+        let mut simulator = Simulator::new(world, 128, 7, choice).unwrap();
+        simulator.steps_at_random(200);
+        simulator.batch().columns().map(|(_, column)| column.to_vec())
+    });
+    assert!(driven[0] == driven[1]);
+}
+
+#[test]
+fn a_truck_that_drives_into_the_car_before_it_ends_by_its_fault_and_one_behind_a_faster_car_drives_on() {
+    let (scenario, world) = with_traffic("demand = [0]\n");
+    let choice = RouteChoice::Fixed(vec![scenario.split(Split::Train)[0]]);
+    let traffic = world.traffic.as_ref().unwrap();
+    // The truck drives straight on at 30 km/h on its approach; a car stands before it, or drives away from it.
+    let ended = |station: f32, speed: f32, steps: usize| {
+        let mut simulator = Simulator::new(world.clone(), 1, 1, choice.clone()).unwrap();
+        let row = *Row::of(&simulator.batch().cars[0]);
+        assert!(row.cars.iter().all(|car| !car.is_there()));
+        let path = traffic.routes[simulator.batch().truck[0].route as usize].path;
+        let car = Car {
+            station: (station * 1_048_576.0) as i32,
+            speed: (speed * 52_428.8) as i32,
+            what: path,
+            acceleration: 0,
+        };
+        let mut cars = row;
+        cars.cars[4] = car;
+        let kept = simulator.batch().clone();
+        let words: Vec<u8> = bytemuck::bytes_of(&cars).to_vec();
+        simulator.restore(|column| Some(if column == Column::Cars { &words } else { kept.column(column) })).unwrap();
+        for _ in 0..steps {
+            simulator.step(&[4]).unwrap();
+            if simulator.batch().ended[0] != Ended::Running as u32 {
+                break;
+            }
+        }
+        let met = Row::of(&simulator.batch().cars[0]).met;
+        (Ended::from_code(simulator.batch().ended[0]).unwrap(), Contact::from_code(met).map(|contact| contact.slot))
+    };
+    assert_eq!(ended(30.0, 0.0, 40), (Ended::MetVehicle, Some(4)));
+    assert_eq!(ended(45.0, 9.0, 5), (Ended::Running, None));
 }
 
 #[test]

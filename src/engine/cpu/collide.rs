@@ -9,6 +9,7 @@ use glam::Vec2;
 use multiversion::multiversion;
 
 use crate::engine::Row;
+use crate::engine::cpu::traffic::meet;
 use crate::field::{Field, Purpose};
 use crate::layout::angle::direction;
 use crate::layout::shared::constants;
@@ -35,9 +36,10 @@ constants! {
     const N_SPANS: usize = 96;
 }
 
-/// Fills the row's clearance.
+/// Fills the row's clearance, and which vehicle the truck touches.
 pub fn collide(world: &World, row: &mut Row) {
     *row.clearance = clearance_of(world, row.truck);
+    meet(world, row);
 }
 
 /// The clearances of a truck.

@@ -1,10 +1,11 @@
 //! Judges the step: whether and why the episode ended, and the reward.
 //!
-//! Failure wins over arrival, everything wins over the time limit.
+//! Failure wins over a vehicle that drove into the truck, that over arrival, everything over the time limit.
 
 use crate::engine::Row;
 use crate::layout::angle::wrapped;
 use crate::layout::{Clearance, Ended, Params, Progress, Reward, RewardTerms, RouteRow, Truck};
+use crate::traffic::{self, Contact};
 use crate::world::World;
 
 /// Advances the truck's number of steps and writes the end code, the reward's terms and the reward.
@@ -12,7 +13,8 @@ pub fn judge(world: &World, row: &mut Row) {
     row.truck.steps += 1;
     let route = &world.routes[row.truck.route as usize];
     let step_limit = world.step_limit(row.truck);
-    let ended = ending(&world.params, route, step_limit, row.truck, row.clearance, row.progress);
+    let met = row.cars.as_deref().and_then(|words| Contact::from_code(traffic::Row::of(words).met));
+    let ended = ending(&world.params, route, step_limit, row.truck, row.clearance, row.progress, met);
     *row.ended = ended as u32;
     *row.terms = reward_terms(&world.reward, row.clearance, row.progress, ended);
     *row.reward = rewarded(&world.reward, row.terms);
@@ -26,6 +28,7 @@ pub fn ending(
     truck: &Truck,
     clearance: &Clearance,
     progress: &Progress,
+    met: Option<Contact>,
 ) -> Ended {
     let articulation = wrapped(truck.heading - truck.trailer_heading);
     let load_transfer_ratio = truck.load_transfer_ratio();
@@ -38,8 +41,12 @@ pub fn ending(
         Ended::RolledOver
     } else if params.jackknife_angle < articulation.abs() {
         Ended::Jackknifed
+    } else if met.is_some_and(|contact| contact.is_trucks_fault) {
+        Ended::MetVehicle
     } else if !arrived && params.stray_distance < progress.waypoint_distance {
         Ended::Strayed
+    } else if met.is_some() {
+        Ended::WasMet
     } else if arrived {
         Ended::Arrived
     } else if step_limit < truck.steps {
@@ -70,4 +77,39 @@ pub fn rewarded(weights: &Reward, terms: &RewardTerms) -> f32 {
         + weights.lane_distance * terms.lane_distance
         + weights.clearance * terms.clearance
         + weights.failure * terms.failure
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable;
+
+    use super::*;
+
+    /// How a step ends in which the truck touched a vehicle, if it did, and so far from kerbs, with this articulation
+    /// (m, rad), having strayed or arrived or neither.
+    fn ended(met: Option<bool>, clearance: f32, articulation: f32, [strayed, arrived]: [bool; 2]) -> Ended {
+        let params = Params { jackknife_angle: 1.0, stray_distance: 10.0, rollover_ratio: 1.0, ..Params::zeroed() };
+        let route = RouteRow { n_waypoints: 50, ..RouteRow::zeroed() };
+        let truck = Truck { heading: articulation, steps: 700, ..Truck::default() };
+        let clearance = Clearance { tractor: 1.0, trailer: clearance };
+        let waypoint_distance = if strayed { 11.0 } else { 1.0 };
+        let progress = Progress { waypoint: if arrived { 50 } else { 7 }, waypoint_distance, ..Progress::zeroed() };
+        let met = met.map(|is_trucks_fault| Contact { slot: 3, is_trucks_fault });
+        ending(&params, &route, 600, &truck, &clearance, &progress, met)
+    }
+
+    #[test]
+    fn of_ends_in_one_step_failure_wins_over_being_met_that_over_arrival_and_the_time_limit_is_last() {
+        let [truck, car] = [Some(true), Some(false)];
+        for met in [truck, car] {
+            assert_eq!(ended(met, -0.1, 0.0, [false, true]), Ended::TrailerCollided);
+            assert_eq!(ended(met, 1.0, 1.1, [false, true]), Ended::Jackknifed);
+        }
+        assert_eq!(ended(truck, 1.0, 0.0, [true, false]), Ended::MetVehicle);
+        assert_eq!(ended(truck, 1.0, 0.0, [false, true]), Ended::MetVehicle);
+        assert_eq!(ended(car, 1.0, 0.0, [true, false]), Ended::Strayed);
+        assert_eq!(ended(car, 1.0, 0.0, [false, true]), Ended::WasMet);
+        assert_eq!(ended(car, 1.0, 0.0, [false, false]), Ended::WasMet);
+        assert_eq!(ended(None, 1.0, 0.0, [false, false]), Ended::TimedOut);
+    }
 }

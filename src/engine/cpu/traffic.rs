@@ -3,13 +3,13 @@
 use glam::Vec2;
 
 use crate::engine::Row;
-use crate::layout::angle::direction;
+use crate::engine::cpu::follow::{followed, reference_point};
 use crate::layout::random::{self, Draw};
 use crate::layout::shared::constants;
-use crate::layout::{Body, Rig, Stream, Truck};
+use crate::layout::{Progress, Stream, Truck};
 use crate::traffic::car::Outline;
-use crate::traffic::{self, Car, Clock, Nobody, Setting};
-use crate::world::{Level, Traffic, TrafficRoad, World};
+use crate::traffic::{self, Car, Clock, Contact, Entry, Event, Setting, Trucks, View, outlines, touched};
+use crate::world::{Level, Traffic, TrafficRoad, TrafficRoute, World};
 
 constants! {
     /// Room to other vehicles before and behind each unit that a truck begins with (m).
@@ -23,54 +23,116 @@ pub fn traffic(world: &World, row: &mut Row) {
     let (Some(shared), Some(words)) = (&world.traffic, &mut row.cars) else { return };
     let around = traffic::Row::of_mut(words);
     let TrafficRoad { network, levels } = road_of(world, shared, row.truck.route);
-    let Level { demand, .. } = &levels[around.level as usize];
+    let view = view(world, shared, row.truck, row.progress);
+    if !view.waits && around.entered == 0 {
+        around.entered = row.truck.steps + 1;
+    }
+    let setting = Setting { network, rules: &shared.rules, demand: &levels[around.level as usize].demand };
+    let views = [view];
+    let trucks = Trucks::new(network, &views, around.hindered);
     let Stream { seed, env } = row.stream;
     let clock = Clock { seed, env, episode: row.truck.episode, step: row.truck.steps };
-    let setting = Setting { network, rules: &shared.rules, demand };
-    traffic::step(setting, clock, &mut around.cars, &mut around.backlog, &Nobody, &mut |_, _| ());
+    let mut came = 0u32;
+    let mut tell = |event, _: &[Car]| {
+        if let Event::Entered(_, slot) = event {
+            came |= 1 << slot;
+        }
+    };
+    traffic::step(setting, clock, &mut around.cars, &mut around.backlog, &trucks, &mut tell);
+    if came != 0 {
+        let drivers = Drivers::drawn(shared, row.stream, row.truck.episode);
+        let slots = (0..around.cars.len()).filter(|slot| came & 1 << slot != 0);
+        slots.for_each(|slot| drivers.sit_in(&mut around.cars[slot], row.truck.steps + 1, slot));
+    }
+    // A slot's next car has yet to be hindered.
+    let there = (0..around.cars.len()).filter(|&slot| around.cars[slot].is_there());
+    around.hindered = trucks.hindered() & !came & there.fold(0, |bits, slot| bits | 1 << slot);
 }
 
-fn road_of<'a>(world: &World, shared: &'a Traffic, route: u32) -> &'a TrafficRoad {
+pub(super) fn road_of<'a>(world: &World, shared: &'a Traffic, route: u32) -> &'a TrafficRoad {
     &shared.roads[world.routes[route as usize].roundabout as usize]
+}
+
+/// A truck as the vehicles around it see it, if the world has any.
+pub fn seen_by_vehicles(world: &World, truck: &Truck, progress: &Progress) -> Option<View> {
+    world.traffic.as_ref().map(|shared| view(world, shared, truck, progress))
+}
+
+fn view(world: &World, shared: &Traffic, truck: &Truck, progress: &Progress) -> View {
+    let TrafficRoute { path, begins } = shared.routes[truck.route as usize];
+    let rig = world.rig(truck);
+    let waypoints = world.route_waypoints(truck.route);
+    let point = reference_point(rig.wheelbase, truck);
+    // Whether this step's waypoints have been counted or not: passed ones stay so.
+    let next = followed(waypoints, point, progress.waypoint, world.params.stray_distance).waypoint as usize;
+    let last = next.clamp(1, waypoints.len() - 1) - 1;
+    let behind_last = (point - waypoints[last].position).dot(waypoints[last].direction);
+    let ahead = rig.tractor_body.front - 0.5 * rig.wheelbase;
+    let station = begins + last as f32 * shared.spacing + behind_last + ahead;
+    View::new(&road_of(world, shared, truck.route).network, rig, truck, path as usize, station)
+}
+
+/// Writes down which vehicle the row's truck touches, if the world has any.
+pub fn meet(world: &World, row: &mut Row) {
+    let (Some(shared), Some(words)) = (&world.traffic, &mut row.cars) else { return };
+    let around = traffic::Row::of_mut(words);
+    let network = &road_of(world, shared, row.truck.route).network;
+    let TrafficRoute { path, .. } = shared.routes[row.truck.route as usize];
+    let steps = (around.entered != 0).then(|| row.truck.steps + 1 - around.entered);
+    let entry = Entry { arm: network.source_of(path as usize).entry, steps };
+    let contact = touched(network, world.rig(row.truck), row.truck, entry, &around.cars);
+    around.met = contact.map_or(0, Contact::code);
+}
+
+/// Who drives the vehicles of an episode.
+struct Drivers {
+    /// Fraction of rude ones (2^-16).
+    rude: u32,
+    key: u32,
+}
+
+impl Drivers {
+    fn drawn(shared: &Traffic, stream: Stream, episode: u32) -> Drivers {
+        let [_, _, rude, key] = drawn(stream, episode);
+        let [least, greatest] = shared.rude;
+        // Of 16 bits each: the product fits in a word.
+        Drivers { rude: least + (((greatest - least) * (rude >> 16)) >> 16), key }
+    }
+
+    /// Has a vehicle, that entered a slot after so many steps of the episode, driven by a rude one or not.
+    fn sit_in(&self, car: &mut Car, step: u32, slot: usize) {
+        let [word, ..] = random::words(self.key, step, slot as u32, Draw::Traffic as u32);
+        *car = car.driven(word >> 16 < self.rude);
+    }
+}
+
+/// What an episode draws of the vehicles: demand, snapshot, fraction of rude drivers, and the key of who is one.
+fn drawn(Stream { seed, env }: Stream, episode: u32) -> [u32; 4] {
+    random::words(seed, env, episode, Draw::Traffic as u32)
 }
 
 /// Puts the vehicles of a snapshot around a truck that begins an episode, but for those that are too near to it.
 pub fn surrounded(world: &World, shared: &Traffic, stream: Stream, truck: &Truck) -> traffic::Row {
-    let Stream { seed, env } = stream;
     let road = road_of(world, shared, truck.route);
-    let [level, snapshot, ..] = random::words(seed, env, truck.episode, Draw::Traffic as u32);
+    let [level, snapshot, ..] = drawn(stream, truck.episode);
     let level = random::index_below(level, road.levels.len() as u32);
     let Level { snapshots, .. } = &road.levels[level as usize];
     let mut row = snapshots[random::index_below(snapshot, snapshots.len() as u32) as usize];
     row.level = level;
+    let drivers = Drivers::drawn(shared, stream, truck.episode);
     let grown = |unit: Outline| Outline {
         half_length: unit.half_length + ROOM_ALONG,
         half_width: unit.half_width + ROOM_BESIDE,
         ..unit
     };
-    let units = units(world.rig(truck), truck).map(grown);
-    for car in row.cars.iter_mut().filter(|car| car.is_there()) {
+    let units = outlines(world.rig(truck), truck).map(grown);
+    for (slot, car) in row.cars.iter_mut().enumerate().filter(|(_, car)| car.is_there()) {
         let outline = car.outline(&road.network);
         if units.iter().any(|unit| unit.overlaps(&outline)) {
             *car = Car::NONE;
+        } else {
+            drivers.sit_in(car, 0, slot);
         }
     }
     row
-}
-
-/// The ground that tractor and trailer cover.
-pub fn units(rig: &Rig, truck: &Truck) -> [Outline; 2] {
-    let outline = |body: &Body, position: Vec2, heading: f32| {
-        let along = direction(heading);
-        Outline {
-            middle: position + 0.5 * (body.front + body.rear) * along,
-            along,
-            half_length: 0.5 * (body.front - body.rear),
-            half_width: body.half_width,
-        }
-    };
-    [
-        outline(&rig.tractor_body, truck.position, truck.heading),
-        outline(&rig.trailer_body, truck.trailer_position(rig), truck.trailer_heading),
-    ]
 }

@@ -1,0 +1,74 @@
+//! Drives a truck that follows and yields among cars over all routes of the study, prints how the episodes ended, and
+//! what the cars cost.
+//!
+//! `cargo run --release -p offtrack-policy --example among_cars -- [TIMES] [RUDE] [DEMAND]...`: each route 3 times, no
+//! rude drivers, 300, 900, 1,500 and 2,100 veh/h unless stated. The time of a step is that of a truck on all cores, in
+//! ratio to the same actions on empty roads: both are driven in turns.
+
+#[path = "../policy/tests/among_cars/driver.rs"]
+mod driver;
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use driver::{Ends, driven, simulator, world};
+use offtrack::world::World;
+
+const SEED: u32 = 7;
+
+/// Time of a truck's step in each of two worlds by the same actions (us).
+fn replayed(worlds: [&Arc<World>; 2], times: usize, actions: &[Vec<u32>]) -> [f64; 2] {
+    let mut simulators = worlds.map(|world| simulator(world, times, SEED));
+    let (mut seconds, mut steps) = ([0.0; 2], [0; 2]);
+    for actions in actions {
+        for (index, simulator) in simulators.iter_mut().enumerate() {
+            steps[index] += simulator.batch().truck.iter().filter(|truck| truck.held == 0).count();
+            let begun = Instant::now();
+            simulator.step(actions).expect("the actions are the world's");
+            seconds[index] += begun.elapsed().as_secs_f64();
+        }
+    }
+    [0, 1].map(|index| seconds[index] * 1e6 / steps[index] as f64)
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let numbers: Vec<f64> = std::env::args().skip(1).map(|word| word.parse()).collect::<Result<_, _>>()?;
+    let number = |index: usize, default: f64| numbers.get(index).copied().unwrap_or(default);
+    let (times, rude) = (number(0, 3.0).max(1.0) as usize, number(1, 0.0));
+    let demands = numbers.get(2..).filter(|demands| !demands.is_empty()).unwrap_or(&[300.0, 900.0, 1500.0, 2100.0]);
+    for demand in demands {
+        let (mut scenario, world) = world(&format!("demand = [{demand}]\nvans = 0.25\nrude = {rude}\n"));
+        scenario.traffic = None;
+        let empty = Arc::new(World::bake(&scenario)?);
+        let Ends {
+            arrived,
+            met_vehicle,
+            was_met,
+            touched_kerb,
+            other,
+            overlaps,
+            hard_brakings,
+            met_on,
+            cars,
+            steps,
+            actions,
+        } = driven(&world, times, SEED);
+        let n = (arrived + met_vehicle + was_met + touched_kerb + other) as f64;
+        let percent = |count: usize| 100.0 * count as f64 / n;
+        let [among, alone] = replayed([&world, &empty], times, &actions);
+        println!(
+            "{demand} veh/h: {n} episodes, arrived {:.1} %, met a vehicle {:.1} %, was met {:.2} % {met_on:?}, \
+             kerb {:.1} %, other {:.1} %, {overlaps} overlaps of cars, hard brakings an episode {:.2}; {:.1} cars, \
+             {among:.2} us a step, ratio to an empty road {:.2}",
+            percent(arrived),
+            percent(met_vehicle),
+            percent(was_met),
+            percent(touched_kerb),
+            percent(other),
+            hard_brakings as f64 / n,
+            cars as f64 / steps as f64,
+            among / alone
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,116 @@
+//! Which car a truck touches, and whose fault it is.
+
+use glam::Vec2;
+
+use super::corridor::front;
+use super::view::{outlines, yaw_rate};
+use crate::layout::angle::{direction, sin_cos};
+use crate::layout::{Rig, Truck};
+use crate::traffic::car::Outline;
+use crate::traffic::units::{length, speed};
+use crate::traffic::{Car, Network};
+
+/// Time before a contact at which it is asked where the truck was (s).
+const BEFORE: f32 = 1.0;
+/// A truck has entered lately if it did so within so many steps.
+const LATELY: u32 = 30;
+/// A car has entered lately if it is not farther behind its line than it drives in this time, or than it comes in it
+/// from standing (steps, 2^-10 m).
+const LATELY_OF_CAR: i32 = LATELY as i32;
+const FROM_STANDING: i32 = length(9.0);
+/// No part of a car is farther from the sample behind its front, and no corner of a unit from the end of its axis (m).
+const NEAR: f32 = 12.0;
+/// Below this speed a car stands, and hits nobody.
+const STANDS: i32 = speed(0.05);
+
+/// A contact of a truck with a car.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Contact {
+    /// The car's slot.
+    pub slot: usize,
+    /// Whether the truck is at fault, or the car.
+    pub is_trucks_fault: bool,
+}
+
+/// Added to a contact's code where the truck is at fault: more than there are slots.
+const TRUCKS_FAULT: u32 = 64;
+
+impl Contact {
+    /// The contact in a word: its slot plus 1, and 64 more where the truck is at fault.
+    pub fn code(self) -> u32 {
+        self.slot as u32 + 1 + if self.is_trucks_fault { TRUCKS_FAULT } else { 0 }
+    }
+
+    /// The contact of a word; none of 0.
+    pub fn from_code(code: u32) -> Option<Contact> {
+        let slot = (code % TRUCKS_FAULT).checked_sub(1)?;
+        Some(Contact { slot: slot as usize, is_trucks_fault: TRUCKS_FAULT <= code })
+    }
+}
+
+/// Where a truck has entered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Entry {
+    /// Index of the arm.
+    pub arm: u32,
+    /// Steps since; none if it has not entered yet.
+    pub steps: Option<u32>,
+}
+
+/// The car that a truck touches, if there is one; of several the one of the lowest slot among those for which the truck
+/// is at fault, or else among all.
+pub fn touched(network: &Network, rig: &Rig, truck: &Truck, entry: Entry, cars: &[Car]) -> Option<Contact> {
+    let now = outlines(rig, truck);
+    let [tractor, trailer] = now;
+    let middle = 0.5 * (tractor.middle + trailer.middle);
+    let reach = 0.5 * tractor.middle.distance(trailer.middle) + tractor.half_length.max(trailer.half_length) + NEAR;
+    let is_near = |car: &Car| front(network, car).distance_squared(middle) < reach * reach;
+    let near = cars.iter().enumerate().filter(|(_, car)| car.is_there() && is_near(car));
+    let contacts = near.filter_map(|(slot, car)| {
+        let outline = car.outline(network);
+        now.iter().any(|unit| unit.overlaps(&outline)).then(|| Contact {
+            slot,
+            is_trucks_fault: !is_cars_fault(network, &outlines_before(rig, truck), entry, car, &outline),
+        })
+    });
+    contacts.min_by_key(|contact| (!contact.is_trucks_fault, contact.slot))
+}
+
+/// Whether the car is at fault of a contact with a truck that covered this ground a second ago.
+///
+/// Who moved in the last step tells nothing: in 0.1 s both do. A car is at fault if it moves, and either the truck was
+/// there a second ago, or the car has entered lately before a truck that drives in the ring. A truck that has entered
+/// lately itself is at fault in any case, and so it is otherwise.
+fn is_cars_fault(network: &Network, before: &[Outline; 2], entry: Entry, car: &Car, outline: &Outline) -> bool {
+    let has_entered_lately = entry.steps.is_some_and(|steps| steps < LATELY);
+    let was_there = before.iter().any(|unit| unit.overlaps(outline));
+    let behind_line = car.front() - network.paths[car.path()].line;
+    // 2^-14 m a step for some steps.
+    let lately = FROM_STANDING.max((LATELY_OF_CAR * car.pace()) >> 4);
+    let cuts_in = entry.steps.is_some()
+        && network.source_of(car.path()).entry != entry.arm
+        && (1..=lately).contains(&behind_line);
+    STANDS < car.pace() && !has_entered_lately && (was_there || cuts_in)
+}
+
+/// The ground that both units covered a second ago, each driven back along its circle.
+fn outlines_before(rig: &Rig, truck: &Truck) -> [Outline; 2] {
+    let [tractor, trailer] = outlines(rig, truck);
+    // At constant acceleration; a truck that stood did not drive backwards.
+    let way = BEFORE * (truck.speed - 0.5 * BEFORE * truck.acceleration).max(0.0);
+    let (sin, cos) = sin_cos(truck.heading - truck.trailer_heading);
+    let turn = if truck.speed == 0.0 { 0.0 } else { way * yaw_rate(rig, truck) / truck.speed };
+    let trailer_turn = (way * sin + rig.fifth_wheel * turn * cos) / rig.trailer_wheelbase;
+    [
+        driven_back(&tractor, truck.position, truck.heading, way, turn),
+        driven_back(&trailer, truck.trailer_position(rig), truck.trailer_heading, way * cos, trailer_turn),
+    ]
+}
+
+/// A unit before it drove this way and turned by this angle, its axle at a position (m, rad).
+fn driven_back(unit: &Outline, axle: Vec2, heading: f32, way: f32, turn: f32) -> Outline {
+    let along = direction(heading - turn);
+    let ahead = (unit.middle - axle).dot(unit.along);
+    let middle = axle - way * direction(heading - 0.5 * turn) + ahead * along;
+    Outline { middle, along, ..*unit }
+}

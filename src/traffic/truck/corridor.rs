@@ -1,0 +1,167 @@
+//! What cars do about the ground that a truck covers, or will: they follow what is in their corridor, slow for what
+//! will be there, and brake for what they would touch.
+
+use glam::Vec2;
+
+use super::view::View;
+use crate::traffic::car::Outline;
+use crate::traffic::decide::Driver;
+use crate::traffic::model::ONE;
+use crate::traffic::network::SPACING;
+use crate::traffic::units::{length, speed};
+use crate::traffic::{Car, Network, Sample};
+
+/// Samples of a path that are a car's corridor, from the one behind its front on.
+const N_SAMPLES: usize = 16;
+/// Length of a corridor, and of the first part of a path that must be free where a car enters (m).
+const REACH: f32 = N_SAMPLES as f32 * SPACING;
+/// Room beside a car to what is in its corridor now, beside its front itself, and to what will be there (m).
+const ROOM: f32 = 0.7;
+const ROOM_AT_FRONT: f32 = 0.4;
+const ROOM_LATER: f32 = 0.5;
+/// What is at a sample may begin half a spacing before it (m).
+const BEFORE_SAMPLE: f32 = 0.5 * SPACING;
+/// A car that can wait does so for what begins so far behind its line.
+const BEHIND_LINE: i32 = length(2.0);
+/// Interaction of the hardest braking, 8 m/s², and of 3 m/s² at low speed, with which a car slows at most for what will
+/// be.
+const HARDEST: i32 = 5 * ONE;
+const GENTLE: i32 = ONE + 3 * ONE / 2;
+/// A unit this near to a car's front may be touched soon (m).
+const NEAR: f32 = 8.0;
+/// A car foresees its own way in 0.4 s, and 0.3 m more (steps, 2^-20 m).
+const STEPS_AHEAD: i32 = 4;
+const MORE: i32 = 314_573;
+/// Room that it keeps then (m).
+const LEAST_ROOM: f32 = 0.15;
+
+/// Points side by side, so that all are measured at once.
+struct Points {
+    x: [f32; N_SAMPLES],
+    y: [f32; N_SAMPLES],
+}
+
+impl Points {
+    /// Points of samples; of those that there are not, points that are near nothing.
+    fn of(samples: &[Sample]) -> Points {
+        let mut points = Points { x: [1e9; N_SAMPLES], y: [1e9; N_SAMPLES] };
+        for (index, sample) in samples.iter().take(N_SAMPLES).enumerate() {
+            (points.x[index], points.y[index]) = sample.position.into();
+        }
+        points
+    }
+
+    /// Squared distance of each to the nearest of some rectangles, 0 inside them (m²).
+    fn to_nearest(&self, outlines: &[Outline]) -> [f32; N_SAMPLES] {
+        let mut nearest = [f32::MAX; N_SAMPLES];
+        for Outline { middle, along, half_length, half_width } in outlines {
+            for k in 0..N_SAMPLES {
+                let (x, y) = (self.x[k] - middle.x, self.y[k] - middle.y);
+                let ahead = ((x * along.x + y * along.y).abs() - half_length).max(0.0);
+                let aside = ((y * along.x - x * along.y).abs() - half_width).max(0.0);
+                nearest[k] = nearest[k].min(ahead * ahead + aside * aside);
+            }
+        }
+        nearest
+    }
+}
+
+/// Takes the ground that a truck covers into account.
+pub(super) fn mind(view: &View, driver: &mut Driver) {
+    let car = *driver.car();
+    let network = driver.network();
+    let (first, at_front) = (first(network, &car), front(network, &car));
+    if is_far(view, at_front) {
+        return;
+    }
+    let samples = corridor(network, &car, first);
+    let points = Points::of(samples);
+    let station = |index: usize| (first + index) as f32 * SPACING;
+    let room = |index: usize| car.half_width() + if station(index) < car.station() { ROOM_AT_FRONT } else { ROOM };
+    let now = points.to_nearest(&view.now);
+    let leader = (0..samples.len()).find(|&index| now[index] < room(index) * room(index));
+    if let Some(index) = leader {
+        let rear = length(station(index) - BEFORE_SAMPLE);
+        let speed = speed(view.velocity.dot(samples[index].direction).max(0.0));
+        let (me, gap) = (driver.me, rear - driver.me.station);
+        if me.waits && me.line + BEHIND_LINE < rear {
+            driver.stop_or_follow(me.line - me.station, gap, speed);
+        } else {
+            driver.follow(gap, speed);
+        }
+        driver.note_leader(rear, speed);
+    }
+    if !view.waits && !car.is_rude() {
+        let later = points.to_nearest(&view.later);
+        let beside = car.half_width() + ROOM_LATER;
+        let before = leader.unwrap_or(samples.len());
+        if let Some(index) = later[..before].iter().position(|&squared| squared < beside * beside) {
+            slow(view, driver, length(station(index) - BEFORE_SAMPLE));
+        }
+    }
+    if touches_soon(view, network, &car, at_front) {
+        driver.heed(HARDEST);
+    }
+}
+
+/// Slows for a truck that will be at a station of the car's path, or waits (2^-10 m).
+fn slow(view: &View, driver: &mut Driver, rear: i32) {
+    let me = driver.me;
+    if me.waits && me.line < rear {
+        driver.wait_at_line();
+    } else {
+        driver.heed(driver.behind(rear - me.station, view.speed / 2).min(GENTLE));
+    }
+}
+
+/// Whether a car is about to touch a truck, with its front near a point.
+fn touches_soon(view: &View, network: &Network, car: &Car, front: Vec2) -> bool {
+    if !view.now.iter().any(|unit| unit.distance_squared(front) < NEAR * NEAR) {
+        return false;
+    }
+    // A station's unit is half of a speed's way in a step.
+    let soon = Car { station: car.station + 2 * STEPS_AHEAD * car.speed + MORE, ..*car }.outline(network);
+    let grown = |unit: &Outline| Outline {
+        half_length: unit.half_length + LEAST_ROOM,
+        half_width: unit.half_width + LEAST_ROOM,
+        ..*unit
+    };
+    view.now.iter().any(|unit| soon.overlaps(&grown(unit)))
+}
+
+/// Where a truck stands nearest on the first part of a car's path: station of its rear, and its speed there (2^-10 m,
+/// 2^-14 m a step).
+pub(super) fn ahead(view: &View, network: &Network, car: &Car) -> Option<(i32, i32)> {
+    if is_far(view, front(network, car)) {
+        return None;
+    }
+    let samples = corridor(network, car, 0);
+    let beside = car.half_width() + ROOM;
+    let now = Points::of(samples).to_nearest(&view.now);
+    let index = now[..samples.len()].iter().position(|&squared| squared < beside * beside)?;
+    let speed = speed(view.velocity.dot(samples[index].direction).max(0.0));
+    Some((length(index as f32 * SPACING - BEFORE_SAMPLE), speed))
+}
+
+/// Whether nothing of a truck's ground is in the corridor of a car with its front near a point.
+fn is_far(view: &View, front: Vec2) -> bool {
+    let reach = view.radius + REACH;
+    reach * reach < front.distance_squared(view.middle)
+}
+
+/// The sample of its path behind a car's front, counted from the path's first.
+fn first(network: &Network, car: &Car) -> usize {
+    // Conversions saturate; a car has left its path before the last sample.
+    ((car.station() / SPACING) as usize).min(network.paths[car.path()].n as usize - 1)
+}
+
+/// Where that is (m).
+pub(super) fn front(network: &Network, car: &Car) -> Vec2 {
+    network.samples[network.paths[car.path()].first as usize + first(network, car)].position
+}
+
+/// The samples of a car's path from one on.
+fn corridor<'a>(network: &'a Network, car: &Car, first: usize) -> &'a [Sample] {
+    let path = &network.paths[car.path()];
+    &network.samples[path.first as usize + first..][..(path.n as usize - first).min(N_SAMPLES)]
+}
