@@ -1,7 +1,5 @@
 //! Other vehicles: each decides from where all were after the last step, all move, some leave and some come.
 
-use glam::Vec2;
-
 use crate::engine::Row;
 use crate::engine::cpu::follow::{followed, reference_point};
 use crate::layout::random::{self, Draw};
