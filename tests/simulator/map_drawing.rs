@@ -146,12 +146,7 @@ fn bad_features_are_refused_by_their_number_and_what_would_do() {
         }
     });
     assert!(said.contains("kerbs: reach over 0.0012") && said.contains("ogr2ogr"), "{said}");
-    for text in [
-        "",
-        "{}",
-        "[1, 2]",
-        "{\"type\": \"FeatureCollection\", \"features\": [NaN]}",
-    ] {
+    for text in ["", "{}", "[1, 2]", "{\"type\": \"FeatureCollection\", \"features\": [NaN]}"] {
         assert!(read_features(text, None).is_err(), "{text}");
     }
     let text = features().to_string();

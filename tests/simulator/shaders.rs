@@ -43,6 +43,8 @@ fn every_shader_of_a_stage_has_a_twin_on_the_cpu_and_every_twin_a_shader() {
         .unwrap()
         .map(|entry| entry.unwrap().file_name().to_str().unwrap().replace(".rs", ""))
         .collect();
+    // A device does not observe other vehicles.
+    found.retain(|stage| stage != "around");
     found.sort_unstable();
     let mut known: Vec<&str> = SHADERS
         .iter()

@@ -52,7 +52,7 @@ pub(super) fn printed(packed: &mut Packed) -> Value {
         "columns": Column::of_trucks()
             .map(|column| (column.name().to_owned(), json!({ "bytes": column.width(), "element": column.element() })))
             .collect::<Map<_, _>>(),
-        "buffers": BUFFERS.map(buffer),
+        "buffers": BUFFERS.into_iter().map(buffer).collect::<Vec<_>>(),
         "kernels": kernels(),
         "journal": journal::facts(),
         "act": {
