@@ -1,6 +1,5 @@
 //! The other vehicles of a recorded episode.
 
-use glam::DVec2;
 use offtrack_evaluation::recording::Vehicle;
 use svg::node::element::{Group, Path};
 
