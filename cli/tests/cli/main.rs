@@ -15,6 +15,7 @@ mod device;
 mod documented_flags;
 mod draw;
 mod evaluate;
+mod export;
 mod fits;
 mod flags;
 mod generate;
