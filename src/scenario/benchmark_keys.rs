@@ -142,6 +142,8 @@ pub(super) struct WrittenTraffic {
     pub(super) courtesy: f64,
     #[serde(default = "waiting")]
     pub(super) waiting: f64,
+    #[serde(default)]
+    pub(super) hindrance: f64,
 }
 
 fn courtesy() -> f64 {

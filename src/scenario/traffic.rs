@@ -5,6 +5,9 @@ use super::check::{Invalid, list, within};
 /// Largest demand (veh/h).
 pub(super) const MOST_DEMAND: f64 = 3000.0;
 
+/// Range of the weight of hindrance.
+pub(super) const MOST_HINDRANCE: [f64; 2] = [-1e6, 1e6];
+
 /// Other vehicles on the roads.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Traffic {
@@ -19,6 +22,8 @@ pub struct Traffic {
     pub courtesy: f64,
     /// Time to wait, which an episode's time limit has in addition (s).
     pub waiting: f64,
+    /// Reward, each step, for each m/s² beyond 2 m/s² with which a vehicle brakes for the truck.
+    pub hindrance: f64,
 }
 
 impl Traffic {
@@ -32,6 +37,7 @@ impl Traffic {
             within(&format!("traffic.{key}"), value, [0.0, 1.0])?;
         }
         within("traffic.rude[1]", greatest, [least, 1.0])?;
-        within("traffic.waiting", self.waiting, [0.0, 1e6])
+        within("traffic.waiting", self.waiting, [0.0, 1e6])?;
+        within("traffic.hindrance", self.hindrance, MOST_HINDRANCE)
     }
 }

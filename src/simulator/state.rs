@@ -14,6 +14,8 @@ use crate::layout::{Column, Control, Ended, N_CARS, N_POSES, Pose, Progress, Rew
 use crate::traffic::{Car, Row};
 use crate::world::World;
 
+/// No vehicle brakes harder (m/s²).
+const MOST_BRAKING: f32 = 8.0;
 /// An observed value's largest magnitude: 1, with room for the rounding of either engine.
 const OBSERVED: f32 = 1.001;
 
@@ -42,7 +44,7 @@ pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
         check_poses(env, &batch.poses[env], next_waypoint(world, truck, progress), n_waypoints)?;
         within(Column::Ended, env, "", batch.ended[env], 0..=Ended::ALL.len() as u32 - 1)?;
         check_terms(env, &batch.terms[env], n_waypoints)?;
-        let most = largest_reward(&world.reward, n_waypoints);
+        let most = largest_reward(&world.reward, n_waypoints) + largest_hindrance(world);
         within(Column::Reward, env, "", batch.reward[env], -most..=most)?;
         within(Column::Command, env, ".steering", batch.command[env].steering, -1.0..=1.0)?;
         within(Column::Command, env, ".speed", batch.command[env].speed, -1.0..=1.0)?;
@@ -180,6 +182,11 @@ fn check_terms(env: usize, terms: &RewardTerms, n_waypoints: u32) -> Result<(), 
 fn largest_reward(weights: &Reward, n_waypoints: u32) -> f32 {
     let once = weights.lane_distance.abs() + weights.clearance.abs() + weights.failure.abs();
     (weights.waypoint.abs() * n_waypoints as f32 + once) * OBSERVED
+}
+
+/// What hindrance adds to a reward at most: all vehicles brake as hard as they can.
+fn largest_hindrance(world: &World) -> f32 {
+    world.traffic.as_ref().map_or(0.0, |traffic| traffic.hindrance.abs() * MOST_BRAKING * N_CARS as f32)
 }
 
 fn all_within(column: Column, env: usize, values: &[f32], range: RangeInclusive<f32>) -> Result<(), Error> {

@@ -23,6 +23,8 @@ pub struct Traffic {
     pub spacing: f32,
     /// Whether trucks observe other vehicles.
     pub is_observed: bool,
+    /// Reward, each step, for each m/s² beyond 2 m/s² with which a vehicle brakes for the truck.
+    pub hindrance: f32,
     /// Every road, in the order of the world's fields.
     pub roads: Vec<TrafficRoad>,
     /// Where each of the world's routes runs.
@@ -59,8 +61,9 @@ pub struct TrafficRoute {
 impl Traffic {
     /// Every table as words, one road after the other.
     pub(super) fn words(&self) -> impl Iterator<Item = Vec<u32>> {
-        let Traffic { rules, rude, spacing, is_observed, roads, routes } = self;
-        let shared = [&rules.words()[..], rude, &[spacing.to_bits(), u32::from(*is_observed)]].concat();
+        let Traffic { rules, rude, spacing, is_observed, hindrance, roads, routes } = self;
+        let shared =
+            [&rules.words()[..], rude, &[*spacing, *hindrance].map(f32::to_bits), &[u32::from(*is_observed)]].concat();
         let routes = routes.iter().flat_map(|&TrafficRoute { path, begins }| [path, begins.to_bits()]).collect();
         [shared, routes].into_iter().chain(roads.iter().map(TrafficRoad::words))
     }
@@ -87,8 +90,15 @@ impl Traffic {
             })
         });
         let rude = of.rude.map(|rude| (rude * f64::from(1 << 16)).round() as u32);
-        let (spacing, is_observed) = (scenario.spacing as f32, scenario.observes_vehicles);
-        Ok(Some(Traffic { rules, rude, spacing, is_observed, roads, routes: routes.collect() }))
+        Ok(Some(Traffic {
+            rules,
+            rude,
+            spacing: scenario.spacing as f32,
+            is_observed: scenario.observes_vehicles,
+            hindrance: of.hindrance as f32,
+            roads,
+            routes: routes.collect(),
+        }))
     }
 }
 

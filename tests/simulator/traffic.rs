@@ -6,8 +6,10 @@ use std::sync::Arc;
 use offtrack::files::cache::Loading;
 use offtrack::layout::shared::Named;
 use offtrack::layout::{Column, Ended, N_AROUND, N_VALUES, VEHICLE_VALUES};
+use offtrack::physics::seen_by_vehicles;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
+use offtrack::traffic::units::metres;
 use offtrack::traffic::{Car, Contact, Row};
 use offtrack::world::World;
 
@@ -128,6 +130,57 @@ fn an_episode_has_rude_drivers_by_its_own_fraction_among_those_who_are_there_and
 }
 
 #[test]
+fn no_episode_begins_behind_a_vehicle_that_the_truck_could_not_stop_for() {
+    let (scenario, world) = with_traffic("demand = [2100]\n");
+    let choice = RouteChoice::Fixed(scenario.split(Split::Train).repeat(12));
+    let simulator = Simulator::new(world.clone(), choice.routes().len(), 3, choice).unwrap();
+    let traffic = world.traffic.as_ref().unwrap();
+    let mut n_on_lane = 0;
+    for (env, row) in rows(&simulator).iter().enumerate() {
+        let (truck, progress) = (&simulator.batch().truck[env], &simulator.batch().progress[env]);
+        let network = &traffic.roads[world.routes[truck.route as usize].roundabout as usize].network;
+        let view = seen_by_vehicles(&world, truck, progress).unwrap();
+        let source = network.paths[view.path].source;
+        let of_lane = row.cars.iter().filter(|car| car.is_there() && network.paths[car.path()].source == source);
+        for car in of_lane {
+            let room = car.station() - car.length() - metres(view.station);
+            // From 30 km/h at 1.5 m/s² it takes 23 m to stop.
+            let stops = (truck.speed * truck.speed - car.speed() * car.speed()).max(0.0) / 3.0;
+            assert!(6.99 + stops <= room || room < -16.0, "{room} m, {stops} m to stop");
+            n_on_lane += 1;
+        }
+    }
+    assert!(200 < n_on_lane, "{n_on_lane}");
+}
+
+#[test]
+fn hindrance_is_rewarded_by_how_hard_vehicles_brake_for_the_truck_and_by_nothing_else() {
+    let [(scenario, without), (_, with)] =
+        ["", "hindrance = -2.0\n"].map(|key| with_traffic(&format!("demand = [1500]\n{key}")));
+    let choice = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
+    let [mut one, mut other] = [without, with].map(|world| Simulator::new(world, 128, 3, choice.clone()).unwrap());
+    let mut n_hindered = 0;
+    for _ in 0..150 {
+        one.steps_at_random(1);
+        other.steps_at_random(1);
+        for env in 0..128 {
+            // Where an episode has ended the cars are those of the next.
+            if one.batch().ended[env] != Ended::Running as u32 {
+                continue;
+            }
+            let row = Row::of(&one.batch().cars[env]);
+            assert_eq!(row, Row::of(&other.batch().cars[env]));
+            let hindered = row.cars.iter().enumerate().filter(|(slot, _)| row.hindered >> slot & 1 == 1);
+            let beyond: f32 = hindered.map(|(_, car)| (-car.acceleration() - 2.0).max(0.0)).sum();
+            let expected = one.batch().reward[env] - 2.0 * beyond;
+            assert!((other.batch().reward[env] - expected).abs() < 1e-3, "{expected}");
+            n_hindered += usize::from(0.0 < beyond);
+        }
+    }
+    assert!(20 < n_hindered, "{n_hindered}");
+}
+
+#[test]
 fn vehicles_around_a_truck_on_a_left_hand_road_are_those_of_its_mirror_image_to_the_last_bit() {
     let folder = tempfile::tempdir().unwrap();
     let driven = [left_hand::text("16m-maps"), left_hand::left_hand(&left_hand::text("16m-maps"))].map(|text| {
@@ -189,6 +242,7 @@ fn a_benchmark_with_a_bad_key_of_traffic_is_refused_by_key_and_value() {
         ("demand = [300]\nvans = 2.0", "traffic.vans: 2"),
         ("demand = [300]\nrude = [0.3, 0.1]", "traffic.rude: [0.3, 0.1]"),
         ("demand = [300]\nwaiting = -5", "traffic.waiting: -5 s"),
+        ("demand = [300]\nhindrance = 1e7", "traffic.hindrance: 1"),
         ("demand = [300]\n[time]\nstep = 0.05", "time.step: 0.05 s"),
         ("demand = [300]\nlorries = 1", "lorries"),
     ] {

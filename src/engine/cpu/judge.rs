@@ -3,12 +3,14 @@
 //! Failure wins over a vehicle that drove into the truck, that over arrival, everything over the time limit.
 
 use crate::engine::Row;
+use crate::engine::cpu::traffic::hindrance;
 use crate::layout::angle::wrapped;
 use crate::layout::{Clearance, Ended, Params, Progress, Reward, RewardTerms, RouteRow, Truck};
 use crate::traffic::{self, Contact};
 use crate::world::World;
 
-/// Advances the truck's number of steps and writes the end code, the reward's terms and the reward.
+/// Advances the truck's number of steps and writes the end code, the reward's terms and the reward: their weighted sum
+/// and, among other vehicles, what the truck's hindrance of them weighs.
 pub fn judge(world: &World, row: &mut Row) {
     row.truck.steps += 1;
     let route = &world.routes[row.truck.route as usize];
@@ -18,6 +20,9 @@ pub fn judge(world: &World, row: &mut Row) {
     *row.ended = ended as u32;
     *row.terms = reward_terms(&world.reward, row.clearance, row.progress, ended);
     *row.reward = rewarded(&world.reward, row.terms);
+    if let Some(hindrance) = hindrance(world, row) {
+        *row.reward += hindrance;
+    }
 }
 
 /// Why the episode ended, [`Ended::Running`] when it did not.

@@ -10,10 +10,14 @@ use crate::traffic::{self, Car, Clock, Contact, Entry, Event, Setting, Trucks, V
 use crate::world::{Level, Traffic, TrafficRoad, TrafficRoute, World};
 
 constants! {
+    /// What a vehicle may brake with for a truck that is in nobody's way (m/s²).
+    const GENTLE: f32 = 2.0;
     /// Room to other vehicles before and behind each unit that a truck begins with (m).
     const ROOM_ALONG: f32 = 7.0;
     /// Room beside each unit (m).
     const ROOM_BESIDE: f32 = 1.0;
+    /// Twice the braking with which a truck that begins can stop behind a vehicle (m/s²).
+    const STOPS_WITH: f32 = 3.0;
 }
 
 /// Moves the vehicles around the row's truck, if the world has any.
@@ -57,17 +61,23 @@ pub fn seen_by_vehicles(world: &World, truck: &Truck, progress: &Progress) -> Op
 }
 
 pub(super) fn view(world: &World, shared: &Traffic, truck: &Truck, progress: &Progress) -> View {
-    let TrafficRoute { path, begins } = shared.routes[truck.route as usize];
+    let network = &road_of(world, shared, truck.route).network;
+    let path = shared.routes[truck.route as usize].path as usize;
+    View::new(network, world.rig(truck), truck, path, front_station(world, shared, truck, progress.waypoint))
+}
+
+/// Station of a truck's front on its path, by the next waypoint of its route; negative before the path's beginning (m).
+pub fn front_station(world: &World, shared: &Traffic, truck: &Truck, next: u32) -> f32 {
+    let begins = shared.routes[truck.route as usize].begins;
     let rig = world.rig(truck);
     let waypoints = world.route_waypoints(truck.route);
     let point = reference_point(rig.wheelbase, truck);
     // Whether this step's waypoints have been counted or not: passed ones stay so.
-    let next = followed(waypoints, point, progress.waypoint, world.params.stray_distance).waypoint as usize;
+    let next = followed(waypoints, point, next, world.params.stray_distance).waypoint as usize;
     let last = next.clamp(1, waypoints.len() - 1) - 1;
     let behind_last = (point - waypoints[last].position).dot(waypoints[last].direction);
     let ahead = rig.tractor_body.front - 0.5 * rig.wheelbase;
-    let station = begins + last as f32 * shared.spacing + behind_last + ahead;
-    View::new(&road_of(world, shared, truck.route).network, rig, truck, path as usize, station)
+    begins + last as f32 * shared.spacing + behind_last + ahead
 }
 
 /// Writes down which vehicle the row's truck touches, if the world has any.
@@ -80,6 +90,17 @@ pub fn meet(world: &World, row: &mut Row) {
     let entry = Entry { arm: network.source_of(path as usize).entry, steps };
     let contact = touched(network, world.rig(row.truck), row.truck, entry, &around.cars);
     around.met = contact.map_or(0, Contact::code);
+}
+
+/// Reward for the vehicles that brake for the row's truck, if the world has any.
+pub fn hindrance(world: &World, row: &Row) -> Option<f32> {
+    let (shared, words) = (world.traffic.as_ref()?, row.cars.as_deref()?);
+    let around = traffic::Row::of(words);
+    let brakes = |(slot, car): (usize, &Car)| {
+        let is_hindered = around.hindered >> slot & 1 == 1;
+        if is_hindered { (-car.acceleration() - GENTLE).max(0.0) } else { 0.0 }
+    };
+    Some(shared.hindrance * around.cars.iter().enumerate().map(brakes).sum::<f32>())
 }
 
 /// Who drives the vehicles of an episode.
@@ -124,9 +145,17 @@ pub fn surrounded(world: &World, shared: &Traffic, stream: Stream, truck: &Truck
         ..unit
     };
     let units = outlines(world.rig(truck), truck).map(grown);
+    let source = road.network.paths[shared.routes[truck.route as usize].path as usize].source;
+    let front = front_station(world, shared, truck, 1);
+    // A truck could not stop behind it.
+    let is_too_near_ahead = |car: &Car| {
+        let room = car.station() - car.length() - front;
+        let stops = ((truck.speed * truck.speed - car.speed() * car.speed()) / STOPS_WITH).max(0.0);
+        road.network.paths[car.path()].source == source && 0.0 <= room && room < ROOM_ALONG + stops
+    };
     for (slot, car) in row.cars.iter_mut().enumerate().filter(|(_, car)| car.is_there()) {
         let outline = car.outline(&road.network);
-        if units.iter().any(|unit| unit.overlaps(&outline)) {
+        if is_too_near_ahead(car) || units.iter().any(|unit| unit.overlaps(&outline)) {
             *car = Car::NONE;
         } else {
             drivers.sit_in(car, 0, slot);
