@@ -110,7 +110,7 @@ class Batch:
         envs: list[int],
         streams: list[tuple[int, int] | None] | None,
         routes: list[str | None] | None,
-        starts: list[tuple[float, float, float, int] | None] | None,
+        starts: list[tuple[float, float, float, int, float] | None] | None,
     ) -> None: ...
     def column_bytes(self, names: list[str]) -> list[npt.NDArray[np.uint8]]: ...
     def restore_bytes(

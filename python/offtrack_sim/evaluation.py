@@ -36,7 +36,8 @@ class Evaluation:
     """A row an episode, route by route, ``[n * episodes]``, with the fields
 
     - ``route``, ``episode``: the route's name, and the episode's index among those of its route;
-    - ``start_offset``, ``start_heading``, ``start_speed``, ``vehicle``: the start, as :class:`offtrack_sim.Start`;
+    - ``start_offset``, ``start_heading``, ``start_speed``, ``start_along``, ``vehicle``: the start, as
+      :class:`offtrack_sim.Start`;
     - ``ended``, ``steps``: why it ended, as :class:`offtrack_sim.Ended`, and its steps of 0.1 s;
     - ``reward``, and what the reward weighs, each summed over the steps: ``term_waypoints``, waypoints passed;
       ``term_lane_distance``, distances as fractions of their limit; ``term_clearance``, depths in the margin kept from

@@ -83,7 +83,7 @@ pub fn drive<'py>(
             Ok::<(), Raised>(())
         });
         driven.map_err(|Raised(exception)| exception)?;
-        let starts = (0..n_envs).map(|env| drawn_start(world.params.n_vehicles, seed, env as u32, 0));
+        let starts = (0..n_envs).map(|env| drawn_start(&world.params, seed, env as u32, 0));
         columns(py, &starts.collect::<Vec<Start>>(), &figures.finish())
     })
 }
@@ -96,10 +96,11 @@ type Field<Row, Value> = (&'static str, fn(&Row) -> Value);
 
 /// The figures of episodes as columns.
 fn columns<'py>(py: Python<'py>, starts: &[Start], episodes: &[Episode]) -> PyResult<Vec<Column<'py>>> {
-    let of_starts: [Field<Start, f32>; 3] = [
+    let of_starts: [Field<Start, f32>; 4] = [
         ("start_offset", |start| start.offset),
         ("start_heading", |start| start.heading),
         ("start_speed", |start| start.speed),
+        ("start_along", |start| start.along),
     ];
     let counts: [Field<Episode, i64>; 3] = [
         ("vehicle", |episode| episode.last.vehicle.into()),

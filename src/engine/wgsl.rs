@@ -33,6 +33,7 @@ pub fn shared() -> String {
         cpu::perceive::printed_constants(),
         cpu::sense::printed_constants(),
         cpu::observe::printed_constants(),
+        cpu::along::printed_constants(),
         tally::printed_constants(),
         autoreset::printed_constants(),
         "\n".to_owned(),

@@ -182,6 +182,7 @@ pub(super) struct WrittenStart {
     pub(super) offset: f64,
     pub(super) heading_deg: f64,
     pub(super) speed_kmh: Option<WrittenSpeeds>,
+    pub(super) along: f64,
 }
 
 /// A speed, or `[least, greatest]`.
@@ -194,7 +195,7 @@ pub(super) enum WrittenSpeeds {
 
 impl Default for WrittenStart {
     fn default() -> Self {
-        WrittenStart { offset: 0.3, heading_deg: 2.0, speed_kmh: None }
+        WrittenStart { offset: 0.3, heading_deg: 2.0, speed_kmh: None, along: 0.0 }
     }
 }
 
