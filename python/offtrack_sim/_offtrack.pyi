@@ -16,6 +16,7 @@ __all__ = [
     "policy_names",
     "write_policy",
     "drive",
+    "interval_over_routes",
     "wilson",
     "column_layouts",
     "observation_groups",
@@ -240,6 +241,9 @@ def drive(
     device: str,
     begins: bool,
 ) -> list[tuple[str, npt.NDArray[Any]]]: ...
+def interval_over_routes(
+    routes: npt.NDArray[np.uint32], values: npt.NDArray[np.float64]
+) -> tuple[float, float] | None: ...
 def wilson(successes: int, trials: int) -> tuple[float, float]: ...
 def column_layouts() -> list[tuple[str, list[tuple[str, str, int, str]], int, str]]: ...
 def observation_groups() -> list[tuple[str, int, int, float, str]]: ...
