@@ -73,9 +73,13 @@ fn motion_of(rig: Rig, truck: Truck) -> Motion {
 // Curvature of the path that the tractor's wheels lead to at a steer angle (rad) and a speed (m/s), without lag (1/m).
 fn steered_curvature(rig: Rig, steering: f32, speed: f32) -> f32 {
     let steered = sin_cos(steering);
+    return steered.x / (steered.y * steered_wheelbase(rig, speed));
+}
+
+// Wheelbase as which the tractor steers at a speed (m/s) (m).
+fn steered_wheelbase(rig: Rig, speed: f32) -> f32 {
     // Oversteer ends in a spin, which is not modelled.
-    let wheelbase = max(rig.wheelbase + rig.understeer * (speed * speed), WHEELBASE_MIN * rig.wheelbase);
-    return steered.x / (steered.y * wheelbase);
+    return max(rig.wheelbase + rig.understeer * (speed * speed), WHEELBASE_MIN * rig.wheelbase);
 }
 
 // Strongest drive at a speed (m/s^2).
@@ -212,6 +216,32 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
     after.curvature_lag = curvature_lag;
     after.lateral_acceleration = last.trailer_lateral_acceleration;
     return Moving(after, last);
+}
+
+// The truck as it leans once it has turned for long with its steer angle and speed.
+fn settled(rig: Rig, truck: Truck) -> Truck {
+    let motion = motion_of(rig, truck);
+    let tractor = vec2<f32>(settled_roll(rig.tractor_roll, motion.lateral_acceleration + rig.crossfall), 0.0);
+    let trailer = vec2<f32>(settled_roll(rig.trailer_roll, motion.trailer_lateral_acceleration + rig.crossfall), 0.0);
+    let ratios = load_transfer_ratios(
+        rig,
+        tractor,
+        trailer,
+        motion.lateral_acceleration,
+        motion.trailer_lateral_acceleration,
+    );
+    var after = truck;
+    after.tractor_roll = tractor.x;
+    after.trailer_roll = trailer.x;
+    after.tractor_load_transfer_ratio = ratios.x;
+    after.trailer_load_transfer_ratio = ratios.y;
+    after.lateral_acceleration = motion.trailer_lateral_acceleration;
+    return after;
+}
+
+// The roll that a unit comes to rest at under a constant lateral acceleration (rad): one at which its rate stays 0.
+fn settled_roll(roll: Roll, lateral_acceleration: f32) -> f32 {
+    return -roll.input[1] * lateral_acceleration / roll.transition[2];
 }
 
 // A unit's (roll, roll rate) one sub-step later. The lateral acceleration of the sub-step's middle stands for its mean.

@@ -407,6 +407,8 @@ const N_SNAPSHOTS: u32 = 64u;
 const ROOM_ALONG: f32 = 7.0f;
 // Room beside each unit (m).
 const ROOM_BESIDE: f32 = 1.0f;
+// Least 1 plus the cosine of an angle that is halved: keeps the quotient finite where a unit has turned round.
+const HALVED_MIN: f32 = 1e-6f;
 // Sums in a tally: steps by their end code, then the rewards.
 const N_SUMS: u32 = 11u;
 // Index of the sum of the rewards.
@@ -524,7 +526,12 @@ struct Pose {
 }
 
 // How a truck begins its route: fractions of the largest start errors and of half the range of speeds, each in
-// -1..=1, and its vehicle. Zeros are the first vehicle on the lane centre at the middle of the speeds.
+// -1..=1, its vehicle, and where along the route. Zeros are the first vehicle on the lane centre at the first
+// waypoint and the middle of the speeds.
+//
+// Beyond the first waypoint both units stand as if the truck had followed the lane to there, with the wheels and the
+// lean that the bend asks for; the errors move and turn it as a whole. The clock begins: the episode has the whole
+// route's time. The start itself is not judged: a truck that touches a kerb there ends with its first step.
 struct Start {
     // Fraction of the largest lateral offset, left positive.
     offset: f32,
@@ -532,6 +539,9 @@ struct Start {
     heading: f32,
     // Fraction of half the range of speeds, from its middle.
     speed: f32,
+    // Fraction of the route that lies behind, in 0..=1: the truck begins at the nearest waypoint, the last but one
+    // at most.
+    along: f32,
     // Index of the vehicle in the world.
     vehicle: u32,
 }
@@ -783,6 +793,8 @@ struct Params {
     start_speed: f32,
     // Half of their range (m/s).
     start_speed_range: f32,
+    // Largest fraction of the route that lies behind at a drawn start.
+    start_along: f32,
     // Lowest target speed (m/s).
     target_speed_min: f32,
     // Highest target speed (m/s).

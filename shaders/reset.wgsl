@@ -76,17 +76,32 @@ fn start(env: u32, begin: BeginRow) {
         let pose = words(stream.seed, stream.env, episode, DRAW_POSE);
         let kind = words(stream.seed, stream.env, episode, DRAW_VEHICLE);
         let vehicle = index_below(kind.x, params.n_vehicles);
-        start = Start(signed_unit(pose.x), signed_unit(pose.y), signed_unit(kind.y), vehicle);
+        let along = params.start_along * (0.5 * (signed_unit(kind.z) + 1.0));
+        start = Start(signed_unit(pose.x), signed_unit(pose.y), signed_unit(kind.y), along, vehicle);
     }
     let lane = route_at(route);
     let wheelbase = vehicles[start.vehicle].rig.wheelbase;
-    var after = started(params, wheelbase, waypoint_at(lane.first), lane_heading(lane, 0u), start);
+    let first = first_waypoint(lane.n_waypoints, start.along);
+    let speed = params.start_speed + start.speed * params.start_speed_range;
+    var standing = Truck();
+    if first == 0u {
+        standing.heading = lane_heading(lane, 0u);
+        standing.trailer_heading = standing.heading;
+        standing.speed = speed;
+    } else {
+        standing = standing_at(vehicles[start.vehicle].rig, speed, lane, first);
+    }
+    var after = started(params, wheelbase, waypoint_at(lane.first + first), standing, start);
     after.route = route;
     after.episode = episode;
     control[env] = Control();
+    control[env].steering = after.steering;
+    control[env].steering_before = after.steering;
+    control[env].steering_earlier = after.steering;
+    control[env].steering_earliest = after.steering;
     control[env].target_speed = after.speed;
     truck[env] = after;
-    progress[env] = followed(lane, reference_point(wheelbase, after), 1u, params.stray_distance);
+    progress[env] = followed(lane, reference_point(wheelbase, after), first + 1u, params.stray_distance);
     progress[env].passed = 0u;
 }
 
@@ -99,15 +114,14 @@ fn route_of(env: u32, episode: u32) -> u32 {
     return choice[index];
 }
 
-// A truck at `waypoint`, where the lane has this heading (rad): trailer straight, offset and turned as `start` says.
-fn started(params: Params, wheelbase: f32, waypoint: WaypointRow, lane_heading: f32, start: Start) -> Truck {
-    let heading = wrapped(lane_heading + start.heading * params.start_heading);
+// A truck that stands at `waypoint` with these headings, offset and turned as a whole as `start` says.
+fn started(params: Params, wheelbase: f32, waypoint: WaypointRow, standing: Truck, start: Start) -> Truck {
+    let error = start.heading * params.start_heading;
     let point = waypoint.position + start.offset * params.start_offset * perpendicular(waypoint.direction);
-    var truck = Truck();
-    truck.position = point - 0.5 * wheelbase * direction(heading);
-    truck.heading = heading;
-    truck.trailer_heading = heading;
-    truck.speed = params.start_speed + start.speed * params.start_speed_range;
+    var truck = standing;
+    truck.heading = wrapped(standing.heading + error);
+    truck.trailer_heading = wrapped(standing.trailer_heading + error);
+    truck.position = point - 0.5 * wheelbase * direction(truck.heading);
     truck.vehicle = start.vehicle;
     return truck;
 }

@@ -131,6 +131,8 @@ pub struct Scenario {
     pub start_heading: f64,
     /// Least and greatest speed at the start; the highest target speed where there is none (m/s).
     pub start_speed: Option<[f64; 2]>,
+    /// Largest fraction of the route that lies behind at the start.
+    pub start_along: f64,
     /// Distance to the next waypoint beyond which the truck has strayed (m).
     pub stray_distance: f64,
     /// Articulation beyond which the truck is jackknifed (rad).

@@ -130,6 +130,7 @@ impl World {
                 start_heading: scenario.start_heading as f32,
                 start_speed: (0.5 * (start_least + start_most)) as f32,
                 start_speed_range: (0.5 * (start_most - start_least)) as f32,
+                start_along: scenario.start_along as f32,
                 target_speed_min: slowest as f32,
                 target_speed_max: fastest as f32,
                 changes_speed: u32::from(!scenario.speed_changes.is_empty()),

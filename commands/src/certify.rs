@@ -26,7 +26,7 @@ use crate::{outputs, progress, roads};
 const STARTS: [Start; 5] = [start(0.0, 0.0), start(1.0, 1.0), start(1.0, -1.0), start(-1.0, 1.0), start(-1.0, -1.0)];
 
 const fn start(offset: f32, heading: f32) -> Start {
-    Start { offset, heading, speed: 0.0, vehicle: 0 }
+    Start { offset, heading, speed: 0.0, along: 0.0, vehicle: 0 }
 }
 
 /// Show which routes of a benchmark can be completed: search for actions that complete each of them.

@@ -198,7 +198,7 @@ impl Evaluation<'_> {
     pub(crate) fn start(&self, episode: usize) -> (u32, Start) {
         (
             self.scenario.split(self.split)[episode / self.episodes],
-            drawn_start(self.world.params.n_vehicles, self.seed, episode as u32, 0),
+            drawn_start(&self.world.params, self.seed, episode as u32, 0),
         )
     }
 

@@ -16,6 +16,7 @@ __all__ = [
     "policy_names",
     "write_policy",
     "drive",
+    "interval_over_routes",
     "wilson",
     "column_layouts",
     "observation_groups",
@@ -113,7 +114,7 @@ class Batch:
         envs: list[int],
         streams: list[tuple[int, int] | None] | None,
         routes: list[str | None] | None,
-        starts: list[tuple[float, float, float, int] | None] | None,
+        starts: list[tuple[float, float, float, int, float] | None] | None,
     ) -> None: ...
     def column_bytes(self, names: list[str]) -> list[npt.NDArray[np.uint8]]: ...
     def restore_bytes(
@@ -245,6 +246,9 @@ def drive(
     device: str,
     begins: bool,
 ) -> list[tuple[str, npt.NDArray[Any]]]: ...
+def interval_over_routes(
+    routes: npt.NDArray[np.uint32], values: npt.NDArray[np.float64]
+) -> tuple[float, float] | None: ...
 def wilson(successes: int, trials: int) -> tuple[float, float]: ...
 def column_layouts() -> list[tuple[str, list[tuple[str, str, int, str]], int, str]]: ...
 def observation_groups() -> list[tuple[str, int, int, float, str]]: ...

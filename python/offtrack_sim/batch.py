@@ -22,7 +22,7 @@ from .arguments import (
     weights_of,
     within,
 )
-from .episodes import Ends, Floats, Ints, Start
+from .episodes import Ends, Floats, GivenStart, Ints, Start
 from .geometry import Road
 from .layout import COLUMNS
 from .scenarios import Scenario, given, kept
@@ -315,17 +315,17 @@ class Batch(_offtrack.Batch):
             raise ValueError(f"envs: more than {self.num_envs} of them; the batch has as many trucks")
         return [checked_integer(f"envs[{index}]", env) for index, env in enumerate(given)]
 
-    def _start(self, index: int, given: Start | tuple[float, ...] | None) -> tuple[float, float, float, int] | None:
+    def _start(self, index: int, given: Start | tuple[float, ...] | None) -> GivenStart | None:
         """A start with the index of its vehicle."""
         if given is None:
             return None
         try:
             start = Start(*given)
-            offset, heading, speed = (float(fraction) for fraction in start[:3])
+            offset, heading, speed, along = (float(fraction) for fraction in (*start[:3], start.along))
         except (TypeError, ValueError):
-            needed = "a tuple of offset, heading error, speed and vehicle is needed, see offtrack_sim.Start"
+            needed = "a tuple of offset, heading error, speed, vehicle and along is needed, see offtrack_sim.Start"
             raise TypeError(f"starts[{index}]: {given!r}; {needed}") from None
-        return offset, heading, speed, self._vehicle(f"starts[{index}].vehicle", start.vehicle)
+        return offset, heading, speed, self._vehicle(f"starts[{index}].vehicle", start.vehicle), along
 
     def _vehicle(self, name: str, given: int | tuple[str, str]) -> int:
         """Index of a vehicle, which may be given as a class."""

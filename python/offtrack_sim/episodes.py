@@ -9,6 +9,8 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
+#: A start as the native part takes it: offset, heading, speed, index of the vehicle, along.
+GivenStart = tuple[float, float, float, int, float]
 
 
 class Ends(NamedTuple):
@@ -27,7 +29,7 @@ class Ends(NamedTuple):
 
 
 class Start(NamedTuple):
-    """How a truck begins its route; the zeros are the first vehicle on the lane's centre line."""
+    """How a truck begins its route; the zeros are the first vehicle on the lane's centre at the first waypoint."""
 
     offset: float = 0.0
     """Lateral offset as a fraction of the benchmark's largest, in ``-1..1``, left positive."""
@@ -37,3 +39,8 @@ class Start(NamedTuple):
     """Where in the benchmark's range of speeds at the start: -1 the lowest, 0 the middle, 1 the highest."""
     vehicle: int | tuple[str, str] = 0
     """Index of the vehicle in ``Batch.vehicle_classes``, or its class, one of ``Batch.classes``: that class's first."""
+    along: float = 0.0
+    """Fraction of the route that lies behind, in ``0..1``: the truck begins at the nearest waypoint, the last but one
+    at most; ``k / (n - 1)`` is waypoint ``k`` of ``n``, see :meth:`Batch.road`. Both units stand there as if the truck
+    had followed the lane, with the wheels and the lean that a bend asks for, and the clock begins: the time limit is
+    that of the whole route. The start is not judged: a truck that touches a kerb there ends with its first step."""

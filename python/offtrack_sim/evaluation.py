@@ -36,7 +36,8 @@ class Evaluation:
     """A row an episode, route by route, ``[n * episodes]``, with the fields
 
     - ``route``, ``episode``: the route's name, and the episode's index among those of its route;
-    - ``start_offset``, ``start_heading``, ``start_speed``, ``vehicle``: the start, as :class:`offtrack_sim.Start`;
+    - ``start_offset``, ``start_heading``, ``start_speed``, ``start_along``, ``vehicle``: the start, as
+      :class:`offtrack_sim.Start`;
     - ``ended``, ``steps``: why it ended, as :class:`offtrack_sim.Ended`, and its steps of 0.1 s;
     - ``reward``, and what the reward weighs, each summed over the steps: ``term_waypoints``, waypoints passed;
       ``term_lane_distance``, distances as fractions of their limit; ``term_clearance``, depths in the margin kept from
@@ -56,8 +57,35 @@ class Evaluation:
 
     @property
     def success_interval(self) -> tuple[float, float]:
-        """Wilson's 95 % interval of that fraction."""
+        """Wilson's 95 % interval of that fraction, as if each episode were a sample of its own."""
         return _offtrack.wilson(int((self.ended == Ended.ARRIVED).sum()), self.ended.size)
+
+    @property
+    def success_interval_over_routes(self) -> tuple[float, float] | None:
+        """The 95 % interval over routes of that fraction, see :meth:`interval_over_routes`."""
+        return self.interval_over_routes(self.ended == Ended.ARRIVED)
+
+    def interval_over_routes(self, values: npt.ArrayLike) -> tuple[float, float] | None:
+        """The 95 % interval of the mean of a figure, such as ``table["lane_distance_mean"]``; None on one route alone.
+
+        Routes are drawn with replacement, each with all its episodes: these have nearly the same start and end alike,
+        so that 30 of them are not 30 samples. The numbers are those of ``offtrack evaluate --json``.
+
+        Args:
+            values: A number for each episode, ``[n * episodes]`` as the rows of :attr:`table`, or ``[n, episodes]``.
+
+        Raises:
+            TypeError, ValueError: For what are no finite numbers, or another number of them.
+        """
+        try:
+            found = np.asarray(values, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise TypeError(f"values: {type(values).__name__}; a number for each episode is needed") from None
+        if found.shape not in (self.ended.shape, (self.ended.size,)) or not np.isfinite(found).all():
+            needed = f"finite numbers of shape ({self.ended.size},) or {self.ended.shape} are needed"
+            raise ValueError(f"values: {found.dtype} of shape {found.shape}; {needed}")
+        routes = np.repeat(np.arange(len(self.ended), dtype=np.uint32), self.ended.shape[1])
+        return _offtrack.interval_over_routes(routes, found.ravel())
 
     @property
     def success_by_route(self) -> dict[str, float]:
@@ -74,6 +102,8 @@ class Evaluation:
     def as_dict(self) -> dict[str, Any]:
         """The same for a JSON file, with the keys of ``offtrack evaluate --json``."""
         low, high = self.success_interval
+        over_routes = self.success_interval_over_routes
+        ends = {} if over_routes is None else {"low": over_routes[0], "high": over_routes[1]}
         return {
             "benchmark": self.scenario,
             "split": self.split,
@@ -83,6 +113,7 @@ class Evaluation:
             "success": self.success,
             "success_low": low,
             "success_high": high,
+            **{f"success_{end}_over_routes": value for end, value in ends.items()},
             "ends": {ended.name.lower(): self.counts.get(ended.name.lower(), 0) for ended in Ended if ended},
             "routes": self.success_by_route,
         }

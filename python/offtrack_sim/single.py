@@ -58,7 +58,8 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
 
     ``reset(seed=s)`` begins the first episode of the stream ``(s, 0)``, and each later ``reset()`` the next one.
     ``reset(options={"route": name, "start": Start(...)})`` states the route or the start (:class:`offtrack_sim.Start`)
-    with its vehicle, or both; ``(offset, heading)`` is the start of the first vehicle.
+    with its vehicle and its place along the route, or both; ``(offset, heading)`` is that of the first vehicle at the
+    route's beginning.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}

@@ -124,7 +124,8 @@ class RoundaboutVector(Base):
                 environment of one truck has with that seed, and None in it leaves the truck its stream. None: every
                 truck goes on with its next episode.
             options: ``reset_mask``, bool ``[num_envs]``: the trucks to begin, the others go on. ``routes`` and
-                ``starts``: sequences of ``num_envs``, as for :meth:`offtrack_sim.Batch.begin`; a start has a vehicle.
+                ``starts``: sequences of ``num_envs``, as for :meth:`offtrack_sim.Batch.begin`; a start has a vehicle
+                and a place along its route.
 
         Returns:
             Observations and infos; trucks outside the mask have the observation they had.

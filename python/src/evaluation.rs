@@ -1,6 +1,6 @@
 //! Evaluations: episodes are driven and counted as on the command line, by a policy or by a function of Python.
 
-use numpy::{PyArray1, PyArrayMethods};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use offtrack::layout::{Ended, N_VALUES, Start};
 use offtrack::physics::drawn_start;
 use offtrack::simulator::{Actions, Error};
@@ -8,6 +8,7 @@ use offtrack::world::World;
 use offtrack_evaluation::episode::Episode;
 use offtrack_evaluation::episodes::Episodes;
 use offtrack_evaluation::figures::Figures;
+use offtrack_evaluation::interval::Cells;
 use offtrack_evaluation::placed::placed;
 use offtrack_evaluation::policies::Controller;
 use offtrack_evaluation::report;
@@ -83,7 +84,7 @@ pub fn drive<'py>(
             Ok::<(), Raised>(())
         });
         driven.map_err(|Raised(exception)| exception)?;
-        let starts = (0..n_envs).map(|env| drawn_start(world.params.n_vehicles, seed, env as u32, 0));
+        let starts = (0..n_envs).map(|env| drawn_start(&world.params, seed, env as u32, 0));
         columns(py, &starts.collect::<Vec<Start>>(), &figures.finish())
     })
 }
@@ -96,10 +97,11 @@ type Field<Row, Value> = (&'static str, fn(&Row) -> Value);
 
 /// The figures of episodes as columns.
 fn columns<'py>(py: Python<'py>, starts: &[Start], episodes: &[Episode]) -> PyResult<Vec<Column<'py>>> {
-    let of_starts: [Field<Start, f32>; 3] = [
+    let of_starts: [Field<Start, f32>; 4] = [
         ("start_offset", |start| start.offset),
         ("start_heading", |start| start.heading),
         ("start_speed", |start| start.speed),
+        ("start_along", |start| start.along),
     ];
     let counts: [Field<Episode, i64>; 3] = [
         ("vehicle", |episode| episode.last.vehicle.into()),
@@ -172,4 +174,18 @@ impl Function<'_, '_> {
 #[pyfunction]
 pub fn wilson(successes: usize, trials: usize) -> (f64, f64) {
     report::wilson(successes, trials)
+}
+
+/// The 95 % interval over routes of the mean of an episode's `values`, one for each of `routes`; None on one route.
+#[pyfunction]
+pub fn interval_over_routes(
+    py: Python,
+    routes: PyReadonlyArray1<u32>,
+    values: PyReadonlyArray1<f64>,
+) -> PyResult<Option<(f64, f64)>> {
+    guarded(|| {
+        let episodes = routes.as_array().into_iter().copied().zip(values.as_array().into_iter().copied());
+        let cells = Cells::of_routes(episodes);
+        Pool::new(0).run(py, || cells.interval())
+    })
 }

@@ -30,6 +30,7 @@ fn _offtrack(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(policy::policy_names, module)?)?;
     module.add_function(wrap_pyfunction!(policy::write_policy, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::drive, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::interval_over_routes, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::wilson, module)?)?;
     module.add_function(wrap_pyfunction!(layout::column_layouts, module)?)?;
     module.add_function(wrap_pyfunction!(layout::observation_groups, module)?)?;

@@ -30,6 +30,31 @@ def test_the_wheel_has_the_command_and_it_counts_what_python_counts(tmp_path: Pa
     assert page.read_text().startswith("<!")
 
 
+def test_intervals_over_routes_are_those_of_the_command_line_to_the_last_bit(tmp_path: Path) -> None:
+    report = tmp_path / "report.json"
+    done = ran(
+        "evaluate", "--benchmark", "maps2026", "--policy", "attard2023", "--episodes", "2", "--json", str(report)
+    )
+    assert done.returncode == 0, done.stderr
+    written = json.loads(report.read_text())
+    python = offtrack_sim.evaluate(offtrack_sim.Policy.shipped(), "maps2026", episodes=2)
+    low, high = written["success_low_over_routes"], written["success_high_over_routes"]
+    assert python.success_interval_over_routes == (low, high) and low < python.success < high
+    assert (
+        python.as_dict().items()
+        <= {**written, "routes": python.success_by_route, "episodes": len(python.table)}.items()
+    )
+    # Episodes of one route end alike: as samples of their own they would promise more.
+    assert high - low > written["success_high"] - written["success_low"]
+    distance = python.interval_over_routes(python.table["lane_distance_mean"])
+    assert distance is not None and distance[0] < written["lane_distance_mean"] < distance[1]
+    one = offtrack_sim.evaluate(offtrack_sim.Policy.shipped(), routes=["16m/N-left-3"], episodes=3)
+    assert one.success_interval_over_routes is None and "success_low_over_routes" not in one.as_dict()
+    for wrong, error in (([1.0], ValueError), ([float("nan")] * 3, ValueError), (["far"] * 3, TypeError)):
+        with pytest.raises(error, match="^values: "):
+            one.interval_over_routes(wrong)
+
+
 def test_it_draws_films_generates_certifies_and_says_which_trucks_fit(tmp_path: Path) -> None:
     for arguments, file in (
         (["draw", "20m", "--route", "N-left-4", "-o", "road.svg"], "road.svg"),

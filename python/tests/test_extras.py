@@ -120,6 +120,42 @@ def test_a_start_states_where_in_the_range_of_speeds_it_is(short_benchmark: str)
     assert np.allclose(3.6 * batch.columns("truck")["truck"]["speed"], [10.0, 20.0, 30.0])
 
 
+def test_a_start_states_where_along_its_route_it_is_in_batches_and_environments() -> None:
+    batch = Batch(num_envs=4, routes=["16m/N-left-3"])
+    n = len(batch.road("16m/N-left-3").waypoints)
+    starts = [Start(along=index / (n - 1)) for index in (0, 31, n - 2)]
+    batch.begin(starts=[*starts, (0.0, 0.0)])
+    columns = batch.columns("truck", "progress", "observation")
+    assert columns["progress"]["waypoint"].tolist() == [1, 32, n - 1, 1]
+    assert columns["observation"][0].tobytes() == columns["observation"][3].tobytes()
+    waypoint, truck = batch.road("16m/N-left-3").waypoints[31], columns["truck"][1]
+    ahead = 0.5 * batch.dimensions()["wheelbase"] * np.array([np.cos(truck["heading"]), np.sin(truck["heading"])])
+    assert np.allclose(truck["position"] + ahead, waypoint[:2], atol=1e-4)
+    assert abs(truck["heading"] - truck["trailer_heading"]) > 0.1
+    options = {"route": "16m/N-left-3", "start": starts[1]}
+    single = offtrack_sim.Roundabout(routes=["16m/N-left-3"])
+    assert (single.reset(seed=0, options=options)[0] == columns["observation"][1]).all()
+    env = offtrack_sim.make_vec(num_envs=2, routes=["16m/N-left-3"])
+    assert (env.reset(seed=0, options={"starts": starts[:2]})[0] == columns["observation"][:2]).all()
+
+
+def test_a_benchmark_draws_starts_along_its_routes_and_an_evaluation_says_where() -> None:
+    anywhere = offtrack_sim.benchmark("attard2023").changed({"start.along": 0.9}, name="anywhere")
+    batch = Batch(anywhere, 256, seed=1)
+    waypoints = batch.columns("progress")["progress"]["waypoint"]
+    assert waypoints.min() < 10 and len(set(waypoints.tolist())) > 50
+    table = offtrack_sim.evaluate(offtrack_sim.Policy.shipped(), anywhere, episodes=3).table
+    assert table["start_along"].min() < 0.2 and 0.7 < table["start_along"].max() < 0.9
+    offset, heading, speed, along = (
+        float(table[5][f"start_{name}"]) for name in ("offset", "heading", "speed", "along")
+    )
+    start = Start(offset, heading, speed, along=along)
+    again, whole = Batch(anywhere, 1, split="test"), Batch(anywhere, 1, split="test")
+    again.begin(routes=[str(table["route"][5])], starts=[start])
+    whole.begin(streams=[(0, 5)], routes=[str(table["route"][5])])
+    assert (again.observation() == whole.observation()).all()
+
+
 def test_wrong_starts_are_refused_and_begin_nothing() -> None:
     batch = Batch("laden2026", 2)
     before = batch.state()
@@ -132,7 +168,10 @@ def test_wrong_starts_are_refused_and_begin_nothing() -> None:
             ValueError,
             r"starts\[1\].vehicle: \('daf_xf', 'wet'\); laden2026 has \('daf_xf', 'empty'\), \('daf_xf', 'half'\)",
         ),
-        ((0.0, 0.0, 0.0, 0, 1), TypeError, r"starts\[1\]: \(0.0, 0.0, 0.0, 0, 1\); a tuple of offset, heading error"),
+        ((0.0, 0.0, 0.0, 0, 0.0, 1), TypeError, r"starts\[1\]: \(0.0, 0.0, 0.0, 0, 0.0, 1\); a tuple of offset"),
+        (Start(along=1.5), ValueError, r"starts\[1\]: 1.5 of the way along the route; must lie in 0..1"),
+        (Start(along=float("nan")), ValueError, r"starts\[1\]: NaN of the way along the route"),
+        (Start(along=cast(Any, "half")), TypeError, r"starts\[1\]: Start\(.*along='half'\); a tuple of offset"),
         (("left", 0.0), TypeError, r"starts\[1\]: \('left', 0.0\); a tuple of offset"),
         (0.5, TypeError, r"starts\[1\]: 0.5; a tuple of offset"),
         (Start(speed=1.5), ValueError, r"starts\[1\]: 1.5 of the largest start error; must lie in -1..1"),

@@ -85,6 +85,14 @@ pub enum Error {
         /// The fraction of the largest error.
         fraction: String,
     },
+    /// A start that is not on its route.
+    #[error("starts[{env}]: {fraction} of the way along the route; must lie in 0..1")]
+    BeyondRoute {
+        /// Index of its truck.
+        env: usize,
+        /// The fraction of the route that is to lie behind.
+        fraction: String,
+    },
     /// A row that the batch does not have.
     #[error("indices[{position}]: {index}; the batch has trucks 0..{n_envs}")]
     UnknownTruck {

@@ -337,7 +337,7 @@ pub fn module() -> String {
 }
 
 /// The shader files in the order in which they make one module.
-pub const SHADERS: [(&str, &str); 23] = [
+pub const SHADERS: [(&str, &str); 24] = [
     ("layout", include_str!("../../shaders/layout.wgsl")),
     ("common/thread", include_str!("../../shaders/common/thread.wgsl")),
     ("common/angle", include_str!("../../shaders/common/angle.wgsl")),
@@ -359,6 +359,7 @@ pub const SHADERS: [(&str, &str); 23] = [
     ("judge", include_str!("../../shaders/judge.wgsl")),
     ("count", include_str!("../../shaders/count.wgsl")),
     ("copy_observation", include_str!("../../shaders/copy_observation.wgsl")),
+    ("along", include_str!("../../shaders/along.wgsl")),
     ("reset", include_str!("../../shaders/reset.wgsl")),
     ("advance", include_str!("../../shaders/advance.wgsl")),
 ];

@@ -36,6 +36,7 @@ pub fn shared() -> String {
         cpu::observe::printed_constants(),
         traffic::printed_constants(),
         cpu::traffic::printed_constants(),
+        cpu::along::printed_constants(),
         tally::printed_constants(),
         autoreset::printed_constants(),
         "\n".to_owned(),

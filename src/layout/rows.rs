@@ -95,7 +95,12 @@ crate::shared! {
     }
 
     /// How a truck begins its route: fractions of the largest start errors and of half the range of speeds, each in
-    /// -1..=1, and its vehicle. Zeros are the first vehicle on the lane centre at the middle of the speeds.
+    /// -1..=1, its vehicle, and where along the route. Zeros are the first vehicle on the lane centre at the first
+    /// waypoint and the middle of the speeds.
+    ///
+    /// Beyond the first waypoint both units stand as if the truck had followed the lane to there, with the wheels and the
+    /// lean that the bend asks for; the errors move and turn it as a whole. The clock begins: the episode has the whole
+    /// route's time. The start itself is not judged: a truck that touches a kerb there ends with its first step.
     pub struct Start {
         /// Fraction of the largest lateral offset, left positive.
         pub offset: f32,
@@ -103,6 +108,9 @@ crate::shared! {
         pub heading: f32,
         /// Fraction of half the range of speeds, from its middle.
         pub speed: f32,
+        /// Fraction of the route that lies behind, in 0..=1: the truck begins at the nearest waypoint, the last but one
+        /// at most.
+        pub along: f32,
         /// Index of the vehicle in the world.
         pub vehicle: u32,
     }

@@ -197,6 +197,8 @@ crate::shared! {
         pub start_speed: f32,
         /// Half of their range (m/s).
         pub start_speed_range: f32,
+        /// Largest fraction of the route that lies behind at a drawn start.
+        pub start_along: f32,
         /// Lowest target speed (m/s).
         pub target_speed_min: f32,
         /// Highest target speed (m/s).

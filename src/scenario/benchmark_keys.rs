@@ -209,6 +209,7 @@ pub(super) struct WrittenStart {
     pub(super) offset: f64,
     pub(super) heading_deg: f64,
     pub(super) speed_kmh: Option<WrittenRange>,
+    pub(super) along: f64,
 }
 
 /// A number, or `[least, greatest]`.
@@ -231,7 +232,7 @@ impl WrittenRange {
 
 impl Default for WrittenStart {
     fn default() -> Self {
-        WrittenStart { offset: 0.3, heading_deg: 2.0, speed_kmh: None }
+        WrittenStart { offset: 0.3, heading_deg: 2.0, speed_kmh: None, along: 0.0 }
     }
 }
 

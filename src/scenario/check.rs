@@ -59,6 +59,7 @@ impl Scenario {
             list("speed_changes", &self.speed_changes, [-100.0, 100.0])?;
         }
         self.start_speed.iter().flatten().try_for_each(|&speed| within("start_speed", speed, [0.0, 100.0]))?;
+        within("start_along", self.start_along, [0.0, 1.0])?;
         self.check_routes()?;
         check_vehicle(&self.vehicle)?;
         if let Some(fleet) = &self.fleet {

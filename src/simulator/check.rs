@@ -20,7 +20,8 @@ pub(super) fn check_routes(world: &World, n_envs: usize, choice: &RouteChoice) -
     Ok(())
 }
 
-/// An error if the start lies beyond the benchmark's largest errors, or its vehicle is not in the world.
+/// An error if the start lies beyond the benchmark's largest errors or not on the route, or its vehicle is not in the
+/// world.
 pub(super) fn check_start(world: &World, env: usize, start: &Start) -> Result<(), Error> {
     let n_vehicles = world.rigs.len();
     if n_vehicles <= start.vehicle as usize {
@@ -28,7 +29,13 @@ pub(super) fn check_start(world: &World, env: usize, start: &Start) -> Result<()
     }
     let outside =
         [start.offset, start.heading, start.speed].into_iter().find(|fraction| !(-1.0..=1.0).contains(fraction));
-    outside.map_or(Ok(()), |fraction| Err(Error::UnknownStart { env, fraction: fraction.to_string() }))
+    if let Some(fraction) = outside {
+        return Err(Error::UnknownStart { env, fraction: fraction.to_string() });
+    }
+    if !(0.0..=1.0).contains(&start.along) {
+        return Err(Error::BeyondRoute { env, fraction: start.along.to_string() });
+    }
+    Ok(())
 }
 
 /// An error if the world does not have one of the routes.

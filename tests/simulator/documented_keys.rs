@@ -83,6 +83,7 @@ hindrance = -0.5
 offset = 0.2
 heading_deg = 1.0
 speed_kmh = [20.0, 25.0]
+along = 0.5
 [ending]
 stray_distance = 8.0
 jackknife_deg = 80.0

@@ -110,7 +110,7 @@ fn a_mirrored_truck_has_the_mirrored_extras() {
     for (name, engine) in engines() {
         let extras = |side: f32, actions: &[u32]| {
             let mut simulator = batch_on(&engine, &world, 1, 0, RouteChoice::Fixed(vec![3]));
-            simulator.reset_from(&[Start { offset: 0.0, heading: 0.5 * side, speed: 0.0, vehicle: 300 }]).unwrap();
+            simulator.reset_from(&[Start { heading: 0.5 * side, vehicle: 300, ..Start::default() }]).unwrap();
             actions.iter().for_each(|&action| simulator.step(&[action]).unwrap());
             simulator.batch().next_extras[0]
         };

@@ -69,7 +69,7 @@ fn each_episode_draws_its_vehicle_alike_on_every_engine() {
         let mut simulator = batch_on(&engine, &world, 512, 7, all_routes(&world));
         (0..200).for_each(|_| simulator.step_at_random());
         let batch = simulator.batch();
-        let drawn = |env: u32, truck: &Truck| drawn_start(512, 7, env, truck.episode).vehicle;
+        let drawn = |env: u32, truck: &Truck| drawn_start(&world.params, 7, env, truck.episode).vehicle;
         assert!((0..).zip(&batch.truck).all(|(env, truck)| truck.vehicle == drawn(env, truck)), "{name}");
         // Two thirds are of the first kind, a quarter has each load; 512 draws deviate by 6 % at most (3 sigma).
         let part = |keeps: &dyn Fn(u32) -> bool| {
@@ -100,7 +100,7 @@ fn a_truck_among_others_drives_as_it_would_alone() {
             alone.rigs = vec![offtrack::layout::Rig { chassis: 0, ..rig }];
             alone.rays = vec![rays];
             alone.params.n_vehicles = 1;
-            let start = Start { offset: 0.4, heading: -0.3, speed: 0.0, vehicle };
+            let start = Start { offset: 0.4, heading: -0.3, vehicle, ..Start::default() };
             let (truck, observation) = driven(&engine, &all, start, 20);
             let (own, expected) = driven(&engine, &Arc::new(alone), Start { vehicle: 0, ..start }, 20);
             assert_eq!(truck, Truck { vehicle, ..own }, "{name}");

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec2;
+use offtrack::layout::Start;
 use offtrack::map::{Gutter, Road};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::RouteChoice;
@@ -76,6 +77,14 @@ fn a_left_hand_world_driven_with_mirrored_actions_is_the_mirrored_right_hand_one
             }
             assert!(rows(one.batch()) == rows(other.batch()), "{name}, {gutter}");
             assert!(one.batch().truck.iter().any(|truck| 0 < truck.episode), "nobody has begun a second episode");
+            // From anywhere along the routes, too.
+            let starts: Vec<Start> =
+                (0..256).map(|env| Start { along: env as f32 / 255.0, ..Start::default() }).collect();
+            for simulator in [&mut one, &mut other] {
+                simulator.reset_from(&starts).unwrap();
+                (0..10).for_each(|_| simulator.step_at_random());
+            }
+            assert!(rows(one.batch()) == rows(other.batch()), "{name}, {gutter}");
         }
     }
 }

@@ -9,6 +9,7 @@ use offtrack::scenario::Scenario;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 
+mod along;
 mod autoreset;
 mod bad_input;
 mod collide;

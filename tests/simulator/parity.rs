@@ -49,8 +49,10 @@ fn is_close_call(world: &World, before: &Batch, after: &Batch, env: usize) -> bo
     let near = |value: f32, limit: f32| (value - limit).abs() < MARGIN;
     let point = reference_point(world.rig(truck).wheelbase, truck);
     let waypoints = world.route_waypoints(truck.route);
-    // The waypoints that were passed, and the next one.
-    let tried = before.progress[env].waypoint as usize..waypoints.len().min(after.progress[env].waypoint as usize + 1);
+    // The waypoints that were passed, and the next one. A truck that begins again has passed none.
+    let begins = before.truck[env].episode != truck.episode;
+    let next = (if begins { after } else { before }).progress[env].waypoint;
+    let tried = next as usize..waypoints.len().min(after.progress[env].waypoint as usize + 1);
     let at_a_line = waypoints.get(tried).unwrap_or_default().iter().any(|waypoint| {
         let offset = point - waypoint.position;
         near(offset.dot(waypoint.direction), 0.0) || near(offset.length(), params.stray_distance)
@@ -218,6 +220,34 @@ fn every_number_of_tyres_delays_and_disturbances_counts_on_the_device() {
     let world = disturbed_world();
     let (choice, before) = varied(&world, false);
     for noticed in NOTICED {
+        assert_noticed(&world, &choice, &before, noticed);
+    }
+}
+
+/// Numbers of the vehicle and the route that decide how a truck stands which begins along its route.
+const OF_STARTS: [Noticed; 11] = [
+    ("start_along", Stage::Reset, |world| world.params.start_along *= 0.99),
+    ("start_offset", Stage::Reset, |world| world.params.start_offset *= 1.001),
+    ("start_heading", Stage::Reset, |world| world.params.start_heading *= 1.001),
+    ("wheelbase", Stage::Reset, |world| world.rigs.iter_mut().for_each(|rig| rig.wheelbase *= 1.001)),
+    ("fifth_wheel", Stage::Reset, |world| world.rigs.iter_mut().for_each(|rig| rig.fifth_wheel += 0.001)),
+    ("trailer_wheelbase", Stage::Reset, |world| world.rigs.iter_mut().for_each(|rig| rig.trailer_wheelbase *= 1.001)),
+    ("understeer", Stage::Reset, |world| world.rigs.iter_mut().for_each(|rig| rig.understeer *= 1.01)),
+    ("slip", Stage::Reset, |world| world.rigs.iter_mut().for_each(|rig| rig.slip *= 1.01)),
+    ("roll", Stage::Reset, |world| world.rigs.iter_mut().for_each(|rig| rig.tractor_roll.input[1] *= 1.001)),
+    ("stiffness", Stage::Reset, |world| world.rigs.iter_mut().for_each(|rig| rig.trailer_roll.transition[2] *= 1.001)),
+    ("crossfall", Stage::Reset, |world| world.rigs.iter_mut().for_each(|rig| rig.crossfall += 0.001)),
+];
+
+#[test]
+fn a_truck_begins_along_its_route_alike_and_every_number_of_its_stance_counts_on_the_device() {
+    let mut world = World::clone(&fleet_world());
+    world.params.start_along = 1.0;
+    let world = Arc::new(world);
+    let (choice, mut before) = varied(&world, false);
+    // All trucks begin again.
+    before.ended.fill(Ended::Arrived as u32);
+    for noticed in OF_STARTS {
         assert_noticed(&world, &choice, &before, noticed);
     }
 }

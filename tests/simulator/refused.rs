@@ -86,7 +86,7 @@ fn brakes_that_drive_and_a_drive_that_brakes_are_refused() {
 #[test]
 fn a_number_of_a_scenario_that_is_not_one_is_refused_by_its_name() {
     type Field = (&'static str, fn(&mut Scenario) -> &mut f64);
-    let fields: [Field; 21] = [
+    let fields: [Field; 22] = [
         ("step", |s| &mut s.step),
         ("cell", |s| &mut s.cell),
         ("steer_max", |s| s.steer_max.insert(0.0)),
@@ -94,6 +94,7 @@ fn a_number_of_a_scenario_that_is_not_one_is_refused_by_its_name() {
         ("sensor_range", |s| &mut s.sensor_range),
         ("start_offset", |s| &mut s.start_offset),
         ("start_heading", |s| &mut s.start_heading),
+        ("start_along", |s| &mut s.start_along),
         ("stray_distance", |s| &mut s.stray_distance),
         ("jackknife_angle", |s| &mut s.jackknife_angle),
         ("rollover_ratio", |s| &mut s.rollover_ratio),

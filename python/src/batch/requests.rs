@@ -9,8 +9,8 @@ use super::Batch;
 use super::state::State;
 use crate::errors;
 
-/// Offset, heading error and speed of a start as fractions, and the index of its vehicle.
-pub(super) type GivenStart = (f32, f32, f32, u32);
+/// Offset, heading error and speed of a start as fractions, the index of its vehicle, and how far along its route it is.
+pub(super) type GivenStart = (f32, f32, f32, u32, f32);
 
 impl Batch {
     /// Begins an episode of each of these trucks; streams, routes and starts are one a truck.
@@ -32,18 +32,15 @@ impl Batch {
                 )));
             }
         }
+        let start =
+            |(offset, heading, speed, vehicle, along): GivenStart| Start { offset, heading, speed, along, vehicle };
         let request = |(index, &env): (usize, &usize)| {
             let route = routes.and_then(|routes| routes[index].as_deref());
             Ok(Begin {
                 env,
                 stream: streams.and_then(|streams| streams[index]).map(|(seed, env)| Stream { seed, env }),
                 route: route.map(|name| self.route(name)).transpose()?,
-                start: starts.and_then(|starts| starts[index]).map(|(offset, heading, speed, vehicle)| Start {
-                    offset,
-                    heading,
-                    speed,
-                    vehicle,
-                }),
+                start: starts.and_then(|starts| starts[index]).map(start),
             })
         };
         let requests = envs.iter().enumerate().map(request).collect::<PyResult<Vec<Begin>>>()?;

@@ -93,9 +93,14 @@ pub fn motion_of(rig: &Rig, truck: &Truck) -> Motion {
 #[inline]
 pub fn steered_curvature(rig: &Rig, steering: f32, speed: f32) -> f32 {
     let (sin, cos) = sin_cos(steering);
+    sin / (cos * steered_wheelbase(rig, speed))
+}
+
+/// Wheelbase as which the tractor steers at a speed (m/s) (m).
+#[inline]
+pub fn steered_wheelbase(rig: &Rig, speed: f32) -> f32 {
     // Oversteer ends in a spin, which is not modelled.
-    let wheelbase = (rig.wheelbase + rig.understeer * (speed * speed)).max(WHEELBASE_MIN * rig.wheelbase);
-    sin / (cos * wheelbase)
+    (rig.wheelbase + rig.understeer * (speed * speed)).max(WHEELBASE_MIN * rig.wheelbase)
 }
 
 /// Strongest drive at a speed (m/s^2).
@@ -249,6 +254,29 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
         },
         motion: end,
     }
+}
+
+/// The truck as it leans once it has turned for long with its steer angle and speed.
+pub fn settled(rig: &Rig, truck: &Truck) -> Truck {
+    let motion = motion_of(rig, truck);
+    let tractor = Vec2::new(settled_roll(&rig.tractor_roll, motion.lateral_acceleration + rig.crossfall), 0.0);
+    let trailer = Vec2::new(settled_roll(&rig.trailer_roll, motion.trailer_lateral_acceleration + rig.crossfall), 0.0);
+    let (tractor_ratio, trailer_ratio) =
+        load_transfer_ratios(rig, tractor, trailer, motion.lateral_acceleration, motion.trailer_lateral_acceleration);
+    Truck {
+        tractor_roll: tractor.x,
+        trailer_roll: trailer.x,
+        tractor_load_transfer_ratio: tractor_ratio,
+        trailer_load_transfer_ratio: trailer_ratio,
+        lateral_acceleration: motion.trailer_lateral_acceleration,
+        ..*truck
+    }
+}
+
+/// The roll that a unit comes to rest at under a constant lateral acceleration (rad): one at which its rate stays 0.
+#[inline]
+fn settled_roll(roll: &Roll, lateral_acceleration: f32) -> f32 {
+    -roll.input[1] * lateral_acceleration / roll.transition[2]
 }
 
 /// A unit's (roll, roll rate) one sub-step later. The lateral acceleration of the sub-step's middle stands for its

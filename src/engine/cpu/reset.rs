@@ -4,7 +4,7 @@
 
 use crate::engine::cpu::follow::{followed, reference_point};
 use crate::engine::cpu::traffic::surrounded;
-use crate::engine::cpu::{around, observe, perceive, sense};
+use crate::engine::cpu::{along, around, observe, perceive, sense};
 use crate::engine::{Autoreset, RouteChoice, Row};
 use crate::layout::angle::{direction, wrapped};
 use crate::layout::random::{self, Draw};
@@ -17,7 +17,7 @@ use crate::world::World;
 
 /// The next episode, as drawn.
 const NEXT: BeginRow =
-    BeginRow { start: Start { offset: 0.0, heading: 0.0, speed: 0.0, vehicle: 0 }, route: 0, what: BEGINS };
+    BeginRow { start: Start { offset: 0.0, heading: 0.0, speed: 0.0, along: 0.0, vehicle: 0 }, route: 0, what: BEGINS };
 
 /// Begins and observes another episode where one ended, or holds the truck. A truck that was held when the step began
 /// begins its next episode with [`Autoreset::NextStep`].
@@ -51,11 +51,17 @@ pub fn begin(world: &World, row: &mut Row, begin: &BeginRow) {
     *row.reward = 0.0;
 }
 
-/// The start that is drawn for an episode of truck `env` in a world of so many vehicles.
-pub fn drawn_start(n_vehicles: u32, seed: u32, env: u32, episode: u32) -> Start {
+/// The start that is drawn for an episode of truck `env` in a world with these `params`.
+pub fn drawn_start(params: &Params, seed: u32, env: u32, episode: u32) -> Start {
     let [offset, heading, ..] = random::words(seed, env, episode, Draw::Pose as u32).map(random::signed_unit);
-    let [vehicle, speed, ..] = random::words(seed, env, episode, Draw::Vehicle as u32);
-    Start { offset, heading, speed: random::signed_unit(speed), vehicle: random::index_below(vehicle, n_vehicles) }
+    let [vehicle, speed, along, _] = random::words(seed, env, episode, Draw::Vehicle as u32);
+    Start {
+        offset,
+        heading,
+        speed: random::signed_unit(speed),
+        along: params.start_along * (0.5 * (random::signed_unit(along) + 1.0)),
+        vehicle: random::index_below(vehicle, params.n_vehicles),
+    }
 }
 
 /// Puts the truck at the start of an episode and observes it there.
@@ -63,21 +69,33 @@ fn start(world: &World, row: &mut Row, begin: &BeginRow) {
     let Stream { seed, env } = row.stream;
     let episode = if begin.what & IS_FIRST == 0 { row.truck.episode + 1 } else { 0 };
     let route = if begin.what & HAS_ROUTE == 0 { route_of(row, episode) } else { begin.route };
-    let start = if begin.what & HAS_START == 0 {
-        drawn_start(world.params.n_vehicles, seed, env, episode)
-    } else {
-        begin.start
-    };
+    let start = if begin.what & HAS_START == 0 { drawn_start(&world.params, seed, env, episode) } else { begin.start };
     let waypoints = world.route_waypoints(route);
     let rig = &world.rigs[start.vehicle as usize];
-    let at_start = started(&world.params, rig, &waypoints[0], world.route_previews(route)[0].heading, &start);
+    let first = along::first_waypoint(waypoints.len() as u32, start.along) as usize;
+    let speed = world.params.start_speed + start.speed * world.params.start_speed_range;
+    let standing = if first == 0 {
+        let heading = world.route_previews(route)[0].heading;
+        Truck { heading, trailer_heading: heading, speed, ..Truck::default() }
+    } else {
+        along::standing_at(rig, speed, &waypoints[..=first])
+    };
+    let at_start = started(&world.params, rig, &waypoints[first], &standing, &start);
     *row.truck = Truck { route, episode, ..at_start };
     if let (Some(shared), Some(cars)) = (&world.traffic, &mut row.cars) {
-        *traffic::Row::of_mut(cars) = surrounded(world, shared, row.stream, row.truck);
+        *traffic::Row::of_mut(cars) = surrounded(world, shared, row.stream, row.truck, first as u32 + 1);
     }
-    *row.control = Control { target_speed: at_start.speed, ..Control::default() };
+    let steering = at_start.steering;
+    *row.control = Control {
+        steering,
+        steering_before: steering,
+        steering_earlier: steering,
+        steering_earliest: steering,
+        target_speed: at_start.speed,
+        ..Control::default()
+    };
     let point = reference_point(rig.wheelbase, row.truck);
-    *row.progress = followed(waypoints, point, 1, world.params.stray_distance);
+    *row.progress = followed(waypoints, point, first as u32 + 1, world.params.stray_distance);
     row.progress.passed = 0;
     if world.disturbances.of_observation == 1 {
         perceive::perceive(world, row, 0);
@@ -104,16 +122,16 @@ fn route_of(row: &Row, episode: u32) -> u32 {
     }
 }
 
-/// A truck at `waypoint`, where the lane has this heading (rad): trailer straight, offset and turned as `start` says.
-pub fn started(params: &Params, rig: &Rig, waypoint: &WaypointRow, lane_heading: f32, start: &Start) -> Truck {
-    let heading = wrapped(lane_heading + start.heading * params.start_heading);
+/// A truck that stands at `waypoint` with these headings, offset and turned as a whole as `start` says.
+fn started(params: &Params, rig: &Rig, waypoint: &WaypointRow, standing: &Truck, start: &Start) -> Truck {
+    let turned = |heading: f32| wrapped(heading + start.heading * params.start_heading);
+    let heading = turned(standing.heading);
     let point = waypoint.position + start.offset * params.start_offset * waypoint.direction.perp();
     Truck {
         position: point - 0.5 * rig.wheelbase * direction(heading),
         heading,
-        trailer_heading: heading,
-        speed: params.start_speed + start.speed * params.start_speed_range,
+        trailer_heading: turned(standing.trailer_heading),
         vehicle: start.vehicle,
-        ..Truck::default()
+        ..*standing
     }
 }

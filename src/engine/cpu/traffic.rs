@@ -130,8 +130,9 @@ fn drawn(Stream { seed, env }: Stream, episode: u32) -> [u32; 4] {
     random::words(seed, env, episode, Draw::Traffic as u32)
 }
 
-/// Puts the vehicles of a snapshot around a truck that begins an episode, but for those that are too near to it.
-pub fn surrounded(world: &World, shared: &Traffic, stream: Stream, truck: &Truck) -> traffic::Row {
+/// Puts the vehicles of a snapshot around a truck that begins an episode before the waypoint `next`, but for those that
+/// are too near to it.
+pub fn surrounded(world: &World, shared: &Traffic, stream: Stream, truck: &Truck, next: u32) -> traffic::Row {
     let road = road_of(world, shared, truck.route);
     let [level, snapshot, ..] = drawn(stream, truck.episode);
     let level = random::index_below(level, road.levels.len() as u32);
@@ -146,7 +147,7 @@ pub fn surrounded(world: &World, shared: &Traffic, stream: Stream, truck: &Truck
     };
     let units = outlines(world.rig(truck), truck).map(grown);
     let source = road.network.paths[shared.routes[truck.route as usize].path as usize].source;
-    let front = front_station(world, shared, truck, 1);
+    let front = front_station(world, shared, truck, next);
     // A truck could not stop behind it.
     let is_too_near_ahead = |car: &Car| {
         let room = car.station() - car.length() - front;

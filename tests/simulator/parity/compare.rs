@@ -29,6 +29,8 @@ const ANGLE: Bound = Bound { turn: std::f32::consts::TAU, ..within(2e-6) };
 const TURN: Bound = Bound { turn: 2.0, ..ANGLE };
 /// Eight units of values below 2.
 const SMALL: Bound = within(1e-6);
+/// Twice that of what is observed beside the rest: load transfer ratios follow a steer angle in which a truck begins.
+const EXTRA: Bound = within(2e-6);
 /// Eight units of speeds, accelerations, roll rates and other values below 16.
 const MIDDLING: Bound = within(8e-6);
 /// Eight units of lateral accelerations below 64 m/s^2: a truck at 16 m/s that is bent by 140 deg has such.
@@ -56,15 +58,16 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
         Column::Action | Column::Ended => &[("", 1, SAME)],
         Column::Around | Column::NextAround => &[("", N_AROUND, SAME)],
         Column::Cars => &[("words", N_CAR_WORDS, SAME)],
+        // In a bend a truck begins with its own steer angle as what was asked for.
         Column::Control => &[
-            ("steering", 1, SAME),
+            ("steering", 1, SMALL),
             ("acceleration", 1, MIDDLING),
             ("speed_error_integral", 1, MIDDLING),
-            ("steering_before", 1, SAME),
-            ("steering_earlier", 1, SAME),
+            ("steering_before", 1, SMALL),
+            ("steering_earlier", 1, SMALL),
             ("target_speed", 1, SMALL),
             ("holds", 1, SAME),
-            ("steering_earliest", 1, SAME),
+            ("steering_earliest", 1, SMALL),
             ("actions_before", 3, SAME),
         ],
         Column::Truck => &[
@@ -116,7 +119,7 @@ pub fn values(column: Column) -> &'static [(&'static str, usize, Bound)] {
             ("failure", 1, SAME),
         ],
         Column::Reward => &[("", 1, REWARD)],
-        Column::Extras | Column::NextExtras => &[("", N_EXTRAS, SMALL)],
+        Column::Extras | Column::NextExtras => &[("", N_EXTRAS, EXTRA)],
         Column::Poses => &[
             ("seen.position", 2, POSITION),
             ("seen.headings", 2, ANGLE),
