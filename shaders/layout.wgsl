@@ -17,6 +17,10 @@ const N_RAYS: u32 = 29u;
 const N_PREVIEW: u32 = 18u;
 // Values that may be observed beside those.
 const N_EXTRAS: u32 = 12u;
+// Other vehicles that are observed one by one, at most.
+const N_NEAREST: u32 = 6u;
+// Values that may be observed of other vehicles.
+const N_AROUND: u32 = 42u;
 // Poses of a truck that are kept where what is observed is disturbed: the one that is observed, and those of the
 // last three steps, the latest first.
 const N_POSES: u32 = 4u;
@@ -720,5 +724,9 @@ struct BatchFacts {
 @group(0) @binding(27) var<storage, read_write> command: array<Command>;
 // The cars on the road of each truck, and what is counted of them: words of a `traffic::Row`, [n_envs, 102].
 @group(0) @binding(28) var<storage, read_write> cars: array<u32>;
+// What is observed of other vehicles before the next action; zeros where the benchmark observes none, [n_envs, 42].
+@group(0) @binding(29) var<storage, read_write> around: array<f32>;
+// What is observed of other vehicles after the last action, [n_envs, 42].
+@group(0) @binding(30) var<storage, read_write> next_around: array<f32>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(29) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(31) var<storage, read_write> tally: array<atomic<u32>>;

@@ -21,6 +21,8 @@ pub struct Traffic {
     pub rude: [u32; 2],
     /// Distance between the waypoints of a route (m).
     pub spacing: f32,
+    /// Whether trucks observe other vehicles.
+    pub is_observed: bool,
     /// Every road, in the order of the world's fields.
     pub roads: Vec<TrafficRoad>,
     /// Where each of the world's routes runs.
@@ -57,8 +59,8 @@ pub struct TrafficRoute {
 impl Traffic {
     /// Every table as words, one road after the other.
     pub(super) fn words(&self) -> impl Iterator<Item = Vec<u32>> {
-        let Traffic { rules, rude, spacing, roads, routes } = self;
-        let shared = [&rules.words()[..], rude, &[spacing.to_bits()]].concat();
+        let Traffic { rules, rude, spacing, is_observed, roads, routes } = self;
+        let shared = [&rules.words()[..], rude, &[spacing.to_bits(), u32::from(*is_observed)]].concat();
         let routes = routes.iter().flat_map(|&TrafficRoute { path, begins }| [path, begins.to_bits()]).collect();
         let of_road = |TrafficRoad { network, levels }: &TrafficRoad| {
             let level = |Level { demand, snapshots }: &Level| [&demand.words(), cast_slice(snapshots)].concat();
@@ -89,7 +91,8 @@ impl Traffic {
             })
         });
         let rude = of.rude.map(|rude| (rude * f64::from(1 << 16)).round() as u32);
-        Ok(Some(Traffic { rules, rude, spacing: scenario.spacing as f32, roads, routes: routes.collect() }))
+        let (spacing, is_observed) = (scenario.spacing as f32, scenario.observes_vehicles);
+        Ok(Some(Traffic { rules, rude, spacing, is_observed, roads, routes: routes.collect() }))
     }
 }
 

@@ -4,7 +4,8 @@ use std::fs;
 use std::sync::Arc;
 
 use offtrack::files::cache::Loading;
-use offtrack::layout::{Column, Ended};
+use offtrack::layout::shared::Named;
+use offtrack::layout::{Column, Ended, N_AROUND, N_VALUES, VEHICLE_VALUES};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::traffic::{Car, Contact, Row};
@@ -195,4 +196,57 @@ fn a_benchmark_with_a_bad_key_of_traffic_is_refused_by_key_and_value() {
         let error = Scenario::parse("traffic", &text, None, &Loading::PLAIN).unwrap_err().to_string();
         assert!(error.contains(expected), "{keys}: {error}");
     }
+}
+
+#[test]
+fn what_is_observed_of_vehicles_is_a_column_of_values_in_their_ranges_that_a_reset_replaces() {
+    let (scenario, world) = with_traffic("demand = [1500]\n[observation]\nvehicles = true\n");
+    assert!(world.observes_vehicles() && world.n_observed() == N_VALUES + N_AROUND);
+    let choice = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
+    let mut simulator = Simulator::new(world, 64, 5, choice).unwrap();
+    let lows: Vec<f32> = VEHICLE_VALUES.iter().flat_map(|group| std::iter::repeat_n(group.low, group.n)).collect();
+    let (mut ended, mut varied) = (0, [false; N_AROUND]);
+    let first = simulator.batch().around[0];
+    assert_eq!(simulator.batch().around, simulator.batch().next_around);
+    for _ in 0..150 {
+        simulator.steps_at_random(1);
+        let batch = simulator.batch();
+        for env in 0..64 {
+            let ends = batch.ended[env] != 0;
+            assert_eq!(batch.around[env] != batch.next_around[env], ends, "truck {env}");
+            ended += usize::from(ends);
+            for (index, value) in batch.around[env].into_iter().chain(batch.next_around[env]).enumerate() {
+                let index = index % N_AROUND;
+                assert!((lows[index]..=1.0).contains(&value), "value {index}: {value}");
+                varied[index] |= value != first[index];
+            }
+        }
+    }
+    assert!(100 < ended && varied.iter().all(|&varied| varied), "{ended} {varied:?}");
+}
+
+#[test]
+fn vehicles_that_are_not_observed_leave_zeros_and_change_nothing_else() {
+    let worlds =
+        [false, true].map(|observed| with_traffic(&format!("demand = [900]\n[observation]\nvehicles = {observed}\n")));
+    let [unseen, seen] = worlds.map(|(scenario, world)| {
+        let choice = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
+        let mut simulator = Simulator::new(world, 16, 5, choice).unwrap();
+        simulator.steps_at_random(100);
+        simulator
+    });
+    assert!(unseen.batch().around.iter().flatten().all(|&value| value == 0.0) && unseen.batch().around.len() == 16);
+    for column in Column::ALL.iter().filter(|column| !matches!(column, Column::Around | Column::NextAround)) {
+        assert!(unseen.batch().column(*column) == seen.batch().column(*column), "{column:?}");
+    }
+}
+
+#[test]
+fn vehicles_can_only_be_observed_where_there_are_some() {
+    let text = Scenario::text_of("attard2023").unwrap() + "\n[observation]\nvehicles = true\n";
+    let error = Scenario::parse("empty", &text, None, &Loading::PLAIN).unwrap_err().to_string();
+    assert!(error.contains("observation.vehicles: true; with the table [traffic]"), "{error}");
+    let mut scenario = Scenario::named("attard2023").unwrap();
+    scenario.observes_vehicles = true;
+    assert!(World::bake(&scenario).unwrap_err().to_string().starts_with("observes_vehicles: true; with traffic"));
 }

@@ -187,6 +187,7 @@ fn a_network_of_tanh_layers_that_was_trained_elsewhere_is_evaluated_with_the_sam
             // The table of the short benchmark: fractions of the vehicle's lock, 30 km/h.
             actions: World::bake(&Scenario::read(&place.file("short.toml")).unwrap()).unwrap().actions,
             extras: Vec::new(),
+            vehicles: false,
             normalisation: Normalisation::none(N_VALUES),
             layers: vec![layer(N_VALUES, 64), layer(64, 64), layer(64, 5)],
             activation,

@@ -53,7 +53,7 @@ pub fn seen_by_vehicles(world: &World, truck: &Truck, progress: &Progress) -> Op
     world.traffic.as_ref().map(|shared| view(world, shared, truck, progress))
 }
 
-fn view(world: &World, shared: &Traffic, truck: &Truck, progress: &Progress) -> View {
+pub(super) fn view(world: &World, shared: &Traffic, truck: &Truck, progress: &Progress) -> View {
     let TrafficRoute { path, begins } = shared.routes[truck.route as usize];
     let rig = world.rig(truck);
     let waypoints = world.route_waypoints(truck.route);
