@@ -1,7 +1,7 @@
 //! Evaluations: episodes are driven and counted as on the command line, by a policy or by a function of Python.
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
-use offtrack::layout::{Ended, N_VALUES, Start};
+use offtrack::layout::{Ended, Start};
 use offtrack::physics::drawn_start;
 use offtrack::simulator::{Actions, Error};
 use offtrack::world::World;
