@@ -227,7 +227,7 @@ pub fn written(stage: Stage) -> Written {
         Stage::Drive => {
             (&[Column::Truck], Some(|world| world.rigs.iter_mut().for_each(|rig| rig.trailer_wheelbase *= 1.001)))
         }
-        // Trucks alone: those among vehicles have tests of their own.
+        // A device has no vehicles.
         Stage::Traffic => (&[], None),
         Stage::Collide => (
             &[Column::Clearance],
