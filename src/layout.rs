@@ -14,6 +14,7 @@ mod observation;
 mod rows; // a truck's rows of the columns
 mod tables; // what trucks share
 mod truck;
+mod vehicles; // what is observed of other vehicles
 
 use crate::layout::shared::{Struct, constants};
 pub use columns::{Column, N_COLUMNS};
@@ -27,6 +28,8 @@ pub use tables::{
     Action, BatchFacts, Body, Disturbances, FieldRow, Lag, Params, PreviewRow, Ray, Reward, Rig, Roll, RouteRow,
     VehicleRow, WaypointRow,
 };
+pub use vehicles::VEHICLE_VALUES;
+pub(crate) use vehicles::first_of_vehicles;
 
 constants! {
     /// Threads of a workgroup.
@@ -45,6 +48,10 @@ constants! {
     pub const N_PREVIEW: usize = 18;
     /// Values that may be observed beside those.
     pub const N_EXTRAS: usize = 12;
+    /// Other vehicles that are observed one by one, at most.
+    pub const N_NEAREST: usize = 6;
+    /// Values that may be observed of other vehicles.
+    pub const N_AROUND: usize = 12 + 5 * N_NEAREST;
     /// Poses of a truck that are kept where what is observed is disturbed: the one that is observed, and those of the
     /// last three steps, the latest first.
     pub const N_POSES: usize = 4;

@@ -6,7 +6,7 @@ pub mod frame; // where a road lies in its map
 pub mod route; // lane centre lines -> waypoints
 pub mod ground; // a ring with its arms: kerb faces, lane edges, routes
 pub mod opendrive; // maps -> rings
-pub mod dxf; // drawings -> rings
+pub mod drawing; // drawings -> rings
 pub mod parametric; // parameters -> kerbs and lanes
 mod road; // a name and its ground
 pub mod chosen; // which ring of a map

@@ -119,6 +119,8 @@ pub struct Scenario {
     pub sensor_range: f64,
     /// What is observed beside the observation.
     pub extras: ObservedExtras,
+    /// Whether other vehicles are observed.
+    pub observes_vehicles: bool,
     /// What the world does to a policy.
     pub disturbances: Disturbances,
     /// Other vehicles on its roads.

@@ -51,6 +51,25 @@ pub use truck::{Contact, Entry, Trucks, View, outlines, touched};
 
 use crate::files::reader::shown;
 
+/// What shaders share of the numbers of cars, in WGSL.
+pub(crate) fn printed_constants() -> String {
+    [
+        units::printed_constants(),
+        model::printed_constants(),
+        rules::printed_constants(),
+        network::printed_constants(),
+        clock::printed_constants(),
+        car::printed_constants(),
+        decide::printed_constants(),
+        decide::entry::printed_constants(),
+        arrivals::printed_constants(),
+        step::printed_constants(),
+        row::printed_constants(),
+        snapshots::printed_constants(),
+    ]
+    .concat()
+}
+
 /// Time of a step (s).
 pub const STEP: f32 = 0.1;
 

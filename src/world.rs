@@ -15,7 +15,8 @@ use rayon::prelude::*;
 use crate::field::Field;
 use crate::files::cache::{Loading, Stopped};
 use crate::layout::{
-    Action, Disturbances, N_PREVIEW, N_RAYS, Params, PreviewRow, Ray, Reward, Rig, RouteRow, Truck, WaypointRow,
+    Action, Disturbances, N_AROUND, N_PREVIEW, N_RAYS, N_VALUES, Params, PreviewRow, Ray, Reward, Rig, RouteRow, Truck,
+    WaypointRow,
 };
 use crate::map::Frame;
 use crate::map::route::{Route, Waypoint};
@@ -178,6 +179,17 @@ impl World {
     /// indices.
     pub fn n_commands(&self) -> usize {
         if self.is_continuous() { 1 + usize::from(self.actions[0].speed != self.actions[1].speed) } else { 0 }
+    }
+
+    /// Whether trucks observe other vehicles.
+    pub fn observes_vehicles(&self) -> bool {
+        self.traffic.as_ref().is_some_and(|traffic| traffic.is_observed)
+    }
+
+    /// Values that a truck observes in all: the 69, the benchmark's extras, and those of other vehicles.
+    pub fn n_observed(&self) -> usize {
+        let around = if self.observes_vehicles() { N_AROUND } else { 0 };
+        N_VALUES + self.params.n_extras as usize + around
     }
 
     /// The vehicle of a truck of this world.

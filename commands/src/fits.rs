@@ -11,7 +11,7 @@ use offtrack::files::shipped::{Kind, Source};
 use offtrack::map::{Gutter, Road};
 use offtrack::vehicle::Vehicle;
 use offtrack_drawing::fits::sheet::{self, Head, Shown};
-use offtrack_drawing::fits::{dxf, pdf};
+use offtrack_drawing::fits::{dxf, geojson, pdf};
 use offtrack_evaluation::certificate::attempt::{HOLD, passes};
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use crate::import::PlaceArgs;
 use crate::progress::Bar;
-use crate::{draw, roads, terminal};
+use crate::{draw, export, roads, terminal};
 
 /// Time between two writes of results that come quickly.
 const WRITE_EVERY: Duration = Duration::from_secs(2);
@@ -65,8 +65,11 @@ pub struct Args {
     /// Print feet and mph in place of metres and km/h; the files have metres.
     #[arg(long)]
     feet: bool,
+    /// The name of the map's coordinate frame, to be stated in GeoJSON, such as urn:ogc:def:crs:EPSG::25832.
+    #[arg(long, value_name = "NAME", value_parser = export::crs)]
+    crs: Option<String>,
     /// The folder to write: fits.json, fits.csv, of each road a sheet at scale, ROAD.svg and ROAD.pdf, and the swept
-    /// paths of each vehicle, ROAD-VEHICLE.dxf.
+    /// paths of each vehicle, ROAD-VEHICLE.dxf and ROAD-VEHICLE.geojson.
     #[arg(short, long)]
     output: PathBuf,
 }
@@ -208,8 +211,13 @@ impl Work<'_> {
         files::write_whole(&printed, &pdf)?;
         for (name, _) in self.vehicles {
             let of: Vec<&Shown> = shown.iter().filter(|one| one.row.vehicle == *name).collect();
-            let file = self.args.output.join(format!("{}-{name}.dxf", stem(road)));
-            files::write_whole(&file, dxf(road, self.asked.gutter, &of).as_bytes())?;
+            let file = |extension: &str| self.args.output.join(format!("{}-{name}.{extension}", stem(road)));
+            let gutter = self.asked.gutter;
+            files::write_whole(&file("dxf"), dxf(road, gutter, &of).as_bytes())?;
+            let features = file("geojson");
+            let text = geojson(road, gutter, &of, self.args.crs.as_deref())
+                .map_err(|error| Error::write(&features)(error.into()))?;
+            files::write_whole(&features, text.as_bytes())?;
         }
         Ok(())
     }

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use offtrack::files::reader::{read_bytes, shown_path};
 use offtrack::files::shipped::Kind;
-use offtrack::map::Road;
 use offtrack::map::procedural::{Distribution, RandomRoad, Reason, Refused, lane_clearance};
+use offtrack::map::{Road, opendrive};
 use offtrack_drawing::histograms::{Histograms, Panel};
 use offtrack_drawing::{rasterised, sheet};
 use offtrack_evaluation::error::Error;
@@ -46,6 +46,9 @@ pub struct Args {
     /// lie.
     #[arg(long)]
     plot: Option<PathBuf>,
+    /// Write each road as an OpenDRIVE map, too: wide-7-12.xodr.
+    #[arg(long, requires = "output")]
+    xodr: bool,
     /// Write over files of these names that the folder has already and that hold something else.
     #[arg(long, requires = "output")]
     overwrite: bool,
@@ -81,13 +84,19 @@ pub fn run(args: &Args) -> Result<(), Error> {
         Some(folder) => sheets(folder, &distribution, args, &roads)?,
         None => Vec::new(),
     };
+    let maps = match args.xodr {
+        true => roads.iter().map(|road| map(&distribution, args.seed, road)).collect::<Result<_, Error>>()?,
+        false => Vec::new(),
+    };
     let plot = args.plot.as_ref().map(|file| picture(file, &histograms(&distribution, args, &roads)?)).transpose()?;
     if let Some(folder) = &args.output {
         let file = |road: &RandomRoad| {
             (format!("{}-{}-{}.toml", distribution.name, args.seed, road.index), text(&distribution, road).into_bytes())
         };
-        let files =
-            || roads.iter().map(file).chain(sheets.iter().cloned()).map(|(name, bytes)| (folder.join(name), bytes));
+        let files = || {
+            let all = roads.iter().map(file).chain(maps.iter().chain(&sheets).cloned());
+            all.map(|(name, bytes)| (folder.join(name), bytes))
+        };
         if !args.overwrite {
             files().try_for_each(|(file, bytes)| free(&file, &bytes))?;
         }
@@ -119,6 +128,12 @@ fn text(distribution: &Distribution, road: &RandomRoad) -> String {
          # Made by: offtrack generate --distribution {name} --seed {seed} --first {index} --count 1\n\n{}",
         road.text()
     )
+}
+
+/// Name and content of a road's map.
+fn map(distribution: &Distribution, seed: u32, road: &RandomRoad) -> Result<(String, Vec<u8>), Error> {
+    let text = opendrive::exported(&road.roundabout)?;
+    Ok((format!("{}-{seed}-{}.xodr", distribution.name, road.index), text.into_bytes()))
 }
 
 /// Names and contents of the contact sheets.

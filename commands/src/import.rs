@@ -10,7 +10,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec2;
 use offtrack::files::reader::{Error as InputError, Reader, shown_path};
 use offtrack::map::chosen::Choice;
-use offtrack::map::dxf::is_drawing;
+use offtrack::map::drawing::is_drawing;
 use offtrack::map::ground::Line;
 use offtrack::map::opendrive::{Hand, Imported, Map, Options, RoadLane, Way};
 use serde::Serialize;
@@ -25,7 +25,7 @@ use drawing::DrawingArgs;
 #[derive(Debug, clap::Args)]
 #[command(group(clap::ArgGroup::new("action").args(["list", "junctions", "check", "output"]).required(true)))]
 pub struct Args {
-    /// The map, a .xodr file, or a drawing, a .dxf file.
+    /// The map, a .xodr file, or a drawing, a .dxf or .geojson file.
     map: PathBuf,
     #[command(flatten)]
     drawing: DrawingArgs,

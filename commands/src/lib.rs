@@ -8,6 +8,7 @@ pub mod deviations;
 pub mod devices;
 pub mod draw;
 pub mod evaluate;
+pub mod export;
 pub mod fits;
 pub mod generate;
 pub mod import;

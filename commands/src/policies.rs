@@ -11,6 +11,7 @@ use offtrack_evaluation::certificate::line;
 use offtrack_evaluation::comparison::Asked;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
+use offtrack_evaluation::policies::rule::{FOLLOWS, YIELDS};
 use offtrack_evaluation::policies::{self, Controller, LOOK_AHEAD, PurePursuit};
 
 use crate::outputs;
@@ -20,9 +21,9 @@ use crate::outputs;
 // A group of flags is named after its type, and a command may not have two of the same name.
 #[group(skip)]
 pub struct Choice {
-    /// A policy file, `pursuit` (pure pursuit of the lane's centre), `random`, or the name of a shipped policy. Without
-    /// it the policy shipped for the benchmark or, where there is none, the first shipped one with its actions and
-    /// extras.
+    /// A policy file, `pursuit` (pure pursuit of the lane's centre), `random`, `follows` or `yields` (rules among other
+    /// vehicles), or the name of a shipped policy. Without it the policy shipped for the benchmark or, where there is
+    /// none, the first shipped one with its actions and extras.
     #[arg(long)]
     policy: Option<String>,
     /// With `pursuit`: look-ahead distance (m) [default: 7].
@@ -75,7 +76,7 @@ impl Choice {
     pub fn check_is_of(&self, folder: &Path, scenario: &Scenario, world: &World) -> Result<(), Error> {
         let of_run = folder.join("policy.safetensors");
         let learned = match self.policy.as_deref() {
-            Some("pursuit" | "random") => None,
+            Some("pursuit" | "random" | YIELDS | FOLLOWS) => None,
             Some(name) => Some(policies::learned(name)?),
             None => Some(offtrack_policy::Policy::shipped_for(&scenario.name, world)?),
         };

@@ -10,8 +10,8 @@ use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
 use crate::{
-    board, certify, compare, deviations, devices, draw, evaluate, fits, generate, import, record, trace, traffic,
-    vehicles, web,
+    board, certify, compare, deviations, devices, draw, evaluate, export, fits, generate, import, record, trace,
+    traffic, vehicles, web,
 };
 
 /// Exit code of a failure on valid input.
@@ -39,6 +39,7 @@ pub enum Command {
     Traffic(traffic::Args),
     Generate(generate::Args),
     Import(import::Args),
+    Export(export::Args),
     Vehicles(vehicles::Args),
     Devices(devices::Args),
     Trace(trace::Args),
@@ -64,6 +65,7 @@ impl Command {
             Command::Traffic(args) => traffic::run(args),
             Command::Generate(args) => generate::run(args),
             Command::Import(args) => import::run(args),
+            Command::Export(args) => export::run(args),
             Command::Vehicles(args) => vehicles::run(args),
             Command::Devices(args) => devices::run(args),
             Command::Trace(args) => trace::run(args),

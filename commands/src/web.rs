@@ -119,6 +119,11 @@ fn printed(parts: &[Part]) -> Result<(), Error> {
 /// A benchmark with the routes asked for, baked.
 fn ground(name: &str, args: &Args) -> Result<Ground, Error> {
     let mut scenario = roads::benchmark(name)?;
+    if scenario.traffic.is_some() {
+        let expected = "has [traffic], and the page steps trucks alone yet: a benchmark without that table is needed; \
+                        offtrack evaluate --html shows vehicles";
+        return Err(Error::Setting { name: "--benchmark", value: name.to_owned(), expected: expected.to_owned() });
+    }
     let split = Split::ALL.into_iter().find(|split| split.name() == args.split);
     if !args.road.is_empty() {
         let splits = split.map_or(Split::ALL.to_vec(), |split| vec![split]);

@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     (false, _) => Ended::Arrived,
                 };
                 let begun = Instant::now();
-                let picture = camera.draw(&Shown { truck, ranges: &ranges, ended });
+                let picture = camera.draw(&Shown { truck, ranges: &ranges, ended, vehicles: &[] });
                 (if n == 0 { &mut first } else { &mut next }).push(begun.elapsed().as_secs_f64() * 1e3);
                 if let Some(folder) = &folder
                     && [0, trucks.len() * 9 / 20, trucks.len() - 1].contains(&n)

@@ -15,6 +15,7 @@ use std::sync::Arc;
 use offtrack::layout::{Ended, N_RAYS, Truck};
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
+use offtrack_evaluation::recording::Vehicle;
 
 use crate::Error;
 use crate::lettering::{Align, Lettering};
@@ -39,6 +40,8 @@ pub struct Shown<'a> {
     pub ranges: &'a [f32; N_RAYS],
     /// Why its episode ended.
     pub ended: Ended,
+    /// The other vehicles around it, as the road is driven.
+    pub vehicles: &'a [Vehicle],
 }
 
 /// Draws trucks on the routes of a scenario, in square pictures from above, north up.

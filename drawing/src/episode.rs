@@ -2,6 +2,7 @@
 //! of a film.
 
 mod moving;
+pub(crate) mod vehicles;
 
 use glam::DVec2;
 use offtrack::layout::Ended;
@@ -100,6 +101,7 @@ impl<'a> Scene<'a> {
             .add(road.lanes())
             .add(road.kerbs())
             .add(self.route_line(view))
+            .add(self.vehicles(view, self.recording.frames.len() - 1))
             .add(self.trucks_at_intervals(view))
             .add(self.axle_paths(view, self.recording.frames.len() - 1))
             .add(self.ends(view))
@@ -114,6 +116,7 @@ impl<'a> Scene<'a> {
             Entry::new(Swatch::Line(colour::ROUTE, 2.4, ""), "route"),
         ];
         entries.extend(path_legend());
+        entries.extend(self.vehicle_legend(" at the end"));
         entries.extend(self.road(view).surface_legend());
         if self.touched().is_some() {
             entries.push(Entry::new(Swatch::Ring(colour::OVERLAP), "a kerb was touched here"));
@@ -257,6 +260,8 @@ impl<'a> Scene<'a> {
             "pursuit" => "pure pursuit",
             planned if planned.starts_with("pursuit of ") => "pure pursuit of a planned line",
             "random" => "random actions",
+            "yields" => "rule that follows and yields",
+            "follows" => "rule that follows",
             _ => "learned policy",
         }
     }

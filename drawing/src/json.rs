@@ -1,8 +1,8 @@
 //! A road's kerbs as polygons, its routes as waypoints and a swept path, for other programs.
 
 use glam::DVec2;
-use offtrack::geometry::Outline;
 use offtrack::map::route::Route;
+use offtrack::map::{Gutter, Road};
 use offtrack_evaluation::polygons::{Polygon, corners, drivable, rounded, to};
 use serde::Serialize;
 
@@ -16,8 +16,18 @@ struct Written<'a> {
     solids: Vec<Polygon>,
     drivable: Vec<Polygon>,
     routes: Vec<WrittenRoute<'a>>,
+    frame: Frame,
     #[serde(skip_serializing_if = "Option::is_none")]
     sweep: Option<sweep::Written<'a>>,
+}
+
+/// Where the road lies in its map.
+#[derive(Serialize)]
+struct Frame {
+    /// The ring's centre there, which is the origin here (m).
+    origin: [f64; 2],
+    /// The hand of traffic: on `left` the simulator drives the road as its mirror image in the x axis.
+    hand: &'static str,
 }
 
 #[derive(Serialize)]
@@ -27,20 +37,25 @@ struct WrittenRoute<'a> {
 }
 
 /// Polygons and waypoints as one line of JSON, in metres and radians: `{"solids": [[[x, y], ...], ...], "drivable":
-/// [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x, y, heading], ...]}]}`.
+/// [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x, y, heading], ...]}], "frame": {"origin", "hand"}}`.
 ///
 /// `drivable` is the outer boundary, then one hole for each island; `solids` are the islands, then the ground beyond
-/// the boundary as two polygons. Curves are within 1 cm. With a swept path there is `sweep`, as `offtrack draw --help`
+/// the boundary as two polygons. Curves are within 1 cm. `road` is as it is driven, `routes` are as they are seen.
+/// With a swept path there is `sweep`, as `offtrack draw --help`
 /// describes it.
 ///
 /// # Errors
 ///
 /// A coordinate that is not finite.
-pub fn written(kerbs: &Outline, routes: &[Route], sweep: Option<&Sweep>) -> serde_json::Result<String> {
-    let (boundary, islands) = corners(kerbs);
+pub fn written(road: &Road, gutter: Gutter, routes: &[Route], sweep: Option<&Sweep>) -> serde_json::Result<String> {
+    let (seen, origin) = (road.seen(), road.ground().origin);
+    let kerbs = seen.kerbs(gutter);
+    let (boundary, islands) = corners(&kerbs);
     let ground = boundary.first().map(|points| ground(points)).into_iter().flatten();
     let solids = islands.iter().cloned().chain(ground).map(|points| rounded(&points)).collect();
-    let drivable = drivable(kerbs);
+    let drivable = drivable(&kerbs);
+    let hand = if road.is_mirrored() { "left" } else { "right" };
+    let frame = Frame { origin: [origin.x, origin.y], hand };
     let routes = routes.iter().map(|route| WrittenRoute {
         name: &route.name,
         waypoints: route
@@ -50,7 +65,7 @@ pub fn written(kerbs: &Outline, routes: &[Route], sweep: Option<&Sweep>) -> serd
             .collect(),
     });
     let sweep = sweep.map(Sweep::written);
-    let mut text = serde_json::to_string(&Written { solids, drivable, routes: routes.collect(), sweep })?;
+    let mut text = serde_json::to_string(&Written { solids, drivable, routes: routes.collect(), frame, sweep })?;
     text.push('\n');
     Ok(text)
 }

@@ -8,8 +8,9 @@ use offtrack::layout::Rig;
 use offtrack::map::route::Route;
 use offtrack::vehicle::Vehicle;
 use offtrack::vehicle::swept::{
-    Demand, Limit, Pose, UnitClearance, demands, front_path, hull, own_lane_suffices, swept_path,
+    self, Demand, Limit, Pose, UnitClearance, demands, front_path, hull, own_lane_suffices, swept_path,
 };
+use offtrack_evaluation::polygons::{Polygon, rounded as polygon};
 use serde::Serialize;
 use svg::node::element::{Circle, Definitions, Group, Path, Use};
 
@@ -56,6 +57,8 @@ pub(crate) struct Written<'a> {
     own_lane_suffices: bool,
     tractor_clearance: f64,
     trailer_clearance: f64,
+    tractor_area: Vec<Polygon>,
+    trailer_area: Vec<Polygon>,
     limits: Vec<WrittenNeed>,
     demands: Vec<[f64; 5]>,
 }
@@ -140,12 +143,15 @@ impl<'a> Sweep<'a> {
 
     pub(crate) fn written(&self) -> Written<'_> {
         let [tractor, trailer] = &self.units;
+        let area = |unit: &Unit| swept::swept_area(&unit.corners).iter().map(|ring| polygon(ring)).collect();
         let rounded = |unit: &Unit| (unit.clearance.least * 1e4).round() / 1e4;
         Written {
             driven: &self.driven,
             own_lane_suffices: self.own_lane_suffices(),
             tractor_clearance: rounded(tractor),
             trailer_clearance: rounded(trailer),
+            tractor_area: area(tractor),
+            trailer_area: area(trailer),
             limits: self.needs.iter().map(|need| need.written(&self.demands)).collect(),
             demands: limits::rows(&self.demands),
         }

@@ -30,6 +30,10 @@ pub(crate) mod colour {
     pub const FOLLOWED: &str = "#96d2c3";
     pub const CROSSED: &str = "#e1695a";
     pub const BESIDE: &str = "#aa3377";
+    pub const CAR: &str = "#5a7887";
+    pub const VAN: &str = "#87785a";
+    pub const BRAKES: &str = "#e11e1e";
+    pub const RUDE: &str = "#aa3377";
 }
 
 /// Width of the page (px).

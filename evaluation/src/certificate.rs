@@ -20,6 +20,10 @@ use verify::Sequence;
 
 /// An error for a world whose actions are continuous: a search tries every action of a table.
 pub fn check_levels(world: &World) -> Result<(), Error> {
+    if world.traffic.is_some() {
+        let expected = "a search drives on an empty road: the same benchmark without that table is needed".to_owned();
+        return Err(Error::Setting { name: "[traffic]", value: "vehicles around each truck".to_owned(), expected });
+    }
     if !world.is_continuous() {
         return Ok(());
     }

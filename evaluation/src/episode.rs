@@ -60,6 +60,8 @@ pub struct Episode {
     pub off_tracking_peak: f64,
     /// How the truck drove, where classes of vehicles are reported.
     pub driving: Option<Driving>,
+    /// How many other vehicles come to the road, where any do (veh/h).
+    pub demand: Option<f64>,
     /// The truck after its last step.
     pub last: Truck,
 }
@@ -208,6 +210,7 @@ pub(super) mod tests {
             articulation_peak: 1.9,
             off_tracking_peak: 10.25,
             driving: Some(Driving::new(&Truck::default(), 0.0)),
+            demand: None,
             last: Truck::default(),
         }
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::recording::{Recorder, Track};
-use offtrack::layout::{Rig, Start};
+use offtrack::layout::{Rig, Start, Stream};
 use offtrack::map::route::Route;
 use offtrack::physics::drawn_start;
 use offtrack::scenario::{Scenario, Split};
@@ -127,6 +127,9 @@ impl Evaluation<'_> {
         let engine = self.device.engine.clone();
         let mut simulator =
             Simulator::on(engine, self.world.clone(), indices.len(), self.seed, RouteChoice::Fixed(routes))?;
+        // Vehicles around a truck, and what disturbs it, are drawn by its place among all.
+        let stream = |&index: &usize| Stream { seed: self.seed, env: index as u32 };
+        simulator.set_streams(&indices.iter().map(stream).collect::<Vec<Stream>>())?;
         simulator.reset_from(&starts)?;
         let mut recorder = Recorder::new(self.world, simulator.batch(), 0..indices.len());
         for step in 0.. {

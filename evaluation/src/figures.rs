@@ -3,6 +3,7 @@
 use offtrack::layout::{Control, Ended, Truck};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{Error, Simulator};
+use offtrack::traffic::Row;
 use offtrack::world::World;
 
 use crate::classes;
@@ -39,15 +40,18 @@ impl<'a> Figures<'a> {
         let lane = |(_, place, route)| LaneWidths::of(scenario, place, route);
         let seen = Seen::of(simulator)?;
         let has_classes = classes::has_classes(scenario);
-        let new = |(truck, control): (&Truck, &Control)| {
+        let levels = scenario.traffic.as_ref().map(|traffic| traffic.demand.as_slice());
+        let cars = &simulator.batch().cars;
+        let new = |(env, (truck, control)): (usize, (&Truck, &Control))| {
             let driving = has_classes.then(|| Driving::new(truck, control.target_speed));
-            Running::new(world.rig(truck), truck, driving, scenario.step)
+            let demand = levels.and_then(|levels| Some(levels[Row::of(cars.get(env)?).level as usize]));
+            Running::new(world.rig(truck), truck, driving, demand, scenario.step)
         };
         Ok(Figures {
             world,
             lanes: routes_of(scenario, routes).into_iter().map(lane).collect(),
             per_route,
-            running: seen.truck.iter().zip(seen.control.iter()).map(new).collect(),
+            running: seen.truck.iter().zip(seen.control.iter()).enumerate().map(new).collect(),
             finished: vec![None; simulator.n_envs()],
         })
     }

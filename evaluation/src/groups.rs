@@ -1,6 +1,6 @@
 //! Sums of an evaluation over routes that have something in common.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use offtrack::map::route::Route;
 use offtrack::scenario::Place;
@@ -29,7 +29,7 @@ pub struct Group {
     pub summary: Summary,
 }
 
-/// Every episode once in each of four partitions.
+/// Every episode once in each partition.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Groups {
     /// Episodes by band of the island's radius, smallest first; `none` for the routes of crossings.
@@ -40,6 +40,9 @@ pub struct Groups {
     pub exit: Vec<Group>,
     /// Episodes by roundabout, in the benchmark's order.
     pub roundabout: Vec<Group>,
+    /// Episodes by the demand of other vehicles that they drew, in rising order; empty where there are none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub demand: Vec<Group>,
 }
 
 impl Groups {
@@ -49,7 +52,13 @@ impl Groups {
         let per_route = (finished.len() / routes.len().max(1)).max(1);
         let episodes: Vec<Vec<&Episode>> = finished.chunks(per_route).map(|chunk| chunk.iter().collect()).collect();
         let by = |key| by(routes, &episodes, key, step);
-        Groups { island_radius: by(island_radius), lane: by(lane), exit: by(exit), roundabout: by(roundabout) }
+        Groups {
+            island_radius: by(island_radius),
+            lane: by(lane),
+            exit: by(exit),
+            roundabout: by(roundabout),
+            demand: by_demand(finished, step),
+        }
     }
 }
 
@@ -67,6 +76,19 @@ pub(super) fn by(routes: &[Evaluated], episodes: &[Vec<&Episode>], key: Key, ste
         Some(Group { name, routes: members.len(), summary })
     };
     members.into_iter().filter_map(group).collect()
+}
+
+/// The groups of episodes by demand.
+fn by_demand(finished: &[Episode], step: f64) -> Vec<Group> {
+    let mut demands: Vec<f64> = finished.iter().filter_map(|episode| episode.demand).collect();
+    demands.sort_by(f64::total_cmp);
+    demands.dedup();
+    let group = |demand: f64| {
+        let episodes = || finished.iter().filter(move |episode| episode.demand == Some(demand));
+        let routes: HashSet<u32> = episodes().map(|episode| episode.last.route).collect();
+        Some(Group { name: format!("{demand} veh/h"), routes: routes.len(), summary: Summary::of(episodes(), step)? })
+    };
+    demands.into_iter().filter_map(group).collect()
 }
 
 pub(super) fn island_radius((_, place, _): &Evaluated) -> (usize, String) {
@@ -120,6 +142,27 @@ mod tests {
         assert_eq!(names(&groups.exit), ["1", "2", "3", "4"]);
         let [left, right] = [0, 1].map(|lane: usize| &groups.lane[lane].summary);
         assert_eq!((left.success, right.success, right.ends["trailer_collided"]), (1.0, 0.5, right.episodes / 2));
+    }
+
+    #[test]
+    fn episodes_among_vehicles_are_grouped_by_demand_from_the_least_on() {
+        let scenario = Scenario::named("attard2023").unwrap();
+        let routes: Vec<_> = scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
+        let at = |demand: f64, ended: Ended| Episode { demand: Some(demand), ..episode(ended) };
+        let finished = [
+            at(900.0, Ended::TimedOut),
+            at(300.0, Ended::Arrived),
+            at(900.0, Ended::Arrived),
+            at(300.0, Ended::Arrived),
+        ];
+        let groups = Groups::of(&routes[..2], &finished, scenario.step);
+        let found: Vec<_> = groups
+            .demand
+            .iter()
+            .map(|group| (group.name.as_str(), group.summary.episodes, group.summary.success))
+            .collect();
+        assert_eq!(found, [("300 veh/h", 2, 1.0), ("900 veh/h", 2, 0.5)]);
+        assert!(Groups::of(&routes[..2], &[Ended::Arrived; 2].map(episode), scenario.step).demand.is_empty());
     }
 
     #[test]

@@ -6,6 +6,7 @@
 pub mod comparison;
 mod ground;
 mod tracks;
+mod vehicles;
 
 use std::path::Path;
 
@@ -69,7 +70,8 @@ impl Page<'_> {
         let per_route = (self.evaluation.summary.episodes / routes.len().max(1)).max(1);
         let Page { scenario, world, tracks, .. } = self;
         let shown = Shown { scenario, world, routes, per_route, tracks };
-        let mut ground = Ground::of(&shown, &columns);
+        let (others, vehicles) = vehicles::packed(tracks).unzip();
+        let mut ground = Ground::of(&shown, &columns, others);
         let mut evaluation = json!(self.evaluation);
         if self.evaluation.has_many_routes() {
             // Gzipped with the ground: of thousands of routes this is most of the report.
@@ -91,8 +93,8 @@ impl Page<'_> {
             Some(run) => drop(run.insert("evaluation".to_owned(), evaluation)),
             None => self.run = json!({ "evaluation": evaluation }),
         }
-        let [ground, tracks] =
-            [ground.into_bytes(), tracks::differences(self.tracks, &columns)].map(|bytes| tracks::packed(&bytes));
+        let columns = [tracks::differences(self.tracks, &columns), vehicles.unwrap_or_default()].concat();
+        let [ground, tracks] = [ground.into_bytes(), columns].map(|bytes| tracks::packed(&bytes));
         let (ground, tracks) = (ground.map_err(Error::write(file))?, tracks.map_err(Error::write(file))?);
         let summary = &self.evaluation.summary;
         let (benchmark, split) = (&self.evaluation.benchmark, self.evaluation.split);

@@ -5,7 +5,7 @@
 #[cfg(feature = "gpu")]
 mod on_device;
 
-use offtrack::layout::{Command, N_EXTRAS, N_VALUES};
+use offtrack::layout::{Command, N_AROUND, N_EXTRAS, N_VALUES};
 use offtrack::simulator::{Actions, Batch, Engine};
 use offtrack::world::World;
 use offtrack_policy::{Choice, Driver, Head, Policy, drawn, greedy, sampled};
@@ -40,8 +40,8 @@ impl Controller for Policy {
 
     fn choose(&mut self, _: &World, batch: &Batch) -> Actions {
         let driving = driving(batch);
-        let (observations, extras) = observed(batch, &driving);
-        let outputs = self.logits_beside(&observations, &extras);
+        let (observations, extras, around) = observed(self, batch, &driving);
+        let outputs = self.logits_among(&observations, &extras, &around);
         best(self, outputs).spread(&driving, batch.n_envs())
     }
 }
@@ -70,8 +70,8 @@ impl Controller for OnHost {
         }
         let driving = driving(batch);
         driving.iter().filter(|&&env| batch.truck[env].steps == 0).for_each(|&env| self.driver.begin(env));
-        let (observations, extras) = observed(batch, &driving);
-        let outputs = self.driver.outputs(&driving, &observations, &extras);
+        let (observations, extras, around) = observed(self.driver.policy(), batch, &driving);
+        let outputs = self.driver.outputs_among(&driving, &observations, &extras, &around);
         let policy = self.driver.policy();
         let chosen = match (self.choice, policy.head) {
             (Choice::Sampled { seed }, Head::Levels) => {
@@ -90,9 +90,14 @@ fn driving(batch: &Batch) -> Vec<usize> {
     (0..batch.n_envs()).filter(|&env| batch.truck[env].held == 0).collect()
 }
 
-/// What these trucks observe, and the extras beside it.
-fn observed(batch: &Batch, driving: &[usize]) -> (Vec<[f32; N_VALUES]>, Vec<[f32; N_EXTRAS]>) {
-    driving.iter().map(|&env| (batch.observation[env], batch.extras[env])).unzip()
+/// Observations of some trucks, the extras beside them, and other vehicles.
+type Observed = (Vec<[f32; N_VALUES]>, Vec<[f32; N_EXTRAS]>, Vec<[f32; N_AROUND]>);
+
+/// What these trucks observe, as far as a policy reads it.
+fn observed(policy: &Policy, batch: &Batch, driving: &[usize]) -> Observed {
+    let (observations, extras) = driving.iter().map(|&env| (batch.observation[env], batch.extras[env])).unzip();
+    let seeing = driving.iter().filter(|_| policy.reads_vehicles());
+    (observations, extras, seeing.map(|&env| batch.around[env]).collect())
 }
 
 /// The best actions by a policy's outputs: the indices of the largest, or the commands.

@@ -1,5 +1,7 @@
-//! What chooses the actions: a learned policy, pure pursuit of the centre line, or actions drawn uniformly at random.
-//! The last two are the baselines that a learner must beat.
+//! What chooses the actions: a learned policy, pure pursuit of the centre line, actions drawn uniformly at random, or a
+//! rule among other vehicles. All but the first are baselines that a learner must beat.
+
+pub mod rule;
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -23,9 +25,8 @@ pub const LOOK_AHEAD: f32 = 7.0;
 /// How far ahead pure pursuit looks for a lower speed: the time that the speed control takes to reach it (s).
 const RESPONSE: f64 = 1.5;
 
-/// The policy that a command's `--policy` names: `pursuit`, `random`, a policy file, or a shipped policy by its name.
-/// Its
-/// action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where there is none, the
+/// The policy that a command's `--policy` names: `pursuit`, `random`, `yields`, `follows`, a policy file, or a shipped
+/// policy by its name. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where there is none, the
 /// first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random actions. It drives trucks
 /// on `engine`: a learned policy acts there.
 pub fn find(
@@ -39,6 +40,7 @@ pub fn find(
     let learned = match policy {
         Some("pursuit") => return Ok(Box::new(pursuit)),
         Some("random") => return Ok(Box::new(UniformRandom { seed })),
+        Some(name @ (rule::YIELDS | rule::FOLLOWS)) => return Ok(Box::new(rule::Rule::new(name, world)?)),
         Some(name) => learned(name)?,
         None => offtrack_policy::Policy::shipped_for(benchmark, world)?,
     };

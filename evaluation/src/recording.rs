@@ -6,6 +6,7 @@
 //! 0.1 mrad), so that a file holds the recording exactly.
 
 mod measures;
+mod vehicles;
 
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Clearance, Command, Ended, N_RAYS, N_TRAILER_RAYS};
@@ -19,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::polygons::{self, Polygon};
 pub use measures::{Class, Measures, Rectangle};
+pub use vehicles::Vehicle;
 
 /// Resolution of lengths, speeds, rewards and load transfer ratios: parts of a unit.
 const MILLI: f64 = 1e3;
@@ -148,6 +150,8 @@ pub struct Track {
     pub ended: Ended,
     /// The start, then one frame a step.
     pub frames: Vec<Frame>,
+    /// The other vehicles of each frame; empty where there are none.
+    pub vehicles: Vec<Vec<Vehicle>>,
 }
 
 impl Track {
@@ -156,6 +160,7 @@ impl Track {
     pub fn seen(mut self, roundabout: &Road) -> Track {
         if roundabout.is_mirrored() {
             self.frames.iter_mut().for_each(|frame| *frame = frame.mirrored());
+            self.vehicles.iter_mut().flatten().for_each(|vehicle| *vehicle = vehicle.mirrored());
         }
         self
     }
@@ -174,7 +179,8 @@ impl Recorder {
     pub fn new(world: &World, batch: &Batch, envs: impl IntoIterator<Item = usize>) -> Recorder {
         let track = |env: usize| {
             let (vehicle, start) = (batch.truck[env].vehicle, Frame::at_start(world, batch, env));
-            Track { env, vehicle, ended: Ended::Running, frames: vec![start] }
+            let vehicles = world.traffic.iter().map(|_| Vehicle::around(world, batch, env)).collect();
+            Track { env, vehicle, ended: Ended::Running, frames: vec![start], vehicles }
         };
         Recorder { tracks: envs.into_iter().map(track).collect() }
     }
@@ -183,6 +189,7 @@ impl Recorder {
     pub fn follow(&mut self, world: &World, batch: &Batch) {
         for track in self.tracks.iter_mut().filter(|track| track.ended == Ended::Running) {
             track.frames.push(Frame::after_step(world, batch, track.env));
+            track.vehicles.extend(world.traffic.iter().map(|_| Vehicle::around(world, batch, track.env)));
             track.ended = Ended::from_code(batch.ended[track.env]).unwrap_or(Ended::Running);
         }
     }
@@ -258,6 +265,9 @@ pub struct Recording {
     pub centre_line: Polygon,
     /// The start, then one frame a step.
     pub frames: Vec<Frame>,
+    /// The other vehicles of each frame; absent where there are none.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub vehicles: Vec<Vec<Vehicle>>,
 }
 
 /// What an episode that is recorded belongs to.
@@ -300,6 +310,7 @@ impl Of<'_, '_> {
             map: Map::of(roundabout, scenario.gutter),
             centre_line: centre_line(roundabout, route),
             frames: track.frames,
+            vehicles: track.vehicles,
         }
     }
 }

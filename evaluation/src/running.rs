@@ -27,8 +27,9 @@ pub(super) struct Running {
 }
 
 impl Running {
-    /// At its start; `driving` is what is kept for its class, where classes are reported.
-    pub(super) fn new(rig: &Rig, truck: &Truck, driving: Option<Driving>, step: f64) -> Running {
+    /// At its start; `driving` is what is kept for its class, where classes are reported, `demand` how many other
+    /// vehicles come (veh/h).
+    pub(super) fn new(rig: &Rig, truck: &Truck, driving: Option<Driving>, demand: Option<f64>, step: f64) -> Running {
         let front = front_axle(rig, truck);
         let ahead = Vec2::from_angle(truck.heading);
         Running {
@@ -49,6 +50,7 @@ impl Running {
                 articulation_peak: 0.0,
                 off_tracking_peak: 0.0,
                 driving,
+                demand,
                 last: *truck,
             },
             // The path's first point lies far behind the start, so that the trailer's axle is beside it from the first

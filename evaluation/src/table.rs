@@ -96,6 +96,9 @@ impl Report {
         } else {
             vec![whole(self.routes.iter().map(of_route))]
         };
+        if !self.groups.demand.is_empty() {
+            sections.push(whole(self.groups.demand.iter().map(|group| of_group(group, ""))));
+        }
         let sums = [
             ("lane own", lane(true), self.own_lane_suffices.as_ref()),
             ("lane wide", lane(false), self.needs_deviation.as_ref()),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use offtrack::layout::{N_VALUES, ObservedExtras};
+use offtrack::layout::{N_AROUND, N_VALUES, ObservedExtras};
 use offtrack::world::World;
 
 use crate::config::{Config, Device};
@@ -85,11 +85,37 @@ impl Backend {
         const BLIND: usize = N_VALUES + ObservedExtras::Blind.n_extras();
         const MASS: usize = N_VALUES + ObservedExtras::Mass.n_extras();
         const ORACLE: usize = N_VALUES + ObservedExtras::Oracle.n_extras();
-        match N_VALUES + world.params.n_extras as usize {
+        const AMONG: usize = N_VALUES + N_AROUND;
+        const BLIND_AMONG: usize = BLIND + N_AROUND;
+        const MASS_AMONG: usize = MASS + N_AROUND;
+        const ORACLE_AMONG: usize = ORACLE + N_AROUND;
+        match world.n_observed() {
             BLIND => self.rollout_of::<BLIND>(config, world, routes, mirror),
             MASS => self.rollout_of::<MASS>(config, world, routes, mirror),
             ORACLE => self.rollout_of::<ORACLE>(config, world, routes, mirror),
+            AMONG => self.rollout_among::<AMONG>(config, world, routes, mirror),
+            BLIND_AMONG => self.rollout_among::<BLIND_AMONG>(config, world, routes, mirror),
+            MASS_AMONG => self.rollout_among::<MASS_AMONG>(config, world, routes, mirror),
+            ORACLE_AMONG => self.rollout_among::<ORACLE_AMONG>(config, world, routes, mirror),
             _ => self.rollout_of::<N_VALUES>(config, world, routes, mirror),
+        }
+    }
+
+    /// The same where other vehicles are observed, which no device moves.
+    fn rollout_among<const N: usize>(
+        &self,
+        config: &Config,
+        world: &Arc<World>,
+        routes: Vec<u32>,
+        mirror: Option<Mirror>,
+    ) -> Result<Box<dyn Rollout>, Error> {
+        match self {
+            Backend::Host => Ok(Box::new(HostRollout::<N>::new(config, world, routes, mirror)?)),
+            #[cfg(feature = "gpu")]
+            Backend::Device(_) => {
+                let expected = "the benchmark has [traffic], which only the CPU steps: set device = \"cpu\"";
+                Err(Error::setting("device", "\"gpu\"", expected))
+            }
         }
     }
 

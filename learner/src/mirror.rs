@@ -3,7 +3,9 @@
 //! A truck and its sensors are symmetric, so the mirror image of a transition is a valid transition of left-hand
 //! traffic. A learner that samples both has seen every bend in both directions.
 
-use offtrack::layout::{Action, EXTRAS, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, OBSERVATION, Ray};
+use offtrack::layout::{
+    Action, EXTRAS, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, OBSERVATION, Ray, VEHICLE_VALUES, Values,
+};
 use offtrack::world::World;
 use rand::Rng;
 
@@ -37,9 +39,11 @@ impl Mirror {
     /// The mirror of a world. Its action table and its sensors must be symmetric.
     pub fn of(world: &World) -> Result<Mirror, Error> {
         let refused = |expected: String| Error::setting("learning.mirror_augmentation", "true", expected);
-        let factors = OBSERVATION.iter().flat_map(|values| std::iter::repeat_n(values.mirror, values.n));
+        let factors =
+            |groups: &'static [Values]| groups.iter().flat_map(|values| std::iter::repeat_n(values.mirror, values.n));
         let extras = EXTRAS[..world.params.n_extras as usize].iter().map(|extra| extra.mirror);
-        let mut values: Vec<(usize, f32)> = factors.chain(extras).enumerate().collect();
+        let around = factors(if world.observes_vehicles() { &VEHICLE_VALUES } else { &[] });
+        let mut values: Vec<(usize, f32)> = factors(&OBSERVATION).chain(extras).chain(around).enumerate().collect();
         if world.rigs.iter().any(|rig| rig.crossfall != 0.0) {
             return Err(refused(
                 "the vehicle's road falls to one side (model.crossfall): leave learning.mirror_augmentation out"

@@ -224,7 +224,7 @@ mod tests {
                     (&simulator.batch().observation, &simulator.batch().extras);
                 let expected = match policy.extras.is_empty() {
                     true => logits(&network, &policy.normalisation, observations),
-                    false => logits::<LADEN>(&network, &policy.normalisation, &observed(observations, extras)),
+                    false => logits::<LADEN>(&network, &policy.normalisation, &observed(observations, extras, &[])),
                 };
                 let n_actions = policy.actions.len();
                 // Sums over 256 values may round in another order or without fused multiply-adds.

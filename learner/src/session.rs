@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use burn::tensor::Device;
-use offtrack::layout::{EXTRAS, N_VALUES};
+use offtrack::layout::EXTRAS;
 use offtrack::world::World;
 use offtrack_policy::{Activation, Frames, Head, Layer, Normalisation, Policy};
 
@@ -64,6 +64,11 @@ impl Session {
         if !policy.is_plain() {
             let expected = "has a memory, values of its own or commands: the learner continues with a perceptron of \
                             all values and an output an action alone";
+            return Err(Error::setting("from", from, expected.to_owned()));
+        }
+        if policy.vehicles != self.world.observes_vehicles() {
+            let expected = "learned without other vehicles, which the benchmark observes: a policy that observes them \
+                            is needed, or a benchmark without observation.vehicles";
             return Err(Error::setting("from", from, expected.to_owned()));
         }
         if policy.activation != Activation::Relu {
@@ -213,6 +218,7 @@ impl Session {
                 .map_or_else(|| self.sac.actor_ema(), |ppo| ppo.actor_ema().clone())
                 .plain_layers(),
             extras: EXTRAS[..self.world.params.n_extras as usize].iter().map(|extra| extra.name.to_owned()).collect(),
+            vehicles: self.world.observes_vehicles(),
             activation: Activation::Relu,
             head: Head::Levels,
             values: None,
@@ -251,7 +257,8 @@ impl Session {
     }
 }
 
-/// Values that networks observe in a world: those of an observation, and the extras that its benchmark observes.
+/// Values that networks observe in a world: those of an observation, extras and other vehicles that its benchmark
+/// observes.
 fn n_values(world: &World) -> usize {
-    N_VALUES + world.params.n_extras as usize
+    world.n_observed()
 }

@@ -15,10 +15,11 @@ impl Policy {
     ///
     /// # Errors
     ///
-    /// Extras that the world does not observe or, for a policy that reads all values, others than the world's; another
-    /// action table; and commands where the world has actions.
+    /// Extras that the world does not observe or, for a policy that reads all values, others than the world's; other
+    /// vehicles where it observes none; another action table; and commands where the world has actions.
     pub fn check(&self, world: &World) -> Result<(), Error> {
         self.check_extras(world).map_err(|message| Error::contents(&self.name, &message))?;
+        self.check_vehicles(world).map_err(|message| Error::contents(&self.name, &message))?;
         self.check_actions(world).map_err(|message| Error::contents(&self.name, &message))
     }
 
@@ -49,6 +50,16 @@ impl Policy {
             listed(&self.extras.iter().map(String::as_str).collect::<Vec<&str>>()),
             listed(&observed),
         ))
+    }
+
+    fn check_vehicles(&self, world: &World) -> Result<(), String> {
+        // One that learned on empty roads is a baseline among vehicles: it does not see them.
+        if !self.reads_vehicles() || world.observes_vehicles() {
+            return Ok(());
+        }
+        Err("reads what other vehicles do, which the benchmark does not observe; one with [traffic] and \
+             observation.vehicles = true is needed"
+            .to_owned())
     }
 
     fn check_actions(&self, world: &World) -> Result<(), String> {

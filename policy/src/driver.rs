@@ -1,6 +1,6 @@
 //! A policy at the wheel of several trucks: what it remembers of each, from one step to the next.
 
-use offtrack::layout::{N_EXTRAS, N_VALUES};
+use offtrack::layout::{N_AROUND, N_EXTRAS, N_VALUES};
 
 use crate::network::Pass;
 use crate::policy::{Policy, greedy};
@@ -69,9 +69,24 @@ impl Driver {
         observations: &[[f32; N_VALUES]],
         extras: &[[f32; N_EXTRAS]],
     ) -> Vec<f32> {
+        self.outputs_among(envs, observations, extras, &[])
+    }
+
+    /// The same, with what is observed of other vehicles, `[envs]`; empty for a policy that does not read it.
+    ///
+    /// # Panics
+    ///
+    /// As [`Driver::outputs`], and where the policy reads what is not given.
+    pub fn outputs_among(
+        &mut self,
+        envs: &[usize],
+        observations: &[[f32; N_VALUES]],
+        extras: &[[f32; N_EXTRAS]],
+        around: &[[f32; N_AROUND]],
+    ) -> Vec<f32> {
         assert!(envs.len() == observations.len() && envs.len() == extras.len(), "an observation and extras a truck");
         let Driver { policy, begins, stacks, kept } = self;
-        let mut rows = policy.read(observations, extras);
+        let mut rows = policy.read(observations, extras, around);
         if policy.frames.n != 1 {
             if policy.normalises_frames() {
                 rows = policy.normalisation.apply_rows(&rows);

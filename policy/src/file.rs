@@ -37,6 +37,9 @@ struct Description {
     /// Names of the extras observed beside the 69 values; none where it is absent.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     extras: Vec<String>,
+    /// Whether other vehicles are observed behind these; not where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    vehicles: Option<bool>,
     /// A rectifier where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     activation: Option<String>,
@@ -80,6 +83,7 @@ impl Description {
             ("head", self.head.is_some()),
             ("squash", self.squash.is_some()),
             ("values", self.values.is_some()),
+            ("vehicles", self.vehicles.is_some()),
             ("frames", self.frames.is_some()),
             ("padding", self.padding.is_some()),
             ("recurrent", self.recurrent.is_some()),
@@ -100,6 +104,7 @@ impl Description {
             actions: policy.actions.iter().map(|action| [action.steering, action.speed]).collect(),
             layers: policy.layers.len(),
             extras: policy.extras.clone(),
+            vehicles: policy.vehicles.then_some(true),
             activation: (policy.activation != Activation::Relu).then(|| policy.activation.name().to_owned()),
             head: squash.is_some().then(|| policy.head.name().to_owned()),
             squash,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use offtrack::files::reader::{self, shown_path};
 use offtrack::layout::random::{self, Draw};
-use offtrack::layout::{Action, N_EXTRAS, N_VALUES, Truck};
+use offtrack::layout::{Action, N_AROUND, N_EXTRAS, N_VALUES, Truck};
 use offtrack::world::World;
 
 use crate::driver::Driver;
@@ -14,7 +14,7 @@ use crate::head::Head;
 use crate::network::{Activation, Layer, Pass};
 use crate::normalisation::Normalisation;
 use crate::recurrent::Recurrent;
-use crate::selection::Selection;
+use crate::selection::{Selection, VEHICLES_AT};
 
 /// Most bytes of a policy file: two hundred times the shipped ones.
 const FILE_LIMIT: u64 = 64 << 20;
@@ -54,11 +54,14 @@ pub struct Policy {
     pub actions: Vec<Action>,
     /// What its outputs are.
     pub head: Head,
-    /// The values that it reads; with `None` all 69 and, behind them, `extras`.
+    /// The values that it reads; with `None` all 69 and, behind them, `extras` and `vehicles`.
     pub values: Option<Selection>,
     /// Names of the extras that it observes beside the 69 values, the first of [`offtrack::layout::EXTRAS`]. None for a
     /// policy that names its values.
     pub extras: Vec<String>,
+    /// Whether it observes other vehicles behind these: all of [`offtrack::layout::VEHICLE_VALUES`]. False for a policy
+    /// that names its values.
+    pub vehicles: bool,
     /// How many steps' values it sees at once.
     pub frames: Frames,
     /// How observations are normalised for it: each frame by itself or, where it has numbers for the values of all
@@ -129,6 +132,7 @@ impl Policy {
     /// memory: a [`Driver`] keeps that.
     pub fn logits(&self, observations: &[[f32; N_VALUES]]) -> Vec<f32> {
         assert!(self.n_extras() == 0, "the policy observes extras: they must be given");
+        assert!(!self.reads_vehicles(), "the policy observes other vehicles: they must be given");
         self.logits_beside(observations, &[])
     }
 
@@ -139,12 +143,27 @@ impl Policy {
     ///
     /// Where the layers do not fit each other; those of a policy that was read do. And where it has a memory.
     pub fn logits_beside(&self, observations: &[[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Vec<f32> {
+        self.logits_among(observations, extras, &[])
+    }
+
+    /// The same, with what is observed of other vehicles beside each observation, `[n_envs]`; empty for a policy that
+    /// does not read it.
+    ///
+    /// # Panics
+    ///
+    /// As [`Policy::logits_beside`], and where it reads what is not given.
+    pub fn logits_among(
+        &self,
+        observations: &[[f32; N_VALUES]],
+        extras: &[[f32; N_EXTRAS]],
+        around: &[[f32; N_AROUND]],
+    ) -> Vec<f32> {
         assert!(!self.has_memory(), "the policy has a memory: a Driver keeps it");
         let pass = self.pass(&self.layers);
-        if self.values.is_none() && self.extras.is_empty() {
+        if self.reads_all_and_nothing_else() {
             return pass.outputs(observations.as_flattened());
         }
-        pass.outputs(&self.read(observations, extras))
+        pass.outputs(&self.read(observations, extras, around))
     }
 
     /// The index of the most probable action for each observation, `[n_envs]`.
@@ -220,7 +239,18 @@ impl Policy {
 
     /// Values that it reads of a step.
     pub(crate) fn n_values(&self) -> usize {
-        self.values.as_ref().map_or(N_VALUES + self.extras.len(), |values| values.indices().len())
+        let around = if self.vehicles { N_AROUND } else { 0 };
+        self.values.as_ref().map_or(N_VALUES + self.extras.len() + around, |values| values.indices().len())
+    }
+
+    /// Whether it reads what other vehicles do.
+    pub fn reads_vehicles(&self) -> bool {
+        self.values.as_ref().map_or(self.vehicles, Selection::has_vehicles)
+    }
+
+    /// Whether it reads the 69 values in their order.
+    fn reads_all_and_nothing_else(&self) -> bool {
+        self.values.is_none() && self.extras.is_empty() && !self.vehicles
     }
 
     /// Values of all frames that it sees.
@@ -234,20 +264,32 @@ impl Policy {
     }
 
     /// The values that it reads of each observation, `[n_envs * values]`.
-    pub(crate) fn read(&self, observations: &[[f32; N_VALUES]], extras: &[[f32; N_EXTRAS]]) -> Vec<f32> {
+    pub(crate) fn read(
+        &self,
+        observations: &[[f32; N_VALUES]],
+        extras: &[[f32; N_EXTRAS]],
+        around: &[[f32; N_AROUND]],
+    ) -> Vec<f32> {
         let mut rows = Vec::with_capacity(observations.len() * self.n_values());
         match &self.values {
-            None if self.extras.is_empty() => rows.extend_from_slice(observations.as_flattened()),
+            None if self.reads_all_and_nothing_else() => rows.extend_from_slice(observations.as_flattened()),
             None => {
-                for (values, extras) in observations.iter().zip(extras) {
+                for (row, values) in observations.iter().enumerate() {
                     rows.extend_from_slice(values);
-                    rows.extend_from_slice(&extras[..self.extras.len()]);
+                    if !self.extras.is_empty() {
+                        rows.extend_from_slice(&extras[row][..self.extras.len()]);
+                    }
+                    if self.vehicles {
+                        rows.extend_from_slice(&around[row]);
+                    }
                 }
             }
             Some(selection) => {
                 for (row, values) in observations.iter().enumerate() {
-                    let value = |&index: &usize| {
-                        index.checked_sub(N_VALUES).map_or_else(|| values[index], |extra| extras[row][extra])
+                    let value = |&index: &usize| match index {
+                        ..N_VALUES => values[index],
+                        N_VALUES..VEHICLES_AT => extras[row][index - N_VALUES],
+                        _ => around[row][index - VEHICLES_AT],
                     };
                     rows.extend(selection.indices().iter().map(value));
                 }

@@ -1,6 +1,9 @@
 //! The values that a policy reads of those that are observed, by their names.
 
-use offtrack::layout::{EXTRAS, N_VALUES, OBSERVATION};
+use offtrack::layout::{EXTRAS, N_EXTRAS, N_VALUES, OBSERVATION, VEHICLE_VALUES, Values};
+
+/// Index of the first value of other vehicles, behind all extras.
+pub(crate) const VEHICLES_AT: usize = N_VALUES + N_EXTRAS;
 
 /// Some of the values that are observed, in an order of their own.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -10,8 +13,8 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// The values of these names. A name is an extra's, a group's of [`OBSERVATION`], which stands for all of its
-    /// values, or `group[2]`, which stands for the third of them.
+    /// The values of these names. A name is an extra's, a group's of [`OBSERVATION`] or [`VEHICLE_VALUES`], which stands
+    /// for all of its values, or `group[2]`, which stands for the third of them.
     ///
     /// # Errors
     ///
@@ -20,8 +23,9 @@ impl Selection {
         let mut indices: Vec<usize> = Vec::new();
         for name in names {
             let found = indices_of(name).ok_or_else(|| {
-                let groups = OBSERVATION.iter().map(|group| group.name);
-                let known: Vec<&str> = groups.chain(EXTRAS.iter().map(|extra| extra.name)).collect();
+                let groups = |groups: &'static [Values]| groups.iter().map(|group| group.name);
+                let extras = EXTRAS.iter().map(|extra| extra.name);
+                let known: Vec<&str> = groups(&OBSERVATION).chain(extras).chain(groups(&VEHICLE_VALUES)).collect();
                 format!("{name:?}; must be one of {}, or one value of several, as {:?}", known.join(", "), "bearing[0]")
             })?;
             if found.iter().any(|index| indices.contains(index)) {
@@ -40,14 +44,20 @@ impl Selection {
         &self.names
     }
 
-    /// The indices of the values, of which the first [`N_VALUES`] are an observation's and those behind are extras.
+    /// The indices of the values, of which the first [`N_VALUES`] are an observation's, those behind are extras, and the
+    /// last ones are of other vehicles.
     pub fn indices(&self) -> &[usize] {
         &self.indices
     }
 
     /// The names of the extras among the values.
     pub fn extras(&self) -> impl Iterator<Item = &'static str> {
-        self.indices.iter().filter_map(|index| Some(EXTRAS[index.checked_sub(N_VALUES)?].name))
+        self.indices.iter().filter_map(|index| EXTRAS.get(index.checked_sub(N_VALUES)?).map(|extra| extra.name))
+    }
+
+    /// Whether values of other vehicles are among them.
+    pub fn has_vehicles(&self) -> bool {
+        self.indices.iter().any(|&index| VEHICLES_AT <= index)
     }
 }
 
@@ -65,15 +75,20 @@ fn indices_of(name: &str) -> Option<Vec<usize>> {
             (group, Some(at))
         }
     };
-    let group = OBSERVATION.iter().find(|values| values.name == group)?;
+    let first_of = |groups: &'static [Values], from: usize| {
+        groups.iter().find(|values| values.name == group).map(|values| (from + values.first, values.n))
+    };
+    let (first, n) = first_of(&OBSERVATION, 0).or_else(|| first_of(&VEHICLE_VALUES, VEHICLES_AT))?;
     match at {
-        None => Some((group.first..group.first + group.n).collect()),
-        Some(at) => (at < group.n).then(|| vec![group.first + at]),
+        None => Some((first..first + n).collect()),
+        Some(at) => (at < n).then(|| vec![first + at]),
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use offtrack::layout::N_AROUND;
+
     use super::*;
 
     fn selected(names: &[&str]) -> Result<Vec<usize>, String> {
@@ -86,8 +101,13 @@ mod tests {
         assert_eq!(selected(&["bearing[3]", "articulation", "bearing[0]", "steering"]).unwrap(), [9, 21, 6, 69]);
         let rays = selected(&["trailer_range", "tractor_range"]).unwrap();
         assert_eq!(rays, (30..59).collect::<Vec<usize>>());
-        let all: Vec<&str> = OBSERVATION.iter().map(|group| group.name).chain(EXTRAS.map(|extra| extra.name)).collect();
-        assert_eq!(selected(&all).unwrap(), (0..N_VALUES + EXTRAS.len()).collect::<Vec<usize>>());
+        let extras = EXTRAS.map(|extra| extra.name);
+        let groups = |groups: &'static [Values]| groups.iter().map(|group| group.name);
+        let all: Vec<&str> = groups(&OBSERVATION).chain(extras).chain(groups(&VEHICLE_VALUES)).collect();
+        assert_eq!(selected(&all).unwrap(), (0..VEHICLES_AT + N_AROUND).collect::<Vec<usize>>());
+        assert_eq!(selected(&["entry_gone[1]", "gap"]).unwrap(), [81 + 5, 81 + 8]);
+        let has_vehicles = |name: &str| Selection::of(&[name.to_owned()]).unwrap().has_vehicles();
+        assert_eq!(["friction", "vehicle_left"].map(has_vehicles), [false, true]);
         let names = ["friction".to_owned(), "speed".to_owned(), "steering".to_owned()];
         assert_eq!(Selection::of(&names).unwrap().extras().collect::<Vec<_>>(), ["friction", "steering"]);
     }

@@ -11,8 +11,11 @@ mod memory;
 
 use std::path::Path;
 
+use offtrack::files::cache::Loading;
 use offtrack::layout::random;
-use offtrack::layout::{Action, EXTRAS, N_EXTRAS, N_VALUES, ObservedExtras};
+use offtrack::layout::{
+    Action, EXTRAS, N_AROUND, N_EXTRAS, N_VALUES, OBSERVATION, ObservedExtras, VEHICLE_VALUES, Values,
+};
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
 use offtrack_policy::{Activation, Frames, Head, Layer, Normalisation, Policy, greedy};
@@ -43,6 +46,7 @@ fn policy(hidden: &[usize], n_actions: usize) -> Policy {
         normalisation: Normalisation::of(&observations(20)),
         layers: sizes.windows(2).enumerate().map(layer).collect(),
         extras: Vec::new(),
+        vehicles: false,
         activation: Activation::Relu,
         head: Head::Levels,
         values: None,

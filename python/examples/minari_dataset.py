@@ -81,7 +81,7 @@ def main() -> None:
         env=spec,
         eval_env=evaluated,
         action_space=gymnasium.spaces.Discrete(len(batch.action_table)),
-        observation_space=observation_space(len(batch.extras)),
+        observation_space=observation_space(len(batch.extras), vehicles=batch.observes_vehicles),
         algorithm_name=f"offtrack policy {policy.name}",
         author="The offtrack authors",
         data_format="arrow",

@@ -24,7 +24,7 @@ from .batch import Batch
 from .episodes import Ends, Start
 from .evaluation import Evaluation, evaluate
 from .geometry import Road
-from .layout import COLUMN_DOCS, COLUMNS, EXTRAS, OBSERVATION, Ended, Values
+from .layout import COLUMN_DOCS, COLUMNS, EXTRAS, OBSERVATION, VEHICLES, Ended, Values
 from .observer import Frame, Observer, Seen, speed_control
 from .policy import Driver, Policy
 from .scenarios import Benchmark, benchmark, write_scenarios
@@ -36,6 +36,7 @@ __all__ = [
     "COLUMN_DOCS",
     "EXTRAS",
     "OBSERVATION",
+    "VEHICLES",
     "Batch",
     "Benchmark",
     "Driver",

@@ -47,6 +47,10 @@ OBSERVATION: tuple[Values, ...] = tuple(Values(*values) for values in _offtrack.
 EXTRAS: tuple[Values, ...] = tuple(Values(*values) for values in _offtrack.extra_groups())
 """What may stand behind these values, a value each: a benchmark with extras has the first so many, ``Batch.extras``."""
 
+VEHICLES: tuple[Values, ...] = tuple(Values(*values) for values in _offtrack.vehicle_groups())
+"""What is observed of other vehicles, group by group, where ``Batch.observes_vehicles``: the last 42 values of an
+observation. ``first`` counts from the first of them."""
+
 
 def _dtype(fields: list[tuple[str, str, int, str]], n: int) -> np.dtype[Any]:
     def typed(kind: str, length: int) -> np.dtype[Any]:

@@ -68,6 +68,11 @@ class Policy:
         return self._network.extras
 
     @property
+    def vehicles(self) -> bool:
+        """Whether it observes other vehicles, which a batch must then observe too."""
+        return self._network.vehicles
+
+    @property
     def values(self) -> list[str] | None:
         """Names of the values that it reads, in its order; ``None`` where it reads all 69 and ``extras``."""
         return self._network.values
@@ -117,6 +122,11 @@ class Policy:
         elif self.extras != batch.extras:
             its, needed = (", ".join(extras) or "none" for extras in (self.extras, batch.extras))
             raise ValueError(f"{self.name}: observes other extras than {batch.scenario}: {its}; {needed} are needed")
+        sees = getattr(batch, "observes_vehicles", False)
+        if self.vehicles and not sees:
+            raise ValueError(f"{self.name}: observes other vehicles, which {batch.scenario} does not")
+        if sees and not self.vehicles and self.values is None:
+            raise ValueError(f"{self.name}: observes no other vehicles, as {batch.scenario} does")
         tables = self.action_table, batch.action_table
         if tables[0].shape != tables[1].shape or not np.allclose(*tables, atol=1e-5):
             raise ValueError(f"{self.name}: has another action table than {batch.scenario}; see action_table of both")

@@ -66,7 +66,7 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
         self.batch = Batch(
             scenario, num_envs, split=split, routes=routes, seed=seed, num_threads=threads, device=device
         )
-        self.single_observation_space = observation_space(len(self.batch.extras))
+        self.single_observation_space = observation_space(len(self.batch.extras), vehicles=self.batch.observes_vehicles)
         self.single_action_space = action_space(self.batch)
         self.num_agents = num_envs
         self.render_mode = "rgb_array"

@@ -69,7 +69,7 @@ class RoundaboutVecEnv(VecEnv):
         self.render_mode = render_mode
         self.render_size = render_size
         self._streams: list[tuple[int, int] | None] = [(seed, env) for env in range(num_envs)]
-        space = observation_space(len(self.batch.extras))
+        space = observation_space(len(self.batch.extras), vehicles=self.batch.observes_vehicles)
         super().__init__(num_envs, space, action_space(self.batch))
 
     def __copy__(self) -> RoundaboutVecEnv:

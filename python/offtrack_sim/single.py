@@ -13,13 +13,14 @@ import numpy.typing as npt
 
 from .arguments import checked_seed
 from .batch import Batch
-from .layout import EXTRAS, OBSERVATION, Ended
+from .layout import EXTRAS, OBSERVATION, VEHICLES, Ended
 from .scenarios import Scenario
 
 
-def observation_space(n_extras: int = 0) -> gymnasium.spaces.Box:
-    """69 values of float32, angles in -1..1, all others in 0..1; behind them a benchmark's extras, in -1..1."""
-    groups = (*OBSERVATION, *EXTRAS[:n_extras])
+def observation_space(n_extras: int = 0, *, vehicles: bool = False) -> gymnasium.spaces.Box:
+    """69 values of float32, angles in -1..1, all others in 0..1; behind them a benchmark's extras, in -1..1, and where
+    it observes other vehicles 42 values of them."""
+    groups = (*OBSERVATION, *EXTRAS[:n_extras], *(VEHICLES if vehicles else ()))
     low = np.concatenate([np.full(values.n, values.low, np.float32) for values in groups])
     return gymnasium.spaces.Box(low, np.ones_like(low), dtype=np.float32)
 
@@ -75,7 +76,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
     ) -> None:
         check_render_mode(render_mode)
         self.batch = Batch(scenario, 1, split=split, routes=routes, autoreset="disabled", num_threads=1, device=device)
-        self.observation_space = observation_space(len(self.batch.extras))  # type: ignore[assignment]
+        self.observation_space = observation_space(len(self.batch.extras), vehicles=self.batch.observes_vehicles)  # type: ignore[assignment]
         self.action_space = action_space(self.batch)
         self.metadata = {**self.metadata, "render_fps": frames_per_second(self.batch)}
         self.render_mode = render_mode

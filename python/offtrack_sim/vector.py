@@ -90,7 +90,7 @@ class RoundaboutVector(Base):
             weights=weights,
         )
         self.num_envs = num_envs = self.batch.num_envs
-        self.single_observation_space = observation_space(len(self.batch.extras))
+        self.single_observation_space = observation_space(len(self.batch.extras), vehicles=self.batch.observes_vehicles)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.single_action_space = action_space(self.batch)
         self.action_space = batch_space(self.single_action_space, num_envs)

@@ -14,13 +14,13 @@ use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray2,
     PyUntypedArrayMethods,
 };
-use offtrack::layout::{Column, Ended, N_VALUES};
+use offtrack::layout::{Column, Ended};
 use offtrack::simulator::Autoreset;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::infos::{End, Infos, Names};
-use crate::observed::{self, Read};
+use crate::observed::{self, Beside, Read};
 use crate::worlds::{Asked, Given, Place};
 use crate::{actions, errors, geometry};
 pub use arguments::engine_of;
@@ -46,8 +46,8 @@ pub struct Batch {
     place: Place,
     names: Names,
     n_envs: usize,
-    /// Extras that stand behind each observation's values.
-    n_extras: usize,
+    /// What stands behind each observation's values.
+    beside: Beside,
     /// What is read after a step.
     read: Vec<Column>,
     device: String,
@@ -122,13 +122,19 @@ impl Batch {
     /// Names of the extras that stand behind an observation's values.
     #[getter]
     fn extras(&self) -> Vec<&'static str> {
-        observed::names(self.n_extras)
+        observed::names(self.beside.n_extras)
     }
 
-    /// Values of an observation, its extras among them.
+    /// Whether what is observed of other vehicles stands behind them.
+    #[getter]
+    fn observes_vehicles(&self) -> bool {
+        self.beside.has_vehicles
+    }
+
+    /// Values of an observation, all that stands behind among them.
     #[getter]
     pub fn n_values(&self) -> usize {
-        N_VALUES + self.n_extras
+        self.beside.n_values()
     }
 
     /// Vehicle and load of each class of the vehicles, in the benchmark's order.
@@ -165,12 +171,12 @@ impl Batch {
             let mut state = self.state()?;
             state.check_process(&self.device)?;
             let State { simulator, pool, .. } = &mut *state;
-            let columns = observed::columns_of_observation(self.n_extras);
-            let read = Read::of(simulator, columns).map_err(|error| errors::of_simulator(&error))?;
-            let observation = if self.n_extras == 0 {
+            let columns = self.beside.columns_of_observation();
+            let read = Read::of(simulator, &columns).map_err(|error| errors::of_simulator(&error))?;
+            let observation = if self.beside.is_empty() {
                 PyArray1::from_slice(py, &read.rows::<f32>(Column::Observation))
             } else {
-                PyArray1::from_vec(py, pool.run(py, || read.observed(self.n_extras).to_vec())?)
+                PyArray1::from_vec(py, pool.run(py, || read.observed(self.beside).to_vec())?)
             };
             observation.reshape([self.n_envs, self.n_values()])
         })

@@ -34,6 +34,7 @@ fn _offtrack(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(layout::column_layouts, module)?)?;
     module.add_function(wrap_pyfunction!(layout::observation_groups, module)?)?;
     module.add_function(wrap_pyfunction!(layout::extra_groups, module)?)?;
+    module.add_function(wrap_pyfunction!(layout::vehicle_groups, module)?)?;
     module.add_function(wrap_pyfunction!(layout::end_codes, module)?)?;
     module.add_function(wrap_pyfunction!(worlds::scenario_files, module)?)?;
     module.add_function(wrap_pyfunction!(worlds::scenario_keys, module)?)?;

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
-use offtrack::layout::{EXTRAS, N_EXTRAS, N_VALUES};
+use offtrack::layout::{EXTRAS, N_AROUND, N_EXTRAS, N_VALUES};
 use offtrack_policy::{Error, Head, Policy};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -65,6 +65,12 @@ impl Network {
         &self.policy.extras
     }
 
+    /// Whether it observes other vehicles behind these.
+    #[getter]
+    fn vehicles(&self) -> bool {
+        self.policy.reads_vehicles()
+    }
+
     #[getter]
     fn action_table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         actions::table(py, &self.policy.actions)
@@ -97,8 +103,8 @@ impl Network {
     fn logits<'py>(&self, py: Python<'py>, observations: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         guarded(|| {
             self.check_no_memory()?;
-            let (values, extras) = split(&self.policy, observations)?;
-            let logits = self.run(py, || self.policy.logits_beside(&values, &extras))?;
+            let Split { values, extras, around } = split(&self.policy, observations)?;
+            let logits = self.run(py, || self.policy.logits_among(&values, &extras, &around))?;
             PyArray1::from_vec(py, logits).reshape([values.len(), self.policy.n_outputs()])
         })
     }
@@ -107,8 +113,8 @@ impl Network {
     fn act<'py>(&self, py: Python<'py>, observations: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         guarded(|| {
             self.check_no_memory()?;
-            let (values, extras) = split(&self.policy, observations)?;
-            let outputs = self.run(py, || self.policy.logits_beside(&values, &extras))?;
+            let Split { values, extras, around } = split(&self.policy, observations)?;
+            let outputs = self.run(py, || self.policy.logits_among(&values, &extras, &around))?;
             chosen(py, &self.policy, outputs)
         })
     }
@@ -167,22 +173,38 @@ fn chosen<'py>(py: Python<'py>, policy: &Policy, outputs: Vec<f32>) -> PyResult<
     }
 }
 
-/// An array of observations, `[n, 69 + extras]`: the values and, where the policy observes some, the extras. A policy
-/// that names its values takes those of any benchmark that observes them.
+/// An array of observations, `[n, n_values]`: the 69 values and, where the policy observes them, extras and what is
+/// observed of other vehicles. A policy that names its values takes those of any benchmark that observes them.
 fn split(policy: &Policy, observations: &Bound<PyAny>) -> PyResult<Split> {
-    let n_least = match &policy.values {
-        None => N_VALUES + policy.extras.len(),
-        Some(values) => values.indices().iter().map(|index| index + 1).max().unwrap_or_default().max(N_VALUES),
+    let least = match &policy.values {
+        None => policy.extras.len(),
+        Some(values) => {
+            let extras = values.indices().iter().filter(|&&index| index < N_VALUES + N_EXTRAS);
+            extras.map(|index| (index + 1).saturating_sub(N_VALUES)).max().unwrap_or_default()
+        }
     };
+    let n_around = |has: bool| if has { N_AROUND } else { 0 };
+    let n_least = N_VALUES + least + n_around(policy.reads_vehicles());
     let needed =
         || PyTypeError::new_err(format!("observations: a numpy array of float32 and shape (n, {n_least}) is needed"));
     let array: PyReadonlyArray2<f32> = observations.extract().map_err(|_| needed())?;
     let n_values = array.shape()[1];
-    let n_most = if policy.values.is_none() { n_least } else { N_VALUES + N_EXTRAS };
-    if !(n_least..=n_most).contains(&n_values) {
-        let extras = observed::described(EXTRAS[..n_least - N_VALUES].iter().map(|extra| extra.name));
+    // All extras together are fewer values than those of other vehicles.
+    let has_vehicles = N_VALUES + N_AROUND <= n_values;
+    let n_extras = n_values.saturating_sub(N_VALUES + n_around(has_vehicles));
+    let fits = match policy.values {
+        None => n_values == n_least,
+        Some(_) => {
+            (least..=N_EXTRAS).contains(&n_extras)
+                && N_VALUES + least <= n_values
+                && (has_vehicles || !policy.reads_vehicles())
+        }
+    };
+    if !fits {
+        let extras = observed::described(EXTRAS[..least].iter().map(|extra| extra.name));
+        let around = if policy.reads_vehicles() { ", those of other vehicles last" } else { "" };
         return Err(PyValueError::new_err(format!(
-            "observations: {n_values} values each; {n_least} are needed{extras}"
+            "observations: {n_values} values each; {n_least} are needed{extras}{around}"
         )));
     }
     let values = array.as_slice().map_err(|_| needed())?;
@@ -192,16 +214,27 @@ fn split(policy: &Policy, observations: &Bound<PyAny>) -> PyResult<Split> {
             "observations[{row}, {column}]: {value}; every value must be finite"
         )));
     }
-    let split = |row: &[f32]| {
-        let (values, extras) = row.split_at(N_VALUES);
-        let padded = |index: usize| extras.get(index).copied().unwrap_or_default();
-        (std::array::from_fn(|index| values[index]), std::array::from_fn(padded))
-    };
-    Ok(values.chunks_exact(n_values).map(split).unzip())
+    let mut split = Split::default();
+    for row in values.chunks_exact(n_values) {
+        let (values, beside) = row.split_at(N_VALUES);
+        let (extras, around) = beside.split_at(n_extras);
+        split.values.push(std::array::from_fn(|index| values[index]));
+        split.extras.push(std::array::from_fn(|index| extras.get(index).copied().unwrap_or_default()));
+        if has_vehicles {
+            split.around.push(std::array::from_fn(|index| around[index]));
+        }
+    }
+    Ok(split)
 }
 
-/// Values of observations, and the extras beside them.
-type Split = (Vec<[f32; N_VALUES]>, Vec<[f32; N_EXTRAS]>);
+/// Values of observations, what stands beside them, and other vehicles.
+#[derive(Default)]
+struct Split {
+    values: Vec<[f32; N_VALUES]>,
+    extras: Vec<[f32; N_EXTRAS]>,
+    /// Empty where none are observed.
+    around: Vec<[f32; N_AROUND]>,
+}
 
 fn refused(error: Error) -> PyErr {
     PyValueError::new_err(error.to_string())

@@ -165,12 +165,16 @@ pub fn scenario_of_keys(keys: &str) -> PyResult<String> {
     toml::to_string(&keys).map_err(|error| wrong(&error))
 }
 
-/// A benchmark's name, its action table, and the names of the extras that it observes.
-pub fn policy_table(scenario: &Given, stop: &AtomicBool) -> PyResult<(String, Vec<Action>, Vec<&'static str>)> {
+/// A benchmark's name, its action table, the names of the extras that it observes, and whether it observes other
+/// vehicles.
+type Table = (String, Vec<Action>, Vec<&'static str>, bool);
+
+/// What a policy file says of a benchmark.
+pub fn policy_table(scenario: &Given, stop: &AtomicBool) -> PyResult<Table> {
     let cache = Cache::of_user();
     let loading = Loading { cache: cache.as_ref(), stop, ..Loading::PLAIN };
     let scenario = scenario.load(&loading)?;
     let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
     let rig = scenario.vehicle.rig(&scenario.load, substep, scenario.steer_max);
-    Ok((scenario.name.clone(), scenario.actions(rig.steer_max), scenario.extras.names()))
+    Ok((scenario.name.clone(), scenario.actions(rig.steer_max), scenario.extras.names(), scenario.observes_vehicles))
 }

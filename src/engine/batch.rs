@@ -8,8 +8,8 @@ use super::order::{Order, Place};
 use super::{Autoreset, Error, Tally, memory};
 use crate::layout::columns::{columns, row_bytes};
 use crate::layout::{
-    Clearance, Column, Command, Control, N_CAR_WORDS, N_COLUMNS, N_EXTRAS, N_POSES, N_RAYS, N_VALUES, Pose, Progress,
-    RewardTerms, Stream, Truck,
+    Clearance, Column, Command, Control, N_AROUND, N_CAR_WORDS, N_COLUMNS, N_EXTRAS, N_POSES, N_RAYS, N_VALUES, Pose,
+    Progress, RewardTerms, Stream, Truck,
 };
 use crate::world::World;
 

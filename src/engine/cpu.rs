@@ -3,6 +3,7 @@
 //! A truck's step reads and writes its own `Row` and reads the shared [`World`], so the number of threads, the truck's
 //! index in the batch and the order in which trucks are stepped, that of their roads, cannot change a result.
 
+pub mod around;
 pub mod collide;
 pub mod copy_observation;
 pub mod count;

@@ -9,7 +9,7 @@ use crate::layout::buffers::Table;
 use crate::layout::{
     BatchFacts, FieldRow, N_PREVIEW, PREVIEW_ROWS, PreviewRow, ROUTE_ROWS, Rig, TEAM_MAX, VehicleRow, WaypointRow,
 };
-use crate::world::World;
+use crate::world::{TrafficRoad, World};
 
 /// Workgroups in a row of a dispatch: the most that every device takes.
 pub const ROW: u32 = 65_535;
@@ -28,6 +28,7 @@ pub struct Tables<'a> {
     // All fields, one after the other.
     cells: Vec<[u32; 2]>,
     corners: Vec<u32>,
+    lanes: Vec<u32>,
 }
 
 impl<'a> Tables<'a> {
@@ -56,6 +57,7 @@ impl<'a> Tables<'a> {
             limits: limits(world),
             cells,
             corners,
+            lanes: lanes(world),
         }
     }
 
@@ -71,6 +73,7 @@ impl<'a> Tables<'a> {
             Table::Cells => cast_slice(&self.cells),
             Table::Corners => cast_slice(&self.corners),
             Table::Limits => cast_slice(&self.limits),
+            Table::Lanes => cast_slice(&self.lanes),
             Table::Batch | Table::Choice | Table::Streams | Table::Begins => return None,
         })
     }
@@ -109,8 +112,24 @@ fn limits(world: &World) -> Vec<u32> {
     limits
 }
 
+/// Where other vehicles drive: the numbers of the driver model, for each route the first word of its road, and the
+/// words of each road. A single word where there are none, since no buffer is empty.
+fn lanes(world: &World) -> Vec<u32> {
+    let Some(traffic) = &world.traffic else { return vec![0] };
+    let rules = traffic.rules.words();
+    let mut first = (rules.len() + world.routes.len()) as u32;
+    let words: Vec<Vec<u32>> = traffic.roads.iter().map(TrafficRoad::words).collect();
+    let starts = words.iter().map(|words| {
+        first += words.len() as u32;
+        first - words.len() as u32
+    });
+    let starts: Vec<u32> = starts.collect();
+    let of_routes = world.routes.iter().map(|route| starts[route.roundabout as usize]);
+    rules.into_iter().chain(of_routes).chain(words.iter().flatten().copied()).collect()
+}
+
 /// Bytes of the tables of a world that grow with it.
-pub fn sizes(world: &World) -> [(Table, usize); 5] {
+pub fn sizes(world: &World) -> [(Table, usize); 6] {
     let of_fields = |bytes: fn(&Field) -> usize| world.fields.iter().map(bytes).sum::<usize>();
     let rows = world.routes.len() * ROUTE_ROWS + world.waypoints.len() * (1 + PREVIEW_ROWS);
     [
@@ -118,6 +137,7 @@ pub fn sizes(world: &World) -> [(Table, usize); 5] {
         (Table::Corners, of_fields(|field| size_of_val(field.values.as_slice()))),
         (Table::Roads, rows * size_of::<[u32; 4]>()),
         (Table::Limits, (world.rigs.len() + world.routes.len() + world.step_limits.len()) * size_of::<u32>()),
+        (Table::Lanes, size_of_val(lanes(world).as_slice())),
         (Table::Vehicles, world.rigs.len() * size_of::<VehicleRow>()),
     ]
 }

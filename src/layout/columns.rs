@@ -5,7 +5,8 @@
 //! [`Column`].
 
 use super::{
-    Clearance, Command, Control, N_CAR_WORDS, N_EXTRAS, N_POSES, N_RAYS, N_VALUES, Pose, Progress, RewardTerms, Truck,
+    Clearance, Command, Control, N_AROUND, N_CAR_WORDS, N_EXTRAS, N_POSES, N_RAYS, N_VALUES, Pose, Progress,
+    RewardTerms, Truck,
 };
 use crate::layout::shared::{Named, Shared};
 
@@ -47,6 +48,10 @@ macro_rules! columns {
             ;
             /// The cars on the road of each truck, and what is counted of them: words of a `traffic::Row`
             Cars cars: [u32; N_CAR_WORDS],
+            /// What is observed of other vehicles before the next action; zeros where the benchmark observes none
+            Around around: [f32; N_AROUND],
+            /// What is observed of other vehicles after the last action
+            NextAround next_around: [f32; N_AROUND],
         }
     };
 }

@@ -42,7 +42,7 @@ pub struct Values {
 /// | 59-68 | `radius` | radius of the route over two chords of 5 waypoints, 0 to 9 chords ahead / 100 m, at most 1 |
 ///
 /// Waypoints ahead are the next one and the 2nd, 5th, 7th and 10th after it.
-pub const OBSERVATION: [Values; 13] = numbered([
+pub const OBSERVATION: [Values; 13] = numbered::<13, N_VALUES>([
     values("speed", 1, "speed of the drive axle / 27.8 m/s, limited to 0..1"),
     values("waypoint_distance", 2, "distance to the next and the following waypoint / 20 m, at most 1"),
     values("crossing_distance", 2, "distance to the crossing lines of these waypoints / 20 m, at most 1"),
@@ -70,33 +70,38 @@ pub const OBSERVATION: [Values; 13] = numbered([
     values("radius", 10, "radius of the route over two chords of 5 waypoints, 0 to 9 chords ahead / 100 m, at most 1"),
 ]);
 
-const fn values(name: &'static str, n: usize, doc: &'static str) -> Values {
+pub(super) const fn values(name: &'static str, n: usize, doc: &'static str) -> Values {
     Values { name, first: 0, n, low: 0.0, mirror: 1.0, doc }
 }
 
-const fn angles(name: &'static str, n: usize, doc: &'static str) -> Values {
+pub(super) const fn angles(name: &'static str, n: usize, doc: &'static str) -> Values {
     Values { low: -1.0, mirror: -1.0, ..values(name, n, doc) }
 }
 
-/// The groups with the index of each one's first value, which follow each other and are [`N_VALUES`] in all.
-const fn numbered<const N: usize>(mut groups: [Values; N]) -> [Values; N] {
+/// The groups with the index of each one's first value, which follow each other and are `IN_ALL`.
+pub(super) const fn numbered<const N: usize, const IN_ALL: usize>(mut groups: [Values; N]) -> [Values; N] {
     let (mut group, mut next) = (0, 0);
     while group < N {
         groups[group].first = next;
         next += groups[group].n;
         group += 1;
     }
-    assert!(next == N_VALUES);
+    assert!(next == IN_ALL);
     groups
 }
 
 /// Index of the first value of the group with this name.
 pub(crate) const fn first_of(name: &str) -> usize {
+    first_among(&OBSERVATION, name)
+}
+
+/// Index of the first value of the group with this name among these.
+pub(super) const fn first_among(groups: &[Values], name: &str) -> usize {
     let mut group = 0;
-    while !is_same(OBSERVATION[group].name, name) {
+    while !is_same(groups[group].name, name) {
         group += 1;
     }
-    OBSERVATION[group].first
+    groups[group].first
 }
 
 const fn is_same(one: &str, other: &str) -> bool {

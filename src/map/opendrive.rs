@@ -30,6 +30,7 @@ mod lines; // ways -> routes
 mod surroundings; // a map around a point
 mod build; // a ring as a `Ground`
 mod junction; // ways through a junction as a `Ground`
+mod export; // a road as a map
 
 use std::path::Path;
 
@@ -38,6 +39,7 @@ use glam::DVec2;
 use crate::files::reader::{Error, Reader, read_bytes};
 pub use build::{Imported, Options};
 pub(in crate::map) use build::{kerb_of, outer_radius, ring_radius};
+pub use export::exported;
 use graph::Graph;
 pub use junction::{Junction, RoadLane, Way};
 use lanes::Strip;

@@ -200,6 +200,7 @@ pub(super) struct WrittenSensors {
 #[serde(deny_unknown_fields, default)]
 pub(super) struct WrittenObservation {
     pub(super) extras: ObservedExtras,
+    pub(super) vehicles: bool,
 }
 
 #[derive(Deserialize)]

@@ -74,6 +74,9 @@ impl Scenario {
         }
         self.disturbances.check()?;
         self.traffic.iter().try_for_each(Traffic::check)?;
+        if self.observes_vehicles && self.traffic.is_none() {
+            return Err(invalid("observes_vehicles", true, "with traffic: without it there are none to observe"));
+        }
         within("vehicle.model.steer_delay", self.longest_steer_delay(), [0.0, MOST_DELAY * self.step])
     }
 

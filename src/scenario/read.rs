@@ -87,6 +87,7 @@ fn without_routes(
         speed_changes: speed_changes.into_iter().map(|change| change / 3.6).collect(),
         sensor_range: reader.within("sensors.range", sensors.range, 1.0..=50.0, "m")?,
         extras: written.observation.extras,
+        observes_vehicles: observes_vehicles(reader, written)?,
         disturbances: disturbances(reader, &written.disturbances)?,
         traffic: written.traffic.as_ref().map(|written| of_traffic(reader, written)).transpose()?,
         start_offset: reader.within("start.offset", start.offset, 0.0..=1.0, "m")?,
@@ -148,6 +149,16 @@ fn disturbances(reader: &Reader, written: &WrittenDisturbances) -> Result<Distur
         observation_delay: delays("observation_delay", written.observation_delay)?,
         action_delay: delays("action_delay", written.action_delay)?,
     })
+}
+
+/// Whether other vehicles are observed, which needs some.
+fn observes_vehicles(reader: &Reader, written: &Written) -> Result<bool, Error> {
+    let observes = written.observation.vehicles;
+    if observes && written.traffic.is_none() {
+        let expected = "with the table [traffic]: without it there are none to observe";
+        return Err(reader.invalid("observation.vehicles", observes, expected));
+    }
+    Ok(observes)
 }
 
 /// Checks `[traffic]`.

@@ -49,6 +49,9 @@ pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
         within(Column::Command, env, ".steering", batch.command[env].steering, -1.0..=1.0)?;
         within(Column::Command, env, ".speed", batch.command[env].speed, -1.0..=1.0)?;
         batch.cars.get(env).map_or(Ok(()), |words| check_cars(world, env, truck, Row::of(words)))?;
+        for (column, rows) in [(Column::Around, &batch.around), (Column::NextAround, &batch.next_around)] {
+            rows.get(env).map_or(Ok(()), |values| all_within(column, env, values, -OBSERVED..=OBSERVED))?;
+        }
     }
     Ok(())
 }

@@ -41,9 +41,7 @@ impl World {
             cast_slice(step_limits),
         ];
         tables.into_iter().for_each(|table| hasher.update(table));
-        traffic
-            .iter()
-            .for_each(|traffic| traffic.words().into_iter().for_each(|words| hasher.update(cast_slice(&words))));
+        traffic.iter().for_each(|traffic| traffic.words().for_each(|words| hasher.update(cast_slice(&words))));
         for Field { origin, cells_per_metre, columns, rows, cells, values } in fields {
             hasher.update(bytes_of(origin));
             hasher.update(bytes_of(cells_per_metre));

@@ -23,6 +23,8 @@ pub struct Traffic {
     pub spacing: f32,
     /// Reward, each step, for each m/s² beyond 2 m/s² with which a vehicle brakes for the truck.
     pub hindrance: f32,
+    /// Whether trucks observe other vehicles.
+    pub is_observed: bool,
     /// Every road, in the order of the world's fields.
     pub roads: Vec<TrafficRoad>,
     /// Where each of the world's routes runs.
@@ -59,14 +61,11 @@ pub struct TrafficRoute {
 impl Traffic {
     /// Every table as words, one road after the other.
     pub(super) fn words(&self) -> impl Iterator<Item = Vec<u32>> {
-        let Traffic { rules, rude, spacing, hindrance, roads, routes } = self;
-        let shared = [&rules.words()[..], rude, &[*spacing, *hindrance].map(f32::to_bits)].concat();
+        let Traffic { rules, rude, spacing, hindrance, is_observed, roads, routes } = self;
+        let numbers = [spacing.to_bits(), hindrance.to_bits(), u32::from(*is_observed)];
+        let shared = [&rules.words()[..], rude, &numbers].concat();
         let routes = routes.iter().flat_map(|&TrafficRoute { path, begins }| [path, begins.to_bits()]).collect();
-        let of_road = |TrafficRoad { network, levels }: &TrafficRoad| {
-            let level = |Level { demand, snapshots }: &Level| [&demand.words(), cast_slice(snapshots)].concat();
-            [network.words(), levels.iter().flat_map(level).collect()].concat()
-        };
-        [shared, routes].into_iter().chain(roads.iter().map(of_road))
+        [shared, routes].into_iter().chain(roads.iter().map(TrafficRoad::words))
     }
 
     /// What a scenario's trucks share; none where its roads are empty.
@@ -96,6 +95,7 @@ impl Traffic {
             rude,
             spacing: scenario.spacing as f32,
             hindrance: of.hindrance as f32,
+            is_observed: scenario.observes_vehicles,
             roads,
             routes: routes.collect(),
         }))
@@ -111,6 +111,13 @@ fn path_of(place: &Place, route: &Route) -> usize {
 }
 
 impl TrafficRoad {
+    /// The tables as words: of the network, the number of levels, and of each level the demand and the snapshots.
+    pub(crate) fn words(&self) -> Vec<u32> {
+        let TrafficRoad { network, levels } = self;
+        let level = |Level { demand, snapshots }: &Level| [&demand.words(), cast_slice(snapshots)].concat();
+        [network.words(), vec![levels.len() as u32], levels.iter().flat_map(level).collect()].concat()
+    }
+
     fn baked(place: &Place, demand: &[f64], mix: Mix, rules: &Rules, loading: &Loading) -> Result<TrafficRoad, Error> {
         let invalid = |error: traffic::Error| {
             let expected = "leave [traffic] out, or the road, or demand less".to_owned();

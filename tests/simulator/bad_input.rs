@@ -21,7 +21,7 @@ fn scenarios() -> PathBuf {
 }
 
 /// Benchmarks and roundabouts that have no key but those of another one.
-const LIKE_OTHERS: [&str; 26] = [
+const LIKE_OTHERS: [&str; 28] = [
     "laden2026-50-random.toml",
     "laden2026-50-training.toml",
     "laden2026-continuous.toml",
@@ -41,6 +41,8 @@ const LIKE_OTHERS: [&str; 26] = [
     "20m-maps.toml",
     "32m-maps.toml",
     "40m-maps.toml",
+    "traffic2026-random.toml",
+    "traffic2026-training.toml",
     "transfer2026-30kmh.toml",
     "transfer2026-50kmh.toml",
     "transfer2026-8kmh.toml",
@@ -63,7 +65,7 @@ fn files() -> Vec<PathBuf> {
         }
     }
     files.sort();
-    assert_eq!(files.len(), 25, "six roundabouts, five vehicles, twelve benchmarks, two distributions");
+    assert_eq!(files.len(), 26, "six roundabouts, five vehicles, thirteen benchmarks, two distributions");
     files
 }
 

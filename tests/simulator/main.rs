@@ -26,6 +26,7 @@ mod left_hand;
 mod machine_code;
 mod map_bypass;
 mod map_drawing;
+mod map_export;
 mod map_junctions;
 mod map_kinds;
 mod map_lanes;

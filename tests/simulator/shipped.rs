@@ -34,12 +34,12 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
         FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
     assert_eq!(
         (files.len(), FILES.len()),
-        (56, 56),
-        "34 benchmarks, ten roundabouts, five outlines, five vehicles, two distributions"
+        (59, 59),
+        "37 benchmarks, ten roundabouts, five outlines, five vehicles, two distributions"
     );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [34, 10, 5, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [37, 10, 5, 2]);
 }
 
 /// A shipped benchmark's file as it is read as TOML.
@@ -121,6 +121,43 @@ fn the_random_roads_of_laden2026_odd_differ_from_those_of_laden2026_in_its_vehic
 }
 
 #[test]
+fn the_benchmarks_of_traffic2026_differ_from_those_without_in_vehicles_speeds_and_training_alone() {
+    let traffic = table("traffic2026");
+    for (name, other) in [
+        ("traffic2026", "attard2023"),
+        ("traffic2026-random", "random2026"),
+        ("traffic2026-training", "random2026-training"),
+    ] {
+        let (mut among, mut other) = (table(name), table(other));
+        assert_eq!((&among["actions"], &among["observation"]), (&traffic["actions"], &traffic["observation"]));
+        assert_eq!(among["actions"]["steer_levels"], other["actions"]["steer_levels"]);
+        let is_training = other.contains_key("start");
+        let keys = if is_training { &["rude", "demand"][..] } else { &[] };
+        assert_eq!(among["traffic"] == traffic["traffic"], !is_training, "{name}");
+        let mut vehicles = [among.remove("traffic").unwrap(), traffic["traffic"].clone()];
+        for table in &mut vehicles {
+            keys.iter().for_each(|&key| drop(table.as_table_mut().unwrap().remove(key)));
+        }
+        assert_eq!(vehicles[0], vehicles[1], "{name}");
+        if is_training {
+            let speeds = among["start"].as_table_mut().unwrap().remove("speed_kmh").unwrap();
+            assert_eq!((speeds[0].as_float(), speeds[1].as_float()), (Some(0.0), Some(30.0)));
+        }
+        for table in [&mut among, &mut other] {
+            ["actions", "observation"].iter().for_each(|&key| drop(table.remove(key)));
+        }
+        assert_eq!(among, other, "{name}");
+    }
+    // What is held out is never trained with.
+    let demand = |name: &str| -> Vec<f64> {
+        let table = table(name);
+        table["traffic"]["demand"].as_array().unwrap().iter().filter_map(toml::Value::as_float).collect()
+    };
+    assert!(demand("traffic2026-training").iter().all(|&trained| trained < 2100.0));
+    assert_eq!(demand("traffic2026"), [300.0, 900.0, 1500.0, 2100.0]);
+}
+
+#[test]
 fn the_benchmarks_of_transfer2026_differ_in_roads_training_and_disturbances_alone() {
     let (transfer, laden) = (table("transfer2026"), table("laden2026"));
     assert_eq!(transfer["roundabout"], laden["roundabout"]);
@@ -190,7 +227,7 @@ fn the_continuous_benchmarks_differ_from_those_with_levels_in_their_actions_alon
 fn every_name_gives_what_its_file_gives() {
     // The two with thousands of roads take minutes; the next test reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 32);
+    assert_eq!(benchmarks.len(), 35);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();

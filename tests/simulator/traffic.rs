@@ -4,18 +4,17 @@ use std::fs;
 use std::sync::Arc;
 
 use offtrack::files::cache::Loading;
-use offtrack::layout::{Column, Ended};
-use offtrack::physics::seen_by_vehicles;
+use offtrack::layout::shared::Named;
+use offtrack::layout::{Column, Ended, N_AROUND, N_VALUES, VEHICLE_VALUES};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
-use offtrack::traffic::units::metres;
 use offtrack::traffic::{Car, Contact, Row};
 use offtrack::world::World;
 
 use crate::left_hand;
 
 /// The world of `attard2023` with a table `[traffic]`.
-fn with_traffic(keys: &str) -> (Scenario, Arc<World>) {
+pub fn with_traffic(keys: &str) -> (Scenario, Arc<World>) {
     let text = Scenario::text_of("attard2023").unwrap() + "\n[traffic]\n" + keys;
     let scenario = Scenario::parse("traffic", &text, None, &Loading::PLAIN).unwrap();
     let world = Arc::new(World::bake(&scenario).unwrap());
@@ -129,30 +128,6 @@ fn an_episode_has_rude_drivers_by_its_own_fraction_among_those_who_are_there_and
 }
 
 #[test]
-fn no_episode_begins_behind_a_vehicle_that_the_truck_could_not_stop_for() {
-    let (scenario, world) = with_traffic("demand = [2100]\n");
-    let choice = RouteChoice::Fixed(scenario.split(Split::Train).repeat(12));
-    let simulator = Simulator::new(world.clone(), choice.routes().len(), 3, choice).unwrap();
-    let traffic = world.traffic.as_ref().unwrap();
-    let mut n_on_lane = 0;
-    for (env, row) in rows(&simulator).iter().enumerate() {
-        let (truck, progress) = (&simulator.batch().truck[env], &simulator.batch().progress[env]);
-        let network = &traffic.roads[world.routes[truck.route as usize].roundabout as usize].network;
-        let view = seen_by_vehicles(&world, truck, progress).unwrap();
-        let source = network.paths[view.path].source;
-        let of_lane = row.cars.iter().filter(|car| car.is_there() && network.paths[car.path()].source == source);
-        for car in of_lane {
-            let room = car.station() - car.length() - metres(view.station);
-            // From 30 km/h at 1.5 m/s² it takes 23 m to stop.
-            let stops = (truck.speed * truck.speed - car.speed() * car.speed()).max(0.0) / 3.0;
-            assert!(6.99 + stops <= room || room < -16.0, "{room} m, {stops} m to stop");
-            n_on_lane += 1;
-        }
-    }
-    assert!(200 < n_on_lane, "{n_on_lane}");
-}
-
-#[test]
 fn hindrance_is_rewarded_by_how_hard_vehicles_brake_for_the_truck_and_by_nothing_else() {
     let [(scenario, without), (_, with)] =
         ["", "hindrance = -2.0\n"].map(|key| with_traffic(&format!("demand = [1500]\n{key}")));
@@ -249,4 +224,57 @@ fn a_benchmark_with_a_bad_key_of_traffic_is_refused_by_key_and_value() {
         let error = Scenario::parse("traffic", &text, None, &Loading::PLAIN).unwrap_err().to_string();
         assert!(error.contains(expected), "{keys}: {error}");
     }
+}
+
+#[test]
+fn what_is_observed_of_vehicles_is_a_column_of_values_in_their_ranges_that_a_reset_replaces() {
+    let (scenario, world) = with_traffic("demand = [1500]\n[observation]\nvehicles = true\n");
+    assert!(world.observes_vehicles() && world.n_observed() == N_VALUES + N_AROUND);
+    let choice = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
+    let mut simulator = Simulator::new(world, 64, 5, choice).unwrap();
+    let lows: Vec<f32> = VEHICLE_VALUES.iter().flat_map(|group| std::iter::repeat_n(group.low, group.n)).collect();
+    let (mut ended, mut varied) = (0, [false; N_AROUND]);
+    let first = simulator.batch().around[0];
+    assert_eq!(simulator.batch().around, simulator.batch().next_around);
+    for _ in 0..150 {
+        simulator.steps_at_random(1);
+        let batch = simulator.batch();
+        for env in 0..64 {
+            let ends = batch.ended[env] != 0;
+            assert_eq!(batch.around[env] != batch.next_around[env], ends, "truck {env}");
+            ended += usize::from(ends);
+            for (index, value) in batch.around[env].into_iter().chain(batch.next_around[env]).enumerate() {
+                let index = index % N_AROUND;
+                assert!((lows[index]..=1.0).contains(&value), "value {index}: {value}");
+                varied[index] |= value != first[index];
+            }
+        }
+    }
+    assert!(100 < ended && varied.iter().all(|&varied| varied), "{ended} {varied:?}");
+}
+
+#[test]
+fn vehicles_that_are_not_observed_leave_zeros_and_change_nothing_else() {
+    let worlds =
+        [false, true].map(|observed| with_traffic(&format!("demand = [900]\n[observation]\nvehicles = {observed}\n")));
+    let [unseen, seen] = worlds.map(|(scenario, world)| {
+        let choice = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
+        let mut simulator = Simulator::new(world, 16, 5, choice).unwrap();
+        simulator.steps_at_random(100);
+        simulator
+    });
+    assert!(unseen.batch().around.iter().flatten().all(|&value| value == 0.0) && unseen.batch().around.len() == 16);
+    for column in Column::ALL.iter().filter(|column| !matches!(column, Column::Around | Column::NextAround)) {
+        assert!(unseen.batch().column(*column) == seen.batch().column(*column), "{column:?}");
+    }
+}
+
+#[test]
+fn vehicles_can_only_be_observed_where_there_are_some() {
+    let text = Scenario::text_of("attard2023").unwrap() + "\n[observation]\nvehicles = true\n";
+    let error = Scenario::parse("empty", &text, None, &Loading::PLAIN).unwrap_err().to_string();
+    assert!(error.contains("observation.vehicles: true; with the table [traffic]"), "{error}");
+    let mut scenario = Scenario::named("attard2023").unwrap();
+    scenario.observes_vehicles = true;
+    assert!(World::bake(&scenario).unwrap_err().to_string().starts_with("observes_vehicles: true; with traffic"));
 }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Instant, SystemTime};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use offtrack::layout::{N_RAYS, N_VALUES};
+use offtrack::layout::N_RAYS;
 use offtrack::scenario::Split;
 use serde::Serialize;
 
@@ -188,7 +188,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
             dt: scenario.step,
             substeps: scenario.n_substeps,
             rays: N_RAYS,
-            values: N_VALUES + world.params.n_extras as usize,
+            values: world.n_observed(),
             holds: "physics, collision, progress, rays, observation, reward, and a new episode where one ended",
             rays_counted: "those of every step, and once more those after each reset",
             speeds: "medians over windows, nothing read back within one; stages are timed apart, each over the whole batch",

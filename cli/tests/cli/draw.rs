@@ -81,12 +81,26 @@ fn the_waypoints_are_the_librarys() {
     }
 }
 
+/// The area of a polygon, positive counter-clockwise.
+fn area(ring: &Value) -> f64 {
+    let points: Vec<[f64; 2]> = serde_json::from_value(ring.clone()).expect("points");
+    let n = points.len();
+    let cross = |i: usize| points[i][0] * points[(i + 1) % n][1] - points[i][1] * points[(i + 1) % n][0];
+    (0..n).map(cross).sum::<f64>() / 2.0
+}
+
 #[test]
 fn a_route_is_found_with_and_without_its_roundabouts_name_and_stands_alone_in_the_json() {
     for name in ["N-left-3", "16m/N-left-3"] {
         let written = written(&["--route", name]);
         assert_eq!(written["routes"].as_array().map(Vec::len), Some(1));
         assert_eq!(written["routes"][0]["name"], "16m/N-left-3");
+        assert_eq!(written["frame"], serde_json::json!({"origin": [0.0, 0.0], "hand": "right"}));
+        for unit in ["tractor", "trailer"] {
+            let rings = written["sweep"][format!("{unit}_area")].as_array().expect("rings");
+            let area: f64 = rings.iter().map(area).sum();
+            assert!((200.0..900.0).contains(&area), "{unit}: {area}");
+        }
     }
 }
 

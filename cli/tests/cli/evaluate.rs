@@ -48,6 +48,27 @@ fn every_episode_is_counted_once_by_its_end_and_once_by_its_route() {
 }
 
 #[test]
+fn a_rule_among_vehicles_is_evaluated_by_demand_and_shown_with_them() {
+    let place = Place::new();
+    let (report, page) = (place.text("report.json"), place.text("page.html"));
+    let flags = ["--benchmark", "traffic2026", "--route", "20m/N-right-2", "--episodes", "12", "--policy", "yields"];
+    let output = offtrack(&[&["evaluate"][..], &flags, &["--json", &report, "--html", &page]].concat());
+    succeed(&output);
+    let table = String::from_utf8(output.stdout).unwrap();
+    let report = place.json("report.json");
+    assert_eq!(report["policy"], "yields");
+    let groups = report["groups"]["demand"].as_array().unwrap();
+    let names: Vec<&str> = groups.iter().map(|group| group["name"].as_str().unwrap()).collect();
+    assert!(2 <= names.len() && names.iter().all(|name| name.ends_with("00 veh/h")), "{names:?}");
+    assert!(names.iter().all(|name| table.contains(name)), "{table}");
+    let counted: u64 = groups.iter().map(|group| group["episodes"].as_u64().unwrap()).sum();
+    assert_eq!(counted, 12);
+    assert!(std::fs::read_to_string(page).unwrap().contains("drawOthers"));
+    let message = refusal(&offtrack(&["evaluate", "--policy", "follows", "--episodes", "1"]), 2);
+    assert!(message.contains("--policy: follows; drives among other vehicles"), "{message}");
+}
+
+#[test]
 fn an_empty_split_is_named_with_its_file_and_those_that_have_routes() {
     let place = Place::new();
     let message = refusal(&place.evaluate(&["--policy", "pursuit", "--split", "validation"]), 2);
@@ -187,6 +208,7 @@ fn a_network_of_tanh_layers_that_was_trained_elsewhere_is_evaluated_with_the_sam
             // The table of the short benchmark: fractions of the vehicle's lock, 30 km/h.
             actions: World::bake(&Scenario::read(&place.file("short.toml")).unwrap()).unwrap().actions,
             extras: Vec::new(),
+            vehicles: false,
             normalisation: Normalisation::none(N_VALUES),
             layers: vec![layer(N_VALUES, 64), layer(64, 64), layer(64, 5)],
             activation,

@@ -1,6 +1,7 @@
 //! `offtrack fits`: verdicts and exit codes, files with what they promise, resumption, and what is refused.
 
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
 
 use serde_json::Value;
 
@@ -52,6 +53,19 @@ fn a_truck_that_fits_is_exit_code_0_with_table_json_csv_sheet_pdf_and_drawing() 
     assert!(pdf.starts_with(b"%PDF-"));
     let dxf = text(&place, "16m-eu_4x2_13m6.dxf");
     assert!(dxf.contains("E-RIGHT-2_SWEPT_TRAILER") && dxf.ends_with("EOF\n"));
+    let features = place.json("fits/16m-eu_4x2_13m6.geojson");
+    let of = |part: &str| {
+        let all = features["features"].as_array().unwrap().iter();
+        all.filter(|feature| feature["properties"]["part"] == part).cloned().collect::<Vec<_>>()
+    };
+    for part in ["swept_tractor", "swept_trailer", "front_axle", "drive_axle", "trailer_axles", "clearance"] {
+        let [one] = of(part).try_into().unwrap();
+        assert_eq!(
+            (&one["properties"]["route"], &one["properties"]["vehicle"]),
+            (&"E-right-2".into(), &"eu_4x2_13m6".into())
+        );
+    }
+    assert!(10 < of("tractor").len() && of("tractor").len() == of("trailer").len() && of("lane").len() == 20);
 }
 
 #[test]
@@ -96,6 +110,40 @@ fn the_same_command_keeps_what_is_there_and_answers_the_rest() {
     assert!(said.contains("fits.json") && said.contains("clearance: 0 there, 0.1 here"), "{said}");
     std::fs::write(place.file("fits/fits.json"), "{}").unwrap();
     assert!(refusal(&fits(&place, &both), 2).contains("is not a file of `offtrack fits`"));
+}
+
+#[test]
+fn a_call_that_is_killed_goes_on_and_leaves_the_same_bytes_as_one_that_is_not() {
+    let place = Place::new();
+    let vehicle = ["--vehicle", "eu_4x2_13m6"];
+    let rows = || match std::fs::read_to_string(place.file("fits/fits.json")) {
+        Ok(text) => text.matches("\"searched_clearance\"").count(),
+        Err(_) => 0,
+    };
+    let mut running = command(&place, &vehicle).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    while rows() == 0 && running.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    running.kill().unwrap();
+    running.wait().unwrap();
+    let left = rows();
+    assert!((1..20).contains(&left), "{left} of 20 rows");
+    let resumed = fits(&place, &vehicle);
+    let whole = place.text("whole");
+    let at_once = program()
+        .current_dir(repository())
+        .args(["fits", "16m", "--widths", "64", "-o", &whole])
+        .args(vehicle)
+        .output()
+        .unwrap();
+    assert_eq!((resumed.status.code(), &resumed.stdout), (at_once.status.code(), &at_once.stdout));
+    for name in ["fits.csv", "16m-eu_4x2_13m6.dxf", "16m-eu_4x2_13m6.geojson"] {
+        let bytes = |folder: &str| std::fs::read(place.file(folder).join(name)).unwrap();
+        assert!(bytes("fits") == bytes("whole"), "{name}");
+    }
+    // The date is that of the call.
+    let (one, other) = (place.json("fits/fits.json"), place.json("whole/fits.json"));
+    assert_eq!(one["rows"], other["rows"]);
 }
 
 #[test]

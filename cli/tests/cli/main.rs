@@ -15,6 +15,7 @@ mod device;
 mod documented_flags;
 mod draw;
 mod evaluate;
+mod export;
 mod fits;
 mod flags;
 mod generate;
@@ -34,6 +35,7 @@ mod seeds;
 mod tensorboard;
 mod threads;
 mod train;
+mod unwritten;
 mod web;
 
 // The states of the simulator's tests look for them here.

@@ -1,7 +1,7 @@
-//! A roundabout from a drawing, a DXF file, as an outline file.
+//! A roundabout from a drawing, a DXF or GeoJSON file, as an outline file.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use offtrack::map::dxf::{self, Drawn, Layers, Unit};
+use offtrack::map::drawing::{self, Drawn, Layers, Unit};
 use offtrack::map::opendrive::{Hand, Imported};
 
 use offtrack_evaluation::error::Error;
@@ -15,7 +15,8 @@ const LANE_WIDTH: f64 = 3.5;
 /// How a drawing is read. Nothing is given of a map.
 #[derive(Debug, Clone, clap::Args)]
 pub struct DrawingArgs {
-    /// Of a drawing: the layer of the kerbs' closed outlines \[default: KERB\].
+    /// Of a drawing: the layer of the kerbs' closed outlines; in GeoJSON the property `part` or `layer` says it
+    /// \[default: KERB\].
     #[arg(long, value_name = "LAYER")]
     kerb_layer: Option<String>,
     /// Of a drawing: the layer of the lanes' centre lines, one for each way from an arm's end to another's, in the
@@ -25,7 +26,7 @@ pub struct DrawingArgs {
     /// Of a drawing: the unit of its coordinates, where it does not say it.
     #[arg(long, value_parser = PossibleValuesParser::new(["m", "mm", "cm", "ft", "in"]).map(unit))]
     unit: Option<Unit>,
-    /// Of a drawing: the width of all lanes (m) \[default: 3.5\].
+    /// Of a drawing: the width of the lanes that say none (m) \[default: 3.5\].
     #[arg(long, value_name = "M")]
     lane_width: Option<f64>,
 }
@@ -44,7 +45,11 @@ impl DrawingArgs {
             ("--lane-width", self.lane_width.map(|width| format!("{width} m"))),
         ];
         let Some((name, Some(value))) = given.into_iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
-        Err(Error::Setting { name, value, expected: "is for a drawing, a file that ends in .dxf; leave it out".into() })
+        Err(Error::Setting {
+            name,
+            value,
+            expected: "is for a drawing, a file that ends in .dxf or .geojson; leave it out".into(),
+        })
     }
 }
 
@@ -83,7 +88,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         ring: args.place.ring,
         arms: args.arms.clone(),
     };
-    let Drawn { ground, notes } = dxf::read(&args.map, &layers)?;
+    let Drawn { ground, notes } = drawing::read(&args.map, &layers)?;
     let name = args.map.file_name().map(|name| name.to_string_lossy().escape_debug().to_string()).unwrap_or_default();
     let comment = [
         format!("A roundabout of the drawing {name}: its centre, here the origin, lies at `origin` there."),

@@ -4,9 +4,11 @@ use glam::{DVec2, Vec2};
 use offtrack::layout::{Body, Ended, N_RAYS, N_TRAILER_RAYS, Ray, Rig};
 use offtrack::vehicle::swept::corners;
 use offtrack::world::World;
+use offtrack_evaluation::recording::Vehicle;
 
 use super::Shown;
 use super::canvas::{Canvas, Ink};
+use crate::episode::vehicles::{brake_lights, kind};
 use crate::episode::{GAUGE, WHEEL};
 use crate::view::{View, colour};
 
@@ -30,6 +32,7 @@ impl Shape {
     /// A truck on a map. A line of width 1 is `pen` wide (px).
     pub fn draw(&self, map: &mut Canvas, view: &View, pen: f64, shown: &Shown) {
         self.rays(map, view, pen, shown);
+        shown.vehicles.iter().for_each(|vehicle| draw_vehicle(map, view, pen, vehicle));
         self.units(map, view, pen, shown);
     }
 
@@ -89,6 +92,15 @@ impl Shape {
         let hitch = view.point(position + f64::from(rig.fifth_wheel) * ahead);
         map.dots(&[hitch], (0.35 * view.scale).max(1.3 * pen), Ink(colour::INK, 1.0));
     }
+}
+
+/// Another vehicle, with its brake lights if they are lit.
+fn draw_vehicle(map: &mut Canvas, view: &View, pen: f64, vehicle: &Vehicle) {
+    let on_page = |corners: [[f32; 2]; 4]| corners.map(|corner| view.point(point(corner.into())));
+    let (edge, width) = if vehicle.is_rude { (colour::RUDE, 2.4) } else { (colour::INK, 1.0) };
+    map.polygon(&on_page(vehicle.corners()), Ink(kind(vehicle), 1.0), Ink(edge, 1.0), width * pen);
+    let lights: Vec<[DVec2; 4]> = brake_lights(vehicle).map(on_page).collect();
+    map.areas(&lights, Ink(colour::BRAKES, 1.0));
 }
 
 fn point(p: Vec2) -> DVec2 {

@@ -33,7 +33,7 @@ fn ranges(truck: &Truck) -> [f32; N_RAYS] {
 }
 
 fn drawn(camera: &mut Camera, truck: &Truck, ended: Ended) -> Vec<u8> {
-    camera.draw(&Shown { truck, ranges: &ranges(truck), ended }).to_vec()
+    camera.draw(&Shown { truck, ranges: &ranges(truck), ended, vehicles: &[] }).to_vec()
 }
 
 /// Column and row of a point of the world, for the route drawn last (pixels).
@@ -161,8 +161,9 @@ fn a_moved_truck_changes_pixels_near_it_and_its_rays_alone() {
     let mut camera = camera(480);
     let before = truck(5, 30.0);
     let after = truck(5, 33.0);
-    let pictures = [before, after]
-        .map(|truck| camera.draw(&Shown { truck: &truck, ranges: &[4.0; N_RAYS], ended: Ended::Running }).to_vec());
+    let pictures = [before, after].map(|truck| {
+        camera.draw(&Shown { truck: &truck, ranges: &[4.0; N_RAYS], ended: Ended::Running, vehicles: &[] }).to_vec()
+    });
     let side = camera.side() as usize;
     let changed: Vec<usize> =
         (0..side * side).filter(|n| pictures[0][3 * n..][..3] != pictures[1][3 * n..][..3]).collect();
@@ -229,7 +230,8 @@ fn no_state_is_too_far_off_to_be_drawn() {
     for far in [1e2, 1e3, 3e4, 1e9, f32::MAX, f32::INFINITY, f32::NAN] {
         let truck = Truck { position: Vec2::new(far, -far), ..there };
         for range in [0.0, -1.0, 1e30, f32::INFINITY, f32::NAN] {
-            let picture = camera.draw(&Shown { truck: &truck, ranges: &[range; N_RAYS], ended: Ended::Strayed });
+            let picture =
+                camera.draw(&Shown { truck: &truck, ranges: &[range; N_RAYS], ended: Ended::Strayed, vehicles: &[] });
             let below = 96 * 20;
             let map = picture[3 * below..].chunks_exact(3).zip(empty[4 * below..].chunks_exact(4));
             assert!(far < 1e3 || map.into_iter().all(|(rgb, rgba)| rgb == &rgba[..3]), "{far}");
@@ -237,11 +239,11 @@ fn no_state_is_too_far_off_to_be_drawn() {
     }
     for value in [1e30, f32::INFINITY, f32::NAN] {
         let truck = Truck { heading: value, trailer_heading: -value, steering: value, speed: -value, ..there };
-        camera.draw(&Shown { truck: &truck, ranges: &[value; N_RAYS], ended: Ended::Running });
+        camera.draw(&Shown { truck: &truck, ranges: &[value; N_RAYS], ended: Ended::Running, vehicles: &[] });
     }
     // No scenario has this route.
     let truck = Truck { route: u32::MAX, ..there };
-    camera.draw(&Shown { truck: &truck, ranges: &[5.0; N_RAYS], ended: Ended::Running });
+    camera.draw(&Shown { truck: &truck, ranges: &[5.0; N_RAYS], ended: Ended::Running, vehicles: &[] });
 }
 
 #[test]
@@ -271,4 +273,40 @@ fn a_left_hand_road_is_drawn_as_it_lies_and_not_as_it_is_driven() {
     for middle in middles(&truck) {
         assert_eq!(seen(&left, &other, middle), seen(&right, &one, middle));
     }
+}
+
+#[test]
+fn another_vehicle_is_where_it_is_with_the_colour_of_its_kind_and_lit_brakes() {
+    let mut camera = camera(512);
+    let truck = truck(0, 20.0);
+    let car = Vehicle {
+        slot: 0,
+        position: [0.0, 20.0],
+        heading: 0.5,
+        length: 4.5,
+        width: 1.8,
+        speed: 5.0,
+        acceleration: 0.0,
+        is_rude: false,
+    };
+    let van = Vehicle { length: 7.0, width: 2.1, ..car };
+    let [ahead, behind] = [0.48f32, -0.46].map(|part| car.at([[part, 0.34]])[0]);
+    for (vehicle, kind, at_rear) in [
+        (car, colour::CAR, colour::CAR),
+        (van, colour::VAN, colour::VAN),
+        (Vehicle { acceleration: -2.0, ..car }, colour::CAR, colour::BRAKES),
+    ] {
+        let vehicles = [vehicle];
+        let shown = Shown { truck: &truck, ranges: &ranges(&truck), ended: Ended::Running, vehicles: &vehicles };
+        let picture = camera.draw(&shown).to_vec();
+        let at = |point: [f32; 2]| seen(&camera, &picture, DVec2::new(point[0].into(), point[1].into()));
+        assert_eq!(at(vehicle.position), is(kind));
+        if vehicle.length == car.length {
+            assert_eq!((at(behind), at(ahead) == is(colour::BRAKES)), (is(at_rear), false));
+        }
+    }
+    assert_ne!(drawn(&mut camera, &truck, Ended::Running), {
+        let shown = Shown { truck: &truck, ranges: &ranges(&truck), ended: Ended::Running, vehicles: &[car] };
+        camera.draw(&shown).to_vec()
+    });
 }

@@ -33,6 +33,7 @@ impl Scene<'_> {
         let mut entries = vec![Entry::new(Swatch::Line(colour::ROUTE, 2.4, ""), "route")];
         entries.extend(path_legend());
         entries.push(Entry::new(Swatch::Line(colour::RAY, 1.2, ""), "distance sensors"));
+        entries.extend(self.vehicle_legend(""));
         let below = view.point(view.low).y + 10.0;
         let width = FILMED.width / LEGEND_SCALE;
         let (legend, height) = legend::drawn(&self.lettering, &entries, DVec2::ZERO, width);
@@ -67,6 +68,7 @@ impl Scene<'_> {
         let map = Group::new()
             .add(self.axle_paths(&view, index))
             .add(self.rays(&view, index))
+            .add(self.vehicles(&view, index))
             .add(self.truck(&view, index, 0.8));
         let size = DVec2::new(WIDTH, view.point(view.low).y);
         document(size, clip(&view), Group::new().add(map.set("clip-path", "url(#map)")).add(self.caption(index)))

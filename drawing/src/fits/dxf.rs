@@ -11,11 +11,10 @@ use offtrack::map::{Gutter, Road};
 use offtrack::vehicle::swept::{Pose, front_path};
 
 use super::panel::Shown;
+use super::stations;
 
 /// Longest name of a route in a layer's: the longest part has 14 characters more.
 const LONGEST: usize = 17;
-/// Distance between the outlines at stations (m).
-const BETWEEN_OUTLINES: f64 = 5.0;
 /// Parts of a route's drawing, a layer each, and their colours by AutoCAD's index.
 const PARTS: [(&str, u8); 8] = [
     ("SWEPT_TRACTOR", 5),
@@ -117,17 +116,9 @@ impl Drawing {
         self.line(&layer(2), &front_path(&one.path.rig, poses), false);
         self.line(&layer(3), &points(|pose| pose.position), false);
         self.line(&layer(4), &points(|pose| pose.trailer_position), false);
-        let mut next = 0.0;
-        let mut station = 0.0;
-        for index in 0..poses.len() {
-            if 0 < index {
-                station += poses[index].position.distance(poses[index - 1].position);
-            }
-            if next <= station {
-                next += BETWEEN_OUTLINES;
-                self.line(&layer(5), &units[0][index], true);
-                self.line(&layer(6), &units[1][index], true);
-            }
+        for (index, _) in stations(poses) {
+            self.line(&layer(5), &units[0][index], true);
+            self.line(&layer(6), &units[1][index], true);
         }
         let (unit, nearest) = one.row.shown().nearest();
         let at = DVec2::new(nearest.x, nearest.y) - self.origin;
@@ -200,7 +191,7 @@ impl Drawing {
 
 #[cfg(test)]
 mod tests {
-    use offtrack::map::dxf::{Layers, Unit, read};
+    use offtrack::map::drawing::{Layers, Unit, read};
     use offtrack::map::ground::Ground;
 
     use super::*;

@@ -11,7 +11,7 @@ use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Ended, Params, Rig, Start, Truck};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
-use offtrack_policy::{Driver, Policy};
+use offtrack_policy::{Driver, Policy, greedy};
 
 use super::check_levels;
 use crate::error::Error;
@@ -200,9 +200,10 @@ fn chosen(driver: Option<&mut Driver>, batch: &Batch, children: &[Candidate], st
     let mut actions: Vec<u32> = children.iter().map(|child| child.held.unwrap_or(straight)).collect();
     if let Some(driver) = driver
         && let Some(env) = children.iter().position(|child| child.held.is_none())
-        && let [action] = driver.act(&[0], &batch.observation[env..=env], &batch.extras[env..=env])[..]
     {
-        actions[env] = action;
+        let around = batch.around.get(env..=env).unwrap_or_default();
+        let outputs = driver.outputs_among(&[0], &batch.observation[env..=env], &batch.extras[env..=env], around);
+        actions[env] = greedy(&outputs, outputs.len())[0];
     }
     actions
 }

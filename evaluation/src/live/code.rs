@@ -52,7 +52,7 @@ pub(super) fn printed(packed: &mut Packed) -> Value {
         "columns": Column::of_trucks()
             .map(|column| (column.name().to_owned(), json!({ "bytes": column.width(), "element": column.element() })))
             .collect::<Map<_, _>>(),
-        "buffers": BUFFERS.map(buffer),
+        "buffers": BUFFERS.into_iter().map(buffer).collect::<Vec<_>>(),
         "kernels": kernels(),
         "journal": journal::facts(),
         "act": {
@@ -98,6 +98,7 @@ fn kernels() -> Map<String, Value> {
             Threads::Truck => "truck",
             Threads::Team => "team",
             Threads::Value => "value",
+            Threads::Car => "car",
         };
         let bindings: Vec<usize> = kernel.buffers().iter().map(|buffer| buffer.binding()).collect();
         (kernel.name().to_owned(), json!({ "bindings": bindings, "threads": threads }))

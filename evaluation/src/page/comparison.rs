@@ -8,7 +8,7 @@ use offtrack::world::World;
 use serde_json::json;
 
 use super::ground::{Ground, Shown};
-use super::{filled, script_json, tracks};
+use super::{filled, script_json, tracks, vehicles};
 use crate::comparison::Comparison;
 use crate::error::Error;
 use crate::files;
@@ -66,7 +66,9 @@ impl ComparisonPage<'_> {
         let columns = tracks::columns(world.params.sensor_range);
         let (routes, per_route) = (self.routes, comparison.episodes);
         let shown = Shown { scenario, world, routes, per_route, tracks: &pairs };
-        let ground = json!(Ground::of(&shown, &columns)).to_string();
+        let (others, vehicles) = vehicles::packed(&pairs).unzip();
+        let ground = json!(Ground::of(&shown, &columns, others)).to_string();
+        let columns = [tracks::differences(&pairs, &columns), vehicles.unwrap_or_default()].concat();
         let packed = |bytes: &[u8]| tracks::packed(bytes).map_err(Error::write(file));
         let differing = comparison.differences.iter().flat_map(|difference| &difference.episodes);
         let differing = differing.filter(|episode| episode.is_pair()).count();
@@ -82,7 +84,7 @@ impl ComparisonPage<'_> {
                 ("pairs", &script_json(&json!({ "first": first, "names": names, "differing": differing }))),
                 ("comparison", &script_json(&json!(comparison))),
                 ("ground", &packed(ground.as_bytes())?),
-                ("tracks", &packed(&tracks::differences(&pairs, &columns))?),
+                ("tracks", &packed(&columns)?),
                 ("script", &SCRIPTS.concat()),
             ],
         );

@@ -44,6 +44,36 @@ function decoded(bytes, columns, lengths) {
   return found;
 }
 
+/** Other vehicles of an episode: of each slot the values of the frames that are kept; null where there are none. */
+function othersOf(page, episode) {
+  const { ground, others } = page;
+  if (others === null) return null;
+  const { every, n_slots: nSlots, values } = ground.others, [from, to] = others.ends[episode.index];
+  const n = Math.ceil((episode.n_frames - 1) / every) + 1;
+  const columns = Array.from({ length: nSlots }, (_, slot) => values.map(([name, unit]) => [`${name}_${slot}`, unit])).flat();
+  return { every, nSlots, n, last: episode.n_frames - 1, found: decoded(others.bytes.subarray(from, to), columns, [n]) };
+}
+
+/** The vehicles of a frame: between two that are kept they are interpolated, unless one of them lacks the vehicle. */
+function othersAt(of, frame) {
+  if (of === null) return [];
+  const { every, nSlots, n, last, found } = of;
+  const lower = Math.min(Math.floor(frame / every), n - 1), upper = Math.min(lower + 1, n - 1);
+  const span = Math.min(upper * every, last) - lower * every, part = span <= 0 ? 0 : Math.min((frame - lower * every) / span, 1);
+  const size = (look) => look >> 2;
+  const vehicle = (slot) => {
+    const [x, y, heading, looks] = ["x", "y", "heading", "look"].map((name) => found[`${name}_${slot}`]);
+    const stays = size(looks[lower]) === size(looks[upper]) && Math.hypot(x[upper] - x[lower], y[upper] - y[lower]) < 8;
+    const at = stays || part < 0.5 ? lower : upper, by = stays ? part : 0, next = stays ? upper : at;
+    const look = looks[part < 0.5 ? lower : upper];
+    return {
+      x: x[at] + by * (x[next] - x[at]), y: y[at] + by * (y[next] - y[at]), heading: heading[at] + by * wrapped(heading[next] - heading[at]),
+      length: (looks[at] >> 8) / 10, width: ((looks[at] >> 2) & 63) / 10, brakes: (look & 1) === 1, rude: (look & 2) === 2,
+    };
+  };
+  return Array.from({ length: nSlots }, (_, slot) => vehicle(slot)).filter(({ length }) => 0 < length);
+}
+
 /** The points of a line that is written as a point and differences, in centimetres [m]. */
 function pointsOf(line) {
   const points = [];
@@ -64,24 +94,27 @@ function shownOf(evaluation, episodes) {
 /** The roundabouts, and the recorded episodes with their columns. */
 async function readEpisodes() {
   const ground = JSON.parse(new TextDecoder().decode(await inflated(block("ground"))));
-  const columns = decoded(await inflated(block("tracks")), ground.columns, ground.episodes.map((episode) => episode.n_frames));
+  const bytes = await inflated(block("tracks")), lengths = ground.others?.bytes ?? [];
+  let end = bytes.length - lengths.reduce((sum, length) => sum + length, 0);
+  const columns = decoded(bytes.subarray(0, end), ground.columns, ground.episodes.map((episode) => episode.n_frames));
+  const others = ground.others === undefined ? null : { bytes, ends: lengths.map((length) => [end, (end += length)]) };
   let first = 0;
-  const episodes = ground.episodes.map((episode) => {
+  const episodes = ground.episodes.map((episode, index) => {
     const rig = ground.vehicles[episode.vehicle ?? 0], { vehicle, load } = ground.classes?.[episode.class] ?? {};
-    const whole = { ...episode, rig, vehicle, load, first, failed: episode.ended !== "arrived", seconds: (episode.n_frames - 1) * ground.step };
+    const whole = { ...episode, index, rig, vehicle, load, first, failed: episode.ended !== "arrived", seconds: (episode.n_frames - 1) * ground.step };
     first += episode.n_frames;
     return whole;
   });
-  return { ground, columns, episodes };
+  return { ground, columns, others, episodes };
 }
 
 /** All data of the page. */
 async function readPage() {
-  const report = JSON.parse(block("report")), { ground, columns, episodes } = await readEpisodes();
+  const report = JSON.parse(block("report")), { ground, columns, others, episodes } = await readEpisodes();
   // Of thousands of routes the reports stand in the gzipped block.
   report.evaluation.routes ??= ground.route_reports;
   const { evaluation } = report;
-  return { report, evaluation, ground, columns, episodes, shown: shownOf(evaluation, episodes), metrics: columnsOf(JSON.parse(block("metrics"))) };
+  return { report, evaluation, ground, columns, others, episodes, shown: shownOf(evaluation, episodes), metrics: columnsOf(JSON.parse(block("metrics"))) };
 }
 
 /** The state of an episode at `frame`: linear interpolation between two frames. */

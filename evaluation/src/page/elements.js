@@ -39,7 +39,7 @@ function short(value) {
 }
 
 /** An end code in words. */
-const endWords = (name) => name.replace("_", " ");
+const endWords = (name) => name.replaceAll("_", " ");
 
 /** The 95 % Wilson interval of successes / trials, as the report's own. */
 function wilson(successes, trials) {

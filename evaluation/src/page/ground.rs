@@ -10,6 +10,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::tracks::Column;
+use super::vehicles::Vehicles;
 use crate::provenance;
 
 /// Points of a line in whole centimetres: x and y of the first one, then of each the differences to the one before.
@@ -34,6 +35,9 @@ pub(super) struct Ground<'a> {
     /// Name and unit of each column of the recorded episodes, in the order of the data.
     columns: Vec<(&'a str, f64)>,
     episodes: Vec<Episode>,
+    /// Other vehicles, whose bytes stand behind those of the columns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    others: Option<Vehicles>,
     /// The report's routes where it does not have them itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) route_reports: Option<Value>,
@@ -88,7 +92,7 @@ pub(super) struct Shown<'a> {
 
 impl<'a> Ground<'a> {
     /// Of the episodes that a page shows.
-    pub(super) fn of(page: &Shown<'a>, columns: &'a [Column]) -> Ground<'a> {
+    pub(super) fn of(page: &Shown<'a>, columns: &'a [Column], others: Option<Vehicles>) -> Ground<'a> {
         let per_route = page.per_route;
         let by_name: HashMap<&str, (usize, &Route)> =
             page.scenario.routes().map(|(place, route)| (route.name.as_str(), (place, route))).collect();
@@ -137,6 +141,7 @@ impl<'a> Ground<'a> {
             routes,
             columns: columns.iter().map(|column| (column.name.as_str(), column.unit)).collect(),
             episodes,
+            others,
             route_reports: None,
             machine: provenance::machine(),
             commit: provenance::commit(),

@@ -3,7 +3,7 @@
 /** Most rows of the worst roundabouts, and of routes. */
 const MOST_ROUNDABOUTS = 20, MOST_ROUTES = 200;
 
-const KINDS = [["island_radius", "Island radius"], ["lane", "Lane"], ["exit", "Exit"], ["roundabout", "Roundabout"]];
+const KINDS = [["island_radius", "Island radius"], ["lane", "Lane"], ["exit", "Exit"], ["demand", "Demand"], ["roundabout", "Roundabout"]];
 
 const failures = ({ episodes, arrived }) => episodes - arrived;
 
@@ -30,7 +30,7 @@ function showGroups(page, scales, open) {
       ...members.map((group) => html("tr", { class: "member" }, html("th", { scope: "row" }, label(kind, group.name),
         html("span", { class: "tag" }, `${whole(group.routes)} ${group.routes === 1 ? "route" : "routes"}`)), ...cells(group, scales))));
   };
-  fillTable(byId("group-table"), "The same figures of groups of routes", "Routes by", KINDS.map(body));
+  fillTable(byId("group-table"), "The same figures of groups of routes", "Routes by", KINDS.filter(([kind]) => groups[kind] !== undefined).map(body));
   const words = (group) => `${group.name}: ${failures(group) === 0 ? "all" : whole(group.arrived)} of ${whole(group.episodes)} arrived`;
   select.replaceChildren(html("option", { value: "" }, "All, worst routes first"),
     ...worstFirst(groups.roundabout).map((group) => html("option", { value: group.name }, words(group))));

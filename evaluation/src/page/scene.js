@@ -24,7 +24,7 @@ function sceneOf(page, episode) {
   const ends = (axis) => [Math.min(...seen.map((point) => point[axis])), Math.max(...seen.map((point) => point[axis]))];
   return {
     road, lanes, route: lineOf(centreLine, false), bounds: [ends(0), ends(1)], rig: episode.rig, ended: episode.ended, last: episode.n_frames - 1,
-    tractorPath: poses.map((pose) => [pose.x, pose.y]), trailerPath: poses.map((pose) => [pose.trailerX, pose.trailerY]), columns,
+    tractorPath: poses.map((pose) => [pose.x, pose.y]), trailerPath: poses.map((pose) => [pose.trailerX, pose.trailerY]), columns, others: othersOf(page, episode),
   };
 }
 
@@ -82,6 +82,28 @@ function drawTruck(context, { rig, ended }, now, pixel, colourOf, atEnd) {
     context.fillStyle = colourOf("panel");
     context.fill();
   });
+}
+
+/** Other vehicles: brake lights at the rear, an edge around who is rude. */
+function drawOthers(context, others, pixel, colourOf) {
+  for (const { x, y, heading, length, width, brakes, rude } of others) {
+    within(context, x, y, heading, () => {
+      context.beginPath();
+      context.roundRect(-length / 2, -width / 2, length, width, 0.3);
+      context.fillStyle = colourOf(length < 6 ? "car" : "van");
+      context.fill();
+      context.lineWidth = (rude ? 2.5 : 1) * pixel;
+      context.strokeStyle = colourOf(rude ? "rude" : "panel");
+      context.stroke();
+      context.fillStyle = colourOf("panel");
+      context.globalAlpha = 0.7;
+      context.fillRect(0.14 * length, -0.4 * width, 0.12 * length, 0.8 * width);
+      context.globalAlpha = 1;
+      if (!brakes) return;
+      context.fillStyle = colourOf("brakes");
+      for (const side of [-1, 1]) context.fillRect(-length / 2, side * 0.36 * width - 0.25, 0.45, 0.5);
+    });
+  }
 }
 
 function drawRays(context, rig, now, pixel, colourOf) {
@@ -167,6 +189,7 @@ function drawScene(canvas, scene, now, frame, { rays, follow }) {
   context.lineWidth = 3 * pixel;
   context.stroke(scene.route);
   drawPaths(context, scene, frame, now, pixel, colourOf);
+  drawOthers(context, othersAt(scene.others, frame), pixel, colourOf);
   if (rays) drawRays(context, scene.rig, now, pixel, colourOf);
   drawTruck(context, scene, now, pixel, colourOf, frame >= scene.last - 1e-6);
   context.restore();

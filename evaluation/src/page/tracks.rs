@@ -14,9 +14,9 @@ use offtrack::layout::N_RAYS;
 use crate::recording::{Frame, Track};
 
 /// Resolution of lengths (m).
-const LENGTH: f64 = 0.01;
+pub(super) const LENGTH: f64 = 0.01;
 /// Resolution of angles (rad).
-const ANGLE: f64 = 1e-4;
+pub(super) const ANGLE: f64 = 1e-4;
 /// Resolution of speeds (m/s) and of load transfer ratios.
 const HUNDREDTH: f64 = 0.01;
 /// Resolution of ranges: this many parts of a sensor's reach.
@@ -84,7 +84,7 @@ pub(super) fn differences(tracks: &[Track], columns: &[Column]) -> Vec<u8> {
 }
 
 /// Appends a zigzag varint.
-fn push(bytes: &mut Vec<u8>, value: i32) {
+pub(super) fn push(bytes: &mut Vec<u8>, value: i32) {
     let mut word = ((value << 1) ^ (value >> 31)) as u32;
     while 0x80 <= word {
         bytes.push(word as u8 | 0x80);

@@ -30,7 +30,8 @@ fn frames_are_the_simulators_states_from_the_start_to_the_last_step() {
     let (world, tracks, states) = driven(&scenario());
     assert_eq!(tracks.iter().map(|track| track.env).collect::<Vec<_>>(), [1, 0]);
     assert_ne!(tracks[0].frames.len(), tracks[1].frames.len(), "one truck is held while the other drives on");
-    for Track { env, vehicle, ended, frames } in tracks {
+    for Track { env, vehicle, ended, frames, vehicles } in tracks {
+        assert!(vehicles.is_empty());
         assert_eq!(vehicle, 0);
         let last = &states[frames.len() - 1];
         assert_eq!((ended as u32, frames.len()), (last.ended[env], last.truck[env].steps as usize + 1));

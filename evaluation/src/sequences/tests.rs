@@ -37,6 +37,7 @@ fn policy(world: &World) -> Policy {
         head: Head::Continuous { squash: Squash::Clip },
         normalisation: Normalisation::none(N_VALUES),
         extras: Vec::new(),
+        vehicles: false,
         layers: vec![Layer { weights, biases }],
         ..Policy::shipped("attard2023").unwrap()
     }

@@ -63,6 +63,7 @@ fn report() -> Report {
             lane: group("right"),
             exit: group("1"),
             roundabout: group("40m"),
+            demand: group("900 veh/h"),
         },
         routes: vec![route(true), route(false)],
     }

@@ -156,3 +156,22 @@ fn half_of_a_sample_is_mirrored_whole_transitions_at_a_time() {
     // Four deviations of 2,000 throws of a coin.
     assert!(n_mirrored.abs_diff(rows / 2) < 90, "{n_mirrored}");
 }
+
+#[test]
+fn what_is_observed_of_vehicles_is_mirrored_by_its_table_behind_the_extras() {
+    let text =
+        Scenario::text_of("traffic2026").unwrap().replace("vehicles = true", "vehicles = true\nextras = \"blind\"");
+    let mut scenario = Scenario::parse("among", &text, None, &offtrack::files::cache::Loading::PLAIN).unwrap();
+    scenario.retain(|_, route| route.name.starts_with("16m"));
+    let mirror = Mirror::of(&World::bake(&scenario).unwrap()).unwrap();
+    const N: usize = N_VALUES + 5 + offtrack::layout::N_AROUND;
+    assert_eq!(mirror.images().0.len(), N);
+    let seen: [f32; N] = std::array::from_fn(|index| 0.01 * index as f32 + 0.01);
+    let image = mirror.observation(&seen);
+    for values in &VEHICLE_VALUES {
+        for index in N_VALUES + 5 + values.first..N_VALUES + 5 + values.first + values.n {
+            let sided = values.name.ends_with("_left");
+            assert_eq!(image[index], if sided { -seen[index] } else { seen[index] }, "{}", values.name);
+        }
+    }
+}

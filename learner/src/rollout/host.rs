@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use burn::tensor::{Device, Tensor, TensorData};
 use offtrack::layout::random;
-use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES, RewardTerms};
+use offtrack::layout::{Column, Ended, N_AROUND, N_EXTRAS, N_VALUES, RewardTerms};
 use offtrack::physics;
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::world::World;
@@ -30,19 +30,29 @@ use crate::shards::N_SHARDS;
 #[cfg(test)]
 mod tests;
 
-/// Each truck's `N` values: those of its observation, and its first extras, `[n_envs]`. Without extras nothing is
-/// copied.
+/// Each truck's `N` values: those of its observation, its first extras and, where `N` has room for more than all of
+/// them, those of other vehicles, `[n_envs]`. Without either nothing is copied.
 pub fn observed<'a, const N: usize>(
     observation: &'a [[f32; N_VALUES]],
     extras: &[[f32; N_EXTRAS]],
+    around: &[[f32; N_AROUND]],
 ) -> Cow<'a, [[f32; N]]> {
     if N == N_VALUES {
         return Cow::Borrowed(bytemuck::cast_slice(observation));
     }
-    let joined = |(values, extras): (&[f32; N_VALUES], &[f32; N_EXTRAS])| {
-        std::array::from_fn(|index| if index < N_VALUES { values[index] } else { extras[index - N_VALUES] })
+    let n_around = if N_VALUES + N_EXTRAS < N { N_AROUND } else { 0 };
+    let joined = |env: usize| {
+        let mut row = [0.0; N];
+        let (values, beside) = row.split_at_mut(N_VALUES);
+        let (own, others) = beside.split_at_mut(N - N_VALUES - n_around);
+        values.copy_from_slice(&observation[env]);
+        own.copy_from_slice(&extras[env][..own.len()]);
+        if 0 < n_around {
+            others.copy_from_slice(&around[env]);
+        }
+        row
     };
-    Cow::Owned(observation.iter().zip(extras).map(joined).collect())
+    Cow::Owned((0..observation.len()).map(joined).collect())
 }
 
 /// Trucks and a replay buffer whose networks observe `N` values. See the module.
@@ -105,7 +115,8 @@ impl<const N: usize> HostRollout<N> {
 
     fn choose(&mut self, actor: &Mlp) -> Vec<u32> {
         let batch = self.simulator.batch();
-        let logits = logits::<N>(actor, &self.normalisation, &observed(&batch.observation, &batch.extras));
+        let logits =
+            logits::<N>(actor, &self.normalisation, &observed(&batch.observation, &batch.extras, &batch.around));
         sampled(&logits, self.n_actions(), &mut self.acting)
     }
 
@@ -117,7 +128,7 @@ impl<const N: usize> HostRollout<N> {
     fn begin_step(&mut self) {
         let batch = self.simulator.batch();
         self.observation.clear();
-        self.observation.extend_from_slice(&observed(&batch.observation, &batch.extras));
+        self.observation.extend_from_slice(&observed(&batch.observation, &batch.extras, &batch.around));
         self.routes.clear();
         self.routes.extend(batch.truck.iter().map(|truck| truck.route));
     }
@@ -134,7 +145,7 @@ impl<const N: usize> HostRollout<N> {
             action: &batch.action,
             reward: &reward,
             ended: &batch.ended,
-            next_observation: &observed(&batch.next_observation, &batch.next_extras),
+            next_observation: &observed(&batch.next_observation, &batch.next_extras, &batch.next_around),
         });
         self.count()
     }
@@ -236,7 +247,7 @@ impl<const N: usize> Rollout for HostRollout<N> {
             }
             reward.iter_mut().for_each(|reward| *reward *= reward_scale as f32);
             steps.ended.extend(batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running)));
-            let next = observed::<N>(&batch.next_observation, &batch.next_extras);
+            let next = observed::<N>(&batch.next_observation, &batch.next_extras, &batch.next_around);
             for (env, next) in next.iter().enumerate() {
                 if steps.needs_next(step * n_envs + env, n_steps * n_envs) {
                     steps.next_observation.extend(self.normalisation.apply(std::slice::from_ref(next)));

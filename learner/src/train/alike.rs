@@ -37,6 +37,9 @@ pub(super) fn needed(trained: &Scenario, other: &Scenario) -> Option<String> {
     if other.action_kind != trained.action_kind || actions(other) != actions(trained) {
         return Some("actions and vehicle lock".to_owned());
     }
+    if other.observes_vehicles != trained.observes_vehicles {
+        return Some("observation.vehicles".to_owned());
+    }
     (other.extras != trained.extras).then(|| "observation.extras".to_owned())
 }
 
@@ -90,6 +93,7 @@ mod tests {
             ("laden2026-training", &["laden2026", "laden2026-random", "laden2026-odd"]),
             ("transfer2026-training", &["transfer2026", "transfer2026-random", "transfer2026-held-out"]),
             ("laden2026-50-training", &["laden2026-50", "laden2026-50-random"]),
+            ("traffic2026-training", &["traffic2026", "traffic2026-random"]),
         ] {
             for other in others {
                 assert_eq!(difference(&named(trained), &named(other)), None, "{trained}, {other}");
@@ -100,10 +104,11 @@ mod tests {
     #[test]
     fn whatever_a_policy_drives_or_observes_otherwise_is_a_difference() {
         let trained = Scenario::named("attard2023").unwrap();
-        let changes: [Change; 10] = [
+        let changes: [Change; 11] = [
             ("actions and vehicle lock", |of| of.steer_levels[0] = -0.7),
             ("actions and vehicle lock", |of| of.steer_max = Some(0.5)),
             ("observation.extras", |of| of.extras = offtrack::layout::ObservedExtras::Mass),
+            ("observation.vehicles", |of| of.observes_vehicles = true),
             ("time.step and time.substeps (0.2 s, 2 in place of 0.1 s, 2)", |of| of.step = 0.2),
             ("sensors.range (10 m in place of 20 m)", |of| of.sensor_range = 10.0),
             ("routes.spacing (1 m in place of 2 m)", |of| of.spacing = 1.0),

@@ -2,7 +2,7 @@
 //! values may not be finite.
 
 use offtrack::layout::shared::Named;
-use offtrack::layout::{Action, EXTRAS, N_VALUES};
+use offtrack::layout::{Action, EXTRAS, N_AROUND, N_VALUES};
 use safetensors::tensor::TensorView;
 
 use super::{Description, RecurrentDescription, floats, transposed};
@@ -35,7 +35,9 @@ pub(super) fn policy(name: &str, description: Description, tensors: Tensors) -> 
     }
     let values = values(&description)?;
     let frames = frames(&description)?;
-    let n_values = values.as_ref().map_or(N_VALUES + description.extras.len(), |values| values.indices().len());
+    let vehicles = description.vehicles.unwrap_or_default();
+    let n_beside = description.extras.len() + if vehicles { N_AROUND } else { 0 };
+    let n_values = values.as_ref().map_or(N_VALUES + n_beside, |values| values.indices().len());
     let n_stacked = frames.n * n_values;
     let (statistics, layers) = tensors.split_at(2);
     check_statistics(statistics, n_values, frames)?;
@@ -51,6 +53,7 @@ pub(super) fn policy(name: &str, description: Description, tensors: Tensors) -> 
         head,
         values,
         extras: description.extras,
+        vehicles,
         frames,
         normalisation: Normalisation { mean: floats(&statistics[0].1), factor: floats(&statistics[1].1) },
         layers,
@@ -117,6 +120,11 @@ fn values(description: &Description) -> Result<Option<Selection>, String> {
     if !extras.is_empty() {
         return Err("is a policy with the keys `values` and `extras`; the extras that it reads are among its values: \
                     leave `extras` out"
+            .to_owned());
+    }
+    if description.vehicles.is_some() {
+        return Err("is a policy with the keys `values` and `vehicles`; what it reads of other vehicles is among its \
+                    values: leave `vehicles` out"
             .to_owned());
     }
     Selection::of(names).map(Some).map_err(|message| format!("is a policy with the values {message}"))

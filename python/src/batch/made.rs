@@ -9,10 +9,11 @@ use pyo3::prelude::*;
 use super::arguments::{autoreset_of, engine_of};
 use super::state::State;
 use super::{Batch, weights};
+use crate::errors;
 use crate::infos::Names;
+use crate::observed::Beside;
 use crate::pool::Pool;
 use crate::worlds::{Asked, Place};
-use crate::{errors, observed};
 
 impl Batch {
     /// What its trucks drive in.
@@ -59,9 +60,9 @@ impl Batch {
             earlier: Tally::default(),
         };
         state.look()?;
-        let n_extras = place.world.params.n_extras as usize;
-        let (names, read) = (Names::new(py, &place.world), observed::columns_of_step(autoreset, n_extras));
-        Ok(Batch { place, names, n_envs, n_extras, read, device, autoreset, state: Mutex::new(state) })
+        let beside = Beside::of(&place.world);
+        let (names, read) = (Names::new(py, &place.world), beside.columns_of_step(autoreset));
+        Ok(Batch { place, names, n_envs, beside, read, device, autoreset, state: Mutex::new(state) })
     }
 
     /// The state, unless another thread has it.

@@ -3,6 +3,7 @@
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use offtrack::layout::{Column, Ended, N_RAYS, Truck};
 use offtrack_drawing::camera::{Camera, Shown};
+use offtrack_evaluation::recording::Vehicle;
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
@@ -34,7 +35,13 @@ impl Batch {
         let ranges = rows_of::<[f32; N_RAYS]>(&read[1])[env];
         // A truck that goes on in another episode has not ended.
         let code = if truck.held == 1 { rows_of::<u32>(&read[2])[env] } else { Ended::Running as u32 };
-        let shown = Shown { truck: &truck, ranges: &ranges, ended: Ended::from_code(code).unwrap_or(Ended::Running) };
+        let ended = Ended::from_code(code).unwrap_or(Ended::Running);
+        // A device has no vehicles.
+        let vehicles = match self.place.world.traffic {
+            Some(_) => Vehicle::around(&self.place.world, simulator.batch(), env),
+            None => Vec::new(),
+        };
+        let shown = Shown { truck: &truck, ranges: &ranges, ended, vehicles: &vehicles };
         let picture = camera.draw(&shown);
         PyArray1::from_slice(py, picture).reshape([size as usize, size as usize, 3])
     }

@@ -52,7 +52,7 @@ impl State {
             simulator.step_any(actions)?;
             let read = Read::of(simulator, &batch.read)?;
             let (codes, trucks) = (read.rows::<u32>(Column::Ended), read.rows::<Truck>(Column::Truck));
-            let last = read.observed_last(batch.n_extras);
+            let last = read.observed_last(batch.beside);
             if batch.autoreset == Autoreset::NextStep {
                 // Trucks that were held have begun, and no other is in another episode.
                 for env in (0..trucks.len()).filter(|&env| std::mem::take(&mut held[env])) {
@@ -65,7 +65,7 @@ impl State {
                 episodes[env] = Episode::of(&trucks[env]);
                 held[env] = trucks[env].held == 1;
             }
-            Ok(deliver(&read.observed(batch.n_extras), &read.rows(Column::Reward), &codes))
+            Ok(deliver(&read.observed(batch.beside), &read.rows(Column::Reward), &codes))
         })?;
         stepped.map_err(|error| errors::of_simulator(&error))
     }

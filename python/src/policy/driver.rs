@@ -7,7 +7,7 @@ use offtrack_policy::Policy;
 use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use super::{chosen, split};
+use super::{Split, chosen, split};
 use crate::errors::{self, guarded};
 use crate::pool::Pool;
 
@@ -33,7 +33,7 @@ impl Driver {
         guarded(|| {
             let mut inner = self.inner.lock_py_attached(py).unwrap_or_else(|poisoned| poisoned.into_inner());
             let (driver, pool) = &mut *inner;
-            let (values, extras) = split(driver.policy(), observations)?;
+            let Split { values, extras, around } = split(driver.policy(), observations)?;
             if values.len() != self.n {
                 return Err(PyValueError::new_err(format!(
                     "observations: {} of them; {} are needed, one a truck",
@@ -44,7 +44,7 @@ impl Driver {
             let begins = begins.map(|begins| self.begun(begins)).transpose()?.unwrap_or_default();
             begins.into_iter().for_each(|env| driver.begin(env));
             let envs: Vec<usize> = (0..self.n).collect();
-            let outputs = pool.run(py, || driver.outputs(&envs, &values, &extras))?;
+            let outputs = pool.run(py, || driver.outputs_among(&envs, &values, &extras, &around))?;
             chosen(py, driver.policy(), outputs)
         })
     }

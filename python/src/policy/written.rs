@@ -4,7 +4,7 @@ use std::path::Path;
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use offtrack::layout::shared::Named;
-use offtrack::layout::{Action, N_VALUES};
+use offtrack::layout::{Action, N_AROUND, N_VALUES};
 use offtrack_policy::{
     Activation, Cell, Frames, Gates, Head, Layer, Normalisation, Padding, Policy, Recurrent, Selection, Squash,
 };
@@ -47,9 +47,9 @@ pub struct Given<'py> {
 #[pyfunction]
 pub fn write_policy(py: Python, file: &str, scenario: worlds::Given, network: Given) -> PyResult<()> {
     guarded(|| {
-        let (benchmark, actions, extras) =
+        let (benchmark, actions, extras, vehicles) =
             Pool::new(0).run_until_signal(py, |stop| worlds::policy_table(&scenario, stop))??;
-        let policy = network.policy(file, benchmark, actions, &extras)?;
+        let policy = network.policy(file, (benchmark, actions), (&extras, vehicles))?;
         let bytes = policy.to_bytes();
         // What is written can be read: sizes that do not fit the benchmark and values that cannot be are found here.
         Policy::from_bytes(file, &bytes).map_err(refused)?;
@@ -58,7 +58,12 @@ pub fn write_policy(py: Python, file: &str, scenario: worlds::Given, network: Gi
 }
 
 impl Given<'_> {
-    fn policy(&self, file: &str, benchmark: String, actions: Vec<Action>, extras: &[&str]) -> PyResult<Policy> {
+    fn policy(
+        &self,
+        file: &str,
+        (benchmark, actions): (String, Vec<Action>),
+        (extras, vehicles): (&[&str], bool),
+    ) -> PyResult<Policy> {
         let activation = word::<Activation>("activation", &self.activation)?;
         let head = match &self.squash {
             None => Head::Levels,
@@ -69,8 +74,9 @@ impl Given<'_> {
         let selected = |names: &Vec<String>| Selection::of(names);
         let values = self.values.as_ref().map(selected).transpose();
         let values = values.map_err(|message| PyValueError::new_err(format!("values: {message}")))?;
-        let extras = if values.is_none() { extras } else { &[] };
-        let n_values = values.as_ref().map_or(N_VALUES + extras.len(), |values| values.indices().len());
+        let (extras, vehicles) = if values.is_none() { (extras, vehicles) } else { (&[][..], false) };
+        let n_beside = extras.len() + if vehicles { N_AROUND } else { 0 };
+        let n_values = values.as_ref().map_or(N_VALUES + n_beside, |values| values.indices().len());
         let n_stacked = n_values.saturating_mul(self.frames);
         self.check_shapes(n_stacked)?;
         let pair = |(input, hidden): &(Pair, Pair)| Cell { input: layer(input), hidden: layer(hidden) };
@@ -83,6 +89,7 @@ impl Given<'_> {
             head,
             values,
             extras: extras.iter().map(|&name| name.to_owned()).collect(),
+            vehicles,
             frames: Frames { n: self.frames, padding },
             normalisation: self.normalisation(n_values, n_stacked, extras)?,
             layers: self.layers.iter().map(layer).collect(),

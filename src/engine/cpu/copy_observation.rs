@@ -9,4 +9,7 @@ use crate::world::World;
 pub fn copy_observation(_: &World, row: &mut Row) {
     *row.observation = *row.next_observation;
     *row.extras = *row.next_extras;
+    if let (Some(around), Some(next)) = (&mut row.around, &row.next_around) {
+        **around = **next;
+    }
 }

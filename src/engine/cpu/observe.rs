@@ -6,7 +6,7 @@ use glam::Vec2;
 
 use crate::engine::Row;
 use crate::engine::cpu::follow::{distance_to_segment, reference_point};
-use crate::engine::cpu::perceive;
+use crate::engine::cpu::{around, perceive};
 use crate::layout::angle::{PI, arc_tangent, wrapped};
 use crate::layout::shared::constants;
 use crate::layout::{Control, N_EXTRAS, N_RAYS, N_VALUES, Progress, Truck, first_of};
@@ -64,6 +64,9 @@ pub fn observe(world: &World, row: &mut Row) {
     *row.next_observation = observation_of(world, row);
     if 0 < world.params.n_extras {
         *row.next_extras = extras(world, row.truck, row.control);
+    }
+    if let Some(seen) = around::around(world, row) {
+        row.next_around.iter_mut().for_each(|next| **next = seen);
     }
 }
 

@@ -4,7 +4,7 @@
 
 use crate::engine::cpu::follow::{followed, reference_point};
 use crate::engine::cpu::traffic::surrounded;
-use crate::engine::cpu::{observe, perceive, sense};
+use crate::engine::cpu::{around, observe, perceive, sense};
 use crate::engine::{Autoreset, RouteChoice, Row};
 use crate::layout::angle::{direction, wrapped};
 use crate::layout::random::{self, Draw};
@@ -43,6 +43,9 @@ pub fn begin(world: &World, row: &mut Row, begin: &BeginRow) {
     start(world, row, begin);
     *row.next_observation = *row.observation;
     *row.next_extras = *row.extras;
+    if let (Some(next), Some(around)) = (&mut row.next_around, &row.around) {
+        **next = **around;
+    }
     *row.ended = Ended::Running as u32;
     *row.terms = RewardTerms::default();
     *row.reward = 0.0;
@@ -83,6 +86,9 @@ fn start(world: &World, row: &mut Row, begin: &BeginRow) {
     *row.observation = observe::observation_of(world, row);
     if 0 < world.params.n_extras {
         *row.extras = observe::extras(world, row.truck, row.control);
+    }
+    if let Some(seen) = around::around(world, row) {
+        row.around.iter_mut().for_each(|around| **around = seen);
     }
 }
 

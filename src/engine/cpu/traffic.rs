@@ -1,10 +1,9 @@
 //! Other vehicles: each decides from where all were after the last step, all move, some leave and some come.
 
-use glam::Vec2;
-
 use crate::engine::Row;
 use crate::engine::cpu::follow::{followed, reference_point};
 use crate::layout::random::{self, Draw};
+use crate::layout::shared::constants;
 use crate::layout::{Progress, Stream, Truck};
 use crate::traffic::car::Outline;
 use crate::traffic::{self, Car, Clock, Contact, Entry, Event, Setting, Trucks, View, outlines, touched};
@@ -12,10 +11,13 @@ use crate::world::{Level, Traffic, TrafficRoad, TrafficRoute, World};
 
 /// What a vehicle may brake with for a truck that is in nobody's way (m/s²).
 const GENTLE: f32 = 2.0;
-/// Room to other vehicles, along each unit and beside it, that a truck begins with (m).
-const ROOM: Vec2 = Vec2::new(7.0, 1.0);
-/// Twice the braking with which a truck that begins can stop behind a vehicle (m/s²).
-const STOPS_WITH: f32 = 3.0;
+
+constants! {
+    /// Room to other vehicles before and behind each unit that a truck begins with (m).
+    const ROOM_ALONG: f32 = 7.0;
+    /// Room beside each unit (m).
+    const ROOM_BESIDE: f32 = 1.0;
+}
 
 /// Moves the vehicles around the row's truck, if the world has any.
 pub fn traffic(world: &World, row: &mut Row) {
@@ -57,24 +59,18 @@ pub fn seen_by_vehicles(world: &World, truck: &Truck, progress: &Progress) -> Op
     world.traffic.as_ref().map(|shared| view(world, shared, truck, progress))
 }
 
-fn view(world: &World, shared: &Traffic, truck: &Truck, progress: &Progress) -> View {
-    let network = &road_of(world, shared, truck.route).network;
-    let path = shared.routes[truck.route as usize].path as usize;
-    View::new(network, world.rig(truck), truck, path, front_station(world, shared, truck, progress.waypoint))
-}
-
-/// Station of a truck's front on its path, by the next waypoint of its route; negative before the path's beginning (m).
-pub fn front_station(world: &World, shared: &Traffic, truck: &Truck, next: u32) -> f32 {
-    let begins = shared.routes[truck.route as usize].begins;
+pub(super) fn view(world: &World, shared: &Traffic, truck: &Truck, progress: &Progress) -> View {
+    let TrafficRoute { path, begins } = shared.routes[truck.route as usize];
     let rig = world.rig(truck);
     let waypoints = world.route_waypoints(truck.route);
     let point = reference_point(rig.wheelbase, truck);
     // Whether this step's waypoints have been counted or not: passed ones stay so.
-    let next = followed(waypoints, point, next, world.params.stray_distance).waypoint as usize;
+    let next = followed(waypoints, point, progress.waypoint, world.params.stray_distance).waypoint as usize;
     let last = next.clamp(1, waypoints.len() - 1) - 1;
     let behind_last = (point - waypoints[last].position).dot(waypoints[last].direction);
     let ahead = rig.tractor_body.front - 0.5 * rig.wheelbase;
-    begins + last as f32 * shared.spacing + behind_last + ahead
+    let station = begins + last as f32 * shared.spacing + behind_last + ahead;
+    View::new(&road_of(world, shared, truck.route).network, rig, truck, path as usize, station)
 }
 
 /// Writes down which vehicle the row's truck touches, if the world has any.
@@ -137,22 +133,14 @@ pub fn surrounded(world: &World, shared: &Traffic, stream: Stream, truck: &Truck
     row.level = level;
     let drivers = Drivers::drawn(shared, stream, truck.episode);
     let grown = |unit: Outline| Outline {
-        half_length: unit.half_length + ROOM.x,
-        half_width: unit.half_width + ROOM.y,
+        half_length: unit.half_length + ROOM_ALONG,
+        half_width: unit.half_width + ROOM_BESIDE,
         ..unit
     };
     let units = outlines(world.rig(truck), truck).map(grown);
-    let source = road.network.paths[shared.routes[truck.route as usize].path as usize].source;
-    let front = front_station(world, shared, truck, 1);
-    // A truck could not stop behind it.
-    let is_too_near_ahead = |car: &Car| {
-        let room = car.station() - car.length() - front;
-        let stops = ((truck.speed * truck.speed - car.speed() * car.speed()) / STOPS_WITH).max(0.0);
-        road.network.paths[car.path()].source == source && 0.0 <= room && room < ROOM.x + stops
-    };
     for (slot, car) in row.cars.iter_mut().enumerate().filter(|(_, car)| car.is_there()) {
         let outline = car.outline(&road.network);
-        if is_too_near_ahead(car) || units.iter().any(|unit| unit.overlaps(&outline)) {
+        if units.iter().any(|unit| unit.overlaps(&outline)) {
             *car = Car::NONE;
         } else {
             drivers.sit_in(car, 0, slot);

@@ -5,7 +5,7 @@ const give = (name, body) => fetch(name, { method: "POST", body });
 
 const opened = async (gpu, job) => Batch.open(gpu, await gpu.world(job.world), job);
 
-/** A whole run of a batch: trucks, actions and ends after every step, all columns before the first and after the last. */
+/** A run of a batch: trucks, actions and ends after every step, all columns before the first and after the last. */
 async function recorded(live, gpu, batch, job) {
   const all = () => Promise.all(batch.columns.map((name) => batch.column(name)));
   batch.beginAll();

@@ -133,11 +133,11 @@ async function touch(live) {
   const devtools = (method, params) => give("devtools", JSON.stringify({ method, params }));
   // What the picture hears of them, which comes some time after the browser has taken them.
   const HEARD = { touchStart: "pointerdown", touchEnd: "pointerup" };
-  const fingers = async (type, points = [], heard = HEARD[type]) => {
+  const fingers = async (type, points = []) => {
     const { left, top } = byId("picture").getBoundingClientRect();
     const touchPoints = points.map(([x, y], id) => ({ x: left + x, y: top + y, id }));
-    const come = new Promise((next) =>
-      heard ? byId("picture").addEventListener(heard, next, { once: true }) : requestAnimationFrame(next));
+    const come = new Promise((next) => (type in HEARD
+      ? byId("picture").addEventListener(HEARD[type], next, { once: true }) : requestAnimationFrame(next)));
     await devtools("Input.dispatchTouchEvent", { type, touchPoints });
     await come;
   };
@@ -152,11 +152,10 @@ async function touch(live) {
   all.scrolled = document.scrollingElement.scrollTop;
   all.canScroll = document.scrollingElement.scrollHeight - document.scrollingElement.clientHeight;
   all.followedAfterDrag = crowd.followed;
-  // Two fingers, apart from 80 to 240 pixels; one is lifted before the other.
+  // Two fingers, apart from 80 to 240 pixels.
   await fingers("touchStart", [[x - 40, y]]);
   await fingers("touchStart", [[x - 40, y], [x + 40, y]]);
   for (let way = 50; way <= 120; way += 10) await fingers("touchMove", [[x - way, y], [x + way, y]]);
-  await fingers("touchMove", [[x - 120, y]], "pointerup");
   await fingers("touchEnd");
   all.nearer = pixel / camera.pixel;
   all.pageZoom = window.visualViewport.scale;

@@ -97,10 +97,10 @@ fn check_samples<const N: usize>(benchmark: &str) {
         // Three times round the ring of 32 steps.
         for _ in 0..100 {
             let batch = rollout.simulator().batch();
-            let seen = observed::<N>(&batch.observation, &batch.extras).into_owned();
+            let seen = observed::<N>(&batch.observation, &batch.extras, &batch.around).into_owned();
             rollout.step_at_random().unwrap();
             let batch = rollout.simulator().batch();
-            let next = observed::<N>(&batch.next_observation, &batch.next_extras);
+            let next = observed::<N>(&batch.next_observation, &batch.next_extras, &batch.next_around);
             history.push(
                 (0..n_envs)
                     .map(|env| Step {

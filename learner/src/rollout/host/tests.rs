@@ -66,3 +66,16 @@ fn a_refinement_has_the_reward_for_arriving_too() {
         assert!((with - without - expected).abs() < 1e-4, "{ended:?}: {with} after {without}");
     }
 }
+
+#[test]
+fn networks_observe_the_values_the_first_extras_and_then_the_vehicles() {
+    const BOTH: usize = N_VALUES + 5 + N_AROUND;
+    let (values, extras) = ([[1.0; N_VALUES]; 2], [std::array::from_fn(|index| 2.0 + index as f32); 2]);
+    let around = [std::array::from_fn(|index| 100.0 + index as f32); 2];
+    let seen = observed::<BOTH>(&values, &extras, &around);
+    assert_eq!((seen.len(), seen[1][68], seen[1][69], seen[1][73]), (2, 1.0, 2.0, 6.0));
+    assert_eq!((seen[1][74], seen[1][BOTH - 1]), (100.0, 141.0));
+    // Without vehicles there is nothing to join.
+    assert_eq!(observed::<{ N_VALUES + 5 }>(&values, &extras, &[])[0][69..], [2.0, 3.0, 4.0, 5.0, 6.0]);
+    assert_eq!(observed::<N_VALUES>(&values, &extras, &[]).len(), 2);
+}

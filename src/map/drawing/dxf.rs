@@ -1,4 +1,4 @@
-//! The polylines, lines and arcs of a drawing on the layers that are asked for, in metres.
+//! The polylines, lines and arcs of a DXF file on the layers that are asked for, in metres.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -6,8 +6,8 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use super::Layers;
 use super::pairs::{Pair, pairs};
+use super::{Drawing, Entity, Layers};
 use crate::files::reader::{Error, Reader};
 use crate::geometry::{Curve, Piece, arc_of_height};
 
@@ -65,24 +65,6 @@ impl Unit {
     }
 }
 
-/// A curve on one of the layers.
-#[derive(Debug, Clone)]
-pub(super) struct Drawn {
-    pub(super) curve: Curve,
-    pub(super) is_closed: bool,
-    /// The line where it begins.
-    pub(super) line: usize,
-}
-
-/// What is drawn on the layers.
-#[derive(Debug, Clone)]
-pub(super) struct Drawing {
-    pub(super) kerbs: Vec<Drawn>,
-    pub(super) lanes: Vec<Drawn>,
-    /// What was left out or done, in words.
-    pub(super) notes: Vec<String>,
-}
-
 impl Drawing {
     pub(super) fn parse(file: &Path, text: &str, layers: &Layers) -> Result<Drawing, Error> {
         let pairs = pairs(file, text)?;
@@ -90,7 +72,7 @@ impl Drawing {
         let entities = entities(&pairs);
         let reader = Reader::of(file);
         reader.count("entities", entities.len(), 0..=MOST_ENTITIES)?;
-        let mut drawing = Drawing { kerbs: Vec::new(), lanes: Vec::new(), notes: Vec::new() };
+        let mut drawing = Drawing { kerbs: Vec::new(), lanes: Vec::new(), centre: None, notes: Vec::new() };
         let mut others: BTreeMap<&str, usize> = BTreeMap::new();
         let mut index = 0;
         while index < entities.len() {
@@ -163,7 +145,7 @@ fn text_of<'a>(entity: &[Pair<'a>], code: i32) -> Option<&'a str> {
 }
 
 /// The curve of an entity on one of the layers; `None` for what has no extent, such as a text.
-fn curve(file: &Path, entity: &[Pair], vertices: &[&[Pair]], metres: f64) -> Result<Option<Drawn>, Error> {
+fn curve(file: &Path, entity: &[Pair], vertices: &[&[Pair]], metres: f64) -> Result<Option<Entity>, Error> {
     let number = |pairs: &[Pair], code: i32| -> Result<Option<f64>, Error> {
         pairs.iter().find(|pair| pair.code == code).map(|pair| pair.number(file)).transpose()
     };
@@ -224,7 +206,7 @@ fn curve(file: &Path, entity: &[Pair], vertices: &[&[Pair]], metres: f64) -> Res
     if curve.pieces.is_empty() {
         return Err(refused("has no length: delete it"));
     }
-    Ok(Some(Drawn { curve, is_closed, line }))
+    Ok(Some(Entity { curve, is_closed, place: format!("line {line}"), widths: None }))
 }
 
 /// The curve through vertices, each with the bulge of the arc to the next: the tangent of a quarter of its angle.

@@ -5,8 +5,7 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use super::Layers;
-use super::entities::{self, Drawing};
+use super::{Drawing, Entity, Layers};
 use crate::files::reader::{Error, Reader};
 use crate::geometry::{Curve, Outline, Piece, fitted_line, wrapped};
 use crate::map::ground::{Arm, Edges, Ground, Kerb, Line};
@@ -40,11 +39,11 @@ pub struct Drawn {
 /// The road of a drawing.
 pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Drawn, Error> {
     let reader = Reader::of(file);
-    let Drawing { kerbs, lanes, mut notes } = drawing;
+    let Drawing { kerbs, lanes, centre: marked, mut notes } = drawing;
     reader.count(&format!("lines on layer {}", layers.kerbs), kerbs.len(), 1..=MOST_KERBS)?;
     reader.count(&format!("lines on layer {}", layers.lanes), lanes.len(), 1..=MOST_WAYS)?;
     let loops = closed(&reader, kerbs, layers, &mut notes)?;
-    let (centre, radius) = island(&reader, &loops, layers)?;
+    let (centre, radius) = island(&reader, &loops, layers, layers.ring.or(marked))?;
     let place = |curve: &Curve| moved(curve, -centre);
     let loops: Vec<Curve> = loops.iter().map(place).collect();
     let ways: Vec<Curve> = lanes.iter().map(|lane| place(&smooth(lane, &mut notes))).collect();
@@ -82,12 +81,7 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
 }
 
 /// The closed outlines: those drawn as such, and chains of open pieces whose ends meet.
-fn closed(
-    reader: &Reader,
-    drawn: Vec<entities::Drawn>,
-    layers: &Layers,
-    notes: &mut Vec<String>,
-) -> Result<Vec<Curve>, Error> {
+fn closed(reader: &Reader, drawn: Vec<Entity>, layers: &Layers, notes: &mut Vec<String>) -> Result<Vec<Curve>, Error> {
     let meets = |a: DVec2, b: DVec2| a.distance(b) <= GAP;
     let ends = |curve: &Curve| (curve.point_at(0.0), curve.point_at(curve.length()));
     let (mut loops, mut open) = (Vec::new(), Vec::new());
@@ -96,7 +90,7 @@ fn closed(
         if one.is_closed || meets(start, end) { loops.push(one.curve) } else { open.push(one) }
     }
     let n_open = open.len();
-    while let Some(entities::Drawn { mut curve, line, .. }) = open.pop() {
+    while let Some(Entity { mut curve, place, .. }) = open.pop() {
         loop {
             let (start, end) = ends(&curve);
             if meets(start, end) {
@@ -111,7 +105,7 @@ fn closed(
                     "the outline is open at ({:.3}, {:.3}) m: kerbs on layer {} must be closed within {GAP} m",
                     end.x, end.y, layers.kerbs
                 );
-                return Err(reader.invalid(format!("line {line}"), "open", expected));
+                return Err(reader.invalid(place, "open", expected));
             };
             let other = open.swap_remove(next).curve;
             let other = if meets(end, ends(&other).0) { other } else { other.reversed() };
@@ -126,12 +120,12 @@ fn closed(
 }
 
 /// The centre and the radius of the central island.
-fn island(reader: &Reader, loops: &[Curve], layers: &Layers) -> Result<(DVec2, f64), Error> {
+fn island(reader: &Reader, loops: &[Curve], layers: &Layers, near: Option<DVec2>) -> Result<(DVec2, f64), Error> {
     let outer = (0..loops.len()).max_by(|&a, &b| loops[a].signed_area().abs().total_cmp(&loops[b].signed_area().abs()));
     let circle = |curve: &Curve| fitted_circle(&curve.polyline(0.002));
     let islands = loops.iter().enumerate().filter(|(index, _)| Some(*index) != outer);
     let round = islands.filter_map(|(_, curve)| circle(curve)).filter(|(_, radius, off)| *off < ROUND * radius);
-    let nearest = |one: &(DVec2, f64, f64)| layers.ring.map_or(-one.1, |ring| ring.distance(one.0));
+    let nearest = |one: &(DVec2, f64, f64)| near.map_or(-one.1, |ring| ring.distance(one.0));
     let found = round.min_by(|one, other| nearest(one).total_cmp(&nearest(other)));
     let found = found.map(|(centre, radius, _)| (centre, radius));
     found.ok_or_else(|| {
@@ -141,15 +135,15 @@ fn island(reader: &Reader, loops: &[Curve], layers: &Layers) -> Result<(DVec2, f
 }
 
 /// A way without corners.
-fn smooth(lane: &entities::Drawn, notes: &mut Vec<String>) -> Curve {
+fn smooth(lane: &Entity, notes: &mut Vec<String>) -> Curve {
     let corner = |pair: &[Piece]| wrapped(pair[1].heading_at(0.0) - pair[0].heading_at(pair[0].length())).abs();
     let sharpest = lane.curve.pieces.windows(2).map(corner).fold(0.0, f64::max);
     if sharpest <= SMOOTH {
         return lane.curve.clone();
     }
     notes.push(format!(
-        "line {}: the way has corners of up to {:.1} deg; a smooth line within {FITTED} m takes its place",
-        lane.line,
+        "{}: the way has corners of up to {:.1} deg; a smooth line within {FITTED} m takes its place",
+        lane.place,
         sharpest.to_degrees()
     ));
     fitted_line(&lane.curve.polyline(0.001), FITTED)
@@ -219,7 +213,7 @@ fn arms(reader: &Reader, ways: &[Curve], layers: &Layers, mirrored: bool) -> Res
 /// The routes along the ways.
 fn lines(
     reader: &Reader,
-    drawn: &[entities::Drawn],
+    drawn: &[Entity],
     ways: &[Curve],
     arms: &[Arm],
     (island, outer): (f64, f64),
@@ -232,7 +226,7 @@ fn lines(
     let start = |way: &Curve| way.point_at(0.0);
     let mut lines: Vec<Line> = Vec::new();
     for (way, drawn) in ways.iter().zip(drawn) {
-        let refused = |found: String, expected: &str| reader.invalid(format!("line {}", drawn.line), found, expected);
+        let refused = |found: String, expected: &str| reader.invalid(drawn.place.clone(), found, expected);
         let (entry, exit_arm) = (arm_of(start(way)), arm_of(way.point_at(way.length())));
         let inwards = -DVec2::from_angle(arms[entry].bearing);
         // Places of the lanes of this arm across the direction of travel, the rightmost first.
@@ -253,9 +247,9 @@ fn lines(
             let found = format!("a second way from {} to {}", arms[entry].name, arms[exit_arm].name);
             return Err(refused(found, "draw one line for each way"));
         }
+        let widths = drawn.widths.unwrap_or([width; 3]);
         let middle = ring_radius(&way.polyline(0.01), island, outer);
-        let crossing = ((middle - island).max(width / 2.0), (outer - middle).max(width / 2.0));
-        let widths = [width; 3];
+        let crossing = ((middle - island).max(widths[1] / 2.0), (outer - middle).max(widths[1] / 2.0));
         lines.push(Line { entry, lane, exit, exit_arm, line: way.clone(), crossing, widths, ends: [None, None] });
     }
     Ok(lines)

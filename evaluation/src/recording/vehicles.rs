@@ -1,0 +1,91 @@
+//! The other vehicles of a recording.
+
+use glam::Vec2;
+use offtrack::simulator::Batch;
+use offtrack::traffic::Row;
+use offtrack::traffic::car::Outline;
+use offtrack::world::World;
+use serde::{Deserialize, Serialize};
+
+use super::{ANGLE, MILLI, to};
+
+/// Deceleration from which on the brake lights are lit (m/s²).
+const BRAKES: f32 = -0.6;
+/// From this length on it is a van (m).
+const VAN: f32 = 6.0;
+
+/// Another vehicle after one step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Vehicle {
+    /// Its slot: one that stays is in the same slot.
+    pub slot: usize,
+    /// Its middle (m).
+    pub position: [f32; 2],
+    /// Heading, counter-clockwise from east, in (-pi, pi] (rad).
+    pub heading: f32,
+    /// Length (m).
+    pub length: f32,
+    /// Width (m).
+    pub width: f32,
+    /// Speed (m/s).
+    pub speed: f32,
+    /// Acceleration (m/s²).
+    pub acceleration: f32,
+    /// Whether its driver is rude.
+    pub is_rude: bool,
+}
+
+impl Vehicle {
+    /// Those around a truck of a batch on the CPU, as the road is driven; none in a world without.
+    pub fn around(world: &World, batch: &Batch, env: usize) -> Vec<Vehicle> {
+        let (Some(shared), Some(words)) = (&world.traffic, batch.cars.get(env)) else { return Vec::new() };
+        let roundabout = world.routes[batch.truck[env].route as usize].roundabout;
+        let network = &shared.roads[roundabout as usize].network;
+        let there = Row::of(words).cars.iter().enumerate().filter(|(_, car)| car.is_there());
+        let vehicle = |(slot, car): (usize, &offtrack::traffic::Car)| {
+            let Outline { middle, along, half_length, half_width } = car.outline(network);
+            Vehicle {
+                slot,
+                position: middle.to_array().map(|value| to(MILLI, value)),
+                heading: to(ANGLE, along.to_angle()),
+                length: to(MILLI, 2.0 * half_length),
+                width: to(MILLI, 2.0 * half_width),
+                speed: to(MILLI, car.speed()),
+                acceleration: to(MILLI, car.acceleration()),
+                is_rude: car.is_rude(),
+            }
+        };
+        there.map(vehicle).collect()
+    }
+
+    /// Whether its brake lights are lit.
+    pub fn brakes(&self) -> bool {
+        self.acceleration < BRAKES
+    }
+
+    /// Whether it is a van.
+    pub fn is_van(&self) -> bool {
+        VAN < self.length
+    }
+
+    /// The vehicle in the mirror image of its world.
+    #[must_use]
+    pub fn mirrored(&self) -> Vehicle {
+        let [x, y] = self.position;
+        Vehicle { position: [x, 0.0 - y], heading: 0.0 - self.heading, ..*self }
+    }
+
+    /// Its corners: front left, front right, rear right, rear left (m).
+    pub fn corners(&self) -> [[f32; 2]; 4] {
+        self.at([[0.5, 0.5], [0.5, -0.5], [-0.5, -0.5], [-0.5, 0.5]])
+    }
+
+    /// Points of it by parts of its length ahead of the middle and of its width to the left (m).
+    pub fn at<const N: usize>(&self, parts: [[f32; 2]; N]) -> [[f32; 2]; N] {
+        let along = Vec2::from_angle(self.heading);
+        parts.map(|[ahead, left]| {
+            let point = Vec2::from(self.position) + ahead * self.length * along + left * self.width * along.perp();
+            point.to_array()
+        })
+    }
+}

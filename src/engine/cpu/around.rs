@@ -1,0 +1,251 @@
+//! Writes what is observed of other vehicles: 42 values, see [`VEHICLE_VALUES`](crate::layout::VEHICLE_VALUES).
+//!
+//! What comes to the own entry, and what is ahead, follow from the zones in which the truck's path meets those of the
+//! others, so that one number says what a driver would look for along several lanes. Every value is a least one or one
+//! in the order of distances, so the slots in which vehicles stand change none of them.
+
+use std::array::from_fn;
+
+use glam::Vec2;
+
+use super::traffic::{road_of, view};
+use crate::engine::Row;
+use crate::layout::angle::direction;
+use crate::layout::{N_AROUND, N_CARS, N_NEAREST, first_of_vehicles};
+use crate::traffic::car::Outline;
+use crate::traffic::units::metres;
+use crate::traffic::{self, Car, Kind, Network, Stretch};
+use crate::world::World;
+
+/// Time that is observed as 1 (s).
+const TIME_SCALE: f32 = 10.0;
+/// Distance along a path that is observed as 1 (m).
+const GAP_SCALE: f32 = 50.0;
+/// Speed of a vehicle that is observed as 1 (m/s).
+const SPEED_SCALE: f32 = 15.0;
+/// Distance to a unit that is observed as 1 (m).
+const ROOM_SCALE: f32 = 20.0;
+/// Distance from a unit within which vehicles are observed one by one, and which is observed as 1 (m).
+const NEAR_SCALE: f32 = 60.0;
+/// Zones that begin so far behind the line are those of the entry (m).
+const ENTRY: f32 = 12.0;
+/// Those that begin so far behind it are on the nearest lane (m).
+const NEAREST_LANE: f32 = 3.0;
+/// Least speed in a time to a zone (m/s).
+const LEAST_SPEED: f32 = 4.0;
+/// Twice the braking with which a vehicle still stops before its line (m/s^2).
+const STOPS_WITH: f32 = 8.0;
+/// Index of the times until vehicles are at the entry.
+const ARRIVAL_AT: usize = first_of_vehicles("entry_arrival");
+/// Index of their distances.
+const DISTANCE_AT: usize = first_of_vehicles("entry_distance");
+/// Index of the times until they have left it.
+const GONE_AT: usize = first_of_vehicles("entry_gone");
+/// Index of the distance from the line.
+const LINE_AT: usize = first_of_vehicles("line_distance");
+/// Index of whether the front is beyond it.
+const ENTERED_AT: usize = first_of_vehicles("has_entered");
+/// Index of the gap.
+const GAP_AT: usize = first_of_vehicles("gap");
+/// Index of the speed beyond the gap.
+const GAP_SPEED_AT: usize = first_of_vehicles("gap_speed");
+/// Index of the room of both units.
+const ROOM_AT: usize = first_of_vehicles("tractor_room");
+/// Index of whether there are nearest vehicles.
+const NEAREST_AT: usize = first_of_vehicles("vehicle");
+
+/// What the row's truck observes of other vehicles; none where the world's trucks do not.
+pub fn around(world: &World, row: &Row) -> Option<[f32; N_AROUND]> {
+    let shared = world.traffic.as_ref().filter(|shared| shared.is_observed)?;
+    let cars = &traffic::Row::of(row.cars.as_ref()?).cars;
+    let truck = &row.truck;
+    let seen = view(world, shared, truck, row.progress);
+    let observing = Observing {
+        network: &road_of(world, shared, truck.route).network,
+        path: seen.path,
+        front: metres(seen.station),
+        length: metres(seen.length),
+        units: seen.now,
+        origin: truck.position,
+        along: direction(truck.heading),
+    };
+    Some(observing.of(cars))
+}
+
+/// A zone of the truck's path with that of a car, in metres.
+struct Meeting {
+    /// Where it begins and ends on the truck's path.
+    own: [f32; 2],
+    /// Where it begins and ends on the car's.
+    its: [f32; 2],
+    /// Station on the car's path less that on the truck's.
+    delta: f32,
+    kind: Kind,
+}
+
+/// A vehicle that comes to the entry.
+#[derive(Clone, Copy)]
+struct Coming {
+    /// Time until it is there (s).
+    arrival: f32,
+    /// Distance that it has to go (m).
+    distance: f32,
+    /// Time until it has left (s).
+    gone: f32,
+}
+
+impl Coming {
+    /// The one of two that is there first; of two that are there together, the one that takes longer to leave.
+    fn first(self, other: Coming) -> Coming {
+        let order = self.arrival.total_cmp(&other.arrival).then(other.gone.total_cmp(&self.gone));
+        if order.then(self.distance.total_cmp(&other.distance)).is_le() { self } else { other }
+    }
+}
+
+/// A truck that looks around: where it is on its path, and on the ground.
+struct Observing<'a> {
+    network: &'a Network,
+    path: usize,
+    /// Station of its front (m).
+    front: f32,
+    /// Length of both units (m).
+    length: f32,
+    /// The ground that tractor and trailer cover.
+    units: [Outline; 2],
+    /// Middle of the drive axle (m).
+    origin: Vec2,
+    /// Unit vector along the tractor.
+    along: Vec2,
+}
+
+impl Observing<'_> {
+    /// What it observes of these cars.
+    fn of(&self, cars: &[Car; N_CARS]) -> [f32; N_AROUND] {
+        let mut seen = [1.0; N_AROUND];
+        self.write_entry(cars, &mut seen);
+        let line = self.network.paths[self.path].line();
+        seen[LINE_AT] = ((line - self.front) / GAP_SCALE).clamp(0.0, 1.0);
+        seen[ENTERED_AT] = f32::from(line < self.front);
+        let outlines: [Option<Outline>; N_CARS] =
+            from_fn(|slot| cars[slot].is_there().then(|| cars[slot].outline(self.network)));
+        if let Some((gap, slot)) = self.gap(cars) {
+            let ahead = self.network.pose(self.path, self.front + gap).1;
+            let along = outlines[slot].map_or(0.0, |outline| outline.along.dot(ahead));
+            seen[GAP_AT] = (gap / GAP_SCALE).min(1.0);
+            seen[GAP_SPEED_AT] = (cars[slot].speed() * along / SPEED_SCALE).clamp(-1.0, 1.0);
+        }
+        for (unit, room) in self.units.iter().zip(&mut seen[ROOM_AT..]) {
+            let rooms = outlines.iter().flatten().map(|outline| room_between(unit, outline));
+            *room = rooms.fold(ROOM_SCALE, f32::min) / ROOM_SCALE;
+        }
+        self.write_nearest(cars, &outlines, &mut seen[NEAREST_AT..]);
+        seen
+    }
+
+    /// The zones of the truck's path with that of a car.
+    fn zones(&self, car: &Car) -> impl Iterator<Item = Meeting> {
+        self.network.zones_of(self.path, car.path()).iter().map(|zone| {
+            let Stretch { a_in, a_out, b_in, b_out, delta, kind } = zone.stretch();
+            Meeting { own: [a_in, a_out].map(metres), its: [b_in, b_out].map(metres), delta: metres(delta), kind }
+        })
+    }
+
+    /// Writes the first vehicle that comes to the entry, by lane.
+    fn write_entry(&self, cars: &[Car; N_CARS], seen: &mut [f32; N_AROUND]) {
+        let line = self.network.paths[self.path].line();
+        let mut first: [Option<Coming>; 2] = [None; 2];
+        for car in cars.iter().filter(|car| car.is_there()) {
+            let (station, speed) = (car.station(), car.speed());
+            let its_line = self.network.paths[car.path()].line();
+            let waits = station + speed * speed / STOPS_WITH <= its_line;
+            let is_beside = |kind: Kind| matches!(kind, Kind::Soft | Kind::Wide);
+            let is_of_entry =
+                |zone: &Meeting| zone.own[0] <= line + ENTRY && (is_beside(zone.kind) || line < zone.own[0]);
+            let touches = self.zones(car).any(|zone| is_of_entry(&zone) && zone.kind != Kind::Wide);
+            for Meeting { own, its, kind, .. } in self.zones(car).filter(is_of_entry) {
+                // A car that runs together with the truck leads it once it is through.
+                let end = if kind == Kind::Follow { its[0] } else { its[1] };
+                let has_left = own[1] < self.front - self.length || end < station - car.length();
+                if has_left || (waits && its_line < its[0]) || (touches && kind == Kind::Wide) {
+                    continue;
+                }
+                let speed = speed.max(LEAST_SPEED);
+                let distance = (its[0] - station).max(0.0);
+                let gone = (end + car.length() - station) / speed;
+                let coming = Coming { arrival: distance / speed, distance, gone };
+                let lane = &mut first[usize::from(is_beside(kind) || line + NEAREST_LANE < own[0])];
+                *lane = Some(lane.map_or(coming, |known| known.first(coming)));
+            }
+        }
+        for (lane, coming) in first.iter().enumerate() {
+            let Some(Coming { arrival, distance, gone }) = *coming else { continue };
+            seen[ARRIVAL_AT + lane] = (arrival / TIME_SCALE).min(1.0);
+            seen[DISTANCE_AT + lane] = (distance / GAP_SCALE).min(1.0);
+            seen[GONE_AT + lane] = (gone / TIME_SCALE).min(1.0);
+        }
+    }
+
+    /// Distance to what is next on the truck's path (m), and its slot.
+    fn gap(&self, cars: &[Car; N_CARS]) -> Option<(f32, usize)> {
+        let mut least: Option<(f32, usize)> = None;
+        for (slot, car) in cars.iter().enumerate().filter(|(_, car)| car.is_there()) {
+            let (station, rear) = (car.station(), car.station() - car.length());
+            for Meeting { own, its, delta, kind } in self.zones(car) {
+                if its[1] <= rear || station <= its[0] {
+                    continue;
+                }
+                let gap = match kind {
+                    Kind::Follow if self.front < station - delta => (rear - delta).max(own[0]) - self.front,
+                    Kind::Cross if self.front < own[1] => own[0] - self.front,
+                    _ => continue,
+                };
+                let gap = gap.max(0.0);
+                if least.is_none_or(|(known, _)| gap < known) {
+                    least = Some((gap, slot));
+                }
+            }
+        }
+        least
+    }
+
+    /// Writes the vehicles nearest to either unit.
+    fn write_nearest(&self, cars: &[Car; N_CARS], outlines: &[Option<Outline>; N_CARS], seen: &mut [f32]) {
+        let distance = |outline: &Outline| {
+            self.units.iter().map(|unit| unit.distance_squared(outline.middle)).fold(f32::INFINITY, f32::min).sqrt()
+        };
+        let mut near: [(f32, usize); N_CARS] =
+            from_fn(|slot| (outlines[slot].as_ref().map_or(f32::INFINITY, distance), slot));
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        seen.fill(0.0);
+        for (rank, &(distance, slot)) in near.iter().take(N_NEAREST).enumerate() {
+            let Some(outline) = outlines[slot].filter(|_| distance < NEAR_SCALE) else { break };
+            let to = (outline.middle - self.origin) / NEAR_SCALE;
+            let velocity = cars[slot].speed() / SPEED_SCALE * outline.along;
+            let in_frame = |vector: Vec2| [vector.dot(self.along), self.along.perp_dot(vector)];
+            let ([ahead, left], [speed_ahead, speed_left]) = (in_frame(to), in_frame(velocity));
+            for (group, value) in [1.0, ahead, left, speed_ahead, speed_left].into_iter().enumerate() {
+                seen[group * N_NEAREST + rank] = value.clamp(-1.0, 1.0);
+            }
+        }
+    }
+}
+
+/// Distance between two rectangles, at most [`ROOM_SCALE`]: that of the corners of each from the other (m).
+fn room_between(one: &Outline, other: &Outline) -> f32 {
+    let reach = |outline: &Outline| outline.half_length + outline.half_width;
+    if ROOM_SCALE + reach(one) + reach(other) < one.middle.distance(other.middle) {
+        return ROOM_SCALE;
+    }
+    if one.overlaps(other) {
+        return 0.0;
+    }
+    let corners = |outline: &Outline| {
+        let (along, across) = (outline.half_length * outline.along, outline.half_width * outline.along.perp());
+        [along + across, along - across, -along + across, -along - across].map(|corner| outline.middle + corner)
+    };
+    let from = |corners: [Vec2; 4], outline: &Outline| corners.map(|corner| outline.distance_squared(corner).sqrt());
+    [from(corners(one), other), from(corners(other), one)].into_iter().flatten().fold(ROOM_SCALE, f32::min)
+}
+
+#[cfg(test)]
+mod tests;
