@@ -6,6 +6,7 @@
 //! ratio to the same actions on empty roads: both are driven in turns.
 
 #[path = "../policy/tests/among_cars/driver.rs"]
+#[expect(clippy::unwrap_used, reason = "it is a helper of tests too")]
 mod driver;
 
 use std::sync::Arc;

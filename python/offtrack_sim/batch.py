@@ -63,8 +63,7 @@ class Batch(_offtrack.Batch):
             target speed from the lowest (-1) to the highest (1); 0 where an action is an index.
         route_names: Names of the routes, in the order of the indices that columns have.
         extras: Names of the extras that stand behind an observation's 69 values, see :data:`offtrack_sim.EXTRAS`.
-        observes_vehicles: Whether what is observed of other vehicles stands behind these, see
-            :data:`offtrack_sim.VEHICLES`.
+        observes_vehicles: Whether what is observed of vehicles stands behind these, :data:`offtrack_sim.VEHICLES`.
         n_values: Number of an observation's values, all of these included.
         classes: Names of vehicle and load of each class that episodes draw from, pairs in the benchmark's order. The
             vehicle of a benchmark that has one is ``""``.

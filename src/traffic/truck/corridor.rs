@@ -55,11 +55,11 @@ impl Points {
     fn to_nearest(&self, outlines: &[Outline]) -> [f32; N_SAMPLES] {
         let mut nearest = [f32::MAX; N_SAMPLES];
         for Outline { middle, along, half_length, half_width } in outlines {
-            for k in 0..N_SAMPLES {
-                let (x, y) = (self.x[k] - middle.x, self.y[k] - middle.y);
+            for (nearest, (x, y)) in nearest.iter_mut().zip(self.x.iter().zip(&self.y)) {
+                let (x, y) = (x - middle.x, y - middle.y);
                 let ahead = ((x * along.x + y * along.y).abs() - half_length).max(0.0);
                 let aside = ((y * along.x - x * along.y).abs() - half_width).max(0.0);
-                nearest[k] = nearest[k].min(ahead * ahead + aside * aside);
+                *nearest = nearest.min(ahead * ahead + aside * aside);
             }
         }
         nearest
