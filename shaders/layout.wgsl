@@ -210,6 +210,8 @@ const ROLL_SCALE: f32 = 0.15f;
 const ROLL_RATE_SCALE: f32 = 0.3f;
 // Mass that is observed as 1 (kg).
 const MASS_SCALE: f32 = 40000.0f;
+// Least 1 plus the cosine of an angle that is halved: keeps the quotient finite where a unit has turned round.
+const HALVED_MIN: f32 = 1e-6f;
 // Sums in a tally: steps by their end code, then the rewards.
 const N_SUMS: u32 = 11u;
 // Index of the sum of the rewards.
@@ -734,5 +736,9 @@ struct BatchFacts {
 @group(0) @binding(27) var<storage, read_write> command: array<Command>;
 // The cars on the road of each truck, and what is counted of them: words of a `traffic::Row`, [n_envs, 102].
 @group(0) @binding(28) var<storage, read_write> cars: array<u32>;
+// What is observed of other vehicles before the next action; zeros where the benchmark observes none, [n_envs, 42].
+@group(0) @binding(29) var<storage, read_write> around: array<f32>;
+// What is observed of other vehicles after the last action, [n_envs, 42].
+@group(0) @binding(30) var<storage, read_write> next_around: array<f32>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(29) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(31) var<storage, read_write> tally: array<atomic<u32>>;
