@@ -1,6 +1,7 @@
 //! The figures of episodes under way, one a truck, from their starts to their ends.
 
-use offtrack::layout::{Control, Ended, Truck};
+use bytemuck::cast_slice;
+use offtrack::layout::{Column, Control, Ended, N_CAR_WORDS, Truck};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{Error, Simulator};
 use offtrack::traffic::Row;
@@ -41,7 +42,9 @@ impl<'a> Figures<'a> {
         let seen = Seen::of(simulator)?;
         let has_classes = classes::has_classes(scenario);
         let levels = scenario.traffic.as_ref().map(|traffic| traffic.demand.as_slice());
-        let cars = &simulator.batch().cars;
+        // From a device no other column is read.
+        let cars = if levels.is_some() { simulator.read(&[Column::Cars])? } else { Vec::new() };
+        let cars: &[[u32; N_CAR_WORDS]] = cars.first().map_or(&[], |bytes| cast_slice(bytes));
         let new = |(env, (truck, control)): (usize, (&Truck, &Control))| {
             let driving = has_classes.then(|| Driving::new(truck, control.target_speed));
             let demand = levels.and_then(|levels| Some(levels[Row::of(cars.get(env)?).level as usize]));

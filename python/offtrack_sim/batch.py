@@ -338,17 +338,15 @@ class Batch(_offtrack.Batch):
         return int(np.flatnonzero(rows == found[0])[0])
 
     def columns(self, *names: str) -> dict[str, Array]:
-        """Copies of columns, all of them where none is named: arrays of ``num_envs`` rows, see :data:`COLUMNS`.
+        """Copies of columns, all of them where none is named: arrays of ``num_envs`` rows, see :data:`COLUMNS`, of those
+        of vehicles without rows where there are none.
 
         ``batch.columns("truck")["truck"]["speed"]`` is every truck's speed [m/s]. From a graphics device only the named
         ones are read.
         """
         wanted = [text("column", name) for name in names] or list(COLUMNS)
         rows = self.column_bytes(wanted)
-        return {
-            name: row.view(COLUMNS[name].base).reshape(self.num_envs, *COLUMNS[name].shape)
-            for name, row in zip(wanted, rows)
-        }
+        return {name: row.view(COLUMNS[name].base).reshape(-1, *COLUMNS[name].shape) for name, row in zip(wanted, rows)}
 
     def state(self) -> dict[str, Array]:
         """Everything that :meth:`restore` needs: all columns, and ``"stream"``, uint32 ``[num_envs, 2]``."""
@@ -373,7 +371,9 @@ class Batch(_offtrack.Batch):
         columns = []
         for name, dtype in COLUMNS.items():
             column = np.asarray(state[name])
-            if column.dtype != dtype.base or column.shape != (self.num_envs, *dtype.shape):
+            # Which columns have no rows is known where they are stored.
+            n = self.num_envs if column.size else 0
+            if column.dtype != dtype.base or column.shape != (n, *dtype.shape):
                 needed = f"{dtype.base} of shape {(self.num_envs, *dtype.shape)}"
                 raise ValueError(f"{name}: {column.dtype} of shape {column.shape}; {needed} is needed")
             columns.append((name, np.ascontiguousarray(column).reshape(-1).view(np.uint8)))

@@ -114,7 +114,8 @@ class Evaluation:
             "success_low": low,
             "success_high": high,
             **{f"success_{end}_over_routes": value for end, value in ends.items()},
-            "ends": {ended.name.lower(): self.counts.get(ended.name.lower(), 0) for ended in Ended if ended},
+            # Those of other vehicles only where there are any.
+            "ends": {ended.name.lower(): 0 for ended in Ended if 0 < ended < Ended.MET_VEHICLE} | self.counts,
             "routes": self.success_by_route,
         }
 

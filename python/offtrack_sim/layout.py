@@ -21,6 +21,10 @@ class Ended(enum.IntEnum):
     JACKKNIFED = 5
     STRAYED = 6
     TIMED_OUT = 7
+    MET_VEHICLE = 8
+    """The truck is at fault of a contact with another vehicle."""
+    WAS_MET = 9
+    """The other vehicle is at fault: no failure of the truck."""
 
 
 assert [ended.name.lower() for ended in Ended] == _offtrack.end_codes()

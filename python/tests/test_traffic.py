@@ -62,7 +62,7 @@ def test_a_policy_of_python_that_observes_vehicles_is_written_and_drives(tmp_pat
     layers = [(0.1 * rng.standard_normal((n, m)), np.zeros(m)) for n, m in ((111, 16), (16, 36))]
     file = tmp_path / "policy.safetensors"
     export.save(file, layers, scenario="traffic2026")
-    policy = Policy(file)
+    policy = Policy.load(file)
     batch = Batch("traffic2026", N, seed=1, routes=["20m"])
     assert policy.vehicles and policy.extras == []
     policy.check(batch)

@@ -62,6 +62,7 @@ speed_changes_kmh = [-5.0, 0.0, 5.0]
 range = 20.0
 [observation]
 extras = "mass"
+vehicles = true
 [disturbances]
 range_noise = 0.05
 dropped_rays = 0.01

@@ -28,7 +28,7 @@ class Batch {
   makeBuffers(fixed) {
     const { gpu, n, code } = this;
     const { structs, columns, journal } = code;
-    this.columns = code.buffers.filter(({ kind }) => kind === "column").map(({ name }) => name);
+    this.columns = code.buffers.filter(({ kind, name }) => kind === "column" && name in columns).map(({ name }) => name);
     this.rowBytes = this.columns.reduce((sum, name) => sum + columns[name].bytes, 0);
     const facts = new DataView(new ArrayBuffer(structs.BatchFacts.size));
     const words = {
