@@ -338,8 +338,8 @@ class Batch(_offtrack.Batch):
         return int(np.flatnonzero(rows == found[0])[0])
 
     def columns(self, *names: str) -> dict[str, Array]:
-        """Copies of columns, all of them where none is named: arrays of ``num_envs`` rows, see :data:`COLUMNS`, of those
-        of vehicles without rows where there are none.
+        """Copies of columns, all where none is named: arrays of ``num_envs`` rows, see :data:`COLUMNS`, of those of
+        vehicles without rows where there are none.
 
         ``batch.columns("truck")["truck"]["speed"]`` is every truck's speed [m/s]. From a graphics device only the named
         ones are read.
