@@ -51,7 +51,8 @@ fn compare(right: &Arc<World>) {
     let start = first(&varied);
     let all: Vec<u32> = (0..right.routes.len() as u32).collect();
     let mut simulator = Simulator::new(right.clone(), N_ENVS, SEED, RouteChoice::Drawn(all)).unwrap();
-    simulator.restore(|column| start.get(&column).map(Vec::as_slice)).unwrap();
+    // Columns of vehicles have no rows.
+    simulator.restore(|column| Some(start.get(&column).map_or(&[], Vec::as_slice))).unwrap();
     let (mut worlds, mut jobs, mut files) = (vec![right.clone()], Vec::new(), HashMap::new());
     let mut batches = Vec::new();
     let mut stages: Vec<Value> = Vec::new();
