@@ -13,7 +13,7 @@ const LAYERS = {
   wheels: ["wheels", "body_colour", { VERTEX: TRUCK }],
 };
 /** Bytes of `View` and `Theme` in view.wgsl; most steps of a path that are drawn; no truck. */
-const VIEW_BYTES = 48, THEME_BYTES = 384, MOST_POINTS = 1024, NOBODY = 0xffffffff;
+const VIEW_BYTES = 48, THEME_BYTES = 416, MOST_POINTS = 1024, NOBODY = 0xffffffff;
 /** Colours of `Theme`, in order; then those of the ends. */
 const THEME = ["solid", "road", "kerb", "panel", "ink", "route", "tractor", "trailer", "ray", "steer-right",
   "steer-straight", "steer-left", "transfer-low", "transfer-high", "begun", "done"];

@@ -59,7 +59,7 @@ struct Theme {
     begun: vec4<f32>,
     done: vec4<f32>,
     // By end code.
-    ends: array<vec4<f32>, 8>,
+    ends: array<vec4<f32>, 10>,
 }
 
 // Where a route's roundabout lies in the picture, or a place and one of its routes.
