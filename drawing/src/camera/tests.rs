@@ -291,18 +291,22 @@ fn another_vehicle_is_where_it_is_with_the_colour_of_its_kind_and_lit_brakes() {
         is_rude: false,
     };
     let van = Vehicle { length: 7.0, width: 2.1, ..car };
-    for (vehicle, kind, brakes) in [
-        (car, colour::CAR, false),
-        (van, colour::VAN, false),
-        (Vehicle { acceleration: -2.0, ..car }, colour::CAR, true),
-    ] {
+    let braking = Vehicle { acceleration: -2.0, ..car };
+    let [plain, _, lit] = [(car, colour::CAR), (van, colour::VAN), (braking, colour::CAR)].map(|(vehicle, kind)| {
         let vehicles = [vehicle];
         let shown = Shown { truck: &truck, ranges: &ranges(&truck), ended: Ended::Running, vehicles: &vehicles };
         let picture = camera.draw(&shown).to_vec();
-        let at = |point: [f32; 2]| seen(&camera, &picture, DVec2::new(point[0].into(), point[1].into()));
-        assert_eq!(at(vehicle.position), is(kind));
-        assert_eq!(picture.chunks_exact(3).any(|pixel| pixel == is(colour::BRAKES)), brakes);
-    }
+        let [x, y] = vehicle.position.map(f64::from);
+        assert_eq!(seen(&camera, &picture, DVec2::new(x, y)), is(kind));
+        picture
+    });
+    // Brake lights are smaller than pixels: these turn red.
+    let changed = plain.chunks_exact(3).zip(lit.chunks_exact(3)).filter(|(plain, lit)| plain != lit);
+    let (n, n_redder) = changed.fold((0, 0), |(n, n_redder), (plain, lit)| {
+        let redness = |pixel: &[u8]| i32::from(pixel[0]) - i32::from(pixel[1]);
+        (n + 1, n_redder + usize::from(redness(plain) < redness(lit)))
+    });
+    assert!(0 < n && n == n_redder, "{n_redder} of {n}");
     assert_ne!(drawn(&mut camera, &truck, Ended::Running), {
         let shown = Shown { truck: &truck, ranges: &ranges(&truck), ended: Ended::Running, vehicles: &[car] };
         camera.draw(&shown).to_vec()
