@@ -43,11 +43,11 @@ pub use others::{Nobody, Others};
 pub use paths::{begins, speed_limit};
 pub use row::Row;
 pub use rules::Rules;
-pub use run::Run;
+pub use run::{Run, overlaps};
 pub use snapshots::{N_SNAPSHOTS, Snapshots};
 pub use step::{Setting, advance, decide, step};
 pub use survey::Survey;
-pub use truck::{Contact, Entry, Trucks, View, outlines, touched};
+pub use truck::{Contact, Entry, Trucks, View, outlines, stretched, touched};
 
 use crate::files::reader::shown;
 

@@ -99,7 +99,7 @@ fn check_control(world: &World, env: usize, control: &Control) -> Result<(), Err
 /// The vehicles around a truck.
 fn check_cars(world: &World, env: usize, truck: &Truck, row: &Row) -> Result<(), Error> {
     let Some(traffic) = &world.traffic else { return Ok(()) };
-    let road = &traffic.roads[world.routes[truck.route as usize].roundabout as usize];
+    let road = traffic.road(world, truck.route);
     within(Column::Cars, env, ".level", row.level as usize, 0..=road.levels.len() - 1)?;
     within(Column::Cars, env, ".entered", row.entered, 0..=truck.steps)?;
     within(Column::Cars, env, ".met", row.met % 64, 0..=N_CARS as u32)?;

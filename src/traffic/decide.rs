@@ -6,8 +6,10 @@
 
 mod entry;
 
+pub(super) use entry::{GONE_BEFORE, LEAST_CROSSING};
+
 use super::clock::Clock;
-use super::model::{ONE, acceleration, braking_of, following, square, stopping, time};
+use super::model::{ONE, acceleration, braking_of, following, square, still_stops, stopping, time};
 use super::network::{Kind, Stretch, cell};
 use super::rules::{SPEED_PARTS, TIME_PARTS};
 use super::units::{FAR, length, speed};
@@ -16,21 +18,19 @@ use super::{Car, Network, Others, Rules};
 /// Most slots of a row.
 pub(super) const MOST_CARS: usize = 64;
 /// Nothing farther ahead of a car is looked at.
-const SIGHT: i32 = length(32.0);
+pub(super) const SIGHT: i32 = length(32.0);
 /// The same of a car that may come to meet it.
-const SIGHT_OF_OTHERS: i32 = length(45.0);
+pub(super) const SIGHT_OF_OTHERS: i32 = length(45.0);
 /// What may matter of a car begins so far behind its rear.
 const BEHIND: i32 = length(0.5);
 /// A zone is left once the rear is so far behind it.
-const LEFT: i32 = length(0.3);
+pub(super) const LEFT: i32 = length(0.3);
 /// Two cars that have it before them agree on who is first from this distance on.
 const AGREED: i32 = length(35.0);
-/// A car can still stop before its line at 4 m/s²: within an eighth of its squared speed.
-const STOPS_WITHIN: u32 = 3;
 /// Twice the braking above which a car does not stop for another that is about as near (m/s²).
 const GOES_ABOVE: i32 = 7;
 /// Least speed in a time to a zone.
-const LEAST_SPEED: i32 = speed(4.0);
+pub(super) const LEAST_SPEED: i32 = speed(4.0);
 /// Least wished speed.
 const LEAST_WISHED: i32 = speed(0.5);
 /// Steps after which one that has been standing goes by the coin.
@@ -105,8 +105,7 @@ impl<'a> Crowd<'a> {
             length: car.extent(),
             line,
             standing: car.standing(),
-            // A car that cannot stop before its line any more has entered.
-            waits: station + (square >> STOPS_WITHIN) <= line,
+            waits: still_stops(station, square, line),
             is_rude: car.is_rude(),
         }
     }
@@ -292,8 +291,8 @@ impl<'a> Driver<'a> {
         self.stops = true;
     }
 
-    /// Keeps off the lanes that it crosses while what it follows leaves it no room behind them: station of its rear, and
-    /// its speed (2^-10 m, 2^-14 m a step).
+    /// Keeps off the lanes that it crosses while what it follows leaves it no room behind them: station of its rear,
+    /// and its speed (2^-10 m, 2^-14 m a step).
     pub fn note_leader(&mut self, rear: i32, speed: i32) {
         if rear < self.leader.0 {
             self.leader = (rear, speed);

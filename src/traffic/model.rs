@@ -1,8 +1,9 @@
 //! The intelligent driver model in integers, and what else decisions compute of distances and speeds.
 //!
 //! Units are those of [`super::units`]. An interaction is the square of the wished gap over the gap, in units of 2^-16:
-//! squares are compared wherever the model compares ratios, so that no root is needed. Every product fits in 32 bits for
-//! speeds in 0..[`FASTEST`], distances below [`FAR`](super::units::FAR) and headways below 3.5 s; the tests try the ends.
+//! squares are compared wherever the model compares ratios, so that no root is needed. Every product fits in 32 bits
+//! for speeds in 0..[`FASTEST`], distances below [`FAR`](super::units::FAR) and headways below 3.5 s; the tests try the
+//! ends.
 
 use super::Car;
 use super::units::{length, speed};
@@ -51,6 +52,12 @@ pub(super) fn way_of_a_second(speed: i32) -> i32 {
     (10 * speed) >> 4
 }
 
+/// Whether what has a squared speed can still stop before a line at 4 m/s², within an eighth of that: what cannot any
+/// more has entered (2^-10 m, 2^-10 m²/s²).
+pub(super) fn still_stops(station: i32, square: i32, line: i32) -> bool {
+    station + (square >> 3) <= line
+}
+
 /// Interaction with something ahead, that a car with a headway and a wished gap at rest follows (1/256 step, 2^-10 m).
 pub(super) fn following(gap: i32, own: i32, other: i32, headway: i32, at_rest: i32) -> i32 {
     let approaching = (((own * (own - other)) >> 10) * PER_PRODUCT) >> 14;
@@ -80,7 +87,8 @@ fn interaction(wished: i32, gap: i32) -> i32 {
     ((ratio * ratio) >> (2 * RATIO_BITS - 16)) as i32
 }
 
-/// The acceleration of a car with a speed, a wished speed and an interaction, in the units of a state (2^-19 m a step²).
+/// The acceleration of a car with a speed, a wished speed and an interaction, in the units of a state (2^-19 m a
+/// step²).
 pub(super) fn acceleration(speed: i32, wished: i32, interaction: i32) -> i32 {
     let part = (((speed as u32) << 15) / wished as u32).min(MOST_PART);
     let squared = (part * part) >> 16;

@@ -43,10 +43,7 @@ impl<'a> Run<'a> {
 
     /// Number of pairs of cars that overlap: 0 where the model holds.
     pub fn overlaps(&self) -> usize {
-        let outlines = self.cars.iter().filter(|car| car.is_there()).map(|car| car.outline(self.setting.network));
-        let outlines: Vec<_> = outlines.collect();
-        let pairs = (0..outlines.len()).flat_map(|one| (0..one).map(move |other| (one, other)));
-        pairs.filter(|&(one, other)| outlines[one].overlaps(&outlines[other])).count()
+        overlaps(self.setting.network, &self.cars)
     }
 
     /// Number of cars that wait outside at a source.
@@ -58,4 +55,11 @@ impl<'a> Run<'a> {
     pub fn fill(&mut self, source: usize) {
         arrivals::fill(&mut self.backlog, source);
     }
+}
+
+/// Number of pairs of cars of a road that overlap.
+pub fn overlaps(network: &Network, cars: &[Car]) -> usize {
+    let outlines: Vec<_> = cars.iter().filter(|car| car.is_there()).map(|car| car.outline(network)).collect();
+    let pairs = (0..outlines.len()).flat_map(|one| (0..one).map(move |other| (one, other)));
+    pairs.filter(|&(one, other)| outlines[one].overlaps(&outlines[other])).count()
 }

@@ -18,7 +18,7 @@ mod view; // a truck as cars see it
 use std::cell::Cell;
 
 pub use contact::{Contact, Entry, touched};
-pub use view::{View, outlines};
+pub use view::{View, outlines, stretched};
 
 use super::decide::Driver;
 use super::units::length;

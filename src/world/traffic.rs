@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicU64;
 use bytemuck::cast_slice;
 use rayon::prelude::*;
 
-use super::Error;
+use super::{Error, World};
 use crate::files::cache::Loading;
 use crate::map::route::Route;
 use crate::scenario::{Invalid, Place, Scenario};
@@ -59,6 +59,11 @@ pub struct TrafficRoute {
 }
 
 impl Traffic {
+    /// The road of a route of the world that this is a part of.
+    pub fn road(&self, world: &World, route: u32) -> &TrafficRoad {
+        &self.roads[world.routes[route as usize].roundabout as usize]
+    }
+
     /// Every table as words, one road after the other.
     pub(super) fn words(&self) -> impl Iterator<Item = Vec<u32>> {
         let Traffic { rules, rude, spacing, is_observed, hindrance, roads, routes } = self;

@@ -138,7 +138,7 @@ fn no_episode_begins_behind_a_vehicle_that_the_truck_could_not_stop_for() {
     let mut n_on_lane = 0;
     for (env, row) in rows(&simulator).iter().enumerate() {
         let (truck, progress) = (&simulator.batch().truck[env], &simulator.batch().progress[env]);
-        let network = &traffic.roads[world.routes[truck.route as usize].roundabout as usize].network;
+        let network = &traffic.road(&world, truck.route).network;
         let view = seen_by_vehicles(&world, truck, progress).unwrap();
         let source = network.paths[view.path].source;
         let of_lane = row.cars.iter().filter(|car| car.is_there() && network.paths[car.path()].source == source);

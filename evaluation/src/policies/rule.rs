@@ -3,7 +3,7 @@
 //! `follows` keeps behind what is ahead and off what it would sweep over, and enters blind. `yields` also waits before
 //! its line until what has entered leaves it a gap: that is what a learner must beat.
 
-use offtrack::layout::{Action, N_VALUES, Truck};
+use offtrack::layout::{Action, N_VALUES};
 use offtrack::physics::seen_by_vehicles;
 use offtrack::simulator::{Actions, Batch};
 use offtrack::traffic::car::Outline;
@@ -71,10 +71,10 @@ impl Rule {
     fn speed(&self, world: &World, batch: &Batch, env: usize) -> f32 {
         let (truck, row) = (&batch.truck[env], Row::of(&batch.cars[env]));
         let fastest = world.params.target_speed_max;
-        let (Some(network), Some(view)) = (network(world, truck), seen_by_vehicles(world, truck, &batch.progress[env]))
-        else {
+        let (Some(shared), Some(view)) = (&world.traffic, seen_by_vehicles(world, truck, &batch.progress[env])) else {
             return fastest;
         };
+        let network = &shared.road(world, truck.route).network;
         let mut speed = fastest.min(SHOWN);
         let cars = || row.cars.iter().filter(|car| car.is_there());
         let stop = metres(network.paths[view.path].line) - STOPS_BEFORE - metres(view.station);
@@ -120,11 +120,6 @@ impl Controller for Rule {
             Actions::Indices(wanted.iter().map(|wanted| rounded(world, wanted)).collect())
         }
     }
-}
-
-fn network<'a>(world: &'a World, truck: &Truck) -> Option<&'a Network> {
-    let shared = world.traffic.as_ref()?;
-    Some(&shared.roads[world.routes[truck.route as usize].roundabout as usize].network)
 }
 
 /// The action of the nearest speed, and of those with the nearest steer angle.

@@ -39,8 +39,7 @@ impl Vehicle {
     /// Those around a truck of a batch on the CPU, as the road is driven; none in a world without.
     pub fn around(world: &World, batch: &Batch, env: usize) -> Vec<Vehicle> {
         let (Some(shared), Some(words)) = (&world.traffic, batch.cars.get(env)) else { return Vec::new() };
-        let roundabout = world.routes[batch.truck[env].route as usize].roundabout;
-        let network = &shared.roads[roundabout as usize].network;
+        let network = &shared.road(world, batch.truck[env].route).network;
         let there = Row::of(words).cars.iter().enumerate().filter(|(_, car)| car.is_there());
         let vehicle = |(slot, car): (usize, &offtrack::traffic::Car)| {
             let Outline { middle, along, half_length, half_width } = car.outline(network);

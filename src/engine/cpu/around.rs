@@ -8,13 +8,13 @@ use std::array::from_fn;
 
 use glam::Vec2;
 
-use super::traffic::{road_of, view};
+use super::traffic::front_station;
 use crate::engine::Row;
 use crate::layout::angle::direction;
 use crate::layout::{N_AROUND, N_CARS, N_NEAREST, first_of_vehicles};
 use crate::traffic::car::Outline;
-use crate::traffic::units::metres;
-use crate::traffic::{self, Car, Kind, Network, Stretch};
+use crate::traffic::units::{length, metres};
+use crate::traffic::{self, Car, Kind, Network, Stretch, outlines, stretched};
 use crate::world::World;
 
 /// Time that is observed as 1 (s).
@@ -58,14 +58,14 @@ const NEAREST_AT: usize = first_of_vehicles("vehicle");
 pub fn around(world: &World, row: &Row) -> Option<[f32; N_AROUND]> {
     let shared = world.traffic.as_ref().filter(|shared| shared.is_observed)?;
     let cars = &traffic::Row::of(row.cars.as_ref()?).cars;
-    let truck = &row.truck;
-    let seen = view(world, shared, truck, row.progress);
+    let (truck, rig) = (&row.truck, world.rig(row.truck));
     let observing = Observing {
-        network: &road_of(world, shared, truck.route).network,
-        path: seen.path,
-        front: metres(seen.station),
-        length: metres(seen.length),
-        units: seen.now,
+        network: &shared.road(world, truck.route).network,
+        path: shared.routes[truck.route as usize].path as usize,
+        // As vehicles see it.
+        front: metres(length(front_station(world, shared, truck, row.progress.waypoint))),
+        length: metres(stretched(rig)),
+        units: outlines(rig, truck),
         origin: truck.position,
         along: direction(truck.heading),
     };

@@ -21,7 +21,7 @@ const STOPS_WITH: f32 = 3.0;
 pub fn traffic(world: &World, row: &mut Row) {
     let (Some(shared), Some(words)) = (&world.traffic, &mut row.cars) else { return };
     let around = traffic::Row::of_mut(words);
-    let TrafficRoad { network, levels } = road_of(world, shared, row.truck.route);
+    let TrafficRoad { network, levels } = shared.road(world, row.truck.route);
     let view = view(world, shared, row.truck, row.progress);
     if !view.waits && around.entered == 0 {
         around.entered = row.truck.steps + 1;
@@ -48,23 +48,19 @@ pub fn traffic(world: &World, row: &mut Row) {
     around.hindered = trucks.hindered() & !came & there.fold(0, |bits, slot| bits | 1 << slot);
 }
 
-pub(super) fn road_of<'a>(world: &World, shared: &'a Traffic, route: u32) -> &'a TrafficRoad {
-    &shared.roads[world.routes[route as usize].roundabout as usize]
-}
-
 /// A truck as the vehicles around it see it, if the world has any.
 pub fn seen_by_vehicles(world: &World, truck: &Truck, progress: &Progress) -> Option<View> {
     world.traffic.as_ref().map(|shared| view(world, shared, truck, progress))
 }
 
-pub(super) fn view(world: &World, shared: &Traffic, truck: &Truck, progress: &Progress) -> View {
-    let network = &road_of(world, shared, truck.route).network;
+fn view(world: &World, shared: &Traffic, truck: &Truck, progress: &Progress) -> View {
+    let network = &shared.road(world, truck.route).network;
     let path = shared.routes[truck.route as usize].path as usize;
     View::new(network, world.rig(truck), truck, path, front_station(world, shared, truck, progress.waypoint))
 }
 
 /// Station of a truck's front on its path, by the next waypoint of its route; negative before the path's beginning (m).
-pub fn front_station(world: &World, shared: &Traffic, truck: &Truck, next: u32) -> f32 {
+pub(super) fn front_station(world: &World, shared: &Traffic, truck: &Truck, next: u32) -> f32 {
     let begins = shared.routes[truck.route as usize].begins;
     let rig = world.rig(truck);
     let waypoints = world.route_waypoints(truck.route);
@@ -81,7 +77,7 @@ pub fn front_station(world: &World, shared: &Traffic, truck: &Truck, next: u32) 
 pub fn meet(world: &World, row: &mut Row) {
     let (Some(shared), Some(words)) = (&world.traffic, &mut row.cars) else { return };
     let around = traffic::Row::of_mut(words);
-    let network = &road_of(world, shared, row.truck.route).network;
+    let network = &shared.road(world, row.truck.route).network;
     let TrafficRoute { path, .. } = shared.routes[row.truck.route as usize];
     let steps = (around.entered != 0).then(|| row.truck.steps + 1 - around.entered);
     let entry = Entry { arm: network.source_of(path as usize).entry, steps };
@@ -130,7 +126,7 @@ fn drawn(Stream { seed, env }: Stream, episode: u32) -> [u32; 4] {
 /// Puts the vehicles of a snapshot around a truck that begins an episode before the waypoint `next`, but for those that
 /// are too near to it.
 pub fn surrounded(world: &World, shared: &Traffic, stream: Stream, truck: &Truck, next: u32) -> traffic::Row {
-    let road = road_of(world, shared, truck.route);
+    let road = shared.road(world, truck.route);
     let [level, snapshot, ..] = drawn(stream, truck.episode);
     let level = random::index_below(level, road.levels.len() as u32);
     let Level { snapshots, .. } = &road.levels[level as usize];

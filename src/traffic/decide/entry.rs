@@ -12,12 +12,12 @@ const OF_ENTRY: i32 = length(ENTRY as f32);
 /// Least speed in the time to the line.
 const LEAST_APPROACH: i32 = speed(3.0);
 /// Least speed in the time until a crossing is free.
-const LEAST_CROSSING: i32 = speed(1.0);
+pub(in crate::traffic) const LEAST_CROSSING: i32 = speed(1.0);
 /// Steps of standing after which a lag would be 0, and how many are left of them at least.
 const IMPATIENCE: i32 = 100;
 const LEAST_PATIENCE: i32 = 30;
 /// Time by which a car that crosses ahead must be gone before this one is there.
-const GONE_BEFORE: i32 = ticks(0.5);
+pub(in crate::traffic) const GONE_BEFORE: i32 = ticks(0.5);
 /// A car that follows one slower than this stays off the lanes that it crosses.
 const SLOW: i32 = speed(3.0);
 /// A car is let in within this distance of its line, below this speed.

@@ -2,23 +2,13 @@
 //! enter beside it.
 
 use super::view::View;
-use crate::traffic::decide::Driver;
+use crate::traffic::decide::{Driver, GONE_BEFORE, LEAST_CROSSING, LEAST_SPEED, LEFT, SIGHT, SIGHT_OF_OTHERS};
 use crate::traffic::model::time;
 use crate::traffic::network::{Kind, Stretch};
-use crate::traffic::units::{length, speed, time as ticks};
+use crate::traffic::units::time as ticks;
 
 /// A truck takes longer to pass than a car: so much is added to the lag.
 const LONGER: i32 = ticks(1.5);
-/// Nothing farther ahead of a car is looked at, and no truck that is farther before where they meet.
-const SIGHT: i32 = length(32.0);
-const SIGHT_OF_TRUCK: i32 = length(45.0);
-/// A zone is left once the rear is so far behind it.
-const LEFT: i32 = length(0.3);
-/// Least speed in the time until a truck comes, and until it is gone.
-const LEAST_SPEED: i32 = speed(4.0);
-const LEAST_LEAVING: i32 = speed(1.0);
-/// Time by which a truck that crosses ahead must be gone before the car is there.
-const GONE_BEFORE: i32 = ticks(0.5);
 
 /// Takes a truck's place on its path into account.
 pub(super) fn mind(view: &View, driver: &mut Driver) {
@@ -37,7 +27,7 @@ pub(super) fn mind(view: &View, driver: &mut Driver) {
 fn is_in_the_way(view: &View, driver: &Driver, zone: &Stretch) -> bool {
     let me = driver.me;
     let is_of_entry = zone.kind == Kind::Wide || driver.is_of_entry(zone);
-    let out_of_sight = SIGHT < zone.a_in - me.station || SIGHT_OF_TRUCK < zone.b_in - view.station;
+    let out_of_sight = SIGHT < zone.a_in - me.station || SIGHT_OF_OTHERS < zone.b_in - view.station;
     let rear = view.station - view.length;
     if !is_of_entry || zone.a_in <= me.station || out_of_sight || zone.b_out + LEFT < rear {
         return false;
@@ -53,7 +43,7 @@ fn is_in_the_way(view: &View, driver: &Driver, zone: &Stretch) -> bool {
     match zone.kind {
         // It may need the lanes beside its own.
         Kind::Soft | Kind::Wide => true,
-        Kind::Cross => to_line + GONE_BEFORE < time((zone.b_out - rear).max(0), view.speed.max(LEAST_LEAVING)),
+        Kind::Cross => to_line + GONE_BEFORE < time((zone.b_out - rear).max(0), view.speed.max(LEAST_CROSSING)),
         // Once its rear has passed, it is followed as what is in the corridor.
         Kind::Follow => rear - zone.delta < zone.a_in,
     }

@@ -7,13 +7,11 @@ use crate::layout::angle::{direction, sin_cos};
 use crate::layout::{Body, Rig, Truck};
 use crate::traffic::Network;
 use crate::traffic::car::Outline;
-use crate::traffic::model::{FASTEST, square, way_of_a_second};
+use crate::traffic::model::{FASTEST, square, still_stops, way_of_a_second};
 use crate::traffic::units::{length, speed};
 
 /// A truck swings out before its line: it has entered so far before the line of cars.
 const SWINGS_OUT: i32 = length(2.5);
-/// It can still stop before its line at 4 m/s², as a car can: within an eighth of its squared speed.
-const STOPS_WITHIN: u32 = 3;
 /// Steps to each of the two times at which it is foreseen, and how long they are (s).
 const STEPS_AHEAD: usize = 2;
 const STEP_AHEAD: f32 = 0.5;
@@ -47,7 +45,7 @@ impl View {
     pub fn new(network: &Network, rig: &Rig, truck: &Truck, path: usize, station: f32) -> View {
         let station = length(station);
         let speed = speed(truck.speed).clamp(0, FASTEST);
-        let waits = station + (square(speed) >> STOPS_WITHIN) <= network.paths[path].line - SWINGS_OUT;
+        let waits = still_stops(station, square(speed), network.paths[path].line - SWINGS_OUT);
         let now = outlines(rig, truck);
         let later = if waits { [now[0], now[1], now[0], now[1]] } else { foreseen(rig, truck) };
         let middle = 0.25 * (now[0].middle + now[1].middle + later[2].middle + later[3].middle);
@@ -56,7 +54,7 @@ impl View {
             path,
             station,
             speed,
-            length: length(rig.tractor_body.front - rig.fifth_wheel + rig.trailer_wheelbase - rig.trailer_body.rear),
+            length: stretched(rig),
             waits,
             velocity: truck.speed * direction(truck.heading),
             now,
@@ -70,6 +68,11 @@ impl View {
     pub(super) fn way_of_two_seconds(&self) -> i32 {
         2 * way_of_a_second(self.speed)
     }
+}
+
+/// Length of a tractor and its trailer, stretched (2^-10 m).
+pub fn stretched(rig: &Rig) -> i32 {
+    length(rig.tractor_body.front - rig.fifth_wheel + rig.trailer_wheelbase - rig.trailer_body.rear)
 }
 
 /// The ground that tractor and trailer cover.
