@@ -1,11 +1,11 @@
 //! Drives a truck that follows and yields among cars over all routes of the study, prints how the episodes ended, and
 //! what the cars cost.
 //!
-//! `cargo run --release -p offtrack-policy --example among_cars -- [TIMES] [RUDE] [DEMAND]...`: each route 3 times, no
-//! rude drivers, 300, 900, 1,500 and 2,100 veh/h unless stated. The time of a step is that of a truck on all cores, in
-//! ratio to the same actions on empty roads: both are driven in turns.
+//! `cargo run --release -p offtrack-evaluation --example among_cars -- [TIMES] [RUDE] [DEMAND]...`: each route 3 times,
+//! no rude drivers, 300, 900, 1,500 and 2,100 veh/h unless stated. The time of a step is that of a truck on all cores,
+//! in ratio to the same actions on empty roads: both are driven in turns.
 
-#[path = "../policy/tests/among_cars/driver.rs"]
+#[path = "../evaluation/tests/among_cars/driver.rs"]
 #[expect(clippy::unwrap_used, reason = "it is a helper of tests too")]
 mod driver;
 

@@ -13,8 +13,8 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// The values of these names. A name is an extra's, a group's of [`OBSERVATION`] or [`VEHICLE_VALUES`], which stands
-    /// for all of its values, or `group[2]`, which stands for the third of them.
+    /// The values of these names. A name is an extra's, a group's of [`OBSERVATION`] or [`VEHICLE_VALUES`], which
+    /// stands for all of its values, or `group[2]`, which stands for the third of them.
     ///
     /// # Errors
     ///
@@ -44,8 +44,8 @@ impl Selection {
         &self.names
     }
 
-    /// The indices of the values, of which the first [`N_VALUES`] are an observation's, those behind are extras, and the
-    /// last ones are of other vehicles.
+    /// The indices of the values, of which the first [`N_VALUES`] are an observation's, those behind are extras, and
+    /// the last ones are of other vehicles.
     pub fn indices(&self) -> &[usize] {
         &self.indices
     }
