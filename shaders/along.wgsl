@@ -1,9 +1,9 @@
 // Where a truck stands that begins along its route: as if its reference point had followed the route from the first
 // waypoint to this one.
 //
-// A trailer that stood straight behind in a bend would cut it, or hang out of it. How it stands depends on the way there
-// and on the vehicle, so both units' headings are integrated along the waypoints when an episode begins. Wheels, slip of
-// the tyres and lean are as a constant turn of that curvature asks for at that speed.
+// A trailer that stood straight behind in a bend would cut it, or hang out of it. How it stands depends on the way
+// there and on the vehicle, so both units' headings are integrated along the waypoints when an episode begins. Wheels,
+// slip of the tyres and lean are as a constant turn of that curvature asks for at that speed.
 
 // Index of the waypoint of a route with `n_waypoints` at which a truck begins that starts `along` it: the last but one
 // at most, since one is yet to pass.
@@ -12,7 +12,8 @@ fn first_waypoint(n_waypoints: u32, along: f32) -> u32 {
 }
 
 // The truck with the headings, the wheels and the lean with which it comes to the waypoint of index `last` of a route,
-// once its reference point has followed the route from its first waypoint at a speed (m/s). Both units begin along that.
+// once its reference point has followed the route from its first waypoint at a speed (m/s). Both units begin along
+// that.
 fn standing_at(rig: Rig, speed: f32, route: Route, last: u32) -> Truck {
     let lane = waypoint_at(route.first + last).direction;
     let units = followed_by(rig, speed, route, last);
@@ -78,8 +79,8 @@ fn halfway(behind: WaypointRow, ahead: WaypointRow) -> vec2<f32> {
     return 0.5 * (behind.position + ahead.position) + bulge;
 }
 
-// Heading of a unit of a length (m), from its front end to where it rolls, once its front end has gone this way (m) in a
-// straight line. It then lies on a tractrix: the tangent of half its angle to the line falls exponentially.
+// Heading of a unit of a length (m), from its front end to where it rolls, once its front end has gone this way (m) in
+// a straight line. It then lies on a tractrix: the tangent of half its angle to the line falls exponentially.
 fn pulled(heading: vec2<f32>, unit_length: f32, way: vec2<f32>) -> vec2<f32> {
     let gone = length(way);
     if gone < TINY { return heading; }

@@ -332,9 +332,9 @@ struct Pose {
 // -1..=1, its vehicle, and where along the route. Zeros are the first vehicle on the lane centre at the first
 // waypoint and the middle of the speeds.
 //
-// Beyond the first waypoint both units stand as if the truck had followed the lane to there, with the wheels and the
-// lean that the bend asks for; the errors move and turn it as a whole. The clock begins: the episode has the whole
-// route's time. The start itself is not judged: a truck that touches a kerb there ends with its first step.
+// Beyond the first waypoint both units stand as if the truck had followed the lane to there, with the wheels and
+// the lean that the bend asks for; the errors move and turn it as a whole. The clock begins: the episode has the
+// whole route's time. The start itself is not judged: a truck that touches a kerb there ends with its first step.
 struct Start {
     // Fraction of the largest lateral offset, left positive.
     offset: f32,

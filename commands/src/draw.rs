@@ -35,10 +35,10 @@ pub struct Args {
     /// JSON: {"solids": [[[x, y], ...], ...], "drivable": [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x,
     /// y, heading], ...]}], "frame": {"origin", "hand"}} in metres and radians, x east, y north, the ring's centre at
     /// the origin, which lies at frame.origin in the map. On the hand "left" the simulator drives the road as its
-    /// mirror image in the x axis. No polygon repeats its first point at its end; curves are within 1 cm. `drivable` is the
-    /// surface's outer boundary, then one hole for each island. `solids` are the islands, then the ground beyond the
-    /// outer boundary as two polygons, north and south, up to 5 m past the kerbs. So a point is drivable when an odd
-    /// number of `drivable` contain it, and solid when any of `solids` does.
+    /// mirror image in the x axis. No polygon repeats its first point at its end; curves are within 1 cm. `drivable` is
+    /// the surface's outer boundary, then one hole for each island. `solids` are the islands, then the ground beyond
+    /// the outer boundary as two polygons, north and south, up to 5 m past the kerbs. So a point is drivable when an
+    /// odd number of `drivable` contain it, and solid when any of `solids` does.
     ///
     /// With --route also "sweep": {"vehicle", "load", "speed_kmh", "own_lane_suffices", "tractor_clearance",
     /// "trailer_clearance", "tractor_area", "trailer_area", "limits": [{"limit", "unit", "has", "needs", "exceeded",

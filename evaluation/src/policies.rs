@@ -26,9 +26,9 @@ pub const LOOK_AHEAD: f32 = 7.0;
 const RESPONSE: f64 = 1.5;
 
 /// The policy that a command's `--policy` names: `pursuit`, `random`, `yields`, `follows`, a policy file, or a shipped
-/// policy by its name. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or, where there is none, the
-/// first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random actions. It drives trucks
-/// on `engine`: a learned policy acts there.
+/// policy by its name. Its action table must be the world's. With `None` it is the policy shipped for `benchmark` or,
+/// where there is none, the first that can drive there. `pursuit` is what pure pursuit would be, `seed` that of random
+/// actions. It drives trucks on `engine`: a learned policy acts there.
 pub fn find(
     policy: Option<&str>,
     benchmark: &str,

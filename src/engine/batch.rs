@@ -163,7 +163,8 @@ macro_rules! batch {
                     RouteChoice::Fixed(routes) => RouteChoice::Fixed(indices.iter().map(|&index| routes[index as usize]).collect()),
                     RouteChoice::Drawn(routes) => RouteChoice::Drawn(routes.clone()),
                 };
-                let mut batch = Batch { tally: self.tally, autoreset: self.autoreset, ..Batch::new(indices.len(), self.seed, choice, self.has_vehicles)? };
+                let batch = Batch::new(indices.len(), self.seed, choice, self.has_vehicles)?;
+                let mut batch = Batch { tally: self.tally, autoreset: self.autoreset, ..batch };
                 $(
                     for (row, &index) in batch.$name.iter_mut().zip(indices) {
                         *row = self.$name[index as usize];
@@ -180,7 +181,10 @@ macro_rules! batch {
             /// Every column as its bytes: with them a batch goes on where it was, see
             /// [`crate::simulator::Simulator::restore`].
             pub fn columns(&self) -> [(Column, &[u8]); N_COLUMNS] {
-                [$((Column::$variant, cast_slice(&self.$name)),)* $((Column::$variant_of, cast_slice(&self.$name_of)),)*]
+                [
+                    $((Column::$variant, cast_slice(&self.$name)),)*
+                    $((Column::$variant_of, cast_slice(&self.$name_of)),)*
+                ]
             }
 
             /// Every column's bytes, to be written to.

@@ -98,9 +98,9 @@ crate::shared! {
     /// -1..=1, its vehicle, and where along the route. Zeros are the first vehicle on the lane centre at the first
     /// waypoint and the middle of the speeds.
     ///
-    /// Beyond the first waypoint both units stand as if the truck had followed the lane to there, with the wheels and the
-    /// lean that the bend asks for; the errors move and turn it as a whole. The clock begins: the episode has the whole
-    /// route's time. The start itself is not judged: a truck that touches a kerb there ends with its first step.
+    /// Beyond the first waypoint both units stand as if the truck had followed the lane to there, with the wheels and
+    /// the lean that the bend asks for; the errors move and turn it as a whole. The clock begins: the episode has the
+    /// whole route's time. The start itself is not judged: a truck that touches a kerb there ends with its first step.
     pub struct Start {
         /// Fraction of the largest lateral offset, left positive.
         pub offset: f32,

@@ -5,10 +5,10 @@ use super::{N_AROUND, N_NEAREST, Values};
 
 /// What each of the [`N_AROUND`] values is; indices count from the first of them.
 ///
-/// Values lie in 0..=1, those with a sign in -1..=1. The first eight are about the own entry: what comes on the lanes of
-/// the ring that the truck will take or pass beside. The next four are about its own path and its sides; then come the
-/// vehicles nearest to either unit, nearest first, those of equal distance by their slots. Disturbances do not touch
-/// them.
+/// Values lie in 0..=1, those with a sign in -1..=1. The first eight are about the own entry: what comes on the lanes
+/// of the ring that the truck will take or pass beside. The next four are about its own path and its sides; then come
+/// the vehicles nearest to either unit, nearest first, those of equal distance by their slots. Disturbances do not
+/// touch them.
 pub const VEHICLE_VALUES: [Values; 14] = numbered::<14, N_AROUND>([
     values(
         "entry_arrival",

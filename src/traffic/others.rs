@@ -8,8 +8,8 @@ pub trait Others {
     /// Adds to what a car that decides must mind, after the other cars were weighed.
     fn hinder(&self, _: &mut Driver) {}
 
-    /// What stands nearest before a car that would enter: station of its rear on the car's path (2^-10 m), and its speed
-    /// (2^-14 m a step).
+    /// What stands nearest before a car that would enter: station of its rear on the car's path (2^-10 m), and its
+    /// speed (2^-14 m a step).
     fn ahead(&self, _: &Car) -> Option<(i32, i32)> {
         None
     }

@@ -37,7 +37,8 @@ pub(super) struct Course {
     pub exit_arm: usize,
 }
 
-/// Of every path the station at which a route with so long an approach begins; negative before the path's beginning (m).
+/// Of every path the station at which a route with so long an approach begins; negative before the path's beginning
+/// (m).
 pub fn begins(ground: &Ground, approach: f64) -> Vec<f64> {
     let of = |line: &Line| ground.ring_stations(&line.line).0 - approach - first(ground, line);
     ground.lines.iter().map(of).collect()

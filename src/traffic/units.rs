@@ -2,8 +2,8 @@
 //! or a root of floats is not rounded exactly, and a product and a sum may become one operation.
 //!
 //! A car's state is in 2^-20 m and steps, in which its motion is exact. Decisions read it in coarser units, so that
-//! products fit in 32 bits: lengths in 2^-10 m, speeds in 2^-14 m a step, times in 1/256 step. Shifts to the right round
-//! down, and nothing negative is divided.
+//! products fit in 32 bits: lengths in 2^-10 m, speeds in 2^-14 m a step, times in 1/256 step. Shifts to the right
+//! round down, and nothing negative is divided.
 
 use super::STEP;
 

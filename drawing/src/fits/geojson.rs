@@ -69,7 +69,8 @@ pub fn geojson(road: &Road, gutter: Gutter, shown: &[&Shown], crs: Option<&str>)
 
 /// The features of a swept path.
 fn swept(one: &Shown, frame: &Frame) -> Vec<Value> {
-    let of = |part: &str| json!({"part": part, "route": one.row.movement(), "vehicle": one.row.vehicle, "fits": one.row.verdict()});
+    let (route, vehicle, fits) = (one.row.movement(), &one.row.vehicle, one.row.verdict());
+    let of = |part: &str| json!({"part": part, "route": route, "vehicle": vehicle, "fits": fits});
     let mut features = Vec::new();
     for (part, rings) in ["swept_tractor", "swept_trailer"].into_iter().zip(one.areas()) {
         features.push(feature(of(part), "MultiPolygon", frame.areas(rings)));

@@ -9,7 +9,8 @@ use super::Batch;
 use super::state::State;
 use crate::errors;
 
-/// Offset, heading error and speed of a start as fractions, the index of its vehicle, and how far along its route it is.
+/// Offset, heading error and speed of a start as fractions, the index of its vehicle, and how far along its route it
+/// is.
 pub(super) type GivenStart = (f32, f32, f32, u32, f32);
 
 impl Batch {

@@ -71,9 +71,9 @@ fn followed_by(rig: &Rig, speed: f32, waypoints: &[WaypointRow]) -> Headings {
     units
 }
 
-/// The heading, as a unit vector, of a tractor in a constant turn at a speed (m/s) whose reference point moves along the
-/// lane, where it heads along `tractor` without slip. Slip moves the point that moves along the tractor ahead of its
-/// axle.
+/// The heading, as a unit vector, of a tractor in a constant turn at a speed (m/s) whose reference point moves along
+/// the lane, where it heads along `tractor` without slip. Slip moves the point that moves along the tractor ahead of
+/// its axle.
 fn slipping(rig: &Rig, speed: f32, tractor: Vec2, lane: Vec2) -> Vec2 {
     let lever = 0.5 * rig.wheelbase;
     let side = (lever - slip_lever(rig, speed)) / lever * tractor.perp_dot(lane);

@@ -141,7 +141,8 @@ fn frame(reader: &Reader, crs: Option<&Value>) -> Result<Option<String>, Error> 
 }
 
 /// What would do in place of degrees.
-const PROJECT: &str = "coordinates must be metres, not degrees: project them, as by ogr2ogr -t_srs EPSG:25832 site.geojson degrees.geojson";
+const PROJECT: &str = "coordinates must be metres, not degrees: project them, as by ogr2ogr -t_srs EPSG:25832 \
+                       site.geojson degrees.geojson";
 
 /// An error if the kerbs are as small as they are in degrees.
 fn check_extent(reader: &Reader, kerbs: &[Entity]) -> Result<(), Error> {

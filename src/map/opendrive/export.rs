@@ -1,8 +1,8 @@
 //! A road as an OpenDRIVE map: one junction with a connecting road for each route, a road for each lane of an arm, and
 //! kerbs as roads of their own, in the frame of the map that the road is from.
 //!
-//! Reference lines are the lines and arcs that the road is made of, so nothing is approximated but the widths of gutters
-//! that vary. A lane lies around its reference line, by a lane offset of half its width.
+//! Reference lines are the lines and arcs that the road is made of, so nothing is approximated but the widths of
+//! gutters that vary. A lane lies around its reference line, by a lane offset of half its width.
 
 mod back; // what was written, read back
 mod kerbs; // kerb faces, with the gutters beside them
@@ -27,7 +27,8 @@ struct Written {
     is_connecting: bool,
     /// Reference line around the origin of the road that is written.
     line: Curve,
-    /// How far the lanes are moved to the left of the reference line; a driving lane's own offset puts it around it (m).
+    /// How far the lanes are moved to the left of the reference line; a driving lane's own offset puts it around it
+    /// (m).
     offset: f64,
     lanes: Vec<WrittenLane>,
     predecessor: Option<Link>,

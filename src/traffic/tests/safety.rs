@@ -11,8 +11,8 @@ const STEPS: u32 = 2_000;
 /// Nobody stands so long (steps).
 const FOR_EVER: u32 = 600;
 
-/// What must not be, over a run: steps with overlapping cars, the longest standing, cars beyond the ends of their path or
-/// at speeds and accelerations that nothing decides; and how many cars there were.
+/// What must not be, over a run: steps with overlapping cars, the longest standing, cars beyond the ends of their path
+/// or at speeds and accelerations that nothing decides; and how many cars there were.
 #[derive(Debug, Default)]
 struct Seen {
     overlaps: u32,

@@ -217,8 +217,8 @@ pub fn agreements(column: Column, here: &[u8], there: &[u8], counted: &[bool]) -
 /// Columns, and a change of the world.
 pub type Written = (&'static [Column], Option<fn(&mut World)>);
 
-/// What a stage writes, and one number of the world that it notices to be off by a thousandth. Three stages use no number
-/// of the world.
+/// What a stage writes, and one number of the world that it notices to be off by a thousandth. Three stages use no
+/// number of the world.
 pub fn written(stage: Stage) -> Written {
     match stage {
         Stage::Steer => {

@@ -76,8 +76,8 @@ pub(super) fn ways(reader: &Reader, seen: &Ground, hand: Hand) -> Result<Vec<Wri
     Ok(roads)
 }
 
-/// The lanes of the arms: routes of one arm that are one line there. A right lane to the first exit may be a line of its
-/// own from the arm's end on.
+/// The lanes of the arms: routes of one arm that are one line there. A right lane to the first exit may be a line of
+/// its own from the arm's end on.
 fn arm_lanes(seen: &Ground) -> Vec<ArmLane> {
     let mut lanes: Vec<ArmLane> = Vec::new();
     for (index, route) in seen.lines.iter().enumerate() {
