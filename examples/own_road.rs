@@ -26,10 +26,10 @@ fn text() -> String {
 fn main() -> Result<(), Box<dyn Error>> {
     let road = Road::from_toml("mine", &text())?;
     let rig = Vehicle::named("eu_4x2_13m6")?.rig("laden", 0.05, None);
-    let kerbs = road.kerbs_beyond_ends(Gutter::Drivable);
+    let kerbs = road.unit_kerbs_beyond_ends(Gutter::Drivable);
     for route in road.routes(40.0, 35.0, 2.0)? {
         let path = swept_path(&rig, &route.centre_line, 20.0 / 3.6, 0.25);
-        let suffices = own_lane_suffices(&rig, &kerbs, &path);
+        let suffices = own_lane_suffices(&rig, kerbs.both(), &path);
         println!("{:<16} {}", route.name, if suffices { "keeps its lane" } else { "has to leave its lane" });
     }
     Ok(())

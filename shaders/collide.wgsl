@@ -1,4 +1,4 @@
-// Measures the clearances: from each unit's rectangle to the nearest solid edge.
+// Measures the clearances: from each unit's rectangle to the nearest solid edge. An apron is solid to a tractor alone.
 //
 // A rectangle is a capsule, all points within half its width of a stretch of its centre line, and four corners. Points
 // of the stretch are sampled for the capsule, so that a solid that lies wholly under the unit is found too, and the
@@ -152,7 +152,7 @@ fn sample_first(local: u32, env: u32, unit: u32) {
     let truck = truck[env];
     let body = body_of(truck.vehicle, unit);
     let n_points = n_points_of(unit);
-    let field = field_at(truck.route);
+    let field = unit_field_at(truck.route, unit);
     var position = truck.position;
     var heading = direction(truck.heading);
     if unit == 1u {
@@ -196,7 +196,7 @@ fn halve(local: u32, unit: u32, first: u32, n: u32) {
     let works = first + team < n;
     let member = undecided[min(first + team, n - 1u)];
     let at = bodies_at[member];
-    let field = field_at(body_routes[member]);
+    let field = unit_field_at(body_routes[member], unit);
     let body = body_of(body_vehicles[member], unit);
     let n_points = n_points_of(unit);
     let stack = team * N_SPANS;

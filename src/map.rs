@@ -9,9 +9,11 @@ pub mod opendrive; // maps -> rings
 pub mod drawing; // drawings -> rings
 pub mod parametric; // parameters -> kerbs and lanes
 mod road; // a name and its ground
+mod apron; // strips of islands for trailers alone
 pub mod chosen; // which ring of a map
 pub mod procedural; // random roundabouts, by seed and index
 
+pub use apron::UnitKerbs;
 pub use frame::Frame;
 pub use ground::Kerb;
 pub use road::{Gutter, Road};

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use crate::field::Field;
 use crate::files::cache::{Loading, Stopped};
+use crate::geometry::Outline;
 use crate::layout::{
     Action, Disturbances, N_AROUND, N_PREVIEW, N_RAYS, N_VALUES, Params, PreviewRow, Ray, Reward, Rig, RouteRow, Truck,
     WaypointRow,
@@ -49,8 +50,10 @@ pub struct World {
     pub rays: Vec<[Ray; N_RAYS]>,
     /// The action table.
     pub actions: Vec<Action>,
-    /// One field a roundabout.
+    /// One field a roundabout: of the kerbs that its tractors keep to and distance sensors see.
     pub fields: Vec<Field>,
+    /// One a roundabout with an apron, in the same order: of what its trailers keep to.
+    pub trailer_fields: Vec<Option<Field>>,
     /// Where each roundabout lies in its map, in the same order.
     pub frames: Vec<Frame>,
     /// Every route's waypoints, one route after the other.
@@ -119,6 +122,7 @@ impl World {
         let [slowest, fastest] = scenario.speed_range();
         let [start_least, start_most] = scenario.start_speed.unwrap_or([scenario.cruising_speed(); 2]);
         let step_limits = step_limits(scenario, substep, &waypoints, &routes, loading)?;
+        let (fields, trailer_fields) = fields(scenario, loading)?;
         Ok(World {
             params: Params {
                 substep,
@@ -146,7 +150,8 @@ impl World {
             classes,
             rays,
             actions,
-            fields: fields(scenario, loading)?,
+            fields,
+            trailer_fields,
             frames: scenario.places.iter().map(|place| place.roundabout.ground().frame()).collect(),
             waypoints,
             previews,
@@ -166,7 +171,7 @@ impl World {
         let vehicles = size_of_val(self.rigs.as_slice()) + size_of_val(self.rays.as_slice());
         let shared = size_of_val(&self.params) + size_of_val(&self.reward) + size_of_val(&self.disturbances);
         let shared = shared + size_of_val(self.actions.as_slice());
-        self.fields.iter().map(Field::bytes).sum::<usize>() + routes + vehicles + shared
+        self.all_fields().map(Field::bytes).sum::<usize>() + routes + vehicles + shared
     }
 
     /// Whether an action is a command, and no index into the action table: the table then has two entries, what
@@ -237,10 +242,23 @@ impl World {
         self.params.n_substeps as f32 * self.params.substep
     }
 
-    /// The field that a route runs through.
+    /// The field that a route runs through: of the kerbs that tractors keep to and distance sensors see.
     #[inline]
     pub fn route_field(&self, route: u32) -> &Field {
         &self.fields[self.routes[route as usize].roundabout as usize]
+    }
+
+    /// The fields of what a tractor and a trailer keep to on a route: the same where there is no apron.
+    #[inline]
+    pub fn unit_fields(&self, route: u32) -> [&Field; 2] {
+        let tractor = self.route_field(route);
+        let own = self.trailer_fields[self.routes[route as usize].roundabout as usize].as_ref();
+        [tractor, own.unwrap_or(tractor)]
+    }
+
+    /// Every field: one a roundabout, then those of trailers.
+    pub fn all_fields(&self) -> impl Iterator<Item = &Field> {
+        self.fields.iter().chain(self.trailer_fields.iter().flatten())
     }
 }
 
@@ -261,22 +279,23 @@ fn rigs(scenario: &Scenario, substep: f32) -> (Vec<Rig>, Vec<[Ray; N_RAYS]>) {
     (rigs, rays)
 }
 
-/// The field of every roundabout.
-fn fields(scenario: &Scenario, loading: &Loading) -> Result<Vec<Field>, Stopped> {
+/// The field of every roundabout, and that of its trailers where it has an apron.
+fn fields(scenario: &Scenario, loading: &Loading) -> Result<(Vec<Field>, Vec<Option<Field>>), Stopped> {
     let done = AtomicU64::new(0);
     let field = |place: &Place| {
         loading.check()?;
-        let kerbs = place.roundabout.kerbs(scenario.gutter);
-        let field = match loading.cache {
-            Some(cache) => Field::cached(&kerbs, scenario.cell, cache),
-            None => Field::bake(&kerbs, scenario.cell),
+        let kerbs = place.roundabout.unit_kerbs(scenario.gutter);
+        let baked = |kerbs: &Outline| match loading.cache {
+            Some(cache) => Field::cached(kerbs, scenario.cell, cache),
+            None => Field::bake(kerbs, scenario.cell),
         };
+        let fields = (baked(&kerbs.tractor), kerbs.behind_aprons().map(baked));
         loading.count("baking roads", &done, scenario.places.len());
-        Ok(field)
+        Ok(fields)
     };
-    let fields = scenario.places.par_iter().map(field).collect();
+    let fields = scenario.places.par_iter().map(field).collect::<Result<Vec<_>, Stopped>>();
     loading.cache.inspect(|cache| cache.prune());
-    fields
+    Ok(fields?.into_iter().unzip())
 }
 
 /// Steps after which an episode is timed out, `[n_routes, n_classes]`: multiples of the time that a route takes at the

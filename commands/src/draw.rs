@@ -157,7 +157,7 @@ fn sweep<'a>(args: &Args, roundabout: &Road, route: &'a Route) -> Result<Sweep<'
     check_load(&vehicle, &args.load)?;
     let name = Source::find(Kind::Vehicle, &args.vehicle)?.stem();
     let driven = Driven { vehicle: name, load: args.load.clone(), speed_kmh: args.speed_kmh };
-    Ok(Sweep::new(&vehicle, driven, &roundabout.kerbs_beyond_ends(args.gutter), route))
+    Ok(Sweep::new(&vehicle, driven, &roundabout.unit_kerbs_beyond_ends(args.gutter), route))
 }
 
 fn format(output: &Path) -> Result<Format, Error> {

@@ -223,9 +223,13 @@ impl<'a> Scene<'a> {
 
     /// Where a unit touched a kerb, if that ended the episode.
     fn touched(&self) -> Option<DVec2> {
-        let units = [(Ended::TractorCollided, &self.tractor), (Ended::TrailerCollided, &self.trailer)];
-        let (_, corners) = units.into_iter().find(|(ended, _)| ended.name() == self.recording.ended)?;
-        Some(nearest(corners.last()?, &self.roundabout.kerbs(self.gutter)).0)
+        let kerbs = self.roundabout.unit_kerbs(self.gutter);
+        let units = [
+            (Ended::TractorCollided, &self.tractor, &kerbs.tractor),
+            (Ended::TrailerCollided, &self.trailer, kerbs.trailer()),
+        ];
+        let (_, corners, kerbs) = units.into_iter().find(|(ended, ..)| ended.name() == self.recording.ended)?;
+        Some(nearest(corners.last()?, kerbs).0)
     }
 
     fn title(&self) -> String {

@@ -5,6 +5,7 @@ use glam::DVec2;
 use offtrack::files::reader::shown;
 use offtrack::geometry::Outline;
 use offtrack::layout::Rig;
+use offtrack::map::UnitKerbs;
 use offtrack::map::route::Route;
 use offtrack::vehicle::Vehicle;
 use offtrack::vehicle::swept::{
@@ -74,13 +75,13 @@ struct Unit {
 
 impl<'a> Sweep<'a> {
     /// The path of `vehicle`, which `driven` names, on a road with these kerbs. Those of
-    /// [`Road::kerbs_beyond_ends`](offtrack::map::Road::kerbs_beyond_ends) do not take the road's end
+    /// [`Road::unit_kerbs_beyond_ends`](offtrack::map::Road::unit_kerbs_beyond_ends) do not take the road's end
     /// for one.
     ///
     /// # Panics
     ///
     /// If the vehicle does not have the load.
-    pub fn new(vehicle: &Vehicle, driven: Driven, kerbs: &Outline, route: &'a Route) -> Sweep<'a> {
+    pub fn new(vehicle: &Vehicle, driven: Driven, kerbs: &UnitKerbs, route: &'a Route) -> Sweep<'a> {
         let speed = driven.speed_kmh / 3.6;
         // A sub-step lasts from one pose to the next.
         let rig = vehicle.rig(&driven.load, (SPACING / speed) as f32, None);
@@ -91,12 +92,12 @@ impl<'a> Sweep<'a> {
         Sweep {
             route,
             driven,
-            clears: own_lane_suffices(&rig, kerbs, &poses),
+            clears: own_lane_suffices(&rig, kerbs.both(), &poses),
             needs: Need::of_all(&rig, &demands),
             demands,
             units: [
-                Unit::new("tractor", colour::TRACTOR, colour::SWEPT_BY_TRACTOR, tractor, kerbs),
-                Unit::new("trailer", colour::TRAILER, colour::SWEPT_BY_TRAILER, trailer, kerbs),
+                Unit::new("tractor", colour::TRACTOR, colour::SWEPT_BY_TRACTOR, tractor, &kerbs.tractor),
+                Unit::new("trailer", colour::TRAILER, colour::SWEPT_BY_TRAILER, trailer, kerbs.trailer()),
             ],
             poses,
             rig,

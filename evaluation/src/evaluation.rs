@@ -210,11 +210,11 @@ impl Evaluation<'_> {
         let (rig, stiffest, speed) = (widest(&world.rigs), stiffest(&world.rigs), scenario.cruising_speed());
         let of_one_place: Vec<_> = routes.chunk_by(|(a, ..), (b, ..)| a == b).collect();
         let suffices = |routes: &&[Evaluated]| {
-            let kerbs = routes[0].1.roundabout.kerbs_beyond_ends(scenario.gutter);
+            let kerbs = routes[0].1.roundabout.unit_kerbs_beyond_ends(scenario.gutter);
             let of_route = |route: &Route| {
                 let path = |rig: &Rig| swept_path(rig, &route.centre_line, speed, SPACING);
                 let steered = || steer_angle_max(stiffest, &route.centre_line, &path(stiffest), speed, SPACING);
-                own_lane_suffices(rig, &kerbs, &path(rig)) && steered() <= stiffest.steer_max.into()
+                own_lane_suffices(rig, kerbs.both(), &path(rig)) && steered() <= stiffest.steer_max.into()
             };
             routes.iter().map(|(_, _, route)| of_route(route)).collect::<Vec<bool>>()
         };

@@ -103,14 +103,14 @@ impl Evaluation<'_> {
         if episode.lost_at_start() {
             return "lost at start".to_owned();
         }
-        let (unit, body, position, heading) = match episode.ended {
-            Ended::TractorCollided => ("tractor", &rig.tractor_body, truck.position, truck.heading),
+        let fields = self.world.unit_fields(truck.route);
+        let (unit, field, body, position, heading) = match episode.ended {
+            Ended::TractorCollided => ("tractor", fields[0], &rig.tractor_body, truck.position, truck.heading),
             Ended::TrailerCollided => {
-                ("trailer", &rig.trailer_body, truck.trailer_position(rig), truck.trailer_heading)
+                ("trailer", fields[1], &rig.trailer_body, truck.trailer_position(rig), truck.trailer_heading)
             }
             other => return other.name().replace('_', " "),
         };
-        let field = self.world.route_field(truck.route);
         let points = points(body).map(|point| position + Vec2::from_angle(heading).rotate(point));
         let (_, contact) = points.fold((f32::INFINITY, position), |best, point| {
             let distance = field.distance(point);

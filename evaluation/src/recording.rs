@@ -82,7 +82,7 @@ impl Frame {
     /// Truck `env` after a reset. A reset computes no clearance, so it is computed here.
     fn at_start(world: &World, batch: &Batch, env: usize) -> Frame {
         let truck = &batch.truck[env];
-        Frame::new(world, batch, env, physics::clearance(world.route_field(truck.route), world.rig(truck), truck))
+        Frame::new(world, batch, env, physics::clearance(world.unit_fields(truck.route), world.rig(truck), truck))
     }
 
     fn new(world: &World, batch: &Batch, env: usize, clearance: Clearance) -> Frame {

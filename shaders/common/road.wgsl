@@ -19,10 +19,21 @@ fn route_at(index: u32) -> Route {
     return Route(row.x, row.y, first_preview, bitcast<f32>(row.z), bitcast<f32>(row.w));
 }
 
-// The field of a route's roundabout.
+// The field of a route's roundabout: of the kerbs that tractors keep to and distance sensors see.
 fn field_at(index: u32) -> FieldRow {
-    let floats = bitcast<vec4<f32>>(roads[index * ROUTE_ROWS + 2u]);
-    let words = roads[index * ROUTE_ROWS + 3u];
+    return field_in(index * ROUTE_ROWS + 2u);
+}
+
+// The field of what a unit keeps to on a route: 0 is the tractor. Where there is an apron, trailers have their own.
+fn unit_field_at(index: u32, unit: u32) -> FieldRow {
+    let own = roads[index * ROUTE_ROWS + 1u].y;
+    return field_in(select(index * ROUTE_ROWS + 2u, own, unit == 1u && own != 0u));
+}
+
+// The field in a row and the next.
+fn field_in(row: u32) -> FieldRow {
+    let floats = bitcast<vec4<f32>>(roads[row]);
+    let words = roads[row + 1u];
     return FieldRow(floats.xy, floats.z, floats.w, words.x, words.y, words.z, words.w);
 }
 

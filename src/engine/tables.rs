@@ -17,6 +17,8 @@ pub const ROW: u32 = 65_535;
 pub const MANY: usize = 16_384;
 /// Trucks of a team below that.
 const FEW: u32 = 8;
+/// Rows that a field takes in the table of roads.
+const FIELD_ROWS: usize = size_of::<FieldRow>() / size_of::<[u32; 4]>();
 
 /// The contents of the tables of a world.
 #[derive(Debug)]
@@ -35,7 +37,7 @@ impl<'a> Tables<'a> {
     pub fn new(world: &'a World) -> Tables<'a> {
         let mut fields = Vec::new();
         let (mut cells, mut corners) = (Vec::new(), Vec::new());
-        for field in &world.fields {
+        for field in world.all_fields() {
             fields.push(FieldRow {
                 origin: field.origin,
                 cells_per_metre: field.cells_per_metre,
@@ -76,18 +78,25 @@ impl<'a> Tables<'a> {
     }
 }
 
-/// Rows of the table of roads: those of the routes, of all waypoints, and of their previews. `common/road.wgsl` reads
-/// them.
+/// Rows of the table of roads: those of the routes, of all waypoints, of their previews, and of the fields of trailers.
+/// `common/road.wgsl` reads them.
 fn roads(world: &World, fields: &[FieldRow]) -> Vec<[u32; 4]> {
     let (n_routes, n_waypoints) = (world.routes.len(), world.waypoints.len());
     let first_waypoint = n_routes * ROUTE_ROWS;
     let first_preview = first_waypoint + n_waypoints;
-    let mut rows = Vec::with_capacity(first_preview + n_waypoints * PREVIEW_ROWS);
+    let first_own = first_preview + n_waypoints * PREVIEW_ROWS;
+    let (fields, own_fields) = fields.split_at(world.fields.len());
+    let mut next_own = (first_own..).step_by(FIELD_ROWS);
+    // 0, the first route's own row, where trailers have no field of their own.
+    let own_row = |own: &Option<Field>| own.as_ref().and_then(|_| next_own.next()).unwrap_or(0);
+    let own_rows: Vec<usize> = world.trailer_fields.iter().map(own_row).collect();
+    let mut rows = Vec::with_capacity(first_own + own_fields.len() * FIELD_ROWS);
     for route in &world.routes {
         let (first, crossing) = (route.first as usize, [route.crossing_left, route.crossing_right].map(f32::to_bits));
         rows.push([(first_waypoint + first) as u32, route.n_waypoints, crossing[0], crossing[1]]);
-        rows.push([(first_preview + first * PREVIEW_ROWS) as u32, 0, 0, 0]);
-        rows.extend(cast::<FieldRow, [[u32; 4]; 2]>(fields[route.roundabout as usize]));
+        let roundabout = route.roundabout as usize;
+        rows.push([(first_preview + first * PREVIEW_ROWS) as u32, own_rows[roundabout] as u32, 0, 0]);
+        rows.extend(cast::<FieldRow, [[u32; 4]; FIELD_ROWS]>(fields[roundabout]));
     }
     rows.extend(world.waypoints.iter().map(|&waypoint| cast::<WaypointRow, [u32; 4]>(waypoint)));
     for preview in &world.previews {
@@ -95,6 +104,7 @@ fn roads(world: &World, fields: &[FieldRow]) -> Vec<[u32; 4]> {
         words.as_flattened_mut()[..=N_PREVIEW].copy_from_slice(&cast::<PreviewRow, [u32; 1 + N_PREVIEW]>(*preview));
         rows.extend(words);
     }
+    own_fields.iter().for_each(|&field| rows.extend(cast::<FieldRow, [[u32; 4]; FIELD_ROWS]>(field)));
     rows
 }
 
@@ -111,8 +121,9 @@ fn limits(world: &World) -> Vec<u32> {
 
 /// Bytes of the tables of a world that grow with it.
 pub fn sizes(world: &World) -> [(Table, usize); 5] {
-    let of_fields = |bytes: fn(&Field) -> usize| world.fields.iter().map(bytes).sum::<usize>();
-    let rows = world.routes.len() * ROUTE_ROWS + world.waypoints.len() * (1 + PREVIEW_ROWS);
+    let of_fields = |bytes: fn(&Field) -> usize| world.all_fields().map(bytes).sum::<usize>();
+    let n_own = world.trailer_fields.iter().flatten().count();
+    let rows = world.routes.len() * ROUTE_ROWS + world.waypoints.len() * (1 + PREVIEW_ROWS) + n_own * FIELD_ROWS;
     [
         (Table::Cells, of_fields(|field| size_of_val(field.cells.as_slice()))),
         (Table::Corners, of_fields(|field| size_of_val(field.values.as_slice()))),

@@ -96,6 +96,8 @@ pub struct Ground {
     pub kerbs: Vec<Kerb>,
     /// The edges of the lanes.
     pub edges: Edges,
+    /// The inner edges of aprons, each within the face of its island: a trailer may drive up to there.
+    pub aprons: Vec<Curve>,
     /// The centre lines of all lanes, to be shown.
     pub lanes: Vec<Curve>,
     /// Every route, ordered by entry arm, lane and exit.
@@ -130,6 +132,7 @@ impl Ground {
                 Edges::Beside(gutter) => Edges::Beside(*gutter),
                 Edges::Own(edges) => Edges::Own(outline(edges)),
             },
+            aprons: self.aprons.iter().map(Curve::mirrored).collect(),
             lanes: self.lanes.iter().map(Curve::mirrored).collect(),
             lines: self.lines.iter().map(Line::mirrored).collect(),
             lane_radii: self.lane_radii.clone(),

@@ -167,6 +167,7 @@ fn ground(ring: &Ring, arms: &[Arm], kerbs: Outline, edges: Edges, lanes: &Lanes
         faces: kerbs,
         kerbs: kerb::order(arms).collect(),
         edges,
+        aprons: ring.behind_apron().map(|radius| Curve::circle(DVec2::ZERO, radius)).into_iter().collect(),
         lines: lanes.routes().iter().map(line).collect(),
     }
 }

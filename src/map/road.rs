@@ -87,7 +87,7 @@ impl Road {
         self.ground.lane_radii.clone()
     }
 
-    /// The edge of the drivable surface.
+    /// The edge of the drivable surface; aprons are behind it, see [`Road::unit_kerbs`].
     pub fn kerbs(&self, gutter: Gutter) -> Outline {
         match (gutter, &self.ground.edges) {
             (Gutter::Drivable, _) => self.ground.faces.clone(),
@@ -111,7 +111,7 @@ impl Road {
         self.kerbs(gutter).loops.iter().map(line).collect()
     }
 
-    /// The kerb whose face is nearest to `p`.
+    /// The kerb whose face is nearest to `p`, also behind an apron.
     pub fn nearest_kerb(&self, p: DVec2) -> Kerb {
         let all = self.ground.kerbs.iter().zip(&self.ground.faces.loops).map(|(&kerb, face)| (face.distance(p), kerb));
         all.fold((f64::INFINITY, Kerb::Outer), |best, other| if other.0 < best.0 { other } else { best }).1

@@ -141,10 +141,12 @@ pub fn swept_path(rig: &Rig, centre_line: &Curve, speed: f64, spacing: f64) -> V
     poses
 }
 
-/// Whether no pose of the path touches a solid: then a truck that can steer it need not leave its lane on this route.
-pub fn own_lane_suffices(rig: &Rig, kerbs: &Outline, path: &[Pose]) -> bool {
+/// Whether no pose of the path touches what is solid to the tractor or to the trailer: then a truck that can steer it
+/// need not leave its lane on this route. `kerbs` are those that each unit keeps to.
+pub fn own_lane_suffices(rig: &Rig, [tractor, trailer]: [&Outline; 2], path: &[Pose]) -> bool {
     !path.iter().any(|pose| {
-        kerbs.intersects_rectangle(&pose.tractor_corners(rig)) || kerbs.intersects_rectangle(&pose.trailer_corners(rig))
+        tractor.intersects_rectangle(&pose.tractor_corners(rig))
+            || trailer.intersects_rectangle(&pose.trailer_corners(rig))
     })
 }
 
@@ -178,7 +180,10 @@ mod tests {
             let routes = roundabout.routes(40.0, 35.0, 2.0).unwrap();
             let path = |line: &Curve| swept_path(&rig, line, 20.0 / 3.6, 0.25);
             let kerbs = kerbs(&roundabout);
-            routes.iter().map(|route| own_lane_suffices(&rig, &kerbs, &path(&route.centre_line))).collect::<Vec<bool>>()
+            routes
+                .iter()
+                .map(|route| own_lane_suffices(&rig, [&kerbs; 2], &path(&route.centre_line)))
+                .collect::<Vec<bool>>()
         };
         let beyond = |roundabout: &Road| roundabout.kerbs_beyond_ends(Gutter::Drivable);
         let (short, long) = (suffices(70, beyond), suffices(90, beyond));

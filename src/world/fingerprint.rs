@@ -1,6 +1,7 @@
 //! A number for all that trucks drive by: a run, and a copy of a batch, go on in the world that they began in.
 
 use bytemuck::{bytes_of, cast_slice};
+use crc32fast::Hasher;
 
 use super::World;
 use crate::field::Field;
@@ -18,6 +19,7 @@ impl World {
             rays,
             actions,
             fields,
+            trailer_fields,
             // No truck drives by where its road lies in a map.
             frames: _,
             waypoints,
@@ -27,7 +29,7 @@ impl World {
             route_names,
             step_limits,
         } = self;
-        let mut hasher = crc32fast::Hasher::new();
+        let mut hasher = Hasher::new();
         let tables: [&[u8]; 10] = [
             bytes_of(params),
             bytes_of(reward),
@@ -42,12 +44,11 @@ impl World {
         ];
         tables.into_iter().for_each(|table| hasher.update(table));
         traffic.iter().for_each(|traffic| traffic.words().for_each(|words| hasher.update(cast_slice(&words))));
-        for Field { origin, cells_per_metre, columns, rows, cells, values } in fields {
-            hasher.update(bytes_of(origin));
-            hasher.update(bytes_of(cells_per_metre));
-            hasher.update(bytes_of(&[*columns, *rows]));
-            hasher.update(cast_slice(cells));
-            hasher.update(cast_slice(values));
+        fields.iter().for_each(|field| add(&mut hasher, field));
+        for (roundabout, field) in trailer_fields.iter().enumerate() {
+            let Some(field) = field else { continue };
+            add(&mut hasher, field);
+            hasher.update(bytes_of(&(roundabout as u32)));
         }
         let classes = classes.iter().flat_map(|Class { vehicle, load }| [vehicle, load]);
         for name in classes.chain(route_names) {
@@ -57,6 +58,14 @@ impl World {
         }
         hasher.finalize()
     }
+}
+
+fn add(hasher: &mut Hasher, Field { origin, cells_per_metre, columns, rows, cells, values }: &Field) {
+    hasher.update(bytes_of(origin));
+    hasher.update(bytes_of(cells_per_metre));
+    hasher.update(bytes_of(&[*columns, *rows]));
+    hasher.update(cast_slice(cells));
+    hasher.update(cast_slice(values));
 }
 
 #[cfg(test)]
@@ -72,7 +81,7 @@ mod tests {
     fn a_change_of_any_table_of_a_world_is_another_fingerprint() {
         let world = World::bake(&Scenario::named("attard2023").unwrap()).unwrap();
         let before = world.fingerprint();
-        let changes: [Change; 20] = [
+        let changes: [Change; 21] = [
             ("params", |world| world.params.stray_distance += 1.0),
             ("params, kind of the actions", |world| world.params.n_actions = 0),
             ("reward", |world| world.reward.failure -= 1.0),
@@ -88,6 +97,7 @@ mod tests {
             ("fields, rows", |world| world.fields[4].rows += 2),
             ("fields, cells", |world| world.fields[4].cells[7][1] ^= 1),
             ("fields, values", |world| world.fields[4].values[7] ^= 1),
+            ("trailer_fields", |world| world.trailer_fields[4] = Some(world.fields[4].clone())),
             ("waypoints", |world| world.waypoints[99].position.x += 0.01),
             ("previews", |world| world.previews[99].heading += 0.01),
             ("routes", |world| world.routes[3].n_waypoints -= 1),

@@ -200,6 +200,7 @@ fn roundabouts() -> Kind {
     let keys = [
         ("hand", "\"right\""),
         ("ring.lanes", "2"),
+        ("ring.apron", "0.0"),
         ("arm[].lane_width", "3.7"),
         ("arm[].entry.lanes", "2"),
         ("arm[].exit.lanes", "2"),

@@ -234,7 +234,7 @@ fn a_truck_passes_the_island_of_a_metre_and_a_half_to_every_exit() {
     let roundabout = roundabout("mini");
     let kerbs = roundabout.kerbs(Gutter::Drivable);
     let suffices = |line: &Curve| {
-        own_lane_suffices(&rig, &kerbs, &swept_path(&rig, &line.part(20.0, line.length() - 20.0), 2.0, 0.25))
+        own_lane_suffices(&rig, [&kerbs; 2], &swept_path(&rig, &line.part(20.0, line.length() - 20.0), 2.0, 0.25))
     };
     for exit in 1..=4 {
         assert!(suffices(&wide_way(9.0, exit)), "exit {exit}");

@@ -10,6 +10,7 @@ use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 
 mod along;
+mod apron;
 mod autoreset;
 mod bad_input;
 mod collide;

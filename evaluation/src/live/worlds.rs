@@ -84,8 +84,8 @@ fn names(kernels: impl Iterator<Item = Kernel>) -> Vec<&'static str> {
 /// The sections of each table, one after the other: a field is a section of its own, which benchmarks may share.
 fn tables(world: &World, packed: &mut Packed) -> Map<String, Value> {
     let tables = Tables::new(world);
-    let cells: Vec<usize> = world.fields.iter().map(|field| packed.add("roads", cast_slice(&field.cells))).collect();
-    let corners: Vec<usize> = world.fields.iter().map(|field| packed.add_distances(&field.values)).collect();
+    let cells: Vec<usize> = world.all_fields().map(|field| packed.add("roads", cast_slice(&field.cells))).collect();
+    let corners: Vec<usize> = world.all_fields().map(|field| packed.add_distances(&field.values)).collect();
     let table = |&table: &Table| {
         let sections = match table {
             Table::Cells => cells.clone(),

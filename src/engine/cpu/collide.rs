@@ -1,4 +1,4 @@
-//! Measures the clearances: from each unit's rectangle to the nearest solid edge.
+//! Measures the clearances: from each unit's rectangle to the nearest solid edge. An apron is solid to a tractor alone.
 //!
 //! A rectangle is a capsule, all points within half its width of a stretch of its centre line, and four corners. Points
 //! of the stretch are sampled for the capsule, so that a solid that lies wholly under the unit is found too, and the
@@ -45,16 +45,22 @@ pub fn collide(world: &World, row: &mut Row) {
 /// The clearances of a truck.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 pub(crate) fn clearance_of(world: &World, truck: &Truck) -> Clearance {
-    clearance(world.route_field(truck.route), world.rig(truck), truck)
+    clearance(world.unit_fields(truck.route), world.rig(truck), truck)
 }
 
-/// Clearance of both units: at least the field's least distance on their rectangles, and at most twice that plus 1 cm.
+/// Clearance of both units, each by the field of what it keeps to: at least the field's least distance on its
+/// rectangle, and at most twice that plus 1 cm.
 #[inline(always)]
-pub fn clearance(field: &Field, rig: &Rig, truck: &Truck) -> Clearance {
+pub fn clearance([tractor_field, trailer_field]: [&Field; 2], rig: &Rig, truck: &Truck) -> Clearance {
     let (tractor, trailer) = (direction(truck.heading), direction(truck.trailer_heading));
     Clearance {
-        tractor: body_clearance::<N_TRACTOR, LANES>(field, &rig.tractor_body, truck.position, tractor),
-        trailer: body_clearance::<N_TRAILER, N_FIRST>(field, &rig.trailer_body, truck.trailer_position(rig), trailer),
+        tractor: body_clearance::<N_TRACTOR, LANES>(tractor_field, &rig.tractor_body, truck.position, tractor),
+        trailer: body_clearance::<N_TRAILER, N_FIRST>(
+            trailer_field,
+            &rig.trailer_body,
+            truck.trailer_position(rig),
+            trailer,
+        ),
     }
 }
 

@@ -72,6 +72,7 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
         lane_radii,
         arms,
         edges: Edges::Own(faces.clone()),
+        aprons: Vec::new(),
         faces,
         kerbs,
         lanes: ways,

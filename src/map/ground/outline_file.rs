@@ -233,6 +233,7 @@ impl Ground {
             faces,
             kerbs,
             edges,
+            aprons: Vec::new(),
             lanes,
             lines,
         })

@@ -164,6 +164,7 @@ impl Site<'_> {
             faces,
             kerbs,
             edges,
+            aprons: Vec::new(),
             lanes,
             lines,
         };

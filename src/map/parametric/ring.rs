@@ -13,12 +13,19 @@ pub(super) struct Ring {
     pub(super) lane_width: f64,
     /// Number of lanes, 1 to 3.
     pub(super) lanes: usize,
+    /// Width of the island's apron; 0 where it has none (m).
+    pub(super) apron: f64,
 }
 
 impl Ring {
     /// Radius of the outer kerb's face (m).
     pub(super) fn outer(&self) -> f64 {
         self.island_radius + (2.0 * self.gutter + self.lanes as f64 * self.lane_width)
+    }
+
+    /// Radius of the apron's inner edge, if there is an apron (m).
+    pub(super) fn behind_apron(&self) -> Option<f64> {
+        (0.0 < self.apron).then_some(self.island_radius - self.apron)
     }
 
     /// Radius of the centre line of the lane that has `from_kerb` lanes outside it (m).

@@ -18,6 +18,9 @@ const SHARPEST_LANE: f64 = 1.0;
 /// Widths that a lane may have; a truck uses all of the wide ring lane of a small roundabout (m).
 const LANE_WIDTHS: RangeInclusive<f64> = 2.5..=12.0;
 
+/// Least radius of what an apron leaves of its island (m).
+const BEHIND_APRON: f64 = 0.5;
+
 /// The file as written. Its values are not checked yet.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -36,6 +39,8 @@ pub(crate) struct WrittenRing {
     pub(crate) lane_width: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) lanes: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) apron: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) island_gutter: Option<Vec<WrittenDirection>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -156,11 +161,18 @@ fn is_right(hand: &Hand) -> bool {
 impl Written {
     /// Ring and arms, with every value within its range and the arms in order.
     pub(super) fn checked(self, reader: &Reader) -> Result<(Ring, Vec<Arm>), Error> {
+        let island_radius = reader.within("ring.island_radius", self.ring.island_radius, 1.5..=200.0, "m")?;
         let ring = Ring {
-            island_radius: reader.within("ring.island_radius", self.ring.island_radius, 1.5..=200.0, "m")?,
+            island_radius,
             gutter: reader.within("ring.gutter", self.ring.gutter, 0.0..=3.0, "m")?,
             lane_width: reader.within("ring.lane_width", self.ring.lane_width, LANE_WIDTHS, "m")?,
             lanes: reader.count("ring.lanes", self.ring.lanes.unwrap_or(2), 1..=3)?,
+            apron: reader.within(
+                "ring.apron",
+                self.ring.apron.unwrap_or(0.0),
+                0.0..=island_radius - BEHIND_APRON,
+                "m",
+            )?,
         };
         reader.count("arm", self.arm.len(), 2..=8)?;
         let arms: Vec<Arm> = self

@@ -137,6 +137,28 @@ fn unknown_and_missing_keys_are_refused() {
 }
 
 #[test]
+fn an_apron_lies_within_its_island_and_one_that_leaves_less_than_half_a_metre_is_refused_by_its_key() {
+    let apron = |width: &str| plain().replace("gutter = 0.5", &format!("gutter = 0.5\napron = {width}"));
+    let road = read(&apron("14.5")).unwrap();
+    let [drivable, solid] = [Gutter::Drivable, Gutter::Solid].map(|gutter| {
+        let kerbs = road.unit_kerbs(gutter);
+        assert_eq!(kerbs.both().map(|outline| outline.loops.len()), [2; 2]);
+        kerbs.both().map(|outline| outline.signed_distance(DVec2::new(3.0, 0.0)))
+    });
+    assert!(drivable[0] < -11.9 && solid[0] < -12.4);
+    assert!((drivable[1] - 2.5).abs() < 1e-9 && (solid[1] - 2.5).abs() < 1e-9);
+    assert_eq!(road.kerbs(Gutter::Drivable), read(&plain()).unwrap().kerbs(Gutter::Drivable));
+    assert!(road.has_apron() && !read(&apron("0.0")).unwrap().has_apron());
+    for (width, said) in [("14.51", "14.51 m"), ("-0.1", "-0.1 m"), ("nan", "NaN m")] {
+        let message = read(&apron(width)).unwrap_err().to_string();
+        assert!(message.contains(&format!("ring.apron: {said}; must lie in 0..14.5 m")), "{message}");
+    }
+    let written: Written = toml::from_str(&apron("2.5")).unwrap();
+    assert_eq!(toml::from_str::<Written>(&written.to_string()).unwrap(), written);
+    assert!(written.to_string().contains("apron = 2.5"));
+}
+
+#[test]
 fn values_out_of_range_are_refused_by_their_key() {
     for (from, nth, to, expected) in [
         ("island_radius = 15.0", 0, "island_radius = 0.0", "ring.island_radius: 0 m; must lie in 1.5..200 m"),

@@ -14,7 +14,7 @@ impl Display for Written {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
         let Written {
             hand,
-            ring: WrittenRing { island_radius, gutter, lane_width, lanes, island_gutter, mouth_gutter },
+            ring: WrittenRing { island_radius, gutter, lane_width, lanes, apron, island_gutter, mouth_gutter },
             arm,
         } = self;
         if *hand == Hand::Left {
@@ -22,6 +22,7 @@ impl Display for Written {
         }
         writeln!(f, "[ring]\nisland_radius = {island_radius:?}\ngutter = {gutter:?}\nlane_width = {lane_width:?}")?;
         lanes.iter().try_for_each(|lanes| writeln!(f, "lanes = {lanes}"))?;
+        apron.iter().try_for_each(|apron| writeln!(f, "apron = {apron:?}"))?;
         for (name, gutter) in [("island_gutter", island_gutter), ("mouth_gutter", mouth_gutter)] {
             let Some(gutter) = gutter else { continue };
             let point =

@@ -72,6 +72,7 @@ fn ring(keys: &Keys, draws: &Draws) -> (WrittenRing, Ring) {
         gutter,
         lane_width: ring_lane_width,
         lanes: (lanes != 2).then_some(lanes),
+        apron: None,
         island_gutter: None,
         mouth_gutter: None,
     };

@@ -131,7 +131,7 @@ proptest! {
     fn two_ring_lanes_lie_where_they_always_lay_to_the_last_bit(
         island in 1.5..200.0, gutter in 0.0..3.0, width in 2.5..8.0,
     ) {
-        let ring = Ring { island_radius: island, gutter, lane_width: width, lanes: 2 };
+        let ring = Ring { island_radius: island, gutter, lane_width: width, lanes: 2, apron: 0.0 };
         let (inner, half) = (island + gutter + width / 2.0, width / 2.0);
         prop_assert_eq!(ring.outer().to_bits(), (island + 2.0 * (gutter + width)).to_bits());
         prop_assert_eq!([0, 1].map(|lane| ring.lane_radius(lane).to_bits()), [inner + width, inner].map(f64::to_bits));
