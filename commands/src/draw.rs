@@ -38,16 +38,18 @@ pub struct Args {
     /// mirror image in the x axis. No polygon repeats its first point at its end; curves are within 1 cm. `drivable` is
     /// the surface's outer boundary, then one hole for each island. `solids` are the islands, then the ground beyond
     /// the outer boundary as two polygons, north and south, up to 5 m past the kerbs. So a point is drivable when an
-    /// odd number of `drivable` contain it, and solid when any of `solids` does.
+    /// odd number of `drivable` contain it, and solid when any of `solids` does. With aprons there is `aprons`:
+    /// [[outer edge, inner edge], ...].
     ///
     /// With --route also "sweep": {"vehicle", "load", "speed_kmh", "own_lane_suffices", "tractor_clearance",
-    /// "trailer_clearance", "tractor_area", "trailer_area", "limits": [{"limit", "unit", "has", "needs", "exceeded",
-    /// "stretches": [[from, to], ...]}, ...], "demands": [[station, steer angle, steer rate, lateral acceleration, load
-    /// transfer ratio], ...]}. Clearances are the least, negative beyond a kerb (m). Areas are what a unit sweeps, as
-    /// polygons within 5 mm: boundaries counter-clockwise, holes clockwise. The limits are lock (deg), steer_rate
-    /// (deg/s), tyres (g) and rollover (ratio); `stretches` are stations of the front axle on the route (m) where one
-    /// is exceeded. `demands` has a row every 0.25 m, in m, deg, deg/s, g and 1, left positive. `own_lane_suffices` is
-    /// true where the path touches no kerb and the lock allows it.
+    /// "trailer_clearance", with aprons "apron_clearance" (negative on one), "tractor_area", "trailer_area", "limits":
+    /// [{"limit", "unit", "has", "needs", "exceeded", "stretches": [[from, to], ...]}, ...], "demands": [[station,
+    /// steer angle, steer rate, lateral acceleration, load transfer ratio], ...]}. Clearances are the least, negative
+    /// beyond a kerb (m). Areas are what a unit sweeps, as polygons within 5 mm: boundaries counter-clockwise, holes
+    /// clockwise. The limits are lock (deg), steer_rate (deg/s), tyres (g) and rollover (ratio); `stretches` are
+    /// stations of the front axle on the route (m) where one is exceeded. `demands` has a row every 0.25 m, in m, deg,
+    /// deg/s, g and 1, left positive. `own_lane_suffices` is true where the path touches no kerb and the lock allows
+    /// it.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// Draw the swept path on this route: N-left-3, or 16m/N-left-3. JSON then lists this route alone. Lock, steer

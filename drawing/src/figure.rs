@@ -75,9 +75,8 @@ pub fn swept_path(
     let layout = Layout { corner: DVec2::new(LEFT, TOP + LINE), ..PRINTED };
     let view = View::laid_out(line.polyline(0.1).into_iter(), &layout);
     let road = RoadLayers::new(&view, &lettering, roundabout, routes, straights, gutter);
-    let solids = Path::new().set("d", view.frame() + &road.kerb_data()).set("clip-rule", "evenodd");
-    let definitions = sweep.shapes(&view).add(ClipPath::new().set("id", "solids").add(solids));
-    let overlaps = Group::new().set("clip-path", "url(#solids)").add(sweep.overlaps());
+    let definitions = road.solids().into_iter().fold(sweep.shapes(&view), Definitions::add);
+    let overlaps = road.clipped(sweep.overlaps());
     let map = Group::new().add(road.surface()).add(sweep.areas()).add(road.distances()).add(road.lanes()).add(overlaps);
     let map = map.add(road.kerbs()).add(sweep.marks(&view, &lettering)).add(road.arm_names());
     let legend: Vec<Entry> = sweep.legend().into_iter().chain(road.legend()).collect();

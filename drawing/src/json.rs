@@ -3,7 +3,7 @@
 use glam::DVec2;
 use offtrack::map::route::Route;
 use offtrack::map::{Gutter, Road};
-use offtrack_evaluation::polygons::{Polygon, corners, drivable, rounded, to};
+use offtrack_evaluation::polygons::{Polygon, corners, drivable as drivable_of, rounded, to};
 use serde::Serialize;
 
 use crate::sweep::{self, Sweep};
@@ -15,6 +15,8 @@ const MARGIN: f64 = 5.0;
 struct Written<'a> {
     solids: Vec<Polygon>,
     drivable: Vec<Polygon>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    aprons: Vec<Vec<Polygon>>,
     routes: Vec<WrittenRoute<'a>>,
     frame: Frame,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -40,9 +42,9 @@ struct WrittenRoute<'a> {
 /// [[[x, y], ...], ...], "routes": [{"name", "waypoints": [[x, y, heading], ...]}], "frame": {"origin", "hand"}}`.
 ///
 /// `drivable` is the outer boundary, then one hole for each island; `solids` are the islands, then the ground beyond
-/// the boundary as two polygons. Curves are within 1 cm. `road` is as it is driven, `routes` are as they are seen.
-/// With a swept path there is `sweep`, as `offtrack draw --help`
-/// describes it.
+/// the boundary as two polygons. With aprons there is `aprons`, of each its outer and its inner edge. Curves are within
+/// 1 cm. `road` is as it is driven, `routes` are as they are seen. With a swept path there is `sweep`, as `offtrack draw
+/// --help` describes it.
 ///
 /// # Errors
 ///
@@ -53,7 +55,8 @@ pub fn written(road: &Road, gutter: Gutter, routes: &[Route], sweep: Option<&Swe
     let (boundary, islands) = corners(&kerbs);
     let ground = boundary.first().map(|points| ground(points)).into_iter().flatten();
     let solids = islands.iter().cloned().chain(ground).map(|points| rounded(&points)).collect();
-    let drivable = drivable(&kerbs);
+    let aprons = seen.aprons().iter().map(drivable_of).collect();
+    let drivable = drivable_of(&kerbs);
     let hand = if road.is_mirrored() { "left" } else { "right" };
     let frame = Frame { origin: [origin.x, origin.y], hand };
     let routes = routes.iter().map(|route| WrittenRoute {
@@ -65,7 +68,8 @@ pub fn written(road: &Road, gutter: Gutter, routes: &[Route], sweep: Option<&Swe
             .collect(),
     });
     let sweep = sweep.map(Sweep::written);
-    let mut text = serde_json::to_string(&Written { solids, drivable, routes: routes.collect(), frame, sweep })?;
+    let mut text =
+        serde_json::to_string(&Written { solids, drivable, aprons, routes: routes.collect(), frame, sweep })?;
     text.push('\n');
     Ok(text)
 }

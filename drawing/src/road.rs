@@ -8,7 +8,7 @@ use offtrack::geometry::{Curve, Outline};
 use offtrack::map::route::{Lane, Route};
 use offtrack::map::{Gutter, Road};
 use offtrack::scenario::FIELD_CELL;
-use svg::node::element::{Group, Path};
+use svg::node::element::{ClipPath, Group, Path};
 
 use crate::isolines::isolines;
 use crate::legend::{Entry, Swatch, chevron};
@@ -46,11 +46,33 @@ impl<'a> RoadLayers<'a> {
     }
 
     /// Path data of the edges of the drivable area.
-    pub(crate) fn kerb_data(&self) -> String {
+    fn kerb_data(&self) -> String {
         self.view.loops(&self.kerbs.loops)
     }
 
-    /// Solid ground, gutters and road.
+    /// Clips to what is solid to the tractor and, where that is something else, to the trailer.
+    pub(crate) fn solids(&self) -> Vec<ClipPath> {
+        let clip = |id: &str, kerbs: &Outline| {
+            let data = self.view.frame() + &self.view.loops(&kerbs.loops);
+            ClipPath::new().set("id", id).add(Path::new().set("d", data).set("clip-rule", "evenodd"))
+        };
+        let kerbs = self.roundabout.unit_kerbs(self.gutter);
+        let of_trailer = kerbs.behind_aprons().map(|kerbs| clip("trailer_solids", kerbs));
+        [clip("solids", &kerbs.tractor)].into_iter().chain(of_trailer).collect()
+    }
+
+    /// What is swept by the tractor and by the trailer, each clipped to what is solid to it by [`RoadLayers::solids`].
+    pub(crate) fn clipped(&self, [tractor, trailer]: [Group; 2]) -> Group {
+        let of_trailer = if self.roundabout.has_apron() { "url(#trailer_solids)" } else { "url(#solids)" };
+        Group::new().add(trailer.set("clip-path", of_trailer)).add(tractor.set("clip-path", "url(#solids)"))
+    }
+
+    /// Path data of all edges.
+    fn edge_data(&self) -> String {
+        self.kerb_data() + &self.view.loops(&self.roundabout.ground().aprons)
+    }
+
+    /// Solid ground, gutters, road and aprons.
     pub(crate) fn surface(&self) -> Group {
         let fill = |outline: &Outline, colour: &str| {
             Path::new().set("d", self.view.loops(&outline.loops)).set("fill", colour).set("fill-rule", "evenodd")
@@ -61,10 +83,12 @@ impl<'a> RoadLayers<'a> {
             self.view.high,
             DVec2::new(self.view.low.x, self.view.high.y),
         ]);
-        Group::new()
+        let surface = Group::new()
             .add(Path::new().set("d", solid).set("fill", colour::SOLID))
             .add(fill(&self.roundabout.kerbs(Gutter::Drivable), colour::GUTTER))
-            .add(fill(&self.roundabout.kerbs(Gutter::Solid), colour::ROAD))
+            .add(fill(&self.roundabout.kerbs(Gutter::Solid), colour::ROAD));
+        let aprons = self.roundabout.aprons();
+        aprons.iter().fold(surface, |surface, apron| surface.add(fill(apron, colour::APRON)))
     }
 
     /// Lines of equal distance to the kerbs.
@@ -88,7 +112,7 @@ impl<'a> RoadLayers<'a> {
     pub(crate) fn kerbs(&self) -> Group {
         Group::new().add(
             Path::new()
-                .set("d", self.kerb_data())
+                .set("d", self.edge_data())
                 .set("fill", "none")
                 .set("stroke", colour::KERB)
                 .set("stroke-width", 1.6),
@@ -102,7 +126,7 @@ impl<'a> RoadLayers<'a> {
 
     /// The edges of the drivable area for a small map.
     pub(crate) fn thin_kerbs(&self) -> Group {
-        let kerbs = Path::new().set("d", self.kerb_data()).set("fill", "none").set("stroke", colour::KERB);
+        let kerbs = Path::new().set("d", self.edge_data()).set("fill", "none").set("stroke", colour::KERB);
         Group::new().add(kerbs.set("stroke-width", 0.8))
     }
 
@@ -168,28 +192,25 @@ impl<'a> RoadLayers<'a> {
 
     /// The legend's lines for a map with distances.
     pub(crate) fn legend(&self) -> Vec<Entry> {
-        let [solid, gutter, edge, lane] = self.surface_legend();
-        vec![
-            solid,
-            gutter,
-            edge,
-            Entry::new(Swatch::Line(colour::CONTOUR, 1.2, ""), "distance to it, each metre"),
-            lane,
-        ]
+        let mut legend = self.surface_legend();
+        let distance = Entry::new(Swatch::Line(colour::CONTOUR, 1.2, ""), "distance to it, each metre");
+        legend.insert(legend.len() - 1, distance);
+        legend
     }
 
     /// The legend's lines for surface, kerbs and lanes.
-    pub(crate) fn surface_legend(&self) -> [Entry; 4] {
+    pub(crate) fn surface_legend(&self) -> Vec<Entry> {
         let gutter = match self.gutter {
             Gutter::Drivable => "gutter, drivable",
             Gutter::Solid => "gutter, solid",
         };
-        [
-            Entry::new(Swatch::Area(colour::SOLID), "solid"),
-            Entry::new(Swatch::Area(colour::GUTTER), gutter),
-            Entry::new(Swatch::Line(colour::KERB, 1.6, ""), "edge of what is drivable"),
-            Entry::new(Swatch::Line(colour::LANE, 0.9, LANE_DASHES), "lane centre"),
-        ]
+        let apron = Entry::new(Swatch::Area(colour::APRON), "apron, for trailers alone");
+        let mut legend =
+            vec![Entry::new(Swatch::Area(colour::SOLID), "solid"), Entry::new(Swatch::Area(colour::GUTTER), gutter)];
+        legend.extend(self.roundabout.has_apron().then_some(apron));
+        legend.push(Entry::new(Swatch::Line(colour::KERB, 1.6, ""), "edge of what is drivable"));
+        legend.push(Entry::new(Swatch::Line(colour::LANE, 0.9, LANE_DASHES), "lane centre"));
+        legend
     }
 
     /// The legend's lines for the routes.

@@ -37,6 +37,8 @@ pub struct Sweep<'a> {
     poses: Vec<Pose>,
     rig: Rig,
     units: [Unit; 2],
+    /// The trailer's least distance from an apron's outer edge, if there is an apron, negative on it (m).
+    apron_clearance: Option<f64>,
 }
 
 /// What is driven.
@@ -58,6 +60,8 @@ pub(crate) struct Written<'a> {
     own_lane_suffices: bool,
     tractor_clearance: f64,
     trailer_clearance: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    apron_clearance: Option<f64>,
     tractor_area: Vec<Polygon>,
     trailer_area: Vec<Polygon>,
     limits: Vec<WrittenNeed>,
@@ -88,13 +92,14 @@ impl<'a> Sweep<'a> {
         let poses = swept_path(&rig, &route.centre_line, speed, SPACING);
         let demands = demands(&rig, &route.centre_line, &poses, speed, SPACING);
         let tractor = poses.iter().map(|pose| pose.tractor_corners(&rig)).collect();
-        let trailer = poses.iter().map(|pose| pose.trailer_corners(&rig)).collect();
+        let trailer: Vec<[DVec2; 4]> = poses.iter().map(|pose| pose.trailer_corners(&rig)).collect();
         Sweep {
             route,
             driven,
             clears: own_lane_suffices(&rig, kerbs.both(), &poses),
             needs: Need::of_all(&rig, &demands),
             demands,
+            apron_clearance: kerbs.apron_edges().map(|edges| UnitClearance::of(&trailer, edges).least),
             units: [
                 Unit::new("tractor", colour::TRACTOR, colour::SWEPT_BY_TRACTOR, tractor, &kerbs.tractor),
                 Unit::new("trailer", colour::TRAILER, colour::SWEPT_BY_TRAILER, trailer, kerbs.trailer()),
@@ -145,12 +150,13 @@ impl<'a> Sweep<'a> {
     pub(crate) fn written(&self) -> Written<'_> {
         let [tractor, trailer] = &self.units;
         let area = |unit: &Unit| swept::swept_area(&unit.corners).iter().map(|ring| polygon(ring)).collect();
-        let rounded = |unit: &Unit| (unit.clearance.least * 1e4).round() / 1e4;
+        let rounded = |least: f64| (least * 1e4).round() / 1e4;
         Written {
             driven: &self.driven,
             own_lane_suffices: self.own_lane_suffices(),
-            tractor_clearance: rounded(tractor),
-            trailer_clearance: rounded(trailer),
+            tractor_clearance: rounded(tractor.clearance.least),
+            trailer_clearance: rounded(trailer.clearance.least),
+            apron_clearance: self.apron_clearance.map(rounded),
             tractor_area: area(tractor),
             trailer_area: area(trailer),
             limits: self.needs.iter().map(|need| need.written(&self.demands)).collect(),
@@ -167,7 +173,10 @@ impl<'a> Sweep<'a> {
                 format!("{} {:.2} m over a kerb", unit.name, -unit.clearance.least.min(0.0))
             }
         });
-        format!("{tractor}, {trailer}")
+        match self.apron_clearance.filter(|clearance| *clearance < 0.0) {
+            Some(clearance) => format!("{tractor}, {trailer}, {:.2} m on an apron", -clearance),
+            None => format!("{tractor}, {trailer}"),
+        }
     }
 
     /// Definitions of the swept areas, which are used twice.
@@ -187,9 +196,9 @@ impl<'a> Sweep<'a> {
         self.units.iter().rev().fold(Group::new(), |group, unit| group.add(unit.area(unit.light)))
     }
 
-    /// The areas again, to be clipped to solid ground.
-    pub(crate) fn overlaps(&self) -> Group {
-        self.units.iter().fold(Group::new(), |group, unit| group.add(unit.area(colour::OVERLAP)))
+    /// The areas again, the tractor's and the trailer's, to be clipped to what is solid to each.
+    pub(crate) fn overlaps(&self) -> [Group; 2] {
+        self.units.each_ref().map(|unit| Group::new().add(unit.area(colour::OVERLAP)))
     }
 
     /// Trucks, paths of the axles, and a ring with its depth around each overlap.

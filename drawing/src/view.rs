@@ -12,6 +12,7 @@ pub(crate) mod colour {
     pub const FAINT: &str = "#6e6e6e";
     pub const SOLID: &str = "#d2d2d2";
     pub const GUTTER: &str = "#f0e1c3";
+    pub const APRON: &str = "#e1b496";
     pub const ROAD: &str = "#ffffff";
     pub const KERB: &str = "#333333";
     pub const CONTOUR: &str = "#b5c4cf";

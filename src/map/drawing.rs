@@ -1,13 +1,14 @@
 //! Roads from drawings: kerbs and lane centre lines of a DXF or GeoJSON file as a [`Ground`](super::ground::Ground).
 //!
 //! A drawing has no meaning but its layers: closed outlines of kerbs on one, on another a line for each way through the
-//! ring, from the end of its entry arm to the end of its exit arm, in the direction of travel. What is drawn otherwise
-//! on these layers is refused with its place; other layers are left out.
+//! ring, from the end of its entry arm to the end of its exit arm, in the direction of travel; on a third there may be
+//! aprons. What is drawn otherwise on these layers is refused with its place; other layers are left out.
 
 mod dxf; // polylines, lines and arcs on their layers
 mod pairs; // group codes and values
 mod geojson; // polygons and lines by a property
 mod site; // what is drawn, as a road
+mod aprons; // their edges among the kerbs
 #[cfg(test)]
 mod tests;
 
@@ -46,6 +47,8 @@ pub struct Layers {
     pub kerbs: String,
     /// Layer of the ways' centre lines.
     pub lanes: String,
+    /// Layer of the aprons' edges, which need not be there.
+    pub aprons: String,
     /// Unit of its coordinates; what the drawing says without one, of GeoJSON metres.
     pub unit: Option<Unit>,
     /// Width of the lanes (m) that say none.
@@ -86,10 +89,12 @@ struct Entity {
 }
 
 /// What is drawn on the layers.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Drawing {
     kerbs: Vec<Entity>,
     lanes: Vec<Entity>,
+    /// Edges of aprons, the outer ones, the inner ones or both.
+    aprons: Vec<Entity>,
     /// The ring's centre, where the file has it (m).
     centre: Option<DVec2>,
     /// What was left out or done, in words.

@@ -145,3 +145,35 @@ fn an_episode_that_ended_with_the_trailer_on_the_island_goes_on_where_there_is_a
     let of_trailers = |tally: &offtrack::simulator::Tally| tally.ended(offtrack::layout::Ended::TrailerCollided);
     assert!(of_trailers(&with) < of_trailers(&without), "{with:?} {without:?}");
 }
+
+#[test]
+fn an_outline_file_keeps_an_apron_and_one_that_lies_in_no_island_is_refused_by_its_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("road.outline.toml");
+    let read = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        Road::read(&file)
+    };
+    let road = road("40m");
+    let text = road.ground().text(&[]);
+    let found = read(&text).unwrap();
+    assert_eq!(found.ground().text(&[]), text);
+    for p in found.ground().aprons[0].polyline(0.01) {
+        assert!((p.length() - (road.island_radius() - APRON)).abs() < 1e-4, "{p}");
+    }
+    let apron = |radius: f64, x: f64| {
+        let path = format!("path = [[{:?}, 0.0, 1.0], [{:?}, 0.0, 1.0]]", x - radius, x + radius);
+        format!("{}\n[[apron]]\n{path}\n", text.split("\n[[apron]]").next().unwrap())
+    };
+    assert_eq!(read(&apron(2.0, 1.0)).unwrap().ground().aprons.len(), 1);
+    let twice = apron(2.0, 1.0) + "[[apron]]\npath = [[-3.0, 0.0, 1.0], [-2.0, 0.0, 1.0]]\n";
+    for (text, expected) in [
+        (apron(2.0, 300.0), "apron[0].path: in no island; must lie within an island's kerb"),
+        (apron(5.0, road.island_radius()), "apron[0].path: crosses; must not cross or touch a kerb"),
+        (twice, "apron[1].path: a second one; an earlier apron lies within the same island"),
+        (apron(2.0, 1.0).replace("[-1.0, 0.0, 1.0]", "[-1.0]"), "apron[0].path[0]: [-1.0]; must be [x, y]"),
+    ] {
+        let said = read(&text).map(drop).unwrap_err().to_string();
+        assert!(said.contains("road.outline.toml: ") && said.contains(expected), "{said}");
+    }
+}

@@ -16,6 +16,7 @@ fn drawing(kerbs: &str) -> Result<Drawn, offtrack::files::reader::Error> {
     let layers = Layers {
         kerbs: kerbs.into(),
         lanes: "C-LANE".into(),
+        aprons: "APRON".into(),
         unit: None,
         lane_width: 4.0,
         ring: Some(AT),
@@ -80,8 +81,8 @@ fn read_features(features: &str, unit: Option<Unit>) -> Result<Drawn, String> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("site.geojson");
     std::fs::write(&file, features).unwrap();
-    let (kerbs, lanes) = ("KERB".into(), "LANE".into());
-    let layers = Layers { kerbs, lanes, unit, lane_width: 4.0, ring: None, arms: Vec::new() };
+    let (kerbs, lanes, aprons) = ("KERB".into(), "LANE".into(), "APRON".into());
+    let layers = Layers { kerbs, lanes, aprons, unit, lane_width: 4.0, ring: None, arms: Vec::new() };
     drawing::read(&file, &layers).map_err(|error| error.to_string())
 }
 

@@ -226,3 +226,34 @@ fn a_drawing_becomes_a_road_through_which_trucks_are_driven_at_its_place_in_the_
         assert!(said.contains(expected), "{expected}: {said}");
     }
 }
+
+#[test]
+fn where_a_trailer_needs_the_apron_table_files_sheet_and_picture_say_so() {
+    let place = Place::new();
+    let file = place.file("apron.toml");
+    let road = std::fs::read_to_string(repository().join("scenarios/roundabouts/16m.toml")).unwrap();
+    std::fs::write(&file, road.replace("[ring]", "[ring]\napron = 3.0")).unwrap();
+    let (road, folder, picture) = (place.text("apron.toml"), place.text("fits"), place.text("road.json"));
+    let case = ["--vehicle", "eu_4x2_13m6", "--route", "E-left-2"];
+    let fits = program().args(["fits", &road, "--widths", "64", "-o", &folder]).args(case).output().unwrap();
+    succeed(&fits);
+    let said = String::from_utf8(fits.stdout).unwrap();
+    assert!(said.contains("lane centre") && said.contains("on apron"), "{said}");
+    let json = place.json("fits/fits.json");
+    assert!(json["rows"][0]["lane_centre"]["apron_clearance"].as_f64().unwrap() < -0.1, "{json}");
+    assert!(json["assumptions"].to_string().contains("trailers may drive on aprons"), "{json}");
+    assert!(text(&place, "fits.csv").lines().next().unwrap().contains("lane_centre_apron_clearance"));
+    let svg = text(&place, "apron.svg");
+    assert!(svg.contains("m on the apron") && svg.contains("apron, for trailers alone"), "{}", svg.len());
+    assert!(svg.contains("url(#trailer_solids)") && svg.contains("id=\"trailer_solids\""));
+    assert!(text(&place, "apron-eu_4x2_13m6.dxf").contains("\nAPRON\n"));
+    assert!(text(&place, "apron-eu_4x2_13m6.geojson").contains("\"part\":\"apron\""));
+    let draw = ["draw", &road, "-o", &picture, "--speed-kmh", "15"];
+    let draw = program().args(draw).args(case).output().unwrap();
+    succeed(&draw);
+    let said = String::from_utf8(draw.stdout).unwrap();
+    assert!(said.contains("its own lane suffices") && said.contains(" m on an apron"), "{said}");
+    let drawn = place.json("road.json");
+    assert_eq!(drawn["aprons"][0].as_array().unwrap().len(), 2);
+    assert!(drawn["sweep"]["apron_clearance"].as_f64().unwrap() < -0.1, "{}", drawn["sweep"]);
+}

@@ -23,6 +23,10 @@ pub struct DrawingArgs {
     /// direction of travel \[default: LANE\].
     #[arg(long, value_name = "LAYER")]
     lane_layer: Option<String>,
+    /// Of a drawing: the layer of the aprons' closed edges, inner ones, outer ones or both; it may be empty \\[default:
+    /// APRON\\].
+    #[arg(long, value_name = "LAYER")]
+    apron_layer: Option<String>,
     /// Of a drawing: the unit of its coordinates, where it does not say it.
     #[arg(long, value_parser = PossibleValuesParser::new(["m", "mm", "cm", "ft", "in"]).map(unit))]
     unit: Option<Unit>,
@@ -41,6 +45,7 @@ impl DrawingArgs {
         let given = [
             ("--kerb-layer", self.kerb_layer.clone()),
             ("--lane-layer", self.lane_layer.clone()),
+            ("--apron-layer", self.apron_layer.clone()),
             ("--unit", self.unit.map(|unit| format!("{unit:?}").to_lowercase())),
             ("--lane-width", self.lane_width.map(|width| format!("{width} m"))),
         ];
@@ -83,6 +88,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let layers = Layers {
         kerbs: layer(&args.drawing.kerb_layer, "KERB"),
         lanes: layer(&args.drawing.lane_layer, "LANE"),
+        aprons: layer(&args.drawing.apron_layer, "APRON"),
         unit: args.drawing.unit,
         lane_width,
         ring: args.place.ring,

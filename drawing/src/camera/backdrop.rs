@@ -124,6 +124,9 @@ fn draw_road(map: &mut Canvas, view: &View, pen: f64, roundabout: &Road) {
     for (area, ink) in [(Gutter::Drivable, colour::GUTTER), (Gutter::Solid, colour::ROAD)] {
         map.areas(&lines(view, &roundabout.kerbs(area).loops), Ink(ink, 1.0));
     }
+    for apron in roundabout.aprons() {
+        map.areas(&lines(view, &apron.loops), Ink(colour::APRON, 1.0));
+    }
     map.dashes(
         &lines(view, &roundabout.lanes()),
         Ink(colour::LANE, 1.0),
@@ -148,7 +151,9 @@ fn draw_route(map: &mut Canvas, view: &View, pen: f64, roundabout: &Road, route:
 }
 
 fn draw_kerbs(map: &mut Canvas, view: &View, pen: f64, roundabout: &Road, gutter: Gutter) {
-    map.lines(&lines(view, &roundabout.kerbs(gutter).loops), true, Ink(colour::KERB, 1.0), 1.6 * pen);
+    for kerbs in [&roundabout.kerbs(gutter).loops, &roundabout.ground().aprons] {
+        map.lines(&lines(view, kerbs), true, Ink(colour::KERB, 1.0), 1.6 * pen);
+    }
 }
 
 /// Curves as points, within a tenth of a pixel (px).

@@ -28,12 +28,14 @@ const PARTS: [(&str, u8); 8] = [
 ];
 /// Layers of the road itself.
 const ROAD: [(&str, u8); 2] = [("KERB", 8), ("LANE", 9)];
+const APRON: (&str, u8) = ("APRON", 32);
 /// Height of the letters, and radius of the ring around a worst place (m).
 const LETTERS: f64 = 0.8;
 const RING: f64 = 0.6;
 
 /// The swept paths of one vehicle on a road as it lies in the world, on the layers `ROUTE_PART`, with the road's kerbs
-/// and the centre lines of its routes on `KERB` and `LANE`, as `offtrack import` reads them.
+/// and the centre lines of its routes on `KERB` and `LANE`, and the inner edges of aprons on `APRON`, as `offtrack
+/// import` reads them.
 pub fn dxf(road: &Road, gutter: Gutter, shown: &[&Shown]) -> String {
     let mut drawing = Drawing { text: String::new(), origin: road.ground().origin };
     let names: Vec<String> =
@@ -42,7 +44,7 @@ pub fn dxf(road: &Road, gutter: Gutter, shown: &[&Shown]) -> String {
     for (code, value) in [(0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"), (0, "ENDSEC")] {
         drawing.pair(code, value);
     }
-    drawing.layers(&names);
+    drawing.layers(&names, road.has_apron());
     drawing.pair(0, "SECTION");
     drawing.pair(2, "ENTITIES");
     for curve in &road.kerbs(gutter).loops {
@@ -50,6 +52,9 @@ pub fn dxf(road: &Road, gutter: Gutter, shown: &[&Shown]) -> String {
     }
     for line in &road.ground().lines {
         drawing.curve("LANE", &line.line, false);
+    }
+    for apron in &road.ground().aprons {
+        drawing.curve(APRON.0, apron, true);
     }
     for (one, name) in shown.iter().zip(&names) {
         drawing.path(one, name);
@@ -78,10 +83,14 @@ impl Drawing {
         let _ = writeln!(self.text, "{code:>3}\n{value}");
     }
 
-    fn layers(&mut self, names: &[String]) {
+    fn layers(&mut self, names: &[String], has_apron: bool) {
         let of_routes = names.iter().flat_map(|name| PARTS.map(|(part, colour)| (format!("{name}_{part}"), colour)));
-        let layers: Vec<(String, u8)> = ROAD.map(|(name, colour)| (name.to_owned(), colour)).into_iter().collect();
-        let layers: Vec<(String, u8)> = layers.into_iter().chain(of_routes).collect();
+        let layers: Vec<(String, u8)> = ROAD
+            .into_iter()
+            .chain(has_apron.then_some(APRON))
+            .map(|(name, colour)| (name.to_owned(), colour))
+            .chain(of_routes)
+            .collect();
         for (code, value) in [(0, "SECTION"), (2, "TABLES"), (0, "TABLE"), (2, "LTYPE")] {
             self.pair(code, value);
         }
@@ -194,6 +203,7 @@ mod tests {
     use offtrack::map::drawing::{Layers, Unit, read};
     use offtrack::map::ground::Ground;
 
+    use super::super::geojson;
     use super::*;
 
     #[test]
@@ -226,18 +236,45 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("road.dxf");
         std::fs::write(&file, dxf(&moved, Gutter::Drivable, &[])).unwrap();
-        let layers = Layers {
+        let found = read(&file, &layers()).unwrap().ground;
+        assert!(found.origin.distance(origin) < 1e-3 && found.lines.len() == road.ground().lines.len());
+        for p in found.faces.loops.iter().flat_map(|curve| curve.polyline(0.01)) {
+            assert!(road.ground().faces.distance(p) < 1e-3, "{p}");
+        }
+    }
+
+    #[test]
+    fn an_apron_is_written_on_a_layer_of_its_own_and_read_back_within_a_millimetre() {
+        let text = include_str!("../../../scenarios/roundabouts/20m.toml").replace("[ring]", "[ring]\napron = 2.0");
+        let road = Road::from_toml("apron", &text).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let crs = Some("EPSG:25832");
+        for (name, text) in [
+            ("road.dxf", dxf(&road, Gutter::Drivable, &[])),
+            ("road.geojson", geojson(&road, Gutter::Drivable, &[], crs).unwrap()),
+        ] {
+            let file = folder.path().join(name);
+            std::fs::write(&file, &text).unwrap();
+            let found = read(&file, &layers()).unwrap().ground;
+            assert!(found.aprons.len() == 1 && text.to_lowercase().contains("apron"), "{name}");
+            let radius = road.island_radius() - 2.0;
+            for p in found.aprons[0].polyline(0.01) {
+                assert!((p.length() - radius).abs() < 2e-3, "{name}: {p}");
+            }
+            assert!((found.island_radius - road.island_radius()).abs() < 2e-3, "{name}");
+        }
+        assert!(!dxf(&Road::named("20m").unwrap(), Gutter::Drivable, &[]).contains("APRON"));
+    }
+
+    fn layers() -> Layers {
+        Layers {
             kerbs: "KERB".into(),
             lanes: "LANE".into(),
+            aprons: "APRON".into(),
             unit: Some(Unit::Metre),
             lane_width: 4.0,
             ring: None,
             arms: Vec::new(),
-        };
-        let found = read(&file, &layers).unwrap().ground;
-        assert!(found.origin.distance(origin) < 1e-3 && found.lines.len() == road.ground().lines.len());
-        for p in found.faces.loops.iter().flat_map(|curve| curve.polyline(0.01)) {
-            assert!(road.ground().faces.distance(p) < 1e-3, "{p}");
         }
     }
 

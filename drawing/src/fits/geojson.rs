@@ -39,9 +39,11 @@ pub fn geojson(road: &Road, gutter: Gutter, shown: &[&Shown], crs: Option<&str>)
             Kerb::Island => "island".to_owned(),
             Kerb::Splitter(arm) => format!("splitter {}", ground.arms[arm].name),
         };
-        let mut points = curve.polyline(CHORD);
-        points.pop();
-        features.push(feature(json!({"part": "kerb", "of": of}), "Polygon", json!([frame.ring(&points)])));
+        features.push(feature(json!({"part": "kerb", "of": of}), "Polygon", json!([frame.ring(&ring(curve))])));
+    }
+    for apron in road.aprons() {
+        let rings: Vec<Vec<DVec2>> = apron.loops.iter().map(ring).collect();
+        features.push(feature(json!({"part": "apron"}), "MultiPolygon", frame.areas(&rings)));
     }
     for line in &ground.lines {
         let name = format!("{}-{}-{}", ground.arms[line.entry].name, line.lane.name(), line.exit);
@@ -65,6 +67,13 @@ pub fn geojson(road: &Road, gutter: Gutter, shown: &[&Shown], crs: Option<&str>)
     text = text.replace("{\"geometry\"", "\n{\"geometry\"");
     text.push('\n');
     Ok(text)
+}
+
+/// The points of a closed curve, each once.
+fn ring(curve: &Curve) -> Vec<DVec2> {
+    let mut points = curve.polyline(CHORD);
+    points.pop();
+    points
 }
 
 /// The features of a swept path.
@@ -161,6 +170,7 @@ mod tests {
         let layers = Layers {
             kerbs: "KERB".into(),
             lanes: "LANE".into(),
+            aprons: "APRON".into(),
             unit: None,
             lane_width: 3.5,
             ring: None,

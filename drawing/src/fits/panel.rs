@@ -7,6 +7,7 @@ use offtrack_evaluation::fits::{Path as Driven, Row};
 use svg::node::element::{Circle, Group, Path, Use};
 
 use crate::lettering::{Align, Lettering};
+use crate::road::RoadLayers;
 use crate::view::{View, colour, number};
 
 /// Size of the letters on a panel (px).
@@ -42,17 +43,22 @@ impl Shown {
     }
 
     /// The panel in the frame of `view`, whose upper left corner is 0; `origin` is that of the road in its map.
-    pub(super) fn drawn(&self, view: &View, lettering: &Lettering, origin: DVec2, asked: f64) -> Group {
+    pub(super) fn drawn(
+        &self,
+        view: &View,
+        lettering: &Lettering,
+        road: &RoadLayers,
+        origin: DVec2,
+        asked: f64,
+    ) -> Group {
         let [tractor, trailer] = self.path.corners();
         let [tractor_area, trailer_area] = self
             .areas
             .each_ref()
             .map(|polygons| polygons.iter().map(|polygon| view.polygon(&thinned(view, polygon))).collect::<String>());
         let area = |data: &str, fill: &str| Path::new().set("d", data).set("fill", fill).set("fill-rule", "evenodd");
-        let overlaps = Group::new()
-            .set("clip-path", "url(#solids)")
-            .add(area(&trailer_area, colour::OVERLAP))
-            .add(area(&tractor_area, colour::OVERLAP));
+        let overlaps =
+            road.clipped([&tractor_area, &trailer_area].map(|data| Group::new().add(area(data, colour::OVERLAP))));
         let mut group = Group::new()
             .add(Use::new().set("href", "#road"))
             .add(area(&trailer_area, colour::SWEPT_BY_TRAILER))
@@ -104,12 +110,17 @@ impl Shown {
         let Row { vehicle, lane_centre, way, .. } = &self.row;
         let found = way.as_ref().map_or("none found".to_owned(), |way| signed(way.clearance()));
         let shown = self.row.shown();
+        let apron = match shown.apron_use() {
+            Some(0.0) => ", apron not used".to_owned(),
+            Some(by) => format!(", {by:.2} m on the apron"),
+            None => String::new(),
+        };
         let verdict = self.row.verdict();
         let verdict = if self.row.fits { format!("fits, {verdict}") } else { verdict.to_owned() };
         [
             format!("{}  {vehicle}: {verdict}", self.row.movement()),
             format!(
-                "centre line {}, other way {found}; swept {:.2} m, off-tracking {:.2} m, steer {:.0}\u{b0}",
+                "centre line {}, other way {found}; swept {:.2} m, off-tracking {:.2} m, steer {:.0}\u{b0}{apron}",
                 signed(lane_centre.clearance()),
                 shown.swept_width,
                 shown.off_tracking,

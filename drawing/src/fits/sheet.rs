@@ -52,16 +52,18 @@ pub fn drawn(road: &Road, shown: &[Shown], head: &Head) -> Result<String, Error>
     let view = View::laid_out([DVec2::splat(-reach), DVec2::splat(reach)].into_iter(), &layout);
     let straights = Straights { approach: reach, departure: reach };
     let layers = RoadLayers::new(&view, &lettering, road, &[], straights, head.gutter);
-    let solids = Path::new().set("d", view.frame() + &layers.kerb_data()).set("clip-rule", "evenodd");
-    let definitions = Definitions::new()
-        .add(ClipPath::new().set("id", "panel").add(Path::new().set("d", view.frame())))
-        .add(ClipPath::new().set("id", "solids").add(solids))
+    let definitions =
+        Definitions::new().add(ClipPath::new().set("id", "panel").add(Path::new().set("d", view.frame())));
+    let definitions = layers
+        .solids()
+        .into_iter()
+        .fold(definitions, Definitions::add)
         .add(Group::new().set("id", "road").add(layers.surface()).add(layers.thin_lanes()))
         .add(Group::new().set("id", "kerbs").add(layers.thin_kerbs()));
     let mut panels = Group::new();
     for (index, one) in shown.iter().enumerate() {
         let corner = paper.corner(index) * PX;
-        let mut map = one.drawn(&view, &lettering, road.ground().origin, head.clearance);
+        let mut map = one.drawn(&view, &lettering, &layers, road.ground().origin, head.clearance);
         if index == 0 {
             map = map.add(scale_bar(&view, &lettering));
         }
@@ -127,7 +129,7 @@ fn block(lettering: &Lettering, paper: &Paper, title: &str, shown: &[Shown], hea
         inner,
     );
     text.base += 6.0;
-    let entries = [
+    let mut entries = vec![
         Entry::new(Swatch::Area(colour::SWEPT_BY_TRACTOR), "swept by the tractor"),
         Entry::new(Swatch::Area(colour::SWEPT_BY_TRAILER), "swept by the trailer alone"),
         Entry::new(Swatch::Area(colour::OVERLAP), "swept beyond a kerb"),
@@ -136,6 +138,9 @@ fn block(lettering: &Lettering, paper: &Paper, title: &str, shown: &[Shown], hea
         Entry::new(Swatch::Line(colour::DRIVE_AXLE, 1.2, "5 3"), "drive axle"),
         Entry::new(Swatch::Line(colour::TRAILER_AXLES, 1.2, ""), "trailer axles"),
     ];
+    if shown.iter().any(|one| one.row.shown().apron_clearance.is_some()) {
+        entries.insert(4, Entry::new(Swatch::Area(colour::APRON), "apron, for trailers alone"));
+    }
     let (legend, _) = legend::drawn(lettering, &entries, DVec2::new(text.left, text.base), inner);
     text.group = text.group.add(legend);
     text.base = top + height - 62.0;

@@ -4,10 +4,9 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::DVec2;
-use offtrack::geometry::Outline;
 use offtrack::layout::{Rig, Start, Truck};
-use offtrack::map::Road;
 use offtrack::map::route::Route;
+use offtrack::map::{Road, UnitKerbs};
 use offtrack::scenario::{APPROACH, DEPARTURE, Scenario};
 use offtrack::vehicle::Vehicle;
 use offtrack::vehicle::profile::Profile;
@@ -49,7 +48,7 @@ pub struct Case {
     /// The routes as they lie in the world, in the order of the scenario's.
     pub routes: Vec<Route>,
     /// The kerbs of the road, its arms prolonged.
-    pub kerbs: Outline,
+    pub kerbs: UnitKerbs,
     /// Lengths of the routes before and after the ring (m).
     pub straights: [f64; 2],
     asked: Asked,
@@ -95,7 +94,7 @@ impl Case {
         let speed = asked.speed_kmh / 3.6;
         Case {
             vehicle: name.to_owned(),
-            kerbs: road.kerbs_beyond_ends(asked.gutter),
+            kerbs: road.unit_kerbs_beyond_ends(asked.gutter),
             routes: place.routes.iter().map(|route| place.roundabout.seen_route(route)).collect(),
             straights: [scenario.approach, scenario.departure],
             road,
@@ -267,6 +266,7 @@ pub fn wanted(routes: &[Route], names: &[String]) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
+    use offtrack::geometry::Curve;
     use offtrack::map::Gutter;
     use offtrack::map::ground::Ground;
 
@@ -274,7 +274,10 @@ mod tests {
 
     /// The answer for a route of 16m, or of its mirror image, with this clearance.
     fn answered(route: &str, vehicle: &str, clearance: f64, is_mirrored: bool) -> Row {
-        let road = Road::named("16m").unwrap();
+        answered_on(Road::named("16m").unwrap(), route, vehicle, clearance, is_mirrored)
+    }
+
+    fn answered_on(road: Road, route: &str, vehicle: &str, clearance: f64, is_mirrored: bool) -> Row {
         let ground = Ground { mirrored: is_mirrored, ..road.ground().clone() };
         let road = Road::on("16m".into(), ground);
         let (load, gutter) = ("empty".into(), Gutter::Drivable);
@@ -314,6 +317,31 @@ mod tests {
             assert!((one.trailer.x - other.trailer.x).abs() < 0.01 && (one.trailer.y + other.trailer.y).abs() < 0.01);
             assert!((one.leaves_lane_left - other.leaves_lane_right).abs() < 1e-2, "{one:?} {other:?}");
         }
+    }
+
+    #[test]
+    fn a_trailer_that_runs_over_the_island_on_its_lanes_centre_line_fits_by_an_apron_of_that_width() {
+        let with_apron = |width: f64| {
+            let road = Road::named("16m").unwrap();
+            let apron = Curve::circle(DVec2::ZERO, road.island_radius() - width);
+            Road::on("16m".into(), Ground { aprons: vec![apron], ..road.ground().clone() })
+        };
+        let without = answered("E-left-2", "eu_4x2_13m6", 0.0, false).lane_centre;
+        let over = -without.trailer.clearance;
+        assert!(0.1 < over && 0.2 < without.tractor.clearance && without.apron_clearance.is_none(), "{without:?}");
+        for is_mirrored in [false, true] {
+            let route = if is_mirrored { "E-right-2" } else { "E-left-2" };
+            let on = |width: f64| answered_on(with_apron(width), route, "eu_4x2_13m6", 0.2, is_mirrored);
+            let row = on(over + 0.3);
+            let way = &row.lane_centre;
+            assert!(row.verdict() == "lane centre" && (way.trailer.clearance - 0.3).abs() < 0.01, "{row:?}");
+            assert!((way.apron_use().unwrap() - over).abs() < 2e-3, "{way:?}");
+            assert_eq!(way.tractor.clearance, without.tractor.clearance);
+            // The clearance that is asked for is kept from the apron's inner edge.
+            assert!(!on(over + 0.1).lane_centre.fits);
+        }
+        let unused = answered_on(with_apron(0.5), "E-right-1", "daf_xf", 0.0, false);
+        assert_eq!(unused.shown().apron_use(), Some(0.0));
     }
 
     #[test]

@@ -75,6 +75,10 @@ impl Results {
 
     /// Notes a road, whose results another shape of it would not have.
     pub fn add_road(&mut self, road: &Road) {
+        let of_aprons = "trailers may drive on aprons, tractors may not";
+        if road.has_apron() && !self.assumptions.iter().any(|assumption| assumption == of_aprons) {
+            self.assumptions.push(of_aprons.to_owned());
+        }
         let text = road.ground().text(&[]);
         self.inputs.insert(format!("road {}", road.name), format!("{:08x}", crc32fast::hash(text.as_bytes())));
     }

@@ -60,13 +60,13 @@ impl Units {
 /// A column: its heading in two lines, and its cell of a row.
 type Column = ([String; 2], Box<dyn Fn(&Row) -> String>);
 
-/// The columns after the names, the most important first.
-fn columns(units: Units) -> Vec<Column> {
+/// The columns after the names, the most important first; one of aprons where a road has any.
+fn columns(rows: &[Row], units: Units) -> Vec<Column> {
     let unit = units.of_length();
     let length = move |value: f64| units.length(value);
     let of_way = move |way: Option<&Way>| way.map_or("-".to_owned(), |way| length(way.clearance()));
     let heading = |first: &str, second: &str| [first.to_owned(), second.to_owned()];
-    vec![
+    let mut columns: Vec<Column> = vec![
         (heading("fits by", ""), Box::new(|row| row.verdict().to_owned())),
         (heading("clearance", &format!("centre {unit}")), Box::new(move |row| of_way(Some(&row.lane_centre)))),
         (heading("clearance", &format!("way {unit}")), Box::new(move |row| of_way(row.way.as_ref()))),
@@ -83,13 +83,22 @@ fn columns(units: Units) -> Vec<Column> {
             Box::new(|row| format!("{:.2}", row.shown().lateral_acceleration / offtrack::vehicle::GRAVITY)),
         ),
         (heading("load", "transfer"), Box::new(|row| format!("{:.2}", row.shown().load_transfer_ratio))),
-    ]
+    ];
+    if rows.iter().any(|row| row.shown().apron_clearance.is_some()) {
+        let on_apron = move |row: &Row| match row.shown().apron_use() {
+            Some(0.0) => "no".to_owned(),
+            Some(by) => length(by),
+            None => "-".to_owned(),
+        };
+        columns.insert(3, (heading("on apron", unit), Box::new(on_apron)));
+    }
+    columns
 }
 
 /// A line for each row under two lines of headings, none longer than `width`: what there is no room for is left out
 /// from the right, and a last line says so.
 pub fn table(rows: &[Row], width: usize, units: Units) -> String {
-    let columns = columns(units);
+    let columns = columns(rows, units);
     let cells: Vec<Vec<String>> = columns.iter().map(|(_, cell)| rows.iter().map(cell).collect()).collect();
     let widths: Vec<usize> = columns
         .iter()
@@ -165,13 +174,14 @@ fn way_cells(way: &Way) -> Vec<String> {
     let after = [way.steer_angle_deg, way.steer_rate_deg, way.lateral_acceleration, way.load_transfer_ratio];
     let radius = way.lowest_radius.map(|radius| radius.to_string()).unwrap_or_default();
     let cells = numbers.iter().map(f64::to_string).chain([radius]).chain(after.iter().map(f64::to_string));
-    std::iter::once(way.fits.to_string()).chain(cells).collect()
+    let apron = way.apron_clearance.map(|clearance| clearance.to_string()).unwrap_or_default();
+    std::iter::once(way.fits.to_string()).chain(cells).chain([apron]).collect()
 }
 
 /// The answers as CSV, a row each under one of names, in metres and as `fits.json` names them; columns of the lane's
 /// centre line begin with `lane_centre_`, those of the way found with `way_`.
 pub fn csv(rows: &[Row]) -> String {
-    let way_names = || WAY.iter().copied().chain(["load_transfer_ratio"]);
+    let way_names = || WAY.iter().copied().chain(["load_transfer_ratio", "apron_clearance"]);
     let mut heading: Vec<String> = ["route", "vehicle", "fits", "fastest_kmh"].map(str::to_owned).to_vec();
     for prefix in ["lane_centre_", "way_"] {
         heading.extend(way_names().map(|name| format!("{prefix}{name}")));
@@ -209,6 +219,7 @@ mod tests {
             steer_rate_deg: 10.0,
             lateral_acceleration: 0.981,
             load_transfer_ratio: 0.2,
+            apron_clearance: None,
         };
         let search = Found {
             ended: "collided".into(),
@@ -249,12 +260,30 @@ mod tests {
     }
 
     #[test]
+    fn a_table_says_by_how_much_an_apron_is_used_and_only_where_a_road_has_one() {
+        let with = |clearance: Option<f64>| {
+            let mut row = row("16m/N-left-3", "us_wb62");
+            row.lane_centre.apron_clearance = clearance;
+            row
+        };
+        let cells = |rows: &[Row]| -> Vec<String> {
+            let text = table(rows, 200, Units::Metric);
+            let at = text.find("on apron");
+            at.map_or_else(Vec::new, |at| text.lines().skip(2).map(|line| line[at..at + 8].trim().to_owned()).collect())
+        };
+        assert_eq!(cells(&[with(Some(-0.853)), with(Some(0.2)), with(None)]), ["0.85", "no", "-"]);
+        assert_eq!(cells(&[with(None)]), Vec::<String>::new());
+        let text = csv(&[with(Some(-0.853))]);
+        assert!(text.lines().nth(1).unwrap().contains(",0.2,-0.853,"), "{text}");
+    }
+
+    #[test]
     fn every_row_of_csv_has_a_cell_for_each_name_and_names_with_commas_are_quoted() {
         let mut with_way = row("a", "b");
         with_way.way = Some(with_way.lane_centre.clone());
         let text = csv(&[row("a", "b"), with_way]);
         let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
-        assert_eq!(lines.iter().map(Vec::len).collect::<Vec<_>>(), [36; 3]);
+        assert_eq!(lines.iter().map(Vec::len).collect::<Vec<_>>(), [38; 3]);
         let of = |name: &str, line: usize| lines[line][lines[0].iter().position(|other| *other == name).unwrap()];
         assert_eq!((of("lane_centre_trailer_clearance", 1), of("way_trailer_clearance", 1)), ("-0.25", ""));
         assert_eq!((of("way_lowest_radius", 2), of("way_load_transfer_ratio", 2)), ("", "0.2"));

@@ -1,10 +1,9 @@
 //! A path that a truck drives on a route, and its figures: clearance, swept width, steering, lateral acceleration.
 
 use glam::DVec2;
-use offtrack::geometry::Outline;
 use offtrack::layout::Rig;
-use offtrack::map::Road;
 use offtrack::map::route::Route;
+use offtrack::map::{Road, UnitKerbs};
 use offtrack::vehicle::swept::{Pose, Section, UnitClearance, beside, front_path, off_tracking, sections};
 use serde::{Deserialize, Serialize};
 
@@ -81,6 +80,10 @@ pub struct Way {
     pub lateral_acceleration: f64,
     /// Highest load transfer ratio of either unit: 1 when the inner wheels lift.
     pub load_transfer_ratio: f64,
+    /// The trailer's least distance from an apron's outer edge, negative where it uses the apron; none without aprons
+    /// (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub apron_clearance: Option<f64>,
 }
 
 impl Way {
@@ -92,7 +95,7 @@ impl Way {
         asks: &Asks,
         road: &Road,
         route: &Route,
-        kerbs: &Outline,
+        kerbs: &UnitKerbs,
         straights: [f64; 2],
         holds: impl FnOnce(f64) -> bool,
     ) -> Way {
@@ -126,12 +129,18 @@ impl Way {
             steer_rate_deg: to(ROUNDED, asks.steer_rate.to_degrees()),
             lateral_acceleration: to(ROUNDED, asks.lateral_acceleration),
             load_transfer_ratio: to(ROUNDED, asks.load_transfer_ratio),
+            apron_clearance: path.apron_clearance(kerbs).map(|least| to(ROUNDED, least)),
         }
     }
 
     /// The least clearance of both units (m).
     pub fn clearance(&self) -> f64 {
         self.tractor.clearance.min(self.trailer.clearance)
+    }
+
+    /// By how much the trailer uses an apron, 0 where it does not; none on a road without aprons (m).
+    pub fn apron_use(&self) -> Option<f64> {
+        self.apron_clearance.map(|clearance| (-clearance).max(0.0))
     }
 
     /// The unit that comes nearest to a kerb, and where.
@@ -153,9 +162,17 @@ impl Path {
         ]
     }
 
-    /// How near the tractor and the trailer come to the kerbs.
-    pub fn clearances(&self, kerbs: &Outline) -> [UnitClearance; 2] {
-        self.corners().map(|unit| UnitClearance::of(&unit, kerbs))
+    /// How near the tractor and the trailer come to the kerbs that each keeps to.
+    pub fn clearances(&self, kerbs: &UnitKerbs) -> [UnitClearance; 2] {
+        let ([tractor, trailer], [of_tractor, of_trailer]) = (self.corners(), kerbs.both());
+        [UnitClearance::of(&tractor, of_tractor), UnitClearance::of(&trailer, of_trailer)]
+    }
+
+    /// The trailer's least distance from the outer edge of an apron, negative on it; none without aprons (m).
+    fn apron_clearance(&self, kerbs: &UnitKerbs) -> Option<f64> {
+        let edges = kerbs.apron_edges()?;
+        let [_, trailer] = self.corners();
+        Some(UnitClearance::of(&trailer, edges).least)
     }
 }
 

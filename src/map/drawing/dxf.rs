@@ -72,7 +72,7 @@ impl Drawing {
         let entities = entities(&pairs);
         let reader = Reader::of(file);
         reader.count("entities", entities.len(), 0..=MOST_ENTITIES)?;
-        let mut drawing = Drawing { kerbs: Vec::new(), lanes: Vec::new(), centre: None, notes: Vec::new() };
+        let mut drawing = Drawing::default();
         let mut others: BTreeMap<&str, usize> = BTreeMap::new();
         let mut index = 0;
         while index < entities.len() {
@@ -89,6 +89,8 @@ impl Drawing {
                 &mut drawing.kerbs
             } else if layer.eq_ignore_ascii_case(&layers.lanes) {
                 &mut drawing.lanes
+            } else if layer.eq_ignore_ascii_case(&layers.aprons) {
+                &mut drawing.aprons
             } else {
                 if !matches!(entity[0].value, "VERTEX" | "SEQEND") {
                     *others.entry(layer).or_default() += 1;

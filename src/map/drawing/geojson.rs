@@ -88,7 +88,7 @@ pub(super) fn drawing(file: &Path, text: &str, layers: &Layers) -> Result<Drawin
         return Err(reader.invalid("type", format!("{kind:?}"), "must be \"FeatureCollection\""));
     }
     reader.count("features", collection.features.len(), 1..=MOST_FEATURES)?;
-    let mut drawing = Drawing { kerbs: Vec::new(), lanes: Vec::new(), centre: None, notes: Vec::new() };
+    let mut drawing = Drawing::default();
     let frame = frame(&reader, collection.crs.as_ref())?;
     drawing.notes.extend(frame.map(|name| format!("coordinates are those of {name}, in which `origin` lies")));
     let metres = layers.unit.map_or(1.0, super::Unit::metres);
@@ -103,6 +103,8 @@ pub(super) fn drawing(file: &Path, text: &str, layers: &Layers) -> Result<Drawin
             drawing.kerbs.extend(shape.kerbs(&mut left)?);
         } else if is(&layers.lanes) {
             drawing.lanes.extend(shape.lanes(feature.widths())?);
+        } else if is(&layers.aprons) {
+            drawing.aprons.extend(shape.kerbs(&mut left)?);
         } else if is(CENTRE) && geometry.kind == "Point" {
             drawing.centre = Some(shape.point("coordinates", &geometry.coordinates)?);
         } else {

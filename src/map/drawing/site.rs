@@ -5,15 +5,16 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use super::{Drawing, Entity, Layers};
+use super::{Drawing, Entity, Layers, aprons};
 use crate::files::reader::{Error, Reader};
 use crate::geometry::{Curve, Outline, Piece, fitted_line, wrapped};
+use crate::map::apron;
 use crate::map::ground::{Arm, Edges, Ground, Kerb, Line};
 use crate::map::opendrive::{fitted_circle, kerb_of, outer_radius, ring_radius};
 use crate::map::route::Lane;
 
 /// Ends of lines nearer than this are joined (m).
-const GAP: f64 = 0.02;
+pub(super) const GAP: f64 = 0.02;
 /// Turn between two pieces of a way that is taken for smooth (rad).
 const SMOOTH: f64 = 5e-3;
 /// Tolerance of a smooth line through a way with corners (m).
@@ -24,6 +25,8 @@ const ONE_ARM: f64 = 0.35;
 /// Most lines of kerbs, each of which is compared with every other, and most ways.
 const MOST_KERBS: usize = 5000;
 const MOST_WAYS: usize = 128;
+/// Most lines of aprons, each of which is compared with every kerb.
+const MOST_APRONS: usize = 200;
 /// Farthest that an island may be from a circle, as a fraction of its radius.
 const ROUND: f64 = 0.3;
 
@@ -39,10 +42,13 @@ pub struct Drawn {
 /// The road of a drawing.
 pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Drawn, Error> {
     let reader = Reader::of(file);
-    let Drawing { kerbs, lanes, centre: marked, mut notes } = drawing;
+    let Drawing { kerbs, lanes, aprons, centre: marked, mut notes } = drawing;
     reader.count(&format!("lines on layer {}", layers.kerbs), kerbs.len(), 1..=MOST_KERBS)?;
     reader.count(&format!("lines on layer {}", layers.lanes), lanes.len(), 1..=MOST_WAYS)?;
-    let loops = closed(&reader, kerbs, layers, &mut notes)?;
+    reader.count(&format!("lines on layer {}", layers.aprons), aprons.len(), 0..=MOST_APRONS)?;
+    let loops = closed(&reader, kerbs, &layers.kerbs, &mut notes)?;
+    let aprons = closed(&reader, aprons, &layers.aprons, &mut notes)?;
+    let (loops, aprons) = aprons::placed(loops, aprons);
     let (centre, radius) = island(&reader, &loops, layers, layers.ring.or(marked))?;
     let place = |curve: &Curve| moved(curve, -centre);
     let loops: Vec<Curve> = loops.iter().map(place).collect();
@@ -51,6 +57,8 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
     let mirrored = turned < 0.0;
     let seen = |curve: &Curve| if mirrored { curve.mirrored() } else { curve.clone() };
     let faces = Outline::new(loops.iter().map(seen).collect());
+    let aprons = aprons.iter().map(|apron| (format!("layer {}", layers.aprons), seen(&place(apron))));
+    let aprons = apron::checked(&reader, &faces, aprons.collect())?;
     let ways: Vec<Curve> = ways.iter().map(seen).collect();
     if mirrored {
         notes.push("the ways lead clockwise around the island: left-hand traffic".into());
@@ -72,7 +80,7 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
         lane_radii,
         arms,
         edges: Edges::Own(faces.clone()),
-        aprons: Vec::new(),
+        aprons,
         faces,
         kerbs,
         lanes: ways,
@@ -82,7 +90,7 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
 }
 
 /// The closed outlines: those drawn as such, and chains of open pieces whose ends meet.
-fn closed(reader: &Reader, drawn: Vec<Entity>, layers: &Layers, notes: &mut Vec<String>) -> Result<Vec<Curve>, Error> {
+fn closed(reader: &Reader, drawn: Vec<Entity>, layer: &str, notes: &mut Vec<String>) -> Result<Vec<Curve>, Error> {
     let meets = |a: DVec2, b: DVec2| a.distance(b) <= GAP;
     let ends = |curve: &Curve| (curve.point_at(0.0), curve.point_at(curve.length()));
     let (mut loops, mut open) = (Vec::new(), Vec::new());
@@ -103,8 +111,8 @@ fn closed(reader: &Reader, drawn: Vec<Entity>, layers: &Layers, notes: &mut Vec<
             });
             let Some(next) = next else {
                 let expected = format!(
-                    "the outline is open at ({:.3}, {:.3}) m: kerbs on layer {} must be closed within {GAP} m",
-                    end.x, end.y, layers.kerbs
+                    "the outline is open at ({:.3}, {:.3}) m: those on layer {layer} must be closed within {GAP} m",
+                    end.x, end.y
                 );
                 return Err(reader.invalid(place, "open", expected));
             };
@@ -115,7 +123,7 @@ fn closed(reader: &Reader, drawn: Vec<Entity>, layers: &Layers, notes: &mut Vec<
         loops.push(curve);
     }
     if 0 < n_open {
-        notes.push(format!("{n_open} open lines of kerbs are joined to closed outlines"));
+        notes.push(format!("{n_open} open lines on layer {layer} are joined to closed outlines"));
     }
     Ok(loops)
 }

@@ -13,7 +13,15 @@ const HEADER: &str = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n6\n0\nENDSEC\n0\n
 const END: &str = "0\nENDSEC\n0\nEOF\n";
 
 fn layers() -> Layers {
-    Layers { kerbs: "KERB".into(), lanes: "LANE".into(), unit: None, lane_width: 4.0, ring: None, arms: Vec::new() }
+    Layers {
+        kerbs: "KERB".into(),
+        lanes: "LANE".into(),
+        aprons: "APRON".into(),
+        unit: None,
+        lane_width: 4.0,
+        ring: None,
+        arms: Vec::new(),
+    }
 }
 
 fn read(entities: &str, layers: &Layers) -> Result<Drawn, String> {
@@ -112,6 +120,48 @@ fn the_mirror_image_of_a_drawing_has_left_hand_traffic_and_is_driven_as_the_road
             .iter()
             .any(|other| line.line.polyline(0.5).into_iter().all(|p| other.line.distance(p) < 1e-3))
     }));
+}
+
+#[test]
+fn an_apron_is_the_same_by_either_of_its_edges_or_both_and_by_either_as_the_islands_kerb() {
+    let road = Road::named("20m").unwrap();
+    let island = road.island_radius();
+    let [outer, inner] = [island, island - 2.0].map(|radius| Curve::circle(DVec2::ZERO, radius));
+    let faces = || road.ground().faces.loops.iter();
+    let is_island = |face: &&Curve| (face.point_at(0.0).length() - island).abs() < 1e-6;
+    let lanes: String = road.ground().lines.iter().map(|line| polyline("LANE", &line.line, false, 1.0)).collect();
+    let others: String =
+        faces().filter(|face| !is_island(face)).map(|face| polyline("KERB", face, true, 1.0)).collect();
+    let with = |kerb: &Curve, aprons: &[&Curve]| {
+        let aprons: String = aprons.iter().map(|apron| polyline("Apron", apron, true, 1.0)).collect();
+        read(&(others.clone() + &polyline("KERB", kerb, true, 1.0) + &aprons + &lanes), &layers())
+    };
+    let drawings: [(&Curve, &[&Curve]); 5] = [
+        (&outer, &[&inner]),
+        (&outer, &[&outer, &inner]),
+        (&inner, &[&outer]),
+        (&inner, &[&outer, &inner]),
+        (&inner, &[&inner, &outer]),
+    ];
+    for (index, (kerb, aprons)) in drawings.into_iter().enumerate() {
+        let ground = with(kerb, aprons).unwrap().ground;
+        assert_eq!((ground.aprons.len(), ground.faces.loops.len()), (1, faces().count()), "{index}");
+        assert!((ground.island_radius - island).abs() < 1e-3, "{index}: {}", ground.island_radius);
+        assert!(ground.aprons[0].polyline(0.01).into_iter().all(|p| inner.distance(p) < 1e-3), "{index}");
+        ground.checked_text(Path::new("site.outline.toml"), &[]).unwrap();
+    }
+    assert_eq!(with(&outer, &[]).unwrap().ground.aprons, []);
+    let [beside, across] = [2.0, 0.7].map(|out| Curve::circle(DVec2::new(out * island, 0.0), 0.5 * island));
+    let open = inner.part(0.0, 3.0);
+    let open = others.clone() + &polyline("KERB", &outer, true, 1.0) + &polyline("APRON", &open, false, 1.0) + &lanes;
+    for (said, expected) in [
+        (with(&outer, &[&beside]).unwrap_err(), "layer APRON: in no island; must lie within an island's kerb"),
+        (with(&outer, &[&across]).unwrap_err(), "layer APRON: crosses; must not cross or touch a kerb"),
+        (with(&outer, &[&inner, &Curve::circle(DVec2::ZERO, 1.0)]).unwrap_err(), "layer APRON: a second one"),
+        (read(&open, &layers()).unwrap_err(), "those on layer APRON must be closed"),
+    ] {
+        assert!(said.contains(expected), "{said}");
+    }
 }
 
 #[test]

@@ -12,6 +12,7 @@ use super::{Arm, Edges, Ground, Hand, Kerb, Line};
 use crate::files::reader::{Error, Reader};
 use crate::geometry::area::signed_area;
 use crate::geometry::{Curve, Outline, Piece, arc_of_height};
+use crate::map::apron::{self, crosses};
 use crate::map::route::Lane;
 
 /// Largest coordinate (m).
@@ -42,6 +43,8 @@ struct Written {
     route: Vec<WrittenRoute>,
     #[serde(default)]
     lane: Vec<WrittenLane>,
+    #[serde(default)]
+    apron: Vec<WrittenLane>,
 }
 
 #[derive(Deserialize)]
@@ -71,6 +74,7 @@ struct WrittenRoute {
     path: Vec<Vec<f64>>,
 }
 
+/// A line of its own: a lane, or the closed inner edge of an apron.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct WrittenLane {
@@ -119,8 +123,9 @@ impl Ground {
             let _ = writeln!(text, "\n[[route]]\nentry = {entry:?}\nlane = {lane:?}\nexit = {exit}\nto = {to:?}");
             let _ = writeln!(text, "crossing = [{crossing}]\nwidths = [{widths}]\npath = [{}\n]", path(line, false));
         }
-        for lane in &self.lanes {
-            let _ = writeln!(text, "\n[[lane]]\npath = [{}\n]", path(lane, false));
+        let lanes = self.lanes.iter().map(|lane| ("lane", path(lane, false)));
+        for (table, path) in lanes.chain(self.aprons.iter().map(|apron| ("apron", path(apron, true)))) {
+            let _ = writeln!(text, "\n[[{table}]]\npath = [{path}\n]");
         }
         text
     }
@@ -221,6 +226,12 @@ impl Ground {
             .enumerate()
             .map(|(i, lane)| curve(&reader, &format!("lane[{i}].path"), &lane.path, false));
         let lanes = lanes.collect::<Result<_, _>>()?;
+        reader.count("apron", written.apron.len(), 0..=MOST_LOOPS)?;
+        let aprons = written.apron.iter().enumerate().map(|(i, apron)| {
+            let key = format!("apron[{i}].path");
+            curve(&reader, &key, &apron.path, true).map(|apron| (key, apron))
+        });
+        let aprons = apron::checked(&reader, &faces, aprons.collect::<Result<_, _>>()?)?;
         let edges = Edges::Own(edges);
         let mirrored = written.hand == Hand::Left;
         Ok(Ground {
@@ -233,7 +244,7 @@ impl Ground {
             faces,
             kerbs,
             edges,
-            aprons: Vec::new(),
+            aprons,
             lanes,
             lines,
         })
@@ -356,8 +367,4 @@ fn loops(
         ));
     }
     Ok((Outline::new(curves), kerbs))
-}
-
-fn crosses(one: &Curve, other: &Curve) -> bool {
-    one.pieces.iter().any(|piece| other.pieces.iter().any(|there| !piece.meetings(there).is_empty()))
 }
