@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Piece};
-use offtrack::map::ground::{Ground, Line};
+use offtrack::map::ground::{Ground, Kerb, Line};
 use offtrack::map::opendrive::{Hand, Map, Options, exported};
 use offtrack::map::{Road, procedural};
 
@@ -152,4 +152,49 @@ fn names_with_markup_are_escaped_in_a_map() {
     let text = exported(&named).unwrap();
     assert!(text.contains("name=\"a&lt;b&gt;&amp;&quot;c&quot;\"") && !text.contains("a<b>"));
     assert_eq!(Map::parse(Path::new("named.xodr"), &text, Hand::Map).unwrap().rings().len(), 1);
+}
+
+#[test]
+fn an_apron_is_a_border_of_the_map_that_trucks_have_access_to_and_is_read_back_within_a_centimetre() {
+    for mirrored in [false, true] {
+        let mut road = placed("16m", mirrored);
+        let radius = road.island_radius() - 2.0;
+        road = Road::on(
+            road.name.clone(),
+            Ground { aprons: vec![Curve::circle(DVec2::ZERO, radius)], ..road.ground().clone() },
+        );
+        let (map, found) = read_back(&road);
+        assert_eq!((found.aprons.len(), found.faces.loops.len()), (1, road.ground().faces.loops.len()));
+        for p in found.aprons[0].polyline(0.01) {
+            assert!((p.length() - radius).abs() < LOST, "{p}");
+        }
+        assert!((found.island_radius - road.island_radius()).abs() < 1e-3 && map.is_mirrored() == mirrored);
+        let text = exported(&road).unwrap();
+        let access = "<access sOffset=\"0\" rule=\"allow\" restriction=\"truck\"/>";
+        assert_eq!(text.matches(access).count(), 2);
+        let ground = |text: &str| {
+            let map = Map::parse(Path::new("back.xodr"), text, Hand::Map).unwrap();
+            let ring = map.nearest(road.ground().origin).unwrap();
+            map.ground(&ring, &Options::default()).unwrap()
+        };
+        // As OpenDRIVE 1.8 has it; without access the border is solid, and half an apron is none.
+        let nested = "<access sOffset=\"0\" rule=\"allow\"><restriction type=\"truck\"/></access>";
+        assert_eq!(ground(&text.replace(access, nested)).ground.aprons.len(), 1);
+        assert_eq!(ground(&text.replace(access, "")).ground.aprons, []);
+        let half = ground(&text.replacen(access, "", 1));
+        assert!(half.ground.aprons.is_empty() && half.warnings.iter().any(|warning| warning.contains("apron")));
+    }
+}
+
+#[test]
+fn an_apron_of_a_splitter_island_is_refused_since_a_map_would_lose_it() {
+    let road = placed("16m", false);
+    let own = road.ground();
+    let splitter =
+        own.faces.loops.iter().zip(&own.kerbs).find(|(_, kerb)| matches!(kerb, Kerb::Splitter(_))).unwrap().0;
+    let (low, high) = offtrack::geometry::Outline::new(vec![splitter.clone()]).bounds();
+    let apron = Curve::circle((low + high) / 2.0, 0.05);
+    let with = Road::on("splitter".into(), Ground { aprons: vec![apron], ..own.clone() });
+    let said = exported(&with).unwrap_err().to_string();
+    assert!(said.contains("splitter: aprons: lost") && said.contains("central island would do"), "{said}");
 }

@@ -19,6 +19,7 @@ use super::{FINEST, Map, Ring};
 use crate::files::reader::{Error, Reader};
 use crate::geometry::area::{densified, points, signed_area};
 use crate::geometry::{Curve, Outline, Piece};
+use crate::map::apron;
 use crate::map::ground::{Arm, Edges, Ground, Kerb};
 use crate::map::route::Lane;
 
@@ -26,6 +27,8 @@ use crate::map::route::Lane;
 const BESIDE_RING: f64 = 6.0;
 /// Ring lanes whose centre lines are nearer to each other than this are one (m).
 const ONE_LANE: f64 = 1.2;
+/// How far an island may reach, in its radii: rings are not quite round.
+const OVAL: f64 = 1.4;
 /// Most arms of a place.
 const MOST_ARMS: usize = 8;
 
@@ -65,6 +68,10 @@ struct Island {
     radius: f64,
     faces: Outline,
     edges: Outline,
+    /// The inner edge of its apron.
+    apron: Option<Curve>,
+    /// Whether the map has an apron that does not lead all around the island.
+    has_open_apron: bool,
 }
 
 /// A ring of a map's records.
@@ -74,7 +81,7 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
         Refusals { reader: Reader::of(&map.file), place: format!("ring at ({:.1}, {:.1})", outside.x, outside.y) };
     let extent = ring.radius + REACH;
     let expected = "its edge is lost among narrow voids; another ring would do";
-    let Island { origin, radius, faces, edges } =
+    let Island { origin, radius, faces, edges, apron, has_open_apron } =
         island(map, ring, extent).ok_or_else(|| refused.error("island", "none", expected))?;
     let outer_radius = outer_radius(&faces, radius);
 
@@ -98,7 +105,15 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
     let mut lane_radii: Vec<f64> = in_ring.into_iter().map(|line| ring_radius(line, radius, outer_radius)).collect();
     lane_radii.sort_by(f64::total_cmp);
     lane_radii.dedup_by(|after, before| *after - *before < ONE_LANE);
-    imported.ground = Ground { island_radius: radius, outer_radius, lane_radii, ..imported.ground };
+    let drawn = apron.into_iter().map(|apron| ("apron".to_owned(), apron)).collect();
+    let checked = apron::checked(&refused.reader, &imported.ground.faces, drawn);
+    if has_open_apron || checked.is_err() {
+        imported
+            .warnings
+            .push(format!("{}: its apron does not lead all around the island; it is solid", refused.place));
+    }
+    let aprons = checked.unwrap_or_default();
+    imported.ground = Ground { island_radius: radius, outer_radius, lane_radii, aprons, ..imported.ground };
     Ok(imported)
 }
 
@@ -180,7 +195,12 @@ fn island(map: &Map, ring: &Ring, extent: f64) -> Option<Island> {
     let edges = clipped(&surface.edges, extent).into_iter().find(around)?;
     let island = faces.iter().skip(1).find(|hole| encloses_origin(hole))?;
     let (centre, radius, _) = fitted_circle(&densified(&points(island), 0.1))?;
+    // Where it leads all around, what is within it is a hole.
+    let aprons = clipped(&surface.aprons, OVAL * radius);
+    let apron = aprons.iter().flat_map(|part| part.iter().skip(1)).find(|hole| encloses_origin(hole));
     Some(Island {
+        has_open_apron: !aprons.is_empty() && apron.is_none(),
+        apron: apron.and_then(|hole| outline(&vec![hole.clone()], centre).loops.pop()),
         origin: ring.centre + centre,
         radius,
         faces: outline(&faces, centre),

@@ -66,6 +66,8 @@ enum Kind {
     Shoulder,
     /// A kerb's stone.
     Curb,
+    /// An apron.
+    Apron,
 }
 
 /// A width that holds from `start` on: `a + b x + c x² + d x³`.

@@ -173,7 +173,7 @@ pub(super) fn sampled(road: &RoadRecord, index: usize, section: usize, tolerance
 fn kind(lane: &Lane, section: &Section, breaks: &[f64]) -> Kind {
     let raised = lane.heights.iter().any(|height| RAISED < height.height);
     match lane.kind {
-        Kind::Lane | Kind::Kerb => lane.kind,
+        Kind::Lane | Kind::Kerb | Kind::Apron => lane.kind,
         _ if !raised => lane.kind,
         _ => {
             let width = |s: f64| {

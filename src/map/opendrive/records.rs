@@ -82,6 +82,8 @@ pub(super) enum Kind {
     Kerb,
     /// Walks, medians, borders: solid unless a lane lies on them.
     Solid,
+    /// One of these that trucks have access to: solid to a tractor, drivable to its trailer.
+    Apron,
     /// Nothing is known of it.
     Nothing,
 }

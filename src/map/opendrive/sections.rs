@@ -23,6 +23,16 @@ struct Written {
     sides: [bool; 2],
 }
 
+/// Whether a lane's access records allow trucks on it.
+fn is_for_trucks(lane: Node) -> bool {
+    let allows = |access: Node| {
+        let restrictions = children(access, "restriction").map(|node| attribute(node, "type"));
+        attribute(access, "rule") == "allow"
+            && restrictions.chain([attribute(access, "restriction")]).any(|of| ["truck", "trucks"].contains(&of))
+    };
+    children(lane, "access").any(allows)
+}
+
 impl Source<'_, '_> {
     /// The lane sections of a road of this length, each with both sides.
     pub(super) fn sections<'a, 'i: 'a>(
@@ -111,6 +121,7 @@ impl Source<'_, '_> {
             *self.records.unknown_types.entry(name.to_owned()).or_default() += 1;
             Kind::Nothing
         });
+        let kind = if kind == Kind::Solid && is_for_trucks(node) { Kind::Apron } else { kind };
         Ok(Lane {
             id,
             kind,

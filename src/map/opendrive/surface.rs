@@ -37,6 +37,8 @@ pub(super) struct Surface {
     pub(super) faces: Area,
     /// Up to the edges of the lanes.
     pub(super) edges: Area,
+    /// The aprons, which are no part of these.
+    pub(super) aprons: Area,
 }
 
 /// The union of the strips of one kind.
@@ -50,7 +52,8 @@ impl Surface {
         let kind = |kind: Kind| of(strips.iter(), kind);
         let kerbs = kind(Kind::Kerb).plus(&Area::union(islands.iter().cloned().map(counter_clockwise))).closed(GAP);
         let lanes = kind(Kind::Lane).closed(GAP).minus(&kerbs);
-        let solid = kind(Kind::Solid).minus(&lanes);
+        let solid = strips.iter().filter(|strip| matches!(strip.kind, Kind::Solid | Kind::Apron));
+        let solid = Area::union(solid.flat_map(Strip::contours)).minus(&lanes);
         let flat = kind(Kind::Flat).minus(&solid);
         let paved = lanes.plus(&flat).closed(GAP).minus(&kerbs).minus(&solid);
         let inscribed = if kerbs.parts.is_empty() { INSCRIBED } else { INSCRIBED_AMONG_KERBS };
@@ -58,7 +61,8 @@ impl Surface {
         let lane_edge = Edge::new(&lanes);
         let beside_lanes = Area { parts: voids.parts.iter().filter(|void| lane_edge.touches(void)).cloned().collect() };
         let bounded = |area: Area| area.closed(GAP).minus(&kerbs).minus(&solid).without_slits(SLIT, SIMPLE);
-        Surface { edges: bounded(lanes.plus(&beside_lanes)), faces: bounded(paved.plus(&voids)) }
+        let aprons = kind(Kind::Apron).closed(GAP);
+        Surface { edges: bounded(lanes.plus(&beside_lanes)), faces: bounded(paved.plus(&voids)), aprons }
     }
 }
 

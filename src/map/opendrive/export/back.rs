@@ -28,8 +28,8 @@ pub(super) fn check(reader: &Reader, road: &Road, text: &str) -> Result<(), Erro
         let ways: Vec<_> = map.junctions().into_iter().flat_map(|junction| junction.ways).collect();
         map.through(&ways, &options)
     };
-    let lost = |error: Error| reader.invalid("map", "not read back", format!("{KEEP}: {error}"));
-    let found = found.map_err(lost)?.ground;
+    let unread = |error: Error| reader.invalid("map", "not read back", format!("{KEEP}: {error}"));
+    let found = found.map_err(unread)?.ground;
     let (routes, others) = (own.lines.len(), found.lines.len());
     if routes != others {
         let expected = format!("as a map it has {others}; a road whose arms are farther apart would do");
@@ -46,10 +46,22 @@ pub(super) fn check(reader: &Reader, road: &Road, text: &str) -> Result<(), Erro
     let back = found.faces.loops.iter().flat_map(points).map(|p| frame.to_driven(other.to_map(p)));
     let back = back.filter(|p| p.length() < reach).map(|p| (own.faces.distance(p), p));
     let (off, at) = there.chain(back).fold((0.0, DVec2::ZERO), |most, one| if most.0 < one.0 { one } else { most });
+    let inner = own.aprons.iter().flat_map(points);
+    let mut lost = inner.map(|p| (distance(&found.aprons, other.to_driven(frame.to_map(p))), p));
+    if let Some((off, at)) = lost.find(|(off, _)| OFF < *off) {
+        let (at, found) = (frame.to_map(at), if off.is_finite() { format!("{off:.2} m off") } else { "lost".into() });
+        let expected = "an apron all around the central island would do, as wide as to the nearest point of its edge";
+        return Err(reader.invalid("aprons", format!("{found} at ({:.1}, {:.1}) as a map", at.x, at.y), expected));
+    }
     if off <= OFF {
         return Ok(());
     }
     let at = frame.to_map(at);
     let expected = format!("more is paved there than its routes' lanes and the gutters; {KEEP}");
     Err(reader.invalid("kerbs", format!("{off:.2} m off at ({:.1}, {:.1}) as a map", at.x, at.y), expected))
+}
+
+/// Distance of a point from the nearest of some curves; infinite without one (m).
+fn distance(curves: &[Curve], p: DVec2) -> f64 {
+    curves.iter().map(|curve| curve.distance(p)).fold(f64::INFINITY, f64::min)
 }

@@ -1,5 +1,5 @@
-//! Kerbs as roads without lanes to drive on: the face is the reference line, a gutter lies on its left and the kerb's
-//! stone on its right.
+//! Kerbs as roads without lanes to drive on: the face is the reference line, a gutter lies on its left, the kerb's stone
+//! on its right, behind an apron where there is one.
 //!
 //! A face is cut where it forms a corner, since reference lines have none. Where an arm ends nothing is solid: there a
 //! narrow shoulder closes the surface.
@@ -9,6 +9,7 @@ use glam::DVec2;
 use super::xml::is_kink;
 use super::{Kind, Width, Written, WrittenLane};
 use crate::geometry::{Curve, Outline, Piece};
+use crate::map::apron;
 use crate::map::ground::{Edges, Ground, Kerb};
 
 /// Width of a kerb's stone (m): the tip of the sharpest splitter island, with a radius of 0.1 m, has room for it.
@@ -40,8 +41,12 @@ pub(super) fn kerbs(seen: &Ground, first: usize) -> Vec<Written> {
             } else {
                 let gutter = gutter(&seen.edges, &line);
                 let gutter = gutter.map(|widths| WrittenLane { id: 1, kind: Kind::Shoulder, widths });
-                let stone = WrittenLane { id: -1, kind: Kind::Curb, widths: Width::constant(STONE) };
-                gutter.into_iter().chain([stone]).collect()
+                let apron = seen.aprons.iter().find(|apron| apron::is_within(apron, curve));
+                let apron = apron.map(|apron| Width::through(&sampled(&line, |p| apron.distance(p))));
+                let apron = apron.map(|widths| WrittenLane { id: -1, kind: Kind::Apron, widths });
+                let id = if apron.is_some() { -2 } else { -1 };
+                let stone = WrittenLane { id, kind: Kind::Curb, widths: Width::constant(STONE) };
+                gutter.into_iter().chain(apron).chain([stone]).collect()
             };
             let id = first + roads.len();
             roads.push(Written {
@@ -90,13 +95,17 @@ fn gutter(edges: &Edges, line: &Curve) -> Option<Vec<Width>> {
     match edges {
         Edges::Beside(width) => (NONE < *width).then(|| Width::constant(*width)),
         Edges::Own(edges) => {
-            let n = (line.length() / STEP).ceil().max(1.0);
-            let station = |i: usize| line.length() * i as f64 / n;
-            let sample = |i: usize| (station(i), beside(edges, line.point_at(station(i))));
-            let samples: Vec<(f64, f64)> = (0..=n as usize).map(sample).collect();
+            let samples = sampled(line, |p| beside(edges, p));
             samples.iter().any(|(_, width)| NONE < *width).then(|| Width::through(&samples))
         }
     }
+}
+
+/// Stations along a line, and a width at each (m).
+fn sampled(line: &Curve, width: impl Fn(DVec2) -> f64) -> Vec<(f64, f64)> {
+    let n = (line.length() / STEP).ceil().max(1.0);
+    let station = |i: usize| line.length() * i as f64 / n;
+    (0..=n as usize).map(|i| (station(i), width(line.point_at(station(i))))).collect()
 }
 
 /// Distance of a point of a face from the edge beside it (m).

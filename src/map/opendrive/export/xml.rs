@@ -116,6 +116,7 @@ fn written_lane(text: &mut String, lane: &WrittenLane, road: &Written) {
         Kind::Middle => "bidirectional",
         Kind::Shoulder => "shoulder",
         Kind::Curb => "curb",
+        Kind::Apron => "border",
     };
     let _ = writeln!(text, "          <lane id=\"{id}\" type=\"{kind}\" level=\"false\">");
     let links = [("predecessor", road.predecessor), ("successor", road.successor)];
@@ -132,6 +133,9 @@ fn written_lane(text: &mut String, lane: &WrittenLane, road: &Written) {
             text,
             "            <width sOffset=\"{start:.9}\" a=\"{a:.9}\" b=\"{b:.9}\" c=\"{c:.9}\" d=\"{d:.12}\"/>"
         );
+    }
+    if lane.kind == Kind::Apron {
+        let _ = writeln!(text, "            <access sOffset=\"0\" rule=\"allow\" restriction=\"truck\"/>");
     }
     if lane.kind == Kind::Curb {
         let _ = writeln!(text, "            <height sOffset=\"0\" inner=\"{KERB_HEIGHT}\" outer=\"{KERB_HEIGHT}\"/>");
