@@ -22,7 +22,7 @@ mod text;
 pub(crate) mod written {
     pub(crate) use super::corner::WrittenCorner;
     pub(crate) use super::roundabout_keys::{
-        Written, WrittenAlignment, WrittenArm, WrittenPoint, WrittenRing, WrittenWay,
+        BEHIND_APRON, Written, WrittenAlignment, WrittenArm, WrittenPoint, WrittenRing, WrittenWay,
     };
 }
 

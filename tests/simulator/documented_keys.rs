@@ -219,7 +219,8 @@ fn keys_of_distribution(path: &Path) -> Result<Box<dyn Debug>, Error> {
 }
 
 fn distributions() -> Kind {
-    Kind { documents: Vec::from([document(&text_of("distributions/mixed.toml"))]), read: keys_of_distribution }
+    let documents = Vec::from([with_keys(&text_of("distributions/mixed.toml"), &[("ring.apron", "[0.5, 2.5]")])]);
+    Kind { documents, read: keys_of_distribution }
 }
 
 fn vehicles() -> Kind {

@@ -19,7 +19,7 @@ const SHARPEST_LANE: f64 = 1.0;
 const LANE_WIDTHS: RangeInclusive<f64> = 2.5..=12.0;
 
 /// Least radius of what an apron leaves of its island (m).
-const BEHIND_APRON: f64 = 0.5;
+pub(crate) const BEHIND_APRON: f64 = 0.5;
 
 /// The file as written. Its values are not checked yet.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]

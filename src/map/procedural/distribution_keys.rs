@@ -49,6 +49,9 @@ pub(super) struct Ring {
     pub(super) narrow_radius: f64,
     pub(super) narrow_lane_width: f64,
     pub(super) gutter: Range,
+    /// Width of the island's apron, at most as wide as the island has room for (m).
+    #[serde(default)]
+    pub(super) apron: Option<Range>,
 }
 
 fn two_lanes() -> [f64; 3] {
@@ -228,6 +231,9 @@ impl Keys {
             ("splitters.corner_radius", splitters.corner_radius, 0.1..=2.0, "m"),
         ];
         ranges.into_iter().try_for_each(|(key, values, limits, unit)| range(reader, key, values, limits, unit))?;
+        if let Some(apron) = ring.apron {
+            range(reader, "ring.apron", apron, 0.0..=50.0, "m")?;
+        }
         weights(reader, "ring.lanes", &ring.lanes)?;
         match single {
             Some(single) => {

@@ -10,7 +10,7 @@ use super::distribution_keys::Keys;
 use super::draws::{Draws, Place, Quantity as Q};
 use super::line::{Line, millimetres};
 use crate::map::ground::Hand;
-use crate::map::parametric::written::{Written, WrittenArm, WrittenCorner, WrittenRing};
+use crate::map::parametric::written::{BEHIND_APRON, Written, WrittenArm, WrittenCorner, WrittenRing};
 
 /// The names of arms: the nearest of eight directions, from east counter-clockwise.
 const COMPASS: [&str; 8] = ["E", "NE", "N", "NW", "W", "SW", "S", "SE"];
@@ -72,7 +72,10 @@ fn ring(keys: &Keys, draws: &Draws) -> (WrittenRing, Ring) {
         gutter,
         lane_width: ring_lane_width,
         lanes: (lanes != 2).then_some(lanes),
-        apron: None,
+        apron: keys.ring.apron.map(|[least, most]| {
+            let room = island - BEHIND_APRON;
+            millimetres(draws.within(place, Q::Apron, [least.min(room), most.min(room)]))
+        }),
         island_gutter: None,
         mouth_gutter: None,
     };

@@ -16,6 +16,7 @@ pub(super) enum Quantity {
     CornerShare = 5,
     RingLanes = 6,
     RingLaneWidth = 7,
+    Apron = 8,
     Gap = 16,
     Length = 17,
     IsBeside = 18,

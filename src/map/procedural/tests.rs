@@ -52,6 +52,30 @@ fn a_road_is_the_same_alone_and_among_others_whatever_the_threads() {
 }
 
 #[test]
+fn roads_of_a_distribution_with_aprons_are_those_without_but_for_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("wide.toml");
+    let read = |text: String| {
+        std::fs::write(&file, text).unwrap();
+        Distribution::read(&file).unwrap()
+    };
+    let text = Distribution::named("wide").unwrap().text;
+    let with = text.replacen("[ring]\n", "[ring]\napron = [1.0, 40.0]\n", 1);
+    assert_ne!(text, with);
+    let [without, with] = [text, with].map(read);
+    let mut widths = Vec::new();
+    for index in 0..10 {
+        let [plain, road] = [&without, &with].map(|distribution| distribution.road(7, index).unwrap());
+        let line = road.text().lines().find(|line| line.starts_with("apron = ")).unwrap().to_owned();
+        assert_eq!(road.text().replacen(&format!("{line}\n"), "", 1), plain.text());
+        let width: f64 = line["apron = ".len()..].parse().unwrap();
+        assert!((1.0..=road.roundabout.island_radius() - 0.5).contains(&width), "{line}");
+        widths.push(width);
+    }
+    assert!(widths.windows(2).all(|pair| pair[0] != pair[1]), "{widths:?}");
+}
+
+#[test]
 fn a_road_written_as_a_file_reads_back_bit_for_bit() {
     for distribution in shipped() {
         for index in 0..30 {
