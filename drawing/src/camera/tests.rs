@@ -1,7 +1,8 @@
 use std::sync::LazyLock;
 
 use glam::{DVec2, Vec2};
-use offtrack::map::Gutter;
+use offtrack::geometry::Curve;
+use offtrack::map::{Gutter, Road};
 use offtrack::physics;
 use offtrack::scenario::APPROACH;
 use offtrack::vehicle::swept::{Pose, corners, swept_path};
@@ -252,7 +253,7 @@ fn a_left_hand_road_is_drawn_as_it_lies_and_not_as_it_is_driven() {
     let mut scenario = (*DRIVEN.0).clone();
     for place in &mut scenario.places {
         let ground = offtrack::map::ground::Ground { mirrored: true, ..place.roundabout.ground().clone() };
-        place.roundabout = offtrack::map::Road::on(place.roundabout.name.clone(), ground);
+        place.roundabout = Road::on(place.roundabout.name.clone(), ground);
     }
     let (mut right, mut left) = (camera(240), Camera::new(Arc::new(scenario), &DRIVEN.1, 240).unwrap());
     let truck = truck(0, 30.0);
@@ -311,4 +312,22 @@ fn another_vehicle_is_where_it_is_with_the_colour_of_its_kind_and_lit_brakes() {
         let shown = Shown { truck: &truck, ranges: &ranges(&truck), ended: Ended::Running, vehicles: &[car] };
         camera.draw(&shown).to_vec()
     });
+}
+
+#[test]
+fn an_apron_has_a_colour_of_its_own_up_to_its_inner_edge() {
+    let roundabout = &DRIVEN.0.places[0].roundabout;
+    let radius = roundabout.island_radius();
+    let aprons = vec![Curve::circle(DVec2::ZERO, radius - 2.5)];
+    let ground = offtrack::map::ground::Ground { aprons, ..roundabout.ground().clone() };
+    let scenario = Arc::new(DRIVEN.0.on(Road::on("apron".into(), ground)).unwrap());
+    let mut camera = Camera::new(scenario.clone(), &World::bake(&scenario).unwrap(), 960).unwrap();
+    let truck = Truck { route: 0, ..truck(0, 20.0) };
+    let shown = Shown { truck: &truck, ranges: &[0.0; N_RAYS], ended: Ended::Running, vehicles: &[] };
+    let picture = camera.draw(&shown).to_vec();
+    let away = -truck.position.as_dvec2().normalize();
+    let at = |inwards: f64| seen(&camera, &picture, (radius - inwards) * away);
+    assert_eq!((at(1.25), at(3.75)), (is(colour::APRON), is(colour::SOLID)));
+    let inner_edge = at(2.5);
+    assert!(inner_edge.iter().all(|&channel| channel < 160), "{inner_edge:?}");
 }
