@@ -5,8 +5,9 @@ use std::sync::Arc;
 use glam::{DVec2, Vec2};
 use offtrack::engine::stages::Stage;
 use offtrack::field::Field;
-use offtrack::layout::Truck;
+use offtrack::layout::{Ended, Truck};
 use offtrack::map::{Gutter, Road, UnitKerbs};
+use offtrack::physics::closeness;
 use offtrack::scenario::{FIELD_CELL, Scenario};
 use offtrack::simulator::RouteChoice;
 use offtrack::vehicle::swept::Pose;
@@ -70,8 +71,16 @@ fn each_unit_touches_what_it_may_not_drive_on_exactly_when_its_rectangle_does_to
         let n_on_apron = trucks.iter().zip(&more).filter(|(truck, more)| !more[1] && is_on_apron(truck)).count();
         assert!(100 < n_on_apron, "{name}: {n_on_apron} trailers are on the apron");
         for (on, engine) in engines() {
-            let simulator = after_stage(&engine, &world, &field, &trucks, Stage::Collide);
-            for (index, found) in simulator.batch().clearance.iter().enumerate() {
+            let mut simulator = after_stage(&engine, &world, &field, &trucks, Stage::Collide);
+            simulator.run_stage(Stage::Judge);
+            let batch = simulator.batch();
+            for (index, found) in batch.clearance.iter().enumerate() {
+                // What ends the episode, and the reward, go by the same.
+                let ended = [Ended::TractorCollided, Ended::TrailerCollided].map(|ended| ended as u32);
+                let touched = [found.tractor, found.trailer].into_iter().position(|clearance| clearance <= 0.0);
+                assert_eq!(ended.iter().position(|&ended| ended == batch.ended[index]), touched, "{name} on the {on}");
+                let term = closeness(&world.reward, found);
+                assert!((batch.terms[index].clearance - term).abs() < 1e-5, "{name} on the {on}, {index}: {found:?}");
                 for (unit, clearance) in [found.tractor, found.trailer].into_iter().enumerate() {
                     let (less, more) = (less[index][unit], more[index][unit]);
                     assert!(less != more || (clearance <= 0.0) == less, "{name} on the {on}, {index}: {found:?}");
@@ -142,7 +151,7 @@ fn an_episode_that_ended_with_the_trailer_on_the_island_goes_on_where_there_is_a
         (0..100).for_each(|_| simulator.step_at_random());
         simulator.tally().unwrap()
     });
-    let of_trailers = |tally: &offtrack::simulator::Tally| tally.ended(offtrack::layout::Ended::TrailerCollided);
+    let of_trailers = |tally: &offtrack::simulator::Tally| tally.ended(Ended::TrailerCollided);
     assert!(of_trailers(&with) < of_trailers(&without), "{with:?} {without:?}");
 }
 
