@@ -2,7 +2,7 @@
 
 use offtrack::layout::{Rig, Truck};
 use offtrack::traffic::car::Outline;
-use offtrack::traffic::{Car, Network, Row, outlines};
+use offtrack::traffic::{Car, Contact, Network, Row, outlines};
 use serde::Serialize;
 
 use super::episode::Episode;
@@ -40,13 +40,24 @@ pub struct Among {
     pub beside: f64,
     /// Least time to a collision with a vehicle ahead, at most 5 s (s).
     pub time_to_collision: f64,
+    /// The contact that ended it, if one did.
+    pub met: Option<Met>,
+}
+
+/// A contact with another vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Met {
+    /// The truck's unit: the tractor, or else the trailer.
+    pub by_tractor: bool,
+    /// The vehicle was beyond its line.
+    pub has_entered: bool,
 }
 
 impl Among {
     /// At an episode's start.
     pub(super) fn new(demand: f64) -> Among {
         let longest = LOOK * N_LOOKS as f64;
-        Among { demand, standing: 0.0, blocked: 0.0, braking: 0.0, beside: 0.0, time_to_collision: longest }
+        Among { demand, standing: 0.0, blocked: 0.0, braking: 0.0, beside: 0.0, time_to_collision: longest, met: None }
     }
 
     /// Adds the last step, of `step` seconds, after which truck and vehicles are these.
@@ -56,6 +67,9 @@ impl Among {
         for (slot, car) in row.cars.iter().enumerate().filter(|(_, car)| car.is_there()) {
             let outline = car.outline(network);
             let (has_entered, hindered) = (has_entered(network, car), row.hindered >> slot & 1 == 1);
+            if Contact::from_code(row.met).is_some_and(|contact| contact.slot == slot) {
+                self.met = Some(Met { by_tractor: units[0].overlaps(&outline), has_entered });
+            }
             if hindered && has_entered {
                 self.blocked = self.blocked.max(f64::from(car.standing()) * step);
             }

@@ -94,6 +94,24 @@ fn only_vehicles_that_brake_for_the_truck_brake_at_its_expense() {
 }
 
 #[test]
+fn the_contact_that_ends_an_episode_tells_the_unit_and_whether_the_vehicle_had_entered() {
+    let world = world();
+    let truck = truck(&world, 20.0, 8.0);
+    let shared = world.traffic.as_ref().unwrap();
+    let network = &shared.road(&world, 0).network;
+    let path = shared.routes[0].path as usize;
+    for (station, by_tractor) in [(21.0, true), (11.0, false)] {
+        // In the second slot, at the truck's fault.
+        let mut row = Row { met: 64 + 2, ..Row::EMPTY };
+        row.cars[1] = car(path, station, 0.0);
+        let mut among = Among::new(900.0);
+        among.follow(world.rig(&truck), &truck, network, &row, STEP);
+        let has_entered = network.paths[path].line() < station;
+        assert_eq!(among.met, Some(Met { by_tractor, has_entered }), "{station} m");
+    }
+}
+
+#[test]
 fn a_summary_has_means_and_quantiles_of_the_episodes_with_vehicles_alone() {
     let near = |among: &mut Among| (among.standing, among.time_to_collision) = (20.0, 0.9);
     let blocks = |among: &mut Among| among.blocked = 10.1;
