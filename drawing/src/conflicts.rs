@@ -83,7 +83,8 @@ impl Zones<'_> {
     fn part(&self, path: usize, from: f32, to: f32) -> String {
         let steps = ((to - from) / SPACING).ceil().max(1.0) as usize;
         let station = |step: usize| from + (to - from) * step as f32 / steps as f32;
-        let points: Vec<DVec2> = (0..=steps).map(|step| self.network.pose(path, station(step)).0.as_dvec2()).collect();
+        let points: Vec<DVec2> =
+            (0..=steps).map(|step| self.network.position(path, station(step)).as_dvec2()).collect();
         self.view.line(&points)
     }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use offtrack::layout::{Ended, RewardTerms, Truck};
 use serde::Serialize;
 
+use super::among::{Among, AmongSummary};
 use super::driving::Driving;
 use super::interval::Cells;
 
@@ -60,8 +61,8 @@ pub struct Episode {
     pub off_tracking_peak: f64,
     /// How the truck drove, where classes of vehicles are reported.
     pub driving: Option<Driving>,
-    /// How many other vehicles come to the road, where any do (veh/h).
-    pub demand: Option<f64>,
+    /// How it drove among other vehicles, where there are any.
+    pub among: Option<Among>,
     /// The truck after its last step.
     pub last: Truck,
 }
@@ -113,6 +114,9 @@ pub struct Summary {
     pub time_mean: f64,
     /// Mean sum of rewards.
     pub reward_mean: f64,
+    /// How they drove among other vehicles; `None` where there were none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub among_vehicles: Option<AmongSummary>,
 }
 
 impl Episode {
@@ -169,6 +173,7 @@ impl Summary {
             off_tracking_peak: most(|episode| episode.off_tracking_peak),
             time_mean: step * mean(|episode| f64::from(episode.steps)),
             reward_mean: mean(|episode| episode.reward),
+            among_vehicles: AmongSummary::of(episodes),
         })
     }
 }
@@ -210,7 +215,7 @@ pub(super) mod tests {
             articulation_peak: 1.9,
             off_tracking_peak: 10.25,
             driving: Some(Driving::new(&Truck::default(), 0.0)),
-            demand: None,
+            among: None,
             last: Truck::default(),
         }
     }

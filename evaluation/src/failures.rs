@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::Evaluation;
+use super::among::Met;
 use super::episode::Episode;
 use super::groups::Evaluated;
 use super::part::Part;
@@ -22,8 +23,9 @@ const SPACING: f32 = 0.1;
 /// Episodes that did not arrive for the same cause.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cause {
-    /// `trailer on the island`, `tractor on the outer kerb of the exit`, `lost at start`, `strayed` and the like; on a
-    /// crossing, which has no ring, `trailer on the outer kerb of the junction`.
+    /// `trailer on the island`, `tractor on the outer kerb of the exit`, `tractor on a vehicle beyond its line, in the
+    /// ring`, `lost at start`, `strayed` and the like; on a crossing, which has no ring, `trailer on the outer kerb of
+    /// the junction`.
     pub cause: String,
     /// Number of the episodes that did not arrive for this cause.
     pub episodes: usize,
@@ -109,7 +111,10 @@ impl Evaluation<'_> {
             Ended::TrailerCollided => {
                 ("trailer", fields[1], &rig.trailer_body, truck.trailer_position(rig), truck.trailer_heading)
             }
-            other => return other.name().replace('_', " "),
+            other => {
+                let met = episode.among.and_then(|among| among.met);
+                return met.map_or_else(|| other.name().replace('_', " "), |met| self.contact(route, episode, met));
+            }
         };
         let points = points(body).map(|point| position + Vec2::from_angle(heading).rotate(point));
         let (_, contact) = points.fold((f32::INFINITY, position), |best, point| {
@@ -117,6 +122,17 @@ impl Evaluation<'_> {
             if distance < best.0 { (distance, point) } else { best }
         });
         format!("{unit} on the {}", self.kerb(route, contact.as_dvec2()))
+    }
+
+    /// A contact with another vehicle, in words.
+    fn contact(&self, &(_, place, route): &Evaluated, episode: &Episode, met: Met) -> String {
+        let (rig, truck) = (self.world.rig(&episode.last), &episode.last);
+        let position = if met.by_tractor { truck.position } else { truck.trailer_position(rig) };
+        let part = Part::at(self.scenario, route, route.centre_line.station(position.as_dvec2()));
+        let unit = if met.by_tractor { "tractor" } else { "trailer" };
+        let vehicle = if met.has_entered { "a vehicle beyond its line" } else { "a vehicle before its line" };
+        let was_met = if episode.ended == Ended::WasMet { ", at its fault" } else { "" };
+        format!("{unit} on {vehicle}, in the {}{was_met}", part.name(&place.roundabout))
     }
 
     /// The kerb of a route nearest to `p`, in words.
@@ -165,6 +181,7 @@ mod tests {
     use offtrack::scenario::{Scenario, Split};
     use offtrack::world::World;
 
+    use super::super::among::Among;
     use super::super::episode::tests::episode;
     use super::*;
     use crate::device::Device;
@@ -194,6 +211,22 @@ mod tests {
         // The trailer stands in line behind the tractor.
         let last = Truck { position, heading, trailer_heading: heading, route, ..Truck::default() };
         Episode { last, ..episode(ended) }
+    }
+
+    #[test]
+    fn a_contact_with_a_vehicle_is_named_by_unit_place_and_whose_fault_it_was() {
+        on_40m(|evaluation| {
+            let (_, _, route) = evaluation.routes()[0];
+            let on_its_arm = route.centre_line.point_at(1.0);
+            let named = |end: Ended, by_tractor: bool, has_entered: bool| {
+                let among = Among { met: Some(Met { by_tractor, has_entered }), ..Among::new(900.0) };
+                let episode = Episode { among: Some(among), ..ended(evaluation, 0, end, on_its_arm, 0.0) };
+                evaluation.cause(&evaluation.routes()[0], &episode)
+            };
+            assert_eq!(named(Ended::MetVehicle, true, false), "tractor on a vehicle before its line, in the entry");
+            let was_met = "trailer on a vehicle beyond its line, in the entry, at its fault";
+            assert_eq!(named(Ended::WasMet, false, true), was_met);
+        });
     }
 
     #[test]

@@ -1,12 +1,12 @@
 //! The figures of episodes under way, one a truck, from their starts to their ends.
 
-use bytemuck::cast_slice;
-use offtrack::layout::{Column, Control, Ended, N_CAR_WORDS, Truck};
+use offtrack::layout::{Control, Ended, Truck};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{Error, Simulator};
 use offtrack::traffic::Row;
 use offtrack::world::World;
 
+use crate::among::Among;
 use crate::classes;
 use crate::driving::Driving;
 use crate::episode::Episode;
@@ -42,13 +42,11 @@ impl<'a> Figures<'a> {
         let seen = Seen::of(simulator)?;
         let has_classes = classes::has_classes(scenario);
         let levels = scenario.traffic.as_ref().map(|traffic| traffic.demand.as_slice());
-        // From a device no other column is read.
-        let cars = if levels.is_some() { simulator.read(&[Column::Cars])? } else { Vec::new() };
-        let cars: &[[u32; N_CAR_WORDS]] = cars.first().map_or(&[], |bytes| cast_slice(bytes));
         let new = |(env, (truck, control)): (usize, (&Truck, &Control))| {
             let driving = has_classes.then(|| Driving::new(truck, control.target_speed));
-            let demand = levels.and_then(|levels| Some(levels[Row::of(cars.get(env)?).level as usize]));
-            Running::new(world.rig(truck), truck, driving, demand, scenario.step)
+            let row = seen.cars.as_ref().and_then(|cars| cars.get(env)).map(Row::of);
+            let demand = levels.zip(row).and_then(|(levels, row)| levels.get(row.level as usize));
+            Running::new(world.rig(truck), truck, driving, demand.map(|&demand| Among::new(demand)), scenario.step)
         };
         Ok(Figures {
             world,
@@ -73,8 +71,10 @@ impl<'a> Figures<'a> {
     pub(crate) fn add(&mut self, seen: &Seen) -> usize {
         let mut n_ended = 0;
         for (env, (running, finished)) in self.running.iter_mut().zip(&mut self.finished).enumerate() {
-            let (rig, lane) = (self.world.rig(&seen.truck[env]), &self.lanes[env / self.per_route]);
-            if finished.is_none() && running.follow(rig, lane, seen, env) {
+            let (truck, lane) = (&seen.truck[env], &self.lanes[env / self.per_route]);
+            let shared = self.world.traffic.as_ref();
+            let network = shared.map(|shared| &shared.road(self.world, truck.route).network);
+            if finished.is_none() && running.follow(self.world.rig(truck), lane, network, seen, env) {
                 *finished = Some(running.finish(Ended::from_code(seen.ended[env]).unwrap_or(Ended::Running)));
                 n_ended += 1;
             }

@@ -80,15 +80,19 @@ pub(super) fn by(routes: &[Evaluated], episodes: &[Vec<&Episode>], key: Key, ste
 
 /// The groups of episodes by demand.
 fn by_demand(finished: &[Episode], step: f64) -> Vec<Group> {
-    let mut demands: Vec<f64> = finished.iter().filter_map(|episode| episode.demand).collect();
+    let mut demands: Vec<f64> = finished.iter().filter_map(demand_of).collect();
     demands.sort_by(f64::total_cmp);
     demands.dedup();
     let group = |demand: f64| {
-        let episodes = || finished.iter().filter(move |episode| episode.demand == Some(demand));
+        let episodes = || finished.iter().filter(move |episode| demand_of(episode) == Some(demand));
         let routes: HashSet<u32> = episodes().map(|episode| episode.last.route).collect();
         Some(Group { name: format!("{demand} veh/h"), routes: routes.len(), summary: Summary::of(episodes(), step)? })
     };
     demands.into_iter().filter_map(group).collect()
+}
+
+fn demand_of(episode: &Episode) -> Option<f64> {
+    episode.among.map(|among| among.demand)
 }
 
 pub(super) fn island_radius((_, place, _): &Evaluated) -> (usize, String) {
@@ -118,6 +122,7 @@ mod tests {
     use offtrack::layout::Ended;
     use offtrack::scenario::{Scenario, Split};
 
+    use super::super::among::Among;
     use super::super::episode::tests::episode;
     use super::*;
 
@@ -148,7 +153,7 @@ mod tests {
     fn episodes_among_vehicles_are_grouped_by_demand_from_the_least_on() {
         let scenario = Scenario::named("attard2023").unwrap();
         let routes: Vec<_> = scenario.routes().map(|(index, route)| (index, &scenario.places[index], route)).collect();
-        let at = |demand: f64, ended: Ended| Episode { demand: Some(demand), ..episode(ended) };
+        let at = |demand: f64, ended: Ended| Episode { among: Some(Among::new(demand)), ..episode(ended) };
         let finished = [
             at(900.0, Ended::TimedOut),
             at(300.0, Ended::Arrived),

@@ -45,6 +45,7 @@ pub mod seeds; // figures of several seeds
 pub mod interval; // intervals over routes, by bootstrap
 pub mod figures; // the figures of several, to their ends
 pub mod driving; // how a truck drives through an episode
+pub mod among; // how it drives among other vehicles
 pub mod episode; // the figures of an episode, and of several
 pub mod classes; // how trucks drive, by vehicle and load
 pub mod failures; // why episodes did not arrive

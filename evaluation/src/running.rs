@@ -8,7 +8,9 @@ use std::collections::VecDeque;
 use glam::Vec2;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Ended, Rig, Truck};
+use offtrack::traffic::{Network, Row};
 
+use super::among::Among;
 use super::driving::Driving;
 use super::episode::{Episode, Terms};
 use super::part::LaneWidths;
@@ -27,9 +29,9 @@ pub(super) struct Running {
 }
 
 impl Running {
-    /// At its start; `driving` is what is kept for its class, where classes are reported, `demand` how many other
-    /// vehicles come (veh/h).
-    pub(super) fn new(rig: &Rig, truck: &Truck, driving: Option<Driving>, demand: Option<f64>, step: f64) -> Running {
+    /// At its start; `driving` is what is kept for its class, where classes are reported, `among` where there are
+    /// other vehicles.
+    pub(super) fn new(rig: &Rig, truck: &Truck, driving: Option<Driving>, among: Option<Among>, step: f64) -> Running {
         let front = front_axle(rig, truck);
         let ahead = Vec2::from_angle(truck.heading);
         Running {
@@ -50,7 +52,7 @@ impl Running {
                 articulation_peak: 0.0,
                 off_tracking_peak: 0.0,
                 driving,
-                demand,
+                among,
                 last: *truck,
             },
             // The path's first point lies far behind the start, so that the trailer's axle is beside it from the first
@@ -59,8 +61,16 @@ impl Running {
         }
     }
 
-    /// Adds the last step; true if it ended the episode. `lane` is that of the truck's route.
-    pub(super) fn follow(&mut self, rig: &Rig, lane: &LaneWidths, seen: &Seen, env: usize) -> bool {
+    /// Adds the last step; true if it ended the episode. `lane` is that of the truck's route, `network` the paths of
+    /// its road, where there are other vehicles.
+    pub(super) fn follow(
+        &mut self,
+        rig: &Rig,
+        lane: &LaneWidths,
+        network: Option<&Network>,
+        seen: &Seen,
+        env: usize,
+    ) -> bool {
         let (truck, progress, clearance) = (&seen.truck[env], &seen.progress[env], &seen.clearance[env]);
         let raise = |peak: &mut f64, value: f32| *peak = peak.max(f64::from(value));
         let lower = |least: &mut f64, value: f32| *least = least.min(f64::from(value));
@@ -76,6 +86,10 @@ impl Running {
         raise(&mut self.episode.articulation_peak, wrapped(truck.heading - truck.trailer_heading).abs());
         if let Some(driving) = &mut self.episode.driving {
             driving.follow(truck, &seen.control[env], self.step);
+        }
+        let cars = seen.cars.as_ref().and_then(|cars| cars.get(env));
+        if let (Some(among), Some(network), Some(cars)) = (&mut self.episode.among, network, cars) {
+            among.follow(rig, truck, network, Row::of(cars), self.step);
         }
         self.episode.last = *truck;
         self.off_tracking.push(front_axle(rig, truck), truck.trailer_position(rig));

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use bytemuck::{AnyBitPattern, NoUninit};
-use offtrack::layout::{Clearance, Column, Command, Control, Progress, RewardTerms, Truck};
+use offtrack::layout::{Clearance, Column, Command, Control, N_CAR_WORDS, Progress, RewardTerms, Truck};
 use offtrack::simulator::{Error, Simulator};
 
 const COLUMNS: [Column; 9] = [
@@ -30,12 +30,16 @@ pub(crate) struct Seen<'a> {
     pub(crate) ended: Cow<'a, [u32]>,
     pub(crate) reward: Cow<'a, [f32]>,
     pub(crate) terms: Cow<'a, [RewardTerms]>,
+    /// Where there are other vehicles.
+    pub(crate) cars: Option<Cow<'a, [[u32; N_CAR_WORDS]]>>,
 }
 
 impl<'a> Seen<'a> {
     /// Reads them.
     pub(crate) fn of(simulator: &'a Simulator) -> Result<Seen<'a>, Error> {
-        let mut read = simulator.read(&COLUMNS)?.into_iter();
+        let cars = simulator.world().traffic.is_some().then_some(Column::Cars);
+        let columns: Vec<Column> = COLUMNS.into_iter().chain(cars).collect();
+        let mut read = simulator.read(&columns)?.into_iter();
         // As many as were asked for, in their order.
         let mut next = || read.next().unwrap_or_default();
         Ok(Seen {
@@ -48,6 +52,7 @@ impl<'a> Seen<'a> {
             ended: rows(next()),
             reward: rows(next()),
             terms: rows(next()),
+            cars: cars.map(|_| rows(next())),
         })
     }
 }

@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use offtrack::layout::Ended;
 
+use super::among;
 use super::classes;
 use super::failures::Cause;
 use super::groups::Group;
@@ -135,6 +136,13 @@ impl Report {
                 &format!("Outside its own lane for {:.1} % of an episode that arrived{own}.", 100.0 * outside),
                 width,
             );
+        }
+        let among = self.groups.demand.iter();
+        let among = among.filter_map(|group| Some((&group.name, group.summary.among_vehicles.as_ref()?)));
+        let among: Vec<String> = among.map(|(name, among)| among.line(name)).collect();
+        if !among.is_empty() {
+            let _ = writeln!(text, "{}\n{}", among::HEADING, among.join("\n"));
+            push_wrapped(&mut text, among::NOTE, width);
         }
         for line in classes::lines(&self.classes) {
             let _ = writeln!(text, "{line}");

@@ -164,7 +164,7 @@ impl Car {
     /// The ground that it covers: both axles are on the path, so in bends its ends swing out and its middle cuts in.
     pub fn outline(&self, network: &Network) -> Outline {
         let length = self.length();
-        let axle = |overhang: f32| network.pose(self.path(), self.station() - overhang * length).0;
+        let axle = |overhang: f32| network.position(self.path(), self.station() - overhang * length);
         let [front, rear] = [axle(OVERHANG), axle(1.0 - OVERHANG)];
         let (middle, along) = (0.5 * (front + rear), (front - rear).normalize_or_zero());
         Outline { middle, along, half_length: 0.5 * length, half_width: self.half_width() }

@@ -186,16 +186,23 @@ pub struct Network {
 impl Network {
     /// Position and direction of travel at a station of a path: cubic between samples (m).
     pub fn pose(&self, path: usize, station: f32) -> (Vec2, Vec2) {
+        let ([from, to], t) = self.cell(path, station);
+        (between(from, to, t), (from.direction + t * (to.direction - from.direction)).normalize_or_zero())
+    }
+
+    /// The position of [`pose`](Self::pose) alone (m).
+    pub fn position(&self, path: usize, station: f32) -> Vec2 {
+        let ([from, to], t) = self.cell(path, station);
+        between(from, to, t)
+    }
+
+    /// The samples before and behind a station of a path, and the fraction of the way from one to the other.
+    fn cell(&self, path: usize, station: f32) -> ([&Sample; 2], f32) {
         let Path { first, n, .. } = self.paths[path];
         let along = (station / SPACING).clamp(0.0, n as f32 - 1.001);
-        let (k, t) = (first as usize + along as usize, along.fract());
-        let (from, to) = (&self.samples[k], &self.samples[k + 1]);
-        let (t2, t3) = (t * t, t * t * t);
-        let position = (2.0 * t3 - 3.0 * t2 + 1.0) * from.position
-            + (t3 - 2.0 * t2 + t) * SPACING * from.direction
-            + (3.0 * t2 - 2.0 * t3) * to.position
-            + (t3 - t2) * SPACING * to.direction;
-        (position, (from.direction + t * (to.direction - from.direction)).normalize_or_zero())
+        let k = along as usize;
+        let from = first as usize + k;
+        ([&self.samples[from], &self.samples[from + 1]], along - k as f32)
     }
 
     /// Speed of a car that nothing hinders, at a station of a path: linear between samples (2^-14 m a step, 2^-20 m).
@@ -277,6 +284,15 @@ impl Network {
 }
 
 /// The next `n` values of a table, of which `words` then has the rest.
+/// The position this fraction of the way from one sample to the next (m).
+fn between(from: &Sample, to: &Sample, t: f32) -> Vec2 {
+    let (t2, t3) = (t * t, t * t * t);
+    (2.0 * t3 - 3.0 * t2 + 1.0) * from.position
+        + (t3 - 2.0 * t2 + t) * SPACING * from.direction
+        + (3.0 * t2 - 2.0 * t3) * to.position
+        + (t3 - t2) * SPACING * to.direction
+}
+
 fn taken<T: Pod>(words: &mut &[u32], n: usize) -> Option<Vec<T>> {
     let n_words = n.checked_mul(size_of::<T>())?.checked_div(4)?;
     let (table, rest) = words.split_at_checked(n_words)?;

@@ -141,7 +141,7 @@ fn a_training_file_is_found_by_its_name() {
     let message = refusal(&offtrack(&["train", "papre", "--out", &place.text("runs")]), 2);
     assert!(
         message.contains(
-            "papre: is no training file: the program comes with default, best, lane, attard, gpu, as-run, laden, laden-50, transfer, laden-gpu, paper"
+            "papre: is no training file: the program comes with default, best, lane, attard, gpu, as-run, laden, laden-50, transfer, traffic, laden-gpu, paper"
         ),
         "{message}"
     );

@@ -161,10 +161,10 @@ fn leaves_no_gap(network: &Network, view: &View, stop: f32, car: &Car) -> bool {
 fn behind(network: &Network, view: &View, own: f32, car: &Car, outline: &Outline) -> f32 {
     let front = metres(view.station);
     let at = |k: usize| front + 2.0 * k as f32;
-    if 2.0 * N_AHEAD as f32 + outline.half_length < network.pose(view.path, front).0.distance(outline.middle) - 4.0 {
+    if 2.0 * N_AHEAD as f32 + outline.half_length < network.position(view.path, front).distance(outline.middle) - 4.0 {
         return f32::INFINITY;
     }
-    let is_there = |&k: &usize| outline.distance_squared(network.pose(view.path, at(k)).0) < HALF_WIDTH * HALF_WIDTH;
+    let is_there = |&k: &usize| outline.distance_squared(network.position(view.path, at(k))) < HALF_WIDTH * HALF_WIDTH;
     let Some(first) = (0..N_AHEAD).find(is_there) else { return f32::INFINITY };
     let along = outline.along.dot(network.pose(view.path, at(first)).1).max(0.0) * car.speed();
     let gap = at(first) - front - ROOM - CLOSING * (own - along).max(0.0);

@@ -20,6 +20,7 @@ const SHIPPED: [(&str, &str); 11] = [
     ("laden", include_str!("../../configs/laden.toml")),
     ("laden-50", include_str!("../../configs/laden-50.toml")),
     ("transfer", include_str!("../../configs/transfer.toml")),
+    ("traffic", include_str!("../../configs/traffic.toml")),
     ("laden-gpu", include_str!("../../configs/laden-gpu.toml")),
     ("paper", include_str!("../../configs/paper.toml")),
 ];

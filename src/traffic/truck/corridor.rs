@@ -51,10 +51,15 @@ impl Points {
         points
     }
 
-    /// Squared distance of each to the nearest of some rectangles, 0 inside them (m²).
-    fn to_nearest(&self, outlines: &[Outline]) -> [f32; N_SAMPLES] {
+    /// Squared distance of each to the nearest of some rectangles, 0 inside them (m²); of those that the corridor, which
+    /// begins at a point, cannot reach, any great one.
+    fn to_nearest(&self, outlines: &[Outline], begins: Vec2) -> [f32; N_SAMPLES] {
         let mut nearest = [f32::MAX; N_SAMPLES];
         for Outline { middle, along, half_length, half_width } in outlines {
+            let reach = REACH + half_length + half_width;
+            if reach * reach < middle.distance_squared(begins) {
+                continue;
+            }
             for (nearest, (x, y)) in nearest.iter_mut().zip(self.x.iter().zip(&self.y)) {
                 let (x, y) = (x - middle.x, y - middle.y);
                 let ahead = ((x * along.x + y * along.y).abs() - half_length).max(0.0);
@@ -78,7 +83,7 @@ pub(super) fn mind(view: &View, driver: &mut Driver) {
     let points = Points::of(samples);
     let station = |index: usize| (first + index) as f32 * SPACING;
     let room = |index: usize| car.half_width() + if station(index) < car.station() { ROOM_AT_FRONT } else { ROOM };
-    let now = points.to_nearest(&view.now);
+    let now = points.to_nearest(&view.now, at_front);
     let leader = (0..samples.len()).find(|&index| now[index] < room(index) * room(index));
     if let Some(index) = leader {
         let rear = length(station(index) - BEFORE_SAMPLE);
@@ -92,7 +97,7 @@ pub(super) fn mind(view: &View, driver: &mut Driver) {
         driver.note_leader(rear, speed);
     }
     if !view.waits && !car.is_rude() {
-        let later = points.to_nearest(&view.later);
+        let later = points.to_nearest(&view.later, at_front);
         let beside = car.half_width() + ROOM_LATER;
         let before = leader.unwrap_or(samples.len());
         if let Some(index) = later[..before].iter().position(|&squared| squared < beside * beside) {
@@ -137,7 +142,7 @@ pub(super) fn ahead(view: &View, network: &Network, car: &Car) -> Option<(i32, i
     }
     let samples = corridor(network, car, 0);
     let beside = car.half_width() + ROOM;
-    let now = Points::of(samples).to_nearest(&view.now);
+    let now = Points::of(samples).to_nearest(&view.now, samples[0].position);
     let index = now[..samples.len()].iter().position(|&squared| squared < beside * beside)?;
     let speed = speed(view.velocity.dot(samples[index].direction).max(0.0));
     Some((length(index as f32 * SPACING - BEFORE_SAMPLE), speed))

@@ -40,7 +40,7 @@ fn truck_at(network: &Network, path: usize, front: f32, speed: f32) -> Truck {
     let rig = rig();
     let axle = front - rig.tractor_body.front;
     let (position, along) = network.pose(path, axle);
-    let behind = network.pose(path, (axle - rig.trailer_wheelbase).max(0.0)).0;
+    let behind = network.position(path, (axle - rig.trailer_wheelbase).max(0.0));
     let trailer = (position + rig.fifth_wheel * along - behind).normalize_or(along);
     Truck { position, heading: along.to_angle(), trailer_heading: trailer.to_angle(), speed, ..Truck::default() }
 }
