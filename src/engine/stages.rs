@@ -41,8 +41,9 @@ pub const N_STAGES: usize = Stage::ALL.len();
 pub const STAGES: [Stage; N_STAGES] = Stage::ALL;
 
 /// The kernels that begin an episode of the trucks that the caller named.
-pub const BEGIN: [Kernel; 6] = [
+pub const BEGIN: [Kernel; 7] = [
     Kernel::Begin,
+    Kernel::SurroundAfterReset,
     Kernel::PerceiveAfterReset,
     Kernel::SenseAfterReset,
     Kernel::ObserveAfterReset,
@@ -50,22 +51,34 @@ pub const BEGIN: [Kernel; 6] = [
     Kernel::Forget,
 ];
 
-/// The kernels of a step before those of [`Stage::Reset`]: each does a stage, or several at once.
-const STEP: [Kernel; 6] =
-    [Kernel::Advance, Kernel::Collide, Kernel::Sense, Kernel::ObserveBoth, Kernel::ExtrasBoth, Kernel::JudgeAndCount];
+/// The kernels of a step before those that judge it: each does a stage, or several at once.
+const STEP: [Kernel; 9] = [
+    Kernel::Advance,
+    Kernel::TrafficDecide,
+    Kernel::TrafficMove,
+    Kernel::TrafficArrive,
+    Kernel::Collide,
+    Kernel::Meet,
+    Kernel::Sense,
+    Kernel::ObserveBoth,
+    Kernel::ExtrasBoth,
+];
 
 /// Those where disturbances come between the truck and the policy. Kernels that did more at once would need more
 /// buffers.
-const DISTURBED_STEP: [Kernel; 9] = [
+const DISTURBED_STEP: [Kernel; 12] = [
     Kernel::Steer,
     Kernel::Drive,
+    Kernel::TrafficDecide,
+    Kernel::TrafficMove,
+    Kernel::TrafficArrive,
     Kernel::Follow,
     Kernel::Collide,
+    Kernel::Meet,
     Kernel::Sense,
     Kernel::Observe,
     Kernel::ObserveExtras,
     Kernel::CopyObservation,
-    Kernel::JudgeAndCount,
 ];
 
 crate::named! {
@@ -79,8 +92,16 @@ crate::named! {
         Steer = "steer",
         /// [`Stage::Drive`].
         Drive = "drive",
+        /// [`Stage::Traffic`]: cars decide.
+        TrafficDecide = "traffic_decide",
+        /// [`Stage::Traffic`]: they move.
+        TrafficMove = "traffic_move",
+        /// [`Stage::Traffic`]: some leave and some come.
+        TrafficArrive = "traffic_arrive",
         /// [`Stage::Collide`].
         Collide = "collide",
+        /// [`Stage::Collide`]: which vehicle a truck touches.
+        Meet = "meet",
         /// [`Stage::Follow`].
         Follow = "follow",
         /// [`Stage::Sense`].
@@ -91,12 +112,16 @@ crate::named! {
         ObserveExtras = "observe_extras",
         /// [`Stage::Judge`].
         Judge = "judge",
+        /// [`Stage::Judge`] where there are other vehicles.
+        JudgeAmong = "judge_among",
         /// [`Stage::Count`].
         Count = "count",
         /// [`Stage::CopyObservation`].
         CopyObservation = "copy_observation",
         /// [`Stage::Reset`]: route and pose.
         Reset = "reset",
+        /// [`Stage::Reset`]: the vehicles around the trucks that began another episode.
+        SurroundAfterReset = "surround_after_reset",
         /// [`Stage::Reset`]: poses that are observed of the trucks that began another episode.
         PerceiveAfterReset = "perceive_after_reset",
         /// [`Stage::Reset`]: their ranges.
@@ -129,6 +154,8 @@ pub enum Threads {
     Team,
     /// One of the values of a truck's observation.
     Value,
+    /// A slot of a truck's row of cars.
+    Car,
 }
 
 /// What decides which kernels have anything to do.
@@ -138,6 +165,8 @@ pub struct Case {
     pub disturbed: bool,
     /// Extras are observed.
     pub extras: bool,
+    /// There are other vehicles.
+    pub vehicles: bool,
     /// What follows the end of an episode.
     pub autoreset: Autoreset,
 }
@@ -146,13 +175,21 @@ impl Case {
     /// That of a batch in a world.
     pub fn of(world: &World, autoreset: Autoreset) -> Case {
         let Disturbances { of_observation, of_action, .. } = world.disturbances;
-        Case { disturbed: of_observation == 1 || of_action == 1, extras: 0 < world.params.n_extras, autoreset }
+        Case {
+            disturbed: of_observation == 1 || of_action == 1,
+            extras: 0 < world.params.n_extras,
+            vehicles: world.traffic.is_some(),
+            autoreset,
+        }
     }
 
     /// The kernels of a step, one after the other.
     pub fn step(self) -> impl Iterator<Item = Kernel> + Clone {
         let kernels: &[Kernel] = if self.disturbed { &DISTURBED_STEP } else { &STEP };
-        self.working(kernels.iter().chain(Stage::Reset.kernels()))
+        // Judging among vehicles leaves no buffer to count with.
+        let judges: &[Kernel] =
+            if self.vehicles { &[Kernel::JudgeAmong, Kernel::Count] } else { &[Kernel::JudgeAndCount] };
+        self.working(kernels.iter().chain(judges).chain(Stage::Reset.kernels()))
     }
 
     /// Those of some kernels that have anything to do.
@@ -170,17 +207,17 @@ impl Stage {
         match self {
             Stage::Steer => &[Kernel::Steer],
             Stage::Drive => &[Kernel::Drive],
-            // A device refuses worlds with vehicles.
-            Stage::Traffic => &[],
-            Stage::Collide => &[Kernel::Collide],
+            Stage::Traffic => &[Kernel::TrafficDecide, Kernel::TrafficMove, Kernel::TrafficArrive],
+            Stage::Collide => &[Kernel::Collide, Kernel::Meet],
             Stage::Follow => &[Kernel::Follow],
             Stage::Sense => &[Kernel::Sense],
             Stage::Observe => &[Kernel::Observe, Kernel::ObserveExtras],
-            Stage::Judge => &[Kernel::Judge],
+            Stage::Judge => &[Kernel::Judge, Kernel::JudgeAmong],
             Stage::Count => &[Kernel::Count],
             Stage::CopyObservation => &[Kernel::CopyObservation],
             Stage::Reset => &[
                 Kernel::Reset,
+                Kernel::SurroundAfterReset,
                 Kernel::PerceiveAfterReset,
                 Kernel::SenseAfterReset,
                 Kernel::ObserveAfterReset,
@@ -214,6 +251,17 @@ impl Kernel {
                 Params Disturbances Vehicles Actions Batch Streams; Action Control Truck Command
             ],
             Kernel::Drive => buffers![Params Vehicles Batch; Control Truck],
+            Kernel::TrafficDecide | Kernel::TrafficArrive => buffers![
+                Params Vehicles Roads Lanes Batch Streams; Truck Progress Cars
+            ],
+            Kernel::Meet => buffers![Vehicles Lanes Batch; Truck Cars],
+            Kernel::JudgeAmong => buffers![
+                Params Weights Limits Batch; Truck Clearance Progress Ended Terms Reward Cars
+            ],
+            Kernel::TrafficMove => buffers![Batch; Truck Cars],
+            Kernel::SurroundAfterReset => buffers![
+                Params Vehicles Roads Lanes Batch Streams; Truck Progress Cars
+            ],
             Kernel::Collide => buffers![Vehicles Roads Cells Corners Batch; Truck Clearance],
             Kernel::Follow => buffers![Params Disturbances Vehicles Roads Batch Streams; Truck Progress Poses],
             Kernel::Sense | Kernel::SenseAfterReset => buffers![
@@ -256,14 +304,23 @@ impl Kernel {
         match self {
             Kernel::Sense | Kernel::SenseAfterReset => Threads::Team,
             Kernel::CopyObservation => Threads::Value,
+            Kernel::TrafficDecide | Kernel::TrafficMove => Threads::Car,
             _ => Threads::Truck,
         }
+    }
+
+    /// Whether it works on the other vehicles alone.
+    pub const fn is_of_vehicles(self) -> bool {
+        use Kernel::{JudgeAmong, Meet, SurroundAfterReset, TrafficArrive, TrafficDecide, TrafficMove};
+        matches!(self, TrafficDecide | TrafficMove | TrafficArrive | Meet | JudgeAmong | SurroundAfterReset)
     }
 
     /// Whether it has anything to do.
     const fn works(self, case: Case) -> bool {
         match self {
             Kernel::PerceiveAfterReset => case.disturbed,
+            Kernel::Judge | Kernel::JudgeAndCount => !case.vehicles,
+            _ if self.is_of_vehicles() => case.vehicles,
             Kernel::ObserveExtras | Kernel::ExtrasAfterReset | Kernel::ExtrasBoth => case.extras,
             Kernel::ForgetAfterReset => matches!(case.autoreset, Autoreset::NextStep),
             _ => true,
@@ -296,7 +353,7 @@ pub fn module() -> String {
 }
 
 /// The shader files in the order in which they make one module.
-pub const SHADERS: [(&str, &str); 21] = [
+pub const SHADERS: [(&str, &str); 26] = [
     ("layout", include_str!("../../shaders/layout.wgsl")),
     ("common/thread", include_str!("../../shaders/common/thread.wgsl")),
     ("common/angle", include_str!("../../shaders/common/angle.wgsl")),
@@ -307,6 +364,11 @@ pub const SHADERS: [(&str, &str); 21] = [
     ("draw", include_str!("../../shaders/draw.wgsl")),
     ("steer", include_str!("../../shaders/steer.wgsl")),
     ("drive", include_str!("../../shaders/drive.wgsl")),
+    ("traffic/cars", include_str!("../../shaders/traffic/cars.wgsl")),
+    ("traffic/driver", include_str!("../../shaders/traffic/driver.wgsl")),
+    ("traffic/truck", include_str!("../../shaders/traffic/truck.wgsl")),
+    ("traffic/contact", include_str!("../../shaders/traffic/contact.wgsl")),
+    ("traffic", include_str!("../../shaders/traffic.wgsl")),
     ("collide", include_str!("../../shaders/collide.wgsl")),
     ("follow", include_str!("../../shaders/follow.wgsl")),
     ("perceive", include_str!("../../shaders/perceive.wgsl")),

@@ -98,6 +98,7 @@ fn kernels() -> Map<String, Value> {
             Threads::Truck => "truck",
             Threads::Team => "team",
             Threads::Value => "value",
+            Threads::Car => "car",
         };
         let bindings: Vec<usize> = kernel.buffers().iter().map(|buffer| buffer.binding()).collect();
         (kernel.name().to_owned(), json!({ "bindings": bindings, "threads": threads }))
