@@ -471,6 +471,42 @@ const ROOM_ALONG: f32 = 7.0f;
 const ROOM_BESIDE: f32 = 1.0f;
 // Twice the braking with which a truck that begins can stop behind a vehicle (m/s²).
 const STOPS_BEHIND_WITH: f32 = 3.0f;
+// Time that is observed as 1 (s).
+const TIME_SCALE: f32 = 10.0f;
+// Distance along a path that is observed as 1 (m).
+const GAP_SCALE: f32 = 50.0f;
+// Speed of a vehicle that is observed as 1 (m/s).
+const VEHICLE_SPEED_SCALE: f32 = 15.0f;
+// Distance to a unit that is observed as 1 (m).
+const ROOM_SCALE: f32 = 20.0f;
+// Distance from a unit within which vehicles are observed one by one, and which is observed as 1 (m).
+const NEAR_SCALE: f32 = 60.0f;
+// Zones that begin so far behind the line are those of the entry (m).
+const ENTRY_REACH: f32 = 12.0f;
+// Those that begin so far behind it are on the nearest lane (m).
+const NEAREST_LANE: f32 = 3.0f;
+// Least speed in a time to a zone (m/s).
+const LEAST_COMING_SPEED: f32 = 4.0f;
+// Twice the braking with which a vehicle still stops before its line (m/s^2).
+const STILL_STOPS_WITH: f32 = 8.0f;
+// Index of the times until vehicles are at the entry.
+const ARRIVAL_AT: u32 = 0u;
+// Index of their distances.
+const DISTANCE_AT: u32 = 2u;
+// Index of the times until they have left it.
+const GONE_AT: u32 = 4u;
+// Index of the distance from the line.
+const LINE_AT: u32 = 6u;
+// Index of whether the front is beyond it.
+const HAS_ENTERED_AT: u32 = 7u;
+// Index of the gap.
+const GAP_AT: u32 = 8u;
+// Index of the speed beyond the gap.
+const GAP_SPEED_AT: u32 = 9u;
+// Index of the room of both units.
+const ROOM_AT: u32 = 10u;
+// Index of whether there are nearest vehicles.
+const NEAREST_AT: u32 = 12u;
 // Least 1 plus the cosine of an angle that is halved: keeps the quotient finite where a unit has turned round.
 const HALVED_MIN: f32 = 1e-6f;
 // First word of the fractions of rude drivers in the table of lanes, behind the numbers of the driver model.

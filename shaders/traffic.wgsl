@@ -43,11 +43,18 @@ fn meet(thread: Thread) {
     if is_driving(env) { cars[env * N_CAR_WORDS + MET_AT] = touched(env, network_of(truck[env].route)); }
 }
 
-// Puts the vehicles of a snapshot around the trucks that have begun an episode, but for those that are too near.
+// Puts the vehicles of a snapshot around the trucks that the caller named, but for those that are too near.
+@compute @workgroup_size(WORKGROUP)
+fn surround(thread: Thread) {
+    let env = index_of(thread);
+    if is_to_begin(env) { surround_truck(env); }
+}
+
+// The same around the trucks that have begun another episode.
 @compute @workgroup_size(WORKGROUP)
 fn surround_after_reset(thread: Thread) {
     let env = index_of(thread);
-    if has_begun(env) { surround(env); }
+    if has_begun(env) { surround_truck(env); }
 }
 
 // Words of a demand: for each source, for each path, for vans and for rude drivers.
@@ -168,7 +175,7 @@ fn square_root(value: u32) -> u32 {
 }
 
 // Puts the vehicles of a snapshot around a truck, but for those that are too near.
-fn surround(env: u32) {
+fn surround_truck(env: u32) {
     let network = network_of(truck[env].route);
     let random = traffic_words(env, DRAW_TRAFFIC);
     let level = index_below(random.x, lanes[LANES_LEVELS]);

@@ -1,6 +1,10 @@
 //! One step, in order. Both engines run these stages: the CPU by the function, the device by the kernels of the same
 //! name.
 
+mod shaders;
+
+pub use shaders::{SHADERS, module};
+
 use crate::engine::Autoreset;
 use crate::layout::buffers::{Access, Buffer, Table};
 use crate::layout::{Column, Disturbances};
@@ -41,18 +45,20 @@ pub const N_STAGES: usize = Stage::ALL.len();
 pub const STAGES: [Stage; N_STAGES] = Stage::ALL;
 
 /// The kernels that begin an episode of the trucks that the caller named.
-pub const BEGIN: [Kernel; 7] = [
+pub const BEGIN: [Kernel; 9] = [
     Kernel::Begin,
-    Kernel::SurroundAfterReset,
+    Kernel::Surround,
     Kernel::PerceiveAfterReset,
     Kernel::SenseAfterReset,
     Kernel::ObserveAfterReset,
     Kernel::ExtrasAfterReset,
+    Kernel::AroundAfterReset,
     Kernel::Forget,
+    Kernel::ForgetAround,
 ];
 
 /// The kernels of a step before those that judge it: each does a stage, or several at once.
-const STEP: [Kernel; 9] = [
+const STEP: [Kernel; 10] = [
     Kernel::Advance,
     Kernel::TrafficDecide,
     Kernel::TrafficMove,
@@ -62,11 +68,12 @@ const STEP: [Kernel; 9] = [
     Kernel::Sense,
     Kernel::ObserveBoth,
     Kernel::ExtrasBoth,
+    Kernel::AroundBoth,
 ];
 
 /// Those where disturbances come between the truck and the policy. Kernels that did more at once would need more
 /// buffers.
-const DISTURBED_STEP: [Kernel; 12] = [
+const DISTURBED_STEP: [Kernel; 13] = [
     Kernel::Steer,
     Kernel::Drive,
     Kernel::TrafficDecide,
@@ -79,6 +86,7 @@ const DISTURBED_STEP: [Kernel; 12] = [
     Kernel::Observe,
     Kernel::ObserveExtras,
     Kernel::CopyObservation,
+    Kernel::AroundBoth,
 ];
 
 crate::named! {
@@ -88,6 +96,8 @@ crate::named! {
         Draw = "draw",
         /// Begins an episode of the trucks that the caller named.
         Begin = "begin",
+        /// The vehicles around these trucks.
+        Surround = "surround",
         /// [`Stage::Steer`].
         Steer = "steer",
         /// [`Stage::Drive`].
@@ -110,6 +120,8 @@ crate::named! {
         Observe = "observe",
         /// [`Stage::Observe`]: the extras.
         ObserveExtras = "observe_extras",
+        /// [`Stage::Observe`]: other vehicles.
+        ObserveAround = "observe_around",
         /// [`Stage::Judge`].
         Judge = "judge",
         /// [`Stage::Judge`] where there are other vehicles.
@@ -118,6 +130,8 @@ crate::named! {
         Count = "count",
         /// [`Stage::CopyObservation`].
         CopyObservation = "copy_observation",
+        /// [`Stage::CopyObservation`]: of other vehicles.
+        CopyAround = "copy_around",
         /// [`Stage::Reset`]: route and pose.
         Reset = "reset",
         /// [`Stage::Reset`]: the vehicles around the trucks that began another episode.
@@ -130,16 +144,22 @@ crate::named! {
         ObserveAfterReset = "observe_after_reset",
         /// [`Stage::Reset`]: their extras.
         ExtrasAfterReset = "extras_after_reset",
+        /// [`Stage::Reset`]: what they observe of other vehicles.
+        AroundAfterReset = "around_after_reset",
         /// [`Stage::Reset`]: that they have no last step, where they begin in a step of their own.
         ForgetAfterReset = "forget_after_reset",
         /// That the trucks that the caller named have no last step.
         Forget = "forget",
+        /// The same of what they observe of other vehicles.
+        ForgetAround = "forget_around",
         /// [`Stage::Steer`], [`Stage::Drive`] and [`Stage::Follow`] at once, where what is observed is what is.
         Advance = "advance",
         /// [`Stage::Observe`] and [`Stage::CopyObservation`] at once, there: the observation.
         ObserveBoth = "observe_both",
         /// The same of the extras.
         ExtrasBoth = "extras_both",
+        /// The same of other vehicles, also with disturbances, which do not touch it.
+        AroundBoth = "around_both",
         /// [`Stage::Judge`] and [`Stage::Count`] at once.
         JudgeAndCount = "judge_and_count",
     }
@@ -167,6 +187,8 @@ pub struct Case {
     pub extras: bool,
     /// There are other vehicles.
     pub vehicles: bool,
+    /// They are observed.
+    pub around: bool,
     /// What follows the end of an episode.
     pub autoreset: Autoreset,
 }
@@ -179,6 +201,7 @@ impl Case {
             disturbed: of_observation == 1 || of_action == 1,
             extras: 0 < world.params.n_extras,
             vehicles: world.traffic.is_some(),
+            around: world.observes_vehicles(),
             autoreset,
         }
     }
@@ -211,10 +234,10 @@ impl Stage {
             Stage::Collide => &[Kernel::Collide, Kernel::Meet],
             Stage::Follow => &[Kernel::Follow],
             Stage::Sense => &[Kernel::Sense],
-            Stage::Observe => &[Kernel::Observe, Kernel::ObserveExtras],
+            Stage::Observe => &[Kernel::Observe, Kernel::ObserveExtras, Kernel::ObserveAround],
             Stage::Judge => &[Kernel::Judge, Kernel::JudgeAmong],
             Stage::Count => &[Kernel::Count],
-            Stage::CopyObservation => &[Kernel::CopyObservation],
+            Stage::CopyObservation => &[Kernel::CopyObservation, Kernel::CopyAround],
             Stage::Reset => &[
                 Kernel::Reset,
                 Kernel::SurroundAfterReset,
@@ -222,6 +245,7 @@ impl Stage {
                 Kernel::SenseAfterReset,
                 Kernel::ObserveAfterReset,
                 Kernel::ExtrasAfterReset,
+                Kernel::AroundAfterReset,
                 Kernel::ForgetAfterReset,
             ],
         }
@@ -259,6 +283,9 @@ impl Kernel {
                 Params Weights Limits Batch; Truck Clearance Progress Ended Terms Reward Cars
             ],
             Kernel::TrafficMove => buffers![Batch; Truck Cars],
+            Kernel::Surround => buffers![
+                Params Vehicles Roads Lanes Batch Streams Begins; Truck Progress Cars
+            ],
             Kernel::SurroundAfterReset => buffers![
                 Params Vehicles Roads Lanes Batch Streams; Truck Progress Cars
             ],
@@ -275,6 +302,11 @@ impl Kernel {
             ],
             Kernel::ObserveExtras => buffers![Params Vehicles Batch; Control Truck NextExtras],
             Kernel::ExtrasAfterReset => buffers![Params Vehicles Batch; Control Truck Extras],
+            Kernel::ObserveAround | Kernel::AroundBoth | Kernel::AroundAfterReset => buffers![
+                Params Vehicles Roads Lanes Batch; Truck Progress Cars Around NextAround
+            ],
+            Kernel::CopyAround => buffers![Batch; Truck Around NextAround],
+            Kernel::ForgetAround => buffers![Batch Begins; Around NextAround],
             Kernel::Judge => buffers![Params Weights Limits Batch; Truck Clearance Progress Ended Terms Reward],
             Kernel::Count => buffers![Batch; Truck Ended Reward; Tally],
             Kernel::CopyObservation => buffers![Batch; Truck Observation NextObservation Extras NextExtras],
@@ -311,8 +343,16 @@ impl Kernel {
 
     /// Whether it works on the other vehicles alone.
     pub const fn is_of_vehicles(self) -> bool {
-        use Kernel::{JudgeAmong, Meet, SurroundAfterReset, TrafficArrive, TrafficDecide, TrafficMove};
-        matches!(self, TrafficDecide | TrafficMove | TrafficArrive | Meet | JudgeAmong | SurroundAfterReset)
+        use Kernel::{JudgeAmong, Meet, Surround, SurroundAfterReset, TrafficArrive, TrafficDecide, TrafficMove};
+        let surrounds = matches!(self, Surround | SurroundAfterReset);
+        let moves = matches!(self, TrafficDecide | TrafficMove | TrafficArrive | Meet | JudgeAmong);
+        surrounds || moves || self.observes_vehicles()
+    }
+
+    /// Whether it is about what is observed of them.
+    const fn observes_vehicles(self) -> bool {
+        use Kernel::{AroundAfterReset, AroundBoth, CopyAround, ForgetAround, ObserveAround};
+        matches!(self, ObserveAround | CopyAround | AroundBoth | AroundAfterReset | ForgetAround)
     }
 
     /// Whether it has anything to do.
@@ -320,6 +360,7 @@ impl Kernel {
         match self {
             Kernel::PerceiveAfterReset => case.disturbed,
             Kernel::Judge | Kernel::JudgeAndCount => !case.vehicles,
+            _ if self.observes_vehicles() => case.around,
             _ if self.is_of_vehicles() => case.vehicles,
             Kernel::ObserveExtras | Kernel::ExtrasAfterReset | Kernel::ExtrasBoth => case.extras,
             Kernel::ForgetAfterReset => matches!(case.autoreset, Autoreset::NextStep),
@@ -346,38 +387,3 @@ pub const N_STORAGE_BUFFERS: usize = {
 
 /// Workgroup memory that a kernel takes at most (bytes): what every device of WebGPU has.
 pub const WORKGROUP_MEMORY: u32 = 16_384;
-
-/// The shaders of a step as one module.
-pub fn module() -> String {
-    SHADERS.iter().flat_map(|(_, text)| [text, "\n"]).collect()
-}
-
-/// The shader files in the order in which they make one module.
-pub const SHADERS: [(&str, &str); 26] = [
-    ("layout", include_str!("../../shaders/layout.wgsl")),
-    ("common/thread", include_str!("../../shaders/common/thread.wgsl")),
-    ("common/angle", include_str!("../../shaders/common/angle.wgsl")),
-    ("common/random", include_str!("../../shaders/common/random.wgsl")),
-    ("common/road", include_str!("../../shaders/common/road.wgsl")),
-    ("common/field", include_str!("../../shaders/common/field.wgsl")),
-    ("common/truck", include_str!("../../shaders/common/truck.wgsl")),
-    ("draw", include_str!("../../shaders/draw.wgsl")),
-    ("steer", include_str!("../../shaders/steer.wgsl")),
-    ("drive", include_str!("../../shaders/drive.wgsl")),
-    ("traffic/cars", include_str!("../../shaders/traffic/cars.wgsl")),
-    ("traffic/driver", include_str!("../../shaders/traffic/driver.wgsl")),
-    ("traffic/truck", include_str!("../../shaders/traffic/truck.wgsl")),
-    ("traffic/contact", include_str!("../../shaders/traffic/contact.wgsl")),
-    ("traffic", include_str!("../../shaders/traffic.wgsl")),
-    ("collide", include_str!("../../shaders/collide.wgsl")),
-    ("follow", include_str!("../../shaders/follow.wgsl")),
-    ("perceive", include_str!("../../shaders/perceive.wgsl")),
-    ("sense", include_str!("../../shaders/sense.wgsl")),
-    ("observe", include_str!("../../shaders/observe.wgsl")),
-    ("judge", include_str!("../../shaders/judge.wgsl")),
-    ("count", include_str!("../../shaders/count.wgsl")),
-    ("copy_observation", include_str!("../../shaders/copy_observation.wgsl")),
-    ("along", include_str!("../../shaders/along.wgsl")),
-    ("reset", include_str!("../../shaders/reset.wgsl")),
-    ("advance", include_str!("../../shaders/advance.wgsl")),
-];

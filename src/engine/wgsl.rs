@@ -36,6 +36,7 @@ pub fn shared() -> String {
         cpu::observe::printed_constants(),
         traffic::printed_constants(),
         cpu::traffic::printed_constants(),
+        cpu::around::printed_constants(),
         cpu::along::printed_constants(),
         tables::printed_constants(),
         tally::printed_constants(),

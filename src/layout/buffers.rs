@@ -147,8 +147,8 @@ impl Table {
                 rows::<u32>(),
             ),
             Table::Limits => (
-                "Each vehicle's class; then each route's number of waypoints, and each class's steps until it times out; \
-                 last, among other vehicles, what hindering them weighs.",
+                "Each vehicle's class; then each route's number of waypoints, and each class's steps until it times \
+                 out; last, among other vehicles, what hindering them weighs.",
                 rows::<u32>(),
             ),
             Table::Lanes => (

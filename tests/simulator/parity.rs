@@ -1,5 +1,6 @@
 //! The device against the CPU, stage by stage and step by step: from the same states, value by value.
 
+mod around;
 mod compare;
 mod states;
 mod vehicles;

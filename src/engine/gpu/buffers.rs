@@ -116,9 +116,6 @@ fn largest(device: &Device) -> u64 {
 
 /// An error if a table of the world is larger than that.
 pub(super) fn check_world(device: &Device, world: &World) -> Result<(), Error> {
-    if world.observes_vehicles() {
-        return Err(Error::Vehicles);
-    }
     let limit = largest(device);
     let n_roundabouts = world.fields.len();
     match sizes(world).into_iter().map(|(table, n_bytes)| (table, n_bytes as u64)).find(|(_, n_bytes)| limit < *n_bytes)

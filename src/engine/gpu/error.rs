@@ -91,9 +91,6 @@ pub enum Error {
         /// Bytes needed.
         needed: u64,
     },
-    /// No kernel observes other vehicles.
-    #[error("the benchmark observes other vehicles, which only the CPU does: leave the device out, or the key")]
-    Vehicles,
     /// External columns cannot change their number of rows.
     #[error("the batch has external columns: its trucks cannot be gathered")]
     ExternalColumns,

@@ -16,7 +16,7 @@ use crate::batch_on;
 use crate::on_device::engine;
 use crate::traffic::with_traffic;
 
-const N_ENVS: usize = 512;
+pub const N_ENVS: usize = 512;
 /// Steps from each state: cars come and leave.
 const STEPS: usize = 40;
 
@@ -32,18 +32,18 @@ fn on(engine: &Engine, world: &Arc<World>) -> Simulator {
     batch_on(engine, world, N_ENVS, 11, RouteChoice::Drawn((0..world.routes.len() as u32).collect()))
 }
 
-fn simulators(world: &Arc<World>) -> [Simulator; 2] {
+pub fn simulators(world: &Arc<World>) -> [Simulator; 2] {
     [Engine::Cpu, engine()].map(|engine| on(&engine, world))
 }
 
 /// A device that computes with a world that is wrong in one number.
-fn wrong_device(world: &World, change: fn(&mut World)) -> Simulator {
+pub fn wrong_device(world: &World, change: fn(&mut World)) -> Simulator {
     let mut wrong = world.clone();
     change(&mut wrong);
     on(&engine(), &Arc::new(wrong))
 }
 
-fn rows(batch: &Batch) -> impl Iterator<Item = &Row> {
+pub fn rows(batch: &Batch) -> impl Iterator<Item = &Row> {
     batch.cars.iter().map(|words| Row::of(words))
 }
 
@@ -89,14 +89,14 @@ fn anywhere(world: &World, batch: &mut Batch) {
     }
 }
 
-fn batch_anywhere(world: &World, simulator: &Simulator) -> Batch {
+pub fn batch_anywhere(world: &World, simulator: &Simulator) -> Batch {
     let mut batch = simulator.batch().clone();
     anywhere(world, &mut batch);
     batch
 }
 
 /// The batch after a stage.
-fn after(simulator: &mut Simulator, stage: Stage, from: &Batch) -> Batch {
+pub fn after(simulator: &mut Simulator, stage: Stage, from: &Batch) -> Batch {
     put(simulator, from);
     simulator.run_stage(stage);
     simulator.batch().clone()
@@ -113,7 +113,7 @@ fn driven(simulator: &mut Simulator, from: &Batch, steps: usize) -> Batch {
 }
 
 /// Columns but these are as they were.
-fn assert_untouched(before: &Batch, after: &Batch, written: &[Column]) {
+pub fn assert_untouched(before: &Batch, after: &Batch, written: &[Column]) {
     let untouched = before.columns().into_iter().filter(|(column, _)| !written.contains(column));
     untouched.for_each(|(column, bytes)| assert!(bytes == after.column(column), "{column:?}"));
 }
@@ -188,11 +188,11 @@ const OFF: [Off; 15] = [
     ("ground of a truck", |world| world.rigs.iter_mut().for_each(|rig| rig.trailer_body.half_width += 0.05)),
 ];
 
-fn of_traffic(world: &mut World, change: fn(&mut Traffic)) {
+pub fn of_traffic(world: &mut World, change: fn(&mut Traffic)) {
     change(world.traffic.as_mut().unwrap());
 }
 
-fn of_networks(world: &mut World, change: fn(&mut Network)) {
+pub fn of_networks(world: &mut World, change: fn(&mut Network)) {
     world.traffic.as_mut().unwrap().roads.iter_mut().for_each(|road| change(&mut road.network));
 }
 
