@@ -1,6 +1,7 @@
 //! The figures of episodes under way, one a truck, from their starts to their ends.
 
-use bytemuck::cast_slice;
+use std::borrow::Cow;
+
 use offtrack::layout::{Column, Control, Ended, N_CAR_WORDS, Truck};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{Error, Simulator};
@@ -13,7 +14,7 @@ use crate::episode::Episode;
 use crate::evaluation::routes_of;
 use crate::part::LaneWidths;
 use crate::running::Running;
-use crate::seen::Seen;
+use crate::seen::{Seen, rows};
 
 /// The figures of each episode so far.
 pub struct Figures<'a> {
@@ -43,8 +44,8 @@ impl<'a> Figures<'a> {
         let has_classes = classes::has_classes(scenario);
         let levels = scenario.traffic.as_ref().map(|traffic| traffic.demand.as_slice());
         // From a device no other column is read.
-        let cars = if levels.is_some() { simulator.read(&[Column::Cars])? } else { Vec::new() };
-        let cars: &[[u32; N_CAR_WORDS]] = cars.first().map_or(&[], |bytes| cast_slice(bytes));
+        let mut cars = if levels.is_some() { simulator.read(&[Column::Cars])? } else { Vec::new() };
+        let cars: Cow<[[u32; N_CAR_WORDS]]> = rows(cars.pop().unwrap_or_default());
         let new = |(env, (truck, control)): (usize, (&Truck, &Control))| {
             let driving = has_classes.then(|| Driving::new(truck, control.target_speed));
             let demand = levels.and_then(|levels| Some(levels[Row::of(cars.get(env)?).level as usize]));

@@ -22,7 +22,7 @@ pub(super) fn printed(packed: &mut Packed) -> Value {
     let mut text = |text: String| packed.add("shaders", text.as_bytes());
     let texts = json!({
         "step": text(module()),
-        "act": SHAPES.map(|shape| text(act::source(shape))),
+        "act": SHAPES.map(|shape| text(act::source(shape, false))),
         "journal": text(journal::module()),
         "picture": text([wgsl::picture(), journal::declared_to_read()].concat()),
     });
