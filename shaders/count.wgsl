@@ -15,7 +15,7 @@ fn count(thread: Thread) {
 @compute @workgroup_size(WORKGROUP)
 fn judge_and_count(thread: Thread) {
     let env = index_of(thread);
-    if is_driving(env) { judge_step(env); }
+    if is_driving(env) { judge_step(env, 0u); }
     count_step(thread.local, env);
 }
 

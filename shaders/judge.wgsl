@@ -1,20 +1,29 @@
 // Judges the step: whether and why the episode ended, and the reward.
 //
-// Failure wins over arrival, everything wins over the time limit.
+// Failure wins over a vehicle that drove into the truck, that over arrival, everything over the time limit.
 
 @compute @workgroup_size(WORKGROUP)
 fn judge(thread: Thread) {
     let env = index_of(thread);
-    if is_driving(env) { judge_step(env); }
+    if is_driving(env) { judge_step(env, 0u); }
 }
 
-// Judges a truck's step.
-fn judge_step(env: u32) {
+// The same where there are other vehicles: what the truck's hindrance of them weighs is added to the weighted sum.
+@compute @workgroup_size(WORKGROUP)
+fn judge_among(thread: Thread) {
+    let env = index_of(thread);
+    if !is_driving(env) { return; }
+    judge_step(env, cars[env * N_CAR_WORDS + MET_AT]);
+    reward[env] += hindrance(env);
+}
+
+// Judges a truck's step, with the contact that it had.
+fn judge_step(env: u32, met: u32) {
     truck[env].steps += 1u;
     // The route's waypoints, and behind them the steps of each class.
     let row = params.n_vehicles + truck[env].route * (1u + params.n_classes);
     let step_limit = limits[row + 1u + limits[truck[env].vehicle]];
-    let code = ending(params, limits[row], step_limit, truck[env], clearance[env], progress[env]);
+    let code = ending(params, limits[row], step_limit, truck[env], clearance[env], progress[env], met);
     let amounts = reward_terms(weights, clearance[env], progress[env], code);
     ended[env] = code;
     terms[env] = amounts;
@@ -29,6 +38,7 @@ fn ending(
     truck: Truck,
     clearance: Clearance,
     progress: Progress,
+    met: u32,
 ) -> u32 {
     let articulation = wrapped(truck.heading - truck.trailer_heading);
     let load_transfer_ratio = max(abs(truck.tractor_load_transfer_ratio), abs(truck.trailer_load_transfer_ratio));
@@ -41,8 +51,12 @@ fn ending(
         return ROLLED_OVER;
     } else if params.jackknife_angle < abs(articulation) {
         return JACKKNIFED;
+    } else if TRUCKS_FAULT <= met {
+        return MET_VEHICLE;
     } else if !arrived && params.stray_distance < progress.waypoint_distance {
         return STRAYED;
+    } else if met != 0u {
+        return WAS_MET;
     } else if arrived {
         return ARRIVED;
     } else if step_limit < truck.steps {
@@ -53,7 +67,7 @@ fn ending(
 
 // The physical amounts that the reward weighs.
 fn reward_terms(weights: Reward, clearance: Clearance, progress: Progress, code: u32) -> RewardTerms {
-    let failed = code != RUNNING && code != ARRIVED && code != TIMED_OUT;
+    let failed = code != RUNNING && code != ARRIVED && code != TIMED_OUT && code != WAS_MET;
     return RewardTerms(
         f32(progress.passed),
         min(progress.lane_distance / weights.lane_distance_limit, 1.0),

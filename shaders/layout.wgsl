@@ -210,8 +210,317 @@ const ROLL_SCALE: f32 = 0.15f;
 const ROLL_RATE_SCALE: f32 = 0.3f;
 // Mass that is observed as 1 (kg).
 const MASS_SCALE: f32 = 40000.0f;
+// Bits of a state's station below one of decisions.
+const FINER_STATION: u32 = 10u;
+// The same of a speed.
+const FINER_SPEED: u32 = 5u;
+// Units of lengths in a metre.
+const METRE: f32 = 1024.0f;
+// Units of speeds in a m/s.
+const PACE: f32 = 1638.4f;
+// Larger than every length of a road (2^-10 m).
+const BEYOND: i32 = 1048576i;
+// No car and no truck that one minds is faster (2^-14 m a step).
+const FASTEST: i32 = 20480i;
+// An interaction of 1.
+const ONE: i32 = 65536i;
+// Bits of a ratio of gaps below 1.
+const RATIO_BITS: u32 = 14u;
+// Interactions are below 16: the hardest braking needs 5.
+const MOST_RATIO: u32 = 65535u;
+// 1 / (2 sqrt(a b)) = 0.2236 s²/m of an acceleration of 2 m/s² and a braking of 2.5 m/s²: for products of speeds
+// in units of 2^-18 m² a step².
+const PER_PRODUCT: i32 = 1431i;
+// The same for squares of speeds in m²/s² (2^-10).
+const PER_SQUARE: i32 = 229i;
+// The smallest gap that counts (2^-10 m).
+const LEAST_GAP: i32 = 102i;
+// A car that stands is this far before what it stops at (2^-10 m).
+const STANDS_BEFORE: i32 = 205i;
+// The least distance to a line (2^-10 m).
+const LEAST_DISTANCE: i32 = 51i;
+// The least distance to half of `STANDS_BEFORE` before it (2^-10 m).
+const LEAST_LEFT: i32 = 31i;
+// A car brakes comfortably where its squared speed is at most so many times the distance: 2 x 2.5 m/s² (m/s²).
+const TWICE_BRAKING: i32 = 5i;
+// What moves can still stop before a line at 4 m/s²: within an eighth of its squared speed, three bits.
+const STOPS_WITHIN: u32 = 3u;
+// Braking at most towards a lower speed limit, in units of an interaction: 1.5 x 2 m/s².
+const SLOWING: i32 = 98304i;
+// Ratio of a speed to the wished one, in units of 2^-15, beyond which a car slows as hard as it does for a limit.
+const MOST_PART: u32 = 49152u;
+// Hardest braking in units of the largest acceleration: 8 m/s² of 2 m/s².
+const HARDEST: i32 = 262144i;
+// The hardest braking in the units of a state (2^-19 m a step²).
+const HARDEST_OF_STATE: i32 = 41943i;
+// How far temperament changes the speed on a free road (1/150 of it for each of its 15 units).
+const SPEED_PARTS: i32 = 150i;
+// How far it changes headway and lags (1/100 of them for each of its 15 units).
+const TIME_PARTS: i32 = 100i;
+// Numbers of `Rules`, in words.
+const N_RULES: u32 = 7u;
+// Index of the time headway among them.
+const RULE_HEADWAY: u32 = 0u;
+// Index of the gap.
+const RULE_GAP: u32 = 1u;
+// Index of the first lag.
+const RULE_LAGS: u32 = 2u;
+// Index of the first lag before traffic that is only passed beside.
+const RULE_SOFT_LAGS: u32 = 4u;
+// Index of the courtesy.
+const RULE_COURTESY: u32 = 6u;
+// Distance between samples of a path (m).
+const SPACING: f32 = 2.0f;
+// Bits of a state's station below the distance between samples.
+const SPACING_BITS: u32 = 21u;
+// Bits of a station of decisions below the unit of zones.
+const UNIT_BITS: u32 = 4u;
+// Bits of a station of decisions below the unit of pairs.
+const CELL_BITS: u32 = 11u;
+// Words before the tables of a road.
+const NETWORK_HEAD: u32 = 6u;
+// Words of a path.
+const PATH_WORDS: u32 = 8u;
+// Words of a sample.
+const SAMPLE_WORDS: u32 = 5u;
+// Words of a pair.
+const PAIR_WORDS: u32 = 2u;
+// Words of a zone.
+const ZONE_WORDS: u32 = 3u;
+// Words of a source.
+const SOURCE_WORDS: u32 = 4u;
+// Cars follow each other: code of a zone's kind.
+const FOLLOW: u32 = 0u;
+// One car at a time.
+const CROSS: u32 = 1u;
+// Who enters yields.
+const SOFT: u32 = 2u;
+// Only a vehicle that may need the lanes beside its own yields.
+const WIDE: u32 = 3u;
+// Arrivals: the step is added.
+const ARRIVAL: u32 = 2147483648u;
+// Path and style of a car that enters: 16 times the step and the source are added.
+const ENTERING: u32 = 2684354560u;
+// Who of two that stand goes first: the period and both slots are added.
+const COIN: u32 = 3221225472u;
+// Whether one lets another in: the period and both slots are added.
+const COURTESY: u32 = 3489660928u;
+// Steps for which a coin falls the same way.
+const COIN_PERIOD: u32 = 10u;
+// Steps for which a car is as courteous to another.
+const COURTESY_PERIOD: u32 = 32u;
+// Numbers of slots that differ in a draw.
+const SLOTS: u32 = 64u;
+// Path of a slot without a car.
+const NO_PATH: u32 = 1023u;
+// Bit of a car's word at which its style begins.
+const STYLE: u32 = 10u;
+// Bit at which the steps begin for which it has been standing.
+const STANDING: u32 = 20u;
+// Most steps that are counted.
+const MOST_STANDING: u32 = 4095u;
+// Bits of a style: temperament in 16 steps.
+const TEMPERAMENT: u32 = 15u;
+// Lowest of the two bits of the length.
+const LENGTH: u32 = 4u;
+// Bit of a van.
+const VAN: u32 = 64u;
+// Bit of a driver who is rude.
+const RUDE: u32 = 128u;
+// Length of the shortest car (2^-10 m).
+const SHORTEST: i32 = 4301i;
+// From one length to the next (2^-10 m).
+const LONGER: i32 = 307i;
+// Length of a van (2^-10 m).
+const VAN_LENGTH: i32 = 7168i;
+// Half the width of a car (m).
+const HALF_WIDTH: f32 = 0.9f;
+// Half the width of a van (m).
+const VAN_HALF_WIDTH: f32 = 1.05f;
+// Part of the length before the front axle, and behind the rear one.
+const OVERHANG: f32 = 0.2f;
+// Units of a state's station in a metre.
+const STATE_METRE: f32 = 1048576.0f;
+// Units of its speed in a m/s.
+const STATE_SPEED: f32 = 52428.8f;
+// Units of its acceleration in a m/s².
+const STATE_ACCELERATION: f32 = 5242.8804f;
+// Below this speed a car stands: 0.1 m/s (2^-19 m a step).
+const STANDS: i32 = 5243i;
+// Nothing farther ahead of a car is looked at (2^-10 m).
+const SIGHT: i32 = 32768i;
+// The same of a car that may come to meet it (2^-10 m).
+const SIGHT_OF_OTHERS: i32 = 46080i;
+// What may matter of a car begins so far behind its rear (2^-10 m).
+const BEHIND: i32 = 512i;
+// A zone is left once the rear is so far behind it (2^-10 m).
+const LEFT: i32 = 307i;
+// Two cars that have it before them agree on who is first from this distance on (2^-10 m).
+const AGREED: i32 = 35840i;
+// Twice the braking above which a car does not stop for another that is about as near (m/s²).
+const GOES_ABOVE: i32 = 7i;
+// Least speed in a time to a zone (2^-14 m a step).
+const LEAST_SPEED: i32 = 6554i;
+// Least wished speed (2^-14 m a step).
+const LEAST_WISHED: i32 = 819i;
+// Steps after which one that has been standing goes by the coin.
+const PATIENT: u32 = 20u;
+// Interaction of a car that must let another out of a crossing: it wishes three times the gap.
+const LETS_OUT: i32 = 589824i;
+// Zones that begin up to here behind the line are those of the entry (2^-10 m).
+const OF_ENTRY: i32 = 12288i;
+// Least speed in the time to the line (2^-14 m a step).
+const LEAST_APPROACH: i32 = 4915i;
+// Least speed in the time until a crossing is free (2^-14 m a step).
+const LEAST_CROSSING: i32 = 1638i;
+// Steps of standing after which a lag would be 0.
+const IMPATIENCE: i32 = 100i;
+// How many are left of them at least.
+const LEAST_PATIENCE: i32 = 30i;
+// Time by which a car that crosses ahead must be gone before this one is there (1/256 step).
+const GONE_BEFORE: i32 = 1280i;
+// A car that follows one slower than this stays off the lanes that it crosses (2^-14 m a step).
+const SLOW: i32 = 4915i;
+// A car is let in within this distance of its line (2^-10 m).
+const LET_IN_WITHIN: i32 = 4096i;
+// The same below this speed (2^-14 m a step).
+const LET_IN_BELOW: i32 = 6554i;
+// Twice the braking with which a car lets another in (m/s²).
+const LETS_IN_WITH: i32 = 3i;
+// It does so far before the zone (2^-10 m).
+const LETS_IN_BEFORE: i32 = 1536i;
+// Bits of the backlog for each source.
+const BACKLOG_BITS: u32 = 4u;
+// Sources of a word of the backlog.
+const BACKLOG_SOURCES: u32 = 8u;
+// So many cars wait outside at most, and further ones stay away.
+const MOST_WAITING: u32 = 15u;
+// A car enters with at least so much room before it (2^-10 m).
+const ENTRY_ROOM: i32 = 3072i;
+// Twice the braking with which it could stop behind the one before it (m/s²).
+const STOPS_WITH: i32 = 3i;
+// Steps between two decisions of a car; slots take turns.
+const DECIDES_EVERY: u32 = 2u;
+// Slots of a row that decide in a step.
+const N_TURNS: u32 = 12u;
+// Words of a car.
+const CAR_WORDS: u32 = 4u;
+// Word of a row at which the cars begin that wait outside.
+const BACKLOG_AT: u32 = 96u;
+// Word of the demand that the episode has.
+const LEVEL_AT: u32 = 98u;
+// Word of the step in which the truck entered.
+const ENTERED_AT: u32 = 99u;
+// Word of the contact.
+const MET_AT: u32 = 100u;
+// Word of the cars that slow for the truck.
+const HINDERED_AT: u32 = 101u;
+// States of a road and a demand.
+const N_SNAPSHOTS: u32 = 64u;
+// A truck that comes is this far from where cars enter, or two seconds, when they stay away (2^-10 m).
+const COMING: i32 = 3072i;
+// A truck swings out before its line: it has entered so far before the line of cars (2^-10 m).
+const SWINGS_OUT: i32 = 2560i;
+// Steps to each of the two times at which it is foreseen.
+const STEPS_AHEAD: u32 = 2u;
+// How long they are (s).
+const STEP_AHEAD: f32 = 0.5f;
+// A truck takes longer to pass than a car: so much is added to the lag (1/256 step).
+const LAG_OF_TRUCK: i32 = 3840i;
+// Samples of a path that are a car's corridor, from the one behind its front on.
+const CORRIDOR_SAMPLES: u32 = 16u;
+// Room beside a car to what is in its corridor now (m).
+const CORRIDOR_ROOM: f32 = 0.7f;
+// The same beside its front itself (m).
+const ROOM_AT_FRONT: f32 = 0.4f;
+// The same to what will be in its corridor (m).
+const ROOM_LATER: f32 = 0.5f;
+// What is at a sample may begin half a spacing before it (m).
+const BEFORE_SAMPLE: f32 = 1.0f;
+// A car that can wait does so for what begins so far behind its line (2^-10 m).
+const BEHIND_LINE: i32 = 2048i;
+// Interaction of the hardest braking, 8 m/s².
+const BRAKES_HARDEST: i32 = 327680i;
+// That of 3 m/s² at low speed, with which a car slows at most for what will be.
+const BRAKES_GENTLY: i32 = 163840i;
+// A unit this near to a car's front may be touched soon (m).
+const NEAR_UNIT: f32 = 8.0f;
+// Steps in which a car foresees its own way.
+const CAR_STEPS_AHEAD: i32 = 4i;
+// It does so 0.3 m farther (2^-20 m).
+const MORE_AHEAD: i32 = 314573i;
+// Room that it keeps then (m).
+const LEAST_ROOM: f32 = 0.15f;
+// Time before a contact at which it is asked where the truck was (s).
+const BEFORE_CONTACT: f32 = 1.0f;
+// A truck has entered lately if it did so within so many steps.
+const LATELY: u32 = 30u;
+// A car has entered lately if it is not farther behind its line than it drives in this time, or than it comes in
+// it from standing (2^-10 m).
+const FROM_STANDING: i32 = 9216i;
+// No part of a car is farther from the sample behind its front, and no corner of a unit from the end of its axis
+// (m).
+const NEAR_CAR: f32 = 12.0f;
+// Below this speed a car stands, and hits nobody (2^-14 m a step).
+const HITS_NOBODY: i32 = 82i;
+// Added to a contact's code where the truck is at fault: more than there are slots.
+const TRUCKS_FAULT: u32 = 64u;
+// What a vehicle may brake with for a truck that is in nobody's way (m/s²).
+const GENTLE: f32 = 2.0f;
+// Room to other vehicles before and behind each unit that a truck begins with (m).
+const ROOM_ALONG: f32 = 7.0f;
+// Room beside each unit (m).
+const ROOM_BESIDE: f32 = 1.0f;
+// Twice the braking with which a truck that begins can stop behind a vehicle (m/s²).
+const STOPS_BEHIND_WITH: f32 = 3.0f;
+// Time that is observed as 1 (s).
+const TIME_SCALE: f32 = 10.0f;
+// Distance along a path that is observed as 1 (m).
+const GAP_SCALE: f32 = 50.0f;
+// Speed of a vehicle that is observed as 1 (m/s).
+const VEHICLE_SPEED_SCALE: f32 = 15.0f;
+// Distance to a unit that is observed as 1 (m).
+const ROOM_SCALE: f32 = 20.0f;
+// Distance from a unit within which vehicles are observed one by one, and which is observed as 1 (m).
+const NEAR_SCALE: f32 = 60.0f;
+// Zones that begin so far behind the line are those of the entry (m).
+const ENTRY_REACH: f32 = 12.0f;
+// Those that begin so far behind it are on the nearest lane (m).
+const NEAREST_LANE: f32 = 3.0f;
+// Least speed in a time to a zone (m/s).
+const LEAST_COMING_SPEED: f32 = 4.0f;
+// Twice the braking with which a vehicle still stops before its line (m/s^2).
+const STILL_STOPS_WITH: f32 = 8.0f;
+// Index of the times until vehicles are at the entry.
+const ARRIVAL_AT: u32 = 0u;
+// Index of their distances.
+const DISTANCE_AT: u32 = 2u;
+// Index of the times until they have left it.
+const GONE_AT: u32 = 4u;
+// Index of the distance from the line.
+const LINE_AT: u32 = 6u;
+// Index of whether the front is beyond it.
+const HAS_ENTERED_AT: u32 = 7u;
+// Index of the gap.
+const GAP_AT: u32 = 8u;
+// Index of the speed beyond the gap.
+const GAP_SPEED_AT: u32 = 9u;
+// Index of the room of both units.
+const ROOM_AT: u32 = 10u;
+// Index of whether there are nearest vehicles.
+const NEAREST_AT: u32 = 12u;
 // Least 1 plus the cosine of an angle that is halved: keeps the quotient finite where a unit has turned round.
 const HALVED_MIN: f32 = 1e-6f;
+// First word of the fractions of rude drivers in the table of lanes, behind the numbers of the driver model.
+const LANES_RUDE: u32 = 7u;
+// Word of the distance between waypoints (m).
+const LANES_SPACING: u32 = 9u;
+// Word of the number of demands, of which each episode draws one.
+const LANES_LEVELS: u32 = 10u;
+// First word of the routes.
+const LANES_ROUTES: u32 = 11u;
+// Words of a route: the first word of its road, its path there, and the station of its beginning (m).
+const LANES_ROUTE_WORDS: u32 = 3u;
 // Sums in a tally: steps by their end code, then the rewards.
 const N_SUMS: u32 = 11u;
 // Index of the sum of the rewards.
@@ -694,51 +1003,53 @@ struct BatchFacts {
 @group(0) @binding(6) var<storage, read> cells: array<vec2<u32>>;
 // Blocks of distances of all fields; a word is a pair, the southern one in its lower half, in units of STORED_UNIT.
 @group(0) @binding(7) var<storage, read> corners: array<u32>;
-// Each vehicle's class; then each route's number of waypoints, and each class's steps until it times out.
+// Each vehicle's class; then each route's number of waypoints, and each class's steps until it times out; last, among other vehicles, what hindering them weighs.
 @group(0) @binding(8) var<storage, read> limits: array<u32>;
+// Of other vehicles: the driver model's numbers, for each route the first word of its road and where it runs there, and each road's tables, as traffic/cars.wgsl reads them.
+@group(0) @binding(9) var<storage, read> lanes: array<u32>;
 // Facts that the trucks of a batch share.
-@group(0) @binding(9) var<uniform> batch: BatchFacts;
+@group(0) @binding(10) var<uniform> batch: BatchFacts;
 // Routes that episodes run on: to be drawn from, or one for each truck.
-@group(0) @binding(10) var<storage, read> choice: array<u32>;
+@group(0) @binding(11) var<storage, read> choice: array<u32>;
 // The stream of random numbers that each truck draws from, [n_envs].
-@group(0) @binding(11) var<storage, read> streams: array<Stream>;
+@group(0) @binding(12) var<storage, read> streams: array<Stream>;
 // Which trucks begin an episode when the caller says so, and how, [n_envs].
-@group(0) @binding(12) var<storage, read> begins: array<BeginRow>;
+@group(0) @binding(13) var<storage, read> begins: array<BeginRow>;
 // Index into the action table, [n_envs].
-@group(0) @binding(13) var<storage, read_write> action: array<u32>;
+@group(0) @binding(14) var<storage, read_write> action: array<u32>;
 // Steer angle and acceleration asked of each truck, [n_envs].
-@group(0) @binding(14) var<storage, read_write> control: array<Control>;
+@group(0) @binding(15) var<storage, read_write> control: array<Control>;
 // The trucks, [n_envs].
-@group(0) @binding(15) var<storage, read_write> truck: array<Truck>;
+@group(0) @binding(16) var<storage, read_write> truck: array<Truck>;
 // Distances to the kerbs (m), [n_envs].
-@group(0) @binding(16) var<storage, read_write> clearance: array<Clearance>;
+@group(0) @binding(17) var<storage, read_write> clearance: array<Clearance>;
 // Progress along the routes, [n_envs].
-@group(0) @binding(17) var<storage, read_write> progress: array<Progress>;
+@group(0) @binding(18) var<storage, read_write> progress: array<Progress>;
 // Distance sensors (m), [n_envs, 29].
-@group(0) @binding(18) var<storage, read_write> ranges: array<f32>;
+@group(0) @binding(19) var<storage, read_write> ranges: array<f32>;
 // The observation before the next action, [n_envs, 69].
-@group(0) @binding(19) var<storage, read_write> observation: array<f32>;
+@group(0) @binding(20) var<storage, read_write> observation: array<f32>;
 // The observation after the last action, another one only where an episode ended, [n_envs, 69].
-@group(0) @binding(20) var<storage, read_write> next_observation: array<f32>;
+@group(0) @binding(21) var<storage, read_write> next_observation: array<f32>;
 // Codes of `Ended` for the last step, [n_envs].
-@group(0) @binding(21) var<storage, read_write> ended: array<u32>;
+@group(0) @binding(22) var<storage, read_write> ended: array<u32>;
 // Physical amounts that the reward weighs, [n_envs].
-@group(0) @binding(22) var<storage, read_write> terms: array<RewardTerms>;
+@group(0) @binding(23) var<storage, read_write> terms: array<RewardTerms>;
 // Rewards of the last step, [n_envs].
-@group(0) @binding(23) var<storage, read_write> reward: array<f32>;
+@group(0) @binding(24) var<storage, read_write> reward: array<f32>;
 // What is observed beside the observation before the next action; zeros beyond what the benchmark observes, [n_envs, 12].
-@group(0) @binding(24) var<storage, read_write> extras: array<f32>;
+@group(0) @binding(25) var<storage, read_write> extras: array<f32>;
 // What is observed beside the observation after the last action, [n_envs, 12].
-@group(0) @binding(25) var<storage, read_write> next_extras: array<f32>;
+@group(0) @binding(26) var<storage, read_write> next_extras: array<f32>;
 // With disturbances: the pose that is observed, and those of the last three steps; zeros without, [n_envs, 4].
-@group(0) @binding(26) var<storage, read_write> poses: array<Pose>;
+@group(0) @binding(27) var<storage, read_write> poses: array<Pose>;
 // Commands, where actions are continuous; zeros where they are indices, [n_envs].
-@group(0) @binding(27) var<storage, read_write> command: array<Command>;
+@group(0) @binding(28) var<storage, read_write> command: array<Command>;
 // The cars on the road of each truck, and what is counted of them: words of a `traffic::Row`, [n_envs, 102].
-@group(0) @binding(28) var<storage, read_write> cars: array<u32>;
+@group(0) @binding(29) var<storage, read_write> cars: array<u32>;
 // What is observed of other vehicles before the next action; zeros where the benchmark observes none, [n_envs, 42].
-@group(0) @binding(29) var<storage, read_write> around: array<f32>;
+@group(0) @binding(30) var<storage, read_write> around: array<f32>;
 // What is observed of other vehicles after the last action, [n_envs, 42].
-@group(0) @binding(30) var<storage, read_write> next_around: array<f32>;
+@group(0) @binding(31) var<storage, read_write> next_around: array<f32>;
 // Sums over all steps, 64 bits each, the lower half first, [N_SUMS, 2].
-@group(0) @binding(31) var<storage, read_write> tally: array<atomic<u32>>;
+@group(0) @binding(32) var<storage, read_write> tally: array<atomic<u32>>;

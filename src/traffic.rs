@@ -45,11 +45,35 @@ pub use row::Row;
 pub use rules::Rules;
 pub use run::{Run, overlaps};
 pub use snapshots::{N_SNAPSHOTS, Snapshots};
-pub use step::{Setting, advance, decide, step};
+pub use step::{N_TURNS, Setting, advance, decide, step};
 pub use survey::Survey;
 pub use truck::{Contact, Entry, Trucks, View, outlines, stretched, touched};
 
 use crate::files::reader::shown;
+
+/// What shaders share of the numbers of cars, in WGSL.
+pub(crate) fn printed_constants() -> String {
+    [
+        units::printed_constants(),
+        model::printed_constants(),
+        rules::printed_constants(),
+        network::printed_constants(),
+        clock::printed_constants(),
+        car::printed_constants(),
+        decide::printed_constants(),
+        decide::printed_entry(),
+        arrivals::printed_constants(),
+        step::printed_constants(),
+        row::printed_constants(),
+        snapshots::printed_constants(),
+        truck::printed_constants(),
+        truck::printed_view(),
+        truck::printed_line(),
+        truck::printed_corridor(),
+        truck::printed_contact(),
+    ]
+    .concat()
+}
 
 /// Time of a step (s).
 pub const STEP: f32 = 0.1;

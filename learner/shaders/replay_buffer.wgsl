@@ -40,7 +40,14 @@ fn store_before(thread: Thread) {
     if value < N_VALUES {
         held_observation[row * facts.n_values + value] = observation[env * N_VALUES + value];
     } else {
-        held_observation[row * facts.n_values + value] = extras[env * N_EXTRAS + value - N_VALUES];
+        let own = value - N_VALUES;
+        var seen = 0.0;
+        if own < facts.n_extras {
+            seen = extras[env * N_EXTRAS + own];
+        } else {
+            seen = around[env * N_AROUND + own - facts.n_extras];
+        }
+        held_observation[row * facts.n_values + value] = seen;
     }
     if value == 0u {
         held_action[row] = action[env];
@@ -60,7 +67,14 @@ fn store_after(thread: Thread) {
     if value < N_VALUES {
         held_next[row * facts.n_values + value] = next_observation[env * N_VALUES + value];
     } else {
-        held_next[row * facts.n_values + value] = next_extras[env * N_EXTRAS + value - N_VALUES];
+        let own = value - N_VALUES;
+        var seen = 0.0;
+        if own < facts.n_extras {
+            seen = next_extras[env * N_EXTRAS + own];
+        } else {
+            seen = next_around[env * N_AROUND + own - facts.n_extras];
+        }
+        held_next[row * facts.n_values + value] = seen;
     }
     if value == 0u {
         held_reward[row] = reward[env] + select(0.0, facts.arrival, ended[env] == ARRIVED);

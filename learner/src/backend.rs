@@ -93,29 +93,11 @@ impl Backend {
             BLIND => self.rollout_of::<BLIND>(config, world, routes, mirror),
             MASS => self.rollout_of::<MASS>(config, world, routes, mirror),
             ORACLE => self.rollout_of::<ORACLE>(config, world, routes, mirror),
-            AMONG => self.rollout_among::<AMONG>(config, world, routes, mirror),
-            BLIND_AMONG => self.rollout_among::<BLIND_AMONG>(config, world, routes, mirror),
-            MASS_AMONG => self.rollout_among::<MASS_AMONG>(config, world, routes, mirror),
-            ORACLE_AMONG => self.rollout_among::<ORACLE_AMONG>(config, world, routes, mirror),
+            AMONG => self.rollout_of::<AMONG>(config, world, routes, mirror),
+            BLIND_AMONG => self.rollout_of::<BLIND_AMONG>(config, world, routes, mirror),
+            MASS_AMONG => self.rollout_of::<MASS_AMONG>(config, world, routes, mirror),
+            ORACLE_AMONG => self.rollout_of::<ORACLE_AMONG>(config, world, routes, mirror),
             _ => self.rollout_of::<N_VALUES>(config, world, routes, mirror),
-        }
-    }
-
-    /// The same where other vehicles are observed, which no device moves.
-    fn rollout_among<const N: usize>(
-        &self,
-        config: &Config,
-        world: &Arc<World>,
-        routes: Vec<u32>,
-        mirror: Option<Mirror>,
-    ) -> Result<Box<dyn Rollout>, Error> {
-        match self {
-            Backend::Host => Ok(Box::new(HostRollout::<N>::new(config, world, routes, mirror)?)),
-            #[cfg(feature = "gpu")]
-            Backend::Device(_) => {
-                let expected = "the benchmark has [traffic], which only the CPU steps: set device = \"cpu\"";
-                Err(Error::setting("device", "\"gpu\"", expected))
-            }
         }
     }
 

@@ -127,8 +127,8 @@ fn drives(first: u32) -> bool {
     return driving;
 }
 
-// A value of a truck's observation or, behind those, of its extras, normalised; 0 behind them. Beyond the last truck
-// those of the last.
+// A value of a truck's observation or of what stands behind it, normalised; 0 behind that. Beyond the last truck those
+// of the last.
 fn normalised(truck: u32, value: u32) -> f32 {
     if facts.n_values <= value { return 0.0; }
     let env = min(truck, arrayLength(&action) - 1u);
@@ -136,7 +136,7 @@ fn normalised(truck: u32, value: u32) -> f32 {
     if value < N_VALUES {
         seen = observation[env * N_VALUES + value];
     } else {
-        seen = extras[env * N_EXTRAS + value - N_VALUES];
+        seen = beside(env, value - N_VALUES);
     }
     let normal = normalisation[value];
     return clamp((seen - normal.x) * normal.y, -LIMIT, LIMIT);

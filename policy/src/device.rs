@@ -10,7 +10,7 @@ use offtrack::world::World;
 
 use crate::error::Error;
 use crate::file::MOST_LAYERS;
-use crate::kernel::{BUFFERS, Facts, Kernel, LayerRow, SHAPES, Shape, source};
+use crate::kernel::{Facts, Kernel, LayerRow, SHAPES, Shape, buffers, source};
 use crate::network::{Activation, Layer};
 use crate::policy::{Choice, Policy};
 
@@ -20,8 +20,9 @@ pub struct DevicePolicy {
     device: gpu::Device,
     kernels: Kernels<Kernel>,
     shape: Shape,
-    /// The policy's own buffers, the first of [`BUFFERS`].
+    /// The policy's own buffers, the first of [`buffers`].
     own: [Slice; 4],
+    reads_vehicles: bool,
 }
 
 impl DevicePolicy {
@@ -75,13 +76,15 @@ impl DevicePolicy {
             bytemuck::cast_slice(&normals),
             bytemuck::cast_slice(&weights),
         ];
+        let reads_vehicles = policy.reads_vehicles();
         Ok(DevicePolicy {
-            kernels: Kernels::compile(&device.device, "policy", source(shape), |_: Kernel| {
-                (0..).zip(BUFFERS).map(|(binding, (_, access, ..))| (binding, access)).collect()
+            kernels: Kernels::compile(&device.device, "policy", source(shape, reads_vehicles), |_: Kernel| {
+                (0..).zip(buffers(reads_vehicles)).map(|(binding, (_, access, ..))| (binding, access)).collect()
             }),
             own: contents.map(|contents| device.filled("policy", contents)),
             device: device.clone(),
             shape,
+            reads_vehicles,
         })
     }
 
@@ -90,7 +93,8 @@ impl DevicePolicy {
     pub fn add(&self, encoder: &mut CommandEncoder, batch: &gpu::Batch) {
         let columns = [Column::Observation, Column::Extras, Column::Truck, Column::Action];
         let columns = columns.map(|column| batch.column(column));
-        let slices = (0..).zip(self.own.iter().chain(columns));
+        let around = self.reads_vehicles.then(|| batch.column(Column::Around));
+        let slices = (0..).zip(self.own.iter().chain(columns).chain(around));
         let group = self.kernels.bind(&self.device.device, Kernel::Act, slices);
         let n_envs = columns[3].size / size_of::<u32>() as u64;
         let n_groups = n_envs.div_ceil(self.shape.tile().into());

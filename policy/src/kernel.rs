@@ -12,7 +12,7 @@ use crate::normalisation::LIMIT;
 offtrack::shared! {
     /// What a policy's actions depend on beside its numbers.
     pub struct Facts {
-        /// Values that are observed: those of an observation, and the extras behind them.
+        /// Values that are observed: those of an observation, the extras behind them, and those of other vehicles.
         pub n_values: u32,
         /// Layers.
         pub n_layers: u32,
@@ -119,9 +119,18 @@ pub const BUFFERS: [(&str, Access, &str, &str); 8] = [
     ("action", Access::ReadWrite, "array<u32>", "The simulator's column of actions, [n_envs]."),
 ];
 
-/// The module's text.
-pub fn source(shape: Shape) -> String {
-    let declared = BUFFERS.iter().enumerate().map(|(binding, (name, access, kind, doc))| {
+/// The buffer beside them of a policy that reads what other vehicles do.
+const AROUND: (&str, Access, &str, &str) =
+    ("around", Access::Read, "array<f32>", "The simulator's column of other vehicles, [n_envs, N_AROUND].");
+
+/// The buffers that the kernel sees, of a policy that reads what other vehicles do or of another one.
+pub fn buffers(reads_vehicles: bool) -> impl Iterator<Item = (&'static str, Access, &'static str, &'static str)> {
+    BUFFERS.into_iter().chain(reads_vehicles.then_some(AROUND))
+}
+
+/// The module's text, for a policy that reads what other vehicles do or for another one.
+pub fn source(shape: Shape, reads_vehicles: bool) -> String {
+    let declared = buffers(reads_vehicles).enumerate().map(|(binding, (name, access, kind, doc))| {
         let space = match access {
             Access::Uniform => "uniform",
             Access::Read => "storage, read",
@@ -137,5 +146,7 @@ pub fn source(shape: Shape) -> String {
         shape.printed(),
     ];
     let common = SHADERS.iter().filter(|(name, _)| *name == "common/random").map(|(_, text)| *text);
-    own.iter().map(String::as_str).chain(common).chain([include_str!("../shaders/act.wgsl")]).collect()
+    let beside =
+        if reads_vehicles { include_str!("../shaders/vehicles.wgsl") } else { include_str!("../shaders/extras.wgsl") };
+    own.iter().map(String::as_str).chain(common).chain([beside, "\n", include_str!("../shaders/act.wgsl")]).collect()
 }

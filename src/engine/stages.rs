@@ -1,6 +1,10 @@
 //! One step, in order. Both engines run these stages: the CPU by the function, the device by the kernels of the same
 //! name.
 
+mod shaders;
+
+pub use shaders::{SHADERS, module};
+
 use crate::engine::Autoreset;
 use crate::layout::buffers::{Access, Buffer, Table};
 use crate::layout::{Column, Disturbances};
@@ -41,31 +45,48 @@ pub const N_STAGES: usize = Stage::ALL.len();
 pub const STAGES: [Stage; N_STAGES] = Stage::ALL;
 
 /// The kernels that begin an episode of the trucks that the caller named.
-pub const BEGIN: [Kernel; 6] = [
+pub const BEGIN: [Kernel; 9] = [
     Kernel::Begin,
+    Kernel::Surround,
     Kernel::PerceiveAfterReset,
     Kernel::SenseAfterReset,
     Kernel::ObserveAfterReset,
     Kernel::ExtrasAfterReset,
+    Kernel::AroundAfterReset,
     Kernel::Forget,
+    Kernel::ForgetAround,
 ];
 
-/// The kernels of a step before those of [`Stage::Reset`]: each does a stage, or several at once.
-const STEP: [Kernel; 6] =
-    [Kernel::Advance, Kernel::Collide, Kernel::Sense, Kernel::ObserveBoth, Kernel::ExtrasBoth, Kernel::JudgeAndCount];
+/// The kernels of a step before those that judge it: each does a stage, or several at once.
+const STEP: [Kernel; 10] = [
+    Kernel::Advance,
+    Kernel::TrafficDecide,
+    Kernel::TrafficMove,
+    Kernel::TrafficArrive,
+    Kernel::Collide,
+    Kernel::Meet,
+    Kernel::Sense,
+    Kernel::ObserveBoth,
+    Kernel::ExtrasBoth,
+    Kernel::AroundBoth,
+];
 
 /// Those where disturbances come between the truck and the policy. Kernels that did more at once would need more
 /// buffers.
-const DISTURBED_STEP: [Kernel; 9] = [
+const DISTURBED_STEP: [Kernel; 13] = [
     Kernel::Steer,
     Kernel::Drive,
+    Kernel::TrafficDecide,
+    Kernel::TrafficMove,
+    Kernel::TrafficArrive,
     Kernel::Follow,
     Kernel::Collide,
+    Kernel::Meet,
     Kernel::Sense,
     Kernel::Observe,
     Kernel::ObserveExtras,
     Kernel::CopyObservation,
-    Kernel::JudgeAndCount,
+    Kernel::AroundBoth,
 ];
 
 crate::named! {
@@ -75,12 +96,22 @@ crate::named! {
         Draw = "draw",
         /// Begins an episode of the trucks that the caller named.
         Begin = "begin",
+        /// The vehicles around these trucks.
+        Surround = "surround",
         /// [`Stage::Steer`].
         Steer = "steer",
         /// [`Stage::Drive`].
         Drive = "drive",
+        /// [`Stage::Traffic`]: cars decide.
+        TrafficDecide = "traffic_decide",
+        /// [`Stage::Traffic`]: they move.
+        TrafficMove = "traffic_move",
+        /// [`Stage::Traffic`]: some leave and some come.
+        TrafficArrive = "traffic_arrive",
         /// [`Stage::Collide`].
         Collide = "collide",
+        /// [`Stage::Collide`]: which vehicle a truck touches.
+        Meet = "meet",
         /// [`Stage::Follow`].
         Follow = "follow",
         /// [`Stage::Sense`].
@@ -89,14 +120,22 @@ crate::named! {
         Observe = "observe",
         /// [`Stage::Observe`]: the extras.
         ObserveExtras = "observe_extras",
+        /// [`Stage::Observe`]: other vehicles.
+        ObserveAround = "observe_around",
         /// [`Stage::Judge`].
         Judge = "judge",
+        /// [`Stage::Judge`] where there are other vehicles.
+        JudgeAmong = "judge_among",
         /// [`Stage::Count`].
         Count = "count",
         /// [`Stage::CopyObservation`].
         CopyObservation = "copy_observation",
+        /// [`Stage::CopyObservation`]: of other vehicles.
+        CopyAround = "copy_around",
         /// [`Stage::Reset`]: route and pose.
         Reset = "reset",
+        /// [`Stage::Reset`]: the vehicles around the trucks that began another episode.
+        SurroundAfterReset = "surround_after_reset",
         /// [`Stage::Reset`]: poses that are observed of the trucks that began another episode.
         PerceiveAfterReset = "perceive_after_reset",
         /// [`Stage::Reset`]: their ranges.
@@ -105,16 +144,22 @@ crate::named! {
         ObserveAfterReset = "observe_after_reset",
         /// [`Stage::Reset`]: their extras.
         ExtrasAfterReset = "extras_after_reset",
+        /// [`Stage::Reset`]: what they observe of other vehicles.
+        AroundAfterReset = "around_after_reset",
         /// [`Stage::Reset`]: that they have no last step, where they begin in a step of their own.
         ForgetAfterReset = "forget_after_reset",
         /// That the trucks that the caller named have no last step.
         Forget = "forget",
+        /// The same of what they observe of other vehicles.
+        ForgetAround = "forget_around",
         /// [`Stage::Steer`], [`Stage::Drive`] and [`Stage::Follow`] at once, where what is observed is what is.
         Advance = "advance",
         /// [`Stage::Observe`] and [`Stage::CopyObservation`] at once, there: the observation.
         ObserveBoth = "observe_both",
         /// The same of the extras.
         ExtrasBoth = "extras_both",
+        /// The same of other vehicles, also with disturbances, which do not touch it.
+        AroundBoth = "around_both",
         /// [`Stage::Judge`] and [`Stage::Count`] at once.
         JudgeAndCount = "judge_and_count",
     }
@@ -129,6 +174,10 @@ pub enum Threads {
     Team,
     /// One of the values of a truck's observation.
     Value,
+    /// A slot of a truck's row of cars.
+    Car,
+    /// One that decides in the step.
+    Turn,
 }
 
 /// What decides which kernels have anything to do.
@@ -138,6 +187,10 @@ pub struct Case {
     pub disturbed: bool,
     /// Extras are observed.
     pub extras: bool,
+    /// There are other vehicles.
+    pub vehicles: bool,
+    /// They are observed.
+    pub around: bool,
     /// What follows the end of an episode.
     pub autoreset: Autoreset,
 }
@@ -146,13 +199,22 @@ impl Case {
     /// That of a batch in a world.
     pub fn of(world: &World, autoreset: Autoreset) -> Case {
         let Disturbances { of_observation, of_action, .. } = world.disturbances;
-        Case { disturbed: of_observation == 1 || of_action == 1, extras: 0 < world.params.n_extras, autoreset }
+        Case {
+            disturbed: of_observation == 1 || of_action == 1,
+            extras: 0 < world.params.n_extras,
+            vehicles: world.traffic.is_some(),
+            around: world.observes_vehicles(),
+            autoreset,
+        }
     }
 
     /// The kernels of a step, one after the other.
     pub fn step(self) -> impl Iterator<Item = Kernel> + Clone {
         let kernels: &[Kernel] = if self.disturbed { &DISTURBED_STEP } else { &STEP };
-        self.working(kernels.iter().chain(Stage::Reset.kernels()))
+        // Judging among vehicles leaves no buffer to count with.
+        let judges: &[Kernel] =
+            if self.vehicles { &[Kernel::JudgeAmong, Kernel::Count] } else { &[Kernel::JudgeAndCount] };
+        self.working(kernels.iter().chain(judges).chain(Stage::Reset.kernels()))
     }
 
     /// Those of some kernels that have anything to do.
@@ -170,21 +232,22 @@ impl Stage {
         match self {
             Stage::Steer => &[Kernel::Steer],
             Stage::Drive => &[Kernel::Drive],
-            // A device refuses worlds with vehicles.
-            Stage::Traffic => &[],
-            Stage::Collide => &[Kernel::Collide],
+            Stage::Traffic => &[Kernel::TrafficDecide, Kernel::TrafficMove, Kernel::TrafficArrive],
+            Stage::Collide => &[Kernel::Collide, Kernel::Meet],
             Stage::Follow => &[Kernel::Follow],
             Stage::Sense => &[Kernel::Sense],
-            Stage::Observe => &[Kernel::Observe, Kernel::ObserveExtras],
-            Stage::Judge => &[Kernel::Judge],
+            Stage::Observe => &[Kernel::Observe, Kernel::ObserveExtras, Kernel::ObserveAround],
+            Stage::Judge => &[Kernel::Judge, Kernel::JudgeAmong],
             Stage::Count => &[Kernel::Count],
-            Stage::CopyObservation => &[Kernel::CopyObservation],
+            Stage::CopyObservation => &[Kernel::CopyObservation, Kernel::CopyAround],
             Stage::Reset => &[
                 Kernel::Reset,
+                Kernel::SurroundAfterReset,
                 Kernel::PerceiveAfterReset,
                 Kernel::SenseAfterReset,
                 Kernel::ObserveAfterReset,
                 Kernel::ExtrasAfterReset,
+                Kernel::AroundAfterReset,
                 Kernel::ForgetAfterReset,
             ],
         }
@@ -214,6 +277,20 @@ impl Kernel {
                 Params Disturbances Vehicles Actions Batch Streams; Action Control Truck Command
             ],
             Kernel::Drive => buffers![Params Vehicles Batch; Control Truck],
+            Kernel::TrafficDecide | Kernel::TrafficArrive => buffers![
+                Params Vehicles Roads Lanes Batch Streams; Truck Progress Cars
+            ],
+            Kernel::Meet => buffers![Vehicles Lanes Batch; Truck Cars],
+            Kernel::JudgeAmong => buffers![
+                Params Weights Limits Batch; Truck Clearance Progress Ended Terms Reward Cars
+            ],
+            Kernel::TrafficMove => buffers![Batch; Truck Cars],
+            Kernel::Surround => buffers![
+                Params Vehicles Roads Lanes Batch Streams Begins; Truck Progress Cars
+            ],
+            Kernel::SurroundAfterReset => buffers![
+                Params Vehicles Roads Lanes Batch Streams; Truck Progress Cars
+            ],
             Kernel::Collide => buffers![Vehicles Roads Cells Corners Batch; Truck Clearance],
             Kernel::Follow => buffers![Params Disturbances Vehicles Roads Batch Streams; Truck Progress Poses],
             Kernel::Sense | Kernel::SenseAfterReset => buffers![
@@ -227,6 +304,11 @@ impl Kernel {
             ],
             Kernel::ObserveExtras => buffers![Params Vehicles Batch; Control Truck NextExtras],
             Kernel::ExtrasAfterReset => buffers![Params Vehicles Batch; Control Truck Extras],
+            Kernel::ObserveAround | Kernel::AroundBoth | Kernel::AroundAfterReset => buffers![
+                Params Vehicles Roads Lanes Batch; Truck Progress Cars Around NextAround
+            ],
+            Kernel::CopyAround => buffers![Batch; Truck Around NextAround],
+            Kernel::ForgetAround => buffers![Batch Begins; Around NextAround],
             Kernel::Judge => buffers![Params Weights Limits Batch; Truck Clearance Progress Ended Terms Reward],
             Kernel::Count => buffers![Batch; Truck Ended Reward; Tally],
             Kernel::CopyObservation => buffers![Batch; Truck Observation NextObservation Extras NextExtras],
@@ -256,14 +338,33 @@ impl Kernel {
         match self {
             Kernel::Sense | Kernel::SenseAfterReset => Threads::Team,
             Kernel::CopyObservation => Threads::Value,
+            Kernel::TrafficDecide => Threads::Turn,
+            Kernel::TrafficMove => Threads::Car,
             _ => Threads::Truck,
         }
+    }
+
+    /// Whether it works on the other vehicles alone.
+    pub const fn is_of_vehicles(self) -> bool {
+        use Kernel::{JudgeAmong, Meet, Surround, SurroundAfterReset, TrafficArrive, TrafficDecide, TrafficMove};
+        let surrounds = matches!(self, Surround | SurroundAfterReset);
+        let moves = matches!(self, TrafficDecide | TrafficMove | TrafficArrive | Meet | JudgeAmong);
+        surrounds || moves || self.observes_vehicles()
+    }
+
+    /// Whether it is about what is observed of them.
+    const fn observes_vehicles(self) -> bool {
+        use Kernel::{AroundAfterReset, AroundBoth, CopyAround, ForgetAround, ObserveAround};
+        matches!(self, ObserveAround | CopyAround | AroundBoth | AroundAfterReset | ForgetAround)
     }
 
     /// Whether it has anything to do.
     const fn works(self, case: Case) -> bool {
         match self {
             Kernel::PerceiveAfterReset => case.disturbed,
+            Kernel::Judge | Kernel::JudgeAndCount => !case.vehicles,
+            _ if self.observes_vehicles() => case.around,
+            _ if self.is_of_vehicles() => case.vehicles,
             Kernel::ObserveExtras | Kernel::ExtrasAfterReset | Kernel::ExtrasBoth => case.extras,
             Kernel::ForgetAfterReset => matches!(case.autoreset, Autoreset::NextStep),
             _ => true,
@@ -289,33 +390,3 @@ pub const N_STORAGE_BUFFERS: usize = {
 
 /// Workgroup memory that a kernel takes at most (bytes): what every device of WebGPU has.
 pub const WORKGROUP_MEMORY: u32 = 16_384;
-
-/// The shaders of a step as one module.
-pub fn module() -> String {
-    SHADERS.iter().flat_map(|(_, text)| [text, "\n"]).collect()
-}
-
-/// The shader files in the order in which they make one module.
-pub const SHADERS: [(&str, &str); 21] = [
-    ("layout", include_str!("../../shaders/layout.wgsl")),
-    ("common/thread", include_str!("../../shaders/common/thread.wgsl")),
-    ("common/angle", include_str!("../../shaders/common/angle.wgsl")),
-    ("common/random", include_str!("../../shaders/common/random.wgsl")),
-    ("common/road", include_str!("../../shaders/common/road.wgsl")),
-    ("common/field", include_str!("../../shaders/common/field.wgsl")),
-    ("common/truck", include_str!("../../shaders/common/truck.wgsl")),
-    ("draw", include_str!("../../shaders/draw.wgsl")),
-    ("steer", include_str!("../../shaders/steer.wgsl")),
-    ("drive", include_str!("../../shaders/drive.wgsl")),
-    ("collide", include_str!("../../shaders/collide.wgsl")),
-    ("follow", include_str!("../../shaders/follow.wgsl")),
-    ("perceive", include_str!("../../shaders/perceive.wgsl")),
-    ("sense", include_str!("../../shaders/sense.wgsl")),
-    ("observe", include_str!("../../shaders/observe.wgsl")),
-    ("judge", include_str!("../../shaders/judge.wgsl")),
-    ("count", include_str!("../../shaders/count.wgsl")),
-    ("copy_observation", include_str!("../../shaders/copy_observation.wgsl")),
-    ("along", include_str!("../../shaders/along.wgsl")),
-    ("reset", include_str!("../../shaders/reset.wgsl")),
-    ("advance", include_str!("../../shaders/advance.wgsl")),
-];

@@ -6,10 +6,11 @@ use bytemuck::{bytes_of, cast, cast_slice};
 use crate::engine::{Batch, RouteChoice};
 use crate::field::{Field, STORED_UNIT};
 use crate::layout::buffers::Table;
+use crate::layout::shared::constants;
 use crate::layout::{
     BatchFacts, FieldRow, N_PREVIEW, PREVIEW_ROWS, PreviewRow, ROUTE_ROWS, Rig, TEAM_MAX, VehicleRow, WaypointRow,
 };
-use crate::world::World;
+use crate::world::{TrafficRoad, World};
 
 /// Workgroups in a row of a dispatch: the most that every device takes.
 pub const ROW: u32 = 65_535;
@@ -19,6 +20,19 @@ pub const MANY: usize = 16_384;
 const FEW: u32 = 8;
 /// Rows that a field takes in the table of roads.
 const FIELD_ROWS: usize = size_of::<FieldRow>() / size_of::<[u32; 4]>();
+
+constants! {
+    /// First word of the fractions of rude drivers in the table of lanes, behind the numbers of the driver model.
+    const LANES_RUDE: usize = 7;
+    /// Word of the distance between waypoints (m).
+    const LANES_SPACING: usize = LANES_RUDE + 2;
+    /// Word of the number of demands, of which each episode draws one.
+    const LANES_LEVELS: usize = LANES_SPACING + 1;
+    /// First word of the routes.
+    const LANES_ROUTES: usize = LANES_LEVELS + 1;
+    /// Words of a route: the first word of its road, its path there, and the station of its beginning (m).
+    const LANES_ROUTE_WORDS: usize = 3;
+}
 
 /// The contents of the tables of a world.
 #[derive(Debug)]
@@ -30,6 +44,7 @@ pub struct Tables<'a> {
     // All fields, one after the other.
     cells: Vec<[u32; 2]>,
     corners: Vec<u32>,
+    lanes: Vec<u32>,
 }
 
 impl<'a> Tables<'a> {
@@ -58,6 +73,7 @@ impl<'a> Tables<'a> {
             limits: limits(world),
             cells,
             corners,
+            lanes: lanes(world),
         }
     }
 
@@ -73,6 +89,7 @@ impl<'a> Tables<'a> {
             Table::Cells => cast_slice(&self.cells),
             Table::Corners => cast_slice(&self.corners),
             Table::Limits => cast_slice(&self.limits),
+            Table::Lanes => cast_slice(&self.lanes),
             Table::Batch | Table::Choice | Table::Streams | Table::Begins => return None,
         })
     }
@@ -108,7 +125,8 @@ fn roads(world: &World, fields: &[FieldRow]) -> Vec<[u32; 4]> {
     rows
 }
 
-/// The class of each vehicle, then what ends an episode on each route.
+/// The class of each vehicle, then what ends an episode on each route; last, among other vehicles, what hindering them
+/// weighs, for which judging has no buffer more.
 fn limits(world: &World) -> Vec<u32> {
     let mut limits: Vec<u32> = world.rigs.iter().map(|rig| rig.class_index).collect();
     let of_routes = world.step_limits.chunks_exact(world.params.n_classes as usize);
@@ -116,11 +134,35 @@ fn limits(world: &World) -> Vec<u32> {
         limits.push(route.n_waypoints);
         limits.extend(step_limits);
     }
+    limits.extend(world.traffic.iter().map(|traffic| traffic.hindrance.to_bits()));
     limits
 }
 
+/// Where other vehicles drive: the numbers of the driver model, for each route the first word of its road and where it
+/// runs there, and the words of each road. A single word where there are none, since no buffer is empty.
+fn lanes(world: &World) -> Vec<u32> {
+    let Some(traffic) = &world.traffic else { return vec![0] };
+    let mut lanes = vec![0; LANES_ROUTES];
+    lanes[..LANES_RUDE].copy_from_slice(&traffic.rules.words());
+    lanes[LANES_RUDE..LANES_SPACING].copy_from_slice(&traffic.rude);
+    lanes[LANES_SPACING] = traffic.spacing.to_bits();
+    lanes[LANES_LEVELS] = traffic.roads.first().map_or(0, |road| road.levels.len() as u32);
+    let mut first = (LANES_ROUTES + LANES_ROUTE_WORDS * world.routes.len()) as u32;
+    let words: Vec<Vec<u32>> = traffic.roads.iter().map(TrafficRoad::words).collect();
+    let starts = words.iter().map(|words| {
+        first += words.len() as u32;
+        first - words.len() as u32
+    });
+    let starts: Vec<u32> = starts.collect();
+    for (route, of) in world.routes.iter().zip(&traffic.routes) {
+        lanes.extend([starts[route.roundabout as usize], of.path, of.begins.to_bits()]);
+    }
+    lanes.extend(words.iter().flatten());
+    lanes
+}
+
 /// Bytes of the tables of a world that grow with it.
-pub fn sizes(world: &World) -> [(Table, usize); 5] {
+pub fn sizes(world: &World) -> [(Table, usize); 6] {
     let of_fields = |bytes: fn(&Field) -> usize| world.all_fields().map(bytes).sum::<usize>();
     let n_own = world.trailer_fields.iter().flatten().count();
     let rows = world.routes.len() * ROUTE_ROWS + world.waypoints.len() * (1 + PREVIEW_ROWS) + n_own * FIELD_ROWS;
@@ -128,7 +170,8 @@ pub fn sizes(world: &World) -> [(Table, usize); 5] {
         (Table::Cells, of_fields(|field| size_of_val(field.cells.as_slice()))),
         (Table::Corners, of_fields(|field| size_of_val(field.values.as_slice()))),
         (Table::Roads, rows * size_of::<[u32; 4]>()),
-        (Table::Limits, (world.rigs.len() + world.routes.len() + world.step_limits.len()) * size_of::<u32>()),
+        (Table::Limits, size_of_val(limits(world).as_slice())),
+        (Table::Lanes, size_of_val(lanes(world).as_slice())),
         (Table::Vehicles, world.rigs.len() * size_of::<VehicleRow>()),
     ]
 }

@@ -1,10 +1,11 @@
 //! What shaders share with Rust, printed as WGSL.
 
 use crate::engine::stages::SHADERS;
-use crate::engine::{autoreset, cpu, tally};
+use crate::engine::{autoreset, cpu, tables, tally};
 use crate::field;
 use crate::layout::{self, buffers};
 use crate::layout::{angle, random};
+use crate::traffic;
 
 /// `shaders/layout.wgsl`: constants, structs and the buffers of a step.
 pub fn layout() -> String {
@@ -33,7 +34,11 @@ pub fn shared() -> String {
         cpu::perceive::printed_constants(),
         cpu::sense::printed_constants(),
         cpu::observe::printed_constants(),
+        traffic::printed_constants(),
+        cpu::traffic::printed_constants(),
+        cpu::around::printed_constants(),
         cpu::along::printed_constants(),
+        tables::printed_constants(),
         tally::printed_constants(),
         autoreset::printed_constants(),
         "\n".to_owned(),

@@ -48,6 +48,8 @@ crate::named! {
         Corners = "corners",
         /// What ends an episode: waypoints and steps.
         Limits = "limits",
+        /// Where other vehicles drive, and how.
+        Lanes = "lanes",
         /// Facts that the trucks of a batch share.
         Batch = "batch",
         /// Routes that episodes run on.
@@ -145,7 +147,13 @@ impl Table {
                 rows::<u32>(),
             ),
             Table::Limits => (
-                "Each vehicle's class; then each route's number of waypoints, and each class's steps until it times out.",
+                "Each vehicle's class; then each route's number of waypoints, and each class's steps until it times \
+                 out; last, among other vehicles, what hindering them weighs.",
+                rows::<u32>(),
+            ),
+            Table::Lanes => (
+                "Of other vehicles: the driver model's numbers, for each route the first word of its road and where it \
+                 runs there, and each road's tables, as traffic/cars.wgsl reads them.",
                 rows::<u32>(),
             ),
             Table::Batch => ("Facts that the trucks of a batch share.", BatchFacts::wgsl()),

@@ -105,6 +105,15 @@ impl Literal for u32 {
     }
 }
 
+impl Literal for i32 {
+    fn type_name() -> String {
+        "i32".to_owned()
+    }
+    fn literal(&self) -> String {
+        format!("{self}i")
+    }
+}
+
 impl Literal for usize {
     fn type_name() -> String {
         u32::wgsl()

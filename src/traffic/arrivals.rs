@@ -3,18 +3,22 @@
 use super::car::style;
 use super::clock::Clock;
 use super::model::{FASTEST, square};
-use super::units::{FAR, FINER_SPEED, falls_below, length};
+use super::units::{BEYOND, FINER_SPEED, falls_below, length};
 use super::{Car, Network, Others, Setting};
+use crate::layout::shared::constants;
 
-/// Bits of the backlog for each source, and the sources of a word: so many cars wait outside at most, and further ones
-/// stay away.
-const BACKLOG_BITS: usize = 4;
-const SOURCES: usize = u32::BITS as usize / BACKLOG_BITS;
-const MOST_WAITING: u32 = (1 << BACKLOG_BITS) - 1;
-/// A car enters with at least so much room before it.
-const ROOM: i32 = length(3.0);
-/// Twice the braking with which it could stop behind the one before it (m/s²).
-const STOPS_WITH: i32 = 3;
+constants! {
+    /// Bits of the backlog for each source.
+    const BACKLOG_BITS: usize = 4;
+    /// Sources of a word of the backlog.
+    const BACKLOG_SOURCES: usize = u32::BITS as usize / BACKLOG_BITS;
+    /// So many cars wait outside at most, and further ones stay away.
+    const MOST_WAITING: u32 = (1 << BACKLOG_BITS) - 1;
+    /// A car enters with at least so much room before it (2^-10 m).
+    const ENTRY_ROOM: i32 = length(3.0);
+    /// Twice the braking with which it could stop behind the one before it (m/s²).
+    const STOPS_WITH: i32 = 3;
+}
 
 /// Cars that wait outside: four bits a source.
 pub type Backlog = [u32; 2];
@@ -34,7 +38,7 @@ pub enum Event {
 
 /// Word and lowest bit of a source in the backlog.
 fn place(source: usize) -> (usize, usize) {
-    (source / SOURCES, BACKLOG_BITS * (source % SOURCES))
+    (source / BACKLOG_SOURCES, BACKLOG_BITS * (source % BACKLOG_SOURCES))
 }
 
 /// The number of cars that wait outside at a source.
@@ -98,9 +102,9 @@ fn entering(setting: Setting, clock: Clock, cars: &[Car], source: usize, others:
     let car = Car::entering(path, style([kind, driver], demand), 0);
     let of_source = cars.iter().filter(|other| other.is_there() && paths.contains(&other.path()));
     let ahead = of_source.map(|other| (other.rear(), other.pace())).chain(others.ahead(&car));
-    let (rear, pace) = ahead.fold((FAR, 0), |nearest, other| if other.0 < nearest.0 { other } else { nearest });
+    let (rear, pace) = ahead.fold((BEYOND, 0), |nearest, other| if other.0 < nearest.0 { other } else { nearest });
     let room = rear - car.front();
-    if room < ROOM {
+    if room < ENTRY_ROOM {
         return None;
     }
     let pace = entry_pace(network, &car, (room - rules.gap).max(0), pace);

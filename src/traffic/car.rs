@@ -7,34 +7,49 @@ use glam::Vec2;
 
 use super::units::{FINER_SPEED, FINER_STATION, falls_below, length as in_units, metres};
 use super::{Demand, Network, STEP};
+use crate::layout::shared::constants;
 
-/// Path of a slot without a car.
-const NO_PATH: u32 = 1023;
-/// Where the style begins in a car's word, and where the steps begin for which it has been standing.
-const STYLE: u32 = 10;
-const STANDING: u32 = 20;
-/// Most steps that are counted.
-const MOST_STANDING: u32 = 4095;
-/// Bits of a style: temperament in 16 steps, length in 4, the kind, and whether the driver is rude.
-const TEMPERAMENT: u32 = 15;
-const LENGTH: u32 = 4;
-const VAN: u32 = 1 << 6;
-const RUDE: u32 = 1 << 7;
-/// Length of the shortest car, and from one to the next longer.
-const SHORTEST: i32 = in_units(4.2);
-const LONGER: i32 = in_units(0.3);
-/// Length of a van.
-const VAN_LENGTH: i32 = in_units(7.0);
-/// Half the width of a car and of a van (m).
-const HALF_WIDTH: f32 = 0.9;
-const VAN_HALF_WIDTH: f32 = 1.05;
-/// Part of the length before the front axle, and behind the rear one.
-const OVERHANG: f32 = 0.2;
-/// Units of a state in a metre, and in a metre a step.
-const METRE: f32 = 1_048_576.0;
+constants! {
+    /// Path of a slot without a car.
+    const NO_PATH: u32 = 1023;
+    /// Bit of a car's word at which its style begins.
+    const STYLE: u32 = 10;
+    /// Bit at which the steps begin for which it has been standing.
+    const STANDING: u32 = 20;
+    /// Most steps that are counted.
+    const MOST_STANDING: u32 = 4095;
+    /// Bits of a style: temperament in 16 steps.
+    const TEMPERAMENT: u32 = 15;
+    /// Lowest of the two bits of the length.
+    const LENGTH: u32 = 4;
+    /// Bit of a van.
+    const VAN: u32 = 1 << 6;
+    /// Bit of a driver who is rude.
+    const RUDE: u32 = 1 << 7;
+    /// Length of the shortest car (2^-10 m).
+    const SHORTEST: i32 = in_units(4.2);
+    /// From one length to the next (2^-10 m).
+    const LONGER: i32 = in_units(0.3);
+    /// Length of a van (2^-10 m).
+    const VAN_LENGTH: i32 = in_units(7.0);
+    /// Half the width of a car (m).
+    const HALF_WIDTH: f32 = 0.9;
+    /// Half the width of a van (m).
+    const VAN_HALF_WIDTH: f32 = 1.05;
+    /// Part of the length before the front axle, and behind the rear one.
+    const OVERHANG: f32 = 0.2;
+    /// Units of a state's station in a metre.
+    const STATE_METRE: f32 = 1_048_576.0;
+    /// Units of its speed in a m/s.
+    const STATE_SPEED: f32 = METRE_A_STEP * STEP;
+    /// Units of its acceleration in a m/s².
+    const STATE_ACCELERATION: f32 = METRE_A_STEP * STEP * STEP;
+    /// Below this speed a car stands: 0.1 m/s (2^-19 m a step).
+    const STANDS: i32 = 5243;
+}
+
+/// Units of a state's speed in a metre a step.
 const METRE_A_STEP: f32 = 524_288.0;
-/// Below this speed a car stands: 0.1 m/s (2^-19 m a step).
-const STANDS: i32 = 5243;
 
 /// A car, or a slot without one: integers, in which a step of motion is exact.
 #[repr(C)]
@@ -71,17 +86,17 @@ impl Car {
 
     /// Station of its front on its path (m).
     pub fn station(&self) -> f32 {
-        self.station as f32 / METRE
+        self.station as f32 / STATE_METRE
     }
 
     /// Its speed (m/s).
     pub fn speed(&self) -> f32 {
-        self.speed as f32 / (METRE_A_STEP * STEP)
+        self.speed as f32 / STATE_SPEED
     }
 
     /// What it decided last (m/s²).
     pub fn acceleration(&self) -> f32 {
-        self.acceleration as f32 / (METRE_A_STEP * STEP * STEP)
+        self.acceleration as f32 / STATE_ACCELERATION
     }
 
     /// Station of its front, as decisions read it (2^-10 m).

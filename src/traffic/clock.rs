@@ -1,21 +1,24 @@
 //! Random numbers of traffic by step and purpose: pure functions of (seed, env, episode, draw) as everywhere.
 
 use crate::layout::random::words;
+use crate::layout::shared::constants;
 
-/// Arrivals: the step is added.
-const ARRIVAL: u32 = 0x8000_0000;
-/// Path and style of a car that enters: 16 times the step and the source are added.
-const ENTERING: u32 = 0xA000_0000;
-/// Who of two that stand goes first: the period and both slots are added.
-const COIN: u32 = 0xC000_0000;
-/// Whether one lets another in: the period and both slots are added.
-const COURTESY: u32 = 0xD000_0000;
-/// Steps for which a coin falls the same way.
-const COIN_PERIOD: u32 = 10;
-/// Steps for which a car is as courteous to another.
-const COURTESY_PERIOD: u32 = 32;
-/// Numbers of slots that differ in a draw.
-const SLOTS: u32 = 64;
+constants! {
+    /// Arrivals: the step is added.
+    const ARRIVAL: u32 = 0x8000_0000;
+    /// Path and style of a car that enters: 16 times the step and the source are added.
+    const ENTERING: u32 = 0xA000_0000;
+    /// Who of two that stand goes first: the period and both slots are added.
+    const COIN: u32 = 0xC000_0000;
+    /// Whether one lets another in: the period and both slots are added.
+    const COURTESY: u32 = 0xD000_0000;
+    /// Steps for which a coin falls the same way.
+    const COIN_PERIOD: u32 = 10;
+    /// Steps for which a car is as courteous to another.
+    const COURTESY_PERIOD: u32 = 32;
+    /// Numbers of slots that differ in a draw.
+    const SLOTS: u32 = 64;
+}
 
 /// The step that a truck's traffic is at, and its stream of random numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,37 +6,41 @@
 
 mod entry;
 
-pub(super) use entry::{GONE_BEFORE, LEAST_CROSSING};
+pub(super) use entry::{GONE_BEFORE, LEAST_CROSSING, printed_constants as printed_entry};
 
 use super::clock::Clock;
 use super::model::{ONE, acceleration, braking_of, following, square, still_stops, stopping, time};
 use super::network::{Kind, Stretch, cell};
 use super::rules::{SPEED_PARTS, TIME_PARTS};
-use super::units::{FAR, length, speed};
+use super::units::{BEYOND, length, speed};
 use super::{Car, Network, Others, Rules};
+use crate::layout::shared::constants;
 
 /// Most slots of a row.
 pub(super) const MOST_CARS: usize = 64;
-/// Nothing farther ahead of a car is looked at.
-pub(super) const SIGHT: i32 = length(32.0);
-/// The same of a car that may come to meet it.
-pub(super) const SIGHT_OF_OTHERS: i32 = length(45.0);
-/// What may matter of a car begins so far behind its rear.
-const BEHIND: i32 = length(0.5);
-/// A zone is left once the rear is so far behind it.
-pub(super) const LEFT: i32 = length(0.3);
-/// Two cars that have it before them agree on who is first from this distance on.
-const AGREED: i32 = length(35.0);
-/// Twice the braking above which a car does not stop for another that is about as near (m/s²).
-const GOES_ABOVE: i32 = 7;
-/// Least speed in a time to a zone.
-pub(super) const LEAST_SPEED: i32 = speed(4.0);
-/// Least wished speed.
-const LEAST_WISHED: i32 = speed(0.5);
-/// Steps after which one that has been standing goes by the coin.
-const PATIENT: u32 = 20;
-/// Interaction of a car that must let another out of a crossing: it wishes three times the gap.
-const LETS_OUT: i32 = 9 * ONE;
+
+constants! {
+    /// Nothing farther ahead of a car is looked at (2^-10 m).
+    pub(super) const SIGHT: i32 = length(32.0);
+    /// The same of a car that may come to meet it (2^-10 m).
+    pub(super) const SIGHT_OF_OTHERS: i32 = length(45.0);
+    /// What may matter of a car begins so far behind its rear (2^-10 m).
+    const BEHIND: i32 = length(0.5);
+    /// A zone is left once the rear is so far behind it (2^-10 m).
+    pub(super) const LEFT: i32 = length(0.3);
+    /// Two cars that have it before them agree on who is first from this distance on (2^-10 m).
+    const AGREED: i32 = length(35.0);
+    /// Twice the braking above which a car does not stop for another that is about as near (m/s²).
+    const GOES_ABOVE: i32 = 7;
+    /// Least speed in a time to a zone (2^-14 m a step).
+    pub(super) const LEAST_SPEED: i32 = speed(4.0);
+    /// Least wished speed (2^-14 m a step).
+    const LEAST_WISHED: i32 = speed(0.5);
+    /// Steps after which one that has been standing goes by the coin.
+    const PATIENT: u32 = 20;
+    /// Interaction of a car that must let another out of a crossing: it wishes three times the gap.
+    const LETS_OUT: i32 = 9 * ONE;
+}
 
 /// All cars of a row as deciding needs them, side by side.
 pub(super) struct Crowd<'a> {
@@ -163,7 +167,7 @@ impl<'a> Driver<'a> {
         let car = &crowd.cars[slot];
         let (me, path, temperament) = (crowd.seen(slot), car.path(), car.temperament());
         let headway = crowd.rules.headway * (TIME_PARTS - temperament) / TIME_PARTS;
-        Driver { crowd, me, path, temperament, headway, interaction: 0, stops: false, leader: (FAR, 0) }
+        Driver { crowd, me, path, temperament, headway, interaction: 0, stops: false, leader: (BEYOND, 0) }
     }
 
     /// Takes another car in a zone of both paths into account.
@@ -316,5 +320,5 @@ impl<'a> Driver<'a> {
 /// The order of who goes first through a zone at this distance: the smaller. Of those that cannot stop any more the
 /// nearer one, before all others; of these the one that is there sooner.
 fn rank(distance: i32, car: &Seen) -> i32 {
-    if GOES_ABOVE * distance < car.square { distance - FAR } else { time(distance, car.speed.max(LEAST_SPEED)) }
+    if GOES_ABOVE * distance < car.square { distance - BEYOND } else { time(distance, car.speed.max(LEAST_SPEED)) }
 }

@@ -2,40 +2,48 @@
 //!
 //! Units are those of [`super::units`]. An interaction is the square of the wished gap over the gap, in units of 2^-16:
 //! squares are compared wherever the model compares ratios, so that no root is needed. Every product fits in 32 bits
-//! for speeds in 0..[`FASTEST`], distances below [`FAR`](super::units::FAR) and headways below 3.5 s; the tests try the
-//! ends.
+//! for speeds in 0..[`FASTEST`], distances below [`BEYOND`](super::units::BEYOND) and headways below 3.5 s; the tests
+//! try the ends.
 
 use super::Car;
 use super::units::{length, speed};
+use crate::layout::shared::constants;
 
-/// No car and no truck that one minds is faster.
-pub(super) const FASTEST: i32 = speed(Car::FASTEST);
-/// An interaction of 1, and a ratio of gaps of 1.
-pub(super) const ONE: i32 = 1 << 16;
-const RATIO_BITS: u32 = 14;
-/// Interactions are below 16: the hardest braking needs 5.
-const MOST_RATIO: u32 = (4 << RATIO_BITS) - 1;
-/// 1 / (2 sqrt(a b)) = 0.2236 s²/m of an acceleration of 2 m/s² and a braking of 2.5 m/s²: for products of speeds in
-/// units of 2^-18 m² a step², and for squares of speeds in m²/s².
-const PER_PRODUCT: i32 = 1431;
-const PER_SQUARE: i32 = 229;
-/// The smallest gap that counts (m).
-const LEAST_GAP: i32 = length(0.1);
-/// A car that stands is this far before what it stops at (m).
-const STANDS_BEFORE: i32 = length(0.2);
-/// The least distance to a line, and to half of [`STANDS_BEFORE`] before it (m).
-const LEAST_DISTANCE: i32 = length(0.05);
-const LEAST_LEFT: i32 = length(0.03);
-/// A car brakes comfortably where its squared speed is at most so many times the distance: 2 x 2.5 m/s² (m/s²).
-const TWICE_BRAKING: i32 = 5;
-/// Braking at most towards a lower speed limit, in units of an interaction: 1.5 x 2 m/s².
-const SLOWING: i32 = ONE + ONE / 2;
-/// Ratio of a speed to the wished one, in units of 2^-15, beyond which a car slows as hard as it does for a limit.
-const MOST_PART: u32 = 3 << 14;
-/// Hardest braking in units of the largest acceleration: 8 m/s² of 2 m/s².
-const HARDEST: i32 = 4 * ONE;
-/// The hardest braking in the units of a state (2^-19 m a step²).
-const HARDEST_OF_STATE: i32 = 41_943;
+constants! {
+    /// No car and no truck that one minds is faster (2^-14 m a step).
+    pub(super) const FASTEST: i32 = speed(Car::FASTEST);
+    /// An interaction of 1.
+    pub(super) const ONE: i32 = 1 << 16;
+    /// Bits of a ratio of gaps below 1.
+    const RATIO_BITS: u32 = 14;
+    /// Interactions are below 16: the hardest braking needs 5.
+    const MOST_RATIO: u32 = (4 << RATIO_BITS) - 1;
+    /// 1 / (2 sqrt(a b)) = 0.2236 s²/m of an acceleration of 2 m/s² and a braking of 2.5 m/s²: for products of speeds
+    /// in units of 2^-18 m² a step².
+    const PER_PRODUCT: i32 = 1431;
+    /// The same for squares of speeds in m²/s² (2^-10).
+    const PER_SQUARE: i32 = 229;
+    /// The smallest gap that counts (2^-10 m).
+    const LEAST_GAP: i32 = length(0.1);
+    /// A car that stands is this far before what it stops at (2^-10 m).
+    const STANDS_BEFORE: i32 = length(0.2);
+    /// The least distance to a line (2^-10 m).
+    const LEAST_DISTANCE: i32 = length(0.05);
+    /// The least distance to half of [`STANDS_BEFORE`] before it (2^-10 m).
+    const LEAST_LEFT: i32 = length(0.03);
+    /// A car brakes comfortably where its squared speed is at most so many times the distance: 2 x 2.5 m/s² (m/s²).
+    const TWICE_BRAKING: i32 = 5;
+    /// What moves can still stop before a line at 4 m/s²: within an eighth of its squared speed, three bits.
+    const STOPS_WITHIN: u32 = 3;
+    /// Braking at most towards a lower speed limit, in units of an interaction: 1.5 x 2 m/s².
+    const SLOWING: i32 = ONE + ONE / 2;
+    /// Ratio of a speed to the wished one, in units of 2^-15, beyond which a car slows as hard as it does for a limit.
+    const MOST_PART: u32 = 3 << 14;
+    /// Hardest braking in units of the largest acceleration: 8 m/s² of 2 m/s².
+    const HARDEST: i32 = 4 * ONE;
+    /// The hardest braking in the units of a state (2^-19 m a step²).
+    const HARDEST_OF_STATE: i32 = 41_943;
+}
 
 /// The square of a speed (2^-10 m²/s²): what comes of comparing it with a distance in metres is in m/s².
 pub(super) fn square(speed: i32) -> i32 {
@@ -52,10 +60,10 @@ pub(super) fn way_of_a_second(speed: i32) -> i32 {
     (10 * speed) >> 4
 }
 
-/// Whether what has a squared speed can still stop before a line at 4 m/s², within an eighth of that: what cannot any
-/// more has entered (2^-10 m, 2^-10 m²/s²).
+/// Whether what has a squared speed can still stop before a line: what cannot any more has entered (2^-10 m, 2^-10
+/// m²/s²).
 pub(super) fn still_stops(station: i32, square: i32, line: i32) -> bool {
-    station + (square >> 3) <= line
+    station + (square >> STOPS_WITHIN) <= line
 }
 
 /// Interaction with something ahead, that a car with a headway and a wished gap at rest follows (1/256 step, 2^-10 m).
@@ -99,13 +107,13 @@ pub(super) fn acceleration(speed: i32, wished: i32, interaction: i32) -> i32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::units::{FAR, metres, metres_per_second, time as ticks};
+    use super::super::units::{BEYOND, metres, metres_per_second, time as ticks};
     use super::*;
 
     /// Speeds from standing to the fastest, and distances from far behind to farther than any road is long.
     const SPEEDS: [i32; 7] = [0, 1, speed(0.1), speed(4.0), speed(8.33), speed(11.0), FASTEST];
     const DISTANCES: [i32; 9] =
-        [-FAR, -1, 0, length(0.1), length(0.3), length(4.0), length(30.0), length(120.0), FAR - 1];
+        [-BEYOND, -1, 0, length(0.1), length(0.3), length(4.0), length(30.0), length(120.0), BEYOND - 1];
 
     fn m(length: i32) -> f64 {
         metres(length).into()

@@ -6,17 +6,44 @@ use bytemuck::{Pod, Zeroable, cast_slice, pod_collect_to_vec};
 use glam::Vec2;
 
 use super::units::{FINER_STATION, metres};
+use crate::layout::shared::constants;
 
-/// Distance between samples of a path (m).
-pub const SPACING: f32 = 2.0;
-/// Bits of a state's station below the spacing.
-const SPACING_BITS: u32 = 21;
-/// Unit of the stations of zones (m), and its bits above that of decisions.
+/// Unit of the stations of zones (m).
 pub(super) const UNIT: f32 = 1.0 / 64.0;
-const UNIT_BITS: u32 = 4;
-/// Unit of the stations of pairs (m), and its bits above that of decisions.
+/// Unit of the stations of pairs (m).
 pub(super) const CELL: f32 = 2.0;
-const CELL_BITS: u32 = 11;
+
+constants! {
+    /// Distance between samples of a path (m).
+    pub const SPACING: f32 = 2.0;
+    /// Bits of a state's station below the distance between samples.
+    const SPACING_BITS: u32 = 21;
+    /// Bits of a station of decisions below the unit of zones.
+    const UNIT_BITS: u32 = 4;
+    /// Bits of a station of decisions below the unit of pairs.
+    const CELL_BITS: u32 = 11;
+    /// Words before the tables of a road.
+    const NETWORK_HEAD: usize = 6;
+    /// Words of a path.
+    const PATH_WORDS: usize = size_of::<Path>() / 4;
+    /// Words of a sample.
+    const SAMPLE_WORDS: usize = size_of::<Sample>() / 4;
+    /// Words of a pair.
+    const PAIR_WORDS: usize = size_of::<Pair>() / 4;
+    /// Words of a zone.
+    const ZONE_WORDS: usize = size_of::<Zone>() / 4;
+    /// Words of a source.
+    const SOURCE_WORDS: usize = size_of::<Source>() / 4;
+    /// Cars follow each other: code of a zone's kind.
+    const FOLLOW: u32 = Kind::Follow as u32;
+    /// One car at a time.
+    const CROSS: u32 = Kind::Cross as u32;
+    /// Who enters yields.
+    const SOFT: u32 = Kind::Soft as u32;
+    /// Only a vehicle that may need the lanes beside its own yields.
+    const WIDE: u32 = Kind::Wide as u32;
+}
+
 /// Most paths of a road: a car names its path in ten bits, of which one value means that there is no car.
 pub const MOST_PATHS: usize = 1023;
 /// Most sources of a road: each has four bits of the backlog.
@@ -250,7 +277,7 @@ impl Network {
 
     /// The tables that these words are; `None` if they are none.
     pub(super) fn parsed(words: &[u32]) -> Option<Network> {
-        let (head, mut rest) = words.split_at_checked(6)?;
+        let (head, mut rest) = words.split_at_checked(NETWORK_HEAD)?;
         let [has_ring, n_paths, n_samples, n_zones, n_sources, n_arms] = head else { return None };
         let n_paths = *n_paths as usize;
         if MOST_PATHS < n_paths || 1 < *has_ring {

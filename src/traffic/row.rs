@@ -1,9 +1,27 @@
 //! The vehicles around one truck: a row of the column of a batch.
 
+use std::mem::offset_of;
+
 use bytemuck::{Pod, Zeroable, cast_mut, cast_ref};
 
 use super::Car;
+use crate::layout::shared::constants;
 use crate::layout::{N_CAR_WORDS, N_CARS};
+
+constants! {
+    /// Words of a car.
+    const CAR_WORDS: usize = size_of::<Car>() / 4;
+    /// Word of a row at which the cars begin that wait outside.
+    const BACKLOG_AT: usize = offset_of!(Row, backlog) / 4;
+    /// Word of the demand that the episode has.
+    const LEVEL_AT: usize = offset_of!(Row, level) / 4;
+    /// Word of the step in which the truck entered.
+    const ENTERED_AT: usize = offset_of!(Row, entered) / 4;
+    /// Word of the contact.
+    const MET_AT: usize = offset_of!(Row, met) / 4;
+    /// Word of the cars that slow for the truck.
+    const HINDERED_AT: usize = offset_of!(Row, hindered) / 4;
+}
 
 /// The vehicles on one truck's road, and what is counted of them.
 #[repr(C)]

@@ -6,14 +6,26 @@
 //! numbers were chosen once.
 
 use super::units::{length, probability, time};
+use crate::layout::shared::constants;
 
-/// How far temperament changes the speed on a free road (1/150 of it for each of its 15 units).
-pub(super) const SPEED_PARTS: i32 = 150;
-/// How far it changes headway and lags (1/100 of them for each of its 15 units).
-pub(super) const TIME_PARTS: i32 = 100;
-
-/// Numbers of [`Rules`].
-const N_RULES: usize = 7;
+constants! {
+    /// How far temperament changes the speed on a free road (1/150 of it for each of its 15 units).
+    pub(super) const SPEED_PARTS: i32 = 150;
+    /// How far it changes headway and lags (1/100 of them for each of its 15 units).
+    pub(super) const TIME_PARTS: i32 = 100;
+    /// Numbers of `Rules`, in words.
+    const N_RULES: usize = 7;
+    /// Index of the time headway among them.
+    const RULE_HEADWAY: usize = 0;
+    /// Index of the gap.
+    const RULE_GAP: usize = 1;
+    /// Index of the first lag.
+    const RULE_LAGS: usize = 2;
+    /// Index of the first lag before traffic that is only passed beside.
+    const RULE_SOFT_LAGS: usize = 4;
+    /// Index of the courtesy.
+    const RULE_COURTESY: usize = 6;
+}
 
 /// What the model's fit may change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,10 +46,14 @@ pub struct Rules {
 impl Rules {
     /// The numbers as words.
     pub(crate) fn words(&self) -> [u32; N_RULES] {
-        let Rules { headway, gap, lags: [joins, crosses], soft_lags: [right, left], courtesy } = *self;
-        let [headway, gap, joins, crosses, right, left] =
-            [headway, gap, joins, crosses, right, left].map(i32::cast_unsigned);
-        [headway, gap, joins, crosses, right, left, courtesy]
+        let Rules { headway, gap, lags, soft_lags, courtesy } = *self;
+        let mut words = [0; N_RULES];
+        words[RULE_HEADWAY] = headway.cast_unsigned();
+        words[RULE_GAP] = gap.cast_unsigned();
+        words[RULE_LAGS..][..2].copy_from_slice(&lags.map(i32::cast_unsigned));
+        words[RULE_SOFT_LAGS..][..2].copy_from_slice(&soft_lags.map(i32::cast_unsigned));
+        words[RULE_COURTESY] = courtesy;
+        words
     }
 
     /// The fitted numbers.

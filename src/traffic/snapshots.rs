@@ -4,10 +4,14 @@ use bytemuck::{bytes_of, cast_slice, cast_slice_mut};
 
 use super::{Car, Demand, Network, Row, Rules, Run};
 use crate::files::cache::Cache;
+use crate::layout::shared::constants;
 use crate::layout::{N_CARS, Stream};
 
-/// States of a road and a demand.
-pub const N_SNAPSHOTS: usize = 64;
+constants! {
+    /// States of a road and a demand.
+    pub const N_SNAPSHOTS: usize = 64;
+}
+
 /// Steps from an empty road to the first: cars have driven through by then.
 const UNTIL_FIRST: u32 = 600;
 /// Steps from one to the next, after which most cars are others.

@@ -9,7 +9,7 @@ use super::bake::ENTRY;
 use super::decide::MOST_CARS;
 use super::hcm::Lane;
 use super::network::{Kind, Network};
-use super::units::{FAR, FINER_SPEED, length, speed};
+use super::units::{BEYOND, FINER_SPEED, length, speed};
 use super::{Car, Demand, Error, Mix, Rules, Run, STEP};
 use crate::layout::Stream;
 
@@ -26,8 +26,8 @@ const QUEUED: i32 = speed(2.0);
 pub struct Survey<'a> {
     network: &'a Network,
     rules: &'a Rules,
-    /// Station at which a path passes the entry of an arm, of path p and arm a at index p n_arms + a; [`FAR`] where it
-    /// does not (2^-10 m).
+    /// Station at which a path passes the entry of an arm, of path p and arm a at index p n_arms + a; [`BEYOND`] where
+    /// it does not (2^-10 m).
     passes: Vec<i32>,
     nobody: Demand,
 }
@@ -104,7 +104,7 @@ impl<'a> Survey<'a> {
         let own = &self.network.sources[source];
         let entry_lanes = self.network.sources.iter().filter(|other| other.entry == own.entry).count();
         let mut passing: Vec<u32> = (0..self.network.paths.len())
-            .filter(|&path| self.passes[path * self.network.n_arms + own.entry as usize] < FAR)
+            .filter(|&path| self.passes[path * self.network.n_arms + own.entry as usize] < BEYOND)
             .map(|path| self.network.source_of(path).lane)
             .collect();
         passing.sort_unstable();
@@ -149,7 +149,7 @@ impl<'a> Survey<'a> {
 /// Where every path passes every arm's entry: where its first zone with a path of this entry begins.
 fn passes(network: &Network) -> Vec<i32> {
     let (n, n_arms) = (network.paths.len(), network.n_arms);
-    let mut passes = vec![FAR; n * n_arms];
+    let mut passes = vec![BEYOND; n * n_arms];
     for a in 0..n {
         let arm = network.source_of(a).entry;
         let line = network.paths[a].line;

@@ -17,15 +17,22 @@ mod view; // a truck as cars see it
 
 use std::cell::Cell;
 
+pub(super) use contact::printed_constants as printed_contact;
 pub use contact::{Contact, Entry, touched};
+pub(super) use corridor::printed_constants as printed_corridor;
+pub(super) use line::printed_constants as printed_line;
+pub(super) use view::printed_constants as printed_view;
 pub use view::{View, outlines, stretched};
 
 use super::decide::Driver;
 use super::units::length;
 use super::{Car, Network, Others};
+use crate::layout::shared::constants;
 
-/// A truck that comes is this far from where cars enter, or two seconds, when they stay away (m).
-const COMING: i32 = length(3.0);
+constants! {
+    /// A truck that comes is this far from where cars enter, or two seconds, when they stay away (2^-10 m).
+    const COMING: i32 = length(3.0);
+}
 
 /// The trucks of a road, as its cars see them.
 #[derive(Debug)]

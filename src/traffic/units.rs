@@ -6,20 +6,27 @@
 //! round down, and nothing negative is divided.
 
 use super::STEP;
+use crate::layout::shared::constants;
 
-/// Bits of a state's station below one of decisions, and of a state's speed.
-pub(super) const FINER_STATION: u32 = 10;
-pub(super) const FINER_SPEED: u32 = 5;
-/// Units of lengths in a metre.
-const METRE: f32 = 1024.0;
+constants! {
+    /// Bits of a state's station below one of decisions.
+    pub(super) const FINER_STATION: u32 = 10;
+    /// The same of a speed.
+    pub(super) const FINER_SPEED: u32 = 5;
+    /// Units of lengths in a metre.
+    const METRE: f32 = 1024.0;
+    /// Units of speeds in a m/s.
+    const PACE: f32 = STEP * METRE_A_STEP;
+    /// Larger than every length of a road (2^-10 m).
+    pub const BEYOND: i32 = 1 << 20;
+}
+
 /// Units of speeds in a metre a step.
 const METRE_A_STEP: f32 = 16_384.0;
 /// Units of times in a step.
 const TICKS: f32 = 256.0;
 /// Units of probabilities in 1: the upper 24 bits of a random word are compared with them.
 const CERTAIN: f64 = 16_777_216.0;
-/// Larger than every length of a road (2^-10 m).
-pub const FAR: i32 = 1 << 20;
 
 /// A length in units of decisions (m to 2^-10 m).
 pub const fn length(metres: f32) -> i32 {
@@ -28,7 +35,7 @@ pub const fn length(metres: f32) -> i32 {
 
 /// A speed in units of decisions (m/s to 2^-14 m a step).
 pub const fn speed(metres_per_second: f32) -> i32 {
-    nearest(metres_per_second * (STEP * METRE_A_STEP))
+    nearest(metres_per_second * PACE)
 }
 
 /// A time in units of decisions (s to 1/256 step).
@@ -48,7 +55,7 @@ pub const fn metres(length: i32) -> f32 {
 
 /// A speed of decisions in m/s.
 pub const fn metres_per_second(speed: i32) -> f32 {
-    speed as f32 / (STEP * METRE_A_STEP)
+    speed as f32 / PACE
 }
 
 /// The nearest integer; conversions from floats saturate.

@@ -70,11 +70,7 @@ impl Traffic {
         let shared =
             [&rules.words()[..], rude, &[*spacing, *hindrance].map(f32::to_bits), &[u32::from(*is_observed)]].concat();
         let routes = routes.iter().flat_map(|&TrafficRoute { path, begins }| [path, begins.to_bits()]).collect();
-        let of_road = |TrafficRoad { network, levels }: &TrafficRoad| {
-            let level = |Level { demand, snapshots }: &Level| [&demand.words(), cast_slice(snapshots)].concat();
-            [network.words(), levels.iter().flat_map(level).collect()].concat()
-        };
-        [shared, routes].into_iter().chain(roads.iter().map(of_road))
+        [shared, routes].into_iter().chain(roads.iter().map(TrafficRoad::words))
     }
 
     /// What a scenario's trucks share; none where its roads are empty.
@@ -120,6 +116,13 @@ fn path_of(place: &Place, route: &Route) -> usize {
 }
 
 impl TrafficRoad {
+    /// The tables as words: of the network, and of each level the demand and the snapshots.
+    pub(crate) fn words(&self) -> Vec<u32> {
+        let TrafficRoad { network, levels } = self;
+        let level = |Level { demand, snapshots }: &Level| [&demand.words(), cast_slice(snapshots)].concat();
+        [network.words(), levels.iter().flat_map(level).collect()].concat()
+    }
+
     fn baked(place: &Place, demand: &[f64], mix: Mix, rules: &Rules, loading: &Loading) -> Result<TrafficRoad, Error> {
         let invalid = |error: traffic::Error| {
             let expected = "leave [traffic] out, or the road, or demand less".to_owned();

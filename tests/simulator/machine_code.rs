@@ -10,9 +10,15 @@ use offtrack::engine::stages::{Kernel, SHADERS};
 const USUAL: Stated = stated("", 48, 0, 0);
 
 /// What the others may take.
-const OTHERS: [Stated; 10] = [
+const OTHERS: [Stated; 16] = [
     stated("drive", 96, 0, 0),
     stated("advance", 96, 0, 0),
+    stated("traffic_decide", 96, 0, 0),
+    stated("traffic_arrive", 96, 0, 0),
+    stated("meet", 96, 0, 0),
+    stated("observe_around", 96, 0, 0),
+    stated("around_both", 96, 0, 0),
+    stated("around_after_reset", 96, 0, 0),
     // Workgroup memory alone lets few subgroups in, so the compiler takes more registers.
     stated("collide", 96, 16_384, 0),
     stated("sense", 48, 6_144, 0),

@@ -115,7 +115,7 @@ fn the_feature_gpu_is_named_only_where_an_engine_or_device_is_chosen() {
             "learner/src",
             50,
             &[
-                ("backend.rs", 10),
+                ("backend.rs", 9),
                 ("level_replay.rs", 2),
                 ("replay_buffer.rs", 1),
                 ("rollout.rs", 1),

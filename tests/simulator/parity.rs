@@ -1,8 +1,10 @@
 //! The device against the CPU, stage by stage and step by step: from the same states, value by value.
 
 mod apron;
+mod around;
 mod compare;
 mod states;
+mod vehicles;
 
 use std::sync::Arc;
 
@@ -295,7 +297,7 @@ fn a_whole_step_from_any_state_ends_alike_for_every_reason_there_is() {
         .filter(|(_, counted)| **counted)
         .for_each(|(&code, _)| codes[code as usize] += 1);
     println!("{codes:?}");
-    // A device refuses worlds with other vehicles.
+    // Trucks alone touch no vehicle.
     let codes = Ended::WITHOUT_VEHICLES.map(|ended| codes[ended as usize]);
     assert!(codes.iter().all(|&count| 100 <= count), "{codes:?}");
     for simulator in [&mut cpu, &mut device, &mut wrong] {
@@ -303,6 +305,7 @@ fn a_whole_step_from_any_state_ends_alike_for_every_reason_there_is() {
         simulator.step(&before.action).unwrap();
     }
     let here = cpu.batch();
+    // Trucks alone have no rows of vehicles.
     let columns: Vec<Column> = Column::of_trucks().collect();
     for there in [&before, wrong.batch()] {
         assert!(compared(here, there, &columns, &counted).iter().any(|agreement| !agreement.holds()));

@@ -16,7 +16,7 @@ use offtrack::world::World;
 use crate::left_hand;
 
 /// The world of `attard2023` with a table `[traffic]`.
-fn with_traffic(keys: &str) -> (Scenario, Arc<World>) {
+pub fn with_traffic(keys: &str) -> (Scenario, Arc<World>) {
     let text = Scenario::text_of("attard2023").unwrap() + "\n[traffic]\n" + keys;
     let scenario = Scenario::parse("traffic", &text, None, &Loading::PLAIN).unwrap();
     let world = Arc::new(World::bake(&scenario).unwrap());

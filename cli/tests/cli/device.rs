@@ -300,6 +300,53 @@ mod on_a_device {
     }
 
     #[test]
+    fn a_policy_is_trained_among_vehicles_on_the_device_and_drives_among_them_there() {
+        let place = Place::new();
+        let text = std::fs::read_to_string(place.file("short.toml")).unwrap();
+        let among = "observation = { vehicles = true }\ntraffic = { demand = [900.0], hindrance = -1.0 }\n";
+        std::fs::write(place.file("short.toml"), among.to_owned() + &text).unwrap();
+        succeed(&place.train(&["--set", "device=gpu"]));
+        let report = place.json("runs/tiny-1/report.json");
+        assert_eq!(report["env_steps"], 1600, "{report}");
+        let policy = place.text("runs/tiny-1/policy.safetensors");
+        let json = place.text("report.json");
+        succeed(&place.evaluate(&["--policy", &policy, "--episodes", "2", "--device", "gpu", "--json", &json]));
+        assert_eq!(place.json("report.json")["routes"].as_array().unwrap().len(), 2);
+        let scale =
+            ["scale", "--benchmark", &place.text("short.toml"), "--device", "gpu", "--envs", "16", "--json", &json];
+        succeed(&offtrack(&[&scale[..], &MOMENT].concat()));
+        let run = &place.json("report.json")["runs"][0];
+        assert_eq!(run["bytes_per_truck"], 1788.0, "{run}");
+        assert_eq!(run["kernels"].as_object().unwrap().len(), 17, "{run}");
+    }
+
+    #[test]
+    fn an_episode_among_vehicles_is_recorded_with_them_and_evaluated_on_the_device() {
+        let place = Place::new();
+        let arguments = |device: &'static [&str]| {
+            let among = ["--benchmark", "traffic2026", "--policy", "pursuit", "--episodes", "1"];
+            [&among, device].concat()
+        };
+        let recorded = |device: &'static [&str]| {
+            let fixed = ["record", "--route", "20m/E-left-3", "-o", &place.text("episode.json")];
+            succeed(&offtrack(&[&fixed[..], &arguments(device)].concat()));
+            place.json("episode.json")
+        };
+        let (here, there) = (recorded(&[]), recorded(&["--device", "gpu"]));
+        let first = |recording: &Value| recording["vehicles"][0].as_array().unwrap().clone();
+        assert!(!first(&there).is_empty() && first(&here) == first(&there), "{here} {there}");
+        let evaluated = |device: &'static [&str]| {
+            succeed(&offtrack(&[&["evaluate", "--json", &place.text("report.json")], &arguments(device)[..]].concat()));
+            let report = place.json("report.json");
+            let arrived = |route: &Value| route["arrived"].as_i64().unwrap();
+            let routes = report["routes"].as_array().unwrap();
+            (routes.len() as i64, routes.iter().map(arrived).sum::<i64>())
+        };
+        let (here, there) = (evaluated(&[]), evaluated(&["--device", "gpu"]));
+        assert!(here.0 == there.0 && 10 * (here.1 - there.1).abs() <= here.0, "{here:?} {there:?}");
+    }
+
+    #[test]
     fn policies_arrive_as_often_on_every_route_as_on_the_processor() {
         let place = Place::new();
         let arrived = |arguments: &[&str]| {

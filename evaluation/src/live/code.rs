@@ -22,7 +22,7 @@ pub(super) fn printed(packed: &mut Packed) -> Value {
     let mut text = |text: String| packed.add("shaders", text.as_bytes());
     let texts = json!({
         "step": text(module()),
-        "act": SHAPES.map(|shape| text(act::source(shape))),
+        "act": SHAPES.map(|shape| text(act::source(shape, false))),
         "journal": text(journal::module()),
         "picture": text([wgsl::picture(), journal::declared_to_read()].concat()),
     });
@@ -98,6 +98,8 @@ fn kernels() -> Map<String, Value> {
             Threads::Truck => "truck",
             Threads::Team => "team",
             Threads::Value => "value",
+            Threads::Car => "car",
+            Threads::Turn => "turn",
         };
         let bindings: Vec<usize> = kernel.buffers().iter().map(|buffer| buffer.binding()).collect();
         (kernel.name().to_owned(), json!({ "bindings": bindings, "threads": threads }))

@@ -16,13 +16,13 @@ use burn::tensor::{Tensor, TensorData};
 use bytemuck::{bytes_of, cast_slice};
 use offtrack::gpu::{Kernels, Slice};
 use offtrack::layout::random;
-use offtrack::layout::{Column, Ended, N_EXTRAS, N_VALUES};
+use offtrack::layout::{Column, Ended, N_AROUND, N_EXTRAS, N_VALUES};
 use offtrack::simulator::{Engine, RouteChoice, Simulator, Tally};
 use offtrack::world::World;
 use offtrack_policy::{LIMIT, Normalisation};
 use wgpu::{PollType, SubmissionIndex};
 
-use super::{Episodes, Rollout, RouteEnd};
+use super::{Episodes, Rollout, RouteEnd, n_around};
 use crate::checkpoint::{Columns, Stored};
 use crate::config::{Config, Refinement};
 use crate::error::Error;
@@ -53,6 +53,8 @@ pub struct DeviceRollout<const N: usize> {
     observation: Tensor<2>,
     /// The simulator's column of extras, `[n_envs, N_EXTRAS]`.
     extras: Tensor<2>,
+    /// The simulator's column of other vehicles where the networks observe them, `[n_envs, N_AROUND]`.
+    around: Option<Tensor<2>>,
     /// Mean and factor of each value, `[1, N]`.
     normalisation: [Tensor<2>; 2],
     sample: Transitions,
@@ -100,6 +102,7 @@ impl<const N: usize> DeviceRollout<N> {
         let zeros = |width: usize| Tensor::<2>::zeros([n_rows, width], device);
         let observation = Tensor::<2>::zeros([n_envs, N_VALUES], device);
         let extras = Tensor::<2>::zeros([n_envs, N_EXTRAS], device);
+        let around = (0 < n_around(N)).then(|| Tensor::<2>::zeros([n_envs, N_AROUND], device));
         let sample = Transitions {
             observation: zeros(N),
             action: Tensor::from_data(TensorData::new(vec![0i32; n_rows], [n_rows, 1]), device),
@@ -109,8 +112,10 @@ impl<const N: usize> DeviceRollout<N> {
             weight: Tensor::ones([n_rows, 1], device),
         };
         shared.flush()?;
-        let (observed, beside) = (floats(&observation)?, floats(&extras)?);
-        let columns = vec![(Column::Observation, observed.slice.clone()), (Column::Extras, beside.slice.clone())];
+        let mut owned = vec![floats(&observation)?, floats(&extras)?];
+        owned.extend(around.as_ref().map(floats).transpose()?);
+        let external = [Column::Observation, Column::Extras, Column::Around];
+        let columns = external.into_iter().zip(&owned).map(|(column, owned)| (column, owned.slice.clone())).collect();
         let engine = Engine::Gpu { device: shared.gpu.clone(), columns };
         let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
         let drawn = level_replay.as_ref().map_or_else(|| routes.clone(), |replay| replay.list().to_vec());
@@ -121,6 +126,7 @@ impl<const N: usize> DeviceRollout<N> {
             n_slots: n_slots as u32,
             n_actions: world.params.n_actions,
             n_values: N as u32,
+            n_extras: (N - N_VALUES - n_around(N)) as u32,
             n_rows: n_rows as u32,
             n_steps: config.learning.n_steps as u32,
             acting_seed: seeds[0],
@@ -146,9 +152,10 @@ impl<const N: usize> DeviceRollout<N> {
             facts,
             observation,
             extras,
+            around,
             normalisation: [0.0, 1.0].map(|value| Tensor::full([1, N], value, device)),
             sample,
-            _owned: vec![observed, beside],
+            _owned: owned,
             n_appended: 0,
             n_steps: 0,
             n_samples: 0,
@@ -164,13 +171,14 @@ impl<const N: usize> DeviceRollout<N> {
         Ok(rollout)
     }
 
-    /// The trucks' observations with the first extras behind them, normalised, `[n_envs, N]`.
+    /// The trucks' observations with the first extras, and other vehicles, behind them, normalised, `[n_envs, N]`.
     fn normalised(&self) -> Tensor<2> {
         let [mean, factor] = self.normalisation.clone();
-        let observed = match N - N_VALUES {
-            0 => self.observation.clone(),
-            n_extras => Tensor::cat(vec![self.observation.clone(), self.extras.clone().narrow(1, 0, n_extras)], 1),
-        };
+        let n_extras = self.facts.n_extras as usize;
+        let extras = (0 < n_extras).then(|| self.extras.clone().narrow(1, 0, n_extras));
+        let beside: Vec<Tensor<2>> = extras.into_iter().chain(self.around.clone()).collect();
+        let own = self.observation.clone();
+        let observed = if beside.is_empty() { own } else { Tensor::cat([vec![own], beside].concat(), 1) };
         ((observed - mean) * factor).clamp(-LIMIT, LIMIT)
     }
 

@@ -40,7 +40,7 @@ pub fn observed<'a, const N: usize>(
     if N == N_VALUES {
         return Cow::Borrowed(bytemuck::cast_slice(observation));
     }
-    let n_around = if N_VALUES + N_EXTRAS < N { N_AROUND } else { 0 };
+    let n_around = super::n_around(N);
     let joined = |env: usize| {
         let mut row = [0.0; N];
         let (values, beside) = row.split_at_mut(N_VALUES);

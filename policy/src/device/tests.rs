@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 use offtrack::gpu;
 use offtrack::layout::buffers::Access;
 use offtrack::layout::random::{signed_unit, words};
-use offtrack::layout::{Action, N_EXTRAS, N_VALUES, Truck};
+use offtrack::layout::{Action, N_AROUND, N_EXTRAS, N_VALUES, Truck};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -43,6 +43,7 @@ struct Drive {
 struct Acted {
     observations: Vec<[f32; N_VALUES]>,
     extras: Vec<[f32; N_EXTRAS]>,
+    around: Vec<[f32; N_AROUND]>,
     trucks: Vec<Truck>,
     actions: Vec<u32>,
 }
@@ -66,6 +67,7 @@ impl Drive {
         Acted {
             observations: batch.observation.clone(),
             extras: batch.extras.clone(),
+            around: batch.around.clone(),
             trucks: batch.truck.clone(),
             actions: batch.action.clone(),
         }
@@ -75,8 +77,8 @@ impl Drive {
     fn compare(&mut self, reference: &Policy, n_steps: usize) -> (BTreeSet<u32>, usize) {
         let (mut taken, mut n_others) = (BTreeSet::new(), 0);
         for _ in 0..n_steps {
-            let Acted { observations, extras, actions, .. } = self.act();
-            let logits = reference.logits_beside(&observations, &extras);
+            let Acted { observations, extras, around, actions, .. } = self.act();
+            let logits = reference.logits_among(&observations, &extras, &around);
             for (row, &action) in logits.chunks_exact(reference.actions.len()).zip(&actions) {
                 let largest = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
                 n_others += usize::from(row[action as usize] < largest - TIE);
@@ -88,10 +90,14 @@ impl Drive {
     }
 }
 
-/// A policy for attard2023 with other layers, of numbers drawn from He's uniform distribution.
+/// A policy for attard2023 with such layers.
 fn drawn(hidden: &[usize], activation: Activation) -> Policy {
-    let policy = Policy::shipped("attard2023").unwrap();
-    let sizes = [&[N_VALUES], hidden, &[policy.actions.len()]].concat();
+    with_layers(Policy::shipped("attard2023").unwrap(), hidden, activation)
+}
+
+/// The policy with other layers, of numbers drawn from He's uniform distribution.
+fn with_layers(policy: Policy, hidden: &[usize], activation: Activation) -> Policy {
+    let sizes = [&[policy.normalisation.mean.len()], hidden, &[policy.actions.len()]].concat();
     let layer = |(index, ends): (usize, &[usize])| {
         let limit = (6.0 / ends[0] as f32).sqrt();
         let number = |at: usize, of: u32| signed_unit(words(3, at as u32, index as u32, of)[0]);
@@ -115,6 +121,25 @@ fn shipped_policies_choose_on_a_device_what_they_choose_on_the_processor() {
         wrong.layers[1].weights.iter_mut().step_by(2).for_each(|weight| *weight *= 1.02);
         assert!(0 < drive.compare(&wrong, 50).1, "{name}: weights that are off by a fiftieth must show");
     }
+}
+
+#[test]
+fn a_policy_that_observes_vehicles_chooses_on_a_device_what_it_chooses_on_the_processor() {
+    let world = world_of("traffic2026").0;
+    let policy = Policy {
+        vehicles: true,
+        actions: world.actions.clone(),
+        normalisation: Normalisation::none(N_VALUES + N_AROUND),
+        ..Policy::shipped("attard2023").unwrap()
+    };
+    let policy = with_layers(policy, &[64, 64], Activation::Relu);
+    let mut drive = Drive::new("traffic2026", policy.clone(), 100, Choice::Best);
+    let (taken, n_others) = drive.compare(&policy, 30);
+    assert!(n_others == 0 && 4 < taken.len(), "{n_others} others, {taken:?}");
+    let mut wrong = policy.clone();
+    // What it makes of the vehicles alone.
+    wrong.layers[0].weights[64 * N_VALUES..].iter_mut().step_by(2).for_each(|weight| *weight *= 1.1);
+    assert!(0 < drive.compare(&wrong, 30).1, "weights of vehicles that are off by a tenth must show");
 }
 
 #[test]
@@ -203,8 +228,8 @@ fn a_policy_that_is_too_wide_or_cannot_drive_is_refused_by_name() {
 
 #[test]
 fn the_kernel_keeps_within_what_every_device_offers() {
-    for shape in SHAPES {
-        let source = source(shape);
+    for (shape, reads_vehicles) in SHAPES.into_iter().flat_map(|shape| [(shape, false), (shape, true)]) {
+        let source = source(shape, reads_vehicles);
         let module = parser::parse_str(&source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&source)));
         let info = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).unwrap();
         let used = info.get_entry_point(0);
@@ -218,8 +243,9 @@ fn the_kernel_keeps_within_what_every_device_offers() {
             }
         }
         // Bound to what it names, of which 8 may be storage buffers; 16 KB and 256 threads a workgroup.
-        assert_eq!(names, BUFFERS.map(|(name, ..)| name));
-        let storage = BUFFERS.iter().filter(|(_, access, ..)| *access != Access::Uniform).count();
+        let known = || buffers(reads_vehicles);
+        assert_eq!(names, known().map(|(name, ..)| name).collect::<Vec<&str>>());
+        let storage = known().filter(|(_, access, ..)| *access != Access::Uniform).count();
         assert!(storage <= 8 && shape.memory() == 16 << 10 && shape.threads() <= 256, "{shape:?}");
         assert_eq!(module.entry_points[0].workgroup_size, [shape.threads(), 1, 1]);
     }
@@ -228,25 +254,31 @@ fn the_kernel_keeps_within_what_every_device_offers() {
 
 /// Checks the machine code of a shape for a card; `test` is the name of the test that asks.
 #[cfg(target_os = "linux")]
-fn check_machine_code(test: &str, shape: Shape) {
+fn check_machine_code(test: &str, shape: Shape, reads_vehicles: bool) {
     let stated = [null_device::stated("act", 96, shape.memory(), 0)];
-    null_device::check(&format!("device::tests::{test}"), &source(shape), &stated);
+    null_device::check(&format!("device::tests::{test}"), &source(shape, reads_vehicles), &stated);
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn the_kernel_of_narrow_networks_spills_nothing_on_a_card() {
-    check_machine_code("the_kernel_of_narrow_networks_spills_nothing_on_a_card", SHAPES[0]);
+    check_machine_code("the_kernel_of_narrow_networks_spills_nothing_on_a_card", SHAPES[0], false);
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn the_kernel_of_wide_networks_spills_nothing_on_a_card() {
-    check_machine_code("the_kernel_of_wide_networks_spills_nothing_on_a_card", SHAPES[1]);
+    check_machine_code("the_kernel_of_wide_networks_spills_nothing_on_a_card", SHAPES[1], false);
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn the_kernel_of_the_widest_networks_spills_nothing_on_a_card() {
-    check_machine_code("the_kernel_of_the_widest_networks_spills_nothing_on_a_card", SHAPES[2]);
+    check_machine_code("the_kernel_of_the_widest_networks_spills_nothing_on_a_card", SHAPES[2], false);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_kernel_of_policies_that_observe_vehicles_spills_nothing_on_a_card() {
+    check_machine_code("the_kernel_of_policies_that_observe_vehicles_spills_nothing_on_a_card", SHAPES[0], true);
 }

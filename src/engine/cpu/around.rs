@@ -11,48 +11,51 @@ use glam::Vec2;
 use super::traffic::front_station;
 use crate::engine::Row;
 use crate::layout::angle::direction;
+use crate::layout::shared::constants;
 use crate::layout::{N_AROUND, N_CARS, N_NEAREST, first_of_vehicles};
 use crate::traffic::car::Outline;
 use crate::traffic::units::{length, metres};
 use crate::traffic::{self, Car, Kind, Network, Stretch, outlines, stretched};
 use crate::world::World;
 
-/// Time that is observed as 1 (s).
-const TIME_SCALE: f32 = 10.0;
-/// Distance along a path that is observed as 1 (m).
-const GAP_SCALE: f32 = 50.0;
-/// Speed of a vehicle that is observed as 1 (m/s).
-const SPEED_SCALE: f32 = 15.0;
-/// Distance to a unit that is observed as 1 (m).
-const ROOM_SCALE: f32 = 20.0;
-/// Distance from a unit within which vehicles are observed one by one, and which is observed as 1 (m).
-const NEAR_SCALE: f32 = 60.0;
-/// Zones that begin so far behind the line are those of the entry (m).
-const ENTRY: f32 = 12.0;
-/// Those that begin so far behind it are on the nearest lane (m).
-const NEAREST_LANE: f32 = 3.0;
-/// Least speed in a time to a zone (m/s).
-const LEAST_SPEED: f32 = 4.0;
-/// Twice the braking with which a vehicle still stops before its line (m/s^2).
-const STOPS_WITH: f32 = 8.0;
-/// Index of the times until vehicles are at the entry.
-const ARRIVAL_AT: usize = first_of_vehicles("entry_arrival");
-/// Index of their distances.
-const DISTANCE_AT: usize = first_of_vehicles("entry_distance");
-/// Index of the times until they have left it.
-const GONE_AT: usize = first_of_vehicles("entry_gone");
-/// Index of the distance from the line.
-const LINE_AT: usize = first_of_vehicles("line_distance");
-/// Index of whether the front is beyond it.
-const ENTERED_AT: usize = first_of_vehicles("has_entered");
-/// Index of the gap.
-const GAP_AT: usize = first_of_vehicles("gap");
-/// Index of the speed beyond the gap.
-const GAP_SPEED_AT: usize = first_of_vehicles("gap_speed");
-/// Index of the room of both units.
-const ROOM_AT: usize = first_of_vehicles("tractor_room");
-/// Index of whether there are nearest vehicles.
-const NEAREST_AT: usize = first_of_vehicles("vehicle");
+constants! {
+    /// Time that is observed as 1 (s).
+    const TIME_SCALE: f32 = 10.0;
+    /// Distance along a path that is observed as 1 (m).
+    const GAP_SCALE: f32 = 50.0;
+    /// Speed of a vehicle that is observed as 1 (m/s).
+    const VEHICLE_SPEED_SCALE: f32 = 15.0;
+    /// Distance to a unit that is observed as 1 (m).
+    const ROOM_SCALE: f32 = 20.0;
+    /// Distance from a unit within which vehicles are observed one by one, and which is observed as 1 (m).
+    const NEAR_SCALE: f32 = 60.0;
+    /// Zones that begin so far behind the line are those of the entry (m).
+    const ENTRY_REACH: f32 = 12.0;
+    /// Those that begin so far behind it are on the nearest lane (m).
+    const NEAREST_LANE: f32 = 3.0;
+    /// Least speed in a time to a zone (m/s).
+    const LEAST_COMING_SPEED: f32 = 4.0;
+    /// Twice the braking with which a vehicle still stops before its line (m/s^2).
+    const STILL_STOPS_WITH: f32 = 8.0;
+    /// Index of the times until vehicles are at the entry.
+    const ARRIVAL_AT: usize = first_of_vehicles("entry_arrival");
+    /// Index of their distances.
+    const DISTANCE_AT: usize = first_of_vehicles("entry_distance");
+    /// Index of the times until they have left it.
+    const GONE_AT: usize = first_of_vehicles("entry_gone");
+    /// Index of the distance from the line.
+    const LINE_AT: usize = first_of_vehicles("line_distance");
+    /// Index of whether the front is beyond it.
+    const HAS_ENTERED_AT: usize = first_of_vehicles("has_entered");
+    /// Index of the gap.
+    const GAP_AT: usize = first_of_vehicles("gap");
+    /// Index of the speed beyond the gap.
+    const GAP_SPEED_AT: usize = first_of_vehicles("gap_speed");
+    /// Index of the room of both units.
+    const ROOM_AT: usize = first_of_vehicles("tractor_room");
+    /// Index of whether there are nearest vehicles.
+    const NEAREST_AT: usize = first_of_vehicles("vehicle");
+}
 
 /// What the row's truck observes of other vehicles; none where the world's trucks do not.
 pub fn around(world: &World, row: &Row) -> Option<[f32; N_AROUND]> {
@@ -125,14 +128,14 @@ impl Observing<'_> {
         self.write_entry(cars, &mut seen);
         let line = self.network.paths[self.path].line();
         seen[LINE_AT] = ((line - self.front) / GAP_SCALE).clamp(0.0, 1.0);
-        seen[ENTERED_AT] = f32::from(line < self.front);
+        seen[HAS_ENTERED_AT] = f32::from(line < self.front);
         let outlines: [Option<Outline>; N_CARS] =
             from_fn(|slot| cars[slot].is_there().then(|| cars[slot].outline(self.network)));
         if let Some((gap, slot)) = self.gap(cars) {
             let ahead = self.network.pose(self.path, self.front + gap).1;
             let along = outlines[slot].map_or(0.0, |outline| outline.along.dot(ahead));
             seen[GAP_AT] = (gap / GAP_SCALE).min(1.0);
-            seen[GAP_SPEED_AT] = (cars[slot].speed() * along / SPEED_SCALE).clamp(-1.0, 1.0);
+            seen[GAP_SPEED_AT] = (cars[slot].speed() * along / VEHICLE_SPEED_SCALE).clamp(-1.0, 1.0);
         }
         for (unit, room) in self.units.iter().zip(&mut seen[ROOM_AT..]) {
             let rooms = outlines.iter().flatten().map(|outline| room_between(unit, outline));
@@ -157,10 +160,10 @@ impl Observing<'_> {
         for car in cars.iter().filter(|car| car.is_there()) {
             let (station, speed) = (car.station(), car.speed());
             let its_line = self.network.paths[car.path()].line();
-            let waits = station + speed * speed / STOPS_WITH <= its_line;
+            let waits = station + speed * speed / STILL_STOPS_WITH <= its_line;
             let is_beside = |kind: Kind| matches!(kind, Kind::Soft | Kind::Wide);
             let is_of_entry =
-                |zone: &Meeting| zone.own[0] <= line + ENTRY && (is_beside(zone.kind) || line < zone.own[0]);
+                |zone: &Meeting| zone.own[0] <= line + ENTRY_REACH && (is_beside(zone.kind) || line < zone.own[0]);
             let touches = self.zones(car).any(|zone| is_of_entry(&zone) && zone.kind != Kind::Wide);
             for Meeting { own, its, kind, .. } in self.zones(car).filter(is_of_entry) {
                 // A car that runs together with the truck leads it once it is through.
@@ -169,7 +172,7 @@ impl Observing<'_> {
                 if has_left || (waits && its_line < its[0]) || (touches && kind == Kind::Wide) {
                     continue;
                 }
-                let speed = speed.max(LEAST_SPEED);
+                let speed = speed.max(LEAST_COMING_SPEED);
                 let distance = (its[0] - station).max(0.0);
                 let gone = (end + car.length() - station) / speed;
                 let coming = Coming { arrival: distance / speed, distance, gone };
@@ -220,7 +223,7 @@ impl Observing<'_> {
         for (rank, &(distance, slot)) in near.iter().take(N_NEAREST).enumerate() {
             let Some(outline) = outlines[slot].filter(|_| distance < NEAR_SCALE) else { break };
             let to = (outline.middle - self.origin) / NEAR_SCALE;
-            let velocity = cars[slot].speed() / SPEED_SCALE * outline.along;
+            let velocity = cars[slot].speed() / VEHICLE_SPEED_SCALE * outline.along;
             let in_frame = |vector: Vec2| [vector.dot(self.along), self.along.perp_dot(vector)];
             let ([ahead, left], [speed_ahead, speed_left]) = (in_frame(to), in_frame(velocity));
             for (group, value) in [1.0, ahead, left, speed_ahead, speed_left].into_iter().enumerate() {

@@ -1,21 +1,24 @@
 //! Other vehicles: each decides from where all were after the last step, all move, some leave and some come.
 
-use glam::Vec2;
-
 use crate::engine::Row;
 use crate::engine::cpu::follow::{followed, reference_point};
 use crate::layout::random::{self, Draw};
+use crate::layout::shared::constants;
 use crate::layout::{Progress, Stream, Truck};
 use crate::traffic::car::Outline;
 use crate::traffic::{self, Car, Clock, Contact, Entry, Event, Setting, Trucks, View, outlines, touched};
 use crate::world::{Level, Traffic, TrafficRoad, TrafficRoute, World};
 
-/// What a vehicle may brake with for a truck that is in nobody's way (m/s²).
-const GENTLE: f32 = 2.0;
-/// Room to other vehicles, along each unit and beside it, that a truck begins with (m).
-const ROOM: Vec2 = Vec2::new(7.0, 1.0);
-/// Twice the braking with which a truck that begins can stop behind a vehicle (m/s²).
-const STOPS_WITH: f32 = 3.0;
+constants! {
+    /// What a vehicle may brake with for a truck that is in nobody's way (m/s²).
+    const GENTLE: f32 = 2.0;
+    /// Room to other vehicles before and behind each unit that a truck begins with (m).
+    const ROOM_ALONG: f32 = 7.0;
+    /// Room beside each unit (m).
+    const ROOM_BESIDE: f32 = 1.0;
+    /// Twice the braking with which a truck that begins can stop behind a vehicle (m/s²).
+    const STOPS_BEHIND_WITH: f32 = 3.0;
+}
 
 /// Moves the vehicles around the row's truck, if the world has any.
 pub fn traffic(world: &World, row: &mut Row) {
@@ -134,8 +137,8 @@ pub fn surrounded(world: &World, shared: &Traffic, stream: Stream, truck: &Truck
     row.level = level;
     let drivers = Drivers::drawn(shared, stream, truck.episode);
     let grown = |unit: Outline| Outline {
-        half_length: unit.half_length + ROOM.x,
-        half_width: unit.half_width + ROOM.y,
+        half_length: unit.half_length + ROOM_ALONG,
+        half_width: unit.half_width + ROOM_BESIDE,
         ..unit
     };
     let units = outlines(world.rig(truck), truck).map(grown);
@@ -144,8 +147,8 @@ pub fn surrounded(world: &World, shared: &Traffic, stream: Stream, truck: &Truck
     // A truck could not stop behind it.
     let is_too_near_ahead = |car: &Car| {
         let room = car.station() - car.length() - front;
-        let stops = ((truck.speed * truck.speed - car.speed() * car.speed()) / STOPS_WITH).max(0.0);
-        road.network.paths[car.path()].source == source && 0.0 <= room && room < ROOM.x + stops
+        let stops = ((truck.speed * truck.speed - car.speed() * car.speed()) / STOPS_BEHIND_WITH).max(0.0);
+        road.network.paths[car.path()].source == source && 0.0 <= room && room < ROOM_ALONG + stops
     };
     for (slot, car) in row.cars.iter_mut().enumerate().filter(|(_, car)| car.is_there()) {
         let outline = car.outline(&road.network);

@@ -43,8 +43,9 @@ impl Batch {
         columns: Columns,
     ) -> Result<Batch, engine::Error> {
         check_world(device, world)?;
-        check_size(device, n_envs)?;
-        let host = engine::Batch::new(n_envs, seed, choice, world.traffic.is_some())?;
+        let has_vehicles = world.traffic.is_some();
+        check_size(device, n_envs, has_vehicles)?;
+        let host = engine::Batch::new(n_envs, seed, choice, has_vehicles)?;
         let buffers = Buffers::new(device, world, &host, &columns)?;
         let case = Case::of(world, host.autoreset());
         let room = Mutex::new(Some(host));
@@ -106,7 +107,8 @@ impl Batch {
     ) {
         let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor { label: None, timestamp_writes });
         for kernel in kernels {
-            let (group, threads) = (self.buffers.group(kernel), kernels::threads(kernel, self.n_envs));
+            let Some(group) = self.buffers.group(kernel) else { continue };
+            let threads = kernels::threads(kernel, self.n_envs);
             self.device.kernels().dispatch(&mut pass, kernel, group, threads);
         }
     }

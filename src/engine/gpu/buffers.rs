@@ -33,8 +33,8 @@ pub type Columns = Vec<(Column, Slice)>;
 pub(super) struct Buffers {
     /// Slices in the order of [`BUFFERS`].
     slices: Vec<Slice>,
-    /// For each kernel those that it names.
-    groups: Vec<BindGroup>,
+    /// For each kernel those that it names; none for kernels of vehicles that the world does not have.
+    groups: Vec<Option<BindGroup>>,
 }
 
 impl Buffers {
@@ -46,6 +46,7 @@ impl Buffers {
         external: &Columns,
     ) -> Result<Buffers, Error> {
         let n_envs = batch.n_envs();
+        let has_vehicles = world.traffic.is_some();
         let tables = Tables::new(world);
         let made = BUFFERS.into_iter().map(|buffer| match buffer {
             Shared::Table(Table::Batch) => Ok(device.filled(buffer.name(), bytes_of(&BatchFacts::of(batch)))),
@@ -55,22 +56,28 @@ impl Buffers {
                 Some(bytes) => device.filled(table.name(), bytes),
                 None => device.empty(table.name(), (n_envs * size_of::<BeginRow>()) as u64),
             }),
-            Shared::Column(column) => column_slice(device, column, n_envs, external),
+            Shared::Column(column) => {
+                let n_rows = column.n_rows(n_envs, has_vehicles);
+                column_slice(device, column, n_rows, external)
+            }
             Shared::Tally => Ok(device.empty(buffer.name(), (2 * N_SUMS * size_of::<u32>()) as u64)),
         });
         let slices: Vec<Slice> = made.collect::<Result<_, Error>>()?;
         let group = |&kernel: &Kernel| {
+            if kernel.is_of_vehicles() && !has_vehicles {
+                return None;
+            }
             let named = kernel.buffers().iter().map(|buffer| (buffer.binding() as u32, &slices[buffer.binding()]));
-            device.kernels().bind(&device.device, kernel, named)
+            Some(device.kernels().bind(&device.device, kernel, named))
         };
         let groups = Kernel::ALL.iter().map(group).collect();
         device.check()?;
         Ok(Buffers { slices, groups })
     }
 
-    /// The buffers that a kernel names.
-    pub(super) fn group(&self, kernel: Kernel) -> &BindGroup {
-        &self.groups[kernel.index()]
+    /// The buffers that a kernel names; none if it is of vehicles that the world does not have.
+    pub(super) fn group(&self, kernel: Kernel) -> Option<&BindGroup> {
+        self.groups[kernel.index()].as_ref()
     }
 
     pub(super) fn table(&self, table: Table) -> &Slice {
@@ -93,8 +100,7 @@ impl Buffers {
 
 /// The caller's slice for a column, or a buffer of zeros.
 fn column_slice(device: &Device, column: Column, n_envs: usize, external: &Columns) -> Result<Slice, Error> {
-    // A device has no vehicles.
-    let needed = column.n_rows(n_envs * column.width(), false) as u64;
+    let needed = (n_envs * column.width()) as u64;
     match external.iter().find(|(known, _)| *known == column) {
         None => Ok(device.empty(column.name(), needed)),
         Some((_, slice)) if needed <= slice.size => Ok(Slice { size: needed, ..slice.clone() }),
@@ -110,9 +116,6 @@ fn largest(device: &Device) -> u64 {
 
 /// An error if a table of the world is larger than that.
 pub(super) fn check_world(device: &Device, world: &World) -> Result<(), Error> {
-    if world.traffic.is_some() {
-        return Err(Error::Vehicles);
-    }
     let limit = largest(device);
     let n_roundabouts = world.fields.len();
     match sizes(world).into_iter().map(|(table, n_bytes)| (table, n_bytes as u64)).find(|(_, n_bytes)| limit < *n_bytes)
@@ -130,9 +133,9 @@ pub(super) fn check_world(device: &Device, world: &World) -> Result<(), Error> {
 }
 
 /// An error if a column of so many trucks is larger than the adapter's largest buffer.
-pub(super) fn check_size(device: &Device, n_envs: usize) -> Result<(), Error> {
+pub(super) fn check_size(device: &Device, n_envs: usize, has_vehicles: bool) -> Result<(), Error> {
     let limit = largest(device);
-    for column in Column::of_trucks() {
+    for &column in Column::ALL.iter().filter(|column| has_vehicles || !column.is_of_vehicles()) {
         let n_bytes = (n_envs as u64).saturating_mul(column.width() as u64);
         if limit < n_bytes {
             let (adapter, fitting) = (device.adapter.get_info().name, limit / column.width() as u64);

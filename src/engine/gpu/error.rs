@@ -91,9 +91,6 @@ pub enum Error {
         /// Bytes needed.
         needed: u64,
     },
-    /// No kernel moves other vehicles.
-    #[error("the benchmark has [traffic], which only the CPU steps: leave the device out, or the table")]
-    Vehicles,
     /// External columns cannot change their number of rows.
     #[error("the batch has external columns: its trucks cannot be gathered")]
     ExternalColumns,

@@ -1,31 +1,37 @@
 //! What a car does before its line: it waits for a gap in what has entered, and is let in at times.
 
 use super::{Driver, LEAST_SPEED, Seen};
+use crate::layout::shared::constants;
 use crate::traffic::bake::ENTRY;
 use crate::traffic::model::{time, way_of_a_second};
 use crate::traffic::network::{Kind, Stretch};
 use crate::traffic::rules::TIME_PARTS;
 use crate::traffic::units::{falls_below, length, speed, time as ticks};
 
-/// Zones that begin up to here behind the line are those of the entry.
-const OF_ENTRY: i32 = length(ENTRY as f32);
-/// Least speed in the time to the line.
-const LEAST_APPROACH: i32 = speed(3.0);
-/// Least speed in the time until a crossing is free.
-pub(in crate::traffic) const LEAST_CROSSING: i32 = speed(1.0);
-/// Steps of standing after which a lag would be 0, and how many are left of them at least.
-const IMPATIENCE: i32 = 100;
-const LEAST_PATIENCE: i32 = 30;
-/// Time by which a car that crosses ahead must be gone before this one is there.
-pub(in crate::traffic) const GONE_BEFORE: i32 = ticks(0.5);
-/// A car that follows one slower than this stays off the lanes that it crosses.
-const SLOW: i32 = speed(3.0);
-/// A car is let in within this distance of its line, below this speed.
-const LET_IN_WITHIN: i32 = length(4.0);
-const LET_IN_BELOW: i32 = speed(4.0);
-/// Twice the braking with which a car lets another in (m/s²), so far before the zone.
-const LETS_IN_WITH: i32 = 3;
-const LETS_IN_BEFORE: i32 = length(1.5);
+constants! {
+    /// Zones that begin up to here behind the line are those of the entry (2^-10 m).
+    const OF_ENTRY: i32 = length(ENTRY as f32);
+    /// Least speed in the time to the line (2^-14 m a step).
+    const LEAST_APPROACH: i32 = speed(3.0);
+    /// Least speed in the time until a crossing is free (2^-14 m a step).
+    pub(in crate::traffic) const LEAST_CROSSING: i32 = speed(1.0);
+    /// Steps of standing after which a lag would be 0.
+    const IMPATIENCE: i32 = 100;
+    /// How many are left of them at least.
+    const LEAST_PATIENCE: i32 = 30;
+    /// Time by which a car that crosses ahead must be gone before this one is there (1/256 step).
+    pub(in crate::traffic) const GONE_BEFORE: i32 = ticks(0.5);
+    /// A car that follows one slower than this stays off the lanes that it crosses (2^-14 m a step).
+    const SLOW: i32 = speed(3.0);
+    /// A car is let in within this distance of its line (2^-10 m).
+    const LET_IN_WITHIN: i32 = length(4.0);
+    /// The same below this speed (2^-14 m a step).
+    const LET_IN_BELOW: i32 = speed(4.0);
+    /// Twice the braking with which a car lets another in (m/s²).
+    const LETS_IN_WITH: i32 = 3;
+    /// It does so far before the zone (2^-10 m).
+    const LETS_IN_BEFORE: i32 = length(1.5);
+}
 
 impl Driver<'_> {
     /// Whether a zone is one of this car's entry.

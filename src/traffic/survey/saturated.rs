@@ -2,7 +2,7 @@
 
 use super::{Counts, Survey};
 use crate::layout::Stream;
-use crate::traffic::units::FAR;
+use crate::traffic::units::BEYOND;
 use crate::traffic::{Demand, Error, Mix};
 
 /// A flow too small to matter: cars of a full source come from its queue, in these shares (veh/h).
@@ -67,7 +67,7 @@ impl Survey<'_> {
     }
 
     fn goes_past(&self, path: usize, arm: usize) -> bool {
-        self.passes[path * self.network.n_arms + arm] < FAR
+        self.passes[path * self.network.n_arms + arm] < BEYOND
     }
 
     fn is_u_turn(&self, path: usize) -> bool {

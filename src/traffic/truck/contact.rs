@@ -5,23 +5,29 @@ use glam::Vec2;
 use super::corridor::front;
 use super::view::{outlines, yaw_rate};
 use crate::layout::angle::{direction, sin_cos};
+use crate::layout::shared::constants;
 use crate::layout::{Rig, Truck};
 use crate::traffic::car::Outline;
 use crate::traffic::units::{length, speed};
 use crate::traffic::{Car, Network};
 
-/// Time before a contact at which it is asked where the truck was (s).
-const BEFORE: f32 = 1.0;
-/// A truck has entered lately if it did so within so many steps.
-const LATELY: u32 = 30;
-/// A car has entered lately if it is not farther behind its line than it drives in this time, or than it comes in it
-/// from standing (steps, 2^-10 m).
-const LATELY_OF_CAR: i32 = LATELY as i32;
-const FROM_STANDING: i32 = length(9.0);
-/// No part of a car is farther from the sample behind its front, and no corner of a unit from the end of its axis (m).
-const NEAR: f32 = 12.0;
-/// Below this speed a car stands, and hits nobody.
-const STANDS: i32 = speed(0.05);
+constants! {
+    /// Time before a contact at which it is asked where the truck was (s).
+    const BEFORE_CONTACT: f32 = 1.0;
+    /// A truck has entered lately if it did so within so many steps.
+    const LATELY: u32 = 30;
+    /// A car has entered lately if it is not farther behind its line than it drives in this time, or than it comes in
+    /// it from standing (2^-10 m).
+    const FROM_STANDING: i32 = length(9.0);
+    /// No part of a car is farther from the sample behind its front, and no corner of a unit from the end of its axis
+    /// (m).
+    const NEAR_CAR: f32 = 12.0;
+    /// Below this speed a car stands, and hits nobody (2^-14 m a step).
+    const HITS_NOBODY: i32 = speed(0.05);
+
+    /// Added to a contact's code where the truck is at fault: more than there are slots.
+    const TRUCKS_FAULT: u32 = 64;
+}
 
 /// A contact of a truck with a car.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,9 +37,6 @@ pub struct Contact {
     /// Whether the truck is at fault, or the car.
     pub is_trucks_fault: bool,
 }
-
-/// Added to a contact's code where the truck is at fault: more than there are slots.
-const TRUCKS_FAULT: u32 = 64;
 
 impl Contact {
     /// The contact in a word: its slot plus 1, and 64 more where the truck is at fault.
@@ -63,7 +66,7 @@ pub fn touched(network: &Network, rig: &Rig, truck: &Truck, entry: Entry, cars: 
     let now = outlines(rig, truck);
     let [tractor, trailer] = now;
     let middle = 0.5 * (tractor.middle + trailer.middle);
-    let reach = 0.5 * tractor.middle.distance(trailer.middle) + tractor.half_length.max(trailer.half_length) + NEAR;
+    let reach = 0.5 * tractor.middle.distance(trailer.middle) + tractor.half_length.max(trailer.half_length) + NEAR_CAR;
     let is_near = |car: &Car| front(network, car).distance_squared(middle) < reach * reach;
     let near = cars.iter().enumerate().filter(|(_, car)| car.is_there() && is_near(car));
     let contacts = near.filter_map(|(slot, car)| {
@@ -86,18 +89,18 @@ fn is_cars_fault(network: &Network, before: &[Outline; 2], entry: Entry, car: &C
     let was_there = before.iter().any(|unit| unit.overlaps(outline));
     let behind_line = car.front() - network.paths[car.path()].line;
     // 2^-14 m a step for some steps.
-    let lately = FROM_STANDING.max((LATELY_OF_CAR * car.pace()) >> 4);
+    let lately = FROM_STANDING.max((LATELY.cast_signed() * car.pace()) >> 4);
     let cuts_in = entry.steps.is_some()
         && network.source_of(car.path()).entry != entry.arm
         && (1..=lately).contains(&behind_line);
-    STANDS < car.pace() && !has_entered_lately && (was_there || cuts_in)
+    HITS_NOBODY < car.pace() && !has_entered_lately && (was_there || cuts_in)
 }
 
 /// The ground that both units covered a second ago, each driven back along its circle.
 fn outlines_before(rig: &Rig, truck: &Truck) -> [Outline; 2] {
     let [tractor, trailer] = outlines(rig, truck);
     // At constant acceleration; a truck that stood did not drive backwards.
-    let way = BEFORE * (truck.speed - 0.5 * BEFORE * truck.acceleration).max(0.0);
+    let way = BEFORE_CONTACT * (truck.speed - 0.5 * BEFORE_CONTACT * truck.acceleration).max(0.0);
     let (sin, cos) = sin_cos(truck.heading - truck.trailer_heading);
     let turn = if truck.speed == 0.0 { 0.0 } else { way * yaw_rate(rig, truck) / truck.speed };
     let trailer_turn = (way * sin + rig.fifth_wheel * turn * cos) / rig.trailer_wheelbase;

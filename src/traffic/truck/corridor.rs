@@ -4,6 +4,7 @@
 use glam::Vec2;
 
 use super::view::View;
+use crate::layout::shared::constants;
 use crate::traffic::car::Outline;
 use crate::traffic::decide::Driver;
 use crate::traffic::model::ONE;
@@ -11,41 +12,47 @@ use crate::traffic::network::SPACING;
 use crate::traffic::units::{length, speed};
 use crate::traffic::{Car, Network, Sample};
 
-/// Samples of a path that are a car's corridor, from the one behind its front on.
-const N_SAMPLES: usize = 16;
+constants! {
+    /// Samples of a path that are a car's corridor, from the one behind its front on.
+    const CORRIDOR_SAMPLES: usize = 16;
+    /// Room beside a car to what is in its corridor now (m).
+    const CORRIDOR_ROOM: f32 = 0.7;
+    /// The same beside its front itself (m).
+    const ROOM_AT_FRONT: f32 = 0.4;
+    /// The same to what will be in its corridor (m).
+    const ROOM_LATER: f32 = 0.5;
+    /// What is at a sample may begin half a spacing before it (m).
+    const BEFORE_SAMPLE: f32 = 0.5 * SPACING;
+    /// A car that can wait does so for what begins so far behind its line (2^-10 m).
+    const BEHIND_LINE: i32 = length(2.0);
+    /// Interaction of the hardest braking, 8 m/s².
+    const BRAKES_HARDEST: i32 = 5 * ONE;
+    /// That of 3 m/s² at low speed, with which a car slows at most for what will be.
+    const BRAKES_GENTLY: i32 = ONE + 3 * ONE / 2;
+    /// A unit this near to a car's front may be touched soon (m).
+    const NEAR_UNIT: f32 = 8.0;
+    /// Steps in which a car foresees its own way.
+    const CAR_STEPS_AHEAD: i32 = 4;
+    /// It does so 0.3 m farther (2^-20 m).
+    const MORE_AHEAD: i32 = 314_573;
+    /// Room that it keeps then (m).
+    const LEAST_ROOM: f32 = 0.15;
+}
+
 /// Length of a corridor, and of the first part of a path that must be free where a car enters (m).
-const REACH: f32 = N_SAMPLES as f32 * SPACING;
-/// Room beside a car to what is in its corridor now, beside its front itself, and to what will be there (m).
-const ROOM: f32 = 0.7;
-const ROOM_AT_FRONT: f32 = 0.4;
-const ROOM_LATER: f32 = 0.5;
-/// What is at a sample may begin half a spacing before it (m).
-const BEFORE_SAMPLE: f32 = 0.5 * SPACING;
-/// A car that can wait does so for what begins so far behind its line.
-const BEHIND_LINE: i32 = length(2.0);
-/// Interaction of the hardest braking, 8 m/s², and of 3 m/s² at low speed, with which a car slows at most for what will
-/// be.
-const HARDEST: i32 = 5 * ONE;
-const GENTLE: i32 = ONE + 3 * ONE / 2;
-/// A unit this near to a car's front may be touched soon (m).
-const NEAR: f32 = 8.0;
-/// A car foresees its own way in 0.4 s, and 0.3 m more (steps, 2^-20 m).
-const STEPS_AHEAD: i32 = 4;
-const MORE: i32 = 314_573;
-/// Room that it keeps then (m).
-const LEAST_ROOM: f32 = 0.15;
+const REACH: f32 = CORRIDOR_SAMPLES as f32 * SPACING;
 
 /// Points side by side, so that all are measured at once.
 struct Points {
-    x: [f32; N_SAMPLES],
-    y: [f32; N_SAMPLES],
+    x: [f32; CORRIDOR_SAMPLES],
+    y: [f32; CORRIDOR_SAMPLES],
 }
 
 impl Points {
     /// Points of samples; of those that there are not, points that are near nothing.
     fn of(samples: &[Sample]) -> Points {
-        let mut points = Points { x: [1e9; N_SAMPLES], y: [1e9; N_SAMPLES] };
-        for (index, sample) in samples.iter().take(N_SAMPLES).enumerate() {
+        let mut points = Points { x: [1e9; CORRIDOR_SAMPLES], y: [1e9; CORRIDOR_SAMPLES] };
+        for (index, sample) in samples.iter().take(CORRIDOR_SAMPLES).enumerate() {
             (points.x[index], points.y[index]) = sample.position.into();
         }
         points
@@ -53,8 +60,8 @@ impl Points {
 
     /// Squared distance of each to the nearest of some rectangles, 0 inside them (m²); of those that the corridor, which
     /// begins at a point, cannot reach, any great one.
-    fn to_nearest(&self, outlines: &[Outline], begins: Vec2) -> [f32; N_SAMPLES] {
-        let mut nearest = [f32::MAX; N_SAMPLES];
+    fn to_nearest(&self, outlines: &[Outline], begins: Vec2) -> [f32; CORRIDOR_SAMPLES] {
+        let mut nearest = [f32::MAX; CORRIDOR_SAMPLES];
         for Outline { middle, along, half_length, half_width } in outlines {
             let reach = REACH + half_length + half_width;
             if reach * reach < middle.distance_squared(begins) {
@@ -82,7 +89,8 @@ pub(super) fn mind(view: &View, driver: &mut Driver) {
     let samples = corridor(network, &car, first);
     let points = Points::of(samples);
     let station = |index: usize| (first + index) as f32 * SPACING;
-    let room = |index: usize| car.half_width() + if station(index) < car.station() { ROOM_AT_FRONT } else { ROOM };
+    let room =
+        |index: usize| car.half_width() + if station(index) < car.station() { ROOM_AT_FRONT } else { CORRIDOR_ROOM };
     let now = points.to_nearest(&view.now, at_front);
     let leader = (0..samples.len()).find(|&index| now[index] < room(index) * room(index));
     if let Some(index) = leader {
@@ -105,7 +113,7 @@ pub(super) fn mind(view: &View, driver: &mut Driver) {
         }
     }
     if touches_soon(view, network, &car, at_front) {
-        driver.heed(HARDEST);
+        driver.heed(BRAKES_HARDEST);
     }
 }
 
@@ -115,17 +123,17 @@ fn slow(view: &View, driver: &mut Driver, rear: i32) {
     if me.waits && me.line < rear {
         driver.wait_at_line();
     } else {
-        driver.heed(driver.behind(rear - me.station, view.speed / 2).min(GENTLE));
+        driver.heed(driver.behind(rear - me.station, view.speed / 2).min(BRAKES_GENTLY));
     }
 }
 
 /// Whether a car is about to touch a truck, with its front near a point.
 fn touches_soon(view: &View, network: &Network, car: &Car, front: Vec2) -> bool {
-    if !view.now.iter().any(|unit| unit.distance_squared(front) < NEAR * NEAR) {
+    if !view.now.iter().any(|unit| unit.distance_squared(front) < NEAR_UNIT * NEAR_UNIT) {
         return false;
     }
     // A station's unit is half of a speed's way in a step.
-    let soon = Car { station: car.station + 2 * STEPS_AHEAD * car.speed + MORE, ..*car }.outline(network);
+    let soon = Car { station: car.station + 2 * CAR_STEPS_AHEAD * car.speed + MORE_AHEAD, ..*car }.outline(network);
     let grown = |unit: &Outline| Outline {
         half_length: unit.half_length + LEAST_ROOM,
         half_width: unit.half_width + LEAST_ROOM,
@@ -141,7 +149,7 @@ pub(super) fn ahead(view: &View, network: &Network, car: &Car) -> Option<(i32, i
         return None;
     }
     let samples = corridor(network, car, 0);
-    let beside = car.half_width() + ROOM;
+    let beside = car.half_width() + CORRIDOR_ROOM;
     let now = Points::of(samples).to_nearest(&view.now, samples[0].position);
     let index = now[..samples.len()].iter().position(|&squared| squared < beside * beside)?;
     let speed = speed(view.velocity.dot(samples[index].direction).max(0.0));
@@ -168,5 +176,5 @@ pub(super) fn front(network: &Network, car: &Car) -> Vec2 {
 /// The samples of a car's path from one on.
 fn corridor<'a>(network: &'a Network, car: &Car, first: usize) -> &'a [Sample] {
     let path = &network.paths[car.path()];
-    &network.samples[path.first as usize + first..][..(path.n as usize - first).min(N_SAMPLES)]
+    &network.samples[path.first as usize + first..][..(path.n as usize - first).min(CORRIDOR_SAMPLES)]
 }

@@ -2,13 +2,16 @@
 //! enter beside it.
 
 use super::view::View;
+use crate::layout::shared::constants;
 use crate::traffic::decide::{Driver, GONE_BEFORE, LEAST_CROSSING, LEAST_SPEED, LEFT, SIGHT, SIGHT_OF_OTHERS};
 use crate::traffic::model::time;
 use crate::traffic::network::{Kind, Stretch};
 use crate::traffic::units::time as ticks;
 
-/// A truck takes longer to pass than a car: so much is added to the lag.
-const LONGER: i32 = ticks(1.5);
+constants! {
+    /// A truck takes longer to pass than a car: so much is added to the lag (1/256 step).
+    const LAG_OF_TRUCK: i32 = ticks(1.5);
+}
 
 /// Takes a truck's place on its path into account.
 pub(super) fn mind(view: &View, driver: &mut Driver) {
@@ -38,7 +41,7 @@ fn is_in_the_way(view: &View, driver: &Driver, zone: &Stretch) -> bool {
         let comes = time(zone.b_in - view.station, speed);
         let gone = comes + time(zone.b_out - zone.b_in + view.length, speed);
         // Beside a truck a car needs as much time as where their paths meet.
-        return comes < driver.lag(Kind::Follow) + LONGER + to_line && to_line < gone;
+        return comes < driver.lag(Kind::Follow) + LAG_OF_TRUCK + to_line && to_line < gone;
     }
     match zone.kind {
         // It may need the lanes beside its own.

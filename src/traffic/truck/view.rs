@@ -4,17 +4,21 @@
 use glam::Vec2;
 
 use crate::layout::angle::{direction, sin_cos};
+use crate::layout::shared::constants;
 use crate::layout::{Body, Rig, Truck};
 use crate::traffic::Network;
 use crate::traffic::car::Outline;
 use crate::traffic::model::{FASTEST, square, still_stops, way_of_a_second};
 use crate::traffic::units::{length, speed};
 
-/// A truck swings out before its line: it has entered so far before the line of cars.
-const SWINGS_OUT: i32 = length(2.5);
-/// Steps to each of the two times at which it is foreseen, and how long they are (s).
-const STEPS_AHEAD: usize = 2;
-const STEP_AHEAD: f32 = 0.5;
+constants! {
+    /// A truck swings out before its line: it has entered so far before the line of cars (2^-10 m).
+    const SWINGS_OUT: i32 = length(2.5);
+    /// Steps to each of the two times at which it is foreseen.
+    const STEPS_AHEAD: usize = 2;
+    /// How long they are (s).
+    const STEP_AHEAD: f32 = 0.5;
+}
 
 /// A truck as cars see it.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use offtrack::engine::stages::STAGES;
-use offtrack::layout::N_VALUES;
 use offtrack::simulator::{Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 use offtrack_evaluation::placed::placed;
@@ -62,7 +61,8 @@ impl Learner {
     fn actor(&self, mode: Mode) -> Mlp {
         match mode {
             Mode::LargePolicy => {
-                let sizes = [&[N_VALUES + self.policy.extras.len()], &LARGE[..], &[self.policy.actions.len()]].concat();
+                let n_values = self.policy.normalisation.mean.len();
+                let sizes = [&[n_values], &LARGE[..], &[self.policy.actions.len()]].concat();
                 Mlp::untrained(&sizes, 0)
             }
             _ => Mlp::of_policy(&self.policy),

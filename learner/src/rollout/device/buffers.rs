@@ -75,6 +75,9 @@ impl<const N: usize> DeviceRollout<N> {
         let batch =
             self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
         let column = |column: Column| batch.column(column).clone();
+        // Where they are not observed any buffer will do.
+        let of_vehicles =
+            |of: Column| if super::super::n_around(N) == 0 { empty(size_of::<f32>()) } else { column(of) };
         let row_bytes = N * size_of::<f32>();
         let buffers = Buffers::new(vec![
             (Binding::facts, filled(bytes_of(&self.facts))),
@@ -87,6 +90,8 @@ impl<const N: usize> DeviceRollout<N> {
             (Binding::next_observation, column(Column::NextObservation)),
             (Binding::extras, column(Column::Extras)),
             (Binding::next_extras, column(Column::NextExtras)),
+            (Binding::around, of_vehicles(Column::Around)),
+            (Binding::next_around, of_vehicles(Column::NextAround)),
             (Binding::ended, column(Column::Ended)),
             (Binding::reward, column(Column::Reward)),
             (Binding::driven, empty(self.config.n_envs * 4)),

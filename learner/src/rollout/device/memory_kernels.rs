@@ -20,8 +20,10 @@ offtrack::shared! {
         pub n_slots: u32,
         /// Entries of the action table.
         pub n_actions: u32,
-        /// Values that the networks observe: those of an observation, and the extras behind them.
+        /// Values that the networks observe: those of an observation, the extras behind them, and other vehicles.
         pub n_values: u32,
+        /// Extras among them.
+        pub n_extras: u32,
         /// Transitions in a sample.
         pub n_rows: u32,
         /// Steps of the n-step return.
@@ -122,6 +124,8 @@ bindings! {
     next_observation: "f32".to_owned(), false, "The simulator's column of next observations, [n_envs, N_VALUES].";
     extras: "f32".to_owned(), false, "The simulator's column of extras, [n_envs, N_EXTRAS].";
     next_extras: "f32".to_owned(), false, "The simulator's column of next extras, [n_envs, N_EXTRAS].";
+    around: "f32".to_owned(), false, "The simulator's column of other vehicles, [n_envs, N_AROUND], where they count.";
+    next_around: "f32".to_owned(), false, "The same after the step.";
     ended: "u32".to_owned(), false, "The simulator's column of end codes, [n_envs].";
     reward: "f32".to_owned(), false, "The simulator's column of rewards, [n_envs].";
     held_observation: "f32".to_owned(), false, "The ring: observations, [n_slots, n_envs, n_values].";
@@ -193,12 +197,21 @@ impl Kernel {
         match self {
             Kernel::Choose => &[facts, now, action, logits],
             Kernel::StoreBefore => {
-                &[facts, now, action, truck, observation, extras, held_observation, held_action, driven]
+                &[facts, now, action, truck, observation, extras, around, held_observation, held_action, driven]
             }
             Kernel::CountEnds => &[facts, ended, driven, route_ends],
-            Kernel::StoreAfter => {
-                &[facts, now, next_observation, next_extras, ended, reward, held_next, held_reward, held_ended]
-            }
+            Kernel::StoreAfter => &[
+                facts,
+                now,
+                next_observation,
+                next_extras,
+                next_around,
+                ended,
+                reward,
+                held_next,
+                held_reward,
+                held_ended,
+            ],
             Kernel::Admit => &[facts, now, priority, largest],
             Kernel::SumBlocks => &[facts, priority, block_sum],
             Kernel::AddUp => &[facts, block_sum, reached],

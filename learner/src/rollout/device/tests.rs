@@ -73,6 +73,30 @@ fn samples_have_the_extras_that_a_benchmark_observes() {
     check_samples::<MASS>("laden2026");
 }
 
+#[test]
+fn samples_have_what_a_benchmark_observes_of_vehicles() {
+    check_samples::<{ N_VALUES + N_AROUND }>("traffic2026");
+}
+
+#[test]
+fn networks_act_by_the_values_the_first_extras_and_then_the_vehicles() {
+    const BOTH: usize = N_VALUES + ObservedExtras::Mass.n_extras() + N_AROUND;
+    let mut scenario = Scenario::named("traffic2026").unwrap();
+    scenario.keep(&[Split::Test]);
+    scenario.extras = ObservedExtras::Mass;
+    let (world, routes) = (Arc::new(World::bake(&scenario).unwrap()), scenario.split(Split::Test).to_vec());
+    let mut rollout =
+        DeviceRollout::<BOTH>::new(&Shared::least().unwrap(), &config(&[]), &world, routes, None).unwrap();
+    rollout.step_at_random().unwrap();
+    rollout.wait().unwrap();
+    let acted_by = host(&rollout.normalised());
+    let batch = rollout.simulator().batch();
+    let seen = observed::<BOTH>(&batch.observation, &batch.extras, &batch.around);
+    let clipped: Vec<f32> = seen.iter().flatten().map(|value| value.clamp(-LIMIT, LIMIT)).collect();
+    assert!(batch.around.iter().flatten().any(|&value| value != 0.0));
+    assert_eq!(acted_by, clipped);
+}
+
 /// Compares samples of a benchmark whose networks observe `N` values with the steps that were made.
 fn check_samples<const N: usize>(benchmark: &str) {
     let (world, routes) = training_of(benchmark);

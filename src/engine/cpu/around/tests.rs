@@ -106,7 +106,7 @@ fn values_lie_in_their_ranges_and_those_that_may_be_1_or_0_are_at_times() {
         });
     }
     assert!(ends[..LINE_AT].iter().all(|&[low, high]| low && high), "{ends:?}");
-    assert!(ends[ENTERED_AT] == [true; 2] && ends[NEAREST_AT] == [true; 2]);
+    assert!(ends[HAS_ENTERED_AT] == [true; 2] && ends[NEAREST_AT] == [true; 2]);
 }
 
 #[test]

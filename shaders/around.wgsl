@@ -1,0 +1,333 @@
+// Writes what is observed of other vehicles: 42 values, see src/layout/vehicles.rs.
+//
+// What comes to the own entry, and what is ahead, follow from the zones in which the truck's path meets those of the
+// others. Every value is a least one or one in the order of distances.
+
+// Farther than everything that is observed (m, s).
+const NOWHERE: f32 = 1e9;
+
+// Where an entry point has values written: as those after the action, and as those before the next one.
+var<private> writes_next: bool;
+var<private> writes_first: bool;
+
+// What is observed after the action.
+@compute @workgroup_size(WORKGROUP)
+fn observe_around(thread: Thread) {
+    writes_next = true;
+    writes_first = false;
+    let env = index_of(thread);
+    if is_driving(env) { look(env); }
+}
+
+// The same as what is observed before the next action.
+@compute @workgroup_size(WORKGROUP)
+fn copy_around(thread: Thread) {
+    let env = index_of(thread);
+    if !is_driving(env) { return; }
+    for (var n = 0u; n < N_AROUND; n++) { around[env * N_AROUND + n] = next_around[env * N_AROUND + n]; }
+}
+
+// Both at once.
+@compute @workgroup_size(WORKGROUP)
+fn around_both(thread: Thread) {
+    writes_next = true;
+    writes_first = true;
+    let env = index_of(thread);
+    if is_driving(env) { look(env); }
+}
+
+// What the trucks observe first that began another episode. With NEXT_STEP they have no last step.
+@compute @workgroup_size(WORKGROUP)
+fn around_after_reset(thread: Thread) {
+    writes_next = batch.autoreset == NEXT_STEP;
+    writes_first = true;
+    let env = index_of(thread);
+    if has_begun(env) { look(env); }
+}
+
+// Takes back what describes the last step of the trucks that the caller named: they have none.
+@compute @workgroup_size(WORKGROUP)
+fn forget_around(thread: Thread) {
+    let env = index_of(thread);
+    if !is_to_begin(env) { return; }
+    for (var n = 0u; n < N_AROUND; n++) { next_around[env * N_AROUND + n] = around[env * N_AROUND + n]; }
+}
+
+// Writes a value of a truck.
+fn write_seen(env: u32, value: u32, seen: f32) {
+    if writes_next { next_around[env * N_AROUND + value] = seen; }
+    if writes_first { around[env * N_AROUND + value] = seen; }
+}
+
+// A truck that looks around: where it is on its path, and on the ground.
+struct Looking {
+    network: Network,
+    path: u32,
+    // Station of the line before the ring (m).
+    line: f32,
+    // Station of its front, as vehicles see it (m).
+    front: f32,
+    // Length of both units (m).
+    length: f32,
+    tractor: Outline,
+    trailer: Outline,
+    // Middle of the drive axle (m).
+    origin: vec2<f32>,
+    // Unit vector along the tractor.
+    along: vec2<f32>,
+}
+
+fn looking_of(env: u32) -> Looking {
+    let at = truck[env];
+    let rig = vehicles[at.vehicle].rig;
+    let network = network_of(at.route);
+    let path = lanes[lanes_row(at.route) + 1u];
+    return Looking(
+        network,
+        path,
+        in_metres(line_of_path(network, path)),
+        in_metres(in_lengths(front_station(env))),
+        in_metres(stretched(rig)),
+        unit_outline(rig.tractor_body, at.position, at.heading),
+        unit_outline(rig.trailer_body, trailer_position(rig, at), at.trailer_heading),
+        at.position,
+        direction(at.heading),
+    );
+}
+
+// A length of decisions in metres.
+fn in_metres(length: i32) -> f32 {
+    return f32(length) * (1.0 / METRE);
+}
+
+// Writes what a truck observes of the cars around it.
+fn look(env: u32) {
+    let looking = looking_of(env);
+    look_at_entry(env, looking);
+    write_seen(env, LINE_AT, clamp((looking.line - looking.front) / GAP_SCALE, 0.0, 1.0));
+    write_seen(env, HAS_ENTERED_AT, select(0.0, 1.0, looking.line < looking.front));
+    look_ahead(env, looking);
+    look_beside(env, looking);
+}
+
+// A zone of the truck's path with that of a car, in metres.
+struct Meeting {
+    // Where it begins and ends on the truck's path.
+    own_in: f32,
+    own_out: f32,
+    // Where it begins and ends on the car's.
+    its_in: f32,
+    its_out: f32,
+    // Station on the car's path less that on the truck's.
+    delta: f32,
+    kind: u32,
+}
+
+fn meeting_at(network: Network, index: u32) -> Meeting {
+    let zone = zone_at(network.zones + ZONE_WORDS * index);
+    return Meeting(
+        in_metres(zone.a_in),
+        in_metres(zone.a_out),
+        in_metres(zone.b_in),
+        in_metres(zone.b_out),
+        in_metres(zone.delta),
+        zone.kind,
+    );
+}
+
+// The zones of a truck's path with that of a car, those for a truck alone among them: the first, and how many.
+fn zones_of(looking: Looking, car: Car) -> vec2<u32> {
+    let network = looking.network;
+    let pair = lanes[network.pairs + PAIR_WORDS * (looking.path * network.n_paths + path_of(car))];
+    return vec2<u32>(pair & 0xffffu, pair >> 24u);
+}
+
+// A vehicle that comes to the entry.
+struct Coming {
+    // Time until it is there (s).
+    arrival: f32,
+    // Distance that it has to go (m).
+    distance: f32,
+    // Time until it has left (s).
+    gone: f32,
+}
+
+// The one of two that is there first; of two that are there together, the one that takes longer to leave.
+fn first_of(one: Coming, other: Coming) -> Coming {
+    if one.arrival != other.arrival {
+        if one.arrival < other.arrival { return one; }
+        return other;
+    }
+    if one.gone != other.gone {
+        if other.gone < one.gone { return one; }
+        return other;
+    }
+    if one.distance <= other.distance { return one; }
+    return other;
+}
+
+fn is_beside(kind: u32) -> bool {
+    return kind == SOFT || kind == WIDE;
+}
+
+fn is_of_own_entry(looking: Looking, meeting: Meeting) -> bool {
+    return meeting.own_in <= looking.line + ENTRY_REACH && (is_beside(meeting.kind) || looking.line < meeting.own_in);
+}
+
+// Writes the first vehicle that comes to the entry, by lane.
+fn look_at_entry(env: u32, looking: Looking) {
+    var near = Coming(NOWHERE, NOWHERE, NOWHERE);
+    var beyond = Coming(NOWHERE, NOWHERE, NOWHERE);
+    for (var slot = 0u; slot < N_CARS; slot++) {
+        let car = car_at(env, slot);
+        if !is_there(car) { continue; }
+        let station = station_of(car);
+        let its_line = in_metres(line_of_path(looking.network, path_of(car)));
+        let waits = station + speed_of(car) * speed_of(car) / STILL_STOPS_WITH <= its_line;
+        let zones = zones_of(looking, car);
+        var touches = false;
+        for (var z = 0u; z < zones.y; z++) {
+            let meeting = meeting_at(looking.network, zones.x + z);
+            touches = touches || (is_of_own_entry(looking, meeting) && meeting.kind != WIDE);
+        }
+        for (var z = 0u; z < zones.y; z++) {
+            let meeting = meeting_at(looking.network, zones.x + z);
+            if !is_of_own_entry(looking, meeting) { continue; }
+            // A car that runs together with the truck leads it once it is through.
+            let end = select(meeting.its_out, meeting.its_in, meeting.kind == FOLLOW);
+            let has_left = meeting.own_out < looking.front - looking.length || end < station - length_of(car);
+            if has_left || (waits && its_line < meeting.its_in) || (touches && meeting.kind == WIDE) { continue; }
+            let speed = max(speed_of(car), LEAST_COMING_SPEED);
+            let distance = max(meeting.its_in - station, 0.0);
+            let coming = Coming(distance / speed, distance, (end + length_of(car) - station) / speed);
+            if is_beside(meeting.kind) || looking.line + NEAREST_LANE < meeting.own_in {
+                beyond = first_of(beyond, coming);
+            } else {
+                near = first_of(near, coming);
+            }
+        }
+    }
+    write_coming(env, 0u, near);
+    write_coming(env, 1u, beyond);
+}
+
+fn write_coming(env: u32, lane: u32, coming: Coming) {
+    write_seen(env, ARRIVAL_AT + lane, min(coming.arrival / TIME_SCALE, 1.0));
+    write_seen(env, DISTANCE_AT + lane, min(coming.distance / GAP_SCALE, 1.0));
+    write_seen(env, GONE_AT + lane, min(coming.gone / TIME_SCALE, 1.0));
+}
+
+// Writes the distance to what is next on the truck's path, and its speed.
+fn look_ahead(env: u32, looking: Looking) {
+    var least = NOWHERE;
+    var next_slot = 0u;
+    for (var slot = 0u; slot < N_CARS; slot++) {
+        let car = car_at(env, slot);
+        if !is_there(car) { continue; }
+        let station = station_of(car);
+        let rear = station - length_of(car);
+        let zones = zones_of(looking, car);
+        for (var z = 0u; z < zones.y; z++) {
+            let meeting = meeting_at(looking.network, zones.x + z);
+            if meeting.its_out <= rear || station <= meeting.its_in { continue; }
+            var gap = NOWHERE;
+            if meeting.kind == FOLLOW && looking.front < station - meeting.delta {
+                gap = max(max(rear - meeting.delta, meeting.own_in) - looking.front, 0.0);
+            } else if meeting.kind == CROSS && looking.front < meeting.own_out {
+                gap = max(meeting.own_in - looking.front, 0.0);
+            }
+            if gap < least {
+                least = gap;
+                next_slot = slot;
+            }
+        }
+    }
+    var speed_along = 1.0;
+    if least < NOWHERE {
+        let car = car_at(env, next_slot);
+        let ahead = direction_at(looking.network, looking.path, looking.front + least);
+        speed_along = speed_of(car) * dot(outline_of(looking.network, car).along, ahead) / VEHICLE_SPEED_SCALE;
+    }
+    write_seen(env, GAP_AT, min(least / GAP_SCALE, 1.0));
+    write_seen(env, GAP_SPEED_AT, clamp(speed_along, -1.0, 1.0));
+}
+
+// Writes the room of both units, and the vehicles nearest to either.
+fn look_beside(env: u32, looking: Looking) {
+    var tractor_room = ROOM_SCALE;
+    var trailer_room = ROOM_SCALE;
+    // The nearest ones' distances and slots, by distance and then by slot.
+    var distances = array<f32, N_NEAREST>();
+    var slots = array<u32, N_NEAREST>();
+    for (var rank = 0u; rank < N_NEAREST; rank++) { distances[rank] = NOWHERE; }
+    for (var slot = 0u; slot < N_CARS; slot++) {
+        let car = car_at(env, slot);
+        if !is_there(car) { continue; }
+        let outline = outline_of(looking.network, car);
+        tractor_room = min(tractor_room, room_between(looking.tractor, outline));
+        trailer_room = min(trailer_room, room_between(looking.trailer, outline));
+        let to_tractor = distance_squared_to(looking.tractor, outline.middle);
+        var distance = sqrt(min(to_tractor, distance_squared_to(looking.trailer, outline.middle)));
+        var whose = slot;
+        for (var rank = 0u; rank < N_NEAREST; rank++) {
+            let known = distances[rank];
+            let known_slot = slots[rank];
+            if distance < known || (distance == known && whose < known_slot) {
+                distances[rank] = distance;
+                slots[rank] = whose;
+                distance = known;
+                whose = known_slot;
+            }
+        }
+    }
+    write_seen(env, ROOM_AT, tractor_room / ROOM_SCALE);
+    write_seen(env, ROOM_AT + 1u, trailer_room / ROOM_SCALE);
+    for (var rank = 0u; rank < N_NEAREST; rank++) {
+        var seen = array<f32, 5>();
+        if distances[rank] < NEAR_SCALE { seen = seen_nearest(looking, car_at(env, slots[rank])); }
+        for (var group = 0u; group < 5u; group++) {
+            write_seen(env, NEAREST_AT + group * N_NEAREST + rank, clamp(seen[group], -1.0, 1.0));
+        }
+    }
+}
+
+// What is observed of one of the nearest vehicles.
+fn seen_nearest(looking: Looking, car: Car) -> array<f32, 5> {
+    let outline = outline_of(looking.network, car);
+    let to = (outline.middle - looking.origin) / NEAR_SCALE;
+    let velocity = speed_of(car) / VEHICLE_SPEED_SCALE * outline.along;
+    let left = perpendicular(looking.along);
+    return array<f32, 5>(1.0, dot(to, looking.along), dot(to, left), dot(velocity, looking.along), dot(velocity, left));
+}
+
+// Distance between two rectangles, at most ROOM_SCALE: that of the corners of each from the other (m).
+fn room_between(one: Outline, other: Outline) -> f32 {
+    let reach = one.half_length + one.half_width + other.half_length + other.half_width;
+    if ROOM_SCALE + reach < distance(one.middle, other.middle) { return ROOM_SCALE; }
+    if are_overlapping(one, other) { return 0.0; }
+    return min(min(to_corners(one, other), to_corners(other, one)), ROOM_SCALE);
+}
+
+// Distance of the nearest corner of a rectangle from another (m).
+fn to_corners(outline: Outline, other: Outline) -> f32 {
+    let along = outline.half_length * outline.along;
+    let across = outline.half_width * perpendicular(outline.along);
+    let ahead = min(
+        distance_squared_to(other, outline.middle + along + across),
+        distance_squared_to(other, outline.middle + along - across),
+    );
+    let behind = min(
+        distance_squared_to(other, outline.middle - along + across),
+        distance_squared_to(other, outline.middle - along - across),
+    );
+    return sqrt(min(ahead, behind));
+}
+
+// Direction at a station of a path: linear between samples.
+fn direction_at(network: Network, path: u32, station: f32) -> vec2<f32> {
+    let along = clamp(station / SPACING, 0.0, f32(path_word(network, path, 1u)) - 1.001);
+    let k = u32(along);
+    let at = network.samples + SAMPLE_WORDS * (path_word(network, path, 0u) + k) + 2u;
+    let before = lanes_vector(at);
+    return normalize(before + (along - f32(k)) * (lanes_vector(at + SAMPLE_WORDS) - before));
+}
