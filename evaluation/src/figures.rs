@@ -13,7 +13,7 @@ use crate::episode::Episode;
 use crate::evaluation::routes_of;
 use crate::part::LaneWidths;
 use crate::running::Running;
-use crate::seen::{Seen, rows};
+use crate::seen::Seen;
 
 /// The figures of each episode so far.
 pub struct Figures<'a> {

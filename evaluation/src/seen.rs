@@ -63,7 +63,7 @@ pub(crate) fn ended(simulator: &Simulator) -> Result<Cow<'_, [u32]>, Error> {
 }
 
 /// Bytes as rows. Those read from a device need not be aligned.
-pub(crate) fn rows<T: AnyBitPattern + NoUninit>(bytes: Cow<'_, [u8]>) -> Cow<'_, [T]> {
+fn rows<T: AnyBitPattern + NoUninit>(bytes: Cow<'_, [u8]>) -> Cow<'_, [T]> {
     match bytes {
         Cow::Borrowed(bytes) => match bytemuck::try_cast_slice(bytes) {
             Ok(rows) => Cow::Borrowed(rows),

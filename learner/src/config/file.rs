@@ -10,7 +10,7 @@ use crate::error::Error;
 use offtrack_evaluation::error::Error as Evaluation;
 
 /// The training files that come with the program.
-const SHIPPED: [(&str, &str); 11] = [
+const SHIPPED: [(&str, &str); 12] = [
     ("default", include_str!("../../configs/default.toml")),
     ("best", include_str!("../../configs/best.toml")),
     ("lane", include_str!("../../configs/lane.toml")),
