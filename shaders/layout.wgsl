@@ -401,6 +401,8 @@ const ENTRY_ROOM: i32 = 3072i;
 const STOPS_WITH: i32 = 3i;
 // Steps between two decisions of a car; slots take turns.
 const DECIDES_EVERY: u32 = 2u;
+// Slots of a row that decide in a step.
+const N_TURNS: u32 = 12u;
 // Words of a car.
 const CAR_WORDS: u32 = 4u;
 // Word of a row at which the cars begin that wait outside.

@@ -6,12 +6,12 @@
 @compute @workgroup_size(WORKGROUP)
 fn traffic_decide(thread: Thread) {
     let index = index_of(thread);
-    let env = index / N_CARS;
+    let env = index / N_TURNS;
     if !is_driving(env) { return; }
-    let slot = index % N_CARS;
+    let first = (DECIDES_EVERY - truck[env].steps % DECIDES_EVERY) % DECIDES_EVERY;
+    let slot = first + DECIDES_EVERY * (index % N_TURNS);
     let me = car_at(env, slot);
-    if !is_there(me) || !is_its_turn(env, slot) { return; }
-    cars[env * N_CAR_WORDS + CAR_WORDS * slot + 3u] = decided(env, slot, me);
+    if is_there(me) { cars[env * N_CAR_WORDS + CAR_WORDS * slot + 3u] = decided(env, slot, me); }
 }
 
 // Whether the car in a slot decides in this step.

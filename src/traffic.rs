@@ -45,7 +45,7 @@ pub use row::Row;
 pub use rules::Rules;
 pub use run::{Run, overlaps};
 pub use snapshots::{N_SNAPSHOTS, Snapshots};
-pub use step::{Setting, advance, decide, step};
+pub use step::{N_TURNS, Setting, advance, decide, step};
 pub use survey::Survey;
 pub use truck::{Contact, Entry, Trucks, View, outlines, stretched, touched};
 

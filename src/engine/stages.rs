@@ -176,6 +176,8 @@ pub enum Threads {
     Value,
     /// A slot of a truck's row of cars.
     Car,
+    /// One that decides in the step.
+    Turn,
 }
 
 /// What decides which kernels have anything to do.
@@ -336,7 +338,8 @@ impl Kernel {
         match self {
             Kernel::Sense | Kernel::SenseAfterReset => Threads::Team,
             Kernel::CopyObservation => Threads::Value,
-            Kernel::TrafficDecide | Kernel::TrafficMove => Threads::Car,
+            Kernel::TrafficDecide => Threads::Turn,
+            Kernel::TrafficMove => Threads::Car,
             _ => Threads::Truck,
         }
     }

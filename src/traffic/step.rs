@@ -4,11 +4,14 @@ use super::arrivals::{Backlog, Event, arrive};
 use super::clock::Clock;
 use super::decide::{Crowd, MOST_CARS};
 use super::{Car, Demand, Network, Others, Rules};
+use crate::layout::N_CARS;
 use crate::layout::shared::constants;
 
 constants! {
     /// Steps between two decisions of a car; slots take turns.
     const DECIDES_EVERY: u32 = 2;
+    /// Slots of a row that decide in a step.
+    pub const N_TURNS: usize = N_CARS / DECIDES_EVERY as usize;
 }
 
 /// What cars drive on, how, and how many come.

@@ -99,6 +99,7 @@ fn kernels() -> Map<String, Value> {
             Threads::Team => "team",
             Threads::Value => "value",
             Threads::Car => "car",
+            Threads::Turn => "turn",
         };
         let bindings: Vec<usize> = kernel.buffers().iter().map(|buffer| buffer.binding()).collect();
         (kernel.name().to_owned(), json!({ "bindings": bindings, "threads": threads }))

@@ -15,6 +15,7 @@ use crate::engine::tables::{ROW, team};
 use crate::layout::buffers::Access;
 use crate::layout::shared::Named;
 use crate::layout::{N_CARS, N_VALUES, WORKGROUP};
+use crate::traffic::N_TURNS;
 
 /// The kernels of a module, named by `K`.
 #[derive(Debug)]
@@ -111,6 +112,7 @@ pub(super) fn threads(kernel: Kernel, n_envs: usize) -> u64 {
         Threads::Truck => n_envs,
         Threads::Value => n_envs * N_VALUES as u64,
         Threads::Car => n_envs * N_CARS as u64,
+        Threads::Turn => n_envs * N_TURNS as u64,
         Threads::Team => n_envs.div_ceil(team(n_envs as usize).into()) * u64::from(WORKGROUP),
     }
 }
