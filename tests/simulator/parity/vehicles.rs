@@ -44,7 +44,7 @@ pub fn wrong_device(world: &World, change: fn(&mut World)) -> Simulator {
 }
 
 pub fn rows(batch: &Batch) -> impl Iterator<Item = &Row> {
-    batch.cars.iter().map(|words| Row::of(words))
+    batch.cars.iter().map(Row::of)
 }
 
 /// Rows that two batches have in common.
