@@ -78,12 +78,14 @@ fn an_evaluation_among_vehicles_on_a_device_counts_nearly_the_processors_episode
     let mut on_device = placed(policy.clone(), &device.engine, &world, Choice::Best).unwrap();
     let here = driven(&scenario, &world, &mut policy, &Device::processor()).unwrap().episodes;
     let there = driven(&scenario, &world, on_device.as_mut(), &device).unwrap().episodes;
-    let of = |episode: &crate::report::Episode| (episode.ended, episode.steps, episode.demand.map(f64::to_bits));
+    let of = |episode: &crate::report::Episode| {
+        (episode.ended, episode.steps, episode.among.map(|among| among.demand.to_bits()))
+    };
     let alike = here.iter().zip(&there).filter(|(here, there)| of(here) == of(there)).count();
     println!("{alike} of {} episodes", here.len());
     // A vehicle that brakes for a last bit of a truck's ground, and not without, drives otherwise from then on.
     assert!(10 * (here.len() - alike) <= here.len(), "{alike} of {}", here.len());
-    assert!(here.iter().all(|episode| episode.demand.is_some()));
+    assert!(here.iter().all(|episode| episode.among.is_some()));
 }
 
 #[test]
