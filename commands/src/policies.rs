@@ -11,7 +11,7 @@ use offtrack_evaluation::certificate::line;
 use offtrack_evaluation::comparison::Asked;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
-use offtrack_evaluation::policies::rule::{FOLLOWS, YIELDS};
+use offtrack_evaluation::policies::rule::{self, FOLLOWS, YIELDS};
 use offtrack_evaluation::policies::{self, Controller, LOOK_AHEAD, PurePursuit};
 
 use crate::outputs;
@@ -77,6 +77,7 @@ impl Choice {
         let of_run = folder.join("policy.safetensors");
         let learned = match self.policy.as_deref() {
             Some("pursuit" | "random" | YIELDS | FOLLOWS) => None,
+            Some(name) if rule::under(name).is_some() => None,
             Some(name) => Some(policies::learned(name)?),
             None => Some(offtrack_policy::Policy::shipped_for(&scenario.name, world)?),
         };

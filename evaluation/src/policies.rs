@@ -41,7 +41,13 @@ pub fn find(
         Some("pursuit") => return Ok(Box::new(pursuit)),
         Some("random") => return Ok(Box::new(UniformRandom { seed })),
         Some(name @ (rule::YIELDS | rule::FOLLOWS)) => return Ok(Box::new(rule::Rule::new(name, world)?)),
-        Some(name) => learned(name)?,
+        Some(name) => match rule::under(name) {
+            Some((rule, policy)) => {
+                let policy = placed(learned(policy)?, engine, world, Choice::Best)?;
+                return Ok(Box::new(rule::Capped::new(rule, policy, world)?));
+            }
+            None => learned(name)?,
+        },
         None => offtrack_policy::Policy::shipped_for(benchmark, world)?,
     };
     placed(learned, engine, world, Choice::Best)

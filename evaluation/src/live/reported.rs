@@ -16,7 +16,7 @@ pub(super) struct Reported {
 }
 
 /// Policies by name, each with its results.
-const REPORTED: [(&str, &[Reported]); 6] = [
+const REPORTED: [(&str, &[Reported]); 7] = [
     (
         "attard2023 (shipped)",
         &[
@@ -45,6 +45,10 @@ const REPORTED: [(&str, &[Reported]); 6] = [
     (
         "transfer2026 (shipped)",
         &[reported("transfer2026", "test", 690, 688), reported("transfer2026", "train", 1560, 1551)],
+    ),
+    (
+        "traffic2026 (shipped)",
+        &[reported("traffic2026", "test", 690, 663), reported("traffic2026", "train", 1560, 1486)],
     ),
 ];
 

@@ -46,6 +46,11 @@ const N_AHEAD: usize = 16;
 /// Half the width of the way (m).
 const HALF_WIDTH: f32 = 1.65;
 
+/// The rule and the policy that it caps in `yields:POLICY` or `follows:POLICY`.
+pub fn under(name: &str) -> Option<(&str, &str)> {
+    name.split_once(':').filter(|(rule, _)| [YIELDS, FOLLOWS].contains(rule))
+}
+
 /// A truck among vehicles by a rule.
 #[derive(Debug)]
 pub struct Rule {
@@ -122,6 +127,52 @@ impl Controller for Rule {
     }
 }
 
+/// A policy that drives no faster than a rule allows.
+pub struct Capped {
+    policy: Box<dyn Controller>,
+    rule: Rule,
+    name: String,
+}
+
+impl Capped {
+    /// The policy under the rule of this name, `follows` or `yields`.
+    ///
+    /// # Errors
+    ///
+    /// A world without other vehicles, or one whose actions state no target speeds.
+    pub fn new(rule: &str, policy: Box<dyn Controller>, world: &World) -> Result<Capped, Error> {
+        let name = format!("{rule}:{}", policy.name());
+        if world.is_continuous() || world.params.changes_speed == 1 {
+            let expected = "caps target speeds: a benchmark with actions.speeds_kmh is needed".to_owned();
+            return Err(Error::Setting { name: "--policy", value: name, expected });
+        }
+        Ok(Capped { rule: Rule::new(rule, world)?, policy, name })
+    }
+}
+
+impl Controller for Capped {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn choose(&mut self, world: &World, batch: &Batch) -> Actions {
+        let chosen = match self.policy.choose(world, batch) {
+            Actions::Indices(chosen) => chosen,
+            // Commands drive no world of levels.
+            commands => return commands,
+        };
+        let capped = |(env, &index): (usize, &u32)| {
+            let Action { steering, speed } = world.actions[index as usize];
+            if batch.truck[env].held == 1 {
+                return index;
+            }
+            let most = self.rule.speed(world, batch, env);
+            if speed <= most { index } else { rounded(world, &Action { steering, speed: most }) }
+        };
+        Actions::Indices(chosen.par_iter().enumerate().map(capped).collect())
+    }
+}
+
 /// The action of the nearest speed, and of those with the nearest steer angle.
 fn rounded(world: &World, wanted: &Action) -> u32 {
     let apart = |action: &Action| [(action.speed - wanted.speed).abs(), (action.steering - wanted.steering).abs()];
@@ -193,18 +244,25 @@ mod tests {
     use offtrack::files::cache::Loading;
     use offtrack::layout::Ended;
     use offtrack::scenario::{Scenario, Split};
+    use offtrack::simulator::{RouteChoice, Simulator};
 
     use super::*;
     use crate::device::Device;
     use crate::evaluation::Evaluation;
 
-    /// Ends of ten episodes on each route of 20m from its northern arm.
-    fn ends(name: &str, demand: &str) -> Vec<Ended> {
+    /// The routes of 20m from its northern arm, at these demands.
+    fn of_one_arm(demand: &str) -> (Scenario, Arc<World>) {
         let text = Scenario::text_of("traffic2026").unwrap();
         let text = text.replace("demand = [300.0, 900.0, 1500.0, 2100.0]", &format!("demand = [{demand}]"));
         let mut scenario = Scenario::parse("among", &text, None, &Loading::PLAIN).unwrap();
         scenario.retain(|_, route| route.name.starts_with("20m/N"));
         let world = Arc::new(World::bake(&scenario).unwrap());
+        (scenario, world)
+    }
+
+    /// Ends of ten episodes on each of them.
+    fn ends(name: &str, demand: &str) -> Vec<Ended> {
+        let (scenario, world) = of_one_arm(demand);
         let device = Device::processor();
         let evaluation = Evaluation {
             scenario: &scenario,
@@ -228,6 +286,51 @@ mod tests {
         }
         let yields = ends(YIELDS, "1500.0");
         assert!(34 <= arrived(&yields), "{yields:?}");
+    }
+
+    /// Straight on, as fast as the actions allow.
+    struct Fastest;
+
+    impl Controller for Fastest {
+        fn name(&self) -> &str {
+            "fastest"
+        }
+
+        fn choose(&mut self, world: &World, batch: &Batch) -> Actions {
+            let fastest = Action { steering: 0.0, speed: 100.0 };
+            Actions::Indices(vec![rounded(world, &fastest); batch.n_envs()])
+        }
+    }
+
+    #[test]
+    fn a_capped_policy_steers_as_it_would_and_drives_no_faster_than_the_rule() {
+        let (_, world) = of_one_arm("1500.0");
+        let routes = RouteChoice::Fixed((0..64).map(|env| env % world.routes.len() as u32).collect());
+        let mut simulator = Simulator::new(world.clone(), 64, 3, routes).unwrap();
+        let rule = Rule::new(YIELDS, &world).unwrap();
+        let mut capped = Capped::new(YIELDS, Box::new(Fastest), &world).unwrap();
+        assert_eq!(capped.name(), "yields:fastest");
+        let (mut free, mut slowed) = (0, 0);
+        for _ in 0..100 {
+            let Actions::Indices(chosen) = capped.choose(&world, simulator.batch()) else { panic!("levels") };
+            for (env, &index) in chosen.iter().enumerate() {
+                let Action { steering, speed } = world.actions[index as usize];
+                let most = rule.speed(&world, simulator.batch(), env);
+                assert_eq!(steering, 0.0);
+                // Half of the 10 km/h between two levels.
+                assert!(speed <= most + 1.39, "{speed} m/s where {most} are allowed");
+                *if 8.0 < speed { &mut free } else { &mut slowed } += 1;
+            }
+            simulator.step(&chosen).unwrap();
+        }
+        assert!(640 < free && 640 < slowed, "{free} {slowed}");
+    }
+
+    #[test]
+    fn a_policy_is_capped_by_a_rule_before_a_colon_alone() {
+        assert_eq!(under("yields:runs/a:b.safetensors"), Some(("yields", "runs/a:b.safetensors")));
+        assert_eq!(under("follows:traffic2026"), Some(("follows", "traffic2026")));
+        assert_eq!((under("yields"), under("pursuit:x"), under("C:/policy.safetensors")), (None, None, None));
     }
 
     #[test]
