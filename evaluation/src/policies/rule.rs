@@ -313,8 +313,9 @@ mod tests {
         let (mut free, mut slowed) = (0, 0);
         for _ in 0..100 {
             let Actions::Indices(chosen) = capped.choose(&world, simulator.batch()) else { panic!("levels") };
-            for (env, &index) in chosen.iter().enumerate() {
-                let Action { steering, speed } = world.actions[index as usize];
+            let driving = |env: &usize| simulator.batch().truck[*env].held == 0;
+            for env in (0..chosen.len()).filter(driving) {
+                let Action { steering, speed } = world.actions[chosen[env] as usize];
                 let most = rule.speed(&world, simulator.batch(), env);
                 assert_eq!(steering, 0.0);
                 // Half of the 10 km/h between two levels.
@@ -323,7 +324,7 @@ mod tests {
             }
             simulator.step(&chosen).unwrap();
         }
-        assert!(640 < free && 640 < slowed, "{free} {slowed}");
+        assert!(64 < free && 64 < slowed, "{free} {slowed}");
     }
 
     #[test]
