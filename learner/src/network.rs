@@ -148,11 +148,11 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
-    use offtrack::layout::{N_VALUES, ObservedExtras};
+    use offtrack::layout::{N_AROUND, N_VALUES, ObservedExtras};
     use offtrack::scenario::{Scenario, Split};
-    use offtrack::simulator::{RouteChoice, Simulator};
+    use offtrack::simulator::{Batch, RouteChoice, Simulator};
     use offtrack::world::World;
-    use offtrack_policy::Policy;
+    use offtrack_policy::{Policy, greedy};
 
     use crate::rollout::host::{logits, observed};
 
@@ -205,6 +205,7 @@ mod tests {
     #[test]
     fn a_policy_drives_as_the_network_that_learned_it() {
         const LADEN: usize = N_VALUES + ObservedExtras::Mass.n_extras();
+        const AMONG: usize = N_VALUES + N_AROUND;
         for name in Policy::shipped_names() {
             let policy = Policy::shipped(name).unwrap();
             let scenario = Scenario::named(name.trim_end_matches("-lane")).unwrap();
@@ -216,23 +217,22 @@ mod tests {
             wrong.layers[1].weights.iter_mut().for_each(|weight| *weight *= 1.001);
             for _ in 0..4 {
                 for _ in 0..20 {
-                    simulator
-                        .step(&policy.act_beside(&simulator.batch().observation, &simulator.batch().extras))
-                        .unwrap();
+                    let Batch { observation, extras, around, .. } = simulator.batch();
+                    let outputs = policy.logits_among(observation, extras, around);
+                    simulator.step(&greedy(&outputs, policy.actions.len())).unwrap();
                 }
-                let (observations, extras): (&[[f32; N_VALUES]], &[_]) =
-                    (&simulator.batch().observation, &simulator.batch().extras);
-                let expected = match policy.extras.is_empty() {
-                    true => logits(&network, &policy.normalisation, observations),
-                    false => logits::<LADEN>(&network, &policy.normalisation, &observed(observations, extras, &[])),
+                let Batch { observation, extras, around, .. } = simulator.batch();
+                let normalisation = &policy.normalisation;
+                let expected = match (policy.extras.is_empty(), policy.vehicles) {
+                    (true, false) => logits(&network, normalisation, observation.as_slice()),
+                    (true, true) => logits::<AMONG>(&network, normalisation, &observed(observation, extras, around)),
+                    (false, _) => logits::<LADEN>(&network, normalisation, &observed(observation, extras, &[])),
                 };
                 let n_actions = policy.actions.len();
                 // Sums over 256 values may round in another order or without fused multiply-adds.
-                assert!(difference(&policy.logits_beside(observations, extras), &expected, n_actions) < 1e-5);
-                assert!(
-                    1e-5 < difference(&wrong.logits_beside(observations, extras), &expected, n_actions),
-                    "a wrong weight must show"
-                );
+                let outputs = |policy: &Policy| policy.logits_among(observation, extras, around);
+                assert!(difference(&outputs(&policy), &expected, n_actions) < 1e-5);
+                assert!(1e-5 < difference(&outputs(&wrong), &expected, n_actions), "a wrong weight must show");
             }
             assert_eq!(network.plain_layers(), policy.layers);
         }
