@@ -43,8 +43,8 @@ struct WrittenRoute<'a> {
 ///
 /// `drivable` is the outer boundary, then one hole for each island; `solids` are the islands, then the ground beyond
 /// the boundary as two polygons. With aprons there is `aprons`, of each its outer and its inner edge. Curves are within
-/// 1 cm. `road` is as it is driven, `routes` are as they are seen. With a swept path there is `sweep`, as `offtrack draw
-/// --help` describes it.
+/// 1 cm. `road` is as it is driven, `routes` are as they are seen. With a swept path there is `sweep`, as `offtrack
+/// draw --help` describes it.
 ///
 /// # Errors
 ///

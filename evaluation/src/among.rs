@@ -63,11 +63,12 @@ impl Among {
     /// Adds the last step, of `step` seconds, after which truck and vehicles are these.
     pub(super) fn follow(&mut self, rig: &Rig, truck: &Truck, network: &Network, row: &Row, step: f64) {
         let units = outlines(rig, truck);
+        let met = Contact::from_code(row.met);
         self.standing += if truck.speed < STANDS { step } else { 0.0 };
         for (slot, car) in row.cars.iter().enumerate().filter(|(_, car)| car.is_there()) {
             let outline = car.outline(network);
             let (has_entered, hindered) = (has_entered(network, car), row.hindered >> slot & 1 == 1);
-            if Contact::from_code(row.met).is_some_and(|contact| contact.slot == slot) {
+            if met.is_some_and(|contact| contact.slot == slot) {
                 self.met = Some(Met { by_tractor: units[0].overlaps(&outline), has_entered });
             }
             if hindered && has_entered {

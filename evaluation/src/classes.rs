@@ -178,7 +178,8 @@ fn percentile(episodes: &[&Episode], bins: impl Fn(&Driving) -> &[u16], fraction
 
 /// A line for each class, under a heading.
 pub(super) fn lines(classes: &[ClassReport]) -> Vec<String> {
-    let heading = "vehicle and load             arrived       % rolled over   % (to)      LTR p50  p90  p99  km/h  time  ay g p50  p95  switches/s";
+    let heading = "vehicle and load             arrived       % rolled over   % (to)      LTR p50  p90  p99  km/h  \
+        time  ay g p50  p95  switches/s";
     let line = |class: &ClassReport| {
         let name =
             if class.vehicle.is_empty() { class.load.clone() } else { format!("{} {}", class.vehicle, class.load) };

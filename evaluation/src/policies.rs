@@ -43,7 +43,8 @@ pub fn find(
         Some(name @ (rule::YIELDS | rule::FOLLOWS)) => return Ok(Box::new(rule::Rule::new(name, world)?)),
         Some(name) => match rule::under(name) {
             Some((rule, policy)) => {
-                let policy = placed(learned(policy)?, engine, world, Choice::Best)?;
+                // The rule decides on the processor, and so does what it caps.
+                let policy = placed(learned(policy)?, &Engine::Cpu, world, Choice::Best)?;
                 return Ok(Box::new(rule::Capped::new(rule, policy, world)?));
             }
             None => learned(name)?,

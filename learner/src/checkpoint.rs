@@ -151,7 +151,8 @@ impl Stored {
         if version.version != VERSION {
             let found = version.version;
             return Err(format!(
-                "is a checkpoint of version {found}, this program continues from version {VERSION}: continue with the program that wrote it"
+                "is a checkpoint of version {found}, this program continues from version {VERSION}: continue with the \
+                program that wrote it"
             ));
         }
         let mut description: Description = serde_json::from_str(entry).map_err(|error| damaged(error.to_string()))?;

@@ -15,7 +15,8 @@ pub enum Error {
     Device(String),
     /// Training has diverged.
     #[error(
-        "{what} is {value} after {env_steps} env steps{also}: training has diverged; {kept}; lower learning rates or a smaller reward_scale would do"
+        "{what} is {value} after {env_steps} env steps{also}: training has diverged; {kept}; lower learning rates or a \
+        smaller reward_scale would do"
     )]
     Diverged {
         /// Which figure or parameter.

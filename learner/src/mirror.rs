@@ -75,7 +75,8 @@ impl Mirror {
             world.actions.iter().position(same).map(|index| index as u32).ok_or_else(|| {
                 let degrees = action.steering.to_degrees();
                 refused(format!(
-                    "steering {degrees:.1} deg is in the action table and its opposite is not: leave learning.mirror_augmentation out"
+                    "steering {degrees:.1} deg is in the action table and its opposite is not: leave \
+                    learning.mirror_augmentation out"
                 ))
             })
         };

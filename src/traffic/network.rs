@@ -213,18 +213,18 @@ pub struct Network {
 impl Network {
     /// Position and direction of travel at a station of a path: cubic between samples (m).
     pub fn pose(&self, path: usize, station: f32) -> (Vec2, Vec2) {
-        let ([from, to], t) = self.cell(path, station);
+        let ([from, to], t) = self.span(path, station);
         (between(from, to, t), (from.direction + t * (to.direction - from.direction)).normalize_or_zero())
     }
 
     /// The position of [`pose`](Self::pose) alone (m).
     pub fn position(&self, path: usize, station: f32) -> Vec2 {
-        let ([from, to], t) = self.cell(path, station);
+        let ([from, to], t) = self.span(path, station);
         between(from, to, t)
     }
 
     /// The samples before and behind a station of a path, and the fraction of the way from one to the other.
-    fn cell(&self, path: usize, station: f32) -> ([&Sample; 2], f32) {
+    fn span(&self, path: usize, station: f32) -> ([&Sample; 2], f32) {
         let Path { first, n, .. } = self.paths[path];
         let along = (station / SPACING).clamp(0.0, n as f32 - 1.001);
         let k = along as usize;

@@ -143,7 +143,8 @@ fn written(lines: &str) -> Result<Scenario, String> {
 #[test]
 fn a_benchmark_states_vehicles_shares_and_ranges() {
     let scenario = written(
-        "[[vehicle]]\nfile = \"daf_xf\"\nloads = { empty = 1, laden = 3 }\n[[vehicle]]\nfile = \"us_wb62\"\nloads = { half = 1 }\nshare = 3\n[draw]\nn_vehicles = 64\nslip = [0.9, 1.1]",
+        "[[vehicle]]\nfile = \"daf_xf\"\nloads = { empty = 1, laden = 3 }\n[[vehicle]]\nfile = \"us_wb62\"\n\
+         loads = { half = 1 }\nshare = 3\n[draw]\nn_vehicles = 64\nslip = [0.9, 1.1]",
     );
     let scenario = scenario.unwrap();
     let counts: Vec<usize> =

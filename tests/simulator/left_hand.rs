@@ -52,8 +52,10 @@ fn pair(name: &str) -> [Road; 2] {
 pub(crate) fn world(folder: &Path, roundabout: &str, gutter: &str) -> (Scenario, Arc<World>) {
     fs::write(folder.join("road.toml"), roundabout).unwrap();
     let benchmark = format!(
-        "vehicle = \"daf_xf\"\nload = \"empty\"\ngutter = \"{gutter}\"\n[actions]\nsteer_levels = [-0.8, -0.4, 0.0, 0.4, 0.8]\n\
-         speeds_kmh = [30.0]\n[sensors]\nrange = 20.0\n[reward]\nwaypoint = 100.0\nlane_distance = -1.5\nlane_distance_limit = 4.0\n\
+        "vehicle = \"daf_xf\"\nload = \"empty\"\ngutter = \"{gutter}\"\n[actions]\n\
+         steer_levels = [-0.8, -0.4, 0.0, 0.4, 0.8]\n\
+         speeds_kmh = [30.0]\n[sensors]\nrange = 20.0\n[reward]\nwaypoint = 100.0\nlane_distance = -1.5\n\
+         lane_distance_limit = 4.0\n\
          failure = -500.0\n[[roundabout]]\nfile = \"road.toml\"\ntrain = \"all\"\n"
     );
     fs::write(folder.join("benchmark.toml"), benchmark).unwrap();

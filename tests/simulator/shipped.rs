@@ -298,15 +298,19 @@ fn a_roundabout_can_be_made_from_text() {
 fn a_file_of_the_users_own_refers_to_shipped_ones_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("own.toml");
-    let text = "vehicle = \"daf_xf\"\nload = \"empty\"\ngutter = \"drivable\"\n\n[actions]\nsteer_levels = [-0.5, 0.0, 0.5]\nspeeds_kmh = [30.0]\n\n\
-                [sensors]\nrange = 20.0\n\n[reward]\nwaypoint = 100.0\nlane_distance = -1.5\nlane_distance_limit = 4.0\nfailure = -500.0\n\n\
-                [[roundabout]]\nfile = \"20m\"\ntest = \"all\"\n\n[procedural]\ndistribution = \"wide\"\nseed = 1\ncount = 2\ntrain = [0, 2]\n";
+    let text = "vehicle = \"daf_xf\"\nload = \"empty\"\ngutter = \"drivable\"\n\n[actions]\n\
+                steer_levels = [-0.5, 0.0, 0.5]\nspeeds_kmh = [30.0]\n\n\
+                [sensors]\nrange = 20.0\n\n[reward]\nwaypoint = 100.0\nlane_distance = -1.5\n\
+                lane_distance_limit = 4.0\nfailure = -500.0\n\n\
+                [[roundabout]]\nfile = \"20m\"\ntest = \"all\"\n\n[procedural]\ndistribution = \"wide\"\nseed = 1\n\
+                count = 2\ntrain = [0, 2]\n";
     std::fs::write(&file, text).unwrap();
     let scenario = Scenario::read(&file).unwrap();
     assert_eq!((scenario.places.len(), scenario.places[0].roundabout.name.as_str()), (3, "20m"));
     std::fs::write(&file, text.replace("\"20m\"", "\"21m\"")).unwrap();
     let message = Scenario::read(&file).unwrap_err().to_string();
-    let expected = "own.toml: roundabout[0].file: \"21m\"; roundabout: 21m; must be a path ending in .toml or one of 16m, 20m, 32m, 40m, 50m, \
+    let expected = "own.toml: roundabout[0].file: \"21m\"; roundabout: 21m; must be a path ending in .toml or one of 16m, 20m, 32m, 40m, \
+                    50m, \
          16m-maps, 20m-maps, 32m-maps, 40m-maps, 50m-maps";
     assert!(message.ends_with(expected), "{message}");
 }

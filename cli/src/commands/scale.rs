@@ -191,7 +191,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
             values: world.n_observed(),
             holds: "physics, collision, progress, rays, observation, reward, and a new episode where one ended",
             rays_counted: "those of every step, and once more those after each reset",
-            speeds: "medians over windows, nothing read back within one; stages are timed apart, each over the whole batch",
+            speeds: "medians over windows, nothing read back within one; stages are timed apart, each over the whole \
+                batch",
             learning: learner.as_ref().filter(|_| args.mode.contains(&Mode::Training)).map(Learner::updates),
         },
         world_bytes: world.bytes(),
@@ -308,7 +309,8 @@ fn heading(scale: &Scale, device: &offtrack_evaluation::device::Device) -> Strin
     let megabytes = *world_bytes as f64 / 1e6;
     format!(
         "{}{threads}; a step is {dt} s in {substeps} sub-steps, {N_RAYS} rays, {values} values: {holds}\n\
-         {roundabouts} roundabouts, {routes} routes, {megabytes:.1} MB; read in {seconds_to_read:.1} s, baked in {seconds_to_bake:.1} s\n\
+         {roundabouts} roundabouts, {routes} routes, {megabytes:.1} MB; read in {seconds_to_read:.1} s, baked in \
+         {seconds_to_bake:.1} s\n\
          {:>8} {:>9} {:>14} {:>14}   ns a truck, a stage at a time:{names}\n",
         device.title(),
         "trucks",

@@ -141,7 +141,8 @@ fn a_training_file_is_found_by_its_name() {
     let message = refusal(&offtrack(&["train", "papre", "--out", &place.text("runs")]), 2);
     assert!(
         message.contains(
-            "papre: is no training file: the program comes with default, best, lane, attard, gpu, as-run, laden, laden-50, transfer, traffic, laden-gpu, paper"
+            "papre: is no training file: the program comes with default, best, lane, attard, gpu, as-run, laden, \
+            laden-50, transfer, traffic, laden-gpu, paper"
         ),
         "{message}"
     );
@@ -332,7 +333,8 @@ fn a_further_evaluation_that_cannot_be_is_refused_before_a_folder_is_made() {
         (&format!("{other}/validation"), "other has no routes under `validation`"),
         (
             "attard2023/train",
-            "also_evaluate: attard2023/train; it differs from short, which is trained on, in actions and vehicle lock: leave",
+            "also_evaluate: attard2023/train; it differs from short, which is trained on, in actions and vehicle lock: \
+            leave",
         ),
         (&tested, "16m/E-right-1 is trained on, so no test route may be"),
         (&format!("{other}/all"), "also_evaluate[0]"),

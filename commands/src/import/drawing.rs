@@ -23,8 +23,8 @@ pub struct DrawingArgs {
     /// direction of travel \[default: LANE\].
     #[arg(long, value_name = "LAYER")]
     lane_layer: Option<String>,
-    /// Of a drawing: the layer of the aprons' closed edges, inner ones, outer ones or both; it may be empty \\[default:
-    /// APRON\\].
+    /// Of a drawing: the layer of the aprons' closed edges, inner ones, outer ones or both; it may be empty
+    /// \[default: APRON\].
     #[arg(long, value_name = "LAYER")]
     apron_layer: Option<String>,
     /// Of a drawing: the unit of its coordinates, where it does not say it.

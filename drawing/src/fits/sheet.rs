@@ -155,7 +155,8 @@ fn block(lettering: &Lettering, paper: &Paper, title: &str, shown: &[Shown], hea
 fn dimensions(name: &str, vehicle: &Vehicle) -> String {
     let tractor = &vehicle.tractor;
     format!(
-        "{name}: {:.2} m long, {:.2} m wide, wheelbase {:.2} m, trailer {:.2} m from kingpin to axles, lock {:.1}\u{b0}, \
+        "{name}: {:.2} m long, {:.2} m wide, wheelbase {:.2} m, trailer {:.2} m from kingpin to axles, lock \
+        {:.1}\u{b0}, \
          {:.0}\u{b0}/s",
         vehicle.length(),
         tractor.width.max(vehicle.trailer.width),

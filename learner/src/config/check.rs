@@ -80,7 +80,8 @@ impl Config {
         let before_updates = (warmup as u64).max(n_steps as u64 * self.n_envs as u64);
         let Some(steps) = self.steps.filter(|&steps| steps <= before_updates) else { return Ok(()) };
         let expected = format!(
-            "must be above {before_updates}, or nothing is learned: updates begin after replay_buffer.warmup = {warmup} env steps \
+            "must be above {before_updates}, or nothing is learned: updates begin after replay_buffer.warmup = \
+            {warmup} env steps \
              and learning.n_steps + 1 = {n_steps} steps of each truck"
         );
         Err(Reader::of(origin).invalid("steps", steps, expected).into())

@@ -249,7 +249,8 @@ fn every_training_file_reads_by_path_and_by_name() {
     let message = Config::read(Path::new("papre")).unwrap_err().to_string();
     assert!(
         message.contains(
-            "papre: is no training file: the program comes with default, best, lane, attard, gpu, as-run, laden, laden-50, transfer, traffic, laden-gpu, paper"
+            "papre: is no training file: the program comes with default, best, lane, attard, gpu, as-run, laden, \
+            laden-50, transfer, traffic, laden-gpu, paper"
         ),
         "{message}"
     );

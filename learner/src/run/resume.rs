@@ -54,7 +54,8 @@ impl Resumed {
         let written =
             toml::from_str(stored.config()).map_err(|error| stored.error(format!("its training file: {error}")))?;
         if !config.is_same_run(&written) {
-            let message = "is not the training file that the checkpoint was written with; only minutes, steps and checkpoint_minutes may differ";
+            let message = "is not the training file that the checkpoint was written with; only minutes, steps and \
+                checkpoint_minutes may differ";
             return Err(Error::contents(&folder.config(), message));
         }
         config.override_with(None, minutes, steps, None)?;

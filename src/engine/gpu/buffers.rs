@@ -99,12 +99,12 @@ impl Buffers {
 }
 
 /// The caller's slice for a column, or a buffer of zeros.
-fn column_slice(device: &Device, column: Column, n_envs: usize, external: &Columns) -> Result<Slice, Error> {
-    let needed = (n_envs * column.width()) as u64;
+fn column_slice(device: &Device, column: Column, n_rows: usize, external: &Columns) -> Result<Slice, Error> {
+    let needed = (n_rows * column.width()) as u64;
     match external.iter().find(|(known, _)| *known == column) {
         None => Ok(device.empty(column.name(), needed)),
         Some((_, slice)) if needed <= slice.size => Ok(Slice { size: needed, ..slice.clone() }),
-        Some((_, slice)) => Err(Error::ColumnSize { column: column.name(), found: slice.size, n_envs, needed }),
+        Some((_, slice)) => Err(Error::ColumnSize { column: column.name(), found: slice.size, n_envs: n_rows, needed }),
     }
 }
 
@@ -135,8 +135,9 @@ pub(super) fn check_world(device: &Device, world: &World) -> Result<(), Error> {
 /// An error if a column of so many trucks is larger than the adapter's largest buffer.
 pub(super) fn check_size(device: &Device, n_envs: usize, has_vehicles: bool) -> Result<(), Error> {
     let limit = largest(device);
-    for &column in Column::ALL.iter().filter(|column| has_vehicles || !column.is_of_vehicles()) {
-        let n_bytes = (n_envs as u64).saturating_mul(column.width() as u64);
+    for &column in Column::ALL {
+        let n_rows = column.n_rows(n_envs, has_vehicles) as u64;
+        let n_bytes = n_rows.saturating_mul(column.width() as u64);
         if limit < n_bytes {
             let (adapter, fitting) = (device.adapter.get_info().name, limit / column.width() as u64);
             return Err(Error::TooManyTrucks { n_envs, buffer: column.name(), n_bytes, adapter, limit, fitting });

@@ -58,8 +58,8 @@ impl Points {
         points
     }
 
-    /// Squared distance of each to the nearest of some rectangles, 0 inside them (m²); of those that the corridor, which
-    /// begins at a point, cannot reach, any great one.
+    /// Squared distance of each to the nearest of some rectangles, 0 inside them (m²), but for those that the corridor,
+    /// which begins at a point, cannot reach.
     fn to_nearest(&self, outlines: &[Outline], begins: Vec2) -> [f32; CORRIDOR_SAMPLES] {
         let mut nearest = [f32::MAX; CORRIDOR_SAMPLES];
         for Outline { middle, along, half_length, half_width } in outlines {

@@ -68,7 +68,8 @@ pub(super) fn drawn(scale: &Scale, device: &str) -> Result<String, offtrack_draw
     let subtitles = vec![
         format!("{}; benchmark {}; commit {}, {}", device, scale.benchmark, scale.commit, scale.date),
         format!(
-            "An env step is {} s of one truck: {} sub-steps, {} rays, {} values, reward, a new episode where one ended.",
+            "An env step is {} s of one truck: {} sub-steps, {} rays, {} values, reward, a new episode where one \
+            ended.",
             step.dt, step.substeps, step.rays, step.values
         ),
     ];

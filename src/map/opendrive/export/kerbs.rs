@@ -1,5 +1,5 @@
-//! Kerbs as roads without lanes to drive on: the face is the reference line, a gutter lies on its left, the kerb's stone
-//! on its right, behind an apron where there is one.
+//! Kerbs as roads without lanes to drive on: the face is the reference line, a gutter lies on its left, the kerb's
+//! stone on its right, behind an apron where there is one.
 //!
 //! A face is cut where it forms a corner, since reference lines have none. Where an arm ends nothing is solid: there a
 //! narrow shoulder closes the surface.
