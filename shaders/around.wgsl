@@ -81,23 +81,18 @@ fn looking_of(env: u32) -> Looking {
     let at = truck[env];
     let rig = vehicles[at.vehicle].rig;
     let network = network_of(at.route);
-    let path = lanes[lanes_row(at.route) + 1u];
+    let path = path_of_route(at.route);
     return Looking(
         network,
         path,
         in_metres(line_of_path(network, path)),
         in_metres(in_lengths(front_station(env))),
         in_metres(stretched(rig)),
-        unit_outline(rig.tractor_body, at.position, at.heading),
-        unit_outline(rig.trailer_body, trailer_position(rig, at), at.trailer_heading),
+        tractor_outline(at),
+        trailer_outline(at),
         at.position,
         direction(at.heading),
     );
-}
-
-// A length of decisions in metres.
-fn in_metres(length: i32) -> f32 {
-    return f32(length) * (1.0 / METRE);
 }
 
 // Writes what a truck observes of the cars around it.
@@ -133,13 +128,6 @@ fn meeting_at(network: Network, index: u32) -> Meeting {
         in_metres(zone.delta),
         zone.kind,
     );
-}
-
-// The zones of a truck's path with that of a car, those for a truck alone among them: the first, and how many.
-fn zones_of(looking: Looking, car: Car) -> vec2<u32> {
-    let network = looking.network;
-    let pair = lanes[network.pairs + PAIR_WORDS * (looking.path * network.n_paths + path_of(car))];
-    return vec2<u32>(pair & 0xffffu, pair >> 24u);
 }
 
 // A vehicle that comes to the entry.
@@ -184,7 +172,7 @@ fn look_at_entry(env: u32, looking: Looking) {
         let station = station_of(car);
         let its_line = in_metres(line_of_path(looking.network, path_of(car)));
         let waits = station + speed_of(car) * speed_of(car) / STILL_STOPS_WITH <= its_line;
-        let zones = zones_of(looking, car);
+        let zones = all_zones_of(looking.network, looking.path, path_of(car));
         var touches = false;
         for (var z = 0u; z < zones.y; z++) {
             let meeting = meeting_at(looking.network, zones.x + z);
@@ -226,7 +214,7 @@ fn look_ahead(env: u32, looking: Looking) {
         if !is_there(car) { continue; }
         let station = station_of(car);
         let rear = station - length_of(car);
-        let zones = zones_of(looking, car);
+        let zones = all_zones_of(looking.network, looking.path, path_of(car));
         for (var z = 0u; z < zones.y; z++) {
             let meeting = meeting_at(looking.network, zones.x + z);
             if meeting.its_out <= rear || station <= meeting.its_in { continue; }

@@ -96,7 +96,7 @@ fn arrive(env: u32) {
             hindered |= slows << slot;
             write_car(env, slot, unmarked(car));
         } else {
-            write_car(env, slot, Car(0, 0, NO_PATH, 0));
+            write_car(env, slot, no_car());
         }
     }
     // One draw for all sources: their rates are exact, and at most one car comes in a step.
@@ -151,7 +151,7 @@ fn entering(env: u32, network: Network, view: View, demand: u32, source: u32) ->
         rear = ahead.x;
         pace = ahead.y;
     }
-    if rear - front < ENTRY_ROOM { return Car(0, 0, NO_PATH, 0); }
+    if rear - front < ENTRY_ROOM { return no_car(); }
     let room = max(rear - front - rule(RULE_GAP), 0);
     let stops = min(square_of(pace) + STOPS_WITH * room, square_of(FASTEST));
     // The root is in 2^-10 m/s, of which 8/5 units of a pace; 2^-10 m in 8 steps are 2 units.
@@ -184,10 +184,9 @@ fn surround_truck(env: u32) {
     for (var word = 0u; word < N_CAR_WORDS; word++) { cars[env * N_CAR_WORDS + word] = lanes[first + word]; }
     cars[env * N_CAR_WORDS + LEVEL_AT] = level;
     let at = truck[env];
-    let rig = vehicles[at.vehicle].rig;
-    let tractor = with_room(unit_outline(rig.tractor_body, at.position, at.heading));
-    let trailer = with_room(unit_outline(rig.trailer_body, trailer_position(rig, at), at.trailer_heading));
-    let source = path_word(network, lanes[lanes_row(at.route) + 1u], 5u);
+    let tractor = grown_by(tractor_outline(at), ROOM_ALONG, ROOM_BESIDE);
+    let trailer = grown_by(trailer_outline(at), ROOM_ALONG, ROOM_BESIDE);
+    let source = path_word(network, path_of_route(at.route), 5u);
     let front = front_station(env);
     let drivers = drivers_of(env);
     for (var slot = 0u; slot < N_CARS; slot++) {
@@ -200,7 +199,7 @@ fn surround_truck(env: u32) {
         let comes_from_there = path_word(network, path_of(car), 5u) == source;
         let is_too_near_ahead = comes_from_there && 0.0 <= room && room < ROOM_ALONG + stops;
         if is_too_near_ahead || are_overlapping(tractor, outline) || are_overlapping(trailer, outline) {
-            write_car(env, slot, Car(0, 0, NO_PATH, 0));
+            write_car(env, slot, no_car());
         } else {
             write_car(env, slot, driven_by(drivers, car, 0u, slot));
         }
@@ -255,9 +254,4 @@ fn truck_ahead(network: Network, view: View, car: Car) -> vec2<i32> {
         }
     }
     return vec2<i32>(BEYOND, 0);
-}
-
-// The ground that a unit covers, and the room around it that it begins with.
-fn with_room(unit: Outline) -> Outline {
-    return Outline(unit.middle, unit.along, unit.half_length + ROOM_ALONG, unit.half_width + ROOM_BESIDE);
 }

@@ -59,7 +59,7 @@ pub fn learned(name: &str) -> Result<offtrack_policy::Policy, Error> {
     let file = Path::new(name);
     let is_shipped = offtrack_policy::Policy::shipped_names().contains(&name) && !file.is_file();
     // A word without an extension that is no file is taken for a wrong name: the error lists the right ones.
-    let is_name = !file.exists() && file.extension().is_none() && file.components().count() == 1;
+    let is_name = !file.exists() && file.extension().is_none() && file.components().count() <= 1;
     if is_shipped || is_name {
         return Ok(offtrack_policy::Policy::shipped(name)?);
     }

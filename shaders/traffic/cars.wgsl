@@ -14,6 +14,11 @@ struct Car {
     acceleration: i32,
 }
 
+// A slot without a car.
+fn no_car() -> Car {
+    return Car(0, 0, NO_PATH, 0);
+}
+
 fn car_at(env: u32, slot: u32) -> Car {
     let at = env * N_CAR_WORDS + CAR_WORDS * slot;
     return Car(bitcast<i32>(cars[at]), bitcast<i32>(cars[at + 1u]), cars[at + 2u], bitcast<i32>(cars[at + 3u]));
@@ -81,7 +86,7 @@ fn extent(style: u32) -> i32 {
 
 // Length of a car (m).
 fn length_of(car: Car) -> f32 {
-    return f32(extent(style_of(car))) * (1.0 / METRE);
+    return in_metres(extent(style_of(car)));
 }
 
 // Station of its front (m).
@@ -131,6 +136,11 @@ struct Network {
 // First word of a route in the table of lanes: where its road begins, its path there, and the station of its beginning.
 fn lanes_row(route: u32) -> u32 {
     return LANES_ROUTES + LANES_ROUTE_WORDS * route;
+}
+
+// Index of the path that a route runs on.
+fn path_of_route(route: u32) -> u32 {
+    return lanes[lanes_row(route) + 1u];
 }
 
 // The network of a route's road.
@@ -192,6 +202,12 @@ fn zone_at(at: u32) -> Zone {
         extractBits(bitcast<i32>(rest), 0u, 16u) << UNIT_BITS,
         (rest >> 16u) & 3u,
     );
+}
+
+// The zones of an ordered pair of paths, those for a truck alone among them: the first, and how many.
+fn all_zones_of(network: Network, a: u32, b: u32) -> vec2<u32> {
+    let pair = lanes[network.pairs + PAIR_WORDS * (a * network.n_paths + b)];
+    return vec2<u32>(pair & 0xffffu, pair >> 24u);
 }
 
 // The cell of a pair's ends that a station lies in, or the first or last one (2^-10 m).

@@ -3,10 +3,8 @@
 // The contact in a word: the car's slot plus 1, and more where the truck is at fault; 0 if there is none. Of several
 // the one of the lowest slot among those for which the truck is at fault, or else among all.
 fn touched(env: u32, network: Network) -> u32 {
-    let at = truck[env];
-    let rig = vehicles[at.vehicle].rig;
-    let tractor = unit_outline(rig.tractor_body, at.position, at.heading);
-    let trailer = unit_outline(rig.trailer_body, trailer_position(rig, at), at.trailer_heading);
+    let tractor = tractor_outline(truck[env]);
+    let trailer = trailer_outline(truck[env]);
     let middle = 0.5 * (tractor.middle + trailer.middle);
     let half_lengths = max(tractor.half_length, trailer.half_length);
     let reach = 0.5 * distance(tractor.middle, trailer.middle) + half_lengths + NEAR_CAR;
@@ -29,7 +27,7 @@ fn is_cars_fault(env: u32, network: Network, tractor: Outline, trailer: Outline,
     let entered = cars[env * N_CAR_WORDS + ENTERED_AT];
     let has_entered_lately = entered != 0u && truck[env].steps + 1u - entered < LATELY;
     if pace_of(car) <= HITS_NOBODY || has_entered_lately { return false; }
-    let arm = arm_of(network, lanes[lanes_row(truck[env].route) + 1u]);
+    let arm = arm_of(network, path_of_route(truck[env].route));
     let behind_line = front_of(car) - line_of_path(network, path_of(car));
     // 2^-14 m a step for some steps.
     let lately = max(FROM_STANDING, (i32(LATELY) * pace_of(car)) >> 4u);

@@ -29,10 +29,10 @@ fn view_of(env: u32, network: Network) -> View {
     let rig = vehicles[at.vehicle].rig;
     let station = in_lengths(front_station(env));
     let speed = clamp(in_speeds(at.speed), 0, FASTEST);
-    let path = lanes[lanes_row(at.route) + 1u];
+    let path = path_of_route(at.route);
     let waits = still_stops(station, square_of(speed), line_of_path(network, path) - SWINGS_OUT);
-    let tractor = unit_outline(rig.tractor_body, at.position, at.heading);
-    let trailer = unit_outline(rig.trailer_body, trailer_position(rig, at), at.trailer_heading);
+    let tractor = tractor_outline(at);
+    let trailer = trailer_outline(at);
     var later = array<Outline, 4>(tractor, trailer, tractor, trailer);
     if !waits { later = foreseen(rig, at); }
     let middle = 0.25 * (tractor.middle + trailer.middle + later[2].middle + later[3].middle);
@@ -67,6 +67,11 @@ fn reach_around(unit: Outline, middle: vec2<f32>) -> f32 {
     return distance(unit.middle, middle) + unit.half_length + unit.half_width;
 }
 
+// A length of decisions in metres.
+fn in_metres(length: i32) -> f32 {
+    return f32(length) * (1.0 / METRE);
+}
+
 // A length and a speed in the units of decisions.
 fn in_lengths(metres: f32) -> i32 {
     return i32(round(metres * METRE));
@@ -83,6 +88,17 @@ fn unit_outline(body: Body, position: vec2<f32>, heading: f32) -> Outline {
     return Outline(middle, along, 0.5 * (body.front - body.rear), body.half_width);
 }
 
+// The ground that a truck's tractor covers.
+fn tractor_outline(at: Truck) -> Outline {
+    return unit_outline(vehicles[at.vehicle].rig.tractor_body, at.position, at.heading);
+}
+
+// The ground that its trailer covers.
+fn trailer_outline(at: Truck) -> Outline {
+    let rig = vehicles[at.vehicle].rig;
+    return unit_outline(rig.trailer_body, trailer_position(rig, at), at.trailer_heading);
+}
+
 // Both units in 1 s and in 2 s at constant speed and steer angle: the tractor on a circle, the trailer behind it.
 fn foreseen(rig: Rig, now: Truck) -> array<Outline, 4> {
     let yaw_rate = yaw_rate_of(rig, now);
@@ -96,8 +112,8 @@ fn foreseen(rig: Rig, now: Truck) -> array<Outline, 4> {
             ahead.heading += STEP_AHEAD * yaw_rate;
             ahead.trailer_heading += STEP_AHEAD * trailer_yaw_rate;
         }
-        later[k] = unit_outline(rig.tractor_body, ahead.position, ahead.heading);
-        later[k + 1u] = unit_outline(rig.trailer_body, trailer_position(rig, ahead), ahead.trailer_heading);
+        later[k] = tractor_outline(ahead);
+        later[k + 1u] = trailer_outline(ahead);
     }
     return later;
 }
@@ -115,11 +131,9 @@ fn mind_at_line(driver: ptr<function, Driver>, view: View) {
     // A truck that can still wait is no more in the way than a car that does.
     if view.waits || !me.waits || me.is_rude { return; }
     let network = (*driver).network;
-    let at = network.pairs + PAIR_WORDS * ((*driver).path * network.n_paths + view.path);
-    let first = lanes[at] & 0xffffu;
-    let n = lanes[at] >> 24u;
-    for (var z = 0u; z < n; z++) {
-        if is_in_the_way(*driver, view, zone_at(network.zones + ZONE_WORDS * (first + z))) { (*driver).stops = true; }
+    let zones = all_zones_of(network, (*driver).path, view.path);
+    for (var z = zones.x; z < zones.x + zones.y; z++) {
+        if is_in_the_way(*driver, view, zone_at(network.zones + ZONE_WORDS * z)) { (*driver).stops = true; }
     }
 }
 
@@ -207,12 +221,13 @@ fn touches_soon(view: View, network: Network, car: Car, front: vec2<f32>) -> boo
     // A station's unit is half of a speed's way in a step.
     let ahead = Car(car.station + 2 * CAR_STEPS_AHEAD * car.speed + MORE_AHEAD, car.speed, car.what, 0);
     let soon = outline_of(network, ahead);
-    return are_overlapping(soon, grown_by(view.tractor, LEAST_ROOM))
-        || are_overlapping(soon, grown_by(view.trailer, LEAST_ROOM));
+    return are_overlapping(soon, grown_by(view.tractor, LEAST_ROOM, LEAST_ROOM))
+        || are_overlapping(soon, grown_by(view.trailer, LEAST_ROOM, LEAST_ROOM));
 }
 
-fn grown_by(unit: Outline, room: f32) -> Outline {
-    return Outline(unit.middle, unit.along, unit.half_length + room, unit.half_width + room);
+// The ground that a unit covers, and the room before, behind and beside it.
+fn grown_by(unit: Outline, along: f32, beside: f32) -> Outline {
+    return Outline(unit.middle, unit.along, unit.half_length + along, unit.half_width + beside);
 }
 
 // Squared distance to the ground that a truck covers (m²).

@@ -332,6 +332,9 @@ mod tests {
         assert_eq!(under("yields:runs/a:b.safetensors"), Some(("yields", "runs/a:b.safetensors")));
         assert_eq!(under("follows:traffic2026"), Some(("follows", "traffic2026")));
         assert_eq!((under("yields"), under("pursuit:x"), under("C:/policy.safetensors")), (None, None, None));
+        let (_, nothing) = under("yields:").unwrap();
+        let message = crate::policies::learned(nothing).unwrap_err().to_string();
+        assert!(message.contains("the program comes with attard2023"), "{message}");
     }
 
     #[test]
