@@ -82,7 +82,7 @@ pub struct Args {
     /// Length of the routes after the ring (m).
     #[arg(long, default_value_t = DEPARTURE)]
     departure: f64,
-    /// Width of a PNG (pixels) \[default: 1000\].
+    /// Width of a PNG (pixels) [default: 1000].
     #[arg(long)]
     size: Option<u32>,
 }

@@ -106,8 +106,7 @@ fn every_flag_of_every_command_is_described_and_no_other() {
 
 #[test]
 fn a_missing_flag_an_unknown_one_and_a_wrong_default_are_found() {
-    let help = "Options:\n      --seed <SEED>    Seed [default: 0]\n      --json <FILE>  Report\n\
-          -o, --output <FILE>\n          A film\n  -h, --help\n";
+    let help = "Options:\n      --seed <SEED>    Seed [default: 0]\n      --json <FILE>  Report\n  -o, --output <FILE>\n          A film\n  -h, --help\n";
     let section = "`offtrack record --seed 7 -o FILE`. As `evaluate --films`, see `offtrack draw --size`.\n\n\
         | flag | default | meaning |\n|---|---|---|\n| `--seed N` | 0 | seed |\n| `--json FILE` | | report |\n";
     assert_eq!(faults("record", section, help), Vec::<String>::new());

@@ -16,21 +16,21 @@ const LANE_WIDTH: f64 = 3.5;
 #[derive(Debug, Clone, clap::Args)]
 pub struct DrawingArgs {
     /// Of a drawing: the layer of the kerbs' closed outlines; in GeoJSON the property `part` or `layer` says it
-    /// \[default: KERB\].
+    /// [default: KERB].
     #[arg(long, value_name = "LAYER")]
     kerb_layer: Option<String>,
     /// Of a drawing: the layer of the lanes' centre lines, one for each way from an arm's end to another's, in the
-    /// direction of travel \[default: LANE\].
+    /// direction of travel [default: LANE].
     #[arg(long, value_name = "LAYER")]
     lane_layer: Option<String>,
     /// Of a drawing: the layer of the aprons' closed edges, inner ones, outer ones or both; it may be empty
-    /// \[default: APRON\].
+    /// [default: APRON].
     #[arg(long, value_name = "LAYER")]
     apron_layer: Option<String>,
     /// Of a drawing: the unit of its coordinates, where it does not say it.
     #[arg(long, value_parser = PossibleValuesParser::new(["m", "mm", "cm", "ft", "in"]).map(unit))]
     unit: Option<Unit>,
-    /// Of a drawing: the width of the lanes that say none (m) \[default: 3.5\].
+    /// Of a drawing: the width of the lanes that say none (m) [default: 3.5].
     #[arg(long, value_name = "M")]
     lane_width: Option<f64>,
 }
