@@ -1,6 +1,6 @@
 //! A learned policy where the trucks are: on the processor, or on their device by its kernel. Then no observation
-//! leaves the device. One that the kernel does not act by, with a memory, values or commands of its own, drives trucks
-//! of a device from the processor.
+//! leaves the device. One that the kernel does not act by, with a memory or commands, drives trucks of a device from the
+//! processor.
 
 #[cfg(feature = "gpu")]
 mod on_device;
@@ -21,7 +21,7 @@ use crate::error::Error;
 pub fn placed(policy: Policy, engine: &Engine, world: &World, choice: Choice) -> Result<Box<dyn Controller>, Error> {
     match engine {
         #[cfg(feature = "gpu")]
-        Engine::Gpu { device, .. } if policy.is_plain() => {
+        Engine::Gpu { device, .. } if policy.acts_on_device() => {
             let placed = on_device::DevicePolicy::new(device, &policy, world, choice)?;
             Ok(Box::new(on_device::OnDevice { placed, host: Box::new(OnHost::new(policy, choice)) }))
         }

@@ -3,8 +3,10 @@
 //! The widest network of a training file, 1,024 outputs, fits into the 16 KB of workgroup memory that every device has.
 //! A wider one is refused: it acts on the processor.
 
+use std::borrow::Cow;
+
 use offtrack::gpu::{self, Kernels, Slice};
-use offtrack::layout::{Column, WORKGROUP};
+use offtrack::layout::{Column, EXTRAS, N_AROUND, N_VALUES, WORKGROUP};
 use offtrack::wgpu::{CommandEncoder, ComputePassDescriptor};
 use offtrack::world::World;
 
@@ -12,7 +14,9 @@ use crate::error::Error;
 use crate::file::MOST_LAYERS;
 use crate::kernel::{Facts, Kernel, LayerRow, SHAPES, Shape, buffers, source};
 use crate::network::{Activation, Layer};
+use crate::normalisation::Normalisation;
 use crate::policy::{Choice, Policy};
+use crate::selection::VEHICLES_AT;
 
 /// A policy whose numbers lie on a device.
 #[derive(Debug)]
@@ -30,12 +34,14 @@ impl DevicePolicy {
     ///
     /// # Errors
     ///
-    /// A policy that cannot drive in `world`, that is not [plain](Policy::is_plain), whose layers do not fit each
-    /// other, that a file could not hold, or that is too wide for a workgroup; a device whose workgroups are too small.
+    /// A policy that cannot drive in `world`, that a device does [not act by](Policy::acts_on_device), whose layers do
+    /// not fit each other, that a file could not hold, or that is too wide for a workgroup; a device whose workgroups
+    /// are too small.
     pub fn new(device: &gpu::Device, policy: &Policy, world: &World, choice: Choice) -> Result<DevicePolicy, Error> {
         policy.check(world)?;
-        check_plain(policy)?;
+        check_acts(policy)?;
         check_whole(policy)?;
+        let policy = &*reading_all(policy);
         let shape = fitting(policy)?;
         check_limits(device, shape)?;
         let mut rows = [LayerRow::default(); MOST_LAYERS];
@@ -119,13 +125,35 @@ impl DevicePolicy {
 }
 
 /// An error for a policy that is more than the kernel acts by.
-fn check_plain(policy: &Policy) -> Result<(), Error> {
-    if policy.is_plain() {
+fn check_acts(policy: &Policy) -> Result<(), Error> {
+    if policy.acts_on_device() {
         return Ok(());
     }
-    let message = "is a policy with a memory, values of its own or commands: a device acts by none of these; let it \
-                   drive on the processor";
+    let message = "is a policy with a memory or commands: a device acts by neither; let it drive on the processor";
     Err(Error::contents(&policy.name, message))
+}
+
+/// The policy as one that reads all values, the extras up to the last one that it reads and, if it reads any of them,
+/// the values of other vehicles: those that it does not read have weights of 0.
+fn reading_all(policy: &Policy) -> Cow<'_, Policy> {
+    let Some(values) = &policy.values else { return Cow::Borrowed(policy) };
+    let extras = values.indices().iter().filter(|index| (N_VALUES..VEHICLES_AT).contains(*index));
+    let n_extras = extras.map(|index| index + 1 - N_VALUES).max().unwrap_or_default();
+    let vehicles = values.has_vehicles();
+    let n_values = N_VALUES + n_extras + if vehicles { N_AROUND } else { 0 };
+    let mut normalisation = Normalisation::none(n_values);
+    let mut layers = policy.layers.clone();
+    let n_outputs = layers[0].n_outputs();
+    layers[0].weights = vec![0.0; n_values * n_outputs];
+    for (input, &index) in values.indices().iter().enumerate() {
+        let value = if index < VEHICLES_AT { index } else { N_VALUES + n_extras + index - VEHICLES_AT };
+        normalisation.mean[value] = policy.normalisation.mean[input];
+        normalisation.factor[value] = policy.normalisation.factor[input];
+        layers[0].weights[value * n_outputs..][..n_outputs]
+            .copy_from_slice(&policy.layers[0].weights[input * n_outputs..][..n_outputs]);
+    }
+    let extras = EXTRAS[..n_extras].iter().map(|extra| extra.name.to_owned()).collect();
+    Cow::Owned(Policy { values: None, extras, vehicles, normalisation, layers, ..policy.clone() })
 }
 
 /// An error for a policy that no file could hold: one whose layers do not fit each other, or with numbers that are not

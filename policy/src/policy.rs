@@ -212,10 +212,15 @@ impl Policy {
         self.frames.n != 1 || self.recurrent.is_some()
     }
 
-    /// Whether it is a perceptron of all values of one step, with a value an action: what a kernel on a device acts by,
-    /// and what `offtrack train` writes and continues with.
+    /// Whether it is a perceptron of all values of one step, with a value an action: what `offtrack train` writes and
+    /// continues with.
     pub fn is_plain(&self) -> bool {
-        !self.has_memory() && self.values.is_none() && self.head == Head::Levels
+        self.acts_on_device() && self.values.is_none()
+    }
+
+    /// Whether it is a perceptron of values of one step, with a value an action: what a kernel on a device acts by.
+    pub fn acts_on_device(&self) -> bool {
+        !self.has_memory() && self.head == Head::Levels
     }
 
     /// The policy at the wheel of `n_envs` trucks.

@@ -11,7 +11,7 @@ use offtrack::wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 use offtrack::wgpu::naga::{AddressSpace, front::wgsl as parser};
 
 use super::*;
-use crate::Normalisation;
+use crate::{Normalisation, Selection};
 
 /// The simulator's tests have it too.
 #[cfg(target_os = "linux")]
@@ -142,6 +142,37 @@ fn a_policy_that_observes_vehicles_chooses_on_a_device_what_it_chooses_on_the_pr
     assert!(0 < drive.compare(&wrong, 30).1, "weights of vehicles that are off by a tenth must show");
 }
 
+/// A network with the actions of a benchmark that reads these values alone, each normalised in another way.
+fn reading(benchmark: &str, names: &[&str]) -> Policy {
+    let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
+    let values = Selection::of(&names).unwrap();
+    let n = values.indices().len();
+    let number = |at: usize| signed_unit(words(4, at as u32, 0, 0)[0]);
+    let normalisation = Normalisation {
+        mean: (0..n).map(|at| 0.3 * number(at)).collect(),
+        factor: (0..n).map(|at| 2.0 + number(n + at)).collect(),
+    };
+    let actions = world_of(benchmark).0.actions.clone();
+    let policy = Policy { values: Some(values), normalisation, actions, ..Policy::shipped("attard2023").unwrap() };
+    with_layers(policy, &[48], Activation::Relu)
+}
+
+#[test]
+fn a_policy_that_reads_values_by_name_in_its_own_order_chooses_on_a_device_what_it_does_on_the_processor() {
+    let cases = [
+        ("laden2026", ["target_speed", "tractor_range", "bearing[3]", "steering"]),
+        ("traffic2026", ["vehicle_left", "tractor_range", "target_speed", "steering"]),
+    ];
+    for (benchmark, mut names) in cases {
+        let policy = reading(benchmark, &names);
+        let mut drive = Drive::new(benchmark, policy.clone(), 100, Choice::Best);
+        let (taken, n_others) = drive.compare(&policy, 20);
+        assert!(n_others == 0 && 4 < taken.len(), "{benchmark}: {n_others} others, {taken:?}");
+        names.swap(0, 3);
+        assert!(0 < drive.compare(&reading(benchmark, &names), 20).1, "{benchmark}: another order must show");
+    }
+}
+
 #[test]
 fn networks_of_every_shape_of_a_workgroup_and_either_activation_choose_as_on_the_processor() {
     let mut all = BTreeSet::new();
@@ -212,7 +243,7 @@ fn a_policy_that_is_too_wide_or_cannot_drive_is_refused_by_name() {
         refusal(&policy, "attard2023")
     };
     let cases: [(Change, &str); 7] = [
-        (|policy| policy.frames.n = 2, "(shipped): is a policy with a memory, values of its own or commands: a device"),
+        (|policy| policy.frames.n = 2, "(shipped): is a policy with a memory or commands: a device"),
         (|policy| policy.layers[1].weights[7] = f32::NAN, "actor.1.weight[7] is NaN; every number must be finite"),
         (|policy| policy.normalisation.mean[2] = f32::INFINITY, "observation.mean[2] is inf"),
         (|policy| policy.layers[0].weights.fill(3e38), "the outputs of actor.0 may reach"),
