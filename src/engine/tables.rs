@@ -161,6 +161,19 @@ fn lanes(world: &World) -> Vec<u32> {
     lanes
 }
 
+/// Of each road the first word of its demands in the table of lanes, and the words of each; nothing where there are no
+/// vehicles.
+pub fn levels(world: &World) -> Vec<(usize, usize)> {
+    let Some(traffic) = &world.traffic else { return Vec::new() };
+    let mut first = LANES_ROUTES + LANES_ROUTE_WORDS * world.routes.len();
+    let of_road = |road: &TrafficRoad| {
+        let (n_words, n_of_network) = (road.words().len(), road.network.words().len());
+        first += n_words;
+        (first + n_of_network - n_words, (n_words - n_of_network) / road.levels.len().max(1))
+    };
+    traffic.roads.iter().map(of_road).collect()
+}
+
 /// Bytes of the tables of a world that grow with it.
 pub fn sizes(world: &World) -> [(Table, usize); 6] {
     let of_fields = |bytes: fn(&Field) -> usize| world.all_fields().map(bytes).sum::<usize>();

@@ -143,7 +143,7 @@ fn a_file_that_is_no_policy_for_the_benchmark_is_refused_in_words() {
             "learned with another action table: 8 actions",
         ),
         ("layers", cut.to_bytes(), "is of another shape"),
-        ("version", reworded(r#"\"version\":1"#, r#"\"version\":2"#), "is a policy file of version 2"),
+        ("version", reworded(r#"\"version\":1"#, r#"\"version\":3"#), "is a policy file of version 3"),
         ("type", reworded(r#""F32""#, r#""F16""#), "must hold 32-bit floats"),
         ("header", reworded(r#""shape":[69]"#, r#""shape":{69}"#), "its header is no JSON"),
         ("nameless", reworded(r#"\"actions\""#, r#"\"actionz\""#), "no layers, far too many, or no actions"),
