@@ -207,3 +207,28 @@ impl BatchFacts {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::cache::Loading;
+    use crate::scenario::Scenario;
+
+    #[test]
+    fn each_demand_of_each_road_is_where_a_host_is_told_to_find_it() {
+        let text = Scenario::text_of("attard2023").unwrap() + "\n[traffic]\ndemand = [900, 1500, 2100]\n";
+        let mut scenario = Scenario::parse("among", &text, None, &Loading::PLAIN).unwrap();
+        scenario.retain(|_, route| route.name == "16m/N-left-2" || route.name == "20m/E-left-3");
+        let world = World::bake(&scenario).unwrap();
+        let (tables, levels) = (Tables::new(&world), levels(&world));
+        let lanes: &[u32] = cast_slice(tables.bytes(Table::Lanes).unwrap());
+        let roads = &world.traffic.as_ref().unwrap().roads;
+        assert_eq!((roads.len(), levels.len()), (2, 2));
+        for (road, (first, n_words)) in roads.iter().zip(levels) {
+            let found: Vec<&[u32]> = lanes[first..].chunks_exact(n_words).take(3).collect();
+            let expected =
+                road.levels.iter().map(|level| [&level.demand.words()[..], cast_slice(&level.snapshots)].concat());
+            assert_eq!(found, expected.collect::<Vec<_>>());
+        }
+    }
+}

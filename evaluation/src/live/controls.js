@@ -60,7 +60,7 @@ function showChoices(app) {
   fillSelect("road", roadChoices(world), chosen.road);
   const demands = world.traffic?.demand ?? [];
   const each = demands.map((demand, index) => [index, `${whole(demand)} an hour`]);
-  fillSelect("demand", [["", "each episode draws how many"], ...each], chosen.demand ?? "");
+  fillSelect("demand", [["", "drawn each episode"], ...each], chosen.demand ?? "");
   for (const node of [byId("demand"), byId("demand").labels[0]]) node.hidden = demands.length < 2;
   const all = app.policies.map((policy, index) => [index, policyWords(policy)]);
   app.learned.show();

@@ -86,7 +86,7 @@ class Followed {
 
 /** Words for the vehicles around a truck. */
 const vehiclesWords = ({ n, slow, demand }) =>
-  `among ${whole(n)} vehicles of ${whole(demand)} an hour${slow === 0 ? "" : `; ${whole(slow)} slow for it`}`;
+  `among ${whole(n)} vehicles of ${whole(demand)} an hour${slow === 0 ? "" : `; ${whole(slow)} slowed by it`}`;
 
 /** Words for the names of vehicles and loads in `scenarios/vehicles/`. */
 const loadWords = (load) => (load === "half" ? "half laden" : load.replaceAll("_", " "));

@@ -19,7 +19,7 @@ const VEHICLES = {
 };
 /** Trucks of a crowd whose vehicles are drawn at most; how opaque these are, and the number of trucks on a road from
  * which on they are paler, down to what eight bits of a colour still show. */
-const MOST_AROUND = 8192, OTHERS = 0.6, FEW_OTHERS = 12, LEAST_OTHERS = 0.02;
+const MOST_AROUND = 8192, OTHERS = 0.6, FEW_OTHERS = 20, LEAST_OTHERS = 0.02;
 /** Bytes of `View` and `Theme` in view.wgsl; most steps of a path that are drawn; no truck. */
 const VIEW_BYTES = 48, THEME_BYTES = 496, MOST_POINTS = 1024, NOBODY = 0xffffffff;
 /** Colours of `Theme`, in order; then those of the ends. */

@@ -7,9 +7,10 @@ const LIGHT_INNER: f32 = 0.22;
 const LIGHT_OUTER: f32 = 0.46;
 const SCREEN_REAR: f32 = 0.14;
 const SCREEN_FRONT: f32 = 0.26;
-// Width of its edge, and of that of who is rude (pixels).
+// Width of its edge, and of that of who is rude (pixels), and most of half its width.
 const EDGE: f32 = 1.0;
 const RUDE_EDGE: f32 = 2.5;
+const MOST_EDGE: f32 = 0.35;
 
 // Another vehicle.
 struct Vehicle {
@@ -70,7 +71,7 @@ fn vehicle_colour(in: Vehicle) -> @location(0) vec4<f32> {
     var colour = in.colour.rgb;
     let is_screen = SCREEN_REAR < part.x && part.x < SCREEN_FRONT && abs(part.y) < 0.4;
     if is_screen { colour = mix(colour, theme.panel.rgb, 0.7 * fine); }
-    let width = in.edge.w * pixel;
+    let width = min(in.edge.w * pixel, MOST_EDGE * in.half.y);
     let edge = smoothstep(-width - 0.5 * pixel, -width + 0.5 * pixel, distance);
     // Of who is rude it is seen from afar too.
     colour = mix(colour, in.edge.rgb, edge * select(fine, 1.0, EDGE < in.edge.w));

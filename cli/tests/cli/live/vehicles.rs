@@ -171,7 +171,7 @@ fn the_page_says_among_how_many_vehicles_a_truck_drives_what_it_observes_of_them
     simulator.step_at_random();
     let row = Row::of(&simulator.batch().cars[2]);
     let n = row.cars.iter().filter(|car| car.is_there()).count();
-    let slow = if row.hindered == 0 { String::new() } else { format!("; {} slow for it", row.hindered.count_ones()) };
+    let slow = if row.hindered == 0 { String::new() } else { format!("; {} slowed by it", row.hindered.count_ones()) };
     let words = format!("among {n} vehicles of {} an hour{slow}", ["1,500", "2,100"][row.level as usize]);
     let steps = 160;
     (1..steps).for_each(|_| simulator.step_at_random());
@@ -212,7 +212,7 @@ fn the_page_says_among_how_many_vehicles_a_truck_drives_what_it_observes_of_them
     let says = |words: &str| listed.iter().any(|line| line.as_str().unwrap().contains(words));
     assert!(says("met vehicle") && says(" on a car ") && says("tractor on a "), "{listed:?}");
     assert!(found["again"].as_str().unwrap().ends_with("as before"), "{found}");
-    assert_eq!(found["offered"], json!(["each episode draws how many", "1,500 an hour", "2,100 an hour"]));
+    assert_eq!(found["offered"], json!(["drawn each episode", "1,500 an hour", "2,100 an hour"]));
     assert!(found["chosen"].as_str().unwrap().contains(" vehicles of 2,100 an hour"), "{found}");
     assert!(found["ends"].as_str().unwrap().contains("met vehicle"), "{found}");
 }
