@@ -19,6 +19,14 @@ fn is_its_turn(env: u32, slot: u32) -> bool {
     return (slot + truck[env].steps) % DECIDES_EVERY == 0u;
 }
 
+fn write_car(env: u32, slot: u32, car: Car) {
+    let at = env * N_CAR_WORDS + CAR_WORDS * slot;
+    cars[at] = bitcast<u32>(car.station);
+    cars[at + 1u] = bitcast<u32>(car.speed);
+    cars[at + 2u] = car.what;
+    cars[at + 3u] = bitcast<u32>(car.acceleration);
+}
+
 // A car moves.
 @compute @workgroup_size(WORKGROUP)
 fn traffic_move(thread: Thread) {

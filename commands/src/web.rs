@@ -8,7 +8,7 @@ use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::kept::{self, Kept};
 use offtrack_evaluation::live::{self, Ground, Live, Part, TrainingRun};
-use offtrack_evaluation::policies;
+use offtrack_evaluation::policies::{self, rule};
 use offtrack_policy::Policy;
 
 use crate::{outputs, roads};
@@ -119,11 +119,6 @@ fn printed(parts: &[Part]) -> Result<(), Error> {
 /// A benchmark with the routes asked for, baked.
 fn ground(name: &str, args: &Args) -> Result<Ground, Error> {
     let mut scenario = roads::benchmark(name)?;
-    if scenario.traffic.is_some() {
-        let expected = "has [traffic], and the page steps trucks alone yet: a benchmark without that table is needed; \
-                        offtrack evaluate --html shows vehicles";
-        return Err(Error::Setting { name: "--benchmark", value: name.to_owned(), expected: expected.to_owned() });
-    }
     let split = Split::ALL.into_iter().find(|split| split.name() == args.split);
     if !args.road.is_empty() {
         let splits = split.map_or(Split::ALL.to_vec(), |split| vec![split]);
@@ -159,6 +154,11 @@ fn shipped(grounds: &[Ground]) -> Result<Vec<Policy>, Error> {
 /// The policies that the flags name.
 fn named(names: &[String], grounds: &[Ground]) -> Result<Vec<Policy>, Error> {
     let named = |name: &String| {
+        if rule::under(name).is_some() || [rule::YIELDS, rule::FOLLOWS].contains(&name.as_str()) {
+            let expected = "a page has no rule, which decides on the processor: a policy is needed, by its name or its \
+                            file; offtrack evaluate --html shows episodes by a rule";
+            return Err(Error::Setting { name: "--policy", value: name.clone(), expected: expected.to_owned() });
+        }
         let policy = policies::learned(name)?;
         check(&policy, name, "--policy", grounds).map(|()| policy)
     };

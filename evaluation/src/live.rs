@@ -28,7 +28,7 @@ const TEMPLATE: &str = concat!(include_str!("page/head.html"), include_str!("liv
 /// What the page shares with that of a report, and its own.
 const STYLES: &[&str] = &[include_str!("page/theme.css"), include_str!("live/style.css")];
 /// The shaders of the picture.
-const VIEW: &str = include_str!("live/view.wgsl");
+const VIEW: &str = concat!(include_str!("live/view.wgsl"), "\n", include_str!("live/vehicles.wgsl"));
 /// Scripts in the order of the page; the last one starts the others.
 const SCRIPTS: &[&str] = &[
     include_str!("page/elements.js"),

@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::polygons::{self, Polygon};
 pub use measures::{Class, Measures, Rectangle};
+pub(crate) use vehicles::BRAKES;
 pub use vehicles::Vehicle;
 
 /// Resolution of lengths, speeds, rewards and load transfer ratios: parts of a unit.

@@ -18,10 +18,8 @@ use crate::recurrent::Recurrent;
 
 /// Key of a policy file's one entry in its metadata.
 pub const KEY: &str = "offtrack";
-/// Version of what that entry means.
-pub const VERSION: u32 = 1;
-/// The same, and that of one with any of the keys that came with the second.
-const VERSIONS: [u32; 2] = [VERSION, 2];
+/// Versions of what that entry means: the second is that of one with any of the keys that came with it.
+pub const VERSIONS: [u32; 2] = [1, 2];
 /// Most layers of a policy: more than any training file asks for.
 pub const MOST_LAYERS: usize = 64;
 

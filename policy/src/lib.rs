@@ -63,7 +63,7 @@ mod selection;
 pub use check::SAME_ACTION;
 pub use driver::Driver;
 pub use error::Error;
-pub use file::{KEY, MOST_LAYERS, VERSION};
+pub use file::{KEY, MOST_LAYERS, VERSIONS};
 pub use frames::{Frames, Padding};
 pub use head::{Head, Squash};
 pub use network::{Activation, Layer};

@@ -1,4 +1,5 @@
-// Cars as the column of cars has them, and the tables of the roads that they drive on.
+// Cars as the column of cars has them, the tables of the roads that they drive on, and the ground that they and trucks
+// cover. Nothing is written here: pictures read it too.
 //
 // Integers of 32 bits in the units of src/traffic/units.rs; outlines alone are floats.
 
@@ -22,14 +23,6 @@ fn no_car() -> Car {
 fn car_at(env: u32, slot: u32) -> Car {
     let at = env * N_CAR_WORDS + CAR_WORDS * slot;
     return Car(bitcast<i32>(cars[at]), bitcast<i32>(cars[at + 1u]), cars[at + 2u], bitcast<i32>(cars[at + 3u]));
-}
-
-fn write_car(env: u32, slot: u32, car: Car) {
-    let at = env * N_CAR_WORDS + CAR_WORDS * slot;
-    cars[at] = bitcast<u32>(car.station);
-    cars[at + 1u] = bitcast<u32>(car.speed);
-    cars[at + 2u] = car.what;
-    cars[at + 3u] = bitcast<u32>(car.acceleration);
 }
 
 // Bit of an acceleration at which the mark stands that its car slows for a truck more than for cars: threads of cars
@@ -79,6 +72,11 @@ fn pace_of(car: Car) -> i32 {
     return car.speed >> FINER_SPEED;
 }
 
+// A length of decisions in metres.
+fn in_metres(length: i32) -> f32 {
+    return f32(length) * (1.0 / METRE);
+}
+
 // Length of a car of a style (2^-10 m).
 fn extent(style: u32) -> i32 {
     return select(SHORTEST + LONGER * i32((style >> LENGTH) & 3u), VAN_LENGTH, (style & VAN) == VAN);
@@ -101,7 +99,11 @@ fn speed_of(car: Car) -> f32 {
 
 // Half the width of a car (m).
 fn half_width_of(car: Car) -> f32 {
-    return select(HALF_WIDTH, VAN_HALF_WIDTH, (style_of(car) & VAN) == VAN);
+    return select(HALF_WIDTH, VAN_HALF_WIDTH, is_van(car));
+}
+
+fn is_van(car: Car) -> bool {
+    return (style_of(car) & VAN) == VAN;
 }
 
 // From -15, who drives slowly and keeps his distance, to 15, in steps of 2.
@@ -239,6 +241,24 @@ fn outline_of(network: Network, car: Car) -> Outline {
     let front = point_at(network, path_of(car), station - OVERHANG * length);
     let rear = point_at(network, path_of(car), station - (1.0 - OVERHANG) * length);
     return Outline(0.5 * (front + rear), normalize(front - rear), 0.5 * length, half_width_of(car));
+}
+
+// The ground that a unit covers.
+fn unit_outline(body: Body, position: vec2<f32>, heading: f32) -> Outline {
+    let along = direction(heading);
+    let middle = position + 0.5 * (body.front + body.rear) * along;
+    return Outline(middle, along, 0.5 * (body.front - body.rear), body.half_width);
+}
+
+// The ground that a truck's tractor covers.
+fn tractor_outline(at: Truck) -> Outline {
+    return unit_outline(vehicles[at.vehicle].rig.tractor_body, at.position, at.heading);
+}
+
+// The ground that its trailer covers.
+fn trailer_outline(at: Truck) -> Outline {
+    let rig = vehicles[at.vehicle].rig;
+    return unit_outline(rig.trailer_body, trailer_position(rig, at), at.trailer_heading);
 }
 
 // Position at a station of a path: cubic between samples (m).

@@ -67,11 +67,6 @@ fn reach_around(unit: Outline, middle: vec2<f32>) -> f32 {
     return distance(unit.middle, middle) + unit.half_length + unit.half_width;
 }
 
-// A length of decisions in metres.
-fn in_metres(length: i32) -> f32 {
-    return f32(length) * (1.0 / METRE);
-}
-
 // A length and a speed in the units of decisions.
 fn in_lengths(metres: f32) -> i32 {
     return i32(round(metres * METRE));
@@ -79,24 +74,6 @@ fn in_lengths(metres: f32) -> i32 {
 
 fn in_speeds(metres_per_second: f32) -> i32 {
     return i32(round(metres_per_second * PACE));
-}
-
-// The ground that a unit covers.
-fn unit_outline(body: Body, position: vec2<f32>, heading: f32) -> Outline {
-    let along = direction(heading);
-    let middle = position + 0.5 * (body.front + body.rear) * along;
-    return Outline(middle, along, 0.5 * (body.front - body.rear), body.half_width);
-}
-
-// The ground that a truck's tractor covers.
-fn tractor_outline(at: Truck) -> Outline {
-    return unit_outline(vehicles[at.vehicle].rig.tractor_body, at.position, at.heading);
-}
-
-// The ground that its trailer covers.
-fn trailer_outline(at: Truck) -> Outline {
-    let rig = vehicles[at.vehicle].rig;
-    return unit_outline(rig.trailer_body, trailer_position(rig, at), at.trailer_heading);
 }
 
 // Both units in 1 s and in 2 s at constant speed and steer angle: the tractor on a circle, the trailer behind it.

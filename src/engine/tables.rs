@@ -161,6 +161,19 @@ fn lanes(world: &World) -> Vec<u32> {
     lanes
 }
 
+/// Of each road the first word of its demands in the table of lanes, and the words of each; nothing where there are no
+/// vehicles.
+pub fn levels(world: &World) -> Vec<(usize, usize)> {
+    let Some(traffic) = &world.traffic else { return Vec::new() };
+    let mut first = LANES_ROUTES + LANES_ROUTE_WORDS * world.routes.len();
+    let of_road = |road: &TrafficRoad| {
+        let (n_words, n_of_network) = (road.words().len(), road.network.words().len());
+        first += n_words;
+        (first + n_of_network - n_words, (n_words - n_of_network) / road.levels.len().max(1))
+    };
+    traffic.roads.iter().map(of_road).collect()
+}
+
 /// Bytes of the tables of a world that grow with it.
 pub fn sizes(world: &World) -> [(Table, usize); 6] {
     let of_fields = |bytes: fn(&Field) -> usize| world.all_fields().map(bytes).sum::<usize>();
@@ -191,6 +204,31 @@ impl BatchFacts {
             fixed: matches!(batch.choice(), RouteChoice::Fixed(_)).into(),
             autoreset: batch.autoreset() as u32,
             team: team(batch.n_envs()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::cache::Loading;
+    use crate::scenario::Scenario;
+
+    #[test]
+    fn each_demand_of_each_road_is_where_a_host_is_told_to_find_it() {
+        let text = Scenario::text_of("attard2023").unwrap() + "\n[traffic]\ndemand = [900, 1500, 2100]\n";
+        let mut scenario = Scenario::parse("among", &text, None, &Loading::PLAIN).unwrap();
+        scenario.retain(|_, route| route.name == "16m/N-left-2" || route.name == "20m/E-left-3");
+        let world = World::bake(&scenario).unwrap();
+        let (tables, levels) = (Tables::new(&world), levels(&world));
+        let lanes: &[u32] = cast_slice(tables.bytes(Table::Lanes).unwrap());
+        let roads = &world.traffic.as_ref().unwrap().roads;
+        assert_eq!((roads.len(), levels.len()), (2, 2));
+        for (road, (first, n_words)) in roads.iter().zip(levels) {
+            let found: Vec<&[u32]> = lanes[first..].chunks_exact(n_words).take(3).collect();
+            let expected =
+                road.levels.iter().map(|level| [&level.demand.words()[..], cast_slice(&level.snapshots)].concat());
+            assert_eq!(found, expected.collect::<Vec<_>>());
         }
     }
 }

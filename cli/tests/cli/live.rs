@@ -12,6 +12,7 @@ mod stages;
 #[path = "../../../tests/simulator/parity/states.rs"]
 #[expect(dead_code, reason = "the simulator's own tests look at more of the states")]
 mod states;
+mod vehicles;
 mod visitor;
 
 use offtrack::scenario::Scenario;

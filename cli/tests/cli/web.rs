@@ -135,7 +135,9 @@ fn what_no_page_can_show_is_refused() {
     refused(&["--policy", "pursuit"], &["pursuit", "the program comes with attard2023"]);
     refused(&[&one[..], &["--road", "20m/N-left-9"]].concat(), &["--road", "20m/N-left-9", "N-left-4"]);
     refused(&[&one[..], &["--split", "validation"]].concat(), &["--split", "validation"]);
-    refused(&["--benchmark", "traffic2026"], &["--benchmark", "traffic2026", "has [traffic]", "--html"]);
+    for rule in ["yields:traffic2026", "follows:mine.safetensors", "yields"] {
+        refused(&["--benchmark", "traffic2026", "--policy", rule], &["--policy", rule, "on the processor", "--html"]);
+    }
     refused(&["--world"], &["--benchmark", "attard2023, laden2026", "name one"]);
     refused(&[&one[..], &["--world", "--seed", "1"]].concat(), &["--world", "--seed"]);
     refused(&[&one[..], &["--world", "--run", "runs/mine"]].concat(), &["--world", "--run"]);

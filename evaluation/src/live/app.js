@@ -36,7 +36,7 @@ class App {
     this.failures = new FailureList((crowd, failure) => this.attempt(() => this.visit.driveAgain(crowd, failure)));
     const { seed } = live.facts;
     const world = Math.max(live.facts.worlds.findIndex((_, index) => this.canDrive(this.learned.last ?? -1, index)), 0);
-    this.chosen = { world, road: "", policy: this.firstPolicy(world), second: null, n: MANY, seed };
+    this.chosen = { world, road: "", policy: this.firstPolicy(world), second: null, demand: null, n: MANY, seed };
     this.ready = new Promise((done) => (this.isReady = done));
     listenToChoices(this);
     listenToKeys(this);
@@ -126,7 +126,7 @@ class App {
   async choose(change) {
     const before = this.chosen, chosen = { ...before, ...change };
     if (chosen.world !== before.world) {
-      chosen.road = change.road ?? "";
+      Object.assign(chosen, { road: change.road ?? "", demand: null });
       if (!this.canDrive(chosen.policy, chosen.world)) chosen.policy = this.firstPolicy(chosen.world);
       if (chosen.second !== null && !this.canDrive(chosen.second, chosen.world)) chosen.second = null;
     }
@@ -150,7 +150,7 @@ class App {
     this.stage.measure();
     const { clientWidth, clientHeight } = byId("picture");
     const sites = sitesOf(world.facts, roads, clientWidth / shown.length / Math.max(clientHeight, 1));
-    const options = { n: chosen.n, seed: chosen.seed, routes };
+    const options = { n: chosen.n, seed: chosen.seed, routes, demand: chosen.demand };
     const made = [];
     try {
       for (const index of shown) {
@@ -192,7 +192,8 @@ class App {
     byId("heading").textContent = `${whole(n)} tractor-trailers drive roundabouts, live in this page`;
     const one = chosen.policy === -1 ? "random actions" : "the same learned policy";
     const by = chosen.second === null ? one : "one of two policies, the same start on both sides";
-    byId("sentence").textContent = `Each drives alone, by ${by}. Click one and take the wheel.`;
+    const where = this.world.facts.traffic ? "among vehicles of its own" : "alone";
+    byId("sentence").textContent = `Each drives ${where}, by ${by}. Click one and take the wheel.`;
   }
 
   /** Steps that `seconds` of the page are. */

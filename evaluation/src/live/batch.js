@@ -5,9 +5,10 @@ const SETTING_OUT = 1 / 250;
 
 class Batch {
   /** `n` trucks that are held until they set out. `routes` are those that episodes run on, without it all of the
-   * benchmark; with `fixed` truck i drives routes[i] alone. */
-  static async open(gpu, world, { n, seed = 0, routes = null, fixed = false, autoreset = "same_step" }) {
-    const batch = new Batch(gpu, world, { n, routes, fixed, autoreset });
+   * benchmark; with `fixed` truck i drives routes[i] alone. `demand` is the index of the only one, without it episodes
+   * draw theirs. */
+  static async open(gpu, world, { n, seed = 0, routes = null, fixed = false, autoreset = "same_step", demand = null }) {
+    const batch = new Batch(gpu, world, { n, routes, fixed, autoreset, demand });
     const { steps, begin } = world.facts;
     const names = [...new Set(["draw", ...steps[autoreset], ...begin])];
     const kernels = await gpu.kernels(names);
@@ -16,8 +17,8 @@ class Batch {
     return batch;
   }
 
-  constructor(gpu, world, { n, routes, fixed, autoreset }) {
-    Object.assign(this, { gpu, world, n, autoreset, live: gpu.live, code: gpu.live.facts.code });
+  constructor(gpu, world, { n, routes, fixed, autoreset, demand }) {
+    Object.assign(this, { gpu, world, n, autoreset, demand, live: gpu.live, code: gpu.live.facts.code });
     Object.assign(this, { kernels: {}, policy: null, acting: null, watched: [], own: null, busy: false });
     this.routes = routes ?? world.facts.routes.map((_, index) => index);
     this.ownAction = world.facts.n_actions;
@@ -28,7 +29,9 @@ class Batch {
   makeBuffers(fixed) {
     const { gpu, n, code } = this;
     const { structs, columns, journal } = code;
-    this.columns = code.buffers.filter(({ kind, name }) => kind === "column" && name in columns).map(({ name }) => name);
+    const hasRows = ({ kind, name }) =>
+      kind === "column" && (this.world.facts.traffic || !columns[name].of_vehicles);
+    this.columns = code.buffers.filter(hasRows).map(({ name }) => name);
     this.rowBytes = this.columns.reduce((sum, name) => sum + columns[name].bytes, 0);
     const facts = new DataView(new ArrayBuffer(structs.BatchFacts.size));
     const words = {
@@ -51,6 +54,10 @@ class Batch {
       journal: gpu.buffer("journal", journal.bytes),
       own: gpu.buffer("own", 4, Uint32Array.of(this.ownAction)),
     };
+    if (this.demand !== null) {
+      const lanes = this.world.lanesAt(this.demand);
+      this.made.lanes = gpu.buffer("lanes", lanes.length, lanes);
+    }
     for (const name of this.columns) this.made[name] = gpu.buffer(name, n * columns[name].bytes);
     this.buffers = { ...this.world.tables, ...this.made };
   }
@@ -62,14 +69,17 @@ class Batch {
 
   /** A kernel with its bind group and workgroups. */
   bound(name, { layout, pipeline }) {
-    const { journal, buffers, workgroup, n_values: nValues } = this.code;
-    const isOwn = name === journal.kernel;
-    const { bindings, threads } = isOwn ? { ...journal, threads: "truck" } : this.code.kernels[name];
+    const { journal, buffers, workgroup, n_values: nValues, cars } = this.code;
+    const isOwn = name in journal.kernels;
+    const { bindings, threads } =
+      isOwn ? { bindings: journal.kernels[name], threads: "truck" } : this.code.kernels[name];
     const pairs = bindings.map((binding) => [binding, this.buffers[buffers[binding].name]]);
     if (isOwn) pairs.push([journal.binding, this.buffers.journal]);
     const workgroups = {
       truck: Math.ceil(this.n / workgroup),
       value: Math.ceil((this.n * nValues) / workgroup),
+      car: Math.ceil((this.n * cars.n) / workgroup),
+      turn: Math.ceil((this.n * cars.turns) / workgroup),
       team: Math.ceil(this.n / this.team()),
     }[threads];
     return { pipeline, group: this.gpu.group(name, layout, pairs), workgroups };

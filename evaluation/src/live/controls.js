@@ -58,6 +58,10 @@ function showChoices(app) {
   const { live, gpu, chosen } = app, world = live.facts.worlds[chosen.world];
   fillSelect("benchmark", live.facts.worlds.map((one, index) => [index, worldWords(one)]), chosen.world);
   fillSelect("road", roadChoices(world), chosen.road);
+  const demands = world.traffic?.demand ?? [];
+  const each = demands.map((demand, index) => [index, `${whole(demand)} an hour`]);
+  fillSelect("demand", [["", "drawn each episode"], ...each], chosen.demand ?? "");
+  for (const node of [byId("demand"), byId("demand").labels[0]]) node.hidden = demands.length < 2;
   const all = app.policies.map((policy, index) => [index, policyWords(policy)]);
   app.learned.show();
   const isOffered = ([index]) => app.canDrive(index, chosen.world) && !app.learned.hides(index);
@@ -71,10 +75,14 @@ function showChoices(app) {
   showLegend(app);
 }
 
+/** Entries of a legend for areas that are there: colour, words, whether. */
+const areaKeys = (all) => all.filter(([, , isThere]) => isThere).map(([colour, words]) =>
+  html("li", {}, html("i", { style: `--swatch: var(--${colour})` }), words));
+
 /** Says what the colours mean. */
 function showLegend(app) {
   const [names, from, to] = COLOURINGS[app.colouring];
-  const hasLoads = 1 < app.live.facts.worlds[app.chosen.world].classes.length;
+  const { classes, roads, traffic } = app.live.facts.worlds[app.chosen.world], hasLoads = 1 < classes.length;
   const ramp = names.map((name, n) => `--${"abc"[n]}: var(--${name})`).join("; ");
   const cross = (name) => html("i", { class: "cross", style: `--swatch: var(--end-${name})` }, "×");
   byId("legend").replaceChildren(
@@ -87,7 +95,10 @@ function showLegend(app) {
       html("li", {}, cross("trailer_collided"), "trailer did"),
       // Only loads that are drawn can stand high enough.
       ...(hasLoads ? [html("li", {}, cross("rolled_over"), "rolled over")] : []),
-    ]));
+      ...(traffic ? [html("li", {}, cross("met_vehicle"), "met a vehicle")] : []),
+    ]),
+    ...areaKeys([["car", "car", traffic], ["van", "van", traffic?.vans], ["rude", "edge of who is rude", traffic?.rude],
+      ["apron", "apron, for trailers alone", roads.some(({ apron }) => apron)]]));
 }
 
 /** Listens to everything that can be chosen. */
@@ -97,6 +108,7 @@ function listenToChoices(app) {
   const value = (id) => byId(id).value;
   on("benchmark", "change", () => app.choose({ world: Number(value("benchmark")) }));
   on("road", "change", () => app.choose({ road: value("road") }));
+  on("demand", "change", () => app.choose({ demand: value("demand") === "" ? null : Number(value("demand")) }));
   on("policy", "change", () => app.choose({ policy: Number(value("policy")) }));
   on("second", "change", () => app.choose({ second: value("second") === "" ? null : Number(value("second")) }));
   on("count", "change", () => app.choose({ n: Number(value("count")) }));

@@ -90,6 +90,15 @@ class Crowd {
     return this.rigs.get(vehicle);
   }
 
+  /** The vehicles around the followed truck: how many, how many of them slow for it, and how many come (veh/h). */
+  vehicles() {
+    const { cars } = this.batch.code, { demand } = this.world.facts.traffic, words = this.row.cars;
+    const slots = Array.from({ length: cars.n }, (_, slot) => slot);
+    const isThere = (slot) => (words[slot * cars.words + cars.what] & cars.none) !== cars.none;
+    const there = slots.filter(isThere), slow = there.filter((slot) => (words[cars.hindered] >>> slot) & 1);
+    return { n: there.length, slow: slow.length, demand: demand[this.batch.demand ?? words[cars.level]] };
+  }
+
   /** Where the followed truck is in the picture (m), moved on by `since` seconds as view.wgsl does it. */
   middle(since) {
     const { truck } = this.row, rig = this.rigOf(truck), offset = this.picture.sites.offsetOf(truck.route);

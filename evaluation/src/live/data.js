@@ -32,7 +32,7 @@ class Live {
     /** Modules of WGSL by name. */
     this.code = {
       step: this.text(step),
-      act: act.map((index) => this.text(index)),
+      act: act.map((shapes) => shapes.map((parts) => this.text(parts))),
       journal: this.text(journal),
       picture: this.text(picture),
       view,
@@ -58,8 +58,8 @@ class Live {
     return bytes;
   }
 
-  text(index) {
-    return new TextDecoder().decode(this.section(index));
+  text(parts) {
+    return new TextDecoder().decode(this.sections(parts));
   }
 
   /** Adds the benchmark of a world file, and gives its index. What is wrong with the file is an error in words. */

@@ -109,9 +109,9 @@ class Gpu {
     const { code } = this.live;
     const of = ({ bindings }) => bindings.map((binding) => ({ binding, access: buffers[binding].access }));
     const made = names.map(async (name) => {
-      if (name !== journal.kernel)
+      if (!(name in journal.kernels))
         return this.kernel(name, await this.module("step", code.step), name, of(kernels[name]));
-      const read = journal.bindings.map((binding) => ({
+      const read = journal.kernels[name].map((binding) => ({
         binding,
         access: buffers[binding].access === "uniform" ? "uniform" : "read",
       }));

@@ -32,12 +32,16 @@ class Followed {
     this.crowd = crowd;
     byId("truck").hidden = crowd === null;
     if (crowd === null) return;
-    const { world, policy } = crowd, facts = this.live.facts.code, { extras, actions } = world.facts;
-    const observed = facts.observation.concat(extras.map((name, n) => {
+    const { world, policy } = crowd, facts = this.live.facts.code, { extras, actions, traffic } = world.facts;
+    const extra = extras.map((name, n) => {
       const { doc } = facts.extras.find((extra) => extra.name === name);
       return { name, doc, n: 1, low: -1, first: facts.n_values + n };
-    }));
-    byId("values-summary").textContent = `The ${facts.n_values + extras.length} values that it observes`;
+    });
+    const behind = facts.n_values + extras.length;
+    const around = traffic?.observed ? facts.around.map((one) => ({ ...one, first: behind + one.first })) : [];
+    const observed = [...facts.observation, ...extra, ...around];
+    const count = observed.reduce((sum, { n }) => sum + n, 0);
+    byId("values-summary").textContent = `The ${count} values that it observes`;
     this.values = new ValueBars(observed);
     byId("values").replaceChildren(this.values.node);
     byId("policy-part").hidden = policy === null;
@@ -59,23 +63,30 @@ class Followed {
       node.querySelector("dd").textContent = words(values.at(-1));
       node.querySelector("svg").replaceWith(sparkline(values));
     });
-    const seen = [...row.observation, ...[...row.extras].slice(0, world.facts.extras.length)];
+    const around = world.facts.traffic?.observed ? row.around : [];
+    const seen = [...row.observation, ...[...row.extras].slice(0, world.facts.extras.length), ...around];
     this.values.show(seen);
     if (this.outputs) {
-      const best = this.outputs.show(crowd.policy.outputs(row.observation, row.extras));
+      const best = this.outputs.show(crowd.policy.outputs(row.observation, row.extras, row.around));
       // Behind the table's actions stands that of a visitor who drives.
       byId("outputs-words").textContent = `${row.action < world.facts.n_actions ? "chooses" : "would choose"} ${best}`;
     }
   }
 
-  /** Which truck it is, and which load it carries. */
+  /** Which truck it is, which load it carries, and among which vehicles it drives. */
   name({ truck }) {
     const { world, failure, followed } = this.crowd, { facts } = world, env = failure?.env ?? followed;
     byId("truck-title").textContent = `Truck ${whole(env)}`;
     byId("truck-route").textContent = `${facts.routes[truck.route].name}, episode ${truck.episode}`;
     byId("truck-load").textContent = truckWords(facts, truck.vehicle);
+    byId("truck-vehicles").hidden = !facts.traffic;
+    if (facts.traffic) byId("truck-vehicles").textContent = vehiclesWords(this.crowd.vehicles());
   }
 }
+
+/** Words for the vehicles around a truck. */
+const vehiclesWords = ({ n, slow, demand }) =>
+  `among ${whole(n)} vehicles of ${whole(demand)} an hour${slow === 0 ? "" : `; ${whole(slow)} slowed by it`}`;
 
 /** Words for the names of vehicles and loads in `scenarios/vehicles/`. */
 const loadWords = (load) => (load === "half" ? "half laden" : load.replaceAll("_", " "));

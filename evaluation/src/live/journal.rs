@@ -5,7 +5,7 @@ use glam::Vec2;
 use offtrack::engine::wgsl;
 use offtrack::layout::Column;
 use offtrack::layout::buffers::{Buffer, N_BUFFERS, Table};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 offtrack::shared! {
     /// An episode that failed.
@@ -24,19 +24,39 @@ offtrack::shared! {
         pub vehicle: u32,
         /// Steps of the episode.
         pub steps: u32,
+        /// The other vehicle that it met: 0 is none, 1 a car, 2 a van.
+        pub met: u32,
+        /// 1 if its tractor met it, or else its trailer; 2 more if the vehicle was beyond its line.
+        pub contact: u32,
     }
 }
 
-/// The kernel's name.
-pub(super) const NAME: &str = "note";
+/// The kernel of trucks alone: its name, and the buffers that it reads, by the bindings of a step.
+const ALONE: (&str, &[Buffer]) =
+    ("note", &[Buffer::Table(Table::Batch), Buffer::Column(Column::Truck), Buffer::Column(Column::Ended)]);
+/// That of trucks among vehicles.
+const AMONG: (&str, &[Buffer]) = (
+    "note_among",
+    &[
+        Buffer::Table(Table::Vehicles),
+        Buffer::Table(Table::Lanes),
+        Buffer::Table(Table::Batch),
+        Buffer::Column(Column::Truck),
+        Buffer::Column(Column::Ended),
+        Buffer::Column(Column::Cars),
+    ],
+);
 /// Failures that are kept: the latest ones.
 const ROOM: u32 = 256;
 /// Bytes before the first of them: the count of all, and what aligns them.
 const HEAD: usize = 8;
-/// The buffers that the kernel reads, by the bindings of a step.
-const READ: [Buffer; 3] = [Buffer::Table(Table::Batch), Buffer::Column(Column::Truck), Buffer::Column(Column::Ended)];
 
-/// The kernel's module.
+/// The name of the kernel that notes, of trucks among vehicles or alone.
+pub(super) const fn kernel(has_vehicles: bool) -> &'static str {
+    if has_vehicles { AMONG.0 } else { ALONE.0 }
+}
+
+/// The kernels' module.
 pub(super) fn module() -> String {
     [wgsl::picture().as_str(), &declared("atomic<u32>", "read_write"), include_str!("journal.wgsl")].concat()
 }
@@ -55,11 +75,13 @@ fn declared(count: &str, access: &str) -> String {
     )
 }
 
-/// What a host must know of it.
+/// What a host must know of it: of each kernel the bindings that it reads.
 pub(super) fn facts() -> Value {
+    let bindings = |read: &[Buffer]| -> Vec<usize> { read.iter().map(|buffer| buffer.binding()).collect() };
+    let kernels: Map<_, _> =
+        [ALONE, AMONG].map(|(name, read)| (name.to_owned(), bindings(read).into())).into_iter().collect();
     json!({
-        "kernel": NAME,
-        "bindings": READ.map(Buffer::binding),
+        "kernels": kernels,
         "binding": N_BUFFERS,
         "room": ROOM,
         "head": HEAD,

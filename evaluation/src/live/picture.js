@@ -1,7 +1,7 @@
 // The picture of a world and its trucks: a pipeline for each layer over the buffers of the step.
 
 /** Layers: entry points of view.wgsl and the buffers of the step that they read, by stage. */
-const TRUCK = ["truck", "vehicles"];
+const TRUCK = ["truck", "vehicles"], CARS = ["truck", "lanes", "cars"];
 const LAYERS = {
   ground: ["ground", "ground_colour", { VERTEX: ["roads"], FRAGMENT: ["roads", "cells", "corners"] }],
   crosses: ["crosses", "mark_colour", { VERTEX: ["journal"] }],
@@ -12,11 +12,19 @@ const LAYERS = {
   followed: ["followed_truck", "body_colour", { VERTEX: TRUCK }],
   wheels: ["wheels", "body_colour", { VERTEX: TRUCK }],
 };
+/** Those of other vehicles, where there are some. */
+const VEHICLES = {
+  others: ["others", "vehicle_colour", { VERTEX: CARS }],
+  around: ["around_followed", "vehicle_colour", { VERTEX: CARS }],
+};
+/** Trucks of a crowd whose vehicles are drawn at most; how opaque these are, and the number of trucks on a road from
+ * which on they are paler, down to what eight bits of a colour still show. */
+const MOST_AROUND = 8192, OTHERS = 0.6, FEW_OTHERS = 20, LEAST_OTHERS = 0.02;
 /** Bytes of `View` and `Theme` in view.wgsl; most steps of a path that are drawn; no truck. */
-const VIEW_BYTES = 48, THEME_BYTES = 416, MOST_POINTS = 1024, NOBODY = 0xffffffff;
+const VIEW_BYTES = 48, THEME_BYTES = 496, MOST_POINTS = 1024, NOBODY = 0xffffffff;
 /** Colours of `Theme`, in order; then those of the ends. */
-const THEME = ["solid", "road", "kerb", "panel", "ink", "route", "tractor", "trailer", "ray", "steer-right",
-  "steer-straight", "steer-left", "transfer-low", "transfer-high", "begun", "done"];
+const THEME = ["solid", "apron", "car", "van", "brakes", "rude", "road", "kerb", "panel", "ink", "route", "tractor",
+  "trailer", "ray", "steer-right", "steer-straight", "steer-left", "transfer-low", "transfer-high", "begun", "done"];
 
 /** A colour of the theme as three numbers of 0 to 1. */
 const numbersOf = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
@@ -48,7 +56,8 @@ class Picture {
   /** The pipeline of a layer; the layouts of two batches are alike. */
   async pipeline(name, layout) {
     if (!this.pipelines.has(name)) {
-      const [vertex, fragment] = LAYERS[name], factors = { srcFactor: "one", dstFactor: "one-minus-src-alpha" };
+      const [vertex, fragment] = LAYERS[name] ?? VEHICLES[name];
+      const factors = { srcFactor: "one", dstFactor: "one-minus-src-alpha" };
       const { code } = this.live, module = await this.gpu.module("view", code.picture + code.view);
       this.pipelines.set(name, this.device.createRenderPipelineAsync({
         label: name, layout: this.device.createPipelineLayout({ bindGroupLayouts: [layout, this.own] }),
@@ -78,7 +87,8 @@ class BatchPicture {
     const resources = [made.view, picture.theme, made.places, made.points];
     made.own = picture.device.createBindGroup({ label: "view", layout: picture.own,
       entries: resources.map((resource, binding) => ({ binding, resource: { buffer: resource } })) });
-    await Promise.all(Object.entries(LAYERS).map(async ([name, [, , reads]]) => {
+    const layers = batch.world.facts.traffic ? { ...LAYERS, ...VEHICLES } : LAYERS;
+    await Promise.all(Object.entries(layers).map(async ([name, [, , reads]]) => {
       const visibility = {};
       for (const [stage, names] of Object.entries(reads)) {
         for (const read of names) visibility[read] = (visibility[read] ?? 0) | GPUShaderStage[stage];
@@ -100,6 +110,12 @@ class BatchPicture {
     this.picture.device.queue.writeBuffer(this.points, 0, new Float32Array(kept.flat()));
   }
 
+  /** How opaque a vehicle of the crowd is. */
+  get others() {
+    const onRoad = Math.min(this.batch.n, MOST_AROUND) / this.sites.places.length;
+    return Math.max(OTHERS * Math.min(1, FEW_OTHERS / onRoad), LEAST_OTHERS);
+  }
+
   /** What `View` holds. */
   write({ centre, half, pixel, since, followed, colouring, crowd }) {
     const bytes = new ArrayBuffer(VIEW_BYTES), floats = new Float32Array(bytes), words = new Uint32Array(bytes);
@@ -107,11 +123,12 @@ class BatchPicture {
     words.set([followed ?? NOBODY, colouring], 6);
     floats[8] = crowd;
     words.set([this.sites.nRoutes, this.nPoints], 9);
+    floats[11] = this.others;
     this.picture.device.queue.writeBuffer(this.view, 0, bytes);
   }
 
-  /** Draws layers: whether the ground too, the crowd, and the truck that is followed. */
-  draw(pass, { ground, followed, rays }) {
+  /** Draws layers: whether the ground too, the crowd, whether its vehicles, and the truck that is followed. */
+  draw(pass, { ground, followed, rays, others }) {
     const { code } = this.picture.live.facts, { n } = this.batch;
     const layer = (name, vertices, instances) => {
       const { pipeline, group } = this.layers[name];
@@ -120,13 +137,15 @@ class BatchPicture {
       pass.setBindGroup(1, this.own);
       pass.draw(vertices, instances);
     };
-    const isFollowed = followed !== null;
+    const isFollowed = followed !== null, hasVehicles = "others" in this.layers;
     if (ground) layer("ground", 6, this.sites.places.length);
+    if (hasVehicles && others) layer("others", 6, code.cars.n * Math.min(n, MOST_AROUND));
     layer("trucks", 18, n);
     layer("crosses", 6, MOST_FAILURES);
     if (!isFollowed) return;
     layer("route", 6, this.sites.mostWaypoints);
     if (1 < this.nPoints) layer("paths", 6, 2 * (this.nPoints - 1));
+    if (hasVehicles) layer("around", 6, code.cars.n);
     if (rays) layer("rays", 12, code.n_rays);
     layer("followed", 18, 1);
     layer("wheels", 6, N_WHEELS);

@@ -13,7 +13,7 @@ class Policy {
   }
 
   static parsed(live, name, bytes) {
-    const { policy: file, act, n_values: nValues, extras: known } = live.facts.code;
+    const { policy: file, act, n_values: nValues, n_around: nAround, extras: known } = live.facts.code;
     if (file.most_bytes < bytes.length) throw new Error("is larger than any policy file");
     const { metadata, tensor } = readTensors(bytes);
     const text = metadata[file.key];
@@ -30,11 +30,19 @@ class Policy {
       actions,
       layers: nLayers,
       extras = [],
+      vehicles = false,
       activation = act.activations[0],
       checksum,
     } = description;
-    if (version !== file.version)
-      throw new Error(`is a policy file of version ${version}; this page reads version ${file.version}`);
+    if (!file.versions.includes(version))
+      throw new Error(
+        `is a policy file of version ${version}; this page reads versions ${file.versions.join(" and ")}`,
+      );
+    const more = ["head", "squash", "values", "frames", "padding", "recurrent"].find((key) => key in description);
+    if (more !== undefined)
+      throw new Error(
+        `has the key “${more}”: a page drives by layers over the values of one step, with an output an action`,
+      );
     if (!(1 <= nLayers && nLayers <= act.most_layers) || !(actions?.length > 0))
       throw new Error("is a damaged policy file: it has no layers, far too many, or no actions");
     const names = ["observation.mean", "observation.factor"];
@@ -56,11 +64,13 @@ class Policy {
       benchmark,
       actions,
       extras,
+      vehicles,
       activation,
       mean: all[0].values,
       factor: all[1].values,
     });
-    policy.layers = Policy.layers(all.slice(2), nValues + extras.length, all.slice(0, 2));
+    const nSeen = nValues + extras.length + (vehicles ? nAround : 0);
+    policy.layers = Policy.layers(all.slice(2), nSeen, all.slice(0, 2));
     if (policy.layers.at(-1).nOutputs !== actions.length)
       throw new Error(
         `is of another shape: its last layer has ${policy.layers.at(-1).nOutputs} outputs, ` +
@@ -99,12 +109,15 @@ class Policy {
 
   /** Why it cannot drive on a benchmark, in words; null where it can. */
   check(world) {
-    const { actions, extras } = world.facts;
+    const { actions, extras, traffic } = world.facts;
     const listed = (names) => (names.length === 0 ? "none" : names.join(", "));
     if (listed(extras) !== listed(this.extras)) {
       const own = listed(this.extras);
       return `learned with other extras beside the observation: ${own}; ${world.facts.name} has ${listed(extras)}`;
     }
+    // One that learned on empty roads drives among vehicles as well: it does not see them.
+    if (this.vehicles && !traffic?.observed)
+      return `reads what other vehicles do, which ${world.facts.name} does not observe`;
     const near = (a, b) => Math.abs(a - b) <= this.live.facts.code.policy.same_action * Math.max(Math.abs(a), 1);
     const same =
       this.actions.length === actions.length &&
@@ -123,10 +136,14 @@ class Policy {
     return `${actions.length} actions, ${range(0, 180 / Math.PI)} deg, ${range(1, 3.6)} km/h`;
   }
 
-  /** One value an action for one observation and its extras. */
-  outputs(observation, extras) {
+  /** One value an action for one observation, its extras and what is observed of other vehicles. */
+  outputs(observation, extras, around) {
     const { limit } = this.live.facts.code.act;
-    const seen = [...observation, ...Array.from(extras).slice(0, this.extras.length)];
+    const seen = [
+      ...observation,
+      ...Array.from(extras).slice(0, this.extras.length),
+      ...(this.vehicles ? around : []),
+    ];
     let values = seen.map((value, index) =>
       Math.min(Math.max((value - this.mean[index]) * this.factor[index], -limit), limit),
     );
@@ -161,9 +178,9 @@ class Policy {
     const own = this.packed();
     const largest = Math.min(gpu.limits.maxStorageBufferBindingSize, gpu.limits.maxBufferSize);
     if (largest < own.weights.byteLength) throw new Error("is too large for the device of this browser");
-    const { buffers } = code.act;
+    const kind = Number(this.vehicles), buffers = code.act.buffers[kind];
     const bound = buffers.map(({ access }, binding) => ({ binding, access }));
-    const module = await gpu.module(`act ${place}`, this.live.code.act[place]);
+    const module = await gpu.module(`act ${kind} ${place}`, this.live.code.act[kind][place]);
     const { layout, pipeline } = await gpu.kernel("act", module, "act", bound);
     const made = buffers
       .filter(({ name }) => name in own)

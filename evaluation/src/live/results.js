@@ -3,8 +3,14 @@
 /** Failures in the list. */
 const MOST_LISTED = 40;
 
-/** Ends of a tally, those that occur first; `running` is none. */
-const endNames = (live) => live.facts.code.ended.filter((name) => name !== "running");
+/** Ends of a tally on a world, those that occur first; `running` is none, and where there are no other vehicles none is
+ * met. */
+const endNames = (live, { facts }) => live.facts.code.ended.filter((name) =>
+  name !== "running" && (facts.traffic || !["met_vehicle", "was_met"].includes(name)));
+
+/** Which vehicle a failure met, by which unit and where; nothing if it met none. */
+const metWords = ({ met, contact }) => (met === 0 ? "" : `${contact & 1 ? "tractor" : "trailer"} on a ${
+  met === 2 ? "van" : "car"} ${contact & 2 ? "beyond" : "before"} its line`);
 
 /** The evaluation of a policy on a benchmark that is reported, of the split that is driven if there is one. */
 function reportedOf(policy, world, split) {
@@ -46,7 +52,7 @@ function showEnds(live, crowds, reported) {
   };
   const known = (name) =>
     html("td", { class: "muted" }, name === "arrived" ? percent(reported.arrived / reported.episodes) : "");
-  const rows = endNames(live).map((name) => html("tr", {},
+  const rows = endNames(live, crowds[0].world).map((name) => html("tr", {},
     html("th", { scope: "row" }, html("i", { class: "swatch", style: `--swatch: var(--end-${name})` }), endWords(name)),
     ...counted.map((tally) => cell(tally, name)), reported && known(name)));
   byId("ends").replaceChildren(
@@ -76,9 +82,10 @@ class FailureList {
       const { ended, route, env, episode } = failure, { name } = crowd.world.facts.routes[route];
       const onclick = () => this.open(crowd, failure);
       const driver = crowd.driven.has(`${env}/${episode}`) ? "you" : `truck ${env}`;
+      const met = metWords(failure);
       return html("li", {}, html("button", { type: "button", style: `--end: var(--end-${ended})`, onclick },
         html("b", { "aria-hidden": "true" }, "×"), html("span", {}, endWords(ended)),
-        html("span", { class: "muted" }, `${name}, ${driver}`)));
+        html("span", { class: "muted" }, `${name}, ${driver}`), met && html("span", { class: "muted met" }, met)));
     }));
   }
 }

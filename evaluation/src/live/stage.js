@@ -78,8 +78,10 @@ class Stage {
     drawn.forEach(({ crowd, over }, pane) => {
       pass.setViewport(pane * width, 0, width, texture.height, 0, 1);
       pass.setScissorRect(pane * width, 0, width, texture.height);
-      crowd.picture.draw(pass, { ground: true, followed: crowd.followed, rays: rays && !over });
-      over?.picture.draw(pass, { ground: false, followed: 0, rays });
+      // The vehicles of other trucks are not there for the one that is followed.
+      const others = crowd.followed === null && !over;
+      crowd.picture.draw(pass, { ground: true, followed: crowd.followed, rays: rays && !over, others });
+      over?.picture.draw(pass, { ground: false, followed: 0, rays, others: false });
     });
     pass.end();
     device.queue.submit([encoder.finish()]);

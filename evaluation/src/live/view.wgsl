@@ -38,11 +38,18 @@ struct View {
     n_routes: u32,
     // Points of the followed truck's paths.
     n_points: u32,
+    // How opaque the vehicles around the other trucks are.
+    others: f32,
 }
 
 // Colours of the page's theme.
 struct Theme {
     solid: vec4<f32>,
+    apron: vec4<f32>,
+    car: vec4<f32>,
+    van: vec4<f32>,
+    brakes: vec4<f32>,
+    rude: vec4<f32>,
     road: vec4<f32>,
     kerb: vec4<f32>,
     panel: vec4<f32>,
@@ -147,9 +154,17 @@ fn ground_colour(in: Ground) -> @location(0) vec4<f32> {
     let fine = 1.0 - smoothstep(0.08, 0.2, view.pixel);
     let contour = 1.0 - smoothstep(0.0, 1.5 * view.pixel, abs(fract(distance + 0.5) - 0.5));
     let asphalt = mix(theme.road.rgb, theme.kerb.rgb, shade + 0.10 * fine * contour * step(0.5, distance));
-    var colour = mix(theme.solid.rgb, asphalt, smoothstep(-soft, soft, distance));
     // The kerb is a line of 12 cm, or of a pixel and a half where that is more.
     let width = max(0.06, 0.75 * view.pixel);
+    var colour = theme.solid.rgb;
+    // What trailers keep to, where that is something else, has an apron within and a kerb of its own.
+    let own = unit_field_at(in.route, 1u);
+    if own.first_cell != field.first_cell {
+        let behind = field_sample(own, true, in.at).distance;
+        colour = mix(colour, theme.apron.rgb, smoothstep(-soft, soft, behind));
+        colour = mix(colour, theme.kerb.rgb, 1.0 - smoothstep(width - soft, width + soft, abs(behind)));
+    }
+    colour = mix(colour, asphalt, smoothstep(-soft, soft, distance));
     let kerb = 1.0 - smoothstep(width - soft, width + soft, abs(distance));
     colour = mix(colour, theme.kerb.rgb, kerb);
     let extent = vec2<f32>(f32(field.columns), f32(field.rows)) / field.cells_per_metre;
@@ -211,12 +226,17 @@ fn hue(env: u32) -> vec3<f32> {
     return mix(theme.begun.rgb, theme.done.rgb, clamp(fraction, 0.0, 1.0));
 }
 
+// How far a point is outside a rectangle with rounded corners, of these half extents; negative inside (m).
+fn outside(local: vec2<f32>, half: vec2<f32>) -> f32 {
+    let radius = min(CORNER, 0.3 * half.y);
+    let beyond = abs(local) - half + radius;
+    return length(max(beyond, vec2<f32>(0.0))) + min(max(beyond.x, beyond.y), 0.0) - radius;
+}
+
 // A body with rounded corners and a thin edge.
 @fragment
 fn body_colour(in: Painted) -> @location(0) vec4<f32> {
-    let radius = min(CORNER, 0.3 * in.half.y);
-    let beyond = abs(in.local) - in.half + radius;
-    let distance = length(max(beyond, vec2<f32>(0.0))) + min(max(beyond.x, beyond.y), 0.0) - radius;
+    let distance = outside(in.local, in.half);
     let pixel = max(view.pixel, 1e-3);
     let inside = 1.0 - smoothstep(-0.5 * pixel, 0.5 * pixel, distance);
     // Edge and windscreen where there are pixels enough.

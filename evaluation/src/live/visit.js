@@ -95,7 +95,7 @@ class Visit {
     this.endAgain();
     await Promise.all(app.crowds.map((one) => one.follow(null)));
     const { env, seed, episode } = failure;
-    const options = { n: 1, seed, routes: app.routes, autoreset: "disabled" };
+    const options = { n: 1, seed, routes: app.routes, autoreset: "disabled", demand: crowd.batch.demand };
     const { picture, gpu, world, sites } = app;
     const again = await Crowd.open({ picture, gpu, world, sites, options, policy: crowd.policy });
     Object.assign(again, { from: crowd, failure });

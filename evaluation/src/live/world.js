@@ -24,6 +24,17 @@ class World {
     return this.live.sections(this.facts.tables[table]);
   }
 
+  /** The table of lanes in which every episode has the demand of this index: that stands in place of the others. */
+  lanesAt(demand) {
+    const bytes = this.bytes("lanes").slice();
+    for (const [first, words] of this.facts.traffic.levels) {
+      const part = (level) => 4 * (first + level * words);
+      const chosen = bytes.slice(part(demand), part(demand + 1));
+      this.facts.traffic.demand.forEach((_, level) => bytes.set(chosen, part(level)));
+    }
+    return bytes;
+  }
+
   /** A row of the table of vehicles: the fields of its rig, and its distance sensors. */
   vehicle(index) {
     this.vehicles ??= this.bytes("vehicles");

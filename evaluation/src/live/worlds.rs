@@ -3,7 +3,7 @@
 use bytemuck::cast_slice;
 use offtrack::engine::Autoreset;
 use offtrack::engine::stages::{BEGIN, Case, Kernel, Stage};
-use offtrack::engine::tables::Tables;
+use offtrack::engine::tables::{Tables, levels};
 use offtrack::layout::EXTRAS;
 use offtrack::layout::buffers::Table;
 use offtrack::map::route::Route;
@@ -27,6 +27,7 @@ pub(super) fn printed(ground: &Ground, policies: &[&Policy], packed: &mut Packed
             "mirrored": road.is_mirrored(),
             "island_radius": road.island_radius(),
             "outer_radius": road.outer_radius(),
+            "apron": world.trailer_fields[index].is_some(),
             "bounds": [field.origin.x, field.origin.y, field.origin.x + extent[0], field.origin.y + extent[1]],
             "routes": (0..routes.len()).filter(|&route| routes[route].0 == index).collect::<Vec<_>>(),
         })
@@ -57,9 +58,23 @@ pub(super) fn printed(ground: &Ground, policies: &[&Policy], packed: &mut Packed
             .collect::<Vec<_>>(),
         "vehicles": world.rigs.iter().map(|rig| rig.class_index).collect::<Vec<_>>(),
         "policies": (0..policies.len()).filter(can_drive).collect::<Vec<_>>(),
+        "traffic": traffic(ground),
         "steps": steps(world),
         "begin": names(Case::of(world, Autoreset::SameStep).working(BEGIN.iter())),
         "tables": tables(world, packed),
+    })
+}
+
+/// Other vehicles: the demands that episodes draw (veh/h) and where those lie, for each road the first word in the table
+/// of lanes and the words of each demand; nothing where there are no vehicles.
+fn traffic(Ground { scenario, world }: &Ground) -> Value {
+    let (Some(of), Some(shared)) = (&scenario.traffic, &world.traffic) else { return Value::Null };
+    json!({
+        "demand": of.demand,
+        "levels": levels(world),
+        "observed": shared.is_observed,
+        "vans": 0.0 < of.vans,
+        "rude": 0.0 < of.rude[1],
     })
 }
 
@@ -71,7 +86,7 @@ fn steps(world: &World) -> Map<String, Value> {
         let mut step = names(Case::of(world, autoreset).step());
         let reset = Stage::Reset.kernels()[0].name();
         let before = step.iter().position(|&name| name == reset).unwrap_or(step.len());
-        step.insert(before, journal::NAME);
+        step.insert(before, journal::kernel(world.traffic.is_some()));
         step
     };
     modes.map(|(name, autoreset)| (name.to_owned(), json!(step(autoreset)))).into_iter().collect()
@@ -90,7 +105,7 @@ fn tables(world: &World, packed: &mut Packed) -> Map<String, Value> {
         let sections = match table {
             Table::Cells => cells.clone(),
             Table::Corners => corners.clone(),
-            _ => vec![packed.add(kind(table), tables.bytes(table)?)],
+            _ => vec![packed.add(kind(table, world), tables.bytes(table)?)],
         };
         Some((table.name().to_owned(), json!(sections)))
     };
@@ -98,8 +113,9 @@ fn tables(world: &World, packed: &mut Packed) -> Map<String, Value> {
 }
 
 /// What a table's bytes are, as the parts of a page are listed.
-fn kind(table: Table) -> &'static str {
+fn kind(table: Table, world: &World) -> &'static str {
     match table {
+        Table::Lanes if world.traffic.is_some() => "traffic",
         Table::Roads | Table::Limits => "routes",
         Table::Vehicles => "vehicles",
         _ => "benchmarks",

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::{ANGLE, MILLI, to};
 
 /// Deceleration from which on the brake lights are lit (m/s²).
-const BRAKES: f32 = -0.6;
+pub const BRAKES: f32 = -0.6;
 /// From this length on it is a van (m).
 const VAN: f32 = 6.0;
 

@@ -26,7 +26,7 @@ fn a_slider_through_a_training_run_lets_the_crowd_drive_by_the_policy_that_it_po
     let policies: Vec<Policy> = files.map(|file| Policy::load(&file).unwrap()).collect();
     let (last, autoreset) = (policies.len() - 1, Autoreset::SameStep);
     let places = [last - 1, 0, last];
-    let runs = places.map(|place| Run { world: 0, policy: Some(place), autoreset });
+    let runs = places.map(|place| Run { world: 0, policy: Some(place), autoreset, demand: None });
     let each: Vec<Value> = runs.iter().map(|run| json!({ "name": run.name(), "place": run.policy })).collect();
     let job = json!({ "kind": "slider", "name": "drag", "runs": each, "n": N_ENVS, "steps": N_STEPS, "seed": SEED });
     let given = done(&read(&place.file("page.html")), &[job], HashMap::new());

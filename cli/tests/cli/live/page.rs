@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use offtrack::engine::stages::{N_STORAGE_BUFFERS, WORKGROUP_MEMORY};
 use offtrack::layout::Column;
+use offtrack::layout::shared::Named;
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
 use offtrack_evaluation::live::{Ground, Live, shown};
@@ -31,9 +32,9 @@ pub fn done(page: &str, jobs: &[Value], mut files: HashMap<String, Vec<u8>>) -> 
     given
 }
 
-/// A benchmark as pages have it, baked.
+/// A benchmark as pages have it, baked: one of the program or a file.
 pub fn ground(benchmark: &str) -> Ground {
-    let scenario = shown(Scenario::named(benchmark).unwrap());
+    let scenario = shown(Scenario::find(benchmark).unwrap());
     let world = Arc::new(World::bake(&scenario).unwrap());
     Ground { scenario, world }
 }
@@ -44,10 +45,15 @@ pub fn written(grounds: Vec<Ground>, policies: Vec<Policy>, file: &Path) -> Stri
     read(file)
 }
 
+/// The columns of a page's batch, those of other vehicles where it has some.
+pub fn own_columns(has_vehicles: bool) -> impl Iterator<Item = Column> {
+    Column::ALL.iter().copied().filter(move |column| 0 < column.n_rows(1, has_vehicles))
+}
+
 /// The columns of `n_envs` trucks that lie one after the other.
-pub fn columns(bytes: &[u8], n_envs: usize) -> HashMap<Column, &[u8]> {
+pub fn columns(bytes: &[u8], n_envs: usize, has_vehicles: bool) -> HashMap<Column, &[u8]> {
     let mut rest = bytes;
-    let each = Column::of_trucks().map(|column| {
+    let each = own_columns(has_vehicles).map(|column| {
         let (own, others) = rest.split_at(n_envs * column.width());
         rest = others;
         (column, own)

@@ -7,7 +7,7 @@ use offtrack::layout::{N_EXTRAS, N_VALUES};
 use offtrack::scenario::Split;
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack_evaluation::live::Ground;
-use offtrack_policy::{Activation, Layer, Policy};
+use offtrack_policy::{Activation, Frames, Layer, Padding, Policy};
 use serde_json::{Value, json};
 
 use super::page::{done, ground, written};
@@ -129,13 +129,16 @@ fn a_file_that_is_no_policy_for_the_benchmark_is_refused_in_words() {
         assert_eq!(from.len(), to.len());
         [&whole[..at], to.as_bytes(), &whole[at + from.len()..]].concat()
     };
-    let cases: [(&str, Vec<u8>, &str); 16] = [
+    let stacked = Policy { frames: Frames { n: 2, padding: Padding::Zero }, ..plain.clone() };
+    let cases: [(&str, Vec<u8>, &str); 18] = [
         ("whole", whole.clone(), "it drives"),
         ("empty", Vec::new(), "is not a policy file, or is damaged: it is too short"),
         ("text", b"policy = \"mine\"\n".to_vec(), "is not a policy file, or is damaged"),
         ("cut", whole[..whole.len() / 2].to_vec(), "does not lie in the file"),
         ("damaged", damaged, "is damaged: its checksum"),
         ("laden", laden.to_bytes(), "learned with other extras beside the observation"),
+        ("among", Policy::shipped("traffic2026").unwrap().to_bytes(), "reads what other vehicles do, which attard2023"),
+        ("stacked", stacked.to_bytes(), "has the key “frames”: a page drives by layers over the values of one step"),
         ("turned", turned.to_bytes(), "learned with another action table: 9 actions"),
         (
             "shape",
@@ -143,7 +146,7 @@ fn a_file_that_is_no_policy_for_the_benchmark_is_refused_in_words() {
             "learned with another action table: 8 actions",
         ),
         ("layers", cut.to_bytes(), "is of another shape"),
-        ("version", reworded(r#"\"version\":1"#, r#"\"version\":2"#), "is a policy file of version 2"),
+        ("version", reworded(r#"\"version\":1"#, r#"\"version\":3"#), "is a policy file of version 3"),
         ("type", reworded(r#""F32""#, r#""F16""#), "must hold 32-bit floats"),
         ("header", reworded(r#""shape":[69]"#, r#""shape":{69}"#), "its header is no JSON"),
         ("nameless", reworded(r#"\"actions\""#, r#"\"actionz\""#), "no layers, far too many, or no actions"),

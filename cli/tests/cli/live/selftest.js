@@ -13,7 +13,8 @@ async function recorded(live, gpu, batch, job) {
   const steps = [];
   for (let step = 0; step < job.steps; step++) {
     await batch.advance(1);
-    const read = ["truck", "action", "ended"].map((name) => [
+    const names = ["truck", "action", "ended", "cars"].filter((name) => batch.columns.includes(name));
+    const read = names.map((name) => [
       batch.buffers[name],
       0,
       job.n * live.facts.code.columns[name].bytes,
@@ -114,7 +115,7 @@ async function act(live, gpu, job) {
     ["observation", "extras"].map(async (name) => new Float32Array(await batch.column(name))),
   );
   const rows = Array.from({ length: Math.min(64, job.n) }, (_, row) =>
-    policy.outputs(seen.slice(row * width, (row + 1) * width), extras.slice(row * beside, (row + 1) * beside)),
+    policy.outputs(seen.slice(row * width, (row + 1) * width), extras.slice(row * beside, (row + 1) * beside), []),
   );
   await give(`${job.name}.outputs`, new Blob(rows));
   batch.close();
@@ -147,7 +148,7 @@ try {
       memory: gpu.limits.maxComputeWorkgroupStorageSize,
     }),
   );
-  await Promise.all(live.code.act.map((code, index) => gpu.module(`act ${index}`, code)));
+  await Promise.all(live.code.act.flat().map((code, index) => gpu.module(`act text ${index}`, code)));
   await gpu.module("view", live.code.picture + live.code.view);
   for (const job of JSON.parse(new TextDecoder().decode(await asked("plan")))) await JOBS[job.kind](live, gpu, job);
   await give("messages", JSON.stringify(gpu.messages));

@@ -39,7 +39,7 @@ fn kernels(world: &World, stage: Stage) -> Vec<&'static str> {
 }
 
 fn compared(stage: Stage, here: &Batch, there: &[u8]) -> Vec<Agreement> {
-    let there = columns(there, N_ENVS);
+    let there = columns(there, N_ENVS, false);
     let (written, _) = written(stage);
     written.iter().flat_map(|&c| agreements(c, here.column(c), there[&c], &[true; N_ENVS])).collect()
 }
@@ -92,7 +92,7 @@ fn compare(right: &Arc<World>) {
             println!("{name} | {agreement}");
             assert!(agreement.holds(), "{name}: {agreement:?}");
         }
-        let there = columns(there, N_ENVS);
+        let there = columns(there, N_ENVS, false);
         for column in Column::of_trucks().filter(|column| !written.contains(column)) {
             assert!(before.column(column) == there[&column], "{name} touches {column:?}");
         }

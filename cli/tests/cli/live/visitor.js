@@ -48,6 +48,53 @@ async function pixels(live) {
   page.gpu.destroy();
 }
 
+/** Colours of the theme, and at points of a road, `inwards` by half an edge of 2.5 pixels. After some steps of trucks that
+ * set out at once, with a truck that is followed or none. */
+async function colouring(live, { n, steps, followed, points, names }) {
+  const page = await opened(live, { n, policy: -1 }), [crowd] = page.crowds, seen = [];
+  await page.between(() => crowd.batch.restart({ seed: 0, atOnce: n }));
+  if (0 < steps) await page.stepBy(steps);
+  if (followed !== null) await page.pickTruck(followed);
+  byId("rays").checked = false;
+  // Nothing is moved on from its last step.
+  page.setRate(1);
+  for (const { road, point, inwards = [0, 0], width } of points) {
+    page.lookAt(road, ...point, width);
+    const at = point.map((part, axis) => part + 1.25 * page.stage.camera.pixel * inwards[axis]);
+    seen.push((await page.pixelAt(...page.screenOf(road, ...at))).slice(0, 3));
+  }
+  const colours = Object.fromEntries(names.map((name) => [name, page.colour(name)]));
+  await give("colouring", JSON.stringify({ seen, colours, legend: byId("legend").innerText }));
+  page.gpu.destroy();
+}
+
+/** What is said of trucks among vehicles: of one that is followed, of failures, and where all have one demand. */
+async function among(live, { n, steps, demand }) {
+  const page = await opened(live, { n, policy: -1 }), [crowd] = page.crowds, text = (id) => byId(id).innerText;
+  await page.between(() => crowd.batch.restart({ seed: 0, atOnce: n }));
+  await page.stepBy(1);
+  await page.pickTruck(2);
+  const followed = { words: text("truck-vehicles"), values: text("values-summary"), cars: crowd.row.cars.length };
+  const sentence = text("sentence"), names = [...byId("values").querySelectorAll("span")].map(({ innerText }) => innerText);
+  await page.between(() => page.visit.leave());
+  for (let made = 1; made < steps; made += 1) await page.stepBy(1);
+  const { failures } = crowd, listed = [...byId("failures").children].map(({ innerText }) => innerText);
+  const met = failures.find((failure) => failure.met !== 0 && failure.episode === 0);
+  await page.between(() => page.visit.driveAgain(crowd, met));
+  page.play(false);
+  while (page.visit.again.row.ended === 0) await page.stepBy(1);
+  const again = text("truck-state");
+  const offered = [...byId("demand").options].map(({ innerText }) => innerText);
+  byId("demand").value = demand;
+  byId("demand").dispatchEvent(new Event("change"));
+  await page.between(() => {});
+  await page.stepBy(2);
+  await page.pickTruck(0);
+  const chosen = text("truck-vehicles"), ends = text("ends");
+  await give("among", JSON.stringify({ followed, names, sentence, failures, listed, again, offered, chosen, ends }));
+  page.gpu.destroy();
+}
+
 /** A truck that is taken over: steer angles of its steps, asked for beyond the lock; and after it is given back. */
 async function wheel(live) {
   const page = await opened(live, { n: 8 }), [crowd] = page.crowds;
@@ -232,7 +279,7 @@ async function without(live, { hasApi }) {
   await give("without", JSON.stringify(missing()));
 }
 
-const VISITS = { pixels, wheel, keys, touch, files, again, lost, without };
+const VISITS = { pixels, colouring, among, wheel, keys, touch, files, again, lost, without };
 
 try {
   const plan = JSON.parse(new TextDecoder().decode(await asked("plan")));

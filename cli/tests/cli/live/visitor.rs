@@ -22,7 +22,7 @@ fn shipped(name: &str) -> Policy {
 }
 
 /// What a visit of a page gives, with files by their names.
-fn visited(page: &str, plan: &Value, mut files: HashMap<String, Vec<u8>>, without_gpu: bool) -> Value {
+pub fn visited(page: &str, plan: &Value, mut files: HashMap<String, Vec<u8>>, without_gpu: bool) -> Value {
     files.insert("plan".to_owned(), plan.to_string().into_bytes());
     let main = read(&repository().join("evaluation/src/live/main.js"));
     assert!(!main.is_empty() && page.contains(&main), "the page has another last script");
@@ -31,7 +31,7 @@ fn visited(page: &str, plan: &Value, mut files: HashMap<String, Vec<u8>>, withou
 }
 
 /// Largest difference of two colours' parts (of 255).
-fn between(a: &Value, b: &Value) -> i64 {
+pub fn between(a: &Value, b: &Value) -> i64 {
     let parts = |colour: &Value| -> Vec<i64> {
         let parts: Vec<i64> = colour.as_array().unwrap().iter().map(|part| part.as_i64().unwrap()).collect();
         assert_eq!(parts.len(), 3);
@@ -58,6 +58,36 @@ fn road_island_kerb_and_truck_have_their_colours_on_the_page() {
     // The line of a kerb is a pixel and a half wide, and its edges are blended.
     assert!(between(&found["kerb"], &colours["kerb"]) < 40, "{found}");
     assert!(between(&found["trailer"], &colours["trailer"]) < 8, "{found}");
+}
+
+#[test]
+fn an_apron_has_its_colour_on_the_page_and_a_kerb_behind_it() {
+    let place = Place::new();
+    let road = std::fs::read_to_string(repository().join("scenarios/roundabouts/16m.toml")).unwrap();
+    assert_eq!(road.matches("[ring]\n").count(), 1);
+    std::fs::write(place.file("apron.toml"), road.replace("[ring]\n", "[ring]\napron = 2.5\n")).unwrap();
+    let benchmark = read(&place.file("short.toml"));
+    let own = format!("{}/roundabouts/16m.toml", repository().join("scenarios").display());
+    assert!(benchmark.contains(&own));
+    std::fs::write(place.file("short.toml"), benchmark.replace(&own, "apron.toml")).unwrap();
+    let ground = ground(&place.text("short.toml"));
+    let radius = ground.scenario.places[0].roundabout.island_radius();
+    // Across the edge of the island, the apron, its inner edge, and what is behind it.
+    let points = [radius + 2.0, radius, radius - 1.25, radius - 2.5, radius - 4.0]
+        .map(|y| json!({ "road": 0, "point": [0.0, y], "width": 60 }));
+    let plan = json!({
+        "visit": "colouring", "n": 8, "steps": 0, "followed": null, "points": points,
+        "names": ["road", "kerb", "apron", "kerb", "solid"],
+    });
+    let page = written(vec![ground], Vec::new(), &place.file("trucks.html"));
+    let found = visited(&page, &plan, HashMap::new(), false);
+    let colours = &found["colours"];
+    assert!(20 < between(&colours["apron"], &colours["solid"]) && 20 < between(&colours["apron"], &colours["road"]));
+    let expected = [("road", 16), ("kerb", 40), ("apron", 8), ("kerb", 40), ("solid", 8)];
+    for ((name, most), seen) in expected.iter().zip(found["seen"].as_array().unwrap()) {
+        assert!(between(seen, &colours[name]) < *most, "{name}: {found}");
+    }
+    assert!(found["legend"].as_str().unwrap().contains("apron, for trailers alone"), "{found}");
 }
 
 #[test]
