@@ -36,7 +36,7 @@ pub(super) fn printed(packed: &mut Packed) -> Value {
         "n_rays": N_RAYS,
         "n_trailer_rays": N_TRAILER_RAYS,
         "n_extras": N_EXTRAS,
-        "roads": { "route_rows": ROUTE_ROWS, "row_bytes": size_of::<[u32; 4]>() },
+        "roads": roads(),
         "begin": { "begins": BEGINS, "is_first": IS_FIRST, "has_route": HAS_ROUTE, "has_start": HAS_START },
         "ended": Ended::ALL.map(Ended::name),
         "autoreset": {
@@ -48,11 +48,11 @@ pub(super) fn printed(packed: &mut Packed) -> Value {
         "observation": OBSERVATION
             .map(|of| json!({ "name": of.name, "first": of.first, "n": of.n, "low": of.low, "doc": of.doc })),
         "extras": EXTRAS.map(|extra| json!({ "name": extra.name, "doc": extra.doc })),
-        "structs": structs(&[layout::structs(), act::structs(), journal::structs()].concat()),
+        "structs": structs(),
         "columns": Column::of_trucks()
             .map(|column| (column.name().to_owned(), json!({ "bytes": column.width(), "element": column.element() })))
             .collect::<Map<_, _>>(),
-        "buffers": BUFFERS.into_iter().map(buffer).collect::<Vec<_>>(),
+        "buffers": buffers(),
         "kernels": kernels(),
         "journal": journal::facts(),
         "act": {
@@ -67,8 +67,17 @@ pub(super) fn printed(packed: &mut Packed) -> Value {
 }
 
 /// A number that differs where a page and a file were written by programs that lay out tables otherwise.
-pub(super) fn fingerprint(code: &Value) -> u32 {
-    crc32fast::hash([&code["structs"], &code["buffers"], &code["roads"]].map(Value::to_string).concat().as_bytes())
+pub(super) fn fingerprint() -> u32 {
+    crc32fast::hash([structs(), buffers(), roads()].map(|facts| facts.to_string()).concat().as_bytes())
+}
+
+/// How routes lie in their table.
+fn roads() -> Value {
+    json!({ "route_rows": ROUTE_ROWS, "row_bytes": size_of::<[u32; 4]>() })
+}
+
+fn buffers() -> Value {
+    BUFFERS.into_iter().map(buffer).collect()
 }
 
 /// Most bytes of a policy file that is dropped on the page.
@@ -107,7 +116,7 @@ fn kernels() -> Map<String, Value> {
     Kernel::ALL.map(kernel).into_iter().collect()
 }
 
-fn structs(all: &[Struct]) -> Map<String, Value> {
+fn structs() -> Value {
     let field = |field: &Field| {
         let doc = field.doc.trim();
         // A unit stands last, in parentheses.
@@ -118,7 +127,7 @@ fn structs(all: &[Struct]) -> Map<String, Value> {
         let fields: Map<_, _> = of.fields.iter().map(field).collect();
         (of.name.to_owned(), json!({ "size": of.size, "fields": fields }))
     };
-    all.iter().map(one).collect()
+    [layout::structs(), act::structs(), journal::structs()].concat().iter().map(one).collect::<Map<_, _>>().into()
 }
 
 fn shape(shape: Shape) -> Value {

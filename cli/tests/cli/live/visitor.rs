@@ -22,7 +22,7 @@ fn shipped(name: &str) -> Policy {
 }
 
 /// What a visit of a page gives, with files by their names.
-fn visited(page: &str, plan: &Value, mut files: HashMap<String, Vec<u8>>, without_gpu: bool) -> Value {
+pub fn visited(page: &str, plan: &Value, mut files: HashMap<String, Vec<u8>>, without_gpu: bool) -> Value {
     files.insert("plan".to_owned(), plan.to_string().into_bytes());
     let main = read(&repository().join("evaluation/src/live/main.js"));
     assert!(!main.is_empty() && page.contains(&main), "the page has another last script");
@@ -155,6 +155,14 @@ fn a_file_that_is_dropped_drives_or_the_page_says_in_words_why_not() {
         assert_eq!(given["policy"], "good.safetensors", "{given}");
         assert!(0 < given["begun"].as_u64().unwrap(), "{given}");
     }
+}
+
+#[test]
+fn a_page_begins_with_four_thousand_trucks_on_a_card_and_with_few_on_a_processor() {
+    let place = Place::new();
+    let found = visited(&page(&place), &json!({ "visit": "counts" }), HashMap::new(), false);
+    assert_eq!((&found["software"]["n"], &found["card"]["n"]), (&json!(256), &json!(4096)), "{found}");
+    assert!(found["card"]["heading"].as_str().unwrap().starts_with("4,096 tractor-trailers"), "{found}");
 }
 
 #[test]
