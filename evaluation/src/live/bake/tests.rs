@@ -6,13 +6,15 @@ use base64::engine::general_purpose::STANDARD;
 
 use super::*;
 
+/// Facts, and the bytes of each kind of sections.
+type Parts = (Value, Vec<(String, Vec<u8>)>);
+
 /// What a page asks for on a benchmark that comes with the program.
 fn asked(of: Value) -> String {
     format!("{}\n", json!({ "benchmark": { "name": "attard2023" }, "of": of }))
 }
 
-/// Facts, and the bytes of each kind of sections.
-fn parts(baked: &[u8]) -> (Value, Vec<(String, Vec<u8>)>) {
+fn parts(baked: &[u8]) -> Parts {
     let end = baked.iter().position(|&byte| byte == b'\n').unwrap();
     let facts: Value = serde_json::from_slice(&baked[..end]).unwrap();
     let mut rest = &baked[end + 1..];
@@ -26,12 +28,12 @@ fn parts(baked: &[u8]) -> (Value, Vec<(String, Vec<u8>)>) {
     (facts, kinds)
 }
 
-fn road(name: &str) -> (Value, Vec<(String, Vec<u8>)>) {
+fn road(name: &str) -> Parts {
     parts(&bake(asked(json!({ "roads": name })).as_bytes()).unwrap())
 }
 
 /// What a page gets for a file.
-fn dropped(name: &str, ring: usize, bytes: &[u8]) -> Result<(Value, Vec<(String, Vec<u8>)>), String> {
+fn dropped(name: &str, ring: usize, bytes: &[u8]) -> Result<Parts, String> {
     let asked = [asked(json!({ "file": { "name": name, "ring": ring } })).as_bytes(), bytes].concat();
     bake(&asked).map(|baked| parts(&baked)).map_err(|error| error.to_string())
 }
