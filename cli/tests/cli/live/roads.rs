@@ -15,6 +15,9 @@ use super::visitor::visited;
 use crate::page::read;
 use crate::place::{Place, repository};
 
+/// What is asked of a page, its file if it is one, what the page says of it, and the benchmark that it drives on then.
+type Visit<'a> = (Value, Option<Vec<u8>>, &'a [&'a str], &'a str);
+
 const TARGET: &str = "wasm32-unknown-unknown";
 
 /// The baker as `web/build.sh` builds it; `None` where the compiler lacks its target.
@@ -102,8 +105,7 @@ fn random_roads_files_and_maps_are_baked_in_the_page_and_driven_on_and_bad_ones_
     let ring = String::from_utf8(file("roundabouts/16m.toml")).unwrap();
     let wrong = ring.replace("[ring]", "[ring]\nspeed = 3");
     assert!(wrong != ring && beside != benchmark && slow != benchmark);
-    // Each with what the page says of it, and the benchmark that it drives on then.
-    let visits: [(Value, Option<Vec<u8>>, &[&str], &str); 10] = [
+    let visits: [Visit; 10] = [
         (json!({ "road": "wide/7/12" }), None, &["wide/7/12 now"], "attard2023 on wide/7/12"),
         (json!({ "road": "narrow/7/12" }), None, &["distribution: narrow; must be"], "attard2023 on wide/7/12"),
         (json!({ "road": "mixed/3/0, wide/7/13" }), None, &["wide/7/13 now"], "attard2023 on mixed/3/0, wide/7/13"),
@@ -143,6 +145,19 @@ fn random_roads_files_and_maps_are_baked_in_the_page_and_driven_on_and_bad_ones_
     assert!(1 < whole["rings"].as_u64().unwrap() && whole["rings"] == other["rings"], "{whole} {other}");
     assert_ne!(whole["bounds"], other["bounds"]);
     assert_eq!(found[5]["policy"], Value::Null, "a policy drives with actions that are not its own");
+}
+
+#[test]
+fn the_page_that_comes_with_the_documents_bakes_a_random_road() {
+    let page = read(&repository().join("docs/trucks.html"));
+    let plan = json!({ "visit": "roads", "visits": [{ "road": "wide/7/12" }] });
+    let found = visited(&page, &plan, HashMap::new(), false);
+    assert_eq!(
+        (&found[0]["isBad"], &found[0]["benchmark"]),
+        (&json!(false), &json!("attard2023 on wide/7/12")),
+        "{found}"
+    );
+    assert!(0 < found[0]["begun"].as_u64().unwrap(), "{found}");
 }
 
 #[test]
