@@ -225,6 +225,17 @@ impl Scenario {
         Scenario::from_source(&source, loading)
     }
 
+    /// A benchmark's text without its roads, which are neither read nor drawn: [`Scenario::add`] gives it others. What
+    /// else it refers to is a file that comes with the library, or lies relative to the process's folder.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Scenario::parse`].
+    pub fn without_roads(name: &str, text: &str) -> Result<Scenario, Error> {
+        let source = Source::Text { name: name.to_owned(), text: text.to_owned(), folder: None };
+        Ok(Scenario::before_roads(&source)?.0)
+    }
+
     /// The text of a benchmark's file, found as by [`Scenario::find`].
     ///
     /// # Errors

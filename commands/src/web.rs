@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::files::reader::shown_path;
+use offtrack::files::reader::{read_bytes, shown_path};
+use offtrack::files::shipped::{Kind, Source};
 use offtrack::scenario::Split;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::kept::{self, Kept};
+use offtrack_evaluation::live::bake::STAMP;
 use offtrack_evaluation::live::{self, Ground, Live, Part, TrainingRun};
 use offtrack_evaluation::policies::{self, rule};
 use offtrack_policy::Policy;
@@ -15,6 +17,8 @@ use crate::{outputs, roads};
 
 /// The benchmarks of a page of which nothing else is asked.
 const BENCHMARKS: [&str; 2] = ["attard2023", "laden2026"];
+/// Most bytes of what bakes roads in a page: ten times what it takes.
+const MOST_BAKER: u64 = 32 << 20;
 /// The word that stands for every split.
 const ALL: &str = "all";
 
@@ -41,8 +45,11 @@ pub struct Args {
     /// Seed of routes, start poses and random actions that the page begins with.
     #[arg(long, default_value_t = 0)]
     seed: u32,
+    /// What bakes roads in the page by name and from files that are dropped on it: the simulator as WebAssembly.
+    #[arg(long, value_name = "FILE")]
+    baker: Option<PathBuf>,
     /// Write the benchmark alone, as a file to drop on such a page.
-    #[arg(long, conflicts_with_all = ["policy", "run", "seed"])]
+    #[arg(long, conflicts_with_all = ["policy", "run", "seed", "baker"])]
     world: bool,
     /// The file to write.
     #[arg(short, long)]
@@ -62,13 +69,15 @@ pub fn run(args: &Args) -> Result<(), Error> {
     };
     let of_run = run.iter().flat_map(TrainingRun::policies).map(|(_, policy)| policy.name.clone());
     let of_run = files_of("--run", &of_run.collect::<Vec<_>>());
-    let read = [files_of("--benchmark", &benchmarks), files_of("--policy", &args.policy), of_run].concat();
+    let mut read = [files_of("--benchmark", &benchmarks), files_of("--policy", &args.policy), of_run].concat();
+    read.push(("--baker", args.baker.clone()));
     let read: Vec<outputs::Named> = read.iter().map(|(flag, file)| (*flag, file.as_deref())).collect();
     outputs::distinct(&[("--output", Some(&args.output))], &read)?;
     if let (true, [_, _, ..]) = (args.world, benchmarks.as_slice()) {
         let (value, expected) = (benchmarks.join(", "), "a world file holds one benchmark: name one".to_owned());
         return Err(Error::Setting { name: "--benchmark", value, expected });
     }
+    let baker = args.baker.as_deref().map(baker).transpose()?;
     let grounds = benchmarks.iter().map(|name| ground(name, args)).collect::<Result<Vec<Ground>, Error>>()?;
     if let (true, [ground]) = (args.world, grounds.as_slice()) {
         return printed(&ground.write(&args.output)?);
@@ -87,7 +96,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
             },
         })?;
     }
-    printed(&Live { grounds, policies, run, seed: args.seed }.write(&args.output)?)
+    printed(&Live { grounds, policies, run, baker, seed: args.seed }.write(&args.output)?)
 }
 
 /// The policies of the training run in a folder, each named by its file.
@@ -133,7 +142,23 @@ fn ground(name: &str, args: &Args) -> Result<Ground, Error> {
         let expected = "a page steers by levels: the same benchmark with actions.steer_levels is needed".to_owned();
         return Err(Error::Setting { name: "actions.kind", value: "continuous".to_owned(), expected });
     }
-    Ok(Ground { scenario, world })
+    let text = match Source::find(Kind::Benchmark, name)? {
+        Source::Embedded(_) => None,
+        source => Some(source.text()?),
+    };
+    Ok(Ground { scenario, world, text })
+}
+
+/// What bakes roads in the page: the bytes of `file`.
+fn baker(file: &Path) -> Result<Vec<u8>, Error> {
+    let bytes = read_bytes(file, MOST_BAKER)?;
+    let is_wasm = bytes.starts_with(b"\0asm");
+    if is_wasm && bytes.windows(STAMP.len()).any(|part| part == STAMP.as_bytes()) {
+        return Ok(bytes);
+    }
+    let what = if is_wasm { "is WebAssembly of another program or version" } else { "is no WebAssembly" };
+    let expected = format!("{what}: build it by web/build.sh {}, as docs/web.md says", shown_path(file));
+    Err(Error::Setting { name: "--baker", value: file.display().to_string(), expected })
 }
 
 /// The shipped policies that can drive on a benchmark and have its name or, where there are none, all that can.
@@ -141,7 +166,7 @@ fn shipped(grounds: &[Ground]) -> Result<Vec<Policy>, Error> {
     let names = Policy::shipped_names();
     let policies = names.into_iter().map(Policy::shipped).collect::<Result<Vec<Policy>, _>>()?;
     let mut is_chosen = vec![false; names.len()];
-    for Ground { scenario, world } in grounds {
+    for Ground { scenario, world, .. } in grounds {
         let able: Vec<usize> = (0..names.len()).filter(|&index| policies[index].check(world).is_ok()).collect();
         let has_own = able.iter().any(|&index| names[index].starts_with(&scenario.name));
         for index in able {

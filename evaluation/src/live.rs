@@ -3,6 +3,7 @@
 //! Shaders go in as text. What a host must know of them (kernels and their order, buffers, layouts, tables) is printed
 //! here, so that no script repeats it. Tables and policies are gzipped; the page loads no other file.
 
+pub mod bake;
 mod code;
 mod journal;
 mod packed;
@@ -15,7 +16,7 @@ use std::sync::Arc;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
 use offtrack_policy::Policy;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::error::Error;
 use crate::kept::Kept;
@@ -27,6 +28,10 @@ use packed::Packed;
 const TEMPLATE: &str = concat!(include_str!("page/head.html"), include_str!("live/live.html"));
 /// What the page shares with that of a report, and its own.
 const STYLES: &[&str] = &[include_str!("page/theme.css"), include_str!("live/style.css")];
+/// What the policy of a page's contents allows it beside its own script, if it bakes roads: WebAssembly, in a worker.
+const BAKES: &str = " 'wasm-unsafe-eval'; worker-src blob:";
+/// The worker.
+const WORKER: &str = include_str!("live/worker.js");
 /// The shaders of the picture.
 const VIEW: &str = concat!(include_str!("live/view.wgsl"), "\n", include_str!("live/vehicles.wgsl"));
 /// Scripts in the order of the page; the last one starts the others.
@@ -54,6 +59,7 @@ const SCRIPTS: &[&str] = &[
     include_str!("live/results.js"),
     include_str!("live/controls.js"),
     include_str!("live/drop.js"),
+    include_str!("live/baker.js"),
     include_str!("live/learned.js"),
     include_str!("live/app.js"),
     include_str!("live/main.js"),
@@ -69,6 +75,8 @@ pub struct Ground {
     pub scenario: Scenario,
     /// The benchmark, baked.
     pub world: Arc<World>,
+    /// The text of the benchmark's file; `None` of one that comes with the program.
+    pub text: Option<String>,
 }
 
 /// A benchmark as pages have it: with [`N_VEHICLES`] at most.
@@ -88,6 +96,8 @@ pub struct Live {
     pub policies: Vec<Policy>,
     /// A training run whose policies a slider goes through.
     pub run: Option<TrainingRun>,
+    /// What bakes roads in the page: the simulator as WebAssembly.
+    pub baker: Option<Vec<u8>>,
     /// The seed that the page begins with.
     pub seed: u32,
 }
@@ -147,7 +157,8 @@ impl Live {
             "version": env!("CARGO_PKG_VERSION"),
             "commit": provenance::commit(),
             "seed": self.seed,
-            "layout": code::fingerprint(&code),
+            "layout": code::fingerprint(),
+            "baker": self.baker.as_ref().map(|baker| packed.add("baker", baker)),
             "world_file": WORLD_FILE,
             "code": code,
             "worlds": worlds,
@@ -162,10 +173,12 @@ impl Live {
             TEMPLATE,
             &[
                 ("title", &html_text(&format!("trucks on {}", names.join(", ")))),
+                ("allowed", if self.baker.is_some() { BAKES } else { "" }),
                 ("style", &style),
                 ("facts", &facts),
                 ("packed", &tables),
                 ("view", VIEW),
+                ("worker", if self.baker.is_some() { WORKER } else { "" }),
                 ("script", &script),
             ],
         );
@@ -186,17 +199,21 @@ impl Ground {
     ///
     /// A file that cannot be written.
     pub fn write(&self, file: &Path) -> Result<Vec<Part>, Error> {
-        let code = code::printed(&mut Packed::default());
-        let mut packed = Packed::default();
-        let world = worlds::printed(self, &[], &mut packed);
-        let layout = code::fingerprint(&code);
-        let version = env!("CARGO_PKG_VERSION");
-        let facts = json!({ "version": version, "layout": layout, "world": world, "sections": packed.sections() });
+        let (facts, packed) = self.printed();
         let facts = format!("{WORLD_FILE}\n{facts}\n");
         let (tables, mut parts) = packed.written().map_err(Error::write(file))?;
         files::write_whole(file, [facts.as_bytes(), tables.as_bytes()].concat().as_slice())?;
         parts.extend([("facts", facts.len()), ("in all", facts.len() + tables.len())]);
         Ok(parts)
+    }
+
+    /// The facts of a file with this benchmark alone, and its sections.
+    fn printed(&self) -> (Value, Packed) {
+        let mut packed = Packed::default();
+        let world = worlds::printed(self, &[], &mut packed);
+        let (version, layout) = (env!("CARGO_PKG_VERSION"), code::fingerprint());
+        let facts = json!({ "version": version, "layout": layout, "world": world, "sections": packed.sections() });
+        (facts, packed)
     }
 }
 

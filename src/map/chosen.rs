@@ -71,8 +71,17 @@ impl Road {
     ///
     /// # Errors
     ///
-    /// The errors of [`Map::read`] and [`Choice::imported`], and a name that no route could have.
+    /// The errors of [`Map::read`] and [`Road::in_map`].
     pub fn from_map(file: &Path, choice: &Choice) -> Result<Road, Error> {
+        Road::in_map(file, &Map::read(file, choice.hand)?, choice)
+    }
+
+    /// A ring, or ways through a junction, of a map that is read already; `file` names it in errors.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`Choice::imported`], and a name that no route could have.
+    pub fn in_map(file: &Path, map: &Map, choice: &Choice) -> Result<Road, Error> {
         let stem = || file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let name = choice.name.clone().unwrap_or_else(stem);
         if name.is_empty() || 40 < name.len() || name.contains('/') || name.chars().any(char::is_control) {
@@ -82,7 +91,6 @@ impl Road {
                 "must be 1 to 40 characters without a slash",
             ));
         }
-        let map = Map::read(file, choice.hand)?;
-        Ok(Road::on(name, choice.imported(file, &map)?.ground))
+        Ok(Road::on(name, choice.imported(file, map)?.ground))
     }
 }

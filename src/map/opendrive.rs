@@ -85,7 +85,16 @@ impl Map {
     /// A file that cannot be read or is no OpenDRIVE map, or a value that makes no sense, with road, lane and line.
     /// What is only odd is a warning.
     pub fn read(file: &Path, hand: Hand) -> Result<Map, Error> {
-        Map::parse(file, &encoding::text(file, read_bytes(file, read::FILE_LIMIT)?)?, hand)
+        Map::from_bytes(file, read_bytes(file, read::FILE_LIMIT)?, hand)
+    }
+
+    /// Reads a map from the file's bytes and finds its rings; `file` names the map in errors.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`Map::read`] but for files that cannot be read.
+    pub fn from_bytes(file: &Path, bytes: Vec<u8>, hand: Hand) -> Result<Map, Error> {
+        Map::parse(file, &encoding::text(file, bytes)?, hand)
     }
 
     /// Reads a map from the file's text and finds its rings; `file` names the map in errors.

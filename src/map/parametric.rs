@@ -92,16 +92,29 @@ impl Road {
         Road::parsed(name.to_owned(), Path::new(name), text)
     }
 
+    /// A roundabout from the text of a file: parameters, or an outline where the file's name ends in `.outline.toml`.
+    /// Nothing is read from `file`: its stem is the roundabout's name, and errors name it.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`Road::read`].
+    pub fn from_text(file: &Path, text: &str) -> Result<Road, Error> {
+        Road::of_text(Source::Disk(file.to_owned()).stem(), file, text)
+    }
+
     pub(crate) fn from_source(source: &Source) -> Result<Road, Error> {
         if let Source::Disk(file) = source
             && chosen::is_map(file)
         {
             return Road::from_map(file, &chosen::Choice::default());
         }
-        let (name, file) = (source.stem(), source.shown());
-        match name.strip_suffix(".outline") {
-            Some(name) => Ok(Road::on(name.to_owned(), Ground::parse(&file, &source.text()?)?)),
-            None => Road::parsed(name, &file, &source.text()?),
+        Road::of_text(source.stem(), &source.shown(), &source.text()?)
+    }
+
+    fn of_text(stem: String, file: &Path, text: &str) -> Result<Road, Error> {
+        match stem.strip_suffix(".outline") {
+            Some(name) => Ok(Road::on(name.to_owned(), Ground::parse(file, text)?)),
+            None => Road::parsed(stem, file, text),
         }
     }
 

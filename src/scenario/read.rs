@@ -15,19 +15,9 @@ use crate::vehicle::Vehicle;
 impl Scenario {
     /// Reads and checks a benchmark file.
     pub(super) fn from_source(source: &Source, loading: &Loading) -> Result<Scenario, Error> {
+        let (mut scenario, written) = Scenario::before_roads(source)?;
         let file = source.shown();
-        let (reader, written) = Reader::parse::<Written>(&file, &source.text()?)?;
-        let vehicles = fleet::vehicles(&reader, source, &written)?;
-        let mut scenario = without_routes(&reader, source.stem(), vehicles, &written)?;
-        let delay = scenario.longest_steer_delay();
-        if MOST_DELAY * scenario.step < delay {
-            let expected = format!("the vehicle's steer delay is up to {delay} s; three steps at most");
-            return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
-        }
-        if scenario.traffic.is_some() && scenario.step as f32 != crate::traffic::STEP {
-            let expected = format!("with [traffic] {} s", crate::traffic::STEP);
-            return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
-        }
+        let reader = Reader::of(&file);
         // Drawing takes longest: everything else is checked first.
         let procedural =
             written.procedural.as_ref().map(|written| Procedural::checked(&reader, source, written)).transpose()?;
@@ -45,6 +35,24 @@ impl Scenario {
             return Err(reader.invalid("roundabout", "no routes", expected));
         }
         Ok(scenario)
+    }
+
+    /// Everything of a benchmark but its roads, and what the file says.
+    pub(super) fn before_roads(source: &Source) -> Result<(Scenario, Written), Error> {
+        let file = source.shown();
+        let (reader, written) = Reader::parse::<Written>(&file, &source.text()?)?;
+        let vehicles = fleet::vehicles(&reader, source, &written)?;
+        let scenario = without_routes(&reader, source.stem(), vehicles, &written)?;
+        let delay = scenario.longest_steer_delay();
+        if MOST_DELAY * scenario.step < delay {
+            let expected = format!("the vehicle's steer delay is up to {delay} s; three steps at most");
+            return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
+        }
+        if scenario.traffic.is_some() && scenario.step as f32 != crate::traffic::STEP {
+            let expected = format!("with [traffic] {} s", crate::traffic::STEP);
+            return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
+        }
+        Ok((scenario, written))
     }
 }
 

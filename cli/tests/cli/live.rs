@@ -6,6 +6,7 @@ mod devtools;
 mod learned;
 mod page;
 mod policies;
+mod roads;
 mod runs;
 mod served;
 mod stages;

@@ -122,6 +122,37 @@ fn a_folder_that_is_no_run_or_has_no_policies_for_the_benchmark_is_refused_with_
 }
 
 #[test]
+fn a_baker_of_this_version_goes_into_the_page_which_else_allows_no_webassembly() {
+    let place = Place::new();
+    let (file, baker) = (place.text("trucks.html"), place.text("baker.wasm"));
+    let web = |flags: &[&str]| {
+        offtrack(&[&["web", "--benchmark", "attard2023", "--road", "16m", "-o", &file], flags].concat())
+    };
+    let stamp = concat!("offtrack baker ", env!("CARGO_PKG_VERSION"));
+    for (bytes, words) in [("offtrack baker", "is no WebAssembly"), ("\0asm of another", "another program or version")]
+    {
+        std::fs::write(&baker, bytes).unwrap();
+        let said = refusal(&web(&["--baker", &baker]), 2);
+        assert!([words, "--baker", "web/build.sh"].iter().all(|word| said.contains(word)), "{said}");
+    }
+    let said = refusal(&web(&["--baker", &place.text("none.wasm")]), 2);
+    assert!(said.contains("none.wasm: cannot be read"), "{said}");
+    let said = refusal(&offtrack(&["web", "--baker", &file, "-o", &file]), 2);
+    assert!(said.contains("--output") && said.contains("is the file of --baker too"), "{said}");
+    std::fs::write(&baker, format!("\0asm {stamp}")).unwrap();
+    let output = web(&["--baker", &baker]);
+    succeed(&output);
+    assert!(String::from_utf8(output.stdout).unwrap().lines().any(|line| line.starts_with("baker ")));
+    let page = read(&place.file("trucks.html"));
+    assert!(page.contains("script-src 'unsafe-inline' 'wasm-unsafe-eval'; worker-src blob:\""));
+    assert!(facts(&page)["baker"].is_u64() && block(&page, "worker").contains("WebAssembly.instantiate"));
+    succeed(&web(&[]));
+    let page = read(&place.file("trucks.html"));
+    assert!(page.contains("script-src 'unsafe-inline'\"") && block(&page, "worker").is_empty());
+    assert_eq!(facts(&page)["baker"], Value::Null);
+}
+
+#[test]
 fn what_no_page_can_show_is_refused() {
     let place = Place::new();
     let file = place.text("trucks.html");

@@ -32,6 +32,7 @@ class App {
     Object.assign(this, { crowds: [], playing: true, rate: 2, debt: 0, colouring: 0 });
     this.frames = Promise.resolve();
     this.learned = new Learned(this);
+    this.baker = new Baker(this);
     this.visit = new Visit(this);
     this.failures = new FailureList((crowd, failure) => this.attempt(() => this.visit.driveAgain(crowd, failure)));
     const { seed } = live.facts;
@@ -331,6 +332,7 @@ class App {
 
   /** Takes a file that was dropped or chosen; what is said on the page. */
   async dropFile(name, bytes) {
+    if (this.baker.takes(name)) return this.baker.file(name, bytes);
     return this.attempt(async () => this.say(await takeFile(this, name, bytes)));
   }
 

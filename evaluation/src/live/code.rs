@@ -54,7 +54,7 @@ pub(super) fn printed(packed: &mut Packed) -> Value {
         "n_extras": N_EXTRAS,
         "n_around": N_AROUND,
         "cars": cars(),
-        "roads": { "route_rows": ROUTE_ROWS, "row_bytes": size_of::<[u32; 4]>() },
+        "roads": roads(),
         "begin": { "begins": BEGINS, "is_first": IS_FIRST, "has_route": HAS_ROUTE, "has_start": HAS_START },
         "ended": Ended::ALL.map(Ended::name),
         "autoreset": {
@@ -66,9 +66,9 @@ pub(super) fn printed(packed: &mut Packed) -> Value {
         "observation": OBSERVATION.map(values),
         "around": VEHICLE_VALUES.map(values),
         "extras": EXTRAS.map(|extra| json!({ "name": extra.name, "doc": extra.doc })),
-        "structs": structs(&[layout::structs(), act::structs(), journal::structs()].concat()),
-        "columns": Column::ALL.iter().copied().map(column).collect::<Map<_, _>>(),
-        "buffers": BUFFERS.into_iter().map(buffer).collect::<Vec<_>>(),
+        "structs": structs(),
+        "columns": columns(),
+        "buffers": buffers(),
         "kernels": kernels(),
         "journal": journal::facts(),
         "act": {
@@ -83,9 +83,22 @@ pub(super) fn printed(packed: &mut Packed) -> Value {
 }
 
 /// A number that differs where a page and a file were written by programs that lay out tables otherwise.
-pub(super) fn fingerprint(code: &Value) -> u32 {
-    let parts = ["structs", "buffers", "roads", "columns", "cars"];
-    crc32fast::hash(parts.map(|part| code[part].to_string()).concat().as_bytes())
+pub(super) fn fingerprint() -> u32 {
+    let parts = [structs(), buffers(), roads(), columns(), cars()];
+    crc32fast::hash(parts.map(|facts| facts.to_string()).concat().as_bytes())
+}
+
+/// How routes lie in their table.
+fn roads() -> Value {
+    json!({ "route_rows": ROUTE_ROWS, "row_bytes": size_of::<[u32; 4]>() })
+}
+
+fn columns() -> Value {
+    Column::ALL.iter().copied().map(column).collect::<Map<_, _>>().into()
+}
+
+fn buffers() -> Value {
+    BUFFERS.into_iter().map(buffer).collect()
 }
 
 /// Whether a policy reads what other vehicles do, in the order of what is printed for both.
@@ -162,7 +175,7 @@ fn kernels() -> Map<String, Value> {
     Kernel::ALL.map(kernel).into_iter().collect()
 }
 
-fn structs(all: &[Struct]) -> Map<String, Value> {
+fn structs() -> Value {
     let field = |field: &Field| {
         let doc = field.doc.trim();
         // A unit stands last, in parentheses.
@@ -173,7 +186,7 @@ fn structs(all: &[Struct]) -> Map<String, Value> {
         let fields: Map<_, _> = of.fields.iter().map(field).collect();
         (of.name.to_owned(), json!({ "size": of.size, "fields": fields }))
     };
-    all.iter().map(one).collect()
+    [layout::structs(), act::structs(), journal::structs()].concat().iter().map(one).collect::<Map<_, _>>().into()
 }
 
 /// The buffers of the kernel that acts, of a policy that reads what other vehicles do or of another one.

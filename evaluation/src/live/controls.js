@@ -33,8 +33,8 @@ function fillSelect(id, pairs, chosen) {
   byId(id).replaceChildren(...pairs.map(([value, text]) => option(value, text, String(value) === String(chosen))));
 }
 
-/** The name of a benchmark, with the file that it came by. */
-const worldWords = ({ name, file }) => (file ? `${name} of ${file}` : name);
+/** The name of a benchmark, with the file that it came by or the roads that were baked for it. */
+const worldWords = ({ name, file, on }) => (file ? `${name} of ${file}` : on ? `${name} on ${on}` : name);
 
 /** Roads to choose from: all, each split that has roads of its own, each road. The value is a split or an index. */
 function roadChoices(world) {
@@ -62,6 +62,7 @@ function showChoices(app) {
   const each = demands.map((demand, index) => [index, `${whole(demand)} an hour`]);
   fillSelect("demand", [["", "drawn each episode"], ...each], chosen.demand ?? "");
   for (const node of [byId("demand"), byId("demand").labels[0]]) node.hidden = demands.length < 2;
+  app.baker.show(world);
   const all = app.policies.map((policy, index) => [index, policyWords(policy)]);
   app.learned.show();
   const isOffered = ([index]) => app.canDrive(index, chosen.world) && !app.learned.hides(index);

@@ -72,7 +72,11 @@ class Live {
     } catch {
       throw new Error(`${name} is a damaged world file; download it or write it again.`);
     }
-    const { version, layout, world, sections, kinds } = read;
+    return this.add(name, read);
+  }
+
+  /** Adds a benchmark that is in no block of the page, and gives its index. */
+  add(name, { version, layout, world, sections, kinds }) {
     if (layout !== this.facts.layout) {
       throw new Error(
         `${name} was written by offtrack ${version}, this page by ${this.facts.version}; write both by one.`,

@@ -69,6 +69,12 @@ impl Packed {
         }
         Ok((lines, parts))
     }
+
+    /// Names and lengths of the kinds, and their bytes, one after the other.
+    pub(super) fn raw(&self) -> (Vec<(&'static str, usize)>, Vec<u8>) {
+        let lengths = self.kinds.iter().map(|(kind, bytes)| (*kind, bytes.len())).collect();
+        (lengths, self.kinds.iter().flat_map(|(_, bytes)| bytes).copied().collect())
+    }
 }
 
 /// Of each word's lower half, and of what its upper half has more, the difference to the word before as a zigzag number

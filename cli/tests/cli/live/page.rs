@@ -36,12 +36,12 @@ pub fn done(page: &str, jobs: &[Value], mut files: HashMap<String, Vec<u8>>) -> 
 pub fn ground(benchmark: &str) -> Ground {
     let scenario = shown(Scenario::find(benchmark).unwrap());
     let world = Arc::new(World::bake(&scenario).unwrap());
-    Ground { scenario, world }
+    Ground { scenario, world, text: None }
 }
 
 /// The text of a page of these benchmarks and policies.
 pub fn written(grounds: Vec<Ground>, policies: Vec<Policy>, file: &Path) -> String {
-    Live { grounds, policies, run: None, seed: 0 }.write(file).unwrap();
+    Live { grounds, policies, run: None, baker: None, seed: 0 }.write(file).unwrap();
     read(file)
 }
 

@@ -241,6 +241,62 @@ async function files(live, { names }) {
   page.gpu.destroy();
 }
 
+/** Facts and words of what the baker makes of what is asked. */
+async function bytes(live, { asked }) {
+  const page = await opened(live, { n: 8 }), none = new Uint8Array();
+  const { facts, kinds } = await page.baker.baked(asked, none, new Promise(() => {}));
+  const wordsOf = ([kind, all]) => [kind, [...new Uint32Array(all.slice().buffer)]];
+  await give("bytes", JSON.stringify({ facts, words: Object.fromEntries(Object.entries(kinds).map(wordsOf)) }));
+  page.gpu.destroy();
+}
+
+/** What the page says to names in its box, to files, and to another ring of a map; and where trucks then drive. */
+async function roads(live, { visits }) {
+  const page = await opened(live, { n: 8 }), all = [];
+  await page.stepBy(2);
+  const isDone = () => !byId("said").hidden && !byId("said").textContent.startsWith("Baking");
+  for (const { road, file, ring, benchmark } of visits) {
+    if (benchmark !== undefined) await page.attempt(() => page.choose({ world: benchmark }));
+    byId("said").hidden = true;
+    if (file !== undefined) await page.dropFile(file, await asked(file));
+    else if (ring !== undefined) {
+      byId("ring").value = ring;
+      byId("ring").dispatchEvent(new Event("change"));
+    } else {
+      byId("any-road").value = road;
+      byId("bake").click();
+    }
+    while (!isDone()) await new Promise((next) => setTimeout(next, 50));
+    await page.stepBy(2);
+    const [{ policy, world, batch }] = page.crowds, [chosen] = byId("benchmark").selectedOptions;
+    all.push({ ...said(), benchmark: chosen.textContent, policy: policy?.name ?? null, begun: batch.begun,
+      bounds: world.facts.roads[0].bounds, rings: byId("ring").checkVisibility() ? byId("ring").length : 0 });
+  }
+  await give("roads", JSON.stringify(all));
+  page.gpu.destroy();
+}
+
+/** Whether roads can be typed, and whether the page says why not. */
+async function unbaked(live) {
+  const page = await opened(live, { n: 8 });
+  const shown = { box: byId("any-road").checkVisibility(), note: byId("no-baker").checkVisibility() };
+  await give("unbaked", JSON.stringify(shown));
+  page.gpu.destroy();
+}
+
+/** How many trucks the page begins with on this device, and on one that calls itself a card. */
+async function counts(live) {
+  const begins = async () => {
+    const page = await opened(live, {}), { n } = page.crowds[0].batch;
+    page.gpu.destroy();
+    return { n, heading: byId("heading").textContent };
+  };
+  const software = await begins();
+  const info = { vendor: "nvidia", architecture: "hopper", description: "", isFallbackAdapter: false };
+  Object.defineProperty(GPUAdapter.prototype, "info", { configurable: true, get: () => info });
+  await give("counts", JSON.stringify({ software, card: await begins() }));
+}
+
 /** A failure of random actions, driven again. */
 async function again(live) {
   const page = await opened(live, { n: 8, policy: -1 }), [crowd] = page.crowds;
@@ -279,7 +335,9 @@ async function without(live, { hasApi }) {
   await give("without", JSON.stringify(missing()));
 }
 
-const VISITS = { pixels, colouring, among, wheel, keys, touch, files, again, lost, without };
+const VISITS = {
+  pixels, colouring, among, wheel, keys, touch, files, bytes, roads, unbaked, counts, again, lost, without,
+};
 
 try {
   const plan = JSON.parse(new TextDecoder().decode(await asked("plan")));

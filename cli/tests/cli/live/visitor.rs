@@ -188,6 +188,14 @@ fn a_file_that_is_dropped_drives_or_the_page_says_in_words_why_not() {
 }
 
 #[test]
+fn a_page_begins_with_four_thousand_trucks_on_a_card_and_with_few_on_a_processor() {
+    let place = Place::new();
+    let found = visited(&page(&place), &json!({ "visit": "counts" }), HashMap::new(), false);
+    assert_eq!((&found["software"]["n"], &found["card"]["n"]), (&json!(256), &json!(4096)), "{found}");
+    assert!(found["card"]["heading"].as_str().unwrap().starts_with("4,096 tractor-trailers"), "{found}");
+}
+
+#[test]
 fn a_failure_that_is_driven_again_ends_as_it_did() {
     let place = Place::new();
     let found = visited(&page(&place), &json!({ "visit": "again" }), HashMap::new(), false);
