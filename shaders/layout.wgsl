@@ -305,10 +305,14 @@ const ENTERING: u32 = 2684354560u;
 const COIN: u32 = 3221225472u;
 // Whether one lets another in: the period and both slots are added.
 const COURTESY: u32 = 3489660928u;
+// Whether one looks away: the period and its slot are added.
+const LAPSE: u32 = 3758096384u;
 // Steps for which a coin falls the same way.
 const COIN_PERIOD: u32 = 10u;
 // Steps for which a car is as courteous to another.
 const COURTESY_PERIOD: u32 = 32u;
+// Steps for which one looks away.
+const LAPSE_PERIOD: u32 = 20u;
 // Numbers of slots that differ in a draw.
 const SLOTS: u32 = 64u;
 // Path of a slot without a car.
@@ -365,6 +369,8 @@ const LEAST_SPEED: i32 = 6554i;
 const LEAST_WISHED: i32 = 819i;
 // Steps after which one that has been standing goes by the coin.
 const PATIENT: u32 = 20u;
+// Who looks away looks up once he would brake harder than at 3 m/s² (2^-19 m a step²).
+const LOOKS_UP: i32 = -15729i;
 // Interaction of a car that must let another out of a crossing: it wishes three times the gap.
 const LETS_OUT: i32 = 589824i;
 // Zones that begin up to here behind the line are those of the entry (2^-10 m).
@@ -517,8 +523,10 @@ const LANES_RUDE: u32 = 7u;
 const LANES_SPACING: u32 = 9u;
 // Word of the number of demands, of which each episode draws one.
 const LANES_LEVELS: u32 = 10u;
+// Word of the probability with which a driver looks away.
+const LANES_LAPSES: u32 = 11u;
 // First word of the routes.
-const LANES_ROUTES: u32 = 11u;
+const LANES_ROUTES: u32 = 12u;
 // Words of a route: the first word of its road, its path there, and the station of its beginning (m).
 const LANES_ROUTE_WORDS: u32 = 3u;
 // Sums in a tally: steps by their end code, then the rewards.

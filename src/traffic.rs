@@ -23,6 +23,7 @@ mod network; // the tables
 mod others; // what cars mind besides each other
 mod paths; // lines that cars drive, and how fast
 pub mod rules; // the numbers of the driver model
+mod drivers; // other kinds of drivers
 mod row; // a truck's row of the column of cars
 mod run; // cars alone on a road
 mod snapshots; // states that episodes begin in
@@ -38,6 +39,7 @@ pub use car::Car;
 pub use clock::Clock;
 pub use decide::Driver;
 pub use demand::{Demand, Mix};
+pub use drivers::Drivers;
 pub use network::{Kind, Network, Pair, Path, Sample, Source, Stretch, Zone};
 pub use others::{Nobody, Others};
 pub use paths::{begins, speed_limit};

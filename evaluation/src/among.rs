@@ -1,11 +1,16 @@
 //! How a truck drives among other vehicles: how long it stands, how near it comes to them, and what it costs them.
 
-use offtrack::layout::{Rig, Truck};
+pub(crate) mod encroachment; // times between both at the places where their paths meet
+pub(crate) mod lanes; // lanes that it takes beside its own
+
+use offtrack::layout::{Ended, Rig, Truck};
 use offtrack::traffic::car::Outline;
 use offtrack::traffic::{Car, Contact, Network, Row, outlines};
 use serde::Serialize;
 
 use super::episode::Episode;
+pub use lanes::LaneClasses;
+use lanes::LanesBeside;
 
 /// Slower than this a truck stands (m/s).
 const STANDS: f32 = 0.3;
@@ -22,6 +27,9 @@ const N_LOOKS: usize = 50;
 /// A shorter time to collision is too short (s). nuPlan's planning metrics state it, and how it is found: both go on at
 /// constant speed and heading for up to 5 s.
 const TOO_SHORT: f64 = 0.95;
+/// Longer post-encroachment times are no conflict (s): D. Gettman and others, "Surrogate Safety Assessment Model",
+/// FHWA-HRT-08-051, 2008.
+const NO_CONFLICT: f64 = 5.0;
 /// Time for which a vehicle that has entered may stand for a truck (s).
 const BLOCKED: f64 = 10.0;
 
@@ -40,6 +48,10 @@ pub struct Among {
     pub beside: f64,
     /// Least time to a collision with a vehicle ahead, at most 5 s (s).
     pub time_to_collision: f64,
+    /// Least post-encroachment time with a vehicle of another arm, at most 5 s (s).
+    pub post_encroachment_time: f64,
+    /// Parts of its way on which it took a lane beside its own, by entry, ring, exit; none where there is no such lane.
+    pub lanes_taken: Option<[bool; 3]>,
     /// The contact that ended it, if one did.
     pub met: Option<Met>,
 }
@@ -57,7 +69,17 @@ impl Among {
     /// At an episode's start.
     pub(super) fn new(demand: f64) -> Among {
         let longest = LOOK * N_LOOKS as f64;
-        Among { demand, standing: 0.0, blocked: 0.0, braking: 0.0, beside: 0.0, time_to_collision: longest, met: None }
+        Among {
+            demand,
+            standing: 0.0,
+            blocked: 0.0,
+            braking: 0.0,
+            beside: 0.0,
+            time_to_collision: longest,
+            post_encroachment_time: NO_CONFLICT,
+            lanes_taken: None,
+            met: None,
+        }
     }
 
     /// Adds the last step, of `step` seconds, after which truck and vehicles are these.
@@ -80,6 +102,20 @@ impl Among {
             if STANDS < truck.speed && 0.0 < (outline.middle - truck.position).dot(units[0].along) {
                 self.look_ahead(&units, truck.speed, &outline, car.speed());
             }
+        }
+    }
+
+    /// Adds a post-encroachment time (s).
+    pub(super) fn encroach(&mut self, time: f64) {
+        self.post_encroachment_time = self.post_encroachment_time.min(time);
+    }
+
+    /// Adds the lanes that both units of the truck take now beside its own.
+    pub(super) fn take(&mut self, rig: &Rig, truck: &Truck, lanes: &LanesBeside) {
+        if !lanes.is_empty() {
+            let taken = self.lanes_taken.get_or_insert_default();
+            let now = lanes.taken(&outlines(rig, truck));
+            taken.iter_mut().zip(now).for_each(|(taken, now)| *taken |= now);
         }
     }
 
@@ -133,12 +169,22 @@ pub struct AmongSummary {
     pub too_near: f64,
     /// The time to collision that one episode in 20 falls below (s).
     pub time_to_collision_p5: f64,
+    /// The post-encroachment time that one episode in 20 falls below, at most 5 s (s).
+    pub post_encroachment_time_p5: f64,
+    /// The same of every other episode (s).
+    pub post_encroachment_time_p50: f64,
+    /// Of the episodes that arrived on routes with lanes beside their own, which lanes they took; none of none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lane_classes: Option<LaneClasses>,
 }
 
 impl AmongSummary {
     /// Of those episodes that have other vehicles; `None` of none.
     pub(super) fn of<'a>(episodes: impl Iterator<Item = &'a Episode>) -> Option<AmongSummary> {
-        let all: Vec<Among> = episodes.filter_map(|episode| episode.among).collect();
+        let of = |episode: &Episode| Some((episode.among?, episode.ended == Ended::Arrived));
+        let (all, arrived): (Vec<Among>, Vec<bool>) = episodes.filter_map(of).unzip();
+        let passages = all.iter().zip(arrived).filter_map(|(among, arrived)| among.lanes_taken.filter(|_| arrived));
+        let passages: Vec<[bool; 3]> = passages.collect();
         let mean = |value: fn(&Among) -> f64| all.iter().map(value).sum::<f64>() / all.len() as f64;
         (!all.is_empty()).then(|| AmongSummary {
             standing_mean: mean(|among| among.standing),
@@ -148,7 +194,18 @@ impl AmongSummary {
             beside_mean: mean(|among| among.beside),
             too_near: mean(|among| f64::from(u8::from(among.time_to_collision < TOO_SHORT))),
             time_to_collision_p5: quantile(&all, |among| among.time_to_collision, 0.05),
+            post_encroachment_time_p5: quantile(&all, |among| among.post_encroachment_time, 0.05),
+            post_encroachment_time_p50: quantile(&all, |among| among.post_encroachment_time, 0.5),
+            lane_classes: LaneClasses::of(&passages),
         })
+    }
+
+    /// A line of the table under [`HEADING_OF_LANES`].
+    pub(super) fn line_of_lanes(&self, name: &str) -> String {
+        let [p5, p50] = [self.post_encroachment_time_p5, self.post_encroachment_time_p50];
+        let classes = self.lane_classes.map(|LaneClasses { i, ii, iii }| [i, ii, iii]);
+        let percent = |index: usize| classes.map_or("-".to_owned(), |classes| format!("{:.1}", 100.0 * classes[index]));
+        format!("{name:<12} {p5:>7.1} {p50:>5.1} {:>9} {:>8} {:>7}", percent(0), percent(1), percent(2))
     }
 
     /// A line of the table under [`HEADING`].
@@ -171,6 +228,12 @@ pub(super) const HEADING: &str = "vehicles     stood s   p95 braking s beside s 
 pub(super) const NOTE: &str = "stood: a truck, per episode; braking: vehicles, harder than 4 m/s2 for it; beside: \
                                vehicles beyond their line; TTC: least time to collision of an episode, short below \
                                0.95 s; blocked: a vehicle beyond its line stood more than 10 s for it.";
+
+/// What [`AmongSummary::line_of_lanes`] gives, and what it means.
+pub(super) const HEADING_OF_LANES: &str = "vehicles      PET p5   p50 class I %     II %   III %";
+pub(super) const NOTE_OF_LANES: &str = "PET: least time of an episode between truck and vehicle where their paths meet, \
+                                        at most 5 s; class I: took a lane beside its own on entry or exit, II: in the \
+                                        ring alone, III: nowhere, of those that arrived.";
 
 /// The value that a fraction of all lies at or below.
 fn quantile(all: &[Among], value: fn(&Among) -> f64, fraction: f64) -> f64 {

@@ -1,18 +1,20 @@
 //! The figures of episodes under way, one a truck, from their starts to their ends.
 
 use offtrack::layout::{Control, Ended, Truck};
+use offtrack::physics::seen_by_vehicles;
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{Error, Simulator};
 use offtrack::traffic::Row;
 use offtrack::world::World;
 
 use crate::among::Among;
+use crate::among::lanes::LanesBeside;
 use crate::classes;
 use crate::driving::Driving;
 use crate::episode::Episode;
 use crate::evaluation::routes_of;
 use crate::part::LaneWidths;
-use crate::running::Running;
+use crate::running::{Around, Running};
 use crate::seen::Seen;
 
 /// The figures of each episode so far.
@@ -20,6 +22,8 @@ pub struct Figures<'a> {
     world: &'a World,
     /// Of each route.
     lanes: Vec<LaneWidths>,
+    /// Of each route.
+    beside: Vec<LanesBeside>,
     per_route: usize,
     running: Vec<Running>,
     finished: Vec<Option<Episode>>,
@@ -39,6 +43,7 @@ impl<'a> Figures<'a> {
         simulator: &Simulator,
     ) -> Result<Figures<'a>, Error> {
         let lane = |(_, place, route)| LaneWidths::of(scenario, place, route);
+        let lanes: Vec<LaneWidths> = routes_of(scenario, routes).into_iter().map(lane).collect();
         let seen = Seen::of(simulator)?;
         let has_classes = classes::has_classes(scenario);
         let levels = scenario.traffic.as_ref().map(|traffic| traffic.demand.as_slice());
@@ -50,7 +55,8 @@ impl<'a> Figures<'a> {
         };
         Ok(Figures {
             world,
-            lanes: routes_of(scenario, routes).into_iter().map(lane).collect(),
+            beside: routes.iter().zip(&lanes).map(|(&route, lane)| LanesBeside::of(world, route, lane)).collect(),
+            lanes,
             per_route,
             running: seen.truck.iter().zip(seen.control.iter()).enumerate().map(new).collect(),
             finished: vec![None; simulator.n_envs()],
@@ -71,10 +77,17 @@ impl<'a> Figures<'a> {
     pub(crate) fn add(&mut self, seen: &Seen) -> usize {
         let mut n_ended = 0;
         for (env, (running, finished)) in self.running.iter_mut().zip(&mut self.finished).enumerate() {
-            let (truck, lane) = (&seen.truck[env], &self.lanes[env / self.per_route]);
-            let shared = self.world.traffic.as_ref();
-            let network = shared.map(|shared| &shared.road(self.world, truck.route).network);
-            if finished.is_none() && running.follow(self.world.rig(truck), lane, network, seen, env) {
+            if finished.is_some() {
+                continue;
+            }
+            let (truck, route) = (&seen.truck[env], env / self.per_route);
+            let view = seen_by_vehicles(self.world, truck, &seen.progress[env]);
+            let around = self.world.traffic.as_ref().zip(view).map(|(shared, view)| Around {
+                network: &shared.road(self.world, truck.route).network,
+                view,
+                lanes: &self.beside[route],
+            });
+            if running.follow(self.world.rig(truck), &self.lanes[route], around.as_ref(), seen, env) {
                 *finished = Some(running.finish(Ended::from_code(seen.ended[env]).unwrap_or(Ended::Running)));
                 n_ended += 1;
             }

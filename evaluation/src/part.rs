@@ -58,6 +58,11 @@ impl LaneWidths {
         }
     }
 
+    /// The part of the route at `station` metres from its beginning.
+    pub(super) fn part(&self, station: f64) -> Part {
+        [Part::Entry, Part::Ring, Part::Exit][self.from.iter().filter(|&&from| from <= station).count()]
+    }
+
     /// Where `waypoint` is the next one to pass: on the segment that ends there (m).
     pub(super) fn half_width(&self, waypoint: u32) -> f32 {
         let middle = (f64::from(waypoint) - 0.5) * self.spacing;
@@ -78,6 +83,8 @@ mod tests {
         let at = |station: f64| (station / scenario.spacing).ceil() as u32;
         let end = route.centre_line.length();
         // The ring begins 40 m along the route and ends 35 m before its end.
+        let parts = [1.0, 39.9, 40.1, end - 34.9].map(|station| lane.part(station));
+        assert_eq!(parts, [Part::Entry, Part::Entry, Part::Ring, Part::Exit]);
         let found = [1.0, 38.5, 42.5, end - 38.5, end - 32.5, end + 2.0].map(|station| lane.half_width(at(station)));
         assert_eq!(found, [1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
         let parts = [1.0, 39.9, 40.1, end - 35.1, end - 34.9, end].map(|station| Part::at(&scenario, route, station));

@@ -8,13 +8,25 @@ use std::collections::VecDeque;
 use glam::Vec2;
 use offtrack::layout::angle::wrapped;
 use offtrack::layout::{Ended, Rig, Truck};
-use offtrack::traffic::{Network, Row};
+use offtrack::traffic::{Network, Row, View};
 
 use super::among::Among;
+use super::among::encroachment::Encroachments;
+use super::among::lanes::LanesBeside;
 use super::driving::Driving;
 use super::episode::{Episode, Terms};
 use super::part::LaneWidths;
 use super::seen::Seen;
+
+/// What is of other vehicles on a truck's road.
+pub(super) struct Around<'a> {
+    /// Their paths.
+    pub(super) network: &'a Network,
+    /// The truck as they see it.
+    pub(super) view: View,
+    /// Lanes beside that of its route.
+    pub(super) lanes: &'a LanesBeside,
+}
 
 /// An episode under way.
 pub(super) struct Running {
@@ -24,6 +36,7 @@ pub(super) struct Running {
     /// The episode's figures so far; the means and the off-tracking follow at its end.
     episode: Episode,
     off_tracking: OffTracking,
+    encroachments: Encroachments,
     /// Duration of a step (s).
     step: f64,
 }
@@ -58,16 +71,17 @@ impl Running {
             // The path's first point lies far behind the start, so that the trailer's axle is beside it from the first
             // step on.
             off_tracking: OffTracking::new(front - 2.0 * (rig.wheelbase + rig.trailer_wheelbase) * ahead, front),
+            encroachments: Encroachments::new(),
         }
     }
 
-    /// Adds the last step; true if it ended the episode. `lane` is that of the truck's route, `network` the paths of
-    /// its road, where there are other vehicles.
+    /// Adds the last step; true if it ended the episode. `lane` is that of the truck's route, `around` what is of other
+    /// vehicles there.
     pub(super) fn follow(
         &mut self,
         rig: &Rig,
         lane: &LaneWidths,
-        network: Option<&Network>,
+        around: Option<&Around>,
         seen: &Seen,
         env: usize,
     ) -> bool {
@@ -88,8 +102,15 @@ impl Running {
             driving.follow(truck, &seen.control[env], self.step);
         }
         let cars = seen.cars.as_ref().and_then(|cars| cars.get(env));
-        if let (Some(among), Some(network), Some(cars)) = (&mut self.episode.among, network, cars) {
-            among.follow(rig, truck, network, Row::of(cars), self.step);
+        if let (Some(among), Some(Around { network, view, lanes }), Some(cars)) =
+            (&mut self.episode.among, around, cars)
+        {
+            let row = Row::of(cars);
+            among.follow(rig, truck, network, row, self.step);
+            among.take(rig, truck, lanes);
+            if let Some(steps) = self.encroachments.follow(network, view, row) {
+                among.encroach(steps as f64 * self.step);
+            }
         }
         self.episode.last = *truck;
         self.off_tracking.push(front_axle(rig, truck), truck.trailer_position(rig));

@@ -139,10 +139,13 @@ impl Report {
         }
         let among = self.groups.demand.iter();
         let among = among.filter_map(|group| Some((&group.name, group.summary.among_vehicles.as_ref()?)));
-        let among: Vec<String> = among.map(|(name, among)| among.line(name)).collect();
+        let lines = among.map(|(name, among)| (among.line(name), among.line_of_lanes(name)));
+        let (among, of_lanes): (Vec<String>, Vec<String>) = lines.unzip();
         if !among.is_empty() {
             let _ = writeln!(text, "{}\n{}", among::HEADING, among.join("\n"));
             push_wrapped(&mut text, among::NOTE, width);
+            let _ = writeln!(text, "{}\n{}", among::HEADING_OF_LANES, of_lanes.join("\n"));
+            push_wrapped(&mut text, among::NOTE_OF_LANES, width);
         }
         for line in classes::lines(&self.classes) {
             let _ = writeln!(text, "{line}");

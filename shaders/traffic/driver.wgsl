@@ -130,7 +130,17 @@ fn decided(env: u32, slot: u32, car: Car) -> u32 {
     // Half a step ahead: a speed's unit is the way of half a step.
     let limit = limit_at(network, path, car.station + car.speed);
     let wished = max(limit, LEAST_WISHED) * (SPEED_PARTS + temperament) / SPEED_PARTS;
-    return marked(acceleration_of(me.speed, wished, driver.interaction), slows_for_truck);
+    let acceleration = acceleration_of(me.speed, wished, driver.interaction);
+    let holds = LOOKS_UP <= acceleration && looks_away(env, slot);
+    return marked(select(acceleration, min(car.acceleration, 0), holds), slows_for_truck);
+}
+
+// Whether the driver in a slot looks away.
+fn looks_away(env: u32, slot: u32) -> bool {
+    let lapses = lanes[LANES_LAPSES];
+    if lapses == 0u { return false; }
+    let period = (truck[env].steps + slot) / LAPSE_PERIOD;
+    return falls_below(traffic_words(env, LAPSE + period * SLOTS + slot).x, lapses);
 }
 
 // Takes another car in a zone of both paths into account.

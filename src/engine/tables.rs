@@ -28,8 +28,10 @@ constants! {
     const LANES_SPACING: usize = LANES_RUDE + 2;
     /// Word of the number of demands, of which each episode draws one.
     const LANES_LEVELS: usize = LANES_SPACING + 1;
+    /// Word of the probability with which a driver looks away.
+    const LANES_LAPSES: usize = LANES_LEVELS + 1;
     /// First word of the routes.
-    const LANES_ROUTES: usize = LANES_LEVELS + 1;
+    const LANES_ROUTES: usize = LANES_LAPSES + 1;
     /// Words of a route: the first word of its road, its path there, and the station of its beginning (m).
     const LANES_ROUTE_WORDS: usize = 3;
 }
@@ -147,6 +149,7 @@ fn lanes(world: &World) -> Vec<u32> {
     lanes[LANES_RUDE..LANES_SPACING].copy_from_slice(&traffic.rude);
     lanes[LANES_SPACING] = traffic.spacing.to_bits();
     lanes[LANES_LEVELS] = traffic.roads.first().map_or(0, |road| road.levels.len() as u32);
+    lanes[LANES_LAPSES] = traffic.rules.lapses;
     let mut first = (LANES_ROUTES + LANES_ROUTE_WORDS * world.routes.len()) as u32;
     let words: Vec<Vec<u32>> = traffic.roads.iter().map(TrafficRoad::words).collect();
     let starts = words.iter().map(|words| {

@@ -11,6 +11,7 @@ use super::{ActionKind, Clock, Reward};
 use crate::layout::ObservedExtras;
 use crate::map::Gutter;
 use crate::map::opendrive::{Hand, RoadLane};
+use crate::traffic::Drivers;
 use crate::vehicle::WrittenModel;
 
 /// The file.
@@ -135,19 +136,16 @@ pub(super) struct WrittenDisturbances {
 pub(super) struct WrittenTraffic {
     pub(super) demand: Vec<f64>,
     #[serde(default)]
+    pub(super) drivers: Drivers,
+    #[serde(default)]
     pub(super) vans: f64,
     #[serde(default)]
     pub(super) rude: Option<WrittenRange>,
-    #[serde(default = "courtesy")]
-    pub(super) courtesy: f64,
+    pub(super) courtesy: Option<f64>,
     #[serde(default = "waiting")]
     pub(super) waiting: f64,
     #[serde(default)]
     pub(super) hindrance: f64,
-}
-
-fn courtesy() -> f64 {
-    0.3
 }
 
 fn waiting() -> f64 {

@@ -172,14 +172,15 @@ fn observes_vehicles(reader: &Reader, written: &Written) -> Result<bool, Error> 
 
 /// Checks `[traffic]`.
 fn of_traffic(reader: &Reader, written: &WrittenTraffic) -> Result<Traffic, Error> {
-    let WrittenTraffic { demand, vans, rude, courtesy, waiting, hindrance } = written;
+    let WrittenTraffic { demand, drivers, vans, rude, courtesy, waiting, hindrance } = written;
     let [least, greatest] = traffic::MOST_HINDRANCE;
     let rude = rude.as_ref().map(|written| range(reader, "traffic.rude", written, 1.0, ""));
     Ok(Traffic {
         demand: numbers(reader, "traffic.demand", demand, traffic::MOST_DEMAND, 0.0, "veh/h")?,
+        drivers: *drivers,
         vans: reader.within("traffic.vans", *vans, 0.0..=1.0, "")?,
         rude: rude.transpose()?.unwrap_or_default(),
-        courtesy: reader.within("traffic.courtesy", *courtesy, 0.0..=1.0, "")?,
+        courtesy: reader.within("traffic.courtesy", courtesy.unwrap_or(drivers.courtesy()), 0.0..=1.0, "")?,
         waiting: reader.within("traffic.waiting", *waiting, 0.0..=600.0, "s")?,
         hindrance: reader.within("traffic.hindrance", *hindrance, least..=greatest, "")?,
     })

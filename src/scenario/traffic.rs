@@ -1,6 +1,7 @@
 //! Other vehicles on the roads of a benchmark: how many, and what their drivers are like.
 
 use super::check::{Invalid, list, within};
+use crate::traffic::Drivers;
 
 /// Largest demand (veh/h).
 pub(super) const MOST_DEMAND: f64 = 3000.0;
@@ -13,6 +14,8 @@ pub(super) const MOST_HINDRANCE: [f64; 2] = [-1e6, 1e6];
 pub struct Traffic {
     /// How many come to a road, from all arms together: each episode draws one of these, all alike (veh/h).
     pub demand: Vec<f64>,
+    /// Who drives them.
+    pub drivers: Drivers,
     /// Fraction of vans, 7 m long.
     pub vans: f64,
     /// Least and greatest fraction of rude drivers, who let nobody in and do not yield to a truck that needs the lanes

@@ -12,10 +12,14 @@ constants! {
     const COIN: u32 = 0xC000_0000;
     /// Whether one lets another in: the period and both slots are added.
     const COURTESY: u32 = 0xD000_0000;
+    /// Whether one looks away: the period and its slot are added.
+    const LAPSE: u32 = 0xE000_0000;
     /// Steps for which a coin falls the same way.
     const COIN_PERIOD: u32 = 10;
     /// Steps for which a car is as courteous to another.
     const COURTESY_PERIOD: u32 = 32;
+    /// Steps for which one looks away.
+    const LAPSE_PERIOD: u32 = 20;
     /// Numbers of slots that differ in a draw.
     const SLOTS: u32 = 64;
 }
@@ -58,5 +62,10 @@ impl Clock {
     pub(super) fn courtesy(&self, inside: u32, waiting: u32) -> u32 {
         let pair = SLOTS * inside + waiting;
         self.draw(COURTESY.wrapping_add((self.step / COURTESY_PERIOD) * SLOTS * SLOTS + pair))[0]
+    }
+
+    /// How attentive the driver in a slot is. The slots' periods begin one after the other.
+    pub(super) fn lapse(&self, slot: u32) -> u32 {
+        self.draw(LAPSE.wrapping_add(((self.step + slot) / LAPSE_PERIOD) * SLOTS + slot))[0]
     }
 }

@@ -12,7 +12,7 @@ use super::clock::Clock;
 use super::model::{ONE, acceleration, braking_of, following, square, still_stops, stopping, time};
 use super::network::{Kind, Stretch, cell};
 use super::rules::{SPEED_PARTS, TIME_PARTS};
-use super::units::{BEYOND, length, speed};
+use super::units::{BEYOND, falls_below, length, speed};
 use super::{Car, Network, Others, Rules};
 use crate::layout::shared::constants;
 
@@ -38,6 +38,8 @@ constants! {
     const LEAST_WISHED: i32 = speed(0.5);
     /// Steps after which one that has been standing goes by the coin.
     const PATIENT: u32 = 20;
+    /// Who looks away looks up once he would brake harder than at 3 m/s² (2^-19 m a step²).
+    const LOOKS_UP: i32 = -15_729;
     /// Interaction of a car that must let another out of a crossing: it wishes three times the gap.
     const LETS_OUT: i32 = 9 * ONE;
 }
@@ -313,7 +315,14 @@ impl<'a> Driver<'a> {
         // Half a step ahead: a speed's unit is the way of half a step.
         let limit = self.network().limit(self.path, car.station + car.speed);
         let wished = limit.max(LEAST_WISHED) * (SPEED_PARTS + self.temperament) / SPEED_PARTS;
-        acceleration(self.me.speed, wished, self.interaction)
+        let decided = acceleration(self.me.speed, wished, self.interaction);
+        if LOOKS_UP <= decided && self.looks_away() { car.acceleration.min(0) } else { decided }
+    }
+
+    /// Whether this driver looks away.
+    fn looks_away(&self) -> bool {
+        let lapses = self.crowd.rules.lapses;
+        0 < lapses && falls_below(self.crowd.clock.lapse(self.me.slot), lapses)
     }
 }
 

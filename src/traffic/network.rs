@@ -5,6 +5,8 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable, cast_slice, pod_collect_to_vec};
 use glam::Vec2;
 
+use super::Drivers;
+use super::drivers::PACE_PARTS;
 use super::units::{FINER_STATION, metres};
 use crate::layout::shared::constants;
 
@@ -240,6 +242,12 @@ impl Network {
         let t = ((station - (k << SPACING_BITS)) >> FINER_STATION).clamp(0, whole);
         let k = first as usize + k as usize;
         (self.samples[k].limit * (whole - t) + self.samples[k + 1].limit * t) >> CELL_BITS
+    }
+
+    /// The same road, on which all drive at another speed where nothing hinders them.
+    pub(crate) fn driven_by(mut self, drivers: Drivers) -> Network {
+        self.samples.iter_mut().for_each(|sample| sample.limit = sample.limit * drivers.pace() / PACE_PARTS);
+        self
     }
 
     /// The zones of an ordered pair of paths, those for a truck alone among them.

@@ -41,12 +41,14 @@ pub struct Rules {
     pub soft_lags: [i32; 2],
     /// Probability with which a ring car lets in one that waits, where it can brake gently (2^-24).
     pub courtesy: u32,
+    /// Probability with which a driver looks away for 2 s (2^-24).
+    pub lapses: u32,
 }
 
 impl Rules {
-    /// The numbers as words.
+    /// The fitted numbers as words.
     pub(crate) fn words(&self) -> [u32; N_RULES] {
-        let Rules { headway, gap, lags, soft_lags, courtesy } = *self;
+        let Rules { headway, gap, lags, soft_lags, courtesy, lapses: _ } = *self;
         let mut words = [0; N_RULES];
         words[RULE_HEADWAY] = headway.cast_unsigned();
         words[RULE_GAP] = gap.cast_unsigned();
@@ -56,6 +58,13 @@ impl Rules {
         words
     }
 
+    /// All numbers as words; lapses where there are any, so that worlds without them keep their fingerprint, and
+    /// snapshots their place in the cache.
+    pub(crate) fn all_words(&self) -> Vec<u32> {
+        let lapses = Some(self.lapses).filter(|&lapses| 0 < lapses);
+        self.words().into_iter().chain(lapses).collect()
+    }
+
     /// The fitted numbers.
     pub const FITTED: Rules = Rules {
         headway: time(1.1),
@@ -63,5 +72,6 @@ impl Rules {
         lags: [time(1.2), time(1.1)],
         soft_lags: [time(2.2), time(1.0)],
         courtesy: probability(0.3),
+        lapses: 0,
     };
 }

@@ -68,7 +68,7 @@ impl Snapshots<'_> {
 
     /// Everything that they are computed from.
     fn key(&self) -> Vec<u8> {
-        let words = [self.network.words(), self.rules.words().to_vec(), self.demand.words()].concat();
+        let words = [self.network.words(), self.rules.all_words(), self.demand.words()].concat();
         [bytes_of(&FORM), cast_slice(&words)].concat()
     }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{Error, World};
 use crate::files::cache::Loading;
 use crate::map::route::Route;
-use crate::scenario::{Invalid, Place, Scenario};
+use crate::scenario::{self, Invalid, Place, Scenario};
 use crate::traffic::units::probability;
 use crate::traffic::{self, Demand, Mix, Network, Row, Rules, Snapshots};
 
@@ -68,7 +68,8 @@ impl Traffic {
     pub(super) fn words(&self) -> impl Iterator<Item = Vec<u32>> {
         let Traffic { rules, rude, spacing, is_observed, hindrance, roads, routes } = self;
         let shared =
-            [&rules.words()[..], rude, &[*spacing, *hindrance].map(f32::to_bits), &[u32::from(*is_observed)]].concat();
+            [&rules.all_words()[..], rude, &[*spacing, *hindrance].map(f32::to_bits), &[u32::from(*is_observed)]]
+                .concat();
         let routes = routes.iter().flat_map(|&TrafficRoute { path, begins }| [path, begins.to_bits()]).collect();
         [shared, routes].into_iter().chain(roads.iter().map(TrafficRoad::words))
     }
@@ -76,13 +77,13 @@ impl Traffic {
     /// What a scenario's trucks share; none where its roads are empty.
     pub(super) fn baked(scenario: &Scenario, loading: &Loading) -> Result<Option<Traffic>, Error> {
         let Some(of) = &scenario.traffic else { return Ok(None) };
-        let rules = Rules { courtesy: probability(of.courtesy), ..Rules::FITTED };
+        let rules = Rules { courtesy: probability(of.courtesy), ..of.drivers.rules() };
         // Whether a driver is rude is drawn when an episode begins, and when a car comes.
         let mix = Mix { vans: of.vans as f32, rude: 0.0 };
         let done = AtomicU64::new(0);
         let road = |place: &Place| {
             loading.check()?;
-            let road = TrafficRoad::baked(place, &of.demand, mix, &rules, loading)?;
+            let road = TrafficRoad::baked(place, of, mix, &rules, loading)?;
             loading.count("baking traffic", &done, scenario.places.len());
             Ok(road)
         };
@@ -123,7 +124,13 @@ impl TrafficRoad {
         [network.words(), levels.iter().flat_map(level).collect()].concat()
     }
 
-    fn baked(place: &Place, demand: &[f64], mix: Mix, rules: &Rules, loading: &Loading) -> Result<TrafficRoad, Error> {
+    fn baked(
+        place: &Place,
+        of: &scenario::Traffic,
+        mix: Mix,
+        rules: &Rules,
+        loading: &Loading,
+    ) -> Result<TrafficRoad, Error> {
         let invalid = |error: traffic::Error| {
             let expected = "leave [traffic] out, or the road, or demand less".to_owned();
             Error::Invalid(Invalid {
@@ -136,7 +143,7 @@ impl TrafficRoad {
             Some(cache) => Network::cached(&place.roundabout, cache),
             None => Network::bake(&place.roundabout),
         };
-        let network = network.map_err(invalid)?;
+        let network = network.map_err(invalid)?.driven_by(of.drivers);
         let level = |&total: &f64| {
             loading.check()?;
             let demand = Demand::new(&network, &Demand::even(&network, total), mix).map_err(invalid)?;
@@ -144,7 +151,7 @@ impl TrafficRoad {
             let snapshots = loading.cache.map_or_else(|| of.baked(), |cache| of.cached(cache));
             Ok(Level { demand, snapshots })
         };
-        let levels = demand.iter().map(level).collect::<Result<_, Error>>()?;
+        let levels = of.demand.iter().map(level).collect::<Result<_, Error>>()?;
         Ok(TrafficRoad { network, levels })
     }
 }

@@ -21,7 +21,7 @@ fn scenarios() -> PathBuf {
 }
 
 /// Benchmarks and roundabouts that have no key but those of another one.
-const LIKE_OTHERS: [&str; 28] = [
+const LIKE_OTHERS: [&str; 34] = [
     "laden2026-50-random.toml",
     "laden2026-50-training.toml",
     "laden2026-continuous.toml",
@@ -41,7 +41,13 @@ const LIKE_OTHERS: [&str; 28] = [
     "20m-maps.toml",
     "32m-maps.toml",
     "40m-maps.toml",
+    "traffic2026-aggressive.toml",
+    "traffic2026-distracted.toml",
+    "traffic2026-laden.toml",
+    "traffic2026-maps.toml",
     "traffic2026-random.toml",
+    "traffic2026-rude.toml",
+    "traffic2026-timid.toml",
     "traffic2026-training.toml",
     "transfer2026-30kmh.toml",
     "transfer2026-50kmh.toml",

@@ -75,6 +75,7 @@ observation_delay = [0, 1]
 action_delay = [0, 2]
 [traffic]
 demand = [300.0, 900.0]
+drivers = "timid"
 vans = 0.1
 rude = [0.0, 0.1]
 courtesy = 0.3

@@ -34,12 +34,12 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
         FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
     assert_eq!(
         (files.len(), FILES.len()),
-        (59, 59),
-        "37 benchmarks, ten roundabouts, five outlines, five vehicles, two distributions"
+        (65, 65),
+        "43 benchmarks, ten roundabouts, five outlines, five vehicles, two distributions"
     );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [37, 10, 5, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [43, 10, 5, 2]);
 }
 
 /// A shipped benchmark's file as it is read as TOML.
@@ -118,6 +118,35 @@ fn the_random_roads_of_laden2026_odd_differ_from_those_of_laden2026_in_its_vehic
     assert_eq!(odd_random.remove("draw").as_ref(), Some(&odd["draw"]));
     assert_ne!(random.remove("draw").as_ref(), Some(&odd["draw"]));
     assert_eq!(odd_random, random);
+}
+
+#[test]
+fn the_held_out_benchmarks_of_traffic2026_differ_from_it_in_what_they_are_named_for_alone() {
+    let traffic = table("traffic2026");
+    let without = |mut table: toml::Table, keys: &[&str]| {
+        keys.iter().for_each(|&key| drop(table.remove(key).unwrap()));
+        table
+    };
+    let among = |name: &str| table(name)["traffic"].clone();
+    for drivers in ["aggressive", "timid", "distracted"] {
+        let name = format!("traffic2026-{drivers}");
+        assert_eq!(without(table(&name), &["traffic"]), without(traffic.clone(), &["traffic"]), "{name}");
+        let expected = format!("demand = [1500.0]\ndrivers = \"{drivers}\"\nvans = 0.25");
+        assert_eq!(among(&name), toml::Value::Table(expected.parse().unwrap()), "{name}");
+    }
+    let rude = "traffic2026-rude";
+    assert_eq!(without(table(rude), &["traffic"]), without(traffic.clone(), &["traffic"]));
+    let mut expected = traffic["traffic"].clone();
+    expected.as_table_mut().unwrap().insert("rude".to_owned(), 0.3.into());
+    assert_eq!(among(rude), expected);
+    for key in ["vehicle", "draw", "ending", "start"] {
+        assert_eq!(table("traffic2026-laden")[key], table("laden2026")[key], "{key}");
+    }
+    let found = without(table("traffic2026-laden"), &["vehicle", "draw", "ending", "start"]);
+    assert_eq!(found, without(traffic.clone(), &["vehicle", "load"]));
+    let maps = without(table("traffic2026-maps"), &["traffic"]);
+    assert_eq!(maps["roundabout"], table("maps2026")["roundabout"]);
+    assert_eq!(without(maps, &["roundabout"]), without(traffic, &["traffic", "roundabout"]));
 }
 
 #[test]
@@ -227,7 +256,7 @@ fn the_continuous_benchmarks_differ_from_those_with_levels_in_their_actions_alon
 fn every_name_gives_what_its_file_gives() {
     // The two with thousands of roads take minutes; the next test reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 35);
+    assert_eq!(benchmarks.len(), 41);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();

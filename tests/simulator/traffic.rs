@@ -240,6 +240,7 @@ fn a_benchmark_with_a_bad_key_of_traffic_is_refused_by_key_and_value() {
         ("demand = [-1]", "traffic.demand[0]: -1 veh/h"),
         ("demand = []", "traffic.demand: 0"),
         ("demand = [300]\nvans = 2.0", "traffic.vans: 2"),
+        ("demand = [300]\ndrivers = \"drunk\"", "unknown variant `drunk`"),
         ("demand = [300]\nrude = [0.3, 0.1]", "traffic.rude: [0.3, 0.1]"),
         ("demand = [300]\nwaiting = -5", "traffic.waiting: -5 s"),
         ("demand = [300]\nhindrance = 1e7", "traffic.hindrance: 1"),

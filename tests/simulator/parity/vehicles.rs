@@ -23,7 +23,7 @@ const STEPS: usize = 40;
 /// Trucks begin anywhere along their routes.
 fn world() -> Arc<World> {
     let keys = "demand = [900, 2100]\nvans = 0.25\nrude = [0.0, 0.3]\ncourtesy = 0.3\nhindrance = -2.0\n";
-    let mut world = World::clone(&with_traffic(keys).1);
+    let mut world = World::clone(&with_traffic(&format!("{keys}drivers = \"distracted\"\n")).1);
     world.params.start_along = 1.0;
     Arc::new(world)
 }
@@ -168,13 +168,14 @@ fn vehicles_beside_a_truck_drive_alike_on_either_engine_but_where_its_ground_is_
 type Off = (&'static str, fn(&mut World));
 
 /// Numbers that are off by a unit, or by as much as something comes of it.
-const OFF: [Off; 15] = [
+const OFF: [Off; 16] = [
     ("headway", |world| of_traffic(world, |traffic| traffic.rules.headway += 1)),
     ("gap", |world| of_traffic(world, |traffic| traffic.rules.gap += 1)),
     ("lag to join", |world| of_traffic(world, |traffic| traffic.rules.lags[0] += 64)),
     ("lag to cross", |world| of_traffic(world, |traffic| traffic.rules.lags[1] += 64)),
     ("lag beside", |world| of_traffic(world, |traffic| traffic.rules.soft_lags[0] += 64)),
     ("courtesy", |world| of_traffic(world, |traffic| traffic.rules.courtesy += 1 << 18)),
+    ("lapses", |world| of_traffic(world, |traffic| traffic.rules.lapses += 1 << 20)),
     ("rude", |world| of_traffic(world, |traffic| traffic.rude[1] += 1 << 13)),
     ("spacing", |world| of_traffic(world, |traffic| traffic.spacing *= 1.01)),
     ("begins", |world| of_traffic(world, |traffic| traffic.routes.iter_mut().for_each(|route| route.begins += 0.5))),
