@@ -29,6 +29,8 @@ BENCHMARKS = {
     "traffic2026-laden": 120,
     "traffic2026-maps": 30,
 }
+# Whether polite vehicles are ever at fault.
+POLITE = ("traffic2026", ["yields", "follows"], 435)
 # Without other vehicles: the same benchmark with another demand.
 EMPTY = ("traffic2026", "demand = [300.0, 900.0, 1500.0, 2100.0]", "demand = [0.0]", 30)
 FIGURES = [
@@ -80,6 +82,9 @@ def main():
             rows[benchmark] = row(name, benchmark, report)
             result |= {"commit": report["commit"], "machine": report["machine"]}
             write_json(args.json, {**result, **policies})
+    benchmark, names, episodes = POLITE
+    for name in names:
+        policies[name]["polite"] = row(name, f"{episodes} episodes", driven(args.offtrack, name, benchmark, episodes))
     base, demand, none, episodes = EMPTY
     scenarios = ROOT / "scenarios"
     text = (scenarios / f"{base}.toml").read_text()
