@@ -157,9 +157,6 @@ fn on(benchmark: &Benchmark, roads: impl Iterator<Item = Result<Road, Error>>) -
 fn baked(scenario: Scenario, text: Option<String>) -> Result<Ground, Error> {
     let scenario = shown(scenario);
     let name = &scenario.name;
-    if scenario.traffic.is_some() {
-        return Err(wrong(name, "has [traffic], and the page steps trucks alone yet".to_owned()));
-    }
     let world = World::bake(&scenario)?;
     if world.is_continuous() {
         return Err(wrong(name, "has continuous actions, and a page steers by actions.steer_levels".to_owned()));
