@@ -131,7 +131,7 @@ impl Vehicle {
         Vehicle::from_source(&Source::Disk(path.to_owned()))
     }
 
-    /// A vehicle that comes with the library: `daf_xf`, `eu_4x2_13m6`, `us_wb40`, `us_wb62` or `us_wb67`.
+    /// A vehicle that comes with the library, by the name of its file under `scenarios/vehicles`: `daf_xf` and the like.
     ///
     /// # Errors
     ///

@@ -1,9 +1,11 @@
-//! A drawing that another program wrote, ezdxf 1.4: light and old polylines, lines and arcs in millimetres, on layers
-//! of its own, beside a text and a block; and features of GeoJSON, good and bad.
+//! A drawing that other programs wrote, ezdxf 1.4 and, from what that wrote, LibreCAD 2.2: light and old polylines,
+//! lines and arcs in millimetres, on layers of its own, beside a text and a block; and features of GeoJSON, good and
+//! bad.
 
 use std::path::Path;
 
 use glam::DVec2;
+use offtrack::geometry::Curve;
 use offtrack::map::Road;
 use offtrack::map::drawing::{self, Drawn, Layers, Unit};
 use serde_json::{Value, json};
@@ -11,8 +13,11 @@ use serde_json::{Value, json};
 /// Where the ring lies in the drawing (m).
 const AT: DVec2 = DVec2::new(412.5, -88.25);
 
-fn drawing(kerbs: &str) -> Result<Drawn, offtrack::files::reader::Error> {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/maps/ezdxf_16m.dxf");
+/// The drawings of both programs.
+const FILES: [&str; 2] = ["ezdxf_16m.dxf", "librecad_16m.dxf"];
+
+fn drawing(name: &str, kerbs: &str) -> Result<Drawn, offtrack::files::reader::Error> {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/maps").join(name);
     let layers = Layers {
         kerbs: kerbs.into(),
         lanes: "C-LANE".into(),
@@ -26,27 +31,47 @@ fn drawing(kerbs: &str) -> Result<Drawn, offtrack::files::reader::Error> {
 }
 
 #[test]
-fn a_drawing_of_another_program_is_the_road_that_it_was_drawn_from_within_a_millimetre() {
-    let Drawn { ground, notes } = drawing("C-KERB").unwrap();
-    let road = Road::named("16m").unwrap();
-    let own = road.ground();
-    assert!(ground.origin.distance(AT) < 1e-3 && !ground.mirrored, "{}", ground.origin);
-    assert_eq!((ground.arms.len(), ground.lines.len(), ground.faces.loops.len()), (4, 4, own.faces.loops.len()));
-    // The island is drawn of arcs, and the entities of one more layer are left out.
-    assert!(notes.iter().any(|note| note.contains("joined")), "{notes:?}");
-    assert!(notes.iter().any(|note| note.contains("2 entities on 1 other layers")), "{notes:?}");
-    for p in ground.faces.loops.iter().flat_map(|face| face.polyline(0.01)) {
-        assert!(own.faces.distance(p) < 1e-3, "{p}");
-    }
-    for line in &ground.lines {
-        assert!(own.lines.iter().any(|other| line.line.polyline(0.5).iter().all(|&p| other.line.distance(p) < 1e-3)));
+fn drawings_of_other_programs_are_the_road_that_they_were_drawn_from_within_a_millimetre() {
+    for name in FILES {
+        let Drawn { ground, notes } = drawing(name, "C-KERB").unwrap();
+        let road = Road::named("16m").unwrap();
+        let own = road.ground();
+        assert!(ground.origin.distance(AT) < 1e-3 && !ground.mirrored, "{name}: {}", ground.origin);
+        assert_eq!((ground.arms.len(), ground.lines.len(), ground.faces.loops.len()), (4, 4, own.faces.loops.len()));
+        // The island is drawn of arcs, and the entities of one more layer are left out.
+        assert!(notes.iter().any(|note| note.contains("joined")), "{name}: {notes:?}");
+        assert!(notes.iter().any(|note| note.contains("2 entities on 1 other layers")), "{name}: {notes:?}");
+        for p in ground.faces.loops.iter().flat_map(|face| face.polyline(0.01)) {
+            assert!(own.faces.distance(p) < 1e-3, "{name}: {p}");
+        }
+        for line in &ground.lines {
+            let is_near = |other: &Curve| line.line.polyline(0.5).iter().all(|&p| other.distance(p) < 1e-3);
+            assert!(own.lines.iter().any(|other| is_near(&other.line)), "{name}");
+        }
     }
 }
 
 #[test]
+fn a_drawing_that_another_program_read_and_wrote_is_the_same_road_within_a_millimetre() {
+    let [one, other] = FILES.map(|name| drawing(name, "C-KERB").unwrap().ground);
+    for (face, same) in one.faces.loops.iter().zip(&other.faces.loops) {
+        assert!(face.polyline(0.01).into_iter().all(|p| same.distance(p) < 1e-3));
+    }
+    for (line, same) in one.lines.iter().zip(&other.lines) {
+        assert_eq!((line.lane, line.entry, line.exit), (same.lane, same.entry, same.exit));
+        assert!(line.line.polyline(0.5).into_iter().all(|p| same.line.distance(p) < 1e-3));
+    }
+    // They are two drawings: their tables and entities are written otherwise.
+    let text = |name| std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/maps").join(name)).unwrap();
+    assert!(text(FILES[1]).starts_with(b"999\ndxfrw") && !text(FILES[0]).starts_with(b"999"));
+}
+
+#[test]
 fn a_layer_that_the_drawing_does_not_have_is_refused_with_those_that_it_has() {
-    let said = drawing("CURB").unwrap_err().to_string();
-    assert!(said.contains("ezdxf_16m.dxf: layer CURB: empty") && said.contains("C-KERB ("), "{said}");
+    for name in FILES {
+        let said = drawing(name, "CURB").unwrap_err().to_string();
+        assert!(said.contains(&format!("{name}: layer CURB: empty")) && said.contains("C-KERB ("), "{said}");
+    }
 }
 
 /// The features of a ring of this radius with two ways past it, from west to east, and another part.

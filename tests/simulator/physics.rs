@@ -17,7 +17,18 @@ use std::path::PathBuf;
 use offtrack::vehicle::Vehicle;
 
 /// The vehicle files of the project.
-const VEHICLES: [&str; 5] = ["daf_xf", "eu_4x2_13m6", "us_wb40", "us_wb62", "us_wb67"];
+const VEHICLES: [&str; 10] = [
+    "cn_18m1",
+    "daf_xf",
+    "eu_4x2_13m6",
+    "eu_4x2_13m6_steered",
+    "eu_6x4_13m6",
+    "uk_15m5",
+    "uk_16m5",
+    "us_wb40",
+    "us_wb62",
+    "us_wb67",
+];
 
 fn vehicle_file(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/vehicles/{name}.toml"))

@@ -34,12 +34,12 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
         FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
     assert_eq!(
         (files.len(), FILES.len()),
-        (65, 65),
-        "43 benchmarks, ten roundabouts, five outlines, five vehicles, two distributions"
+        (70, 70),
+        "43 benchmarks, ten roundabouts, five outlines, ten vehicles, two distributions"
     );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [43, 10, 5, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [43, 10, 10, 2]);
 }
 
 /// A shipped benchmark's file as it is read as TOML.
@@ -288,7 +288,8 @@ fn an_unknown_name_is_refused_with_the_names_there_are() {
     );
     assert_eq!(
         Vehicle::named("bus").unwrap_err().to_string(),
-        "vehicle: bus; must be a path ending in .toml or one of daf_xf, eu_4x2_13m6, us_wb40, us_wb62, us_wb67"
+        "vehicle: bus; must be a path ending in .toml or one of cn_18m1, daf_xf, eu_4x2_13m6, eu_4x2_13m6_steered, \
+         eu_6x4_13m6, uk_15m5, uk_16m5, us_wb40, us_wb62, us_wb67"
     );
     // A name is not a path below the folder, nor one kind's name another's.
     for name in ["roundabouts/16m", "../scenarios/attard2023", "16m", ""] {

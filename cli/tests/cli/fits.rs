@@ -205,7 +205,7 @@ fn a_drawing_becomes_a_road_through_which_trucks_are_driven_at_its_place_in_the_
     succeed(&fits(&place, &EASY));
     let (drawing, road) = (place.text("fits/16m-eu_4x2_13m6.dxf"), place.text("site.outline.toml"));
     let said = refusal(&offtrack(&["import", &drawing, "-o", &road]), 2);
-    assert!(said.contains("--unit m, mm, cm, ft or in"), "{said}");
+    assert!(said.contains("--unit m, mm, cm, ft, us-ft or in"), "{said}");
     let output = offtrack(&["import", &drawing, "--unit", "m", "-o", &road]);
     succeed(&output);
     let said = String::from_utf8(output.stdout).unwrap();

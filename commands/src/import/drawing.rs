@@ -28,7 +28,7 @@ pub struct DrawingArgs {
     #[arg(long, value_name = "LAYER")]
     apron_layer: Option<String>,
     /// Of a drawing: the unit of its coordinates, where it does not say it.
-    #[arg(long, value_parser = PossibleValuesParser::new(["m", "mm", "cm", "ft", "in"]).map(unit))]
+    #[arg(long, value_parser = PossibleValuesParser::new(Unit::NAMED.map(|(name, _)| name)).map(unit))]
     unit: Option<Unit>,
     /// Of a drawing: the width of the lanes that say none (m) [default: 3.5].
     #[arg(long, value_name = "M")]

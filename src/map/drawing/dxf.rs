@@ -1,18 +1,21 @@
 //! The polylines, lines and arcs of a DXF file on the layers that are asked for, in metres.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use glam::DVec2;
 
 use super::pairs::{Pair, pairs};
 use super::{Drawing, Entity, Layers};
-use crate::files::reader::{Error, Reader};
+use crate::files::reader::{Error, Reader, shown};
 use crate::geometry::{Curve, Piece, arc_of_height};
 
 /// Points nearer than this are one (m).
 const SAME: f64 = 1e-6;
+/// Least and most that kerbs reach over (m).
+const REACH: RangeInclusive<f64> = 10.0..=20_000.0;
 /// Most entities of a drawing.
 const MOST_ENTITIES: usize = 1_000_000;
 
@@ -27,17 +30,20 @@ pub enum Unit {
     Centimetre,
     /// Feet of 0.3048 m.
     Foot,
+    /// Feet of the United States' surveys, of 1200 / 3937 m.
+    SurveyFoot,
     /// Inches.
     Inch,
 }
 
 impl Unit {
     /// The units by the words of a flag.
-    pub const NAMED: [(&'static str, Unit); 5] = [
+    pub const NAMED: [(&'static str, Unit); 6] = [
         ("m", Unit::Metre),
         ("mm", Unit::Millimetre),
         ("cm", Unit::Centimetre),
         ("ft", Unit::Foot),
+        ("us-ft", Unit::SurveyFoot),
         ("in", Unit::Inch),
     ];
 
@@ -48,6 +54,7 @@ impl Unit {
             Unit::Millimetre => 1e-3,
             Unit::Centimetre => 1e-2,
             Unit::Foot => 0.3048,
+            Unit::SurveyFoot => 1200.0 / 3937.0,
             Unit::Inch => 0.0254,
         }
     }
@@ -60,6 +67,7 @@ impl Unit {
             "4" => Some(Unit::Millimetre),
             "5" => Some(Unit::Centimetre),
             "6" => Some(Unit::Metre),
+            "21" => Some(Unit::SurveyFoot),
             _ => None,
         }
     }
@@ -69,11 +77,14 @@ impl Drawing {
     pub(super) fn parse(file: &Path, text: &str, layers: &Layers) -> Result<Drawing, Error> {
         let pairs = pairs(file, text)?;
         let unit = unit(file, &pairs, layers)?;
-        let entities = entities(&pairs);
+        let entities = section(&pairs, "ENTITIES");
+        let blocks = drawn_blocks(&pairs, layers);
         let reader = Reader::of(file);
         reader.count("entities", entities.len(), 0..=MOST_ENTITIES)?;
         let mut drawing = Drawing::default();
         let mut others: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut without_outline: Vec<&str> = Vec::new();
+        let mut on_paper = 0;
         let mut index = 0;
         while index < entities.len() {
             let entity = entities[index];
@@ -84,7 +95,16 @@ impl Drawing {
                 vertices = &entities[index..index + n];
                 index += n;
             }
+            if text_of(entity, 67) == Some("1") {
+                on_paper += 1;
+                continue;
+            }
             let layer = text_of(entity, 8).unwrap_or_default();
+            if let Some(name) = text_of(entity, 2).filter(|name| entity[0].value == "INSERT" && blocks.contains(name)) {
+                let found = format!("INSERT of {name}");
+                let place = format!("line {}", entity[0].line);
+                return Err(reader.invalid(place, found, "kerbs, lanes or aprons lie in this block: explode it"));
+            }
             let target = if layer.eq_ignore_ascii_case(&layers.kerbs) {
                 &mut drawing.kerbs
             } else if layer.eq_ignore_ascii_case(&layers.lanes) {
@@ -97,8 +117,10 @@ impl Drawing {
                 }
                 continue;
             };
-            if let Some(drawn) = curve(file, entity, vertices, unit.metres())? {
-                target.push(drawn);
+            match curve(file, entity, vertices, unit.metres())? {
+                Some(drawn) => target.push(drawn),
+                None if entity[0].value == "SEQEND" => {}
+                None => without_outline.push(entity[0].value),
             }
         }
         for (layer, kind) in [(&layers.kerbs, &drawing.kerbs), (&layers.lanes, &drawing.lanes)] {
@@ -108,12 +130,36 @@ impl Drawing {
                 return Err(reader.invalid(format!("layer {layer}"), "empty", format!("the drawing has {has}")));
             }
         }
+        reach(&reader, &drawing.kerbs)?;
         let n_others: usize = others.values().sum();
         if 0 < n_others {
             drawing.notes.push(format!("{n_others} entities on {} other layers are left out", others.len()));
         }
+        if 0 < on_paper {
+            drawing.notes.push(format!("{on_paper} entities in paper space are left out"));
+        }
+        if !without_outline.is_empty() {
+            let kinds: Vec<&str> = without_outline.iter().copied().collect::<BTreeSet<_>>().into_iter().collect();
+            let n = without_outline.len();
+            let kinds = kinds.join(", ");
+            drawing.notes.push(format!("{n} entities on these layers that are no outlines are left out: {kinds}"));
+        }
         Ok(drawing)
     }
+}
+
+/// A drawing of a roundabout reaches over tens or hundreds of metres; one whose unit is not what it says does not.
+fn reach(reader: &Reader, kerbs: &[Entity]) -> Result<(), Error> {
+    let ends = kerbs.iter().flat_map(|kerb| kerb.curve.pieces.iter().flat_map(|piece| [piece.start(), piece.end()]));
+    let (low, high) = ends.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+    let over = (high - low).max_element();
+    if REACH.contains(&over) {
+        return Ok(());
+    }
+    let (least, most) = (REACH.start(), REACH.end());
+    let expected =
+        format!("must lie in {least}..{most} m; is its unit right? --unit m, mm, cm, ft, us-ft or in says another");
+    Err(reader.invalid("kerbs", format!("reach over {} m", shown(over)), expected))
 }
 
 /// The unit that is asked for, else that of the header.
@@ -124,15 +170,19 @@ fn unit(file: &Path, pairs: &[Pair], layers: &Layers) -> Result<Unit, Error> {
     let stated = pairs.windows(2).find(|pair| pair[0].code == 9 && pair[0].value == "$INSUNITS").map(|pair| pair[1]);
     stated.and_then(|pair| Unit::of_code(pair.value)).ok_or_else(|| {
         let (key, value) = stated.map_or(("$INSUNITS".to_owned(), "missing"), |pair| (pair.key(), pair.value));
-        Reader::of(file).invalid(key, value, "the drawing does not say its unit: give --unit m, mm, cm, ft or in")
+        Reader::of(file).invalid(
+            key,
+            value,
+            "the drawing does not say its unit: give --unit m, mm, cm, ft, us-ft or in",
+        )
     })
 }
 
-/// The entities of the section ENTITIES, each from its code 0 on. Blocks are not looked into.
-fn entities<'a, 'b>(pairs: &'b [Pair<'a>]) -> Vec<&'b [Pair<'a>]> {
-    let begin = pairs.windows(2).position(|pair| {
-        (pair[0].code, pair[0].value) == (0, "SECTION") && (pair[1].code, pair[1].value) == (2, "ENTITIES")
-    });
+/// The entities of a section, each from its code 0 on.
+fn section<'a, 'b>(pairs: &'b [Pair<'a>], name: &str) -> Vec<&'b [Pair<'a>]> {
+    let begin = pairs
+        .windows(2)
+        .position(|pair| (pair[0].code, pair[0].value) == (0, "SECTION") && (pair[1].code, pair[1].value) == (2, name));
     let Some(begin) = begin else { return Vec::new() };
     let section = &pairs[begin + 2..];
     let end = section.iter().position(|pair| pair.code == 0 && pair.value == "ENDSEC").unwrap_or(section.len());
@@ -140,6 +190,35 @@ fn entities<'a, 'b>(pairs: &'b [Pair<'a>]) -> Vec<&'b [Pair<'a>]> {
     let starts: Vec<usize> = (0..end).filter(|&index| section[index].code == 0).collect();
     let ends = starts.iter().skip(1).copied().chain([end]);
     starts.iter().zip(ends).map(|(&start, end)| &section[start..end]).collect()
+}
+
+/// Names of the blocks in which something is drawn on one of the layers, or in a block that is inserted there.
+fn drawn_blocks<'a>(pairs: &[Pair<'a>], layers: &Layers) -> HashSet<&'a str> {
+    let mut drawn: HashSet<&str> = HashSet::new();
+    let mut inserted: Vec<(&str, &str)> = Vec::new();
+    let mut block = "";
+    for entity in section(pairs, "BLOCKS") {
+        match entity[0].value {
+            "BLOCK" => block = text_of(entity, 2).unwrap_or_default(),
+            "INSERT" => inserted.push((block, text_of(entity, 2).unwrap_or_default())),
+            "LINE" | "ARC" | "CIRCLE" | "LWPOLYLINE" | "POLYLINE" | "SPLINE" | "ELLIPSE" => {
+                let layer = text_of(entity, 8).unwrap_or_default();
+                if [&layers.kerbs, &layers.lanes, &layers.aprons].iter().any(|one| layer.eq_ignore_ascii_case(one)) {
+                    drawn.insert(block);
+                }
+            }
+            _ => {}
+        }
+    }
+    loop {
+        let n = drawn.len();
+        let outer: Vec<&str> =
+            inserted.iter().filter(|(_, inner)| drawn.contains(inner)).map(|&(outer, _)| outer).collect();
+        drawn.extend(outer);
+        if drawn.len() == n {
+            return drawn;
+        }
+    }
 }
 
 fn text_of<'a>(entity: &[Pair<'a>], code: i32) -> Option<&'a str> {

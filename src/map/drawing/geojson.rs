@@ -183,7 +183,7 @@ impl Shape<'_> {
             }
             *left -= points.windows(2).map(|pair| pair[0].distance(pair[1])).sum::<f64>();
             if *left < 0.0 {
-                let expected = "cut the file down to the roundabout, or give --unit mm, cm, ft or in";
+                let expected = "cut the file down to the roundabout, or give --unit mm, cm, ft, us-ft or in";
                 let long = format!("kerbs are more than {:.0} km long by then", LONGEST / 1000.0);
                 return Err(self.reader.invalid(format!("{}: {key}", self.place), long, expected));
             }

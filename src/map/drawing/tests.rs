@@ -105,7 +105,17 @@ fn feet_are_metres_and_a_drawing_that_does_not_say_its_unit_is_refused_with_the_
     assert!((ground.island_radius - road.island_radius()).abs() < 1e-3 && ground.origin.distance(AT) < 1e-3);
     let unknown = HEADER.replace("70\n6\n", "70\n0\n") + &drawn(&road, 1.0) + END;
     let said = parse(Path::new("site.dxf"), &unknown, &layers()).unwrap_err().to_string();
-    assert!(said.contains("line 8") && said.contains("--unit m, mm, cm, ft or in"), "{said}");
+    assert!(said.contains("line 8") && said.contains("--unit m, mm, cm, ft, us-ft or in"), "{said}");
+    // Metres that are said to be millimetres, and the other way round.
+    for (code, drawn) in [("4", drawn(&road, 1.0)), ("6", drawn(&road, 0.001))] {
+        let text = HEADER.replace("70\n6\n", &format!("70\n{code}\n")) + &drawn + END;
+        let said = parse(Path::new("site.dxf"), &text, &layers()).unwrap_err().to_string();
+        assert!(said.contains("site.dxf: kerbs: reach over ") && said.contains("is its unit right?"), "{said}");
+    }
+    // Feet of surveys, of which 2 millionths more make a metre 500 km from the frame's origin.
+    let surveyed = HEADER.replace("70\n6\n", "70\n21\n") + &drawn(&road, 1200.0 / 3937.0) + END;
+    let Drawn { ground, .. } = parse(Path::new("site.dxf"), &surveyed, &layers()).unwrap();
+    assert!((ground.island_radius - road.island_radius()).abs() < 1e-3 && ground.origin.distance(AT) < 1e-3);
 }
 
 #[test]
@@ -215,6 +225,40 @@ fn what_is_neither_a_line_nor_an_arc_is_refused_by_its_line_and_other_layers_are
     assert!(said.contains("lines on layer KERB: 5006; must lie in 1..5000"), "{said}");
     let without_lanes: String = road.replace("8\nLane", "8\nElsewhere");
     assert!(read(&without_lanes, &layers()).unwrap_err().contains("layer LANE: empty"));
+}
+
+#[test]
+fn a_block_with_kerbs_is_refused_on_any_layer_and_at_any_depth_and_other_blocks_are_left_out() {
+    let road = drawn(&Road::named("16m").unwrap(), 1.0);
+    let line = "0\nLINE\n8\nKerb\n10\n0\n20\n0\n11\n1\n21\n0\n";
+    let blocks = format!(
+        "0\nSECTION\n2\nBLOCKS\n\
+         0\nBLOCK\n8\n0\n2\nOUTER\n0\nINSERT\n8\n0\n2\nINNER\n0\nENDBLK\n\
+         0\nBLOCK\n8\n0\n2\nINNER\n{line}0\nENDBLK\n\
+         0\nBLOCK\n8\n0\n2\nTREE\n0\nCIRCLE\n8\n0\n40\n1\n0\nENDBLK\n0\nENDSEC\n"
+    );
+    let with = |name: &str| {
+        let text = HEADER.replace("0\nSECTION\n2\nENTITIES\n", &format!("{blocks}0\nSECTION\n2\nENTITIES\n"));
+        let insert = format!("0\nINSERT\n8\n0\n2\n{name}\n10\n5\n20\n5\n");
+        parse(Path::new("site.dxf"), &(text + &road + &insert + END), &layers()).map_err(|error| error.to_string())
+    };
+    for name in ["OUTER", "INNER"] {
+        let said = with(name).unwrap_err();
+        assert!(said.contains(&format!("INSERT of {name}; kerbs, lanes or aprons lie in this block")), "{said}");
+    }
+    assert_eq!(with("TREE").unwrap().notes, ["1 entities on 1 other layers are left out"]);
+}
+
+#[test]
+fn what_has_no_outline_and_what_lies_on_paper_is_left_out_and_said() {
+    let road = drawn(&Road::named("16m").unwrap(), 1.0);
+    let hatch = "0\nHATCH\n8\nKERB\n10\n0\n20\n0\n";
+    let text = "0\nTEXT\n8\nLANE\n1\nA 1\n";
+    let frame = "0\nLINE\n67\n1\n8\nKERB\n10\n0\n20\n0\n11\n297\n21\n0\n";
+    let Drawn { ground, notes } = read(&(road.clone() + hatch + text + hatch + frame), &layers()).unwrap();
+    assert_eq!(ground.faces.loops.len(), read(&road, &layers()).unwrap().ground.faces.loops.len());
+    let said = "3 entities on these layers that are no outlines are left out: HATCH, TEXT";
+    assert_eq!(notes, ["1 entities in paper space are left out", said]);
 }
 
 #[test]

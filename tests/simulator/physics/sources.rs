@@ -38,6 +38,20 @@ fn length(vehicle: &Vehicle) -> f64 {
 const AASHTO: [(&str, [f64; 4]); 3] =
     [("us_wb40", [45.5, 33.0, 36.0, 19.3]), ("us_wb67", [73.5, 53.0, 41.0, 1.9]), ("us_wb62", [69.0, 48.0, 41.0, 7.4])];
 
+/// The table of turning widths of the United Kingdom's CD 116, before it TD 16: outer circle of its design vehicle and
+/// the inner one there (m).
+const CD_116: [[f64; 2]; 8] =
+    [[13.0, 3.0], [13.4, 4.0], [13.9, 5.0], [14.4, 6.0], [15.0, 7.0], [15.6, 8.0], [16.3, 9.0], [17.0, 10.0]];
+
+/// Vehicles that keep the turning circle of Directive 96/53/EC and of the United Kingdom's regulations, which have the
+/// same.
+const EUROPEAN: [&str; 4] = ["eu_4x2_13m6", "eu_4x2_13m6_steered", "eu_6x4_13m6", "uk_16m5"];
+
+/// Distance of the trailer's front corners from the kingpin (m).
+fn front_corners(vehicle: &Vehicle) -> f64 {
+    vehicle.trailer.kingpin_to_front.hypot(0.5 * vehicle.trailer.width)
+}
+
 /// Least distance of the trailer's inner rear wheels from the centre of AASHTO's minimum turn: half a turn, the front
 /// axle on this radius (m).
 fn inside_radius(vehicle: &Vehicle, radius: f64) -> f64 {
@@ -66,7 +80,7 @@ fn metres(value: f64) -> String {
 
 /// The rows of the table: vehicle, what, published, ours.
 fn rows() -> Vec<[String; 4]> {
-    let [us, eu, daf] = ["us_wb62", "eu_4x2_13m6", "daf_xf"].map(vehicle);
+    let [us, daf] = ["us_wb62", "daf_xf"].map(vehicle);
     let row = |cells: [&str; 3], ours: String| [cells[0].to_owned(), cells[1].to_owned(), cells[2].to_owned(), ours];
     let feet = |value: f64| format!("{:.1} ft, {value:.2} m", value / FOOT);
     let circle = |vehicle: &Vehicle| metres(vehicle.turning_circle_inner_radius(12.5).unwrap());
@@ -83,17 +97,30 @@ fn rows() -> Vec<[String; 4]> {
         ]
     };
     let mut rows: Vec<[String; 4]> = AASHTO.into_iter().flat_map(of_aashto).collect();
-    rows.extend([
-        row(["`eu_4x2_13m6`", "overall length", "at most 16.50 m"], metres(length(&eu))),
-        row(["`eu_4x2_13m6`", "kingpin to the trailer's rear", "at most 12.00 m"], metres(eu.trailer.kingpin_to_rear)),
-        row(
-            ["`eu_4x2_13m6`", "kingpin to the trailer's front corners", "at most 2.04 m"],
-            format!("{:.3} m", eu.trailer.kingpin_to_front.hypot(0.5 * eu.trailer.width)),
-        ),
-        row(["`eu_4x2_13m6`", "wheelbase of the trailer", "at most 8.135 m"], metres(eu.trailer.wheelbase)),
-        row(["`eu_4x2_13m6`", "inner circle, the outer one of 12.50 m", "at least 5.30 m"], circle(&eu)),
-        row(["`daf_xf`", "the same", "at least 5.30 m"], circle(&daf)),
-    ]);
+    for name in EUROPEAN {
+        let (eu, named) = (vehicle(name), format!("`{name}`"));
+        let corners = format!("{:.3} m", front_corners(&eu));
+        rows.extend([
+            row([&named, "overall length", "at most 16.50 m"], metres(length(&eu))),
+            row([&named, "kingpin to the trailer's rear", "at most 12.00 m"], metres(eu.trailer.kingpin_to_rear)),
+            row([&named, "kingpin to the trailer's front corners", "at most 2.04 m"], corners),
+            row([&named, "wheelbase of the trailer", "at most 8.135 m"], metres(eu.trailer.wheelbase)),
+            row([&named, "inner circle, the outer one of 12.50 m", "at least 5.30 m"], circle(&eu)),
+        ]);
+    }
+    rows.push(row(["`daf_xf`", "the same", "at least 5.30 m"], circle(&daf)));
+    let uk = vehicle("uk_15m5");
+    rows.push(row(["`uk_15m5`", "overall length", "15.50 m"], metres(length(&uk))));
+    for [outer, inner] in CD_116 {
+        let what = format!("inner circle, the outer one of {outer:.2} m");
+        let found = uk.turning_circle_inner_radius(outer).unwrap();
+        rows.push(row(["`uk_15m5`", &what, &metres(inner)], metres(found)));
+    }
+    let cn = vehicle("cn_18m1");
+    rows.push(row(["`cn_18m1`", "overall length", "18.10 m"], metres(length(&cn))));
+    let trailer = cn.trailer.kingpin_to_front + cn.trailer.kingpin_to_rear;
+    rows.push(row(["`cn_18m1`", "length of the trailer", "at most 14.60 m"], metres(trailer)));
+    let eu = vehicle("eu_4x2_13m6");
     for (name, vehicle) in [("`us_wb62`", &us), ("`eu_4x2_13m6`", &eu), ("`daf_xf`", &daf)] {
         let [driven, published] = off_tracking(vehicle).map(metres);
         rows.push([name.to_owned(), "steady off-tracking, the front axle on 20 m".to_owned(), published, driven]);
@@ -132,6 +159,60 @@ fn aashtos_vehicles_turn_inside_the_radius_that_is_published() {
         assert!((found - inside).abs() < 0.1, "{name}: {found}");
         assert!((us.tractor.wheelbase / us.tractor.steer_max.sin() / FOOT - radius).abs() < 0.1, "{name}");
     }
+}
+
+#[test]
+fn the_united_kingdoms_design_vehicle_turns_on_the_circles_of_its_manuals_table() {
+    let uk = vehicle("uk_15m5");
+    for [outer, inner] in CD_116 {
+        let found = uk.turning_circle_inner_radius(outer).unwrap();
+        // The table rounds the outer circle to 0.1 m: at the tightest, 0.14 m of the inner one.
+        assert!((found - inner).abs() < 0.05, "{outer} m: {found} m");
+    }
+    // One trailer wheelbase alone does it: a tenth of a metre off, and the tightest circle is missed by 0.3 m.
+    let mut other = uk;
+    other.trailer.wheelbase += 0.1;
+    assert!(0.2 < CD_116[0][1] - other.turning_circle_inner_radius(CD_116[0][0]).unwrap());
+}
+
+#[test]
+fn european_vehicles_keep_their_directive_and_the_longest_british_one_lies_on_its_limits() {
+    for name in EUROPEAN {
+        let eu = vehicle(name);
+        assert!(length(&eu) <= 16.5 + 1e-9 && eu.trailer.kingpin_to_rear <= 12.0, "{name}: {}", length(&eu));
+        // What the directive deems to keep the circle: sqrt((12.5 - 2.04)^2 - (5.3 + width / 2)^2).
+        let longest = (10.46f64.powi(2) - (5.3 + 0.5 * eu.trailer.width).powi(2)).sqrt();
+        assert!(eu.trailer.wheelbase <= longest && 5.3 <= eu.turning_circle_inner_radius(12.5).unwrap(), "{name}");
+    }
+    let uk = vehicle("uk_16m5");
+    assert!((length(&uk) - 16.5).abs() < 1e-9 && (front_corners(&uk) - 2.04).abs() < 1e-3);
+    assert!((uk.turning_circle_inner_radius(12.5).unwrap() - 5.3).abs() < 0.005);
+}
+
+#[test]
+fn a_steered_rearmost_axle_leaves_the_trailer_to_turn_about_the_middle_of_the_other_two() {
+    let (fixed, steered) = (vehicle("eu_4x2_13m6"), vehicle("eu_4x2_13m6_steered"));
+    // Three axles 1.31 m apart: without the last their middle is half of that farther ahead.
+    assert!((fixed.trailer.wheelbase - steered.trailer.wheelbase - 0.5 * 1.31).abs() < 1e-9);
+    let mut same = fixed;
+    same.trailer.wheelbase = steered.trailer.wheelbase;
+    assert_eq!((same.tractor, same.trailer), (steered.tractor, steered.trailer));
+}
+
+#[test]
+fn chinas_design_vehicle_has_the_lengths_of_its_standard_which_add_up_to_its_overall_length() {
+    let cn = vehicle("cn_18m1");
+    let parts = [
+        cn.tractor.front_overhang,
+        cn.tractor.wheelbase,
+        cn.trailer.wheelbase,
+        cn.trailer.kingpin_to_rear - cn.trailer.wheelbase,
+    ];
+    // JTG B01-2014: front overhang, 3.3 + 11, rear overhang; 18.1 m in all.
+    for (part, published) in parts.into_iter().zip([1.5, 3.3, 11.0, 2.3]) {
+        assert!((part - published).abs() < 1e-9, "{part} m, {published} m");
+    }
+    assert!((length(&cn) - 18.1).abs() < 1e-9 && cn.turning_circle_inner_radius(12.5).is_none());
 }
 
 #[test]
