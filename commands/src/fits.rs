@@ -15,7 +15,7 @@ use offtrack_drawing::fits::{dxf, geojson, pdf};
 use offtrack_evaluation::certificate::attempt::{HOLD, passes};
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
-use offtrack_evaluation::fits::table::{Units, csv, table};
+use offtrack_evaluation::fits::table::{Units, csv, table, verdicts};
 use offtrack_evaluation::fits::{Asked, Case, Results, Row, case};
 use rayon::prelude::*;
 
@@ -37,7 +37,7 @@ pub struct Args {
     roads: Vec<String>,
     #[command(flatten)]
     place: PlaceArgs,
-    /// A vehicle's name, or the path of its file; repeatable.
+    /// A vehicle's name, or the path of its file; repeatable. `all` are those that come with the program.
     #[arg(long, required = true)]
     vehicle: Vec<String>,
     /// One of the vehicles' loads.
@@ -62,16 +62,29 @@ pub struct Args {
     /// Candidates that the search for a way keeps, tried in turn until it finds one, separated by commas.
     #[arg(long, value_delimiter = ',', default_value = "64,512")]
     widths: Vec<usize>,
-    /// Print feet and mph in place of metres and km/h; the files have metres.
+    /// Print feet and mph in place of metres and km/h, and feet on the sheets; the other files have metres.
     #[arg(long)]
     feet: bool,
     /// The name of the map's coordinate frame, to be stated in GeoJSON, such as urn:ogc:def:crs:EPSG::25832.
     #[arg(long, value_name = "NAME", value_parser = export::crs)]
     crs: Option<String>,
-    /// The folder to write: fits.json, fits.csv, of each road a sheet at scale, ROAD.svg and ROAD.pdf, and the swept
-    /// paths of each vehicle, ROAD-VEHICLE.dxf and ROAD-VEHICLE.geojson.
+    /// The folder to write: fits.json, fits.csv, verdicts.csv, of each road a sheet at scale, ROAD.svg and ROAD.pdf,
+    /// and the swept paths of each vehicle, ROAD-VEHICLE.dxf and ROAD-VEHICLE.geojson.
     #[arg(short, long)]
     output: PathBuf,
+}
+
+impl Args {
+    fn vehicle_names(&self) -> impl Iterator<Item = &str> {
+        self.vehicle.iter().flat_map(|name| match name.as_str() {
+            "all" => Kind::Vehicle.names().collect::<Vec<&str>>(),
+            name => vec![name],
+        })
+    }
+
+    fn units(&self) -> Units {
+        if self.feet { Units::Feet } else { Units::Metric }
+    }
 }
 
 /// Runs the command; whether everything fits.
@@ -82,7 +95,7 @@ pub fn run(args: &Args) -> Result<bool, Error> {
         args.place.check_absent()?;
     }
     let vehicles: Vec<(String, Vehicle)> =
-        args.vehicle.iter().map(|name| vehicle(name, &args.load)).collect::<Result<_, _>>()?;
+        args.vehicle_names().map(|name| vehicle(name, &args.load)).collect::<Result<_, _>>()?;
     unlike("ROAD", roads.iter().map(stem))?;
     unlike("--vehicle", vehicles.iter().map(|(name, _)| name.clone()))?;
     check_routes(&roads, &args.route)?;
@@ -106,7 +119,8 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     results.write(&file)?;
     files::write_whole(&args.output.join("fits.csv"), csv(&results.rows).as_bytes())?;
     let shown: Vec<Row> = order.iter().filter_map(|(route, vehicle)| results.row(route, vehicle).cloned()).collect();
-    let units = if args.feet { Units::Feet } else { Units::Metric };
+    files::write_whole(&args.output.join("verdicts.csv"), verdicts(&shown).as_bytes())?;
+    let units = args.units();
     let fit = shown.iter().filter(|row| row.fits).count();
     files::print(&format!(
         "{}{fit} of {} fit: {}, {} km/h, {} {} from every kerb\n",
@@ -159,6 +173,7 @@ impl Work<'_> {
             vehicles: self.vehicles,
             assumptions: &results.assumptions,
             clearance: self.asked.clearance,
+            units: self.args.units(),
             gutter: self.asked.gutter,
             date: &results.date,
             version: &format!("{}, commit {}", results.program, results.commit),
@@ -206,8 +221,8 @@ impl Work<'_> {
         let svg =
             sheet::drawn(road, shown, head).map_err(|error| Error::write(&drawn)(std::io::Error::other(error)))?;
         files::write_whole(&drawn, svg.as_bytes())?;
-        let title = format!("Swept paths: {}", road.name);
-        let pdf = pdf(&svg, &title, head.date).map_err(|error| Error::write(&printed)(std::io::Error::other(error)))?;
+        let pdf = pdf(&svg, &sheet::title(road), head.date)
+            .map_err(|error| Error::write(&printed)(std::io::Error::other(error)))?;
         files::write_whole(&printed, &pdf)?;
         for (name, _) in self.vehicles {
             let of: Vec<&Shown> = shown.iter().filter(|one| one.row.vehicle == *name).collect();

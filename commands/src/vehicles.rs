@@ -13,7 +13,8 @@ use crate::terminal;
 /// Radius of the outer circle whose inner one is listed, that of Directive 96/53/EC (m).
 const OUTER: f64 = 12.5;
 
-/// List the vehicles that come with the program, with their dimensions and sources.
+/// List the vehicles that come with the program, with their dimensions and sources, each drawn from the side: trailer,
+/// tractor, axles.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Print feet in place of metres.
@@ -64,7 +65,31 @@ fn described(name: &str, vehicle: &Vehicle, source: &str, units: Units, width: u
         }
         let _ = writeln!(text, "  {line}");
     }
-    text
+    text + &drawn(vehicle, width)
+}
+
+/// Columns of a metre, where there is room.
+const METRE: f64 = 3.0;
+
+/// The vehicle from the side, its front on the left: trailer, tractor, axles.
+fn drawn(vehicle: &Vehicle, width: usize) -> String {
+    let Vehicle { tractor, trailer, .. } = vehicle;
+    let scale = METRE.min(width.saturating_sub(5) as f64 / vehicle.length());
+    let column = |behind: f64| (scale * behind).round().max(0.0) as usize;
+    let axles = [tractor.front_overhang, tractor.front_overhang + tractor.wheelbase];
+    let kingpin = axles[1] - tractor.fifth_wheel;
+    let body = |from: f64, to: f64, side: &str| {
+        let (from, to) = (column(from), column(to));
+        format!("  {}[{}]\n", " ".repeat(from), side.repeat(to.saturating_sub(from + 1)))
+    };
+    let mut below = String::new();
+    for axle in [axles[0], axles[1], kingpin + trailer.wheelbase] {
+        below += &" ".repeat(column(axle).saturating_sub(below.len()));
+        below.push('O');
+    }
+    body(kingpin - trailer.kingpin_to_front, kingpin + trailer.kingpin_to_rear, "-")
+        + &body(0.0, axles[1] + tractor.rear_overhang, "=")
+        + &format!("  {below}\n")
 }
 
 #[cfg(test)]
@@ -87,5 +112,20 @@ mod tests {
         }
         let vehicle = Vehicle::named("us_wb67").unwrap();
         assert!(described("us_wb67", &vehicle, "", Units::Feet, 100).contains("73.5 ft long"));
+    }
+
+    #[test]
+    fn a_vehicle_is_drawn_from_the_side_with_its_lengths_and_axles() {
+        let vehicle = Vehicle::named("eu_4x2_13m6").unwrap();
+        let text = drawn(&vehicle, 100);
+        let lines: Vec<&str> = text.lines().map(|line| &line[2..]).collect();
+        let place = |line: usize, of: char| lines[line].find(of).unwrap();
+        // Three columns a metre: 16.45 m in all, the trailer of 13.6 m, the tractor of 5.9 m.
+        assert_eq!((place(0, '['), place(0, ']'), place(1, '['), place(1, ']')), (9, 49, 0, 18));
+        let axles: Vec<usize> = lines[2].match_indices('O').map(|(at, _)| at).collect();
+        assert_eq!(axles, [4, 15, 36]);
+        for width in [20, 40, 60] {
+            assert!(drawn(&vehicle, width).lines().all(|line| line.len() <= width), "{width}");
+        }
     }
 }

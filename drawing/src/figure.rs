@@ -149,15 +149,20 @@ fn axes(view: &View, lettering: &Lettering) -> Group {
 
 /// A bar of ten metres in the map's lower right corner.
 pub(crate) fn scale_bar(view: &View, lettering: &Lettering) -> Group {
+    bar(view, lettering, 10.0, "10 m")
+}
+
+/// A bar of this length in the lower right corner, with words for it (m).
+pub(crate) fn bar(view: &View, lettering: &Lettering, length: f64, words: &str) -> Group {
     let right = view.point(DVec2::new(view.high.x, view.low.y)) - DVec2::new(16.0, 14.0);
-    let length = 10.0 * view.scale;
+    let length = length * view.scale;
     let box_corner = right - DVec2::new(length + 14.0, 32.0);
     let paper = Rectangle::new().set("x", number(box_corner.x)).set("y", number(box_corner.y)).set("rx", 4);
     let paper =
         paper.set("width", number(length + 24.0)).set("height", 42).set("fill", "white").set("fill-opacity", 0.85);
     let data = format!("M{} {}v6h{}v-6", number(right.x - length), number(right.y - 6.0), number(length));
     let bar = Path::new().set("d", data).set("fill", "none").set("stroke", colour::INK).set("stroke-width", 2.0);
-    let words = lettering.text("10 m", right - DVec2::new(length / 2.0, 10.0), 15.0, Align::Middle, colour::INK);
+    let words = lettering.text(words, right - DVec2::new(length / 2.0, 10.0), 15.0, Align::Middle, colour::INK);
     Group::new().add(paper).add(bar).add(words)
 }
 

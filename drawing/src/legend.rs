@@ -1,13 +1,14 @@
 //! The legend: a sample and a few words for each element of a map, in columns.
 
 use glam::DVec2;
+use svg::Node;
 use svg::node::element::{Circle, Group, Path, Rectangle};
 
 use crate::lettering::{Align, Lettering};
 use crate::view::{colour, number};
 
 /// Size of the text (px).
-const SIZE: f64 = 15.0;
+pub const SIZE: f64 = 15.0;
 /// Line spacing (px).
 const LINE: f64 = 25.0;
 /// Width of a sample and the gap after it (px).
@@ -41,6 +42,19 @@ impl Entry {
 
 /// The legend with its upper left corner at `corner`, at most `width` wide, and its height (px).
 pub fn drawn(lettering: &Lettering, entries: &[Entry], corner: DVec2, width: f64) -> (Group, f64) {
+    drawn_with(lettering, entries, corner, width, |words, at| {
+        lettering.text(words, at, SIZE, Align::Left, colour::INK).into()
+    })
+}
+
+/// The same, its words drawn by `text` in letters of [`SIZE`] with their base line there (px).
+pub fn drawn_with(
+    lettering: &Lettering,
+    entries: &[Entry],
+    corner: DVec2,
+    width: f64,
+    text: impl Fn(&str, DVec2) -> Box<dyn Node>,
+) -> (Group, f64) {
     let widest = entries.iter().map(|entry| lettering.width(&entry.words, SIZE)).fold(0.0, f64::max);
     let columns = ((width / (SAMPLE + widest + 12.0)).floor() as usize).clamp(1, 4);
     let rows = entries.len().div_ceil(columns);
@@ -50,7 +64,7 @@ pub fn drawn(lettering: &Lettering, entries: &[Entry], corner: DVec2, width: f64
         let (column, row) = (index / rows, index % rows);
         let at = corner + DVec2::new(column as f64 * width / columns as f64, (row as f64 + 0.5) * LINE);
         group = group.add(sample(&entry.swatch, at));
-        group = group.add(lettering.text(&entry.words, at + DVec2::new(SAMPLE, 5.0), SIZE, Align::Left, colour::INK));
+        group = group.add(text(&entry.words, at + DVec2::new(SAMPLE, 5.0)));
     }
     (group, rows as f64 * LINE)
 }

@@ -68,6 +68,13 @@ impl Lettering {
         brush.path.finish()
     }
 
+    /// The outline of a glyph in units of the typeface, as path data; empty for one that draws nothing.
+    pub fn glyph(&self, glyph: GlyphId) -> String {
+        let mut pen = Pen { data: String::new(), at: DVec2::ZERO, scale: 1.0 };
+        self.face.outline_glyph(glyph, &mut pen);
+        pen.data
+    }
+
     fn outlines(&self, words: &str, at: DVec2, size: f64, align: Align) -> Path {
         let mut pen = Pen { data: String::new(), at, scale: self.scale(size) };
         for (glyph, at) in self.placed(words, at, size, align) {
@@ -79,13 +86,8 @@ impl Lettering {
     }
 
     /// The glyphs of one line of text, each with the left end of its base line (px).
-    fn placed(&self, words: &str, at: DVec2, size: f64, align: Align) -> impl Iterator<Item = (GlyphId, DVec2)> {
-        let shift = match align {
-            Align::Left => 0.0,
-            Align::Middle => 0.5,
-            Align::Right => 1.0,
-        };
-        let mut at = at - DVec2::new(shift * self.width(words, size), 0.0);
+    pub fn placed(&self, words: &str, at: DVec2, size: f64, align: Align) -> impl Iterator<Item = (GlyphId, DVec2)> {
+        let mut at = self.left(words, at, size, align);
         words.chars().filter_map(|letter| self.face.glyph_index(letter)).map(move |glyph| {
             let left = at;
             at.x += f64::from(self.face.glyph_hor_advance(glyph).unwrap_or(0)) * self.scale(size);
@@ -93,7 +95,18 @@ impl Lettering {
         })
     }
 
-    fn scale(&self, size: f64) -> f64 {
+    /// The left end of the base line of a line of text (px).
+    pub fn left(&self, words: &str, at: DVec2, size: f64, align: Align) -> DVec2 {
+        let shift = match align {
+            Align::Left => 0.0,
+            Align::Middle => 0.5,
+            Align::Right => 1.0,
+        };
+        at - DVec2::new(shift * self.width(words, size), 0.0)
+    }
+
+    /// Size of a unit of the typeface in text of `size` (px).
+    pub fn scale(&self, size: f64) -> f64 {
         size / f64::from(self.face.units_per_em())
     }
 }

@@ -49,6 +49,8 @@ fn a_truck_that_fits_is_exit_code_0_with_table_json_csv_sheet_pdf_and_drawing() 
     assert!((5.0..90.0).contains(&row["fastest_kmh"].as_f64().unwrap()));
     let csv = text(&place, "fits.csv");
     assert!(csv.starts_with("route,vehicle,fits,fastest_kmh,lane_centre_fits") && csv.lines().count() == 2, "{csv}");
+    let verdicts = text(&place, "verdicts.csv");
+    assert!(verdicts.starts_with("route,eu_4x2_13m6\n16m/E-right-2,lane centre "), "{verdicts}");
     let pdf = std::fs::read(place.file("fits/16m.pdf")).unwrap();
     assert!(pdf.starts_with(b"%PDF-"));
     let dxf = text(&place, "16m-eu_4x2_13m6.dxf");
@@ -173,6 +175,10 @@ fn the_table_is_no_wider_than_the_terminal_and_has_feet_on_request() {
     }
     let said = String::from_utf8(fits(&place, &[&EASY[..], &["--feet"]].concat()).stdout).unwrap();
     assert!(said.contains(" ft") && said.contains("mph"), "{said}");
+    let (json, svg) = (place.json("fits/fits.json"), text(&place, "16m.svg"));
+    let width = json["rows"][0]["lane_centre"]["swept_width"].as_f64().unwrap();
+    assert!(svg.contains(&format!("swept {:.1} ft", width / 0.3048)) && svg.contains("30 ft"), "{width}");
+    assert!(!svg.contains(" m long") && svg.contains(" ft long"));
 }
 
 #[test]
@@ -186,6 +192,7 @@ fn wrong_input_is_refused_by_flag_and_value() {
         (&["--vehicle", "daf_xf", "--clearance", "nan"], "--clearance"),
         (&["--vehicle", "daf_xf", "--route", "N-left-9"], "--route: N-left-9; the roads have 16m/E-left-2"),
         (&["--vehicle", "daf_xf", "--vehicle", "daf_xf"], "--vehicle: daf_xf; is named twice"),
+        (&["--vehicle", "all", "--vehicle", "us_wb67"], "--vehicle: us_wb67; is named twice"),
         (&["--vehicle", "daf_xf", "--ring", "1,2"], "--ring: 1,2; is for an OpenDRIVE map"),
         (&["16m", "--vehicle", "daf_xf"], "ROAD: 16m; is named twice"),
     ] {
@@ -256,4 +263,24 @@ fn where_a_trailer_needs_the_apron_table_files_sheet_and_picture_say_so() {
     let drawn = place.json("road.json");
     assert_eq!(drawn["aprons"][0].as_array().unwrap().len(), 2);
     assert!(drawn["sweep"]["apron_clearance"].as_f64().unwrap() < -0.1, "{}", drawn["sweep"]);
+}
+
+#[test]
+fn the_verdicts_in_the_documents_are_those_of_the_program() {
+    let place = Place::new();
+    let folder = place.text("fits");
+    let vehicle = "daf_xf";
+    let output = program()
+        .current_dir(repository())
+        .args(["fits", "50m", "--vehicle", vehicle, "-o", &folder])
+        .output()
+        .unwrap();
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{output:?}");
+    let kept = std::fs::read_to_string(repository().join("docs/fits/verdicts.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = kept.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!((rows.len(), rows[0].len()), (1 + 95, 1 + 10), "the five study rings, all vehicles");
+    let column = rows[0].iter().position(|name| *name == vehicle).unwrap();
+    let of_ring =
+        rows.iter().filter(|row| row[0].starts_with("50m/")).map(|row| format!("{},{}\n", row[0], row[column]));
+    assert_eq!(text(&place, "verdicts.csv"), format!("route,{vehicle}\n") + &of_ring.collect::<String>());
 }

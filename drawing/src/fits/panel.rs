@@ -3,10 +3,13 @@
 use glam::DVec2;
 use offtrack::map::route::Route;
 use offtrack::vehicle::swept::{front_path, swept_area};
+use offtrack_evaluation::fits::table::Units;
 use offtrack_evaluation::fits::{Path as Driven, Row};
 use svg::node::element::{Circle, Group, Path, Use};
 
-use crate::lettering::{Align, Lettering};
+use super::letters::Letters;
+use super::sheet::Head;
+use crate::lettering::Align;
 use crate::road::RoadLayers;
 use crate::view::{View, colour, number};
 
@@ -14,8 +17,8 @@ use crate::view::{View, colour, number};
 const SIZE: f64 = 11.0;
 /// Distance between the outlines that are drawn (m).
 const BETWEEN_TRUCKS: f64 = 18.0;
-/// Distance between the points of a line on the sheet (px).
-const APART: f64 = 0.6;
+/// Farthest that a line on the sheet may be from where it should be (px).
+const OFF: f64 = 0.04;
 const DASHES: &str = "5 3";
 
 /// A route and vehicle that a sheet shows.
@@ -43,14 +46,7 @@ impl Shown {
     }
 
     /// The panel in the frame of `view`, whose upper left corner is 0; `origin` is that of the road in its map.
-    pub(super) fn drawn(
-        &self,
-        view: &View,
-        lettering: &Lettering,
-        road: &RoadLayers,
-        origin: DVec2,
-        asked: f64,
-    ) -> Group {
+    pub(super) fn drawn(&self, view: &View, letters: &Letters, road: &RoadLayers, origin: DVec2, head: &Head) -> Group {
         let [tractor, trailer] = self.path.corners();
         let [tractor_area, trailer_area] = self
             .areas
@@ -86,33 +82,34 @@ impl Shown {
                 group = group.add(body.set("stroke-width", 0.9));
             }
         }
-        group.add(self.worst(view, lettering, origin, asked))
+        group.add(self.worst(view, letters, origin, head))
     }
 
     /// A ring around the place where the truck comes nearest to a kerb, with the clearance there.
-    fn worst(&self, view: &View, lettering: &Lettering, origin: DVec2, asked: f64) -> Group {
+    fn worst(&self, view: &View, letters: &Letters, origin: DVec2, head: &Head) -> Group {
         let (unit, nearest) = self.row.shown().nearest();
         let place = DVec2::new(nearest.x, nearest.y) - origin;
         let at = view.point(place);
-        let colour = if self.row.shown().fits || asked <= nearest.clearance { colour::INK } else { colour::OVERLAP };
+        let colour =
+            if self.row.shown().fits || head.clearance <= nearest.clearance { colour::INK } else { colour::OVERLAP };
         let ring = Circle::new().set("cx", number(at.x)).set("cy", number(at.y)).set("r", 6).set("fill", "none");
-        let words = format!("{unit} {}", signed(nearest.clearance));
+        let words = format!("{unit} {}", said(head.units, nearest.clearance));
         let is_east = view.low.x + view.high.x < 2.0 * place.x;
         let (aside, align) = if is_east { (-9.0, Align::Right) } else { (9.0, Align::Left) };
         let corner = at + DVec2::new(aside, 4.0);
         Group::new()
             .add(ring.set("stroke", colour).set("stroke-width", 1.6))
-            .add(lettering.text_on_map(&words, corner, SIZE, align, colour))
+            .add(letters.text_on_map(&words, corner, SIZE, align, colour))
     }
 
     /// The two lines below the panel.
-    pub(super) fn caption(&self) -> [String; 2] {
+    pub(super) fn caption(&self, units: Units) -> [String; 2] {
         let Row { vehicle, lane_centre, way, .. } = &self.row;
-        let found = way.as_ref().map_or("none found".to_owned(), |way| signed(way.clearance()));
+        let found = way.as_ref().map_or("none found".to_owned(), |way| said(units, way.clearance()));
         let shown = self.row.shown();
         let apron = match shown.apron_use() {
             Some(0.0) => ", apron not used".to_owned(),
-            Some(by) => format!(", {by:.2} m on the apron"),
+            Some(by) => format!(", {} on the apron", said(units, by)),
             None => String::new(),
         };
         let verdict = self.row.verdict();
@@ -120,29 +117,67 @@ impl Shown {
         [
             format!("{}  {vehicle}: {verdict}", self.row.movement()),
             format!(
-                "centre line {}, other way {found}; swept {:.2} m, off-tracking {:.2} m, steer {:.0}\u{b0}{apron}",
-                signed(lane_centre.clearance()),
-                shown.swept_width,
-                shown.off_tracking,
+                "centre line {}, other way {found}; swept {}, off-tracking {}, steer {:.0}\u{b0}{apron}",
+                said(units, lane_centre.clearance()),
+                said(units, shown.swept_width),
+                said(units, shown.off_tracking),
                 shown.steer_angle_deg
             ),
         ]
     }
 }
 
-/// Points of a line that are far enough from each other to be told apart on the sheet.
+/// The points of a line that it needs on the sheet: between two of them it is straight, nearly.
 fn thinned(view: &View, points: &[DVec2]) -> Vec<DVec2> {
-    let mut kept: Vec<DVec2> = Vec::new();
-    for (index, &p) in points.iter().enumerate() {
-        let is_far = kept.last().is_none_or(|last| APART <= view.scale * last.distance(p));
-        if is_far || index + 1 == points.len() {
-            kept.push(p);
+    let placed: Vec<DVec2> = points.iter().map(|&p| view.point(p)).collect();
+    let mut kept = vec![false; points.len()];
+    let mut parts = Vec::new();
+    if let Some(last) = points.len().checked_sub(1) {
+        (kept[0], kept[last]) = (true, true);
+        parts.push((0, last));
+    }
+    while let Some((from, to)) = parts.pop() {
+        let off = |index: &usize| distance(placed[*index], placed[from], placed[to]);
+        let Some(farthest) = (from + 1..to).max_by(|a, b| off(a).total_cmp(&off(b))) else { continue };
+        if OFF < off(&farthest) {
+            kept[farthest] = true;
+            parts.extend([(from, farthest), (farthest, to)]);
         }
     }
-    kept
+    points.iter().zip(kept).filter(|(_, kept)| *kept).map(|(&p, _)| p).collect()
 }
 
-/// A clearance in metres with a typographic minus sign.
-fn signed(clearance: f64) -> String {
-    if clearance < 0.0 { format!("\u{2212}{:.2} m", -clearance) } else { format!("{clearance:.2} m") }
+/// Distance of a point from a segment.
+fn distance(p: DVec2, from: DVec2, to: DVec2) -> f64 {
+    let along = to - from;
+    let part = ((p - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    p.distance(from + part * along)
+}
+
+/// A length with its unit and a typographic minus sign (m).
+pub(super) fn said(units: Units, length: f64) -> String {
+    format!("{} {}", units.length(length).replace('-', "\u{2212}"), units.of_length())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::Layout;
+
+    #[test]
+    fn a_line_on_a_sheet_has_the_points_that_it_needs_and_no_other() {
+        let layout = Layout { corner: DVec2::ZERO, width: 500.0, margin: 0.0, ratio: 1.0 };
+        let view = View::laid_out([DVec2::splat(-50.0), DVec2::splat(50.0)].into_iter(), &layout);
+        let straight: Vec<DVec2> = (0..400).map(|i| DVec2::new(0.1 * f64::from(i) - 40.0, 3.0)).collect();
+        assert_eq!(thinned(&view, &straight), [straight[0], straight[399]]);
+        let circle: Vec<DVec2> = (0..=720).map(|i| 20.0 * DVec2::from_angle(f64::from(i).to_radians() / 2.0)).collect();
+        let kept = thinned(&view, &circle);
+        assert!((20..200).contains(&kept.len()), "{}", kept.len());
+        for p in circle {
+            let off = kept.windows(2).map(|pair| distance(p, pair[0], pair[1])).fold(f64::INFINITY, f64::min);
+            assert!(view.scale * off <= OFF + 1e-9, "{p}: {off} m");
+        }
+        assert_eq!(thinned(&view, &[]), []);
+        assert_eq!(thinned(&view, &[DVec2::X]), [DVec2::X]);
+    }
 }

@@ -1,17 +1,17 @@
 //! An SVG of paths as a PDF of one page, as large as the SVG says.
 //!
 //! The pictures of this crate are paths alone: letters are outlines, and there are neither gradients nor images. So the
-//! tree that `usvg` makes of them is written as it is.
+//! tree that `usvg` makes of them is written as it is, but for what it repeats: a glyph, or the road of every panel, is
+//! a form that is written once.
 
 use std::io::Write;
 
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use pdf_writer::types::{LineCapStyle, LineJoinStyle};
-use pdf_writer::{Content, Date, Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
-use resvg::tiny_skia::{PathSegment, Point, Transform};
-use resvg::usvg::{self, FillRule, LineCap, LineJoin, Node, Paint};
+use pdf_writer::{Date, Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
+use resvg::usvg;
 
+use super::page::{Page, form, name};
 use crate::Error;
 
 /// Points in a pixel: 72 and 96 in an inch (pt/px).
@@ -25,10 +25,8 @@ const POINT: f32 = 0.75;
 pub fn pdf(svg: &str, title: &str, date: &str) -> Result<Vec<u8>, Error> {
     let tree = usvg::Tree::from_str(svg, &usvg::Options::default())?;
     let (width, height) = (POINT * tree.size().width(), POINT * tree.size().height());
-    let mut page = Page { content: Content::new(), opacities: Vec::new() };
     // A page's y points up.
-    page.content.transform([POINT, 0.0, 0.0, -POINT, 0.0, height]);
-    page.group(tree.root());
+    let page = Page::of(tree.root(), [POINT, 0.0, 0.0, -POINT, 0.0, height]);
     let [catalog, pages, only, content, info] = [1, 2, 3, 4, 5].map(Ref::new);
     let mut pdf = Pdf::new();
     pdf.catalog(catalog).pages(pages);
@@ -43,12 +41,19 @@ pub fn pdf(svg: &str, title: &str, date: &str) -> Result<Vec<u8>, Error> {
         state.non_stroking_alpha(opacity_of).stroking_alpha(opacity_of);
     }
     states.finish();
+    let mut forms = resources.x_objects();
+    for (index, _) in page.forms() {
+        forms.pair(Name(form(index).as_bytes()), Ref::new(FIRST_FORM + index as i32));
+    }
+    forms.finish();
     resources.finish();
     written.finish();
-    let mut packed = ZlibEncoder::new(Vec::new(), Compression::default());
-    // Writing to memory cannot fail.
-    let _ = packed.write_all(page.content.finish().as_slice());
-    pdf.stream(content, &packed.finish().unwrap_or_default()).filter(Filter::FlateDecode);
+    pdf.stream(content, &packed(&page.written())).filter(Filter::FlateDecode);
+    for (index, painted) in page.forms() {
+        let content = packed(&painted.ops);
+        let mut form = pdf.form_xobject(Ref::new(FIRST_FORM + index as i32), &content);
+        form.bbox(painted.bounds).filter(Filter::FlateDecode);
+    }
     let mut about = pdf.document_info(info);
     about.title(TextStr(title)).producer(TextStr("offtrack"));
     if let Some(date) = day(date) {
@@ -66,140 +71,13 @@ fn day(date: &str) -> Option<Date> {
     Some(Date::new(year).month(month as u8).day(day as u8))
 }
 
-/// Name of the state with this opacity, in parts of 255.
-fn name(opacity: u8) -> String {
-    format!("o{opacity}")
-}
-
-struct Page {
-    content: Content,
-    /// Opacities that the page uses, in parts of 255.
-    opacities: Vec<u8>,
-}
-
-impl Page {
-    fn group(&mut self, group: &usvg::Group) {
-        self.content.save_state();
-        self.content.transform(matrix(group.transform()));
-        if let Some(clip) = group.clip_path() {
-            let mut rule = FillRule::NonZero;
-            self.clip(clip.root(), clip.transform(), &mut rule);
-            match rule {
-                FillRule::NonZero => self.content.clip_nonzero(),
-                FillRule::EvenOdd => self.content.clip_even_odd(),
-            };
-            self.content.end_path();
-        }
-        for node in group.children() {
-            match node {
-                Node::Group(group) => self.group(group),
-                Node::Path(path) if path.is_visible() => self.path(path),
-                _ => {}
-            }
-        }
-        self.content.restore_state();
-    }
-
-    /// The outlines that a group clips to. A clip is in the frame of what it clips.
-    fn clip(&mut self, group: &usvg::Group, transform: Transform, rule: &mut FillRule) {
-        let transform = transform.pre_concat(group.transform());
-        for node in group.children() {
-            match node {
-                Node::Group(group) => self.clip(group, transform, rule),
-                Node::Path(path) => {
-                    *rule = path.fill().map_or(*rule, |fill| fill.rule());
-                    self.outline(path, transform);
-                }
-                _ => {}
-            }
-        }
-    }
-
-    fn path(&mut self, path: &usvg::Path) {
-        if let Some(fill) = path.fill()
-            && let Paint::Color(colour) = fill.paint()
-        {
-            self.opaque(fill.opacity().to_u8());
-            let [r, g, b] = [colour.red, colour.green, colour.blue].map(|channel| f32::from(channel) / 255.0);
-            self.content.set_fill_rgb(r, g, b);
-            self.outline(path, Transform::identity());
-            match fill.rule() {
-                FillRule::NonZero => self.content.fill_nonzero(),
-                FillRule::EvenOdd => self.content.fill_even_odd(),
-            };
-        }
-        if let Some(stroke) = path.stroke()
-            && let Paint::Color(colour) = stroke.paint()
-        {
-            self.opaque(stroke.opacity().to_u8());
-            let [r, g, b] = [colour.red, colour.green, colour.blue].map(|channel| f32::from(channel) / 255.0);
-            self.content.set_stroke_rgb(r, g, b).set_line_width(stroke.width().get());
-            self.content.set_line_cap(match stroke.linecap() {
-                LineCap::Butt => LineCapStyle::ButtCap,
-                LineCap::Round => LineCapStyle::RoundCap,
-                LineCap::Square => LineCapStyle::ProjectingSquareCap,
-            });
-            self.content.set_line_join(match stroke.linejoin() {
-                LineJoin::Miter | LineJoin::MiterClip => LineJoinStyle::MiterJoin,
-                LineJoin::Round => LineJoinStyle::RoundJoin,
-                LineJoin::Bevel => LineJoinStyle::BevelJoin,
-            });
-            self.content.set_miter_limit(stroke.miterlimit().get());
-            let dashes = stroke.dasharray().unwrap_or_default();
-            self.content.set_dash_pattern(dashes.iter().copied(), stroke.dashoffset());
-            self.outline(path, Transform::identity());
-            self.content.stroke();
-        }
-    }
-
-    fn opaque(&mut self, opacity: u8) {
-        if !self.opacities.contains(&opacity) {
-            self.opacities.push(opacity);
-        }
-        self.content.set_parameters(Name(name(opacity).as_bytes()));
-    }
-
-    fn outline(&mut self, path: &usvg::Path, transform: Transform) {
-        let at = |mut p: Point| {
-            transform.map_point(&mut p);
-            p
-        };
-        let mut last = Point::zero();
-        for segment in path.data().segments() {
-            match segment {
-                PathSegment::MoveTo(to) => {
-                    last = at(to);
-                    self.content.move_to(last.x, last.y);
-                }
-                PathSegment::LineTo(to) => {
-                    last = at(to);
-                    self.content.line_to(last.x, last.y);
-                }
-                PathSegment::QuadTo(one, to) => {
-                    let (one, to) = (at(one), at(to));
-                    let third =
-                        |from: Point| Point::from_xy(one.x + (from.x - one.x) / 3.0, one.y + (from.y - one.y) / 3.0);
-                    self.cubic(third(last), third(to), to);
-                    last = to;
-                }
-                PathSegment::CubicTo(one, other, to) => {
-                    last = at(to);
-                    self.cubic(at(one), at(other), last);
-                }
-                PathSegment::Close => {
-                    self.content.close_path();
-                }
-            }
-        }
-    }
-
-    fn cubic(&mut self, one: Point, other: Point, to: Point) {
-        self.content.cubic_to(one.x, one.y, other.x, other.y, to.x, to.y);
-    }
-}
-
-fn matrix(t: Transform) -> [f32; 6] {
-    [t.sx, t.ky, t.kx, t.sy, t.tx, t.ty]
+/// The object of the first form; those before it are the document's.
+const FIRST_FORM: i32 = 6;
+fn packed(bytes: &[u8]) -> Vec<u8> {
+    let mut packed = ZlibEncoder::new(Vec::new(), Compression::best());
+    // Writing to memory cannot fail.
+    let _ = packed.write_all(bytes);
+    packed.finish().unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -219,12 +97,40 @@ mod tests {
         // 420 mm are 1190.55 points, 297 mm 841.89.
         assert!(text.contains("/MediaBox [0 0 1190.5") && text.contains(" 841.8"), "{text}");
         assert!(text.contains("A title") && text.contains("D:20261126") && text.contains("/o102"), "{text}");
-        let start = bytes.windows(7).position(|at| at == b"stream\n").unwrap() + 7;
-        let mut content = String::new();
-        flate2::read::ZlibDecoder::new(&bytes[start..]).read_to_string(&mut content).unwrap();
+        let content = streams(&bytes).remove(0);
         for expected in ["W*\nn", "1 0 0 rg", "/o102 gs", "0 1 0 RG", "[3 1] 0 d", " c\n", "S\n"] {
             assert!(content.contains(expected), "{expected}: {content}");
         }
         assert!(pdf("no SVG", "", "").is_err());
+    }
+
+    /// The streams of a PDF, unpacked.
+    fn streams(bytes: &[u8]) -> Vec<String> {
+        let starts = bytes.windows(8).enumerate().filter(|(_, at)| *at == b"\nstream\n").map(|(at, _)| at + 8);
+        let unpacked = |start: usize| {
+            let mut content = String::new();
+            flate2::read::ZlibDecoder::new(&bytes[start..]).read_to_string(&mut content).unwrap();
+            content
+        };
+        starts.map(unpacked).collect()
+    }
+
+    #[test]
+    fn a_path_that_a_page_repeats_is_written_once_in_any_colour_and_at_any_place() {
+        let star = "M0 0L10 1L20 0L19 10L20 20L10 19L0 20L1 10Z";
+        let other = "M0 0L10 1L20 0L19 10L20 20L10 19L0 20L1 11Z";
+        let svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"100\" height=\"100\">\
+             <defs><path id=\"star\" d=\"{star}\"/></defs>\
+             <g fill=\"#ff0000\"><use href=\"#star\"/></g><g fill=\"#0000ff\"><use href=\"#star\" x=\"30\"/></g>\
+             <path d=\"{other}\"/><path d=\"M0 0L1 1\" stroke=\"#000\"/><path d=\"M0 0L1 1\" stroke=\"#000\"/></svg>"
+        );
+        let bytes = pdf(&svg, "t", "").unwrap();
+        let streams = streams(&bytes);
+        assert_eq!(streams.len(), 2, "{streams:?}");
+        assert_eq!(streams[0].matches("/f0 Do").count(), 2, "{}", streams[0]);
+        assert!(streams[0].contains("1 0 0 rg") && streams[0].contains("0 0 1 rg"), "{}", streams[0]);
+        assert!(streams[0].contains("1 11 l") && streams[1].contains("1 10 l\nh\nf"), "{streams:?}");
+        assert!(String::from_utf8_lossy(&bytes).contains("/f0 6 0 R"));
     }
 }

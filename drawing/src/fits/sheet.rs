@@ -3,18 +3,23 @@
 use glam::DVec2;
 use offtrack::map::{Gutter, Road};
 use offtrack::vehicle::Vehicle;
+use offtrack_evaluation::fits::table::Units;
 use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Group, Path, Rectangle, Title};
 
+use super::letters::Letters;
 pub use super::panel::Shown;
+use super::panel::said;
 use super::paper::{BLOCK, GAP, MARGIN, PX, Paper};
 use crate::Error;
-use crate::figure::scale_bar;
+use crate::figure::bar;
 use crate::legend::{self, Entry, Swatch};
 use crate::lettering::{Align, Lettering};
 use crate::road::RoadLayers;
 use crate::view::{Layout, Straights, View, colour, number};
 
+/// Metres in a foot.
+const FOOT: f64 = 0.3048;
 /// Length of the arms shown beyond the ring (m).
 const ARMS: f64 = 25.0;
 /// Sizes of letters, and line spacing as a multiple of them (px).
@@ -31,6 +36,8 @@ pub struct Head<'a> {
     pub assumptions: &'a [String],
     /// Clearance asked for (m).
     pub clearance: f64,
+    /// What lengths are said in.
+    pub units: Units,
     /// Whether gutters may be driven on.
     pub gutter: Gutter,
     /// When the results were made, in UTC.
@@ -46,6 +53,7 @@ pub struct Head<'a> {
 /// [`Error::Typeface`].
 pub fn drawn(road: &Road, shown: &[Shown], head: &Head) -> Result<String, Error> {
     let lettering = Lettering::new()?;
+    let letters = Letters::of(&lettering);
     let reach = (road.outer_radius() + ARMS).ceil();
     let paper = Paper::holding(shown.len(), 2.0 * reach);
     let layout = Layout { corner: DVec2::ZERO, width: paper.side * PX, margin: 0.0, ratio: 1.0 };
@@ -63,9 +71,13 @@ pub fn drawn(road: &Road, shown: &[Shown], head: &Head) -> Result<String, Error>
     let mut panels = Group::new();
     for (index, one) in shown.iter().enumerate() {
         let corner = paper.corner(index) * PX;
-        let mut map = one.drawn(&view, &lettering, &layers, road.ground().origin, head.clearance);
+        let mut map = one.drawn(&view, &letters, &layers, road.ground().origin, head);
         if index == 0 {
-            map = map.add(scale_bar(&view, &lettering));
+            let (length, words) = match head.units {
+                Units::Metric => (10.0, "10 m"),
+                Units::Feet => (30.0 * FOOT, "30 ft"),
+            };
+            map = map.add(bar(&view, &lettering, length, words));
         }
         let frame = Path::new().set("d", view.frame()).set("fill", "none").set("stroke", colour::FAINT);
         let place = format!("translate({} {})", number(corner.x), number(corner.y));
@@ -74,49 +86,59 @@ pub fn drawn(road: &Road, shown: &[Shown], head: &Head) -> Result<String, Error>
                 .set("transform", place)
                 .add(map.set("clip-path", "url(#panel)"))
                 .add(frame.set("stroke-width", 0.8))
-                .add(captions(one, &lettering, paper.side * PX)),
+                .add(captions(one, &lettering, &letters, paper.side * PX, head.units)),
         );
     }
+    let block = block(&lettering, &letters, &paper, &title(road), shown, head);
+    let definitions = letters.defined(definitions);
     let size = paper.size * PX;
-    let title = format!("Swept paths: {}", road.name);
     let document = Document::new()
         .set("viewBox", (0.0, 0.0, number(size.x), number(size.y)))
         .set("width", format!("{}mm", paper.size.x))
         .set("height", format!("{}mm", number(paper.size.y)))
-        .add(Title::new(title.as_str()))
+        .add(Title::new(title(road)))
         .add(definitions)
         .add(Rectangle::new().set("width", size.x + 1.0).set("height", size.y + 1.0).set("fill", "white"))
         .add(panels)
-        .add(block(&lettering, &paper, &title, shown, head));
+        .add(block);
     Ok(format!("{document}\n"))
 }
 
-fn captions(one: &Shown, lettering: &Lettering, width: f64) -> Group {
-    let [verdict, figures] = one.caption();
+/// The sheet's title.
+pub fn title(road: &Road) -> String {
+    format!("Swept paths: {}", road.name)
+}
+
+fn captions(one: &Shown, lettering: &Lettering, letters: &Letters, width: f64, units: Units) -> Group {
+    let [verdict, figures] = one.caption(units);
     let colour = if one.row.fits { colour::INK } else { colour::OVERLAP };
     let line = |words: &str, base: f64, largest: f64, colour: &str| {
         let size = lettering.fitting(words, largest, width);
-        lettering.text(words, DVec2::new(0.0, width + base), size, Align::Left, colour)
+        letters.text(words, DVec2::new(0.0, width + base), size, Align::Left, colour)
     };
     Group::new().add(line(&verdict, 15.0, HEADING, colour)).add(line(&figures, 31.0, TEXT, colour::FAINT))
 }
 
 /// The title block along the right edge.
-fn block(lettering: &Lettering, paper: &Paper, title: &str, shown: &[Shown], head: &Head) -> Group {
+fn block(lettering: &Lettering, letters: &Letters, paper: &Paper, title: &str, shown: &[Shown], head: &Head) -> Group {
     let left = (paper.size.x - MARGIN - BLOCK + GAP) * PX;
     let (top, width, height) = (MARGIN * PX, (BLOCK - GAP) * PX, (paper.size.y - 2.0 * MARGIN) * PX);
     let edge = Rectangle::new().set("x", number(left)).set("y", number(top)).set("fill", "none");
     let edge = edge.set("width", number(width)).set("height", number(height)).set("stroke", colour::INK);
-    let mut text = Text { lettering, group: Group::new().add(edge), left: left + 10.0, base: top + 8.0 };
+    let mut text = Text { lettering, letters, group: Group::new().add(edge), left: left + 10.0, base: top + 8.0 };
     let inner = width - 20.0;
     text.line(title, TITLE, inner, colour::INK);
     let fit = shown.iter().filter(|one| one.row.fits).count();
-    let verdict = format!("{fit} of {} fit with {} m clearance", shown.len(), head.clearance);
+    let clearance = match head.units {
+        Units::Metric => format!("{} m", head.clearance),
+        Units::Feet => said(Units::Feet, head.clearance),
+    };
+    let verdict = format!("{fit} of {} fit with {clearance} clearance", shown.len());
     text.line(&verdict, 15.0, inner, if fit == shown.len() { colour::INK } else { colour::OVERLAP });
     text.line(&format!("Scale 1:{:.0} on {}; north is up", paper.scale, paper.name), HEADING, inner, colour::INK);
     text.heading("Vehicles", inner);
     for (name, vehicle) in head.vehicles {
-        text.wrapped(&dimensions(name, vehicle), inner);
+        text.wrapped(&dimensions(name, vehicle, head.units), inner);
     }
     text.heading("Assumed", inner);
     for assumption in head.assumptions {
@@ -141,7 +163,10 @@ fn block(lettering: &Lettering, paper: &Paper, title: &str, shown: &[Shown], hea
     if shown.iter().any(|one| one.row.shown().apron_clearance.is_some()) {
         entries.insert(4, Entry::new(Swatch::Area(colour::APRON), "apron, for trailers alone"));
     }
-    let (legend, _) = legend::drawn(lettering, &entries, DVec2::new(text.left, text.base), inner);
+    let corner = DVec2::new(text.left, text.base);
+    let (legend, _) = legend::drawn_with(lettering, &entries, corner, inner, |words, at| {
+        letters.text(words, at, legend::SIZE, Align::Left, colour::INK).into()
+    });
     text.group = text.group.add(legend);
     text.base = top + height - 62.0;
     text.line("Designed: ______________________   Checked: ______________________", TEXT, inner, colour::INK);
@@ -152,16 +177,14 @@ fn block(lettering: &Lettering, paper: &Paper, title: &str, shown: &[Shown], hea
 }
 
 /// A vehicle's name and dimensions.
-fn dimensions(name: &str, vehicle: &Vehicle) -> String {
+fn dimensions(name: &str, vehicle: &Vehicle, units: Units) -> String {
     let tractor = &vehicle.tractor;
+    let [long, wide, wheelbase, trailer] =
+        [vehicle.length(), tractor.width.max(vehicle.trailer.width), tractor.wheelbase, vehicle.trailer.wheelbase]
+            .map(|length| said(units, length));
     format!(
-        "{name}: {:.2} m long, {:.2} m wide, wheelbase {:.2} m, trailer {:.2} m from kingpin to axles, lock \
-        {:.1}\u{b0}, \
-         {:.0}\u{b0}/s",
-        vehicle.length(),
-        tractor.width.max(vehicle.trailer.width),
-        tractor.wheelbase,
-        vehicle.trailer.wheelbase,
+        "{name}: {long} long, {wide} wide, wheelbase {wheelbase}, trailer {trailer} from kingpin to axles, lock \
+         {:.1}\u{b0}, {:.0}\u{b0}/s",
         tractor.steer_max.to_degrees(),
         tractor.steer_rate.to_degrees()
     )
@@ -170,6 +193,7 @@ fn dimensions(name: &str, vehicle: &Vehicle) -> String {
 /// Lines of text below each other.
 struct Text<'a> {
     lettering: &'a Lettering,
+    letters: &'a Letters<'a>,
     group: Group,
     left: f64,
     /// Lower edge of the last line (px).
@@ -181,7 +205,7 @@ impl Text<'_> {
         let size = self.lettering.fitting(words, largest, width);
         self.base += largest * SPACING;
         let at = DVec2::new(self.left, self.base);
-        let line = self.lettering.text(words, at, size, Align::Left, colour);
+        let line = self.letters.text(words, at, size, Align::Left, colour);
         self.group = std::mem::replace(&mut self.group, Group::new()).add(line);
     }
 

@@ -36,6 +36,8 @@ const SHORTEST: f64 = 10.0;
 const FASTEST: f64 = 90.0 / 3.6;
 /// By how much a way may come nearer to a kerb than is asked for: positions of the simulator are f32 (m).
 const SLACK: f64 = 1e-3;
+/// How far a truck sees in a search, which observes nothing: rays to the usual range take half of its time (m).
+const UNSEEN: f32 = 0.01;
 /// The benchmark whose reward and sensors stand for those that no search asks for.
 const BASE: &str = "attard2023-full";
 
@@ -53,7 +55,7 @@ pub struct Case {
     pub straights: [f64; 2],
     asked: Asked,
     world: Arc<World>,
-    /// The same with the truck's outline grown by the clearance asked for.
+    /// The same with the truck's outline grown by the clearance asked for, and without sensors.
     grown: Arc<World>,
     /// The truck with its roll discretised for the time from one pose to the next.
     rig: Rig,
@@ -85,6 +87,7 @@ impl Case {
     /// The vehicle on the road of [`Case::scenario`], which `world` was baked from.
     pub fn new(asked: &Asked, name: &str, scenario: &Scenario, world: Arc<World>) -> Case {
         let mut grown = World::clone(&world);
+        grown.params.sensor_range = UNSEEN;
         let by = asked.clearance as f32;
         for body in grown.rigs.iter_mut().flat_map(|rig| [&mut rig.tractor_body, &mut rig.trailer_body]) {
             (body.front, body.rear, body.half_width) = (body.front + by, body.rear - by, body.half_width + by);
@@ -293,6 +296,21 @@ mod tests {
         let [tractor, trailer] = path.clearances(&case.kerbs);
         assert!((row.shown().clearance() - tractor.least.min(trailer.least)).abs() < 1e-3);
         row
+    }
+
+    #[test]
+    fn a_search_without_sensors_finds_the_way_that_one_with_them_finds() {
+        let (load, gutter) = ("empty".into(), Gutter::Drivable);
+        let asked = Asked { load, speed_kmh: 15.0, clearance: 0.0, gutter, widths: vec![64] };
+        let road = Road::named("16m").unwrap();
+        let scenario = Case::scenario(&asked, &road, &Vehicle::named("eu_4x2_13m6").unwrap()).unwrap();
+        let case = Case::new(&asked, "eu_4x2_13m6", &scenario, Arc::new(World::bake(&scenario).unwrap()));
+        let starts: Vec<(u32, Start)> = [0, 7].map(|route| (route, Start::default())).into();
+        let passes = case.passes().unwrap();
+        let found = |world: &Arc<World>| attempts(world, &starts, &passes, &|_, _| {}).unwrap();
+        assert!(case.grown.params.sensor_range < case.world.params.sensor_range);
+        let (blind, seeing) = (found(&case.grown), found(&case.world));
+        assert!(blind.iter().all(Found::arrived) && blind == seeing, "{blind:?} {seeing:?}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The answers as a table of text that fits a terminal, and as CSV.
 
+use std::collections::HashMap;
 use std::fmt::Write;
 
 use offtrack::files::reader::shortened;
@@ -15,7 +16,7 @@ const MILE: f64 = 1.609_344;
 /// Width of a name that is long, at least (columns).
 const LEAST_NAME: usize = 8;
 
-/// The units of the table. Files have metres and km/h, whatever the table has.
+/// The units of the table and of sheets. Other files have metres and km/h, whatever these have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Units {
     /// Metres and km/h.
@@ -137,6 +138,32 @@ pub fn table(rows: &[Row], width: usize, units: Units) -> String {
         text += "more columns in fits.csv\n";
     }
     text
+}
+
+/// The verdicts as CSV: a row for each route, a column for each vehicle, in the cells by what it fits and the clearance
+/// of the path shown (m).
+pub fn verdicts(rows: &[Row]) -> String {
+    let mut vehicles: Vec<&str> = Vec::new();
+    let mut routes: Vec<(&str, HashMap<&str, String>)> = Vec::new();
+    for row in rows {
+        if !vehicles.contains(&row.vehicle.as_str()) {
+            vehicles.push(&row.vehicle);
+        }
+        let cell = format!("{} {}", row.verdict(), Units::Metric.length(row.shown().clearance()));
+        match routes.iter_mut().find(|(route, _)| *route == row.route) {
+            Some((_, cells)) => drop(cells.insert(&row.vehicle, cell)),
+            None => routes.push((&row.route, HashMap::from([(row.vehicle.as_str(), cell)]))),
+        }
+    }
+    let line = |first: &str, cells: &mut dyn Iterator<Item = String>| {
+        let cells: Vec<String> = std::iter::once(quoted(first)).chain(cells).collect();
+        cells.join(",") + "\n"
+    };
+    let heading = line("route", &mut vehicles.iter().map(|vehicle| quoted(vehicle)));
+    let of = |(route, cells): &(&str, HashMap<&str, String>)| {
+        line(route, &mut vehicles.iter().map(|vehicle| cells.get(vehicle).cloned().unwrap_or_default()))
+    };
+    heading + &routes.iter().map(of).collect::<String>()
 }
 
 /// The columns of a path's figures in CSV, and its cells.
@@ -275,6 +302,16 @@ mod tests {
         assert_eq!(cells(&[with(None)]), Vec::<String>::new());
         let text = csv(&[with(Some(-0.853))]);
         assert!(text.lines().nth(1).unwrap().contains(",0.2,-0.853,"), "{text}");
+    }
+
+    #[test]
+    fn verdicts_are_a_row_a_route_and_a_column_a_vehicle_with_a_gap_where_none_was_asked_for() {
+        let mut fits = row("16m/N-left-3", "us_wb62");
+        (fits.fits, fits.lane_centre.fits, fits.lane_centre.trailer.clearance) = (true, true, 0.456);
+        let rows = [row("16m/N-left-3", "daf_xf"), fits, row("16m/S-left-3", "us_wb62")];
+        let expected = "route,daf_xf,us_wb62\n16m/N-left-3,does not fit -0.25,lane centre 0.46\n\
+                        16m/S-left-3,,does not fit -0.25\n";
+        assert_eq!(verdicts(&rows), expected);
     }
 
     #[test]
