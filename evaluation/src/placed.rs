@@ -47,27 +47,15 @@ impl Controller for Policy {
 }
 
 /// Any policy on the processor.
-pub(crate) struct OnHost {
+struct OnHost {
     driver: Driver,
     choice: Choice,
 }
 
 impl OnHost {
-    pub(crate) fn new(policy: Policy, choice: Choice) -> OnHost {
+    fn new(policy: Policy, choice: Choice) -> OnHost {
         // The batch's size is known once trucks are there.
         OnHost { driver: policy.driver(0), choice }
-    }
-
-    /// The trucks that drive, and the policy's outputs for them, `[trucks * outputs]`.
-    pub(crate) fn outputs(&mut self, batch: &Batch) -> (Vec<usize>, Vec<f32>) {
-        if self.driver.n_envs() != batch.n_envs() {
-            self.driver = self.driver.policy().clone().driver(batch.n_envs());
-        }
-        let driving = driving(batch);
-        driving.iter().filter(|&&env| batch.truck[env].steps == 0).for_each(|&env| self.driver.begin(env));
-        let (observations, extras, around) = observed(self.driver.policy(), batch, &driving);
-        let outputs = self.driver.outputs_among(&driving, &observations, &extras, &around);
-        (driving, outputs)
     }
 }
 
@@ -77,7 +65,13 @@ impl Controller for OnHost {
     }
 
     fn choose(&mut self, _: &World, batch: &Batch) -> Actions {
-        let (driving, outputs) = self.outputs(batch);
+        if self.driver.n_envs() != batch.n_envs() {
+            self.driver = self.driver.policy().clone().driver(batch.n_envs());
+        }
+        let driving = driving(batch);
+        driving.iter().filter(|&&env| batch.truck[env].steps == 0).for_each(|&env| self.driver.begin(env));
+        let (observations, extras, around) = observed(self.driver.policy(), batch, &driving);
+        let outputs = self.driver.outputs_among(&driving, &observations, &extras, &around);
         let policy = self.driver.policy();
         let chosen = match (self.choice, policy.head) {
             (Choice::Sampled { seed }, Head::Levels) => {

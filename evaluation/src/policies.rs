@@ -44,7 +44,8 @@ pub fn find(
         Some(name) => match rule::under(name) {
             Some((rule, policy)) => {
                 // The rule decides on the processor, and so does what it caps.
-                return Ok(Box::new(rule::Capped::new(rule, learned(policy)?, world)?));
+                let policy = placed(learned(policy)?, &Engine::Cpu, world, Choice::Best)?;
+                return Ok(Box::new(rule::Capped::new(rule, policy, world)?));
             }
             None => learned(name)?,
         },

@@ -3,8 +3,6 @@
 //! `follows` keeps behind what is ahead and off what it would sweep over, and enters blind. `yields` also waits before
 //! its line until what has entered leaves it a gap: that is what a learner must beat.
 
-mod capped; // a policy under a rule
-
 use offtrack::layout::{Action, N_VALUES};
 use offtrack::physics::seen_by_vehicles;
 use offtrack::simulator::{Actions, Batch};
@@ -14,8 +12,6 @@ use offtrack::traffic::{Car, Kind, Network, Row, View};
 use offtrack::world::World;
 use offtrack_policy::Policy;
 use rayon::prelude::*;
-
-pub use capped::Capped;
 
 use super::command_for;
 use crate::controller::Controller;
@@ -30,6 +26,8 @@ const STEERS: &str = "attard2023";
 /// The speed that it is shown, and the speed that is observed as 1 (m/s).
 const SHOWN: f32 = 30.0 / 3.6;
 const SPEED_SCALE: f32 = 27.8;
+/// Time that is left to what comes (s).
+const LAG: f32 = 4.0;
 /// A truck swings out as it enters: it stops so far before the line of cars (m).
 const STOPS_BEFORE: f32 = 4.0;
 /// Braking that is planned with (m/s²), and the time that the speed control takes to reach a speed (s).
@@ -45,32 +43,12 @@ const ENTRY: f32 = 14.0;
 const ROOM: f32 = 5.5;
 /// Points ahead of the front, 2 m apart, at which something may be in the way.
 const N_AHEAD: usize = 16;
-/// Speed below which a car stands (m/s).
-const STANDS: f32 = 0.5;
 /// Half the width of the way (m).
 const HALF_WIDTH: f32 = 1.65;
 
 /// The rule and the policy that it caps in `yields:POLICY` or `follows:POLICY`.
 pub fn under(name: &str) -> Option<(&str, &str)> {
     name.split_once(':').filter(|(rule, _)| [YIELDS, FOLLOWS].contains(rule))
-}
-
-/// How near a truck lets what is in its way come.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Manner {
-    Usual,
-    /// After it has stood for long: it takes shorter gaps, and passes closely by what stands.
-    Impatient,
-}
-
-impl Manner {
-    /// Time that is left to what comes (s).
-    fn lag(self) -> f32 {
-        match self {
-            Manner::Usual => 4.0,
-            Manner::Impatient => 1.5,
-        }
-    }
 }
 
 /// A truck among vehicles by a rule.
@@ -95,7 +73,7 @@ impl Rule {
     }
 
     /// The speed that the rule asks for (m/s).
-    fn speed(&self, world: &World, batch: &Batch, env: usize, manner: Manner) -> f32 {
+    fn speed(&self, world: &World, batch: &Batch, env: usize) -> f32 {
         let (truck, row) = (&batch.truck[env], Row::of(&batch.cars[env]));
         let fastest = world.params.target_speed_max;
         let (Some(shared), Some(view)) = (&world.traffic, seen_by_vehicles(world, truck, &batch.progress[env])) else {
@@ -105,15 +83,14 @@ impl Rule {
         let mut speed = fastest.min(SHOWN);
         let cars = || row.cars.iter().filter(|car| car.is_there());
         let stop = metres(network.paths[view.path].line) - STOPS_BEFORE - metres(view.station);
-        if self.yields && row.entered == 0 && cars().any(|car| leaves_no_gap(network, &view, stop, car, manner)) {
+        if self.yields && row.entered == 0 && cars().any(|car| leaves_no_gap(network, &view, stop, car)) {
             let distance = stop - RESPONSE * truck.speed;
             let least = if truck.speed < 1.0 { CREEPS } else { 0.0 };
             speed = speed.min(if distance < 0.3 { 0.0 } else { (2.0 * BRAKING * distance).sqrt().max(least) });
         }
         for car in cars() {
             let outline = car.outline(network);
-            let closely = manner == Manner::Impatient && car.speed() < STANDS;
-            speed = speed.min(behind(network, &view, truck.speed, car, &outline)).min(beside(&view, &outline, closely));
+            speed = speed.min(behind(network, &view, truck.speed, car, &outline)).min(beside(&view, &outline));
         }
         speed.max(0.0)
     }
@@ -137,7 +114,7 @@ impl Controller for Rule {
             .map(|env| {
                 let steering = self.steers.actions[steered[env] as usize].steering;
                 // A held truck needs no action.
-                let speed = if batch.truck[env].held == 1 { 0.0 } else { self.speed(world, batch, env, Manner::Usual) };
+                let speed = if batch.truck[env].held == 1 { 0.0 } else { self.speed(world, batch, env) };
                 let before = if world.params.changes_speed == 1 { batch.control[env].target_speed } else { 0.0 };
                 Action { steering, speed: speed - before }
             })
@@ -147,6 +124,52 @@ impl Controller for Rule {
         } else {
             Actions::Indices(wanted.iter().map(|wanted| rounded(world, wanted)).collect())
         }
+    }
+}
+
+/// A policy that drives no faster than a rule allows.
+pub struct Capped {
+    policy: Box<dyn Controller>,
+    rule: Rule,
+    name: String,
+}
+
+impl Capped {
+    /// The policy under the rule of this name, `follows` or `yields`.
+    ///
+    /// # Errors
+    ///
+    /// A world without other vehicles, or one whose actions state no target speeds.
+    pub fn new(rule: &str, policy: Box<dyn Controller>, world: &World) -> Result<Capped, Error> {
+        let name = format!("{rule}:{}", policy.name());
+        if world.is_continuous() || world.params.changes_speed == 1 {
+            let expected = "caps target speeds: a benchmark with actions.speeds_kmh is needed".to_owned();
+            return Err(Error::Setting { name: "--policy", value: name, expected });
+        }
+        Ok(Capped { rule: Rule::new(rule, world)?, policy, name })
+    }
+}
+
+impl Controller for Capped {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn choose(&mut self, world: &World, batch: &Batch) -> Actions {
+        let chosen = match self.policy.choose(world, batch) {
+            Actions::Indices(chosen) => chosen,
+            // Commands drive no world of levels.
+            commands => return commands,
+        };
+        let capped = |(env, &index): (usize, &u32)| {
+            let Action { steering, speed } = world.actions[index as usize];
+            if batch.truck[env].held == 1 {
+                return index;
+            }
+            let most = self.rule.speed(world, batch, env);
+            if speed <= most { index } else { rounded(world, &Action { steering, speed: most }) }
+        };
+        Actions::Indices(chosen.par_iter().enumerate().map(capped).collect())
     }
 }
 
@@ -162,7 +185,7 @@ fn rounded(world: &World, wanted: &Action) -> u32 {
 }
 
 /// Whether a car that has entered leaves no gap to a truck that has so far to go to where it stops (m).
-fn leaves_no_gap(network: &Network, view: &View, stop: f32, car: &Car, manner: Manner) -> bool {
+fn leaves_no_gap(network: &Network, view: &View, stop: f32, car: &Car) -> bool {
     let (line, its_line) = (network.paths[view.path].line, network.paths[car.path()].line);
     let station = length(car.station());
     let is_of_own_arm = network.source_of(car.path()).entry == network.source_of(view.path).entry;
@@ -181,7 +204,7 @@ fn leaves_no_gap(network: &Network, view: &View, stop: f32, car: &Car, manner: M
         }
         let comes = metres(zone.b_in - station) / car.speed().max(4.0);
         let gone = metres(zone.b_out - rear) / car.speed().max(1.0);
-        comes < manner.lag() + to_line && to_line - 0.5 < gone
+        comes < LAG + to_line && to_line - 0.5 < gone
     })
 }
 
@@ -199,40 +222,36 @@ fn behind(network: &Network, view: &View, own: f32, car: &Car, outline: &Outline
     if gap < 0.0 { (0.7 * along).min(along - 1.0) } else { (along * along + 2.0 * BRAKING * gap).sqrt() }
 }
 
-/// Speed at which the truck does not sweep over a car that is not behind it (m/s); closely by it, it minds where its
-/// units are within a second alone, and by less.
-fn beside(view: &View, outline: &Outline, closely: bool) -> f32 {
+/// Speed at which the truck does not sweep over a car that is not behind it (m/s).
+fn beside(view: &View, outline: &Outline) -> f32 {
     let is_behind =
         view.now.iter().any(|unit| (outline.middle - unit.middle).dot(unit.along) < -unit.half_length - 1.0);
-    let [before, aside] = if closely { [0.1, 0.15] } else { [0.2, 0.4] };
-    let grown = |unit: &Outline| Outline {
-        half_length: unit.half_length + before,
-        half_width: unit.half_width + aside,
-        ..*unit
-    };
+    let grown =
+        |unit: &Outline| Outline { half_length: unit.half_length + 0.2, half_width: unit.half_width + 0.4, ..*unit };
     let touches = |units: &[Outline]| units.iter().any(|unit| grown(unit).overlaps(outline));
     match view.later.split_at(2) {
         _ if is_behind => f32::INFINITY,
         (soon, _) if touches(soon) => 0.0,
-        (_, later) if !closely && touches(later) => 2.8,
+        (_, later) if touches(later) => 2.8,
         _ => f32::INFINITY,
     }
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use std::sync::Arc;
 
     use offtrack::files::cache::Loading;
     use offtrack::layout::Ended;
     use offtrack::scenario::{Scenario, Split};
+    use offtrack::simulator::{RouteChoice, Simulator};
 
     use super::*;
     use crate::device::Device;
     use crate::evaluation::Evaluation;
 
     /// The routes of 20m from its northern arm, at these demands.
-    pub(super) fn of_one_arm(demand: &str) -> (Scenario, Arc<World>) {
+    fn of_one_arm(demand: &str) -> (Scenario, Arc<World>) {
         let text = Scenario::text_of("traffic2026").unwrap();
         let text = text.replace("demand = [300.0, 900.0, 1500.0, 2100.0]", &format!("demand = [{demand}]"));
         let mut scenario = Scenario::parse("among", &text, None, &Loading::PLAIN).unwrap();
@@ -267,6 +286,45 @@ pub(super) mod tests {
         }
         let yields = ends(YIELDS, "1500.0");
         assert!(34 <= arrived(&yields), "{yields:?}");
+    }
+
+    /// Straight on, as fast as the actions allow.
+    struct Fastest;
+
+    impl Controller for Fastest {
+        fn name(&self) -> &str {
+            "fastest"
+        }
+
+        fn choose(&mut self, world: &World, batch: &Batch) -> Actions {
+            let fastest = Action { steering: 0.0, speed: 100.0 };
+            Actions::Indices(vec![rounded(world, &fastest); batch.n_envs()])
+        }
+    }
+
+    #[test]
+    fn a_capped_policy_steers_as_it_would_and_drives_no_faster_than_the_rule() {
+        let (_, world) = of_one_arm("1500.0");
+        let routes = RouteChoice::Fixed((0..64).map(|env| env % world.routes.len() as u32).collect());
+        let mut simulator = Simulator::new(world.clone(), 64, 3, routes).unwrap();
+        let rule = Rule::new(YIELDS, &world).unwrap();
+        let mut capped = Capped::new(YIELDS, Box::new(Fastest), &world).unwrap();
+        assert_eq!(capped.name(), "yields:fastest");
+        let (mut free, mut slowed) = (0, 0);
+        for _ in 0..100 {
+            let Actions::Indices(chosen) = capped.choose(&world, simulator.batch()) else { panic!("levels") };
+            let driving = |env: &usize| simulator.batch().truck[*env].held == 0;
+            for env in (0..chosen.len()).filter(driving) {
+                let Action { steering, speed } = world.actions[chosen[env] as usize];
+                let most = rule.speed(&world, simulator.batch(), env);
+                assert_eq!(steering, 0.0);
+                // Half of the 10 km/h between two levels.
+                assert!(speed <= most + 1.39, "{speed} m/s where {most} are allowed");
+                *if 8.0 < speed { &mut free } else { &mut slowed } += 1;
+            }
+            simulator.step(&chosen).unwrap();
+        }
+        assert!(64 < free && 64 < slowed, "{free} {slowed}");
     }
 
     #[test]
