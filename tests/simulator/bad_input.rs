@@ -20,8 +20,8 @@ fn scenarios() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
 }
 
-/// Benchmarks and roundabouts that have no key but those of another one.
-const LIKE_OTHERS: [&str; 34] = [
+/// Benchmarks, roundabouts and vehicles that have no key but those of another one.
+const LIKE_OTHERS: [&str; 39] = [
     "laden2026-50-random.toml",
     "laden2026-50-training.toml",
     "laden2026-continuous.toml",
@@ -56,6 +56,11 @@ const LIKE_OTHERS: [&str; 34] = [
     "transfer2026-held-out.toml",
     "transfer2026-random.toml",
     "transfer2026-training.toml",
+    "cn_18m1.toml",
+    "eu_4x2_13m6_steered.toml",
+    "eu_6x4_13m6.toml",
+    "uk_15m5.toml",
+    "uk_16m5.toml",
 ];
 
 /// Every other scenario file, relative to `scenarios/`.

@@ -46,7 +46,7 @@ fn a_truck_reaches_its_target_speed_without_overshoot() {
             }
         }
     }
-    assert_eq!(checked, 5 * 5 * 7);
+    assert_eq!(checked, 10 * 5 * 7);
 }
 
 #[test]
