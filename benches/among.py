@@ -39,8 +39,12 @@ FIGURES = [
 ]
 
 
-def kept(figures):
-    return {key: figures[key] for key in FIGURES if key in figures}
+BY_DEMAND = ["episodes", "arrived", "success", "time_mean"]
+AMONG_BY_DEMAND = ["standing_mean", "blocked", "braking_mean", "lane_classes"]
+
+
+def kept(figures, keys):
+    return {key: figures[key] for key in keys if key in figures}
 
 
 def driven(offtrack, policy, benchmark, episodes):
@@ -56,11 +60,14 @@ def driven(offtrack, policy, benchmark, episodes):
 
 def row(name, benchmark, report):
     """What is kept of a report, printed as it comes."""
-    by_demand = {group["name"]: kept(group) for group in report["groups"].get("demand", [])}
+    by_demand = {
+        group["name"]: kept(group, BY_DEMAND) | kept(group.get("among_vehicles") or {}, AMONG_BY_DEMAND)
+        for group in report["groups"].get("demand", [])
+    }
     levels = ", ".join(f"{demand} {100 * figures['success']:.1f} %" for demand, figures in by_demand.items())
     print(f"{name}, {benchmark}: {report['arrived']} of {report['episodes']}; {levels}", flush=True)
     causes = {cause["cause"]: cause["episodes"] for cause in report["failures"][:8]}
-    return {**kept(report), "by_demand": by_demand, "causes": causes}
+    return {**kept(report, FIGURES), "by_demand": by_demand, "causes": causes}
 
 
 def main():
