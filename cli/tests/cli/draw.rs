@@ -229,7 +229,7 @@ fn wrong_input_is_refused_with_exit_code_2_and_says_what_would_do() {
     refuse(
         &[&place, "-o", svg, "--route", "N-left-3", "--vehicle", "bus"],
         2,
-        "vehicle: bus; must be a path ending in .toml or one of daf_xf, ",
+        "vehicle: bus; must be a path ending in .toml or one of cn_18m1, daf_xf, ",
     );
     refuse(&[&place, "-o", svg, "--load", "laden"], 2, "--route <ROUTE>");
     refuse(
