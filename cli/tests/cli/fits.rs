@@ -117,25 +117,25 @@ fn the_same_command_keeps_what_is_there_and_answers_the_rest() {
 #[test]
 fn a_call_that_is_killed_goes_on_and_leaves_the_same_bytes_as_one_that_is_not() {
     let place = Place::new();
-    let vehicle = ["--vehicle", "eu_4x2_13m6"];
+    // Long enough that the call is killed on its way on a busy machine too.
+    let vehicles = ["--vehicle", "eu_4x2_13m6", "--vehicle", "us_wb62", "--vehicle", "us_wb67"];
     let rows = || match std::fs::read_to_string(place.file("fits/fits.json")) {
         Ok(text) => text.matches("\"searched_clearance\"").count(),
         Err(_) => 0,
     };
-    let mut running = command(&place, &vehicle).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let mut running = command(&place, &vehicles).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     while rows() == 0 && running.try_wait().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(5));
     }
     running.kill().unwrap();
     running.wait().unwrap();
     let left = rows();
-    assert!((1..20).contains(&left), "{left} of 20 rows");
-    let resumed = fits(&place, &vehicle);
+    let resumed = fits(&place, &vehicles);
     let whole = place.text("whole");
     let at_once = program()
         .current_dir(repository())
         .args(["fits", "16m", "--widths", "64", "-o", &whole])
-        .args(vehicle)
+        .args(vehicles)
         .output()
         .unwrap();
     assert_eq!((resumed.status.code(), &resumed.stdout), (at_once.status.code(), &at_once.stdout));
@@ -146,6 +146,8 @@ fn a_call_that_is_killed_goes_on_and_leaves_the_same_bytes_as_one_that_is_not() 
     // The date is that of the call.
     let (one, other) = (place.json("fits/fits.json"), place.json("whole/fits.json"));
     assert_eq!(one["rows"], other["rows"]);
+    let all = other["rows"].as_array().unwrap().len();
+    assert!(0 < left && left < all, "{left} of {all} rows");
 }
 
 #[test]
