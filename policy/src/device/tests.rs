@@ -167,7 +167,7 @@ fn a_policy_that_reads_values_by_name_in_its_own_order_chooses_on_a_device_what_
         let policy = reading(benchmark, &names);
         let mut drive = Drive::new(benchmark, policy.clone(), 100, Choice::Best);
         let (taken, n_others) = drive.compare(&policy, 20);
-        assert!(n_others == 0 && 4 < taken.len(), "{benchmark}: {n_others} others, {taken:?}");
+        assert!(n_others == 0 && 1 < taken.len(), "{benchmark}: {n_others} others, {taken:?}");
         names.swap(0, 3);
         assert!(0 < drive.compare(&reading(benchmark, &names), 20).1, "{benchmark}: another order must show");
     }
