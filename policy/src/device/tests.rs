@@ -161,7 +161,7 @@ fn reading(benchmark: &str, names: &[&str]) -> Policy {
 fn a_policy_that_reads_values_by_name_in_its_own_order_chooses_on_a_device_what_it_does_on_the_processor() {
     let cases = [
         ("laden2026", ["target_speed", "tractor_range", "bearing[3]", "steering"]),
-        ("traffic2026", ["vehicle_left", "tractor_range", "target_speed", "steering"]),
+        ("traffic2026", ["vehicle_left", "tractor_range", "bearing[3]", "tractor_room"]),
     ];
     for (benchmark, mut names) in cases {
         let policy = reading(benchmark, &names);
