@@ -8,13 +8,10 @@ Standard library only.
 
 import argparse
 import datetime
-import json
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
-from ablations.series import write_json
+from ablations.series import evaluation, write_json
 
 ROOT = Path(__file__).resolve().parents[1]
 POLICIES = ["yields:traffic2026", "traffic2026", "yields", "follows"]
@@ -49,13 +46,7 @@ def kept(figures, keys):
 
 def driven(offtrack, policy, benchmark, episodes):
     """The report of a policy on the test routes of a benchmark."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "report.json"
-        command = [offtrack, "evaluate", "--policy", policy, "--benchmark", str(benchmark), "--json", str(file)]
-        done = subprocess.run([*command, "--episodes", str(episodes)], capture_output=True, text=True)
-        if done.returncode != 0:
-            sys.exit(f"{' '.join(command)}: {done.stderr.strip().splitlines()[-1]}")
-        return json.loads(file.read_text())
+    return evaluation(offtrack, "--policy", policy, "--benchmark", benchmark, "--episodes", episodes)
 
 
 def row(name, benchmark, report):

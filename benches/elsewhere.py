@@ -9,13 +9,9 @@ benchmark with its actions, 30 episodes each. Standard library only.
 
 import argparse
 import datetime
-import json
-import subprocess
-import sys
-import tempfile
 from pathlib import Path
 
-from ablations.series import write_json
+from ablations.series import evaluation, write_json
 
 ROOT = Path(__file__).resolve().parents[1]
 # Shipped policy, its benchmark, and the one of trucks elsewhere with its actions.
@@ -32,14 +28,8 @@ KEPT = ["episodes", "arrived", "success", "success_low", "success_high", "lane_d
 
 def examined(offtrack, policy, benchmark):
     """The figures of a policy on the test routes of a benchmark, and the commit of the program."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "report.json"
-        command = [offtrack, "evaluate", "--policy", policy, "--benchmark", benchmark, "--json", str(file)]
-        done = subprocess.run(command, capture_output=True, text=True)
-        if done.returncode != 0:
-            sys.exit(f"{' '.join(command)}: {done.stderr.strip().splitlines()[-1]}")
-        report = json.loads(file.read_text())
-        return {key: report[key] for key in KEPT if key in report}, report["commit"]
+    report = evaluation(offtrack, "--policy", policy, "--benchmark", benchmark)
+    return {key: report[key] for key in KEPT if key in report}, report["commit"]
 
 
 def main():

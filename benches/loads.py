@@ -14,13 +14,12 @@ import argparse
 import json
 import re
 import struct
-import subprocess
 import sys
 import tempfile
 import zlib
 from pathlib import Path
 
-from ablations.series import SCENARIOS, with_paths, write_json
+from ablations.series import SCENARIOS, evaluation, finish, with_paths, write_json
 
 ROOT = Path(__file__).resolve().parents[1]
 LOADS = ["empty", "half", "laden", "laden_high"]
@@ -40,21 +39,10 @@ PLANNED_WIDTHS = "64,512"
 PLANNED = "pursuit of a planned line"
 
 
-def finish(command):
-    """Runs a command; where it fails, ends with what it said last."""
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(command)}: {done.stderr.strip().splitlines()[-1]}")
-
-
 def evaluated(offtrack, benchmark, split, episodes, load, policy, more=()):
     """The report of a policy with a load, without its lists of routes."""
-    with tempfile.TemporaryDirectory() as folder:
-        report = Path(folder) / "report.json"
-        command = [str(offtrack), "evaluate", "--benchmark", str(benchmark), "--split", split, "--load", load]
-        command += ["--episodes", str(episodes), "--policy", str(policy), "--json", str(report), *more]
-        finish(command)
-        return condensed(json.loads(report.read_text()))
+    flags = ["--benchmark", benchmark, "--split", split, "--load", load, "--episodes", episodes, "--policy", policy]
+    return condensed(evaluation(offtrack, *flags, *more))
 
 
 def condensed(report):

@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import Queue
@@ -68,6 +69,21 @@ def trained(core, args, folder, config, seed, steps, settings):
 def with_paths(text):
     """A benchmark's text with paths that hold in any folder."""
     return re.sub(r'^(file|vehicle|distribution) = "(.*)"$', rf'\1 = "{SCENARIOS}/\2"', text, flags=re.MULTILINE)
+
+
+def finish(command):
+    """Runs a command; where it fails, ends with what it said last."""
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(command)}: {done.stderr.strip().splitlines()[-1]}")
+
+
+def evaluation(offtrack, *flags):
+    """The report of `offtrack evaluate` with these flags."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "report.json"
+        finish([str(offtrack), "evaluate", *map(str, flags), "--json", str(file)])
+        return json.loads(file.read_text())
 
 
 def write_json(file, whole):
