@@ -9,7 +9,7 @@ use glam::DVec2;
 
 use super::pairs::{Pair, pairs};
 use super::{Drawing, Entity, Layers};
-use crate::files::reader::{Error, Reader, shown};
+use crate::files::reader::{Error, Reader};
 use crate::geometry::{Curve, Piece, arc_of_height};
 
 /// Points nearer than this are one (m).
@@ -46,6 +46,12 @@ impl Unit {
         ("us-ft", Unit::SurveyFoot),
         ("in", Unit::Inch),
     ];
+
+    /// Those of these units, as an error lists them.
+    pub(super) fn listed(named: &[(&str, Unit)]) -> String {
+        let names: Vec<&str> = named.iter().map(|(name, _)| *name).collect();
+        names.split_last().map_or_else(String::new, |(last, others)| format!("{} or {last}", others.join(", ")))
+    }
 
     /// The unit's length (m).
     pub fn metres(self) -> f64 {
@@ -156,10 +162,9 @@ fn reach(reader: &Reader, kerbs: &[Entity]) -> Result<(), Error> {
     if REACH.contains(&over) {
         return Ok(());
     }
-    let (least, most) = (REACH.start(), REACH.end());
-    let expected =
-        format!("must lie in {least}..{most} m; is its unit right? --unit m, mm, cm, ft, us-ft or in says another");
-    Err(reader.invalid("kerbs", format!("reach over {} m", shown(over)), expected))
+    let (least, most, units) = (REACH.start(), REACH.end(), Unit::listed(&Unit::NAMED));
+    let expected = format!("must lie in {least}..{most} m; is its unit right? --unit {units} says another");
+    Err(reader.invalid("kerbs", format!("reach over {over:.2} m"), expected))
 }
 
 /// The unit that is asked for, else that of the header.
@@ -170,11 +175,8 @@ fn unit(file: &Path, pairs: &[Pair], layers: &Layers) -> Result<Unit, Error> {
     let stated = pairs.windows(2).find(|pair| pair[0].code == 9 && pair[0].value == "$INSUNITS").map(|pair| pair[1]);
     stated.and_then(|pair| Unit::of_code(pair.value)).ok_or_else(|| {
         let (key, value) = stated.map_or(("$INSUNITS".to_owned(), "missing"), |pair| (pair.key(), pair.value));
-        Reader::of(file).invalid(
-            key,
-            value,
-            "the drawing does not say its unit: give --unit m, mm, cm, ft, us-ft or in",
-        )
+        let units = Unit::listed(&Unit::NAMED);
+        Reader::of(file).invalid(key, value, format!("the drawing does not say its unit: give --unit {units}"))
     })
 }
 

@@ -9,7 +9,7 @@ use glam::DVec2;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::{Drawing, Entity, Layers};
+use super::{Drawing, Entity, Layers, Unit};
 use crate::files::reader::{Error, Reader, shortened};
 use crate::geometry::area::densified;
 use crate::geometry::{Curve, Piece, fitted_outline};
@@ -91,7 +91,7 @@ pub(super) fn drawing(file: &Path, text: &str, layers: &Layers) -> Result<Drawin
     let mut drawing = Drawing::default();
     let frame = frame(&reader, collection.crs.as_ref())?;
     drawing.notes.extend(frame.map(|name| format!("coordinates are those of {name}, in which `origin` lies")));
-    let metres = layers.unit.map_or(1.0, super::Unit::metres);
+    let metres = layers.unit.map_or(1.0, Unit::metres);
     let mut others: BTreeMap<&str, usize> = BTreeMap::new();
     let mut left = LONGEST;
     for (index, feature) in collection.features.iter().enumerate() {
@@ -183,7 +183,9 @@ impl Shape<'_> {
             }
             *left -= points.windows(2).map(|pair| pair[0].distance(pair[1])).sum::<f64>();
             if *left < 0.0 {
-                let expected = "cut the file down to the roundabout, or give --unit mm, cm, ft, us-ft or in";
+                // All but metres, which the file's are taken for.
+                let units = Unit::listed(&Unit::NAMED[1..]);
+                let expected = format!("cut the file down to the roundabout, or give --unit {units}");
                 let long = format!("kerbs are more than {:.0} km long by then", LONGEST / 1000.0);
                 return Err(self.reader.invalid(format!("{}: {key}", self.place), long, expected));
             }
