@@ -2,12 +2,12 @@
 //! paths as DXF and GeoJSON.
 
 mod dxf; // swept paths for a CAD program
-mod letters; // each glyph once
 mod geojson; // a road and swept paths for a GIS program
+mod letters; // each glyph once
+mod page; // the content of a PDF
 mod panel; // one route and vehicle on the sheet
 mod paper; // which paper at which scale
 mod pdf; // an SVG of paths as PDF
-mod page; // its content
 pub mod sheet; // panels, title block, legend
 
 pub use dxf::dxf;

@@ -17,6 +17,13 @@ pub enum Align {
     Right,
 }
 
+/// Width of the stroke of a letter as a fraction of the size: the typeface is light, and a thin stroke keeps it readable
+/// in small pictures.
+pub const WEIGHT: f64 = 0.035;
+/// Width of the light rim behind one over a map, as a fraction of the size, and its opacity.
+pub const RIM: f64 = 0.3;
+pub const RIM_OPACITY: f64 = 0.85;
+
 /// The typeface.
 pub struct Lettering {
     face: Face<'static>,
@@ -41,20 +48,15 @@ impl Lettering {
 
     /// One line of text with its base line at `at` (px).
     pub fn text(&self, words: &str, at: DVec2, size: f64, align: Align, colour: &str) -> Path {
-        // The typeface is light: a thin stroke keeps it readable in small pictures.
-        let weight = number(0.035 * size);
-        self.outlines(words, at, size, align)
-            .set("fill", colour)
-            .set("stroke", colour)
-            .set("stroke-width", weight)
-            .set("aria-label", words)
+        let outlines = self.outlines(words, at, size, align).set("fill", colour).set("stroke", colour);
+        outlines.set("stroke-width", number(WEIGHT * size)).set("aria-label", words)
     }
 
     /// One line of text with a light rim, to be read over a map, with its base line at `at` (px).
     pub fn text_on_map(&self, words: &str, at: DVec2, size: f64, align: Align, colour: &str) -> Group {
         let rim = self.outlines(words, at, size, align).set("fill", "white").set("stroke", "white");
-        let rim =
-            rim.set("stroke-width", number(0.3 * size)).set("stroke-linejoin", "round").set("stroke-opacity", 0.85);
+        let rim = rim.set("stroke-width", number(RIM * size)).set("stroke-linejoin", "round");
+        let rim = rim.set("stroke-opacity", RIM_OPACITY);
         Group::new().add(rim).add(self.text(words, at, size, align, colour))
     }
 

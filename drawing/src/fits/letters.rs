@@ -7,7 +7,7 @@ use glam::DVec2;
 use svg::node::element::{Definitions, Group, Path, Use};
 use ttf_parser::GlyphId;
 
-use crate::lettering::{Align, Lettering};
+use crate::lettering::{Align, Lettering, RIM, RIM_OPACITY, WEIGHT};
 use crate::view::number;
 
 /// Lines of text whose glyphs are used by name.
@@ -31,7 +31,7 @@ impl Letters<'_> {
     pub(super) fn text_on_map(&self, words: &str, at: DVec2, size: f64, align: Align, colour: &str) -> Group {
         let (rim, weight) = self.line(words, at, size, align);
         let rim = rim.set("fill", "white").set("stroke", "white").set("stroke-linejoin", "round");
-        let rim = rim.set("stroke-width", number(RIM / WEIGHT * weight)).set("stroke-opacity", 0.85);
+        let rim = rim.set("stroke-width", number(RIM / WEIGHT * weight)).set("stroke-opacity", RIM_OPACITY);
         Group::new().add(rim).add(self.text(words, at, size, align, colour))
     }
 
@@ -57,10 +57,6 @@ impl Letters<'_> {
         (group, WEIGHT / self.lettering.scale(1.0))
     }
 }
-
-/// Widths of the stroke of a letter and of the rim behind one, as fractions of the size.
-const WEIGHT: f64 = 0.035;
-const RIM: f64 = 0.3;
 
 fn name(glyph: GlyphId) -> String {
     format!("g{}", glyph.0)

@@ -42,16 +42,16 @@ pub fn pdf(svg: &str, title: &str, date: &str) -> Result<Vec<u8>, Error> {
     }
     states.finish();
     let mut forms = resources.x_objects();
-    for (index, _) in page.forms() {
-        forms.pair(Name(form(index).as_bytes()), Ref::new(FIRST_FORM + index as i32));
+    for (reference, (index, _)) in (FIRST_FORM..).map(Ref::new).zip(page.forms()) {
+        forms.pair(Name(form(index).as_bytes()), reference);
     }
     forms.finish();
     resources.finish();
     written.finish();
     pdf.stream(content, &packed(&page.written())).filter(Filter::FlateDecode);
-    for (index, painted) in page.forms() {
+    for (reference, (_, painted)) in (FIRST_FORM..).map(Ref::new).zip(page.forms()) {
         let content = packed(&painted.ops);
-        let mut form = pdf.form_xobject(Ref::new(FIRST_FORM + index as i32), &content);
+        let mut form = pdf.form_xobject(reference, &content);
         form.bbox(painted.bounds).filter(Filter::FlateDecode);
     }
     let mut about = pdf.document_info(info);
@@ -73,6 +73,7 @@ fn day(date: &str) -> Option<Date> {
 
 /// The object of the first form; those before it are the document's.
 const FIRST_FORM: i32 = 6;
+
 fn packed(bytes: &[u8]) -> Vec<u8> {
     let mut packed = ZlibEncoder::new(Vec::new(), Compression::best());
     // Writing to memory cannot fail.

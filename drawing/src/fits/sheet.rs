@@ -3,7 +3,7 @@
 use glam::DVec2;
 use offtrack::map::{Gutter, Road};
 use offtrack::vehicle::Vehicle;
-use offtrack_evaluation::fits::table::Units;
+use offtrack_evaluation::fits::table::{FOOT, Units};
 use svg::Document;
 use svg::node::element::{ClipPath, Definitions, Group, Path, Rectangle, Title};
 
@@ -18,8 +18,6 @@ use crate::lettering::{Align, Lettering};
 use crate::road::RoadLayers;
 use crate::view::{Layout, Straights, View, colour, number};
 
-/// Metres in a foot.
-const FOOT: f64 = 0.3048;
 /// Length of the arms shown beyond the ring (m).
 const ARMS: f64 = 25.0;
 /// Sizes of letters, and line spacing as a multiple of them (px).

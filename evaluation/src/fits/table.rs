@@ -10,7 +10,7 @@ use super::way::Way;
 use crate::tabular::quoted;
 
 /// Metres in a foot.
-const FOOT: f64 = 0.3048;
+pub const FOOT: f64 = 0.3048;
 /// Kilometres in a mile.
 const MILE: f64 = 1.609_344;
 /// Width of a name that is long, at least (columns).
