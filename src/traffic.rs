@@ -15,6 +15,7 @@ pub mod car; // the state of one car, and its outline
 pub mod clock; // random numbers by step and purpose
 pub mod decide; // the acceleration of each car
 pub mod demand; // how many cars want to go where
+mod drivers; // other kinds of drivers
 pub mod hcm; // the Highway Capacity Manual's equations
 mod kept; // tables from the cache
 mod meetings; // where two lines are near each other
@@ -23,7 +24,6 @@ mod network; // the tables
 mod others; // what cars mind besides each other
 mod paths; // lines that cars drive, and how fast
 pub mod rules; // the numbers of the driver model
-mod drivers; // other kinds of drivers
 mod row; // a truck's row of the column of cars
 mod run; // cars alone on a road
 mod snapshots; // states that episodes begin in
@@ -40,7 +40,7 @@ pub use clock::Clock;
 pub use decide::Driver;
 pub use demand::{Demand, Mix};
 pub use drivers::Drivers;
-pub use network::{Kind, Network, Pair, Path, Sample, Source, Stretch, Zone};
+pub use network::{Kind, Network, Pair, Path, SPACING, Sample, Source, Stretch, Zone};
 pub use others::{Nobody, Others};
 pub use paths::{begins, speed_limit};
 pub use row::Row;

@@ -131,7 +131,7 @@ impl Vehicle {
         Vehicle::from_source(&Source::Disk(path.to_owned()))
     }
 
-    /// A vehicle that comes with the library, by the name of its file under `scenarios/vehicles`: `daf_xf` and the like.
+    /// A vehicle that comes with the library, by the name of its file under `scenarios/vehicles`, as `daf_xf`.
     ///
     /// # Errors
     ///

@@ -20,7 +20,11 @@ fn ring_and_exit(scenario: &Scenario, route: &Route) -> [f64; 2] {
 impl Part {
     /// The part of `route` at `station` metres from its beginning. A route that passes outside the ring has no ring.
     pub(super) fn at(scenario: &Scenario, route: &Route, station: f64) -> Part {
-        let [ring, exit] = ring_and_exit(scenario, route);
+        Part::from(ring_and_exit(scenario, route), station)
+    }
+
+    /// The part at a station of a route whose ring and exit begin at these (m).
+    fn from([ring, exit]: [f64; 2], station: f64) -> Part {
         match station {
             station if station < ring => Part::Entry,
             station if station < exit => Part::Ring,
@@ -60,7 +64,7 @@ impl LaneWidths {
 
     /// The part of the route at `station` metres from its beginning.
     pub(super) fn part(&self, station: f64) -> Part {
-        [Part::Entry, Part::Ring, Part::Exit][self.from.iter().filter(|&&from| from <= station).count()]
+        Part::from(self.from, station)
     }
 
     /// Where `waypoint` is the next one to pass: on the segment that ends there (m).

@@ -1,6 +1,6 @@
 //! A learned policy where the trucks are: on the processor, or on their device by its kernel. Then no observation
-//! leaves the device. One that the kernel does not act by, with a memory or commands, drives trucks of a device from the
-//! processor.
+//! leaves the device. One that the kernel does not act by, with a memory or commands, drives trucks of a device from
+//! the processor.
 
 #[cfg(feature = "gpu")]
 mod on_device;

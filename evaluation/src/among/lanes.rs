@@ -5,7 +5,7 @@
 
 use glam::Vec2;
 use offtrack::traffic::car::Outline;
-use offtrack::traffic::{Network, Sample};
+use offtrack::traffic::{Network, SPACING, Sample};
 use offtrack::world::World;
 use serde::Serialize;
 
@@ -20,8 +20,6 @@ const SAME_WAY: f32 = 0.985;
 const AHEAD: f32 = 1.5;
 /// A unit so near to a lane's centre line leaves no room there for a car (m).
 const TAKES: f32 = 0.9;
-/// Distance between the samples of a path (m).
-const SPACING: f64 = 2.0;
 
 /// Points in the middle of the lanes beside a route's own, each with the part of the route that it is beside.
 #[derive(Debug, Clone, Default)]
@@ -34,7 +32,7 @@ impl LanesBeside {
         let network = &shared.road(world, route).network;
         let on = shared.routes[route as usize];
         let own = samples(network, on.path as usize);
-        let part = |index: usize| lane.part(SPACING * index as f64 - f64::from(on.begins));
+        let part = |index: usize| lane.part(f64::from(SPACING) * index as f64 - f64::from(on.begins));
         let others = (0..network.paths.len()).filter(|&path| path != on.path as usize);
         let points = others.flat_map(|path| samples(network, path)).filter_map(|sample| {
             let distance = |own: &Sample| own.position.distance_squared(sample.position);

@@ -66,8 +66,8 @@ pub(super) fn printed(ground: &Ground, policies: &[&Policy], packed: &mut Packed
     })
 }
 
-/// Other vehicles: the demands that episodes draw (veh/h) and where those lie, for each road the first word in the table
-/// of lanes and the words of each demand; nothing where there are no vehicles.
+/// Other vehicles: the demands that episodes draw (veh/h) and where those lie, for each road the first word in the
+/// table of lanes and the words of each demand; nothing where there are no vehicles.
 fn traffic(Ground { scenario, world, .. }: &Ground) -> Value {
     let (Some(of), Some(shared)) = (&scenario.traffic, &world.traffic) else { return Value::Null };
     json!({
