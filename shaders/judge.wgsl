@@ -17,6 +17,27 @@ fn judge_among(thread: Thread) {
     reward[env] += hindrance(env);
 }
 
+// Adds what the trailer's way over an apron weighs.
+@compute @workgroup_size(WORKGROUP)
+fn weigh_apron(thread: Thread) {
+    let env = index_of(thread);
+    if is_driving(env) { reward[env] += weights.apron * depth_on_apron(truck[env]); }
+}
+
+// How far a trailer is on an apron (m): the wheel that is furthest, of those at both ends of its axle group.
+fn depth_on_apron(truck: Truck) -> f32 {
+    if !has_apron(truck.route) { return 0.0; }
+    let rig = vehicles[truck.vehicle].rig;
+    let middle = trailer_position(rig, truck);
+    let heading = direction(truck.trailer_heading);
+    let across = rig.trailer_body.half_width * vec2<f32>(-heading.y, heading.x);
+    // What the tractor keeps to ends where an apron begins.
+    let field = field_at(truck.route);
+    let left = field_sample(field, true, middle + across).distance;
+    let right = field_sample(field, true, middle - across).distance;
+    return max(-min(left, right), 0.0);
+}
+
 // Judges a truck's step, with the contact that it had.
 fn judge_step(env: u32, met: u32) {
     truck[env].steps += 1u;

@@ -861,6 +861,8 @@ struct Reward {
     clearance_limit: f32,
     // Reward when the episode fails.
     failure: f32,
+    // Reward for each metre that the trailer is on an apron, each step.
+    apron: f32,
 }
 
 // What the world does to a policy, by the keys of a benchmark's `[disturbances]`. Zeros are nothing.

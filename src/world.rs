@@ -256,6 +256,12 @@ impl World {
         [tractor, own.unwrap_or(tractor)]
     }
 
+    /// Whether a route's roundabout has an apron.
+    #[inline]
+    pub fn has_apron(&self, route: u32) -> bool {
+        self.trailer_fields[self.routes[route as usize].roundabout as usize].is_some()
+    }
+
     /// Every field: one a roundabout, then those of trailers.
     pub fn all_fields(&self) -> impl Iterator<Item = &Field> {
         self.fields.iter().chain(self.trailer_fields.iter().flatten())

@@ -59,6 +59,8 @@ pub struct Episode {
     pub articulation_peak: f64,
     /// Largest distance of the trailer axle from the path of the front axle (m).
     pub off_tracking_peak: f64,
+    /// Furthest that a wheel of the trailer was on an apron (m); `None` where the road has none.
+    pub on_apron: Option<f64>,
     /// How the truck drove, where classes of vehicles are reported.
     pub driving: Option<Driving>,
     /// How it drove among other vehicles, where there are any.
@@ -110,6 +112,13 @@ pub struct Summary {
     pub articulation_peak_deg: f64,
     /// Largest off-tracking (m).
     pub off_tracking_peak: f64,
+    /// Fraction of the episodes in which wheels of the trailer were on an apron, of those on roads with one; `None` of
+    /// none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub on_apron: Option<f64>,
+    /// Furthest that a wheel was on one (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub on_apron_max: Option<f64>,
     /// Mean time of an episode (s).
     pub time_mean: f64,
     /// Mean sum of rewards.
@@ -143,6 +152,8 @@ impl Summary {
         let mean_arrived = |value: fn(&Episode) -> f64| {
             (0 < n_arrived).then(|| arrived.clone().map(value).sum::<f64>() / n_arrived as f64)
         };
+        let on_aprons: Vec<f64> = episodes.clone().filter_map(|episode| episode.on_apron).collect();
+        let n_on_apron = on_aprons.iter().filter(|&&depth| 0.0 < depth).count();
         let mut ends: BTreeMap<&'static str, usize> = Ended::WITHOUT_VEHICLES
             .into_iter()
             .filter(|&ended| ended != Ended::Running)
@@ -171,6 +182,8 @@ impl Summary {
             load_transfer_ratio_peak: most(|episode| episode.load_transfer_ratio_peak),
             articulation_peak_deg: most(|episode| episode.articulation_peak).to_degrees(),
             off_tracking_peak: most(|episode| episode.off_tracking_peak),
+            on_apron: (!on_aprons.is_empty()).then(|| n_on_apron as f64 / on_aprons.len() as f64),
+            on_apron_max: on_aprons.iter().copied().reduce(f64::max),
             time_mean: step * mean(|episode| f64::from(episode.steps)),
             reward_mean: mean(|episode| episode.reward),
             among_vehicles: AmongSummary::of(episodes),
@@ -214,6 +227,7 @@ pub(super) mod tests {
             load_transfer_ratio_peak: 1.5,
             articulation_peak: 1.9,
             off_tracking_peak: 10.25,
+            on_apron: None,
             driving: Some(Driving::new(&Truck::default(), 0.0)),
             among: None,
             last: Truck::default(),
@@ -234,6 +248,20 @@ pub(super) mod tests {
         assert!(low < 0.6 && 0.95 < high && low < summary.success_low && summary.success_high < high, "{low} {high}");
         let one_route = Summary::of(episodes[..30].iter(), 0.1).unwrap();
         assert_eq!((one_route.success_low_over_routes, one_route.success_high_over_routes), (None, None));
+    }
+
+    #[test]
+    fn the_use_of_aprons_is_that_of_the_episodes_on_roads_that_have_one() {
+        let on = |on_apron| Episode { on_apron, ..episode(Ended::Arrived) };
+        let of = |episodes: &[Episode]| {
+            let summary = Summary::of(episodes.iter(), 0.1).unwrap();
+            (summary.on_apron, summary.on_apron_max)
+        };
+        assert_eq!(
+            of(&[on(None), on(Some(0.0)), on(Some(0.25)), on(Some(0.0)), on(Some(1.5))]),
+            (Some(0.5), Some(1.5))
+        );
+        assert_eq!(of(&[on(None), on(None)]), (None, None));
     }
 
     #[test]

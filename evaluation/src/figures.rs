@@ -1,7 +1,7 @@
 //! The figures of episodes under way, one a truck, from their starts to their ends.
 
 use offtrack::layout::{Control, Ended, Truck};
-use offtrack::physics::seen_by_vehicles;
+use offtrack::physics::{depth_on_apron, seen_by_vehicles};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{Error, Simulator};
 use offtrack::traffic::Row;
@@ -87,7 +87,8 @@ impl<'a> Figures<'a> {
                 view,
                 lanes: &self.beside[route],
             });
-            if running.follow(self.world.rig(truck), &self.lanes[route], around.as_ref(), seen, env) {
+            let apron = self.world.has_apron(truck.route).then(|| depth_on_apron(self.world, truck));
+            if running.follow(self.world.rig(truck), &self.lanes[route], around.as_ref(), apron, seen, env) {
                 *finished = Some(running.finish(Ended::from_code(seen.ended[env]).unwrap_or(Ended::Running)));
                 n_ended += 1;
             }

@@ -64,6 +64,7 @@ impl Running {
                 load_transfer_ratio_peak: 0.0,
                 articulation_peak: 0.0,
                 off_tracking_peak: 0.0,
+                on_apron: None,
                 driving,
                 among,
                 last: *truck,
@@ -76,12 +77,13 @@ impl Running {
     }
 
     /// Adds the last step; true if it ended the episode. `lane` is that of the truck's route, `around` what is of other
-    /// vehicles there.
+    /// vehicles there, `apron` how far the trailer is on an apron (m), if there is one.
     pub(super) fn follow(
         &mut self,
         rig: &Rig,
         lane: &LaneWidths,
         around: Option<&Around>,
+        apron: Option<f32>,
         seen: &Seen,
         env: usize,
     ) -> bool {
@@ -98,6 +100,9 @@ impl Running {
         lower(&mut self.episode.trailer_clearance_min, clearance.trailer);
         raise(&mut self.episode.load_transfer_ratio_peak, truck.load_transfer_ratio());
         raise(&mut self.episode.articulation_peak, wrapped(truck.heading - truck.trailer_heading).abs());
+        if let Some(depth) = apron {
+            self.episode.on_apron = Some(self.episode.on_apron.unwrap_or(0.0).max(f64::from(depth)));
+        }
         if let Some(driving) = &mut self.episode.driving {
             driving.follow(truck, &seen.control[env], self.step);
         }

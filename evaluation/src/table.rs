@@ -137,6 +137,13 @@ impl Report {
                 width,
             );
         }
+        if let Some((fraction, most)) = self.summary.on_apron.zip(self.summary.on_apron_max) {
+            let percent = 100.0 * fraction;
+            let line = format!(
+                "On an apron with a wheel of the trailer in {percent:.1} % of the episodes, up to {most:.2} m."
+            );
+            push_wrapped(&mut text, &line, width);
+        }
         let among = self.groups.demand.iter();
         let among = among.filter_map(|group| Some((&group.name, group.summary.among_vehicles.as_ref()?)));
         let lines = among.map(|(name, among)| (among.line(name), among.line_of_lanes(name)));

@@ -44,7 +44,8 @@ class Evaluation:
       kerbs, 0..1; ``term_failure``, 1 for a failure;
     - ``lane_distance_mean``, ``lane_distance_max`` [m]; ``outside_lane``, a fraction of the steps;
     - ``tractor_clearance_min``, ``trailer_clearance_min`` [m], negative beyond a kerb;
-    - ``load_transfer_ratio_peak``, 1 where wheels lift; ``articulation_peak`` [rad]; ``off_tracking_peak`` [m].
+    - ``load_transfer_ratio_peak``, 1 where wheels lift; ``articulation_peak`` [rad]; ``off_tracking_peak`` [m];
+    - ``on_apron``, furthest that a wheel of the trailer was on an apron [m], NaN where the road has none.
 
     ``pandas.DataFrame(table)`` takes it, and ``np.savetxt(file, table, "%s", ",", header=",".join(table.dtype.names),
     comments="")`` writes it.

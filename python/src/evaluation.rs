@@ -108,7 +108,7 @@ fn columns<'py>(py: Python<'py>, starts: &[Start], episodes: &[Episode]) -> PyRe
         ("ended", |episode| episode.ended as i64),
         ("steps", |episode| episode.steps.into()),
     ];
-    let of_episodes: [Field<Episode, f64>; 13] = [
+    let of_episodes: [Field<Episode, f64>; 14] = [
         ("reward", |episode| episode.reward),
         ("lane_distance_mean", |episode| episode.lane_distance_mean),
         ("lane_distance_max", |episode| episode.lane_distance_max),
@@ -118,6 +118,7 @@ fn columns<'py>(py: Python<'py>, starts: &[Start], episodes: &[Episode]) -> PyRe
         ("load_transfer_ratio_peak", |episode| episode.load_transfer_ratio_peak),
         ("articulation_peak", |episode| episode.articulation_peak),
         ("off_tracking_peak", |episode| episode.off_tracking_peak),
+        ("on_apron", |episode| episode.on_apron.unwrap_or(f64::NAN)),
         ("term_waypoints", |episode| episode.terms.waypoints),
         ("term_lane_distance", |episode| episode.terms.lane_distance),
         ("term_clearance", |episode| episode.terms.clearance),

@@ -30,6 +30,11 @@ fn unit_field_at(index: u32, unit: u32) -> FieldRow {
     return field_in(select(index * ROUTE_ROWS + 2u, own, unit == 1u && own != 0u));
 }
 
+// Whether a route's roundabout has an apron.
+fn has_apron(index: u32) -> bool {
+    return roads[index * ROUTE_ROWS + 1u].y != 0u;
+}
+
 // The field in a row and the next.
 fn field_in(row: u32) -> FieldRow {
     let floats = bitcast<vec4<f32>>(roads[row]);

@@ -126,6 +126,8 @@ crate::named! {
         Judge = "judge",
         /// [`Stage::Judge`] where there are other vehicles.
         JudgeAmong = "judge_among",
+        /// [`Stage::Judge`]: what a trailer's way over an apron weighs.
+        WeighApron = "weigh_apron",
         /// [`Stage::Count`].
         Count = "count",
         /// [`Stage::CopyObservation`].
@@ -191,6 +193,8 @@ pub struct Case {
     pub vehicles: bool,
     /// They are observed.
     pub around: bool,
+    /// The reward weighs how far trailers are on aprons.
+    pub aprons: bool,
     /// What follows the end of an episode.
     pub autoreset: Autoreset,
 }
@@ -204,6 +208,7 @@ impl Case {
             extras: 0 < world.params.n_extras,
             vehicles: world.traffic.is_some(),
             around: world.observes_vehicles(),
+            aprons: world.reward.apron != 0.0,
             autoreset,
         }
     }
@@ -211,9 +216,10 @@ impl Case {
     /// The kernels of a step, one after the other.
     pub fn step(self) -> impl Iterator<Item = Kernel> + Clone {
         let kernels: &[Kernel] = if self.disturbed { &DISTURBED_STEP } else { &STEP };
-        // Judging among vehicles leaves no buffer to count with.
-        let judges: &[Kernel] =
-            if self.vehicles { &[Kernel::JudgeAmong, Kernel::Count] } else { &[Kernel::JudgeAndCount] };
+        // Judging among vehicles leaves no buffer to count with, and what an apron weighs is added before.
+        use Kernel::{Count, Judge, JudgeAmong, JudgeAndCount, WeighApron};
+        let apart = self.vehicles || self.aprons;
+        let judges: &[Kernel] = if apart { &[Judge, JudgeAmong, WeighApron, Count] } else { &[JudgeAndCount] };
         self.working(kernels.iter().chain(judges).chain(Stage::Reset.kernels()))
     }
 
@@ -237,7 +243,7 @@ impl Stage {
             Stage::Follow => &[Kernel::Follow],
             Stage::Sense => &[Kernel::Sense],
             Stage::Observe => &[Kernel::Observe, Kernel::ObserveExtras, Kernel::ObserveAround],
-            Stage::Judge => &[Kernel::Judge, Kernel::JudgeAmong],
+            Stage::Judge => &[Kernel::Judge, Kernel::JudgeAmong, Kernel::WeighApron],
             Stage::Count => &[Kernel::Count],
             Stage::CopyObservation => &[Kernel::CopyObservation, Kernel::CopyAround],
             Stage::Reset => &[
@@ -310,6 +316,7 @@ impl Kernel {
             Kernel::CopyAround => buffers![Batch; Truck Around NextAround],
             Kernel::ForgetAround => buffers![Batch Begins; Around NextAround],
             Kernel::Judge => buffers![Params Weights Limits Batch; Truck Clearance Progress Ended Terms Reward],
+            Kernel::WeighApron => buffers![Weights Vehicles Roads Cells Corners Batch; Truck Reward],
             Kernel::Count => buffers![Batch; Truck Ended Reward; Tally],
             Kernel::CopyObservation => buffers![Batch; Truck Observation NextObservation Extras NextExtras],
             Kernel::Reset => buffers![Params Vehicles Roads Batch Choice Streams; Control Truck Progress Ended],
@@ -362,6 +369,7 @@ impl Kernel {
     const fn works(self, case: Case) -> bool {
         match self {
             Kernel::PerceiveAfterReset => case.disturbed,
+            Kernel::WeighApron => case.aprons,
             Kernel::Judge | Kernel::JudgeAndCount => !case.vehicles,
             _ if self.observes_vehicles() => case.around,
             _ if self.is_of_vehicles() => case.vehicles,

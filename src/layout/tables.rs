@@ -145,6 +145,8 @@ crate::shared! {
         pub clearance_limit: f32,
         /// Reward when the episode fails.
         pub failure: f32,
+        /// Reward for each metre that the trailer is on an apron, each step.
+        pub apron: f32,
     }
 
     /// What the world does to a policy, by the keys of a benchmark's `[disturbances]`. Zeros are nothing.

@@ -87,6 +87,9 @@ reward! {
     clearance_limit: [0.01, 10.0], "m";
     /// Reward for a failure.
     failure: WEIGHT, "";
+    /// Weight of how far the trailer is on an apron, in the reward of each step; no term of reports.
+    #[serde(default)]
+    apron: WEIGHT, "";
 }
 
 fn half_a_metre() -> f64 {

@@ -178,9 +178,13 @@ fn check_terms(env: usize, terms: &RewardTerms, n_waypoints: u32) -> Result<(), 
     fractions.into_iter().try_for_each(|(field, value)| within(Column::Terms, env, field, value, 0.0..=1.0))
 }
 
+/// Furthest that a wheel can be on an apron (m): a field tells no more.
+const MOST_ON_APRON: f32 = 16.0;
+
 /// Most that a step's reward can be, and its negative the least, on a route with so many waypoints.
 fn largest_reward(weights: &Reward, n_waypoints: u32) -> f32 {
-    let once = weights.lane_distance.abs() + weights.clearance.abs() + weights.failure.abs();
+    let Reward { lane_distance, clearance, failure, apron, .. } = weights;
+    let once = lane_distance.abs() + clearance.abs() + failure.abs() + MOST_ON_APRON * apron.abs();
     (weights.waypoint.abs() * n_waypoints as f32 + once) * OBSERVED
 }
 

@@ -81,10 +81,11 @@ mod tests {
     fn a_change_of_any_table_of_a_world_is_another_fingerprint() {
         let world = World::bake(&Scenario::named("attard2023").unwrap()).unwrap();
         let before = world.fingerprint();
-        let changes: [Change; 21] = [
+        let changes: [Change; 22] = [
             ("params", |world| world.params.stray_distance += 1.0),
             ("params, kind of the actions", |world| world.params.n_actions = 0),
             ("reward", |world| world.reward.failure -= 1.0),
+            ("reward, apron", |world| world.reward.apron -= 1.0),
             ("disturbances", |world| world.disturbances.map_offset += 0.1),
             ("rigs", |world| world.rigs[0].slip += 1e-6),
             ("classes, vehicle", |world| world.classes[0].vehicle += "x"),

@@ -9,7 +9,7 @@ use offtrack::layout::{Ended, Truck};
 use offtrack::map::{Gutter, Road, UnitKerbs};
 use offtrack::physics::closeness;
 use offtrack::scenario::{FIELD_CELL, Scenario};
-use offtrack::simulator::RouteChoice;
+use offtrack::simulator::{Engine, RouteChoice};
 use offtrack::vehicle::swept::Pose;
 use offtrack::world::World;
 use rayon::prelude::*;
@@ -104,6 +104,44 @@ fn on_an_apron_a_trailer_stands_clear_and_a_tractor_does_not() {
         assert!(0.0 < beside.tractor && beside.tractor < 1.0, "{name}: {beside:?}");
         assert!(on.tractor <= 0.0 && 0.0 < on.trailer && on.trailer < APRON as f32, "{name}: {on:?}");
         assert!(beside.tractor + 0.5 * (APRON as f32) < beside.trailer, "{name}: {beside:?}");
+    }
+}
+
+#[test]
+fn the_reward_weighs_how_far_the_trailers_wheels_are_on_an_apron_and_nothing_else_does() {
+    let kerbs = road("40m").unit_kerbs(Gutter::Drivable);
+    let (mut world, field) = on_kerbs(&kerbs);
+    let radius = Road::named("40m").unwrap().island_radius();
+    let rig = world.rigs[0];
+    // The trailer stands along a tangent of the island, its left wheel so far inside of the kerb's face.
+    let deep = |depth: f64| {
+        let middle = DVec2::new(0.0, -(radius - depth + f64::from(rig.trailer_body.half_width)));
+        let front = Vec2::new(rig.trailer_wheelbase - rig.fifth_wheel, 0.0);
+        Truck { position: middle.as_vec2() + front, ..Truck::default() }
+    };
+    let depths = [-0.5, -0.02, 0.02, 0.3, 0.98, 1.4];
+    let trucks = depths.map(deep);
+    let rewards = |engine: &Engine, world: &World| {
+        let mut simulator = after_stage(engine, world, &field, &trucks, Stage::Collide);
+        simulator.run_stage(Stage::Judge);
+        let batch = simulator.batch();
+        (batch.reward.clone(), batch.terms.clone())
+    };
+    for (name, engine) in engines() {
+        world.reward.apron = 0.0;
+        let (before, terms) = rewards(&engine, &world);
+        world.reward.apron = -4.0;
+        let (after, same) = rewards(&engine, &world);
+        assert_eq!(terms, same);
+        for ((depth, before), after) in depths.into_iter().zip(before).zip(after) {
+            let expected = -4.0 * depth.max(0.0) as f32;
+            assert!((after - before - expected).abs() < 0.05, "{name}, {depth} m: {before} {after}");
+        }
+        let mut without = world.clone();
+        without.trailer_fields = vec![None];
+        let mut unweighed = without.clone();
+        unweighed.reward.apron = 0.0;
+        assert_eq!(rewards(&engine, &without), rewards(&engine, &unweighed), "{name}");
     }
 }
 

@@ -99,6 +99,7 @@ lane_distance_limit = 4.0
 clearance = -1.0
 clearance_limit = 0.4
 failure = -500.0
+apron = -2.0
 [routes]
 approach = 26.0
 departure = 30.0

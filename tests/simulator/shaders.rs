@@ -223,7 +223,7 @@ mod module {
         let of_stages: Vec<Kernel> = STAGES.iter().flat_map(|stage| stage.kernels()).copied().collect();
         let of_steps = [false, true].map(|all| {
             let autoreset = Autoreset::NextStep;
-            let case = Case { disturbed: all, extras: true, vehicles: all, around: all, autoreset };
+            let case = Case { disturbed: all, extras: true, vehicles: all, around: all, aprons: all, autoreset };
             case.step().collect::<Vec<Kernel>>()
         });
         for kernel in Kernel::ALL {
@@ -235,9 +235,12 @@ mod module {
     #[test]
     fn a_step_takes_few_kernels_and_more_only_where_there_is_more_to_do() {
         let n = |disturbed, extras, autoreset| {
-            let count = |vehicles, around| Case { disturbed, extras, vehicles, around, autoreset }.step().count();
-            let alone = count(false, false);
-            assert_eq!([count(true, false), count(true, true)], [alone + 6, alone + 8]);
+            let count = |vehicles, around, aprons| {
+                Case { disturbed, extras, vehicles, around, aprons, autoreset }.step().count()
+            };
+            let alone = count(false, false, false);
+            assert_eq!([count(true, false, false), count(true, true, false)], [alone + 6, alone + 8]);
+            assert_eq!([count(false, false, true), count(true, true, true)], [alone + 2, alone + 9]);
             alone
         };
         assert_eq!(n(false, false, Autoreset::SameStep), 8);

@@ -133,6 +133,15 @@ fn the_time_outside_the_own_lane_is_told() {
 }
 
 #[test]
+fn the_use_of_aprons_is_told_where_there_are_any() {
+    let mut report = report();
+    assert!(!report.table(100).contains("apron"));
+    (report.summary.on_apron, report.summary.on_apron_max) = (Some(0.25), Some(0.876));
+    let expected = "On an apron with a wheel of the trailer in 25.0 % of the episodes, up to 0.88 m.\n";
+    assert!(report.table(100).contains(expected));
+}
+
+#[test]
 fn the_searches_for_possible_starts_are_told_below_the_sums() {
     let table = report().table(100);
     assert!(table.lines().any(|line| line.starts_with("possible ") && line.contains("692/695")), "{table}");

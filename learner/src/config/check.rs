@@ -137,6 +137,10 @@ impl Refinement {
         reader.within("refinement.critic_iterations", self.critic_iterations as f64, 0.0..=1e9, "iterations")?;
         reader.within("refinement.clearance_power", self.clearance_power, 0.1..=10.0, "")?;
         self.reward.check(reader, "refinement.reward")?;
+        if let Some(apron) = self.reward.apron {
+            let expected = "an apron weighs what it does in the run: set reward.apron";
+            return Err(reader.invalid("refinement.reward.apron", apron, expected).into());
+        }
         Ok(())
     }
 }

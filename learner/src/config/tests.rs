@@ -96,6 +96,7 @@ fn a_refinements_value_out_of_its_range_is_refused_with_its_key() {
         ("refinement.clearance_power=0.0", "refinement.clearance_power: 0; must lie in"),
         ("refinement.reward.clearance_limit=0.0", "refinement.reward.clearance_limit: 0 m; must lie in 0.01..10 m"),
         ("refinement.reward.lane=1.0", "unknown field `lane`"),
+        ("refinement.reward.apron=-1.0", "refinement.reward.apron: -1; an apron weighs what it does in the run"),
     ] {
         let message = Config::read_with(Path::new("lane"), &[setting.to_owned()]).unwrap_err().to_string();
         assert!(message.contains(expected), "{setting}: {message}");

@@ -216,8 +216,8 @@ impl<const N: usize> Rollout for HostRollout<N> {
     fn collect(&mut self, actor: &Mlp, settings: &Refinement) -> Result<Steps, Error> {
         let (n_envs, n_actions, n_steps) = (self.config.n_envs, self.n_actions(), settings.n_steps);
         let Learning { arrival, reward_scale, .. } = self.config.learning;
-        let limit = self.simulator.world().reward.lane_distance_limit;
-        let mut weights = self.simulator.world().reward;
+        let own = self.simulator.world().reward;
+        let mut weights = own;
         settings.reward.apply_to_world(&mut weights);
         let mut steps = Steps { n_envs, n_values: N, ..Steps::default() };
         for step in 0..n_steps {
@@ -233,13 +233,15 @@ impl<const N: usize> Rollout for HostRollout<N> {
             self.simulator.step(&actions)?;
             let batch = self.simulator.batch();
             for env in 0..n_envs {
+                let lane = batch.terms[env].lane_distance * own.lane_distance_limit / weights.lane_distance_limit;
                 let terms = RewardTerms {
-                    lane_distance: (batch.terms[env].lane_distance * limit / weights.lane_distance_limit).min(1.0),
+                    lane_distance: lane.min(1.0),
                     clearance: physics::closeness(&weights, &batch.clearance[env])
                         .powf(settings.clearance_power as f32),
                     ..batch.terms[env]
                 };
-                steps.reward.push(physics::rewarded(&weights, &terms));
+                let beside = batch.reward[env] - physics::rewarded(&own, &batch.terms[env]); // hindrance, aprons
+                steps.reward.push(physics::rewarded(&weights, &terms) + beside);
             }
             let reward = &mut steps.reward[step * n_envs..];
             if let Some(arrival) = arrival {

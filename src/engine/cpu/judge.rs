@@ -2,15 +2,18 @@
 //!
 //! Failure wins over a vehicle that drove into the truck, that over arrival, everything over the time limit.
 
+use glam::Vec2;
+
 use crate::engine::Row;
 use crate::engine::cpu::traffic::hindrance;
-use crate::layout::angle::wrapped;
+use crate::field::Purpose;
+use crate::layout::angle::{direction, wrapped};
 use crate::layout::{Clearance, Ended, Params, Progress, Reward, RewardTerms, RouteRow, Truck};
 use crate::traffic::{self, Contact};
 use crate::world::World;
 
 /// Advances the truck's number of steps and writes the end code, the reward's terms and the reward: their weighted sum
-/// and, among other vehicles, what the truck's hindrance of them weighs.
+/// and, among other vehicles, what the truck's hindrance of them weighs, and what its trailer's way over an apron does.
 pub fn judge(world: &World, row: &mut Row) {
     row.truck.steps += 1;
     let route = &world.routes[row.truck.route as usize];
@@ -23,6 +26,24 @@ pub fn judge(world: &World, row: &mut Row) {
     if let Some(hindrance) = hindrance(world, row) {
         *row.reward += hindrance;
     }
+    if world.reward.apron != 0.0 {
+        *row.reward += world.reward.apron * depth_on_apron(world, row.truck);
+    }
+}
+
+/// How far the trailer is on an apron (m): the wheel that is furthest, of those at both ends of its axle group.
+pub fn depth_on_apron(world: &World, truck: &Truck) -> f32 {
+    if !world.has_apron(truck.route) {
+        return 0.0;
+    }
+    let rig = world.rig(truck);
+    let (middle, heading) = (truck.trailer_position(rig), direction(truck.trailer_heading));
+    let across = rig.trailer_body.half_width * Vec2::new(-heading.y, heading.x);
+    let [left, right] = [middle + across, middle - across];
+    // What the tractor keeps to ends where an apron begins.
+    let field = world.route_field(truck.route);
+    let [left, right] = field.sample(Purpose::Exact, &[left.x, right.x], &[left.y, right.y]).distance;
+    (-left.min(right)).max(0.0)
 }
 
 /// Why the episode ended, [`Ended::Running`] when it did not.

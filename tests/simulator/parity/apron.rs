@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use offtrack::engine::stages::Stage;
 use offtrack::field::Field;
+use offtrack::layout::Truck;
 use offtrack::map::Gutter;
+use offtrack::physics;
 use offtrack::world::World;
 
 use super::assert_noticed;
@@ -32,5 +34,20 @@ fn clearances_beside_aprons_agree_and_would_not_without_them_or_with_those_of_an
         [|world: &mut World| world.trailer_fields.fill(None), |world: &mut World| world.trailer_fields.swap(1, 3)]
     {
         assert_noticed(&world, &choice, &before, ("trailer_fields", Stage::Collide, change));
+    }
+}
+
+#[test]
+fn what_an_apron_weighs_agrees_and_would_not_with_another_weight_or_without_aprons() {
+    let mut world = World::clone(&world_with_aprons());
+    world.reward.apron = -2.0;
+    let world = Arc::new(world);
+    let (choice, before) = varied(&world, false);
+    let is_on_one = |truck: &&Truck| 0.0 < physics::depth_on_apron(&world, truck);
+    let n_on = before.truck.iter().filter(is_on_one).count();
+    assert!(500 < n_on, "{n_on} trailers are on an apron");
+    let wider: fn(&mut World) = |world| world.rigs[0].trailer_body.half_width += 0.05;
+    for change in [|world: &mut World| world.reward.apron *= 1.01, |world| world.trailer_fields.fill(None), wider] {
+        assert_noticed(&world, &choice, &before, ("reward.apron", Stage::Judge, change));
     }
 }
