@@ -82,7 +82,7 @@ def at_one_speed(folder, base, kmh):
 
 def slower(folder, kmh):
     """A policy of attard2023, seed 71 of its long run, with another target speed in its action table."""
-    whole = (ROOT / "docs/data/best-71.safetensors").read_bytes()
+    whole = (ROOT / "board/best-71.safetensors").read_bytes()
     (length,) = struct.unpack("<Q", whole[:8])
     header = json.loads(whole[8 : 8 + length])
     description = json.loads(header["__metadata__"]["offtrack"])

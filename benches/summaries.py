@@ -184,7 +184,7 @@ def shipped():
 def refinement():
     archive = Archive("refinement")
     commands = [
-        "offtrack train lane --from docs/data/best-71.safetensors --seed 150, 151, 152",
+        "offtrack train lane --from board/best-71.safetensors --seed 150, 151, 152",
         "offtrack evaluate --benchmark attard2023-full --policy FILE --certify, and with --split train",
         "offtrack evaluate --benchmark random2026 --policy FILE --episodes 1 --certify",
         "offtrack evaluate --benchmark random2026 --split validation --policy FILE --episodes 20",

@@ -22,7 +22,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-STRONG = ["attard2023", "attard2023-lane", str(ROOT / "docs/data/best-71.safetensors")]
+STRONG = ["attard2023", "attard2023-lane", str(ROOT / "board/best-71.safetensors")]
 HEAD = """\
 # Ten routes of ten validation roads of random2026, hard and of low variance, for ablations: dev10.py chose them, and
 # says how. Otherwise as random2026.toml; policies are trained on its training roads.
