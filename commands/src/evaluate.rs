@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use offtrack::files::reader;
 use offtrack::scenario::Split;
 use offtrack_evaluation::actions;
+use offtrack_evaluation::avoidable::{self, contacts};
 use offtrack_evaluation::certificate::attempt::{HOLD, passes};
 use offtrack_evaluation::certificate::{certified, check_levels};
 use offtrack_evaluation::comparison::Asked;
@@ -80,6 +81,17 @@ pub struct Args {
     /// commas. The widest search is repeated with a choice at every step.
     #[arg(long, value_delimiter = ',', default_value = "64,512", requires = "certify")]
     widths: Vec<usize>,
+    /// Search from so long before each contact with another vehicle [s] for actions that avoid it, and report how many
+    /// could have been avoided.
+    #[arg(
+        long,
+        value_name = "SECONDS,...",
+        value_delimiter = ',',
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "3,1"
+    )]
+    avoidable: Option<Vec<f64>>,
     #[command(flatten)]
     device: devices::Choice,
 }
@@ -134,6 +146,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if args.certify {
         check_levels(&world)?;
     }
+    if let Some(seconds) = &args.avoidable {
+        avoidable::check(&scenario, &world, seconds)?;
+    }
     if args.actions.is_some() {
         actions::check_levels(&world)?;
     }
@@ -164,6 +179,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
         None
     };
     let mut report = evaluation.summarised(policy.name(), &finished, searched);
+    if let Some(seconds) = &args.avoidable {
+        let bar = progress::Bar::new("avoiding", "contacts", contacts(&finished).count());
+        report.avoidable = Some(evaluation.avoidable(&finished, &sequences, seconds, &|| bar.advance())?);
+    }
     report.certified = possible.and_then(|possible| {
         let chunks = scenario.split(split).iter().zip(finished.chunks(episodes));
         let kept: Vec<&Episode> =

@@ -3,6 +3,7 @@
 
 pub mod attempt; // searches from one start until one arrives, and from many at once
 pub mod beam; // a search
+pub mod avoidance; // a search from before a contact with another vehicle
 pub mod file; // what it found
 pub mod line; // the paths that it drove, as lines to follow
 pub mod verify; // driving it again
@@ -21,14 +22,18 @@ use verify::Sequence;
 /// An error for a world whose actions are continuous: a search tries every action of a table.
 pub fn check_levels(world: &World) -> Result<(), Error> {
     if world.traffic.is_some() {
-        let expected = "a search drives on an empty road: the same benchmark without that table is needed".to_owned();
+        let expected = "a search drives on an empty road: the same benchmark without that table is needed; `evaluate \
+                        --avoidable` searches from before each contact"
+            .to_owned();
         return Err(Error::Setting { name: "[traffic]", value: "vehicles around each truck".to_owned(), expected });
     }
-    if !world.is_continuous() {
-        return Ok(());
-    }
+    if world.is_continuous() { Err(needs_levels()) } else { Ok(()) }
+}
+
+/// The error for a world whose actions are continuous.
+pub(crate) fn needs_levels() -> Error {
     let expected = "a search tries levels: the same benchmark with actions.steer_levels is needed".to_owned();
-    Err(Error::Setting { name: "actions.kind", value: "continuous".to_owned(), expected })
+    Error::Setting { name: "actions.kind", value: "continuous".to_owned(), expected }
 }
 
 /// The certified ones among `routes`, as indices of the world: those completed from every start. Their sequences are

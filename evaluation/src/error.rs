@@ -84,13 +84,27 @@ pub enum Error {
         /// The end code after the last action of the sequence.
         ended: &'static str,
     },
+    /// The recorded actions of an episode do not give its end again.
+    #[error(
+        "{}, episode {episode}: driven again it ends otherwise; leave --avoidable out",
+        shortened(route, LONGEST_PATH)
+    )]
+    NotRepeated {
+        /// The route.
+        route: String,
+        /// Number of the episode among those of its route.
+        episode: usize,
+    },
 }
 
 impl Error {
     /// Whether the input was wrong: a file, a setting or a batch asked for. Otherwise something failed on valid input:
-    /// a device, a disk, threads, or a certificate.
+    /// a device, a disk, threads, a certificate, or an episode driven again.
     pub fn is_wrong_input(&self) -> bool {
-        let failed = matches!(self, Error::Write { .. } | Error::Threads(_) | Error::NotVerified { .. });
+        let failed = matches!(
+            self,
+            Error::Write { .. } | Error::Threads(_) | Error::NotVerified { .. } | Error::NotRepeated { .. }
+        );
         !failed && !self.is_device_failure()
     }
 

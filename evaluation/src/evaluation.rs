@@ -182,6 +182,7 @@ impl Evaluation<'_> {
             needs_deviation: of_routes(false),
             certified: None,
             possible,
+            avoidable: None,
             failures: self.failures(finished, is_possible),
             classes: classes::classes(scenario, self.world, finished, is_possible),
             groups: Groups::of(&routes, finished, scenario.step),

@@ -53,6 +53,7 @@ pub mod certificate; // routes shown to be possible
 pub mod actions; // an evaluation's, in a file
 pub mod fits; // whether a truck fits through a road
 pub mod possible; // success over the starts that are shown to be possible
+pub mod avoidable; // contacts that could have been avoided
 pub mod groups; // routes that have something in common
 pub mod report; // figures of an evaluation
 mod table; // a report as text

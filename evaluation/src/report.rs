@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use super::avoidable::Avoidable;
 use super::classes::ClassReport;
 pub use super::episode::{Episode, Summary, wilson};
 use super::failures::Cause;
@@ -54,6 +55,9 @@ pub struct Report {
     /// Episodes whose own start is shown to be possible; `None` where nobody asked for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub possible: Option<Possible>,
+    /// Contacts with other vehicles that could have been avoided; `None` where nobody asked for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub avoidable: Option<Avoidable>,
     /// Why episodes did not arrive, the commonest cause first.
     pub failures: Vec<Cause>,
     /// How trucks drove, by vehicle and load; empty where the benchmark has one vehicle and one speed.

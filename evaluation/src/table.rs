@@ -161,6 +161,9 @@ impl Report {
         if let Some(possible) = &self.possible {
             push_wrapped(&mut text, &possible.note(), width);
         }
+        if let Some(avoidable) = &self.avoidable {
+            push_wrapped(&mut text, &avoidable.note(), width);
+        }
         if !left_out.is_empty() {
             let names: Vec<String> =
                 left_out.iter().map(|column| column.head.join(" ").trim().replace("- ", "-")).collect();

@@ -52,11 +52,14 @@ fn a_rule_among_vehicles_is_evaluated_by_demand_and_shown_with_them() {
     let place = Place::new();
     let (report, page) = (place.text("report.json"), place.text("page.html"));
     let flags = ["--benchmark", "traffic2026", "--route", "20m/N-right-2", "--episodes", "12", "--policy", "yields"];
-    let output = offtrack(&[&["evaluate"][..], &flags, &["--json", &report, "--html", &page]].concat());
+    let output = offtrack(&[&["evaluate"][..], &flags, &["--avoidable", "--json", &report, "--html", &page]].concat());
     succeed(&output);
     let table = String::from_utf8(output.stdout).unwrap();
     let report = place.json("report.json");
     assert_eq!(report["policy"], "yields");
+    let from = report["avoidable"]["from"].as_array().unwrap();
+    assert_eq!(from.iter().map(|from| from["seconds"].as_f64().unwrap()).collect::<Vec<_>>(), [3.0, 1.0]);
+    assert!(table.contains("contacts a search avoided"), "{table}");
     let groups = report["groups"]["demand"].as_array().unwrap();
     let names: Vec<&str> = groups.iter().map(|group| group["name"].as_str().unwrap()).collect();
     assert!(2 <= names.len() && names.iter().all(|name| name.ends_with("00 veh/h")), "{names:?}");
@@ -66,6 +69,10 @@ fn a_rule_among_vehicles_is_evaluated_by_demand_and_shown_with_them() {
     assert!(std::fs::read_to_string(page).unwrap().contains("drawOthers"));
     let message = refusal(&offtrack(&["evaluate", "--policy", "follows", "--episodes", "1"]), 2);
     assert!(message.contains("--policy: follows; drives among other vehicles"), "{message}");
+    let message = refusal(&offtrack(&["evaluate", "--policy", "pursuit", "--avoidable"]), 2);
+    assert!(message.contains("--avoidable: attard2023; asks about contacts with other vehicles"), "{message}");
+    let message = refusal(&offtrack(&["certify", "--benchmark", "traffic2026"]), 2);
+    assert!(message.contains("`evaluate --avoidable` searches from before each contact"), "{message}");
 }
 
 #[test]

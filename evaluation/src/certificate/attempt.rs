@@ -73,33 +73,42 @@ pub fn attempt(
 
 /// The results of [`attempt`] from many starts, each on its route, in their order. `done` is given each as it is found,
 /// with its index, from any thread.
-///
-/// Every core makes searches of its own: the batch of a narrow search is too small to be divided among them.
 pub fn attempts(
     world: &Arc<World>,
     starts: &[(u32, Start)],
     passes: &[Pass],
     done: &(dyn Fn(usize, &Found) + Sync),
 ) -> Result<Vec<Found>, Error> {
+    each(starts.len(), &|index| {
+        let (route, start) = &starts[index];
+        let found = attempt(world, *route, start, passes, None)?;
+        done(index, &found);
+        Ok(found)
+    })
+}
+
+/// The results of `n` searches in their order. Every core makes searches of its own: the batch of a narrow search is
+/// too small to be divided among them.
+pub(crate) fn each<T: Send>(n: usize, search: &(dyn Fn(usize) -> Result<T, Error> + Sync)) -> Result<Vec<T>, Error> {
     let next = AtomicUsize::new(0);
-    let searches = || -> Result<Vec<(usize, Found)>, Error> {
+    let searches = || -> Result<Vec<(usize, T)>, Error> {
         // Steps run in the pool of the thread that asks for them.
         rayon::ThreadPoolBuilder::new().num_threads(1).build()?.install(|| {
             let mut found = Vec::new();
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some((route, start)) = starts.get(index) else { return Ok(found) };
-                let one = attempt(world, *route, start, passes, None)?;
-                done(index, &one);
-                found.push((index, one));
+                if n <= index {
+                    return Ok(found);
+                }
+                found.push((index, search(index)?));
             }
         })
     };
     let mut found = std::thread::scope(|scope| {
-        let threads: Vec<_> =
-            (0..rayon::current_num_threads().min(starts.len())).map(|_| scope.spawn(searches)).collect();
+        let threads: Vec<_> = (0..rayon::current_num_threads().min(n)).map(|_| scope.spawn(searches)).collect();
         let joined = threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)));
-        joined.collect::<Result<Vec<_>, Error>>().map(|found| found.concat())
+        let found = joined.collect::<Result<Vec<_>, Error>>()?;
+        Ok::<Vec<(usize, T)>, Error>(found.into_iter().flatten().collect())
     })?;
     found.sort_unstable_by_key(|&(index, _)| index);
     Ok(found.into_iter().map(|(_, found)| found).collect())

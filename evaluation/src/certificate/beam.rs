@@ -42,7 +42,7 @@ const SPEED_BIN: f32 = 1.0;
 /// Steer angles that differ by less are equal (rad).
 const SAME_STEER: f32 = 1e-6;
 /// The parent of the first segment.
-const ROOT: u32 = u32::MAX;
+pub(super) const ROOT: u32 = u32::MAX;
 
 /// Width and time resolution of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -78,14 +78,23 @@ struct Segment {
 
 /// A candidate of the beam, at one row of the batch.
 #[derive(Debug, Clone)]
-struct Candidate {
+pub(super) struct Candidate {
     /// The last segment of its sequence.
-    parent: u32,
+    pub(super) parent: u32,
     /// Actions since that segment.
-    actions: Vec<u32>,
+    pub(super) actions: Vec<u32>,
     /// Action to hold; `None` for the candidate that has followed the policy from the start.
-    held: Option<u32>,
-    cost: f32,
+    pub(super) held: Option<u32>,
+    /// How unsafely it drove, discounted.
+    pub(super) cost: f32,
+}
+
+impl Candidate {
+    /// Adds a step: its action, and what it cost.
+    pub(super) fn follow(&mut self, action: u32, cost: f32) {
+        self.actions.push(action);
+        self.cost = DISCOUNT * self.cost + cost;
+    }
 }
 
 /// Searches for a sequence of actions that completes `route` from `start`. With a `policy`, its own sequence is a
@@ -115,8 +124,7 @@ pub fn search(
             outcome.env_steps += simulator.batch().truck.iter().filter(|truck| truck.held == 0).count() as u64;
             simulator.step(&actions)?;
             for (env, child) in children.iter_mut().enumerate() {
-                child.actions.push(actions[env]);
-                child.cost = DISCOUNT * child.cost + cost(world, simulator.batch(), env);
+                child.follow(actions[env], cost(world, simulator.batch(), env, SLOWNESS_WEIGHT));
             }
             if let Some(child) = arrived(simulator.batch(), &children) {
                 outcome.actions = traced(&segments, child);
@@ -142,13 +150,13 @@ pub fn search(
 }
 
 /// The action that steers least.
-fn nearest_to_straight(world: &World) -> u32 {
+pub(super) fn nearest_to_straight(world: &World) -> u32 {
     let steering = |action: u32| world.actions[action as usize].steering.abs();
     (0..world.params.n_actions).min_by(|&a, &b| steering(a).total_cmp(&steering(b))).unwrap_or(0)
 }
 
 /// The children of all candidates, and the row that each branches from.
-fn branched(
+pub(super) fn branched(
     world: &World,
     batch: &Batch,
     beam: &[Candidate],
@@ -208,8 +216,8 @@ fn chosen(driver: Option<&mut Driver>, batch: &Batch, children: &[Candidate], st
     actions
 }
 
-/// The cost of a candidate's last step.
-fn cost(world: &World, batch: &Batch, env: usize) -> f32 {
+/// The cost of a candidate's last step, where standing costs `slowness`.
+pub(super) fn cost(world: &World, batch: &Batch, env: usize, slowness: f32) -> f32 {
     let (truck, clearance, progress) = (&batch.truck[env], &batch.clearance[env], &batch.progress[env]);
     let previews = world.route_previews(truck.route);
     let lane_heading = previews[(progress.waypoint as usize + AHEAD).min(previews.len() - 1)].heading;
@@ -217,9 +225,9 @@ fn cost(world: &World, batch: &Batch, env: usize) -> f32 {
     let load = truck.load_transfer_ratio() / world.params.rollover_ratio;
     let Params { target_speed_min, target_speed_max, .. } = world.params;
     // Where a truck may drive more slowly, safety alone would make it crawl.
-    let slowness = if target_speed_min < target_speed_max { 1.0 - truck.speed / target_speed_max } else { 0.0 };
+    let slowly = if target_speed_min < target_speed_max { 1.0 - truck.speed / target_speed_max } else { 0.0 };
     shortfall.powi(2)
-        + SLOWNESS_WEIGHT * slowness
+        + slowness * slowly
         + LANE_WEIGHT * progress.lane_distance.powi(2)
         + HEADING_WEIGHT * wrapped(truck.heading - lane_heading).powi(2)
         + LOAD_TRANSFER_WEIGHT * load.powi(4)
@@ -254,7 +262,7 @@ fn note_furthest(world: &World, batch: &Batch, outcome: &mut Outcome) {
 }
 
 /// The rows to keep: the policy's own while it runs, then the cheapest; of nearly equal states only the cheapest.
-fn selected(batch: &Batch, children: &[Candidate], width: usize) -> Vec<u32> {
+pub(super) fn selected(batch: &Batch, children: &[Candidate], width: usize) -> Vec<u32> {
     let mut running: Vec<u32> = (0..children.len() as u32).filter(|&row| batch.truck[row as usize].held == 0).collect();
     let rank = |row: u32| (children[row as usize].held.is_some(), children[row as usize].cost);
     running.sort_by(|&a, &b| rank(a).0.cmp(&rank(b).0).then(rank(a).1.total_cmp(&rank(b).1)));

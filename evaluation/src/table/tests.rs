@@ -56,6 +56,7 @@ fn report() -> Report {
             island_radius: Vec::new(),
             lane: Vec::new(),
         }),
+        avoidable: None,
         failures: (0..CAUSES + 2).map(cause).collect(),
         classes: Vec::new(),
         groups: Groups {
