@@ -5,6 +5,7 @@
 mod also_evaluate;
 mod check;
 mod file;
+mod rule;
 mod set;
 
 use std::collections::BTreeMap;
@@ -17,6 +18,8 @@ use serde::{Deserialize, Serialize};
 use crate::error::Error;
 
 pub use also_evaluate::AlsoEvaluate;
+pub use rule::Rule;
+pub(crate) use rule::driven;
 
 /// A training file. Unknown keys are refused; one in hand has been checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -39,6 +42,9 @@ pub struct Config {
     /// A policy to begin with, a file or a shipped one's name; none begins with random weights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from: Option<String>,
+    /// A rule among other vehicles that caps the speed of every action that a truck makes; none caps nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rule: Option<Rule>,
     /// Seed of routes, poses, networks, actions and samples.
     pub seed: u32,
     /// Number of trucks.

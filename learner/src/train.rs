@@ -226,10 +226,11 @@ impl Training {
             caller.tell(Event::Finished { folder, outcome: &outcome });
             return Ok(outcome);
         }
-        let mut policy = Policy { name: shown_path(&folder.policy()), ..policy };
-        let evaluated = self.worlds.evaluate(&mut policy, caller)?;
+        let policy = Policy { name: shown_path(&folder.policy()), ..policy };
+        let rule = self.config.rule;
+        let evaluated = self.worlds.evaluate(&policy, rule, caller)?;
         outcome.evaluation = evaluated.as_ref().map(|(report, _)| report.clone());
-        let further = self.worlds.also.iter().map(|also| also.evaluate(&mut policy, caller));
+        let further = self.worlds.also.iter().map(|also| also.evaluate(&policy, rule, caller));
         outcome.also = further.collect::<Result<_, _>>()?;
         files::write_json(&folder.report(), &outcome)?;
         if let Some((report, tracks)) = evaluated {

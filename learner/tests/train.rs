@@ -2,11 +2,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a failure of a test's helper fails the test")]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use offtrack_learner::config::Config;
+use offtrack_learner::config::{Config, Rule};
 use offtrack_learner::train::{Event, Watcher, train};
 
 /// A benchmark of one training route and two test routes.
@@ -44,14 +44,27 @@ const SMALL: [&str; 13] = [
     "level_replay=",
 ];
 
+fn scenarios() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("scenarios")
+}
+
 /// A small config whose benchmark is written into `folder`.
 fn small(folder: &Path) -> Config {
-    let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("scenarios");
     let file = folder.join("short.toml");
-    std::fs::write(&file, BENCHMARK.replace("SCENARIOS", scenarios.to_str().unwrap())).unwrap();
+    std::fs::write(&file, BENCHMARK.replace("SCENARIOS", scenarios().to_str().unwrap())).unwrap();
     let benchmark = format!("benchmark={}", file.display());
     let settings: Vec<String> = SMALL.iter().map(|&setting| setting.to_owned()).chain([benchmark]).collect();
     Config::read_with(Path::new("default"), &settings).unwrap()
+}
+
+/// The same among other vehicles, under a rule.
+fn under_a_rule(folder: &Path) -> Config {
+    let config = small(folder);
+    let text = BENCHMARK
+        .replace("[30.0]", "[0.0, 10.0, 30.0]")
+        .replace("reward =", "traffic = { demand = [900.0] }\nreward =");
+    std::fs::write(&config.benchmark, text.replace("SCENARIOS", scenarios().to_str().unwrap())).unwrap();
+    Config { rule: Some(Rule::Yields), ..config }
 }
 
 const DEAF: &Watcher = &|_| {};
@@ -104,8 +117,21 @@ fn a_caller_is_told_how_far_a_run_is_and_finds_its_files_and_its_report() {
 #[test]
 fn a_run_that_a_caller_stops_and_continues_equals_one_never_stopped() {
     let place = tempfile::tempdir().unwrap();
-    let config = Config { checkpoint_minutes: 0.0001, steps: Some(24_000), ..small(place.path()) };
-    let [stopped, never] = ["stopped", "never"].map(|name| place.path().join(name));
+    check_continued(&small(place.path()), place.path());
+}
+
+#[test]
+fn a_run_under_a_rule_continues_under_it_and_its_report_names_it() {
+    let place = tempfile::tempdir().unwrap();
+    let report = check_continued(&under_a_rule(place.path()), place.path());
+    let policy = report["evaluation"]["policy"].as_str().unwrap();
+    assert!(policy.starts_with("yields:") && policy.ends_with("policy.safetensors"), "{policy}");
+}
+
+/// Trains with this config, once stopped on the way and once not, and compares. Returns the report.
+fn check_continued(config: &Config, place: &Path) -> serde_json::Value {
+    let config = Config { checkpoint_minutes: 0.0001, steps: Some(24_000), ..config.clone() };
+    let [stopped, never] = ["stopped", "never"].map(|name| place.join(name));
     let stop = AtomicBool::new(false);
     // With three rows the learner is on its way; far more follow.
     let rows = |folder: &Path| std::fs::read_to_string(folder.join("metrics.csv")).unwrap_or_default().lines().count();
@@ -134,6 +160,7 @@ fn a_run_that_a_caller_stops_and_continues_equals_one_never_stopped() {
     assert!(policy(&stopped) == policy(&never));
     let error = offtrack_learner::resume(&never, None, None, DEAF, &go_on).unwrap_err();
     assert!(error.is_wrong_input() && error.to_string().contains("it has finished"), "{error}");
+    serde_json::from_slice(&std::fs::read(never.join("report.json")).unwrap()).unwrap()
 }
 
 #[test]
@@ -146,6 +173,10 @@ fn what_is_wrong_with_a_config_or_a_folder_is_named_and_nothing_is_made_or_repla
         (Config { n_envs: 0, ..config.clone() }, "config: n_envs: 0; must lie in"),
         (Config { steps: Some(400), ..config.clone() }, "config: steps: 400; must be above 400"),
         (Config { benchmark: missing.clone(), ..config.clone() }, "config: benchmark: "),
+        (
+            Config { rule: Some(Rule::Yields), ..config.clone() },
+            "config: benchmark: short; it has no [traffic], and rule = \"yields\" caps target speeds",
+        ),
         (Config { from: Some(missing), ..config.clone() }, "missing.toml"),
     ] {
         let error = train(&wrong, &folder, DEAF, &go_on).unwrap_err();

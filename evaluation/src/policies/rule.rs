@@ -65,11 +65,42 @@ impl Rule {
     ///
     /// A world without other vehicles.
     pub fn new(name: &str, world: &World) -> Result<Rule, Error> {
+        Rule::named(name, world, "--policy", name)
+    }
+
+    /// The rule of this name to cap target speeds with. `setting` and `value` are what an error names.
+    ///
+    /// # Errors
+    ///
+    /// A world without other vehicles, or one whose actions state no target speeds.
+    pub fn over_policies(name: &str, world: &World, setting: &'static str, value: &str) -> Result<Rule, Error> {
+        if world.is_continuous() || world.params.changes_speed == 1 {
+            let expected = "caps target speeds: a benchmark with actions.speeds_kmh is needed".to_owned();
+            return Err(Error::Setting { name: setting, value: value.to_owned(), expected });
+        }
+        Rule::named(name, world, setting, value)
+    }
+
+    fn named(name: &str, world: &World, setting: &'static str, value: &str) -> Result<Rule, Error> {
         if world.traffic.is_none() {
             let expected = "drives among other vehicles: a benchmark with [traffic] is needed, as traffic2026";
-            return Err(Error::Setting { name: "--policy", value: name.to_owned(), expected: expected.to_owned() });
+            return Err(Error::Setting { name: setting, value: value.to_owned(), expected: expected.to_owned() });
         }
         Ok(Rule { steers: Policy::shipped(STEERS)?, yields: name == YIELDS })
+    }
+
+    /// The actions that trucks make where these were chosen, `[n_envs]` each: none faster than the rule allows. That of
+    /// the nearest speed takes the place of one that is.
+    pub fn capped(&self, world: &World, batch: &Batch, chosen: &[u32]) -> Vec<u32> {
+        let capped = |(env, &index): (usize, &u32)| {
+            let Action { steering, speed } = world.actions[index as usize];
+            if batch.truck[env].held == 1 {
+                return index;
+            }
+            let most = self.speed(world, batch, env);
+            if speed <= most { index } else { rounded(world, &Action { steering, speed: most }) }
+        };
+        chosen.par_iter().enumerate().map(capped).collect()
     }
 
     /// The speed that the rule asks for (m/s).
@@ -142,11 +173,7 @@ impl Capped {
     /// A world without other vehicles, or one whose actions state no target speeds.
     pub fn new(rule: &str, policy: Box<dyn Controller>, world: &World) -> Result<Capped, Error> {
         let name = format!("{rule}:{}", policy.name());
-        if world.is_continuous() || world.params.changes_speed == 1 {
-            let expected = "caps target speeds: a benchmark with actions.speeds_kmh is needed".to_owned();
-            return Err(Error::Setting { name: "--policy", value: name, expected });
-        }
-        Ok(Capped { rule: Rule::new(rule, world)?, policy, name })
+        Ok(Capped { rule: Rule::over_policies(rule, world, "--policy", &name)?, policy, name })
     }
 }
 
@@ -156,20 +183,11 @@ impl Controller for Capped {
     }
 
     fn choose(&mut self, world: &World, batch: &Batch) -> Actions {
-        let chosen = match self.policy.choose(world, batch) {
-            Actions::Indices(chosen) => chosen,
+        match self.policy.choose(world, batch) {
+            Actions::Indices(chosen) => Actions::Indices(self.rule.capped(world, batch, &chosen)),
             // Commands drive no world of levels.
-            commands => return commands,
-        };
-        let capped = |(env, &index): (usize, &u32)| {
-            let Action { steering, speed } = world.actions[index as usize];
-            if batch.truck[env].held == 1 {
-                return index;
-            }
-            let most = self.rule.speed(world, batch, env);
-            if speed <= most { index } else { rounded(world, &Action { steering, speed: most }) }
-        };
-        Actions::Indices(chosen.par_iter().enumerate().map(capped).collect())
+            commands => commands,
+        }
     }
 }
 

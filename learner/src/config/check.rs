@@ -63,7 +63,11 @@ impl Config {
             return Err(reader.invalid("adapter", "given", "works with device = \"gpu\" alone: leave it out").into());
         }
         if self.device == Device::Gpu {
-            let without = [("exploration", self.exploration.is_some()), ("refinement", self.refinement.is_some())];
+            let without = [
+                ("exploration", self.exploration.is_some()),
+                ("refinement", self.refinement.is_some()),
+                ("rule", self.rule.is_some()),
+            ];
             if let Some((key, _)) = without.into_iter().find(|(_, given)| *given) {
                 return Err(reader
                     .invalid(key, "given", "works with device = \"cpu\" alone: leave one of them out")

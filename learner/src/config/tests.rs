@@ -346,3 +346,18 @@ fn a_file_does_without_keys_of_its_base() {
         assert!(message.contains("mine.toml") && message.contains(expected), "{message}");
     }
 }
+
+#[test]
+fn a_rule_is_one_of_two_on_the_processor_alone_and_part_of_what_makes_a_run() {
+    let read = |settings: &[&str]| {
+        let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+        Config::read_with(Path::new("traffic"), &settings).map_err(|error| error.to_string())
+    };
+    let unknown = read(&["rule=\"waits\""]).unwrap_err();
+    assert!(unknown.contains("unknown variant `waits`, expected `yields` or `follows`"), "{unknown}");
+    let on_device = read(&["rule=\"yields\"", "device=\"gpu\""]).unwrap_err();
+    assert!(on_device.contains("rule: given; works with device = \"cpu\" alone"), "{on_device}");
+    let (with, without) = (read(&["rule=\"yields\""]).unwrap(), read(&[]).unwrap());
+    assert_eq!((with.rule, without.rule), (Some(Rule::Yields), None));
+    assert!(!with.is_same_run(&without));
+}

@@ -2,14 +2,16 @@
 
 use std::borrow::Cow;
 
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::Tensor;
 use offtrack::layout::random;
 use offtrack::layout::{Column, Ended, N_AROUND, N_EXTRAS, N_VALUES, RewardTerms};
 use offtrack::physics;
-use offtrack::simulator::{RouteChoice, Simulator};
+use offtrack::simulator::{Actions, RouteChoice, Simulator};
 use offtrack::world::World;
+use offtrack_evaluation::policies::rule::Rule;
+use offtrack_evaluation::policies::{Controller, UniformRandom};
 use offtrack_policy::Normalisation;
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use std::sync::Arc;
 
 use super::{Episodes, Rollout, RouteEnd};
@@ -23,12 +25,15 @@ use crate::mirror::Mirror;
 use crate::network::{Mlp, sampled};
 use crate::pass::softmax;
 use crate::ppo::steps::Steps;
-use crate::replay_buffer::{ReplayBuffer, Rows, Sample};
+use crate::replay_buffer::{ReplayBuffer, Rows};
 use crate::sac::Transitions;
-use crate::shards::N_SHARDS;
 
+mod tensors;
 #[cfg(test)]
 mod tests;
+
+use tensors::logits_of_normalised;
+pub use tensors::{logits, shards};
 
 /// Each truck's `N` values: those of its observation, its first extras and, where `N` has room for more than all of
 /// them, those of other vehicles, `[n_envs]`. Without either nothing is copied.
@@ -59,6 +64,8 @@ pub fn observed<'a, const N: usize>(
 pub struct HostRollout<const N: usize> {
     config: Config,
     simulator: Simulator,
+    /// Caps the speed of every action that is made, not of the one that is chosen; none caps nothing.
+    rule: Option<Rule>,
     /// None where routes are drawn uniformly.
     level_replay: Option<LevelReplay>,
     replay_buffer: ReplayBuffer<N>,
@@ -97,6 +104,7 @@ impl<const N: usize> HostRollout<N> {
         reserve(&mut replay_buffer, config)?;
         Ok(HostRollout {
             simulator: Simulator::new(world.clone(), config.n_envs, config.seed, choice)?,
+            rule: config.rule_in(world)?,
             level_replay,
             replay_buffer,
             acting: stream(1),
@@ -122,6 +130,13 @@ impl<const N: usize> HostRollout<N> {
 
     fn n_actions(&self) -> usize {
         self.simulator.world().actions.len()
+    }
+
+    /// Makes a step of every truck with these actions, or with what the rule makes of them.
+    fn make(&mut self, chosen: &[u32]) -> Result<(), Error> {
+        let Some(rule) = &self.rule else { return Ok(self.simulator.step(chosen)?) };
+        let capped = rule.capped(self.simulator.world(), self.simulator.batch(), chosen);
+        Ok(self.simulator.step(&capped)?)
     }
 
     /// Keeps what the step in hand replaces.
@@ -199,7 +214,14 @@ impl<const N: usize> Rollout for HostRollout<N> {
 
     fn step_at_random(&mut self) -> Result<(), Error> {
         self.begin_step();
-        self.simulator.step_at_random();
+        if self.rule.is_none() {
+            self.simulator.step_at_random();
+            return self.remember();
+        }
+        let drawn = UniformRandom { seed: self.config.seed }.choose(self.simulator.world(), self.simulator.batch());
+        if let Actions::Indices(drawn) = drawn {
+            self.make(&drawn)?;
+        }
         self.remember()
     }
 
@@ -209,7 +231,7 @@ impl<const N: usize> Rollout for HostRollout<N> {
         if let Some(exploration) = &self.config.exploration {
             exploration.explore(env_steps, n_actions, &mut actions, &mut self.acting);
         }
-        self.simulator.step(&actions)?;
+        self.make(&actions)?;
         self.remember()
     }
 
@@ -230,7 +252,7 @@ impl<const N: usize> Rollout for HostRollout<N> {
                 logits.chunks_exact(n_actions).zip(&actions).map(|(row, &action)| softmax(row).1[action as usize]),
             );
             steps.action.extend_from_slice(&actions);
-            self.simulator.step(&actions)?;
+            self.make(&actions)?;
             let batch = self.simulator.batch();
             for env in 0..n_envs {
                 let lane = batch.terms[env].lane_distance * own.lane_distance_limit / weights.lane_distance_limit;
@@ -262,7 +284,7 @@ impl<const N: usize> Rollout for HostRollout<N> {
 
     fn drive(&mut self, actor: &Mlp) -> Result<(), Error> {
         let actions = self.choose(actor);
-        Ok(self.simulator.step(&actions)?)
+        self.make(&actions)
     }
 
     fn sample(&mut self) -> Result<Vec<Transitions>, Error> {
@@ -344,57 +366,4 @@ fn add_arrivals(reward: &mut [f32], ended: &[u32], arrival: f32) {
 
 fn column_name(column: Column) -> String {
     format!("batch, {}", column.name())
-}
-
-/// A sample as tensors, in [`N_SHARDS`] shards of nearly the same size. Both observations of a transition get the same
-/// noise, so that their difference stays what it is.
-pub fn shards<const N: usize>(
-    sample: &Sample<N>,
-    normalisation: &Normalisation,
-    learning: &Learning,
-    rng: &mut impl Rng,
-) -> Vec<Transitions> {
-    let device = Device::flex();
-    let n_rows = sample.action.len();
-    let (reward_scale, noise) = (learning.reward_scale as f32, learning.observation_noise as f32);
-    let mut shard = |index: usize| {
-        let rows = n_rows * index / N_SHARDS..n_rows * (index + 1) / N_SHARDS;
-        let shape = [rows.len(), 1];
-        let actions: Vec<i32> = sample.action[rows.clone()].iter().map(|&action| action as i32).collect();
-        let rewards: Vec<f32> = sample.reward[rows.clone()].iter().map(|reward| reward * reward_scale).collect();
-        let mut normalised =
-            [&sample.observation, &sample.next_observation].map(|column| normalisation.apply(&column[rows.clone()]));
-        if 0.0 < noise {
-            let [observation, next] = &mut normalised;
-            for (value, next) in observation.iter_mut().zip(next) {
-                let added = rng.random_range(-noise..noise);
-                *value += added;
-                *next += added;
-            }
-        }
-        let [observation, next_observation] =
-            normalised.map(|values| Tensor::from_data(TensorData::new(values, [rows.len(), N]), &device));
-        Transitions {
-            observation,
-            action: Tensor::from_data(TensorData::new(actions, shape), &device),
-            reward: Tensor::from_data(TensorData::new(rewards, shape), &device),
-            discount: Tensor::from_data(TensorData::new(sample.discount[rows.clone()].to_vec(), shape), &device),
-            next_observation,
-            weight: Tensor::from_data(TensorData::new(sample.weight[rows].to_vec(), shape), &device),
-        }
-    };
-    (0..N_SHARDS).map(&mut shard).collect()
-}
-
-/// The network's output for each observation, `[rows * actions]`.
-pub fn logits<const N: usize>(network: &Mlp, normalisation: &Normalisation, observations: &[[f32; N]]) -> Vec<f32> {
-    logits_of_normalised(network, normalisation.apply(observations), N)
-}
-
-/// The network's output for normalised observations of `n_values` each, one after the other, `[rows * actions]`.
-fn logits_of_normalised(network: &Mlp, observations: Vec<f32>, n_values: usize) -> Vec<f32> {
-    let shape = [observations.len() / n_values, n_values];
-    let data = TensorData::new(observations, shape);
-    let output = network.forward(Tensor::from_data(data, &Device::flex())).into_data();
-    output.try_to_vec().expect("the layers' weights are f32, and so is their output")
 }

@@ -62,6 +62,7 @@ pub struct Validations {
 /// Validation routes, and the best policy so far.
 pub struct Validation {
     settings: config::Validation,
+    rule: Option<config::Rule>,
     scenario: Arc<Scenario>,
     world: Arc<World>,
     /// CRC-32 of the world.
@@ -73,9 +74,16 @@ pub struct Validation {
 }
 
 impl Validation {
-    /// Validation on the validation routes of `scenario`, which has at least one and whose world is `world`.
-    pub fn new(settings: config::Validation, scenario: Arc<Scenario>, world: Arc<World>) -> Validation {
-        Validation { fingerprint: world.fingerprint(), settings, scenario, world, n_made: 0, last: None, best: None }
+    /// Validation on the validation routes of `scenario`, which has at least one and whose world is `world`, under the
+    /// rule.
+    pub fn new(
+        settings: config::Validation,
+        rule: Option<config::Rule>,
+        scenario: Arc<Scenario>,
+        world: Arc<World>,
+    ) -> Validation {
+        let fingerprint = world.fingerprint();
+        Validation { fingerprint, settings, rule, scenario, world, n_made: 0, last: None, best: None }
     }
 
     /// Whether it is time for the next one, with this fraction of the budget spent.
@@ -109,8 +117,8 @@ impl Validation {
             record: false,
             device: &device,
         };
-        let mut policy = policy;
-        let driven = evaluation.drive(&mut policy, &mut |_, _| {})?;
+        let mut policy = config::driven(policy, self.rule, &self.world)?;
+        let driven = evaluation.drive(policy.as_mut(), &mut |_, _| {})?;
         let summary = Summary::of(driven.episodes.iter(), self.scenario.step)
             .expect("there is a validation route, and an episode on it");
         let Summary { arrived, success, lane_distance_mean_arrived, .. } = summary;

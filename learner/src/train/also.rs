@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::alike;
 use super::event::{Caller, Event};
 use super::roads::Roads;
-use crate::config::{AlsoEvaluate, Config};
+use crate::config::{AlsoEvaluate, Config, Rule, driven};
 use crate::error::Error;
 
 /// A further evaluation, ready to be made.
@@ -67,13 +67,14 @@ impl Also {
                     training.name
                 )));
             }
+            config.check_rule(reader, "also_evaluate", &scenario)?;
             Ok(Also { scenario, split: named.split, trained_on })
         };
         config.also_evaluated().into_iter().map(read).collect()
     }
 
     /// Drives every route as many times as an evaluation usually does.
-    pub(super) fn evaluate(&self, policy: &mut Policy, caller: Caller) -> Result<AlsoReport, Error> {
+    pub(super) fn evaluate(&self, policy: &Policy, rule: Option<Rule>, caller: Caller) -> Result<AlsoReport, Error> {
         let world = Roads::unstoppable(caller).world(&self.scenario)?;
         let evaluation = Evaluation {
             scenario: &self.scenario,
@@ -85,8 +86,8 @@ impl Also {
             device: &Device::processor(),
         };
         let benchmark = &self.scenario.name;
-        let (report, _) =
-            evaluation.report(policy, &mut |done, total| caller.tell(Event::Evaluating { benchmark, done, total }))?;
+        let mut tell = |done, total| caller.tell(Event::Evaluating { benchmark, done, total });
+        let (report, _) = evaluation.report(driven(policy.clone(), rule, &world)?.as_mut(), &mut tell)?;
         Ok(AlsoReport { trained_on: self.trained_on, report })
     }
 }

@@ -17,7 +17,7 @@ use super::alike;
 use super::also::Also;
 use super::event::{Caller, Event};
 use super::roads::Roads;
-use crate::config::Config;
+use crate::config::{Config, Rule, driven};
 use crate::error::Error;
 use crate::run::validation::Validation;
 
@@ -60,8 +60,10 @@ impl Worlds {
         let reader = Reader::of(origin);
         let own = named(&reader, "benchmark", &config.benchmark, roads)?;
         check_levels(&reader, "benchmark", &own)?;
+        config.check_rule(&reader, "benchmark", &own)?;
         let training = training(&reader, config, &own, roads)?;
         check_levels(&reader, "training_benchmark", &training)?;
+        config.check_rule(&reader, "training_benchmark", &training)?;
         // The policy is evaluated on the test routes alone; without any it is not evaluated.
         let mut benchmark = own.clone();
         if !benchmark.split(Split::Test).is_empty() {
@@ -92,11 +94,16 @@ impl Worlds {
     /// Validation at its beginning, if the config has it.
     pub(super) fn validation(&self, config: &Config) -> Option<Validation> {
         let (scenario, world) = self.validation.as_ref()?;
-        Some(Validation::new(config.validation.clone()?, scenario.clone(), world.clone()))
+        Some(Validation::new(config.validation.clone()?, config.rule, scenario.clone(), world.clone()))
     }
 
     /// The evaluation on `benchmark`, with the episodes that its page shows; none where it has no test routes.
-    pub(super) fn evaluate(&self, policy: &mut Policy, caller: Caller) -> Result<Option<(Report, Vec<Track>)>, Error> {
+    pub(super) fn evaluate(
+        &self,
+        policy: &Policy,
+        rule: Option<Rule>,
+        caller: Caller,
+    ) -> Result<Option<(Report, Vec<Track>)>, Error> {
         let n_routes = self.benchmark.split(Split::Test).len();
         if n_routes == 0 {
             return Ok(None);
@@ -112,7 +119,8 @@ impl Worlds {
         };
         let benchmark = &self.benchmark.name;
         let mut tell = |done, total| caller.tell(Event::Evaluating { benchmark, done, total });
-        Ok(Some(evaluation.report(policy, &mut tell)?))
+        let mut policy = driven(policy.clone(), rule, &self.benchmark_world)?;
+        Ok(Some(evaluation.report(policy.as_mut(), &mut tell)?))
     }
 }
 
@@ -173,6 +181,7 @@ fn validation(
             training.name, own.name
         ));
     }
+    config.check_rule(reader, "validation.benchmark", &scenario)?;
     scenario.keep(&[Split::Validation]);
     Ok(scenario)
 }

@@ -1,10 +1,12 @@
 use std::path::Path;
 
+use burn::tensor::Device;
 use offtrack::scenario::{Scenario, Split};
 use offtrack_policy::Policy;
 use rand::rngs::SmallRng;
 
 use super::*;
+use crate::config;
 
 const ARRIVAL: f32 = 1500.0;
 const N_ENVS: usize = 16;
@@ -78,4 +80,89 @@ fn networks_observe_the_values_the_first_extras_and_then_the_vehicles() {
     // Without vehicles there is nothing to join.
     assert_eq!(observed::<{ N_VALUES + 5 }>(&values, &extras, &[])[0][69..], [2.0, 3.0, 4.0, 5.0, 6.0]);
     assert_eq!(observed::<N_VALUES>(&values, &extras, &[]).len(), 2);
+}
+
+/// A truck's values among other vehicles.
+const AMONG: usize = N_VALUES + N_AROUND;
+
+/// A table of steps, one at a time.
+const REFINEMENT: &str = "refinement={begin=0.0, n_steps=1, epochs=1, batch=64, gamma=0.99, gae_lambda=0.98, clip=0.2, \
+                          advantage_limit=4.0, entropy_coefficient=0.0, actor_learning_rate=1e-4, \
+                          critic_learning_rate=1e-3, final_learning_rate_fraction=1.0, actor_ema_rate=0.1, \
+                          critic_iterations=0, clearance_power=1.0}";
+
+/// Trucks of `traffic2026` among many vehicles, under the rule that yields, and the network of its shipped policy.
+fn under_a_rule(settings: &[&str]) -> (HostRollout<AMONG>, Mlp) {
+    let settings: Vec<String> =
+        ["n_envs=64", "rule=\"yields\""].iter().chain(settings).map(|&setting| setting.to_owned()).collect();
+    let config = Config::read_with(Path::new("traffic"), &settings).unwrap();
+    let mut scenario = Scenario::named("traffic2026").unwrap();
+    scenario.retain(|_, route| route.name.starts_with("20m/N"));
+    let world = Arc::new(World::bake(&scenario).unwrap());
+    let mut rollout = HostRollout::new(&config, &world, scenario.split(Split::Test).to_vec(), None).unwrap();
+    let policy = Policy::shipped("traffic2026").unwrap();
+    rollout.set_normalisation(&policy.normalisation);
+    (rollout, Mlp::of(&policy.layers, &Device::flex()))
+}
+
+/// The speed that each truck may drive at as the rule has it, for which the fastest action makes way.
+fn allowed(rollout: &HostRollout<AMONG>) -> Vec<f32> {
+    let (world, batch) = (rollout.simulator.world(), rollout.simulator.batch());
+    let speeds = || world.actions.iter().map(|action| action.speed);
+    let fastest = speeds().enumerate().max_by(|(_, a), (_, b)| a.total_cmp(b)).unwrap().0 as u32;
+    let capped = rollout.rule.as_ref().unwrap().capped(world, batch, &[fastest; 64]);
+    capped.iter().map(|&action| world.actions[action as usize].speed).collect()
+}
+
+#[test]
+fn under_a_rule_no_truck_drives_faster_than_it_allows_and_a_refinement_remembers_what_was_chosen() {
+    let (mut rollout, actor) = under_a_rule(&[REFINEMENT]);
+    let settings = rollout.config.refinement.clone().unwrap();
+    let mut n_slowed = 0;
+    for _ in 0..150 {
+        let allowed = allowed(&rollout);
+        let steps = rollout.collect(&actor, &settings).unwrap();
+        let logits = logits_of_normalised(&actor, steps.observation, AMONG);
+        let world = rollout.simulator.world();
+        for (env, (&chosen, row)) in steps.action.iter().zip(logits.chunks_exact(world.actions.len())).enumerate() {
+            let made = rollout.simulator.batch().action[env];
+            let [wanted, driven] = [chosen, made].map(|action| world.actions[action as usize].speed);
+            assert!(driven <= allowed[env], "{driven} m/s where {} are allowed", allowed[env]);
+            assert!((wanted <= allowed[env]) == (made == chosen), "{chosen} became {made}");
+            assert_eq!(steps.log_prob[env], softmax(row).1[chosen as usize]);
+            n_slowed += usize::from(made != chosen);
+        }
+    }
+    // A truck that wants to go while it must wait.
+    assert!(64 < n_slowed, "{n_slowed}");
+}
+
+#[test]
+fn under_a_rule_the_replay_buffer_has_the_actions_that_were_made_by_chance_too() {
+    let sizes = ["replay_buffer={capacity=12800, warmup=64}", "learning.n_steps=1"];
+    let (mut rollout, actor) = under_a_rule(&sizes);
+    let (mut made, mut n_slow) = (Vec::new(), 0);
+    for step in 0..100 {
+        let allowed = allowed(&rollout);
+        if step < 50 { rollout.step_at_random() } else { rollout.step(&actor, 0) }.unwrap();
+        let batch = rollout.simulator.batch();
+        for (&action, allowed) in batch.action.iter().zip(allowed) {
+            assert!(rollout.simulator.world().actions[action as usize].speed <= allowed);
+            n_slow += usize::from(allowed < 8.0);
+        }
+        made.extend_from_slice(&batch.action);
+    }
+    assert!(64 < n_slow, "{n_slow}");
+    let sample = rollout.replay_buffer.sample(4000, 0.99, &mut SmallRng::seed_from_u64(1));
+    sample.row.iter().zip(&sample.action).for_each(|(&row, &action)| assert_eq!(action, made[row], "row {row}"));
+}
+
+#[test]
+fn a_rule_is_refused_where_there_are_no_vehicles() {
+    let config = Config::read_with(Path::new("lane"), &["rule=\"follows\"".to_owned()]).unwrap();
+    assert_eq!(config.rule, Some(config::Rule::Follows));
+    let scenario = Scenario::named("attard2023").unwrap();
+    let world = Arc::new(World::bake(&scenario).unwrap());
+    let error = HostRollout::<N_VALUES>::new(&config, &world, vec![0], None).map(drop).unwrap_err();
+    assert!(error.to_string().starts_with("rule: follows; drives among other vehicles: "), "{error}");
 }
