@@ -46,8 +46,12 @@ fn what_an_apron_weighs_agrees_and_would_not_with_another_weight_or_without_apro
     let is_on_one = |truck: &&Truck| 0.0 < physics::depth_on_apron(&world, truck);
     let n_on = before.truck.iter().filter(is_on_one).count();
     assert!(500 < n_on, "{n_on} trailers are on an apron");
-    let wider: fn(&mut World) = |world| world.rigs[0].trailer_body.half_width += 0.05;
-    for change in [|world: &mut World| world.reward.apron *= 1.01, |world| world.trailer_fields.fill(None), wider] {
+    let changes: [fn(&mut World); 3] = [
+        |world| world.reward.apron *= 1.01,
+        |world| world.trailer_fields.fill(None),
+        |world| world.rigs[0].trailer_body.half_width += 0.05,
+    ];
+    for change in changes {
         assert_noticed(&world, &choice, &before, ("reward.apron", Stage::Judge, change));
     }
 }
