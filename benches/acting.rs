@@ -1,6 +1,7 @@
 //! Times how a policy acts on a graphics device: by its kernel, and by the launches of the tensor library.
 //!
-//! `cargo run --release --features gpu --example acting -- [ROUNDS] [TRUCKS]`: 21 rounds of 1024 trucks unless stated.
+//! `cargo run --release --features gpu --example acting -- [ROUNDS] [TRUCKS]`: 21 rounds of 1024 trucks unless stated;
+//! `-- shader` prints the kernel's module for narrow networks, for benches/machine_code.py.
 //! Policies are the shipped one of attard2023, and an untrained network with hidden layers of 512, 512 and 1024;
 //! actions are sampled. What is compared drives in turns within one process, and so do random actions: load from other
 //! programs changes more slowly than the rounds. Printed as JSON are times of a step, the median and the fastest of the
@@ -22,7 +23,7 @@ use offtrack_learner::config::Config;
 use offtrack_learner::network::Mlp;
 use offtrack_learner::rollout::Rollout;
 use offtrack_policy::device::DevicePolicy;
-use offtrack_policy::{Choice, Policy};
+use offtrack_policy::{Choice, Policy, kernel};
 use serde_json::json;
 
 const BENCHMARK: &str = "attard2023";
@@ -69,7 +70,11 @@ impl Driven {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
+    let mut arguments = std::env::args().skip(1).peekable();
+    if arguments.peek().is_some_and(|word| word == "shader") {
+        print!("{}", kernel::source(kernel::SHAPES[0], false));
+        return Ok(());
+    }
     let mut number = |usual: usize| arguments.next().map_or(Ok(usual), |word| word.parse());
     let (n_rounds, n_envs) = (number(21)?, number(1024)?);
     let scenario = Scenario::named(BENCHMARK)?;

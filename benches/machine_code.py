@@ -32,6 +32,7 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 CARGO = ["--release", "--locked", "--manifest-path", REPOSITORY / "Cargo.toml"]
 TEST = ["cargo", "test", *CARGO, "--features", "gpu", "-p", "offtrack", "--test", "simulator"]
 LANES = ["cargo", "run", *CARGO, "--quiet", "--example", "lanes"]
+ACTING = ["cargo", "run", *CARGO, "--quiet", "--features", "gpu", "--example", "acting", "--", "shader"]
 # Kinds of instructions by the beginning of their names.
 KINDS = {
     "load": ("LDG",),
@@ -60,14 +61,16 @@ def main():
     parser.add_argument("--shaders", type=Path, default=REPOSITORY / "shaders", help="another folder of the same files")
     parser.add_argument("--tests", type=Path, help="the simulator's test binary with the feature gpu; else it is built")
     parser.add_argument("--lanes", type=Path, help="the example lanes; else it is built")
+    parser.add_argument("--acting", type=Path, help="the example acting; else it is built")
     parser.add_argument("--json", type=Path, help="write the result to this file")
     args = parser.parse_args()
     cuda = args.cuda / "nvidia/cu13"
     if not (cuda / "bin/nvdisasm").is_file():
         sys.exit(f"{cuda}/bin/nvdisasm: no such file; unpack NVIDIA's wheels as the head of this script says")
 
-    source = translated(metal(args.naga, args.shaders))
-    nvidia = {chip: kernels(source, cuda, chip) for chip in args.chips.split(",")}
+    acts = output([args.acting, "shader"] if args.acting else ACTING)
+    sources = [translated(metal(args.naga, module)) for module in (step(args.shaders), acts)]
+    nvidia = {chip: kernels(sources[0], cuda, chip) | kernels(sources[1], cuda, chip) for chip in args.chips.split(",")}
     for kernel in [kernel for found in list(nvidia.values())[:-1] for kernel in found.values()]:
         del kernel["parts"]
     for chip, found in nvidia.items():
@@ -100,12 +103,20 @@ def output(command):
     return done.stdout
 
 
-def metal(naga, shaders):
-    """The module of all shaders in Metal, with the checks that are asked for on Vulkan."""
-    order = re.findall(r'include_str!\("../../shaders/(.*?)"\)', (REPOSITORY / "src/engine/stages.rs").read_text())
+def step(shaders):
+    """The module of a step."""
+    listed = (REPOSITORY / "src/engine/stages/shaders.rs").read_text()
+    files = re.findall(r'include_str!\("(?:\.\./)+shaders/(.*?)"\)', listed)
+    if not files:
+        sys.exit("src/engine/stages/shaders.rs names no shader")
+    return "".join((shaders / file).read_text() + "\n" for file in files)
+
+
+def metal(naga, module):
+    """A module in Metal, with the checks that are asked for on Vulkan."""
     with tempfile.TemporaryDirectory() as folder:
         wgsl, written = Path(folder) / "module.wgsl", Path(folder) / "module.metal"
-        wgsl.write_text("".join((shaders / file).read_text() + "\n" for file in order))
+        wgsl.write_text(module)
         checks = ["--index-bounds-check-policy", "Restrict", "--buffer-bounds-check-policy", "ReadZeroSkipWrite"]
         output([naga, *checks, "--metal-version", "3.1", wgsl, written])
         return written.read_text()
@@ -203,6 +214,8 @@ def counted(instructions):
     """Instructions of a kernel by kind, and by function: all, and those in loops."""
     # Behind its end the code jumps to itself for ever.
     loops = [(to, at) for at, (_, to, _) in enumerate(instructions) if to is not None and to < at]
+    names = [name for name, _, _ in instructions]
+    multiplying = [inner for loop in loops if (inner := multiply_adds(names, loop, loops))]
     kinds, parts = Counter(), {}
     for at, (name, to, chain) in enumerate(instructions):
         if name == "NOP" or to == at:
@@ -213,7 +226,18 @@ def counted(instructions):
         count = parts.setdefault(part, [0, 0])
         count[0] += 1
         count[1] += any(begin <= at <= end for begin, end in loops)
-    return {"instructions": dict(kinds.most_common()), "parts": named(parts)}
+    found = {"instructions": dict(kinds.most_common()), "parts": named(parts)}
+    return found | ({"multiplying_loops": multiplying} if multiplying else {})
+
+
+def multiply_adds(names, loop, loops):
+    """Of a loop that is nothing else than multiplying and adding its instructions and those; None of others."""
+    begin, end = loop
+    if any(other != loop and begin <= other[0] and other[1] <= end for other in loops):
+        return None
+    inside = [name for name in names[begin : end + 1] if name != "NOP"]
+    n = sum(name.startswith("FFMA") for name in inside)
+    return {"instructions": len(inside), "multiply_adds": n} if len(inside) < 2 * n else None
 
 
 def named(parts):

@@ -74,6 +74,7 @@ HERE float2 min(float2 a, float2 b) { return float2(fminf(a.x, b.x), fminf(a.y, 
 HERE float2 max(float2 a, float2 b) { return float2(fmaxf(a.x, b.x), fmaxf(a.y, b.y)); }
 HERE float clamp(float a, float l, float h) { return fminf(fmaxf(a, l), h); }
 HERE uint clamp(uint a, uint l, uint h) { return min(max(a, l), h); }
+HERE int clamp(int a, int l, int h) { return min(max(a, l), h); }
 HERE float2 clamp(float2 a, float2 l, float2 h) { return min(max(a, l), h); }
 HERE float rint(float a) { return rintf(a); }
 HERE float2 rint(float2 a) { return float2(rintf(a.x), rintf(a.y)); }
@@ -87,6 +88,7 @@ HERE float sign(float a) { return a < 0 ? -1.0f : 0 < a ? 1.0f : 0.0f; }
 HERE float dot(float2 a, float2 b) { return a.x * b.x + a.y * b.y; }
 HERE float length(float2 a) { return sqrtf(dot(a, a)); }
 HERE float distance(float2 a, float2 b) { return length(a - b); }
+HERE float2 normalize(float2 a) { return a * rsqrtf(dot(a, a)); }
 HERE uint clz(uint a) { return __clz(a); }
 HERE uint popcount(uint a) { return __popc(a); }
 template <typename T> HERE T select(T a, T b, bool c) { return c ? b : a; }

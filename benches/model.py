@@ -68,6 +68,10 @@ AT_ONCE = {
     "observe_both": ("observe", "copy_observation"),
     "judge_and_count": ("judge", "count"),
 }
+# The policy that is modelled: values and outputs of its layers, those of `attard2023`.
+LAYERS = [69, 256, 256, 9]
+# Threads side by side, each for four outputs; as many teams, each with trucks of its own. See policy/src/kernel.rs.
+COLUMNS, TEAMS, TILE = 64, 2, 16
 # Values that neighbouring threads write to sectors of their own, of 32 bytes; not by way of workgroup memory.
 SCATTERED = {"observe": 69}
 # Trucks of a workgroup where `sense` has workgroup memory: its threads take rays from a queue.
@@ -217,12 +221,53 @@ def modelled(result, card):
         if name not in TOUCHED or any(name in parts for at_once, parts in AT_ONCE.items() if at_once in kernels):
             continue
         need = amounts(name, kernel, result["replay"], card)
-        # A TB/s is 1,000 bytes a ns.
-        scale = {"memory": 1000, "cache": 1000}
-        rates = {what: getattr(CARDS[card], what) * scale.get(what, 1) for what in need}
-        ns = [max(need[what] / (rates[what] * REACHED[case][what]) for what in need) for case in CASES]
-        found[name] = {"need": need, "ns": ns}
+        found[name] = {"need": need, "ns": longest(need, card)}
     return found
+
+
+def acting(result, card):
+    """The same of the kernel that acts: its multiply-adds, and each weight that a workgroup reads for its trucks."""
+    of, kernel = CARDS[card], list(result["nvidia"].values())[-1].get("act")
+    if kernel is None:
+        return None
+    loops = sorted(kernel["multiplying_loops"], key=lambda loop: -loop["multiply_adds"])
+    subgroups = TEAMS * COLUMNS / of.width
+    n, read = 0, 0
+    for inputs, outputs in zip(LAYERS, LAYERS[1:]):
+        inputs, columns = -(-inputs // 4) * 4, -(-outputs // 4)
+        # Where half of the threads would do, two share a column, and each has half of a team's trucks.
+        is_shared = 2 * columns <= COLUMNS
+        loop = loops[1 if is_shared else 0]
+        needed = inputs * 4 * TILE / TEAMS / (2 if is_shared else 1)
+        # Subgroups of a team in which any thread has a column.
+        working = TEAMS * -(-columns * (2 if is_shared else 1) // of.width)
+        n += needed * loop["instructions"] / loop["multiply_adds"] * working
+        read += 16 * columns * (inputs + 1)
+    # What is not in these loops runs once a layer, about.
+    rest = sum(kernel["instructions"].values()) - sum(loop["instructions"] for loop in loops)
+    memory = sum(result["replay"]["row_bytes"][what] for what in ("next_observation", "action"))
+    need = {
+        "instructions": (n + rest * subgroups * (len(LAYERS) - 1)) / TILE,
+        "memory": memory,
+        "cache": memory + read / TILE,
+        "workgroups": 1 / TILE,
+    }
+    return {"need": need, "ns": longest(need, card)}
+
+
+def by_policy(result, card):
+    """The kernels of a step with the policy's actions; None of a result without its kernel."""
+    acts = acting(result, card)
+    random = modelled(result, card)
+    return acts and {name: kernel for name, kernel in random.items() if name != "draw"} | {"act": acts}
+
+
+def longest(need, card):
+    """The ns that is the longest of all needs, low, middle and high."""
+    # A TB/s is 1,000 bytes a ns.
+    scale = {"memory": 1000, "cache": 1000}
+    rates = {what: getattr(CARDS[card], what) * scale.get(what, 1) for what in need}
+    return [max(need[what] / (rates[what] * REACHED[case][what]) for what in need) for case in CASES]
 
 
 def speed(found, n_envs):
@@ -241,22 +286,23 @@ def three(values, digits):
 def table(results):
     """The lines of a document's table: for each file instructions, H100 and 7900 XTX."""
     found = [{card: modelled(result, card) for card in ("H100", "7900 XTX")} for result in results]
+    driven = [{card: by_policy(result, card) for card in cards} for result, cards in zip(results, found)]
     kernels = list(dict.fromkeys(name for cards in found for name in cards["H100"]))
     yield "| kernel |" + " instructions of a warp a truck | H100 | 7900 XTX |" * len(found)
     yield "|---|" + "---|---|---|" * len(found)
-    for name in kernels:
+    for name in [*kernels, *(["act"] if all(driven[0].values()) else [])]:
         row = [name]
-        for cards in found:
+        for cards in driven if name == "act" else found:
             if name in cards["H100"]:
                 row.append(f"{cards['H100'][name]['need']['instructions']:,.0f}")
                 row += [three(cards[card][name]["ns"], 2) for card in cards]
             else:
                 row += ["", "", ""]
         yield f"| {' | '.join(row)} |"
-    for n_envs in (1 << 20, 1 << 16):
-        row = [f"M env steps/s, {n_envs:,} trucks"]
-        for cards in found:
-            row += ["", *(three(speed(cards[card], n_envs), 0) for card in cards)]
+    for n_envs, by, cards_of in ((1 << 20, "", found), (1 << 16, "", found), (1 << 20, ", the policy", driven)):
+        row = [f"M env steps/s, {n_envs:,} trucks{by}"]
+        for cards in cards_of:
+            row += ["", *(three(speed(cards[card], n_envs), 0) if cards[card] else "" for card in cards)]
         yield f"| {' | '.join(row)} |"
 
 
@@ -272,14 +318,19 @@ def main():
     for file, result in zip(args.results, results):
         print(f"{file.name}, {result['date']}, {result['commit']}: ns a truck on each card, low / middle / high")
         cards = {card: modelled(result, card) for card in CARDS}
-        for name in cards["H100"]:
-            columns = [" / ".join(f"{ns:.2f}" for ns in found[name]["ns"]) for found in cards.values()]
-            need = cards["H100"][name]["need"]
+        driven = {card: by_policy(result, card) for card in CARDS}
+        for name in [*cards["H100"], *(["act"] if all(driven.values()) else [])]:
+            of_cards = driven if name == "act" else cards
+            columns = [" / ".join(f"{ns:.2f}" for ns in found[name]["ns"]) for found in of_cards.values()]
+            need = of_cards["H100"][name]["need"]
             amount = f"{need['instructions']:7.1f} instr. {need['memory']:6.0f} B {need['workgroups']:.2f} workgroups"
             print(f"  {name:20}{amount}  " + "  ".join(columns))
         for n_envs in (16_384, 65_536, 1_048_576):
             rates = [f"{card} " + " / ".join(f"{rate:.0f}" for rate in speed(cards[card], n_envs)) for card in cards]
             print(f"  {n_envs:9,} trucks, M env steps/s: " + ";  ".join(rates))
+        if all(driven.values()):
+            rates = [f"{card} " + " / ".join(f"{rate:.0f}" for rate in speed(driven[card], 1 << 20)) for card in driven]
+            print(f"  {1 << 20:9,} trucks by the policy: " + ";  ".join(rates))
 
 
 if __name__ == "__main__":
