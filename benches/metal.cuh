@@ -89,6 +89,13 @@ HERE float dot(float2 a, float2 b) { return a.x * b.x + a.y * b.y; }
 HERE float length(float2 a) { return sqrtf(dot(a, a)); }
 HERE float distance(float2 a, float2 b) { return length(a - b); }
 HERE float2 normalize(float2 a) { return a * rsqrtf(dot(a, a)); }
+HERE float4 min(float4 a, float4 b) { return float4(fminf(a.x, b.x), fminf(a.y, b.y), fminf(a.z, b.z), fminf(a.w, b.w)); }
+HERE float4 max(float4 a, float4 b) { return float4(fmaxf(a.x, b.x), fmaxf(a.y, b.y), fmaxf(a.z, b.z), fmaxf(a.w, b.w)); }
+HERE float4 clamp(float4 a, float4 l, float4 h) { return min(max(a, l), h); }
+HERE float4 tanh(float4 a) { return float4(tanhf(a.x), tanhf(a.y), tanhf(a.z), tanhf(a.w)); }
+HERE float4 fma(float4 a, float4 b, float4 c) {
+    return float4(fmaf(a.x, b.x, c.x), fmaf(a.y, b.y, c.y), fmaf(a.z, b.z, c.z), fmaf(a.w, b.w, c.w));
+}
 HERE uint clz(uint a) { return __clz(a); }
 HERE uint popcount(uint a) { return __popc(a); }
 template <typename T> HERE T select(T a, T b, bool c) { return c ? b : a; }

@@ -95,7 +95,7 @@ def test_the_speeds_that_the_notebook_expects_of_cards_are_the_models() -> None:
     table = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     rows = [line for line in table.splitlines() if line.startswith("| M env steps/s")]
     speeds = [speed for row in rows for speed in re.findall(r"\d+/\*\*\d+\*\*/\d+", row)]
-    assert len(speeds) == 4, table
+    assert len(speeds) == 6, table
     notebook = (ROOT / "docs/notebook/gpu.md").read_text()
     assert [speed for speed in speeds if speed not in notebook] == []
 
