@@ -19,7 +19,8 @@ struct Flag {
 fn flags(help: &str) -> Vec<Flag> {
     let mut flags: Vec<Flag> = Vec::new();
     for line in help.lines().filter(|line| line.starts_with("  ")) {
-        let words = line.split([' ', ',']).filter(|word| !word.is_empty());
+        // A value that may be left out stands in brackets.
+        let words = line.split([' ', ',', '[']).filter(|word| !word.is_empty());
         let names: Vec<&str> = words.take_while(|word| word.starts_with('-')).collect();
         if let Some(long) = names.iter().find(|name| name.starts_with("--")) {
             let short = names.iter().find(|name| name.len() == 2).map(|name| (*name).to_owned());
