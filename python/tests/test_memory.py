@@ -164,7 +164,7 @@ def test_the_table_is_written_by_numpy(tmp_path: Path) -> None:
     np.savetxt(file, table, "%s", ",", header=",".join(table.dtype.names or ()), comments="")
     first, second = file.read_text().splitlines()[:2]
     assert first.startswith("route,episode,start_offset,") and second.startswith("16m/")
-    assert len(second.split(",")) == len(first.split(",")) == 22
+    assert len(second.split(",")) == len(first.split(",")) == 23
 
 
 def test_a_policy_that_reads_some_values_takes_them_from_observations_with_and_without_extras(tmp_path: Path) -> None:
