@@ -225,11 +225,9 @@ def modelled(result, card):
     return found
 
 
-def acting(result, card):
+def acting(kernel, result, card):
     """The same of the kernel that acts: its multiply-adds, and each weight that a workgroup reads for its trucks."""
-    of, kernel = CARDS[card], list(result["nvidia"].values())[-1].get("act")
-    if kernel is None:
-        return None
+    of = CARDS[card]
     loops = sorted(kernel["multiplying_loops"], key=lambda loop: -loop["multiply_adds"])
     subgroups = TEAMS * COLUMNS / of.width
     n, read = 0, 0
@@ -256,10 +254,12 @@ def acting(result, card):
 
 
 def by_policy(result, card):
-    """The kernels of a step with the policy's actions; None of a result without its kernel."""
-    acts = acting(result, card)
-    random = modelled(result, card)
-    return acts and {name: kernel for name, kernel in random.items() if name != "draw"} | {"act": acts}
+    """The kernels of a step with the policy's actions; none of a result without its kernel."""
+    kernel = list(result["nvidia"].values())[-1].get("act")
+    if kernel is None:
+        return {}
+    others = {name: found for name, found in modelled(result, card).items() if name != "draw"}
+    return others | {"act": acting(kernel, result, card)}
 
 
 def longest(need, card):
@@ -290,7 +290,7 @@ def table(results):
     kernels = list(dict.fromkeys(name for cards in found for name in cards["H100"]))
     yield "| kernel |" + " instructions of a warp a truck | H100 | 7900 XTX |" * len(found)
     yield "|---|" + "---|---|---|" * len(found)
-    for name in [*kernels, *(["act"] if all(driven[0].values()) else [])]:
+    for name in [*kernels, *(["act"] if any(any(cards.values()) for cards in driven) else [])]:
         row = [name]
         for cards in driven if name == "act" else found:
             if name in cards["H100"]:
