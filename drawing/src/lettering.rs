@@ -17,8 +17,8 @@ pub enum Align {
     Right,
 }
 
-/// Width of the stroke of a letter as a fraction of the size: the typeface is light, and a thin stroke keeps it readable
-/// in small pictures.
+/// Width of the stroke of a letter as a fraction of the size: the typeface is light, and a thin stroke keeps it
+/// readable in small pictures.
 pub const WEIGHT: f64 = 0.035;
 /// Width of the light rim behind one over a map, as a fraction of the size, and its opacity.
 pub const RIM: f64 = 0.3;

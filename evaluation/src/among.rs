@@ -232,8 +232,8 @@ pub(super) const NOTE: &str = "stood: a truck, per episode; braking: vehicles, h
 /// What [`AmongSummary::line_of_lanes`] gives, and what it means.
 pub(super) const HEADING_OF_LANES: &str = "vehicles      PET p5   p50 class I %     II %   III %";
 pub(super) const NOTE_OF_LANES: &str = "PET: least time of an episode between truck and vehicle where their paths \
-                                        meet, at most 5 s; class I: took a lane beside its own on entry or exit, II: in the \
-                                        ring alone, III: nowhere, of those that arrived.";
+                                        meet, at most 5 s; class I: took a lane beside its own on entry or exit, \
+                                        II: in the ring alone, III: nowhere, of those that arrived.";
 
 /// The value that a fraction of all lies at or below.
 fn quantile(all: &[Among], value: fn(&Among) -> f64, fraction: f64) -> f64 {

@@ -2,8 +2,8 @@
 //! when it is read.
 
 pub mod attempt; // searches from one start until one arrives, and from many at once
-pub mod beam; // a search
 pub mod avoidance; // a search from before a contact with another vehicle
+pub mod beam; // a search
 pub mod file; // what it found
 pub mod line; // the paths that it drove, as lines to follow
 pub mod verify; // driving it again

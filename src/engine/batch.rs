@@ -160,7 +160,9 @@ macro_rules! batch {
             /// `indices[i]` was.
             pub(crate) fn gathered(&self, indices: &[u32]) -> Result<Batch, Error> {
                 let choice = match &self.choice {
-                    RouteChoice::Fixed(routes) => RouteChoice::Fixed(indices.iter().map(|&index| routes[index as usize]).collect()),
+                    RouteChoice::Fixed(routes) => {
+                        RouteChoice::Fixed(indices.iter().map(|&index| routes[index as usize]).collect())
+                    }
                     RouteChoice::Drawn(routes) => RouteChoice::Drawn(routes.clone()),
                 };
                 let batch = Batch::new(indices.len(), self.seed, choice, self.has_vehicles)?;
@@ -199,7 +201,8 @@ macro_rules! batch {
             /// roads.
             pub(crate) fn blocks(&mut self, world: &World) -> impl ParallelIterator<Item = Block<'_>> {
                 let n = self.order.renewed(world, &self.truck);
-                let (streams, choice, autoreset, order) = (&self.streams, &self.choice, self.autoreset, &mut self.order);
+                let (streams, choice, autoreset) = (&self.streams, &self.choice, self.autoreset);
+                let order = &mut self.order;
                 let n_envs = streams.len();
                 let of_vehicles = ($(blocks_of(&mut self.$name_of, n, n_envs),)*).into_par_iter();
                 let blocks = order.blocks().zip(zipped!(self, n; $($name)*)).zip(of_vehicles).enumerate();
