@@ -46,7 +46,7 @@ fn a_device_that_fails_ends_the_run_with_its_last_checkpoint_intact() {
         .learn(|| {
             asked.set(asked.get() + 1);
             // By then a checkpoint has been written: they are due every 6 ms.
-            if asked.get() == 60 {
+            if asked.get() == 20 {
                 device.destroy();
             }
             false
