@@ -57,7 +57,7 @@ impl Groups {
             lane: by(lane),
             exit: by(exit),
             roundabout: by(roundabout),
-            demand: by_demand(finished, step),
+            demand: by_demand(&finished.iter().collect::<Vec<_>>(), step),
         }
     }
 }
@@ -79,12 +79,12 @@ pub(super) fn by(routes: &[Evaluated], episodes: &[Vec<&Episode>], key: Key, ste
 }
 
 /// The groups of episodes by demand.
-fn by_demand(finished: &[Episode], step: f64) -> Vec<Group> {
-    let mut demands: Vec<f64> = finished.iter().filter_map(demand_of).collect();
+pub(super) fn by_demand(finished: &[&Episode], step: f64) -> Vec<Group> {
+    let mut demands: Vec<f64> = finished.iter().filter_map(|episode| demand_of(episode)).collect();
     demands.sort_by(f64::total_cmp);
     demands.dedup();
     let group = |demand: f64| {
-        let episodes = || finished.iter().filter(move |episode| demand_of(episode) == Some(demand));
+        let episodes = || finished.iter().copied().filter(move |episode| demand_of(episode) == Some(demand));
         let routes: HashSet<u32> = episodes().map(|episode| episode.last.route).collect();
         Some(Group { name: format!("{demand} veh/h"), routes: routes.len(), summary: Summary::of(episodes(), step)? })
     };

@@ -2,12 +2,17 @@
 //! nobody arrives.
 //!
 //! An episode that arrived shows it itself. The start of one that did not is searched for actions that complete it;
-//! what no search completes may be possible all the same, and is left out.
+//! what no search completes may be possible all the same, and is left out. Among other vehicles the search drives on
+//! the empty road, so that what only vehicles make impossible counts as possible.
+
+use std::sync::Arc;
 
 use offtrack::layout::{Ended, Truck};
+use offtrack::world::World;
 use serde::Serialize;
 
 use super::Evaluation;
+use super::certificate;
 use super::certificate::attempt::attempts;
 use super::certificate::beam::Pass;
 use super::certificate::file;
@@ -34,6 +39,10 @@ pub struct Possible {
     pub island_radius: Vec<Group>,
     /// The episodes with a possible start by the lane of approach.
     pub lane: Vec<Group>,
+    /// The episodes with a possible start by the demand of other vehicles, without which it was searched; empty where
+    /// there are none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub demand: Vec<Group>,
 }
 
 impl Possible {
@@ -42,8 +51,9 @@ impl Possible {
         let passes: Vec<String> =
             self.passes.iter().map(|pass| format!("{} (held {})", pass.width, pass.hold)).collect();
         format!(
-            "possible: the episodes that arrived and those whose own start a search completed, {} of the {} searched \
+            "possible: the episodes that arrived and those whose own start a search completed{}, {} of the {} searched \
              with {} candidates, {} env steps.",
+            if self.demand.is_empty() { "" } else { " on the empty road" },
             self.found,
             self.searched,
             passes.join(", then "),
@@ -57,6 +67,21 @@ pub fn to_search(finished: &[Episode]) -> impl Iterator<Item = usize> {
     (0..finished.len()).filter(|&index| finished[index].ended != Ended::Arrived && !finished[index].lost_at_start())
 }
 
+/// An error for a world whose actions are continuous: a search tries every action of a table.
+pub fn check(world: &World) -> Result<(), Error> {
+    if world.is_continuous() { Err(certificate::needs_levels()) } else { Ok(()) }
+}
+
+/// The world without its other vehicles.
+fn emptied(world: &Arc<World>) -> Arc<World> {
+    if world.traffic.is_none() {
+        return world.clone();
+    }
+    let mut emptied = World::clone(world);
+    emptied.traffic = None;
+    Arc::new(emptied)
+}
+
 impl Evaluation<'_> {
     /// Searches the starts of the episodes that did not arrive; the episodes stand as [`Evaluation::drive`] gives them.
     /// Every sequence found is driven again. `done` is called after each search, from any thread. Given beside the
@@ -67,15 +92,17 @@ impl Evaluation<'_> {
         passes: &[Pass],
         done: &(dyn Fn() + Sync),
     ) -> Result<(Possible, Vec<bool>), Error> {
+        check(self.world)?;
+        let world = emptied(self.world);
         let searched: Vec<usize> = to_search(finished).collect();
         let starts: Vec<_> = searched.iter().map(|&index| self.start(index)).collect();
-        let searches = attempts(self.world, &starts, passes, &|_, _| done())?;
+        let searches = attempts(&world, &starts, passes, &|_, _| done())?;
         let sequences = searches.iter().zip(&starts).map(|(found, &(route, start))| {
-            let limit = self.world.step_limit(&Truck { route, vehicle: start.vehicle, ..Truck::default() }) as usize;
-            let actions = file::actions(&found.actions, self.world.params.n_actions, limit).unwrap_or_default();
+            let limit = world.step_limit(&Truck { route, vehicle: start.vehicle, ..Truck::default() }) as usize;
+            let actions = file::actions(&found.actions, world.params.n_actions, limit).unwrap_or_default();
             Sequence { route, start, actions }
         });
-        let ended = driven(self.world, &sequences.collect::<Vec<_>>())?;
+        let ended = driven(&world, &sequences.collect::<Vec<_>>())?;
         let mut is_possible: Vec<bool> = finished.iter().map(|episode| episode.ended == Ended::Arrived).collect();
         for (&index, &ended) in searched.iter().zip(&ended) {
             is_possible[index] = ended == Ended::Arrived;
@@ -94,6 +121,7 @@ impl Evaluation<'_> {
             passes: passes.to_vec(),
             island_radius: groups::by(&routes, &possible, groups::island_radius, step),
             lane: groups::by(&routes, &possible, groups::lane, step),
+            demand: groups::by_demand(&possible.concat(), step),
         };
         Ok((figures, is_possible))
     }
@@ -114,8 +142,13 @@ mod tests {
     /// A route that a narrow search completes, with the largest start offset given (m), and what is found of `policy`.
     fn possible(start_offset: f64, policy: &mut dyn Controller, pass: Pass) -> (Vec<Episode>, Possible) {
         let mut scenario = Scenario::named("attard2023").unwrap();
-        scenario.retain(|_, route| route.name == "20m/E-right-1");
         scenario.start_offset = start_offset;
+        possible_in(scenario, policy, pass)
+    }
+
+    /// The same of a benchmark.
+    fn possible_in(mut scenario: Scenario, policy: &mut dyn Controller, pass: Pass) -> (Vec<Episode>, Possible) {
+        scenario.retain(|_, route| route.name == "20m/E-right-1");
         let world = Arc::new(World::bake(&scenario).unwrap());
         let device = Device::processor();
         let evaluation = Evaluation {
@@ -161,6 +194,17 @@ mod tests {
         let (_, possible) = possible(0.3, &mut UniformRandom { seed: 1 }, Pass { width: 1, hold: 10 });
         assert_eq!((possible.searched, possible.found, possible.summary), (6, 0, None));
         assert!(0 < possible.env_steps);
+    }
+
+    #[test]
+    fn among_vehicles_starts_are_searched_on_the_empty_road_and_counted_by_demand() {
+        let scenario = Scenario::named("traffic2026").unwrap();
+        let (episodes, possible) = possible_in(scenario, &mut UniformRandom { seed: 1 }, Pass { width: 32, hold: 3 });
+        assert!(episodes.iter().all(|episode| episode.ended.failed() && episode.among.is_some()), "{episodes:?}");
+        assert_eq!((possible.searched, possible.found), (6, 6));
+        assert!(1 < possible.demand.len(), "{:?}", possible.demand);
+        assert_eq!(possible.demand.iter().map(|group| group.summary.episodes).sum::<usize>(), 6);
+        assert!(possible.note().contains("on the empty road"), "{}", possible.note());
     }
 
     #[test]

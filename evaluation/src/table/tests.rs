@@ -55,6 +55,7 @@ fn report() -> Report {
             passes: vec![Pass { width: 512, hold: 3 }],
             island_radius: Vec::new(),
             lane: Vec::new(),
+            demand: Vec::new(),
         }),
         avoidable: None,
         failures: (0..CAUSES + 2).map(cause).collect(),
