@@ -4,10 +4,13 @@
 Standard library only.
 
     python3 benches/among.py --json docs/results/traffic.json
+
+With --benchmarks those alone are driven, and what the file has of the others stays.
 """
 
 import argparse
 import datetime
+import json
 import tempfile
 from pathlib import Path
 
@@ -26,6 +29,8 @@ BENCHMARKS = {
     "traffic2026-laden": 120,
     "traffic2026-maps": 30,
 }
+# Where the starts of what did not arrive are searched on the empty road.
+CERTIFIED = ["traffic2026", "traffic2026-random"]
 # Whether polite vehicles are ever at fault.
 POLITE = ("traffic2026", ["yields", "follows"], 435)
 # Without other vehicles: the same benchmark with another demand.
@@ -37,6 +42,7 @@ FIGURES = [
 
 
 BY_DEMAND = ["episodes", "arrived", "success", "time_mean"]
+POSSIBLE = ["searched", "found", "passes"]
 AMONG_BY_DEMAND = ["standing_mean", "blocked", "braking_mean", "lane_classes"]
 
 
@@ -46,7 +52,8 @@ def kept(figures, keys):
 
 def driven(offtrack, policy, benchmark, episodes):
     """The report of a policy on the test routes of a benchmark."""
-    return evaluation(offtrack, "--policy", policy, "--benchmark", benchmark, "--episodes", episodes)
+    certify = ["--certify"] if benchmark in CERTIFIED else []
+    return evaluation(offtrack, "--policy", policy, "--benchmark", benchmark, "--episodes", episodes, *certify)
 
 
 def row(name, benchmark, report):
@@ -58,14 +65,40 @@ def row(name, benchmark, report):
     levels = ", ".join(f"{demand} {100 * figures['success']:.1f} %" for demand, figures in by_demand.items())
     print(f"{name}, {benchmark}: {report['arrived']} of {report['episodes']}; {levels}", flush=True)
     causes = {cause["cause"]: cause["episodes"] for cause in report["failures"][:8]}
-    return {**kept(report, FIGURES), "by_demand": by_demand, "causes": causes}
+    found = {**kept(report, FIGURES), "by_demand": by_demand, "causes": causes}
+    if "possible" in report:
+        of_demands = {group["name"]: kept(group, BY_DEMAND) for group in report["possible"]["demand"]}
+        found["possible"] = kept(report["possible"], [*POSSIBLE, *BY_DEMAND]) | {
+            "by_demand": of_demands,
+            "commit": report["commit"],
+        }
+    return found
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--offtrack", default=str(ROOT / "target/release/offtrack"), help="the program")
     parser.add_argument("--json", type=Path, required=True, help="file to write")
+    parser.add_argument("--benchmarks", nargs="+", choices=BENCHMARKS, help="these alone")
     args = parser.parse_args()
+    if args.benchmarks:
+        redone(args)
+    else:
+        every(args)
+
+
+def redone(args):
+    """Drives some benchmarks again."""
+    result = json.loads(args.json.read_text())
+    for benchmark in args.benchmarks:
+        for name in POLICIES:
+            report = driven(args.offtrack, name, benchmark, BENCHMARKS[benchmark])
+            result[name][benchmark] = row(name, benchmark, report)
+            write_json(args.json, result)
+
+
+def every(args):
+    """Drives all benchmarks, and some more."""
     result = {
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
         "command": "python3 benches/among.py --json docs/results/traffic.json",
