@@ -29,8 +29,9 @@ BENCHMARKS = {
     "traffic2026-laden": 120,
     "traffic2026-maps": 30,
 }
-# Where the starts of what did not arrive are searched on the empty road.
+# Where the starts of what did not arrive are searched on the empty road, and of which policies.
 CERTIFIED = ["traffic2026", "traffic2026-random"]
+SEARCHED = ["yields:traffic2026", "traffic2026"]
 # Whether polite vehicles are ever at fault.
 POLITE = ("traffic2026", ["yields", "follows"], 435)
 # Without other vehicles: the same benchmark with another demand.
@@ -52,7 +53,7 @@ def kept(figures, keys):
 
 def driven(offtrack, policy, benchmark, episodes):
     """The report of a policy on the test routes of a benchmark."""
-    certify = ["--certify"] if benchmark in CERTIFIED else []
+    certify = ["--certify", "--widths", "64"] if benchmark in CERTIFIED and policy in SEARCHED else []
     return evaluation(offtrack, "--policy", policy, "--benchmark", benchmark, "--episodes", episodes, *certify)
 
 
