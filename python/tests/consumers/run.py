@@ -43,6 +43,7 @@ CONSUMERS = [
     Consumer("cleanrl_ppo_continuous", "sb3", 256, []),
     Consumer("sb3_sac", "sb3", 64, ["--algorithm", "sac"]),
     Consumer("sb3_td3", "sb3", 64, ["--algorithm", "td3"], "sb3_sac"),
+    Consumer("sb3_dqn", "sb3", 64, []),
     Consumer("puffer_ppo", "puffer", 256, []),
     Consumer("ray_actors", "ray", 256, ["--actors", "2", "--envs", "128"]),
     Consumer("rllib_ppo", "ray", 128, ["--runners", "2", "--envs", "64", "--steps", "3000000"]),
