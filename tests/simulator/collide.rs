@@ -59,7 +59,7 @@ fn verdicts(
 fn a_unit_touches_a_kerb_exactly_when_its_rectangle_does_to_two_centimetres() {
     let world = benchmark("attard2023").1;
     let rig = &world.rigs[0];
-    for (gutter, n) in [(Gutter::Drivable, 30_000), (Gutter::Solid, 10_000)] {
+    for (gutter, n) in [(Gutter::Drivable, 100_000), (Gutter::Solid, 10_000)] {
         for (name, kerbs, field) in places(gutter) {
             let trucks: Vec<Truck> = (0..n).into_par_iter().map(|index| pose(&kerbs, index, 0.5)).collect();
             let exact: Vec<[bool; 2]> = trucks.par_iter().map(|truck| touches(&kerbs, rig, truck, 0.0)).collect();
