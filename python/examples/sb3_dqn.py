@@ -12,7 +12,7 @@ Exploration falls from random actions to 2 % of them within the first third of t
 from __future__ import annotations
 
 from sb3_ppo import arguments, learn, trucks
-from sb3_sac import OffPolicyCurve
+from sb3_sac import SETTINGS, OffPolicyCurve
 from stable_baselines3 import DQN
 
 
@@ -21,15 +21,10 @@ def main() -> None:
         "DQN of Stable-Baselines3", benchmark="attard2023", steps=1_000_000, envs=64, out="dqn"
     ).parse_args()
     settings = {
-        "learning_starts": 10_000,
-        "batch_size": 512,
-        "train_freq": 1,
-        "gradient_steps": 4,
-        "gamma": 0.97,
+        **SETTINGS,
         "target_update_interval": 1_000,
         "exploration_fraction": 0.33,
         "exploration_final_eps": 0.02,
-        "policy_kwargs": {"net_arch": [128, 128]},
     }
     env = trucks(args, settings["gamma"])
     model = DQN("MlpPolicy", env, learning_rate=1e-3, seed=args.seed, device="cpu", **settings)

@@ -21,6 +21,15 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 #: Env steps between two rows of the curve.
 ROW = 20_000
+#: Settings of all that learn from a replay buffer.
+SETTINGS = {
+    "learning_starts": 10_000,
+    "batch_size": 512,
+    "train_freq": 1,
+    "gradient_steps": 4,
+    "gamma": 0.97,
+    "policy_kwargs": {"net_arch": [128, 128]},
+}
 
 
 class OffPolicyCurve(Curve):
@@ -36,18 +45,10 @@ def main() -> None:
     parser = arguments("SAC or TD3 of Stable-Baselines3", benchmark=benchmark, steps=1_000_000, envs=64, out="sac")
     parser.add_argument("--algorithm", choices=["sac", "td3"], default="sac")
     args = parser.parse_args()
-    settings = {
-        "learning_starts": 10_000,
-        "batch_size": 512,
-        "train_freq": 1,
-        "gradient_steps": 4,
-        "gamma": 0.97,
-        "policy_kwargs": {"net_arch": [128, 128]},
-    }
-    env = trucks(args, settings["gamma"])
+    env = trucks(args, SETTINGS["gamma"])
     kind, more = (SAC, {}) if args.algorithm == "sac" else (TD3, {"action_noise": _noise(env)})
-    model = kind("MlpPolicy", env, learning_rate=1e-3, seed=args.seed, device="cpu", **settings, **more)
-    learn(f"sb3_{args.algorithm}", model, OffPolicyCurve(args.minutes), args, settings)
+    model = kind("MlpPolicy", env, learning_rate=1e-3, seed=args.seed, device="cpu", **SETTINGS, **more)
+    learn(f"sb3_{args.algorithm}", model, OffPolicyCurve(args.minutes), args, SETTINGS)
 
 
 def _noise(env: VecNormalize) -> VectorizedActionNoise:
