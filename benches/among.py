@@ -82,24 +82,6 @@ def main():
     parser.add_argument("--json", type=Path, required=True, help="file to write")
     parser.add_argument("--benchmarks", nargs="+", choices=BENCHMARKS, help="these alone")
     args = parser.parse_args()
-    if args.benchmarks:
-        redone(args)
-    else:
-        every(args)
-
-
-def redone(args):
-    """Drives some benchmarks again."""
-    result = json.loads(args.json.read_text())
-    for benchmark in args.benchmarks:
-        for name in POLICIES:
-            report = driven(args.offtrack, name, benchmark, BENCHMARKS[benchmark])
-            result[name][benchmark] = row(name, benchmark, report)
-            write_json(args.json, result)
-
-
-def every(args):
-    """Drives all benchmarks, and some more."""
     result = {
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
         "command": "python3 benches/among.py --json docs/results/traffic.json",
@@ -107,13 +89,18 @@ def every(args):
         "training": "offtrack train traffic, seed 0; the budget was raised from 12 to 18 million env steps on the way; "
         "the policy is the best of 20 validations on 40 validation roads, after 17.1 million",
     }
-    policies = {name: {} for name in POLICIES}
-    for benchmark, episodes in BENCHMARKS.items():
+    if args.benchmarks:
+        result = json.loads(args.json.read_text())
+    policies = {name: result.get(name, {}) for name in POLICIES}
+    for benchmark in args.benchmarks or BENCHMARKS:
         for name, rows in policies.items():
-            report = driven(args.offtrack, name, benchmark, episodes)
+            report = driven(args.offtrack, name, benchmark, BENCHMARKS[benchmark])
             rows[benchmark] = row(name, benchmark, report)
-            result |= {"commit": report["commit"], "machine": report["machine"]}
+            if not args.benchmarks:
+                result |= {"commit": report["commit"], "machine": report["machine"]}
             write_json(args.json, {**result, **policies})
+    if args.benchmarks:
+        return
     benchmark, names, episodes = POLITE
     for name in names:
         policies[name]["polite"] = row(name, f"{episodes} episodes", driven(args.offtrack, name, benchmark, episodes))
