@@ -7,13 +7,13 @@ use offtrack::scenario::Split;
 use offtrack_evaluation::actions;
 use offtrack_evaluation::avoidable::{self, contacts};
 use offtrack_evaluation::certificate::attempt::{HOLD, passes};
-use offtrack_evaluation::certificate::certified;
+use offtrack_evaluation::certificate::{certified, check_table};
 use offtrack_evaluation::comparison::Asked;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::failures::Example;
 use offtrack_evaluation::outcomes::Outcomes;
 use offtrack_evaluation::page::Page;
-use offtrack_evaluation::possible::{self, to_search};
+use offtrack_evaluation::possible::to_search;
 use offtrack_evaluation::recording::Of;
 use offtrack_evaluation::report::{Episode, Report, Summary};
 use offtrack_evaluation::{Driven, Evaluation, Sequences, legend, usual_episodes};
@@ -144,7 +144,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let scenario = roads::asked(&asked, split)?;
     let world = roads::world(&scenario)?;
     if args.certify {
-        possible::check(&world)?;
+        check_table(&world)?;
     }
     if let Some(seconds) = &args.avoidable {
         avoidable::check(&scenario, &world, seconds)?;

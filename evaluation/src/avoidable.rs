@@ -108,9 +108,7 @@ pub fn check(scenario: &Scenario, world: &World, seconds: &[f64]) -> Result<(), 
         let expected = "asks about contacts with other vehicles: a benchmark with [traffic] is needed, as traffic2026";
         return wrong(scenario.name.clone(), expected.to_owned());
     }
-    if world.is_continuous() {
-        return Err(certificate::needs_levels());
-    }
+    certificate::check_table(world)?;
     let range = scenario.step..=EARLIEST;
     match seconds.iter().find(|seconds| !range.contains(*seconds)) {
         Some(seconds) => wrong(seconds.to_string(), format!("must lie in {}..{EARLIEST} s", scenario.step)),

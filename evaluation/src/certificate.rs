@@ -19,7 +19,7 @@ use crate::error::Error;
 use file::Certificate;
 use verify::Sequence;
 
-/// An error for a world whose actions are continuous: a search tries every action of a table.
+/// An error for a world that no search from a start can drive in: one with other vehicles or with continuous actions.
 pub fn check_levels(world: &World) -> Result<(), Error> {
     if world.traffic.is_some() {
         let expected = "a search drives on an empty road: the same benchmark without that table is needed; `evaluate \
@@ -27,6 +27,11 @@ pub fn check_levels(world: &World) -> Result<(), Error> {
             .to_owned();
         return Err(Error::Setting { name: "[traffic]", value: "vehicles around each truck".to_owned(), expected });
     }
+    check_table(world)
+}
+
+/// An error for a world whose actions are continuous: a search tries every action of a table.
+pub fn check_table(world: &World) -> Result<(), Error> {
     if world.is_continuous() { Err(needs_levels()) } else { Ok(()) }
 }
 

@@ -12,7 +12,6 @@ use offtrack::world::World;
 use serde::Serialize;
 
 use super::Evaluation;
-use super::certificate;
 use super::certificate::attempt::attempts;
 use super::certificate::beam::Pass;
 use super::certificate::file;
@@ -67,11 +66,6 @@ pub fn to_search(finished: &[Episode]) -> impl Iterator<Item = usize> {
     (0..finished.len()).filter(|&index| finished[index].ended != Ended::Arrived && !finished[index].lost_at_start())
 }
 
-/// An error for a world whose actions are continuous: a search tries every action of a table.
-pub fn check(world: &World) -> Result<(), Error> {
-    if world.is_continuous() { Err(certificate::needs_levels()) } else { Ok(()) }
-}
-
 /// The world without its other vehicles.
 fn emptied(world: &Arc<World>) -> Arc<World> {
     if world.traffic.is_none() {
@@ -92,7 +86,6 @@ impl Evaluation<'_> {
         passes: &[Pass],
         done: &(dyn Fn() + Sync),
     ) -> Result<(Possible, Vec<bool>), Error> {
-        check(self.world)?;
         let world = emptied(self.world);
         let searched: Vec<usize> = to_search(finished).collect();
         let starts: Vec<_> = searched.iter().map(|&index| self.start(index)).collect();
