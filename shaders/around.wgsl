@@ -95,7 +95,49 @@ fn looking_of(env: u32) -> Looking {
     );
 }
 
-// Writes what a truck observes of the cars around it.
+// Another vehicle: a car, or a truck of the same group behind the slots of cars.
+struct Other {
+    // NO_PATH where there is none.
+    path: u32,
+    // Station of its front (m).
+    station: f32,
+    // Its speed (m/s).
+    speed: f32,
+    // Its length (m).
+    length: f32,
+}
+
+// Numbers of others, present or not.
+fn n_others() -> u32 {
+    return select(N_CARS + batch.group, N_CARS, batch.group == 1u);
+}
+
+fn other_at(env: u32, index: u32) -> Other {
+    if index < N_CARS {
+        let car = car_at(env, index);
+        return Other(path_of(car), station_of(car), speed_of(car), length_of(car));
+    }
+    let mate = first_of_group(env) + index - N_CARS;
+    if mate == env || !is_driving(mate) { return Other(NO_PATH, 0.0, 0.0, 0.0); }
+    let at = truck[mate];
+    let station = in_metres(in_lengths(front_station(mate)));
+    return Other(path_of_route(at.route), station, at.speed, in_metres(stretched(vehicles[at.vehicle].rig)));
+}
+
+// Units that it has: a truck two.
+fn units_of(index: u32) -> u32 {
+    return select(2u, 1u, index < N_CARS);
+}
+
+// The ground that one of its units covers.
+fn unit_of_other(env: u32, network: Network, index: u32, unit: u32) -> Outline {
+    if index < N_CARS { return outline_of(network, car_at(env, index)); }
+    let at = truck[first_of_group(env) + index - N_CARS];
+    if unit == 0u { return tractor_outline(at); }
+    return trailer_outline(at);
+}
+
+// Writes what a truck observes of the vehicles around it.
 fn look(env: u32) {
     let looking = looking_of(env);
     look_at_entry(env, looking);
@@ -166,13 +208,13 @@ fn is_of_own_entry(looking: Looking, meeting: Meeting) -> bool {
 fn look_at_entry(env: u32, looking: Looking) {
     var near = Coming(NOWHERE, NOWHERE, NOWHERE);
     var beyond = Coming(NOWHERE, NOWHERE, NOWHERE);
-    for (var slot = 0u; slot < N_CARS; slot++) {
-        let car = car_at(env, slot);
-        if !is_there(car) { continue; }
-        let station = station_of(car);
-        let its_line = in_metres(line_of_path(looking.network, path_of(car)));
-        let waits = station + speed_of(car) * speed_of(car) / STILL_STOPS_WITH <= its_line;
-        let zones = all_zones_of(looking.network, looking.path, path_of(car));
+    for (var index = 0u; index < n_others(); index++) {
+        let other = other_at(env, index);
+        if other.path == NO_PATH { continue; }
+        let station = other.station;
+        let its_line = in_metres(line_of_path(looking.network, other.path));
+        let waits = station + other.speed * other.speed / STILL_STOPS_WITH <= its_line;
+        let zones = all_zones_of(looking.network, looking.path, other.path);
         var touches = false;
         for (var z = 0u; z < zones.y; z++) {
             let meeting = meeting_at(looking.network, zones.x + z);
@@ -183,11 +225,11 @@ fn look_at_entry(env: u32, looking: Looking) {
             if !is_of_own_entry(looking, meeting) { continue; }
             // A car that runs together with the truck leads it once it is through.
             let end = select(meeting.its_out, meeting.its_in, meeting.kind == FOLLOW);
-            let has_left = meeting.own_out < looking.front - looking.length || end < station - length_of(car);
+            let has_left = meeting.own_out < looking.front - looking.length || end < station - other.length;
             if has_left || (waits && its_line < meeting.its_in) || (touches && meeting.kind == WIDE) { continue; }
-            let speed = max(speed_of(car), LEAST_COMING_SPEED);
+            let speed = max(other.speed, LEAST_COMING_SPEED);
             let distance = max(meeting.its_in - station, 0.0);
-            let coming = Coming(distance / speed, distance, (end + length_of(car) - station) / speed);
+            let coming = Coming(distance / speed, distance, (end + other.length - station) / speed);
             if is_beside(meeting.kind) || looking.line + NEAREST_LANE < meeting.own_in {
                 beyond = first_of(beyond, coming);
             } else {
@@ -208,13 +250,13 @@ fn write_coming(env: u32, lane: u32, coming: Coming) {
 // Writes the distance to what is next on the truck's path, and its speed.
 fn look_ahead(env: u32, looking: Looking) {
     var least = NOWHERE;
-    var next_slot = 0u;
-    for (var slot = 0u; slot < N_CARS; slot++) {
-        let car = car_at(env, slot);
-        if !is_there(car) { continue; }
-        let station = station_of(car);
-        let rear = station - length_of(car);
-        let zones = all_zones_of(looking.network, looking.path, path_of(car));
+    var next = 0u;
+    for (var index = 0u; index < n_others(); index++) {
+        let other = other_at(env, index);
+        if other.path == NO_PATH { continue; }
+        let station = other.station;
+        let rear = station - other.length;
+        let zones = all_zones_of(looking.network, looking.path, other.path);
         for (var z = 0u; z < zones.y; z++) {
             let meeting = meeting_at(looking.network, zones.x + z);
             if meeting.its_out <= rear || station <= meeting.its_in { continue; }
@@ -226,15 +268,15 @@ fn look_ahead(env: u32, looking: Looking) {
             }
             if gap < least {
                 least = gap;
-                next_slot = slot;
+                next = index;
             }
         }
     }
     var speed_along = 1.0;
     if least < NOWHERE {
-        let car = car_at(env, next_slot);
+        let along = unit_of_other(env, looking.network, next, 0u).along;
         let ahead = direction_at(looking.network, looking.path, looking.front + least);
-        speed_along = speed_of(car) * dot(outline_of(looking.network, car).along, ahead) / VEHICLE_SPEED_SCALE;
+        speed_along = other_at(env, next).speed * dot(along, ahead) / VEHICLE_SPEED_SCALE;
     }
     write_seen(env, GAP_AT, min(least / GAP_SCALE, 1.0));
     write_seen(env, GAP_SPEED_AT, clamp(speed_along, -1.0, 1.0));
@@ -244,27 +286,27 @@ fn look_ahead(env: u32, looking: Looking) {
 fn look_beside(env: u32, looking: Looking) {
     var tractor_room = ROOM_SCALE;
     var trailer_room = ROOM_SCALE;
-    // The nearest ones' distances and slots, by distance and then by slot.
+    // The nearest ones' distances and numbers, by distance and then by number: twice the index, and the unit.
     var distances = array<f32, N_NEAREST>();
-    var slots = array<u32, N_NEAREST>();
+    var numbers = array<u32, N_NEAREST>();
     for (var rank = 0u; rank < N_NEAREST; rank++) { distances[rank] = NOWHERE; }
-    for (var slot = 0u; slot < N_CARS; slot++) {
-        let car = car_at(env, slot);
-        if !is_there(car) { continue; }
-        let outline = outline_of(looking.network, car);
+    for (var n = 0u; n < 2u * n_others(); n++) {
+        let index = n / 2u;
+        if units_of(index) <= n % 2u || other_at(env, index).path == NO_PATH { continue; }
+        let outline = unit_of_other(env, looking.network, index, n % 2u);
         tractor_room = min(tractor_room, room_between(looking.tractor, outline));
         trailer_room = min(trailer_room, room_between(looking.trailer, outline));
         let to_tractor = distance_squared_to(looking.tractor, outline.middle);
         var distance = sqrt(min(to_tractor, distance_squared_to(looking.trailer, outline.middle)));
-        var whose = slot;
+        var whose = n;
         for (var rank = 0u; rank < N_NEAREST; rank++) {
             let known = distances[rank];
-            let known_slot = slots[rank];
-            if distance < known || (distance == known && whose < known_slot) {
+            let known_number = numbers[rank];
+            if distance < known || (distance == known && whose < known_number) {
                 distances[rank] = distance;
-                slots[rank] = whose;
+                numbers[rank] = whose;
                 distance = known;
-                whose = known_slot;
+                whose = known_number;
             }
         }
     }
@@ -272,7 +314,10 @@ fn look_beside(env: u32, looking: Looking) {
     write_seen(env, ROOM_AT + 1u, trailer_room / ROOM_SCALE);
     for (var rank = 0u; rank < N_NEAREST; rank++) {
         var seen = array<f32, 5>();
-        if distances[rank] < NEAR_SCALE { seen = seen_nearest(looking, car_at(env, slots[rank])); }
+        if distances[rank] < NEAR_SCALE {
+            let outline = unit_of_other(env, looking.network, numbers[rank] / 2u, numbers[rank] % 2u);
+            seen = seen_nearest(looking, outline, other_at(env, numbers[rank] / 2u).speed);
+        }
         for (var group = 0u; group < 5u; group++) {
             write_seen(env, NEAREST_AT + group * N_NEAREST + rank, clamp(seen[group], -1.0, 1.0));
         }
@@ -280,10 +325,9 @@ fn look_beside(env: u32, looking: Looking) {
 }
 
 // What is observed of one of the nearest vehicles.
-fn seen_nearest(looking: Looking, car: Car) -> array<f32, 5> {
-    let outline = outline_of(looking.network, car);
+fn seen_nearest(looking: Looking, outline: Outline, speed: f32) -> array<f32, 5> {
     let to = (outline.middle - looking.origin) / NEAR_SCALE;
-    let velocity = speed_of(car) / VEHICLE_SPEED_SCALE * outline.along;
+    let velocity = speed / VEHICLE_SPEED_SCALE * outline.along;
     let left = perpendicular(looking.along);
     return array<f32, 5>(1.0, dot(to, looking.along), dot(to, left), dot(velocity, looking.along), dot(velocity, left));
 }

@@ -469,7 +469,7 @@ const FROM_STANDING: i32 = 9216i;
 const NEAR_CAR: f32 = 12.0f;
 // Below this speed a car stands, and hits nobody (2^-14 m a step).
 const HITS_NOBODY: i32 = 82i;
-// Added to a contact's code where the truck is at fault: more than there are slots.
+// Added to a contact's code where the truck is at fault: more than there are slots and trucks of a group.
 const TRUCKS_FAULT: u32 = 64u;
 // What a vehicle may brake with for a truck that is in nobody's way (m/s²).
 const GENTLE: f32 = 2.0f;
@@ -995,6 +995,8 @@ struct BatchFacts {
     autoreset: u32,
     // Trucks whose rays a workgroup shares.
     team: u32,
+    // Neighbouring trucks that share a road and its vehicles.
+    group: u32,
 }
 
 // Time and limits.

@@ -9,13 +9,41 @@
 fn reset(thread: Thread) {
     let env = index_of(thread);
     if batch.n_envs <= env { return; }
-    if truck[env].held == 1u {
+    if 1u < batch.group {
+        if truck[env].held == TOGETHER { start(env, next()); }
+    } else if truck[env].held == 1u {
         if batch.autoreset == NEXT_STEP { start(env, next()); }
     } else if ended[env] != RUNNING {
         if batch.autoreset == SAME_STEP {
             start(env, next());
         } else {
             truck[env].held = 1u;
+        }
+    }
+}
+
+// A truck that is held is on its way to its next episode, with all of its group.
+const TOGETHER: u32 = 2u;
+
+// Decides for each group, in the thread of its first truck, whether its next episodes begin: once all have ended. Until
+// then trucks whose episodes have ended are held.
+@compute @workgroup_size(WORKGROUP)
+fn assemble(thread: Thread) {
+    let env = index_of(thread);
+    if batch.n_envs <= env || env != first_of_group(env) { return; }
+    var all_are_held = true;
+    var all_have_ended = true;
+    for (var mate = env; mate < env + batch.group; mate++) {
+        let is_held = truck[mate].held == 1u;
+        all_are_held = all_are_held && is_held;
+        all_have_ended = all_have_ended && (is_held || ended[mate] != RUNNING);
+    }
+    let begins_now = (batch.autoreset == SAME_STEP && all_have_ended) || (batch.autoreset == NEXT_STEP && all_are_held);
+    for (var mate = env; mate < env + batch.group; mate++) {
+        if begins_now {
+            truck[mate].held = TOGETHER;
+        } else if ended[mate] != RUNNING {
+            truck[mate].held = 1u;
         }
     }
 }
@@ -107,11 +135,54 @@ fn start(env: u32, begin: BeginRow) {
 
 // The route of an episode as the batch chooses it.
 fn route_of(env: u32, episode: u32) -> u32 {
-    var index = env;
-    if batch.fixed == 0u {
-        index = index_below(words(streams[env].seed, streams[env].env, episode, DRAW_ROUTE).x, batch.n_routes);
+    if batch.fixed != 0u { return choice[env]; }
+    let group = first_of_group(env);
+    let first = choice[drawn_below(group, episode, batch.n_routes)];
+    // Those of the group's other trucks begin on another arm of its road than those before them, or in another lane.
+    var route = first;
+    var arms = 0u;
+    var lanes_taken = 0u;
+    for (var mate = group + 1u; mate <= env; mate++) {
+        arms |= arm_bit(route);
+        lanes_taken |= lane_bit(route);
+        let n_on_other_arms = n_free(first, arms, 0u);
+        if 0u < n_on_other_arms {
+            route = free_route(first, arms, 0u, drawn_below(mate, episode, n_on_other_arms));
+        } else {
+            let n_in_other_lanes = n_free(first, 0u, lanes_taken);
+            route = free_route(first, 0u, lanes_taken, drawn_below(mate, episode, n_in_other_lanes));
+        }
     }
-    return choice[index];
+    return route;
+}
+
+// An index below `n` for the route of a truck's episode.
+fn drawn_below(env: u32, episode: u32, n: u32) -> u32 {
+    return index_below(words(streams[env].seed, streams[env].env, episode, DRAW_ROUTE).x, n);
+}
+
+// Whether a route is on the road of another one and begins on none of these arms and in none of these lanes.
+fn is_free(first: u32, arms: u32, lanes_taken: u32, route: u32) -> bool {
+    return road_of(route) == road_of(first) && (arms & arm_bit(route)) == 0u && (lanes_taken & lane_bit(route)) == 0u;
+}
+
+fn n_free(first: u32, arms: u32, lanes_taken: u32) -> u32 {
+    var n = 0u;
+    for (var index = 0u; index < batch.n_routes; index++) {
+        if is_free(first, arms, lanes_taken, choice[index]) { n++; }
+    }
+    return n;
+}
+
+// The free route with this number; the first one where there is none.
+fn free_route(first: u32, arms: u32, lanes_taken: u32, number: u32) -> u32 {
+    var left = number;
+    for (var index = 0u; index < batch.n_routes; index++) {
+        if !is_free(first, arms, lanes_taken, choice[index]) { continue; }
+        if left == 0u { return choice[index]; }
+        left--;
+    }
+    return first;
 }
 
 // A truck that stands at `waypoint` with these headings, offset and turned as a whole as `start` says.

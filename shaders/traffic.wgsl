@@ -92,9 +92,8 @@ fn waiting_cars(env: u32, source: u32) -> u32 {
 // into the first free slots.
 fn arrive(env: u32) {
     let network = network_of(truck[env].route);
-    let view = view_of(env, network);
     let row = env * N_CAR_WORDS;
-    if !view.waits && cars[row + ENTERED_AT] == 0u { cars[row + ENTERED_AT] = truck[env].steps + 1u; }
+    if !view_of(env, network).waits && cars[row + ENTERED_AT] == 0u { cars[row + ENTERED_AT] = truck[env].steps + 1u; }
     let hindered_before = cars[row + HINDERED_AT];
     var hindered = 0u;
     for (var slot = 0u; slot < N_CARS; slot++) {
@@ -121,7 +120,7 @@ fn arrive(env: u32) {
         var slot = 0u;
         while slot < N_CARS && is_there(car_at(env, slot)) { slot++; }
         if slot == N_CARS { break; }
-        let car = entering(env, network, view, demand, source);
+        let car = entering(env, network, demand, source);
         if !is_there(car) { continue; }
         write_car(env, slot, driven_by(drivers, car, truck[env].steps + 1u, slot));
         cars[backlog_word(env, source)] -= 1u << backlog_bit(source);
@@ -131,7 +130,7 @@ fn arrive(env: u32) {
 }
 
 // The next car of a source, or none if there is no room for it.
-fn entering(env: u32, network: Network, view: View, demand: u32, source: u32) -> Car {
+fn entering(env: u32, network: Network, demand: u32, source: u32) -> Car {
     let random = traffic_words(env, ENTERING + 16u * truck[env].steps + source);
     let first = lanes[network.sources + SOURCE_WORDS * source + 2u];
     let end = first + lanes[network.sources + SOURCE_WORDS * source + 3u];
@@ -154,10 +153,14 @@ fn entering(env: u32, network: Network, view: View, demand: u32, source: u32) ->
         }
     }
     let station = front << FINER_STATION;
-    let ahead = truck_ahead(network, view, Car(station, 0, path | (style << STYLE), 0));
-    if ahead.x < rear {
-        rear = ahead.x;
-        pace = ahead.y;
+    let group = first_of_group(env);
+    for (var mate = group; mate < group + batch.group; mate++) {
+        if !is_driving(mate) { continue; }
+        let ahead = truck_ahead(network, view_of(mate, network), Car(station, 0, path | (style << STYLE), 0));
+        if ahead.x < rear {
+            rear = ahead.x;
+            pace = ahead.y;
+        }
     }
     if rear - front < ENTRY_ROOM { return no_car(); }
     let room = max(rear - front - rule(RULE_GAP), 0);
@@ -182,7 +185,7 @@ fn square_root(value: u32) -> u32 {
     return root;
 }
 
-// Puts the vehicles of a snapshot around a truck, but for those that are too near.
+// Puts the vehicles of a snapshot around a truck, but for those that are too near to it or to one of its group.
 fn surround_truck(env: u32) {
     let network = network_of(truck[env].route);
     let random = traffic_words(env, DRAW_TRAFFIC);
@@ -191,12 +194,22 @@ fn surround_truck(env: u32) {
     let first = snapshots + index_below(random.y, N_SNAPSHOTS) * N_CAR_WORDS;
     for (var word = 0u; word < N_CAR_WORDS; word++) { cars[env * N_CAR_WORDS + word] = lanes[first + word]; }
     cars[env * N_CAR_WORDS + LEVEL_AT] = level;
-    let at = truck[env];
+    let drivers = drivers_of(env);
+    for (var slot = 0u; slot < N_CARS; slot++) {
+        let car = car_at(env, slot);
+        if is_there(car) { write_car(env, slot, driven_by(drivers, car, 0u, slot)); }
+    }
+    let group = first_of_group(env);
+    for (var mate = group; mate < group + batch.group; mate++) { clear_around(env, network, mate); }
+}
+
+// Takes the vehicles of a row away that are too near to a truck that begins.
+fn clear_around(env: u32, network: Network, mate: u32) {
+    let at = truck[mate];
     let tractor = grown_by(tractor_outline(at), ROOM_ALONG, ROOM_BESIDE);
     let trailer = grown_by(trailer_outline(at), ROOM_ALONG, ROOM_BESIDE);
     let source = path_word(network, path_of_route(at.route), 5u);
-    let front = front_station(env);
-    let drivers = drivers_of(env);
+    let front = front_station(mate);
     for (var slot = 0u; slot < N_CARS; slot++) {
         let car = car_at(env, slot);
         if !is_there(car) { continue; }
@@ -208,8 +221,6 @@ fn surround_truck(env: u32) {
         let is_too_near_ahead = comes_from_there && 0.0 <= room && room < ROOM_ALONG + stops;
         if is_too_near_ahead || are_overlapping(tractor, outline) || are_overlapping(trailer, outline) {
             write_car(env, slot, no_car());
-        } else {
-            write_car(env, slot, driven_by(drivers, car, 0u, slot));
         }
     }
 }

@@ -9,6 +9,7 @@ pub(crate) mod autoreset;
 mod batch;
 pub(crate) mod cpu; // the CPU engine: all cores, a truck at a time
 mod error;
+pub(crate) mod group; // trucks that share a road
 pub(crate) mod limits; // of what the numbers of a truck can be
 #[cfg(feature = "gpu")]
 pub mod gpu; // the engine of compute shaders
@@ -28,6 +29,7 @@ pub use autoreset::Autoreset;
 pub(crate) use batch::Row;
 pub use batch::{Batch, RouteChoice, check_size};
 pub use error::Error;
+pub use group::Mate;
 pub use memory::available as available_memory;
 pub use tally::Tally;
 

@@ -31,6 +31,9 @@ pub use tables::{
 pub use vehicles::VEHICLE_VALUES;
 pub(crate) use vehicles::first_of_vehicles;
 
+/// Most trucks that share a road and its vehicles.
+pub const MOST_IN_GROUP: usize = 8;
+
 constants! {
     /// Threads of a workgroup.
     pub const WORKGROUP: u32 = 64;

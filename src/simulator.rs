@@ -17,7 +17,7 @@ pub use crate::engine::{Autoreset, Batch, Error, RouteChoice, Tally, available_m
 use crate::layout::{BEGINS, BeginRow, Column, Command, HAS_ROUTE, HAS_START, IS_FIRST, Start, Stream};
 use crate::world::World;
 pub use actions::Actions;
-use check::{check_known, check_routes, check_start};
+use check::{check_alone, check_begins, check_drawn, check_known, check_routes, check_start};
 use state::check_state;
 
 /// What steps a batch.
@@ -78,7 +78,7 @@ impl Simulator {
         check_routes(&world, n_envs, &choice)?;
         let drawn = matches!(choice, RouteChoice::Drawn(_)).then_some(choice.routes().len());
         let batch: Box<dyn EngineBatch> = match engine {
-            Engine::Cpu => Box::new(Batch::new(n_envs, seed, choice, world.traffic.is_some())?),
+            Engine::Cpu => Box::new(Batch::new(n_envs, seed, choice, world.traffic.is_some(), world.group())?),
             #[cfg(feature = "gpu")]
             Engine::Gpu { device, columns } => {
                 Box::new(gpu::Batch::new(&device, &world, n_envs, seed, choice, columns)?)
@@ -181,6 +181,7 @@ impl Simulator {
             streams[env] = stream.unwrap_or(streams[env]);
             has_stream |= stream.is_some();
         }
+        check_begins(&self.world, &begins)?;
         self.batch.begin(&self.world, &begins, has_stream.then_some(streams.as_slice()))
     }
 
@@ -206,6 +207,7 @@ impl Simulator {
             return Err(Error::DrawnCount { n_routes: routes.len(), drawn: self.drawn });
         }
         check_known(&self.world, routes)?;
+        check_drawn(&self.world, routes)?;
         self.batch.draw_from(routes);
         Ok(())
     }
@@ -220,6 +222,7 @@ impl Simulator {
         if indices.is_empty() {
             return Err(Error::EmptyBatch);
         }
+        check_alone(&self.world, "gather")?;
         if let Some((position, &index)) = indices.iter().enumerate().find(|&(_, &index)| n_envs <= index as usize) {
             return Err(Error::UnknownTruck { position, index: index as usize, n_envs });
         }

@@ -49,7 +49,7 @@ pub use run::{Run, overlaps};
 pub use snapshots::{N_SNAPSHOTS, Snapshots};
 pub use step::{N_TURNS, Setting, advance, decide, step};
 pub use survey::Survey;
-pub use truck::{Contact, Entry, Trucks, View, outlines, stretched, touched};
+pub use truck::{Contact, Entry, Met, Trucks, View, outlines, stretched, touched, touched_by};
 
 use crate::files::reader::shown;
 

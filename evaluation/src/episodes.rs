@@ -29,6 +29,10 @@ impl Episodes {
         per_route: usize,
         seed: u32,
     ) -> Result<Episodes, Error> {
+        let group = world.group();
+        if 1 < group {
+            return Err(Error::NotInGroups { what: "an episode of one truck", group });
+        }
         // Before the list of them is made: many would not fit into memory either.
         check_size(routes.len().saturating_mul(per_route))?;
         let trucks: Vec<u32> = routes.iter().flat_map(|&route| std::iter::repeat_n(route, per_route)).collect();

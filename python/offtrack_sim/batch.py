@@ -26,6 +26,7 @@ from .episodes import Ends, Floats, GivenStart, Ints, Start
 from .geometry import Road
 from .layout import COLUMNS
 from .scenarios import Scenario, given, kept
+from .state import checked_state
 
 Array = npt.NDArray[Any]
 Bools = npt.NDArray[np.bool_]
@@ -64,6 +65,8 @@ class Batch(_offtrack.Batch):
         route_names: Names of the routes, in the order of the indices that columns have.
         extras: Names of the extras that stand behind an observation's 69 values, see :data:`offtrack_sim.EXTRAS`.
         observes_vehicles: Whether what is observed of vehicles stands behind these, :data:`offtrack_sim.VEHICLES`.
+        group: Neighbouring trucks that share a road and its vehicles, ``traffic.group`` of the benchmark. They see and
+            touch each other, and begin together once all their episodes have ended: see :meth:`waiting`.
         n_values: Number of an observation's values, all of these included.
         classes: Names of vehicle and load of each class that episodes draw from, pairs in the benchmark's order. The
             vehicle of a benchmark that has one is ``""``.
@@ -196,6 +199,14 @@ class Batch(_offtrack.Batch):
     def observation(self) -> Floats:
         """What every truck observes before its next action, ``[num_envs, n_values]``."""
         return super().observation()
+
+    def waiting(self) -> Bools:
+        """Whether each truck's episode has ended and no other has begun, bool ``[num_envs]``.
+
+        A truck of a group that waits for the others ignores its action and has a reward of 0; its next end is one of
+        its next episode. What a learner keeps of its steps must leave those out that began with True.
+        """
+        return super().waiting()
 
     def routes(self) -> Ints:
         """Index in ``route_names`` of the route that each truck is on, ``[num_envs]``."""
@@ -361,30 +372,8 @@ class Batch(_offtrack.Batch):
                 column, truck and field: a steer angle beyond the lock, a number that is not finite. The batch is left
                 as it was.
         """
-        if not isinstance(state, Mapping):
-            raise TypeError(f"state: {type(state).__name__}; what Batch.state() gives is needed")
-        missing = [name for name in (*COLUMNS, "stream") if name not in state]
-        if missing:
-            raise ValueError(
-                f"state: {missing[0]} is missing; Batch.state() gives all of {', '.join([*COLUMNS, 'stream'])}"
-            )
-        columns = []
-        for name, dtype in COLUMNS.items():
-            column = np.asarray(state[name])
-            # Which columns have no rows is known where they are stored.
-            n = self.num_envs if column.size else 0
-            if column.dtype != dtype.base or column.shape != (n, *dtype.shape):
-                needed = f"{dtype.base} of shape {(self.num_envs, *dtype.shape)}"
-                raise ValueError(f"{name}: {column.dtype} of shape {column.shape}; {needed} is needed")
-            columns.append((name, np.ascontiguousarray(column).reshape(-1).view(np.uint8)))
-        stream = np.asarray(state["stream"])
-        if stream.shape != (self.num_envs, 2) or stream.dtype.kind not in "iu":
-            needed = f"integers of shape {(self.num_envs, 2)}"
-            raise ValueError(f"stream: {stream.dtype} of shape {stream.shape}; {needed} are needed")
-        outside = stream[(stream < 0) | (stream >= 2**32)] if stream.dtype != np.uint32 else stream[:0]
-        if outside.size:
-            raise ValueError(f"stream: {outside.flat[0]}; must lie in 0..{2**32}")
-        self.restore_bytes(columns, [(seed, env) for seed, env in stream.tolist()])
+        columns, streams = checked_state(state, self.num_envs)
+        self.restore_bytes(columns, streams)
 
     def render(self, env: int = 0, size: int = 480) -> npt.NDArray[np.uint8]:
         """A picture of a truck on its roundabout from above, RGB ``[size, size, 3]``; size in 64..4096 pixels."""

@@ -131,6 +131,17 @@ impl Batch {
         self.beside.has_vehicles
     }
 
+    /// Trucks that share a road and its vehicles.
+    #[getter]
+    fn group(&self) -> usize {
+        self.place.world.group()
+    }
+
+    /// Whether each truck's episode has ended and no other has begun, `[num_envs]`.
+    fn waiting<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        Ok(PyArray1::from_slice(py, &self.state()?.held))
+    }
+
     /// Values of an observation, all that stands behind among them.
     #[getter]
     pub fn n_values(&self) -> usize {

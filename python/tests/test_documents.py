@@ -26,7 +26,7 @@ def snippets(document: str) -> list[str]:
     return [block for text, block in zip(before, blocks) if not text.rstrip().split("\n")[-1].startswith(ELSEWHERE)]
 
 
-@pytest.mark.parametrize(("document", "n"), [("README.md", 9), ("TUTORIAL.ipynb", 5)])
+@pytest.mark.parametrize(("document", "n"), [("README.md", 10), ("TUTORIAL.ipynb", 5)])
 def test_the_snippets_run(
     document: str, n: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -19,6 +19,21 @@ fn route_at(index: u32) -> Route {
     return Route(row.x, row.y, first_preview, bitcast<f32>(row.z), bitcast<f32>(row.w));
 }
 
+// Index of a route's road.
+fn road_of(index: u32) -> u32 {
+    return roads[index * ROUTE_ROWS + 1u].z;
+}
+
+// A bit for the arm on which a route begins.
+fn arm_bit(index: u32) -> u32 {
+    return 1u << (roads[index * ROUTE_ROWS + 1u].w & 0xffffu);
+}
+
+// A bit for the lane in which it does, among all of the road.
+fn lane_bit(index: u32) -> u32 {
+    return 1u << (roads[index * ROUTE_ROWS + 1u].w >> 16u);
+}
+
 // The field of a route's roundabout: of the kerbs that tractors keep to and distance sensors see.
 fn field_at(index: u32) -> FieldRow {
     return field_in(index * ROUTE_ROWS + 2u);

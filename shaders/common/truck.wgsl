@@ -16,6 +16,11 @@ fn has_begun(env: u32) -> bool {
     return env < batch.n_envs && truck[env].steps == 0u && truck[env].held == 0u;
 }
 
+// The first truck of a truck's group: neighbours that share a road and its vehicles.
+fn first_of_group(env: u32) -> u32 {
+    return env - env % batch.group;
+}
+
 // Whether there is such a truck and the caller says that it begins an episode.
 fn is_to_begin(env: u32) -> bool {
     return env < batch.n_envs && (begins[env].what & BEGINS) != 0u;

@@ -222,8 +222,10 @@ fn falls_below(word: u32, probability: u32) -> bool {
     return word >> 8u < probability;
 }
 
+// The trucks of a group draw alike, so that each finds the same of their vehicles.
 fn traffic_words(env: u32, draw: u32) -> vec4<u32> {
-    return words(streams[env].seed, streams[env].env, truck[env].episode, draw);
+    let stream = streams[first_of_group(env)];
+    return words(stream.seed, stream.env, truck[env].episode, draw);
 }
 
 // A rectangle on the ground: its middle, a unit vector along it, half its length and half its width (m).

@@ -93,7 +93,8 @@ fn rule(index: u32) -> i32 {
     return bitcast<i32>(lanes[index]);
 }
 
-// What a car decides: its acceleration (2^-19 m a step²), with a mark if it slows for a truck more than for cars.
+// What a car decides: its acceleration (2^-19 m a step²), with a mark if it slows for the row's truck more than for
+// anything else.
 fn decided(env: u32, slot: u32, car: Car) -> u32 {
     let network = network_of(truck[env].route);
     let temperament = temperament_of(car);
@@ -120,11 +121,19 @@ fn decided(env: u32, slot: u32, car: Car) -> u32 {
             consider(&driver, zone_at(network.zones + ZONE_WORDS * (first + z)), weighed);
         }
     }
-    let of_cars = driver.interaction;
-    let view = view_of(env, network);
-    mind_at_line(&driver, view);
-    mind_in_corridor(&driver, view, car);
-    let slows_for_truck = of_cars < driver.interaction;
+    // The same car, if this truck were not there.
+    var without = driver;
+    let first = first_of_group(env);
+    for (var mate = first; mate < first + batch.group; mate++) {
+        if !is_driving(mate) { continue; }
+        let view = view_of(mate, network);
+        mind_at_line(&driver, view);
+        mind_in_corridor(&driver, view, car);
+        if mate == env { continue; }
+        mind_at_line(&without, view);
+        mind_in_corridor(&without, view, car);
+    }
+    let slows_for_truck = without.interaction < driver.interaction;
     keep_crossed_lanes_clear(&driver);
     if me.waits && driver.stops { stop_before(&driver, me.line - me.station); }
     // Half a step ahead: a speed's unit is the way of half a step.

@@ -5,12 +5,13 @@ use rayon::iter::{Either, repeat_n};
 use rayon::prelude::*;
 
 use super::order::{Order, Place};
-use super::{Autoreset, Error, Tally, memory};
+use super::{Autoreset, Error, Mate, Tally, memory};
 use crate::layout::columns::{columns, row_bytes};
 use crate::layout::{
     Clearance, Column, Command, Control, N_AROUND, N_CAR_WORDS, N_COLUMNS, N_EXTRAS, N_POSES, N_RAYS, N_VALUES, Pose,
     Progress, RewardTerms, Stream, Truck,
 };
+use crate::traffic;
 use crate::world::World;
 
 /// Which route an episode runs on.
@@ -80,6 +81,8 @@ macro_rules! batch {
             pub autoreset: Autoreset,
             /// Routes that episodes run on, as indices into the world's table.
             pub choice: &'a RouteChoice,
+            /// All trucks of its group, itself among them; none where it is alone.
+            pub mates: &'a [Mate],
             /// What this truck adds to the batch's tally.
             pub tally: Tally,
             $($(#[doc = $doc])* pub $name: &'a mut $type,)*
@@ -95,20 +98,35 @@ macro_rules! batch {
             pub places: &'a mut [Place],
             streams: &'a [Stream],
             choice: &'a RouteChoice,
-            autoreset: Autoreset,
+            /// What follows the end of an episode.
+            pub autoreset: Autoreset,
             $($(#[doc = $doc])* pub $name: &'a mut [$type],)*
             $($(#[doc = $doc_of])* pub $name_of: &'a mut [$type_of],)*
         }
 
         impl Block<'_> {
-            /// The row of the truck at a place.
-            pub(crate) fn row(&mut self, place: Place) -> Row<'_> {
+            /// The truck at a place as the others of its group read it.
+            pub(crate) fn mate(&self, place: Place) -> Mate {
+                let index = place.index as usize;
+                Mate {
+                    env: (self.first + index) as u32,
+                    stream: self.streams[self.first + index],
+                    truck: self.truck[index],
+                    progress: self.progress[index],
+                    ended: self.ended[index],
+                    entered: self.cars.get(index).map_or(0, |words| traffic::Row::of(words).entered),
+                }
+            }
+
+            /// The row of the truck at a place, among these of its group.
+            pub(crate) fn row<'a>(&'a mut self, place: Place, mates: &'a [Mate]) -> Row<'a> {
                 let index = place.index as usize;
                 Row {
                     stream: self.streams[self.first + index],
                     env: (self.first + index) as u32,
                     autoreset: self.autoreset,
                     choice: self.choice,
+                    mates,
                     tally: Tally::default(),
                     $($name: &mut self.$name[index],)*
                     $($name_of: self.$name_of.get_mut(index),)*
@@ -125,6 +143,7 @@ macro_rules! batch {
             streams: Vec<Stream>,
             order: Order,
             has_vehicles: bool,
+            group: usize,
             /// Sums since the batch was made.
             pub(crate) tally: Tally,
             $($(#[doc = $doc])* pub $name: Vec<$type>,)*
@@ -132,17 +151,18 @@ macro_rules! batch {
         }
 
         impl Batch {
-            /// `n_envs` trucks that have yet to be reset, among other vehicles or not.
+            /// `n_envs` trucks that have yet to be reset, among other vehicles or not, so many to a road.
             pub(crate) fn new(
                 n_envs: usize,
                 seed: u32,
                 choice: RouteChoice,
                 has_vehicles: bool,
+                group: usize,
             ) -> Result<Batch, Error> {
                 check_fits(n_envs, has_vehicles)?;
                 let mut streams: Vec<Stream> = zeros(n_envs)?;
                 (0..).zip(&mut streams).for_each(|(env, stream)| *stream = Stream { seed, env });
-                let order = Order::new(zeros(n_envs)?);
+                let order = Order::new(zeros(n_envs)?, group);
                 Ok(Batch {
                     seed,
                     autoreset: choice.autoreset(),
@@ -151,6 +171,7 @@ macro_rules! batch {
                     order,
                     tally: Tally::default(),
                     has_vehicles,
+                    group,
                     $($name: zeros(n_envs)?,)*
                     $($name_of: zeros(Column::$variant_of.n_rows(n_envs, has_vehicles))?,)*
                 })
@@ -165,7 +186,7 @@ macro_rules! batch {
                     }
                     RouteChoice::Drawn(routes) => RouteChoice::Drawn(routes.clone()),
                 };
-                let batch = Batch::new(indices.len(), self.seed, choice, self.has_vehicles)?;
+                let batch = Batch::new(indices.len(), self.seed, choice, self.has_vehicles, self.group)?;
                 let mut batch = Batch { tally: self.tally, autoreset: self.autoreset, ..batch };
                 $(
                     for (row, &index) in batch.$name.iter_mut().zip(indices) {
@@ -238,6 +259,11 @@ impl Batch {
         &self.choice
     }
 
+    /// Neighbouring trucks that share a road and its vehicles.
+    pub fn group(&self) -> usize {
+        self.group
+    }
+
     /// What follows the end of an episode.
     pub fn autoreset(&self) -> Autoreset {
         self.autoreset
@@ -273,7 +299,7 @@ impl Batch {
 
     /// A batch of as many trucks with the same streams, routes and tally as this one, and all columns zero.
     pub(crate) fn blank(&self) -> Result<Batch, Error> {
-        let batch = Batch::new(self.n_envs(), self.seed, self.choice.clone(), self.has_vehicles)?;
+        let batch = Batch::new(self.n_envs(), self.seed, self.choice.clone(), self.has_vehicles, self.group)?;
         Ok(Batch { tally: self.tally, autoreset: self.autoreset, streams: self.streams.clone(), ..batch })
     }
 

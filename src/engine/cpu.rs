@@ -24,16 +24,16 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use super::{Autoreset, Batch, EngineBatch, Error, Row, Tally};
+use super::{Autoreset, Batch, EngineBatch, Error, Row, Tally, group};
 use crate::engine::stages::{N_STAGES, STAGES, Stage};
 use crate::layout::{BeginRow, Column, Command, Stream};
 use crate::world::World;
 
 /// Does a stage to one truck.
-type Entry = fn(&World, &mut Row);
+pub(super) type Entry = fn(&World, &mut Row);
 
 /// The function of a stage.
-fn entry(stage: Stage) -> Entry {
+pub(super) fn entry(stage: Stage) -> Entry {
     match stage {
         Stage::Steer => steer::steer,
         Stage::Drive => drive::drive,
@@ -55,8 +55,11 @@ fn run(world: &World, row: &mut Row, stages: &[Stage]) {
 }
 
 /// Does `stages` to every truck that is not held: all of them to one row while it is in the cache, then to the next.
-/// Of them a held truck has the reset alone.
+/// Of them a held truck has the reset alone. Trucks that share a road go through them together.
 fn run_all(world: &World, batch: &mut Batch, stages: &[Stage]) {
+    if 1 < world.group() {
+        return group::run_all(world, batch, stages);
+    }
     let resets = stages.contains(&Stage::Reset);
     let tally = on_all(world, batch, |row| {
         if row.truck.held == 0 {
@@ -73,7 +76,7 @@ fn on_all(world: &World, batch: &mut Batch, work: impl Fn(&mut Row) + Sync) -> T
     let tallies = batch.blocks(world).map(|mut block| {
         let mut tally = Tally::default();
         for n in 0..block.places.len() {
-            let mut row = block.row(block.places[n]);
+            let mut row = block.row(block.places[n], &[]);
             work(&mut row);
             tally = tally.plus(row.tally);
         }
@@ -109,7 +112,11 @@ impl EngineBatch for Batch {
 
     fn begin(&mut self, world: &World, begins: &[BeginRow], streams: Option<&[Stream]>) -> Result<(), Error> {
         streams.into_iter().for_each(|streams| self.set_streams(streams));
-        on_all(world, self, |row| reset::begin(world, row, &begins[row.env as usize]));
+        if 1 < world.group() {
+            group::begin_all(world, self, begins);
+        } else {
+            on_all(world, self, |row| reset::begin(world, row, &begins[row.env as usize]));
+        }
         self.outdate_order();
         Ok(())
     }

@@ -10,6 +10,47 @@ pub enum Error {
     /// A batch needs a truck.
     #[error("n_envs: 0; a batch needs at least 1 truck")]
     EmptyBatch,
+    /// Trucks that share a road are not split.
+    #[error(
+        "n_envs: {n_envs}; the benchmark has groups of {group} trucks (traffic.group): a multiple of that is needed"
+    )]
+    SplitGroup {
+        /// Trucks asked for.
+        n_envs: usize,
+        /// Trucks of a group.
+        group: usize,
+    },
+    /// Trucks of a group begin in lanes of their own on one road.
+    #[error(
+        "routes: {n_lanes} lanes of {road} where trucks begin; a group of {group} trucks (traffic.group) needs as many"
+    )]
+    NarrowGroup {
+        /// A road, or the trucks whose routes these are.
+        road: String,
+        /// Lanes in which these routes begin.
+        n_lanes: usize,
+        /// Trucks of a group.
+        group: usize,
+    },
+    /// Trucks of a group begin together.
+    #[error(
+        "trucks: the group of truck {env} is not begun as a whole; all {group} begin together, each or none on a \
+             stated route"
+    )]
+    PartOfGroup {
+        /// A truck of the group.
+        env: usize,
+        /// Trucks of a group.
+        group: usize,
+    },
+    /// Trucks of a group go on together.
+    #[error("{what}: trucks that share a road (traffic.group is {group}) go on together")]
+    NotInGroups {
+        /// What was asked for.
+        what: &'static str,
+        /// Trucks of a group.
+        group: usize,
+    },
     /// The columns do not fit into the host's memory.
     #[error(
         "n_envs: {n_envs}; the columns would take {n_bytes} bytes, more than this machine has free: at most {fitting} \

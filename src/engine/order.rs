@@ -39,17 +39,20 @@ pub(super) struct Order {
     block: usize,
     /// Uses since the order was renewed.
     uses: u32,
+    /// Neighbouring trucks on one road, which stay in one block and beside each other.
+    group: usize,
 }
 
 impl Order {
-    /// An order in the memory of these places.
-    pub(super) fn new(places: Vec<Place>) -> Order {
-        Order { places, block: 0, uses: 0 }
+    /// An order in the memory of these places, of which each `group` neighbours are on one road.
+    pub(super) fn new(places: Vec<Place>, group: usize) -> Order {
+        Order { places, block: 0, uses: 0, group }
     }
 
     /// Renews the order where it is due; returns the number of trucks of a block.
     pub(super) fn renewed(&mut self, world: &World, trucks: &[Truck]) -> usize {
         let block = block_of(self.places.len(), world.fields.len(), rayon::current_num_threads());
+        let block = block.next_multiple_of(self.group);
         if self.block == block && self.uses < USES {
             self.uses += 1;
             return block;
@@ -107,7 +110,7 @@ mod tests {
     fn a_block_has_each_of_its_trucks_once_in_the_order_of_their_roads_and_follows_them_to_others() {
         let world = World::bake(&Scenario::named("attard2023-full").unwrap()).unwrap();
         for n_envs in [1, 15, 64, 1000] {
-            let mut order = Order::new(bytemuck::zeroed_vec(n_envs));
+            let mut order = Order::new(bytemuck::zeroed_vec(n_envs), 1);
             let (before, after) = (trucks(&world, n_envs, 0), trucks(&world, n_envs, 50));
             let roads = |order: &mut Order, trucks: &[Truck]| {
                 let block = order.renewed(&world, trucks);
@@ -126,7 +129,7 @@ mod tests {
             // The trucks have other roads: the order stays for a while, then it is theirs.
             let uses = (1..).find(|_| roads(&mut order, &after) != first || n_envs == 1).unwrap_or_default();
             assert!(n_envs == 1 || uses == USES + 1, "{uses}");
-            let mut fresh = Order::new(bytemuck::zeroed_vec(n_envs));
+            let mut fresh = Order::new(bytemuck::zeroed_vec(n_envs), 1);
             assert!(n_envs == 1 || roads(&mut fresh, &after) == roads(&mut order, &after));
             order.outdate();
             assert_eq!(roads(&mut order, &before), first);

@@ -3,6 +3,7 @@
 
 use bytemuck::{bytes_of, cast, cast_slice};
 
+use crate::engine::group::begins_in;
 use crate::engine::{Batch, RouteChoice};
 use crate::field::{Field, STORED_UNIT};
 use crate::layout::buffers::Table;
@@ -110,11 +111,17 @@ fn roads(world: &World, fields: &[FieldRow]) -> Vec<[u32; 4]> {
     let own_row = |own: &Option<Field>| own.as_ref().and_then(|_| next_own.next()).unwrap_or(0);
     let own_rows: Vec<usize> = world.trailer_fields.iter().map(own_row).collect();
     let mut rows = Vec::with_capacity(first_own + own_fields.len() * FIELD_ROWS);
-    for route in &world.routes {
+    for (index, route) in world.routes.iter().enumerate() {
         let (first, crossing) = (route.first as usize, [route.crossing_left, route.crossing_right].map(f32::to_bits));
         rows.push([(first_waypoint + first) as u32, route.n_waypoints, crossing[0], crossing[1]]);
         let roundabout = route.roundabout as usize;
-        rows.push([(first_preview + first * PREVIEW_ROWS) as u32, own_rows[roundabout] as u32, 0, 0]);
+        let [arm, lane] = begins_in(world, index as u32);
+        rows.push([
+            (first_preview + first * PREVIEW_ROWS) as u32,
+            own_rows[roundabout] as u32,
+            route.roundabout,
+            lane << 16 | arm,
+        ]);
         rows.extend(cast::<FieldRow, [[u32; 4]; FIELD_ROWS]>(fields[roundabout]));
     }
     rows.extend(world.waypoints.iter().map(|&waypoint| cast::<WaypointRow, [u32; 4]>(waypoint)));
@@ -207,6 +214,7 @@ impl BatchFacts {
             fixed: matches!(batch.choice(), RouteChoice::Fixed(_)).into(),
             autoreset: batch.autoreset() as u32,
             team: team(batch.n_envs()),
+            group: batch.group() as u32,
         }
     }
 }

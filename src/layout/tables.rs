@@ -279,5 +279,7 @@ crate::shared! {
         pub autoreset: u32,
         /// Trucks whose rays a workgroup shares.
         pub team: u32,
+        /// Neighbouring trucks that share a road and its vehicles.
+        pub group: u32,
     }
 }

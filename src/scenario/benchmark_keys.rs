@@ -146,6 +146,12 @@ pub(super) struct WrittenTraffic {
     pub(super) waiting: f64,
     #[serde(default)]
     pub(super) hindrance: f64,
+    #[serde(default = "alone")]
+    pub(super) group: usize,
+}
+
+fn alone() -> usize {
+    1
 }
 
 fn waiting() -> f64 {

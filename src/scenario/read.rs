@@ -10,6 +10,7 @@ use super::{ActionKind, Scenario, Traffic};
 use crate::files::cache::Loading;
 use crate::files::reader::{Error, Reader};
 use crate::files::shipped::Source;
+use crate::layout::MOST_IN_GROUP;
 use crate::vehicle::Vehicle;
 
 impl Scenario {
@@ -101,7 +102,7 @@ fn without_routes(
         start_offset: reader.within("start.offset", start.offset, 0.0..=1.0, "m")?,
         start_heading: reader.within("start.heading_deg", start.heading_deg, 0.0..=20.0, "deg")?.to_radians(),
         start_speed: start.speed_kmh.as_ref().map(|written| start_speed(reader, written)).transpose()?,
-        start_along: reader.within("start.along", start.along, 0.0..=1.0, "")?,
+        start_along: start_along(reader, written)?,
         stray_distance: reader.within("ending.stray_distance", ending.stray_distance, 3.0..=50.0, "m")?,
         jackknife_angle: reader.within("ending.jackknife_deg", ending.jackknife_deg, 30.0..=120.0, "deg")?.to_radians(),
         rollover_ratio: reader.within("ending.rollover_ratio", ending.rollover_ratio, 0.1..=2.0, "")?,
@@ -172,7 +173,7 @@ fn observes_vehicles(reader: &Reader, written: &Written) -> Result<bool, Error> 
 
 /// Checks `[traffic]`.
 fn of_traffic(reader: &Reader, written: &WrittenTraffic) -> Result<Traffic, Error> {
-    let WrittenTraffic { demand, drivers, vans, rude, courtesy, waiting, hindrance } = written;
+    let WrittenTraffic { demand, drivers, vans, rude, courtesy, waiting, hindrance, group } = written;
     let [least, greatest] = traffic::MOST_HINDRANCE;
     let rude = rude.as_ref().map(|written| range(reader, "traffic.rude", written, 1.0, ""));
     Ok(Traffic {
@@ -183,7 +184,23 @@ fn of_traffic(reader: &Reader, written: &WrittenTraffic) -> Result<Traffic, Erro
         courtesy: reader.within("traffic.courtesy", courtesy.unwrap_or(drivers.courtesy()), 0.0..=1.0, "")?,
         waiting: reader.within("traffic.waiting", *waiting, 0.0..=600.0, "s")?,
         hindrance: reader.within("traffic.hindrance", *hindrance, least..=greatest, "")?,
+        group: reader.count("traffic.group", *group, 1..=MOST_IN_GROUP)?,
     })
+}
+
+/// How far along its route an episode may begin, as a fraction. Trucks of a group would stand in each other.
+fn start_along(reader: &Reader, written: &Written) -> Result<f64, Error> {
+    const KEY: &str = "start.along";
+    let along = reader.within(KEY, written.start.along, 0.0..=1.0, "")?;
+    let is_in_group = written.traffic.as_ref().is_some_and(|traffic| 1 < traffic.group);
+    if is_in_group && along != 0.0 {
+        return Err(reader.invalid(
+            KEY,
+            along,
+            "must be 0 with traffic.group above 1, whose trucks begin on their arms",
+        ));
+    }
+    Ok(along)
 }
 
 /// Least and greatest speed at the start (m/s).

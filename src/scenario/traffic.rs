@@ -1,6 +1,7 @@
 //! Other vehicles on the roads of a benchmark: how many, and what their drivers are like.
 
 use super::check::{Invalid, list, within};
+use crate::layout::MOST_IN_GROUP;
 use crate::traffic::Drivers;
 
 /// Largest demand (veh/h).
@@ -27,6 +28,8 @@ pub struct Traffic {
     pub waiting: f64,
     /// Reward, each step, for each m/s² beyond 2 m/s² with which a vehicle brakes for the truck.
     pub hindrance: f64,
+    /// Trucks that share a road and its vehicles.
+    pub group: usize,
 }
 
 impl Traffic {
@@ -41,6 +44,7 @@ impl Traffic {
         }
         within("traffic.rude[1]", greatest, [least, 1.0])?;
         within("traffic.waiting", self.waiting, [0.0, 1e6])?;
-        within("traffic.hindrance", self.hindrance, MOST_HINDRANCE)
+        within("traffic.hindrance", self.hindrance, MOST_HINDRANCE)?;
+        within("traffic.group", self.group as f64, [1.0, MOST_IN_GROUP as f64])
     }
 }

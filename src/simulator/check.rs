@@ -1,7 +1,10 @@
 //! What a caller asks of a batch, checked before it is touched: stages use indices and numbers without a check.
 
+use std::collections::BTreeMap;
+
+use crate::engine::group::n_lanes;
 use crate::engine::{Error, RouteChoice};
-use crate::layout::Start;
+use crate::layout::{BEGINS, BeginRow, HAS_ROUTE, IS_FIRST, Start};
 use crate::world::World;
 
 /// An error if the routes do not fit the world or the number of trucks.
@@ -17,7 +20,76 @@ pub(super) fn check_routes(world: &World, n_envs: usize, choice: &RouteChoice) -
     if matches!(choice, RouteChoice::Fixed(_)) && routes.len() != n_envs {
         return Err(Error::RouteCount { n_routes: routes.len(), n_envs });
     }
+    let group = world.group();
+    if !n_envs.is_multiple_of(group) {
+        return Err(Error::SplitGroup { n_envs, group });
+    }
+    match choice {
+        RouteChoice::Drawn(routes) => check_drawn(world, routes),
+        RouteChoice::Fixed(routes) => {
+            let first_trucks = (0..).step_by(group);
+            routes.chunks(group).zip(first_trucks).try_for_each(|(routes, env)| check_group(world, env, routes))
+        }
+    }
+}
+
+/// An error if a road of routes that groups draw from has fewer lanes to begin in than they have trucks.
+pub(super) fn check_drawn(world: &World, routes: &[u32]) -> Result<(), Error> {
+    let group = world.group();
+    if group == 1 {
+        return Ok(());
+    }
+    let mut on_roads: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for &route in routes {
+        on_roads.entry(world.routes[route as usize].roundabout).or_default().push(route);
+    }
+    for routes in on_roads.into_values() {
+        let name = world.route_names[routes[0] as usize].rsplit_once('/').map_or("the road", |(road, _)| road);
+        let n_lanes = n_lanes(world, routes);
+        if n_lanes < group {
+            return Err(Error::NarrowGroup { road: name.to_owned(), n_lanes, group });
+        }
+    }
     Ok(())
+}
+
+/// An error if the routes of a group's trucks, the first of which is `env`, are not on one road or begin in one lane.
+pub(super) fn check_group(world: &World, env: usize, routes: &[u32]) -> Result<(), Error> {
+    let group = routes.len();
+    let road = |route: u32| world.routes[route as usize].roundabout;
+    let on_road = routes.iter().copied().filter(|&route| road(route) == road(routes[0]));
+    let n_lanes = n_lanes(world, on_road);
+    if n_lanes == group {
+        Ok(())
+    } else {
+        Err(Error::NarrowGroup { road: format!("one road for trucks {env}..{}", env + group), n_lanes, group })
+    }
+}
+
+/// An error if some trucks of a group begin an episode and others do not, or on routes that do not go together.
+pub(super) fn check_begins(world: &World, begins: &[BeginRow]) -> Result<(), Error> {
+    let group = world.group();
+    if group == 1 {
+        return Ok(());
+    }
+    for (index, begins) in begins.chunks(group).enumerate() {
+        let env = index * group;
+        let all_or_none = |bit: u32| begins.iter().all(|begin| (begin.what ^ begins[0].what) & bit == 0);
+        // Episodes are counted alike, since vehicles are drawn by them.
+        if ![BEGINS, HAS_ROUTE, IS_FIRST].into_iter().all(all_or_none) {
+            return Err(Error::PartOfGroup { env, group });
+        }
+        if begins[0].what & HAS_ROUTE != 0 {
+            check_group(world, env, &begins.iter().map(|begin| begin.route).collect::<Vec<u32>>())?;
+        }
+    }
+    Ok(())
+}
+
+/// An error where trucks share roads.
+pub(super) fn check_alone(world: &World, what: &'static str) -> Result<(), Error> {
+    let group = world.group();
+    if group == 1 { Ok(()) } else { Err(Error::NotInGroups { what, group }) }
 }
 
 /// An error if the start lies beyond the benchmark's largest errors or not on the route, or its vehicle is not in the

@@ -22,6 +22,7 @@ const OBSERVED: f32 = 1.001;
 /// An error for the first value that no truck of this world can have.
 pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
     check_indices(world, batch)?;
+    check_groups(world, batch)?;
     for env in 0..batch.n_envs() {
         let (truck, progress) = (&batch.truck[env], &batch.progress[env]);
         let n_waypoints = world.routes[truck.route as usize].n_waypoints;
@@ -102,7 +103,7 @@ fn check_cars(world: &World, env: usize, truck: &Truck, row: &Row) -> Result<(),
     let road = traffic.road(world, truck.route);
     within(Column::Cars, env, ".level", row.level as usize, 0..=road.levels.len() - 1)?;
     within(Column::Cars, env, ".entered", row.entered, 0..=truck.steps)?;
-    within(Column::Cars, env, ".met", row.met % 64, 0..=N_CARS as u32)?;
+    within(Column::Cars, env, ".met", row.met % 64, 0..=(N_CARS + world.group()) as u32)?;
     within(Column::Cars, env, ".hindered", row.hindered, 0..=(1 << N_CARS) - 1)?;
     for (slot, car) in row.cars.iter().enumerate().filter(|(_, car)| car.is_there()) {
         let field = |name: &str| format!("[{slot}].{name}");
@@ -208,6 +209,22 @@ fn within<T: PartialOrd + Debug>(
     range: RangeInclusive<T>,
 ) -> Result<(), Error> {
     limits::within(|| format!("{}[{env}]{field}", column.name()), value, range)
+}
+
+/// An error if trucks of a group are on several roads, or in other episodes.
+fn check_groups(world: &World, batch: &Batch) -> Result<(), Error> {
+    for (index, trucks) in batch.truck.chunks(world.group()).enumerate() {
+        let road = |truck: &Truck| world.routes[truck.route as usize].roundabout;
+        for (n, truck) in trucks.iter().enumerate() {
+            let env = index * trucks.len() + n;
+            if road(truck) != road(&trucks[0]) {
+                let limit = format!("routes of one road in trucks {}..{}", env - n, env - n + trucks.len());
+                return Err(Error::OutsideWorld { column: Column::Truck.name(), env, found: truck.route, limit });
+            }
+            within(Column::Truck, env, ".episode", truck.episode, trucks[0].episode..=trucks[0].episode)?;
+        }
+    }
+    Ok(())
 }
 
 /// An error if a truck's route, vehicle, waypoint or action is not in the world: stages use them as indices without a

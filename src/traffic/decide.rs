@@ -148,6 +148,7 @@ impl<'a> Crowd<'a> {
 }
 
 /// A car that decides.
+#[derive(Clone, Copy)]
 pub struct Driver<'a> {
     crowd: &'a Crowd<'a>,
     /// The car as others weigh it.

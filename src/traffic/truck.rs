@@ -18,7 +18,7 @@ mod view; // a truck as cars see it
 use std::cell::Cell;
 
 pub(super) use contact::printed_constants as printed_contact;
-pub use contact::{Contact, Entry, touched};
+pub use contact::{Contact, Entry, Met, touched, touched_by};
 pub(super) use corridor::printed_constants as printed_corridor;
 pub(super) use line::printed_constants as printed_line;
 pub(super) use view::printed_constants as printed_view;
@@ -38,17 +38,19 @@ constants! {
 #[derive(Debug)]
 pub struct Trucks<'a> {
     network: &'a Network,
-    views: &'a [View],
+    views: &'a [Option<View>],
+    /// Index of the one that is told whom it hinders.
+    own: usize,
     hindered: Cell<u32>,
 }
 
 impl<'a> Trucks<'a> {
-    /// Trucks on a road, and a bit for each slot whose car they hindered when it last decided.
-    pub fn new(network: &'a Network, views: &'a [View], hindered: u32) -> Trucks<'a> {
-        Trucks { network, views, hindered: Cell::new(hindered) }
+    /// Trucks on a road, of which some may not be there, and a bit for each slot whose car the one with index `own` hindered when it last decided.
+    pub fn new(network: &'a Network, views: &'a [Option<View>], own: usize, hindered: u32) -> Trucks<'a> {
+        Trucks { network, views, own, hindered: Cell::new(hindered) }
     }
 
-    /// A bit for each slot whose car slows for a truck more than for anything else, since it last decided.
+    /// A bit for each slot whose car slows for this truck more than for anything else, since it last decided.
     pub fn hindered(&self) -> u32 {
         self.hindered.get()
     }
@@ -56,14 +58,21 @@ impl<'a> Trucks<'a> {
 
 impl Others for Trucks<'_> {
     fn hinder(&self, driver: &mut Driver) {
-        let before = driver.interaction();
-        for view in self.views {
-            line::mind(view, driver);
-            corridor::mind(view, driver);
+        // The same car, if this truck were not there.
+        let mut without = *driver;
+        for (index, view) in self.views.iter().flatten().enumerate() {
+            let mind = |driver: &mut Driver| {
+                line::mind(view, driver);
+                corridor::mind(view, driver);
+            };
+            mind(driver);
+            if index != self.own {
+                mind(&mut without);
+            }
         }
         let bit = 1 << driver.me.slot;
         let others = self.hindered.get() & !bit;
-        self.hindered.set(if before < driver.interaction() { others | bit } else { others });
+        self.hindered.set(if without.interaction() < driver.interaction() { others | bit } else { others });
     }
 
     fn ahead(&self, car: &Car) -> Option<(i32, i32)> {
@@ -72,6 +81,6 @@ impl Others for Trucks<'_> {
                 && (-COMING - view.way_of_two_seconds()..0).contains(&view.station);
             if is_coming { Some((0, view.speed)) } else { corridor::ahead(view, self.network, car) }
         };
-        self.views.iter().filter_map(of).min_by_key(|&(rear, _)| rear)
+        self.views.iter().flatten().filter_map(of).min_by_key(|&(rear, _)| rear)
     }
 }

@@ -25,6 +25,8 @@ pub struct Traffic {
     pub is_observed: bool,
     /// Reward, each step, for each m/s² beyond 2 m/s² with which a vehicle brakes for the truck.
     pub hindrance: f32,
+    /// Neighbouring trucks of a batch that share a road and its vehicles.
+    pub group: usize,
     /// Every road, in the order of the world's fields.
     pub roads: Vec<TrafficRoad>,
     /// Where each of the world's routes runs.
@@ -58,6 +60,13 @@ pub struct TrafficRoute {
     pub begins: f32,
 }
 
+impl World {
+    /// Neighbouring trucks of a batch that share a road and its vehicles: 1 where none do.
+    pub fn group(&self) -> usize {
+        self.traffic.as_ref().map_or(1, |traffic| traffic.group)
+    }
+}
+
 impl Traffic {
     /// The road of a route of the world that this is a part of.
     pub fn road(&self, world: &World, route: u32) -> &TrafficRoad {
@@ -66,12 +75,14 @@ impl Traffic {
 
     /// Every table as words, one road after the other.
     pub(super) fn words(&self) -> impl Iterator<Item = Vec<u32>> {
-        let Traffic { rules, rude, spacing, is_observed, hindrance, roads, routes } = self;
+        let Traffic { rules, rude, spacing, is_observed, hindrance, group, roads, routes } = self;
+        // A world of trucks that are alone has the words that it had before there were groups.
+        let group = (1 < *group).then_some(*group as u32);
         let shared =
             [&rules.all_words()[..], rude, &[*spacing, *hindrance].map(f32::to_bits), &[u32::from(*is_observed)]]
                 .concat();
         let routes = routes.iter().flat_map(|&TrafficRoute { path, begins }| [path, begins.to_bits()]).collect();
-        [shared, routes].into_iter().chain(roads.iter().map(TrafficRoad::words))
+        [shared, group.into_iter().collect(), routes].into_iter().chain(roads.iter().map(TrafficRoad::words))
     }
 
     /// What a scenario's trucks share; none where its roads are empty.
@@ -102,6 +113,7 @@ impl Traffic {
             spacing: scenario.spacing as f32,
             is_observed: scenario.observes_vehicles,
             hindrance: of.hindrance as f32,
+            group: of.group,
             roads,
             routes: routes.collect(),
         }))

@@ -81,6 +81,7 @@ rude = [0.0, 0.1]
 courtesy = 0.3
 waiting = 60.0
 hindrance = -0.5
+group = 1
 [start]
 offset = 0.2
 heading_deg = 1.0

@@ -22,6 +22,7 @@ mod extras;
 mod field;
 mod fit;
 mod fleet;
+mod groups;
 mod kinds;
 mod left_hand;
 #[cfg(all(feature = "gpu", target_os = "linux"))]

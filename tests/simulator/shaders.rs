@@ -223,7 +223,8 @@ mod module {
         let of_stages: Vec<Kernel> = STAGES.iter().flat_map(|stage| stage.kernels()).copied().collect();
         let of_steps = [false, true].map(|all| {
             let autoreset = Autoreset::NextStep;
-            let case = Case { disturbed: all, extras: true, vehicles: all, around: all, aprons: all, autoreset };
+            let (extras, vehicles, around, grouped, aprons) = (true, all, all, all, all);
+            let case = Case { disturbed: all, extras, vehicles, around, grouped, aprons, autoreset };
             case.step().collect::<Vec<Kernel>>()
         });
         for kernel in Kernel::ALL {
@@ -236,7 +237,7 @@ mod module {
     fn a_step_takes_few_kernels_and_more_only_where_there_is_more_to_do() {
         let n = |disturbed, extras, autoreset| {
             let count = |vehicles, around, aprons| {
-                Case { disturbed, extras, vehicles, around, aprons, autoreset }.step().count()
+                Case { disturbed, extras, vehicles, around, grouped: false, aprons, autoreset }.step().count()
             };
             let alone = count(false, false, false);
             assert_eq!([count(true, false, false), count(true, true, false)], [alone + 6, alone + 8]);

@@ -40,6 +40,7 @@ class Batch {
       fixed: Number(fixed),
       autoreset: code.autoreset[this.autoreset],
       team: this.team(),
+      group: 1,
     };
     writeWords(this.live, "BatchFacts", facts, 0, words);
     // Behind the benchmark's actions stands that of the truck that a person drives.

@@ -1,9 +1,10 @@
 //! The other vehicles of a recording.
 
 use glam::Vec2;
+use offtrack::layout::N_CARS;
 use offtrack::simulator::Batch;
-use offtrack::traffic::Row;
 use offtrack::traffic::car::Outline;
+use offtrack::traffic::{Row, outlines};
 use offtrack::world::World;
 use serde::{Deserialize, Serialize};
 
@@ -42,19 +43,34 @@ impl Vehicle {
         let network = &shared.road(world, batch.truck[env].route).network;
         let there = Row::of(words).cars.iter().enumerate().filter(|(_, car)| car.is_there());
         let vehicle = |(slot, car): (usize, &offtrack::traffic::Car)| {
-            let Outline { middle, along, half_length, half_width } = car.outline(network);
-            Vehicle {
-                slot,
-                position: middle.to_array().map(|value| to(MILLI, value)),
-                heading: to(ANGLE, along.to_angle()),
-                length: to(MILLI, 2.0 * half_length),
-                width: to(MILLI, 2.0 * half_width),
-                speed: to(MILLI, car.speed()),
-                acceleration: to(MILLI, car.acceleration()),
-                is_rude: car.is_rude(),
-            }
+            let state = [car.speed(), car.acceleration()];
+            Vehicle { is_rude: car.is_rude(), ..Vehicle::of(slot, car.outline(network), state) }
         };
-        there.map(vehicle).collect()
+        // Behind the slots of cars stand the other trucks of a group, two units each.
+        let first = env - env % batch.group();
+        let mates = (first..first + batch.group()).filter(|&mate| mate != env && batch.truck[mate].held == 0);
+        let units = mates.flat_map(|mate| {
+            let truck = &batch.truck[mate];
+            let slot = N_CARS + 2 * (mate - first);
+            let of = move |(unit, outline)| Vehicle::of(slot + unit, outline, [truck.speed, truck.acceleration]);
+            outlines(world.rig(truck), truck).into_iter().enumerate().map(of)
+        });
+        there.map(vehicle).chain(units).collect()
+    }
+
+    /// What covers this ground, at a speed and an acceleration (m/s, m/s²).
+    fn of(slot: usize, outline: Outline, [speed, acceleration]: [f32; 2]) -> Vehicle {
+        let Outline { middle, along, half_length, half_width } = outline;
+        Vehicle {
+            slot,
+            position: middle.to_array().map(|value| to(MILLI, value)),
+            heading: to(ANGLE, along.to_angle()),
+            length: to(MILLI, 2.0 * half_length),
+            width: to(MILLI, 2.0 * half_width),
+            speed: to(MILLI, speed),
+            acceleration: to(MILLI, acceleration),
+            is_rude: false,
+        }
     }
 
     /// Whether its brake lights are lit.

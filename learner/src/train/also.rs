@@ -14,6 +14,7 @@ use serde::Serialize;
 use super::alike;
 use super::event::{Caller, Event};
 use super::roads::Roads;
+use super::worlds::check_alone;
 use crate::config::{AlsoEvaluate, Config, Rule, driven};
 use crate::error::Error;
 
@@ -48,6 +49,7 @@ impl Also {
         let read = |named: AlsoEvaluate| {
             let wrong = |expected: String| Error::from(reader.invalid("also_evaluate", named.name(), expected));
             let mut scenario = roads.benchmark(&named.benchmark).map_err(|error| wrong(error.to_string()))?;
+            check_alone(reader, "also_evaluate", &scenario)?;
             scenario.keep(&[named.split]);
             if scenario.split(named.split).is_empty() {
                 return Err(wrong(format!("{} has no routes under `{}`", scenario.name, named.split.name())));

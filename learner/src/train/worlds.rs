@@ -126,13 +126,27 @@ impl Worlds {
 
 /// The benchmark that a key names.
 fn named(reader: &Reader, key: &str, name: &str, roads: Roads) -> Result<Scenario, InputError> {
-    roads.benchmark(name).map_err(|error| match error {
+    let scenario = roads.benchmark(name).map_err(|error| match error {
         // The benchmark's own file was not found or is none, so the key that names it is what is wrong.
         InputError::UnknownName { .. } | InputError::Unreadable { .. } | InputError::NotAFile { .. } => {
             reader.invalid(key, name, error.to_string())
         }
         error => error,
-    })
+    })?;
+    check_alone(reader, key, &scenario)?;
+    Ok(scenario)
+}
+
+/// An error for a benchmark with several trucks on a road.
+pub(super) fn check_alone(reader: &Reader, key: &str, scenario: &Scenario) -> Result<(), InputError> {
+    match &scenario.traffic {
+        Some(traffic) if 1 < traffic.group => {
+            let expected = "its traffic.group puts several trucks on a road, which are trained from Python: \
+                            python/examples/self_play.py";
+            Err(reader.invalid(key, &scenario.name, expected))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// What is trained on, with its training routes alone and the reward of the training file.

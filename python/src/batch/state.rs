@@ -40,12 +40,13 @@ impl State {
     ) -> PyResult<T> {
         self.check_process(&batch.device)?;
         let State { simulator, pool, ends, episodes, held, .. } = self;
+        let group = batch.place.world.group();
         if batch.autoreset == Autoreset::Disabled
-            && let Some(env) = held.iter().position(|held| *held)
+            && let Some(index) = held.chunks(group).position(|held| held.iter().all(|&held| held))
         {
             return Err(errors::reset_needed(
                 py,
-                &format!("truck {env}: its episode has ended; begin another before the next step"),
+                &format!("truck {}: its episode has ended; begin another before the next step", index * group),
             ));
         }
         let stepped = pool.run(py, || {
@@ -53,7 +54,16 @@ impl State {
             let read = Read::of(simulator, &batch.read)?;
             let (codes, trucks) = (read.rows::<u32>(Column::Ended), read.rows::<Truck>(Column::Truck));
             let last = read.observed_last(batch.beside);
-            if batch.autoreset == Autoreset::NextStep {
+            let mut rewards = read.rows::<f32>(Column::Reward);
+            let mut codes = codes;
+            if 1 < group {
+                // What a truck had in its last step stands in its row while it waits for its group.
+                for (env, held) in held.iter_mut().enumerate().filter(|(_, held)| **held) {
+                    (codes.to_mut()[env], rewards.to_mut()[env]) = (Ended::Running as u32, 0.0);
+                    *held = trucks[env].held == 1;
+                    episodes[env] = Episode::of(&trucks[env]);
+                }
+            } else if batch.autoreset == Autoreset::NextStep {
                 // Trucks that were held have begun, and no other is in another episode.
                 for env in (0..trucks.len()).filter(|&env| std::mem::take(&mut held[env])) {
                     episodes[env] = Episode::of(&trucks[env]);
@@ -65,7 +75,7 @@ impl State {
                 episodes[env] = Episode::of(&trucks[env]);
                 held[env] = trucks[env].held == 1;
             }
-            Ok(deliver(&read.observed(batch.beside), &read.rows(Column::Reward), &codes))
+            Ok(deliver(&read.observed(batch.beside), &rewards, &codes))
         })?;
         stepped.map_err(|error| errors::of_simulator(&error))
     }

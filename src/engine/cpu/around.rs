@@ -4,19 +4,17 @@
 //! others, so that one number says what a driver would look for along several lanes. Every value is a least one or one
 //! in the order of distances, so the slots in which vehicles stand change none of them.
 
-use std::array::from_fn;
-
 use glam::Vec2;
 
 use super::traffic::front_station;
-use crate::engine::Row;
+use crate::engine::{Mate, Row};
 use crate::layout::angle::direction;
 use crate::layout::shared::constants;
-use crate::layout::{N_AROUND, N_CARS, N_NEAREST, first_of_vehicles};
+use crate::layout::{MOST_IN_GROUP, N_AROUND, N_CARS, N_NEAREST, first_of_vehicles};
 use crate::traffic::car::Outline;
 use crate::traffic::units::{length, metres};
 use crate::traffic::{self, Car, Kind, Network, Stretch, outlines, stretched};
-use crate::world::World;
+use crate::world::{Traffic, World};
 
 constants! {
     /// Time that is observed as 1 (s).
@@ -62,8 +60,14 @@ pub fn around(world: &World, row: &Row) -> Option<[f32; N_AROUND]> {
     let shared = world.traffic.as_ref().filter(|shared| shared.is_observed)?;
     let cars = &traffic::Row::of(row.cars.as_ref()?).cars;
     let (truck, rig) = (&row.truck, world.rig(row.truck));
+    let network = &shared.road(world, truck.route).network;
+    let cars = cars.iter().filter(|car| car.is_there()).map(|car| Other::car(network, car));
+    let others = row.mates.iter().filter(|mate| mate.is_there() && mate.env != row.env);
+    let others = others.map(|mate| Other::truck(world, shared, mate));
+    let mut seen = [const { None }; N_OTHERS];
+    cars.chain(others).zip(&mut seen).for_each(|(other, place)| *place = Some(other));
     let observing = Observing {
-        network: &shared.road(world, truck.route).network,
+        network,
         path: shared.routes[truck.route as usize].path as usize,
         // As vehicles see it.
         front: metres(length(front_station(world, shared, truck, row.progress.waypoint))),
@@ -72,8 +76,60 @@ pub fn around(world: &World, row: &Row) -> Option<[f32; N_AROUND]> {
         origin: truck.position,
         along: direction(truck.heading),
     };
-    Some(observing.of(cars))
+    Some(observing.of(&seen))
 }
+
+/// Another vehicle: a car, or a truck of the same group.
+struct Other {
+    path: usize,
+    /// Station of its front (m).
+    station: f32,
+    /// Its speed (m/s).
+    speed: f32,
+    /// Its length (m).
+    length: f32,
+    /// The ground that it covers; a car is one unit.
+    units: [Option<Outline>; 2],
+}
+
+impl Other {
+    fn car(network: &Network, car: &Car) -> Other {
+        Other {
+            path: car.path(),
+            station: car.station(),
+            speed: car.speed(),
+            length: car.length(),
+            units: [Some(car.outline(network)), None],
+        }
+    }
+
+    fn truck(world: &World, shared: &Traffic, mate: &Mate) -> Other {
+        let rig = world.rig(&mate.truck);
+        Other {
+            path: shared.routes[mate.truck.route as usize].path as usize,
+            station: metres(length(front_station(world, shared, &mate.truck, mate.progress.waypoint))),
+            speed: mate.truck.speed,
+            length: metres(stretched(rig)),
+            units: outlines(rig, &mate.truck).map(Some),
+        }
+    }
+
+    fn units(&self) -> impl Iterator<Item = &Outline> {
+        self.units.iter().flatten()
+    }
+
+    /// Unit vector along it, along the tractor of a truck.
+    fn along(&self) -> Vec2 {
+        self.units().next().map_or(Vec2::ZERO, |unit| unit.along)
+    }
+}
+
+/// Most vehicles around a truck, and most units of them: other trucks have two.
+const N_OTHERS: usize = N_CARS + MOST_IN_GROUP - 1;
+const N_UNITS: usize = N_CARS + 2 * (MOST_IN_GROUP - 1);
+
+/// The vehicles around a truck.
+type Others = [Option<Other>; N_OTHERS];
 
 /// A zone of the truck's path with that of a car, in metres.
 struct Meeting {
@@ -122,59 +178,57 @@ struct Observing<'a> {
 }
 
 impl Observing<'_> {
-    /// What it observes of these cars.
-    fn of(&self, cars: &[Car; N_CARS]) -> [f32; N_AROUND] {
+    /// What it observes of these vehicles.
+    fn of(&self, others: &Others) -> [f32; N_AROUND] {
         let mut seen = [1.0; N_AROUND];
-        self.write_entry(cars, &mut seen);
+        self.write_entry(others, &mut seen);
         let line = self.network.paths[self.path].line();
         seen[LINE_AT] = ((line - self.front) / GAP_SCALE).clamp(0.0, 1.0);
         seen[HAS_ENTERED_AT] = f32::from(line < self.front);
-        let outlines: [Option<Outline>; N_CARS] =
-            from_fn(|slot| cars[slot].is_there().then(|| cars[slot].outline(self.network)));
-        if let Some((gap, slot)) = self.gap(cars) {
+        if let Some((gap, other)) = self.gap(others) {
             let ahead = self.network.pose(self.path, self.front + gap).1;
-            let along = outlines[slot].map_or(0.0, |outline| outline.along.dot(ahead));
+            let along = other.along().dot(ahead);
             seen[GAP_AT] = (gap / GAP_SCALE).min(1.0);
-            seen[GAP_SPEED_AT] = (cars[slot].speed() * along / VEHICLE_SPEED_SCALE).clamp(-1.0, 1.0);
+            seen[GAP_SPEED_AT] = (other.speed * along / VEHICLE_SPEED_SCALE).clamp(-1.0, 1.0);
         }
         for (unit, room) in self.units.iter().zip(&mut seen[ROOM_AT..]) {
-            let rooms = outlines.iter().flatten().map(|outline| room_between(unit, outline));
+            let rooms = others.iter().flatten().flat_map(Other::units).map(|outline| room_between(unit, outline));
             *room = rooms.fold(ROOM_SCALE, f32::min) / ROOM_SCALE;
         }
-        self.write_nearest(cars, &outlines, &mut seen[NEAREST_AT..]);
+        self.write_nearest(others, &mut seen[NEAREST_AT..]);
         seen
     }
 
-    /// The zones of the truck's path with that of a car.
-    fn zones(&self, car: &Car) -> impl Iterator<Item = Meeting> {
-        self.network.zones_of(self.path, car.path()).iter().map(|zone| {
+    /// The zones of the truck's path with that of another vehicle.
+    fn zones(&self, other: &Other) -> impl Iterator<Item = Meeting> {
+        self.network.zones_of(self.path, other.path).iter().map(|zone| {
             let Stretch { a_in, a_out, b_in, b_out, delta, kind } = zone.stretch();
             Meeting { own: [a_in, a_out].map(metres), its: [b_in, b_out].map(metres), delta: metres(delta), kind }
         })
     }
 
     /// Writes the first vehicle that comes to the entry, by lane.
-    fn write_entry(&self, cars: &[Car; N_CARS], seen: &mut [f32; N_AROUND]) {
+    fn write_entry(&self, others: &Others, seen: &mut [f32; N_AROUND]) {
         let line = self.network.paths[self.path].line();
         let mut first: [Option<Coming>; 2] = [None; 2];
-        for car in cars.iter().filter(|car| car.is_there()) {
-            let (station, speed) = (car.station(), car.speed());
-            let its_line = self.network.paths[car.path()].line();
+        for other in others.iter().flatten() {
+            let &Other { station, speed, length, .. } = other;
+            let its_line = self.network.paths[other.path].line();
             let waits = station + speed * speed / STILL_STOPS_WITH <= its_line;
             let is_beside = |kind: Kind| matches!(kind, Kind::Soft | Kind::Wide);
             let is_of_entry =
                 |zone: &Meeting| zone.own[0] <= line + ENTRY_REACH && (is_beside(zone.kind) || line < zone.own[0]);
-            let touches = self.zones(car).any(|zone| is_of_entry(&zone) && zone.kind != Kind::Wide);
-            for Meeting { own, its, kind, .. } in self.zones(car).filter(is_of_entry) {
+            let touches = self.zones(other).any(|zone| is_of_entry(&zone) && zone.kind != Kind::Wide);
+            for Meeting { own, its, kind, .. } in self.zones(other).filter(is_of_entry) {
                 // A car that runs together with the truck leads it once it is through.
                 let end = if kind == Kind::Follow { its[0] } else { its[1] };
-                let has_left = own[1] < self.front - self.length || end < station - car.length();
+                let has_left = own[1] < self.front - self.length || end < station - length;
                 if has_left || (waits && its_line < its[0]) || (touches && kind == Kind::Wide) {
                     continue;
                 }
                 let speed = speed.max(LEAST_COMING_SPEED);
                 let distance = (its[0] - station).max(0.0);
-                let gone = (end + car.length() - station) / speed;
+                let gone = (end + length - station) / speed;
                 let coming = Coming { arrival: distance / speed, distance, gone };
                 let lane = &mut first[usize::from(is_beside(kind) || line + NEAREST_LANE < own[0])];
                 *lane = Some(lane.map_or(coming, |known| known.first(coming)));
@@ -188,12 +242,12 @@ impl Observing<'_> {
         }
     }
 
-    /// Distance to what is next on the truck's path (m), and its slot.
-    fn gap(&self, cars: &[Car; N_CARS]) -> Option<(f32, usize)> {
-        let mut least: Option<(f32, usize)> = None;
-        for (slot, car) in cars.iter().enumerate().filter(|(_, car)| car.is_there()) {
-            let (station, rear) = (car.station(), car.station() - car.length());
-            for Meeting { own, its, delta, kind } in self.zones(car) {
+    /// Distance to what is next on the truck's path (m), and what it is.
+    fn gap<'o>(&self, others: &'o Others) -> Option<(f32, &'o Other)> {
+        let mut least: Option<(f32, &Other)> = None;
+        for other in others.iter().flatten() {
+            let (station, rear) = (other.station, other.station - other.length);
+            for Meeting { own, its, delta, kind } in self.zones(other) {
                 if its[1] <= rear || station <= its[0] {
                     continue;
                 }
@@ -204,7 +258,7 @@ impl Observing<'_> {
                 };
                 let gap = gap.max(0.0);
                 if least.is_none_or(|(known, _)| gap < known) {
-                    least = Some((gap, slot));
+                    least = Some((gap, other));
                 }
             }
         }
@@ -212,18 +266,25 @@ impl Observing<'_> {
     }
 
     /// Writes the vehicles nearest to either unit.
-    fn write_nearest(&self, cars: &[Car; N_CARS], outlines: &[Option<Outline>; N_CARS], seen: &mut [f32]) {
+    fn write_nearest(&self, others: &Others, seen: &mut [f32]) {
         let distance = |outline: &Outline| {
             self.units.iter().map(|unit| unit.distance_squared(outline.middle)).fold(f32::INFINITY, f32::min).sqrt()
         };
-        let mut near: [(f32, usize); N_CARS] =
-            from_fn(|slot| (outlines[slot].as_ref().map_or(f32::INFINITY, distance), slot));
-        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let of_other = |other| Other::units(other).map(move |unit| (unit, other.speed));
+        let units = others.iter().flatten().flat_map(of_other).enumerate();
+        let mut near = [None; N_UNITS];
+        for ((number, (unit, speed)), place) in units.zip(&mut near) {
+            *place = Some((distance(unit), number, unit, speed)).filter(|&(distance, ..)| distance < NEAR_SCALE);
+        }
+        // Of two that are as near the one in the lower slot is first.
+        near.sort_unstable_by(|a, b| match (a, b) {
+            (Some(a), Some(b)) => a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)),
+            _ => a.is_none().cmp(&b.is_none()),
+        });
         seen.fill(0.0);
-        for (rank, &(distance, slot)) in near.iter().take(N_NEAREST).enumerate() {
-            let Some(outline) = outlines[slot].filter(|_| distance < NEAR_SCALE) else { break };
+        for (rank, &(_, _, outline, speed)) in near.iter().flatten().take(N_NEAREST).enumerate() {
             let to = (outline.middle - self.origin) / NEAR_SCALE;
-            let velocity = cars[slot].speed() / VEHICLE_SPEED_SCALE * outline.along;
+            let velocity = speed / VEHICLE_SPEED_SCALE * outline.along;
             let in_frame = |vector: Vec2| [vector.dot(self.along), self.along.perp_dot(vector)];
             let ([ahead, left], [speed_ahead, speed_left]) = (in_frame(to), in_frame(velocity));
             for (group, value) in [1.0, ahead, left, speed_ahead, speed_left].into_iter().enumerate() {

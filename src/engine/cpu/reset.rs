@@ -3,24 +3,23 @@
 //! Route and pose are functions of (seed, env, episode) alone, where the caller states none.
 
 use crate::engine::cpu::follow::{followed, reference_point};
-use crate::engine::cpu::traffic::surrounded;
+use crate::engine::cpu::traffic::surround;
 use crate::engine::cpu::{along, around, observe, perceive, sense};
-use crate::engine::{Autoreset, RouteChoice, Row};
+use crate::engine::{Autoreset, RouteChoice, Row, group};
 use crate::layout::angle::{direction, wrapped};
 use crate::layout::random::{self, Draw};
 use crate::layout::{
     BEGINS, BeginRow, Control, Ended, HAS_ROUTE, HAS_START, IS_FIRST, Params, RewardTerms, Rig, Start, Stream, Truck,
     WaypointRow,
 };
-use crate::traffic;
 use crate::world::World;
 
 /// The next episode, as drawn.
-const NEXT: BeginRow =
+pub(in crate::engine) const NEXT: BeginRow =
     BeginRow { start: Start { offset: 0.0, heading: 0.0, speed: 0.0, along: 0.0, vehicle: 0 }, route: 0, what: BEGINS };
 
 /// Begins and observes another episode where one ended, or holds the truck. A truck that was held when the step began
-/// begins its next episode with [`Autoreset::NextStep`].
+/// begins its next episode with [`Autoreset::NextStep`]. Trucks of a group begin together, see [`crate::engine::group`].
 pub fn reset(world: &World, row: &mut Row) {
     if row.truck.held == 1 {
         if row.autoreset == Autoreset::NextStep {
@@ -41,6 +40,11 @@ pub fn begin(world: &World, row: &mut Row, begin: &BeginRow) {
         return;
     }
     start(world, row, begin);
+    forget(row);
+}
+
+/// Takes back what describes the last step: there is none.
+pub(in crate::engine) fn forget(row: &mut Row) {
     *row.next_observation = *row.observation;
     *row.next_extras = *row.extras;
     if let (Some(next), Some(around)) = (&mut row.next_around, &row.around) {
@@ -66,9 +70,15 @@ pub fn drawn_start(params: &Params, seed: u32, env: u32, episode: u32) -> Start 
 
 /// Puts the truck at the start of an episode and observes it there.
 fn start(world: &World, row: &mut Row, begin: &BeginRow) {
+    put(world, row, begin);
+    look(world, row);
+}
+
+/// Puts the truck at the start of an episode.
+pub(in crate::engine) fn put(world: &World, row: &mut Row, begin: &BeginRow) {
     let Stream { seed, env } = row.stream;
     let episode = if begin.what & IS_FIRST == 0 { row.truck.episode + 1 } else { 0 };
-    let route = if begin.what & HAS_ROUTE == 0 { route_of(row, episode) } else { begin.route };
+    let route = if begin.what & HAS_ROUTE == 0 { route_of(world, row, episode) } else { begin.route };
     let start = if begin.what & HAS_START == 0 { drawn_start(&world.params, seed, env, episode) } else { begin.start };
     let waypoints = world.route_waypoints(route);
     let rig = &world.rigs[start.vehicle as usize];
@@ -82,9 +92,6 @@ fn start(world: &World, row: &mut Row, begin: &BeginRow) {
     };
     let at_start = started(&world.params, rig, &waypoints[first], &standing, &start);
     *row.truck = Truck { route, episode, ..at_start };
-    if let (Some(shared), Some(cars)) = (&world.traffic, &mut row.cars) {
-        *traffic::Row::of_mut(cars) = surrounded(world, shared, row.stream, row.truck, first as u32 + 1);
-    }
     let steering = at_start.steering;
     *row.control = Control {
         steering,
@@ -97,6 +104,11 @@ fn start(world: &World, row: &mut Row, begin: &BeginRow) {
     let point = reference_point(rig.wheelbase, row.truck);
     *row.progress = followed(waypoints, point, first as u32 + 1, world.params.stray_distance);
     row.progress.passed = 0;
+}
+
+/// Puts vehicles around a truck that begins an episode, and observes them and the road.
+pub(in crate::engine) fn look(world: &World, row: &mut Row) {
+    surround(world, row);
     if world.disturbances.of_observation == 1 {
         perceive::perceive(world, row, 0);
     }
@@ -111,9 +123,10 @@ fn start(world: &World, row: &mut Row, begin: &BeginRow) {
 }
 
 /// The route of an episode as the batch chooses it.
-fn route_of(row: &Row, episode: u32) -> u32 {
+fn route_of(world: &World, row: &Row, episode: u32) -> u32 {
     match row.choice {
         RouteChoice::Fixed(routes) => routes[row.env as usize],
+        RouteChoice::Drawn(routes) if !row.mates.is_empty() => group::route_of(world, routes, row, episode),
         RouteChoice::Drawn(routes) => {
             let Stream { seed, env } = row.stream;
             let [word, ..] = random::words(seed, env, episode, Draw::Route as u32);

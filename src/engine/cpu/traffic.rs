@@ -1,12 +1,14 @@
 //! Other vehicles: each decides from where all were after the last step, all move, some leave and some come.
 
-use crate::engine::Row;
 use crate::engine::cpu::follow::{followed, reference_point};
+use crate::engine::{Mate, Row};
 use crate::layout::random::{self, Draw};
 use crate::layout::shared::constants;
-use crate::layout::{Progress, Stream, Truck};
+use crate::layout::{MOST_IN_GROUP, Progress, Stream, Truck};
 use crate::traffic::car::Outline;
-use crate::traffic::{self, Car, Clock, Contact, Entry, Event, Setting, Trucks, View, outlines, touched};
+use crate::traffic::{
+    self, Car, Clock, Contact, Entry, Event, Met, Setting, Trucks, View, outlines, touched, touched_by,
+};
 use crate::world::{Level, Traffic, TrafficRoad, TrafficRoute, World};
 
 constants! {
@@ -25,14 +27,23 @@ pub fn traffic(world: &World, row: &mut Row) {
     let (Some(shared), Some(words)) = (&world.traffic, &mut row.cars) else { return };
     let around = traffic::Row::of_mut(words);
     let TrafficRoad { network, levels } = shared.road(world, row.truck.route);
-    let view = view(world, shared, row.truck, row.progress);
-    if !view.waits && around.entered == 0 {
+    let own = view(world, shared, row.truck, row.progress);
+    if !own.waits && around.entered == 0 {
         around.entered = row.truck.steps + 1;
     }
     let setting = Setting { network, rules: &shared.rules, demand: &levels[around.level as usize].demand };
-    let views = [view];
-    let trucks = Trucks::new(network, &views, around.hindered);
-    let Stream { seed, env } = row.stream;
+    // The trucks of a group in their order, so that each finds the same of the vehicles.
+    let there = row.mates.iter().filter(|mate| mate.is_there());
+    let place = there.clone().position(|mate| mate.env == row.env).unwrap_or_default();
+    let mut of_group = [const { None }; MOST_IN_GROUP];
+    for (mate, seen) in there.zip(&mut of_group) {
+        *seen = Some(view(world, shared, &mate.truck, &mate.progress));
+    }
+    let of_one = [Some(own)];
+    let views = if row.mates.is_empty() { &of_one[..] } else { &of_group };
+    let trucks = Trucks::new(network, views, place, around.hindered);
+    let stream = stream_of_vehicles(row.stream, row.mates);
+    let Stream { seed, env } = stream;
     let clock = Clock { seed, env, episode: row.truck.episode, step: row.truck.steps };
     let mut came = 0u32;
     let mut tell = |event, _: &[Car]| {
@@ -42,13 +53,18 @@ pub fn traffic(world: &World, row: &mut Row) {
     };
     traffic::step(setting, clock, &mut around.cars, &mut around.backlog, &trucks, &mut tell);
     if came != 0 {
-        let drivers = Drivers::drawn(shared, row.stream, row.truck.episode);
+        let drivers = Drivers::drawn(shared, stream, row.truck.episode);
         let slots = (0..around.cars.len()).filter(|slot| came & 1 << slot != 0);
         slots.for_each(|slot| drivers.sit_in(&mut around.cars[slot], row.truck.steps + 1, slot));
     }
     // A slot's next car has yet to be hindered.
     let there = (0..around.cars.len()).filter(|&slot| around.cars[slot].is_there());
     around.hindered = trucks.hindered() & !came & there.fold(0, |bits, slot| bits | 1 << slot);
+}
+
+/// What the vehicles around a truck are drawn from: the stream of the first truck of its group.
+fn stream_of_vehicles(own: Stream, mates: &[Mate]) -> Stream {
+    mates.first().map_or(own, |mate| mate.stream)
 }
 
 /// A truck as the vehicles around it see it, if the world has any.
@@ -82,9 +98,19 @@ pub fn meet(world: &World, row: &mut Row) {
     let around = traffic::Row::of_mut(words);
     let network = &shared.road(world, row.truck.route).network;
     let TrafficRoute { path, .. } = shared.routes[row.truck.route as usize];
-    let steps = (around.entered != 0).then(|| row.truck.steps + 1 - around.entered);
-    let entry = Entry { arm: network.source_of(path as usize).entry, steps };
-    let contact = touched(network, world.rig(row.truck), row.truck, entry, &around.cars);
+    let step = row.truck.steps + 1;
+    let entry = |entered: u32, path: u32| Entry {
+        arm: network.source_of(path as usize).entry,
+        steps: (entered != 0).then(|| step - entered),
+    };
+    let own = Met { rig: world.rig(row.truck), truck: row.truck, entry: entry(around.entered, path) };
+    let others = row.mates.iter().enumerate().filter(|(_, mate)| mate.is_there() && mate.env != row.env);
+    let with_others = others.filter_map(|(index, mate)| {
+        let path = shared.routes[mate.truck.route as usize].path;
+        let its = Met { rig: world.rig(&mate.truck), truck: &mate.truck, entry: entry(mate.entered, path) };
+        touched_by(&own, &its, index)
+    });
+    let contact = touched(network, &own, &around.cars).into_iter().chain(with_others).min_by_key(Contact::order);
     around.met = contact.map_or(0, Contact::code);
 }
 
@@ -126,16 +152,36 @@ fn drawn(Stream { seed, env }: Stream, episode: u32) -> [u32; 4] {
     random::words(seed, env, episode, Draw::Traffic as u32)
 }
 
-/// Puts the vehicles of a snapshot around a truck that begins an episode before the waypoint `next`, but for those that
-/// are too near to it.
-pub fn surrounded(world: &World, shared: &Traffic, stream: Stream, truck: &Truck, next: u32) -> traffic::Row {
-    let road = shared.road(world, truck.route);
-    let [level, snapshot, ..] = drawn(stream, truck.episode);
+/// Puts the vehicles of a snapshot around a truck that begins an episode, if the world has any, but for those that are
+/// too near to it or to another one of its group.
+pub fn surround(world: &World, row: &mut Row) {
+    let (Some(shared), Some(words)) = (&world.traffic, &mut row.cars) else { return };
+    let stream = stream_of_vehicles(row.stream, row.mates);
+    let mut around = surroundings(shared.road(world, row.truck.route), shared, stream, row.truck.episode);
+    if row.mates.is_empty() {
+        clear(world, shared, row.truck, row.progress, &mut around);
+    }
+    row.mates.iter().for_each(|mate| clear(world, shared, &mate.truck, &mate.progress, &mut around));
+    **words = *around.words();
+}
+
+/// The vehicles of a snapshot of a road, as an episode draws it.
+fn surroundings(road: &TrafficRoad, shared: &Traffic, stream: Stream, episode: u32) -> traffic::Row {
+    let [level, snapshot, ..] = drawn(stream, episode);
     let level = random::index_below(level, road.levels.len() as u32);
     let Level { snapshots, .. } = &road.levels[level as usize];
     let mut row = snapshots[random::index_below(snapshot, snapshots.len() as u32) as usize];
     row.level = level;
-    let drivers = Drivers::drawn(shared, stream, truck.episode);
+    let drivers = Drivers::drawn(shared, stream, episode);
+    for (slot, car) in row.cars.iter_mut().enumerate().filter(|(_, car)| car.is_there()) {
+        drivers.sit_in(car, 0, slot);
+    }
+    row
+}
+
+/// Takes away what is too near to a truck that begins.
+fn clear(world: &World, shared: &Traffic, truck: &Truck, progress: &Progress, row: &mut traffic::Row) {
+    let road = shared.road(world, truck.route);
     let grown = |unit: Outline| Outline {
         half_length: unit.half_length + ROOM_ALONG,
         half_width: unit.half_width + ROOM_BESIDE,
@@ -143,20 +189,17 @@ pub fn surrounded(world: &World, shared: &Traffic, stream: Stream, truck: &Truck
     };
     let units = outlines(world.rig(truck), truck).map(grown);
     let source = road.network.paths[shared.routes[truck.route as usize].path as usize].source;
-    let front = front_station(world, shared, truck, next);
+    let front = front_station(world, shared, truck, progress.waypoint);
     // A truck could not stop behind it.
     let is_too_near_ahead = |car: &Car| {
         let room = car.station() - car.length() - front;
         let stops = ((truck.speed * truck.speed - car.speed() * car.speed()) / STOPS_BEHIND_WITH).max(0.0);
         road.network.paths[car.path()].source == source && 0.0 <= room && room < ROOM_ALONG + stops
     };
-    for (slot, car) in row.cars.iter_mut().enumerate().filter(|(_, car)| car.is_there()) {
+    for car in row.cars.iter_mut().filter(|car| car.is_there()) {
         let outline = car.outline(&road.network);
         if is_too_near_ahead(car) || units.iter().any(|unit| unit.overlaps(&outline)) {
             *car = Car::NONE;
-        } else {
-            drivers.sit_in(car, 0, slot);
         }
     }
-    row
 }

@@ -45,7 +45,7 @@ impl Batch {
         check_world(device, world)?;
         let has_vehicles = world.traffic.is_some();
         check_size(device, n_envs, has_vehicles)?;
-        let host = engine::Batch::new(n_envs, seed, choice, has_vehicles)?;
+        let host = engine::Batch::new(n_envs, seed, choice, has_vehicles, world.group())?;
         let buffers = Buffers::new(device, world, &host, &columns)?;
         let case = Case::of(world, host.autoreset());
         let room = Mutex::new(Some(host));

@@ -6,7 +6,7 @@ use super::corridor::front;
 use super::view::{outlines, yaw_rate};
 use crate::layout::angle::{direction, sin_cos};
 use crate::layout::shared::constants;
-use crate::layout::{Rig, Truck};
+use crate::layout::{N_CARS, Rig, Truck};
 use crate::traffic::car::Outline;
 use crate::traffic::units::{length, speed};
 use crate::traffic::{Car, Network};
@@ -25,20 +25,25 @@ constants! {
     /// Below this speed a car stands, and hits nobody (2^-14 m a step).
     const HITS_NOBODY: i32 = speed(0.05);
 
-    /// Added to a contact's code where the truck is at fault: more than there are slots.
+    /// Added to a contact's code where the truck is at fault: more than there are slots and trucks of a group.
     const TRUCKS_FAULT: u32 = 64;
 }
 
-/// A contact of a truck with a car.
+/// A contact of a truck with a car, or with another truck of its group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Contact {
-    /// The car's slot.
+    /// The car's slot; behind those of cars the other truck's index in the group.
     pub slot: usize,
-    /// Whether the truck is at fault, or the car.
+    /// Whether the truck is at fault, or the other.
     pub is_trucks_fault: bool,
 }
 
 impl Contact {
+    /// Of several contacts the first in this order counts.
+    pub fn order(&self) -> (bool, usize) {
+        (!self.is_trucks_fault, self.slot)
+    }
+
     /// The contact in a word: its slot plus 1, and 64 more where the truck is at fault.
     pub fn code(self) -> u32 {
         self.slot as u32 + 1 + if self.is_trucks_fault { TRUCKS_FAULT } else { 0 }
@@ -60,9 +65,21 @@ pub struct Entry {
     pub steps: Option<u32>,
 }
 
+/// A truck that may be in a contact.
+#[derive(Debug, Clone, Copy)]
+pub struct Met<'a> {
+    /// Its vehicle.
+    pub rig: &'a Rig,
+    /// Where it is.
+    pub truck: &'a Truck,
+    /// Where it has entered.
+    pub entry: Entry,
+}
+
 /// The car that a truck touches, if there is one; of several the one of the lowest slot among those for which the truck
 /// is at fault, or else among all.
-pub fn touched(network: &Network, rig: &Rig, truck: &Truck, entry: Entry, cars: &[Car]) -> Option<Contact> {
+pub fn touched(network: &Network, own: &Met, cars: &[Car]) -> Option<Contact> {
+    let Met { rig, truck, entry } = own;
     let now = outlines(rig, truck);
     let [tractor, trailer] = now;
     let middle = 0.5 * (tractor.middle + trailer.middle);
@@ -73,10 +90,26 @@ pub fn touched(network: &Network, rig: &Rig, truck: &Truck, entry: Entry, cars: 
         let outline = car.outline(network);
         now.iter().any(|unit| unit.overlaps(&outline)).then(|| Contact {
             slot,
-            is_trucks_fault: !is_cars_fault(network, &outlines_before(rig, truck), entry, car, &outline),
+            is_trucks_fault: !is_cars_fault(network, &outlines_before(rig, truck), *entry, car, &outline),
         })
     });
-    contacts.min_by_key(|contact| (!contact.is_trucks_fault, contact.slot))
+    contacts.min_by_key(Contact::order)
+}
+
+/// The contact of a truck with another one, which has an index in their group, if they touch. Each is judged as it is
+/// with a car in the other's place: both may be at fault, or neither.
+pub fn touched_by(own: &Met, other: &Met, index: usize) -> Option<Contact> {
+    let [now, its] = [own, other].map(|met| outlines(met.rig, met.truck));
+    let touch = |one: &[Outline; 2]| one.iter().any(|unit| its.iter().any(|other| unit.overlaps(other)));
+    if !touch(&now) {
+        return None;
+    }
+    let lately = |entry: &Entry| entry.steps.is_some_and(|steps| steps < LATELY);
+    let cuts_in = own.entry.steps.is_some() && own.entry.arm != other.entry.arm && lately(&other.entry);
+    let was_there = || touch(&outlines_before(own.rig, own.truck));
+    let moves = HITS_NOBODY < speed(other.truck.speed);
+    let is_its_fault = moves && !lately(&own.entry) && (cuts_in || was_there());
+    Some(Contact { slot: N_CARS + index, is_trucks_fault: !is_its_fault })
 }
 
 /// Whether the car is at fault of a contact with a truck that covered this ground a second ago.

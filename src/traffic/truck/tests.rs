@@ -73,7 +73,8 @@ fn decided(network: &Network, cars: &[Car], others: &impl Others) -> Vec<f32> {
 
 /// What a single car decides beside a truck, and alone (m/s²).
 fn beside(network: &Network, view: View, car: Car) -> [f32; 2] {
-    let trucks = Trucks::new(network, std::slice::from_ref(&view), 0);
+    let views = [Some(view)];
+    let trucks = Trucks::new(network, &views, 0, 0);
     [decided(network, &[car], &trucks)[0], decided(network, &[car], &Nobody)[0]]
 }
 
@@ -87,8 +88,8 @@ fn touches(network: &Network, view: &View, car: &Car) -> bool {
 fn driven(network: &Network, view: View, mut car: Car, steps: u32) -> (bool, Car) {
     let demand = Demand::new(network, &vec![0.0; network.paths.len()], Mix::default()).unwrap();
     let setting = Setting { network, rules: &Rules::FITTED, demand: &demand };
-    let views = [view];
-    let trucks = Trucks::new(network, &views, 0);
+    let views = [Some(view)];
+    let trucks = Trucks::new(network, &views, 0, 0);
     let mut kept_clear = true;
     for step in 0..steps {
         let mut cars = [car];

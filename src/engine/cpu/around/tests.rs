@@ -1,5 +1,7 @@
 //! What is observed of other vehicles, from crowds of cars on shipped roads.
 
+use std::array::from_fn;
+
 use super::*;
 use crate::layout::{Stream, VEHICLE_VALUES};
 use crate::map::Road;
@@ -35,6 +37,14 @@ fn view(network: &Network, path: usize, front: f32) -> Observing<'_> {
     Observing { network, path, front, length: 16.0, units, origin: position - 5.0 * along, along }
 }
 
+/// What a truck observes of these cars.
+fn observed(view: &Observing, cars: &[Car; N_CARS]) -> [f32; N_AROUND] {
+    let there = cars.iter().filter(|car| car.is_there()).map(|car| Other::car(view.network, car));
+    let mut others = [const { None }; N_OTHERS];
+    there.zip(&mut others).for_each(|(other, place)| *place = Some(other));
+    view.of(&others)
+}
+
 fn value(seen: &[f32; N_AROUND], name: &str) -> f32 {
     seen[first_of_vehicles(name)]
 }
@@ -47,7 +57,7 @@ fn no_order_of_the_slots_changes_what_is_observed() {
         let turned: [Car; N_CARS] = from_fn(|slot| cars[(7 * slot + 5) % N_CARS]);
         for (path, front) in [(0, 20.0), (3, 45.0), (8, 49.0), (11, 70.0)] {
             let view = view(&network, path, front);
-            let (here, there) = (view.of(&cars), view.of(&turned));
+            let (here, there) = (observed(&view, &cars), observed(&view, &turned));
             assert_eq!(here, there, "path {path}");
             n_seen += here[NEAREST_AT..][..N_NEAREST].iter().filter(|&&is_there| is_there == 1.0).count();
         }
@@ -77,7 +87,7 @@ fn a_mirrored_road_is_observed_by_the_mirror_factors() {
                 along: mirror(view.along),
                 ..view
             };
-            let (here, there) = (view.of(&cars), other.of(&cars));
+            let (here, there) = (observed(&view, &cars), observed(&other, &cars));
             for (index, (here, there)) in here.iter().zip(there).enumerate() {
                 assert!((factors[index] * here - there).abs() < 1e-5, "path {path}, value {index}: {here} and {there}");
                 changed[index] |= 1e-3 < (here - there).abs();
@@ -97,7 +107,7 @@ fn values_lie_in_their_ranges_and_those_that_may_be_1_or_0_are_at_times() {
         crowds(&network, demand, 60, |cars| {
             for (path, front) in (0..network.paths.len()).flat_map(|path| [5.0, 49.0, 70.0].map(|front| (path, front)))
             {
-                for (index, value) in view(&network, path, front).of(&cars).into_iter().enumerate() {
+                for (index, value) in observed(&view(&network, path, front), &cars).into_iter().enumerate() {
                     assert!((lows[index]..=1.0).contains(&value), "value {index}: {value}");
                     ends[index][0] |= value < 0.2;
                     ends[index][1] |= 0.8 < value;
@@ -122,7 +132,7 @@ fn a_vehicle_ahead_on_the_same_path_is_at_the_gap_between_them() {
             if front < 5.0 || 40.0 < station || 0 < others {
                 continue;
             }
-            let seen = view(&network, leader.path(), front).of(&cars);
+            let seen = observed(&view(&network, leader.path(), front), &cars);
             assert!((50.0 * value(&seen, "gap") - 4.0).abs() < 1e-3, "{seen:?}");
             assert!((15.0 * value(&seen, "gap_speed") - speed).abs() < 0.05 * speed + 1e-3, "{seen:?}");
             assert!((20.0 * value(&seen, "tractor_room") - 4.0).abs() < 0.2, "{seen:?}");
@@ -143,7 +153,7 @@ fn what_comes_to_the_entry_is_there_when_it_was_expected() {
     // Each half second: when the next vehicle is expected, by how far it is.
     let mut seen: Vec<[f32; 2]> = Vec::new();
     crowds(&network, 900.0, 600, |cars| {
-        let values = truck.of(&cars);
+        let values = observed(&truck, &cars);
         assert_eq!(value(&values, "has_entered"), 0.0);
         assert!((50.0 * value(&values, "line_distance") - 1.0).abs() < 1e-3);
         seen.push([10.0 * values[ARRIVAL_AT + 1], 50.0 * values[DISTANCE_AT + 1]]);

@@ -2,14 +2,14 @@
 
 use super::*;
 use crate::traffic::units::metres;
-use crate::traffic::{Contact, Entry, touched};
+use crate::traffic::{Contact, Entry, Met, touched};
 
 /// The truck's path.
 const PATH: usize = 0;
 
 fn contact(network: &Network, truck: &Truck, steps: Option<u32>, cars: &[Car]) -> Option<Contact> {
     let entry = Entry { arm: network.source_of(PATH).entry, steps };
-    touched(network, &rig(), truck, entry, cars)
+    touched(network, &Met { rig: &rig(), truck, entry }, cars)
 }
 
 /// Whether the truck is at fault of its contact with a car.
@@ -41,7 +41,7 @@ fn a_truck_that_has_entered_lately_is_at_fault_and_one_that_has_long_been_in_the
     let longest = (0..network.paths.len()).max_by_key(|&path| network.paths[path].length).unwrap();
     let arm = network.source_of(longest).entry;
     let of = |truck: &Truck, steps: u32, car: Car| {
-        touched(&network, &rig(), truck, Entry { arm, steps: Some(steps) }, &[car])
+        touched(&network, &Met { rig: &rig(), truck, entry: Entry { arm, steps: Some(steps) } }, &[car])
             .map(|contact| contact.is_trucks_fault)
     };
     let (mut n_was_there, mut n_cuts_in, mut n_ahead) = (0, 0, 0);

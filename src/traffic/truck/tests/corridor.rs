@@ -76,8 +76,8 @@ fn nobody_enters_where_a_truck_stands_or_is_about_to_come() {
     let entered = |view: View| {
         let (mut cars, mut backlog, mut entered) = (vec![Car::NONE; 24], Backlog::default(), Vec::new());
         (0..network.sources.len()).for_each(|source| fill(&mut backlog, source));
-        let views = [view];
-        let trucks = Trucks::new(&network, &views, 0);
+        let views = [Some(view)];
+        let trucks = Trucks::new(&network, &views, 0, 0);
         arrive(setting, CLOCK, &mut cars, &mut backlog, &trucks, &mut |event, _| {
             if let Event::Entered(source, _) = event {
                 entered.push(source);
@@ -99,8 +99,8 @@ fn nobody_enters_where_a_truck_stands_or_is_about_to_come() {
 #[test]
 fn a_bit_tells_which_car_slows_for_the_truck_until_it_decides_again() {
     let network = baked("20m");
-    let views = [view_at(&network, PATH, 40.0, 0.0)];
-    let trucks = Trucks::new(&network, &views, 0b1010);
+    let views = [Some(view_at(&network, PATH, 40.0, 0.0))];
+    let trucks = Trucks::new(&network, &views, 0, 0b1010);
     let far = car_at(network.paths.len() - 1, 20.0, 6.0, false);
     // Slots 0 and 2 decide.
     let cars = [car_at(PATH, 12.0, 6.0, false), far, far, far];
