@@ -5,12 +5,17 @@ Standard library only.
 
     python3 benches/among.py --json docs/results/traffic.json
 
-With --benchmarks those alone are driven, and what the file has of the others stays.
+With --benchmarks those alone are driven, and what the file has of the others stays. With --policies others are driven
+than those that come with the program, into a file of their own:
+
+    python3 benches/among.py --policies yields:runs/traffic-1/policy.safetensors \\
+        --benchmarks traffic2026 traffic2026-random --json docs/results/traffic-seeds.json
 """
 
 import argparse
 import datetime
 import json
+import shlex
 import tempfile
 from pathlib import Path
 
@@ -81,6 +86,7 @@ def main():
     parser.add_argument("--offtrack", default=str(ROOT / "target/release/offtrack"), help="the program")
     parser.add_argument("--json", type=Path, required=True, help="file to write")
     parser.add_argument("--benchmarks", nargs="+", choices=BENCHMARKS, help="these alone")
+    parser.add_argument("--policies", nargs="+", help="these in place of those that come with the program")
     args = parser.parse_args()
     result = {
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
@@ -89,17 +95,21 @@ def main():
         "training": "offtrack train traffic, seed 0; the budget was raised from 12 to 18 million env steps on the way; "
         "the policy is the best of 20 validations on 40 validation roads, after 17.1 million",
     }
-    if args.benchmarks:
+    if args.policies:
+        benchmarks = ["--benchmarks", *args.benchmarks] if args.benchmarks else []
+        words = ["--policies", *args.policies, *benchmarks, "--json", f"docs/results/{args.json.name}"]
+        result = {"date": result["date"], "command": shlex.join(["python3", "benches/among.py", *words])}
+    elif args.benchmarks:
         result = json.loads(args.json.read_text())
-    policies = {name: result.get(name, {}) for name in POLICIES}
+    policies = {name: result.get(name, {}) for name in args.policies or POLICIES}
     for benchmark in args.benchmarks or BENCHMARKS:
         for name, rows in policies.items():
             report = driven(args.offtrack, name, benchmark, BENCHMARKS[benchmark])
             rows[benchmark] = row(name, benchmark, report)
-            if not args.benchmarks:
+            if args.policies or not args.benchmarks:
                 result |= {"commit": report["commit"], "machine": report["machine"]}
             write_json(args.json, {**result, **policies})
-    if args.benchmarks:
+    if args.benchmarks or args.policies:
         return
     benchmark, names, episodes = POLITE
     for name in names:
