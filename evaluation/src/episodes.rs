@@ -31,7 +31,7 @@ impl Episodes {
     ) -> Result<Episodes, Error> {
         let group = world.group();
         if 1 < group {
-            return Err(Error::NotInGroups { what: "an episode of one truck", group });
+            return Err(Error::NotInGroups { what: "an evaluation, whose trucks drive alone", group });
         }
         // Before the list of them is made: many would not fit into memory either.
         check_size(routes.len().saturating_mul(per_route))?;

@@ -79,8 +79,11 @@ pub struct Ground {
     pub text: Option<String>,
 }
 
-/// A benchmark as pages have it: with [`N_VEHICLES`] at most.
+/// A benchmark as pages have it: with [`N_VEHICLES`] at most, and each truck alone on its road.
 pub fn shown(mut scenario: Scenario) -> Scenario {
+    if let Some(traffic) = &mut scenario.traffic {
+        traffic.group = 1;
+    }
     if let Some(fleet) = &mut scenario.fleet {
         fleet.n_vehicles = fleet.n_vehicles.min(N_VEHICLES);
     }

@@ -43,8 +43,8 @@ pub enum Error {
         /// Trucks of a group.
         group: usize,
     },
-    /// Trucks of a group go on together.
-    #[error("{what}: trucks that share a road (traffic.group is {group}) go on together")]
+    /// What is done to trucks one by one.
+    #[error("{what}: not where trucks share a road (traffic.group is {group}); leave the key out")]
     NotInGroups {
         /// What was asked for.
         what: &'static str,

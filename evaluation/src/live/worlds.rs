@@ -85,8 +85,8 @@ fn steps(world: &World) -> Map<String, Value> {
         [("same_step", Autoreset::SameStep), ("next_step", Autoreset::NextStep), ("disabled", Autoreset::Disabled)];
     let step = |autoreset: Autoreset| {
         let mut step = names(Case::of(world, autoreset).step());
-        let reset = Stage::Reset.kernels()[0].name();
-        let before = step.iter().position(|&name| name == reset).unwrap_or(step.len());
+        let resets = |name: &&str| Stage::Reset.kernels().iter().any(|kernel| kernel.name() == *name);
+        let before = step.iter().position(|name| resets(name)).unwrap_or(step.len());
         step.insert(before, journal::kernel(world.traffic.is_some()));
         step
     };
