@@ -86,7 +86,7 @@ fn steps(world: &World) -> Map<String, Value> {
     let step = |autoreset: Autoreset| {
         let mut step = names(Case::of(world, autoreset).step());
         let resets = |name: &&str| Stage::Reset.kernels().iter().any(|kernel| kernel.name() == *name);
-        let before = step.iter().position(|name| resets(name)).unwrap_or(step.len());
+        let before = step.iter().position(resets).unwrap_or(step.len());
         step.insert(before, journal::kernel(world.traffic.is_some()));
         step
     };
