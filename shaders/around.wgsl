@@ -107,9 +107,25 @@ struct Other {
     length: f32,
 }
 
-// Numbers of others, present or not.
+// Trucks of a group behind the slots of cars, the one that looks around among them: none where it is alone.
+fn n_mates() -> u32 {
+    return select(batch.group, 0u, batch.group == 1u);
+}
+
+// Others that there may be.
 fn n_others() -> u32 {
-    return select(N_CARS + batch.group, N_CARS, batch.group == 1u);
+    return N_CARS + n_mates();
+}
+
+// Index in the batch of the truck that is an other.
+fn mate_at(env: u32, index: u32) -> u32 {
+    return first_of_group(env) + index - N_CARS;
+}
+
+fn has_other(env: u32, index: u32) -> bool {
+    if index < N_CARS { return is_there(car_at(env, index)); }
+    let mate = mate_at(env, index);
+    return mate != env && is_driving(mate);
 }
 
 fn other_at(env: u32, index: u32) -> Other {
@@ -117,23 +133,40 @@ fn other_at(env: u32, index: u32) -> Other {
         let car = car_at(env, index);
         return Other(path_of(car), station_of(car), speed_of(car), length_of(car));
     }
-    let mate = first_of_group(env) + index - N_CARS;
-    if mate == env || !is_driving(mate) { return Other(NO_PATH, 0.0, 0.0, 0.0); }
+    if !has_other(env, index) { return Other(NO_PATH, 0.0, 0.0, 0.0); }
+    let mate = mate_at(env, index);
     let at = truck[mate];
     let station = in_metres(in_lengths(front_station(mate)));
     return Other(path_of_route(at.route), station, at.speed, in_metres(stretched(vehicles[at.vehicle].rig)));
 }
 
-// Units that it has: a truck two.
-fn units_of(index: u32) -> u32 {
-    return select(2u, 1u, index < N_CARS);
+fn speed_of_other(env: u32, index: u32) -> f32 {
+    if index < N_CARS { return speed_of(car_at(env, index)); }
+    return truck[mate_at(env, index)].speed;
 }
 
-// The ground that one of its units covers.
-fn unit_of_other(env: u32, network: Network, index: u32, unit: u32) -> Outline {
-    if index < N_CARS { return outline_of(network, car_at(env, index)); }
-    let at = truck[first_of_group(env) + index - N_CARS];
-    if unit == 0u { return tractor_outline(at); }
+// Units that there may be: one of each car, then two of each truck.
+fn n_units_around() -> u32 {
+    return N_CARS + 2u * n_mates();
+}
+
+// Index of the other that has a unit.
+fn whose(unit: u32) -> u32 {
+    if unit < N_CARS { return unit; }
+    return N_CARS + (unit - N_CARS) / 2u;
+}
+
+// The first unit of an other.
+fn first_unit(index: u32) -> u32 {
+    if index < N_CARS { return index; }
+    return N_CARS + 2u * (index - N_CARS);
+}
+
+// The ground that a unit covers.
+fn outline_of_unit(env: u32, network: Network, unit: u32) -> Outline {
+    if unit < N_CARS { return outline_of(network, car_at(env, unit)); }
+    let at = truck[mate_at(env, whose(unit))];
+    if (unit - N_CARS) % 2u == 0u { return tractor_outline(at); }
     return trailer_outline(at);
 }
 
@@ -274,9 +307,9 @@ fn look_ahead(env: u32, looking: Looking) {
     }
     var speed_along = 1.0;
     if least < NOWHERE {
-        let along = unit_of_other(env, looking.network, next, 0u).along;
+        let along = outline_of_unit(env, looking.network, first_unit(next)).along;
         let ahead = direction_at(looking.network, looking.path, looking.front + least);
-        speed_along = other_at(env, next).speed * dot(along, ahead) / VEHICLE_SPEED_SCALE;
+        speed_along = speed_of_other(env, next) * dot(along, ahead) / VEHICLE_SPEED_SCALE;
     }
     write_seen(env, GAP_AT, min(least / GAP_SCALE, 1.0));
     write_seen(env, GAP_SPEED_AT, clamp(speed_along, -1.0, 1.0));
@@ -286,27 +319,26 @@ fn look_ahead(env: u32, looking: Looking) {
 fn look_beside(env: u32, looking: Looking) {
     var tractor_room = ROOM_SCALE;
     var trailer_room = ROOM_SCALE;
-    // The nearest ones' distances and numbers, by distance and then by number: twice the index, and the unit.
+    // The nearest units and their distances, by distance and then by number.
     var distances = array<f32, N_NEAREST>();
-    var numbers = array<u32, N_NEAREST>();
+    var units = array<u32, N_NEAREST>();
     for (var rank = 0u; rank < N_NEAREST; rank++) { distances[rank] = NOWHERE; }
-    for (var n = 0u; n < 2u * n_others(); n++) {
-        let index = n / 2u;
-        if units_of(index) <= n % 2u || other_at(env, index).path == NO_PATH { continue; }
-        let outline = unit_of_other(env, looking.network, index, n % 2u);
+    for (var unit = 0u; unit < n_units_around(); unit++) {
+        if !has_other(env, whose(unit)) { continue; }
+        let outline = outline_of_unit(env, looking.network, unit);
         tractor_room = min(tractor_room, room_between(looking.tractor, outline));
         trailer_room = min(trailer_room, room_between(looking.trailer, outline));
         let to_tractor = distance_squared_to(looking.tractor, outline.middle);
         var distance = sqrt(min(to_tractor, distance_squared_to(looking.trailer, outline.middle)));
-        var whose = n;
+        var placed = unit;
         for (var rank = 0u; rank < N_NEAREST; rank++) {
             let known = distances[rank];
-            let known_number = numbers[rank];
-            if distance < known || (distance == known && whose < known_number) {
+            let known_unit = units[rank];
+            if distance < known || (distance == known && placed < known_unit) {
                 distances[rank] = distance;
-                numbers[rank] = whose;
+                units[rank] = placed;
                 distance = known;
-                whose = known_number;
+                placed = known_unit;
             }
         }
     }
@@ -315,8 +347,8 @@ fn look_beside(env: u32, looking: Looking) {
     for (var rank = 0u; rank < N_NEAREST; rank++) {
         var seen = array<f32, 5>();
         if distances[rank] < NEAR_SCALE {
-            let outline = unit_of_other(env, looking.network, numbers[rank] / 2u, numbers[rank] % 2u);
-            seen = seen_nearest(looking, outline, other_at(env, numbers[rank] / 2u).speed);
+            let outline = outline_of_unit(env, looking.network, units[rank]);
+            seen = seen_nearest(looking, outline, speed_of_other(env, whose(units[rank])));
         }
         for (var group = 0u; group < 5u; group++) {
             write_seen(env, NEAREST_AT + group * N_NEAREST + rank, clamp(seen[group], -1.0, 1.0));

@@ -22,7 +22,7 @@ fn reset(thread: Thread) {
     }
 }
 
-// A truck that is held is on its way to its next episode, with all of its group.
+// What `held` is between two kernels of a reset where a truck begins its next episode with all of its group.
 const TOGETHER: u32 = 2u;
 
 // Decides for each group, in the thread of its first truck, whether its next episodes begin: once all have ended. Until

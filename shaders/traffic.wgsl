@@ -92,8 +92,9 @@ fn waiting_cars(env: u32, source: u32) -> u32 {
 // into the first free slots.
 fn arrive(env: u32) {
     let network = network_of(truck[env].route);
+    let view = view_of(env, network);
     let row = env * N_CAR_WORDS;
-    if !view_of(env, network).waits && cars[row + ENTERED_AT] == 0u { cars[row + ENTERED_AT] = truck[env].steps + 1u; }
+    if !view.waits && cars[row + ENTERED_AT] == 0u { cars[row + ENTERED_AT] = truck[env].steps + 1u; }
     let hindered_before = cars[row + HINDERED_AT];
     var hindered = 0u;
     for (var slot = 0u; slot < N_CARS; slot++) {
@@ -120,7 +121,7 @@ fn arrive(env: u32) {
         var slot = 0u;
         while slot < N_CARS && is_there(car_at(env, slot)) { slot++; }
         if slot == N_CARS { break; }
-        let car = entering(env, network, demand, source);
+        let car = entering(env, network, view, demand, source);
         if !is_there(car) { continue; }
         write_car(env, slot, driven_by(drivers, car, truck[env].steps + 1u, slot));
         cars[backlog_word(env, source)] -= 1u << backlog_bit(source);
@@ -129,8 +130,8 @@ fn arrive(env: u32) {
     cars[row + HINDERED_AT] = hindered;
 }
 
-// The next car of a source, or none if there is no room for it.
-fn entering(env: u32, network: Network, demand: u32, source: u32) -> Car {
+// The next car of a source, or none if there is no room for it. `view` is the row's own truck.
+fn entering(env: u32, network: Network, view: View, demand: u32, source: u32) -> Car {
     let random = traffic_words(env, ENTERING + 16u * truck[env].steps + source);
     let first = lanes[network.sources + SOURCE_WORDS * source + 2u];
     let end = first + lanes[network.sources + SOURCE_WORDS * source + 3u];
@@ -156,7 +157,9 @@ fn entering(env: u32, network: Network, demand: u32, source: u32) -> Car {
     let group = first_of_group(env);
     for (var mate = group; mate < group + batch.group; mate++) {
         if !is_driving(mate) { continue; }
-        let ahead = truck_ahead(network, view_of(mate, network), Car(station, 0, path | (style << STYLE), 0));
+        var seen = view;
+        if mate != env { seen = view_of(mate, network); }
+        let ahead = truck_ahead(network, seen, Car(station, 0, path | (style << STYLE), 0));
         if ahead.x < rear {
             rear = ahead.x;
             pace = ahead.y;

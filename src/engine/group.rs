@@ -11,7 +11,6 @@ use super::batch::Block;
 use super::cpu::{entry, reset};
 use super::stages::Stage;
 use super::{Autoreset, Batch, Row, Tally};
-use crate::layout::random::{self, Draw};
 use crate::layout::{BEGINS, BeginRow, Ended, MOST_IN_GROUP, Progress, Stream, Truck};
 use crate::world::World;
 
@@ -147,10 +146,7 @@ fn on_groups(world: &World, batch: &mut Batch, work: impl Fn(&mut Group) + Sync)
 /// The route of a truck's episode: that of the group's first truck is drawn from all, those of the others from what
 /// begins on another arm of its road than theirs before it, or at least in another lane.
 pub(super) fn route_of(world: &World, routes: &[u32], row: &Row, episode: u32) -> u32 {
-    let drawn = |mate: &Mate, n: usize| {
-        let [word, ..] = random::words(mate.stream.seed, mate.stream.env, episode, Draw::Route as u32);
-        random::index_below(word, n as u32) as usize
-    };
+    let drawn = |mate: &Mate, n: usize| reset::drawn_below(mate.stream, episode, n);
     let first = routes[drawn(&row.mates[0], routes.len())];
     let road = |route: u32| world.routes[route as usize].roundabout;
     // Those on its road that begin on none of these arms and in none of these lanes.

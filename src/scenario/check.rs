@@ -77,7 +77,7 @@ impl Scenario {
         self.traffic.iter().try_for_each(Traffic::check)?;
         if self.traffic.as_ref().is_some_and(|traffic| 1 < traffic.group) && self.start_along != 0.0 {
             let expected = "0 with traffic.group above 1: trucks that begin on their way would stand in each other";
-            return Err(invalid("start.along", self.start_along, expected));
+            return Err(invalid("start_along", self.start_along, expected));
         }
         if self.observes_vehicles && self.traffic.is_none() {
             return Err(invalid("observes_vehicles", true, "with traffic: without it there are none to observe"));

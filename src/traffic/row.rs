@@ -51,11 +51,6 @@ impl Row {
         cast_ref(words)
     }
 
-    /// The words of a column.
-    pub fn words(&self) -> &[u32; N_CAR_WORDS] {
-        cast_ref(self)
-    }
-
     /// The same, to be written to.
     pub fn of_mut(words: &mut [u32; N_CAR_WORDS]) -> &mut Row {
         cast_mut(words)

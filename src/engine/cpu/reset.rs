@@ -127,12 +127,14 @@ fn route_of(world: &World, row: &Row, episode: u32) -> u32 {
     match row.choice {
         RouteChoice::Fixed(routes) => routes[row.env as usize],
         RouteChoice::Drawn(routes) if !row.mates.is_empty() => group::route_of(world, routes, row, episode),
-        RouteChoice::Drawn(routes) => {
-            let Stream { seed, env } = row.stream;
-            let [word, ..] = random::words(seed, env, episode, Draw::Route as u32);
-            routes[random::index_below(word, routes.len() as u32) as usize]
-        }
+        RouteChoice::Drawn(routes) => routes[drawn_below(row.stream, episode, routes.len())],
     }
+}
+
+/// An index below `n` for the route of a truck's episode.
+pub(in crate::engine) fn drawn_below(Stream { seed, env }: Stream, episode: u32, n: usize) -> usize {
+    let [word, ..] = random::words(seed, env, episode, Draw::Route as u32);
+    random::index_below(word, n as u32) as usize
 }
 
 /// A truck that stands at `waypoint` with these headings, offset and turned as a whole as `start` says.

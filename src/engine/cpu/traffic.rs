@@ -37,7 +37,8 @@ pub fn traffic(world: &World, row: &mut Row) {
     let place = there.clone().position(|mate| mate.env == row.env).unwrap_or_default();
     let mut of_group = [const { None }; MOST_IN_GROUP];
     for (mate, seen) in there.zip(&mut of_group) {
-        *seen = Some(view(world, shared, &mate.truck, &mate.progress));
+        let is_own = mate.env == row.env;
+        *seen = Some(if is_own { own } else { view(world, shared, &mate.truck, &mate.progress) });
     }
     let of_one = [Some(own)];
     let views = if row.mates.is_empty() { &of_one[..] } else { &of_group };
@@ -162,7 +163,7 @@ pub fn surround(world: &World, row: &mut Row) {
         clear(world, shared, row.truck, row.progress, &mut around);
     }
     row.mates.iter().for_each(|mate| clear(world, shared, &mate.truck, &mate.progress, &mut around));
-    **words = *around.words();
+    *traffic::Row::of_mut(words) = around;
 }
 
 /// The vehicles of a snapshot of a road, as an episode draws it.
