@@ -2,7 +2,7 @@
 
     python distil.py NEAR.safetensors SAFE.safetensors --out distilled
 
-Needs ``offtrack-sim``, ``torch`` and ``safetensors``. Teachers are policy files, the most wanted first. They drive the
+Needs ``offtrack-sim`` and ``torch``. Teachers are policy files, the most wanted first. They drive the
 training routes of ``--scenario`` a few times, and a route's teacher is the one that arrives most often; of equal ones
 the one that keeps ``--margin`` from the kerbs more often, for a student never does quite what its teacher does; of
 equal ones the first. Then a student drives all routes at once, every second truck with sampled actions, and learns from
@@ -18,7 +18,6 @@ the success on the validation routes. Ctrl-C ends the training early; what was l
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from pathlib import Path
 from typing import Any
@@ -26,37 +25,37 @@ from typing import Any
 import numpy as np
 import torch
 from results import about, write_json
-from safetensors import safe_open
 from torch import nn
 
 import offtrack_sim
-from offtrack_sim import Batch, Ended, Policy, export
+from offtrack_sim import Batch, Benchmark, Ended, Policy, export
 
 HERE = Path(__file__).resolve().parent
 
 
 class Network(nn.Module):
-    """A policy file as a PyTorch module: ``[n, n_values]`` to logits ``[n, n_actions]``, see docs/policies.md."""
+    """A policy as a PyTorch module: ``[n, n_values]`` to logits ``[n, n_actions]``, see docs/policies.md."""
 
-    def __init__(self, file: Path) -> None:
+    def __init__(self, policy: Policy) -> None:
         super().__init__()
-        Policy.load(file)  # Its errors say what is wrong with a file.
-        with safe_open(file, "pt") as tensors:
-            about_it = json.loads(tensors.metadata()["offtrack"])
-            self.mean, self.factor = (tensors.get_tensor(f"observation.{name}") for name in ("mean", "factor"))
-            activation = nn.Tanh if about_it.get("activation") == "tanh" else nn.ReLU
-            layers: list[nn.Module] = []
-            for n in range(about_it["layers"]):
-                weight, bias = (tensors.get_tensor(f"actor.{n}.{name}") for name in ("weight", "bias"))
-                linear = nn.Linear(*weight.shape)
-                linear.load_state_dict({"weight": weight.T, "bias": bias})
-                layers += [linear, activation()]
+        parts = export.network(policy)
+        assert parts.normalisation is not None, "policies of the project's own learner normalise what they observe"
+        self.mean, self.factor = (torch.from_numpy(array.copy()) for array in parts.normalisation)
+        activation = nn.Tanh if parts.activation == "tanh" else nn.ReLU
+        layers: list[nn.Module] = []
+        for weight, bias in parts.layers:
+            linear = nn.Linear(*weight.shape)
+            linear.load_state_dict({"weight": torch.from_numpy(weight.T.copy()), "bias": torch.from_numpy(bias.copy())})
+            layers += [linear, activation()]
         self.actor = nn.Sequential(*layers[:-1])
 
-    def forward(self, observation: torch.Tensor) -> torch.Tensor:
-        return self.actor(((observation - self.mean) * self.factor).clamp(-export.CLIP, export.CLIP))
+    def normalised(self, observation: torch.Tensor) -> torch.Tensor:
+        return ((observation - self.mean) * self.factor).clamp(-export.CLIP, export.CLIP)
 
-    def save(self, file: Path, scenario: Path) -> None:
+    def forward(self, observation: torch.Tensor) -> torch.Tensor:
+        return self.actor(self.normalised(observation))
+
+    def save(self, file: Path, scenario: Path | Benchmark) -> None:
         variance = 1 / self.factor.double().numpy() ** 2
         export.save(file, self.actor, scenario=scenario, mean=self.mean.numpy(), variance=variance, epsilon=0.0)
 
@@ -249,7 +248,7 @@ def main() -> None:
         parser.error("--starts: must lie in 0..1")
     args.out.parent.mkdir(parents=True, exist_ok=True)
     # The student begins as the first teacher.
-    *teachers, student = (Network(file) for file in [*args.teachers, args.teachers[0]])
+    *teachers, student = (Network(Policy.load(file)) for file in [*args.teachers, args.teachers[0]])
     batch = Batch(args.scenario, args.envs, split="train", seed=args.seed)
     names, chosen, surveys = choose(args)
     by_name = dict(zip(names, chosen.tolist()))

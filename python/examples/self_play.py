@@ -19,12 +19,15 @@ import time
 from pathlib import Path
 from typing import Any
 
+import cleanrl_ppo
 import numpy as np
 import torch
+from cleanrl_ppo import Fragment, advantages
+from distil import Network
 from results import about, write_json
 from torch import nn
 
-from offtrack_sim import Batch, Benchmark, Ended, Policy, benchmark, export
+from offtrack_sim import Batch, Benchmark, Ended, Policy, benchmark
 
 #: Who drives the other vehicles where the policies are evaluated.
 DRIVERS = ["fitted", "aggressive", "timid", "distracted"]
@@ -33,138 +36,89 @@ REWARD = {"reward.failure": -8000.0, "reward.clearance": -100.0}
 ARRIVAL = 14000.0
 
 
-class Actor(nn.Module):
-    """A policy as a PyTorch module: ``[n, n_values]`` to logits ``[n, n_actions]``."""
+class Agent(cleanrl_ppo.Agent):
+    """The policy as the actor, and a critic that sees what it sees."""
 
     def __init__(self, policy: Policy) -> None:
-        super().__init__()
-        parts = export.network(policy)
-        assert parts.normalisation is not None and parts.activation == "relu"
-        self.mean, self.factor = (torch.from_numpy(array.copy()) for array in parts.normalisation)
-        layers: list[nn.Module] = []
-        for weight, bias in parts.layers:
-            linear = nn.Linear(*weight.shape)
-            linear.load_state_dict({"weight": torch.from_numpy(weight.T.copy()), "bias": torch.from_numpy(bias.copy())})
-            layers += [linear, nn.ReLU()]
-        self.layers = nn.Sequential(*layers[:-1])
+        nn.Module.__init__(self)
+        self.actor = Network(policy)
+        n_values, hidden = len(self.actor.mean), 128
+        layers = [nn.Linear(n_values, hidden), nn.ReLU(), nn.Linear(hidden, hidden), nn.ReLU(), nn.Linear(hidden, 1)]
+        self.critic = nn.Sequential(*layers)
 
-    def normalised(self, observation: torch.Tensor) -> torch.Tensor:
-        return ((observation - self.mean) * self.factor).clamp(-export.CLIP, export.CLIP)
-
-    def forward(self, observation: torch.Tensor) -> torch.Tensor:
-        return self.layers(self.normalised(observation))
-
-    def save(self, file: Path, scenario: Benchmark) -> None:
-        variance = 1 / self.factor.double().numpy() ** 2
-        export.save(file, self.layers, scenario=scenario, mean=self.mean.numpy(), variance=variance, epsilon=0.0)
+    def value(self, observation: torch.Tensor) -> torch.Tensor:
+        return self.critic(self.actor.normalised(observation)).squeeze(-1)  # [B]
 
 
-class Fragment:
-    """Some steps of all trucks, ``[T, N, ...]``, in order."""
-
-    def __init__(self, n_steps: int, batch: Batch) -> None:
-        shape = (n_steps, batch.num_envs)
-        self.observation = torch.zeros(n_steps + 1, batch.num_envs, batch.n_values)  # the last follows the last step
-        self.action = torch.zeros(shape, dtype=torch.int64)
-        self.log_prob, self.reward = torch.zeros(shape), torch.zeros(shape)
-        self.ended, self.waited = torch.zeros(shape, dtype=torch.bool), torch.zeros(shape, dtype=torch.bool)
-        # Value of what a step ended by the time limit led to: the task goes on.
-        self.beyond = torch.zeros(shape)
-
-
-def driven(batch: Batch, actor: Actor, critic: nn.Module, args: argparse.Namespace, ends: list[int]) -> Fragment:
-    """Steps all trucks with sampled actions; the codes of the episodes that end are added to ``ends``."""
-    fragment = Fragment(args.fragment, batch)
-    observation = torch.from_numpy(batch.observation())
+def driven(batch: Batch, agent: Agent, args: argparse.Namespace, ends: list[int]) -> tuple[Fragment, np.ndarray]:
+    """Steps all trucks with sampled actions; which of these steps trucks waited in, ``[T, N]``. The codes of the
+    episodes that end are added to ``ends``."""
+    fragment = Fragment(args.fragment, batch.num_envs, batch.n_values)
+    waited = np.zeros((args.fragment, batch.num_envs), np.bool_)
+    observation = batch.observation()
     for step in range(args.fragment):
-        fragment.observation[step] = observation
-        fragment.waited[step] = torch.from_numpy(batch.waiting())
+        fragment.observation[step], waited[step] = observation, batch.waiting()
         with torch.no_grad():
-            log_probs = actor(observation).log_softmax(-1)  # [N, A]
-        action = torch.multinomial(log_probs.exp(), 1)  # [N, 1]
-        fragment.action[step] = action.squeeze(-1)
-        fragment.log_prob[step] = log_probs.gather(1, action).squeeze(-1)
-        after, reward, terminated, truncated = batch.step(fragment.action[step].numpy())
-        fragment.reward[step] = args.reward_scale * torch.from_numpy(reward)
-        fragment.ended[step] = torch.from_numpy(terminated | truncated)
+            fragment.action[step], fragment.log_prob[step] = agent.act(torch.from_numpy(observation))
+        observation, reward, terminated, truncated = batch.step(fragment.action[step])
+        fragment.reward[step] = args.reward_scale * reward
+        fragment.terminated[step], fragment.truncated[step] = terminated, truncated
         if (found := batch.ended()) is not None:
             ends += found.codes.tolist()
             arrived, late = found.codes == Ended.ARRIVED, found.codes == Ended.TIMED_OUT
             fragment.reward[step, found.envs[arrived]] += args.reward_scale * ARRIVAL
-            if late.any():
-                with torch.no_grad():
-                    last = critic(actor.normalised(torch.from_numpy(found.observations[late]))).squeeze(-1)
-                fragment.beyond[step, found.envs[late]] = last
-        observation = torch.from_numpy(after)
+            fragment.limits += [(step, found.envs[row], found.observations[row]) for row in np.flatnonzero(late)]
     fragment.observation[-1] = observation
-    return fragment
-
-
-@torch.no_grad()
-def advantages(
-    actor: Actor, critic: nn.Module, fragment: Fragment, args: argparse.Namespace
-) -> tuple[torch.Tensor, torch.Tensor]:
-    """Generalised advantage estimation; advantages and targets of the value, ``[T, N]`` each."""
-    values = critic(actor.normalised(fragment.observation)).squeeze(-1)  # [T + 1, N]
-    goes_on = ~fragment.ended
-    following = torch.where(goes_on, values[1:], fragment.beyond)
-    delta = fragment.reward + args.gamma * following - values[:-1]
-    advantage, later = torch.zeros_like(delta), torch.zeros(delta.shape[1])
-    for step in reversed(range(len(delta))):
-        later = delta[step] + args.gamma * args.gae_lambda * later * goes_on[step]
-        advantage[step] = later
-    return advantage, advantage + values[:-1]
+    return fragment, waited
 
 
 def learn(
-    actor: Actor,
-    critic: nn.Module,
+    agent: Agent,
     optimizers: list[torch.optim.Optimizer],
     fragment: Fragment,
+    waited: np.ndarray,
     args: argparse.Namespace,
     learns_to_act: bool,
 ) -> None:
     """Some epochs over the steps of the fragment in which a truck drove."""
-    kept = ~fragment.waited.flatten()
-    advantage, target = (values.flatten()[kept] for values in advantages(actor, critic, fragment, args))
-    observation = fragment.observation[:-1].flatten(0, 1)[kept]
-    action, old = fragment.action.flatten()[kept], fragment.log_prob.flatten()[kept]
+    kept = torch.from_numpy(~waited).flatten()
+    estimates = advantages(agent, fragment, args.gamma, args.gae_lambda)
+    advantage, target = (values.flatten()[kept] for values in estimates)
+    observation = torch.from_numpy(fragment.observation[:-1]).flatten(0, 1)[kept]
+    action, old = (torch.from_numpy(values).flatten()[kept] for values in (fragment.action, fragment.log_prob))
     gain = ((advantage - advantage.mean()) / (advantage.std() + 1e-8)).clamp(-10, 10)
     for _ in range(args.epochs):
         for rows in torch.randperm(len(action)).split(args.minibatch):
-            value = critic(actor.normalised(observation[rows])).squeeze(-1)
-            loss = (value - target[rows]).square().mean()
+            loss = (agent.value(observation[rows]) - target[rows]).square().mean()
             if learns_to_act:
-                log_probs = actor(observation[rows]).log_softmax(-1)
-                ratio = (log_probs.gather(1, action[rows, None]).squeeze(-1) - old[rows]).exp()
+                ratio = (agent.judge(observation[rows], action[rows])[0] - old[rows]).exp()
                 clipped = ratio.clamp(1 - args.clip, 1 + args.clip)
                 loss = loss - torch.min(gain[rows] * ratio, gain[rows] * clipped).mean()
             for optimizer in optimizers:
                 optimizer.zero_grad()
             loss.backward()
-            nn.utils.clip_grad_norm_([*actor.parameters(), *critic.parameters()], 0.5)
+            nn.utils.clip_grad_norm_(agent.parameters(), 0.5)
             for optimizer in optimizers[: 2 if learns_to_act else 1]:
                 optimizer.step()
 
 
-def trained(actor: Actor, scenario: Benchmark, args: argparse.Namespace) -> list[dict[str, float]]:
-    """Lets the actor learn; returns the curve."""
+def trained(agent: Agent, scenario: Benchmark, args: argparse.Namespace) -> list[dict[str, float]]:
+    """Lets the agent learn; returns the curve."""
     batch = Batch(scenario, args.groups * args.trucks, split="train", seed=args.seed)
-    critic = nn.Sequential(nn.Linear(batch.n_values, 128), nn.ReLU(), nn.Linear(128, 128), nn.ReLU(), nn.Linear(128, 1))
     optimizers: list[torch.optim.Optimizer] = [
-        torch.optim.Adam(critic.parameters(), lr=1e-3),
-        torch.optim.Adam(actor.layers.parameters(), lr=args.learning_rate, eps=1e-5),
+        torch.optim.Adam(agent.critic.parameters(), lr=1e-3),
+        torch.optim.Adam(agent.actor.parameters(), lr=args.learning_rate, eps=1e-5),
     ]
     curve: list[dict[str, float]] = []
     ends: list[int] = []
     start, env_steps = time.perf_counter(), 0
     try:
         while env_steps < args.steps:
-            fragment = driven(batch, actor, critic, args, ends)
+            fragment, waited = driven(batch, agent, args, ends)
             # First the critic learns alone what the actor is worth.
             optimizers[1].param_groups[0]["lr"] = args.learning_rate * (1 - env_steps / args.steps)
-            learn(actor, critic, optimizers, fragment, args, learns_to_act=0.1 < env_steps / args.steps)
-            env_steps += int((~fragment.waited).sum())
+            learn(agent, optimizers, fragment, waited, args, learns_to_act=0.1 < env_steps / args.steps)
+            env_steps += int((~waited).sum())
             if len(ends) >= 2000 or env_steps >= args.steps:
                 row = {
                     "env_steps": env_steps,
@@ -224,10 +178,10 @@ def main() -> None:
     group = {"traffic.group": args.trucks}
     scenario = benchmark("traffic2026-training").changed({**group, **REWARD}, name="traffic2026-training")
     before = Policy.shipped("traffic2026")
-    actor = Actor(before)
-    curve = trained(actor, scenario, args)
+    agent = Agent(before)
+    curve = trained(agent, scenario, args)
     file = Path(f"{args.out}.safetensors")
-    actor.save(file, scenario)
+    agent.actor.save(file, scenario)
     policies = {"traffic2026": before, "self-play": Policy.load(file)}
     found: dict[str, dict[str, Any]] = {name: {} for name in policies}
     for drivers in DRIVERS:
