@@ -45,7 +45,8 @@ pub struct Trucks<'a> {
 }
 
 impl<'a> Trucks<'a> {
-    /// Trucks on a road, of which some may not be there, and a bit for each slot whose car the one with index `own` hindered when it last decided.
+    /// Trucks on a road, of which some may not be there, and a bit for each slot whose car the one with index `own`
+    /// hindered when it last decided.
     pub fn new(network: &'a Network, views: &'a [Option<View>], own: usize, hindered: u32) -> Trucks<'a> {
         Trucks { network, views, own, hindered: Cell::new(hindered) }
     }

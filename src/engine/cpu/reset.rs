@@ -19,7 +19,7 @@ pub(in crate::engine) const NEXT: BeginRow =
     BeginRow { start: Start { offset: 0.0, heading: 0.0, speed: 0.0, along: 0.0, vehicle: 0 }, route: 0, what: BEGINS };
 
 /// Begins and observes another episode where one ended, or holds the truck. A truck that was held when the step began
-/// begins its next episode with [`Autoreset::NextStep`]. Trucks of a group begin together, see [`crate::engine::group`].
+/// begins its next episode with [`Autoreset::NextStep`]. Trucks of a group begin together: [`crate::engine::group`].
 pub fn reset(world: &World, row: &mut Row) {
     if row.truck.held == 1 {
         if row.autoreset == Autoreset::NextStep {
